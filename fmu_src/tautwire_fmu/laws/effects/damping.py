@@ -1,0 +1,38 @@
+"""Viscous damping in the cable."""
+
+from typing import Any, NamedTuple, Tuple
+
+from ..mathematics import Mathematics
+from .effect import Effect, Parameter
+
+
+class Values(NamedTuple):
+    """The damping that the cable really has, in place of the declared one."""
+
+    damping: Any
+
+
+def tension(m: Mathematics, values: Values, states: Tuple[Any, ...], cable: Any, motion: Any) -> Any:
+    """``(c - c_declared) S (dl/dt + V) / l``, in N."""
+    return (values.damping - cable.damping) * cable.area * motion.strain_rate
+
+
+DAMPING = Effect(
+    name="damping",
+    component="cable",
+    description="viscous damping in the cable other than declared",
+    parameters=(
+        Parameter(
+            name="damping",
+            unit="Pa s",
+            description="viscosity of the rope, the c of T = E S eps + c S deps/dt + T0",
+            minimum=0.0,
+            maximum=1e11,
+            neutral=None,
+            start=1.5,
+        ),
+    ),
+    values=Values,
+    tension=tension,
+    source="Baklouti et al. 2017, Eqs. 10 and 12",
+)

@@ -1,0 +1,38 @@
+"""A modulus of elasticity other than the declared one."""
+
+from typing import Any, NamedTuple, Tuple
+
+from ..mathematics import Mathematics
+from .effect import Effect, Parameter
+
+
+class Values(NamedTuple):
+    """The modulus that the cable really has, in place of the declared one."""
+
+    modulus: Any
+
+
+def tension(m: Mathematics, values: Values, states: Tuple[Any, ...], cable: Any, motion: Any) -> Any:
+    """``(E - E_declared) S eps``, in N."""
+    return (values.modulus - cable.modulus) * cable.area * motion.strain
+
+
+MODULUS = Effect(
+    name="modulus",
+    component="cable",
+    description="stiffness of the cable other than declared",
+    parameters=(
+        Parameter(
+            name="modulus",
+            unit="Pa",
+            description="modulus of elasticity of the rope on its declared area",
+            minimum=1e6,
+            maximum=1e13,
+            neutral=None,
+            start=1.1,
+        ),
+    ),
+    values=Values,
+    tension=tension,
+    source="Baklouti et al. 2017, sec. 3.2: 102.2 GPa quasi-static, 126 to 137 GPa dynamic, for one rope",
+)
