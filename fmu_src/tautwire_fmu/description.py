@@ -1,0 +1,105 @@
+"""Completes the model description: units, bounds, exact start values, dependencies, initial unknowns."""
+
+from typing import Dict, NamedTuple, Optional, Sequence, Tuple
+from xml.etree.ElementTree import Element, SubElement
+
+from .units import UNITS
+
+
+class Variable(NamedTuple):
+    """One real FMI variable of a slave.
+
+    ``depends_on`` names the inputs that act on an output without delay.
+    """
+
+    name: str
+    causality: str
+    unit: str
+    description: str
+    start: float = 0.0
+    tunable: bool = False
+    minimum: Optional[float] = None
+    maximum: Optional[float] = None
+    nominal: Optional[float] = None
+    depends_on: Tuple[str, ...] = ()
+
+
+def vector(
+    name: str,
+    causality: str,
+    unit: str,
+    description: str,
+    start: Tuple[float, float, float] = (0.0, 0.0, 0.0),
+    nominal: Optional[float] = None,
+    depends_on: Tuple[str, ...] = (),
+) -> Tuple[Variable, ...]:
+    """Three variables ``name.x``, ``name.y``, ``name.z``."""
+    return tuple(
+        Variable(
+            f"{name}.{axis}",
+            causality,
+            unit,
+            f"{description}, {axis} axis",
+            start=value,
+            nominal=nominal,
+            depends_on=depends_on,
+        )
+        for axis, value in zip("xyz", start)
+    )
+
+
+def axes(*names: str) -> Tuple[str, ...]:
+    """The names of the components of vectors."""
+    return tuple(f"{name}.{axis}" for name in names for axis in "xyz")
+
+
+def complete(root: Element, variables: Sequence[Variable]) -> Element:
+    """Add to the tree that pythonfmu writes what FMI 2.0 has a place for and pythonfmu leaves out.
+
+    Raises KeyError where a variable bears a unit that :data:`UNITS` does not list.
+    """
+    by_name = {variable.name: variable for variable in variables}
+    index = {}
+    nodes = root.find("ModelVariables")
+    assert nodes is not None
+    for position, node in enumerate(nodes, start=1):
+        name = node.attrib["name"]
+        index[name] = position
+        if name in by_name:
+            _complete_real(node[0], by_name[name])
+    root.insert(1, _unit_definitions(variables))
+    _complete_structure(root, variables, index)
+    return root
+
+
+def _complete_real(real: Element, variable: Variable) -> None:
+    real.set("unit", variable.unit)
+    for key, value in (("min", variable.minimum), ("max", variable.maximum), ("nominal", variable.nominal)):
+        if value is not None:
+            real.set(key, repr(float(value)))
+    if "start" in real.attrib:
+        real.set("start", repr(float(variable.start)))
+
+
+def _unit_definitions(variables: Sequence[Variable]) -> Element:
+    definitions = Element("UnitDefinitions")
+    for unit in sorted({variable.unit for variable in variables}):
+        node = SubElement(definitions, "Unit", {"name": unit})
+        SubElement(node, "BaseUnit", {base: str(exponent) for base, exponent in UNITS[unit].items()})
+    return definitions
+
+
+def _complete_structure(root: Element, variables: Sequence[Variable], index: Dict[str, int]) -> None:
+    structure = root.find("ModelStructure")
+    assert structure is not None
+    for child in list(structure):
+        structure.remove(child)
+    outputs = SubElement(structure, "Outputs")
+    unknowns = SubElement(structure, "InitialUnknowns")
+    for variable in variables:
+        if variable.causality != "output":
+            continue
+        known = sorted(index[name] for name in variable.depends_on)
+        attributes = {"index": str(index[variable.name]), "dependencies": " ".join(map(str, known))}
+        SubElement(outputs, "Unknown", attributes)
+        SubElement(unknowns, "Unknown", {"index": attributes["index"]})

@@ -1,0 +1,17 @@
+"""The units that FMU variables carry, as exponents of the SI base units for FMI's UnitDefinitions."""
+
+from typing import Dict
+
+UNITS: Dict[str, Dict[str, int]] = {
+    "1": {},
+    "s": {"s": 1},
+    "m": {"m": 1},
+    "m2": {"m": 2},
+    "m/s": {"m": 1, "s": -1},
+    "m/s2": {"m": 1, "s": -2},
+    "kg": {"kg": 1},
+    "N": {"kg": 1, "m": 1, "s": -2},
+    "N/s": {"kg": 1, "m": 1, "s": -3},
+    "Pa": {"kg": 1, "m": -1, "s": -2},
+    "Pa s": {"kg": 1, "m": -1, "s": -1},
+}
