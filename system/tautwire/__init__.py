@@ -1,0 +1,1 @@
+"""Cable-driven parallel robots as FMI components, and a tracer that finds what their model lacks."""

@@ -1,0 +1,81 @@
+"""What Tautwire raises on purpose; each error carries its values, and its text is one line."""
+
+from collections.abc import Sequence
+
+
+class TautwireError(Exception):
+    """Any error that Tautwire raises on purpose."""
+
+
+class InputError(TautwireError):
+    """The input is wrong, and whoever wrote it can mend it.
+
+    ``where`` names the file and the line or key (``hall.toml: cable[2].modulus``), ``problem`` the offending
+    value and its bound, ``mend`` what to write instead. The text is the one line ``where: problem; mend``.
+    """
+
+    def __init__(self, where: str, problem: str, mend: str) -> None:
+        super().__init__(where, problem, mend)
+        self.where = where
+        self.problem = problem
+        self.mend = mend
+
+    def __str__(self) -> str:
+        return one_line(f"{self.where}: {self.problem}; {self.mend}")
+
+
+class RobotFileError(InputError):
+    """A robot file that cannot be read or declares something impossible."""
+
+
+class RecordingError(InputError):
+    """A recording that cannot be read or does not fit the robot."""
+
+
+class UnreachableError(InputError):
+    """A position where cables that only pull cannot hold the platform.
+
+    ``position`` in m; ``cable``, from 1, is the one that fails first, and ``tension``, in N, what it would
+    need there; both None where no single cable is to blame. ``reason`` says why in a few words.
+    """
+
+    def __init__(
+        self,
+        where: str,
+        position: Sequence[float],
+        cable: int | None,
+        tension: float | None,
+        reason: str = "a cable cannot push",
+        mend: str = "choose a position that the cables can hold, below and between the anchors",
+    ) -> None:
+        place = ", ".join(f"{coordinate:g}" for coordinate in position)
+        need = "" if cable is None or tension is None else f", cable {cable} would need {tension:.6g} N"
+        super().__init__(where, f"the platform cannot be held at [{place}] m: {reason}{need}", mend)
+        self.position = tuple(position)
+        self.cable = cable
+        self.tension = tension
+        self.reason = reason
+        # Exceptions are unpickled as ``type(*args)``, so args must be those of this constructor.
+        self.args = (where, self.position, cable, tension, reason, mend)
+
+
+def one_line(text: str) -> str:
+    """The text with line breaks and other unprintable characters written as escapes."""
+    return "".join(character if character.isprintable() else ascii(character)[1:-1] for character in text)
+
+
+def shown(value: object, longest: int = 60) -> str:
+    """A value from a file as an error message shows it: one line of at most about ``longest`` characters."""
+    if isinstance(value, int) and value.bit_length() > 1000:
+        return f"a whole number of {value.bit_length()} bits"
+    if isinstance(value, str):
+        text = repr(value[: longest + 1])
+    elif isinstance(value, bool):
+        text = str(value).lower()
+    elif isinstance(value, dict):
+        text = f"a table of {len(value)} keys"
+    elif isinstance(value, list):
+        text = f"a list of {len(value)}"
+    else:
+        text = str(value)
+    return text if len(text) <= longest else f"{text[:longest]}..."

@@ -1,0 +1,153 @@
+"""What a robot file declares: the robot and the effects that act on it."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+Point = tuple[float, float, float]
+
+# Components of which there is one for each cable: an effect in them may hold for some cables only.
+PER_CABLE = ("cable", "winch")
+
+
+class Numbers(Mapping[str, float]):
+    """Named numbers that never change; two are equal where names and numbers are, whatever their order."""
+
+    __slots__ = ("_items",)
+
+    def __init__(self, numbers: Mapping[str, float]) -> None:
+        self._items = tuple(numbers.items())
+
+    def __getitem__(self, name: str) -> float:
+        for known, number in self._items:
+            if known == name:
+                return number
+        raise KeyError(name)
+
+    def __iter__(self) -> Iterator[str]:
+        return (name for name, _ in self._items)
+
+    def __len__(self) -> int:
+        return len(self._items)
+
+    def __hash__(self) -> int:
+        return hash(frozenset(self._items))
+
+    def __repr__(self) -> str:
+        return f"Numbers({dict(self._items)})"
+
+
+@dataclass(frozen=True)
+class Platform:
+    """The moved point mass: ``mass`` in kg; ``start``, where the run starts at rest, in m."""
+
+    mass: float
+    start: Point
+
+
+@dataclass(frozen=True)
+class TensionLimits:
+    """Bounds and aim of the tension distribution, in N; used where there are more than three cables."""
+
+    minimum: float
+    maximum: float
+    preferred: float
+
+
+@dataclass(frozen=True)
+class Sensors:
+    """Standard deviation of one sample: position in m, tension in N, winch speed in m/s; None if unknown."""
+
+    position_noise: float | None = None
+    tension_noise: float | None = None
+    winch_speed_noise: float | None = None
+
+
+@dataclass(frozen=True)
+class Cable:
+    """One cable: ``anchor`` in m, ``modulus`` in Pa, ``area`` in m^2, ``damping`` in Pa s; ``law``."""
+
+    anchor: Point
+    modulus: float
+    area: float
+    damping: float
+    law: str
+
+
+@dataclass(frozen=True)
+class EffectSetting:
+    """One effect switched on: ``values`` by parameter name, in the parameters' units.
+
+    ``cables`` counts from 1 and is kept ascending; empty where the effect acts on no cable or winch.
+    """
+
+    name: str
+    values: Mapping[str, float]
+    cables: tuple[int, ...] = ()
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "values", Numbers(self.values))
+        object.__setattr__(self, "cables", tuple(sorted(set(self.cables))))
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A cable-driven robot as declared; ``gravity`` in m/s^2.
+
+    Settings of one effect stand together in ``effects``, as they do in a file; otherwise their order is kept.
+    """
+
+    name: str
+    gravity: float
+    platform: Platform
+    tension: TensionLimits | None
+    sensors: Sensors
+    cables: tuple[Cable, ...]
+    effects: tuple[EffectSetting, ...] = ()
+
+    def __post_init__(self) -> None:
+        names = list(dict.fromkeys(setting.name for setting in self.effects))
+        together = tuple(sorted(self.effects, key=lambda setting: names.index(setting.name)))
+        object.__setattr__(self, "effects", together)
+
+    @property
+    def cable_count(self) -> int:
+        """Number of cables."""
+        return len(self.cables)
+
+    @property
+    def cable_numbers(self) -> tuple[int, ...]:
+        """All cables, counted from 1."""
+        return tuple(range(1, len(self.cables) + 1))
+
+    @property
+    def anchors(self) -> tuple[Point, ...]:
+        """Exit points of all cables, in m."""
+        return tuple(cable.anchor for cable in self.cables)
+
+    def effects_on_cable(self, cable: int) -> tuple[EffectSetting, ...]:
+        """The settings that act on one cable, or on its winch; ``cable`` counts from 1."""
+        return tuple(setting for setting in self.effects if cable in setting.cables)
+
+    def effects_elsewhere(self) -> tuple[EffectSetting, ...]:
+        """The settings that act on no cable or winch, such as those on the platform."""
+        return tuple(setting for setting in self.effects if not setting.cables)
+
+    def with_effect(self, setting: EffectSetting) -> "Robot":
+        """This robot with one more effect; the new setting wins wherever the same effect acted before."""
+        kept: list[EffectSetting] = []
+        placed = False
+        for old in self.effects:
+            if old.name == setting.name and old.cables == setting.cables:
+                kept.append(setting)
+                placed = True
+            elif old.name == setting.name and set(old.cables) & set(setting.cables):
+                # An effect acts on a cable once: contributions add up, and two moduli would not.
+                left = tuple(cable for cable in old.cables if cable not in setting.cables)
+                kept.extend([replace(old, cables=left)] if left else [])
+            else:
+                kept.append(old)
+        return replace(self, effects=(*kept, *(() if placed else (setting,))))
+
+    def without_effects(self) -> "Robot":
+        """This robot as its owner declares it, with no effect switched on."""
+        return replace(self, effects=())
