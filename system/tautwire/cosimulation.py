@@ -1,0 +1,138 @@
+"""A robot's FMUs wired together: cables and platform, driven by winch speeds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+
+from .master import Component, Connection, Coupling, Port, Progress, Sampled, Source, simulate
+from .packaging import RobotFmus
+
+Array = NDArray[np.float64]
+
+AXES = ("x", "y", "z")
+PLATFORM = "platform"
+STEP = 0.01
+SHOWN_OF_CABLE = ("tension", "length", "elongation", "strain")
+
+
+@dataclass(frozen=True)
+class Motion:
+    """A run of a robot with n cables at N times; SI units.
+
+    ``time`` (N,); ``position`` and ``velocity`` (N, 3); ``tension``, ``length``, ``elongation`` and ``strain``
+    (N, n). ``elongation`` is the paper's r, see :func:`tautwire_fmu.laws.cable.reading`.
+    """
+
+    time: Array
+    position: Array
+    velocity: Array
+    tension: Array
+    length: Array
+    elongation: Array
+    strain: Array
+
+    def measured(self) -> Array:
+        """What sensors see, shape (N, 3 + n): x, y, z, then the tensions."""
+        return np.hstack([self.position, self.tension])
+
+    def frame(self) -> pd.DataFrame:
+        """The run as a table with the columns of a result file."""
+        columns: dict[str, Array] = {"time": self.time}
+        columns |= dict(zip(AXES, self.position.T, strict=True))
+        columns |= {f"v{axis}": speed for axis, speed in zip(AXES, self.velocity.T, strict=True)}
+        for name in SHOWN_OF_CABLE:
+            columns |= {f"{name}_{i + 1}": row for i, row in enumerate(getattr(self, name).T)}
+        return pd.DataFrame(columns)
+
+
+def cable_name(index: int) -> str:
+    """The component that holds cable ``index``, counted from 1."""
+    return f"cable_{index}"
+
+
+def connections(cable_count: int) -> list[Connection]:
+    """Platform motion to every cable, every cable's force to the platform, each with its rates."""
+    wires = []
+    for index in range(1, cable_count + 1):
+        for axis in AXES:
+            for name in ("position", "velocity", "acceleration"):
+                wires.append(_wire(PLATFORM, f"{name}.{axis}", cable_name(index), f"{name}.{axis}"))
+            for name in ("force", "force_rate"):
+                wires.append(_wire(cable_name(index), f"{name}.{axis}", PLATFORM, f"{name}_{index}.{axis}"))
+    return wires
+
+
+def _wire(source: str, output: str, target: str, variable: str) -> Connection:
+    return Connection(Port(source, output), Port(target, variable))
+
+
+def winch_ports(cable_count: int) -> list[Port]:
+    """The driven inputs: winch speed and acceleration of each cable."""
+    return [
+        Port(cable_name(index), variable)
+        for index in range(1, cable_count + 1)
+        for variable in ("winch_speed", "winch_acceleration")
+    ]
+
+
+def shown_ports(cable_count: int) -> list[Port]:
+    """What a run records, in the order of :class:`Motion`."""
+    platform = [Port(PLATFORM, f"{name}.{axis}") for name in ("position", "velocity") for axis in AXES]
+    cables = [
+        Port(cable_name(index), name) for name in SHOWN_OF_CABLE for index in range(1, cable_count + 1)
+    ]
+    return platform + cables
+
+
+@contextmanager
+def instantiated(fmus: RobotFmus, tolerance: float = 1e-9) -> Iterator[Coupling]:
+    """The wired robot in initialization mode; instances and folders go when the block ends."""
+    count = len(fmus.cables)
+    with ExitStack() as stack:
+        components = {
+            name: stack.enter_context(Component(name, path))
+            for name, path in [
+                (PLATFORM, fmus.platform),
+                *((cable_name(i), path) for i, path in enumerate(fmus.cables, start=1)),
+            ]
+        }
+        for component in components.values():
+            component.initialize(0.0, {})
+        yield Coupling(components, connections(count), winch_ports(count), tolerance)
+
+
+def cosimulate(
+    fmus: RobotFmus,
+    time: Array,
+    winch_speed: Array,
+    step: float = STEP,
+    progress: Progress | None = None,
+) -> Motion:
+    """Co-simulate a robot over sampled winch speeds, linear between samples.
+
+    ``time`` (N,) in s, rising; ``winch_speed`` (N, n) in m/s, positive reels in; ``step`` bounds the macro step in
+    s. Returns the run at ``time``.
+    """
+    return run(fmus, Sampled(time, winch_speed), time, step, progress)
+
+
+def run(
+    fmus: RobotFmus, source: Source, time: Array, step: float = STEP, progress: Progress | None = None
+) -> Motion:
+    """Co-simulate a robot under any source of winch speeds, recorded at ``time``."""
+    count = len(fmus.cables)
+    with instantiated(fmus) as coupling:
+        shown = simulate(coupling, source, time, shown_ports(count), step, progress)
+    return motion_of(time, shown, count)
+
+
+def motion_of(time: Array, shown: Array, cable_count: int) -> Motion:
+    """Sort recorded columns, in the order of :func:`shown_ports`, into a run."""
+    per_cable = (shown[:, 6 + k * cable_count : 6 + (k + 1) * cable_count] for k in range(len(SHOWN_OF_CABLE)))
+    return Motion(time, shown[:, :3], shown[:, 3:6], *per_cable)

@@ -1,0 +1,207 @@
+"""An FMI 2.0 co-simulation FMU in a slot of the master, called through kept arrays."""
+
+from __future__ import annotations
+
+import ctypes
+import shutil
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from types import TracebackType
+from typing import Any
+
+import fmpy
+import numpy as np
+from fmpy.fmi2 import (
+    FMU2Slave,
+    fmi2CallbackAllocateMemoryTYPE,
+    fmi2CallbackFreeMemoryTYPE,
+    fmi2CallbackFunctions,
+    fmi2CallbackLoggerTYPE,
+)
+from fmpy.model_description import ModelDescription, ScalarVariable
+from numpy.typing import NDArray
+
+from ..errors import TautwireError
+
+Array = NDArray[np.float64]
+
+FMI_WARNING = 1
+STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
+KEPT_MESSAGES = 20
+
+
+class ComponentError(TautwireError):
+    """An FMU failed; tells which, in which call, at which time (s), with which inputs, and what it logged."""
+
+    def __init__(
+        self, component: str, call: str, status: str, time: float, inputs: dict[str, float], messages: Sequence[str]
+    ) -> None:
+        self.component = component
+        self.call = call
+        self.status = status
+        self.time = time
+        self.inputs = inputs
+        self.messages = tuple(messages)
+        said = f"; it logged: {' | '.join(messages[-3:])}" if messages else ""
+        given = ", ".join(f"{name}={value:.6g}" for name, value in inputs.items())
+        super().__init__(f"FMU {component}: {call} gave '{status}' at {time:.6g} s with {given}{said}")
+
+
+@dataclass(frozen=True)
+class Block:
+    """Some real variables of one FMU with the memory through which they are read or written; shape (n,)."""
+
+    names: tuple[str, ...]
+    references: ctypes.Array[ctypes.c_uint]
+    values: Array
+    memory: Any
+
+    @property
+    def count(self) -> int:
+        """Number of variables."""
+        return len(self.names)
+
+
+class Component:
+    """An instance of an FMU: extracted, loaded, and freed again on leaving its ``with`` block.
+
+    Raises ComponentError where the FMU cannot be instantiated or any of its calls fails.
+    """
+
+    def __init__(self, name: str, path: Path) -> None:
+        self.name = name
+        self.path = path
+        self.time = 0.0
+        self.messages: list[str] = []
+        self.description: ModelDescription = fmpy.read_model_description(str(path))
+        self.variables: dict[str, ScalarVariable] = {v.name: v for v in self.description.modelVariables}
+        self.can_restore = bool(self.description.coSimulation.canGetAndSetFMUstate)
+        self.folder = fmpy.extract(str(path))
+        try:
+            self._load()
+        except Exception:
+            shutil.rmtree(self.folder, ignore_errors=True)
+            raise
+
+    def _load(self) -> None:
+        self.fmu = FMU2Slave(
+            guid=self.description.guid,
+            unzipDirectory=self.folder,
+            modelIdentifier=self.description.coSimulation.modelIdentifier,
+            instanceName=self.name,
+        )
+        self.callbacks = fmi2CallbackFunctions()
+        self.callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
+        self.callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
+        self.callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(fmpy.free)
+        try:
+            self.fmu.instantiate(callbacks=self.callbacks, loggingOn=True)
+        except Exception as error:
+            raise ComponentError(self.name, "fmi2Instantiate", str(error), 0.0, {}, self.messages) from error
+        library = self.fmu.dll
+        self._handle = ctypes.c_void_p(self.fmu.component)
+        self._get = library.fmi2GetReal
+        self._set = library.fmi2SetReal
+        self._step = library.fmi2DoStep
+        self._step.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int]
+        for function in (self._get, self._set):
+            function.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p]
+        self._saved = ctypes.c_void_p()
+
+    def __enter__(self) -> Component:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        self.close()
+
+    def close(self) -> None:
+        """Free the instance and the folder into which the FMU was extracted."""
+        self.release()
+        self.fmu.freeInstance()
+        shutil.rmtree(self.folder, ignore_errors=True)
+
+    def _log(self, environment: Any, instance: bytes, status: int, category: bytes, message: bytes) -> None:
+        if status >= FMI_WARNING:
+            self.messages.append(message.decode("utf-8", "replace"))
+            del self.messages[:-KEPT_MESSAGES]
+
+    def block(self, names: Sequence[str]) -> Block:
+        """Set aside memory for some variables, by name."""
+        references = [self.variables[name].valueReference for name in names]
+        values = np.zeros(len(names))
+        return Block(
+            tuple(names),
+            (ctypes.c_uint * len(names))(*references),
+            values,
+            values.ctypes.data_as(ctypes.c_void_p),
+        )
+
+    def initialize(self, start: float, parameters: dict[str, float]) -> None:
+        """Set parameters and enter initialization mode."""
+        self.time = start
+        self.fmu.setupExperiment(startTime=start)
+        for name, value in parameters.items():
+            block = self.block([name])
+            block.values[0] = value
+            self.write(block)
+        self.fmu.enterInitializationMode()
+
+    def run(self) -> None:
+        """Leave initialization mode."""
+        self.fmu.exitInitializationMode()
+
+    def read(self, block: Block) -> None:
+        """Read variables into the block's values."""
+        status = self._get(self._handle, block.references, block.count, block.memory)
+        if status > FMI_WARNING:
+            self._fail("fmi2GetReal", status)
+
+    def write(self, block: Block) -> None:
+        """Write the block's values."""
+        status = self._set(self._handle, block.references, block.count, block.memory)
+        if status > FMI_WARNING:
+            self._fail("fmi2SetReal", status)
+
+    def step(self, time: float, step: float) -> None:
+        """One macro step."""
+        self.time = time
+        status = self._step(self._handle, time, step, 0)
+        if status > FMI_WARNING:
+            self._fail("fmi2DoStep", status)
+
+    def save(self) -> None:
+        """Keep the present state, in place of the one kept before."""
+        self.release()
+        status = self.fmu.dll.fmi2GetFMUstate(self._handle, ctypes.byref(self._saved))
+        if status > FMI_WARNING:
+            self._fail("fmi2GetFMUstate", status)
+
+    def restore(self) -> None:
+        """Go back to the state kept last."""
+        status = self.fmu.dll.fmi2SetFMUstate(self._handle, self._saved)
+        if status > FMI_WARNING:
+            self._fail("fmi2SetFMUstate", status)
+
+    def release(self) -> None:
+        """Let the kept state go."""
+        if self._saved:
+            self.fmu.dll.fmi2FreeFMUstate(self._handle, ctypes.byref(self._saved))
+            self._saved = ctypes.c_void_p()
+
+    def refuse(self, block: Block) -> None:
+        """Raise ComponentError for values that are not finite."""
+        shown = ", ".join(f"{n}={v}" for n, v in zip(block.names, block.values, strict=True) if not np.isfinite(v))
+        raise ComponentError(self.name, f"output {shown}", "not finite", self.time, self._inputs(), self.messages)
+
+    def _fail(self, call: str, status: int) -> None:
+        alive = call != "fmi2GetReal" and status < STATUS.index("fatal")
+        inputs = self._inputs() if alive else {}
+        raise ComponentError(self.name, call, STATUS[min(status, 5)], self.time, inputs, self.messages)
+
+    def _inputs(self) -> dict[str, float]:
+        block = self.block([v.name for v in self.variables.values() if v.causality == "input" and v.type == "Real"])
+        self._get(self._handle, block.references, block.count, block.memory)
+        return dict(zip(block.names, block.values.tolist(), strict=True))
