@@ -1,0 +1,134 @@
+"""One sample of the extended Kalman filter as a CasADi function: take the measurement in, go to the next sample.
+
+Measurements are taken in one by one (their noise is independent), which needs no matrix inverse and lets a missing
+one be passed over. Sensitivities by the free parameters are carried along with the gain held fixed.
+
+Source: Bierman (1977), Factorization Methods for Discrete Sequential Estimation, ch. 2; Ljung (1999), ch. 11.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import casadi
+from casadi import SX, Function
+
+from ..symbolic import Model
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Standard deviations: position (m), tension (N), winch speed (m/s), and of the start's place (m)."""
+
+    position: float
+    tension: float
+    winch_speed: float
+    start: float
+
+
+@dataclass(frozen=True)
+class _Filtered:
+    state: SX
+    covariance: SX
+    slopes: SX
+    innovations: SX
+    log_variances: SX
+    gradient: SX
+
+
+def filter_sample(model: Model, cable_count: int, noise: Noise, substeps: int) -> Function:
+    """Arguments: state, covariance, slopes, parameters, measured, seen, speed, next speed, time step, roughness.
+
+    Results: the first three at the next sample, then whitened innovations (m,), log of their variances (m,), and
+    the innovations' derivatives by the parameters (m, p), whitened. Measured is x, y, z and the tensions.
+    """
+    size, count = model.states.numel(), model.parameters.numel()
+    predicted = _Filtered(
+        SX.sym("state", size), SX.sym("covariance", size, size), SX.sym("slopes", size, count), SX(), SX(), SX()
+    )
+    measured, seen = SX.sym("measured", 3 + cable_count), SX.sym("seen", 3 + cable_count)
+    speed, later = SX.sym("speed", cable_count), SX.sym("later", cable_count)
+    step, roughness = SX.sym("step"), SX.sym("roughness")
+    filtered = _take_in(model, cable_count, noise, predicted, measured, seen, speed)
+    state, transition, direct = _advance(model, substeps, filtered.state, speed, later, step)
+    spread = casadi.mtimes([transition, filtered.covariance, transition.T])
+    variance = SX(size, 1)
+    variance[3:6] = roughness**2 * step
+    variance[6 : 6 + cable_count] = (noise.winch_speed * step) ** 2
+    return Function(
+        "filter_sample",
+        [*(predicted.state, predicted.covariance, predicted.slopes), model.parameters]
+        + [measured, seen, speed, later, step, roughness],
+        [
+            state,
+            spread + casadi.diag(variance),
+            casadi.mtimes(transition, filtered.slopes) + direct,
+            filtered.innovations,
+            filtered.log_variances,
+            filtered.gradient,
+        ],
+    )
+
+
+def _take_in(
+    model: Model, cable_count: int, noise: Noise, predicted: _Filtered, measured: SX, seen: SX, speed: SX
+) -> _Filtered:
+    shown = casadi.vertcat(model.outputs[:3], model.outputs[6 : 6 + cable_count])
+    inputs = casadi.vertcat(speed, SX(3, 1))
+    outputs = Function(
+        "outputs",
+        [model.states, model.inputs, model.parameters],
+        [shown, casadi.jacobian(shown, model.states), casadi.jacobian(shown, model.parameters)],
+    )
+    expected, by_state, by_parameters = outputs(predicted.state, inputs, model.parameters)
+    covariance = predicted.covariance
+    correction = SX(predicted.state.numel(), 1)
+    slopes = predicted.slopes
+    rows: list[tuple[SX, SX, SX]] = []
+    for index in range(3 + cable_count):
+        own = noise.position if index < 3 else noise.tension
+        row = by_state[index, :]
+        spread = casadi.mtimes(covariance, row.T)
+        variance = casadi.mtimes(row, spread) + own**2
+        error = measured[index] - expected[index] - casadi.mtimes(row, correction)
+        slope = -(casadi.mtimes(row, slopes) + by_parameters[index, :])
+        gain = spread * (seen[index] / variance)
+        correction = correction + gain * error
+        slopes = slopes + casadi.mtimes(gain, slope)
+        covariance = covariance - casadi.mtimes(gain, spread.T)
+        deviation = casadi.sqrt(variance)
+        rows.append((error / deviation, casadi.log(variance), slope / deviation))
+    errors, logs, gradients = (casadi.vertcat(*column) for column in zip(*rows, strict=True))
+    return _Filtered(predicted.state + correction, covariance, slopes, errors, logs, gradients)
+
+
+def _advance(model: Model, substeps: int, state: SX, speed: SX, later: SX, step: SX) -> tuple[SX, SX, SX]:
+    """State after one sample, and its derivatives by the state before and by the parameters."""
+    single = _runge_kutta_step(model, speed.numel())
+    transition = SX.eye(state.numel())
+    direct = SX(state.numel(), model.parameters.numel())
+    for k in range(substeps):
+        begin = speed + (k / substeps) * (later - speed)
+        end = speed + ((k + 1) / substeps) * (later - speed)
+        state, by_state, by_parameters = single(state, model.parameters, begin, end, step / substeps)
+        transition = casadi.mtimes(by_state, transition)
+        direct = casadi.mtimes(by_state, direct) + by_parameters
+    return state, transition, direct
+
+
+def _runge_kutta_step(model: Model, cable_count: int) -> Function:
+    rates = Function("rates", [model.states, model.inputs, model.parameters], [model.rates])
+    begin, end, step = SX.sym("begin", cable_count), SX.sym("end", cable_count), SX.sym("step")
+    none = SX(3, 1)
+    at_begin, at_end = casadi.vertcat(begin, none), casadi.vertcat(end, none)
+    middle = 0.5 * (at_begin + at_end)
+    k1 = rates(model.states, at_begin, model.parameters)
+    k2 = rates(model.states + 0.5 * step * k1, middle, model.parameters)
+    k3 = rates(model.states + 0.5 * step * k2, middle, model.parameters)
+    k4 = rates(model.states + step * k3, at_end, model.parameters)
+    after = model.states + step / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
+    return Function(
+        "runge_kutta_step",
+        [model.states, model.parameters, begin, end, step],
+        [after, casadi.jacobian(after, model.states), casadi.jacobian(after, model.parameters)],
+    )
