@@ -1,0 +1,53 @@
+"""Reading files that others wrote."""
+
+from pathlib import Path
+
+from .errors import InputError
+
+_UTF_16_MARKS = (b"\xff\xfe", b"\xfe\xff")
+
+
+def read_bytes(path: str | Path, error: type[InputError], largest: int | None = None) -> bytes:
+    """All bytes of a regular file; raises ``error`` where there is none or it is larger than ``largest``."""
+    where = str(path)
+    try:
+        file = Path(path)
+        if file.is_dir():
+            raise error(where, "is a folder, not a file", "name a file inside it")
+        if not file.exists():
+            raise error(where, "there is no such file", "check the path")
+        if not file.is_file():
+            raise error(where, "is not a regular file", "copy it to a file first")
+        size = file.stat().st_size
+        if largest is not None and size > largest:
+            raise error(where, f"has {size} bytes, at most {largest} are read", "check the path")
+        return file.read_bytes()
+    except (OSError, ValueError) as problem:
+        reason = getattr(problem, "strerror", None) or str(problem)
+        raise error(where, f"cannot be read ({reason})", "check the path and its permissions") from problem
+
+
+def require_text(content: bytes, where: str, error: type[InputError], kind: str) -> None:
+    """Raises ``error`` unless the bytes are UTF-8 text; ``kind`` is what the file should be."""
+    mend = f"save it as {kind} in UTF-8"
+    if content.startswith(b"PK\x03\x04"):
+        raise error(where, "is a zip archive or a spreadsheet, not text", mend)
+    if content.startswith(_UTF_16_MARKS):
+        raise error(where, "is UTF-16, not UTF-8", mend)
+    zero = content.find(b"\0")
+    if zero >= 0:
+        raise error(_line(content, where, zero), "is binary (it has a zero byte), not text", mend)
+    if content.isascii():
+        return
+    try:
+        content.decode("utf-8")
+    except UnicodeDecodeError as problem:
+        line = _line(content, where, problem.start)
+        byte = content[problem.start]
+        raise error(line, f"byte 0x{byte:02x} is not UTF-8", mend) from problem
+
+
+def _line(content: bytes, where: str, position: int) -> str:
+    before = content[:position].replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    breaks = before.count(b"\n")
+    return f"{where}: line {breaks + 1}"

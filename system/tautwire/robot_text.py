@@ -1,0 +1,80 @@
+"""A robot as the text of a robot file."""
+
+import json
+
+from tautwire_fmu.laws.effects import BY_NAME
+
+from .robot import PER_CABLE, Cable, EffectSetting, Point, Robot, Sensors, TensionLimits
+
+
+def robot_text(robot: Robot) -> str:
+    """The robot as a commented TOML file; every number reads back exactly."""
+    # TOML has JSON's strings, except that it wants no surrogate pairs: characters stand for themselves.
+    blocks = [
+        [
+            f"name = {json.dumps(robot.name, ensure_ascii=False)}",
+            _number("gravity", robot.gravity, "m/s^2"),
+        ],
+        [
+            "[platform]",
+            _number("mass", robot.platform.mass, "kg"),
+            _point("start", robot.platform.start, "m, where the run starts at rest"),
+        ],
+        _tension(robot.tension) if robot.tension else [],
+        _sensors(robot.sensors),
+        *(_cable(number, cable) for number, cable in enumerate(robot.cables, 1)),
+        *(_effect(robot, setting) for setting in robot.effects),
+    ]
+    return "\n\n".join("\n".join(block) for block in blocks if block) + "\n"
+
+
+def _number(key: str, value: float, comment: str) -> str:
+    return f"{key} = {float(value)!r}" + (f"  # {comment}" if comment else "")
+
+
+def _point(key: str, point: Point, comment: str) -> str:
+    return f"{key} = [{', '.join(repr(float(value)) for value in point)}]  # {comment}"
+
+
+def _tension(tension: TensionLimits) -> list[str]:
+    return [
+        "[tension]",
+        _number("minimum", tension.minimum, "N"),
+        _number("maximum", tension.maximum, "N"),
+        _number("preferred", tension.preferred, "N"),
+    ]
+
+
+def _sensors(sensors: Sensors) -> list[str]:
+    noises = (
+        ("position_noise", sensors.position_noise, "m"),
+        ("tension_noise", sensors.tension_noise, "N"),
+        ("winch_speed_noise", sensors.winch_speed_noise, "m/s"),
+    )
+    lines = [_number(key, value, unit) for key, value, unit in noises if value is not None]
+    return ["[sensors]  # standard deviation of one sample", *lines] if lines else []
+
+
+def _cable(number: int, cable: Cable) -> list[str]:
+    return [
+        f"[[cable]]  # cable {number}",
+        _point("anchor", cable.anchor, "m, exit point on the frame"),
+        _number("modulus", cable.modulus, "Pa"),
+        _number("area", cable.area, "m^2"),
+        _number("damping", cable.damping, "Pa s"),
+        f"law = {json.dumps(cable.law, ensure_ascii=False)}",
+    ]
+
+
+def _effect(robot: Robot, setting: EffectSetting) -> list[str]:
+    effect = BY_NAME.get(setting.name)
+    units = {parameter.name: parameter.unit for parameter in effect.parameters} if effect else {}
+    alone = sum(other.name == setting.name for other in robot.effects) == 1
+    header = f"[effect.{setting.name}]" if alone else f"[[effect.{setting.name}]]"
+    lines = [header + (f"  # {effect.description}" if effect else "")]
+    lines += [_number(name, value, units.get(name, "")) for name, value in setting.values.items()]
+    per_cable = effect is not None and effect.component in PER_CABLE
+    # All cables is what the absent key means; an empty list is kept visible, for the reader to refuse.
+    if (per_cable or setting.cables) and setting.cables != robot.cable_numbers:
+        lines.append(f"cables = {list(setting.cables)}")
+    return lines

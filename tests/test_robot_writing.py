@@ -1,0 +1,139 @@
+"""Robots as values, and written as files: nothing is lost, and nothing wrong is written."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tautwire.errors import RobotFileError
+from tautwire.robot import Cable, EffectSetting, Platform, Robot, Sensors, TensionLimits
+from tautwire.robot_file import read_robot, robot_text, write_robot
+from tautwire_fmu.laws.cable import LAWS
+from tautwire_fmu.laws.effects import ALL
+
+HALL = Robot(
+    name="hall",
+    gravity=9.81,
+    platform=Platform(80.0, (10.0, 5.5, 4.0)),
+    tension=None,
+    sensors=Sensors(position_noise=1.5e-4),
+    cables=tuple(
+        Cable(anchor, 6.0e10, 3.2e-6, 4.0e8, "logarithmic")
+        for anchor in ((0.0, 0.0, 12.0), (20.0, 0.0, 12.0), (10.0, 16.0, 12.0))
+    ),
+)
+
+
+def test_written_text_is_commented() -> None:
+    robot = HALL.with_effect(EffectSetting("modulus", {"modulus": 5e10}, (2,)))
+    text = robot_text(robot)
+    assert "mass = 80.0  # kg" in text
+    assert "[effect.modulus]" in text
+    assert "cables = [2]" in text
+
+
+def test_writing_replaces_whole_files_only(tmp_path: Path) -> None:
+    target = tmp_path / "out.toml"
+    write_robot(HALL, target)
+    before = target.read_bytes()
+    with pytest.raises(RobotFileError, match=r"cable\[1\]\.modulus"):
+        write_robot(replace(HALL, cables=(replace(HALL.cables[0], modulus=-1.0), *HALL.cables[1:])), target)
+    assert target.read_bytes() == before
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["out.toml"]
+
+
+def test_writing_into_no_folder_leaves_nothing_behind(tmp_path: Path) -> None:
+    with pytest.raises(OSError, match="No such file"):
+        write_robot(HALL, tmp_path / "absent" / "out.toml")
+    assert not list(tmp_path.iterdir())
+
+
+def test_effect_on_a_cable_that_the_robot_lacks_is_not_written(tmp_path: Path) -> None:
+    robot = HALL.with_effect(EffectSetting("damping", {"damping": 1.0}, (7,)))
+    with pytest.raises(RobotFileError, match=r"effect\.damping\.cables"):
+        write_robot(robot, tmp_path / "out.toml")
+
+
+def test_with_effect_replaces_the_same_effect_on_the_same_cables() -> None:
+    payload = EffectSetting("payload", {"mass": 2.0})
+    robot = HALL.with_effect(EffectSetting("damping", {"damping": 1.0}, (1, 2))).with_effect(payload)
+    changed = robot.with_effect(EffectSetting("damping", {"damping": 2.0}, (2, 1)))
+    assert changed.effects == (EffectSetting("damping", {"damping": 2.0}, (1, 2)), payload)
+    assert robot.effects[0].values["damping"] == 1.0
+    assert changed.without_effects() == HALL
+
+
+def test_with_effect_wins_on_the_cables_that_it_names() -> None:
+    robot = HALL.with_effect(EffectSetting("modulus", {"modulus": 5e10}, (1, 2, 3)))
+    changed = robot.with_effect(EffectSetting("modulus", {"modulus": 7e10}, (2,)))
+    assert changed.effects == (
+        EffectSetting("modulus", {"modulus": 5e10}, (1, 3)),
+        EffectSetting("modulus", {"modulus": 7e10}, (2,)),
+    )
+
+
+def test_settings_are_values() -> None:
+    numbers = {"a": 1.0, "b": 2.0}
+    setting = EffectSetting("relaxation", numbers, (1,))
+    numbers["a"] = 5.0
+    assert setting == EffectSetting("relaxation", {"b": 2.0, "a": 1.0}, (1,))
+    assert hash(setting) == hash(EffectSetting("relaxation", {"b": 2.0, "a": 1.0}, (1,)))
+    assert len({HALL, replace(HALL)}) == 1
+    with pytest.raises(KeyError):
+        setting.values["c"]
+
+
+SMALL = st.floats(-1e4, 1e4)
+POSITIVE = st.floats(1e-12, 1e13)
+NOT_NEGATIVE = st.floats(0.0, 1e13)
+NAMES = st.text(st.characters(exclude_categories=("C", "Z")), min_size=1, max_size=20)
+
+
+@st.composite
+def effect_settings(draw: st.DrawFn, cable_count: int) -> list[EffectSetting]:
+    """Settings as files may hold them: each effect at most once for each cable."""
+    drawn = []
+    for effect in draw(st.lists(st.sampled_from(ALL), unique=True, max_size=3)):
+        numbers = st.fixed_dictionaries({p.name: st.floats(p.minimum, p.maximum) for p in effect.parameters})
+        if effect.component not in ("cable", "winch"):
+            drawn.append(EffectSetting(effect.name, draw(numbers)))
+            continue
+        shares = draw(st.lists(st.integers(0, 2), min_size=cable_count, max_size=cable_count))
+        groups = [tuple(i for i, share in enumerate(shares, 1) if share == group) for group in (1, 2)]
+        drawn += [EffectSetting(effect.name, draw(numbers), group) for group in groups if group]
+    return draw(st.permutations(drawn))
+
+
+@st.composite
+def robots(draw: st.DrawFn) -> Robot:
+    """Robots as files may declare them."""
+    count = draw(st.integers(3, 6))
+    apart = st.lists(st.integers(-9999, 9999), min_size=count + 1, max_size=count + 1, unique=True)
+    start, *anchors = [(float(x), draw(SMALL), draw(SMALL)) for x in draw(apart)]
+    low, middle, high = sorted(draw(st.lists(POSITIVE, min_size=3, max_size=3)))
+    cables = [
+        Cable(anchor, draw(POSITIVE), draw(POSITIVE), draw(NOT_NEGATIVE), draw(st.sampled_from(sorted(LAWS))))
+        for anchor in anchors
+    ]
+    noise = st.none() | NOT_NEGATIVE
+    return Robot(
+        name=draw(NAMES),
+        gravity=draw(NOT_NEGATIVE),
+        platform=Platform(draw(POSITIVE), start),
+        tension=draw(st.sampled_from([None, TensionLimits(low, high, middle)])),
+        sensors=Sensors(draw(noise), draw(noise), draw(noise)),
+        cables=tuple(cables),
+        effects=tuple(draw(effect_settings(count))),
+    )
+
+
+@settings(max_examples=100, deadline=None)
+@given(robot=robots())
+def test_written_robots_read_back_equal(tmp_path_factory: pytest.TempPathFactory, robot: Robot) -> None:
+    path = tmp_path_factory.getbasetemp() / "round trip.toml"
+    write_robot(robot, path)
+    assert read_robot(path) == robot
