@@ -70,7 +70,11 @@ class Cable(Slave):
         moving = law.motion(REAL, self.constants, self.effects, state, inputs)
         shown = law.reading(REAL, self.constants, self.effects, state, moving)
         self.real[FIRST_OUTPUT:FIRST_RATE] = [
-            *shown.force, shown.tension, shown.length, shown.elongation, shown.strain
+            *shown.force,
+            shown.tension,
+            shown.length,
+            shown.elongation,
+            shown.strain,
         ]
         self.rates_stale = True
 
@@ -128,7 +132,10 @@ class Cable(Slave):
         assert then is not None
         path = [
             quintic(
-                (then[axis], then[axis + 3], then[axis + 6]), (now[axis], now[axis + 3], now[axis + 6]), step, fraction
+                (then[axis], then[axis + 3], then[axis + 6]),
+                (now[axis], now[axis + 3], now[axis + 6]),
+                step,
+                fraction,
             )
             for axis in range(POSITION, VELOCITY)
         ]
@@ -160,7 +167,12 @@ def _variables(data: Dict[str, Any]) -> Tuple[Variable, ...]:
         Variable("winch_speed", "input", "m/s", "rope speed by the winch encoder, positive reels in"),
         Variable("winch_acceleration", "input", "m/s2", "rate of winch_speed"),
         *vector(
-            "force", "output", "N", "force on the platform", nominal=tension, depends_on=(*MOTION, "winch_speed")
+            "force",
+            "output",
+            "N",
+            "force on the platform",
+            nominal=tension,
+            depends_on=(*MOTION, "winch_speed"),
         ),
         Variable(
             "tension",
@@ -180,7 +192,11 @@ def _variables(data: Dict[str, Any]) -> Tuple[Variable, ...]:
             depends_on=axes("position"),
         ),
         Variable(
-            "elongation", "output", "m", "length less start length and rope let out", depends_on=axes("position")
+            "elongation",
+            "output",
+            "m",
+            "length less start length and rope let out",
+            depends_on=axes("position"),
         ),
         Variable("strain", "output", "1", "strain by the tension law", nominal=1e-3, depends_on=axes("position")),
         *vector("force_rate", "output", "N/s", "rate of force", nominal=tension, depends_on=rated),
@@ -195,7 +211,16 @@ def _variables(data: Dict[str, Any]) -> Tuple[Variable, ...]:
         *vector("anchor", "parameter", "m", "exit point on the frame", tuple(data["anchor"])),
         *vector("start", "parameter", "m", "position of the platform at the start, in static equilibrium", start),
         Variable("modulus", "parameter", "Pa", "modulus of elasticity", data["modulus"], True, 0.0, nominal=1e11),
-        Variable("area", "parameter", "m2", "area that the modulus refers to", data["area"], True, 0.0, nominal=1e-5),
+        Variable(
+            "area",
+            "parameter",
+            "m2",
+            "area that the modulus refers to",
+            data["area"],
+            True,
+            0.0,
+            nominal=1e-5,
+        ),
         Variable("damping", "parameter", "Pa s", "viscosity of the rope", data["damping"], True, 0.0, nominal=1e9),
         Variable("start_tension", "parameter", "N", "tension at the start", tension, False, 0.0, nominal=1e3),
         *effect_variables(data["effects"]),

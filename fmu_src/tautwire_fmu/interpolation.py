@@ -11,9 +11,8 @@ def extrapolate(value: float, rate: float, curvature: float, elapsed: float) -> 
 def cubic(start: float, start_rate: float, end: float, end_rate: float, step: float, fraction: float) -> float:
     """The Hermite cubic through value and rate at both ends, at ``fraction`` of the step (0 to 1)."""
     rest = 1.0 - fraction
-    return (
-        rest * rest * ((1.0 + 2.0 * fraction) * start + fraction * step * start_rate)
-        + fraction * fraction * ((1.0 + 2.0 * rest) * end - rest * step * end_rate)
+    return rest * rest * ((1.0 + 2.0 * fraction) * start + fraction * step * start_rate) + fraction * fraction * (
+        (1.0 + 2.0 * rest) * end - rest * step * end_rate
     )
 
 

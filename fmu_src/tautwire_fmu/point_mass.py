@@ -42,8 +42,8 @@ class PointMass(Slave):
         Where a wrench depends on the motion the end values are found by sweeping; otherwise one sweep is exact.
         """
         first = self.first_output
-        x0: Vector = tuple(self.real[first : first + 3])  # type: ignore[assignment]
-        v0: Vector = tuple(self.real[first + 3 : first + 6])  # type: ignore[assignment]
+        x0: Vector = tuple(self.real[first : first + 3])
+        v0: Vector = tuple(self.real[first + 3 : first + 6])
         now = self._force(self.real)
         if ends:
             assert self.earlier is not None
@@ -81,7 +81,7 @@ class PointMass(Slave):
         end = self.first_output
         force = tuple(sum(inputs[1 + axis : end : 6]) for axis in range(3))
         rate = tuple(sum(inputs[4 + axis : end : 6]) for axis in range(3))
-        return force, rate  # type: ignore[return-value]
+        return force, rate
 
     def _acceleration_and_jerk(
         self, position: Vector, velocity: Vector, force: Vector, rate: Vector
@@ -98,7 +98,7 @@ class PointMass(Slave):
             tuple(map(along, velocity, acceleration)),
             tuple(map(along, force, rate)),
         )
-        return acceleration, tuple(map(rate_of, carried))  # type: ignore[return-value]
+        return acceleration, tuple(map(rate_of, carried))
 
 
 def _integrate_cubic(
@@ -111,7 +111,7 @@ def _integrate_cubic(
     velocity = tuple(
         v + step * (0.5 * (a0 + a1) + step / 12.0 * (j0 - j1)) for v, a0, j0, a1, j1 in zip(v0, *start, *end)
     )
-    return position, velocity  # type: ignore[return-value]
+    return position, velocity
 
 
 def _variables(data: Dict[str, Any]) -> Tuple[Variable, ...]:

@@ -42,9 +42,7 @@ class Slave(Fmi2Slave):
         self.variables = tuple(variables)
         self.real: List[float] = [variable.start for variable in self.variables]
         self.input_count = sum(variable.causality == "input" for variable in self.variables)
-        self.first_parameter = next(
-            i for i, variable in enumerate(self.variables) if variable.causality == "parameter"
-        )
+        self.first_parameter = next(i for i, variable in enumerate(self.variables) if variable.causality == "parameter")
         self.earlier: Optional[Tuple[float, ...]] = None
         self.elapsed = 0.0
         self.started = False

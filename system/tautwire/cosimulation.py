@@ -58,13 +58,13 @@ def cable_name(index: int) -> str:
 
 def connections(cable_count: int) -> list[Connection]:
     """Platform motion to every cable, every cable's force to the platform, each with its rates."""
-    wires = []
+    shared = [f"{name}.{axis}" for axis in AXES for name in ("position", "velocity", "acceleration")]
+    own = [(name, axis) for axis in AXES for name in ("force", "force_rate")]
+    wires: list[Connection] = []
     for index in range(1, cable_count + 1):
-        for axis in AXES:
-            for name in ("position", "velocity", "acceleration"):
-                wires.append(_wire(PLATFORM, f"{name}.{axis}", cable_name(index), f"{name}.{axis}"))
-            for name in ("force", "force_rate"):
-                wires.append(_wire(cable_name(index), f"{name}.{axis}", PLATFORM, f"{name}_{index}.{axis}"))
+        cable = cable_name(index)
+        wires += [_wire(PLATFORM, name, cable, name) for name in shared]
+        wires += [_wire(cable, f"{name}.{axis}", PLATFORM, f"{name}_{index}.{axis}") for name, axis in own]
     return wires
 
 
@@ -84,9 +84,7 @@ def winch_ports(cable_count: int) -> list[Port]:
 def shown_ports(cable_count: int) -> list[Port]:
     """What a run records, in the order of :class:`Motion`."""
     platform = [Port(PLATFORM, f"{name}.{axis}") for name in ("position", "velocity") for axis in AXES]
-    cables = [
-        Port(cable_name(index), name) for name in SHOWN_OF_CABLE for index in range(1, cable_count + 1)
-    ]
+    cables = [Port(cable_name(index), name) for name in SHOWN_OF_CABLE for index in range(1, cable_count + 1)]
     return platform + cables
 
 
@@ -122,9 +120,7 @@ def cosimulate(
     return run(fmus, Sampled(time, winch_speed), time, step, progress)
 
 
-def run(
-    fmus: RobotFmus, source: Source, time: Array, step: float = STEP, progress: Progress | None = None
-) -> Motion:
+def run(fmus: RobotFmus, source: Source, time: Array, step: float = STEP, progress: Progress | None = None) -> Motion:
     """Co-simulate a robot under any source of winch speeds, recorded at ``time``."""
     count = len(fmus.cables)
     with instantiated(fmus) as coupling:

@@ -14,8 +14,9 @@ from pathlib import Path
 from typing import Any
 from uuid import NAMESPACE_URL, uuid5
 
-import tautwire_fmu
 from pythonfmu.builder import FmuBuilder
+
+import tautwire_fmu
 
 from .robot import EffectSetting, Robot
 from .statics import directions, static_tensions
@@ -110,9 +111,7 @@ def _build(module: str, base: str, name: str, data: dict[str, Any], folder: Path
         script.write_text(LAUNCHER.format(package=package, base=base), encoding="utf-8")
         unfinished = scratch / "built" / f"{name}.fmu"
         with _imports_from(scratch):
-            FmuBuilder.build_FMU(
-                script, dest=unfinished, project_files=[scratch / package, resource], **OPTIONS
-            )
+            FmuBuilder.build_FMU(script, dest=unfinished, project_files=[scratch / package, resource], **OPTIONS)
         return _move(unfinished, folder / f"{name}.fmu")
 
 

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import casadi
 import numpy as np
 from numpy.typing import NDArray
@@ -69,7 +71,7 @@ def _solve_three(robot: Robot, position: Array, unit: Array, load: Array) -> Arr
             tension=None,
             reason="the three cables lie in one plane there",
         )
-    tensions: Array = np.linalg.solve(unit, load)
+    tensions = np.asarray(np.linalg.solve(unit, load), dtype=np.float64)
     worst = int(np.argmin(tensions))
     if tensions[worst] < 0.0:
         raise UnreachableError(
@@ -85,7 +87,7 @@ def _solve_three(robot: Robot, position: Array, unit: Array, load: Array) -> Arr
 def _distribute(robot: Robot, position: Array, unit: Array, load: Array) -> Array:
     limits = robot.tension or DEFAULT_LIMITS
     count = unit.shape[1]
-    problem = {"h": casadi.Sparsity.dense(count, count), "a": casadi.Sparsity.dense(3, count)}
+    problem: Any = {"h": casadi.Sparsity.dense(count, count), "a": casadi.Sparsity.dense(3, count)}
     options = {"printLevel": "none", "error_on_fail": False}
     solver = casadi.conic("tension_distribution", "qpoases", problem, options)
     scale = max(float(np.linalg.norm(load)), 1.0)

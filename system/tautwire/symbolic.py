@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from typing import Any
 
 import casadi
 import numpy as np
@@ -104,7 +105,8 @@ def _with_symbols(robot: Robot, free: Sequence[FreeParameter], symbols: Sequence
     effects = list(robot.effects)
     for parameter, symbol in zip(free, symbols, strict=True):
         old = effects[parameter.setting]
-        effects[parameter.setting] = EffectSetting(old.name, {**old.values, parameter.name: symbol}, old.cables)
+        values: dict[str, Any] = {**old.values, parameter.name: symbol}
+        effects[parameter.setting] = EffectSetting(old.name, values, old.cables)
     return replace(robot, effects=tuple(effects))
 
 
@@ -130,7 +132,13 @@ def _start_tensions(nominal: Robot, opened: Robot) -> list[SX]:
 
 
 def _equations(
-    assembly: Assembly, position: SX, velocity: SX, unstrained: SX, speeds: SX, external: SX, own: list[list[SX]]
+    assembly: Assembly,
+    position: SX,
+    velocity: SX,
+    unstrained: SX,
+    speeds: SX,
+    external: SX,
+    own: list[list[SX]],
 ) -> tuple[SX, SX]:
     force = _three(external)
     shown = []
@@ -183,4 +191,3 @@ def _state_names(assembly: Assembly) -> tuple[str, ...]:
         *_numbered("unstrained_length", len(assembly.cables)),
         *effects,
     )
-

@@ -142,9 +142,7 @@ def state_rates(
         ),
         wound_length=moving.rope_speed,
         effects=tuple(
-            ()
-            if active.effect.state_rates is None
-            else active.effect.state_rates(m, active.values, own, cable, moving)
+            () if active.effect.state_rates is None else active.effect.state_rates(m, active.values, own, cable, moving)
             for active, own in zip(effects, state.effects)
         ),
     )

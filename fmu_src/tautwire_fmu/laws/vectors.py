@@ -4,7 +4,7 @@ from typing import Any, Tuple
 
 from .mathematics import Mathematics
 
-Vector = Tuple[Any, Any, Any]
+Vector = Tuple[Any, ...]
 
 
 def add(a: Vector, b: Vector) -> Vector:

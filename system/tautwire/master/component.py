@@ -35,7 +35,13 @@ class ComponentError(TautwireError):
     """An FMU failed; tells which, in which call, at which time (s), with which inputs, and what it logged."""
 
     def __init__(
-        self, component: str, call: str, status: str, time: float, inputs: dict[str, float], messages: Sequence[str]
+        self,
+        component: str,
+        call: str,
+        status: str,
+        time: float,
+        inputs: dict[str, float],
+        messages: Sequence[str],
     ) -> None:
         self.component = component
         self.call = call

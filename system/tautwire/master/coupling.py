@@ -72,7 +72,9 @@ class Coupling:
             if names or self.stamped[name]
         }
         self.nominal = {name: self._nominals(name) for name in self.inputs}
-        self.drive_places = [(self.inputs[p.component], self.inputs[p.component].names.index(p.variable)) for p in drives]
+        self.drive_places = [
+            (self.inputs[p.component], self.inputs[p.component].names.index(p.variable)) for p in drives
+        ]
         groups = levels(components, connections)
         self.transfers = [self._transfer(group) for group in groups]
         self.after_drives = [self._transfer(group) for group in self._downstream(groups)]
@@ -107,7 +109,9 @@ class Coupling:
                 copies.append((part.values, whole.values, zero, zero))
             writes.append((self.components[target], part))
         return Transfer(
-            tuple((self.components[name], block) for name, block in reads.items()), tuple(copies), tuple(writes)
+            tuple((self.components[name], block) for name, block in reads.items()),
+            tuple(copies),
+            tuple(writes),
         )
 
     def _downstream(self, groups: Sequence[Sequence[Connection]]) -> list[list[Connection]]:

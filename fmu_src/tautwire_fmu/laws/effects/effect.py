@@ -7,8 +7,8 @@ class Parameter(NamedTuple):
     """One number of an effect.
 
     ``neutral`` is the value at which the effect is exactly absent; None where that is the value that the robot
-    file declares for the cable under the key of the same name. ``start`` is where fits begin, in the unit, or as a
-    multiple of the declared value where ``neutral`` is None; it is never the neutral value.
+    file declares for the cable under the key of the same name. Fits begin at ``start_ratio`` times the declared
+    value, or at ``start`` where nothing or zero is declared; neither is the neutral value.
     """
 
     name: str
@@ -18,6 +18,7 @@ class Parameter(NamedTuple):
     maximum: float
     neutral: Optional[float]
     start: float
+    start_ratio: float = 1.0
 
 
 class State(NamedTuple):
