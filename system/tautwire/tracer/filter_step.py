@@ -44,7 +44,12 @@ def filter_sample(model: Model, cable_count: int, noise: Noise, substeps: int) -
     """
     size, count = model.states.numel(), model.parameters.numel()
     predicted = _Filtered(
-        SX.sym("state", size), SX.sym("covariance", size, size), SX.sym("slopes", size, count), SX(), SX(), SX()
+        SX.sym("state", size),
+        SX.sym("covariance", size, size),
+        SX.sym("slopes", size, count),
+        SX(),
+        SX(),
+        SX(),
     )
     measured, seen = SX.sym("measured", 3 + cable_count), SX.sym("seen", 3 + cable_count)
     speed, later = SX.sym("speed", cable_count), SX.sym("later", cable_count)
@@ -57,8 +62,18 @@ def filter_sample(model: Model, cable_count: int, noise: Noise, substeps: int) -
     variance[6 : 6 + cable_count] = (noise.winch_speed * step) ** 2
     return Function(
         "filter_sample",
-        [*(predicted.state, predicted.covariance, predicted.slopes), model.parameters]
-        + [measured, seen, speed, later, step, roughness],
+        [
+            predicted.state,
+            predicted.covariance,
+            predicted.slopes,
+            model.parameters,
+            measured,
+            seen,
+            speed,
+            later,
+            step,
+            roughness,
+        ],
         [
             state,
             spread + casadi.diag(variance),

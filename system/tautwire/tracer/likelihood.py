@@ -48,18 +48,17 @@ class Innovations:
         """Where something was measured, shape (N, m)."""
         return np.isfinite(self.values)
 
-    @cached_property
-    def log_likelihood(self) -> float:
-        """Natural logarithm of the recording's probability density, in SI units."""
-        squares = self.values[self.seen] ** 2 + self.log_variances[self.seen] + log(2.0 * pi)
+    def log_likelihood(self, rows: NDArray[np.bool_]) -> float:
+        """Log of the probability density, in SI units, of the samples in ``rows`` given those before them."""
+        chosen = self.seen & rows[:, None]
+        squares = self.values[chosen] ** 2 + self.log_variances[chosen] + log(2.0 * pi)
         return float(-0.5 * np.sum(squares))
 
-    @property
-    def mean_square(self) -> Array:
-        """Mean square of each output's innovations, shape (m,); one where the model is right."""
-        count = np.maximum(np.sum(self.seen, axis=0), 1)
-        square: Array = np.nansum(self.values**2, axis=0) / count
-        return square
+    def mean_square(self, rows: NDArray[np.bool_]) -> Array:
+        """Mean square of each output's innovations, shape (m,); one where the model is right, NaN if unseen."""
+        count = np.sum(self.seen[rows], axis=0)
+        total = np.nansum(self.values[rows] ** 2, axis=0)
+        return np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0)
 
 
 class Likelihood:
@@ -77,41 +76,62 @@ class Likelihood:
         self._sample = filter_sample(model, robot.cable_count, noise, substeps)
         self._runs = {CHUNK: self._sample.mapaccum("run", CHUNK, 3)}
 
-    def innovations(self, recording: Recording, parameters: Sequence[float], roughness: float = 0.0) -> Innovations:
+    def innovations(
+        self, recording: Recording, parameters: Sequence[float] | Array, roughness: float = 0.0
+    ) -> Innovations:
         """Filter a recording at some values of the free parameters.
 
         ``roughness`` (m/s^2 per root hertz) adds an unknown white acceleration of the platform: a fit that starts
         far from the solution then follows the data instead of losing phase.
         """
+        seen = np.isfinite(recording.measured())
+        values, variances, slopes = self._filter(recording, seen, parameters, self._start_covariance(), roughness)
+        values[~seen] = np.nan
+        variances[~seen] = np.nan
+        return Innovations(values, slopes, variances)
+
+    def open_loop_variances(self, recording: Recording, parameters: Sequence[float] | Array) -> Array:
+        """Variance of measured less simulated, shape (N, m), where the model is right and its start exact.
+
+        Noise of the sensors, and of the recorded winch speeds as it integrates.
+        """
+        nothing = np.zeros(recording.measured().shape, dtype=bool)
+        exact = np.zeros((self.state_count, self.state_count))
+        _, log_variances, _ = self._filter(recording, nothing, parameters, exact, 0.0)
+        variances: Array = np.exp(log_variances)
+        return variances
+
+    def _filter(
+        self,
+        recording: Recording,
+        seen: NDArray[np.bool_],
+        parameters: Sequence[float] | Array,
+        start_covariance: Array,
+        roughness: float,
+    ) -> tuple[Array, Array, Array]:
         theta = np.asarray(parameters, dtype=float)
-        measured = recording.measured()
-        seen = np.isfinite(measured)
         speed = recording.winch_speed
         columns = (
-            np.where(seen, measured, 0.0).T,
+            np.where(seen, recording.measured(), 0.0).T,
             seen.astype(float).T,
             speed.T,
             np.vstack([speed[1:], speed[-1:]]).T,
             np.append(np.diff(recording.time), 0.0)[None, :],
         )
         state, slopes = self._start(theta)
-        carried = (state, self._start_covariance(), slopes)
+        carried = (state, start_covariance, slopes)
         values, logs, gradients = [], [], []
-        for first in range(0, len(measured), CHUNK):
+        for first in range(0, len(seen), CHUNK):
             part = [column[:, first : first + CHUNK] for column in columns]
             count = part[0].shape[1]
-            width = self.state_count
-            result = self._run(count)(
-                *carried, np.repeat(theta[:, None], count, axis=1), *part, np.full((1, count), roughness)
-            )
-            carried = (result[0][:, -1], result[1][:, -width:], result[2][:, result[2].shape[1] - len(theta) :])
+            constant = (np.repeat(theta[:, None], count, axis=1), *part, np.full((1, count), roughness))
+            result = self._run(count)(*carried, *constant)
+            width, free = self.state_count, len(theta)
+            carried = (result[0][:, -1], result[1][:, -width:], result[2][:, result[2].shape[1] - free :])
             values.append(np.array(result[3]).T)
             logs.append(np.array(result[4]).T)
-            gradients.append(np.array(result[5]).reshape(measured.shape[1], count, len(theta)).swapaxes(0, 1))
-        whitened, variances = np.vstack(values), np.vstack(logs)
-        whitened[~seen] = np.nan
-        variances[~seen] = np.nan
-        return Innovations(whitened, np.vstack(gradients), variances)
+            gradients.append(np.array(result[5]).reshape(seen.shape[1], count, free).swapaxes(0, 1))
+        return np.vstack(values), np.vstack(logs), np.vstack(gradients)
 
     def _run(self, count: int) -> casadi.Function:
         if count not in self._runs:

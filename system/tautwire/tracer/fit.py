@@ -1,0 +1,129 @@
+"""Fits the parameters of a robot's effects to recorded samples."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+
+from tautwire_fmu.laws.effects import BY_NAME
+
+from ..robot import Robot
+from .data import Sample, placed
+from .filter_step import Noise
+from .hypotheses import free_parameters, with_values
+from .likelihood import Innovations, Likelihood
+
+Array = NDArray[np.float64]
+
+ROUGHNESSES = (0.1, 0.01, 0.0)
+EVALUATIONS = 30
+NORMAL_95 = 1.959964
+
+
+@dataclass(frozen=True)
+class Fit:
+    """A robot whose effects' parameters, shape (p,) in the order of ``free_parameters``, are fitted.
+
+    ``deviations`` are their standard deviations from the curvature of the likelihood.
+    """
+
+    robot: Robot
+    values: Array
+    deviations: Array
+
+    def interval(self, index: int) -> tuple[float, float]:
+        """95 % interval of one parameter."""
+        reach = NORMAL_95 * float(self.deviations[index])
+        return float(self.values[index]) - reach, float(self.values[index]) + reach
+
+
+class Fitter:
+    """Fits and judges robots on samples; compiled likelihoods are kept."""
+
+    def __init__(self, noise: Noise) -> None:
+        self.noise = noise
+        self._compiled: dict[tuple[object, ...], Likelihood] = {}
+
+    def fit(self, robot: Robot, sample: Sample) -> Fit:
+        """Least squares on whitened innovations, first under a rough model, then under the exact one."""
+        free = free_parameters(robot)
+        here = placed(robot, sample.start)
+        if not free:
+            return Fit(robot, np.zeros(0), np.zeros(0))
+        start = np.array([robot.effects[f.setting].values[f.name] for f in free])
+        scale = np.where(start == 0.0, 1.0, np.abs(start))
+        parameters = [
+            next(p for p in BY_NAME[robot.effects[f.setting].name].parameters if p.name == f.name) for f in free
+        ]
+        bounds = (
+            np.array([p.minimum for p in parameters]) / scale,
+            np.array([p.maximum for p in parameters]) / scale,
+        )
+        likelihood = self._likelihood(here, sample)
+        scaled = start / scale
+        for rough in ROUGHNESSES:
+            residual = _Residual(likelihood, sample, scale, rough)
+            solution = least_squares(
+                residual.values,
+                scaled,
+                jac=residual.slopes,
+                bounds=bounds,
+                x_scale="jac",
+                max_nfev=EVALUATIONS,
+            )
+            scaled = solution.x
+        values = scaled * scale
+        slopes = np.asarray(solution.jac, dtype=float)
+        covariance = np.linalg.pinv(slopes.T @ slopes)
+        fitted = with_values(robot, free, dict(zip(free, values.tolist(), strict=True)))
+        return Fit(fitted, values, np.sqrt(np.diag(covariance)) * scale)
+
+    def innovations(self, robot: Robot, sample: Sample) -> Innovations:
+        """Innovations of all samples of a recording under a robot as it is."""
+        here = placed(robot, sample.start)
+        free = free_parameters(robot)
+        values = [robot.effects[f.setting].values[f.name] for f in free]
+        return self._likelihood(here, sample).innovations(sample.recording, values)
+
+    def open_loop_variances(self, robot: Robot, sample: Sample) -> Array:
+        """See :meth:`tautwire.tracer.likelihood.Likelihood.open_loop_variances`."""
+        here = placed(robot, sample.start)
+        values = [robot.effects[f.setting].values[f.name] for f in free_parameters(robot)]
+        return self._likelihood(here, sample).open_loop_variances(sample.recording, values)
+
+    def _likelihood(self, robot: Robot, sample: Sample) -> Likelihood:
+        interval = float(np.median(np.diff(sample.recording.time)))
+        shape = tuple((s.name, s.cables) for s in robot.effects)
+        key = (robot.without_effects(), shape, round(interval, 9))
+        if key not in self._compiled:
+            self._compiled[key] = Likelihood(robot, free_parameters(robot), self.noise, interval)
+        return self._compiled[key]
+
+
+class _Residual:
+    """Innovations and their slopes at the last point asked for, in scaled parameters."""
+
+    def __init__(self, likelihood: Likelihood, sample: Sample, scale: Array, roughness: float) -> None:
+        self.likelihood = likelihood
+        self.sample = sample
+        self.scale = scale
+        self.roughness = roughness
+        self._at: Array | None = None
+        self._found: tuple[Array, Array] = (np.zeros(0), np.zeros((0, 0)))
+
+    def values(self, scaled: Array) -> Array:
+        return self._evaluate(scaled)[0]
+
+    def slopes(self, scaled: Array) -> Array:
+        return self._evaluate(scaled)[1]
+
+    def _evaluate(self, scaled: Array) -> tuple[Array, Array]:
+        if self._at is None or not np.array_equal(self._at, scaled):
+            found = self.likelihood.innovations(self.sample.recording, scaled * self.scale, self.roughness)
+            chosen = found.seen & self.sample.rows[:, None]
+            self._found = (found.values[chosen], found.slopes[chosen] * self.scale)
+            self._at = scaled.copy()
+        return self._found

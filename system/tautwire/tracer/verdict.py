@@ -1,0 +1,107 @@
+"""What a trace found: values only, for reports to show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..cosimulation import Motion
+from ..recording import Recording
+from ..robot import Robot
+
+Array = NDArray[np.float64]
+VerdictName = Literal["effects", "none", "discovered", "unexplained"]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter with its 95 % interval; ``declared`` is what the robot file says, where it says anything."""
+
+    value: float
+    unit: str
+    low: float
+    high: float
+    declared: float | None
+
+
+@dataclass(frozen=True)
+class FoundEffect:
+    """An effect that earned its place; ``evidence`` is the natural log of its likelihood ratio on unseen data."""
+
+    name: str
+    component: str
+    cables: tuple[int, ...]
+    parameters: Mapping[str, Estimate]
+    evidence: float
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A hypothesis that was tried: one effect more than the model had in its round.
+
+    ``evidence`` is the natural log of its likelihood ratio on unseen data, against the model without it;
+    ``mean_square`` the mean square of the whitened innovations there (one where nothing is left).
+    """
+
+    round: int
+    name: str
+    cables: tuple[int, ...]
+    values: Mapping[str, float]
+    evidence: float
+    mean_square: float
+    accepted: bool
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Root mean squares of residuals: positions in m over each axis and all, tensions in N over each cable and all.
+
+    NaN where nothing was measured; ``axes`` has shape (3,), ``cables`` (n,).
+    """
+
+    position_rms: float
+    tension_rms: float
+    axes: Array
+    cables: Array
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One recording beside the co-simulations of the robot before and after; ``role`` is "fit" or "check"."""
+
+    role: str
+    recording: Recording
+    before: Motion
+    after: Motion
+    errors_before: Errors
+    errors_after: Errors
+
+
+@dataclass(frozen=True)
+class Trace:
+    """The answer to: what does this model lack.
+
+    ``noise_floor`` is what the sensors alone would leave; ``left`` the mean square of the whitened innovations of
+    each output (x, y, z, tensions) under the final model on unseen data, shape (3 + n,).
+    """
+
+    verdict: VerdictName
+    sentence: str
+    robot_before: Robot
+    robot_after: Robot
+    effects: tuple[FoundEffect, ...]
+    also_possible: tuple[tuple[str, ...], ...]
+    candidates: tuple[Candidate, ...]
+    formula: str | None
+    comparisons: tuple[Comparison, ...]
+    noise_floor: Errors
+    noise_before: bool
+    noise_after: bool
+    left: Array
+    alpha: float
+    notes: tuple[str, ...]
+    seconds: float
