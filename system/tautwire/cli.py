@@ -1,0 +1,212 @@
+"""The command line: ``tautwire build | simulate | linearise | trace``."""
+
+from __future__ import annotations
+
+import json
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    Progress,
+    SpinnerColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+from .errors import InputError, TautwireError, UnreachableError
+from .robot import Robot
+from .robot_file import read_robot
+from .statics import static_tensions
+
+# The base of all errors of usage; newer typer hides it in a private module.
+UsageError: type[Exception] = typer.BadParameter.__bases__[0]
+
+DONE, FAILED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
+
+application = typer.Typer(
+    name="tautwire",
+    help="Cable-driven parallel robots as FMI components, and a tracer that finds what their model lacks.",
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+)
+
+RobotFile = Annotated[Path, typer.Argument(metavar="ROBOT.toml", help="The robot file.")]
+
+
+def main() -> None:
+    """Run the command line; the exit status is 0 done, 2 the input is wrong, 1 anything else."""
+    sys.exit(run(sys.argv[1:]))
+
+
+def run(arguments: list[str]) -> int:
+    """Run one command and return its exit status; errors go to standard error, one line each."""
+    try:
+        application(arguments, standalone_mode=False)
+    except (InputError, UsageError) as error:
+        message = str(error) if isinstance(error, InputError) else error.format_message()  # type: ignore[attr-defined]
+        return _say(message, WRONG_INPUT)
+    except (TautwireError, OSError) as error:
+        return _say(str(error), FAILED)
+    except (KeyboardInterrupt, typer.Abort):
+        return _say("interrupted; nothing was written", INTERRUPTED)
+    return DONE
+
+
+def _say(message: str, status: int) -> int:
+    print("tautwire: " + " ".join(message.split()), file=sys.stderr)
+    return status
+
+
+@application.command()
+def build(
+    robot_file: RobotFile,
+    out: Annotated[Path, typer.Option(help="Folder for the FMUs.")] = Path("build"),
+) -> None:
+    """Build the FMUs: one a cable, one for the platform.
+
+    Example: tautwire build robot.toml --out build/
+    """
+    from .output import folder_in_place
+    from .packaging import build_fmus
+
+    robot = _robot(robot_file)
+    with folder_in_place(out) as scratch:
+        fmus = build_fmus(robot, scratch)
+    for path in (*fmus.cables, fmus.platform):
+        print(out / path.name)
+
+
+@application.command()
+def simulate(
+    robot_file: RobotFile,
+    speeds: Annotated[Path, typer.Option(metavar="RECORDING.csv", help="Winch speeds over time.")],
+    out: Annotated[Path, typer.Option(metavar="RESULT.csv", help="Where the result goes.")],
+    step: Annotated[float, typer.Option(help="Longest macro step, s.")] = 0.01,
+    until: Annotated[float | None, typer.Option(help="Stop at this time, s.")] = None,
+) -> None:
+    """Co-simulate the FMUs over recorded winch speeds.
+
+    Example: tautwire simulate robot.toml --speeds recording.csv --out result.csv
+    """
+    from .output import file_in_place
+    from .simulation import simulate_recording
+
+    if not step > 0.0:
+        raise InputError("--step", f"{step:g} s is not positive", "give a step such as 0.01")
+    robot = _robot(robot_file)
+    with file_in_place(out) as scratch, _progress() as tell:
+        motion, notes = simulate_recording(robot, speeds, step, until, tell)
+        motion.frame().to_csv(scratch, index=False)
+    for note in notes:
+        print(note, file=sys.stderr)
+    print(out)
+
+
+@application.command()
+def linearise(
+    robot_file: RobotFile,
+    out: Annotated[Path, typer.Option(metavar="MODEL.json", help="Where the model goes.")],
+    at: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Position, m; by default the start.")] = None,
+) -> None:
+    """Linearise the robot at rest: modes, and A, B, C, D with named signals.
+
+    Example: tautwire linearise robot.toml --at 10,5.5,4 --out model.json
+    """
+    from .linear import linearise as linearised
+    from .linear import model_document
+    from .output import file_in_place
+
+    robot = _robot(robot_file)
+    plant = linearised(robot, None if at is None else _position(at))
+    with file_in_place(out) as scratch:
+        scratch.write_text(json.dumps(model_document(plant), indent=1), encoding="utf-8")
+    pairs = zip(plant.frequencies, plant.damping_ratios, strict=True)
+    for number, (frequency, ratio) in enumerate(pairs, start=1):
+        print(f"mode {number}: {frequency:.4f} Hz, damping ratio {ratio:.5f}")
+    print(out)
+
+
+@application.command()
+def trace(
+    robot_file: RobotFile,
+    fit: Annotated[Path, typer.Argument(metavar="FIT.csv", help="The recording to fit.")],
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where the report goes.")],
+    check: Annotated[Path | None, typer.Option(metavar="CHECK.csv", help="A recording to judge on.")] = None,
+    alpha: Annotated[float, typer.Option(help="Rate of false alarms allowed.")] = 0.01,
+) -> None:
+    """Find what the model lacks, add it, and report the error before and after.
+
+    Example: tautwire trace robot.toml fit.csv --check check.csv --out report/
+    """
+    from .output import folder_in_place
+    from .recording import read_recording
+    from .report import trace_table, write_report
+    from .tracer import trace as traced
+
+    if not 0.0 < alpha < 1.0:
+        raise InputError("--alpha", f"{alpha:g} is not a rate", "give a number between 0 and 1, such as 0.01")
+    robot = _robot(robot_file)
+    recording = read_recording(fit, robot.cable_count)
+    judging = None if check is None else read_recording(check, robot.cable_count)
+    with folder_in_place(out) as scratch:
+        with _progress() as tell:
+            result = traced(robot, recording, judging, tell, alpha)
+        write_report(result, scratch)
+    Console().print(trace_table(result))
+    print(out / "index.html")
+
+
+def _robot(path: Path) -> Robot:
+    """Read a robot file and refuse a start that its cables cannot hold."""
+    robot = read_robot(path)
+    try:
+        static_tensions(robot)
+    except UnreachableError as error:
+        where = f"{path}: platform.start"
+        raise UnreachableError(where, error.position, error.cable, error.tension, error.reason) from error
+    return robot
+
+
+def _position(text: str) -> tuple[float, float, float]:
+    mend = "give three numbers in m, such as --at 10,5.5,4"
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError:
+        raise InputError("--at", f"{text!r} is not a position", mend) from None
+    return x, y, z
+
+
+@contextmanager
+def _progress() -> Iterator[Callable[[str, float], None]]:
+    """A bar on standard error that names what is being done."""
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description:<32}"),
+        BarColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
+    with Progress(*columns, console=Console(stderr=True), transient=True) as bar:
+        task = bar.add_task("", total=1.0)
+        current = ""
+
+        def tell(what: str, done: float) -> None:
+            nonlocal current
+            if what != current:
+                bar.reset(task, description=what)
+                current = what
+            bar.update(task, completed=done)
+
+        yield tell
+
+
+if __name__ == "__main__":
+    main()
