@@ -1,0 +1,44 @@
+"""An independent simulator of a point mass on cables; it shares no code with the project it checks."""
+
+from tests.rig.effect import Effect
+from tests.rig.mechanics import Rig
+from tests.rig.program import (
+    PathProgram,
+    Program,
+    RampProgram,
+    SampledProgram,
+    StillProgram,
+)
+from tests.rig.record import Accuracy, make_recording, write_recording
+from tests.rig.registry import EFFECTS
+from tests.rig.robot import Noise, Robot, TensionLimits, load_robot, robot_from
+from tests.rig.robots import eight_robot, paper_robot, robot_of, symmetric_robot, with_law
+from tests.rig.solve import Run, simulate
+from tests.rig.wander import wander
+
+__all__ = [
+    "EFFECTS",
+    "Accuracy",
+    "Effect",
+    "Noise",
+    "PathProgram",
+    "Program",
+    "RampProgram",
+    "Rig",
+    "Robot",
+    "Run",
+    "SampledProgram",
+    "StillProgram",
+    "TensionLimits",
+    "eight_robot",
+    "load_robot",
+    "make_recording",
+    "paper_robot",
+    "robot_from",
+    "robot_of",
+    "simulate",
+    "symmetric_robot",
+    "wander",
+    "with_law",
+    "write_recording",
+]

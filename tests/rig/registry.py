@@ -1,0 +1,39 @@
+"""Every effect of the rig, by the name that the project's formats use; `unlisted_...` are on no list."""
+
+from __future__ import annotations
+
+from tests.rig.constants import Damping, Modulus, Payload
+from tests.rig.effect import Effect
+from tests.rig.material import Creep, Hysteresis, Pushing, Relaxation, Slack, Stiffening, Thermal
+from tests.rig.outside import Drag, SensorDelay, SensorGain
+from tests.rig.route import Anchor, Frame, Pulley, Sag
+from tests.rig.unlisted import Bungee, Magnet, Shaker, Sideways, Swing, Wave
+from tests.rig.winch import Drum, Friction
+
+EFFECTS: dict[str, type[Effect]] = {
+    "damping": Damping,
+    "modulus": Modulus,
+    "relaxation": Relaxation,
+    "hysteresis": Hysteresis,
+    "creep": Creep,
+    "thermal": Thermal,
+    "sag": Sag,
+    "pulley": Pulley,
+    "anchor": Anchor,
+    "drum": Drum,
+    "friction": Friction,
+    "payload": Payload,
+    "drag": Drag,
+    "slack": Slack,
+    "sensor_delay": SensorDelay,
+    "sensor_gain": SensorGain,
+    "unlisted_bungee": Bungee,
+    "unlisted_frame": Frame,
+    "unlisted_magnet": Magnet,
+    "unlisted_pushing": Pushing,
+    "unlisted_shaker": Shaker,
+    "unlisted_sideways": Sideways,
+    "unlisted_stiffening": Stiffening,
+    "unlisted_swing": Swing,
+    "unlisted_wave": Wave,
+}

@@ -1,0 +1,89 @@
+"""The robot as its owner declares it, read from a robot file."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+Vector = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class TensionLimits:
+    """Where the start tensions of a robot with more than three cables may lie, N."""
+
+    minimum: float = 0.0
+    maximum: float = float("inf")
+    preferred: float = 0.0
+
+
+@dataclass(frozen=True)
+class Noise:
+    """Standard deviation of one sample: position m, tension N, winch speed m/s."""
+
+    position: float = 0.0
+    tension: float = 0.0
+    winch_speed: float = 0.0
+
+
+@dataclass(frozen=True)
+class Robot:
+    """A point mass on n >= 3 cables; one row or entry per cable, SI units, z up."""
+
+    gravity: float
+    mass: float
+    start: Vector
+    anchors: Vector
+    modulus: Vector
+    area: Vector
+    damping: Vector
+    linear: NDArray[np.bool_]
+    tension: TensionLimits = field(default_factory=TensionLimits)
+    noise: Noise = field(default_factory=Noise)
+    name: str = "robot"
+
+    @property
+    def count(self) -> int:
+        """Number of cables."""
+        return len(self.anchors)
+
+
+def robot_from(content: Mapping[str, Any]) -> Robot:
+    """The robot that the content of a robot file declares; its [effect] tables are not read here."""
+    cables = content["cable"]
+    sensors = content.get("sensors", {})
+
+    def column(key: str, default: float | None = None) -> Vector:
+        rows = [cable[key] if default is None else cable.get(key, default) for cable in cables]
+        return np.array(rows, float)
+
+    return Robot(
+        name=content.get("name", "robot"),
+        gravity=float(content.get("gravity", 9.81)),
+        mass=float(content["platform"]["mass"]),
+        start=np.array(content["platform"]["start"], float),
+        anchors=column("anchor"),
+        modulus=column("modulus"),
+        area=column("area"),
+        damping=column("damping", 0.0),
+        linear=np.array([cable.get("law", "logarithmic") == "linear" for cable in cables]),
+        tension=TensionLimits(**content.get("tension", {})),
+        noise=Noise(**{key.removesuffix("_noise"): float(value) for key, value in sensors.items()}),
+    )
+
+
+def load_robot(path: str | Path) -> Robot:
+    """The robot of a robot file."""
+    with open(path, "rb") as file:
+        return robot_from(tomllib.load(file))
