@@ -88,8 +88,7 @@ def _distribute(robot: Robot, position: Array, unit: Array, load: Array) -> Arra
     limits = robot.tension or DEFAULT_LIMITS
     count = unit.shape[1]
     problem: Any = {"h": casadi.Sparsity.dense(count, count), "a": casadi.Sparsity.dense(3, count)}
-    options = {"printLevel": "none", "error_on_fail": False}
-    solver = casadi.conic("tension_distribution", "qpoases", problem, options)
+    solver = casadi.conic("tension_distribution", "daqp", problem, {"error_on_fail": False})
     scale = max(float(np.linalg.norm(load)), 1.0)
     solution = solver(
         h=np.eye(count),
