@@ -81,7 +81,7 @@ class Cable(Slave):
     def get_real(self, vrs: Any) -> List[float]:
         if (self.stale or self.rates_stale) and any(FIRST_RATE <= reference < FIRST_STATE for reference in vrs):
             super().get_real(vrs)
-            self._refresh_rates()
+            self.attempt(self._refresh_rates)
             self.rates_stale = False
         return super().get_real(vrs)
 

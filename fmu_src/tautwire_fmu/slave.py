@@ -8,7 +8,7 @@ step, the inputs run on a polynomial from those set before to those set now.
 import json
 import math
 from pathlib import Path
-from typing import Any, Dict, List, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
 from xml.etree.ElementTree import Element
 
 from pythonfmu import Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability, Real
@@ -63,12 +63,31 @@ class Slave(Fmi2Slave):
 
     def get_real(self, vrs: Sequence[int]) -> List[float]:
         if self.stale:
-            self.refresh()
+            self.attempt(self.refresh)
             self.stale = False
         real = self.real
         return [real[reference] for reference in vrs]
 
+    def attempt(self, refresh: Callable[[], None]) -> None:
+        """Refresh outputs; where the law has no value for the inputs, all outputs become NaN.
+
+        An exception must not leave a slave: pythonfmu 0.7.0 ends the process at the third.
+        """
+        try:
+            refresh()
+        except (ArithmeticError, ValueError) as error:
+            for reference, variable in enumerate(self.variables):
+                if variable.causality == "output":
+                    self.real[reference] = math.nan
+            self.log(f"no outputs: {error}; inputs {self.inputs_by_name()}", Fmi2Status.warning)
+
+    def inputs_by_name(self) -> Dict[str, float]:
+        """The inputs as they were set."""
+        return {v.name: value for v, value in zip(self.variables, self.real[: self.input_count])}
+
     def set_real(self, vrs: Sequence[int], values: Sequence[float]) -> None:
+        if not vrs:
+            return
         real = self.real
         if 0 in vrs and values[list(vrs).index(0)] != real[0]:
             self.earlier = tuple(real[: self.input_count])
@@ -89,8 +108,8 @@ class Slave(Fmi2Slave):
             self.advance(step_size, ends)
         except (ArithmeticError, ValueError) as error:
             self.restore(before)
-            inputs = dict(zip((v.name for v in self.variables), self.real[: self.input_count]))
-            self.log(f"step of {step_size!r} s at {current_time!r} s: {error}; inputs {inputs}", Fmi2Status.error)
+            told = f"step of {step_size!r} s at {current_time!r} s: {error}; inputs {self.inputs_by_name()}"
+            self.log(told, Fmi2Status.error)
             return False
         self.started = True
         self.elapsed = 0.0 if ends else step_size

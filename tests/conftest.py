@@ -1,0 +1,22 @@
+import pytest
+
+from tautwire.packaging import RobotFmus, build_fmus
+from tests.robots import example, paper_robot, with_damping
+
+
+@pytest.fixture(scope="session")
+def three_fmus(tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
+    """The paper's undamped three-cable robot, built once."""
+    return build_fmus(paper_robot(), tmp_path_factory.mktemp("three"))
+
+
+@pytest.fixture(scope="session")
+def damped_fmus(tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
+    """The paper's robot with its damping at 2 Hz."""
+    return build_fmus(paper_robot(damping=2.08e9), tmp_path_factory.mktemp("damped"))
+
+
+@pytest.fixture(scope="session")
+def eight_fmus(tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
+    """The example with eight cables."""
+    return build_fmus(with_damping(example("eight"), 3e8), tmp_path_factory.mktemp("eight"))

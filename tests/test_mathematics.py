@@ -1,0 +1,34 @@
+import math
+
+import pytest
+
+from tautwire_fmu.laws.mathematics import COMPLEX_STEP, REAL, along, rate_of
+
+
+@pytest.mark.parametrize(
+    ("name", "at", "slope"),
+    [
+        ("log", 0.7, 1 / 0.7),
+        ("exp", 0.3, math.exp(0.3)),
+        ("sqrt", 2.0, 0.5 / math.sqrt(2.0)),
+        ("sin", 1.1, math.cos(1.1)),
+        ("cos", 1.1, -math.sin(1.1)),
+        ("tanh", 0.4, 1.0 - math.tanh(0.4) ** 2),
+        ("absolute", -0.4, -1.0),
+    ],
+)
+def test_complex_step_is_exact(name: str, at: float, slope: float) -> None:
+    value = getattr(COMPLEX_STEP, name)(along(at, 3.0))
+    assert rate_of(value) == pytest.approx(3.0 * slope, rel=1e-15)
+    assert value.real == pytest.approx(getattr(REAL, name)(at), rel=1e-15)
+
+
+def test_kinks_choose_by_the_real_part() -> None:
+    assert rate_of(COMPLEX_STEP.maximum(along(1.0, 2.0), along(0.5, 7.0))) == 2.0
+    assert rate_of(COMPLEX_STEP.where(along(-1.0, 1.0), along(0.0, 2.0), along(0.0, 5.0))) == 5.0
+    assert REAL.where(1.0, 2.0, 3.0) == 2.0
+    assert REAL.where(0.0, 2.0, 3.0) == 3.0
+
+
+def test_a_constant_has_no_rate() -> None:
+    assert rate_of(4.0) == 0.0  # type: ignore[arg-type]
