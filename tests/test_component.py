@@ -1,0 +1,38 @@
+"""What the master does with FMUs that fail."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tautwire.cosimulation import instantiated, shown_ports
+from tautwire.master import Component, ComponentError, Sampled, simulate
+from tautwire.packaging import RobotFmus
+
+
+def test_a_failing_fmu_is_named_with_time_and_inputs(three_fmus: RobotFmus) -> None:
+    with Component("left", three_fmus.cables[0]) as component:
+        component.initialize(0.0, {})
+        component.run()
+        at_anchor = component.block(["position.x", "position.y", "position.z"])
+        at_anchor.values[:] = [0.0, 50.0, 50.0]
+        component.write(at_anchor)
+        with pytest.raises(ComponentError) as caught:
+            component.step(0.25, 0.01)
+    assert caught.value.component == "left"
+    assert caught.value.time == 0.25
+    assert caught.value.inputs["position.y"] == 50.0
+    assert "division by zero" in str(caught.value)
+
+
+def test_a_value_that_is_not_finite_stops_the_run(three_fmus: RobotFmus) -> None:
+    speeds = np.array([[0.0, 0.0, 0.0], [0.0, np.inf, 0.0]])
+    with instantiated(three_fmus) as coupling, pytest.raises(ComponentError, match="not finite"):
+        simulate(coupling, Sampled(np.array([0.0, 0.1]), speeds), np.array([0.0, 0.1]), shown_ports(3), 0.01)
+
+
+def test_folders_go_when_the_block_ends(three_fmus: RobotFmus) -> None:
+    with Component("left", three_fmus.cables[0]) as component:
+        folder = Path(component.folder)
+        assert folder.is_dir()
+    assert not folder.exists()

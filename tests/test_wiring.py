@@ -1,0 +1,63 @@
+from collections.abc import Iterator
+
+import pytest
+
+from tautwire.cosimulation import connections
+from tautwire.master import Component, Connection, Port, WiringError
+from tautwire.master.wiring import check, levels
+from tautwire.packaging import RobotFmus
+
+
+@pytest.fixture
+def components(three_fmus: RobotFmus) -> Iterator[dict[str, Component]]:
+    paths = {"platform": three_fmus.platform} | {f"cable_{i + 1}": p for i, p in enumerate(three_fmus.cables)}
+    made = {name: Component(name, path) for name, path in paths.items()}
+    yield made
+    for component in made.values():
+        component.close()
+
+
+def wire(source: str, target: str) -> Connection:
+    return Connection(Port(*source.split(":")), Port(*target.split(":")))
+
+
+def test_the_robots_wiring_passes(components: dict[str, Component]) -> None:
+    check(components, connections(3))
+
+
+def test_motion_comes_first_and_force_rates_last(components: dict[str, Component]) -> None:
+    order = [{c.source.variable.split(".")[0] for c in group} for group in levels(components, connections(3))]
+    assert order == [{"position", "velocity"}, {"force"}, {"acceleration"}, {"force_rate"}]
+
+
+@pytest.mark.parametrize(
+    ("source", "target", "said"),
+    [
+        ("winch:speed", "cable_1:winch_speed", "no component 'winch'"),
+        ("platform:positon.x", "cable_1:position.x", "no variable 'positon.x'"),
+        ("cable_1:winch_speed", "platform:force_1.x", "is input, it must be output"),
+        ("platform:position.x", "cable_1:tension", "is output, it must be input"),
+        ("platform:position.x", "cable_1:velocity.x", "units differ, 'm' and 'm/s'"),
+    ],
+)
+def test_a_wrong_connection_is_refused(components: dict[str, Component], source: str, target: str, said: str) -> None:
+    with pytest.raises(WiringError, match=said):
+        check(components, [wire(source, target)])
+
+
+def test_an_input_has_one_source(components: dict[str, Component]) -> None:
+    twice = [wire(f"platform:position.{axis}", "cable_1:position.x") for axis in "xy"]
+    with pytest.raises(WiringError, match="driven by platform"):
+        check(components, twice)
+
+
+def test_a_loop_without_delay_is_named(components: dict[str, Component]) -> None:
+    loop = [
+        wire("cable_1:force.x", "platform:force_1.x"),
+        wire("platform:acceleration.x", "cable_1:acceleration.x"),
+        wire("cable_1:force_rate.x", "cable_2:acceleration.y"),
+        wire("cable_2:tension_rate", "cable_1:acceleration.y"),
+    ]
+    levels(components, loop[:3])
+    with pytest.raises(WiringError, match="depend on each other without delay"):
+        levels(components, [*loop, wire("cable_2:force_rate.x", "cable_1:acceleration.z")])
