@@ -1,0 +1,135 @@
+"""Reference paths of the platform, and the winch speeds that follow them with inelastic cables."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import pi
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .robot import Point, Robot
+
+Array = NDArray[np.float64]
+
+
+class Trajectory(Protocol):
+    """A path over time; each method takes times (N,) in s and gives (N, 3), in m, m/s and m/s^2."""
+
+    @property
+    def duration(self) -> float:
+        """When the end is reached, in s; the path rests there afterwards, and at its start before 0."""
+        ...
+
+    def position(self, times: Array) -> Array:
+        """Where the platform shall be."""
+        ...
+
+    def velocity(self, times: Array) -> Array:
+        """The rate of position."""
+        ...
+
+    def acceleration(self, times: Array) -> Array:
+        """The rate of velocity."""
+        ...
+
+
+@dataclass(frozen=True)
+class Line:
+    """A straight line from rest at ``start`` to rest at ``end``, in m, within ``duration``, in s.
+
+    ``p = start + s(t) (end - start)`` with the fifth-order law s of :func:`quintic_law`.
+    """
+
+    start: Point
+    end: Point
+    duration: float
+
+    def position(self, times: Array) -> Array:
+        """Where the platform shall be, (N, 3) in m."""
+        return np.array(self.start) + np.outer(quintic_law(times, self.duration)[0], self._span)
+
+    def velocity(self, times: Array) -> Array:
+        """The rate of position, (N, 3) in m/s."""
+        return np.outer(quintic_law(times, self.duration)[1], self._span)
+
+    def acceleration(self, times: Array) -> Array:
+        """The rate of velocity, (N, 3) in m/s^2."""
+        return np.outer(quintic_law(times, self.duration)[2], self._span)
+
+    @property
+    def _span(self) -> Array:
+        return np.array(self.end) - np.array(self.start)
+
+
+@dataclass(frozen=True)
+class Helix:
+    """A helix about a vertical axis from rest to rest within ``duration``, in s.
+
+    ``p = centre + (R cos q, R sin q, rise q / angle)``, ``q = angle s(t)`` with the fifth-order law s of
+    :func:`quintic_law`; ``radius`` R and ``rise`` in m, ``angle`` in rad. Baklouti et al. 2017, Eqs. 13, 14.
+    """
+
+    centre: Point
+    radius: float
+    rise: float
+    angle: float
+    duration: float
+
+    def position(self, times: Array) -> Array:
+        """Where the platform shall be, (N, 3) in m."""
+        turned = self.angle * quintic_law(times, self.duration)[0]
+        return np.array(self.centre) + self._columns(np.cos(turned), np.sin(turned), turned)
+
+    def velocity(self, times: Array) -> Array:
+        """The rate of position, (N, 3) in m/s."""
+        turned, rate, _ = (self.angle * part for part in quintic_law(times, self.duration))
+        return self._columns(-rate * np.sin(turned), rate * np.cos(turned), rate)
+
+    def acceleration(self, times: Array) -> Array:
+        """The rate of velocity, (N, 3) in m/s^2."""
+        turned, rate, change = (self.angle * part for part in quintic_law(times, self.duration))
+        return self._columns(
+            -change * np.sin(turned) - rate**2 * np.cos(turned),
+            change * np.cos(turned) - rate**2 * np.sin(turned),
+            change,
+        )
+
+    def _columns(self, x: Array, y: Array, turned: Array) -> Array:
+        return np.column_stack([self.radius * x, self.radius * y, self.rise / self.angle * turned])
+
+
+# The printed coefficients turn three times and rise 9.4 m; the printed end point and figures need these.
+PAPER_HELIX = Helix(centre=(23.86, 0.0, 5.0), radius=5.0, rise=15.0, angle=4.0 * pi, duration=50.0)
+# The printed beta_2 = 0.1 m contradicts the printed start; z = 1 m is the start.
+CAROCA_HELIX = Helix(centre=(0.0, 0.0, 1.0), radius=1.0, rise=0.12 * pi, angle=0.6 * pi, duration=4.0)
+
+
+def quintic_law(times: Array, duration: float) -> tuple[Array, Array, Array]:
+    """A rest-to-rest time law from 0 to 1 with its two derivatives in time.
+
+    ``s = 6 f^5 - 15 f^4 + 10 f^3``, ``f = t / duration`` held within 0 and 1; speed and acceleration are zero
+    at both ends.
+    """
+    f = np.clip(np.asarray(times, dtype=float) / duration, 0.0, 1.0)
+    rest = 1.0 - f
+    return (
+        f**3 * (10.0 + f * (6.0 * f - 15.0)),
+        30.0 * f**2 * rest**2 / duration,
+        60.0 * f * rest * (rest - f) / duration**2,
+    )
+
+
+def cable_directions(robot: Robot, positions: Array) -> Array:
+    """Unit vectors from the platform to the exit points; positions (N, 3) in m give (N, 3, n)."""
+    spans = np.array(robot.anchors).T - np.asarray(positions, dtype=float)[:, :, None]
+    directions: Array = spans / np.linalg.norm(spans, axis=1, keepdims=True)
+    return directions
+
+
+def ideal_winch_speeds(robot: Robot, trajectory: Trajectory, times: Array) -> Array:
+    """Speeds that reel inelastic cables along a path, ``V_i = -dl_i/dt = u_i . v``, shape (N, n), in m/s."""
+    unit = cable_directions(robot, trajectory.position(times))
+    speeds: Array = np.einsum("kai,ka->ki", unit, trajectory.velocity(times))
+    return speeds
