@@ -1,0 +1,133 @@
+"""The numbers that the page's figures draw, as one JSON value; the scripts in ``assets`` draw them."""
+
+from __future__ import annotations
+
+import math
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..tracer.verdict import Comparison, Trace
+from .series import envelope, envelope_times, noise_density, packed, spectrum, thinned
+from .summary import Output, axis_outputs, cable_outputs
+from .units import significant
+
+Array = NDArray[np.float64]
+
+ALL_POINTS = 260_000  # of all residuals on a page, so that it stays a few MB
+MOST_POINTS, FEWEST_POINTS = 3000, 400  # a trace
+PATH_POINTS = 900
+MAGNIFICATIONS = (1, 10, 100, 1000)
+# Deviations are drawn larger until the largest is this share of the robot.
+VISIBLE_SHARE = 0.05
+ROLE_LABELS = {"fit": "Fit recording", "check": "Check recording"}
+
+
+def page_data(trace: Trace) -> dict[str, Any]:
+    """All recordings of a trace, ready to draw."""
+    return {
+        "anchors": [[float(value) for value in anchor] for anchor in trace.robot_before.anchors],
+        "magnifications": list(MAGNIFICATIONS),
+        "recordings": [_recording(trace, comparison) for comparison in trace.comparisons],
+    }
+
+
+def outputs(trace: Trace) -> list[Output]:
+    """All measured outputs in the order of a recording's: axes, then cables."""
+    return [*axis_outputs(), *cable_outputs(trace.robot_before.cable_count)]
+
+
+def noise_of(trace: Trace, output: Output) -> tuple[float, bool]:
+    """Standard deviation of one sample in the output's unit, and whether the robot file declares it.
+
+    Where it does not, it is the trace's noise floor of that output.
+    """
+    sensors = trace.robot_before.sensors
+    declared = sensors.position_noise if output.key[0] == "axes" else sensors.tension_noise
+    if declared is not None:
+        return output.scale * declared, True
+    return output.of(trace.noise_floor), False
+
+
+def _recording(trace: Trace, comparison: Comparison) -> dict[str, Any]:
+    shown = outputs(trace)
+    points = int(np.clip(ALL_POINTS // (4 * len(shown)), FEWEST_POINTS, MOST_POINTS))
+    return {
+        "role": comparison.role,
+        "label": ROLE_LABELS.get(comparison.role, comparison.role),
+        "time": packed(envelope_times(comparison.recording.time, points)),
+        "channels": [_channel(trace, comparison, output, place, points) for place, output in enumerate(shown)],
+        "scene": _scene(trace, comparison),
+    }
+
+
+def _channel(trace: Trace, comparison: Comparison, output: Output, place: int, points: int) -> dict[str, Any]:
+    """Residuals of one output, measured minus model, and their spectra; null where it was not measured."""
+    time = comparison.recording.time
+    measured = comparison.recording.measured()[:, place]
+    before = output.scale * (measured - comparison.before.measured()[:, place])
+    after = output.scale * (measured - comparison.after.measured()[:, place])
+    sigma, _ = noise_of(trace, output)
+    described = {
+        "label": output.label,
+        "unit": output.unit,
+        "rms": [significant(output.of(errors)) for errors in (comparison.errors_before, comparison.errors_after)],
+        "sigma": sigma if math.isfinite(sigma) else None,
+    }
+    if not np.isfinite(before).any() and not np.isfinite(after).any():
+        return {**described, "before": None, "after": None, "reach": None, "spectrum": None}
+    return {
+        **described,
+        "before": packed(envelope(before, points)),
+        "after": packed(envelope(after, points)),
+        "reach": float(np.max(np.abs(after[np.isfinite(after)]), initial=0.0)),
+        "spectrum": _spectrum(time, before, after, sigma),
+    }
+
+
+def _spectrum(time: Array, before: Array, after: Array, sigma: float) -> dict[str, Any] | None:
+    found = spectrum(time, before, after)
+    if found is None:
+        return None
+    return {
+        "frequency": packed(found.frequency),
+        "before": packed(found.before),
+        "after": packed(found.after),
+        "floor": noise_density(sigma, time) if math.isfinite(sigma) else None,
+    }
+
+
+def _scene(trace: Trace, comparison: Comparison) -> dict[str, Any]:
+    """Paths (m) and tensions (N) at times that the slider stops at."""
+    recording = comparison.recording
+    kept = thinned(recording.time.size, PATH_POINTS)
+    tensions = comparison.after.tension[kept]
+    finite = tensions[np.isfinite(tensions)]
+    return {
+        "time": packed(recording.time[kept]),
+        "before": _columns(comparison.before.position[kept]),
+        "after": _columns(comparison.after.position[kept]),
+        "measured": _columns(recording.position[kept]) if recording.has_position else None,
+        "tension": _columns(tensions),
+        "measuredTension": _columns(recording.tension[kept]) if recording.has_tension else None,
+        "tensionRange": [float(finite.min()), float(finite.max())] if finite.size else [0.0, 1.0],
+        "magnify": _magnification(trace, comparison),
+    }
+
+
+def _columns(values: Array) -> list[str]:
+    return [packed(column) for column in values.T]
+
+
+def _magnification(trace: Trace, comparison: Comparison) -> int:
+    """How many times larger to draw deviations from the path, so that a reader sees them."""
+    points = np.vstack((np.array(trace.robot_before.anchors), comparison.after.position))
+    size = float(np.max(np.ptp(points, axis=0)))
+    gap = np.linalg.norm(comparison.before.position - comparison.after.position, axis=1)
+    if comparison.recording.has_position:
+        apart = comparison.recording.position - comparison.after.position
+        gap = np.concatenate((gap, np.sqrt(np.nansum(apart**2, axis=1))))
+    largest = float(np.max(gap[np.isfinite(gap)], initial=0.0))
+    fitting = [times for times in MAGNIFICATIONS if times * largest <= VISIBLE_SHARE * size]
+    return max(fitting, default=1) if largest > 0.0 else 1

@@ -1,0 +1,27 @@
+"""The folder that a trace leaves: the robot with its effects, its FMUs, the report for machines and for people."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+from ..packaging import RobotFmus, build_fmus
+from ..robot_file import write_robot
+from ..tracer.verdict import Trace
+from .document import trace_document
+from .page import trace_page
+
+
+def write_report(trace: Trace, folder: Path) -> RobotFmus:
+    """Write ``robot.toml``, its FMUs, ``report.json`` and ``index.html`` into an existing folder.
+
+    Raises OSError where the disk refuses; returns where the FMUs are.
+    """
+    write_robot(trace.robot_after, folder / "robot.toml")
+    fmus = build_fmus(trace.robot_after, folder)
+    document = json.dumps(trace_document(trace), indent=1, allow_nan=False)
+    (folder / "report.json").write_text(document + "\n", encoding="utf-8")
+    links = {"robot.toml": "robot.toml", "report.json": "report.json"}
+    links |= {path.name: path.name for path in (*fmus.cables, fmus.platform)}
+    (folder / "index.html").write_text(trace_page(trace, links), encoding="utf-8")
+    return fmus

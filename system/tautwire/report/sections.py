@@ -1,0 +1,228 @@
+"""The written parts of the page: verdict, tables and lists; each function gives HTML."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+
+import numpy as np
+
+from ..tracer.verdict import Candidate, FoundEffect, Trace
+from . import charts
+from .figures import ROLE_LABELS, outputs
+from .markup import Column, bullets, href, number, section, table, text
+from .summary import (
+    POSITION,
+    ROLES,
+    TENSION,
+    VERDICTS,
+    Output,
+    axis_outputs,
+    cable_outputs,
+    cables_text,
+    comparison_of,
+    estimate_text,
+    evidence_text,
+    noise_sentence,
+    ranking,
+    share_explained,
+    values_text,
+)
+from .units import percent, significant
+
+SHOWN_CANDIDATES = 8
+ERROR_COLUMNS = (
+    Column("Output"),
+    Column("Before", True),
+    Column("After", True),
+    Column("Noise floor", True),
+    Column("Explained", True),
+    Column("Before to after"),
+)
+
+
+def masthead(trace: Trace, links: Mapping[str, str]) -> str:
+    """What the page is about, the verdict in one sentence, and where the files are."""
+    anchors = "".join(f'<li><a href="{href(target)}">{text(label)}</a></li>' for label, target in links.items())
+    files = f'<nav class="files" aria-label="Files"><ul>{anchors}</ul></nav>' if anchors else ""
+    robot = trace.robot_before
+    return (
+        f'<header><p class="eyebrow"><strong>Tautwire trace</strong> '
+        f"<span>{text(robot.name)}, {robot.cable_count} cables</span></p>"
+        f'<p class="verdict verdict-{trace.verdict}">{VERDICTS[trace.verdict]}</p>'
+        f"<h1>{text(trace.sentence)}</h1>"
+        f'<p class="aside">{text(noise_sentence(trace))}</p>{files}</header>'
+    )
+
+
+def summary(trace: Trace) -> str:
+    """Errors before and after on all recordings, and each output below on request."""
+    rows = []
+    details = ""
+    for role in ROLES:
+        if comparison_of(trace, role):
+            rows += _error_rows(trace, role, [POSITION, TENSION], f"{role.capitalize()}, ")
+            details += _error_details(trace, role)
+    lead = (
+        "Root mean square of measured minus co-simulated, before and after. The noise floor is what the sensors "
+        "alone would leave; “explained” is the share of the mean square above it that is gone."
+    )
+    key = _key("before", "after") + '<span class="key key-floor">noise floor, logarithmic scale</span>'
+    main = table("Error of the co-simulation over all axes and all cables", ERROR_COLUMNS, rows, "errors", True)
+    return section("summary", "Before and after", f'{main}<p class="keys dots">{key}</p>{details}', lead)
+
+
+def found(trace: Trace) -> str:
+    """Effects with their parameters, and the formula of a new one."""
+    rows = [row for effect in trace.effects for row in _effect_rows(trace, effect)]
+    content = f"<p>Formula of the new effect:</p><pre>{text(trace.formula)}</pre>" if trace.formula else ""
+    if rows:
+        columns = (
+            Column("Effect"), Column("Where"), Column("Parameter"), Column("Value", True),
+            Column("95 % interval", True), Column("Declared", True), Column("Unit"), Column("Estimate and declared"),
+            Column("Evidence", True),
+        )  # fmt: skip
+        content += table("Effects found, with their parameters", columns, rows, "effects", True)
+        content += '<p class="keys dots"><span class="key key-after">estimate with its interval</span>'
+        content += '<span class="key key-floor">declared</span></p>'
+    elif not content:
+        content = "<p>No effect was added to the model.</p>"
+    lead = "Evidence is the natural logarithm of the likelihood ratio on data that the fit did not see."
+    return section("found", "What the model lacked", content, lead if rows else "")
+
+
+def also_possible(trace: Trace) -> str:
+    """Sets of effects that fit as well."""
+    if trace.also_possible:
+        content = bullets([" + ".join(names) for names in trace.also_possible])
+        lead = "These recordings cannot tell the answer above from:"
+    else:
+        other = "No other set of effects that was tried explains the recordings as well."
+        none = "Nothing that was tried explains the recordings significantly better."
+        content, lead = f"<p>{other if trace.effects else none}</p>", ""
+    return section("possible", "What else is possible", content, lead)
+
+
+def candidates(trace: Trace) -> str:
+    """What was tried in each round, the best first."""
+    lead = (
+        "One effect at a time, fitted on one part of the data and judged on another. Left is the mean square of "
+        "the whitened innovations there: 1 where only noise is left."
+    )
+    largest = max((each.evidence for each in trace.candidates if math.isfinite(each.evidence)), default=0.0)
+    content = "".join(_round(trace, place, group, largest) for place, group in ranking(trace.candidates))
+    return section("candidates", "What was tried", content or "<p>Nothing was tried.</p>", lead)
+
+
+def left(trace: Trace) -> str:
+    """Mean squares of the whitened innovations of each output, against one."""
+    largest = float(np.max(trace.left[np.isfinite(trace.left)], initial=1.5))
+    rows = [
+        [text(output.label), number(significant(float(value))), charts.bar(float(value), largest, mark=1.0)]
+        for output, value in zip(outputs(trace), trace.left, strict=True)
+    ]
+    columns = (Column("Output"), Column("Mean square", True), Column("Against 1"))
+    lead = (
+        "Mean square of the whitened innovations of each output under the final model, on unseen data: 1 where "
+        f"only sensor noise is left. Significance level of the tests: {text(significant(trace.alpha, 2))}."
+    )
+    return section("left", "What is left", table("What is left in each output", columns, rows, "left", True), lead)
+
+
+def notes(trace: Trace) -> str:
+    """Remarks of the trace, columns that were not read, and how long it took."""
+    lines = list(trace.notes)
+    for each in trace.comparisons:
+        if each.recording.unknown_columns:
+            unread = ", ".join(each.recording.unknown_columns)
+            lines.append(f"Columns of the {each.role} recording that were not read: {unread}")
+    lines.append(f"The trace took {significant(trace.seconds)} s.")
+    return section("notes", "Notes", bullets(lines))
+
+
+def _key(*names: str) -> str:
+    return "".join(f'<span class="key key-{name}">{name}</span>' for name in names)
+
+
+def _error_details(trace: Trace, role: str) -> str:
+    """The errors of each output, folded away."""
+    label = ROLE_LABELS[role]
+    parts = [*axis_outputs(), *cable_outputs(trace.robot_before.cable_count)]
+    rows = _error_rows(trace, role, parts)
+    inside = table(f"{label}: error of each output", ERROR_COLUMNS, rows, "errors", True)
+    return f"<details><summary>{label}, axis by axis and cable by cable</summary>{inside}</details>"
+
+
+def _error_rows(trace: Trace, role: str, shown: Sequence[Output], prefix: str = "") -> list[list[str]]:
+    comparison = comparison_of(trace, role)
+    if comparison is None:
+        return []
+    rows = []
+    for output in shown:
+        before, after = output.of(comparison.errors_before), output.of(comparison.errors_after)
+        floor = output.of(trace.noise_floor)
+        low, high = _scale(trace, output)
+        numbers = [f"{number(significant(value))} {_unit(value, output)}" for value in (before, after, floor)]
+        share = number(percent(share_explained(before, after, floor)))
+        label = f"{text(prefix + output.label)}"
+        rows.append([label, *numbers, share, charts.dumbbell(before, after, floor, low, high)])
+    return rows
+
+
+def _unit(value: float, output: Output) -> str:
+    return f'<span class="unit">{output.unit}</span>' if math.isfinite(value) else ""
+
+
+def _scale(trace: Trace, output: Output) -> tuple[float, float]:
+    """One scale for all drawings of a unit: from below the least value to above the largest."""
+    kinds = [*axis_outputs(), POSITION, *cable_outputs(trace.robot_before.cable_count), TENSION]
+    errors = [trace.noise_floor]
+    for each in trace.comparisons:
+        errors += [each.errors_before, each.errors_after]
+    values = np.array([kind.of(each) for kind in kinds if kind.unit == output.unit for each in errors])
+    values = values[np.isfinite(values) & (values > 0.0)]
+    return (0.8 * float(values.min()), 1.25 * float(values.max())) if values.size else (0.0, 0.0)
+
+
+def _effect_rows(trace: Trace, effect: FoundEffect) -> list[list[str]]:
+    where = effect.component
+    if effect.cables:
+        where = cables_text(effect.cables, trace.robot_before.cable_count)
+    rows = []
+    for place, (name, estimate) in enumerate(effect.parameters.items()):
+        told = estimate_text(estimate)
+        interval = f"{number(told.low)} to {number(told.high)}"
+        drawing = charts.whisker(estimate.value, estimate.low, estimate.high, estimate.declared)
+        evidence = number(evidence_text(effect.evidence)) if place == 0 else ""
+        rows.append([
+            text(effect.name), text(where), text(name), f"<strong>{number(told.value)}</strong>",
+            interval, number(told.declared), text(told.unit), drawing, evidence,
+        ])  # fmt: skip
+    return rows
+
+
+def _round(trace: Trace, place: int, group: Sequence[Candidate], largest: float) -> str:
+    """The table of one round; weak candidates are folded away. ``largest`` evidence fills a bar."""
+    columns = (
+        Column("Effect"), Column("Where"), Column("Evidence", True), Column("On unseen data"),
+        Column("Left", True), Column("Values"), Column(""),
+    )  # fmt: skip
+    rows = [_candidate_row(trace, each, largest) for each in group]
+    content = table(f"Round {place}", columns, rows[:SHOWN_CANDIDATES], "candidates")
+    if rest := rows[SHOWN_CANDIDATES:]:
+        folded = table(f"Round {place}, the others", columns, rest, "candidates")
+        content += f"<details><summary>{len(rest)} more with less evidence</summary>{folded}</details>"
+    return content
+
+
+def _candidate_row(trace: Trace, candidate: Candidate, largest: float) -> list[str]:
+    name = "after" if candidate.accepted else "before"
+    return [
+        text(candidate.name),
+        number(cables_text(candidate.cables, trace.robot_before.cable_count)),
+        number(evidence_text(candidate.evidence)),
+        charts.bar(candidate.evidence, largest, name=name),
+        number(significant(candidate.mean_square)),
+        number(values_text(candidate)),
+        '<span class="taken">taken</span>' if candidate.accepted else "",
+    ]

@@ -1,0 +1,262 @@
+"""The page: well formed, complete, self-contained, and deaf to what hostile names say."""
+
+from __future__ import annotations
+
+import json
+import re
+from dataclasses import replace
+from functools import cache
+from html.parser import HTMLParser
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tautwire.report import trace_document, trace_page, write_report
+from tautwire.report.figures import MOST_POINTS, page_data
+from tautwire.report.series import envelope, envelope_times, noise_density, packed, spectrum, unpacked
+from tautwire.robot_file import read_robot
+from tautwire.tracer.verdict import Trace
+from tests.traces import HOSTILE, TENSION_NOISE, made_trace, nothing_found, without_positions
+
+LINKS = {"robot.toml": "robot.toml", "cable 1": "fmus/cable 1.fmu"}
+SECTIONS = ("summary", "found", "possible", "robot", "residuals", "spectra", "candidates", "left", "notes")
+VOID = {"meta", "input", "img", "br", "link", "hr"}
+FETCHING = {"src", "srcset", "poster", "data", "action", "background"}
+
+
+class Page(HTMLParser):
+    """What a page holds: elements with attributes, text, and the content of each script."""
+
+    def __init__(self, content: str) -> None:
+        super().__init__()
+        self.elements: list[tuple[str, dict[str, str]]] = []
+        self.open: list[str] = []
+        self.scripts: list[str] = []
+        self.text = ""
+        self.feed(content)
+        self.close()
+
+    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, {name: value or "" for name, value in attributes}))
+        if tag == "script":
+            self.scripts.append("")
+        if tag not in VOID:
+            self.open.append(tag)
+
+    def handle_startendtag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
+        self.elements.append((tag, {name: value or "" for name, value in attributes}))
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open and self.open.pop() == tag, f"</{tag}> closes nothing"
+
+    def handle_data(self, data: str) -> None:
+        if self.open and self.open[-1] == "script":
+            self.scripts[-1] += data
+        elif "style" not in self.open:
+            self.text += data
+
+    def all(self, tag: str) -> list[dict[str, str]]:
+        """Attributes of all elements of a kind."""
+        return [attributes for name, attributes in self.elements if name == tag]
+
+    def data(self) -> dict[str, Any]:
+        """What the figures draw."""
+        found: dict[str, Any] = json.loads(self.scripts[0])
+        return found
+
+
+@cache
+def page(kind: str) -> Page:
+    """A parsed page, made once."""
+    traces = {
+        "three": lambda: made_trace(),
+        "eight": lambda: made_trace(eight=True),
+        "hostile": lambda: replace(made_trace(name=HOSTILE, path=HOSTILE), sentence=HOSTILE, notes=(HOSTILE,)),
+        "none": lambda: nothing_found(made_trace()),
+        "tensions only": lambda: without_positions(made_trace(check=False)),
+    }
+    return Page(trace_page(traces[kind](), LINKS))
+
+
+KINDS = ("three", "eight", "hostile", "none", "tensions only")
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_page_is_well_formed_with_all_sections(kind: str) -> None:
+    found = page(kind)
+    assert found.open == []
+    assert tuple(each["id"] for each in found.all("section")) == SECTIONS
+    identities = [attributes["id"] for _, attributes in found.elements if "id" in attributes]
+    assert len(identities) == len(set(identities))
+    assert [len(found.all(tag)) for tag in ("h1", "main", "title")] == [1, 1, 1]
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_page_asks_nothing_of_the_network(kind: str) -> None:
+    for tag, attributes in page(kind).elements:
+        assert not FETCHING & set(attributes), tag
+        assert not re.match(r"(?i)\s*([a-z]+:|//)", attributes.get("href", "")), attributes
+    policy = next(each for each in page(kind).all("meta") if each.get("http-equiv"))
+    assert policy["content"].startswith("default-src 'none'")
+
+
+def test_style_fetches_nothing() -> None:
+    assert not re.search(r"@import|url\(", trace_style(), re.IGNORECASE)
+
+
+def trace_style() -> str:
+    """The page's style sheet."""
+    content = trace_page(made_trace(samples=200), {})
+    return content[content.index("<style>") : content.index("</style>")]
+
+
+def test_plotly_is_there_once() -> None:
+    assert sum("plotly.js v" in script for script in page("three").scripts) == 1
+    assert len(page("three").scripts) == 3
+
+
+@pytest.mark.parametrize("eight", [False, True])
+def test_page_stays_small_for_long_recordings(eight: bool) -> None:
+    assert len(trace_page(made_trace(eight, samples=120_000), LINKS)) < 7_000_000
+
+
+def test_verdict_numbers_and_links_are_written_without_scripts() -> None:
+    found = page("three")
+    for words in ("The cables damp 5.3 times", "2.103", "2.050 to 2.160", "812.4", "creep + thermal", "drum effects"):
+        assert words in found.text
+    assert [each["href"] for each in found.all("a")][1:] == ["robot.toml", "fmus/cable%201.fmu"]
+
+
+def test_hostile_names_are_shown_and_do_nothing() -> None:
+    plain, hostile = page("three"), page("hostile")
+    assert [tag for tag, _ in hostile.elements] == [tag for tag, _ in plain.elements]
+    assert all(set(a) == set(b) for (_, a), (_, b) in zip(hostile.elements, plain.elements, strict=True))
+    assert hostile.text.count(HOSTILE) >= 3
+    assert len(hostile.scripts) == len(plain.scripts)
+
+
+def test_hostile_links_stay_paths_beside_the_page() -> None:
+    content = trace_page(made_trace(samples=200), {HOSTILE: 'javascript:alert(1)"><script>alert(2)</script>'})
+    target = Page(content).all("a")[1]["href"]
+    assert target.startswith("javascript%3A") and '"' not in target and "<" not in target
+
+
+def test_hostile_effects_and_columns_are_escaped() -> None:
+    trace = made_trace(samples=200)
+    effect = replace(trace.effects[0], name=HOSTILE, component=HOSTILE, parameters={HOSTILE: _estimate(trace)})
+    candidate = replace(trace.candidates[0], name=HOSTILE, values={HOSTILE: 1.0})
+    recording = replace(trace.comparisons[0].recording, unknown_columns=(HOSTILE, "\u202e\udc80"))
+    comparison = replace(trace.comparisons[0], recording=recording)
+    strange = replace(
+        trace, effects=(effect,), candidates=(candidate,), also_possible=((HOSTILE,),), formula=HOSTILE,
+        comparisons=(comparison,),
+    )  # fmt: skip
+    content = trace_page(strange, {})
+    assert content.encode("utf-8")
+    assert "img" not in [tag for tag, _ in Page(content).elements]
+    assert len(Page(content).scripts) == 3
+
+
+def _estimate(trace: Trace) -> Any:
+    return replace(trace.effects[0].parameters["damping"], unit=HOSTILE)
+
+
+@pytest.mark.parametrize(("kind", "cables"), [("three", 3), ("eight", 8)])
+def test_every_figure_has_data_for_both_recordings(kind: str, cables: int) -> None:
+    found, data = page(kind), page(kind).data()
+    panels = [each for each in found.all("figure") if "data-kind" in each]
+    assert len(panels) == 2 * (3 + cables)
+    assert [each["role"] for each in data["recordings"]] == ["fit", "check"]
+    for recording in data["recordings"]:
+        time = unpacked(recording["time"])
+        for panel in panels:
+            channel = recording["channels"][int(panel["data-channel"])]
+            drawn = channel if panel["data-kind"] == "residual" else channel["spectrum"]
+            across = time if panel["data-kind"] == "residual" else unpacked(drawn["frequency"])
+            for name in ("before", "after"):
+                values = unpacked(drawn[name])
+                assert values.size == across.size > 50
+                assert np.isfinite(values).mean() > 0.9
+        scene = recording["scene"]
+        for columns in (scene["before"], scene["after"], scene["measured"], scene["tension"]):
+            assert all(unpacked(column).size == unpacked(scene["time"]).size for column in columns)
+    assert len(data["anchors"]) == cables
+
+
+def test_what_was_not_measured_is_null_not_nan() -> None:
+    recording = page("tensions only").data()["recordings"][0]
+    assert recording["channels"][0]["before"] is None and recording["channels"][0]["sigma"] is None
+    assert recording["scene"]["measured"] is None
+    assert recording["channels"][3]["before"] is not None
+    assert recording["channels"][3]["sigma"] == TENSION_NOISE  # the floor, as the file declares none
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_controls_and_figures_have_names(kind: str) -> None:
+    found = page(kind)
+    assert all(each.get("aria-label") for tag, each in found.elements if each.get("role") in ("img", "region", "group"))
+    assert found.all("html")[0]["lang"] == "en"
+    labelled = [tag for tag, _ in found.elements].count("label")
+    assert labelled == len(found.all("input")) + len(found.all("select"))
+    assert all(each["aria-hidden"] == "true" for each in found.all("svg"))
+    assert len(found.all("caption")) == len(found.all("table"))
+
+
+def test_page_follows_light_and_dark() -> None:
+    assert "prefers-color-scheme: dark" in trace_style()
+    assert "prefers-color-scheme: dark" in page("three").scripts[2]
+
+
+def test_short_recordings_and_still_robots_make_a_page() -> None:
+    short = made_trace(samples=8)
+    assert page_data(short)["recordings"][0]["channels"][0]["spectrum"] is None
+    assert Page(trace_page(short, {})).open == []
+
+
+def test_diverged_model_makes_a_page() -> None:
+    trace = made_trace(samples=400)
+    gone = replace(trace.comparisons[0].before, position=np.full((400, 3), np.nan), tension=np.full((400, 3), np.inf))
+    errors = replace(trace.comparisons[0].errors_before, position_rms=np.inf, tension_rms=np.nan)
+    comparison = replace(trace.comparisons[0], before=gone, errors_before=errors)
+    assert Page(trace_page(replace(trace, comparisons=(comparison,)), {})).data()["recordings"]
+
+
+def test_envelope_keeps_peaks_order_and_gaps() -> None:
+    values = np.sin(np.linspace(0.0, 50.0, 100_001))
+    values[12_345], values[77_777], values[40_000:42_000] = 9.0, -7.0, np.nan
+    drawn = envelope(values, MOST_POINTS)
+    time = envelope_times(np.arange(values.size, dtype=float), MOST_POINTS)
+    assert drawn.size == time.size <= MOST_POINTS
+    assert (np.diff(time) >= 0.0).all()
+    assert (np.nanmax(drawn), np.nanmin(drawn)) == (9.0, -7.0)
+    assert abs(time[np.nanargmax(drawn)] - 12_345) < 100
+    assert np.isnan(drawn[(time > 40_100) & (time < 41_900)]).all()
+    short = np.array([1.0, np.nan, 3.0])
+    assert np.array_equal(envelope(short, MOST_POINTS), short, equal_nan=True)
+
+
+def test_spectrum_of_noise_lies_on_the_noise_line_and_a_tone_above() -> None:
+    random, time = np.random.default_rng(3), np.linspace(0.0, 399.99, 40_000)
+    noise = random.normal(0.0, 2.0, time.size)
+    found = spectrum(time, noise + np.sin(2 * np.pi * 5.0 * time), noise)
+    assert found is not None
+    level = noise_density(2.0, time)
+    assert np.median(found.after) == pytest.approx(level, rel=0.05)
+    assert found.frequency[np.argmax(found.before)] == pytest.approx(5.0, rel=0.03)
+    assert found.before.max() > 3.0 * level
+
+
+def test_packing_keeps_numbers_and_turns_the_infinite_into_gaps() -> None:
+    assert np.array_equal(unpacked(packed(np.array([1.5, np.nan, np.inf]))), [1.5, np.nan, np.nan], equal_nan=True)
+
+
+def test_folder_holds_robot_fmus_report_and_page_that_links_them(tmp_path: Path) -> None:
+    trace = made_trace(samples=200)
+    fmus = write_report(trace, tmp_path)
+    assert read_robot(tmp_path / "robot.toml") == trace.robot_after
+    assert json.loads((tmp_path / "report.json").read_text(encoding="utf-8")) == trace_document(trace)
+    links = [each["href"] for each in Page((tmp_path / "index.html").read_text(encoding="utf-8")).all("a")][1:]
+    assert sorted(links) == sorted(path.name for path in tmp_path.iterdir() if path.name != "index.html")
+    assert {path.name for path in (*fmus.cables, fmus.platform)} < set(links)
