@@ -128,7 +128,7 @@ def linearise(
     plant = linearised(robot, None if at is None else _position(at))
     with file_in_place(out) as scratch:
         scratch.write_text(json.dumps(model_document(plant), indent=1), encoding="utf-8")
-    pairs = zip(plant.frequencies, plant.damping_ratios, strict=True)
+    pairs = zip(plant.modes.frequencies, plant.modes.damping_ratios, strict=True)
     for number, (frequency, ratio) in enumerate(pairs, start=1):
         print(f"mode {number}: {frequency:.4f} Hz, damping ratio {ratio:.5f}")
     print(out)
