@@ -9,6 +9,7 @@ Source: Bierman (1977), Factorization Methods for Discrete Sequential Estimation
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import casadi
 from casadi import SX, Function
@@ -27,6 +28,14 @@ class Noise:
 
 
 @dataclass(frozen=True)
+class Substeps:
+    """Integration steps between two samples: of the state itself, and of its derivatives."""
+
+    state: int
+    slope: int
+
+
+@dataclass(frozen=True)
 class _Filtered:
     state: SX
     covariance: SX
@@ -36,7 +45,7 @@ class _Filtered:
     gradient: SX
 
 
-def filter_sample(model: Model, cable_count: int, noise: Noise, substeps: int) -> Function:
+def filter_sample(model: Model, cable_count: int, noise: Noise, substeps: Substeps) -> Function:
     """Arguments: state, covariance, slopes, parameters, measured, seen, speed, next speed, time step, roughness.
 
     Results: the first three at the next sample, then whitened innovations (m,), log of their variances (m,), and
@@ -117,18 +126,36 @@ def _take_in(
     return _Filtered(predicted.state + correction, covariance, slopes, errors, logs, gradients)
 
 
-def _advance(model: Model, substeps: int, state: SX, speed: SX, later: SX, step: SX) -> tuple[SX, SX, SX]:
-    """State after one sample, and its derivatives by the state before and by the parameters."""
+def _advance(model: Model, substeps: Substeps, state: SX, speed: SX, later: SX, step: SX) -> tuple[SX, SX, SX]:
+    """State after one sample, and its derivatives by the state before and by the parameters.
+
+    The derivatives weigh errors and may be coarser than the state, whose own error would pose as an effect.
+    """
     single = _runge_kutta_step(model, speed.numel())
+    after = state
+    for begin, end in _cuts(speed, later, substeps.state):
+        after = single(after, model.parameters, begin, end, step / substeps.state)
+    slope = Function(
+        "slope",
+        single.sx_in(),
+        [casadi.jacobian(single(*single.sx_in()), symbol) for symbol in single.sx_in()[:2]],
+    )
     transition = SX.eye(state.numel())
     direct = SX(state.numel(), model.parameters.numel())
-    for k in range(substeps):
-        begin = speed + (k / substeps) * (later - speed)
-        end = speed + ((k + 1) / substeps) * (later - speed)
-        state, by_state, by_parameters = single(state, model.parameters, begin, end, step / substeps)
+    along = state
+    for begin, end in _cuts(speed, later, substeps.slope):
+        arguments = (along, model.parameters, begin, end, step / substeps.slope)
+        by_state, by_parameters = slope(*arguments)
         transition = casadi.mtimes(by_state, transition)
         direct = casadi.mtimes(by_state, direct) + by_parameters
-    return state, transition, direct
+        along = single(*arguments)
+    return after, transition, direct
+
+
+def _cuts(speed: SX, later: SX, count: int) -> list[tuple[SX, SX]]:
+    """Winch speeds at both ends of equal parts of a sample interval."""
+    points = [speed + (k / count) * (later - speed) for k in range(count + 1)]
+    return list(pairwise(points))
 
 
 def _runge_kutta_step(model: Model, cable_count: int) -> Function:
@@ -142,8 +169,4 @@ def _runge_kutta_step(model: Model, cable_count: int) -> Function:
     k3 = rates(model.states + 0.5 * step * k2, middle, model.parameters)
     k4 = rates(model.states + step * k3, at_end, model.parameters)
     after = model.states + step / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
-    return Function(
-        "runge_kutta_step",
-        [model.states, model.parameters, begin, end, step],
-        [after, casadi.jacobian(after, model.states), casadi.jacobian(after, model.parameters)],
-    )
+    return Function("runge_kutta_step", [model.states, model.parameters, begin, end, step], [after])

@@ -18,8 +18,9 @@ from .likelihood import Innovations, Likelihood
 
 Array = NDArray[np.float64]
 
-ROUGHNESSES = (0.1, 0.01, 0.0)
-EVALUATIONS = 30
+# Roughness of the model and relative change of the cost at which to stop, stage by stage.
+STAGES = ((0.1, 1e-3), (0.01, 1e-3), (0.0, 1e-7))
+EVALUATIONS = 15
 NORMAL_95 = 1.959964
 
 
@@ -50,33 +51,26 @@ class Fitter:
     def fit(self, robot: Robot, sample: Sample) -> Fit:
         """Least squares on whitened innovations, first under a rough model, then under the exact one."""
         free = free_parameters(robot)
-        here = placed(robot, sample.start)
         if not free:
             return Fit(robot, np.zeros(0), np.zeros(0))
         start = np.array([robot.effects[f.setting].values[f.name] for f in free])
         scale = np.where(start == 0.0, 1.0, np.abs(start))
-        parameters = [
-            next(p for p in BY_NAME[robot.effects[f.setting].name].parameters if p.name == f.name) for f in free
-        ]
-        bounds = (
-            np.array([p.minimum for p in parameters]) / scale,
-            np.array([p.maximum for p in parameters]) / scale,
-        )
-        likelihood = self._likelihood(here, sample)
-        scaled = start / scale
-        for rough in ROUGHNESSES:
+        bounds = np.array(_bounds(robot)).T / scale
+        likelihood = self._likelihood(placed(robot, sample.start), sample)
+        scaled, slopes = start / scale, np.zeros((0, len(free)))
+        for rough, stop in STAGES:
             residual = _Residual(likelihood, sample, scale, rough)
             solution = least_squares(
                 residual.values,
                 scaled,
                 jac=residual.slopes,
-                bounds=bounds,
+                bounds=(bounds[0], bounds[1]),
                 x_scale="jac",
+                ftol=stop,
                 max_nfev=EVALUATIONS,
             )
-            scaled = solution.x
+            scaled, slopes = solution.x, np.asarray(solution.jac, dtype=float)
         values = scaled * scale
-        slopes = np.asarray(solution.jac, dtype=float)
         covariance = np.linalg.pinv(slopes.T @ slopes)
         fitted = with_values(robot, free, dict(zip(free, values.tolist(), strict=True)))
         return Fit(fitted, values, np.sqrt(np.diag(covariance)) * scale)
@@ -101,6 +95,11 @@ class Fitter:
         if key not in self._compiled:
             self._compiled[key] = Likelihood(robot, free_parameters(robot), self.noise, interval)
         return self._compiled[key]
+
+
+def _bounds(robot: Robot) -> list[tuple[float, float]]:
+    """Smallest and largest value of every parameter, in the order of ``free_parameters``."""
+    return [(p.minimum, p.maximum) for s in robot.effects for p in BY_NAME[s.name].parameters]
 
 
 class _Residual:

@@ -23,11 +23,12 @@ from numpy.typing import NDArray
 from ..recording import Recording
 from ..robot import Robot
 from ..symbolic import FreeParameter, symbolic_model
-from .filter_step import Noise, filter_sample
+from .filter_step import Noise, Substeps, filter_sample
 
 Array = NDArray[np.float64]
 
-STEP_TIMES_FREQUENCY = 0.15
+# Radians of the fastest vibration in one integration step.
+STATE_ANGLE, SLOPE_ANGLE = 0.05, 0.3
 CHUNK = 500
 
 
@@ -72,7 +73,8 @@ class Likelihood:
         self._start = casadi.Function(
             "start", [model.parameters], [model.start, casadi.jacobian(model.start, model.parameters)]
         )
-        substeps = max(1, ceil(fastest_mode(robot) * sample_time / STEP_TIMES_FREQUENCY))
+        angle = fastest_mode(robot) * sample_time
+        substeps = Substeps(max(1, ceil(angle / STATE_ANGLE)), max(1, ceil(angle / SLOPE_ANGLE)))
         self._sample = filter_sample(model, robot.cable_count, noise, substeps)
         self._runs = {CHUNK: self._sample.mapaccum("run", CHUNK, 3)}
 

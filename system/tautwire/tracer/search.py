@@ -15,16 +15,20 @@ from math import log
 import numpy as np
 
 from ..errors import UnreachableError
-from ..robot import Robot
+from ..robot import EffectSetting, Robot
+from .adequacy import is_noise
 from .data import Evidence
 from .fit import Fit, Fitter
 from .hypotheses import Hypothesis, hypotheses
+from .screen import Prospect, screen
 from .verdict import Candidate
 
 Progress = Callable[[str, float], None]
 
 ROUNDS = 3
 ALIKE = 5.0
+# A gain on FIT below this many nats is what chance gives one hypothesis in a hundred.
+HOPELESS = 3.3
 
 
 @dataclass(frozen=True)
@@ -87,19 +91,23 @@ class _Trial:
 
 
 def _try_all(
-    number: int,
-    robot: Robot,
-    accepted: list[Hypothesis],
-    fitter: Fitter,
-    evidence: Evidence,
-    progress: Progress,
+    number: int, robot: Robot, accepted: list[Hypothesis], fitter: Fitter, evidence: Evidence, progress: Progress
 ) -> list[_Trial]:
     judge = evidence.judge
-    without = fitter.innovations(robot, judge).log_likelihood(judge.rows)
-    trials = []
+    plain = fitter.innovations(robot, judge)
+    without = plain.log_likelihood(judge.rows)
     open_ones = [h for h in hypotheses(robot) if not any(h.effect is a.effect for a in accepted)]
+    prospects: dict[Hypothesis, Prospect] = {}
+    if is_noise(plain, judge.rows) and is_noise(fitter.innovations(robot, evidence.fit), evidence.fit.rows):
+        progress(f"round {number}: screening", 0.0)
+        prospects = screen(robot, open_ones, fitter, evidence)
+    trials = []
     for index, hypothesis in enumerate(open_ones):
         progress(f"round {number}: {hypothesis.label(robot)}", index / len(open_ones))
+        prospect = prospects.get(hypothesis)
+        if prospect is not None and prospect.fit_gain < HOPELESS:
+            trials.append(_screened(robot, hypothesis, prospect))
+            continue
         try:
             fit = fitter.fit(robot.with_effect(hypothesis.setting(robot)), evidence.fit)
             innovations = fitter.innovations(fit.robot, judge)
@@ -111,6 +119,15 @@ def _try_all(
             trials.append(_Trial(hypothesis, fit, gain, square))
     progress(f"round {number}: done", 1.0)
     return trials
+
+
+def _screened(robot: Robot, hypothesis: Hypothesis, prospect: Prospect) -> _Trial:
+    names = (parameter.name for parameter in hypothesis.effect.parameters)
+    values = dict(zip(names, prospect.values, strict=True))
+    promised = robot.with_effect(EffectSetting(hypothesis.effect.name, values, hypothesis.cables))
+    empty = np.zeros(0)
+    # Chance may promise more on the judging samples than the threshold; only a fit may pass it.
+    return _Trial(hypothesis, Fit(promised, empty, empty), min(prospect.judge_gain, 0.0), prospect.mean_square)
 
 
 def _without_needless(

@@ -1,0 +1,83 @@
+"""Innovations against what a Kalman filter must do."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tautwire.robot import EffectSetting
+from tautwire.tracer.hypotheses import free_parameters
+from tautwire.tracer.likelihood import Likelihood
+from tautwire.tracer.noise import noise_of
+from tests.recordings import recorded
+from tests.robots import example
+
+ROBOT = example("three")
+RECORDING = recorded("three", 1)
+NOISE = noise_of(ROBOT, RECORDING)
+ALL = np.ones(len(RECORDING.time), dtype=bool)
+
+
+@pytest.mark.parametrize("name", ["three", "caroca", "eight"])
+def test_innovations_of_a_true_model_are_white_with_unit_variance(name: str) -> None:
+    robot, recording = example(name), recorded(name, 1)
+    interval = recording.time[1] - recording.time[0]
+    innovations = Likelihood(robot, (), noise_of(robot, recording), interval).innovations(recording, [])
+    square = innovations.mean_square(np.ones(len(recording.time), dtype=bool))
+    assert np.all(np.abs(square - 1.0) < 5.0 * np.sqrt(2.0 / len(recording.time)))
+    values = innovations.values
+    for lag in (1, 2, 5):
+        alike = np.mean(values[lag:] * values[:-lag], axis=0)
+        assert np.all(np.abs(alike) < 5.0 / np.sqrt(len(values)))
+
+
+def test_slopes_are_the_derivatives_of_the_innovations() -> None:
+    robot = ROBOT.with_effect(EffectSetting("damping", {"damping": 6e8}, (1, 2, 3)))
+    robot = robot.with_effect(EffectSetting("payload", {"mass": 1.0}))
+    likelihood = Likelihood(robot, free_parameters(robot), NOISE, 0.02)
+    short = replace(
+        RECORDING,
+        time=RECORDING.time[:60],
+        winch_speed=RECORDING.winch_speed[:60],
+        tension=RECORDING.tension[:60],
+        position=RECORDING.position[:60],
+    )
+    at = np.array([6e8, 1.0])
+    slopes = likelihood.innovations(short, at).slopes
+    for index, width in enumerate((1e5, 1e-4)):
+        step = np.zeros(2)
+        step[index] = width
+        more, less = (likelihood.innovations(short, at + sign * step).values for sign in (1, -1))
+        difference = (more - less) / (2.0 * width)
+        assert np.max(np.abs(difference - slopes[:, :, index])) < 0.02 * np.max(np.abs(difference))
+
+
+def test_missing_cells_are_passed_over() -> None:
+    tension = RECORDING.tension.copy()
+    tension[100:300, 1] = np.nan
+    blind = replace(RECORDING, tension=tension, position=np.full_like(RECORDING.position, np.nan))
+    innovations = Likelihood(ROBOT, (), NOISE, 0.02).innovations(blind, [])
+    assert np.array_equal(innovations.seen, np.isfinite(blind.measured()))
+    square = innovations.mean_square(ALL)
+    assert np.all(np.isnan(square[:3]))
+    assert np.all(np.abs(square[3:] - 1.0) < 0.3)
+
+
+def test_a_wrong_model_is_less_probable() -> None:
+    right = Likelihood(ROBOT, (), NOISE, 0.02).innovations(RECORDING, [])
+    heavier = ROBOT.with_effect(EffectSetting("payload", {"mass": 1.0}))
+    wrong = Likelihood(heavier, free_parameters(heavier), NOISE, 0.02).innovations(RECORDING, [1.0])
+    assert right.log_likelihood(ALL) - wrong.log_likelihood(ALL) > 100.0
+
+
+def test_parts_of_a_recording_add_up() -> None:
+    innovations = Likelihood(ROBOT, (), NOISE, 0.02).innovations(RECORDING, [])
+    first = np.arange(len(ALL)) < 300
+    parts = innovations.log_likelihood(first) + innovations.log_likelihood(~first)
+    assert parts == pytest.approx(innovations.log_likelihood(ALL), rel=1e-12)
+
+
+def test_the_open_loop_variance_starts_at_the_sensors_and_grows_with_the_winches() -> None:
+    variance = Likelihood(ROBOT, (), NOISE, 0.02).open_loop_variances(RECORDING, [])
+    assert variance[0] == pytest.approx([NOISE.position**2] * 3 + [NOISE.tension**2] * 3)
+    assert np.all(variance[-1] > variance[0])

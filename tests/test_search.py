@@ -1,0 +1,92 @@
+"""The tracer's decision on recordings that the rig makes: the right name, or none."""
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tautwire.tracer.adequacy import is_noise
+from tautwire.tracer.data import split
+from tautwire.tracer.fit import Fitter
+from tautwire.tracer.noise import noise_of
+from tautwire.tracer.search import Found, search
+from tests.recordings import recorded
+from tests.robots import example
+
+
+def quiet(what: str, done: float) -> None:
+    """No progress."""
+
+
+def searched(name: str, seed: int, effects: dict[str, Any]) -> tuple[Found, bool]:
+    robot = example(name)
+    fit, check = recorded(name, seed, effects), recorded(name, seed + 50, effects)
+    noise = noise_of(robot, fit)
+    evidence = split(robot, noise, fit, check)
+    fitter = Fitter(noise)
+    found = search(robot, fitter, evidence, 0.01, quiet)
+    left = fitter.innovations(found.fit.robot, evidence.judge)
+    return found, is_noise(left, evidence.judge.rows)
+
+
+HIDDEN: list[tuple[str, dict[str, Any]]] = [
+    ("three", {"damping": {"damping": 9e8}}),
+    ("three", {"modulus": {"modulus": 1.12e11}}),
+    ("three", {"modulus": {"modulus": 0.9e11, "cables": [2]}}),
+    ("caroca", {"payload": {"mass": 1.5}}),
+    ("caroca", {"damping": {"damping": 1.6e8, "cables": [3]}}),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "effects"), HIDDEN, ids=str)
+def test_a_hidden_effect_is_named_and_measured(name: str, effects: dict[str, Any]) -> None:
+    found, noise_is_left = searched(name, 3, effects)
+    ((effect, values),) = effects.items()
+    assert [h.effect.name for h in found.accepted] == [effect]
+    cables = () if effect == "payload" else tuple(values.get("cables", example(name).cable_numbers))
+    assert found.accepted[0].cables == cables
+    assert noise_is_left
+    truth = next(value for key, value in values.items() if key != "cables")
+    assert abs(found.fit.values[0] - truth) < 4.5 * found.fit.deviations[0]
+
+
+@pytest.mark.slow
+def test_two_effects_are_found_together() -> None:
+    found, noise_is_left = searched("three", 4, {"damping": {"damping": 9e8}, "payload": {"mass": 6.0}})
+    assert {h.effect.name for h in found.accepted} == {"damping", "payload"}
+    assert noise_is_left
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["three", "caroca"])
+def test_where_nothing_is_hidden_nothing_is_found(name: str) -> None:
+    for seed in (5, 6):
+        found, noise_is_left = searched(name, seed, {})
+        assert found.accepted == ()
+        assert noise_is_left
+
+
+@pytest.mark.slow
+def test_an_effect_outside_the_list_leaves_more_than_noise() -> None:
+    _, noise_is_left = searched("three", 7, {"unlisted_swing": {"mass": 20.0, "length": 2.0}})
+    assert not noise_is_left
+
+
+def test_noise_is_noise_and_a_tone_is_not() -> None:
+    random = np.random.default_rng(0)
+    values = random.normal(size=(3000, 6))
+    rows = np.ones(3000, dtype=bool)
+
+    class Plain:
+        seen = np.ones((3000, 6), dtype=bool)
+
+        def __init__(self, values: np.ndarray) -> None:
+            self.values = values
+
+        def mean_square(self, rows: np.ndarray) -> np.ndarray:
+            return np.mean(self.values**2, axis=0)
+
+    assert is_noise(Plain(values), rows)  # type: ignore[arg-type]
+    toned = values + 0.6 * np.sin(np.arange(3000) * 0.05)[:, None]
+    assert not is_noise(Plain(toned), rows)  # type: ignore[arg-type]
