@@ -176,9 +176,9 @@ def host(ready: tuple[str, ...], tmp_path_factory: pytest.TempPathFactory) -> Ho
     flags = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", f"-I{headers}"]
     subprocess.run([*ready, *flags, str(source), "-o", str(program), "-ldl"], check=True)
 
-    def run(plan: Plan, **environment: str) -> subprocess.CompletedProcess[str]:
+    def run(plan: str, **environment: str) -> subprocess.CompletedProcess[str]:
         order = scratch / "plan.txt"
-        order.write_text(plan.text(), encoding="utf-8")
+        order.write_text(plan, encoding="utf-8")
         return subprocess.run(
             [str(program), str(order)], env=environment, capture_output=True, text=True, timeout=60, check=False
         )
@@ -205,17 +205,15 @@ def numbers(done: subprocess.CompletedProcess[str]) -> list[float]:
 
 def test_the_robot_in_a_c_program_is_that_in_python_and_near_the_one_model(host: Host, folders: list[Path]) -> None:
     plan = robot_plan(folders)
-    shown = numbers(host(plan))
+    shown = numbers(host(plan.text()))
     assert shown == pytest.approx(plan.in_python(), abs=1e-12)
     until = STEPS * STEP
     run = integrate(paper_robot(), np.array([0.0, until]), np.array([[0.0] * 3, [rate * until for rate in RAMPS]]))
     assert np.linalg.norm(np.array(shown) - run.position[-1]) < 0.5e-3
 
 
-def test_without_the_option_a_c_program_cannot_load_the_fmus(
-    host: Host, three_fmus: RobotFmus, tmp_path: Path
-) -> None:
-    done = host(robot_plan(extracted(three_fmus, tmp_path)))
+def test_without_the_option_a_c_program_cannot_load_the_fmus(host: Host, three_fmus: RobotFmus, tmp_path: Path) -> None:
+    done = host(robot_plan(extracted(three_fmus, tmp_path)).text())
     assert done.returncode == 1
     assert "undefined symbol: _Py_NoneStruct" in done.stderr
 
@@ -224,9 +222,9 @@ def test_the_importers_environment_has_no_say(host: Host, folders: list[Path], t
     for name in ("json", "encodings", "pythonfmu", "sitecustomize"):
         (tmp_path / f"{name}.py").write_text("raise SystemExit('not mine')\n")
     plan = cable_plan(folders[:1])
-    shown = numbers(host(plan))
-    assert numbers(host(plan, PYTHONPATH=str(tmp_path), PYTHONHOME=str(tmp_path), PATH=str(tmp_path))) == shown
-    assert numbers(host(plan, LC_ALL="C", PYTHONUTF8="0", PYTHONSTARTUP=str(tmp_path / "json.py"))) == shown
+    shown = numbers(host(plan.text()))
+    assert numbers(host(plan.text(), PYTHONPATH=str(tmp_path), PYTHONHOME=str(tmp_path), PATH=str(tmp_path))) == shown
+    assert numbers(host(plan.text(), LC_ALL="C", PYTHONUTF8="0", PYTHONSTARTUP=str(tmp_path / "json.py"))) == shown
 
 
 def test_an_importer_without_that_python_is_told_and_a_python_process_needs_none(
@@ -236,7 +234,7 @@ def test_an_importer_without_that_python_is_told_and_a_python_process_needs_none
     gone = EmbeddablePython(Path("/gone/libpython9.9.so.1.0"), "/gone", Path("/gone/lib/python9.9"), headers)
     monkeypatch.setattr(c_hosts, "embeddable_python", lambda: gone)
     folder = extracted(for_c_hosts(three_fmus, tmp_path / "fmus"), tmp_path)[0]
-    done = host(cable_plan([folder, folder]))
+    done = host(cable_plan([folder, folder]).text())
     assert done.returncode == 1
     assert "this FMU needs Python: /gone/libpython9.9.so.1.0" in done.stderr
     assert cable_plan([folder]).in_python()[0] > 0.0
@@ -247,15 +245,47 @@ def test_fmus_of_two_robots_in_one_c_process_run_their_own_physics(
 ) -> None:
     soft = for_c_hosts(build_fmus(paper_robot(modulus=40e9), tmp_path / "plain"), tmp_path / "soft")
     others = extracted(soft, tmp_path / "extracted")
-    both = numbers(host(cable_plan([folders[0], others[0], folders[0]])))
-    assert both[0] == both[2] > 1.5 * both[1]
-    assert both == cable_plan([folders[0], others[0], folders[0]]).in_python()
+    plan = cable_plan([folders[0], others[0], folders[0]])
+    both = numbers(host(plan.text()))
+    assert both[0] == both[2] > both[1] + 50.0
+    assert both == plan.in_python()
 
 
 @pytest.mark.parametrize("name", ["a b", "a+b", "é", "a#b", "100%", "%41 %d", "a?b&c;d", "'\"$(e)"])
 def test_any_folder_name_will_do(host: Host, fmus: RobotFmus, tmp_path: Path, name: str) -> None:
     plan = cable_plan(extracted(fmus, tmp_path / name)[:1])
-    assert numbers(host(plan)) == plan.in_python()
+    assert numbers(host(plan.text())) == plan.in_python()
+
+
+def test_a_folder_that_pythonfmu_would_take_for_another_is_refused(host: Host, fmus: RobotFmus, tmp_path: Path) -> None:
+    plan = cable_plan(extracted(fmus, tmp_path / "a%20b")[:1])
+    extracted(fmus, tmp_path / "a b")
+    assert "pythonfmu cannot read from a folder with %20 in its name" in host(plan.text()).stderr
+    with pytest.raises(Exception, match="Failed to instantiate"):
+        plan.in_python()
+
+
+@pytest.mark.parametrize("uri", ["", "file:/{}", "file://localhost/{}", "/{}", "file:///nowhere", "%"])
+def test_resources_are_found_whatever_the_importer_calls_them(host: Host, folders: list[Path], uri: str) -> None:
+    plan = cable_plan(folders[:1])
+    right = (folders[0] / "resources").as_uri()
+    given = uri.format(right.removeprefix("file:///"))
+    assert numbers(host(plan.text().replace(right, given))) == numbers(host(plan.text()))
+
+
+def test_missing_resources_are_an_error_and_no_crash(host: Host, fmus: RobotFmus, tmp_path: Path) -> None:
+    folder = extracted(fmus, tmp_path)[0]
+    text = cable_plan([folder]).text()
+    shutil.rmtree(folder / "resources")
+    done = host(text)
+    assert done.returncode == 1
+    assert f"no resources of this FMU in {folder / 'resources'}" in done.stderr
+
+
+def test_a_python_that_the_importer_keeps_to_itself_is_shared(host: Host, folders: list[Path]) -> None:
+    plan = cable_plan(folders[:2])
+    library = c_hosts.embeddable_python().library
+    assert numbers(host(f"python {library}\n" + plan.text())) == numbers(host(plan.text()))
 
 
 def test_the_fmus_stay_valid_and_keep_their_other_members(fmus: RobotFmus, three_fmus: RobotFmus) -> None:
@@ -309,7 +339,7 @@ def test_a_python_without_libpython_is_refused_with_the_mend(
 ) -> None:
     settings = {"INSTSONAME": "libpython3.x.a", "Py_ENABLE_SHARED": 0, "LIBDIR": "/gone", "LDVERSION": "9.9"}
     monkeypatch.setattr(sysconfig, "get_config_var", settings.get)
-    with pytest.raises(CHostError, match="built without a shared libpython.*--enable-shared"):
+    with pytest.raises(CHostError, match=r"built without a shared libpython.*--enable-shared"):
         make_for_c_hosts(platform)
 
 

@@ -137,25 +137,33 @@ static int is_resources(const char *path) {
 }
 
 static void decode(const char *uri, char *path, size_t size) {
-    unsigned code;
+    unsigned code = 0;
     size_t length = 0;
     if (strncmp(uri, "file:", 5) == 0) uri += 5;
     if (strncmp(uri, "//", 2) == 0) uri += 2 + strcspn(uri + 2, "/");
     for (; *uri != '\0' && length < size - 1; uri++) {
-        int escaped = *uri == '%' && strspn(uri + 1, "0123456789abcdefABCDEF") >= 2 && sscanf(uri + 1, "%2x", &code) == 1;
+        int escaped = *uri == '%' && strspn(uri + 1, "0123456789abcdefABCDEF") >= 2;
+        if (escaped) sscanf(uri + 1, "%2x", &code);
         path[length++] = escaped ? (char)code : *uri;
         if (escaped) uri += 2;
     }
     path[length] = '\0';
 }
 
-/* pythonfmu decodes nothing but %20; and some importers encode nothing, or give a folder that they do not fill. */
-static void find_resources(const char *uri, char *path, size_t size) {
+/* pythonfmu decodes nothing but %20, even in a decoded path, and crashes where it finds no resources; some importers
+   encode nothing, or name a folder that they do not fill. */
+static int find_resources(const char *uri, char *path, size_t size) {
     if (uri != NULL) decode(uri, path, size);
-    if (uri != NULL && is_resources(path)) return;
-    snprintf(path, size, "%s", own_path);
-    for (int up = 0; up < 3; up++) *strrchr(path, '/') = '\0';
-    strncat(path, "/resources", size - strlen(path) - 1);
+    if (uri == NULL || !is_resources(path)) {
+        snprintf(path, size, "%s", own_path);
+        for (int up = 0; up < 3; up++)
+            if (strrchr(path, '/') != NULL) *strrchr(path, '/') = '\0';
+        strncat(path, "/resources", size - strlen(path) - 1);
+    }
+    if (!is_resources(path)) fail("no resources of this FMU in %s", path);
+    else if (strstr(path, "%20") != NULL) fail("%s: pythonfmu cannot read from a folder with %%20 in its name", path);
+    else return 1;
+    return 0;
 }
 
 PUBLIC const char *fmi2GetTypesPlatform(void) { return "default"; }
@@ -165,14 +173,11 @@ PUBLIC Component fmi2Instantiate(const char *name, int type, const char *guid, c
                                  const Callbacks *callbacks, int visible, int logging) {
     char path[PATH_MAX + 16];
     Component (*next)(const char *, int, const char *, const char *, const Callbacks *, int, int) = NULL;
-    if (wrapper != NULL) *(void **)&next = dlsym(wrapper, "fmi2Instantiate");
-    if (next == NULL) {
-        if (callbacks != NULL && callbacks->logger != NULL)
-            callbacks->logger(callbacks->environment, name, FMI_ERROR, "logStatusError", "%s", failure);
-        return NULL;
-    }
-    find_resources(uri, path, sizeof path);
-    return next(name, type, guid, path, callbacks, visible, logging);
+    if (wrapper != NULL && find_resources(uri, path, sizeof path)) *(void **)&next = dlsym(wrapper, "fmi2Instantiate");
+    if (next != NULL) return next(name, type, guid, path, callbacks, visible, logging);
+    if (callbacks != NULL && callbacks->logger != NULL)
+        callbacks->logger(callbacks->environment, name, FMI_ERROR, "logStatusError", "%s", failure);
+    return NULL;
 }
 
 PUBLIC void fmi2FreeInstance(Component c) {
@@ -181,11 +186,11 @@ PUBLIC void fmi2FreeInstance(Component c) {
     if (next != NULL) next(c);
 }
 
-#define HAND_ON(name, parameters, ...)                      \
-    PUBLIC int name parameters {                            \
-        static int(*next) parameters;                       \
+#define HAND_ON(name, parameters, ...)                             \
+    PUBLIC int name parameters {                                   \
+        static int(*next) parameters;                              \
         if (next == NULL) *(void **)&next = dlsym(wrapper, #name); \
-        return next == NULL ? FMI_ERROR : next(__VA_ARGS__); \
+        return next == NULL ? FMI_ERROR : next(__VA_ARGS__);       \
     }
 
 HAND_ON(fmi2SetDebugLogging, (Component c, int on, size_t n, const char *const categories[]), c, on, n, categories)

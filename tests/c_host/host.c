@@ -6,6 +6,7 @@
      ramp A IN RATE                              input IN of component A is RATE times the time
      hold A IN VALUE                             input IN of component A is set once
      step SECONDS / steps N                      the grid
+     python LIBRARY                              this program has a Python of its own, as a plugin would: RTLD_LOCAL
      show A OUT                                  printed at the end with all its digits */
 #include <dlfcn.h>
 #include <stdarg.h>
@@ -64,6 +65,24 @@ static void log_message(fmi2ComponentEnvironment environment, fmi2String instanc
 
 static const fmi2CallbackFunctions callbacks = {log_message, calloc, free, NULL, NULL};
 
+/* ISO C has no conversion from an object pointer to a function pointer; POSIX promises that the bytes fit. */
+static void find(void *handle, const char *name, void *function) {
+    void *symbol = dlsym(handle, name);
+    if (symbol == NULL) fail(name, dlerror());
+    memcpy(function, &symbol, sizeof symbol);
+}
+
+static void start_own_python(const char *library) {
+    void *handle = dlopen(library, RTLD_LAZY | RTLD_LOCAL);
+    void (*initialise)(int);
+    void *(*let_others)(void);
+    if (handle == NULL) fail("dlopen", dlerror());
+    find(handle, "Py_InitializeEx", &initialise);
+    find(handle, "PyEval_SaveThread", &let_others);
+    initialise(0);
+    let_others();
+}
+
 static void read_order(char *line) {
     Link link = {0, 0, 0, 0, 0.0};
     char *rest = strchr(line, ' ');
@@ -75,6 +94,7 @@ static void read_order(char *line) {
     else if (!strcmp(line, "resources")) strcpy(fmus[fmu_count - 1].resources, rest);
     else if (!strcmp(line, "step")) step = atof(rest);
     else if (!strcmp(line, "steps")) steps = (size_t)atol(rest);
+    else if (!strcmp(line, "python")) start_own_python(rest);
     else if (!strcmp(line, "connect")) {
         if (sscanf(rest, "%u %u %u %u", &link.source, &link.output, &link.target, &link.input) != 4) fail(line, rest);
         connections[connection_count++] = link;
@@ -96,25 +116,18 @@ static void read_plan(const char *path) {
     fclose(plan);
 }
 
-/* ISO C has no conversion from an object pointer to a function pointer; POSIX promises that the bytes fit. */
-static void find(const Fmu *fmu, const char *name, void *function) {
-    void *symbol = dlsym(fmu->handle, name);
-    if (symbol == NULL) fail(name, dlerror());
-    memcpy(function, &symbol, sizeof symbol);
-}
-
 static void load(Fmu *fmu) {
     fmu->handle = dlopen(fmu->library, RTLD_NOW | RTLD_LOCAL);
     if (fmu->handle == NULL) fail("dlopen", dlerror());
-    find(fmu, "fmi2Instantiate", &fmu->instantiate);
-    find(fmu, "fmi2SetupExperiment", &fmu->setup);
-    find(fmu, "fmi2EnterInitializationMode", &fmu->enter);
-    find(fmu, "fmi2ExitInitializationMode", &fmu->leave);
-    find(fmu, "fmi2GetReal", &fmu->get);
-    find(fmu, "fmi2SetReal", &fmu->set);
-    find(fmu, "fmi2DoStep", &fmu->advance);
-    find(fmu, "fmi2Terminate", &fmu->terminate);
-    find(fmu, "fmi2FreeInstance", &fmu->release);
+    find(fmu->handle, "fmi2Instantiate", &fmu->instantiate);
+    find(fmu->handle, "fmi2SetupExperiment", &fmu->setup);
+    find(fmu->handle, "fmi2EnterInitializationMode", &fmu->enter);
+    find(fmu->handle, "fmi2ExitInitializationMode", &fmu->leave);
+    find(fmu->handle, "fmi2GetReal", &fmu->get);
+    find(fmu->handle, "fmi2SetReal", &fmu->set);
+    find(fmu->handle, "fmi2DoStep", &fmu->advance);
+    find(fmu->handle, "fmi2Terminate", &fmu->terminate);
+    find(fmu->handle, "fmi2FreeInstance", &fmu->release);
     fmu->instance = fmu->instantiate("fmu", fmi2CoSimulation, fmu->guid, fmu->resources, &callbacks, 0, 0);
     if (fmu->instance == NULL) fail("fmi2Instantiate", fmu->library);
     check(fmu->setup(fmu->instance, fmi2False, 0.0, 0.0, fmi2False, 0.0), "fmi2SetupExperiment");

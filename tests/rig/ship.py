@@ -6,9 +6,11 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 
 from tests.rig.mechanics import Settings
+from tests.rig.program import SampledProgram
 from tests.rig.record import make_recording, write_recording
 from tests.rig.robot import load_robot
 from tests.rig.wander import wander
@@ -68,7 +70,9 @@ def make(shipment: Shipment, which: str) -> pd.DataFrame:
     """One of the two recordings, `fit` or `check`."""
     robot = load_robot(EXAMPLES / shipment.name / "robot.toml")
     seed = shipment.seeds[which]
-    program = wander(robot, seed, shipment.reach, shipment.centre, shipment.slow)
+    smooth = wander(robot, seed, shipment.reach, shipment.centre, shipment.slow)
+    times = np.arange(round(shipment.duration * shipment.rate) + 1) / shipment.rate
+    program = SampledProgram(times, np.array([smooth.speed(float(time)) for time in times]))
     return make_recording(
         robot, shipment.effects, program, duration=shipment.duration, rate=shipment.rate, seed=seed + 1000
     )

@@ -1,0 +1,214 @@
+"""The command line as a user meets it: exit status, one line for what is wrong, nothing written then."""
+
+import json
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from tautwire.cli import run
+from tautwire.robot_file import read_robot
+from tests.robots import EXAMPLES, example
+
+THREE = EXAMPLES / "three"
+ROBOT = str(THREE / "robot.toml")
+
+
+@pytest.fixture
+def short(tmp_path: Path) -> tuple[Path, Path]:
+    """Four seconds of both shipped recordings, every second sample."""
+    places = []
+    for name in ("fit", "check"):
+        place = tmp_path / f"{name}.csv"
+        pd.read_csv(THREE / f"{name}.csv").iloc[:401:2].to_csv(place, index=False)
+        places.append(place)
+    return places[0], places[1]
+
+
+def test_build_writes_the_fmus(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["build", ROBOT, "--out", str(tmp_path / "out")]) == 0
+    listed = [f"cable_{i}.fmu" for i in (1, 2, 3)] + ["platform.fmu"]
+    assert sorted(path.name for path in (tmp_path / "out").iterdir()) == listed
+    assert [Path(line).name for line in capsys.readouterr().out.split()] == listed
+
+
+def test_simulate_answers_at_the_recordings_times(tmp_path: Path, short: tuple[Path, Path]) -> None:
+    result = tmp_path / "result.csv"
+    assert run(["simulate", ROBOT, "--speeds", str(short[0]), "--until", "1.0", "--out", str(result)]) == 0
+    frame = pd.read_csv(result)
+    recorded = pd.read_csv(short[0])
+    assert list(frame["time"]) == list(recorded["time"][recorded["time"] <= 1.0])
+    assert (frame["z"] - recorded["z"][: len(frame)]).abs().max() < 0.02
+    assert {"vx", "tension_3", "length_1", "elongation_2", "strain_3"} <= set(frame.columns)
+
+
+def test_simulate_needs_only_times_and_speeds(tmp_path: Path, short: tuple[Path, Path]) -> None:
+    speeds = tmp_path / "speeds.csv"
+    pd.read_csv(short[0])[["time", "winch_speed_1", "winch_speed_2", "winch_speed_3"]].head(20).to_csv(
+        speeds, index=False
+    )
+    assert run(["simulate", ROBOT, "--speeds", str(speeds), "--out", str(tmp_path / "result.csv")]) == 0
+    assert len(pd.read_csv(tmp_path / "result.csv")) == 20
+
+
+def test_linearise_writes_the_model(tmp_path: Path) -> None:
+    place = tmp_path / "model.json"
+    assert run(["linearise", ROBOT, "--at", "28.86,0,8", "--out", str(place)]) == 0
+    model = json.loads(place.read_text())
+    assert model["position"] == [28.86, 0.0, 8.0]
+    assert len(model["frequencies_hz"]) == 3
+    assert len(model["A"]) == len(model["states"])
+    assert len(model["B"][0]) == len(model["inputs"])
+
+
+@pytest.mark.slow
+def test_trace_finds_the_damping_of_the_shipped_robot(
+    tmp_path: Path, short: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "report"
+    assert run(["trace", ROBOT, str(short[0]), "--check", str(short[1]), "--out", str(out)]) == 0
+    report = json.loads((out / "report.json").read_text())
+    assert report["verdict"] == "effects"
+    (effect,) = report["effects"]
+    assert effect["name"] == "damping"
+    assert effect["cables"] == [1, 2, 3]
+    found = effect["parameters"]["damping"]
+    assert found["low"] < 2.08e9 < found["high"]
+    for role in ("fit", "check"):
+        after, floor = report["error_after"][role], report["noise_floor"]
+        assert after["position_rms"] < 1.2 * floor["position_rms"]
+        assert after["tension_rms"] < 1.2 * floor["tension_rms"] < report["error_before"][role]["tension_rms"]
+    assert report["residual_is_noise"] == {"before": False, "after": True}
+    assert "damping" in capsys.readouterr().out
+    assert (out / "index.html").stat().st_size > 10_000
+    again = read_robot(out / "robot.toml")
+    assert again.effects[0].values["damping"] == found["value"]
+    result = tmp_path / "again.csv"
+    assert run(["simulate", str(out / "robot.toml"), "--speeds", str(short[1]), "--out", str(result)]) == 0
+    gap = pd.read_csv(result)["tension_1"] - pd.read_csv(short[1])["tension_1"]
+    assert (gap**2).mean() ** 0.5 < 1.3 * report["noise_floor"]["tension_rms"]
+
+
+@pytest.mark.slow
+def test_trace_without_a_check_recording_judges_on_the_second_half(tmp_path: Path, short: tuple[Path, Path]) -> None:
+    assert run(["trace", ROBOT, str(short[0]), "--out", str(tmp_path / "report")]) == 0
+    report = json.loads((tmp_path / "report" / "report.json").read_text())
+    assert report["effects"][0]["name"] == "damping"
+    assert report["error_after"]["check"]["position_rms"] is None
+    assert any("no check recording" in note for note in report["notes"])
+
+
+def edited(tmp_path: Path, old: str, new: str) -> Path:
+    """The three-cable robot file with one line changed."""
+    text = Path(ROBOT).read_text(encoding="utf-8")
+    assert old in text
+    place = tmp_path / "edited.toml"
+    place.write_text(text.replace(old, new, 1), encoding="utf-8")
+    return place
+
+
+WRONG_ROBOTS = [
+    ("mass = 300.0", "mass = -300.0", "platform.mass"),
+    ("mass = 300.0", "mas = 300.0", "mas"),
+    ("start = [28.86, 0.0, 5.0]", "start = [-30.0, 0.0, 5.0]", "platform.start"),
+    ("gravity", "gravty", "gravty"),
+]
+
+
+@pytest.mark.parametrize(("old", "new", "said"), WRONG_ROBOTS)
+@pytest.mark.parametrize("command", ["build", "simulate", "linearise", "trace"])
+def test_a_wrong_robot_file_is_one_line_and_nothing_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], command: str, old: str, new: str, said: str
+) -> None:
+    robot = str(edited(tmp_path, old, new))
+    out = tmp_path / "out"
+    recording = str(THREE / "fit.csv")
+    arguments = {
+        "build": ["build", robot],
+        "simulate": ["simulate", robot, "--speeds", recording],
+        "linearise": ["linearise", robot],
+        "trace": ["trace", robot, recording],
+    }[command]
+    assert run([*arguments, "--out", str(out)]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    assert said in captured.err
+    assert "edited.toml" in captured.err
+    assert [path.name for path in tmp_path.iterdir()] == ["edited.toml"]
+
+
+def with_cell(tmp_path: Path, row: int, column: str, cell: str) -> Path:
+    frame = pd.read_csv(THREE / "fit.csv", dtype=str).head(40)
+    frame.loc[row, column] = cell
+    place = tmp_path / "wrong.csv"
+    frame.to_csv(place, index=False)
+    return place
+
+
+@pytest.mark.parametrize(
+    ("row", "column", "cell", "said"),
+    [
+        (5, "winch_speed_2", "fast", "line 7"),
+        (5, "winch_speed_2", "nan", "line 7"),
+        (5, "time", "0.001", "line 7"),
+        (5, "x", "12m", "line 7"),
+    ],
+)
+def test_a_wrong_recording_is_one_line_and_nothing_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], row: int, column: str, cell: str, said: str
+) -> None:
+    recording = with_cell(tmp_path, row, column, cell)
+    assert run(["trace", ROBOT, str(recording), "--out", str(tmp_path / "out")]) == 2
+    captured = capsys.readouterr()
+    assert captured.err.count("\n") == 1
+    assert said in captured.err
+    assert [path.name for path in tmp_path.iterdir()] == ["wrong.csv"]
+
+
+def test_a_missing_column_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    place = tmp_path / "wrong.csv"
+    pd.read_csv(THREE / "fit.csv").drop(columns="winch_speed_3").to_csv(place, index=False)
+    assert run(["trace", ROBOT, str(place), "--out", str(tmp_path / "out")]) == 2
+    assert "winch_speed_3" in capsys.readouterr().err
+
+
+def test_two_cables_are_too_few(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = Path(ROBOT).read_text(encoding="utf-8")
+    place = tmp_path / "two.toml"
+    place.write_text(text[: text.rindex("[[cable]]")], encoding="utf-8")
+    assert run(["build", str(place), "--out", str(tmp_path / "out")]) == 2
+    assert "three" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["build"],
+        ["fly", ROBOT],
+        ["build", ROBOT, "--sideways"],
+        ["linearise", ROBOT, "--at", "here", "--out", "m.json"],
+        ["simulate", ROBOT, "--speeds", str(THREE / "fit.csv"), "--step", "0", "--out", "r.csv"],
+        ["simulate", ROBOT, "--speeds", str(THREE / "fit.csv"), "--until", "-1", "--out", "r.csv"],
+        ["trace", ROBOT, str(THREE / "fit.csv"), "--alpha", "2", "--out", "f"],
+    ],
+)
+def test_wrong_usage_is_one_line(
+    arguments: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(arguments) == 2
+    assert capsys.readouterr().err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize("command", [[], ["build"], ["simulate"], ["linearise"], ["trace"]])
+def test_every_command_has_help_with_an_example(command: list[str], capsys: pytest.CaptureFixture[str]) -> None:
+    assert run([*command, "--help"]) == 0
+    shown = capsys.readouterr().out
+    assert "Usage" in shown
+    assert not command or "Example: tautwire" in shown
+
+
+def test_shipped_robots_are_read(capsys: pytest.CaptureFixture[str]) -> None:
+    assert [example(name).cable_count for name in ("three", "caroca", "eight")] == [3, 3, 8]
