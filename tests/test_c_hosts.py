@@ -7,7 +7,7 @@ import subprocess
 import sysconfig
 import zipfile
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import fmpy
@@ -173,7 +173,7 @@ def host(ready: tuple[str, ...], tmp_path_factory: pytest.TempPathFactory) -> Ho
     program = scratch / "host"
     headers = next(Path(fmpy.__file__).parent.rglob("fmi2Functions.h")).parent
     source = Path(__file__).parent / "c_host" / "host.c"
-    flags = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", f"-I{headers}"]
+    flags = ["-std=c99", "-Wall", "-Wextra", "-Wpedantic", "-Werror", "-pthread", f"-I{headers}"]
     subprocess.run([*ready, *flags, str(source), "-o", str(program), "-ldl"], check=True)
 
     def run(plan: str, **environment: str) -> subprocess.CompletedProcess[str]:
@@ -225,6 +225,27 @@ def test_the_importers_environment_has_no_say(host: Host, folders: list[Path], t
     shown = numbers(host(plan.text()))
     assert numbers(host(plan.text(), PYTHONPATH=str(tmp_path), PYTHONHOME=str(tmp_path), PATH=str(tmp_path))) == shown
     assert numbers(host(plan.text(), LC_ALL="C", PYTHONUTF8="0", PYTHONSTARTUP=str(tmp_path / "json.py"))) == shown
+
+
+def test_python_finds_nothing_but_its_standard_library_and_the_fmu(
+    monkeypatch: pytest.MonkeyPatch, host: Host, three_fmus: RobotFmus, tmp_path: Path
+) -> None:
+    python = c_hosts.embeddable_python()
+    home = tmp_path / "ho me+é"
+    home.symlink_to(python.home.split(":")[0])
+    elsewhere = replace(python, home=str(home))
+    monkeypatch.setattr(c_hosts, "embeddable_python", lambda: elsewhere)
+    folder = extracted(for_c_hosts(three_fmus, tmp_path / "fmus"), tmp_path)[0]
+    resources = folder / "resources"
+    script = resources / ((resources / "slavemodule.txt").read_text().strip() + ".py")
+    seen = "[*sys.path, 'site' in sys.modules, sys.flags.isolated]"
+    script.write_text(script.read_text() + f"import sys\nprint(*{seen}, sep='\\n', file=sys.stderr)\n")
+    told = host(cable_plan([folder]).text()).stderr.splitlines()
+    # pythonfmu runs the script twice at every instantiation.
+    first, *library, site, isolated = told[: len(told) // 2]
+    assert (first, site, isolated) == (str(resources), "False", "1")
+    assert len(library) == 3 and all(Path(path).is_relative_to(home) for path in library)
+    assert not list(folder.rglob("__pycache__"))
 
 
 def test_an_importer_without_that_python_is_told_and_a_python_process_needs_none(

@@ -6,7 +6,7 @@
    site-packages, no signal handlers, no locale, UTF-8 paths. It stays until the process ends.
 
    c_hosts.py defines PYTHON_LIBRARY, PYTHON_SONAME, PYTHON_HOME and STANDARD_LIBRARY. */
-#define _GNU_SOURCE
+#define _GNU_SOURCE 1
 #include <Python.h>
 #include <dlfcn.h>
 #include <limits.h>
