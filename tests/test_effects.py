@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from tautwire_fmu.laws.cable import LAWS, CableConstants, CableInputs, CableState, motion, reading
+from tautwire_fmu.laws.cable import LAWS, CableConstants, CableInputs, CableState, motion, reading, span
 from tautwire_fmu.laws.effects import ALL, ActiveEffect, Effect, Parameter
 from tautwire_fmu.laws.mathematics import REAL
 from tautwire_fmu.laws.point_mass import PointMassConstants, acceleration
@@ -22,7 +22,7 @@ def neutral(parameter: Parameter) -> float:
 
 def shown(effects: tuple[ActiveEffect, ...]) -> tuple[Any, ...]:
     state = CableState(*STATE, tuple((0.0,) * len(a.effect.states) for a in effects))
-    moving = motion(REAL, CABLE, effects, state, INPUTS)
+    moving = motion(REAL, CABLE, effects, state, span(REAL, CABLE, INPUTS), INPUTS.winch_speed)
     return (
         reading(REAL, CABLE, effects, state, moving),
         moving.rope_speed,

@@ -14,10 +14,12 @@ from tautwire_fmu.laws.cable import (
     LAWS,
     CableConstants,
     CableInputs,
+    CableMotion,
     CableReading,
     CableState,
     motion,
     reading,
+    span,
     start_state,
     state_rates,
 )
@@ -38,7 +40,13 @@ def constants(law: str = "logarithmic", damping: float = DAMPING) -> CableConsta
 def show(
     m: Mathematics, cable: CableConstants, state: CableState, inputs: CableInputs, effects: tuple[Any, ...] = ()
 ) -> CableReading:
-    return reading(m, cable, effects, state, motion(m, cable, effects, state, inputs))
+    return reading(m, cable, effects, state, moved(m, cable, state, inputs, effects))
+
+
+def moved(
+    m: Mathematics, cable: CableConstants, state: CableState, inputs: CableInputs, effects: tuple[Any, ...] = ()
+) -> CableMotion:
+    return motion(m, cable, effects, state, span(m, cable, inputs), inputs.winch_speed)
 
 
 def at(position: tuple[Any, ...], velocity: tuple[Any, ...] = (0.0, 0.0, 0.0), speed: Any = 0.0) -> CableInputs:
@@ -58,21 +66,21 @@ def test_tension_follows_the_formula(law: str) -> None:
     state = CableState(4.999, 0.0015, ())
     velocity, speed = (0.1, -0.2, 0.3), 0.05
     shown = show(REAL, constants(law), state, at((0.01, 0.02, -0.03), velocity, speed))
-    span = np.array([2.99, -0.02, 4.03])
-    length = float(np.linalg.norm(span))
-    rate = -float(span @ np.array(velocity)) / length
+    line = np.array([2.99, -0.02, 4.03])
+    length = float(np.linalg.norm(line))
+    rate = -float(line @ np.array(velocity)) / length
     strain = math.log(length / 4.999) if law == "logarithmic" else (length - 4.999) / length
     expected = MODULUS * AREA * strain + DAMPING * AREA * (rate + speed) / length + TENSION
     assert shown.tension == pytest.approx(expected, rel=1e-13)
     assert shown.elongation == pytest.approx(length - LENGTH + 0.0015, abs=1e-15)
-    assert np.allclose(shown.force, expected * span / length, rtol=1e-13)
+    assert np.allclose(shown.force, expected * line / length, rtol=1e-13)
 
 
 def test_the_winch_takes_up_strained_rope_under_the_logarithmic_law_only() -> None:
     state, inputs = CableState(4.99, 0.0, ()), at((0.0, 0.0, 0.0), speed=0.2)
     for law, expected in (("logarithmic", -0.2 * 4.99 / 5.0), ("linear", -0.2)):
         cable = constants(law)
-        rates = state_rates(REAL, cable, (), state, motion(REAL, cable, (), state, inputs))
+        rates = state_rates(REAL, cable, (), state, moved(REAL, cable, state, inputs))
         assert rates.unstrained_length == pytest.approx(expected, rel=1e-15)
         assert rates.wound_length == 0.2
 
@@ -160,7 +168,7 @@ def test_units_come_out_right() -> None:
     state = CableState(4.999 * metre, 0.0 * metre, ((),))
     velocity = tuple(speed * metre / second for speed in (0.01, -0.02, 0.03))
     inputs = at((0.0 * metre, 0.0 * metre, 0.0 * metre), velocity, 0.05 * metre / second)
-    moving = motion(m, cable, effects, state, inputs)
+    moving = moved(m, cable, state, inputs, effects)
     shown = reading(m, cable, effects, state, moving)
     rates = state_rates(m, cable, effects, state, moving)
     assert shown.tension.check("[force]")

@@ -1,6 +1,6 @@
 """The cable as an FMI slave: the platform's motion and the winch speed in, tension and force out."""
 
-from typing import Any, Dict, List, Tuple
+from typing import Any, Dict, List, Sequence, Tuple
 
 from .description import Variable, axes, vector
 from .interpolation import cubic, extrapolate, quintic
@@ -16,6 +16,8 @@ FIRST_RATE = 19
 FIRST_STATE = 23
 MOTION = axes("position", "velocity")
 
+Motion = Tuple[Sequence[float], Sequence[float], float]
+
 
 class Cable(Slave):
     """One cable with its tension law, its effects and its winch's rope speed."""
@@ -24,12 +26,11 @@ class Cable(Slave):
         data = read_resource(kwargs["resources"], "cable.json")
         self.settings: List[Dict[str, Any]] = data["effects"]
         self.tension_law = law.LAWS[data["law"]]
-        self.state_count = 2 + sum(len(BY_NAME[s["name"]].states) for s in self.settings)
+        self.end_of_state = FIRST_STATE + 2 + sum(len(BY_NAME[s["name"]].states) for s in self.settings)
         super().__init__(_variables(data), **kwargs)
         self.modelName = data["model_name"]
         self.description = data["description"]
         self.guid = data["guid"]
-        self.rates_stale = True
         self.parameters_changed()
 
     def parameters_changed(self) -> None:
@@ -48,64 +49,58 @@ class Cable(Slave):
         )
         if not self.started:
             state = law.start_state(self.constants, self.effects)
-            self.real[FIRST_STATE : FIRST_STATE + self.state_count] = _flat(state)
+            self.real[FIRST_STATE : self.end_of_state] = _flat(state)
 
     def advance(self, step: float, ends: bool) -> None:
         """The classical Runge-Kutta method on the state, under inputs that move on polynomials."""
-        state = self.real[FIRST_STATE : FIRST_STATE + self.state_count]
-        at_start = self._inputs(step, 0.0, ends)
-        at_middle = self._inputs(step, 0.5, ends)
-        at_end = self._inputs(step, 1.0, ends)
-        k1 = self._rates(state, at_start)
-        k2 = self._rates([s + 0.5 * step * k for s, k in zip(state, k1)], at_middle)
-        k3 = self._rates([s + 0.5 * step * k for s, k in zip(state, k2)], at_middle)
-        k4 = self._rates([s + step * k for s, k in zip(state, k3)], at_end)
-        self.real[FIRST_STATE : FIRST_STATE + self.state_count] = [
-            s + step / 6.0 * (a + 2.0 * (b + c) + d) for s, a, b, c, d in zip(state, k1, k2, k3, k4)
+        start = law.CableInputs(*self._at_start(ends))
+        middle = law.CableInputs(*self._moved(step, 0.5, ends))
+        end = law.CableInputs(*self._moved(step, 1.0, ends))
+        first, half, last = (law.span(REAL, self.constants, inputs) for inputs in (start, middle, end))
+        state = self.real[FIRST_STATE : self.end_of_state]
+        k1 = self._rates(state, first, start.winch_speed)
+        k2 = self._rates([s + 0.5 * step * k for s, k in zip(state, k1)], half, middle.winch_speed)
+        k3 = self._rates([s + 0.5 * step * k for s, k in zip(state, k2)], half, middle.winch_speed)
+        k4 = self._rates([s + step * k for s, k in zip(state, k3)], last, end.winch_speed)
+        sixth = step / 6.0
+        self.real[FIRST_STATE : self.end_of_state] = [
+            s + sixth * (a + 2.0 * (b + c) + d) for s, a, b, c, d in zip(state, k1, k2, k3, k4)
         ]
 
     def refresh(self) -> None:
-        inputs = self._inputs(self.elapsed, 1.0, False)
-        state = self._state(self.real[FIRST_STATE : FIRST_STATE + self.state_count])
-        moving = law.motion(REAL, self.constants, self.effects, state, inputs)
-        shown = law.reading(REAL, self.constants, self.effects, state, moving)
-        self.real[FIRST_OUTPUT:FIRST_RATE] = [
-            *shown.force,
-            shown.tension,
-            shown.length,
-            shown.elongation,
-            shown.strain,
-        ]
-        self.rates_stale = True
-
-    def get_real(self, vrs: Any) -> List[float]:
-        if (self.stale or self.rates_stale) and any(FIRST_RATE <= reference < FIRST_STATE for reference in vrs):
-            super().get_real(vrs)
-            self.attempt(self._refresh_rates)
-            self.rates_stale = False
-        return super().get_real(vrs)
-
-    def _refresh_rates(self) -> None:
-        inputs = self._inputs(self.elapsed, 1.0, False)
-        numbers = self.real[FIRST_STATE : FIRST_STATE + self.state_count]
-        rates = self._rates(numbers, inputs)
-        acceleration = self.real[ACCELERATION : ACCELERATION + 3]
+        """One complex step gives the outputs and their rates."""
+        real = self.real
+        position, velocity, speed = self._moved(self.elapsed, 1.0, False)
+        numbers = real[FIRST_STATE : self.end_of_state]
+        line = law.span(REAL, self.constants, law.CableInputs(position, velocity, speed))
+        rates = self._rates(numbers, line, speed)
         carried = law.CableInputs(
-            tuple(map(along, inputs.position, inputs.velocity)),
-            tuple(map(along, inputs.velocity, acceleration)),
-            along(inputs.winch_speed, self.real[WINCH_ACCELERATION]),
+            tuple(map(along, position, velocity)),
+            tuple(map(along, velocity, real[ACCELERATION:WINCH_SPEED])),
+            along(speed, real[WINCH_ACCELERATION]),
         )
         state = self._state(list(map(along, numbers, rates)))
-        moving = law.motion(COMPLEX_STEP, self.constants, self.effects, state, carried)
+        moving = law.motion(
+            COMPLEX_STEP,
+            self.constants,
+            self.effects,
+            state,
+            law.span(COMPLEX_STEP, self.constants, carried),
+            carried.winch_speed,
+        )
         shown = law.reading(COMPLEX_STEP, self.constants, self.effects, state, moving)
-        self.real[FIRST_RATE:FIRST_STATE] = [*map(rate_of, shown.force), rate_of(shown.tension)]
+        values = (*shown.force, shown.tension, shown.length, shown.elongation, shown.strain)
+        real[FIRST_OUTPUT:FIRST_RATE] = [complex(value).real for value in values]
+        real[FIRST_RATE:FIRST_STATE] = [*map(rate_of, shown.force), rate_of(shown.tension)]
 
-    def _rates(self, numbers: List[float], inputs: law.CableInputs) -> List[float]:
+    def _rates(self, numbers: List[float], line: law.Span, winch_speed: float) -> List[float]:
         state = self._state(numbers)
-        moving = law.motion(REAL, self.constants, self.effects, state, inputs)
+        moving = law.motion(REAL, self.constants, self.effects, state, line, winch_speed)
         return _flat(law.state_rates(REAL, self.constants, self.effects, state, moving))
 
     def _state(self, numbers: List[Any]) -> law.CableState:
+        if not self.effects:
+            return law.CableState(numbers[0], numbers[1], ())
         own = []
         first = 2
         for active in self.effects:
@@ -114,21 +109,27 @@ class Cable(Slave):
             first += count
         return law.CableState(numbers[0], numbers[1], tuple(own))
 
-    def _inputs(self, step: float, fraction: float, ends: bool) -> law.CableInputs:
-        if ends:
-            return self._inputs_between(step, fraction)
+    def _at_start(self, ends: bool) -> Motion:
+        inputs = self.earlier if ends and self.earlier is not None else self.real
+        return inputs[POSITION:VELOCITY], inputs[VELOCITY:ACCELERATION], inputs[WINCH_SPEED]
+
+    def _moved(self, step: float, fraction: float, ends: bool) -> Motion:
+        """Position, velocity and winch speed after a fraction of a step."""
         real = self.real
+        if ends and fraction == 1.0:
+            return real[POSITION:VELOCITY], real[VELOCITY:ACCELERATION], real[WINCH_SPEED]
+        if ends:
+            return self._between(step, fraction)
         s = step * fraction
-        position, velocity, acceleration = real[1:4], real[4:7], real[7:10]
-        return law.CableInputs(
-            tuple(extrapolate(x, v, a, s) for x, v, a in zip(position, velocity, acceleration)),
-            tuple(v + s * a for v, a in zip(velocity, acceleration)),
-            real[WINCH_SPEED] + s * real[WINCH_ACCELERATION],
+        x0, x1, x2, v0, v1, v2, a0, a1, a2, speed, rate = real[POSITION:FIRST_OUTPUT]
+        return (
+            (extrapolate(x0, v0, a0, s), extrapolate(x1, v1, a1, s), extrapolate(x2, v2, a2, s)),
+            (v0 + s * a0, v1 + s * a1, v2 + s * a2),
+            speed + s * rate,
         )
 
-    def _inputs_between(self, step: float, fraction: float) -> law.CableInputs:
-        now = self.real
-        then = self.earlier
+    def _between(self, step: float, fraction: float) -> Motion:
+        now, then = self.real, self.earlier
         assert then is not None
         path = [
             quintic(
@@ -147,10 +148,12 @@ class Cable(Slave):
             step,
             fraction,
         )
-        return law.CableInputs(tuple(p[0] for p in path), tuple(p[1] for p in path), speed)
+        return [p[0] for p in path], [p[1] for p in path], speed
 
 
 def _flat(state: law.CableState) -> List[float]:
+    if not state.effects:
+        return [state.unstrained_length, state.wound_length]
     return [state.unstrained_length, state.wound_length, *(s for own in state.effects for s in own)]
 
 

@@ -38,6 +38,10 @@ application = typer.Typer(
     rich_markup_mode=None,
 )
 
+C_HOSTS = (
+    "Make FMUs that also run in importers that are not Python processes; needs a C compiler, and Python's headers "
+    "and shared library (Debian: gcc, python3-dev)."
+)
 RobotFile = Annotated[Path, typer.Argument(metavar="ROBOT.toml", help="The robot file.")]
 
 
@@ -69,17 +73,25 @@ def _say(message: str, status: int) -> int:
 def build(
     robot_file: RobotFile,
     out: Annotated[Path, typer.Option(help="Folder for the FMUs.")] = Path("build"),
+    for_c_hosts: Annotated[bool, typer.Option("--for-c-hosts", help=C_HOSTS)] = False,
 ) -> None:
     """Build the FMUs: one a cable, one for the platform.
 
     Example: tautwire build robot.toml --out build/
     """
+    from .c_hosts import embeddable_python, find_compiler, make_for_c_hosts
     from .output import folder_in_place
     from .packaging import build_fmus
 
     robot = _robot(robot_file)
+    if for_c_hosts:
+        embeddable_python()
+        find_compiler()
     with folder_in_place(out) as scratch:
         fmus = build_fmus(robot, scratch)
+        if for_c_hosts:
+            for path in (*fmus.cables, fmus.platform):
+                make_for_c_hosts(path)
     for path in (*fmus.cables, fmus.platform):
         print(out / path.name)
 

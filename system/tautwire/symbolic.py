@@ -140,7 +140,7 @@ def _equations(
     external: SX,
     own: list[list[SX]],
 ) -> tuple[SX, SX]:
-    force = _three(external)
+    force: Sequence[SX] = _three(external)
     shown = []
     cable_rates = []
     effect_rates: list[SX] = []
@@ -150,7 +150,8 @@ def _equations(
         state = cable_law.CableState(unstrained[index], 0.0, states)
         inputs = cable_law.CableInputs(_three(position), _three(velocity), speeds[index])
         arguments = (CASADI, component.constants, component.effects, state)
-        moving = cable_law.motion(*arguments, inputs)
+        line = cable_law.span(CASADI, component.constants, inputs)
+        moving = cable_law.motion(*arguments, line, inputs.winch_speed)
         reading = cable_law.reading(*arguments, moving)
         rate = cable_law.state_rates(*arguments, moving)
         force = add(force, reading.force)

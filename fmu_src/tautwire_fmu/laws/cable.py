@@ -75,6 +75,14 @@ class CableInputs(NamedTuple):
     winch_speed: Any
 
 
+class Span(NamedTuple):
+    """The straight line from the platform to the exit point; ``direction`` is its unit vector."""
+
+    direction: Vector
+    length: Any
+    length_rate: Any
+
+
 class CableMotion(NamedTuple):
     """The kinematics of a cable, as effects in the rope see them."""
 
@@ -105,26 +113,31 @@ def start_state(cable: CableConstants, effects: Sequence[ActiveEffect]) -> Cable
     )
 
 
+def span(m: Mathematics, cable: CableConstants, inputs: CableInputs) -> Span:
+    """Length, its rate and direction; they depend on the platform's motion alone."""
+    line = subtract(cable.anchor, inputs.position)
+    length = norm(m, line)
+    direction = scale(1.0 / length, line)
+    return Span(direction, length, -dot(direction, inputs.velocity))
+
+
 def motion(
     m: Mathematics,
     cable: CableConstants,
     effects: Sequence[ActiveEffect],
     state: CableState,
-    inputs: CableInputs,
+    line: Span,
+    winch_speed: Any,
 ) -> CableMotion:
-    """Length, strain and their rates; ``direction`` points from the platform to the exit point."""
-    span = subtract(cable.anchor, inputs.position)
-    length = norm(m, span)
-    direction = scale(1.0 / length, span)
-    length_rate = -dot(direction, inputs.velocity)
-    speed = rope_speed(m, effects, state.effects, inputs.winch_speed)
+    """Strain and its rate on a span."""
+    speed = rope_speed(m, effects, state.effects, winch_speed)
     return CableMotion(
-        direction=direction,
-        length=length,
-        length_rate=length_rate,
+        direction=line.direction,
+        length=line.length,
+        length_rate=line.length_rate,
         rope_speed=speed,
-        strain=cable.law.strain(m, length, state.unstrained_length),
-        strain_rate=(length_rate + speed) / length,
+        strain=cable.law.strain(m, line.length, state.unstrained_length),
+        strain_rate=(line.length_rate + speed) / line.length,
     )
 
 

@@ -1,10 +1,10 @@
 """Vectors of three scalars as tuples, for any kind of number."""
 
-from typing import Any, Tuple
+from typing import Any, Sequence
 
 from .mathematics import Mathematics
 
-Vector = Tuple[Any, ...]
+Vector = Sequence[Any]
 
 
 def add(a: Vector, b: Vector) -> Vector:

@@ -134,10 +134,10 @@ class Component:
             self.messages.append(message.decode("utf-8", "replace"))
             del self.messages[:-KEPT_MESSAGES]
 
-    def block(self, names: Sequence[str]) -> Block:
-        """Set aside memory for some variables, by name."""
+    def block(self, names: Sequence[str], values: Array | None = None) -> Block:
+        """Memory for some variables, by name: the contiguous ``values`` handed in, or memory of its own."""
         references = [self.variables[name].valueReference for name in names]
-        values = np.zeros(len(names))
+        values = np.zeros(len(names)) if values is None else values
         return Block(
             tuple(names),
             (ctypes.c_uint * len(names))(*references),

@@ -66,8 +66,7 @@ def simulate(
     blocks = _observation(coupling, observed)
     shown = np.empty((len(times), len(observed)))
     start, _ = source.interval(0, float(times[0]), 0.0, np.zeros(len(observed)))
-    coupling.drive(start)
-    coupling.settle(float(times[0]))
+    coupling.settle(float(times[0]), start)
     for component in coupling.components.values():
         component.run()
     _read(blocks, shown[0])
