@@ -132,3 +132,40 @@ def test_an_impossible_input_does_not_bring_the_process_down(three_fmus: RobotFm
         cable.set(position__x=28.86, position__y=0.0, position__z=5.0)
         cable.step(0.0, 0.01)
         assert cable.get("length") == pytest.approx([73.1977], abs=1e-4)
+
+
+def test_unknown_references_spoil_the_instance_but_not_the_process(three_fmus: RobotFmus) -> None:
+    with in_hand(three_fmus.cables[0]) as cable:
+        cable.run()
+        for _ in range(5):
+            assert np.isnan(cable.fmu.getReal([9999])[0])
+            cable.fmu.setReal([9999], [1.0])
+        with pytest.raises(FMICallException):
+            cable.step(0.0, 0.01)
+
+
+@pytest.mark.parametrize("content", [b"", b"no state", b"[[1.0], null, 0.0, true]", b'{"a": 1}'])
+def test_bytes_that_are_no_state_are_refused_at_the_next_step(three_fmus: RobotFmus, content: bytes) -> None:
+    with in_hand(three_fmus.platform) as platform:
+        platform.run()
+        saved = platform.fmu.getFMUstate()
+        for _ in range(4):
+            platform.fmu.setFMUstate(platform.fmu.deSerializeFMUstate(content))
+        with pytest.raises(FMICallException):
+            platform.step(0.0, 0.01)
+        platform.fmu.setFMUstate(saved)
+        platform.step(0.0, 0.01)
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf")])
+def test_inputs_that_are_no_numbers_are_refused(three_fmus: RobotFmus, value: float) -> None:
+    with in_hand(three_fmus.cables[0]) as cable, in_hand(three_fmus.platform) as platform:
+        cable.set(winch_speed=value)
+        platform.set(force_1__x=value)
+        for hand, state in ((cable, "unstrained_length"), (platform, "position.x")):
+            hand.run()
+            before = hand.get(state)
+            for _ in range(4):
+                with pytest.raises(FMICallException):
+                    hand.step(0.0, 0.01)
+            assert hand.get(state) == before

@@ -27,7 +27,7 @@ class Cable(Slave):
         self.settings: List[Dict[str, Any]] = data["effects"]
         self.tension_law = law.LAWS[data["law"]]
         self.end_of_state = FIRST_STATE + 2 + sum(len(BY_NAME[s["name"]].states) for s in self.settings)
-        super().__init__(_variables(data), **kwargs)
+        super().__init__(_variables(data), slice(FIRST_STATE, self.end_of_state), **kwargs)
         self.modelName = data["model_name"]
         self.description = data["description"]
         self.guid = data["guid"]

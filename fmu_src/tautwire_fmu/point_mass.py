@@ -22,7 +22,7 @@ class PointMass(Slave):
         self.force_count = len(data["start_forces"]) + 1
         self.first_output = 1 + 6 * self.force_count
         self.couples = any(BY_NAME[s["name"]].wrench is not None for s in self.settings)
-        super().__init__(_variables(data), **kwargs)
+        super().__init__(_variables(data), slice(self.first_output, self.first_output + 6), **kwargs)
         self.modelName = data["model_name"]
         self.description = data["description"]
         self.guid = data["guid"]

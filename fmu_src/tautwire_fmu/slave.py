@@ -8,7 +8,7 @@ step, the inputs run on a polynomial from those set before to those set now.
 import json
 import math
 from pathlib import Path
-from typing import Any, Callable, Dict, List, Optional, Sequence, Tuple
+from typing import Any, Dict, List, Optional, Sequence, Tuple
 from xml.etree.ElementTree import Element
 
 from pythonfmu import Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability, Real
@@ -30,15 +30,16 @@ INPUT_TIME = Variable(
 class Slave(Fmi2Slave):
     """A slave whose variables are the entries of one list, in the order of their value references.
 
-    Subclasses give ``variables`` and implement :meth:`advance` and :meth:`refresh`. Inputs come first in the list,
-    ``input_time`` at their head.
+    Subclasses give ``variables`` and where the ``states`` are, and implement :meth:`advance` and :meth:`refresh`.
+    Inputs come first in the list, ``input_time`` at their head.
     """
 
     author = "Tautwire"
     license = "MIT"
 
-    def __init__(self, variables: Sequence[Variable], **kwargs: Any) -> None:
+    def __init__(self, variables: Sequence[Variable], states: slice, **kwargs: Any) -> None:
         super().__init__(**kwargs)
+        self.states = states
         self.variables = tuple(variables)
         self.real: List[float] = [variable.start for variable in self.variables]
         self.input_count = sum(variable.causality == "input" for variable in self.variables)
@@ -47,6 +48,7 @@ class Slave(Fmi2Slave):
         self.elapsed = 0.0
         self.started = False
         self.stale = True
+        self.fault = ""
         for variable in self.variables:
             self.register_variable(_fmi_variable(variable, self), nested=False)
 
@@ -63,27 +65,12 @@ class Slave(Fmi2Slave):
 
     def get_real(self, vrs: Sequence[int]) -> List[float]:
         if self.stale:
-            self.attempt(self.refresh)
+            self._refresh_or_nan()
             self.stale = False
-        real = self.real
-        return [real[reference] for reference in vrs]
-
-    def attempt(self, refresh: Callable[[], None]) -> None:
-        """Refresh outputs; where the law has no value for the inputs, all outputs become NaN.
-
-        An exception must not leave a slave: pythonfmu 0.7.0 ends the process at the third.
-        """
         try:
-            refresh()
-        except (ArithmeticError, ValueError) as error:
-            for reference, variable in enumerate(self.variables):
-                if variable.causality == "output":
-                    self.real[reference] = math.nan
-            self.log(f"no outputs: {error}; inputs {self.inputs_by_name()}", Fmi2Status.warning)
-
-    def inputs_by_name(self) -> Dict[str, float]:
-        """The inputs as they were set."""
-        return {v.name: value for v, value in zip(self.variables, self.real[: self.input_count])}
+            return [self.real[reference] for reference in vrs]
+        except IndexError:
+            return [self.real[r] if r < len(self.real) else self._unknown(r) for r in vrs]
 
     def set_real(self, vrs: Sequence[int], values: Sequence[float]) -> None:
         if not vrs:
@@ -92,7 +79,10 @@ class Slave(Fmi2Slave):
         if 0 in vrs and values[list(vrs).index(0)] != real[0]:
             self.earlier = tuple(real[: self.input_count])
         for reference, value in zip(vrs, values):
-            real[reference] = value
+            if reference < len(real):
+                real[reference] = value
+            else:
+                self._unknown(reference)
         self.stale = True
         self.elapsed = 0.0
         if max(vrs) >= self.first_parameter:
@@ -100,21 +90,55 @@ class Slave(Fmi2Slave):
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         if not (step_size > 0.0 and math.isfinite(current_time) and math.isfinite(step_size)):
-            self.log(f"step of {step_size!r} s at {current_time!r} s: must be positive", Fmi2Status.error)
+            self.tell(f"step of {step_size!r} s at {current_time!r} s: must be positive", Fmi2Status.error)
+            return False
+        if self.fault:
+            self.tell(self.fault, Fmi2Status.error)
             return False
         before = self.snapshot()
         ends = self.earlier is not None and self.real[0] > current_time + 0.5 * step_size
         try:
             self.advance(step_size, ends)
+            if not all(map(math.isfinite, self.real[self.states])):
+                raise ValueError("the state is not finite any more")
         except (ArithmeticError, ValueError) as error:
             self.restore(before)
             told = f"step of {step_size!r} s at {current_time!r} s: {error}; inputs {self.inputs_by_name()}"
-            self.log(told, Fmi2Status.error)
+            self.tell(told, Fmi2Status.error)
             return False
         self.started = True
         self.elapsed = 0.0 if ends else step_size
         self.stale = True
         return True
+
+    def _refresh_or_nan(self) -> None:
+        """Refresh outputs; where the law has no value for the inputs, all outputs become NaN.
+
+        An exception must not leave a slave: pythonfmu 0.7.0 ends the process at the third.
+        """
+        try:
+            self.refresh()
+        except (ArithmeticError, ValueError) as error:
+            for reference, variable in enumerate(self.variables):
+                if variable.causality == "output" and not self._is_state(reference):
+                    self.real[reference] = math.nan
+            self.tell(f"no outputs: {error}; inputs {self.inputs_by_name()}", Fmi2Status.warning)
+
+    def _is_state(self, reference: int) -> bool:
+        return self.states.start <= reference < self.states.stop
+
+    def _unknown(self, reference: int) -> float:
+        self.fault = f"no real variable has the value reference {reference}"
+        self.tell(self.fault, Fmi2Status.error)
+        return math.nan
+
+    def tell(self, message: str, status: Fmi2Status) -> None:
+        """Log; the wrapper hands the text to the host as a format, where a percent sign would be an order."""
+        self.log(message.replace("%", " per cent"), status)
+
+    def inputs_by_name(self) -> Dict[str, float]:
+        """The inputs as they were set."""
+        return {v.name: value for v, value in zip(self.variables, self.real[: self.input_count])}
 
     def snapshot(self) -> Snapshot:
         """All that the slave remembers."""
@@ -132,7 +156,12 @@ class Slave(Fmi2Slave):
     def _get_fmu_state(self) -> Snapshot:
         return self.snapshot()
 
-    def _set_fmu_state(self, state: Snapshot) -> None:
+    def _set_fmu_state(self, state: Optional[Snapshot]) -> None:
+        if state is None or len(state[0]) != len(self.real):
+            self.fault = "a saved state that was no state of this FMU"
+            self.tell(self.fault, Fmi2Status.error)
+            return
+        self.fault = ""
         self.restore(state)
 
     @staticmethod
@@ -140,9 +169,13 @@ class Slave(Fmi2Slave):
         return json.dumps(state).encode("utf-8")
 
     @staticmethod
-    def _fmu_state_from_bytes(state: bytes) -> Snapshot:
-        real, earlier, elapsed, started = json.loads(state.decode("utf-8"))
-        return (tuple(real), None if earlier is None else tuple(earlier), elapsed, started)
+    def _fmu_state_from_bytes(state: bytes) -> Optional[Snapshot]:
+        try:
+            real, earlier, elapsed, started = json.loads(state.decode("utf-8"))
+            past = None if earlier is None else tuple(map(float, earlier))
+            return (tuple(map(float, real)), past, float(elapsed), bool(started))
+        except (ValueError, TypeError):
+            return None
 
     def to_xml(self, model_options: Dict[str, str] = {}) -> Element:  # noqa: B006 (pythonfmu's signature)
         return complete(super().to_xml(model_options), self.variables)
