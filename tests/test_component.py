@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tautwire.cosimulation import instantiated, shown_ports
-from tautwire.master import Component, ComponentError, Sampled, simulate
+from tautwire.master import Component, ComponentError, FixedStep, Sampled, simulate
 from tautwire.packaging import RobotFmus
 
 
@@ -28,7 +28,7 @@ def test_a_failing_fmu_is_named_with_time_and_inputs(three_fmus: RobotFmus) -> N
 def test_a_value_that_is_not_finite_stops_the_run(three_fmus: RobotFmus) -> None:
     speeds = np.array([[0.0, 0.0, 0.0], [0.0, np.inf, 0.0]])
     with instantiated(three_fmus) as coupling, pytest.raises(ComponentError, match="not finite"):
-        simulate(coupling, Sampled(np.array([0.0, 0.1]), speeds), np.array([0.0, 0.1]), shown_ports(3), 0.01)
+        simulate(coupling, Sampled(np.array([0.0, 0.1]), speeds), np.array([0.0, 0.1]), shown_ports(3), FixedStep(0.01))
 
 
 def test_folders_go_when_the_block_ends(three_fmus: RobotFmus) -> None:

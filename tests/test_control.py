@@ -14,6 +14,7 @@ import tautwire
 from tautwire.control import ControlAim, PathController, cosimulate_closed_loop, design_controller, path_tensions
 from tautwire.cosimulation import Motion, cosimulate, run
 from tautwire.errors import UnreachableError
+from tautwire.master import FixedStep
 from tautwire.packaging import RobotFmus, build_fmus
 from tautwire.robot import Robot
 from tautwire.robot_file import read_robot
@@ -130,7 +131,7 @@ def test_limit_of_speed_is_kept_and_nothing_winds_up(fmus: dict[str, RobotFmus])
     design = design_controller(robot, ControlAim(speed_limit=0.3))
     times = np.linspace(0.0, 8.0, 801)
     source = PathController(robot, design, path, times)
-    motion = run(fmus["three"], source, times)
+    motion = run(fmus["three"], source, times, FixedStep(0.01))
     assert np.abs(ideal_winch_speeds(robot, path, times)).max() > 0.35
     assert np.abs(source.speeds).max() == pytest.approx(0.3, abs=1e-12)
     assert errors(motion, path).max() > 0.05

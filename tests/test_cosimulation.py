@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tautwire.cosimulation import cosimulate
+from tautwire.cosimulation import Motion, cosimulate
 from tautwire.packaging import RobotFmus, build_fmus
 from tautwire.reference import integrate
 from tautwire.robot import EffectSetting, Platform, Robot
@@ -136,3 +136,36 @@ def test_a_cable_may_go_slack_and_tight_again(tmp_path: Path) -> None:
     )
     assert np.min(motion.tension) == 0.0
     assert np.max(np.abs(motion.position - exact.position)) < 1e-4
+
+
+@pytest.mark.parametrize("tolerance", [1e-4, 1e-6, 1e-7])
+def test_steps_chosen_by_a_tolerance_keep_it(three_fmus: RobotFmus, tolerance: float) -> None:
+    speeds = np.clip(RAMP * CORNERS[:, None], -1.0, 1.0)
+    motion = cosimulate(three_fmus, CORNERS, speeds, tolerance=tolerance)
+    exact = simulate(rig_of(paper_robot()), None, RampProgram(RAMP, 1.0), CORNERS, rtol=1e-12, atol=1e-13)
+    assert np.max(np.abs(motion.position[-1] - exact.position[-1])) < tolerance
+    assert motion.account.error is not None and motion.account.error <= tolerance
+    assert motion.account.steps < 600
+
+
+def swing_energy(robot: Robot, motion: Motion) -> np.ndarray:
+    """Kinetic, potential and elastic energy in J while the winches stand, logarithmic law."""
+    axial = robot.cables[0].modulus * robot.cables[0].area
+    kinetic = 0.5 * robot.platform.mass * np.sum(motion.velocity**2, axis=1)
+    weight = robot.platform.mass * robot.gravity * motion.position[:, 2]
+    tension = motion.tension[0]
+    elastic = axial * (motion.length * motion.strain - motion.length) + tension * motion.length
+    return np.asarray(kinetic + weight + np.sum(elastic, axis=1))
+
+
+def test_the_coupling_neither_makes_nor_eats_energy(three_fmus: RobotFmus) -> None:
+    time = np.concatenate([[0.0, 0.5, 1.0], np.arange(1.05, 26.0, 0.05)])
+    speed = np.zeros((len(time), 3))
+    speed[1] = [0.3, -0.2, 0.25]
+    motion = cosimulate(three_fmus, time, speed)
+    free = time >= 1.0
+    energy = swing_energy(paper_robot(), motion)[free]
+    vibration = np.max(0.5 * 300.0 * np.sum(motion.velocity[free] ** 2, axis=1))
+    assert np.max(np.abs(energy - energy[0])) < 1e-6 * vibration
+    assert motion.account.share < 1e-9
+    assert motion.account.warning() is None

@@ -102,6 +102,9 @@ def simulate(
     speeds: Annotated[Path, typer.Option(metavar="RECORDING.csv", help="Winch speeds over time.")],
     out: Annotated[Path, typer.Option(metavar="RESULT.csv", help="Where the result goes.")],
     step: Annotated[float, typer.Option(help="Longest macro step, s.")] = 0.01,
+    tolerance: Annotated[
+        float | None, typer.Option(help="Error allowed, m; chooses the steps, in place of --step.")
+    ] = None,
     until: Annotated[float | None, typer.Option(help="Stop at this time, s.")] = None,
 ) -> None:
     """Co-simulate the FMUs over recorded winch speeds.
@@ -113,13 +116,17 @@ def simulate(
 
     if not step > 0.0:
         raise InputError("--step", f"{step:g} s is not positive", "give a step such as 0.01")
+    if tolerance is not None and not tolerance > 0.0:
+        raise InputError("--tolerance", f"{tolerance:g} m is not positive", "give an error such as 1e-6")
     robot = _robot(robot_file)
     with file_in_place(out) as scratch, _progress() as tell:
-        motion, notes = simulate_recording(robot, speeds, step, until, tell)
+        motion, notes = simulate_recording(robot, speeds, step, tolerance, until, tell)
         motion.frame().to_csv(scratch, index=False)
     for note in notes:
         print(note, file=sys.stderr)
-    print(out)
+    account = motion.account
+    error = "" if account.error is None else f", estimated error {account.error:.2g} m"
+    print(f"{out}: {account.steps} steps, {account.redos} redos, coupling made {account.made:.2g} J{error}")
 
 
 @application.command()

@@ -25,7 +25,7 @@ from tautwire_fmu.laws.point_mass import PointMassConstants, total_mass
 from .cosimulation import AXES, STEP, Motion, run
 from .errors import UnreachableError
 from .linear import LinearPlant, linearise
-from .master import Progress
+from .master import FixedStep, Progress
 from .packaging import RobotFmus
 from .robot import Robot
 from .statics import platform_effects, static_tensions
@@ -279,4 +279,4 @@ def cosimulate_closed_loop(
     count = int(np.ceil(duration / period * (1.0 - 1e-9))) + 1
     times = np.linspace(0.0, (count - 1) * period, count)
     source = PathController(robot, controller, trajectory, times, seed)
-    return run(fmus, source, times, step, progress)
+    return run(fmus, source, times, FixedStep(step), progress)

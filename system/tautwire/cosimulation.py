@@ -4,13 +4,27 @@ from __future__ import annotations
 
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from .master import Component, Connection, Coupling, Port, Progress, Sampled, Source, simulate
+from .master import (
+    Account,
+    AdaptiveStep,
+    Bond,
+    Component,
+    Connection,
+    Coupling,
+    FixedStep,
+    Port,
+    Progress,
+    Sampled,
+    Source,
+    Stepping,
+    simulate,
+)
 from .packaging import RobotFmus
 
 Array = NDArray[np.float64]
@@ -25,7 +39,8 @@ SHOWN_OF_CABLE = ("tension", "length", "elongation", "strain")
 class Motion:
     """A run of a robot with n cables at N times; SI units.
 
-    ``time`` (N,); ``position`` and ``velocity`` (N, 3); ``tension``, ``length``, ``elongation`` and ``strain``
+    ``account`` tells steps, redos and the energy that the coupling made. ``time`` (N,); ``position`` and ``velocity``
+    (N, 3); ``tension``, ``length``, ``elongation`` and ``strain``
     (N, n). ``elongation`` is the paper's r, see :func:`tautwire_fmu.laws.cable.reading`.
     """
 
@@ -36,6 +51,7 @@ class Motion:
     length: Array
     elongation: Array
     strain: Array
+    account: Account = field(default_factory=Account, compare=False)
 
     def measured(self) -> Array:
         """What sensors see, shape (N, 3 + n): x, y, z, then the tensions."""
@@ -88,8 +104,20 @@ def shown_ports(cable_count: int) -> list[Port]:
     return platform + cables
 
 
+def bonds(cable_count: int) -> list[Bond]:
+    """The power that each cable and the platform exchange, axis by axis."""
+    return [
+        Bond(
+            effort=_wire(cable_name(index), f"force.{axis}", PLATFORM, f"force_{index}.{axis}"),
+            flow=_wire(PLATFORM, f"velocity.{axis}", cable_name(index), f"velocity.{axis}"),
+        )
+        for index in range(1, cable_count + 1)
+        for axis in AXES
+    ]
+
+
 @contextmanager
-def instantiated(fmus: RobotFmus, tolerance: float = 1e-9) -> Iterator[Coupling]:
+def instantiated(fmus: RobotFmus) -> Iterator[Coupling]:
     """The wired robot in initialization mode; instances and folders go when the block ends."""
     count = len(fmus.cables)
     with ExitStack() as stack:
@@ -102,7 +130,7 @@ def instantiated(fmus: RobotFmus, tolerance: float = 1e-9) -> Iterator[Coupling]
         }
         for component in components.values():
             component.initialize(0.0, {})
-        yield Coupling(components, connections(count), winch_ports(count), tolerance)
+        yield Coupling(components, connections(count), winch_ports(count), bonds(count))
 
 
 def cosimulate(
@@ -110,25 +138,32 @@ def cosimulate(
     time: Array,
     winch_speed: Array,
     step: float = STEP,
+    tolerance: float | None = None,
     progress: Progress | None = None,
 ) -> Motion:
     """Co-simulate a robot over sampled winch speeds, linear between samples.
 
-    ``time`` (N,) in s, rising; ``winch_speed`` (N, n) in m/s, positive reels in; ``step`` bounds the macro step in
-    s. Returns the run at ``time``.
+    ``time`` (N,) in s, rising; ``winch_speed`` (N, n) in m/s, positive reels in. Macro steps are no longer than
+    ``step`` (s); or such that their estimated errors of all lengths sum to at most ``tolerance`` (m), where one is
+    given. Returns the run at ``time``.
+
+    Raises ComponentError where an FMU fails, StepError where no step meets the tolerance.
     """
-    return run(fmus, Sampled(time, winch_speed), time, step, progress)
+    stepping: Stepping = FixedStep(step)
+    if tolerance is not None:
+        stepping = AdaptiveStep(tolerance, float(time[-1] - time[0]))
+    return run(fmus, Sampled(time, winch_speed), time, stepping, progress)
 
 
-def run(fmus: RobotFmus, source: Source, time: Array, step: float = STEP, progress: Progress | None = None) -> Motion:
+def run(fmus: RobotFmus, source: Source, time: Array, stepping: Stepping, progress: Progress | None = None) -> Motion:
     """Co-simulate a robot under any source of winch speeds, recorded at ``time``."""
     count = len(fmus.cables)
     with instantiated(fmus) as coupling:
-        shown = simulate(coupling, source, time, shown_ports(count), step, progress)
-    return motion_of(time, shown, count)
+        shown = simulate(coupling, source, time, shown_ports(count), stepping, progress)
+        return replace(motion_of(time, shown), account=coupling.account)
 
 
-def motion_of(time: Array, shown: Array, cable_count: int) -> Motion:
+def motion_of(time: Array, shown: Array) -> Motion:
     """Sort recorded columns, in the order of :func:`shown_ports`, into a run."""
-    per_cable = (shown[:, 6 + k * cable_count : 6 + (k + 1) * cable_count] for k in range(len(SHOWN_OF_CABLE)))
-    return Motion(time, shown[:, :3], shown[:, 3:6], *per_cable)
+    tension, length, elongation, strain = np.split(shown[:, 6:], len(SHOWN_OF_CABLE), axis=1)
+    return Motion(time, shown[:, :3], shown[:, 3:6], tension, length, elongation, strain)

@@ -18,7 +18,12 @@ from .tracer.noise import noise_of
 
 
 def simulate_recording(
-    robot: Robot, path: Path, step: float, until: float | None, progress: Callable[[str, float], None]
+    robot: Robot,
+    path: Path,
+    step: float,
+    tolerance: float | None,
+    until: float | None,
+    progress: Callable[[str, float], None],
 ) -> tuple[Motion, tuple[str, ...]]:
     """The run at the recording's times, up to ``until`` (s), and what the user should know of it.
 
@@ -40,6 +45,8 @@ def simulate_recording(
             recording.time[:count],
             recording.winch_speed[:count],
             step,
+            tolerance,
             lambda done: progress("co-simulating", done),
         )
-    return motion, notes
+    warning = motion.account.warning()
+    return motion, notes if warning is None else (*notes, warning)

@@ -113,7 +113,6 @@ class Component:
         self._step.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int]
         for function in (self._get, self._set):
             function.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p]
-        self._saved = ctypes.c_void_p()
 
     def __enter__(self) -> Component:
         return self
@@ -125,7 +124,6 @@ class Component:
 
     def close(self) -> None:
         """Free the instance and the folder into which the FMU was extracted."""
-        self.release()
         self.fmu.freeInstance()
         shutil.rmtree(self.folder, ignore_errors=True)
 
@@ -178,24 +176,23 @@ class Component:
         if status > FMI_WARNING:
             self._fail("fmi2DoStep", status)
 
-    def save(self) -> None:
-        """Keep the present state, in place of the one kept before."""
-        self.release()
-        status = self.fmu.dll.fmi2GetFMUstate(self._handle, ctypes.byref(self._saved))
+    def save(self) -> ctypes.c_void_p:
+        """A copy of the present state, to be let go with :meth:`release`."""
+        saved = ctypes.c_void_p()
+        status = self.fmu.dll.fmi2GetFMUstate(self._handle, ctypes.byref(saved))
         if status > FMI_WARNING:
             self._fail("fmi2GetFMUstate", status)
+        return saved
 
-    def restore(self) -> None:
-        """Go back to the state kept last."""
-        status = self.fmu.dll.fmi2SetFMUstate(self._handle, self._saved)
+    def restore(self, saved: ctypes.c_void_p) -> None:
+        """Go back to a saved state."""
+        status = self.fmu.dll.fmi2SetFMUstate(self._handle, saved)
         if status > FMI_WARNING:
             self._fail("fmi2SetFMUstate", status)
 
-    def release(self) -> None:
-        """Let the kept state go."""
-        if self._saved:
-            self.fmu.dll.fmi2FreeFMUstate(self._handle, ctypes.byref(self._saved))
-            self._saved = ctypes.c_void_p()
+    def release(self, saved: ctypes.c_void_p) -> None:
+        """Let a saved state go."""
+        self.fmu.dll.fmi2FreeFMUstate(self._handle, ctypes.byref(saved))
 
     def refuse(self, block: Block) -> None:
         """Raise ComponentError for values that are not finite."""

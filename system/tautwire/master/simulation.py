@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Protocol
@@ -10,7 +9,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
+from .component import Block, Component
 from .coupling import Coupling
+from .stepping import Stepping
 from .wiring import Port
 
 Array = NDArray[np.float64]
@@ -23,7 +24,8 @@ class Source(Protocol):
     def interval(self, index: int, time: float, step: float, shown: Array) -> tuple[Array, Array]:
         """Driven inputs just after ``time`` and just before ``time + step``.
 
-        ``index`` counts the intervals of the sample grid; ``shown`` holds the recorded outputs at ``time``.
+        ``index`` counts the intervals of the sample grid; ``shown`` holds the recorded outputs at its begin. May be
+        asked more than once for the same interval, and with a step of zero before anything is recorded.
         """
         ...
 
@@ -53,48 +55,56 @@ def simulate(
     source: Source,
     times: Array,
     observed: Sequence[Port],
-    step: float,
+    stepping: Stepping,
     progress: Progress | None = None,
 ) -> Array:
     """Co-simulate over the grid ``times`` and give the observed outputs there, shape (len(times), len(observed)).
 
-    Each interval of the grid is cut into equal macro steps no longer than ``step``, so kinks of the source at grid
-    times never fall inside a step. Components must be in initialization mode.
+    Each interval of the grid is cut into macro steps of its own, so kinks of the source at grid times never fall
+    inside a step. Components must be in initialization mode.
 
     Raises ComponentError where an FMU fails or shows a value that is not finite.
     """
-    blocks = _observation(coupling, observed)
+    window = _Window(coupling, observed)
     shown = np.empty((len(times), len(observed)))
     start, _ = source.interval(0, float(times[0]), 0.0, np.zeros(len(observed)))
     coupling.settle(float(times[0]), start)
     for component in coupling.components.values():
         component.run()
-    _read(blocks, shown[0])
+    window.read(shown[0])
     for index in range(len(times) - 1):
         begin, span = float(times[index]), float(times[index + 1] - times[index])
-        count = max(1, math.ceil(span / step * (1.0 - 1e-9)))
-        for k in range(count):
-            time = begin + k * span / count
-            start, end = source.interval(index, time, span / count, shown[index])
-            coupling.step(time, span / count, start, end)
-        _read(blocks, shown[index + 1])
+
+        def drives(time: float, step: float, index: int = index) -> tuple[Array, Array]:
+            return source.interval(index, time, step, shown[index])
+
+        stepping.cover(coupling, begin, span, drives, window.lengths)
+        window.read(shown[index + 1])
         if progress is not None:
             progress((index + 1) / (len(times) - 1))
     return shown
 
 
-def _observation(coupling: Coupling, observed: Sequence[Port]):  # type: ignore[no-untyped-def]
-    blocks = []
-    for name in dict.fromkeys(port.component for port in observed):
-        places = [i for i, port in enumerate(observed) if port.component == name]
-        block = coupling.components[name].block([observed[i].variable for i in places])
-        blocks.append((coupling.components[name], block, np.array(places)))
-    return blocks
+class _Window:
+    """Reads the observed outputs, and those of them that are lengths."""
 
+    def __init__(self, coupling: Coupling, observed: Sequence[Port]) -> None:
+        self._blocks: list[tuple[Component, Block, NDArray[np.intp]]] = []
+        units = [coupling.components[p.component].variables[p.variable].unit for p in observed]
+        self._lengths = np.array([unit == "m" for unit in units], dtype=bool)
+        for name in dict.fromkeys(port.component for port in observed):
+            places = [i for i, port in enumerate(observed) if port.component == name]
+            block = coupling.components[name].block([observed[i].variable for i in places])
+            self._blocks.append((coupling.components[name], block, np.array(places)))
 
-def _read(blocks, row: Array) -> None:  # type: ignore[no-untyped-def]
-    for component, block, places in blocks:
-        component.read(block)
-        if not np.all(np.isfinite(block.values)):
-            component.refuse(block)
-        row[places] = block.values
+    def read(self, row: Array) -> None:
+        for component, block, places in self._blocks:
+            component.read(block)
+            if not np.all(np.isfinite(block.values)):
+                component.refuse(block)
+            row[places] = block.values
+
+    def lengths(self) -> Array:
+        row = np.empty(len(self._lengths))
+        self.read(row)
+        return row[self._lengths]

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from tautwire_fmu.laws.effects import BY_NAME
 
-from ..cosimulation import STEP, Motion, cosimulate
+from ..cosimulation import Motion, cosimulate
 from ..packaging import build_fmus
 from ..recording import Recording, require_outputs
 from ..robot import Robot
@@ -114,8 +114,7 @@ def _cosimulated(robot: Robot, sample: Sample, what: str, progress: Progress) ->
             fmus,
             recording.time,
             recording.winch_speed,
-            STEP,
-            lambda done: progress(f"co-simulating {what}", done),
+            progress=lambda done: progress(f"co-simulating {what}", done),
         )
 
 

@@ -1,0 +1,106 @@
+"""How an interval between two grid times is cut into macro steps: by a bound, or by a tolerance."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import TautwireError
+from .coupling import Coupling
+
+Array = NDArray[np.float64]
+Drives = Callable[[float, float], tuple[Array, Array]]
+Watch = Callable[[], Array]
+
+ORDER = 4
+SAFETY = 0.9
+# Errors of steps may grow as they travel on; a third of the tolerance is theirs.
+SHARE = 0.3
+SMALLEST_SHARE = 1e-6
+LARGEST_GROWTH, LARGEST_CUT = 4.0, 0.1
+
+
+class StepError(TautwireError):
+    """The tolerance asks for steps too small to go on; carries time (s), step (s) and the error estimated (m)."""
+
+    def __init__(self, time: float, step: float, error: float) -> None:
+        self.time = time
+        self.step = step
+        self.error = error
+        super().__init__(
+            f"at {time:.6g} s a step of {step:.3g} s still errs by {error:.3g} m: give a larger --tolerance"
+        )
+
+
+class Stepping(Protocol):
+    """Goes from ``begin`` over ``span`` seconds; ``drives(time, step)`` gives the driven inputs at both ends."""
+
+    def cover(self, coupling: Coupling, begin: float, span: float, drives: Drives, watch: Watch) -> None:
+        """Advance the coupling; ``watch()`` reads the outputs whose error counts."""
+        ...
+
+
+@dataclass(frozen=True)
+class FixedStep:
+    """Equal macro steps no longer than ``longest`` (s)."""
+
+    longest: float
+
+    def cover(self, coupling: Coupling, begin: float, span: float, drives: Drives, watch: Watch) -> None:
+        """See :class:`Stepping`."""
+        count = max(1, math.ceil(span / self.longest * (1.0 - 1e-9)))
+        for k in range(count):
+            time = begin + k * span / count
+            coupling.step(time, span / count, *drives(time, span / count))
+
+
+@dataclass
+class AdaptiveStep:
+    """Macro steps such that the errors of all steps of a run of ``duration`` (s) sum to at most ``tolerance`` (m).
+
+    Each step is made whole and, from the saved states, in two halves; a fifteenth of the difference is the error of
+    the halves (order 4), which are kept.
+    """
+
+    tolerance: float
+    duration: float
+    next: float = 0.02
+
+    def cover(self, coupling: Coupling, begin: float, span: float, drives: Drives, watch: Watch) -> None:
+        """See :class:`Stepping`; raises StepError where no step is small enough."""
+        done = 0.0
+        while done < span * (1.0 - 1e-12):
+            rest = span - done
+            step = rest if self.next >= rest * 0.999 else min(self.next, 0.5 * rest)
+            error = self._try(coupling, begin + done, step, drives, watch)
+            if error is None:
+                done += step
+
+    def _try(self, coupling: Coupling, time: float, step: float, drives: Drives, watch: Watch) -> float | None:
+        """Make one step; None if it is kept, else its error, and all is as before."""
+        before = coupling.save()
+        try:
+            coupling.step(time, step, *drives(time, step))
+            whole = watch()
+            coupling.restore(before)
+            half = 0.5 * step
+            coupling.step(time, half, *drives(time, half))
+            coupling.step(time + half, half, *drives(time + half, half))
+            error = float(np.max(np.abs(watch() - whole), initial=0.0)) / (2**ORDER - 1)
+            allowed = SHARE * self.tolerance * step / self.duration
+            factor = SAFETY * (allowed / max(error, 1e-300)) ** (1.0 / ORDER)
+            self.next = step * min(max(factor, LARGEST_CUT), LARGEST_GROWTH)
+            if error <= allowed:
+                coupling.account.error = (coupling.account.error or 0.0) + error
+                return None
+            if self.next < SMALLEST_SHARE * self.duration:
+                raise StepError(time, step, error)
+            coupling.restore(before)
+            return error
+        finally:
+            coupling.release(before)

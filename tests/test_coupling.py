@@ -1,0 +1,60 @@
+"""Coupling with FMUs that can do less than ours."""
+
+import numpy as np
+import pytest
+
+from tautwire.cosimulation import instantiated, shown_ports
+from tautwire.master import AdaptiveStep, Coupling, FixedStep, Sampled, StepError, simulate
+from tautwire.packaging import RobotFmus
+from tests.rig import RampProgram
+from tests.rig import simulate as rig_simulate
+from tests.robots import paper_robot
+from tests.test_cosimulation import CORNERS, RAMP, rig_of
+
+RAMPS = Sampled(CORNERS, np.clip(RAMP * CORNERS[:, None], -1.0, 1.0))
+
+
+def end_error(coupling: Coupling, step: float) -> float:
+    shown = simulate(coupling, RAMPS, CORNERS, shown_ports(3), FixedStep(step))
+    exact = rig_simulate(rig_of(paper_robot()), None, RampProgram(RAMP, 1.0), CORNERS, rtol=1e-12, atol=1e-13)
+    return float(np.linalg.norm(shown[-1, :3] - exact.position[-1]))
+
+
+def test_without_saved_states_it_goes_on_with_one_pass(three_fmus: RobotFmus) -> None:
+    with instantiated(three_fmus) as coupling:
+        coupling.can_redo = False
+        assert end_error(coupling, 0.01) < 1e-4
+        assert coupling.account.redos == 0
+        assert coupling.account.passes == coupling.account.steps
+
+
+def test_the_books_show_what_a_coupling_without_redo_makes(three_fmus: RobotFmus) -> None:
+    shares = []
+    for can_redo in (True, False):
+        with instantiated(three_fmus) as coupling:
+            coupling.can_redo = can_redo
+            end_error(coupling, 0.05)
+            shares.append(coupling.account.share)
+    assert shares[1] > 100.0 * shares[0]
+
+
+def test_a_checkpoint_takes_everything_back(three_fmus: RobotFmus) -> None:
+    with instantiated(three_fmus) as coupling:
+        simulate(coupling, RAMPS, CORNERS[:2], shown_ports(3), FixedStep(0.02))
+        drives = RAMPS.interval(1, CORNERS[1], 0.02, np.zeros(0))
+        checkpoint = coupling.save()
+        ends = []
+        for _ in range(2):
+            coupling.step(CORNERS[1], 0.02, *drives)
+            platform = coupling.components["platform"]
+            block = platform.block(["position.x", "velocity.z"])
+            platform.read(block)
+            ends.append(block.values.copy())
+            coupling.restore(checkpoint)
+        coupling.release(checkpoint)
+    assert ends[0] == pytest.approx(ends[1], rel=1e-13)
+
+
+def test_a_tolerance_that_no_step_meets_is_said(three_fmus: RobotFmus) -> None:
+    with instantiated(three_fmus) as coupling, pytest.raises(StepError, match="larger --tolerance"):
+        simulate(coupling, RAMPS, CORNERS, shown_ports(3), AdaptiveStep(1e-22, 7.0))
