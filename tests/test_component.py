@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tautwire.cosimulation import instantiated, shown_ports
-from tautwire.master import Component, ComponentError, FixedStep, Sampled, simulate
+from tautwire.cosimulation import RunError, cosimulate, instantiated, shown_ports
+from tautwire.master import Component, ComponentError, FixedStep, Kept, Sampled, simulate
 from tautwire.packaging import RobotFmus
 
 
@@ -28,7 +28,14 @@ def test_a_failing_fmu_is_named_with_time_and_inputs(three_fmus: RobotFmus) -> N
 def test_a_value_that_is_not_finite_stops_the_run(three_fmus: RobotFmus) -> None:
     speeds = np.array([[0.0, 0.0, 0.0], [0.0, np.inf, 0.0]])
     with instantiated(three_fmus) as coupling, pytest.raises(ComponentError, match="not finite"):
-        simulate(coupling, Sampled(np.array([0.0, 0.1]), speeds), np.array([0.0, 0.1]), shown_ports(3), FixedStep(0.01))
+        simulate(
+            coupling,
+            Sampled(np.array([0.0, 0.1]), speeds),
+            np.array([0.0, 0.1]),
+            shown_ports(3),
+            FixedStep(0.01),
+            Kept(2, 18),
+        )
 
 
 def test_folders_go_when_the_block_ends(three_fmus: RobotFmus) -> None:
@@ -36,3 +43,14 @@ def test_folders_go_when_the_block_ends(three_fmus: RobotFmus) -> None:
         folder = Path(component.folder)
         assert folder.is_dir()
     assert not folder.exists()
+
+
+def test_a_run_that_fails_keeps_what_came_before(three_fmus: RobotFmus) -> None:
+    time = np.array([0.0, 0.1, 0.2, 0.3])
+    speeds = np.zeros((4, 3))
+    speeds[3, 1] = np.nan
+    with pytest.raises(RunError, match="FMU cable_2: fmi2DoStep gave 'discard' at 0.2") as caught:
+        cosimulate(three_fmus, time, speeds)
+    assert caught.value.motion.time.tolist() == [0.0, 0.1, 0.2]
+    assert np.isfinite(caught.value.motion.tension).all()
+    assert caught.value.cause.component == "cable_2"

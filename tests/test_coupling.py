@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tautwire.cosimulation import instantiated, shown_ports
-from tautwire.master import AdaptiveStep, Coupling, FixedStep, Sampled, StepError, simulate
+from tautwire.master import AdaptiveStep, Coupling, FixedStep, Kept, Sampled, StepError, simulate
 from tautwire.packaging import RobotFmus
 from tests.rig import RampProgram
 from tests.rig import simulate as rig_simulate
@@ -15,9 +15,10 @@ RAMPS = Sampled(CORNERS, np.clip(RAMP * CORNERS[:, None], -1.0, 1.0))
 
 
 def end_error(coupling: Coupling, step: float) -> float:
-    shown = simulate(coupling, RAMPS, CORNERS, shown_ports(3), FixedStep(step))
+    kept = Kept(len(CORNERS), 18)
+    simulate(coupling, RAMPS, CORNERS, shown_ports(3), FixedStep(step), kept)
     exact = rig_simulate(rig_of(paper_robot()), None, RampProgram(RAMP, 1.0), CORNERS, rtol=1e-12, atol=1e-13)
-    return float(np.linalg.norm(shown[-1, :3] - exact.position[-1]))
+    return float(np.linalg.norm(kept.rows[-1, :3] - exact.position[-1]))
 
 
 def test_without_saved_states_it_goes_on_with_one_pass(three_fmus: RobotFmus) -> None:
@@ -40,7 +41,7 @@ def test_the_books_show_what_a_coupling_without_redo_makes(three_fmus: RobotFmus
 
 def test_a_checkpoint_takes_everything_back(three_fmus: RobotFmus) -> None:
     with instantiated(three_fmus) as coupling:
-        simulate(coupling, RAMPS, CORNERS[:2], shown_ports(3), FixedStep(0.02))
+        simulate(coupling, RAMPS, CORNERS[:2], shown_ports(3), FixedStep(0.02), Kept(2, 18))
         drives = RAMPS.interval(1, CORNERS[1], 0.02, np.zeros(0))
         checkpoint = coupling.save()
         ends = []
@@ -57,4 +58,4 @@ def test_a_checkpoint_takes_everything_back(three_fmus: RobotFmus) -> None:
 
 def test_a_tolerance_that_no_step_meets_is_said(three_fmus: RobotFmus) -> None:
     with instantiated(three_fmus) as coupling, pytest.raises(StepError, match="larger --tolerance"):
-        simulate(coupling, RAMPS, CORNERS, shown_ports(3), AdaptiveStep(1e-22, 7.0))
+        simulate(coupling, RAMPS, CORNERS, shown_ports(3), AdaptiveStep(1e-22, 7.0), Kept(4, 18))

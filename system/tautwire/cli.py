@@ -111,6 +111,7 @@ def simulate(
 
     Example: tautwire simulate robot.toml --speeds recording.csv --out result.csv
     """
+    from .cosimulation import RunError
     from .output import file_in_place
     from .simulation import simulate_recording
 
@@ -119,14 +120,20 @@ def simulate(
     if tolerance is not None and not tolerance > 0.0:
         raise InputError("--tolerance", f"{tolerance:g} m is not positive", "give an error such as 1e-6")
     robot = _robot(robot_file)
-    with file_in_place(out) as scratch, _progress() as tell:
-        motion, notes = simulate_recording(robot, speeds, step, tolerance, until, tell)
+    try:
+        with _progress() as tell:
+            motion, notes = simulate_recording(robot, speeds, step, tolerance, until, tell)
+    except RunError as failure:
+        with file_in_place(out) as scratch:
+            failure.motion.frame().to_csv(scratch, index=False)
+        raise TautwireError(f"{failure}; the run until then is in {out}") from failure
+    with file_in_place(out) as scratch:
         motion.frame().to_csv(scratch, index=False)
     for note in notes:
         print(note, file=sys.stderr)
     account = motion.account
-    error = "" if account.error is None else f", estimated error {account.error:.2g} m"
-    print(f"{out}: {account.steps} steps, {account.redos} redos, coupling made {account.made:.2g} J{error}")
+    estimated = "" if account.error is None else f", estimated error {account.error:.2g} m"
+    print(f"{out}: {account.steps} steps, {account.redos} redos, coupling made {account.made:.2g} J{estimated}")
 
 
 @application.command()

@@ -10,14 +10,17 @@ import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
+from .errors import TautwireError
 from .master import (
     Account,
     AdaptiveStep,
     Bond,
     Component,
+    ComponentError,
     Connection,
     Coupling,
     FixedStep,
+    Kept,
     Port,
     Progress,
     Sampled,
@@ -65,6 +68,15 @@ class Motion:
         for name in SHOWN_OF_CABLE:
             columns |= {f"{name}_{i + 1}": row for i, row in enumerate(getattr(self, name).T)}
         return pd.DataFrame(columns)
+
+
+class RunError(TautwireError):
+    """An FMU failed in a run; ``motion`` is the run until then."""
+
+    def __init__(self, cause: ComponentError, motion: Motion) -> None:
+        self.cause = cause
+        self.motion = motion
+        super().__init__(str(cause))
 
 
 def cable_name(index: int) -> str:
@@ -147,7 +159,7 @@ def cosimulate(
     ``step`` (s); or such that their estimated errors of all lengths sum to at most ``tolerance`` (m), where one is
     given. Returns the run at ``time``.
 
-    Raises ComponentError where an FMU fails, StepError where no step meets the tolerance.
+    Raises RunError where an FMU fails, StepError where no step meets the tolerance.
     """
     stepping: Stepping = FixedStep(step)
     if tolerance is not None:
@@ -156,11 +168,19 @@ def cosimulate(
 
 
 def run(fmus: RobotFmus, source: Source, time: Array, stepping: Stepping, progress: Progress | None = None) -> Motion:
-    """Co-simulate a robot under any source of winch speeds, recorded at ``time``."""
+    """Co-simulate a robot under any source of winch speeds, recorded at ``time``.
+
+    Raises RunError, which has the run until then, where an FMU fails.
+    """
     count = len(fmus.cables)
+    ports = shown_ports(count)
+    kept = Kept(len(time), len(ports))
     with instantiated(fmus) as coupling:
-        shown = simulate(coupling, source, time, shown_ports(count), stepping, progress)
-        return replace(motion_of(time, shown), account=coupling.account)
+        try:
+            simulate(coupling, source, time, ports, stepping, kept, progress)
+        except ComponentError as error:
+            raise RunError(error, motion_of(time[: kept.count], kept.rows)) from error
+        return replace(motion_of(time, kept.rows), account=coupling.account)
 
 
 def motion_of(time: Array, shown: Array) -> Motion:

@@ -3,7 +3,7 @@
 from .audit import Account, Bond
 from .component import Component, ComponentError
 from .coupling import Coupling
-from .simulation import Progress, Sampled, Source, simulate
+from .simulation import Kept, Progress, Recorder, Sampled, Source, simulate
 from .stepping import AdaptiveStep, FixedStep, StepError, Stepping
 from .wiring import Connection, Port, WiringError
 
@@ -16,8 +16,10 @@ __all__ = [
     "Connection",
     "Coupling",
     "FixedStep",
+    "Kept",
     "Port",
     "Progress",
+    "Recorder",
     "Sampled",
     "Source",
     "StepError",

@@ -50,39 +50,67 @@ class Sampled:
         )
 
 
+class Recorder(Protocol):
+    """Takes the observed outputs of one grid time after the other."""
+
+    def add(self, time: float, row: Array) -> None:
+        """Keep a row, shape (number of observed outputs,); it is overwritten afterwards."""
+        ...
+
+
+class Kept:
+    """Keeps all rows in memory; ``rows`` holds those that came, shape (N, number of observed outputs)."""
+
+    def __init__(self, count: int, width: int) -> None:
+        self._rows = np.empty((count, width))
+        self.count = 0
+
+    def add(self, time: float, row: Array) -> None:
+        """See :class:`Recorder`."""
+        self._rows[self.count] = row
+        self.count += 1
+
+    @property
+    def rows(self) -> Array:
+        """The rows that came."""
+        return self._rows[: self.count]
+
+
 def simulate(
     coupling: Coupling,
     source: Source,
     times: Array,
     observed: Sequence[Port],
     stepping: Stepping,
+    recorder: Recorder,
     progress: Progress | None = None,
-) -> Array:
-    """Co-simulate over the grid ``times`` and give the observed outputs there, shape (len(times), len(observed)).
+) -> None:
+    """Co-simulate over the grid ``times`` and record the observed outputs there.
 
     Each interval of the grid is cut into macro steps of its own, so kinks of the source at grid times never fall
     inside a step. Components must be in initialization mode.
 
-    Raises ComponentError where an FMU fails or shows a value that is not finite.
+    Raises ComponentError where an FMU fails or shows a value that is not finite; the recorder has what came before.
     """
     window = _Window(coupling, observed)
-    shown = np.empty((len(times), len(observed)))
-    start, _ = source.interval(0, float(times[0]), 0.0, np.zeros(len(observed)))
+    shown = np.zeros(len(observed))
+    start, _ = source.interval(0, float(times[0]), 0.0, shown)
     coupling.settle(float(times[0]), start)
     for component in coupling.components.values():
         component.run()
-    window.read(shown[0])
+    window.read(shown)
+    recorder.add(float(times[0]), shown)
     for index in range(len(times) - 1):
         begin, span = float(times[index]), float(times[index + 1] - times[index])
 
         def drives(time: float, step: float, index: int = index) -> tuple[Array, Array]:
-            return source.interval(index, time, step, shown[index])
+            return source.interval(index, time, step, shown)
 
         stepping.cover(coupling, begin, span, drives, window.lengths)
-        window.read(shown[index + 1])
+        window.read(shown)
+        recorder.add(float(times[index + 1]), shown)
         if progress is not None:
             progress((index + 1) / (len(times) - 1))
-    return shown
 
 
 class _Window:
