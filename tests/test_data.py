@@ -1,6 +1,7 @@
 from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from tautwire.tracer.data import placed, split, start_of
 from tautwire.tracer.noise import noise_of
@@ -25,7 +26,7 @@ def test_noise_alone_does_not_move_the_start() -> None:
 def test_a_recording_that_starts_elsewhere_starts_where_it_says() -> None:
     recording = moved([0.0, 0.5, 0.0])
     start, notes = start_of(ROBOT, NOISE, recording)
-    assert start == tuple(recording.position[0])
+    assert start == pytest.approx(recording.position[:5].mean(axis=0), abs=1e-12)
     assert "starts where it says" in notes[0]
     assert placed(ROBOT, start).platform.start == start
 
@@ -34,7 +35,14 @@ def test_a_missing_axis_stays_at_the_robot_files_start() -> None:
     recording = moved([0.0, 0.5, np.nan])
     start, _ = start_of(ROBOT, NOISE, recording)
     assert start[2] == ROBOT.platform.start[2]
-    assert start[1] == recording.position[0, 1]
+    assert start[1] == pytest.approx(recording.position[:5, 1].mean(), abs=1e-12)
+
+
+def test_a_first_row_that_dropped_out_does_not_hide_the_start() -> None:
+    recording = moved([0.0, 0.5, 0.0])
+    recording.position[:2] = np.nan
+    start, _ = start_of(ROBOT, NOISE, recording)
+    assert start[1] == pytest.approx(0.5, abs=1e-3)
 
 
 def test_no_sample_both_fits_and_judges() -> None:

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tautwire.robot import EffectSetting
-from tautwire.tracer.hypotheses import free_parameters
+from tautwire.symbolic import FreeParameter
 from tautwire.tracer.likelihood import Likelihood
 from tautwire.tracer.noise import noise_of
 from tests.recordings import recorded
@@ -34,7 +34,8 @@ def test_innovations_of_a_true_model_are_white_with_unit_variance(name: str) -> 
 def test_slopes_are_the_derivatives_of_the_innovations() -> None:
     robot = ROBOT.with_effect(EffectSetting("damping", {"damping": 6e8}, (1, 2, 3)))
     robot = robot.with_effect(EffectSetting("payload", {"mass": 1.0}))
-    likelihood = Likelihood(robot, free_parameters(robot), NOISE, 0.02)
+    free = [FreeParameter(0, "damping"), FreeParameter(1, "mass")]
+    likelihood = Likelihood(robot, free, NOISE, 0.02)
     short = replace(
         RECORDING,
         time=RECORDING.time[:60],
@@ -66,7 +67,7 @@ def test_missing_cells_are_passed_over() -> None:
 def test_a_wrong_model_is_less_probable() -> None:
     right = Likelihood(ROBOT, (), NOISE, 0.02).innovations(RECORDING, [])
     heavier = ROBOT.with_effect(EffectSetting("payload", {"mass": 1.0}))
-    wrong = Likelihood(heavier, free_parameters(heavier), NOISE, 0.02).innovations(RECORDING, [1.0])
+    wrong = Likelihood(heavier, [FreeParameter(0, "mass")], NOISE, 0.02).innovations(RECORDING, [1.0])
     assert right.log_likelihood(ALL) - wrong.log_likelihood(ALL) > 100.0
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import shutil
 import tempfile
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -28,9 +28,20 @@ def folder_in_place(target: Path) -> Iterator[Path]:
         yield scratch
         target.mkdir(parents=True, exist_ok=True)
         for finished in sorted(scratch.iterdir()):
+            if (target / finished.name).is_dir():
+                raise InputError(str(target / finished.name), "is a folder, a file belongs there", "move it away")
+        for finished in sorted(scratch.iterdir()):
             finished.replace(target / finished.name)
     finally:
         shutil.rmtree(scratch, ignore_errors=True)
+
+
+def refuse_inputs(inputs: Iterable[Path], outputs: Iterable[Path]) -> None:
+    """Raises InputError where an output would take the place of an input."""
+    taken = {path.resolve() for path in inputs}
+    for output in outputs:
+        if output.resolve() in taken:
+            raise InputError(str(output), "is an input, the output would take its place", "choose another --out")
 
 
 @contextmanager

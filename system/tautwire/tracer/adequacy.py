@@ -9,28 +9,40 @@ from .likelihood import Innovations
 
 Array = NDArray[np.float64]
 
-SIGMAS = 5.0
-MATERIAL = 0.05
+SIGMAS = 4.0
+MATERIAL = 0.03
 LAGS = 20
+FEWEST = 100
 
 
 def is_noise(innovations: Innovations, rows: NDArray[np.bool_]) -> bool:
-    """True where no output's innovations are larger or more alike than independent noise would be.
+    """True where the innovations are neither larger nor more alike than independent noise would be.
 
-    Mean square at most ``1 + 5 sqrt(2 / N) + 0.05``; autocorrelation at lags 1 to 20 at most
-    ``5 / sqrt(N) + 0.05``, per output. Significance alone is not asked for: with many samples everything is
-    significant; hence the second term.
+    Of N innovations, per output and of all together: mean square at most ``1 + 4 sqrt(2 / N) + 0.03``. Mean square
+    of the autocorrelations at lags 1 to 20 of m outputs of N samples: at most ``(1 + 4 sqrt(2 / 20 m)) / N + 0.03^2``.
+    Significance alone is not asked for: with many samples everything is significant; hence the last terms. An
+    innovation that is not finite is not noise.
     """
-    squares = innovations.mean_square(rows)
-    counts = np.sum(innovations.seen[rows], axis=0)
-    for output in np.flatnonzero(counts > LAGS):
-        count = float(counts[output])
-        if squares[output] > 1.0 + SIGMAS * np.sqrt(2.0 / count) + MATERIAL:
-            return False
-        values = np.where(innovations.seen[rows, output], innovations.values[rows, output], 0.0)
-        if np.max(np.abs(autocorrelation(values))) > SIGMAS / np.sqrt(count) + MATERIAL:
-            return False
-    return True
+    values, seen = innovations.values[rows], innovations.seen[rows]
+    if not np.all(np.isfinite(values[seen])):
+        return False
+    used = np.sum(seen, axis=0) > LAGS
+    counts = np.append(np.sum(seen, axis=0)[used], np.sum(seen))
+    squares = np.where(seen, np.nan_to_num(values) ** 2, 0.0)
+    sums = np.append(np.sum(squares, axis=0)[used], np.sum(squares))
+    if np.any(sums / np.maximum(counts, 1) > 1.0 + SIGMAS * np.sqrt(2.0 / np.maximum(counts, 1)) + MATERIAL):
+        return False
+    correlated = [autocorrelation(np.where(s, v, 0.0)) for v, s in zip(values.T[used], seen.T[used], strict=True)]
+    if not correlated:
+        return True
+    average = float(np.mean(np.square(correlated)))
+    chance = (1.0 + SIGMAS * np.sqrt(2.0 / (LAGS * len(correlated)))) / float(np.min(counts))
+    return average <= chance + MATERIAL**2
+
+
+def enough_samples(innovations: Innovations, rows: NDArray[np.bool_]) -> bool:
+    """Whether there is enough to tell noise from more: at least 100 rows with something measured."""
+    return int(np.sum(np.any(innovations.seen[rows], axis=1))) >= FEWEST
 
 
 def autocorrelation(values: Array) -> Array:

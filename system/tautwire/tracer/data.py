@@ -12,6 +12,8 @@ from ..robot import Robot
 from .filter_step import Noise
 
 START_SIGNIFICANCE = 6.0
+# The robot starts at rest: its first samples are of one place.
+START_ROWS, START_SAMPLES = 10, 5
 
 
 @dataclass(frozen=True)
@@ -51,10 +53,12 @@ def split(robot: Robot, noise: Noise, fit: Recording, check: Recording | None) -
 def start_of(robot: Robot, noise: Noise, recording: Recording) -> tuple[tuple[float, float, float], tuple[str, ...]]:
     """Where a recording starts: where it says, if that differs significantly from the robot file."""
     declared = np.array(robot.platform.start)
-    first = recording.position[0]
-    there = np.isfinite(first)
-    away = np.where(there, first - declared, 0.0)
-    if np.all(np.abs(away) <= START_SIGNIFICANCE * noise.position):
+    away, spread = np.zeros(3), np.full(3, np.inf)
+    for axis, column in enumerate(recording.position[:START_ROWS].T):
+        seen = column[np.isfinite(column)][:START_SAMPLES]
+        if len(seen):
+            away[axis], spread[axis] = float(np.mean(seen)) - declared[axis], noise.position / len(seen) ** 0.5
+    if np.all(np.abs(away) <= START_SIGNIFICANCE * spread):
         return robot.platform.start, ()
     start = declared + away
     shown = ", ".join(f"{axis} {value:.6g}" for axis, value in zip(AXES, start, strict=True))

@@ -46,10 +46,11 @@ class _Filtered:
 
 
 def filter_sample(model: Model, cable_count: int, noise: Noise, substeps: Substeps) -> Function:
-    """Arguments: state, covariance, slopes, parameters, measured, seen, speed, next speed, time step, roughness.
+    """Arguments: state, covariance, slopes, parameters, measured, seen, speed, next speed, time step, drift, roughness.
 
     Results: the first three at the next sample, then whitened innovations (m,), log of their variances (m,), and
-    the innovations' derivatives by the parameters (m, p), whitened. Measured is x, y, z and the tensions.
+    the innovations' derivatives by the parameters (m, p), whitened. Measured is x, y, z and the tensions; drift (s^2)
+    times the variance of a winch speed is what its noise adds to the variance of each unstrained length.
     """
     size, count = model.states.numel(), model.parameters.numel()
     predicted = _Filtered(
@@ -62,13 +63,13 @@ def filter_sample(model: Model, cable_count: int, noise: Noise, substeps: Subste
     )
     measured, seen = SX.sym("measured", 3 + cable_count), SX.sym("seen", 3 + cable_count)
     speed, later = SX.sym("speed", cable_count), SX.sym("later", cable_count)
-    step, roughness = SX.sym("step"), SX.sym("roughness")
+    step, drift, roughness = SX.sym("step"), SX.sym("drift"), SX.sym("roughness")
     filtered = _take_in(model, cable_count, noise, predicted, measured, seen, speed)
     state, transition, direct = _advance(model, substeps, filtered.state, speed, later, step)
     spread = casadi.mtimes([transition, filtered.covariance, transition.T])
     variance = SX(size, 1)
     variance[3:6] = roughness**2 * step
-    variance[6 : 6 + cable_count] = (noise.winch_speed * step) ** 2
+    variance[6 : 6 + cable_count] = noise.winch_speed**2 * drift
     return Function(
         "filter_sample",
         [
@@ -81,6 +82,7 @@ def filter_sample(model: Model, cable_count: int, noise: Noise, substeps: Subste
             speed,
             later,
             step,
+            drift,
             roughness,
         ],
         [

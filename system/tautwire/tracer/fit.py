@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -11,9 +12,10 @@ from scipy.optimize import least_squares
 from tautwire_fmu.laws.effects import BY_NAME
 
 from ..robot import Robot
+from ..symbolic import FreeParameter
 from .data import Sample, placed
 from .filter_step import Noise
-from .hypotheses import free_parameters, with_values
+from .hypotheses import Hypothesis, free_parameters, with_values
 from .likelihood import Innovations, Likelihood
 
 Array = NDArray[np.float64]
@@ -21,17 +23,20 @@ Array = NDArray[np.float64]
 # Roughness of the model and relative change of the cost at which to stop, stage by stage.
 STAGES = ((0.1, 1e-3), (0.01, 1e-3), (0.0, 1e-7))
 EVALUATIONS = 15
+KEPT = 40
 NORMAL_95 = 1.959964
 
 
 @dataclass(frozen=True)
 class Fit:
-    """A robot whose effects' parameters, shape (p,) in the order of ``free_parameters``, are fitted.
+    """A robot some of whose effects' parameters are fitted.
 
-    ``deviations`` are their standard deviations from the curvature of the likelihood.
+    ``values`` of the ``free`` ones have shape (p,); ``deviations`` are their standard deviations from the curvature
+    of the likelihood.
     """
 
     robot: Robot
+    free: tuple[FreeParameter, ...]
     values: Array
     deviations: Array
 
@@ -48,18 +53,25 @@ class Fitter:
         self.noise = noise
         self._compiled: dict[tuple[object, ...], Likelihood] = {}
 
-    def fit(self, robot: Robot, sample: Sample) -> Fit:
-        """Least squares on whitened innovations, first under a rough model, then under the exact one."""
-        free = free_parameters(robot)
+    def fit(self, robot: Robot, chosen: Collection[Hypothesis], sample: Sample) -> Fit:
+        """Least squares on whitened innovations, first under a rough model, then under the exact one.
+
+        Frees the parameters of the chosen effects. The exact stage begins where the rough one ended or where that
+        began, whichever is more probable.
+        """
+        free = free_parameters(robot, chosen)
         if not free:
-            return Fit(robot, np.zeros(0), np.zeros(0))
+            return Fit(robot, (), np.zeros(0), np.zeros(0))
         start = np.array([robot.effects[f.setting].values[f.name] for f in free])
         scale = np.where(start == 0.0, 1.0, np.abs(start))
-        bounds = np.array(_bounds(robot)).T / scale
-        likelihood = self._likelihood(placed(robot, sample.start), sample)
-        scaled, slopes = start / scale, np.zeros((0, len(free)))
+        bounds = np.array(_bounds(robot, free)).T / scale
+        likelihood = self._likelihood(placed(robot, sample.start), free, sample)
+        begun = scaled = start / scale
+        slopes = np.zeros((0, len(free)))
         for rough, stop in STAGES:
             residual = _Residual(likelihood, sample, scale, rough)
+            if rough == 0.0:
+                scaled = max((scaled, begun), key=residual.log_likelihood)
             solution = least_squares(
                 residual.values,
                 scaled,
@@ -73,33 +85,36 @@ class Fitter:
         values = scaled * scale
         covariance = np.linalg.pinv(slopes.T @ slopes)
         fitted = with_values(robot, free, dict(zip(free, values.tolist(), strict=True)))
-        return Fit(fitted, values, np.sqrt(np.diag(covariance)) * scale)
+        return Fit(fitted, free, values, np.sqrt(np.diag(covariance)) * scale)
 
     def innovations(self, robot: Robot, sample: Sample) -> Innovations:
         """Innovations of all samples of a recording under a robot as it is."""
-        here = placed(robot, sample.start)
-        free = free_parameters(robot)
+        return self._likelihood(placed(robot, sample.start), (), sample).innovations(sample.recording, ())
+
+    def linearised(self, robot: Robot, free: Sequence[FreeParameter], sample: Sample) -> Innovations:
+        """Innovations with their slopes by some of the robot's parameters."""
         values = [robot.effects[f.setting].values[f.name] for f in free]
-        return self._likelihood(here, sample).innovations(sample.recording, values)
+        return self._likelihood(placed(robot, sample.start), free, sample).innovations(sample.recording, values)
 
     def open_loop_variances(self, robot: Robot, sample: Sample) -> Array:
         """See :meth:`tautwire.tracer.likelihood.Likelihood.open_loop_variances`."""
-        here = placed(robot, sample.start)
-        values = [robot.effects[f.setting].values[f.name] for f in free_parameters(robot)]
-        return self._likelihood(here, sample).open_loop_variances(sample.recording, values)
+        return self._likelihood(placed(robot, sample.start), (), sample).open_loop_variances(sample.recording, ())
 
-    def _likelihood(self, robot: Robot, sample: Sample) -> Likelihood:
+    def _likelihood(self, robot: Robot, free: Sequence[FreeParameter], sample: Sample) -> Likelihood:
         interval = float(np.median(np.diff(sample.recording.time)))
-        shape = tuple((s.name, s.cables) for s in robot.effects)
-        key = (robot.without_effects(), shape, round(interval, 9))
+        opened = with_values(robot, free, dict.fromkeys(free, 0.0))
+        key = (opened, tuple(free), round(interval, 9))
         if key not in self._compiled:
-            self._compiled[key] = Likelihood(robot, free_parameters(robot), self.noise, interval)
+            if len(self._compiled) >= KEPT:
+                self._compiled.pop(next(iter(self._compiled)))
+            self._compiled[key] = Likelihood(robot, free, self.noise, interval)
         return self._compiled[key]
 
 
-def _bounds(robot: Robot) -> list[tuple[float, float]]:
-    """Smallest and largest value of every parameter, in the order of ``free_parameters``."""
-    return [(p.minimum, p.maximum) for s in robot.effects for p in BY_NAME[s.name].parameters]
+def _bounds(robot: Robot, free: Sequence[FreeParameter]) -> list[tuple[float, float]]:
+    """Smallest and largest value of each free parameter."""
+    known = [{p.name: p for p in BY_NAME[robot.effects[f.setting].name].parameters}[f.name] for f in free]
+    return [(parameter.minimum, parameter.maximum) for parameter in known]
 
 
 class _Residual:
@@ -112,6 +127,11 @@ class _Residual:
         self.roughness = roughness
         self._at: Array | None = None
         self._found: tuple[Array, Array] = (np.zeros(0), np.zeros((0, 0)))
+
+    def log_likelihood(self, scaled: Array) -> float:
+        found = self.likelihood.innovations(self.sample.recording, scaled * self.scale, self.roughness)
+        value = found.log_likelihood(self.sample.rows)
+        return value if np.isfinite(value) else -np.inf
 
     def values(self, scaled: Array) -> Array:
         return self._evaluate(scaled)[0]

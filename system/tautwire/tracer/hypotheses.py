@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from tautwire_fmu.laws.effects import ALL, BY_NAME, Effect, Parameter
@@ -23,6 +23,10 @@ class Hypothesis:
         if self.cables in ((), robot.cable_numbers):
             return self.effect.name
         return f"{self.effect.name} of cable {', '.join(map(str, self.cables))}"
+
+    def excludes(self, other: Hypothesis) -> bool:
+        """Whether the other is the same effect in the same place, which would only replace it."""
+        return self.effect is other.effect and (not self.cables or bool(set(self.cables) & set(other.cables)))
 
     def setting(self, robot: Robot) -> EffectSetting:
         """The effect switched on at the values where fits begin."""
@@ -54,16 +58,18 @@ def declared_value(robot: Robot, parameter: Parameter, cables: tuple[int, ...]) 
     return sum(values) / len(values)
 
 
-def free_parameters(robot: Robot) -> tuple[FreeParameter, ...]:
-    """Every parameter of every effect of a robot, in order."""
+def free_parameters(robot: Robot, chosen: Collection[Hypothesis]) -> tuple[FreeParameter, ...]:
+    """Every parameter of the chosen effects of a robot, in its order; what else the file declares stays fixed."""
+    names = {(hypothesis.effect.name, hypothesis.cables) for hypothesis in chosen}
     return tuple(
         FreeParameter(index, parameter.name)
         for index, setting in enumerate(robot.effects)
+        if (setting.name, setting.cables) in names
         for parameter in BY_NAME[setting.name].parameters
     )
 
 
-def with_values(robot: Robot, free: tuple[FreeParameter, ...], values: Mapping[FreeParameter, float]) -> Robot:
+def with_values(robot: Robot, free: Sequence[FreeParameter], values: Mapping[FreeParameter, float]) -> Robot:
     """The robot with its effects' parameters set anew."""
     effects = list(robot.effects)
     for parameter in free:

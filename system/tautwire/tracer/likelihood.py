@@ -13,7 +13,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from functools import cached_property
 from math import ceil, log, pi
 
 import casadi
@@ -30,24 +29,22 @@ Array = NDArray[np.float64]
 # Radians of the fastest vibration in one integration step.
 STATE_ANGLE, SLOPE_ANGLE = 0.05, 0.3
 CHUNK = 500
+# In medians of the sample interval.
+LONGEST_STEP = 1.5
 
 
 @dataclass(frozen=True)
 class Innovations:
-    """Whitened innovations of N samples of m outputs, NaN where nothing was measured.
+    """Whitened innovations of N samples of m outputs, NaN where nothing was ``seen`` (N, m).
 
     ``values`` (N, m) have unit variance where the model is right; ``slopes`` (N, m, p) are their derivatives by the
     free parameters; ``log_variances`` (N, m) the log of the variances that they were divided by.
     """
 
+    seen: NDArray[np.bool_]
     values: Array
     slopes: Array
     log_variances: Array
-
-    @cached_property
-    def seen(self) -> NDArray[np.bool_]:
-        """Where something was measured, shape (N, m)."""
-        return np.isfinite(self.values)
 
     def log_likelihood(self, rows: NDArray[np.bool_]) -> float:
         """Log of the probability density, in SI units, of the samples in ``rows`` given those before them."""
@@ -90,7 +87,7 @@ class Likelihood:
         values, variances, slopes = self._filter(recording, seen, parameters, self._start_covariance(), roughness)
         values[~seen] = np.nan
         variances[~seen] = np.nan
-        return Innovations(values, slopes, variances)
+        return Innovations(seen, values, slopes, variances)
 
     def open_loop_variances(self, recording: Recording, parameters: Sequence[float] | Array) -> Array:
         """Variance of measured less simulated, shape (N, m), where the model is right and its start exact.
@@ -112,18 +109,11 @@ class Likelihood:
         roughness: float,
     ) -> tuple[Array, Array, Array]:
         theta = np.asarray(parameters, dtype=float)
-        speed = recording.winch_speed
-        columns = (
-            np.where(seen, recording.measured(), 0.0).T,
-            seen.astype(float).T,
-            speed.T,
-            np.vstack([speed[1:], speed[-1:]]).T,
-            np.append(np.diff(recording.time), 0.0)[None, :],
-        )
+        columns, rows = _columns(recording, seen)
         state, slopes = self._start(theta)
         carried = (state, start_covariance, slopes)
         values, logs, gradients = [], [], []
-        for first in range(0, len(seen), CHUNK):
+        for first in range(0, columns[0].shape[1], CHUNK):
             part = [column[:, first : first + CHUNK] for column in columns]
             count = part[0].shape[1]
             constant = (np.repeat(theta[:, None], count, axis=1), *part, np.full((1, count), roughness))
@@ -133,7 +123,7 @@ class Likelihood:
             values.append(np.array(result[3]).T)
             logs.append(np.array(result[4]).T)
             gradients.append(np.array(result[5]).reshape(seen.shape[1], count, free).swapaxes(0, 1))
-        return np.vstack(values), np.vstack(logs), np.vstack(gradients)
+        return np.vstack(values)[rows], np.vstack(logs)[rows], np.vstack(gradients)[rows]
 
     def _run(self, count: int) -> casadi.Function:
         if count not in self._runs:
@@ -146,6 +136,25 @@ class Likelihood:
         variance[6 : 6 + self.cable_count] = self.noise.start**2
         covariance: Array = np.diag(variance)
         return covariance
+
+
+def _columns(recording: Recording, seen: NDArray[np.bool_]) -> tuple[tuple[Array, ...], NDArray[np.intp]]:
+    """What the filter takes, a column a sample, and which columns are the recording's own samples.
+
+    A gap in time is filled with samples of which nothing was seen, so that no step is longer than usual.
+    """
+    steps = np.diff(recording.time)
+    pieces = np.maximum(np.ceil(steps / (LONGEST_STEP * np.median(steps))), 1).astype(int)
+    rows = np.append(0, np.cumsum(pieces))
+    time = np.interp(np.arange(rows[-1] + 1), rows, recording.time)
+    speed = np.array([np.interp(time, recording.time, column) for column in recording.winch_speed.T])
+    measured = np.zeros((seen.shape[1], len(time)))
+    looked = np.zeros_like(measured)
+    measured[:, rows] = np.where(seen, recording.measured(), 0.0).T
+    looked[:, rows] = seen.T
+    step = np.append(np.diff(time), 0.0)
+    drift = step * np.append(np.repeat(steps, pieces), 0.0)
+    return (measured, looked, speed, np.hstack([speed[:, 1:], speed[:, -1:]]), step[None, :], drift[None, :]), rows
 
 
 def fastest_mode(robot: Robot) -> float:

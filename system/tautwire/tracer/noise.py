@@ -16,20 +16,26 @@ Array = NDArray[np.float64]
 DIFFERENCES = 6
 NORMAL_MEDIAN = 0.6745
 START_SPREAD = 3.0
+START_UNSEEN = 1e-3
+# Files carry some seven digits: nothing is known better than that.
+RESOLUTION = 1e-7
 
 
 def noise_of(robot: Robot, recording: Recording) -> Noise:
-    """Standard deviations as declared; one that is not declared is measured on the recording."""
+    """Standard deviations as declared; one that is not declared, or zero, is measured on the recording.
+
+    A winch speed may be declared free of noise; no position or tension is.
+    """
     sensors = robot.sensors
     position = sensors.position_noise
     tension = sensors.tension_noise
     speed = sensors.winch_speed_noise
-    position = roughness(recording.position) if position is None else position
+    position = position or roughness(recording.position)
     return Noise(
         position=position,
-        tension=roughness(recording.tension) if tension is None else tension,
+        tension=tension or roughness(recording.tension),
         winch_speed=roughness(recording.winch_speed) if speed is None else speed,
-        start=START_SPREAD * position,
+        start=START_SPREAD * position if recording.has_position else START_UNSEEN,
     )
 
 
@@ -46,5 +52,6 @@ def roughness(samples: Array) -> float:
         for column, there in zip(differences.T, seen.T, strict=True)
         if np.any(there)
     ]
-    smallest = np.finfo(float).tiny
-    return max(float(np.sqrt(np.mean(np.square(deviations)))), smallest) if deviations else 1.0
+    if not deviations:
+        return 1.0
+    return max(float(np.sqrt(np.mean(np.square(deviations)))), RESOLUTION * float(np.nanmax(np.abs(samples))))

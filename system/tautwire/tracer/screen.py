@@ -35,18 +35,23 @@ class Prospect:
 
 
 def screen(
-    robot: Robot, open_ones: Sequence[Hypothesis], fitter: Fitter, evidence: Evidence
+    robot: Robot,
+    accepted: Sequence[Hypothesis],
+    open_ones: Sequence[Hypothesis],
+    fitter: Fitter,
+    evidence: Evidence,
 ) -> dict[Hypothesis, Prospect]:
-    """The prospect of each hypothesis beside the effects that the robot has, whose parameters move along."""
-    whole = robot
+    """The prospect of each hypothesis beside the accepted ones, whose parameters move along."""
+    whole, single = robot, []
     for hypothesis in open_ones:
         parts: list[tuple[int, ...]] = [(cable,) for cable in hypothesis.cables]
         for cables in parts or [()]:
             whole = whole.with_effect(_neutral(robot, hypothesis, cables))
-    free = free_parameters(whole)
-    fit_error, fit_slopes = _linearised(whole, fitter, evidence.fit)
-    judge_error, judge_slopes = _linearised(whole, fitter, evidence.judge)
-    present = {(s.name, s.cables) for s in robot.effects}
+            single.append(Hypothesis(hypothesis.effect, cables))
+    free = free_parameters(whole, [*accepted, *single])
+    fit_error, fit_slopes = _linearised(whole, free, fitter, evidence.fit)
+    judge_error, judge_slopes = _linearised(whole, free, fitter, evidence.judge)
+    present = {(h.effect.name, h.cables) for h in accepted}
     old = _selection(free, [i for i, f in enumerate(free) if _key(whole, f) in present])
     found = {}
     for hypothesis in open_ones:
@@ -75,8 +80,8 @@ def _neutral(robot: Robot, hypothesis: Hypothesis, cables: tuple[int, ...]) -> E
     return EffectSetting(hypothesis.effect.name, {k: float(v or 0.0) for k, v in values.items()}, cables)
 
 
-def _linearised(robot: Robot, fitter: Fitter, sample: Sample) -> tuple[Array, Array]:
-    innovations = fitter.innovations(robot, sample)
+def _linearised(robot: Robot, free: Sequence[FreeParameter], fitter: Fitter, sample: Sample) -> tuple[Array, Array]:
+    innovations = fitter.linearised(robot, free, sample)
     chosen = innovations.seen & sample.rows[:, None]
     return innovations.values[chosen], innovations.slopes[chosen]
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from time import perf_counter
@@ -10,16 +10,16 @@ from time import perf_counter
 import numpy as np
 from numpy.typing import NDArray
 
-from tautwire_fmu.laws.effects import BY_NAME
-
 from ..cosimulation import Motion, cosimulate
+from ..errors import RecordingError
 from ..packaging import build_fmus
 from ..recording import Recording, require_outputs
 from ..robot import Robot
-from .adequacy import is_noise
+from .adequacy import FEWEST, enough_samples, is_noise
 from .data import Evidence, Sample, placed, split
 from .fit import Fitter
 from .hypotheses import declared_value
+from .likelihood import Innovations
 from .noise import noise_of
 from .search import Found, search
 from .verdict import Comparison, Errors, Estimate, FoundEffect, Trace, VerdictName
@@ -29,6 +29,7 @@ Progress = Callable[[str, float], None]
 
 ALPHA = 0.01
 ROLES = ("fit", "check")
+REACHED = 1.5
 
 
 def trace(robot: Robot, fit: Recording, check: Recording | None, progress: Progress, alpha: float = ALPHA) -> Trace:
@@ -45,45 +46,68 @@ def trace(robot: Robot, fit: Recording, check: Recording | None, progress: Progr
             require_outputs(recording)
     noise = noise_of(robot, fit)
     evidence = split(robot, noise, fit, check)
+    fitter = Fitter(noise)
+    plain = _innovations(fitter, robot, evidence)
+    _require_samples(plain, evidence)
     samples = (evidence.fit,) if check is None else (evidence.fit, evidence.judge)
     before = [_cosimulated(robot, s, f"before, {r}", progress) for s, r in zip(samples, ROLES, strict=False)]
-    fitter = Fitter(noise)
-    judge = evidence.judge
-    plain = fitter.innovations(robot, judge)
     found = search(robot, fitter, evidence, alpha, progress)
-    explained = fitter.innovations(found.fit.robot, judge)
-    enough = is_noise(explained, judge.rows)
-    verdict, sentence = _verdict(robot, found, enough, is_noise(plain, judge.rows))
-    kept = verdict == "effects"
-    after_robot = found.fit.robot if kept else robot
-    after = (
-        [_cosimulated(after_robot, s, f"after, {r}", progress) for s, r in zip(samples, ROLES, strict=False)]
-        if kept
-        else before
-    )
-    comparisons = tuple(
-        Comparison(role, s.recording, b, a, errors(s.recording, b), errors(s.recording, a))
-        for role, s, b, a in zip(ROLES, samples, before, after, strict=False)
-    )
-    left = (explained if kept else plain).mean_square(judge.rows)
+    explained = _innovations(fitter, found.fit.robot, evidence)
+    before_is_noise, after_is_noise = _all_noise(plain, evidence), _all_noise(explained, evidence)
+    comparisons, floors = _compared(robot, fitter, samples, before, before)
+    kept = bool(found.accepted) and after_is_noise
+    if kept:
+        pairs = zip(samples, ROLES, strict=False)
+        after = [_cosimulated(found.fit.robot, sample, f"after, {role}", progress) for sample, role in pairs]
+        better, lower = _compared(found.fit.robot, fitter, samples, before, after)
+        # The co-simulation has the last word: a filter follows what the model itself would not do.
+        kept = all(_reached(c.errors_after, floor) for c, floor in zip(better, lower, strict=True))
+        comparisons, floors = (better, lower) if kept else (comparisons, floors)
+    verdict, sentence = _verdict(robot, found, kept, before_is_noise)
     return Trace(
         verdict=verdict,
         sentence=sentence,
         robot_before=robot,
-        robot_after=after_robot,
+        robot_after=found.fit.robot if kept else robot,
         effects=_effects(robot, found) if kept else (),
         also_possible=found.alike if kept else (),
         candidates=found.candidates,
         formula=None,
         comparisons=comparisons,
-        noise_floor=_floor(fitter, after_robot, samples[-1]),
-        noise_before=is_noise(plain, judge.rows),
-        noise_after=enough if kept else is_noise(plain, judge.rows),
-        left=left,
+        noise_floor=floors[-1],
+        noise_before=before_is_noise,
+        noise_after=True if kept else before_is_noise,
+        left=(explained if kept else plain)[1].mean_square(evidence.judge.rows),
         alpha=alpha,
         notes=_notes(evidence, samples),
         seconds=perf_counter() - began,
     )
+
+
+def _innovations(fitter: Fitter, robot: Robot, evidence: Evidence) -> tuple[Innovations, Innovations]:
+    return fitter.innovations(robot, evidence.fit), fitter.innovations(robot, evidence.judge)
+
+
+def _require_samples(innovations: tuple[Innovations, Innovations], evidence: Evidence) -> None:
+    for found, sample in zip(innovations, (evidence.fit, evidence.judge), strict=True):
+        if not enough_samples(found, sample.rows):
+            mend = f"record at least {FEWEST} samples, {2 * FEWEST} where there is no check recording"
+            raise RecordingError(sample.recording.path, "too few samples to tell noise from more", mend)
+
+
+def _compared(
+    robot: Robot,
+    fitter: Fitter,
+    samples: Sequence[Sample],
+    before: Sequence[Motion],
+    after: Sequence[Motion],
+) -> tuple[tuple[Comparison, ...], list[Errors]]:
+    """Both runs beside each recording, and what noise alone would leave there under the later robot."""
+    comparisons = tuple(
+        Comparison(role, s.recording, b, a, errors(s.recording, b), errors(s.recording, a))
+        for role, s, b, a in zip(ROLES, samples, before, after, strict=False)
+    )
+    return comparisons, [_floor(fitter, robot, sample) for sample in samples]
 
 
 def errors(recording: Recording, motion: Motion) -> Errors:
@@ -124,9 +148,21 @@ def _floor(fitter: Fitter, robot: Robot, sample: Sample) -> Errors:
     return _root_mean_squares(np.where(np.isfinite(sample.recording.measured()), variances, np.nan))
 
 
-def _verdict(robot: Robot, found: Found, enough: bool, noise_alone: bool) -> tuple[VerdictName, str]:
+def _all_noise(innovations: Sequence[Innovations], evidence: Evidence) -> bool:
+    """Whether nothing but noise is left, where the model was fitted as where it is judged."""
+    samples = (evidence.fit, evidence.judge)
+    return all(is_noise(found, sample.rows) for found, sample in zip(innovations, samples, strict=True))
+
+
+def _reached(after: Errors, floor: Errors) -> bool:
+    """Whether a co-simulation errs by no more than half over what noise alone leaves."""
+    pairs = ((after.position_rms, floor.position_rms), (after.tension_rms, floor.tension_rms))
+    return all(not error > REACHED * least for error, least in pairs)
+
+
+def _verdict(robot: Robot, found: Found, kept: bool, noise_alone: bool) -> tuple[VerdictName, str]:
     names = " and ".join(h.label(robot) for h in found.accepted)
-    if found.accepted and enough:
+    if kept:
         return "effects", f"The model lacks {names}; with it, what is left is noise."
     if not found.accepted and noise_alone:
         return "none", "The residual is noise: this recording shows nothing that the model lacks."
@@ -137,11 +173,9 @@ def _verdict(robot: Robot, found: Found, enough: bool, noise_alone: bool) -> tup
 def _effects(robot: Robot, found: Found) -> tuple[FoundEffect, ...]:
     fit = found.fit
     places = {}
-    index = 0
-    for setting in fit.robot.effects:
-        for parameter in BY_NAME[setting.name].parameters:
-            places[setting.name, setting.cables, parameter.name] = index
-            index += 1
+    for index, free in enumerate(fit.free):
+        setting = fit.robot.effects[free.setting]
+        places[setting.name, setting.cables, free.name] = index
     effects = []
     for hypothesis, evidence in zip(found.accepted, found.evidence, strict=True):
         estimates = {}
