@@ -1,6 +1,11 @@
 """The command line as a user meets it: exit status, one line for what is wrong, nothing written then."""
 
 import json
+import os
+import signal
+import subprocess
+import sys
+import time
 from pathlib import Path
 
 import pandas as pd
@@ -191,6 +196,11 @@ def test_two_cables_are_too_few(tmp_path: Path, capsys: pytest.CaptureFixture[st
         ["simulate", ROBOT, "--speeds", str(THREE / "fit.csv"), "--step", "0", "--out", "r.csv"],
         ["simulate", ROBOT, "--speeds", str(THREE / "fit.csv"), "--until", "-1", "--out", "r.csv"],
         ["trace", ROBOT, str(THREE / "fit.csv"), "--alpha", "2", "--out", "f"],
+        ["linearise", ROBOT, "--at", "nan,0,0", "--out", "m.json"],
+        ["linearise", ROBOT, "--at", "0,50,50", "--out", "m.json"],
+        ["linearise", ROBOT, "--at", "-30,0,5", "--out", "m.json"],
+        ["simulate", ROBOT, "--speeds", str(THREE / "fit.csv"), "--until", "nan", "--out", "r.csv"],
+        ["simulate", ROBOT, "--speeds", str(THREE / "fit.csv"), "--tolerance", "0", "--out", "r.csv"],
     ],
 )
 def test_wrong_usage_is_one_line(
@@ -212,3 +222,49 @@ def test_every_command_has_help_with_an_example(command: list[str], capsys: pyte
 
 def test_shipped_robots_are_read(capsys: pytest.CaptureFixture[str]) -> None:
     assert [example(name).cable_count for name in ("three", "caroca", "eight")] == [3, 3, 8]
+
+
+def test_an_input_is_never_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    robot, recording = tmp_path / "robot.toml", tmp_path / "fit.csv"
+    robot.write_text(Path(ROBOT).read_text(encoding="utf-8"), encoding="utf-8")
+    recording.write_text((THREE / "fit.csv").read_text(encoding="utf-8"), encoding="utf-8")
+    before = robot.read_bytes(), recording.read_bytes()
+    for arguments in (
+        ["trace", str(robot), str(recording), "--out", str(tmp_path)],
+        ["simulate", str(robot), "--speeds", str(recording), "--out", str(recording)],
+        ["linearise", str(robot), "--out", str(robot)],
+    ):
+        assert run(arguments) == 2
+        assert "is an input" in capsys.readouterr().err
+    assert (robot.read_bytes(), recording.read_bytes()) == before
+
+
+def test_too_few_samples_are_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    place = tmp_path / "short.csv"
+    pd.read_csv(THREE / "fit.csv").head(150).to_csv(place, index=False)
+    assert run(["trace", ROBOT, str(place), "--out", str(tmp_path / "out")]) == 2
+    assert "at least 100 samples" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("delay", [2.5, 4.0, 9.0])
+def test_ctrl_c_leaves_nothing_behind(tmp_path: Path, delay: float) -> None:
+    scratch = tmp_path / "scratch"
+    scratch.mkdir()
+    arguments = ["trace", ROBOT, str(THREE / "fit.csv"), "--out", str(tmp_path / "out")]
+    process = subprocess.Popen(
+        [sys.executable, "-m", "tautwire.cli", *arguments],
+        stderr=subprocess.PIPE,
+        stdout=subprocess.PIPE,
+        env={**os.environ, "TMPDIR": str(scratch)},
+        text=True,
+    )
+    time.sleep(delay)
+    process.send_signal(signal.SIGINT)
+    shown, said = process.communicate(timeout=60)
+    assert process.returncode == 1
+    assert said == "tautwire: interrupted; nothing was written\n"
+    assert shown == ""
+    assert [path.name for path in tmp_path.iterdir()] == ["scratch"]
+    assert list(scratch.iterdir()) == []

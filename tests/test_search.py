@@ -1,9 +1,13 @@
 """The tracer's decision on recordings that the rig makes: the right name, or none."""
 
+from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
+from tautwire.recording import Recording
+from tautwire.robot import EffectSetting, Robot
 from tautwire.tracer.adequacy import is_noise
 from tautwire.tracer.data import split
 from tautwire.tracer.fit import Fitter
@@ -17,9 +21,18 @@ def quiet(what: str, done: float) -> None:
     """No progress."""
 
 
+def pair(name: str, seed: int, effects: dict[str, Any]) -> tuple[Recording, Recording]:
+    return recorded(name, seed, effects), recorded(name, seed + 50, effects)
+
+
+def found_in(robot: Robot, fit: Recording, check: Recording) -> Found:
+    noise = noise_of(robot, fit)
+    return search(robot, Fitter(noise), split(robot, noise, fit, check), 0.01, quiet)
+
+
 def searched(name: str, seed: int, effects: dict[str, Any]) -> tuple[Found, bool]:
     robot = example(name)
-    fit, check = recorded(name, seed, effects), recorded(name, seed + 50, effects)
+    fit, check = pair(name, seed, effects)
     noise = noise_of(robot, fit)
     evidence = split(robot, noise, fit, check)
     fitter = Fitter(noise)
@@ -70,3 +83,34 @@ def test_where_nothing_is_hidden_nothing_is_found(name: str) -> None:
 def test_an_effect_outside_the_list_leaves_more_than_noise() -> None:
     _, noise_is_left = searched("three", 7, {"unlisted_swing": {"mass": 20.0, "length": 2.0}})
     assert not noise_is_left
+
+
+@pytest.mark.slow
+def test_tensions_alone_are_enough() -> None:
+    robot = example("three")
+    effects = {"damping": {"damping": 9e8}}
+    fit, check = (replace(r, position=np.full_like(r.position, np.nan)) for r in pair("three", 3, effects))
+    found = found_in(robot, fit, check)
+    assert [h.effect.name for h in found.accepted] == ["damping"]
+    assert abs(found.fit.values[0] - 9e8) < 4.5 * found.fit.deviations[0]
+
+
+@pytest.mark.slow
+def test_a_gap_in_time_is_no_effect() -> None:
+    fit, check = recorded("three", 5, gap=(6.0, 6.8)), recorded("three", 55, gap=(3.0, 4.5))
+    assert found_in(example("three"), fit, check).accepted == ()
+
+
+@pytest.mark.slow
+def test_a_declared_effect_that_is_wrong_is_replaced() -> None:
+    robot = example("three").with_effect(EffectSetting("damping", {"damping": 6e8}, (1, 2, 3)))
+    found = found_in(robot, *pair("three", 3, {"damping": {"damping": 9e8}}))
+    assert [h.effect.name for h in found.accepted] == ["damping"]
+    assert found.fit.robot.effects[0].values["damping"] == pytest.approx(9e8, rel=0.05)
+
+
+@pytest.mark.slow
+def test_two_cables_may_be_softer_each_by_its_own() -> None:
+    effects = {"modulus": [{"modulus": 0.92e11, "cables": [1]}, {"modulus": 1.1e11, "cables": [3]}]}
+    found = found_in(example("three"), *pair("three", 8, effects))
+    assert {(h.effect.name, h.cables) for h in found.accepted} == {("modulus", (1,)), ("modulus", (3,))}

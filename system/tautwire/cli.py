@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -28,7 +29,7 @@ from .statics import static_tensions
 # The base of all errors of usage; newer typer hides it in a private module.
 UsageError: type[Exception] = typer.BadParameter.__bases__[0]
 
-DONE, FAILED, WRONG_INPUT, INTERRUPTED = 0, 1, 2, 130
+DONE, FAILED, WRONG_INPUT = 0, 1, 2
 
 application = typer.Typer(
     name="tautwire",
@@ -53,15 +54,16 @@ def main() -> None:
 def run(arguments: list[str]) -> int:
     """Run one command and return its exit status; errors go to standard error, one line each."""
     try:
-        application(arguments, standalone_mode=False)
+        status = application(arguments, standalone_mode=False)
     except (InputError, UsageError) as error:
         message = str(error) if isinstance(error, InputError) else error.format_message()  # type: ignore[attr-defined]
         return _say(message, WRONG_INPUT)
     except (TautwireError, OSError) as error:
         return _say(str(error), FAILED)
     except (KeyboardInterrupt, typer.Abort):
-        return _say("interrupted; nothing was written", INTERRUPTED)
-    return DONE
+        status = FAILED
+    # Newer typer turns Ctrl-C into a status that it returns.
+    return _say("interrupted; nothing was written", FAILED) if status else DONE
 
 
 def _say(message: str, status: int) -> int:
@@ -112,13 +114,16 @@ def simulate(
     Example: tautwire simulate robot.toml --speeds recording.csv --out result.csv
     """
     from .cosimulation import RunError
-    from .output import file_in_place
+    from .output import file_in_place, refuse_inputs
     from .simulation import simulate_recording
 
     if not step > 0.0:
         raise InputError("--step", f"{step:g} s is not positive", "give a step such as 0.01")
+    if until is not None and math.isnan(until):
+        raise InputError("--until", "nan is not a time", "give a time in s")
     if tolerance is not None and not tolerance > 0.0:
         raise InputError("--tolerance", f"{tolerance:g} m is not positive", "give an error such as 1e-6")
+    refuse_inputs([robot_file, speeds], [out])
     robot = _robot(robot_file)
     try:
         with _progress() as tell:
@@ -148,10 +153,14 @@ def linearise(
     """
     from .linear import linearise as linearised
     from .linear import model_document
-    from .output import file_in_place
+    from .output import file_in_place, refuse_inputs
 
+    refuse_inputs([robot_file], [out])
     robot = _robot(robot_file)
-    plant = linearised(robot, None if at is None else _position(at))
+    try:
+        plant = linearised(robot, None if at is None else _position(at))
+    except UnreachableError as error:
+        raise UnreachableError("--at", error.position, error.cable, error.tension, error.reason) from error
     with file_in_place(out) as scratch:
         scratch.write_text(json.dumps(model_document(plant), indent=1), encoding="utf-8")
     pairs = zip(plant.modes.frequencies, plant.modes.damping_ratios, strict=True)
@@ -172,7 +181,7 @@ def trace(
 
     Example: tautwire trace robot.toml fit.csv --check check.csv --out report/
     """
-    from .output import folder_in_place
+    from .output import folder_in_place, refuse_inputs
     from .recording import read_recording
     from .report import trace_table, write_report
     from .tracer import trace as traced
@@ -182,6 +191,8 @@ def trace(
     robot = _robot(robot_file)
     recording = read_recording(fit, robot.cable_count)
     judging = None if check is None else read_recording(check, robot.cable_count)
+    made = ["robot.toml", "report.json", "index.html"]
+    refuse_inputs([robot_file, fit, *([check] if check else [])], [out / name for name in made])
     with folder_in_place(out) as scratch:
         with _progress() as tell:
             result = traced(robot, recording, judging, tell, alpha)
@@ -207,6 +218,8 @@ def _position(text: str) -> tuple[float, float, float]:
         x, y, z = (float(part) for part in text.split(","))
     except ValueError:
         raise InputError("--at", f"{text!r} is not a position", mend) from None
+    if not all(map(math.isfinite, (x, y, z))):
+        raise InputError("--at", f"{text!r} is not a position", mend)
     return x, y, z
 
 

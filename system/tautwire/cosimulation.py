@@ -28,6 +28,7 @@ from .master import (
     Stepping,
     simulate,
 )
+from .master.interrupt import interrupts_held
 from .packaging import RobotFmus
 
 Array = NDArray[np.float64]
@@ -175,9 +176,15 @@ def run(fmus: RobotFmus, source: Source, time: Array, stepping: Stepping, progre
     count = len(fmus.cables)
     ports = shown_ports(count)
     kept = Kept(len(time), len(ports))
-    with instantiated(fmus) as coupling:
+    with interrupts_held() as raise_interrupt, instantiated(fmus) as coupling:
+
+        def tell(done: float) -> None:
+            raise_interrupt()
+            if progress is not None:
+                progress(done)
+
         try:
-            simulate(coupling, source, time, ports, stepping, kept, progress)
+            simulate(coupling, source, time, ports, stepping, kept, tell)
         except ComponentError as error:
             raise RunError(error, motion_of(time[: kept.count], kept.rows)) from error
         return replace(motion_of(time, kept.rows), account=coupling.account)

@@ -19,6 +19,7 @@ Array = NDArray[np.float64]
 
 DEFAULT_LIMITS = TensionLimits(minimum=0.0, maximum=float("inf"), preferred=0.0)
 PARALLEL = 1e-9
+AT_ANCHOR = 1e-6
 
 
 def active(setting: EffectSetting) -> ActiveEffect:
@@ -55,11 +56,24 @@ def static_tensions(robot: Robot, at: Array | None = None) -> Array:
     Raises UnreachableError where a cable would have to push or to break a limit.
     """
     position = np.array(robot.platform.start if at is None else at, dtype=float)
+    _refuse_anchors(robot, position)
     unit = directions(robot, position)
     load = np.array([0.0, 0.0, weight(robot)])
     if len(robot.cables) == 3:
         return _solve_three(robot, position, unit, load)
     return _distribute(robot, position, unit, load)
+
+
+def _refuse_anchors(robot: Robot, position: Array) -> None:
+    for index, anchor in enumerate(robot.anchors, start=1):
+        if float(np.linalg.norm(np.array(anchor) - position)) < AT_ANCHOR:
+            raise UnreachableError(
+                robot.name,
+                position=tuple(position),
+                cable=index,
+                tension=None,
+                reason=f"cable {index} has no length there",
+            )
 
 
 def _solve_three(robot: Robot, position: Array, unit: Array, load: Array) -> Array:
