@@ -77,13 +77,14 @@ def build(
     out: Annotated[Path, typer.Option(help="Folder for the FMUs.")] = Path("build"),
     for_c_hosts: Annotated[bool, typer.Option("--for-c-hosts", help=C_HOSTS)] = False,
 ) -> None:
-    """Build the FMUs: one a cable, one for the platform.
+    """Build the FMUs, one a cable and one for the platform, and the whole robot as an SSP archive.
 
     Example: tautwire build robot.toml --out build/
     """
     from .c_hosts import embeddable_python, find_compiler, make_for_c_hosts
     from .output import folder_in_place
     from .packaging import build_fmus
+    from .ssp import ssp_name, write_ssp
 
     robot = _robot(robot_file)
     if for_c_hosts:
@@ -94,7 +95,8 @@ def build(
         if for_c_hosts:
             for path in (*fmus.cables, fmus.platform):
                 make_for_c_hosts(path)
-    for path in (*fmus.cables, fmus.platform):
+        system = write_ssp(robot, fmus, scratch / ssp_name(robot))
+    for path in (*fmus.cables, fmus.platform, system):
         print(out / path.name)
 
 

@@ -85,8 +85,8 @@ class Comparison:
 class Trace:
     """The answer to: what does this model lack.
 
-    ``noise_floor`` is what the sensors alone would leave; ``left`` the mean square of the whitened innovations of
-    each output (x, y, z, tensions) under the final model on unseen data, shape (3 + n,).
+    ``noise_floor`` is what noise of the sensors and of the recorded winch speeds would leave; ``left`` the mean square
+    of the whitened innovations of each output (x, y, z, tensions) under the final model on unseen data, shape (3 + n,).
     """
 
     verdict: VerdictName
