@@ -13,8 +13,8 @@ from .errors import RecordingError
 from .packaging import build_fmus
 from .recording import read_recording
 from .robot import Robot
-from .tracer.data import placed, start_of
-from .tracer.noise import noise_of
+from .roughness import roughness
+from .start import placed, start_of
 
 
 def simulate_recording(
@@ -30,7 +30,8 @@ def simulate_recording(
     Raises RecordingError where fewer than two samples lie before ``until``.
     """
     recording = read_recording(path, robot.cable_count)
-    start, notes = start_of(robot, noise_of(robot, recording), recording)
+    noise = robot.sensors.position_noise or roughness(recording.position)
+    start, notes = start_of(robot, noise, recording)
     count = len(recording.time) if until is None else int(np.searchsorted(recording.time, until, side="right"))
     if count < 2:
         raise RecordingError(

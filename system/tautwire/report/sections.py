@@ -65,7 +65,8 @@ def summary(trace: Trace) -> str:
             details += _error_details(trace, role)
     lead = (
         "Root mean square of measured minus co-simulated, before and after. The noise floor is what noise of "
-        "the sensors and of the recorded winch speeds would leave; “explained” is the share of the mean square above it that is gone."
+        "the sensors and of the recorded winch speeds would leave; “explained” is the share of the mean square above "
+        "it that is gone."
     )
     key = _key("before", "after") + '<span class="key key-floor">noise floor, logarithmic scale</span>'
     main = table("Error of the co-simulation over all axes and all cables", ERROR_COLUMNS, rows, "errors", True)

@@ -12,8 +12,9 @@ from scipy.optimize import least_squares
 from tautwire_fmu.laws.effects import BY_NAME
 
 from ..robot import Robot
+from ..start import placed
 from ..symbolic import FreeParameter
-from .data import Sample, placed
+from .data import Sample
 from .filter_step import Noise
 from .hypotheses import Hypothesis, free_parameters, with_values
 from .likelihood import Innovations, Likelihood

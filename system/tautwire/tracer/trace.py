@@ -15,8 +15,9 @@ from ..errors import RecordingError
 from ..packaging import build_fmus
 from ..recording import Recording, require_outputs
 from ..robot import Robot
+from ..start import placed
 from .adequacy import FEWEST, enough_samples, is_noise
-from .data import Evidence, Sample, placed, split
+from .data import Evidence, Sample, split
 from .fit import Fitter
 from .hypotheses import declared_value
 from .likelihood import Innovations

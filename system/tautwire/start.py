@@ -1,0 +1,37 @@
+"""Where a recording starts, and the robot placed there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .recording import AXES, Recording
+from .robot import Robot
+
+START_SIGNIFICANCE = 6.0
+# The robot starts at rest: its first samples are of one place.
+START_ROWS, START_SAMPLES = 10, 5
+
+
+def start_of(
+    robot: Robot, position_noise: float, recording: Recording
+) -> tuple[tuple[float, float, float], tuple[str, ...]]:
+    """Where a recording starts: where it says, if that differs significantly from the robot file."""
+    declared = np.array(robot.platform.start)
+    away, spread = np.zeros(3), np.full(3, np.inf)
+    for axis, column in enumerate(recording.position[:START_ROWS].T):
+        seen = column[np.isfinite(column)][:START_SAMPLES]
+        if len(seen):
+            away[axis], spread[axis] = float(np.mean(seen)) - declared[axis], position_noise / len(seen) ** 0.5
+    if np.all(np.abs(away) <= START_SIGNIFICANCE * spread):
+        return robot.platform.start, ()
+    start = declared + away
+    shown = ", ".join(f"{axis} {value:.6g}" for axis, value in zip(AXES, start, strict=True))
+    note = f"{recording.path} starts at {shown} m, not at the robot file's start; the run starts where it says"
+    return (float(start[0]), float(start[1]), float(start[2])), (note,)
+
+
+def placed(robot: Robot, start: tuple[float, float, float]) -> Robot:
+    """The robot at another start."""
+    return robot if start == robot.platform.start else replace(robot, platform=replace(robot.platform, start=start))

@@ -1,0 +1,17 @@
+import numpy as np
+import pytest
+
+from tautwire.roughness import roughness
+
+
+def test_roughness_passes_over_what_is_smooth_what_is_missing_and_outliers() -> None:
+    random = np.random.default_rng(3)
+    time = np.linspace(0.0, 20.0, 4001)
+    signal = 100.0 * np.sin(8.0 * time) + random.normal(scale=0.5, size=len(time))
+    signal[100:140] = np.nan
+    signal[::500] += 300.0
+    assert roughness(signal[:, None]) == pytest.approx(0.5, rel=0.1)
+
+
+def test_a_sensor_that_saw_nothing_has_some_noise() -> None:
+    assert roughness(np.full((50, 3), np.nan)) == 1.0
