@@ -1,4 +1,5 @@
-# make run: the main job on a shipped recording. make test: lint, types and all tests. Each sets up what it needs.
+# make run: the main job on a shipped recording. make test: lint, types and all tests. make bench: the co-simulation's
+# speed. Each sets up what it needs.
 
 PYTHON ?= python3
 VENV := .venv
@@ -6,7 +7,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 EXAMPLE := system/tautwire/examples/three
 
-.PHONY: run test lint types clean
+.PHONY: run test lint types bench clean
 
 run: $(READY)
 	$(BIN)/tautwire trace $(EXAMPLE)/robot.toml $(EXAMPLE)/fit.csv --check $(EXAMPLE)/check.csv --out build/three
@@ -26,6 +27,9 @@ $(READY): pyproject.toml
 	$(BIN)/python -m pip install --quiet --upgrade pip
 	$(BIN)/python -m pip install --quiet --editable ".[dev]"
 	touch $@
+
+bench: $(READY)
+	$(BIN)/python -m tests.bench
 
 clean:
 	rm -rf $(VENV) build/* dist
