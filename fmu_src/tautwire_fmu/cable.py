@@ -2,20 +2,18 @@
 
 from typing import Any, Dict, List, Sequence, Tuple
 
-from .description import Variable, axes, vector
+from .cable_variables import cable_variables
 from .interpolation import cubic, extrapolate, quintic
 from .laws import cable as law
 from .laws.effects import BY_NAME
 from .laws.mathematics import COMPLEX_STEP, REAL, along, rate_of
 from .laws.vectors import norm, subtract
-from .slave import INPUT_TIME, Slave, active_effects, effect_variables, read_resource
+from .slave import Slave, active_effects, read_resource
 
 POSITION, VELOCITY, ACCELERATION, WINCH_SPEED, WINCH_ACCELERATION = 1, 4, 7, 10, 11
 FIRST_OUTPUT = 12
 FIRST_RATE = 19
 FIRST_STATE = 23
-MOTION = axes("position", "velocity")
-
 Motion = Tuple[Sequence[float], Sequence[float], float]
 
 
@@ -27,10 +25,7 @@ class Cable(Slave):
         self.settings: List[Dict[str, Any]] = data["effects"]
         self.tension_law = law.LAWS[data["law"]]
         self.end_of_state = FIRST_STATE + 2 + sum(len(BY_NAME[s["name"]].states) for s in self.settings)
-        super().__init__(_variables(data), slice(FIRST_STATE, self.end_of_state), **kwargs)
-        self.modelName = data["model_name"]
-        self.description = data["description"]
-        self.guid = data["guid"]
+        super().__init__(data, cable_variables(data), slice(FIRST_STATE, self.end_of_state), **kwargs)
         self.parameters_changed()
 
     def parameters_changed(self) -> None:
@@ -155,76 +150,3 @@ def _flat(state: law.CableState) -> List[float]:
     if not state.effects:
         return [state.unstrained_length, state.wound_length]
     return [state.unstrained_length, state.wound_length, *(s for own in state.effects for s in own)]
-
-
-def _variables(data: Dict[str, Any]) -> Tuple[Variable, ...]:
-    start = tuple(data["start"])
-    tension = float(data["start_tension"])
-    length = float(data["start_length"])
-    rated = (*MOTION, *axes("acceleration"), "winch_speed", "winch_acceleration")
-    return (
-        INPUT_TIME,
-        *vector("position", "input", "m", "position of the platform", start, nominal=length),
-        *vector("velocity", "input", "m/s", "velocity of the platform, the rate of position"),
-        *vector("acceleration", "input", "m/s2", "acceleration of the platform, the rate of velocity"),
-        Variable("winch_speed", "input", "m/s", "rope speed by the winch encoder, positive reels in"),
-        Variable("winch_acceleration", "input", "m/s2", "rate of winch_speed"),
-        *vector(
-            "force",
-            "output",
-            "N",
-            "force on the platform",
-            nominal=tension,
-            depends_on=(*MOTION, "winch_speed"),
-        ),
-        Variable(
-            "tension",
-            "output",
-            "N",
-            "tension at the load cell, between winch and exit point",
-            minimum=0.0,
-            nominal=tension,
-            depends_on=(*MOTION, "winch_speed"),
-        ),
-        Variable(
-            "length",
-            "output",
-            "m",
-            "distance from exit point to platform",
-            nominal=length,
-            depends_on=axes("position"),
-        ),
-        Variable(
-            "elongation",
-            "output",
-            "m",
-            "length less start length and rope let out",
-            depends_on=axes("position"),
-        ),
-        Variable("strain", "output", "1", "strain by the tension law", nominal=1e-3, depends_on=axes("position")),
-        *vector("force_rate", "output", "N/s", "rate of force", nominal=tension, depends_on=rated),
-        Variable("tension_rate", "output", "N/s", "rate of tension", nominal=tension, depends_on=rated),
-        Variable("unstrained_length", "local", "m", "state: rope in the span if it were unloaded", nominal=length),
-        Variable("wound_length", "local", "m", "state: rope reeled in since the start", nominal=length),
-        *(
-            Variable(f"effect.{s['name']}.{state.name}", "local", state.unit, f"state: {state.description}")
-            for s in data["effects"]
-            for state in BY_NAME[s["name"]].states
-        ),
-        *vector("anchor", "parameter", "m", "exit point on the frame", tuple(data["anchor"])),
-        *vector("start", "parameter", "m", "position of the platform at the start, in static equilibrium", start),
-        Variable("modulus", "parameter", "Pa", "modulus of elasticity", data["modulus"], True, 0.0, nominal=1e11),
-        Variable(
-            "area",
-            "parameter",
-            "m2",
-            "area that the modulus refers to",
-            data["area"],
-            True,
-            0.0,
-            nominal=1e-5,
-        ),
-        Variable("damping", "parameter", "Pa s", "viscosity of the rope", data["damping"], True, 0.0, nominal=1e9),
-        Variable("start_tension", "parameter", "N", "tension at the start", tension, False, 0.0, nominal=1e3),
-        *effect_variables(data["effects"]),
-    )

@@ -22,10 +22,7 @@ class PointMass(Slave):
         self.force_count = len(data["start_forces"]) + 1
         self.first_output = 1 + 6 * self.force_count
         self.couples = any(BY_NAME[s["name"]].wrench is not None for s in self.settings)
-        super().__init__(_variables(data), slice(self.first_output, self.first_output + 6), **kwargs)
-        self.modelName = data["model_name"]
-        self.description = data["description"]
-        self.guid = data["guid"]
+        super().__init__(data, _variables(data), slice(self.first_output, self.first_output + 6), **kwargs)
         self.parameters_changed()
 
     def parameters_changed(self) -> None:

@@ -37,8 +37,11 @@ class Slave(Fmi2Slave):
     author = "Tautwire"
     license = "MIT"
 
-    def __init__(self, variables: Sequence[Variable], states: slice, **kwargs: Any) -> None:
+    def __init__(self, data: Dict[str, Any], variables: Sequence[Variable], states: slice, **kwargs: Any) -> None:
         super().__init__(**kwargs)
+        self.modelName = data["model_name"]
+        self.description = data["description"]
+        self.guid = data["guid"]
         self.states = states
         self.variables = tuple(variables)
         self.real: List[float] = [variable.start for variable in self.variables]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import tempfile
 from collections.abc import Callable
 from functools import partial
+from itertools import pairwise
 from pathlib import Path
 from time import perf_counter
 
@@ -58,7 +59,7 @@ def by_solve_ivp(robot: Robot, method: str, tolerance: float) -> tuple[np.ndarra
     lengths = [np.linalg.norm(np.array(a) - robot.platform.start) for a in robot.anchors]
     state = np.array([*robot.platform.start, 0.0, 0.0, 0.0, *lengths])
     begun = perf_counter()
-    for first, last in zip(CORNERS[:-1], CORNERS[1:], strict=True):
+    for first, last in pairwise(CORNERS):
         state = solve_ivp(rates, (first, last), state, method=method, rtol=tolerance, atol=tolerance * 1e-2).y[:, -1]
     return state[:3], perf_counter() - begun
 
@@ -103,19 +104,19 @@ def work_and_precision(folder: Path) -> None:
     for method in ("DOP853", "RK45"):
         for tolerance in (1e-5, 1e-6, 1e-7, 1e-9):
             runs = [by_solve_ivp(robot, method, tolerance) for _ in range(RUNS)]
-            error = np.linalg.norm(runs[0][0] - exact)
-            print(
-                f"| solve_ivp {method}, {tolerance:g} | {1e6 * error:.2g} um | {1e3 * min(r[1] for r in runs):.0f} ms | |"
-            )
+            tell(f"solve_ivp {method}, {tolerance:g}", runs[0][0] - exact, [run[1] for run in runs], "")
     steppings: list[tuple[str, Callable[[], Stepping]]] = [
         *((f"Tautwire, steps of {1e3 * h:g} ms", partial(FixedStep, h)) for h in (0.05, 0.03, 0.02, 0.01)),
         *((f"Tautwire, tolerance {t:g} m", partial(AdaptiveStep, t, 7.0)) for t in (1e-5, 1e-6)),
     ]
     for label, make in steppings:
         results = [by_fmus(fmus, make()) for _ in range(RUNS)]
-        error = np.linalg.norm(results[0][0] - exact)
-        best = 1e3 * min(result[1] for result in results)
-        print(f"| {label} | {1e6 * error:.2g} um | {best:.0f} ms | {results[0][2]} |")
+        tell(label, results[0][0] - exact, [result[1] for result in results], str(results[0][2]))
+
+
+def tell(label: str, away: np.ndarray, times: list[float], steps: str) -> None:
+    """A row of the table."""
+    print(f"| {label} | {1e6 * np.linalg.norm(away):.2g} um | {1e3 * min(times):.0f} ms | {steps} |")
 
 
 def main() -> None:

@@ -1,0 +1,79 @@
+"""The FMI variables of a cable, in the order in which the slave keeps their values."""
+
+from typing import Any, Dict, Tuple
+
+from .description import Variable, axes, vector
+from .laws.effects import BY_NAME
+from .slave import INPUT_TIME, effect_variables
+
+MOTION = (*axes("position", "velocity"), "winch_speed")
+RATED = (*MOTION, *axes("acceleration"), "winch_acceleration")
+
+
+def cable_variables(data: Dict[str, Any]) -> Tuple[Variable, ...]:
+    """Inputs, outputs, their rates, states, parameters; ``data`` is the cable's resource."""
+    return (*_inputs(data), *_outputs(data), *_states(data), *_parameters(data))
+
+
+def _inputs(data: Dict[str, Any]) -> Tuple[Variable, ...]:
+    start, length = tuple(data["start"]), float(data["start_length"])
+    return (
+        INPUT_TIME,
+        *vector("position", "input", "m", "position of the platform", start, nominal=length),
+        *vector("velocity", "input", "m/s", "velocity of the platform, the rate of position"),
+        *vector("acceleration", "input", "m/s2", "acceleration of the platform, the rate of velocity"),
+        Variable("winch_speed", "input", "m/s", "rope speed by the winch encoder, positive reels in"),
+        Variable("winch_acceleration", "input", "m/s2", "rate of winch_speed"),
+    )
+
+
+def _outputs(data: Dict[str, Any]) -> Tuple[Variable, ...]:
+    tension, length = float(data["start_tension"]), float(data["start_length"])
+    cell = "tension at the load cell, between winch and exit point"
+    chord = "distance from exit point to platform"
+    stretch = "length less start length and rope let out"
+    place = axes("position")
+    return (
+        *vector("force", "output", "N", "force on the platform", nominal=tension, depends_on=MOTION),
+        Variable("tension", "output", "N", cell, minimum=0.0, nominal=tension, depends_on=MOTION),
+        Variable("length", "output", "m", chord, nominal=length, depends_on=place),
+        Variable("elongation", "output", "m", stretch, depends_on=place),
+        Variable("strain", "output", "1", "strain by the tension law", nominal=1e-3, depends_on=place),
+        *vector("force_rate", "output", "N/s", "rate of force", nominal=tension, depends_on=RATED),
+        Variable("tension_rate", "output", "N/s", "rate of tension", nominal=tension, depends_on=RATED),
+    )
+
+
+def _states(data: Dict[str, Any]) -> Tuple[Variable, ...]:
+    length = float(data["start_length"])
+    return (
+        Variable("unstrained_length", "local", "m", "state: rope in the span if it were unloaded", nominal=length),
+        Variable("wound_length", "local", "m", "state: rope reeled in since the start", nominal=length),
+        *(
+            Variable(f"effect.{s['name']}.{state.name}", "local", state.unit, f"state: {state.description}")
+            for s in data["effects"]
+            for state in BY_NAME[s["name"]].states
+        ),
+    )
+
+
+def _parameters(data: Dict[str, Any]) -> Tuple[Variable, ...]:
+    anchor, start = tuple(data["anchor"]), tuple(data["start"])
+    area = "area that the modulus refers to"
+    return (
+        *vector("anchor", "parameter", "m", "exit point on the frame", anchor),
+        *vector("start", "parameter", "m", "position of the platform at the start, in static equilibrium", start),
+        Variable("modulus", "parameter", "Pa", "modulus of elasticity", data["modulus"], True, 0.0, nominal=1e11),
+        Variable("area", "parameter", "m2", area, data["area"], True, 0.0, nominal=1e-5),
+        Variable("damping", "parameter", "Pa s", "viscosity of the rope", data["damping"], True, 0.0, nominal=1e9),
+        Variable(
+            "start_tension",
+            "parameter",
+            "N",
+            "tension at the start",
+            float(data["start_tension"]),
+            minimum=0.0,
+            nominal=1e3,
+        ),
+        *effect_variables(data["effects"]),
+    )
