@@ -27,7 +27,7 @@ from .wiring import Connection, Port, check, levels
 Array = NDArray[np.float64]
 
 REMEASURED = 50
-LEAST_CONTRACTION = 1e-6
+LEAST_CONTRACTION, LEAST_CHANGE = 1e-6, 1e-14
 PAST = 4
 
 
@@ -144,11 +144,13 @@ class Coupling:
         self._drive(end)
         change = self._pass(time, step, begun)
         redo = 0
-        while before and redo < self.redos and not change * self._contraction <= self.tolerance:
+        # What the first pass changes is the guess's error; only redos tell how fast the rest shrinks.
+        while before and redo < self.redos and not (redo and change * self._contraction <= self.tolerance):
             self._restore_states(before)
             redo += 1
             earlier, change = change, self._pass(time, step, begun)
-            self._contraction = min(1.0, max(change / max(earlier, LEAST_CONTRACTION), LEAST_CONTRACTION))
+            if redo > 1:
+                self._contraction = min(1.0, max(change / max(earlier, LEAST_CHANGE), LEAST_CONTRACTION))
         if before:
             self.release(before)
         self._past.append((time + step, self._shown.copy()))
