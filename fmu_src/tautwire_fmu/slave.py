@@ -23,7 +23,8 @@ INPUT_TIME = Variable(
     "input_time",
     "input",
     "s",
-    "time at which the inputs hold; at or before the start of a step they are extrapolated over it",
+    "time at which the inputs hold, set before or together with them; at or before the start of a step they are "
+    "extrapolated over it",
 )
 
 
