@@ -45,6 +45,7 @@ HIDDEN: list[tuple[str, dict[str, Any]]] = [
     ("three", {"damping": {"damping": 9e8}}),
     ("three", {"modulus": {"modulus": 1.12e11}}),
     ("three", {"modulus": {"modulus": 0.9e11, "cables": [2]}}),
+    ("three", {"modulus": {"modulus": 1.1e11, "cables": [1, 2]}}),
     ("caroca", {"payload": {"mass": 1.5}}),
     ("caroca", {"damping": {"damping": 1.6e8, "cables": [3]}}),
 ]

@@ -24,8 +24,8 @@ class Hypothesis:
             return self.effect.name
         return f"{self.effect.name} of cable {', '.join(map(str, self.cables))}"
 
-    def excludes(self, other: Hypothesis) -> bool:
-        """Whether the other is the same effect in the same place, which would only replace it."""
+    def overlaps(self, other: Hypothesis) -> bool:
+        """Whether the other is the same effect in a place that both share."""
         return self.effect is other.effect and (not self.cables or bool(set(self.cables) & set(other.cables)))
 
     def setting(self, robot: Robot) -> EffectSetting:
@@ -36,6 +36,18 @@ class Hypothesis:
         for parameter in self.effect.parameters:
             declared = declared_value(robot, parameter, self.cables)
             yield parameter.name, parameter.start if not declared else parameter.start_ratio * declared
+
+
+def joined(accepted: Sequence[Hypothesis], new: Hypothesis) -> list[Hypothesis]:
+    """The accepted hypotheses and a new one, which has its cables to itself."""
+    kept = []
+    for old in accepted:
+        cables = tuple(cable for cable in old.cables if cable not in new.cables)
+        if not old.overlaps(new):
+            kept.append(old)
+        elif cables:
+            kept.append(Hypothesis(old.effect, cables))
+    return [*kept, new]
 
 
 def hypotheses(robot: Robot) -> tuple[Hypothesis, ...]:

@@ -20,7 +20,7 @@ from ..robot import EffectSetting, Robot
 from .adequacy import is_noise
 from .data import Evidence
 from .fit import Fit, Fitter
-from .hypotheses import Hypothesis, hypotheses
+from .hypotheses import Hypothesis, hypotheses, joined
 from .screen import Prospect, screen
 from .verdict import Candidate
 
@@ -96,7 +96,7 @@ class Search:
                 break
             rivals = {t.hypothesis.effect.name for t in trials if best.evidence - t.evidence < ALIKE}
             alike += [(best.hypothesis.effect.name, r) for r in sorted(rivals - {best.hypothesis.effect.name})]
-            accepted.append(best.hypothesis)
+            accepted = joined(accepted, best.hypothesis)
             present = best.fit
         return self._without_needless(accepted, present, tuple(tried), tuple(alike))
 
@@ -115,12 +115,14 @@ class Search:
 
     def _try_all(self, number: int, robot: Robot, accepted: list[Hypothesis]) -> list[_Trial]:
         judge, fit = self.evidence.judge, self.evidence.fit
-        open_ones = [h for h in hypotheses(self.robot) if not any(a.excludes(h) for a in accepted)]
+        open_ones = [h for h in hypotheses(self.robot) if not any(a.overlaps(h) for a in accepted)]
         prospects: dict[Hypothesis, Prospect] = {}
         adequate = all(is_noise(self.fitter.innovations(robot, sample), sample.rows) for sample in (judge, fit))
         if adequate and open_ones:
             self.progress(f"round {number}: screening", 0.0)
             prospects = screen(robot, accepted, open_ones, self.fitter, self.evidence)
+        if not adequate:
+            open_ones += _divided(accepted)
         without = self._best_on_judge(robot, accepted)
         trials = []
         for index, hypothesis in enumerate(open_ones):
@@ -129,7 +131,7 @@ class Search:
             if prospect is not None and prospect.fit_gain < HOPELESS:
                 trials.append(_screened(robot, hypothesis, prospect))
             else:
-                trials += self._tried(robot, [*accepted, hypothesis], without)
+                trials += self._tried(robot, joined(accepted, hypothesis), without)
         self.progress(f"round {number}: done", 1.0)
         return trials
 
@@ -165,6 +167,11 @@ class Search:
                 break
             accepted, present, gains = rests[weakest], fits[weakest], []
         return Found(tuple(accepted), tuple(gains), present, tried, alike)
+
+
+def _divided(accepted: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """One cable less: each cable that shares its value with others gets one of its own."""
+    return [Hypothesis(a.effect, (cable,)) for a in accepted if len(a.cables) > 1 for cable in a.cables]
 
 
 def search(robot: Robot, fitter: Fitter, evidence: Evidence, alpha: float, progress: Progress) -> Found:
