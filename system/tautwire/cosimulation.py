@@ -11,6 +11,7 @@ import pandas as pd
 from numpy.typing import NDArray
 
 from .errors import TautwireError
+from .interrupt import interrupts_held
 from .master import (
     Account,
     AdaptiveStep,
@@ -28,7 +29,6 @@ from .master import (
     Stepping,
     simulate,
 )
-from .master.interrupt import interrupts_held
 from .packaging import RobotFmus
 
 Array = NDArray[np.float64]

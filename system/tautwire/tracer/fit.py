@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -48,10 +48,11 @@ class Fit:
 
 
 class Fitter:
-    """Fits and judges robots on samples; compiled likelihoods are kept."""
+    """Fits and judges robots on samples; compiled likelihoods are kept, and ``between`` is called before each run."""
 
-    def __init__(self, noise: Noise) -> None:
+    def __init__(self, noise: Noise, between: Callable[[], None] = lambda: None) -> None:
         self.noise = noise
+        self.between = between
         self._compiled: dict[tuple[object, ...], Likelihood] = {}
 
     def fit(self, robot: Robot, chosen: Collection[Hypothesis], sample: Sample) -> Fit:
@@ -70,7 +71,7 @@ class Fitter:
         begun = scaled = start / scale
         slopes = np.zeros((0, len(free)))
         for rough, stop in STAGES:
-            residual = _Residual(likelihood, sample, scale, rough)
+            residual = _Residual(likelihood, sample, scale, rough, self.between)
             if rough == 0.0:
                 scaled = max((scaled, begun), key=residual.log_likelihood)
             solution = least_squares(
@@ -102,6 +103,7 @@ class Fitter:
         return self._likelihood(placed(robot, sample.start), (), sample).open_loop_variances(sample.recording, ())
 
     def _likelihood(self, robot: Robot, free: Sequence[FreeParameter], sample: Sample) -> Likelihood:
+        self.between()
         interval = float(np.median(np.diff(sample.recording.time)))
         opened = with_values(robot, free, dict.fromkeys(free, 0.0))
         key = (opened, tuple(free), round(interval, 9))
@@ -121,7 +123,10 @@ def _bounds(robot: Robot, free: Sequence[FreeParameter]) -> list[tuple[float, fl
 class _Residual:
     """Innovations and their slopes at the last point asked for, in scaled parameters."""
 
-    def __init__(self, likelihood: Likelihood, sample: Sample, scale: Array, roughness: float) -> None:
+    def __init__(
+        self, likelihood: Likelihood, sample: Sample, scale: Array, roughness: float, between: Callable[[], None]
+    ) -> None:
+        self.between = between
         self.likelihood = likelihood
         self.sample = sample
         self.scale = scale
@@ -142,6 +147,7 @@ class _Residual:
 
     def _evaluate(self, scaled: Array) -> tuple[Array, Array]:
         if self._at is None or not np.array_equal(self._at, scaled):
+            self.between()
             found = self.likelihood.innovations(self.sample.recording, scaled * self.scale, self.roughness)
             chosen = found.seen & self.sample.rows[:, None]
             self._found = (found.values[chosen], found.slopes[chosen] * self.scale)

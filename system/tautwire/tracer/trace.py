@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..cosimulation import Motion, cosimulate
 from ..errors import RecordingError
+from ..interrupt import interrupts_held
 from ..packaging import build_fmus
 from ..recording import Recording, require_outputs
 from ..robot import Robot
@@ -41,13 +42,25 @@ def trace(robot: Robot, fit: Recording, check: Recording | None, progress: Progr
     Raises RecordingError where a recording has no measured output, UnreachableError where the cables cannot hold
     the platform where a recording starts.
     """
+    with interrupts_held() as raise_interrupt:
+        return _trace(robot, fit, check, progress, alpha, raise_interrupt)
+
+
+def _trace(
+    robot: Robot,
+    fit: Recording,
+    check: Recording | None,
+    progress: Progress,
+    alpha: float,
+    between: Callable[[], None],
+) -> Trace:
     began = perf_counter()
     for recording in (fit, check):
         if recording is not None:
             require_outputs(recording)
     noise = noise_of(robot, fit)
     evidence = split(robot, noise, fit, check)
-    fitter = Fitter(noise)
+    fitter = Fitter(noise, between)
     plain = _innovations(fitter, robot, evidence)
     _require_samples(plain, evidence)
     samples = (evidence.fit,) if check is None else (evidence.fit, evidence.judge)

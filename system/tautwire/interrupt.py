@@ -1,4 +1,7 @@
-"""Holds Ctrl-C back while FMUs are being called: an exception inside one would bring the process down."""
+"""Holds Ctrl-C back while foreign code runs.
+
+Inside an FMU it would end the process, inside CasADi it would become another error.
+"""
 
 from __future__ import annotations
 
@@ -11,9 +14,9 @@ from types import FrameType
 
 @contextmanager
 def interrupts_held() -> Iterator[Callable[[], None]]:
-    """Within the block Ctrl-C is only noted; call what the block gets between steps to have it raised.
+    """Within the block Ctrl-C is only noted.
 
-    Raises KeyboardInterrupt there. Only the main thread receives signals; elsewhere nothing is changed.
+    Call what the block gets, where nothing foreign is running, to have KeyboardInterrupt raised there. Only the main thread receives signals; elsewhere nothing is changed.
     """
     if threading.current_thread() is not threading.main_thread():
         yield lambda: None
