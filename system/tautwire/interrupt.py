@@ -16,7 +16,8 @@ from types import FrameType
 def interrupts_held() -> Iterator[Callable[[], None]]:
     """Within the block Ctrl-C is only noted.
 
-    Call what the block gets, where nothing foreign is running, to have KeyboardInterrupt raised there. Only the main thread receives signals; elsewhere nothing is changed.
+    Call what the block gets, where nothing foreign is running, to have KeyboardInterrupt raised there. Only the main
+    thread receives signals; elsewhere nothing is changed.
     """
     if threading.current_thread() is not threading.main_thread():
         yield lambda: None
