@@ -3,6 +3,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tautwire.errors import UnreachableError
 from tautwire.recording import Recording
 from tautwire.start import placed, start_of
 from tests.recordings import recorded
@@ -43,3 +44,8 @@ def test_a_first_row_that_dropped_out_does_not_hide_the_start() -> None:
     recording.position[:2] = np.nan
     start, _ = start_of(ROBOT, NOISE, recording)
     assert start[1] == pytest.approx(0.5, abs=1e-3)
+
+
+def test_a_start_that_the_cables_cannot_hold_names_the_recording() -> None:
+    with pytest.raises(UnreachableError, match=r"three-1\.csv: first positions: .*cable \d would need -"):
+        start_of(ROBOT, NOISE, moved([-60.0, 0.0, 0.0]))

@@ -6,6 +6,8 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
 
+from fmpy.model_description import ScalarVariable
+
 from ..errors import TautwireError
 from .component import Component
 
@@ -51,7 +53,9 @@ def check(components: Mapping[str, Component], connections: Sequence[Connection]
         driven[connection.target] = connection
 
 
-def _variable(components: Mapping[str, Component], connection: Connection, port: Port, causality: str):  # type: ignore[no-untyped-def]
+def _variable(
+    components: Mapping[str, Component], connection: Connection, port: Port, causality: str
+) -> ScalarVariable:
     if port.component not in components:
         raise WiringError(f"{connection}: no component {port.component!r}; there are {', '.join(components)}")
     variable = components[port.component].variables.get(port.variable)

@@ -1,6 +1,6 @@
 """Finds what a model lacks from recordings, or says that it does not know."""
 
-from .trace import trace
+from .tracing import trace
 from .verdict import Candidate, Comparison, Errors, Estimate, FoundEffect, Trace
 
 __all__ = ["Candidate", "Comparison", "Errors", "Estimate", "FoundEffect", "Trace", "trace"]

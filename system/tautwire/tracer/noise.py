@@ -16,14 +16,11 @@ def noise_of(robot: Robot, recording: Recording) -> Noise:
 
     A winch speed may be declared free of noise; no position or tension is.
     """
-    sensors = robot.sensors
-    position = sensors.position_noise
-    tension = sensors.tension_noise
-    speed = sensors.winch_speed_noise
-    position = position or roughness(recording.position)
+    position = robot.sensors.position_noise or roughness(recording.position)
+    speed = robot.sensors.winch_speed_noise
     return Noise(
         position=position,
-        tension=tension or roughness(recording.tension),
+        tension=robot.sensors.tension_noise or roughness(recording.tension),
         winch_speed=roughness(recording.winch_speed) if speed is None else speed,
         start=START_SPREAD * position if recording.has_position else START_UNSEEN,
     )

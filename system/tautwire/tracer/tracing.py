@@ -90,7 +90,7 @@ def _trace(
         comparisons=comparisons,
         noise_floor=floors[-1],
         noise_before=before_is_noise,
-        noise_after=True if kept else before_is_noise,
+        noise_after=kept or before_is_noise,
         left=(explained if kept else plain)[1].mean_square(evidence.judge.rows),
         alpha=alpha,
         notes=_notes(evidence, samples),

@@ -1,0 +1,50 @@
+"""What a trace makes of a search: the co-simulation of the rebuilt FMUs has the last word."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tautwire.cosimulation import Motion, cosimulate
+from tautwire.tracer import Trace, trace
+from tautwire.tracer.tracing import errors
+from tests.recordings import recorded
+from tests.robots import example
+
+HIDDEN = {"damping": {"damping": 9e8}}
+
+
+def traced() -> Trace:
+    fit, check = recorded("three", 3, HIDDEN), recorded("three", 53, HIDDEN)
+    return trace(example("three"), fit, check, lambda what, done: None)
+
+
+@pytest.mark.slow
+def test_the_rebuilt_fmus_give_the_error_after() -> None:
+    found = traced()
+    assert found.verdict == "effects"
+    for comparison in found.comparisons:
+        again = errors(comparison.recording, comparison.after)
+        assert again.tension_rms == comparison.errors_after.tension_rms
+        assert again.tension_rms < 1.2 * found.noise_floor.tension_rms < comparison.errors_before.tension_rms
+    assert found.robot_after.effects[0].name == "damping"
+    assert found.robot_before == example("three")
+
+
+@pytest.mark.slow
+def test_no_name_is_given_where_the_rebuilt_fmus_miss_the_recording(monkeypatch: pytest.MonkeyPatch) -> None:
+    runs = []
+
+    def astray(*arguments: Any, **options: Any) -> Motion:
+        motion = cosimulate(*arguments, **options)
+        runs.append(motion)
+        return replace(motion, position=motion.position + 0.01) if len(runs) > 2 else motion
+
+    monkeypatch.setattr("tautwire.tracer.tracing.cosimulate", astray)
+    found = traced()
+    assert len(runs) == 4
+    assert found.verdict == "unexplained"
+    assert found.effects == ()
+    assert found.robot_after == found.robot_before
+    assert all(np.array_equal(c.after.position, c.before.position) for c in found.comparisons)
