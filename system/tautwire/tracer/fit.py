@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from tautwire_fmu.laws.effects import BY_NAME
+from tautwire_fmu.laws.effects import BY_NAME, Parameter
 
 from ..robot import Robot
 from ..start import placed
@@ -65,8 +65,9 @@ class Fitter:
         if not free:
             return Fit(robot, (), np.zeros(0), np.zeros(0))
         start = np.array([robot.effects[f.setting].values[f.name] for f in free])
-        scale = np.where(start == 0.0, 1.0, np.abs(start))
-        bounds = np.array(_bounds(robot, free)).T / scale
+        known = _parameters(robot, free)
+        scale = np.maximum(np.abs(start), [abs(parameter.start) for parameter in known])
+        lower, upper = (np.array([p.minimum for p in known]) / scale, np.array([p.maximum for p in known]) / scale)
         likelihood = self._likelihood(placed(robot, sample.start), free, sample)
         begun = scaled = start / scale
         slopes = np.zeros((0, len(free)))
@@ -74,16 +75,18 @@ class Fitter:
             residual = _Residual(likelihood, sample, scale, rough, self.between)
             if rough == 0.0:
                 scaled = max((scaled, begun), key=residual.log_likelihood)
+            # The first trust region is as large as the start: counted from one, a parameter near zero is not stuck.
+            residual.origin = scaled - 1.0
             solution = least_squares(
                 residual.values,
-                scaled,
+                np.ones(len(free)),
                 jac=residual.slopes,
-                bounds=(bounds[0], bounds[1]),
+                bounds=(lower - residual.origin, upper - residual.origin),
                 x_scale="jac",
                 ftol=stop,
                 max_nfev=EVALUATIONS,
             )
-            scaled, slopes = solution.x, np.asarray(solution.jac, dtype=float)
+            scaled, slopes = residual.origin + solution.x, np.asarray(solution.jac, dtype=float)
         values = scaled * scale
         covariance = np.linalg.pinv(slopes.T @ slopes)
         fitted = with_values(robot, free, dict(zip(free, values.tolist(), strict=True)))
@@ -114,10 +117,9 @@ class Fitter:
         return self._compiled[key]
 
 
-def _bounds(robot: Robot, free: Sequence[FreeParameter]) -> list[tuple[float, float]]:
-    """Smallest and largest value of each free parameter."""
-    known = [{p.name: p for p in BY_NAME[robot.effects[f.setting].name].parameters}[f.name] for f in free]
-    return [(parameter.minimum, parameter.maximum) for parameter in known]
+def _parameters(robot: Robot, free: Sequence[FreeParameter]) -> list[Parameter]:
+    """What the effects say of each free parameter."""
+    return [{p.name: p for p in BY_NAME[robot.effects[f.setting].name].parameters}[f.name] for f in free]
 
 
 class _Residual:
@@ -131,6 +133,7 @@ class _Residual:
         self.sample = sample
         self.scale = scale
         self.roughness = roughness
+        self.origin = np.zeros(len(scale))
         self._at: Array | None = None
         self._found: tuple[Array, Array] = (np.zeros(0), np.zeros((0, 0)))
 
@@ -139,11 +142,11 @@ class _Residual:
         value = found.log_likelihood(self.sample.rows)
         return value if np.isfinite(value) else -np.inf
 
-    def values(self, scaled: Array) -> Array:
-        return self._evaluate(scaled)[0]
+    def values(self, moved: Array) -> Array:
+        return self._evaluate(self.origin + moved)[0]
 
-    def slopes(self, scaled: Array) -> Array:
-        return self._evaluate(scaled)[1]
+    def slopes(self, moved: Array) -> Array:
+        return self._evaluate(self.origin + moved)[1]
 
     def _evaluate(self, scaled: Array) -> tuple[Array, Array]:
         if self._at is None or not np.array_equal(self._at, scaled):
