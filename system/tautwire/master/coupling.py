@@ -19,15 +19,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from .acceleration import Secants
 from .audit import Account, Bond
 from .component import Component
-from .seat import STAMP, Level, Places, Seat, downstream, gauss_seidel_order
+from .seat import STAMP, Level, Places, Seat, downstream, fed_back, gauss_seidel_order
 from .wiring import Connection, Port, check, levels
 
 Array = NDArray[np.float64]
 
-REMEASURED = 50
-LEAST_CONTRACTION, LEAST_CHANGE = 1e-6, 1e-14
 PAST = 4
 
 
@@ -46,9 +45,9 @@ class Coupling:
     """A wired system of components, ready to step.
 
     ``drives`` are the input ports that the master itself sets; ``bonds`` are audited for energy; ``tolerance`` is
-    relative to the nominal values of the connected outputs; ``redos`` bounds the redos of a step. How much a redo
-    shrinks the error is measured now and then, so that most steps need no redo whose only use is to show that
-    nothing changed. ``can_redo`` is False where some FMU cannot save its state: then no step is redone.
+    relative to the nominal values of the connected outputs; ``redos`` bounds the redos of a step. What a redo is
+    given is improved by what earlier ones have shown, see :class:`Secants`. ``can_redo`` is False where some FMU
+    cannot save its state: then no step is redone.
     """
 
     def __init__(
@@ -84,7 +83,10 @@ class Coupling:
         self._bond_given = _places(given, [c.target for c in efforts]), _places(given, [c.target for c in flows])
         self._driven = np.full(len(drives), np.nan)
         self._past: deque[tuple[float, Array]] = deque(maxlen=PAST)
-        self._contraction, self._contraction_at = 1.0, 0.0
+        self._fed_back = fed_back([seat.component.name for seat in self._order], connections, shown)
+        self._scale = self._nominal[self._fed_back]
+        self._secants = Secants()
+        self._learnt_at = 0.0
 
     def _inputs_of(self, name: str, connections: Sequence[Connection]) -> list[Port]:
         stamp = [Port(name, STAMP)] * (STAMP in self.components[name].variables)
@@ -138,19 +140,20 @@ class Coupling:
         self._pass_on(time, self._after_drives if jumped else ())
         before = self.save() if self.can_redo else None
         begun = self._given.copy()
-        if abs(step - self._contraction_at) > 0.1 * step or self.account.steps % REMEASURED == 0:
-            self._contraction, self._contraction_at = 1.0, step
+        if abs(step - self._learnt_at) > 0.1 * step:
+            self._secants.forget()
+            self._learnt_at = step
+        self._secants.begin()
         self._guess(time + step)
         self._drive(end)
-        change = self._pass(time, step, begun)
+        error = self._pass(time, step, begun)
         redo = 0
-        # What the first pass changes is the guess's error; only redos tell how fast the rest shrinks.
-        while before and redo < self.redos and not (redo and change * self._contraction <= self.tolerance):
+        while before and redo < self.redos and error > self.tolerance:
+            self._shown[self._fed_back] = self._secants.next() * self._scale
             self._restore_states(before)
             redo += 1
-            earlier, change = change, self._pass(time, step, begun)
-            if redo > 1:
-                self._contraction = min(1.0, max(change / max(earlier, LEAST_CHANGE), LEAST_CONTRACTION))
+            # What the outputs still err by is less than what their inputs do.
+            error = self._pass(time, step, begun) * self._secants.contraction()
         if before:
             self.release(before)
         self._past.append((time + step, self._shown.copy()))
@@ -168,12 +171,17 @@ class Coupling:
         self._shown[:] = guess
 
     def _pass(self, time: float, step: float, begun: Array) -> float:
-        """Each component steps in turn; returns the largest change of an output, relative to its nominal value."""
+        """Each component steps in turn; returns by how much an output at most is not what others were given.
+
+        Relative to the nominal value.
+        """
         self.account.passes += 1
-        before = self._shown.copy()
+        given = self._shown[self._fed_back] / self._scale
         for seat in self._order:
             seat.advance(time, step, begun, self._shown)
-        return float(np.max(np.abs(self._shown - before) / self._nominal, initial=0.0))
+        shown = self._shown[self._fed_back] / self._scale
+        self._secants.learn(given, shown)
+        return float(np.max(np.abs(shown - given), initial=0.0))
 
     def _enter_books(self, step: float, redos: int) -> None:
         (sent_effort, sent_flow), (given_effort, given_flow) = self._bond_sent, self._bond_given

@@ -101,6 +101,12 @@ def gauss_seidel_order(
     return sorted(components, key=waits)
 
 
+def fed_back(order: Sequence[str], connections: Sequence[Connection], shown: Sequence[Port]) -> Places:
+    """Places of the outputs that a pass in this order uses before it has found them."""
+    back = {c.source for c in connections if order.index(c.source.component) >= order.index(c.target.component)}
+    return np.array([place for place, port in enumerate(shown) if port in back], dtype=np.intp)
+
+
 def downstream(
     components: Mapping[str, Component], groups: Sequence[Sequence[Connection]], drives: Sequence[Port]
 ) -> list[list[Connection]]:
