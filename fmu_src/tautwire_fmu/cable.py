@@ -12,8 +12,8 @@ from .slave import Slave, active_effects, read_resource
 
 POSITION, VELOCITY, ACCELERATION, WINCH_SPEED, WINCH_ACCELERATION = 1, 4, 7, 10, 11
 FIRST_OUTPUT = 12
-FIRST_RATE = 19
-FIRST_STATE = 23
+FIRST_RATE = 20
+FIRST_STATE = 24
 Motion = Tuple[Sequence[float], Sequence[float], float]
 
 
@@ -84,7 +84,7 @@ class Cable(Slave):
             carried.winch_speed,
         )
         shown = law.reading(COMPLEX_STEP, self.constants, self.effects, state, moving)
-        values = (*shown.force, shown.tension, shown.length, shown.elongation, shown.strain)
+        values = (*shown.force, shown.tension, shown.length, shown.elongation, shown.strain, shown.pull)
         real[FIRST_OUTPUT:FIRST_RATE] = [complex(value).real for value in values]
         real[FIRST_RATE:FIRST_STATE] = [*map(rate_of, shown.force), rate_of(shown.tension)]
 

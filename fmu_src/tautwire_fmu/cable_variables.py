@@ -32,6 +32,7 @@ def _outputs(data: Dict[str, Any]) -> Tuple[Variable, ...]:
     cell = "tension at the load cell, between winch and exit point"
     chord = "distance from exit point to platform"
     stretch = "length less start length and rope let out"
+    pull = "tension that the law asks for, negative where the cable hangs slack"
     place = axes("position")
     return (
         *vector("force", "output", "N", "force on the platform", nominal=tension, depends_on=MOTION),
@@ -39,6 +40,7 @@ def _outputs(data: Dict[str, Any]) -> Tuple[Variable, ...]:
         Variable("length", "output", "m", chord, nominal=length, depends_on=place),
         Variable("elongation", "output", "m", stretch, depends_on=place),
         Variable("strain", "output", "1", "strain by the tension law", nominal=1e-3, depends_on=place),
+        Variable("pull", "output", "N", pull, nominal=tension, depends_on=MOTION),
         *vector("force_rate", "output", "N/s", "rate of force", nominal=tension, depends_on=RATED),
         Variable("tension_rate", "output", "N/s", "rate of tension", nominal=tension, depends_on=RATED),
     )

@@ -129,6 +129,11 @@ def bonds(cable_count: int) -> list[Bond]:
     ]
 
 
+def kinks(cable_count: int) -> list[Port]:
+    """Outputs at whose sign changes forces have a kink: a cable goes slack, or tight."""
+    return [Port(cable_name(index), "pull") for index in range(1, cable_count + 1)]
+
+
 @contextmanager
 def instantiated(fmus: RobotFmus) -> Iterator[Coupling]:
     """The wired robot in initialization mode; instances and folders go when the block ends."""
@@ -143,7 +148,7 @@ def instantiated(fmus: RobotFmus) -> Iterator[Coupling]:
         }
         for component in components.values():
             component.initialize(0.0, {})
-        yield Coupling(components, connections(count), winch_ports(count), bonds(count))
+        yield Coupling(components, connections(count), winch_ports(count), bonds(count), kinks(count))
 
 
 def cosimulate(

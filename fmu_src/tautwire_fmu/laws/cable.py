@@ -95,9 +95,13 @@ class CableMotion(NamedTuple):
 
 
 class CableReading(NamedTuple):
-    """What a cable shows: tension in N, force on the platform in N, lengths in m."""
+    """What a cable shows: tension in N, force on the platform in N, lengths in m.
+
+    ``pull`` is the tension that the law asks for, in N: negative where the cable hangs slack.
+    """
 
     tension: Any
+    pull: Any
     force: Vector
     length: Any
     elongation: Any
@@ -180,6 +184,7 @@ def reading(
     tension = m.maximum(pull, 0.0)
     return CableReading(
         tension=tension,
+        pull=pull,
         force=scale(tension, moving.direction),
         length=moving.length,
         elongation=moving.length - (cable.start_length - state.wound_length),

@@ -39,7 +39,6 @@ class Secants:
     def forget(self) -> None:
         """Drop all pairs."""
         self._pairs.clear()
-        self._last = None
 
     def learn(self, given: Array, shown: Array) -> None:
         """One pass: it was given ``given`` and showed ``shown``."""

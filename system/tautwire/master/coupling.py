@@ -44,10 +44,11 @@ class Checkpoint:
 class Coupling:
     """A wired system of components, ready to step.
 
-    ``drives`` are the input ports that the master itself sets; ``bonds`` are audited for energy; ``tolerance`` is
-    relative to the nominal values of the connected outputs; ``redos`` bounds the redos of a step. What a redo is
-    given is improved by what earlier ones have shown, see :class:`Secants`. ``can_redo`` is False where some FMU
-    cannot save its state: then no step is redone.
+    ``drives`` are the input ports that the master itself sets; ``bonds`` are audited for energy; ``kinks`` are
+    outputs at whose sign changes other outputs have a kink, see :mod:`.kinks`. ``tolerance`` is relative to the
+    nominal values of the connected outputs; ``redos`` bounds the redos of a step. What a redo is given is improved
+    by what earlier ones have shown, see :class:`Secants`. ``can_redo`` and ``can_cut`` are False where some FMU
+    cannot save its state: then no step is redone, or cut at kinks.
     """
 
     def __init__(
@@ -56,6 +57,7 @@ class Coupling:
         connections: Sequence[Connection],
         drives: Sequence[Port],
         bonds: Sequence[Bond] = (),
+        kinks: Sequence[Port] = (),
         tolerance: float = 1e-9,
         redos: int = 8,
     ) -> None:
@@ -65,9 +67,10 @@ class Coupling:
         self.tolerance = tolerance
         self.redos = redos
         self.can_redo = all(c.can_restore for c in components.values())
+        self.can_cut = self.can_redo
         self.account = Account()
         names = list(components)
-        shown = sorted({c.source for c in connections}, key=lambda p: (names.index(p.component), p))
+        shown = sorted({c.source for c in connections} | set(kinks), key=lambda p: (names.index(p.component), p))
         self._shown = np.zeros(len(shown))
         self._nominal = np.array([float(components[p.component].variables[p.variable].nominal or 1.0) for p in shown])
         given = [port for name in names for port in self._inputs_of(name, connections)]
@@ -81,6 +84,7 @@ class Coupling:
         efforts, flows = [bond.effort for bond in bonds], [bond.flow for bond in bonds]
         self._bond_sent = _places(shown, [c.source for c in efforts]), _places(shown, [c.source for c in flows])
         self._bond_given = _places(given, [c.target for c in efforts]), _places(given, [c.target for c in flows])
+        self._kink_places = _places(shown, kinks)
         self._driven = np.full(len(drives), np.nan)
         self._past: deque[tuple[float, Array]] = deque(maxlen=PAST)
         self._fed_back = fed_back([seat.component.name for seat in self._order], connections, shown)
@@ -120,8 +124,19 @@ class Coupling:
         """Set all inputs at ``time`` and pass outputs on until every input holds; for initialization."""
         self._drive(drives)
         self._pass_on(time, self._levels)
+        for seat in self._order:
+            seat.show()
+        self.forget(time)
+
+    def forget(self, time: float) -> None:
+        """Do not extrapolate over ``time``, which is now: some output has a kink there."""
         self._past.clear()
         self._past.append((time, self._shown.copy()))
+
+    def kinks(self) -> Array:
+        """The outputs whose signs tell of kinks, as last shown."""
+        values: Array = self._shown[self._kink_places]
+        return values
 
     def _drive(self, values: Array) -> None:
         self._given[self._drive_places] = values
@@ -153,7 +168,9 @@ class Coupling:
             self._restore_states(before)
             redo += 1
             # What the outputs still err by is less than what their inputs do.
-            error = self._pass(time, step, begun) * self._secants.contraction()
+            earlier, error = error, self._pass(time, step, begun) * self._secants.contraction()
+            if error > earlier:
+                self._secants.forget()
         if before:
             self.release(before)
         self._past.append((time + step, self._shown.copy()))

@@ -67,6 +67,10 @@ class Seat:
             self.inputs.values[:] = end
             if self.inputs.count:
                 self.component.write(self.inputs)
+        self.show()
+
+    def show(self) -> None:
+        """Read the outputs."""
         if self.outputs.count:
             self.component.read(self.outputs)
 

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import TautwireError
 from .coupling import Coupling
+from .kinks import step_over
 
 Array = NDArray[np.float64]
 Drives = Callable[[float, float], tuple[Array, Array]]
@@ -56,7 +57,7 @@ class FixedStep:
         count = max(1, math.ceil(span / self.longest * (1.0 - 1e-9)))
         for k in range(count):
             time = begin + k * span / count
-            coupling.step(time, span / count, *drives(time, span / count))
+            step_over(coupling, time, span / count, drives)
 
 
 @dataclass
@@ -85,12 +86,12 @@ class AdaptiveStep:
         """Make one step; None if it is kept, else its error, and all is as before."""
         before = coupling.save()
         try:
-            coupling.step(time, step, *drives(time, step))
+            step_over(coupling, time, step, drives)
             whole = watch()
             coupling.restore(before)
             half = 0.5 * step
-            coupling.step(time, half, *drives(time, half))
-            coupling.step(time + half, half, *drives(time + half, half))
+            step_over(coupling, time, half, drives)
+            step_over(coupling, time + half, half, drives)
             error = float(np.max(np.abs(watch() - whole), initial=0.0)) / (2**ORDER - 1)
             allowed = SHARE * self.tolerance * step / self.duration
             factor = SAFETY * (allowed / max(error, 1e-300)) ** (1.0 / ORDER)
