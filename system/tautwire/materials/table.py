@@ -1,0 +1,201 @@
+"""A table of a dynamic test on a rope: what was measured at which frequency, and how surely."""
+
+from __future__ import annotations
+
+import csv
+import math
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from decimal import Decimal, InvalidOperation
+from io import StringIO
+from pathlib import Path
+
+from ..checked_table import NumberRule, nearest
+from ..errors import MaterialTableError, shown
+from ..input_file import read_bytes, require_text
+from ..recording_rules import MISSING
+
+PAPER_TABLE = Path(__file__).parent / "steel_wire_rope_baklouti_2017.csv"
+# The row, in Hz, whose pair the paper takes as constant (sec. 4.3).
+PAPER_PAIR_AT = 2.0
+LEAST_ROWS, MOST_ROWS = 4, 500
+LARGEST_FILE = 10_000_000
+LARGEST_EXPONENT = 300
+
+RULES: Mapping[str, NumberRule] = {
+    "frequency": NumberRule("the loading frequency, 0 for a static test,", "Hz", 0.0, 1e6),
+    "stress_amplitude": NumberRule("the amplitude of the stress", "Pa", 0.0, 1e12, positive=True),
+    "strain_amplitude": NumberRule("the amplitude of the strain", "1", 0.0, 1.0, positive=True),
+    "dynamic_modulus": NumberRule("the dynamic modulus |E*|", "Pa", 1e5, 1e14),
+    "storage_modulus": NumberRule("the storage modulus E'", "Pa", 1e5, 1e14),
+    "loss_modulus": NumberRule("the loss modulus E''", "Pa", 0.0, 1e14),
+    "phase": NumberRule("the phase by which strain lags stress", "rad", 0.0, math.pi / 2.0),
+    "phase_degrees": NumberRule("the phase by which strain lags stress", "degrees", 0.0, 90.0),
+    "loss_factor": NumberRule("the loss factor E''/E'", "1", 0.0, 1e3),
+    "damping": NumberRule("the damping c = E''/(2 pi f)", "Pa s"),
+}
+UNCERTAINTY = "_uncertainty"
+WITHOUT_UNCERTAINTY = ("frequency",)
+# Two quantities that make a complex modulus, in the order of preference: what the test measures comes first.
+PAIRS: tuple[tuple[str, str], ...] = (
+    ("dynamic_modulus", "phase"),
+    ("storage_modulus", "loss_factor"),
+    ("storage_modulus", "loss_modulus"),
+    ("storage_modulus", "damping"),
+)
+
+
+@dataclass(frozen=True)
+class Quantity:
+    """A measured number in SI units; ``digit`` is one unit of the last digit written, ``uncertainty`` one sigma."""
+
+    value: float
+    digit: float
+    uncertainty: float | None = None
+    uncertainty_digit: float = 0.0
+
+    def scaled(self, factor: float) -> Quantity:
+        """The same in another unit."""
+        sigma = None if self.uncertainty is None else self.uncertainty * factor
+        return Quantity(self.value * factor, self.digit * factor, sigma, self.uncertainty_digit * factor)
+
+
+@dataclass(frozen=True)
+class MaterialRow:
+    """One frequency of the test, in Hz; ``quantities`` by column, the phase in rad."""
+
+    where: str
+    frequency: float
+    quantities: Mapping[str, Quantity]
+
+
+@dataclass(frozen=True)
+class MaterialTable:
+    """A dynamic test: ``rows`` at frequencies above zero, ``static`` ones at zero, both in the file's order."""
+
+    path: str
+    rows: tuple[MaterialRow, ...]
+    static: tuple[MaterialRow, ...]
+
+    def pairs(self) -> tuple[tuple[str, str], ...]:
+        """The pairs of columns that give a complex modulus with uncertainty in every row, the preferred first."""
+        return tuple(pair for pair in PAIRS if all(_is_measured(row, name) for row in self.rows for name in pair))
+
+
+def read_material_table(path: str | Path) -> MaterialTable:
+    """The table in a CSV file; raises MaterialTableError.
+
+    Lines that begin with ``#`` are remarks. Columns are those of ``RULES``, each with ``_uncertainty`` (one standard
+    deviation) beside it where there is one; ``frequency`` and one of ``PAIRS`` with uncertainties are needed. Values
+    in Hz, Pa, Pa s and rad, or degrees in ``phase_degrees``. A row of frequency 0 gives the storage modulus alone.
+    """
+    file = str(path)
+    content = read_bytes(path, MaterialTableError, LARGEST_FILE)
+    require_text(content, file, MaterialTableError, "CSV")
+    lines = list(_cells(content.decode("utf-8-sig"), file))
+    if not lines:
+        raise MaterialTableError(file, "is empty", "write a header line and four or more rows")
+    (where, names), body = lines[0], lines[1:]
+    _require_header(names, where)
+    rows = tuple(_row(place, cells, names) for place, cells in body)
+    table = MaterialTable(
+        path=file,
+        rows=tuple(row for row in rows if row.frequency > 0.0),
+        static=tuple(row for row in rows if row.frequency == 0.0),
+    )
+    _require_rows(table)
+    return table
+
+
+def _is_measured(row: MaterialRow, name: str) -> bool:
+    quantity = row.quantities.get(name)
+    return quantity is not None and quantity.uncertainty is not None
+
+
+def _cells(text: str, file: str) -> Iterator[tuple[str, list[str]]]:
+    """Lines that hold something, as cells, each with its place."""
+    for number, line in enumerate(text.splitlines(), 1):
+        if line.strip() and not line.lstrip().startswith("#"):
+            where = f"{file}: line {number}"
+            try:
+                yield where, [cell.strip() for cell in next(csv.reader(StringIO(line)))]
+            except csv.Error as problem:
+                raise MaterialTableError(where, f"is no CSV ({problem})", "write one number a cell") from problem
+
+
+def _require_header(names: Sequence[str], where: str) -> None:
+    known = [*RULES, *(name + UNCERTAINTY for name in RULES if name not in WITHOUT_UNCERTAINTY)]
+    for place, name in enumerate(names):
+        if name in names[:place]:
+            raise MaterialTableError(where, f"the column {shown(name)} is there twice", "keep one of the two")
+        if ";" in name or "\t" in name:
+            problem = "the columns are separated with semicolons or tabs"
+            raise MaterialTableError(
+                where, problem, "separate them with commas, and write numbers with a decimal point"
+            )
+        if name not in known:
+            mend = f"write {nearest(name, known)}, or remove it"
+            raise MaterialTableError(where, f"the column {shown(name)} is not known", mend)
+        owner = name.removesuffix(UNCERTAINTY)
+        if owner not in names:
+            raise MaterialTableError(where, f"{name} stands without {owner}", f"add the column {owner}")
+    if "phase" in names and "phase_degrees" in names:
+        raise MaterialTableError(where, "the phase is there in rad and in degrees", "keep one of the two")
+    if "frequency" not in names:
+        raise MaterialTableError(where, "the column frequency is missing", "add it, in Hz")
+
+
+def _row(where: str, cells: Sequence[str], names: Sequence[str]) -> MaterialRow:
+    if len(cells) != len(names):
+        mend = "complete the line, leave a cell empty where nothing was measured"
+        raise MaterialTableError(where, f"has {len(cells)} cells, the header has {len(names)}", mend)
+    numbers = {name: _number(where, name, cell) for name, cell in zip(names, cells, strict=True)}
+    if numbers["frequency"] is None:
+        raise MaterialTableError(f"{where}: frequency", "is missing", RULES["frequency"].mend())
+    quantities = {}
+    for name in names:
+        number, sigma = numbers[name], numbers.get(name + UNCERTAINTY)
+        if name in RULES and number is not None:
+            quantities[name] = Quantity(number[0], number[1], *(sigma or ()))
+    if "phase_degrees" in quantities:
+        quantities["phase"] = quantities.pop("phase_degrees").scaled(math.pi / 180.0)
+    frequency = quantities.pop("frequency").value
+    return MaterialRow(where, frequency, quantities)
+
+
+def _number(where: str, name: str, cell: str) -> tuple[float, float] | None:
+    """A number and one unit of its last digit; None where the cell is empty."""
+    if cell in MISSING:
+        return None
+    place, rule = f"{where}: {name}", RULES[name.removesuffix(UNCERTAINTY)]
+    try:
+        number = Decimal(cell) if cell.isascii() and "_" not in cell else Decimal("nan")
+    except InvalidOperation:
+        number = Decimal("nan")
+    exponent = number.as_tuple().exponent
+    value = float(number)
+    if not isinstance(exponent, int) or not math.isfinite(value):
+        raise MaterialTableError(place, f"is {shown(cell)}, not a number", rule.mend())
+    if name.endswith(UNCERTAINTY):
+        rule = NumberRule(f"one standard deviation of {rule.meaning}", rule.unit, positive=True)
+    bound = rule.broken_bound(value)
+    if bound:
+        raise MaterialTableError(place, f"is {value!r}, must be {bound}", rule.mend())
+    return value, 10.0 ** min(exponent, LARGEST_EXPONENT)
+
+
+def _require_rows(table: MaterialTable) -> None:
+    if len(table.rows) < LEAST_ROWS:
+        problem = f"has {len(table.rows)} rows of a frequency above zero, must have at least {LEAST_ROWS}"
+        raise MaterialTableError(table.path, problem, "measure at more frequencies")
+    if len(table.rows) > MOST_ROWS:
+        problem = f"has {len(table.rows)} rows, at most {MOST_ROWS} are fitted"
+        raise MaterialTableError(table.path, problem, "average the repeats at one frequency")
+    for row in table.static:
+        if not _is_measured(row, "storage_modulus"):
+            problem = "a static row gives no storage_modulus with its uncertainty"
+            raise MaterialTableError(row.where, problem, "add both, or remove the row")
+    if not table.pairs():
+        problem = "no pair of columns gives a complex modulus with uncertainties in every row"
+        pairs = "; ".join(f"{first} and {second}" for first, second in PAIRS)
+        raise MaterialTableError(table.path, problem, f"give, with {UNCERTAINTY} columns, one of: {pairs}")
