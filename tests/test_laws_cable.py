@@ -27,14 +27,23 @@ from tautwire_fmu.laws.effects import BY_NAME, ActiveEffect
 from tautwire_fmu.laws.mathematics import COMPLEX_STEP, REAL, Mathematics, along, rate_of
 
 NUMPY = Mathematics(
-    np.log, np.exp, np.sqrt, np.sin, np.cos, np.tanh, np.abs, np.maximum, lambda c, a, b: np.where(c > 0, a, b)
+    log=np.log,
+    exp=np.exp,
+    sqrt=np.sqrt,
+    sin=np.sin,
+    cos=np.cos,
+    tanh=np.tanh,
+    atan2=np.arctan2,
+    absolute=np.abs,
+    maximum=np.maximum,
+    where=lambda c, a, b: np.where(c > 0, a, b),
 )
 MODULUS, AREA, DAMPING, LENGTH, TENSION = 1.0e11, 1.2e-5, 5.0e8, 5.0, 900.0
 DAMPED = (ActiveEffect(BY_NAME["damping"], BY_NAME["damping"].values(2e9)),)
 
 
 def constants(law: str = "logarithmic", damping: float = DAMPING) -> CableConstants:
-    return CableConstants(LAWS[law], (3.0, 0.0, 4.0), MODULUS, AREA, damping, LENGTH, TENSION)
+    return CableConstants(LAWS[law], (3.0, 0.0, 4.0), MODULUS, AREA, damping, LENGTH, TENSION, (0.6, 0.0, 0.8), 9.81)
 
 
 def show(
@@ -150,6 +159,7 @@ def test_units_come_out_right() -> None:
         sin=math.sin,
         cos=math.cos,
         tanh=math.tanh,
+        atan2=math.atan2,
         absolute=abs,
         maximum=lambda a, b: a if a.to_base_units().magnitude > b else b,
         where=REAL.where,
@@ -163,6 +173,8 @@ def test_units_come_out_right() -> None:
         DAMPING * pascal * second,
         LENGTH * metre,
         TENSION * newton,
+        (0.6, 0.0, 0.8),
+        9.81 * unit.metre / unit.second**2,
     )
     effects = (ActiveEffect(BY_NAME["damping"], BY_NAME["damping"].values(2e9 * pascal * second)),)
     state = CableState(4.999 * metre, 0.0 * metre, ((),))

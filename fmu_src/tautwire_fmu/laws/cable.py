@@ -1,6 +1,7 @@
 """A cable from its exit point to the platform: length, strain, tension, and the force on the platform.
 
-State: the unstrained length ``l_u`` and the wound length, the integral of the rope speed ``V``.
+State: the unstrained length ``l_u`` and the wound length, the integral of the rope speed ``V``; and what the effects
+remember. How the effects act on the way from motion to load cell: :class:`tautwire_fmu.laws.effects.Effect`.
 
     logarithmic law   T = E S ln(l / l_u) + c S (dl/dt + V) / l + T0,   dl_u/dt = -V l_u / l
     linear law        T = E S r / l       + c S (dl/dt + V) / l + T0,   r = l - l_u,  dl_u/dt = -V
@@ -13,10 +14,10 @@ Source: Baklouti et al. 2017, Eqs. 1 to 4 and 12, with the reference length movi
 
 from typing import Any, Callable, NamedTuple, Sequence, Tuple
 
+from . import stages
 from .effects import ActiveEffect
 from .mathematics import Mathematics
-from .vectors import Vector, dot, norm, scale, subtract
-from .winch import rope_speed
+from .vectors import Vector, add, dot, norm, scale, subtract
 
 
 class TensionLaw(NamedTuple):
@@ -48,7 +49,10 @@ LAWS = {"logarithmic": LOGARITHMIC, "linear": LINEAR}
 
 
 class CableConstants(NamedTuple):
-    """What the robot file declares of a cable; SI units."""
+    """What the robot file declares of a cable, and its static start; SI units.
+
+    ``start_direction`` and ``start_length`` are those of :func:`tautwire_fmu.laws.stages.route` at the start.
+    """
 
     law: TensionLaw
     anchor: Vector
@@ -57,6 +61,8 @@ class CableConstants(NamedTuple):
     damping: Any
     start_length: Any
     start_tension: Any
+    start_direction: Vector
+    gravity: Any
 
 
 class CableState(NamedTuple):
@@ -76,31 +82,39 @@ class CableInputs(NamedTuple):
 
 
 class Span(NamedTuple):
-    """The straight line from the platform to the exit point; ``direction`` is its unit vector."""
+    """The rope between platform and exit point as if it did not sag; see :class:`tautwire_fmu.laws.stages.Route`."""
 
     direction: Vector
     length: Any
+    chord: Any
     length_rate: Any
 
 
 class CableMotion(NamedTuple):
-    """The kinematics of a cable, as effects in the rope see them."""
+    """The kinematics of a cable, as effects in the rope see them.
 
-    direction: Vector
-    length: Any
-    length_rate: Any
+    ``strain`` is what the law acts on, ``elastic_tension`` what it gives without viscosity, in N; ``arc`` is the
+    length of the rope with its sag, in m; ``winch_speed`` is the encoder's, ``rope_speed`` the rope's, in m/s.
+    """
+
+    line: Span
+    winch_speed: Any
     rope_speed: Any
+    arc: Any
     strain: Any
     strain_rate: Any
+    elastic_tension: Any
 
 
 class CableReading(NamedTuple):
     """What a cable shows: tension in N, force on the platform in N, lengths in m.
 
-    ``pull`` is the tension that the law asks for, in N: negative where the cable hangs slack.
+    ``tension`` is what the load cell shows, but for its lag; ``span_tension`` that of the free span; ``pull`` what
+    the law asks for, negative where the cable hangs slack.
     """
 
     tension: Any
+    span_tension: Any
     pull: Any
     force: Vector
     length: Any
@@ -117,12 +131,15 @@ def start_state(cable: CableConstants, effects: Sequence[ActiveEffect]) -> Cable
     )
 
 
-def span(m: Mathematics, cable: CableConstants, inputs: CableInputs) -> Span:
+def span(m: Mathematics, cable: CableConstants, inputs: CableInputs, effects: Sequence[ActiveEffect] = ()) -> Span:
     """Length, its rate and direction; they depend on the platform's motion alone."""
-    line = subtract(cable.anchor, inputs.position)
-    length = norm(m, line)
-    direction = scale(1.0 / length, line)
-    return Span(direction, length, -dot(direction, inputs.velocity))
+    if effects:
+        direction, length, chord = stages.route(m, effects, cable.anchor, inputs.position)
+    else:
+        line = subtract(cable.anchor, inputs.position)
+        length = chord = norm(m, line)
+        direction = scale(1.0 / length, line)
+    return Span(direction, length, chord, -dot(direction, inputs.velocity))
 
 
 def motion(
@@ -134,15 +151,27 @@ def motion(
     winch_speed: Any,
 ) -> CableMotion:
     """Strain and its rate on a span."""
-    speed = rope_speed(m, effects, state.effects, winch_speed)
-    return CableMotion(
-        direction=line.direction,
-        length=line.length,
-        length_rate=line.length_rate,
-        rope_speed=speed,
-        strain=cable.law.strain(m, line.length, state.unstrained_length),
-        strain_rate=(line.length_rate + speed) / line.length,
-    )
+    strain = cable.law.strain(m, line.length, state.unstrained_length)
+    if not effects:
+        return CableMotion(
+            line,
+            winch_speed,
+            winch_speed,
+            line.length,
+            strain,
+            (line.length_rate + winch_speed) / line.length,
+            cable.area * (cable.modulus * strain) + cable.start_tension,
+        )
+    own = state.effects
+    modulus, stress = stages.stiffness(m, effects, own, cable)
+    strain = strain - stages.free_strain(m, effects, own)
+    sag, sag_before = stages.sag(m, effects, cable, line, strain, modulus, stress)
+    strain = strain + (sag - sag_before)
+    arc = line.length * m.exp(sag)
+    elastic = cable.area * (modulus * strain + stress) + cable.start_tension
+    speed = stages.rope_speed(m, effects, own, winch_speed, elastic)
+    free_rate = stages.free_strain_rate(m, effects, own, cable, elastic)
+    return CableMotion(line, winch_speed, speed, arc, strain, (line.length_rate + speed) / arc - free_rate, elastic)
 
 
 def state_rates(
@@ -154,9 +183,7 @@ def state_rates(
 ) -> CableState:
     """Time derivative of the state, in the shape of the state."""
     return CableState(
-        unstrained_length=cable.law.unstrained_length_rate(
-            m, moving.rope_speed, moving.length, state.unstrained_length
-        ),
+        unstrained_length=cable.law.unstrained_length_rate(m, moving.rope_speed, moving.arc, state.unstrained_length),
         wound_length=moving.rope_speed,
         effects=tuple(
             () if active.effect.state_rates is None else active.effect.state_rates(m, active.values, own, cable, moving)
@@ -172,21 +199,31 @@ def reading(
     state: CableState,
     moving: CableMotion,
 ) -> CableReading:
-    """Tension, force on the platform, length, elongation and strain.
+    """Tensions, force on the platform, length, elongation and strain.
 
     ``elongation`` is the paper's ``r = l - (l_0 - integral V dt)`` (Eq. 4). Not ``l - l_u``: under the logarithmic
     law the winch has taken up strained rope, and the two part by that stretch.
     """
-    pull = cable.area * (cable.modulus * moving.strain + cable.damping * moving.strain_rate) + cable.start_tension
-    for active, own in zip(effects, state.effects):
-        if active.effect.tension is not None:
-            pull = pull + active.effect.tension(m, active.values, own, cable, moving)
-    tension = m.maximum(pull, 0.0)
+    line = moving.line
+    if effects:
+        damping = stages.viscosity(m, effects, cable)
+        pull = moving.elastic_tension + cable.area * (damping * moving.strain_rate)
+        pull = pull + stages.added_tension(m, effects, state.effects, cable, moving)
+        tension = stages.carried(m, effects, cable, pull)
+        at_platform, at_cell = stages.transmission(m, effects, moving)
+        on_platform, more = stages.ends(m, effects, cable.gravity, line, tension)
+        force = add(scale(tension * m.exp(at_platform), line.direction), on_platform)
+        shown = (tension + more) * m.exp(at_cell) * stages.gains(m, effects)[0]
+    else:
+        pull = moving.elastic_tension + cable.area * (cable.damping * moving.strain_rate)
+        shown = tension = m.maximum(pull, 0.0)
+        force = scale(tension, line.direction)
     return CableReading(
-        tension=tension,
+        tension=shown,
+        span_tension=tension,
         pull=pull,
-        force=scale(tension, moving.direction),
-        length=moving.length,
-        elongation=moving.length - (cable.start_length - state.wound_length),
+        force=force,
+        length=line.length,
+        elongation=line.length - (cable.start_length - state.wound_length),
         strain=moving.strain,
     )

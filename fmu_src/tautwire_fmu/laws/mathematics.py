@@ -22,6 +22,7 @@ class Mathematics(NamedTuple):
     sin: Callable[[Any], Any]
     cos: Callable[[Any], Any]
     tanh: Callable[[Any], Any]
+    atan2: Callable[[Any, Any], Any]
     absolute: Callable[[Any], Any]
     maximum: Callable[[Any, Any], Any]
     where: Callable[[Any, Any, Any], Any]
@@ -29,6 +30,13 @@ class Mathematics(NamedTuple):
 
 def _real_where(condition: float, a: float, b: float) -> float:
     return a if condition > 0.0 else b
+
+
+def _complex_atan2(y: complex, x: complex) -> complex:
+    """To first order in the imaginary parts, which is all that a complex step has."""
+    a, b = complex(y), complex(x)
+    slope = (b.real * a.imag - a.real * b.imag) / (a.real * a.real + b.real * b.real)
+    return complex(math.atan2(a.real, b.real), slope)
 
 
 def _complex_absolute(a: complex) -> complex:
@@ -50,6 +58,7 @@ REAL = Mathematics(
     sin=math.sin,
     cos=math.cos,
     tanh=math.tanh,
+    atan2=math.atan2,
     absolute=abs,
     maximum=max,
     where=_real_where,
@@ -62,6 +71,7 @@ COMPLEX_STEP = Mathematics(
     sin=cmath.sin,
     cos=cmath.cos,
     tanh=cmath.tanh,
+    atan2=_complex_atan2,
     absolute=_complex_absolute,
     maximum=_complex_maximum,
     where=_complex_where,

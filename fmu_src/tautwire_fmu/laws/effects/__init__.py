@@ -2,12 +2,42 @@
 
 from typing import Dict, Tuple
 
+from .anchor import ANCHOR
+from .creep import CREEP
 from .damping import DAMPING
+from .drag import DRAG
+from .drum import DRUM
 from .effect import ActiveEffect, Effect, Parameter, State
+from .friction import FRICTION
+from .hysteresis import HYSTERESIS
 from .modulus import MODULUS
 from .payload import PAYLOAD
+from .pulley import PULLEY
+from .relaxation import RELAXATION
+from .sag import SAG
+from .sensor_delay import SENSOR_DELAY
+from .sensor_gain import SENSOR_GAIN
+from .slack import SLACK
+from .thermal import THERMAL
 
-ALL: Tuple[Effect, ...] = (DAMPING, MODULUS, PAYLOAD)
+ALL: Tuple[Effect, ...] = (
+    DAMPING,
+    MODULUS,
+    RELAXATION,
+    HYSTERESIS,
+    CREEP,
+    THERMAL,
+    SAG,
+    PULLEY,
+    ANCHOR,
+    DRUM,
+    FRICTION,
+    PAYLOAD,
+    DRAG,
+    SLACK,
+    SENSOR_DELAY,
+    SENSOR_GAIN,
+)
 
 BY_NAME: Dict[str, Effect] = {effect.name: effect for effect in ALL}
 

@@ -1,6 +1,6 @@
 """Viscous damping in the cable."""
 
-from typing import Any, NamedTuple, Tuple
+from typing import Any, NamedTuple
 
 from ..mathematics import Mathematics
 from .effect import Effect, Parameter
@@ -12,9 +12,9 @@ class Values(NamedTuple):
     damping: Any
 
 
-def tension(m: Mathematics, values: Values, states: Tuple[Any, ...], cable: Any, motion: Any) -> Any:
-    """``(c - c_declared) S (dl/dt + V) / l``, in N."""
-    return (values.damping - cable.damping) * cable.area * motion.strain_rate
+def viscosity(m: Mathematics, values: Values, cable: Any) -> Any:
+    """What the damping has over the declared one, in Pa s."""
+    return values.damping - cable.damping
 
 
 DAMPING = Effect(
@@ -34,6 +34,7 @@ DAMPING = Effect(
         ),
     ),
     values=Values,
-    tension=tension,
+    forms=(("damping",),),
+    viscosity=viscosity,
     source="Baklouti et al. 2017, Eqs. 10 and 12",
 )

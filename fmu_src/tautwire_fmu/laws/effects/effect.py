@@ -1,14 +1,16 @@
 """What an effect is: data and a few functions, each for the stage where the effect acts."""
 
-from typing import Any, Callable, NamedTuple, Optional, Tuple
+from typing import Any, Callable, Dict, Mapping, NamedTuple, Optional, Tuple
 
 
 class Parameter(NamedTuple):
     """One number of an effect.
 
-    ``neutral`` is the value at which the effect is exactly absent; None where that is the value that the robot
-    file declares for the cable under the key of the same name. Fits begin at ``start_ratio`` times the declared
-    value, or at ``start`` where nothing or zero is declared; neither is the neutral value.
+    ``neutral`` is the value of a parameter that is not given: with all parameters neutral the effect is exactly
+    absent. None where that is the value that the robot file declares for the cable under the key of the same name;
+    such a parameter has to be given. Fits begin at ``start_ratio`` times the declared value, or at ``start`` where
+    nothing or zero is declared; neither is the neutral value. ``trials`` are values from which fits begin where one
+    start could end in the wrong valley: of parameters that count only while others are not neutral.
     """
 
     name: str
@@ -19,33 +21,54 @@ class Parameter(NamedTuple):
     neutral: Optional[float]
     start: float
     start_ratio: float = 1.0
+    trials: Tuple[float, ...] = ()
 
 
 class State(NamedTuple):
-    """One state of an effect; it starts at zero."""
+    """One state of an effect; it starts at zero.
+
+    ``scale`` is a size, in ``unit``, that is felt: a ten-millionth of it is not. A state that ``drifts`` never
+    settles: where the robot rests it is taken as it was at the start.
+    """
 
     name: str
     unit: str
     description: str
+    scale: float = 1.0
+    drifts: bool = False
 
 
 class Effect(NamedTuple):
     """A physical effect that the plain robot lacks.
 
-    Stages, each a function or None where the effect does not act there. Contributions of one stage add up (speeds,
-    tensions, masses, forces), so the order of effects never matters.
+    Stages, each a function or None where the effect does not act there; the first two arguments of all are ``m`` and
+    ``values``. Contributions of one stage add up (or their logarithms do: transmission, gain), so the order of effects
+    never matters; ``path`` and ``sag`` are stages of one effect alone.
 
-    ============== ======================================================== =======================
-    stage          call                                                     gives
-    ============== ======================================================== =======================
-    ``rope_speed`` ``(m, values, states, winch_speed)``                     m/s, added at the winch
-    ``tension``    ``(m, values, states, cable, motion)``                   N, added in the rope
-    ``inertia``    ``(m, values)``                                          kg, added on the platform
-    ``wrench``     ``(m, values, states, position, velocity)``              N, vector on the platform
-    ============== ======================================================== =======================
+    ==================== ============================================== ==============================================
+    stage                further arguments                              gives
+    ==================== ============================================== ==============================================
+    ``exit_point``                                                      m, vector from the declared exit point
+    ``path``             ``line`` (m, platform to exit point)           unit vector at the platform, and length in m
+    ``stiffness``        ``states, cable``                              Pa added to the modulus, Pa added at no strain
+    ``viscosity``        ``cable``                                      Pa s, added to the damping
+    ``free_strain``      ``states``                                     strain that carries no tension
+    ``free_strain_rate`` ``states, cable, tension``                     1/s, its rate under an elastic tension in N
+    ``sag``              ``cable, line, strain, modulus, stress``       ln(arc / chord), now and at the start
+    ``rope_speed``       ``states, winch_speed, tension``               m/s, added at the winch
+    ``tension``          ``states, cable, motion``                      N, added in the rope
+    ``softening``        ``cable, pull``                                N, added to ``max(pull, 0)``
+    ``ends``             ``gravity, line, tension``                     N, vector on the platform; N at the load cell
+    ``transmission``     ``motion``                                     ln(tension / that of the span) at platform, cell
+    ``inertia``                                                         kg, added on the platform
+    ``wrench``           ``states, position, velocity``                 N, vector on the platform
+    ``gain``                                                            factors of measured tension and position
+    ``delay``                                                           s, of measured tension and position
+    ==================== ============================================== ==============================================
 
-    ``values`` is the class of the parameters (a NamedTuple, one field a parameter, in order); ``state_rates`` has
-    the arguments of the stage and gives a tuple, one rate a state.
+    ``values`` is the class of the parameters (a NamedTuple, one field a parameter, in order). ``state_rates`` gives a
+    tuple, one rate a state, from ``m, values, states, cable, motion``. ``forms`` are the sets of parameters that a fit
+    frees together; the others stay neutral.
     """
 
     name: str
@@ -54,12 +77,29 @@ class Effect(NamedTuple):
     parameters: Tuple[Parameter, ...]
     values: Callable[..., Any]
     source: str
+    forms: Tuple[Tuple[str, ...], ...] = ()
     states: Tuple[State, ...] = ()
     state_rates: Optional[Callable[..., Any]] = None
+    exit_point: Optional[Callable[..., Any]] = None
+    path: Optional[Callable[..., Any]] = None
+    stiffness: Optional[Callable[..., Any]] = None
+    viscosity: Optional[Callable[..., Any]] = None
+    free_strain: Optional[Callable[..., Any]] = None
+    free_strain_rate: Optional[Callable[..., Any]] = None
+    sag: Optional[Callable[..., Any]] = None
     rope_speed: Optional[Callable[..., Any]] = None
     tension: Optional[Callable[..., Any]] = None
+    softening: Optional[Callable[..., Any]] = None
+    ends: Optional[Callable[..., Any]] = None
+    transmission: Optional[Callable[..., Any]] = None
     inertia: Optional[Callable[..., Any]] = None
     wrench: Optional[Callable[..., Any]] = None
+    gain: Optional[Callable[..., Any]] = None
+    delay: Optional[Callable[..., Any]] = None
+
+    def completed(self, given: Mapping[str, Any]) -> Dict[str, Any]:
+        """All parameters by name: those given, the others neutral; KeyError where one that has to be is not given."""
+        return {p.name: given[p.name] if p.neutral is None else given.get(p.name, p.neutral) for p in self.parameters}
 
 
 class ActiveEffect(NamedTuple):

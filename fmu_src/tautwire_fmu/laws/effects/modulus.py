@@ -12,9 +12,9 @@ class Values(NamedTuple):
     modulus: Any
 
 
-def tension(m: Mathematics, values: Values, states: Tuple[Any, ...], cable: Any, motion: Any) -> Any:
-    """``(E - E_declared) S eps``, in N."""
-    return (values.modulus - cable.modulus) * cable.area * motion.strain
+def stiffness(m: Mathematics, values: Values, states: Tuple[Any, ...], cable: Any) -> Tuple[Any, Any]:
+    """What the modulus has over the declared one, in Pa; no stress of its own."""
+    return values.modulus - cable.modulus, 0.0
 
 
 MODULUS = Effect(
@@ -34,6 +34,7 @@ MODULUS = Effect(
         ),
     ),
     values=Values,
-    tension=tension,
+    forms=(("modulus",),),
+    stiffness=stiffness,
     source="Baklouti et al. 2017, sec. 3.2: 102.2 GPa quasi-static, 126 to 137 GPa dynamic, for one rope",
 )

@@ -33,6 +33,7 @@ PAYLOAD = Effect(
         ),
     ),
     values=Values,
+    forms=(("mass",),),
     inertia=inertia,
     source="Newton's second law",
 )

@@ -1,0 +1,42 @@
+"""Sensors that show late."""
+
+from typing import Any, NamedTuple, Tuple
+
+from ..mathematics import Mathematics
+from .effect import Effect, Parameter
+
+
+class Values(NamedTuple):
+    """Lags: of the load cells of the named cables, and of the platform's position."""
+
+    tension_delay: Any
+    position_delay: Any
+
+
+def delay(m: Mathematics, values: Values) -> Tuple[Any, Any]:
+    """The lags themselves, in s; until one has passed the sensor shows the start."""
+    return values.tension_delay, values.position_delay
+
+
+def _lag(of: str, sensor: str) -> Parameter:
+    return Parameter(
+        name=f"{of}_delay",
+        unit="s",
+        description=f"time by which {sensor} shows late",
+        minimum=0.0,
+        maximum=10.0,
+        neutral=0.0,
+        start=0.01,
+    )
+
+
+SENSOR_DELAY = Effect(
+    name="sensor_delay",
+    component="sensor",
+    description="load cells or measured position that lag",
+    parameters=(_lag("tension", "a load cell"), _lag("position", "the measured position")),
+    values=Values,
+    forms=(("tension_delay",), ("position_delay",)),
+    delay=delay,
+    source="the definition of a pure delay",
+)
