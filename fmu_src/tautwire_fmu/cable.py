@@ -1,20 +1,36 @@
 """The cable as an FMI slave: the platform's motion and the winch speed in, tension and force out."""
 
-from typing import Any, Dict, List, Sequence, Tuple
+from typing import Any, Dict, List, NamedTuple, Sequence, Tuple
 
 from .cable_variables import cable_variables
+from .inner_steps import integrate
 from .interpolation import cubic, extrapolate, quintic
 from .laws import cable as law
+from .laws import stages
 from .laws.effects import BY_NAME
 from .laws.mathematics import COMPLEX_STEP, REAL, along, rate_of
-from .laws.vectors import norm, subtract
+from .past import Seen, remember, seen
 from .slave import Slave, active_effects, read_resource
 
-POSITION, VELOCITY, ACCELERATION, WINCH_SPEED, WINCH_ACCELERATION = 1, 4, 7, 10, 11
-FIRST_OUTPUT = 12
-FIRST_RATE = 20
-FIRST_STATE = 24
-Motion = Tuple[Sequence[float], Sequence[float], float]
+POSITION, VELOCITY, ACCELERATION, WINCH_SPEED, WINCH_ACCELERATION, MIDDLE = 2, 5, 8, 11, 12, 13
+FIRST_OUTPUT = 22
+TENSION = 25
+FIRST_RATE = 30
+TENSION_RATE = 33
+MIDDLE_FORCE = 34
+FIRST_STATE = 40
+# m: what of a length is felt, for the inner steps.
+LENGTH_SCALE = 1e-3
+
+
+class Motion(NamedTuple):
+    """What acts on a cable at an instant, with its rates."""
+
+    position: Sequence[float]
+    velocity: Sequence[float]
+    acceleration: Sequence[float]
+    winch_speed: float
+    winch_acceleration: float
 
 
 class Cable(Slave):
@@ -25,54 +41,103 @@ class Cable(Slave):
         self.settings: List[Dict[str, Any]] = data["effects"]
         self.tension_law = law.LAWS[data["law"]]
         self.end_of_state = FIRST_STATE + 2 + sum(len(BY_NAME[s["name"]].states) for s in self.settings)
+        own = (state.scale for setting in self.settings for state in BY_NAME[setting["name"]].states)
+        self.scales = (LENGTH_SCALE, LENGTH_SCALE, *own)
         super().__init__(data, cable_variables(data), slice(FIRST_STATE, self.end_of_state), **kwargs)
         self.parameters_changed()
 
     def parameters_changed(self) -> None:
         numbers = self.real[self.first_parameter :]
         anchor, start = tuple(numbers[0:3]), tuple(numbers[3:6])
-        modulus, area, damping, start_tension = numbers[6:10]
-        self.effects = active_effects(self.settings, numbers[10:])
+        modulus, area, damping, start_tension, gravity = numbers[6:11]
+        self.effects = active_effects(self.settings, numbers[11:])
+        self.lag = stages.delays(REAL, self.effects)[0]
+        line = stages.route(REAL, self.effects, anchor, start)
         self.constants = law.CableConstants(
             law=self.tension_law,
             anchor=anchor,
             modulus=modulus,
             area=area,
             damping=damping,
-            start_length=norm(REAL, subtract(anchor, start)),
+            start_length=line.length,
             start_tension=start_tension,
+            start_direction=line.direction,
+            gravity=gravity,
         )
         if not self.started:
             state = law.start_state(self.constants, self.effects)
             self.real[FIRST_STATE : self.end_of_state] = _flat(state)
 
     def advance(self, step: float, ends: bool) -> None:
-        """The classical Runge-Kutta method on the state, under inputs that move on polynomials."""
-        start = law.CableInputs(*self._at_start(ends))
-        middle = law.CableInputs(*self._moved(step, 0.5, ends))
-        end = law.CableInputs(*self._moved(step, 1.0, ends))
-        first, half, last = (law.span(REAL, self.constants, inputs) for inputs in (start, middle, end))
+        """The state under inputs that move on polynomials, and what the cable shows in the middle of the step."""
         state = self.real[FIRST_STATE : self.end_of_state]
+        middle = self._moved(step, 0.5, ends)
+        half = self._line(middle)
+        if len(state) == 2:
+            between, after = self._in_one_step(state, step, ends, middle, half)
+        else:
+            between, after = self._in_inner_steps(state, step, ends)
+        shown = self._show(between, middle, half)
+        if self.lag > 0.0:
+            self._remember(step, ends, state, shown, after)
+        self.real[MIDDLE_FORCE:FIRST_STATE] = [*(f.real for f in shown.force), *map(rate_of, shown.force)]
+        self.real[FIRST_STATE : self.end_of_state] = after
+
+    def _in_one_step(
+        self, state: List[float], step: float, ends: bool, middle: Motion, half: law.Span
+    ) -> Tuple[List[float], List[float]]:
+        """Middle and end by the classical Runge-Kutta method."""
+        start, end = self._at_start(ends), self._moved(step, 1.0, ends)
+        first, last = self._line(start), self._line(end)
         k1 = self._rates(state, first, start.winch_speed)
         k2 = self._rates([s + 0.5 * step * k for s, k in zip(state, k1)], half, middle.winch_speed)
         k3 = self._rates([s + 0.5 * step * k for s, k in zip(state, k2)], half, middle.winch_speed)
         k4 = self._rates([s + step * k for s, k in zip(state, k3)], last, end.winch_speed)
         sixth = step / 6.0
-        self.real[FIRST_STATE : self.end_of_state] = [
-            s + sixth * (a + 2.0 * (b + c) + d) for s, a, b, c, d in zip(state, k1, k2, k3, k4)
-        ]
+        after = [s + sixth * (a + 2.0 * (b + c) + d) for s, a, b, c, d in zip(state, k1, k2, k3, k4)]
+        return [0.5 * (s + e) + 0.125 * step * (a - d) for s, e, a, d in zip(state, after, k1, k4)], after
+
+    def _in_inner_steps(self, state: List[float], step: float, ends: bool) -> Tuple[List[float], List[float]]:
+        """Middle and end, where effects have states of their own."""
+        start = self._at_start(ends)
+
+        def rates(fraction: float, numbers: List[float]) -> List[float]:
+            now = start if fraction == 0.0 else self._moved(step, fraction, ends)
+            return self._rates(numbers, self._line(now), now.winch_speed)
+
+        return integrate(rates, state, self.scales, step)
+
+    def _remember(
+        self, step: float, ends: bool, begun: List[float], middle: law.CableReading, after: List[float]
+    ) -> None:
+        """Keep the tension of this step for the load cell, which lags."""
+        start, end = self._at_start(ends), self._moved(step, 1.0, ends)
+        first = self._show(begun, start, self._line(start))
+        last = self._show(after, end, self._line(end))
+        past = self.pasts[0] if self.pasts else ()
+        readings = zip((0.0, 0.5, 1.0), (first, middle, last))
+        told = [Seen(self.time + f * step, _value_and_rate(shown.tension)) for f, shown in readings]
+        self.pasts = (remember(remember(past, told[0], told[1], self.lag), told[1], told[2], self.lag),)
 
     def refresh(self) -> None:
-        """One complex step gives the outputs and their rates."""
         real = self.real
-        position, velocity, speed = self._moved(self.elapsed, 1.0, False)
-        numbers = real[FIRST_STATE : self.end_of_state]
-        line = law.span(REAL, self.constants, law.CableInputs(position, velocity, speed))
-        rates = self._rates(numbers, line, speed)
+        now = self._moved(self.elapsed, 1.0, False)
+        shown = self._show(real[FIRST_STATE : self.end_of_state], now, self._line(now))
+        values = (*shown.force, shown.tension, shown.length, shown.elongation, shown.strain, shown.pull)
+        real[FIRST_OUTPUT:FIRST_RATE] = [complex(value).real for value in values]
+        real[FIRST_RATE:MIDDLE_FORCE] = [*map(rate_of, shown.force), rate_of(shown.tension)]
+        if self.lag > 0.0 and self.pasts:
+            real[TENSION], real[TENSION_RATE] = seen(self.pasts[0], self.lag)
+        if not self.started:
+            real[MIDDLE_FORCE:FIRST_STATE] = [*(f.real for f in shown.force), *map(rate_of, shown.force)]
+
+    def _show(self, numbers: List[float], now: Motion, line: law.Span) -> law.CableReading:
+        """One complex step gives the outputs and their rates."""
+        rates = self._rates(numbers, line, now.winch_speed)
         carried = law.CableInputs(
-            tuple(map(along, position, velocity)),
-            tuple(map(along, velocity, real[ACCELERATION:WINCH_SPEED])),
-            along(speed, real[WINCH_ACCELERATION]),
+            tuple(map(along, now.position, now.velocity)),
+            tuple(map(along, now.velocity, now.acceleration)),
+            along(now.winch_speed, now.winch_acceleration),
         )
         state = self._state(list(map(along, numbers, rates)))
         moving = law.motion(
@@ -80,13 +145,14 @@ class Cable(Slave):
             self.constants,
             self.effects,
             state,
-            law.span(COMPLEX_STEP, self.constants, carried),
+            law.span(COMPLEX_STEP, self.constants, carried, self.effects),
             carried.winch_speed,
         )
-        shown = law.reading(COMPLEX_STEP, self.constants, self.effects, state, moving)
-        values = (*shown.force, shown.tension, shown.length, shown.elongation, shown.strain, shown.pull)
-        real[FIRST_OUTPUT:FIRST_RATE] = [complex(value).real for value in values]
-        real[FIRST_RATE:FIRST_STATE] = [*map(rate_of, shown.force), rate_of(shown.tension)]
+        return law.reading(COMPLEX_STEP, self.constants, self.effects, state, moving)
+
+    def _line(self, now: Motion) -> law.Span:
+        inputs = law.CableInputs(now.position, now.velocity, now.winch_speed)
+        return law.span(REAL, self.constants, inputs, self.effects)
 
     def _rates(self, numbers: List[float], line: law.Span, winch_speed: float) -> List[float]:
         state = self._state(numbers)
@@ -105,45 +171,52 @@ class Cable(Slave):
         return law.CableState(numbers[0], numbers[1], tuple(own))
 
     def _at_start(self, ends: bool) -> Motion:
-        inputs = self.earlier if ends and self.earlier is not None else self.real
-        return inputs[POSITION:VELOCITY], inputs[VELOCITY:ACCELERATION], inputs[WINCH_SPEED]
+        return _motion(self.earlier if ends and self.earlier is not None else self.real)
 
     def _moved(self, step: float, fraction: float, ends: bool) -> Motion:
-        """Position, velocity and winch speed after a fraction of a step."""
-        real = self.real
+        """What acts on the cable after a fraction of a step."""
         if ends and fraction == 1.0:
-            return real[POSITION:VELOCITY], real[VELOCITY:ACCELERATION], real[WINCH_SPEED]
+            return _motion(self.real)
         if ends:
             return self._between(step, fraction)
         s = step * fraction
-        x0, x1, x2, v0, v1, v2, a0, a1, a2, speed, rate = real[POSITION:FIRST_OUTPUT]
-        return (
+        x0, x1, x2, v0, v1, v2, a0, a1, a2, speed, rate = self.real[POSITION:MIDDLE]
+        return Motion(
             (extrapolate(x0, v0, a0, s), extrapolate(x1, v1, a1, s), extrapolate(x2, v2, a2, s)),
             (v0 + s * a0, v1 + s * a1, v2 + s * a2),
+            (a0, a1, a2),
             speed + s * rate,
+            rate,
         )
 
     def _between(self, step: float, fraction: float) -> Motion:
         now, then = self.real, self.earlier
         assert then is not None
-        path = [
-            quintic(
-                (then[axis], then[axis + 3], then[axis + 6]),
-                (now[axis], now[axis + 3], now[axis + 6]),
-                step,
-                fraction,
+        speed, rate = cubic(then[WINCH_SPEED:MIDDLE], now[WINCH_SPEED:MIDDLE], step, fraction)
+        if self.middle_given and fraction == 0.5:
+            return Motion(
+                now[MIDDLE : MIDDLE + 3], now[MIDDLE + 3 : MIDDLE + 6], now[MIDDLE + 6 : FIRST_OUTPUT], speed, rate
             )
+        path = [
+            quintic(then[axis:WINCH_SPEED:3], now[axis:WINCH_SPEED:3], step, fraction)
             for axis in range(POSITION, VELOCITY)
         ]
-        speed = cubic(
-            then[WINCH_SPEED],
-            then[WINCH_ACCELERATION],
-            now[WINCH_SPEED],
-            now[WINCH_ACCELERATION],
-            step,
-            fraction,
-        )
-        return [p[0] for p in path], [p[1] for p in path], speed
+        position, velocity, acceleration = zip(*path)
+        return Motion(position, velocity, acceleration, speed, rate)
+
+
+def _motion(inputs: Sequence[float]) -> Motion:
+    return Motion(
+        inputs[POSITION:VELOCITY],
+        inputs[VELOCITY:ACCELERATION],
+        inputs[ACCELERATION:WINCH_SPEED],
+        inputs[WINCH_SPEED],
+        inputs[WINCH_ACCELERATION],
+    )
+
+
+def _value_and_rate(number: complex) -> Tuple[float, float]:
+    return complex(number).real, rate_of(number)
 
 
 def _flat(state: law.CableState) -> List[float]:

@@ -4,7 +4,7 @@ from typing import Any, Dict, Tuple
 
 from .description import Variable, axes, vector
 from .laws.effects import BY_NAME
-from .slave import INPUT_TIME, effect_variables
+from .slave import INPUT_TIME, MIDDLE_TIME, effect_variables
 
 MOTION = (*axes("position", "velocity"), "winch_speed")
 RATED = (*MOTION, *axes("acceleration"), "winch_acceleration")
@@ -19,18 +19,22 @@ def _inputs(data: Dict[str, Any]) -> Tuple[Variable, ...]:
     start, length = tuple(data["start"]), float(data["start_length"])
     return (
         INPUT_TIME,
+        MIDDLE_TIME,
         *vector("position", "input", "m", "position of the platform", start, nominal=length),
         *vector("velocity", "input", "m/s", "velocity of the platform, the rate of position"),
         *vector("acceleration", "input", "m/s2", "acceleration of the platform, the rate of velocity"),
         Variable("winch_speed", "input", "m/s", "rope speed by the winch encoder, positive reels in"),
         Variable("winch_acceleration", "input", "m/s2", "rate of winch_speed"),
+        *vector("middle_position", "input", "m", "position in the middle of a step", start, nominal=length),
+        *vector("middle_velocity", "input", "m/s", "velocity in the middle of a step"),
+        *vector("middle_acceleration", "input", "m/s2", "acceleration in the middle of a step"),
     )
 
 
 def _outputs(data: Dict[str, Any]) -> Tuple[Variable, ...]:
     tension, length = float(data["start_tension"]), float(data["start_length"])
     cell = "tension at the load cell, between winch and exit point"
-    chord = "distance from exit point to platform"
+    chord = "rope from exit point to platform, as if it did not sag"
     stretch = "length less start length and rope let out"
     pull = "tension that the law asks for, negative where the cable hangs slack"
     place = axes("position")
@@ -43,6 +47,8 @@ def _outputs(data: Dict[str, Any]) -> Tuple[Variable, ...]:
         Variable("pull", "output", "N", pull, nominal=tension, depends_on=MOTION),
         *vector("force_rate", "output", "N/s", "rate of force", nominal=tension, depends_on=RATED),
         Variable("tension_rate", "output", "N/s", "rate of tension", nominal=tension, depends_on=RATED),
+        *vector("middle_force", "output", "N", "force in the middle of the last step", nominal=tension),
+        *vector("middle_force_rate", "output", "N/s", "rate of force there", nominal=tension),
     )
 
 
@@ -77,5 +83,6 @@ def _parameters(data: Dict[str, Any]) -> Tuple[Variable, ...]:
             minimum=0.0,
             nominal=1e3,
         ),
+        Variable("gravity", "parameter", "m/s2", "gravity, along -z", float(data["gravity"]), True),
         *effect_variables(data["effects"]),
     )

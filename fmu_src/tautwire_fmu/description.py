@@ -9,7 +9,7 @@ from .units import UNITS
 class Variable(NamedTuple):
     """One real FMI variable of a slave.
 
-    ``depends_on`` names the inputs that act on an output without delay.
+    ``depends_on`` names the inputs that act on an output without delay; a ``discrete`` one holds over a step.
     """
 
     name: str
@@ -22,6 +22,7 @@ class Variable(NamedTuple):
     maximum: Optional[float] = None
     nominal: Optional[float] = None
     depends_on: Tuple[str, ...] = ()
+    discrete: bool = False
 
 
 def vector(

@@ -1,14 +1,19 @@
 """The point-mass platform as an FMI slave: cable forces in, motion out."""
 
-from typing import Any, Dict, List, Tuple
+from typing import Any, Dict, List, Sequence, Tuple
 
 from .description import Variable, axes, vector
+from .interpolation import cubic
 from .laws import point_mass as law
+from .laws import stages
 from .laws.effects import BY_NAME
-from .laws.mathematics import COMPLEX_STEP, REAL, along, rate_of
+from .laws.mathematics import COMPLEX_STEP, REAL, Mathematics, along, rate_of
 from .laws.vectors import Vector
-from .slave import INPUT_TIME, Slave, active_effects, effect_variables, read_resource
+from .past import Seen, remember, seen
+from .quadrature import CUBIC_END, CUBIC_MIDDLE, QUINTIC_END, QUINTIC_MIDDLE, Node, Place, integrate
+from .slave import INPUT_TIME, MIDDLE_TIME, Slave, active_effects, effect_variables, read_resource
 
+FIRST_FORCE = 2
 SWEEPS = 8
 TOLERANCE = 1e-15
 
@@ -20,7 +25,9 @@ class PointMass(Slave):
         data = read_resource(kwargs["resources"], "point_mass.json")
         self.settings: List[Dict[str, Any]] = data["effects"]
         self.force_count = len(data["start_forces"]) + 1
-        self.first_output = 1 + 6 * self.force_count
+        self.first_middle = FIRST_FORCE + 6 * self.force_count
+        self.first_output = self.first_middle + 6 * (self.force_count - 1)
+        self.measures = _is_measured(self.settings)
         self.couples = any(BY_NAME[s["name"]].wrench is not None for s in self.settings)
         super().__init__(data, _variables(data), slice(self.first_output, self.first_output + 6), **kwargs)
         self.parameters_changed()
@@ -30,35 +37,32 @@ class PointMass(Slave):
         self.effects = active_effects(self.settings, numbers[5:])
         self.constants = law.PointMassConstants(mass=numbers[0], gravity=numbers[1])
         self.effect_states: Tuple[Tuple[float, ...], ...] = tuple(() for _ in self.effects)
+        self.gain, self.lag = stages.gains(REAL, self.effects)[1], stages.delays(REAL, self.effects)[1]
         if not self.started:
             self.real[self.first_output : self.first_output + 6] = [*numbers[2:5], 0.0, 0.0, 0.0]
 
     def advance(self, step: float, ends: bool) -> None:
-        """Exact integral of the cubic through acceleration and its rate at both ends.
+        """Exact integral of the polynomial through acceleration and its rate at both ends, and in the middle if known.
 
-        Where a wrench depends on the motion the end values are found by sweeping; otherwise one sweep is exact.
+        Where a wrench depends on the motion the later nodes are found by sweeping; otherwise one sweep is exact.
         """
         first = self.first_output
-        x0: Vector = tuple(self.real[first : first + 3])
-        v0: Vector = tuple(self.real[first + 3 : first + 6])
-        now = self._force(self.real)
-        if ends:
-            assert self.earlier is not None
-            force0, rate0 = self._force(self.earlier)
-            force1, rate1 = now
-        else:
-            force0, rate0 = now
-            force1 = tuple(f + step * r for f, r in zip(force0, rate0))
-            rate1 = rate0
-        a0, j0 = self._acceleration_and_jerk(x0, v0, force0, rate0)
-        x1, v1, a1, j1 = x0, v0, a0, j0
-        for _ in range(SWEEPS if self.couples else 1):
-            a1, j1 = self._acceleration_and_jerk(x1, v1, force1, rate1)
-            before = x1
-            x1, v1 = _integrate_cubic(x0, v0, (a0, j0), (a1, j1), step)
-            if all(abs(p - q) <= TOLERANCE * abs(p) for p, q in zip(x1, before)):
+        start = Place(self.real[first : first + 3], self.real[first + 3 : first + 6], ())
+        pushes = self._pushes(step, ends)
+        to_middle, to_end = (QUINTIC_MIDDLE, QUINTIC_END) if len(pushes) == 3 else (CUBIC_MIDDLE, CUBIC_END)
+        nodes = [self._node(start, push) for push in pushes]
+        middle, end = integrate(start, nodes, step, to_middle), integrate(start, nodes, step, to_end)
+        for _ in range(SWEEPS if self.couples else 0):
+            before = end.position
+            places = (start, end) if len(pushes) == 2 else (start, middle, end)
+            nodes = [self._node(place, push) for place, push in zip(places, pushes)]
+            middle, end = integrate(start, nodes, step, to_middle), integrate(start, nodes, step, to_end)
+            if all(abs(p - q) <= TOLERANCE * abs(p) for p, q in zip(end.position, before)):
                 break
-        self.real[first : first + 6] = [*x1, *v1]
+        if self.lag > 0.0:
+            self._remember(step, start, nodes, end)
+        self.real[first : first + 6] = [*end.position, *end.velocity]
+        self.real[first + 9 : first + 18] = [*middle.position, *middle.velocity, *middle.acceleration]
 
     def refresh(self) -> None:
         first = self.first_output
@@ -73,42 +77,63 @@ class PointMass(Slave):
             tuple(self.real[first + 3 : first + 6]),
             force,
         )
+        if not self.started:
+            self.real[first + 9 : first + 18] = self.real[first : first + 9]
+        if self.measures:
+            past = [seen(pieces, self.lag)[0] for pieces in self.pasts] if self.lag > 0.0 else []
+            self.real[first + 18 : first + 21] = [self.gain * x for x in past or self.real[first : first + 3]]
+
+    def _remember(self, step: float, start: Place, nodes: Sequence[Node], end: Place) -> None:
+        """Keep the path of this step for the sensor of the position, which lags."""
+        pasts = self.pasts or ((), (), ())
+        columns = zip(start.position, start.velocity, nodes[0].acceleration)
+        begun = [Seen(self.time, numbers) for numbers in columns]
+        ended = [Seen(self.time + step, numbers) for numbers in zip(end.position, end.velocity, nodes[-1].acceleration)]
+        self.pasts = tuple(remember(past, b, e, self.lag) for past, b, e in zip(pasts, begun, ended))
+
+    def _pushes(self, step: float, ends: bool) -> List[Tuple[Vector, Vector]]:
+        """Summed force and its rate at the start, in the middle where it is known, and at the end."""
+        now = self._force(self.real)
+        if not ends:
+            force, rate = now
+            return [now, (tuple(f + step * r for f, r in zip(force, rate)), rate)]
+        assert self.earlier is not None
+        between = [self._middle_force(self.earlier, step)] if self.middle_given else []
+        return [self._force(self.earlier), *between, now]
 
     def _force(self, inputs: Any) -> Tuple[Vector, Vector]:
-        end = self.first_output
-        force = tuple(sum(inputs[1 + axis : end : 6]) for axis in range(3))
-        rate = tuple(sum(inputs[4 + axis : end : 6]) for axis in range(3))
-        return force, rate
+        x, y, z, rx, ry, rz = (sum(inputs[FIRST_FORCE + k : self.first_middle : 6]) for k in range(6))
+        return (x, y, z), (rx, ry, rz)
 
-    def _acceleration_and_jerk(
-        self, position: Vector, velocity: Vector, force: Vector, rate: Vector
-    ) -> Tuple[Vector, Vector]:
-        acceleration = law.acceleration(
-            REAL, self.constants, self.effects, self.effect_states, position, velocity, force
-        )
-        carried = law.acceleration(
+    def _middle_force(self, then: Sequence[float], step: float) -> Tuple[Vector, Vector]:
+        """The cables' forces as given, and the external force between its values at both ends."""
+        now, outside = self.real, self.first_middle - 6
+        sums = [sum(now[self.first_middle + k : self.first_output : 6]) for k in range(6)]
+        pushed = [cubic(then[outside + k :: 3][:2], now[outside + k :: 3][:2], step, 0.5) for k in range(3)]
+        force = tuple(f + value for f, (value, _) in zip(sums[:3], pushed))
+        return force, tuple(r + rate for r, (_, rate) in zip(sums[3:], pushed))
+
+    def _node(self, place: Place, push: Tuple[Vector, Vector]) -> Node:
+        force, rate = push
+        velocity = place.velocity
+        # Only a wrench makes the acceleration's rate depend on the acceleration itself.
+        acceleration = self._acceleration(REAL, place.position, velocity, force) if self.couples else (0.0, 0.0, 0.0)
+        carried = self._acceleration(
             COMPLEX_STEP,
-            self.constants,
-            self.effects,
-            self.effect_states,
-            tuple(map(along, position, velocity)),
+            tuple(map(along, place.position, velocity)),
             tuple(map(along, velocity, acceleration)),
             tuple(map(along, force, rate)),
         )
-        return acceleration, tuple(map(rate_of, carried))
+        return Node([complex(a).real for a in carried], [rate_of(a) for a in carried])
+
+    def _acceleration(self, m: Mathematics, position: Vector, velocity: Vector, force: Vector) -> Vector:
+        return law.acceleration(m, self.constants, self.effects, self.effect_states, position, velocity, force)
 
 
-def _integrate_cubic(
-    x0: Vector, v0: Vector, start: Tuple[Vector, Vector], end: Tuple[Vector, Vector], step: float
-) -> Tuple[Vector, Vector]:
-    position = tuple(
-        x + step * v + step * step * (0.35 * a0 + 0.15 * a1 + step * (j0 / 20.0 - j1 / 30.0))
-        for x, v, a0, j0, a1, j1 in zip(x0, v0, *start, *end)
-    )
-    velocity = tuple(
-        v + step * (0.5 * (a0 + a1) + step / 12.0 * (j0 - j1)) for v, a0, j0, a1, j1 in zip(v0, *start, *end)
-    )
-    return position, velocity
+def _is_measured(settings: Sequence[Dict[str, Any]]) -> bool:
+    """Whether some effect parts what the sensor shows from what is."""
+    effects = [BY_NAME[setting["name"]] for setting in settings]
+    return any(effect.gain is not None or effect.delay is not None for effect in effects)
 
 
 def _variables(data: Dict[str, Any]) -> Tuple[Variable, ...]:
@@ -123,9 +148,19 @@ def _variables(data: Dict[str, Any]) -> Tuple[Variable, ...]:
     for name, rate, meaning, force in named:
         inputs += vector(name, "input", "N", meaning, force, nominal=weight)
         inputs += vector(rate, "input", "N/s", f"rate of the {meaning}", nominal=weight)
+    middle: Tuple[Variable, ...] = ()
+    for name, rate, meaning, force in named[:-1]:
+        within = f"{meaning} in the middle of a step"
+        middle += vector(f"middle_{name}", "input", "N", within, force, nominal=weight)
+        middle += vector(f"middle_{rate}", "input", "N/s", f"rate of the {within}", nominal=weight)
+    measured = vector("measured_position", "output", "m", "position as its sensor shows it", start)
+    if not _is_measured(data["effects"]):
+        measured = ()
     return (
         INPUT_TIME,
+        MIDDLE_TIME,
         *inputs,
+        *middle,
         *vector("position", "output", "m", "position of the point mass", start),
         *vector("velocity", "output", "m/s", "velocity of the point mass"),
         *vector(
@@ -136,6 +171,16 @@ def _variables(data: Dict[str, Any]) -> Tuple[Variable, ...]:
             nominal=float(data["gravity"]) or None,
             depends_on=axes(*(name for name, *_ in named)),
         ),
+        *vector("middle_position", "output", "m", "position in the middle of the last step", start),
+        *vector("middle_velocity", "output", "m/s", "velocity in the middle of the last step"),
+        *vector(
+            "middle_acceleration",
+            "output",
+            "m/s2",
+            "acceleration in the middle of the last step",
+            nominal=float(data["gravity"]) or None,
+        ),
+        *measured,
         Variable("mass", "parameter", "kg", "mass of the platform", data["mass"], True, 0.0, nominal=data["mass"]),
         Variable("gravity", "parameter", "m/s2", "gravity, along -z", data["gravity"], True),
         *vector("start", "parameter", "m", "position at the start, at rest", start),

@@ -2,7 +2,8 @@
 
 Inputs carry their own rates. A master that knows nothing of this sets inputs at the start of a step, and the slave
 extrapolates them over it. A master that also sets ``input_time`` says when they hold: stamped with the end of the
-step, the inputs run on a polynomial from those set before to those set now.
+step, the inputs run on a polynomial from those set before to those set now; with ``middle_time``, through those of
+the middle.
 """
 
 import json
@@ -16,8 +17,9 @@ from pythonfmu.enums import Fmi2Status
 
 from .description import Variable, complete
 from .laws.effects import BY_NAME, ActiveEffect
+from .past import Pieces
 
-Snapshot = Tuple[Tuple[float, ...], Optional[Tuple[float, ...]], float, bool]
+Snapshot = Tuple[Tuple[float, ...], Optional[Tuple[float, ...]], float, bool, Tuple[Pieces, ...]]
 
 INPUT_TIME = Variable(
     "input_time",
@@ -25,6 +27,12 @@ INPUT_TIME = Variable(
     "s",
     "time at which the inputs hold, set before or together with them; at or before the start of a step they are "
     "extrapolated over it",
+)
+MIDDLE_TIME = Variable(
+    "middle_time",
+    "input",
+    "s",
+    "time at which the inputs of the middle hold; they count in a step of which it is the middle",
 )
 
 
@@ -48,8 +56,12 @@ class Slave(Fmi2Slave):
         self.real: List[float] = [variable.start for variable in self.variables]
         self.input_count = sum(variable.causality == "input" for variable in self.variables)
         self.first_parameter = next(i for i, variable in enumerate(self.variables) if variable.causality == "parameter")
+        self.middle_place = next((i for i, v in enumerate(self.variables) if v.name == MIDDLE_TIME.name), None)
+        self.middle_given = False
         self.earlier: Optional[Tuple[float, ...]] = None
         self.elapsed = 0.0
+        self.time = 0.0
+        self.pasts: Tuple[Pieces, ...] = ()
         self.started = False
         self.stale = True
         self.fault = ""
@@ -101,6 +113,8 @@ class Slave(Fmi2Slave):
             return False
         before = self.snapshot()
         ends = self.earlier is not None and self.real[0] > current_time + 0.5 * step_size
+        self.middle_given = ends and self._holds_in_middle(current_time, step_size)
+        self.time = current_time
         try:
             self.advance(step_size, ends)
             if not all(map(math.isfinite, self.real[self.states])):
@@ -114,6 +128,9 @@ class Slave(Fmi2Slave):
         self.elapsed = 0.0 if ends else step_size
         self.stale = True
         return True
+
+    def _holds_in_middle(self, time: float, step: float) -> bool:
+        return self.middle_place is not None and abs(self.real[self.middle_place] - time - 0.5 * step) < 1e-3 * step
 
     def _refresh_or_nan(self) -> None:
         """Refresh outputs; where the law has no value for the inputs, all outputs become NaN.
@@ -146,11 +163,11 @@ class Slave(Fmi2Slave):
 
     def snapshot(self) -> Snapshot:
         """All that the slave remembers."""
-        return (tuple(self.real), self.earlier, self.elapsed, self.started)
+        return (tuple(self.real), self.earlier, self.elapsed, self.started, self.pasts)
 
     def restore(self, snapshot: Snapshot) -> None:
         """Go back to a snapshot; a redo from it gives the same bits."""
-        real, self.earlier, self.elapsed, self.started = snapshot
+        real, self.earlier, self.elapsed, self.started, self.pasts = snapshot
         parameters = self.real[self.first_parameter :]
         self.real = list(real)
         self.stale = True
@@ -175,9 +192,10 @@ class Slave(Fmi2Slave):
     @staticmethod
     def _fmu_state_from_bytes(state: bytes) -> Optional[Snapshot]:
         try:
-            real, earlier, elapsed, started = json.loads(state.decode("utf-8"))
-            past = None if earlier is None else tuple(map(float, earlier))
-            return (tuple(map(float, real)), past, float(elapsed), bool(started))
+            real, earlier, elapsed, started, pasts = json.loads(state.decode("utf-8"))
+            before = None if earlier is None else tuple(map(float, earlier))
+            pieces = tuple(tuple(tuple(map(float, piece)) for piece in past) for past in pasts)
+            return (tuple(map(float, real)), before, float(elapsed), bool(started), pieces)
         except (ValueError, TypeError):
             return None
 
@@ -231,6 +249,8 @@ def _fmi_variable(variable: Variable, owner: Slave) -> Real:
         variability=(
             (Fmi2Variability.tunable if variable.tunable else Fmi2Variability.fixed)
             if parameter
+            else Fmi2Variability.discrete
+            if variable.discrete
             else Fmi2Variability.continuous
         ),
         initial=Fmi2Initial.exact if parameter else None if given else Fmi2Initial.calculated,
