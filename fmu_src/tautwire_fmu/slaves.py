@@ -5,6 +5,8 @@ folder of the first, which may be gone by then.
 """
 
 from .cable import Cable
+from .controller import Controller
 from .point_mass import PointMass
+from .winch import Winch
 
-__all__ = ["Cable", "PointMass"]
+__all__ = ["Cable", "Controller", "PointMass", "Winch"]

@@ -1,5 +1,6 @@
 """An independent simulator of a point mass on cables; it shares no code with the project it checks."""
 
+from tests.rig.drive import Drive
 from tests.rig.effect import Effect
 from tests.rig.mechanics import Rig
 from tests.rig.program import (
@@ -19,6 +20,7 @@ from tests.rig.wander import wander
 __all__ = [
     "EFFECTS",
     "Accuracy",
+    "Drive",
     "Effect",
     "Noise",
     "PathProgram",
