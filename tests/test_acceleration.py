@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tautwire.master.acceleration import Secants
+from tautwire.master.acceleration import Lessons, Secants
 
 SLOWLY = np.array([[0.6, 0.2, 0.0], [0.1, 0.5, -0.3], [0.0, 0.2, 0.4]])
 OFFSET = np.array([1.0, -2.0, 0.5])
@@ -55,3 +55,13 @@ def test_a_pass_shrinks_errors_by_what_the_largest_pair_shows() -> None:
     secants = Secants()
     error_after(4, secants, np.zeros(3))
     assert 0.5 < secants.contraction() < 1.0
+
+
+def test_lessons_are_kept_by_the_length_of_the_step() -> None:
+    lessons = Lessons()
+    long, short = lessons.of(0.1), lessons.of(0.05)
+    assert long is not short
+    assert lessons.of(0.104) is long
+    assert lessons.of(0.052) is short
+    lessons.forget()
+    assert lessons.of(0.1) is not long

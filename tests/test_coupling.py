@@ -3,9 +3,10 @@
 import numpy as np
 import pytest
 
-from tautwire.cosimulation import instantiated, shown_ports
+from tautwire.cosimulation import instantiated
 from tautwire.master import AdaptiveStep, Coupling, FixedStep, Kept, Sampled, StepError, simulate
 from tautwire.packaging import RobotFmus
+from tautwire.robot_wiring import connections, shown_ports, winch_ports
 from tests.rig import RampProgram
 from tests.rig import simulate as rig_simulate
 from tests.robots import paper_robot
@@ -59,3 +60,24 @@ def test_a_checkpoint_takes_everything_back(three_fmus: RobotFmus) -> None:
 def test_a_tolerance_that_no_step_meets_is_said(three_fmus: RobotFmus) -> None:
     with instantiated(three_fmus) as coupling, pytest.raises(StepError, match="larger --tolerance"):
         simulate(coupling, RAMPS, CORNERS, shown_ports(3), AdaptiveStep(1e-22, 7.0), Kept(4, 18))
+
+
+def test_what_holds_in_the_middle_of_a_step_gives_the_sixth_order(three_fmus: RobotFmus) -> None:
+    errors = []
+    for step in (0.1, 0.05):
+        with instantiated(three_fmus) as coupling:
+            assert coupling.order == 6
+            errors.append(end_error(coupling, step))
+    assert errors[0] < 2e-7
+    assert 25.0 < errors[0] / errors[1] < 100.0
+
+
+def test_without_the_middle_the_order_is_four(three_fmus: RobotFmus) -> None:
+    errors = []
+    for step in (0.05, 0.025):
+        with instantiated(three_fmus) as coupling:
+            plain = Coupling(coupling.components, connections(3), winch_ports(3))
+            assert plain.order == 4
+            errors.append(end_error(plain, step))
+    assert errors[0] < 2e-5
+    assert 10.0 < errors[0] / errors[1] < 30.0

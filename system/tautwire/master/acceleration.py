@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-MEMORY = 12
-LEAST_DIFFERENCE = 1e-12
+MEMORY = 20
+LENGTHS = 4
+SAME_LENGTH = 0.1
+LEAST_DIFFERENCE = 1e-10
 LEAST_SINGULAR = 1e-9
 
 
@@ -64,3 +66,22 @@ class Secants:
         weights = np.linalg.lstsq(residuals, given - shown, rcond=LEAST_SINGULAR)[0]
         improved: Array = shown + responses @ weights
         return improved
+
+
+class Lessons:
+    """Secants by the length of the step, since a coupling is not the same for another; the last few lengths."""
+
+    def __init__(self) -> None:
+        self._taught: deque[tuple[float, Secants]] = deque(maxlen=LENGTHS)
+
+    def of(self, step: float) -> Secants:
+        """Those of steps of nearly the same length; empty where there were none."""
+        for length, secants in self._taught:
+            if abs(step - length) <= SAME_LENGTH * length:
+                return secants
+        self._taught.appendleft((step, Secants()))
+        return self._taught[0][1]
+
+    def forget(self) -> None:
+        """Drop all."""
+        self._taught.clear()

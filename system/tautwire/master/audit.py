@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
+from .fallback import Fallback
 from .wiring import Connection
 
 Array = NDArray[np.float64]
@@ -29,7 +30,7 @@ class Account:
     Over a step h, a bond sends ``effort sent x flow received`` and gets ``effort received x flow sent``; half of h
     times their difference at its end is energy (J) that no component made. Zero where inputs equal outputs at both
     ends; what the polynomials between them err by does not show. ``error`` is the sum of the steps' estimated errors
-    (m), where steps were chosen by a tolerance.
+    (m), where steps were chosen by a tolerance. ``doubted`` sums the squares of what estimated rates may err by.
 
     Source: Sadjina, Kyllingstad, Skjong and Pedersen (2017), Energy conservation and power bonds in co-simulations,
     Engineering with Computers 33(3), 607-620.
@@ -41,6 +42,8 @@ class Account:
     made: float = 0.0
     exchanged: float = 0.0
     error: float | None = None
+    without: Fallback = field(default_factory=Fallback, repr=False)
+    doubted: Array = field(default_factory=lambda: np.zeros(0), repr=False, compare=False)
 
     def enter(self, step: float, redos: int, sent: tuple[Array, Array], received: tuple[Array, Array]) -> None:
         """One step; ``sent`` and ``received`` are (efforts, flows) of all bonds at its end."""
@@ -50,6 +53,14 @@ class Account:
         effort_received, flow_received = received
         self.made += 0.5 * step * float(effort_received @ flow_sent - effort_sent @ flow_received)
         self.exchanged += step * float(np.sum(np.abs(effort_sent * flow_sent)))
+
+    def doubt(self, doubts: Array) -> None:
+        """By how much the estimated rates of a step may err, shape (number of rates,)."""
+        self.doubted = self.doubted + doubts**2
+
+    def fallbacks(self) -> tuple[str, ...]:
+        """What the master did without, for want of FMUs that can do it; the errors of rates are root mean squares."""
+        return self.without.notes(np.sqrt(self.doubted / max(self.steps, 1)))
 
     @property
     def share(self) -> float:

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import ctypes
+import os
 import shutil
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -12,6 +13,7 @@ from typing import Any
 
 import fmpy
 import numpy as np
+from fmpy.fmi1 import FMICallException
 from fmpy.fmi2 import (
     FMU2Slave,
     fmi2CallbackAllocateMemoryTYPE,
@@ -51,7 +53,13 @@ class ComponentError(TautwireError):
         self.messages = tuple(messages)
         said = f"; it logged: {' | '.join(messages[-3:])}" if messages else ""
         given = ", ".join(f"{name}={value:.6g}" for name, value in inputs.items())
-        super().__init__(f"FMU {component}: {call} gave '{status}' at {time:.6g} s with {given}{said}")
+        at = f"at {time:.6g} s" + (f" with {given}" if given else "")
+        super().__init__(f"FMU {component}: {call} {self.outcome} {at}{said}")
+
+    @property
+    def outcome(self) -> str:
+        """What became of the call, in words."""
+        return f"gave '{self.status}'"
 
 
 @dataclass(frozen=True)
@@ -83,6 +91,7 @@ class Component:
         self.description: ModelDescription = fmpy.read_model_description(str(path))
         self.variables: dict[str, ScalarVariable] = {v.name: v for v in self.description.modelVariables}
         self.can_restore = bool(self.description.coSimulation.canGetAndSetFMUstate)
+        self.takes_any_step = bool(self.description.coSimulation.canHandleVariableCommunicationStepSize)
         self.folder = fmpy.extract(str(path))
         try:
             self._load()
@@ -91,12 +100,18 @@ class Component:
             raise
 
     def _load(self) -> None:
-        self.fmu = FMU2Slave(
-            guid=self.description.guid,
-            unzipDirectory=self.folder,
-            modelIdentifier=self.description.coSimulation.modelIdentifier,
-            instanceName=self.name,
-        )
+        here = os.getcwd()
+        try:
+            self.fmu = FMU2Slave(
+                guid=self.description.guid,
+                unzipDirectory=self.folder,
+                modelIdentifier=self.description.coSimulation.modelIdentifier,
+                instanceName=self.name,
+            )
+        except Exception as error:
+            # fmpy loads from the library's folder, and stays there where that fails.
+            os.chdir(here)
+            raise ComponentError(self.name, "loading its library", str(error), 0.0, {}, ()) from error
         self.callbacks = fmi2CallbackFunctions()
         self.callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
         self.callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
@@ -146,16 +161,23 @@ class Component:
     def initialize(self, start: float, parameters: dict[str, float]) -> None:
         """Set parameters and enter initialization mode."""
         self.time = start
-        self.fmu.setupExperiment(startTime=start)
+        self._call("fmi2SetupExperiment", self.fmu.setupExperiment, startTime=start)
         for name, value in parameters.items():
             block = self.block([name])
             block.values[0] = value
             self.write(block)
-        self.fmu.enterInitializationMode()
+        self._call("fmi2EnterInitializationMode", self.fmu.enterInitializationMode)
 
     def run(self) -> None:
         """Leave initialization mode."""
-        self.fmu.exitInitializationMode()
+        self._call("fmi2ExitInitializationMode", self.fmu.exitInitializationMode)
+
+    def _call(self, call: str, function: Callable[..., Any], **arguments: Any) -> None:
+        """One of the calls that are made once a run, and whose status fmpy looks at."""
+        try:
+            function(**arguments)
+        except FMICallException as error:
+            self._fail(call, error.status)
 
     def read(self, block: Block) -> None:
         """Read variables into the block's values."""
@@ -206,5 +228,6 @@ class Component:
 
     def _inputs(self) -> dict[str, float]:
         block = self.block([v.name for v in self.variables.values() if v.causality == "input" and v.type == "Real"])
-        self._get(self._handle, block.references, block.count, block.memory)
+        if self._get(self._handle, block.references, block.count, block.memory) > FMI_WARNING:
+            return {}
         return dict(zip(block.names, block.values.tolist(), strict=True))

@@ -1,9 +1,10 @@
 """One macro step of a wired system, redone until inputs and outputs agree at its end.
 
 The outputs at the end of the step are guessed from their past. Then each component in turn steps over ``[t, t + h]``
-on inputs that run from their values at ``t`` to those last known at ``t + h`` (value and rate at both ends, a Hermite
-polynomial), and shows its outputs there. While that changes more than the tolerance, all go back to their saved
-states and step again. Converged, the step is symmetric in time: the coupling neither creates nor eats energy.
+on inputs that run from their values at ``t`` to those last known at ``t + h`` (value and rate at both ends and in the
+middle, a Hermite polynomial), and shows its outputs there. While that changes more than the tolerance, all go back to
+their saved states and step again. Converged, the step is symmetric in time: the coupling neither creates nor eats
+energy.
 
 Source: Kuebler and Schiehlen (2000), Mathematical and Computer Modelling of Dynamical Systems 6(2), 93-113, on
 iterated coupling; the polynomial through value and rate at both ends is the Hermite form.
@@ -13,21 +14,25 @@ from __future__ import annotations
 
 import ctypes
 from collections import deque
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .acceleration import Secants
+from .acceleration import Lessons, Secants
 from .audit import Account, Bond
 from .component import Component
-from .seat import STAMP, Level, Places, Seat, downstream, fed_back, gauss_seidel_order
-from .wiring import Connection, Port, check, levels
+from .fallback import fallback
+from .held import Held
+from .rates import Rates
+from .seat import MIDDLE_STAMP, STAMP, Level, Places, Seat, downstream, fed_back, gauss_seidel_order, takes_middle
+from .wiring import Connection, Port, WiringError, check, check_rates, levels
 
 Array = NDArray[np.float64]
 
 PAST = 4
+MOST_ROUNDS, SETTLED = 20, 1e-12
 
 
 @dataclass(frozen=True)
@@ -48,7 +53,9 @@ class Coupling:
     outputs at whose sign changes other outputs have a kink, see :mod:`.kinks`. ``tolerance`` is relative to the
     nominal values of the connected outputs; ``redos`` bounds the redos of a step. What a redo is given is improved
     by what earlier ones have shown, see :class:`Secants`. ``can_redo`` and ``can_cut`` are False where some FMU
-    cannot save its state: then no step is redone, or cut at kinks.
+    cannot save its state: then no step is redone, or cut at kinks. ``rates`` are pairs whose target takes the rate of
+    the source, worked out from its past, see :class:`Rates`. ``memory`` gives the array in which the values of
+    all inputs stand, so that a watching process may see them.
     """
 
     def __init__(
@@ -60,27 +67,39 @@ class Coupling:
         kinks: Sequence[Port] = (),
         tolerance: float = 1e-9,
         redos: int = 8,
+        memory: Callable[[Sequence[Port]], Array] | None = None,
+        rates: Sequence[Connection] = (),
     ) -> None:
         check(components, connections)
+        check_rates(components, rates)
         self.components = dict(components)
         self.drives = tuple(drives)
         self.tolerance = tolerance
         self.redos = redos
         self.can_redo = all(c.can_restore for c in components.values())
-        self.can_cut = self.can_redo
-        self.account = Account()
+        self.can_cut = self.can_redo and all(c.takes_any_step for c in components.values())
+        without = fallback(components, connections, drives, rates)
+        self.account = Account(without=without, doubted=np.zeros(len(without.estimated)))
         names = list(components)
-        shown = sorted({c.source for c in connections} | set(kinks), key=lambda p: (names.index(p.component), p))
-        self._shown = np.zeros(len(shown))
+        connected = {wire.source for wire in (*connections, *rates)}
+        shown = sorted(connected | set(kinks), key=lambda p: (names.index(p.component), p))
+        estimated = list(dict.fromkeys(pair.source for pair in rates))
+        # Estimated rates stand behind all outputs, as if some nameless component showed them.
+        all_shown = [*shown, *map(_rate_of, estimated)]
+        wires = [*connections, *(Connection(_rate_of(pair.source), pair.target) for pair in rates)]
+        self._shown = np.zeros(len(all_shown))
+        self._rates = Rates(_places(shown, estimated), np.arange(len(shown), len(all_shown)))
         self._nominal = np.array([float(components[p.component].variables[p.variable].nominal or 1.0) for p in shown])
-        given = [port for name in names for port in self._inputs_of(name, connections)]
-        self._given = np.zeros(len(given))
-        self._seats = {name: self._seat(name, connections, shown, given) for name in names}
+        given = [port for name in names for port in self._inputs_of(name, wires)]
+        self._given = np.zeros(len(given)) if memory is None else memory(given)
+        self._seats = {name: self._seat(name, wires, all_shown, given) for name in names}
         self._order = [self._seats[name] for name in gauss_seidel_order(components, connections, shown)]
         self._drive_places = _places(given, drives)
         groups = levels(components, connections)
         self._levels = [self._level(group, shown) for group in groups]
-        self._after_drives = [self._level(group, shown) for group in downstream(components, groups, drives)]
+        self._held = Held(components, shown)
+        jumping = [*drives, *self._held.targets(connections)]
+        self._after_jumps = [self._level(group, shown) for group in downstream(components, groups, jumping)]
         efforts, flows = [bond.effort for bond in bonds], [bond.flow for bond in bonds]
         self._bond_sent = _places(shown, [c.source for c in efforts]), _places(shown, [c.source for c in flows])
         self._bond_given = _places(given, [c.target for c in efforts]), _places(given, [c.target for c in flows])
@@ -89,11 +108,13 @@ class Coupling:
         self._past: deque[tuple[float, Array]] = deque(maxlen=PAST)
         self._fed_back = fed_back([seat.component.name for seat in self._order], connections, shown)
         self._scale = self._nominal[self._fed_back]
+        self._lessons = Lessons()
         self._secants = Secants()
-        self._learnt_at = 0.0
 
     def _inputs_of(self, name: str, connections: Sequence[Connection]) -> list[Port]:
-        stamp = [Port(name, STAMP)] * (STAMP in self.components[name].variables)
+        component = self.components[name]
+        stamp = [Port(name, STAMP)] * (STAMP in component.variables)
+        stamp += [Port(name, MIDDLE_STAMP)] * takes_middle(component, connections)
         driven = [port for port in self.drives if port.component == name]
         return [*stamp, *driven, *(c.target for c in connections if c.target.component == name)]
 
@@ -109,6 +130,7 @@ class Coupling:
             taken=taken,
             sources=_places(shown, [c.source for c in connections if c.target.component == name]),
             stamped=STAMP in component.variables,
+            middle=takes_middle(component, connections),
         )
 
     def _level(self, group: Sequence[Connection], shown: Sequence[Port]) -> Level:
@@ -123,15 +145,28 @@ class Coupling:
     def settle(self, time: float, drives: Array) -> None:
         """Set all inputs at ``time`` and pass outputs on until every input holds; for initialization."""
         self._drive(drives)
-        self._pass_on(time, self._levels)
+        for _ in range(MOST_ROUNDS):
+            before = self._shown.copy()
+            self._pass_on(time, self._levels)
+            if np.allclose(self._shown, before, rtol=SETTLED, atol=SETTLED, equal_nan=True):
+                break
+        else:
+            raise WiringError(f"outputs at {time:g} s do not settle: they depend on each other without delay")
         for seat in self._order:
             seat.show()
         self.forget(time)
 
     def forget(self, time: float) -> None:
-        """Do not extrapolate over ``time``, which is now: some output has a kink there."""
+        """Carry nothing over ``time``, which is now: some output has a kink there."""
+        self._lessons.forget()
         self._past.clear()
         self._past.append((time, self._shown.copy()))
+
+    @property
+    def order(self) -> int:
+        """Of the error in the step: six where all fed components take what holds in its middle, four if stamped."""
+        fed = [seat for seat in self._order if len(seat.sources)]
+        return 6 if all(seat.middle for seat in fed) else 4 if all(seat.stamped for seat in fed) else 2
 
     def kinks(self) -> Array:
         """The outputs whose signs tell of kinks, as last shown."""
@@ -151,15 +186,15 @@ class Coupling:
     def step(self, time: float, step: float, start: Array, end: Array) -> None:
         """One macro step under driven inputs that are ``start`` at its begin and ``end`` at its end."""
         jumped = not np.array_equal(start, self._driven)
+        jumped |= self._held.begin(self._shown)
         self._drive(start)
-        self._pass_on(time, self._after_drives if jumped else ())
+        self._pass_on(time, self._after_jumps if jumped else ())
         before = self.save() if self.can_redo else None
         begun = self._given.copy()
-        if abs(step - self._learnt_at) > 0.1 * step:
-            self._secants.forget()
-            self._learnt_at = step
+        self._secants = self._lessons.of(step)
         self._secants.begin()
         self._guess(time + step)
+        self._rates.begin(tuple(self._past), time + step)
         self._drive(end)
         error = self._pass(time, step, begun)
         redo = 0
@@ -173,6 +208,7 @@ class Coupling:
                 self._secants.forget()
         if before:
             self.release(before)
+        self._held.end(self._shown)
         self._past.append((time + step, self._shown.copy()))
         self._enter_books(step, redo)
 
@@ -194,8 +230,12 @@ class Coupling:
         """
         self.account.passes += 1
         given = self._shown[self._fed_back] / self._scale
+        self._rates.fill(self._shown)
+        self._held.hold(self._shown)
         for seat in self._order:
             seat.advance(time, step, begun, self._shown)
+            self._rates.fill(self._shown)
+            self._held.hold(self._shown)
         shown = self._shown[self._fed_back] / self._scale
         self._secants.learn(given, shown)
         return float(np.max(np.abs(shown - given), initial=0.0))
@@ -208,6 +248,8 @@ class Coupling:
             (self._shown[sent_effort], self._shown[sent_flow]),
             (self._given[given_effort], self._given[given_flow]),
         )
+        if self._rates.count:
+            self.account.doubt(self._rates.doubts(self._shown))
 
     def save(self) -> Checkpoint:
         """Where everything is now; let it go with :meth:`release`."""
@@ -218,6 +260,7 @@ class Coupling:
         """Go back to a checkpoint."""
         self._restore_states(checkpoint)
         self._shown[:] = checkpoint.shown
+        self._held.forget()
         self._driven = checkpoint.driven
         self.account = replace(checkpoint.account, passes=self.account.passes)
         self._past = deque(checkpoint.past, maxlen=PAST)
@@ -230,6 +273,10 @@ class Coupling:
     def _restore_states(self, checkpoint: Checkpoint) -> None:
         for seat, state in zip(self._order, checkpoint.states, strict=True):
             seat.component.restore(state)
+
+
+def _rate_of(port: Port) -> Port:
+    return Port("", f"rate of {port}")
 
 
 def _places(among: Sequence[Port], ports: Sequence[Port]) -> Places:

@@ -19,23 +19,27 @@ Drives = Callable[[float, float], tuple[Array, Array]]
 
 # A kink nearer than this is stepped over; the error is of second order in it.
 WIDTH = 1e-6
+NEAREST = 0.2 * WIDTH
 MOST_CUTS = 20
 LANDING = 1e-3
 
 
-def step_over(coupling: Coupling, time: float, step: float, drives: Drives) -> None:
+def step_over(coupling: Coupling, time: float, step: float, drives: Drives) -> float:
     """One macro step from ``time``, cut at the kinks inside it where states can be restored.
 
     ``drives(time, step)`` gives the driven inputs at both ends. A sign that changes twice within a step is not seen.
+    Returns the length of the first piece: ``step`` where there was no kink.
     """
-    done = 0.0
+    done, first = 0.0, step
     if coupling.can_cut and coupling.kinks().size:
         for _ in range(MOST_CUTS):
             cut = _step_to_kink(coupling, time + done, step - done, drives)
             if cut is None:
-                return
+                return first
+            first = first if done else cut
             done += cut
     coupling.step(time + done, step - done, *drives(time + done, step - done))
+    return first
 
 
 def _step_to_kink(coupling: Coupling, time: float, step: float, drives: Drives) -> float | None:
@@ -71,16 +75,20 @@ def _landing(at: Callable[[float], Array], step: float, signs: Array, end: Array
     """
     if np.any(np.sign(at(WIDTH)) != signs):
         return 0.0
-    near = max(LANDING * step, 0.2 * WIDTH)
+    near = max(LANDING * step, NEAREST)
 
     def shown(span: float, place: int) -> float:
         return float((end if span == step else at(span))[place])
 
-    root = min(float(brentq(shown, WIDTH, step, args=(int(place),), xtol=near)) for place in changed)
-    back = near
-    while root - back > WIDTH:
-        if np.all(np.sign(at(root - back)) == signs):
-            return float(root - back)
-        back *= 4.0
-    at(WIDTH)
-    return 0.0
+    while True:
+        root = min(float(brentq(shown, WIDTH, step, args=(int(place),), xtol=near)) for place in changed)
+        back = near
+        while root - back > WIDTH:
+            if np.all(np.sign(at(root - back)) == signs):
+                return float(root - back)
+            back *= 4.0
+        if near <= NEAREST:
+            at(WIDTH)
+            return 0.0
+        # The kink is not much farther than its place is uncertain: look closer.
+        near = max(LANDING * root, NEAREST)

@@ -15,6 +15,7 @@ Array = NDArray[np.float64]
 Places = NDArray[np.intp]
 
 STAMP = "input_time"
+MIDDLE_STAMP = "middle_time"
 
 
 @dataclass(frozen=True)
@@ -23,7 +24,7 @@ class Seat:
 
     ``outputs`` and ``inputs`` are parts of the coupling's arrays of all outputs and inputs, the latter at ``taken``.
     The last inputs take the outputs at ``sources``, those before them are driven, and the first is the stamp where
-    the component has one.
+    the component has one; the second is that of the middle where ``middle`` inputs are connected.
     """
 
     component: Component
@@ -32,6 +33,7 @@ class Seat:
     taken: slice
     sources: Places
     stamped: bool
+    middle: bool
 
     def gather(self, time: float, shown: Array) -> None:
         """Take all inputs at ``time`` from the outputs shown."""
@@ -55,6 +57,8 @@ class Seat:
         its outputs are read.
         """
         if self.stamped:
+            if self.middle:
+                self.inputs.values[1] = time + 0.5 * step
             self.write(time + step, shown)
             self.component.step(time, step)
         else:
@@ -89,6 +93,13 @@ class Level:
             shown[places] = block.values
         for seat in self.writes:
             seat.write(time, shown)
+
+
+def takes_middle(component: Component, connections: Sequence[Connection]) -> bool:
+    """Whether a component is given what holds in the middle of a step."""
+    return MIDDLE_STAMP in component.variables and any(
+        c.target.component == component.name and c.target.variable.startswith("middle_") for c in connections
+    )
 
 
 def gauss_seidel_order(

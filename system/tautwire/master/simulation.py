@@ -8,6 +8,7 @@ from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
+from threadpoolctl import threadpool_limits
 
 from .component import Block, Component
 from .coupling import Coupling
@@ -92,6 +93,8 @@ def simulate(
 
     Raises ComponentError where an FMU fails or shows a value that is not finite; the recorder has what came before.
     """
+    if stepping.agreement is not None:
+        coupling.tolerance = stepping.agreement
     window = _Window(coupling, observed)
     shown = np.zeros(len(observed))
     start, _ = source.interval(0, float(times[0]), 0.0, shown)
@@ -100,6 +103,21 @@ def simulate(
         component.run()
     window.read(shown)
     recorder.add(float(times[0]), shown)
+    # The master's own systems of equations are small: threads of BLAS only wait for each other.
+    with threadpool_limits(limits=1, user_api="blas"):
+        _march(coupling, source, times, shown, stepping, recorder, window, progress)
+
+
+def _march(
+    coupling: Coupling,
+    source: Source,
+    times: Array,
+    shown: Array,
+    stepping: Stepping,
+    recorder: Recorder,
+    window: _Window,
+    progress: Progress | None,
+) -> None:
     for index in range(len(times) - 1):
         begin, span = float(times[index]), float(times[index + 1] - times[index])
 

@@ -10,6 +10,7 @@ from fmpy.model_description import ScalarVariable
 
 from ..errors import TautwireError
 from .component import Component
+from .units import Measure, measure, same_unit, unit_of
 
 
 class WiringError(TautwireError):
@@ -46,11 +47,18 @@ def check(components: Mapping[str, Component], connections: Sequence[Connection]
         target = _variable(components, connection, connection.target, "input")
         if source.type != "Real" or target.type != "Real":
             raise WiringError(f"{connection}: both must be Real, they are {source.type} and {target.type}")
-        if source.unit and target.unit and source.unit != target.unit:
-            raise WiringError(f"{connection}: units differ, {source.unit!r} and {target.unit!r}")
+        given, taken = (_unit(components, end) for end in (connection.source, connection.target))
+        if not same_unit(given, taken):
+            raise WiringError(f"{connection}: units differ, {given[0]!r} and {taken[0]!r}")
         if connection.target in driven:
             raise WiringError(f"{connection}: {connection.target} is driven by {driven[connection.target].source} too")
         driven[connection.target] = connection
+
+
+def _unit(components: Mapping[str, Component], port: Port) -> tuple[str | None, Measure | None]:
+    component = components[port.component]
+    unit = unit_of(component.variables[port.variable])
+    return unit, None if unit is None else measure(component.description, unit)
 
 
 def _variable(
@@ -66,10 +74,22 @@ def _variable(
     return variable
 
 
-def direct_inputs(component: Component) -> dict[str, frozenset[str]]:
-    """For each output, the inputs that act on it without delay; all of them where the FMU does not say."""
+def check_rates(components: Mapping[str, Component], rates: Sequence[Connection]) -> None:
+    """Refuse unknown names, wrong causality and types in pairs whose target takes the rate of the source."""
+    for pair in rates:
+        ends = _variable(components, pair, pair.source, "output"), _variable(components, pair, pair.target, "input")
+        if any(end.type != "Real" for end in ends):
+            raise WiringError(f"{pair}: both must be Real, they are {ends[0].type} and {ends[1].type}")
+
+
+def direct_inputs(component: Component, unsaid: bool = True) -> dict[str, frozenset[str]]:
+    """For each output, the inputs that act on it without delay.
+
+    Where the FMU does not say, all of them, or none where ``unsaid`` is False.
+    """
     inputs = frozenset(v.name for v in component.variables.values() if v.causality == "input")
-    found = {v.name: inputs for v in component.variables.values() if v.causality == "output"}
+    undeclared = inputs if unsaid else frozenset()
+    found = {v.name: undeclared for v in component.variables.values() if v.causality == "output"}
     for unknown in component.description.outputs:
         if unknown.dependencies is not None:
             found[unknown.variable.name] = inputs & {known.name for known in unknown.dependencies}
@@ -79,11 +99,27 @@ def direct_inputs(component: Component) -> dict[str, frozenset[str]]:
 def levels(components: Mapping[str, Component], connections: Sequence[Connection]) -> list[list[Connection]]:
     """Connections in groups: those of a group carry outputs that only depend on groups before it.
 
+    An FMU that does not say what its outputs depend on is taken to delay all of its inputs, if else there was a loop.
+
     Raises WiringError where outputs depend on each other in a loop without delay.
     """
+    try:
+        return _grouped(components, connections, unsaid=True)
+    except CycleError:
+        pass
+    try:
+        return _grouped(components, connections, unsaid=False)
+    except CycleError as error:
+        loop = " -> ".join(str(port) for port in error.args[1])
+        raise WiringError(f"outputs depend on each other without delay: {loop}") from error
+
+
+def _grouped(
+    components: Mapping[str, Component], connections: Sequence[Connection], unsaid: bool
+) -> list[list[Connection]]:
     feeding = {connection.target: connection.source for connection in connections}
     sources = {connection.source for connection in connections}
-    direct = {name: direct_inputs(component) for name, component in components.items()}
+    direct = {name: direct_inputs(component, unsaid) for name, component in components.items()}
     depends: dict[Port, set[Port]] = {
         source: {
             feeding[target]
@@ -93,11 +129,7 @@ def levels(components: Mapping[str, Component], connections: Sequence[Connection
         for source in sources
     }
     sorter = TopologicalSorter(depends)
-    try:
-        sorter.prepare()
-    except CycleError as error:
-        loop = " -> ".join(str(port) for port in error.args[1])
-        raise WiringError(f"outputs depend on each other without delay: {loop}") from error
+    sorter.prepare()
     groups = []
     while sorter.is_active():
         ready = set(sorter.get_ready())

@@ -1,0 +1,35 @@
+"""A winch with faults, and two of it coupled."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+from tautwire.master import Connection, Coupling, Journal, Port, WatchedComponent
+
+HERE = Path(__file__).parent
+NAMES = ("left", "right")
+# What environment variables of these names tell the FMU: "name:where:how:time", and a file for process numbers.
+FAULT, NUMBERS = "TAUTWIRE_TEST_FAULT", "TAUTWIRE_TEST_NUMBERS"
+
+
+def build_faulty(folder: Path) -> Path:
+    """The FMU of ``faulty.py``; building leaves modules behind, so another process does it."""
+    command = [sys.executable, "-m", "pythonfmu", "build", "-f", str(HERE / "faulty.py"), "-d", str(folder)]
+    subprocess.run([*command, "--no-external-tool"], check=True, capture_output=True, timeout=120)
+    return folder / "Faulty.fmu"
+
+
+@contextmanager
+def coupled(path: Path, journal: Journal) -> Iterator[Coupling]:
+    """Two of the FMU: ``left`` is driven, and ``right`` is asked for what it shows."""
+    with ExitStack() as stack:
+        components = {name: stack.enter_context(WatchedComponent(journal, name, path)) for name in NAMES}
+        for component in components.values():
+            component.initialize(0.0, {})
+        wires = [Connection(Port("left", "winch_speed"), Port("right", "speed_command"))]
+        drives = [Port("left", "speed_command"), Port("left", "speed_command_rate")]
+        yield Coupling(components, wires, drives, memory=journal.inputs)
