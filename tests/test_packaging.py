@@ -25,13 +25,20 @@ def test_there_is_one_fmu_a_cable_and_one_for_the_platform(three_fmus: RobotFmus
     assert all(path.is_file() for path in all_of(three_fmus))
 
 
-def test_fmpy_finds_nothing_to_complain_about(three_fmus: RobotFmus, eight_fmus: RobotFmus) -> None:
-    for path in (*all_of(three_fmus), *all_of(eight_fmus)):
+def test_there_is_one_more_a_winch_where_the_robot_has_them(winch_fmus: RobotFmus) -> None:
+    assert list(winch_fmus.parts) == ["platform", *(f"{kind}_{i}" for kind in ("winch", "cable") for i in (1, 2, 3))]
+    assert all(path.name == f"{name}.fmu" and path.is_file() for name, path in winch_fmus.parts.items())
+
+
+def test_fmpy_finds_nothing_to_complain_about(
+    three_fmus: RobotFmus, eight_fmus: RobotFmus, winch_fmus: RobotFmus
+) -> None:
+    for path in (*all_of(three_fmus), *all_of(eight_fmus), *winch_fmus.parts.values()):
         assert validate_fmu(str(path)) == []
 
 
-def test_every_variable_says_what_it_is(three_fmus: RobotFmus) -> None:
-    for path in all_of(three_fmus):
+def test_every_variable_says_what_it_is(winch_fmus: RobotFmus) -> None:
+    for path in winch_fmus.parts.values():
         description = fmpy.read_model_description(str(path))
         units = {unit.name for unit in description.unitDefinitions}
         for variable in description.modelVariables:
@@ -45,7 +52,7 @@ def test_start_values_are_written_to_the_last_bit(three_fmus: RobotFmus) -> None
     assert float(variables["area"].start) == np.pi * 0.002**2
 
 
-def test_outputs_name_the_inputs_that_act_without_delay(three_fmus: RobotFmus) -> None:
+def test_outputs_name_the_inputs_that_act_without_delay(three_fmus: RobotFmus, winch_fmus: RobotFmus) -> None:
     outputs = {
         unknown.variable.name: {known.name for known in unknown.dependencies}
         for unknown in fmpy.read_model_description(str(three_fmus.cables[0])).outputs
@@ -53,6 +60,15 @@ def test_outputs_name_the_inputs_that_act_without_delay(three_fmus: RobotFmus) -
     assert "position.x" in outputs["force.x"]
     assert "acceleration.x" not in outputs["force.x"]
     assert "acceleration.x" in outputs["force_rate.x"]
+    winch = fmpy.read_model_description(str(winch_fmus.parts["winch_2"])).outputs
+    assert {u.variable.name: [known.name for known in u.dependencies] for u in winch} == {
+        "winch_speed": [],
+        "motor_speed": [],
+        "speed_margin": [],
+        "winch_acceleration": ["speed_command"],
+        "command_margin": ["speed_command"],
+        "acceleration_margin": ["speed_command"],
+    }
     platform = fmpy.read_model_description(str(three_fmus.platform)).outputs
     assert {u.variable.name: u.dependencies for u in platform}["position.x"] == []
 
