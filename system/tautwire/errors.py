@@ -4,7 +4,16 @@ from collections.abc import Sequence
 
 
 class TautwireError(Exception):
-    """Any error that Tautwire raises on purpose."""
+    """Any error that Tautwire raises on purpose; it may be pickled, whatever its constructor takes."""
+
+    def __reduce__(self) -> tuple[object, ...]:
+        return _revived, (type(self), self.args, vars(self))
+
+
+def _revived(kind: type[TautwireError], arguments: tuple[object, ...], values: dict[str, object]) -> TautwireError:
+    error = kind.__new__(kind, *arguments)
+    vars(error).update(values)
+    return error
 
 
 class InputError(TautwireError):
@@ -32,6 +41,10 @@ class RecordingError(InputError):
     """A recording that cannot be read or does not fit the robot."""
 
 
+class MaterialTableError(InputError):
+    """A table of a dynamic test that cannot be read or declares something impossible."""
+
+
 class UnreachableError(InputError):
     """A position where cables that only pull cannot hold the platform.
 
@@ -55,8 +68,6 @@ class UnreachableError(InputError):
         self.cable = cable
         self.tension = tension
         self.reason = reason
-        # Exceptions are unpickled as ``type(*args)``, so args must be those of this constructor.
-        self.args = (where, self.position, cable, tension, reason, mend)
 
 
 def one_line(text: str) -> str:

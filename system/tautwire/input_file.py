@@ -1,5 +1,7 @@
 """Reading files that others wrote."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 from .errors import InputError
@@ -9,6 +11,16 @@ _UTF_16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 
 def read_bytes(path: str | Path, error: type[InputError], largest: int | None = None) -> bytes:
     """All bytes of a regular file; raises ``error`` where there is none or it is larger than ``largest``."""
+    with readable_file(path, error) as file:
+        size = file.stat().st_size
+        if largest is not None and size > largest:
+            raise error(str(path), f"has {size} bytes, at most {largest} are read", "check the path")
+        return file.read_bytes()
+
+
+@contextmanager
+def readable_file(path: str | Path, error: type[InputError]) -> Iterator[Path]:
+    """The path of a regular file; raises ``error`` where there is none, or where the block cannot read it."""
     where = str(path)
     try:
         file = Path(path)
@@ -18,10 +30,7 @@ def read_bytes(path: str | Path, error: type[InputError], largest: int | None = 
             raise error(where, "there is no such file", "check the path")
         if not file.is_file():
             raise error(where, "is not a regular file", "copy it to a file first")
-        size = file.stat().st_size
-        if largest is not None and size > largest:
-            raise error(where, f"has {size} bytes, at most {largest} are read", "check the path")
-        return file.read_bytes()
+        yield file
     except (OSError, ValueError) as problem:
         reason = getattr(problem, "strerror", None) or str(problem)
         raise error(where, f"cannot be read ({reason})", "check the path and its permissions") from problem

@@ -1,21 +1,17 @@
 """Recordings: the speeds that the winches reported and what was measured, sample by sample."""
 
-import csv
-from dataclasses import dataclass
-from io import BytesIO
-from itertools import islice
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
-import pandas as pd  # type: ignore[import-untyped,unused-ignore]
 from numpy.typing import NDArray
 
 from .errors import RecordingError, shown
-from .input_file import read_bytes, require_text
-from .recording_header import AXES, Header, as_text, read_header
-from .recording_rules import HUGE, MISSING, raise_first_fault
-
-BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+from .recording_csv import open_csv
+from .recording_header import AXES
+from .recording_parquet import is_parquet, open_parquet
+from .recording_rules import HUGE, raise_first_fault
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,32 +59,38 @@ class Recording:
         """Names of the outputs in the order of :meth:`measured`: x, y, z, tension_1 to tension_n."""
         return (*AXES, *(f"tension_{cable}" for cable in range(1, self.cable_count + 1)))
 
+    def first(self, count: int) -> "Recording":
+        """The first samples."""
+        return replace(
+            self,
+            time=self.time[:count],
+            winch_speed=self.winch_speed[:count],
+            tension=self.tension[:count],
+            position=self.position[:count],
+        )
+
     def measured(self) -> NDArray[np.float64]:
         """All outputs, shape (N, 3 + n), in the order of ``channel_names``, in m and N; NaN where missing."""
         return np.hstack((self.position, self.tension))
 
 
 def read_recording(path: str | Path, cable_count: int) -> Recording:
-    """The recording in a CSV file of a robot with ``cable_count`` cables; raises RecordingError."""
-    file = str(path)
-    content = read_bytes(path, RecordingError)
-    require_text(content, file, RecordingError, "CSV")
-    content = content.removeprefix(BYTE_ORDER_MARK)
-    header = read_header(content, file, cable_count)
-    numbers = _numbers(content, header)
+    """The recording in a CSV or Parquet file of a robot with ``cable_count`` cables; raises RecordingError."""
+    table = open_parquet(path, cable_count) if is_parquet(path) else open_csv(path, cable_count)
+    numbers = table.numbers()
     if numbers is None:
-        raise_first_fault(content, header, file)
+        raise_first_fault(table.rows(), table.header, table.file)
     cables = range(1, cable_count + 1)
     recording = Recording(
-        path=file,
-        time=_column(numbers, "time"),
+        path=table.file,
+        time=_columns(numbers, ["time"])[:, 0],
         winch_speed=_columns(numbers, [f"winch_speed_{cable}" for cable in cables]),
         tension=_columns(numbers, [f"tension_{cable}" for cable in cables]),
         position=_columns(numbers, AXES),
-        unknown_columns=header.unknown,
+        unknown_columns=table.header.unknown,
     )
     if not _is_sound(recording):
-        raise_first_fault(content, header, file)
+        raise_first_fault(table.rows(), table.header, table.file)
     return recording
 
 
@@ -104,59 +106,22 @@ def require_outputs(recording: Recording) -> None:
     raise RecordingError(recording.path, problem, mend)
 
 
-def _numbers(content: bytes, header: Header) -> pd.DataFrame | None:
-    """The known columns as numbers; None where the file is no table of numbers."""
-    # Where the first row has more cells than the header, pandas would take some for an index.
-    if not _is_rectangular(content, len(header.names), row_count=1):
-        return None
-    try:
-        frame = pd.read_csv(
-            BytesIO(content),
-            header=0,
-            names=list(header.names),
-            dtype={name: str if name in header.unknown else np.float64 for name in header.names},
-            encoding="utf-8",
-            skipinitialspace=True,
-            keep_default_na=False,
-            na_values=list(MISSING),
-        )
-    except (ValueError, OverflowError):
-        return None
-    return frame if _is_rectangular(content, len(header.names), len(frame)) else None
-
-
-def _is_rectangular(content: bytes, width: int, row_count: int) -> bool:
-    """Whether the first rows are as wide as the header; pandas fills short ones up without a word."""
-    if row_count > 1 and b'"' not in content:
-        return content.count(b",") == (row_count + 1) * (width - 1)
-    try:
-        rows = csv.reader(as_text(content), skipinitialspace=True)
-        filled = (row for row in rows if len(row) > 1 or "".join(row).strip())
-        return all(len(row) == width for row in islice(filled, row_count + 1))
-    except csv.Error:
-        return False
-
-
 def _is_sound(recording: Recording) -> bool:
     """Whether the numbers keep the rules that ``raise_first_fault`` explains."""
-    inputs = np.column_stack((recording.time, recording.winch_speed))
-    outputs = recording.measured()
+    inputs, outputs = (recording.time, recording.winch_speed), (recording.position, recording.tension)
     return bool(
         recording.sample_count >= 2
-        and np.isfinite(inputs).all()
-        and (np.abs(inputs) <= HUGE).all()
+        and all(np.isfinite(signals).all() for signals in inputs)
+        and not any((np.abs(signals) > HUGE).any() for signals in (*inputs, *outputs))
         and (np.diff(recording.time) > 0.0).all()
-        and not (np.abs(outputs) > HUGE).any()
     )
 
 
-def _column(numbers: pd.DataFrame, name: str) -> NDArray[np.float64]:
-    column = np.array(numbers[name], dtype=np.float64) if name in numbers else np.full(len(numbers), np.nan)
-    column.setflags(write=False)
-    return column
-
-
-def _columns(numbers: pd.DataFrame, names: list[str] | tuple[str, ...]) -> NDArray[np.float64]:
-    columns = np.column_stack([_column(numbers, name) for name in names])
+def _columns(numbers: Mapping[str, NDArray[np.float64]], names: Sequence[str]) -> NDArray[np.float64]:
+    """Columns side by side, shape (N, number of names); NaN where the file has none of that name."""
+    columns = np.full((len(numbers["time"]), len(names)), np.nan)
+    for place, name in enumerate(names):
+        if name in numbers:
+            columns[:, place] = numbers[name]
     columns.setflags(write=False)
     return columns

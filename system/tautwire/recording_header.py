@@ -1,9 +1,8 @@
-"""The header line of a recording: which columns there are and which are missing."""
+"""The columns of a recording: which there are and which are missing."""
 
-import csv
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass
-from io import BytesIO, TextIOWrapper
 
 from .checked_table import nearest
 from .errors import RecordingError, shown
@@ -11,7 +10,6 @@ from .errors import RecordingError, shown
 AXES = ("x", "y", "z")
 
 _OF_A_CABLE = re.compile(r"(?:winch_speed|tension)_(0|[1-9][0-9]{0,5})")
-_NUMBER = re.compile(r"[-+]?[0-9]*[.,]?[0-9]+([eE][-+]?[0-9]+)?")
 
 
 @dataclass(frozen=True)
@@ -21,18 +19,15 @@ class Header:
     names: tuple[str, ...]
     unknown: tuple[str, ...]
 
+    @property
+    def known(self) -> tuple[str, ...]:
+        """The columns that are read, in the file's order."""
+        return tuple(name for name in self.names if name not in self.unknown)
 
-def as_text(content: bytes) -> TextIOWrapper:
-    """The lines of a CSV file, as the csv module wants them."""
-    return TextIOWrapper(BytesIO(content), encoding="utf-8", newline="")
 
-
-def read_header(content: bytes, file: str, cable_count: int) -> Header:
-    """The header of a recording; raises RecordingError unless time and every winch speed have a column."""
-    where = f"{file}: line 1"
+def header_of(cells: Sequence[str], where: str, cable_count: int) -> Header:
+    """The header in these cells; raises RecordingError unless time and every winch speed have a column."""
     known = known_columns(cable_count)
-    cells = _first_row(content, file)
-    _require_header(cells, where)
     names = tuple(cell or f"(column {place})" for place, cell in enumerate(cells, 1))
     for place, name in enumerate(names):
         if name in names[:place]:
@@ -54,24 +49,3 @@ def known_columns(cable_count: int) -> frozenset[str]:
     cables = range(1, cable_count + 1)
     of_cables = (f"{kind}_{cable}" for kind in ("winch_speed", "tension") for cable in cables)
     return frozenset(("time", *AXES, *of_cables))
-
-
-def _first_row(content: bytes, file: str) -> list[str]:
-    if not content.strip():
-        raise RecordingError(file, "is empty", "write a header line and two or more samples")
-    try:
-        return [cell.strip() for cell in next(csv.reader(as_text(content), skipinitialspace=True))]
-    except csv.Error as problem:
-        raise RecordingError(f"{file}: line 1", f"is no CSV ({problem})", "write a header line") from problem
-
-
-def _require_header(cells: list[str], where: str) -> None:
-    if not any(cells):
-        raise RecordingError(where, "is blank, the header is missing", "begin with the names of the columns")
-    for separator, name in ((";", "semicolons"), ("\t", "tabs")):
-        if "time" not in cells and any(separator in cell for cell in cells):
-            mend = "separate them with commas, and write numbers with a decimal point"
-            raise RecordingError(where, f"the columns are separated with {name}", mend)
-    if all(_NUMBER.fullmatch(cell) for cell in cells):
-        mend = "begin with a line that names the columns, as in time,winch_speed_1"
-        raise RecordingError(where, f"has numbers ({shown(cells[0])}), so the header is missing", mend)

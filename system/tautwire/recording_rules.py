@@ -1,13 +1,14 @@
-"""The rules that the cells of a recording keep, and the line and column where one is broken."""
+"""The rules that the cells of a recording keep, and the row and column where one is broken."""
 
-import csv
 import math
 import re
-from collections.abc import Iterator
+from collections.abc import Iterable
 from typing import NoReturn
 
 from .errors import RecordingError, shown
-from .recording_header import Header, as_text
+from .recording_header import Header
+
+Row = tuple[str, list[str]]  # the file and the row's place in it, then the cells
 
 HUGE = 1e12  # beyond any quantity of a cable robot in SI units
 MISSING = ("", "nan", "NaN", "NAN", "NA")  # what loggers write where a sensor dropped out
@@ -15,14 +16,14 @@ MISSING = ("", "nan", "NaN", "NAN", "NA")  # what loggers write where a sensor d
 _DECIMAL_COMMA = re.compile(r"[-+]?[0-9]+,[0-9]+([eE][-+]?[0-9]+)?")
 
 
-def raise_first_fault(content: bytes, header: Header, file: str) -> NoReturn:
+def raise_first_fault(rows: Iterable[Row], header: Header, file: str) -> NoReturn:
     """Raises RecordingError about the first broken rule of a recording that breaks one; takes its time."""
     count = 0
     before = -math.inf
-    for where, row in _rows(content, file):
+    for where, row in rows:
         time = _checked_time(where, row, header)
         if time <= before:
-            problem = f"is {time!r} after {before!r}, must rise from line to line"
+            problem = f"is {time!r} after {before!r}, must rise from sample to sample"
             raise _fault(where, "time", problem, "sort the samples, keep each once")
         before = time
         count += 1
@@ -30,22 +31,6 @@ def raise_first_fault(content: bytes, header: Header, file: str) -> NoReturn:
         samples = "1 sample" if count else "no samples"
         raise RecordingError(file, f"has {samples}, must have at least 2", "record for longer")
     raise RecordingError(file, "is no table of numbers", "write one line per sample, one number per cell")
-
-
-def _rows(content: bytes, file: str) -> Iterator[tuple[str, list[str]]]:
-    """Rows below the header that are not blank, each with the file and the line on which it begins."""
-    rows = csv.reader(as_text(content), skipinitialspace=True, strict=True)
-    begin = 1
-    try:
-        next(rows)
-        begin = rows.line_num + 1
-        for row in rows:
-            if len(row) > 1 or "".join(row).strip():
-                yield f"{file}: line {begin}", row
-            begin = rows.line_num + 1
-    except csv.Error as problem:
-        mend = "check the quotation marks from this line on"
-        raise RecordingError(f"{file}: line {begin}", f"is no CSV ({problem})", mend) from problem
 
 
 def _checked_time(where: str, row: list[str], header: Header) -> float:
@@ -68,7 +53,7 @@ def _number(where: str, name: str, cell: str) -> float:
     if cell in MISSING:
         if name == "time" or name.startswith("winch_speed_"):
             problem = f"is {shown(cell) if cell else 'empty'}, must be a number"
-            raise _fault(where, name, problem, "write a number, or cut the recording before this line")
+            raise _fault(where, name, problem, "write a number, or cut the recording before this sample")
         return math.nan
     try:
         # Python's own float would take underscores and the digits of all scripts.
