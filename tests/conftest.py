@@ -1,7 +1,7 @@
 import pytest
 
 from tautwire.packaging import RobotFmus, build_fmus
-from tests.robots import example, paper_robot, with_damping
+from tests.robots import LIMITED, example, paper_robot, with_damping, with_winch
 
 
 @pytest.fixture(scope="session")
@@ -14,6 +14,12 @@ def three_fmus(tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
 def damped_fmus(tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
     """The paper's robot with its damping at 2 Hz."""
     return build_fmus(paper_robot(damping=2.08e9), tmp_path_factory.mktemp("damped"))
+
+
+@pytest.fixture(scope="session")
+def winch_fmus(tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
+    """The paper's undamped robot on winches with limits."""
+    return build_fmus(with_winch(paper_robot(), LIMITED), tmp_path_factory.mktemp("winch"))
 
 
 @pytest.fixture(scope="session")

@@ -8,11 +8,12 @@ from pathlib import Path
 
 import numpy as np
 
-from tautwire.robot import Cable, Platform, Robot, Sensors
+from tautwire.robot import Cable, Platform, Robot, Sensors, Winch
 from tautwire.robot_file import read_robot
 
 EXAMPLES = Path(str(files("tautwire"))) / "examples"
 NAMES = ("three", "caroca", "eight")
+LIMITED = Winch(drum_radius=0.2, gear=15.0, bandwidth=8.0, damping_ratio=0.7, speed_limit=0.9, acceleration_limit=1.5)
 
 
 def example(name: str) -> Robot:
@@ -31,6 +32,11 @@ def paper_robot(damping: float = 0.0, law: str = "logarithmic", modulus: float =
 def with_damping(robot: Robot, damping: float) -> Robot:
     """The robot with another declared damping."""
     return replace(robot, cables=tuple(replace(cable, damping=damping) for cable in robot.cables))
+
+
+def with_winch(robot: Robot, winch: Winch) -> Robot:
+    """The robot on winches that follow their commands."""
+    return replace(robot, winch=winch)
 
 
 def gentle_speeds(robot: Robot, duration: float, interval: float) -> tuple[np.ndarray, np.ndarray]:

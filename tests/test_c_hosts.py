@@ -212,6 +212,21 @@ def test_the_robot_in_a_c_program_is_that_in_python_and_near_the_one_model(host:
     assert np.linalg.norm(np.array(shown) - run.position[-1]) < 0.5e-3
 
 
+def test_a_winch_in_a_c_program_is_that_in_python(
+    ready: tuple[str, ...], host: Host, winch_fmus: RobotFmus, tmp_path: Path
+) -> None:
+    fmu = Path(shutil.copy(winch_fmus.parts["winch_1"], tmp_path))
+    make_for_c_hosts(fmu)
+    with zipfile.ZipFile(fmu) as archive:
+        archive.extractall(tmp_path / "winch")
+    plan = Plan([tmp_path / "winch"])
+    plan.ramps, plan.held = [(0, "speed_command", 0.4)], [(0, "speed_command_rate", 0.4)]
+    plan.shown = [(0, "winch_speed"), (0, "winch_acceleration"), (0, "motor_speed")]
+    shown = numbers(host(plan.text()))
+    assert shown == pytest.approx(plan.in_python(), abs=1e-13)
+    assert shown[0] == pytest.approx(0.9, abs=1e-6)
+
+
 def test_without_the_option_a_c_program_cannot_load_the_fmus(host: Host, three_fmus: RobotFmus, tmp_path: Path) -> None:
     done = host(robot_plan(extracted(three_fmus, tmp_path)).text())
     assert done.returncode == 1

@@ -9,7 +9,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tautwire.errors import InputError, RobotFileError
-from tautwire.robot import Cable, EffectSetting, Platform, Robot, Sensors, TensionLimits
+from tautwire.robot import Cable, EffectSetting, OwnFmu, Platform, Robot, Sensors, TensionLimits, Winch
 from tautwire.robot_file import read_robot
 
 HALL = """\
@@ -150,7 +150,7 @@ def test_effect_may_hold_with_other_numbers_for_other_cables(tmp_path: Path) -> 
         ('name = "hall"', "name = 3", "name", ["3", "not text"]),
         ('name = "hall"', 'name = " "', "name", ["printable"]),
         ('name = "hall"', 'name = "a\\nb"', "name", ["printable"]),
-        ('name = "hall"', "[winch]\nradius = 0.1\n[x]", "winch", ["not a known key"]),
+        ('name = "hall"', "[winches]\nradius = 0.1\n[x]", "winches", ["not a known key", "'winch'"]),
         ("minimum = 50.0", "minimum = -1", "tension.minimum", ["-1.0", "at least 0 N"]),
         ("minimum = 50.0", "minimum = 20000", "tension.minimum", ["20000.0", "10000.0"]),
         ("minimum = 50.0", "", "tension.minimum", ["missing"]),
@@ -213,6 +213,53 @@ def test_refuses_a_wrong_effect(tmp_path: Path, effect: str, key: str, words: li
     error = refused(tmp_path, f"{HALL}\n{effect}\n")
     assert key_of(error) == key
     assert not [word for word in words if word not in str(error)], str(error)
+
+
+@pytest.mark.parametrize(
+    ("text", "key", "words"),
+    [
+        ("[winch]", "winch.drum_radius", ["missing", "m"]),
+        ("[winch]\nradius = 0.1", "winch.radius", ["not a known key", "'drum_radius'"]),
+        ("[winch]\ndrum_radius = 0", "winch.drum_radius", ["0.0", "above 0 m"]),
+        ("[winch]\ndrum_radius = 0.1\ngear = -3", "winch.gear", ["-3.0", "above 0"]),
+        ("[winch]\ndrum_radius = 0.1\nbandwidth = 0", "winch.bandwidth", ["0.0", "at least 0.01 Hz"]),
+        ("[winch]\ndrum_radius = 0.1\nbandwidth = 1e4", "winch.bandwidth", ["10000.0", "at most 1000 Hz"]),
+        ("[winch]\ndrum_radius = 0.1\ndamping_ratio = 0", "winch.damping_ratio", ["0.0", "at least 0.05"]),
+        ("[winch]\ndrum_radius = 0.1\nspeed_limit = -1", "winch.speed_limit", ["-1.0", "above 0 m/s"]),
+        ("[winch]\ndrum_radius = 0.1\nacceleration_limit = 0", "winch.acceleration_limit", ["above 0 m/s^2"]),
+        ("[[winch]]\ndrum_radius = 0.1", "winch", ["list", "not a table"]),
+        ("[fmu]\nplatfrm = 'a.fmu'", "fmu.platfrm", ["not a known key", "'platform'"]),
+        ("[fmu]\ncable_4 = 'a.fmu'", "fmu.cable_4", ["not a known key", "'cable_"]),
+        ("[fmu]\nplatform = 3", "fmu.platform", ["3", "not text", "mine.fmu"]),
+        ("[fmu]\nplatform = ' '", "fmu.platform", ["path"]),
+        ('[fmu]\nplatform = "a\\u0000b"', "fmu.platform", ["path"]),
+    ],
+)
+def test_refuses_a_wrong_winch_or_fmu(tmp_path: Path, text: str, key: str, words: list[str]) -> None:
+    error = refused(tmp_path, f"{HALL}\n{text}\n")
+    assert key_of(error) == key
+    assert not [word for word in words if word not in str(error)], str(error)
+
+
+def test_a_winch_has_defaults_and_limits_only_where_they_are_given(tmp_path: Path) -> None:
+    assert read(tmp_path, HALL).winch is None
+    assert read(tmp_path, f"{HALL}\n[winch]\ndrum_radius = 0.1\n").winch == Winch(0.1, 1.0, 10.0, 1.0, None, None)
+    given = "drum_radius = 0.2\ngear = 30\nbandwidth = 25\ndamping_ratio = 0.7\nspeed_limit = 2\nacceleration_limit = 8"
+    assert read(tmp_path, f"{HALL}\n[winch]\n{given}\n").winch == Winch(0.2, 30.0, 25.0, 0.7, 2.0, 8.0)
+
+
+def test_fmus_of_the_users_are_found_from_the_robot_file(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    absolute = tmp_path.parent / "x.fmu"
+    own = f"[fmu]\nplatform = 'models/mine.fmu'\ncable_2 = '../a.fmu'\nwinch_3 = '{absolute}'\n"
+    path = tmp_path / "robot.toml"
+    path.write_text(f"{HALL}\n{own}")
+    monkeypatch.chdir(tmp_path)
+    for place in (path, Path("robot.toml")):
+        assert read_robot(place).fmus == (
+            OwnFmu("platform", tmp_path / "models" / "mine.fmu"),
+            OwnFmu("cable_2", tmp_path.parent / "a.fmu"),
+            OwnFmu("winch_3", absolute),
+        )
 
 
 @pytest.mark.parametrize(

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from dataclasses import replace
 from pathlib import Path
 
@@ -10,7 +11,18 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tautwire.errors import RobotFileError
-from tautwire.robot import Cable, EffectSetting, Platform, Robot, Sensors, TensionLimits
+from tautwire.robot import (
+    PER_CABLE,
+    Cable,
+    EffectSetting,
+    OwnFmu,
+    Platform,
+    Robot,
+    Sensors,
+    TensionLimits,
+    Winch,
+    slots,
+)
 from tautwire.robot_file import read_robot, robot_text, write_robot
 from tautwire_fmu.laws.cable import LAWS
 from tautwire_fmu.laws.effects import ALL
@@ -67,6 +79,16 @@ def test_with_effect_replaces_the_same_effect_on_the_same_cables() -> None:
     assert changed.without_effects() == HALL
 
 
+def test_winches_and_users_fmus_are_no_part_of_the_model() -> None:
+    own = OwnFmu("winch_2", Path("/models/a.fmu"))
+    robot = replace(HALL, winch=Winch(0.1)).with_fmus([own, OwnFmu("platform", Path("/models/b.fmu"))])
+    assert robot.as_modelled() == HALL
+    assert robot.winch_numbers == (1, 2, 3)
+    assert HALL.with_fmus([own]).winch_numbers == (2,)
+    again = HALL.with_fmus([own]).with_fmus([OwnFmu("winch_2", Path("/models/c.fmu"))])
+    assert again.fmus == (OwnFmu("winch_2", Path("/models/c.fmu")),)
+
+
 def test_with_effect_wins_on_the_cables_that_it_names() -> None:
     robot = HALL.with_effect(EffectSetting("modulus", {"modulus": 5e10}, (1, 2, 3)))
     changed = robot.with_effect(EffectSetting("modulus", {"modulus": 7e10}, (2,)))
@@ -90,6 +112,10 @@ def test_settings_are_values() -> None:
 SMALL = st.floats(-1e4, 1e4)
 POSITIVE = st.floats(1e-12, 1e13)
 NOT_NEGATIVE = st.floats(0.0, 1e13)
+BANDWIDTH, RATIO, LIMIT = st.floats(0.01, 1000.0), st.floats(0.05, 20.0), st.none() | POSITIVE
+FILES = st.text(st.characters(exclude_categories=("C", "Z"), exclude_characters="/"), min_size=1, max_size=20).map(
+    lambda name: Path(os.path.abspath(f"/models/{name}.fmu"))
+)
 NAMES = st.text(st.characters(exclude_categories=("C", "Z")), min_size=1, max_size=20)
 
 
@@ -99,7 +125,7 @@ def effect_settings(draw: st.DrawFn, cable_count: int) -> list[EffectSetting]:
     drawn = []
     for effect in draw(st.lists(st.sampled_from(ALL), unique=True, max_size=3)):
         numbers = st.fixed_dictionaries({p.name: st.floats(p.minimum, p.maximum) for p in effect.parameters})
-        if effect.component not in ("cable", "winch"):
+        if effect.component not in PER_CABLE:
             drawn.append(EffectSetting(effect.name, draw(numbers)))
             continue
         shares = draw(st.lists(st.integers(0, 2), min_size=cable_count, max_size=cable_count))
@@ -128,6 +154,8 @@ def robots(draw: st.DrawFn) -> Robot:
         sensors=Sensors(draw(noise), draw(noise), draw(noise)),
         cables=tuple(cables),
         effects=tuple(draw(effect_settings(count))),
+        winch=draw(st.none() | st.builds(Winch, POSITIVE, POSITIVE, BANDWIDTH, RATIO, LIMIT, LIMIT)),
+        fmus=tuple(OwnFmu(slot, draw(FILES)) for slot in draw(st.lists(st.sampled_from(slots(count)), unique=True))),
     )
 
 

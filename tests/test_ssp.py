@@ -12,10 +12,10 @@ from fmpy.ssp.simulation import simulate_ssp
 from fmpy.ssp.ssd import read_ssd, validate_tree
 from lxml import etree
 
-from tautwire.cosimulation import connections, shown_ports, winch_ports
 from tautwire.errors import InputError
 from tautwire.packaging import RobotFmus, build_fmus
 from tautwire.robot import EffectSetting
+from tautwire.robot_wiring import connections, shown_ports, winch_ports
 from tautwire.ssp import COMPONENTS_ONLY, OPEN, ssp_name, write_ssp
 from tautwire_fmu.units import UNITS
 from tests.robots import paper_robot

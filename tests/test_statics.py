@@ -62,3 +62,49 @@ def test_limits_that_no_distribution_meets_are_refused() -> None:
     robot = replace(example("eight"), tension=TensionLimits(1.0, 20.0, 10.0))
     with pytest.raises(UnreachableError, match="between 1 and 20 N"):
         static_tensions(robot)
+
+
+def test_the_cable_that_would_push_is_named_among_more_than_three() -> None:
+    # Without limits, beyond the wall two of the eight would have to push, the nearer upper corners most.
+    robot = replace(example("eight"), tension=None)
+    with pytest.raises(UnreachableError) as caught:
+        static_tensions(robot, np.array([11.0, 3.0, 2.5]))
+    error = caught.value
+    assert error.cable is not None and error.tension is not None and error.tension < 0.0
+    assert f"cable {error.cable} would need {error.tension:.6g} N" in str(error)
+    # With that push allowed to this cable and as much to the others, the platform is held.
+    relaxed = replace(robot, tension=TensionLimits(error.tension, 1e9, 0.0))
+    assert static_tensions(relaxed, np.array([11.0, 3.0, 2.5])).min() >= error.tension - 1e-6
+
+
+def test_the_cable_that_breaks_its_limit_most_is_named_with_what_it_would_need() -> None:
+    robot = replace(example("eight"), tension=TensionLimits(1.0, 120.0, 10.0))
+    with pytest.raises(UnreachableError, match="between 1 and 120 N") as caught:
+        static_tensions(robot, np.array([5.0, 3.0, 4.0]))
+    assert caught.value.tension is not None and not 1.0 <= caught.value.tension <= 120.0
+    wide = replace(robot, tension=TensionLimits(-abs(caught.value.tension), 120.0 + abs(caught.value.tension), 10.0))
+    assert static_tensions(wide, np.array([5.0, 3.0, 4.0])).min() < 1.0
+
+
+def test_more_cables_in_one_plane_hold_nothing() -> None:
+    robot = replace(example("eight"), tension=None)
+    flat = replace(robot, cables=tuple(c for c in robot.cables if c.anchor[2] == 6.0))
+    with pytest.raises(UnreachableError, match="the 4 cables lie in one plane there"):
+        static_tensions(flat, np.array([5.0, 4.0, 6.0]))
+
+
+@pytest.mark.parametrize("tension", [None, TensionLimits(100.0, 4000.0, 600.0), TensionLimits(300.0, 1000.0, 400.0)])
+def test_tensions_are_continuous_along_a_path(tension: TensionLimits | None) -> None:
+    robot = replace(example("eight"), tension=tension)
+    begin, end = np.array([3.0, 2.0, 1.5]), np.array([6.0, 5.0, 3.0])
+
+    def jump(count: int) -> float:
+        places = begin + np.linspace(0.0, 1.0, count)[:, None] * (end - begin)
+        tensions = np.array([static_tensions(robot, place) for place in places])
+        if tension is not None and count > 300:
+            # Cables meet their limits on the way, and leave them again.
+            held = np.isclose(tensions, tension.minimum) | np.isclose(tensions, tension.maximum)
+            assert tension.minimum == 100.0 or (held.any() and not held.all())
+        return float(np.max(np.abs(np.diff(tensions, axis=0))))
+
+    assert jump(801) == pytest.approx(jump(201) / 4.0, rel=0.1)

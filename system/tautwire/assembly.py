@@ -6,14 +6,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
-import numpy as np
-
 from tautwire_fmu.laws.cable import LAWS, CableConstants
 from tautwire_fmu.laws.effects import ActiveEffect
+from tautwire_fmu.laws.mathematics import REAL, Mathematics
 from tautwire_fmu.laws.point_mass import PointMassConstants
 
 from .robot import Robot
-from .statics import active, platform_effects, static_tensions
+from .statics import cable_effects, platform_effects, routes, static_tensions
 
 
 @dataclass(frozen=True)
@@ -34,13 +33,15 @@ class Assembly:
     start: tuple[float, float, float]
 
 
-def assemble(robot: Robot, start_tensions: Sequence[Any] | None = None) -> Assembly:
+def assemble(robot: Robot, start_tensions: Sequence[Any] | None = None, m: Mathematics = REAL) -> Assembly:
     """Gather constants and effects; the static start gives the tensions where none are handed in.
+
+    ``m`` is the mathematics of the effects' parameters.
 
     Raises UnreachableError where the cables cannot hold the platform at its start.
     """
     tensions = static_tensions(robot) if start_tensions is None else start_tensions
-    start = np.array(robot.platform.start)
+    lines = routes(m, robot, robot.platform.start)
     cables = tuple(
         CableComponent(
             constants=CableConstants(
@@ -49,12 +50,14 @@ def assemble(robot: Robot, start_tensions: Sequence[Any] | None = None) -> Assem
                 modulus=cable.modulus,
                 area=cable.area,
                 damping=cable.damping,
-                start_length=float(np.linalg.norm(np.array(cable.anchor) - start)),
+                start_length=line.length,
                 start_tension=tension,
+                start_direction=line.direction,
+                gravity=robot.gravity,
             ),
-            effects=tuple(active(s) for s in robot.effects_on_cable(index)),
+            effects=cable_effects(robot, index),
         )
-        for index, (cable, tension) in enumerate(zip(robot.cables, tensions, strict=True), start=1)
+        for index, (cable, line, tension) in enumerate(zip(robot.cables, lines, tensions, strict=True), start=1)
     )
     return Assembly(
         cables=cables,

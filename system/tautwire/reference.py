@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from .robot import Robot
-from .symbolic import symbolic_model
+from .symbolic import Model, symbolic_model
 
 Array = NDArray[np.float64]
 
@@ -32,13 +32,29 @@ def integrate(
     """Integrate the whole robot over winch speeds that are linear between samples.
 
     ``time`` (N,), ``winch_speed`` (N, n). Dormand and Prince's method of order 8 (DOP853), begun anew at every
-    sample, where the slope of the winch speed jumps.
+    sample, where the slope of the winch speed jumps. A sensor that lags shows the start until its lag has passed.
     """
     model = symbolic_model(robot)
-    rates = casadi.Function("rates", [model.states, model.inputs], [model.rates])
     outputs = casadi.Function("outputs", [model.states, model.inputs], [model.outputs])
+    lags = np.array(casadi.Function("lags", [], [model.lags])()["o0"]).ravel()
+    late = {float(lag): np.maximum(time - lag, time[0]) for lag in np.unique(np.append(lags, 0.0))}
+    instants = np.unique(np.concatenate(list(late.values())))
+    states = _states(model, time, winch_speed, instants, relative, absolute)
+    speeds = np.array([np.interp(instants, time, column) for column in winch_speed.T])
+    shown = np.array(outputs(states.T, np.vstack([speeds, np.zeros((3, len(instants)))]))).T
+    count = robot.cable_count
+    columns = np.repeat(0.0, shown.shape[1])
+    columns[np.r_[0:3, 6 : 6 + count]] = lags
+    rows = np.array([np.searchsorted(instants, late[float(lag)]) for lag in columns]).T
+    shown = np.take_along_axis(shown, rows, axis=0)
+    return ReferenceRun(time, shown[:, :3], shown[:, 3:6], shown[:, 6 : 6 + count], shown[:, 6 + count :])
+
+
+def _states(model: Model, time: Array, winch_speed: Array, instants: Array, relative: float, absolute: float) -> Array:
+    """States at rising instants, the first of which is the start, shape (instants, states)."""
+    rates = casadi.Function("rates", [model.states, model.inputs], [model.rates])
     state = np.array(casadi.Function("start", [], [model.start])()["o0"]).ravel()
-    states = [state]
+    states = [state[None, :]]
     for index in range(len(time) - 1):
         begin, end = float(time[index]), float(time[index + 1])
         slope = (winch_speed[index + 1] - winch_speed[index]) / (end - begin)
@@ -47,10 +63,9 @@ def integrate(
             speed = winch_speed[index] + (at - begin) * slope
             return np.array(rates(y, np.append(speed, np.zeros(3)))).ravel()
 
-        solution = solve_ivp(rate, (begin, end), state, method="DOP853", rtol=relative, atol=absolute)
+        inside = instants[(instants > begin) & (instants <= end)]
+        asked = np.unique(np.append(inside, end))
+        solution = solve_ivp(rate, (begin, end), state, method="DOP853", t_eval=asked, rtol=relative, atol=absolute)
         state = solution.y[:, -1]
-        states.append(state)
-    inputs = np.hstack([winch_speed, np.zeros((len(time), 3))])
-    shown = np.array(outputs(np.array(states).T, inputs.T)).T
-    count = robot.cable_count
-    return ReferenceRun(time, shown[:, :3], shown[:, 3:6], shown[:, 6 : 6 + count], shown[:, 6 + count :])
+        states.append(solution.y.T[: len(inside)])
+    return np.vstack(states)

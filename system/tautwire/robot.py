@@ -1,12 +1,13 @@
 """What a robot file declares: the robot and the effects that act on it."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
+from pathlib import Path
 
 Point = tuple[float, float, float]
 
 # Components of which there is one for each cable: an effect in them may hold for some cables only.
-PER_CABLE = ("cable", "winch")
+PER_CABLE = ("cable", "winch", "sensor")
 
 
 class Numbers(Mapping[str, float]):
@@ -74,6 +75,36 @@ class Cable:
 
 
 @dataclass(frozen=True)
+class Winch:
+    """How each winch follows the speed asked of it; its speed loop is a PI controller on the motor's inertia.
+
+    ``drum_radius`` in m; ``gear``, motor turns a drum turn; ``bandwidth``, the loop's natural frequency, in Hz; limits
+    of the rope in m/s and m/s^2, None where there is none.
+    """
+
+    drum_radius: float
+    gear: float = 1.0
+    bandwidth: float = 10.0
+    damping_ratio: float = 1.0
+    speed_limit: float | None = None
+    acceleration_limit: float | None = None
+
+
+@dataclass(frozen=True)
+class OwnFmu:
+    """An FMU of the user's in place of the project's: ``slot`` is ``platform``, ``cable_2``, ``winch_1`` ..."""
+
+    slot: str
+    path: Path
+
+
+def slots(cable_count: int) -> tuple[str, ...]:
+    """All components that may be a user's FMU: ``platform``, ``cable_1`` ..., ``winch_1`` ..."""
+    numbers = range(1, cable_count + 1)
+    return ("platform", *(f"cable_{i}" for i in numbers), *(f"winch_{i}" for i in numbers))
+
+
+@dataclass(frozen=True)
 class EffectSetting:
     """One effect switched on: ``values`` by parameter name, in the parameters' units.
 
@@ -93,7 +124,8 @@ class EffectSetting:
 class Robot:
     """A cable-driven robot as declared; ``gravity`` in m/s^2.
 
-    Settings of one effect stand together in ``effects``, as they do in a file; otherwise their order is kept.
+    Without a ``winch`` rope runs at the speed asked for. Settings of one effect stand together in ``effects``, as they
+    do in a file; otherwise their order is kept.
     """
 
     name: str
@@ -103,6 +135,8 @@ class Robot:
     sensors: Sensors
     cables: tuple[Cable, ...]
     effects: tuple[EffectSetting, ...] = ()
+    winch: Winch | None = None
+    fmus: tuple[OwnFmu, ...] = ()
 
     def __post_init__(self) -> None:
         names = list(dict.fromkeys(setting.name for setting in self.effects))
@@ -118,6 +152,12 @@ class Robot:
     def cable_numbers(self) -> tuple[int, ...]:
         """All cables, counted from 1."""
         return tuple(range(1, len(self.cables) + 1))
+
+    @property
+    def winch_numbers(self) -> tuple[int, ...]:
+        """The cables, counted from 1, whose rope a winch drives: all with a ``winch``, else those with a user's FMU."""
+        slots_taken = {fmu.slot for fmu in self.fmus}
+        return tuple(cable for cable in self.cable_numbers if self.winch or f"winch_{cable}" in slots_taken)
 
     @property
     def anchors(self) -> tuple[Point, ...]:
@@ -147,6 +187,15 @@ class Robot:
             else:
                 kept.append(old)
         return replace(self, effects=(*kept, *(() if placed else (setting,))))
+
+    def with_fmus(self, fmus: Iterable[OwnFmu]) -> "Robot":
+        """This robot with more FMUs of the user's; a new one takes the slot of an old one."""
+        by_slot = {fmu.slot: fmu for fmu in (*self.fmus, *fmus)}
+        return replace(self, fmus=tuple(by_slot.values()))
+
+    def as_modelled(self) -> "Robot":
+        """This robot as the laws know it: rope at the speed that the drum's encoder gives, no FMU of the user's."""
+        return replace(self, winch=None, fmus=())
 
     def without_effects(self) -> "Robot":
         """This robot as its owner declares it, with no effect switched on."""

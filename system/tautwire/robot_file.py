@@ -4,6 +4,7 @@ import math
 import os
 import re
 import sys
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +14,19 @@ from tautwire_fmu.laws.effects import BY_NAME, Effect, Parameter
 from .checked_table import CheckedTable, NumberRule, nearest
 from .errors import RobotFileError, one_line, shown
 from .input_file import read_bytes, require_text
-from .robot import PER_CABLE, Cable, EffectSetting, Platform, Point, Robot, Sensors, TensionLimits
+from .robot import (
+    PER_CABLE,
+    Cable,
+    EffectSetting,
+    OwnFmu,
+    Platform,
+    Point,
+    Robot,
+    Sensors,
+    TensionLimits,
+    Winch,
+    slots,
+)
 from .robot_text import robot_text
 
 if sys.version_info >= (3, 11):
@@ -39,6 +52,14 @@ NOISES = {
 MODULUS = NumberRule("the modulus of elasticity", "Pa", positive=True)
 AREA = NumberRule("the area of the rope's cross-section", "m^2", positive=True)
 DAMPING = NumberRule("the damping", "Pa s", minimum=0.0, default=0.0)
+DRUM_RADIUS = NumberRule("the radius at which rope lies on the drum", "m", positive=True)
+GEAR = NumberRule("the turns of the motor for one turn of the drum", "", positive=True, default=Winch.gear)
+BANDWIDTH = NumberRule("the natural frequency of the speed loop", "Hz", 0.01, 1000.0, default=Winch.bandwidth)
+DAMPING_RATIO = NumberRule("the damping ratio of the speed loop", "", 0.05, 20.0, default=Winch.damping_ratio)
+LIMITS = {
+    "speed_limit": NumberRule("the largest speed of the rope", "m/s", positive=True),
+    "acceleration_limit": NumberRule("the largest acceleration of the rope", "m/s^2", positive=True),
+}
 
 
 def read_robot(path: str | Path) -> Robot:
@@ -56,7 +77,7 @@ def write_robot(robot: Robot, path: str | Path) -> None:
     Raises RobotFileError where the robot is one that no file may declare, OSError where the disk refuses.
     """
     text = robot_text(robot)
-    if _robot(CheckedTable(str(path), "", _parsed(text, str(path))), robot.name) != robot:
+    if _robot(CheckedTable(str(path), "", _parsed(text, str(path))), robot.name) != _completed(robot):
         raise RobotFileError(str(path), "would not read back equal", "build the robot as read_robot does")
     target = Path(path)
     beside = target.with_name(f".{target.name}.{os.getpid()}.part")
@@ -65,6 +86,12 @@ def write_robot(robot: Robot, path: str | Path) -> None:
         beside.replace(target)
     finally:
         beside.unlink(missing_ok=True)
+
+
+def _completed(robot: Robot) -> Robot:
+    """The robot with the neutral values that its effects' settings leave out."""
+    effects = (replace(s, values=BY_NAME[s.name].completed(s.values)) for s in robot.effects)
+    return replace(robot, effects=tuple(effects))
 
 
 def _parsed(text: str, file: str) -> dict[str, Any]:
@@ -82,7 +109,7 @@ def _parsed(text: str, file: str) -> dict[str, Any]:
 
 
 def _robot(root: CheckedTable, default_name: str) -> Robot:
-    root.require_known(("name", "gravity", "platform", "tension", "sensors", "cable", "effect"))
+    root.require_known(("name", "gravity", "platform", "tension", "sensors", "cable", "effect", "winch", "fmu"))
     name = _name(root, default_name)
     gravity = root.number("gravity", GRAVITY)
     platform = _platform(root)
@@ -95,6 +122,8 @@ def _robot(root: CheckedTable, default_name: str) -> Robot:
         sensors=_sensors(root.table("sensors")) if "sensors" in root.content else Sensors(),
         cables=cables,
         effects=_effects(root.table("effect"), len(cables)) if "effect" in root.content else (),
+        winch=_winch(root.table("winch")) if "winch" in root.content else None,
+        fmus=_fmus(root.table("fmu"), len(cables)) if "fmu" in root.content else (),
     )
 
 
@@ -166,6 +195,30 @@ def _cable(table: CheckedTable) -> Cable:
     )
 
 
+def _winch(table: CheckedTable) -> Winch:
+    table.require_known(("drum_radius", "gear", "bandwidth", "damping_ratio", *LIMITS))
+    return Winch(
+        drum_radius=table.number("drum_radius", DRUM_RADIUS),
+        gear=table.number("gear", GEAR),
+        bandwidth=table.number("bandwidth", BANDWIDTH),
+        damping_ratio=table.number("damping_ratio", DAMPING_RATIO),
+        **{key: table.optional_number(key, rule) for key, rule in LIMITS.items()},
+    )
+
+
+def _fmus(table: CheckedTable, cable_count: int) -> tuple[OwnFmu, ...]:
+    table.require_known(slots(cable_count))
+    mend = 'name an FMU, as in platform = "mine.fmu"'
+    found = []
+    for slot in table.content:
+        name = table.text(slot, mend)
+        if not name.strip() or not name.isprintable():
+            raise table.refusal(slot, f"is {shown(name)}, must be the path of a file", mend)
+        # Whoever writes the robot elsewhere must still find the FMU.
+        found.append(OwnFmu(slot, Path(os.path.abspath(Path(table.file).parent / name))))
+    return tuple(found)
+
+
 def _effects(table: CheckedTable, cable_count: int) -> tuple[EffectSetting, ...]:
     settings: list[EffectSetting] = []
     for name, content in table.content.items():
@@ -194,11 +247,15 @@ def _effect(table: CheckedTable, effect: Effect, cable_count: int) -> EffectSett
     names = [parameter.name for parameter in effect.parameters]
     table.require_known([*names, "cables"] if per_cable else names)
     values = {each.name: table.number(each.name, _rule(each)) for each in effect.parameters}
+    if not any(name in table.content for name in names):
+        mend = f"give {effect.parameters[0].description}, as in {names[0]} = {effect.parameters[0].start:g}"
+        raise table.refusal("", "sets none of its numbers", mend)
     return EffectSetting(effect.name, values, _cables_of_effect(table, cable_count) if per_cable else ())
 
 
 def _rule(parameter: Parameter) -> NumberRule:
-    return NumberRule(parameter.description, parameter.unit, parameter.minimum, parameter.maximum)
+    bounds = (parameter.minimum, parameter.maximum)
+    return NumberRule(parameter.description, parameter.unit, *bounds, default=parameter.neutral)
 
 
 def _cables_of_effect(table: CheckedTable, cable_count: int) -> tuple[int, ...]:

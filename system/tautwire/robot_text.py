@@ -1,10 +1,11 @@
 """A robot as the text of a robot file."""
 
 import json
+from collections.abc import Sequence
 
 from tautwire_fmu.laws.effects import BY_NAME
 
-from .robot import PER_CABLE, Cable, EffectSetting, Point, Robot, Sensors, TensionLimits
+from .robot import PER_CABLE, Cable, EffectSetting, OwnFmu, Point, Robot, Sensors, TensionLimits, Winch
 
 
 def robot_text(robot: Robot) -> str:
@@ -22,6 +23,8 @@ def robot_text(robot: Robot) -> str:
         ],
         _tension(robot.tension) if robot.tension else [],
         _sensors(robot.sensors),
+        _winch(robot.winch) if robot.winch else [],
+        _fmus(robot.fmus),
         *(_cable(number, cable) for number, cable in enumerate(robot.cables, 1)),
         *(_effect(robot, setting) for setting in robot.effects),
     ]
@@ -55,6 +58,23 @@ def _sensors(sensors: Sensors) -> list[str]:
     return ["[sensors]  # standard deviation of one sample", *lines] if lines else []
 
 
+def _winch(winch: Winch) -> list[str]:
+    limits = (("speed_limit", winch.speed_limit, "m/s"), ("acceleration_limit", winch.acceleration_limit, "m/s^2"))
+    return [
+        "[winch]",
+        _number("drum_radius", winch.drum_radius, "m"),
+        _number("gear", winch.gear, "motor turns a drum turn"),
+        _number("bandwidth", winch.bandwidth, "Hz, natural frequency of the speed loop"),
+        _number("damping_ratio", winch.damping_ratio, ""),
+        *(_number(key, value, f"{unit}, of the rope") for key, value, unit in limits if value is not None),
+    ]
+
+
+def _fmus(fmus: Sequence[OwnFmu]) -> list[str]:
+    lines = [f"{fmu.slot} = {json.dumps(str(fmu.path), ensure_ascii=False)}" for fmu in fmus]
+    return ["[fmu]  # in place of the project's own", *lines] if lines else []
+
+
 def _cable(number: int, cable: Cable) -> list[str]:
     return [
         f"[[cable]]  # cable {number}",
@@ -69,10 +89,12 @@ def _cable(number: int, cable: Cable) -> list[str]:
 def _effect(robot: Robot, setting: EffectSetting) -> list[str]:
     effect = BY_NAME.get(setting.name)
     units = {parameter.name: parameter.unit for parameter in effect.parameters} if effect else {}
+    neutral = {parameter.name: parameter.neutral for parameter in effect.parameters} if effect else {}
+    told = {name: value for name, value in setting.values.items() if value != neutral.get(name)} or setting.values
     alone = sum(other.name == setting.name for other in robot.effects) == 1
     header = f"[effect.{setting.name}]" if alone else f"[[effect.{setting.name}]]"
     lines = [header + (f"  # {effect.description}" if effect else "")]
-    lines += [_number(name, value, units.get(name, "")) for name, value in setting.values.items()]
+    lines += [_number(name, value, units.get(name, "")) for name, value in told.items()]
     per_cable = effect is not None and effect.component in PER_CABLE
     # All cables is what the absent key means; an empty list is kept visible, for the reader to refuse.
     if (per_cable or setting.cables) and setting.cables != robot.cable_numbers:

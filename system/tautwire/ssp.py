@@ -1,8 +1,8 @@
 """Writes a robot's FMUs, their wiring, parameter values and units as one SSP 1.0 archive.
 
-``SystemStructure.ssd`` has connectors of its own for the winches (in) and for what a run shows (out). Importers that
-know connections between components only (libcosim, ecos) refuse those, so ``ComponentsOnly.ssd``, a second variant
-in the same archive, leaves them away.
+``SystemStructure.ssd`` has connectors of its own for what drives the winches (in) and for what a run shows (out).
+Importers that know connections between components only (libcosim, ecos) refuse those, so ``ComponentsOnly.ssd``, a
+second variant in the same archive, leaves them away.
 """
 
 from __future__ import annotations
@@ -16,16 +16,19 @@ from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
 import fmpy
-from fmpy.model_description import ScalarVariable
+from fmpy.model_description import ModelDescription, ScalarVariable
 
 from tautwire_fmu.units import UNITS
 
-from .cosimulation import PLATFORM, cable_name, connections, shown_ports, winch_ports
+from .cosimulation import wired
 from .errors import one_line
 from .master import Connection, Port
+from .master.units import BASES, measure, measure_of, unit_of
 from .output import file_in_place
 from .packaging import RobotFmus
 from .robot import Robot
+from .robot_wiring import PLATFORM, middle_connections
+from .slots import slot_ports
 
 OPEN = "SystemStructure.ssd"
 COMPONENTS_ONLY = "ComponentsOnly.ssd"
@@ -44,11 +47,21 @@ STAMP = (1980, 1, 1, 0, 0, 0)
 
 @dataclass(frozen=True)
 class _Part:
-    """A component of the system: its FMU, the FMU's variables by name, and the names of its connectors."""
+    """A component of the system: its name and FMU, the FMU's variables by name, its connectors and their units."""
 
+    name: str
     path: Path
+    description: ModelDescription
     variables: Mapping[str, ScalarVariable]
-    connectors: tuple[str, ...]
+    connectors: Mapping[str, str]
+
+    def bases(self, unit: str) -> dict[str, str]:
+        """The attributes that tell what a unit measures, as the FMU defines it."""
+        if unit in UNITS:
+            return {base: str(exponent) for base, exponent in UNITS[unit].items()}
+        *exponents, factor, offset = measure(self.description, unit) or measure_of({})
+        powers = {base: str(int(power)) for base, power in zip(BASES, exponents, strict=True) if power}
+        return powers | ({} if (factor, offset) == (1.0, 0.0) else {"factor": repr(factor), "offset": repr(offset)})
 
 
 def ssp_name(robot: Robot) -> str:
@@ -63,10 +76,12 @@ def write_ssp(robot: Robot, fmus: RobotFmus, path: Path) -> Path:
 
     Raises InputError where ``path`` cannot be written.
     """
-    count = len(fmus.cables)
-    wires = connections(count)
-    inward = {_outer_name(port): port for port in winch_ports(count)}
-    outward = {_outer_name(port): port for port in shown_ports(count)}
+    wiring = wired(fmus)
+    # Importers know no middle of a step.
+    middle = middle_connections(len(fmus.cables))
+    wires = [wire for wire in wiring.connections if wire not in middle]
+    inward = {_outer_name(port): port for port in wiring.drives}
+    outward = {_outer_name(port): port for port in wiring.shown}
     ends = [end for wire in wires for end in (wire.source, wire.target)]
     parts = _parts(fmus, [*ends, *inward.values(), *outward.values()])
     with file_in_place(path) as scratch, zipfile.ZipFile(scratch, "w") as archive:
@@ -78,15 +93,18 @@ def write_ssp(robot: Robot, fmus: RobotFmus, path: Path) -> Path:
 
 
 def _parts(fmus: RobotFmus, ports: Iterable[Port]) -> dict[str, _Part]:
-    paths = {PLATFORM: fmus.platform} | {cable_name(i): path for i, path in enumerate(fmus.cables, start=1)}
-    names: dict[str, dict[str, None]] = {name: {} for name in paths}
+    names: dict[str, dict[str, None]] = {name: {} for name in fmus.parts}
     for port in ports:
         names[port.component][port.variable] = None
-    return {name: _Part(path, _variables(path), tuple(names[name])) for name, path in paths.items()}
+    return {name: _part(name, path, names[name], len(fmus.cables)) for name, path in fmus.parts.items()}
 
 
-def _variables(path: Path) -> dict[str, ScalarVariable]:
-    return {v.name: v for v in fmpy.read_model_description(str(path)).modelVariables}
+def _part(name: str, path: Path, connectors: Iterable[str], cable_count: int) -> _Part:
+    description = fmpy.read_model_description(str(path))
+    variables = {variable.name: variable for variable in description.modelVariables}
+    ours = {port.name: port.unit for port in slot_ports(name, cable_count)}
+    units = {connector: unit_of(variables[connector]) or ours[connector] for connector in connectors}
+    return _Part(name, path, description, variables, units)
 
 
 def _outer_name(port: Port) -> str:
@@ -95,7 +113,7 @@ def _outer_name(port: Port) -> str:
 
 
 def _source(part: _Part) -> str:
-    return f"resources/{part.path.name}"
+    return f"resources/{part.name}.fmu"
 
 
 def _add(archive: zipfile.ZipFile, name: str, data: bytes, method: int = zipfile.ZIP_DEFLATED) -> None:
@@ -120,7 +138,7 @@ def _description(
         frame = SubElement(system, "ssd:Connectors")
         for kind, ports in (("input", inward), ("output", outward)):
             for outer, port in ports.items():
-                _connector(frame, outer, kind, parts[port.component].variables[port.variable])
+                _connector(frame, outer, kind, port.variable, parts[port.component])
     elements = SubElement(system, "ssd:Elements")
     for component, part in parts.items():
         _component(elements, component, part)
@@ -135,23 +153,24 @@ def _component(elements: Element, name: str, part: _Part) -> None:
     component = SubElement(elements, "ssd:Component", attributes | {"implementation": "CoSimulation"})
     frame = SubElement(component, "ssd:Connectors")
     for connector in part.connectors:
-        _connector(frame, connector, part.variables[connector].causality, part.variables[connector])
+        _connector(frame, connector, part.variables[connector].causality, connector, part)
     bindings = SubElement(component, "ssd:ParameterBindings")
     values = SubElement(SubElement(bindings, "ssd:ParameterBinding"), "ssd:ParameterValues")
     settings = SubElement(values, "ssv:ParameterSet", {"version": "1.0", "name": "values"})
     numbers = SubElement(settings, "ssv:Parameters")
-    parameters = [v for v in part.variables.values() if v.causality == "parameter"]
+    parameters = [v for v in part.variables.values() if v.causality == "parameter" and v.type == "Real"]
     for parameter in parameters:
         number = SubElement(numbers, "ssv:Parameter", {"name": parameter.name})
-        SubElement(number, "ssv:Real", {"value": str(parameter.start), "unit": parameter.unit})
-    _unit_list(settings, "ssv:Units", parameters)
+        unit = unit_of(parameter)
+        SubElement(number, "ssv:Real", {"value": str(parameter.start)} | ({"unit": unit} if unit else {}))
+    _unit_list(settings, "ssv:Units", {unit: part.bases(unit) for unit in filter(None, map(unit_of, parameters))})
 
 
-def _connector(frame: Element, name: str, kind: str, variable: ScalarVariable) -> None:
+def _connector(frame: Element, name: str, kind: str, variable: str, part: _Part) -> None:
     connector = SubElement(frame, "ssd:Connector", {"name": name, "kind": kind})
-    if variable.description:
-        connector.set("description", variable.description)
-    SubElement(connector, "ssc:Real", {"unit": variable.unit})
+    if part.variables[variable].description:
+        connector.set("description", part.variables[variable].description)
+    SubElement(connector, "ssc:Real", {"unit": part.connectors[variable]})
 
 
 def _connections(
@@ -172,11 +191,11 @@ def _end(side: str, port: Port) -> dict[str, str]:
 
 def _units(root: Element, parts: Iterable[_Part]) -> None:
     """The units of all connectors; parameter sets list their own."""
-    _unit_list(root, "ssd:Units", [part.variables[name] for part in parts for name in part.connectors])
+    _unit_list(root, "ssd:Units", {unit: part.bases(unit) for part in parts for unit in part.connectors.values()})
 
 
-def _unit_list(parent: Element, tag: str, variables: Iterable[ScalarVariable]) -> None:
+def _unit_list(parent: Element, tag: str, units: Mapping[str, Mapping[str, str]]) -> None:
     frame = SubElement(parent, tag)
-    for unit in sorted({variable.unit for variable in variables}):
+    for unit, bases in sorted(units.items()):
         node = SubElement(frame, "ssc:Unit", {"name": unit})
-        SubElement(node, "ssc:BaseUnit", {base: str(exponent) for base, exponent in UNITS[unit].items()})
+        SubElement(node, "ssc:BaseUnit", dict(bases))

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable, Sequence
 from typing import Any
 
-import casadi
 import numpy as np
 from numpy.typing import NDArray
 
-from tautwire_fmu.laws import point_mass
+from tautwire_fmu.laws import point_mass, stages
 from tautwire_fmu.laws.effects import BY_NAME, ActiveEffect
-from tautwire_fmu.laws.mathematics import REAL
+from tautwire_fmu.laws.mathematics import REAL, Mathematics
+from tautwire_fmu.laws.stages import Route
+from tautwire_fmu.laws.vectors import Vector, add, scale, subtract
 
+from .distribution import excess_tensions, nearest_tensions
 from .errors import UnreachableError
 from .robot import EffectSetting, Robot, TensionLimits
 
@@ -20,60 +23,144 @@ Array = NDArray[np.float64]
 DEFAULT_LIMITS = TensionLimits(minimum=0.0, maximum=float("inf"), preferred=0.0)
 PARALLEL = 1e-9
 AT_ANCHOR = 1e-6
+SWEEPS = 50
+SETTLED = 1e-14
 
 
 def active(setting: EffectSetting) -> ActiveEffect:
     """An effect of the robot file with its numbers, as the laws take it."""
     effect = BY_NAME[setting.name]
-    return ActiveEffect(effect, effect.values(**setting.values))
+    return ActiveEffect(effect, effect.values(**effect.completed(setting.values)))
+
+
+def cable_effects(robot: Robot, cable: int) -> tuple[ActiveEffect, ...]:
+    """The effects of the robot file that act on a cable, its winch or its load cell; ``cable`` counts from 1."""
+    return tuple(active(s) for s in robot.effects_on_cable(cable))
+
+
+def platform_settings(robot: Robot) -> tuple[EffectSetting, ...]:
+    """The effects of the robot file that act on the platform or on the sensor of its position."""
+    return tuple(s for s in robot.effects if not s.cables or BY_NAME[s.name].component == "sensor")
+
+
+def has_sensor_effects(robot: Robot) -> bool:
+    """Whether sensors show something else than what is."""
+    return any(BY_NAME[setting.name].component == "sensor" for setting in robot.effects)
 
 
 def platform_effects(robot: Robot) -> tuple[ActiveEffect, ...]:
-    """The effects of the robot file that act on the platform."""
-    return tuple(active(s) for s in robot.effects_elsewhere())
+    """Those of :func:`platform_settings` as the laws take them."""
+    return tuple(map(active, platform_settings(robot)))
+
+
+def routes(m: Mathematics, robot: Robot, position: Sequence[Any]) -> tuple[Route, ...]:
+    """How the ropes run from the platform at a position (m) to their exit points, effects included.
+
+    Raises UnreachableError where a rope has no length there, or the platform is inside a pulley.
+    """
+    found = []
+    for index, anchor in enumerate(robot.anchors, start=1):
+        try:
+            line = stages.route(m, cable_effects(robot, index), anchor, position)
+        except (ArithmeticError, ValueError) as error:
+            raise _no_length(robot, position, index) from error
+        if isinstance(line.length, float) and not line.length >= AT_ANCHOR:
+            raise _no_length(robot, position, index)
+        found.append(line)
+    return tuple(found)
 
 
 def directions(robot: Robot, at: Array | None = None) -> Array:
-    """Unit vectors from the platform, by default at its start, to the exit points, shape (3, n)."""
-    spans = np.array([cable.anchor for cable in robot.cables]) - (robot.platform.start if at is None else at)
-    unit: Array = (spans / np.linalg.norm(spans, axis=1, keepdims=True)).T
-    return unit
+    """Unit vectors of the ropes at the platform, by default at its start, shape (3, n)."""
+    position = np.array(robot.platform.start if at is None else at, dtype=float)
+    return np.array([line.direction for line in routes(REAL, robot, position.tolist())]).T
 
 
-def weight(robot: Robot) -> float:
+def weight(robot: Robot, m: Mathematics = REAL) -> Any:
     """Weight of the platform with all that the robot file puts on it, in N."""
     constants = point_mass.PointMassConstants(robot.platform.mass, robot.gravity)
-    return float(point_mass.total_mass(REAL, constants, platform_effects(robot)) * robot.gravity)
+    return point_mass.total_mass(m, constants, platform_effects(robot)) * robot.gravity
+
+
+def load(m: Mathematics, robot: Robot, position: Sequence[Any]) -> Vector:
+    """What the cables have to hold of the platform at rest, in N: its weight less what effects push it with."""
+    effects = platform_effects(robot)
+    pushed = point_mass.wrench(m, effects, tuple(() for _ in effects), position, (0.0, 0.0, 0.0))
+    return subtract((0.0, 0.0, weight(robot, m)), pushed)
+
+
+def has_routes(robot: Robot) -> bool:
+    """Whether some rope does not run straight to its declared exit point."""
+    effects = (BY_NAME[setting.name] for setting in robot.effects)
+    return any(effect.exit_point is not None or effect.path is not None for effect in effects)
+
+
+def has_weight(robot: Robot) -> bool:
+    """Whether the ropes' ends carry more than the tension."""
+    return any(BY_NAME[setting.name].ends is not None for setting in robot.effects)
+
+
+def hung(m: Mathematics, robot: Robot, lines: Sequence[Route], tensions: Sequence[Any]) -> Vector:
+    """What ropes under tensions (N) put on the platform beside them, in N."""
+    total: Vector = (0.0, 0.0, 0.0)
+    for index, (line, tension) in enumerate(zip(lines, tensions, strict=True), start=1):
+        total = add(total, stages.ends(m, cable_effects(robot, index), robot.gravity, line, tension)[0])
+    return total
+
+
+def held_by(robot: Robot, position: Sequence[float], tensions: Array) -> Array:
+    """What tensions (n,) in N along the ropes have to hold of the platform at rest at a position (m), (3,) in N."""
+    lines = routes(REAL, robot, position)
+    hanging = hung(REAL, robot, lines, tensions.tolist())
+    return np.array(subtract(load(REAL, robot, position), hanging), dtype=float)
 
 
 def static_tensions(robot: Robot, at: Array | None = None) -> Array:
     """Tensions that hold the platform at rest, shape (n,), in N.
 
-    Solves ``sum T_i u_i = m g e_z``. With more than three cables, the tensions nearest to the preferred one (least
-    squares) within the limits of the robot file; without limits there, nearest to zero and not negative. ``at`` is
-    a position in m, by default the start.
+    Solves ``sum T_i u_i = m g e_z``, with what effects add to the load and hang on the platform. With more than three
+    cables, the tensions nearest to the preferred one (least squares) within the limits of the robot file; without
+    limits there, nearest to zero and not negative. ``at`` is a position in m, by default the start.
 
     Raises UnreachableError where a cable would have to push or to break a limit.
     """
     position = np.array(robot.platform.start if at is None else at, dtype=float)
-    _refuse_anchors(robot, position)
-    unit = directions(robot, position)
-    load = np.array([0.0, 0.0, weight(robot)])
-    if len(robot.cables) == 3:
-        return _solve_three(robot, position, unit, load)
-    return _distribute(robot, position, unit, load)
+    lines = routes(REAL, robot, position.tolist())
+    unit = np.array([line.direction for line in lines]).T
+    held = np.array(load(REAL, robot, position.tolist()), dtype=float)
+    solve = _solve_three if len(robot.cables) == 3 else _distribute
+    if not has_weight(robot):
+        return solve(robot, position, unit, held)
+
+    def sweep(tensions: Array) -> Array:
+        return solve(robot, position, unit, held - np.array(hung(REAL, robot, lines, tensions.tolist())))
+
+    return _settled(sweep, np.full(len(lines), float(np.linalg.norm(held))))
 
 
-def _refuse_anchors(robot: Robot, position: Array) -> None:
-    for index, anchor in enumerate(robot.anchors, start=1):
-        if float(np.linalg.norm(np.array(anchor) - position)) < AT_ANCHOR:
-            raise UnreachableError(
-                robot.name,
-                position=tuple(position),
-                cable=index,
-                tension=None,
-                reason=f"cable {index} has no length there",
-            )
+def static_forces(robot: Robot) -> Array:
+    """Forces of the cables on the platform at its start, shape (n, 3), in N."""
+    lines = routes(REAL, robot, robot.platform.start)
+    forces = []
+    for index, (line, tension) in enumerate(zip(lines, static_tensions(robot).tolist(), strict=True), start=1):
+        beside = stages.ends(REAL, cable_effects(robot, index), robot.gravity, line, tension)[0]
+        forces.append(add(scale(tension, line.direction), beside))
+    return np.array(forces)
+
+
+def _settled(sweep: Callable[[Array], Array], guess: Array) -> Array:
+    """The fixed point of a map that hardly depends on where it starts: ropes are light against their tensions."""
+    tensions = guess
+    for _ in range(SWEEPS):
+        before, tensions = tensions, sweep(tensions)
+        if np.max(np.abs(tensions - before)) <= SETTLED * np.max(tensions):
+            break
+    return tensions
+
+
+def _no_length(robot: Robot, position: Sequence[Any], cable: int) -> UnreachableError:
+    reason = f"cable {cable} has no length there"
+    return UnreachableError(robot.name, tuple(map(float, position)), cable=cable, tension=None, reason=reason)
 
 
 def _solve_three(robot: Robot, position: Array, unit: Array, load: Array) -> Array:
@@ -100,29 +187,24 @@ def _solve_three(robot: Robot, position: Array, unit: Array, load: Array) -> Arr
 
 def _distribute(robot: Robot, position: Array, unit: Array, load: Array) -> Array:
     limits = robot.tension or DEFAULT_LIMITS
-    count = unit.shape[1]
-    problem: Any = {"h": casadi.Sparsity.dense(count, count), "a": casadi.Sparsity.dense(3, count)}
-    solver = casadi.conic("tension_distribution", "daqp", problem, {"error_on_fail": False})
-    scale = max(float(np.linalg.norm(load)), 1.0)
-    solution = solver(
-        h=np.eye(count),
-        g=-np.full(count, limits.preferred / scale),
-        a=unit,
-        lba=load / scale,
-        uba=load / scale,
-        lbx=limits.minimum / scale,
-        ubx=limits.maximum / scale,
-    )
-    if solver.stats()["success"]:
-        tensions: Array = np.asarray(solution["x"], dtype=float).ravel() * scale
+    tensions = nearest_tensions(unit, load, limits)
+    if tensions is not None:
         return tensions
-    free: Array = limits.preferred + np.linalg.pinv(unit) @ (load - unit @ np.full(count, limits.preferred))
-    excess = np.maximum(limits.minimum - free, free - limits.maximum)
-    worst = int(np.argmax(excess))
+    excess = excess_tensions(unit, load, limits)
+    if not np.all(np.isfinite(excess)):
+        raise UnreachableError(
+            robot.name,
+            position=tuple(position),
+            cable=None,
+            tension=None,
+            reason=f"the {len(excess)} cables lie in one plane there",
+        )
+    worst = int(np.argmax(np.abs(excess)))
+    bound = limits.minimum if excess[worst] < 0.0 else limits.maximum
     raise UnreachableError(
         robot.name,
         position=tuple(position),
         cable=worst + 1,
-        tension=float(free[worst]),
+        tension=bound + float(excess[worst]),
         reason=f"no tensions between {limits.minimum:g} and {limits.maximum:g} N hold the platform there",
     )

@@ -13,17 +13,21 @@ from numpy.typing import NDArray
 
 from tautwire_fmu.laws import cable as cable_law
 from tautwire_fmu.laws import point_mass as platform_law
+from tautwire_fmu.laws import stages
+from tautwire_fmu.laws.effects import State
 from tautwire_fmu.laws.mathematics import Mathematics
-from tautwire_fmu.laws.vectors import add
+from tautwire_fmu.laws.vectors import add, scale
 
 from .assembly import Assembly, assemble
 from .robot import EffectSetting, Robot
-from .statics import DEFAULT_LIMITS, directions, platform_effects, static_tensions
+from .statics import DEFAULT_LIMITS, PARALLEL, directions, has_weight, hung, load, routes, static_tensions
 
 Array = NDArray[np.float64]
 
 AXES = ("x", "y", "z")
 AT_BOUND = 1e-6
+# Of the start tensions, where ropes have weight: each gains some three digits.
+SWEEPS = 6
 
 CASADI = Mathematics(
     log=casadi.log,
@@ -32,6 +36,7 @@ CASADI = Mathematics(
     sin=casadi.sin,
     cos=casadi.cos,
     tanh=casadi.tanh,
+    atan2=casadi.atan2,
     absolute=casadi.fabs,
     maximum=casadi.fmax,
     where=lambda condition, a, b: casadi.if_else(condition > 0, a, b),
@@ -50,9 +55,11 @@ class FreeParameter:
 class Model:
     """The equations of a robot; SX columns.
 
-    States: position, velocity, unstrained lengths, states of every effect. Inputs: winch speeds, external force.
-    Outputs: position, velocity, tensions, lengths. ``start`` is the state at the static start; ``parameters`` are
-    the free ones.
+    States: position, velocity, unstrained lengths, and those states of effects that something depends on. Inputs:
+    winch speeds, external force. Outputs: position and tensions as sensors show them but for their lag, velocity,
+    lengths. ``lags`` (3 + n) of positions and tensions in s; ``span_tensions`` (n) those of the free ropes in N.
+    ``start`` is the state at the static start; ``drifting`` are the places of states that never settle;
+    ``parameters`` are the free ones.
     """
 
     states: SX
@@ -60,10 +67,34 @@ class Model:
     parameters: SX
     rates: SX
     outputs: SX
+    span_tensions: SX
+    lags: SX
     start: SX
+    drifting: tuple[int, ...]
     state_names: tuple[str, ...]
     input_names: tuple[str, ...]
     output_names: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Equations:
+    rates: SX
+    outputs: SX
+    span_tensions: SX
+
+
+@dataclass(frozen=True)
+class _EffectState:
+    """A state of an effect with its symbol; ``cable`` counts from 1."""
+
+    effect: str
+    cable: int
+    state: State
+    symbol: SX
+
+    @property
+    def name(self) -> str:
+        return f"{self.effect}.{self.state.name}_{self.cable}"
 
 
 def symbolic_model(robot: Robot, free: Sequence[FreeParameter] = ()) -> Model:
@@ -74,23 +105,32 @@ def symbolic_model(robot: Robot, free: Sequence[FreeParameter] = ()) -> Model:
     """
     symbols = [SX.sym(f"{robot.effects[f.setting].name}.{f.name}") for f in free]
     opened = _with_symbols(robot, free, symbols)
-    assembly = assemble(opened, _start_tensions(robot, opened))
+    assembly = assemble(opened, _start_tensions(robot, opened), CASADI)
     count = len(assembly.cables)
     position, velocity = SX.sym("position", 3), SX.sym("velocity", 3)
     unstrained = SX.sym("unstrained_length", count)
     speeds, external = SX.sym("winch_speed", count), SX.sym("external_force", 3)
-    own = [[SX.sym(s.name) for a in c.effects for s in a.effect.states] for c in assembly.cables]
-    rates, outputs = _equations(assembly, position, velocity, unstrained, speeds, external, own)
-    lengths = [c.constants.start_length for c in assembly.cables]
-    effect_states = [state for states in own for state in states]
+    own = _effect_states(assembly)
+    equations = _equations(assembly, position, velocity, unstrained, speeds, external, [e.symbol for e in own])
+    always = casadi.vertcat(position, velocity, unstrained)
+    kept = _felt(casadi.vertcat(always, *(e.symbol for e in own)), always.numel(), equations)
+    lengths = [SX(c.constants.start_length) for c in assembly.cables]
     return Model(
-        states=casadi.vertcat(position, velocity, unstrained, *effect_states),
+        states=casadi.vertcat(always, *(own[place].symbol for place in kept)),
         inputs=casadi.vertcat(speeds, external),
         parameters=casadi.vertcat(*symbols) if symbols else SX(0, 1),
-        rates=rates,
-        outputs=outputs,
-        start=casadi.vertcat(SX(list(assembly.start)), SX(3, 1), SX(lengths), SX(len(effect_states), 1)),
-        state_names=_state_names(assembly),
+        rates=equations.rates[[*range(always.numel()), *(always.numel() + place for place in kept)]],
+        outputs=equations.outputs,
+        span_tensions=equations.span_tensions,
+        lags=_lags(assembly),
+        start=casadi.vertcat(SX(list(assembly.start)), SX(3, 1), *lengths, SX(len(kept), 1)),
+        drifting=tuple(always.numel() + i for i, place in enumerate(kept) if own[place].state.drifts),
+        state_names=(
+            *_vector("position"),
+            *_vector("velocity"),
+            *_numbered("unstrained_length", count),
+            *(own[place].name for place in kept),
+        ),
         input_names=(*_numbered("winch_speed", count), *_vector("external_force")),
         output_names=(
             *_vector("position"),
@@ -99,6 +139,51 @@ def symbolic_model(robot: Robot, free: Sequence[FreeParameter] = ()) -> Model:
             *_numbered("length", count),
         ),
     )
+
+
+def with_drifts_held(model: Model) -> Model:
+    """The model without the states that never settle, which stay as they are at the start."""
+    if not model.drifting:
+        return model
+    settling = [place for place in range(model.states.numel()) if place not in model.drifting]
+    held = model.states[list(model.drifting)]
+    expressions = [model.rates[settling], model.outputs, model.span_tensions]
+    rates, outputs, tensions = casadi.substitute(expressions, [held], [SX.zeros(*held.shape)])
+    return replace(
+        model,
+        states=model.states[settling],
+        rates=rates,
+        outputs=outputs,
+        span_tensions=tensions,
+        start=model.start[settling],
+        drifting=(),
+        state_names=tuple(model.state_names[place] for place in settling),
+    )
+
+
+def _effect_states(assembly: Assembly) -> list[_EffectState]:
+    return [
+        _EffectState(active.effect.name, index, state, SX.sym(state.name))
+        for index, component in enumerate(assembly.cables, start=1)
+        for active in component.effects
+        for state in active.effect.states
+    ]
+
+
+def _felt(states: SX, always: int, equations: _Equations) -> list[int]:
+    """Which states of effects reach an output or the other states, counted among the states of effects."""
+    shown = casadi.vertcat(equations.outputs, equations.span_tensions)
+    by_rates, by_shown = (_present(casadi.jacobian(f, states)) for f in (equations.rates, shown))
+    felt: NDArray[np.bool_] = np.any(by_shown, axis=0) | (np.arange(states.numel()) < always)
+    for _ in range(len(felt)):
+        felt = felt | np.any(by_rates[felt], axis=0)
+    return np.flatnonzero(felt[always:]).tolist()
+
+
+def _present(matrix: SX) -> NDArray[np.bool_]:
+    """Where a matrix has entries at all."""
+    found: NDArray[np.bool_] = np.array(casadi.DM(matrix.sparsity(), 1.0), dtype=bool)
+    return found
 
 
 def _with_symbols(robot: Robot, free: Sequence[FreeParameter], symbols: Sequence[SX]) -> Robot:
@@ -113,44 +198,67 @@ def _with_symbols(robot: Robot, free: Sequence[FreeParameter], symbols: Sequence
 def _start_tensions(nominal: Robot, opened: Robot) -> list[SX]:
     """Static tensions as expressions: cables at a limit stay there, the others share the rest."""
     tensions = static_tensions(nominal)
-    unit = directions(nominal)
-    constants = platform_law.PointMassConstants(opened.platform.mass, opened.gravity)
-    mass = platform_law.total_mass(CASADI, constants, platform_effects(opened))
-    load = casadi.vertcat(0.0, 0.0, mass * opened.gravity)
     limits = nominal.tension or DEFAULT_LIMITS
     span = max(float(np.max(tensions)), 1.0) * AT_BOUND
     held = np.zeros(len(tensions), dtype=bool)
     if len(tensions) > 3:
         held = (tensions - limits.minimum < span) | (limits.maximum - tensions < span)
-    preferred = np.full(int(np.sum(~held)), limits.preferred)
-    rest = load - unit[:, held] @ tensions[held] - unit[:, ~held] @ preferred
-    shares = preferred + casadi.DM(np.linalg.pinv(unit[:, ~held])) @ rest
-    result: list[SX] = [SX(float(t)) for t in tensions]
-    for place, index in enumerate(np.flatnonzero(~held)):
-        result[index] = SX(shares[place])
+    start = nominal.platform.start
+    lines = routes(CASADI, opened, start)
+    across = SX(_spanned(directions(nominal))).T
+    unit = casadi.mtimes(across, casadi.horzcat(*(casadi.vertcat(*line.direction) for line in lines)))
+    weight = SX(casadi.vertcat(*load(CASADI, opened, start)))
+    result = [SX(float(tension)) for tension in tensions]
+    for _ in range(SWEEPS if has_weight(opened) else 1):
+        rest = casadi.mtimes(across, weight - casadi.vertcat(*hung(CASADI, opened, lines, result)))
+        result = _shared(unit, rest, result, held, limits.preferred)
     return result
 
 
+def _spanned(unit: Array) -> Array:
+    """A basis of what the cables can push in; the axes themselves where that is everything."""
+    basis, size, _ = np.linalg.svd(unit)
+    return np.eye(3) if size[-1] > PARALLEL else basis[:, size > PARALLEL]
+
+
+def _shared(unit: SX, rest: SX, tensions: list[SX], held: NDArray[np.bool_], preferred: float) -> list[SX]:
+    """The tensions with those that are not held chosen anew, to hold ``rest``."""
+    sharing = np.flatnonzero(~held).tolist()
+    for index in np.flatnonzero(held).tolist():
+        rest = rest - unit[:, index] * tensions[index]
+    own = unit[:, sharing]
+    if len(tensions) == 3:
+        shares = casadi.solve(own, rest)
+    else:
+        missing = rest - preferred * casadi.sum2(own)
+        shares = preferred + casadi.mtimes(_pseudo_inverse(own), missing)
+    result = list(tensions)
+    for place, index in enumerate(sharing):
+        result[index] = shares[place]
+    return result
+
+
+def _pseudo_inverse(matrix: SX) -> SX:
+    """Of a matrix of full rank."""
+    if matrix.shape[1] < matrix.shape[0]:
+        return casadi.solve(casadi.mtimes(matrix.T, matrix), matrix.T)
+    return casadi.solve(casadi.mtimes(matrix, matrix.T), matrix).T
+
+
 def _equations(
-    assembly: Assembly,
-    position: SX,
-    velocity: SX,
-    unstrained: SX,
-    speeds: SX,
-    external: SX,
-    own: list[list[SX]],
-) -> tuple[SX, SX]:
+    assembly: Assembly, position: SX, velocity: SX, unstrained: SX, speeds: SX, external: SX, own: list[SX]
+) -> _Equations:
     force: Sequence[SX] = _three(external)
     shown = []
     cable_rates = []
     effect_rates: list[SX] = []
+    symbols = iter(own)
     for index, component in enumerate(assembly.cables):
-        symbols = iter(own[index])
         states = tuple(tuple(next(symbols) for _ in a.effect.states) for a in component.effects)
         state = cable_law.CableState(unstrained[index], 0.0, states)
         inputs = cable_law.CableInputs(_three(position), _three(velocity), speeds[index])
         arguments = (CASADI, component.constants, component.effects, state)
-        line = cable_law.span(CASADI, component.constants, inputs)
+        line = cable_law.span(CASADI, component.constants, inputs, component.effects)
         moving = cable_law.motion(*arguments, line, inputs.winch_speed)
         reading = cable_law.reading(*arguments, moving)
         rate = cable_law.state_rates(*arguments, moving)
@@ -162,9 +270,19 @@ def _equations(
     acceleration = platform_law.acceleration(
         CASADI, assembly.platform, assembly.platform_effects, none, _three(position), _three(velocity), force
     )
-    rates = casadi.vertcat(velocity, *acceleration, *cable_rates, *effect_rates)
-    outputs = casadi.vertcat(position, velocity, *(r.tension for r in shown), *(r.length for r in shown))
-    return rates, outputs
+    measured = scale(stages.gains(CASADI, assembly.platform_effects)[1], _three(position))
+    return _Equations(
+        rates=casadi.vertcat(velocity, *acceleration, *cable_rates, *effect_rates),
+        outputs=casadi.vertcat(*measured, velocity, *(r.tension for r in shown), *(r.length for r in shown)),
+        span_tensions=casadi.vertcat(*(r.span_tension for r in shown)),
+    )
+
+
+def _lags(assembly: Assembly) -> SX:
+    """By how many seconds the measured x, y, z and tensions are late."""
+    of_position = stages.delays(CASADI, assembly.platform_effects)[1]
+    of_tensions = [stages.delays(CASADI, component.effects)[0] for component in assembly.cables]
+    return casadi.vertcat(*[SX(of_position)] * 3, *map(SX, of_tensions))
 
 
 def _three(column: SX) -> tuple[SX, SX, SX]:
@@ -177,18 +295,3 @@ def _vector(name: str) -> tuple[str, ...]:
 
 def _numbered(name: str, count: int) -> tuple[str, ...]:
     return tuple(f"{name}_{index}" for index in range(1, count + 1))
-
-
-def _state_names(assembly: Assembly) -> tuple[str, ...]:
-    effects = tuple(
-        f"{active.effect.name}.{state.name}_{index}"
-        for index, component in enumerate(assembly.cables, start=1)
-        for active in component.effects
-        for state in active.effect.states
-    )
-    return (
-        *_vector("position"),
-        *_vector("velocity"),
-        *_numbered("unstrained_length", len(assembly.cables)),
-        *effects,
-    )

@@ -10,6 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .robot import Point, Robot
+from .statics import directions as rope_directions
+from .statics import has_routes
 
 Array = NDArray[np.float64]
 
@@ -122,7 +124,9 @@ def quintic_law(times: Array, duration: float) -> tuple[Array, Array, Array]:
 
 
 def cable_directions(robot: Robot, positions: Array) -> Array:
-    """Unit vectors from the platform to the exit points; positions (N, 3) in m give (N, 3, n)."""
+    """Unit vectors of the ropes at the platform; positions (N, 3) in m give (N, 3, n)."""
+    if has_routes(robot):
+        return np.array([rope_directions(robot, position) for position in np.asarray(positions, dtype=float)])
     spans = np.array(robot.anchors).T - np.asarray(positions, dtype=float)[:, :, None]
     directions: Array = spans / np.linalg.norm(spans, axis=1, keepdims=True)
     return directions

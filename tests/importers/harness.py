@@ -21,10 +21,10 @@ from typing import Any
 
 import numpy as np
 
-from tautwire.cosimulation import AXES, PLATFORM, cable_name, connections
 from tautwire.packaging import build_fmus
 from tautwire.reference import integrate
 from tautwire.robot import Robot
+from tautwire.robot_wiring import AXES, PLATFORM, cable_name, connections
 from tautwire.ssp import COMPONENTS_ONLY, OPEN, ssp_name, write_ssp
 
 from .ramps import LIMIT, RAMP, STOP

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
-from ..cosimulation import AXES
+from ..robot_wiring import AXES
 from ..tracer.verdict import Candidate, Errors, Estimate, FoundEffect, Trace
 from .summary import ROLES, comparison_of
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from ..packaging import RobotFmus, build_fmus
+from ..packaging import RobotFmus, build_fmus, gathered
 from ..robot_file import write_robot
 from ..tracer.verdict import Trace
 from .document import trace_document
@@ -18,10 +18,10 @@ def write_report(trace: Trace, folder: Path) -> RobotFmus:
     Raises OSError where the disk refuses; returns where the FMUs are.
     """
     write_robot(trace.robot_after, folder / "robot.toml")
-    fmus = build_fmus(trace.robot_after, folder)
+    fmus = gathered(build_fmus(trace.robot_after, folder), folder)
     document = json.dumps(trace_document(trace), indent=1, allow_nan=False)
     (folder / "report.json").write_text(document + "\n", encoding="utf-8")
     links = {"robot.toml": "robot.toml", "report.json": "report.json"}
-    links |= {path.name: path.name for path in (*fmus.cables, fmus.platform)}
+    links |= {path.name: path.name for path in fmus.paths}
     (folder / "index.html").write_text(trace_page(trace, links), encoding="utf-8")
     return fmus

@@ -1,0 +1,86 @@
+"""FMUs that are not the project's, as other tools make them."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import sys
+import zipfile
+from collections.abc import Mapping
+from pathlib import Path
+
+import fmpy
+
+HERE = Path(__file__).parent
+GUID = "{4a1d6f0e-0c55-4f8e-9b1c-2f6f0c9a7c11}"
+LAG = 0.05  # s, of the winch
+
+
+def falling_mass(folder: Path) -> Path:
+    """The paper's platform."""
+    return _plain("falling_mass.py", folder / "FallingMass.fmu")
+
+
+def spring_cable(folder: Path) -> Path:
+    """Cable 2 of the paper's robot with the linear law."""
+    return _plain("spring_cable.py", folder / "SpringCable.fmu")
+
+
+def _plain(script: str, path: Path) -> Path:
+    """An FMU by pythonfmu's own builder; it leaves modules behind, so another process runs it."""
+    command = [sys.executable, "-m", "pythonfmu", "build", "-f", str(HERE / script), "-d", str(path.parent)]
+    subprocess.run([*command, "--no-external-tool"], check=True, capture_output=True, timeout=120)
+    return path
+
+
+def compiler() -> str | None:
+    """A C compiler, where there is one."""
+    return shutil.which("cc") or shutil.which("gcc") or shutil.which("clang")
+
+
+def lag_winch(folder: Path) -> Path:
+    """The winch of ``lag_winch.c``."""
+    found = compiler()
+    assert found is not None
+    library = folder / "lag_winch.so"
+    headers = Path(fmpy.__file__).parent / "c-code"
+    source = [str(HERE / "lag_winch.c"), f"-I{headers}", "-lm"]
+    subprocess.run([found, "-shared", "-fPIC", "-O2", "-o", str(library), *source], check=True, timeout=120)
+    return packed(folder / "lag_winch.fmu", library.read_bytes())
+
+
+def packed(path: Path, library: bytes, description: Mapping[str, str] | None = None, platform: str = "") -> Path:
+    """An FMU of a library and the winch's description; ``description`` replaces texts in it."""
+    text = DESCRIPTION
+    for old, new in (description or {}).items():
+        assert old in text
+        text = text.replace(old, new)
+    with zipfile.ZipFile(path, "w") as archive:
+        archive.writestr("modelDescription.xml", text)
+        archive.writestr(f"binaries/{platform or fmpy.platform}/lag_winch.so", library)
+    return path
+
+
+DESCRIPTION = f"""<?xml version="1.0" encoding="UTF-8"?>
+<fmiModelDescription fmiVersion="2.0" modelName="lag_winch" guid="{GUID}" numberOfEventIndicators="0">
+  <CoSimulation modelIdentifier="lag_winch" canHandleVariableCommunicationStepSize="true" canGetAndSetFMUstate="true"/>
+  <UnitDefinitions>
+    <Unit name="m.s-1"><BaseUnit m="1" s="-1"/></Unit>
+    <Unit name="s"><BaseUnit s="1"/></Unit>
+  </UnitDefinitions>
+  <ModelVariables>
+    <ScalarVariable name="speed_command" valueReference="0" causality="input" variability="continuous">
+      <Real unit="m.s-1" start="0"/>
+    </ScalarVariable>
+    <ScalarVariable name="winch_speed" valueReference="1" causality="output" variability="continuous" initial="exact">
+      <Real unit="m.s-1" start="0"/>
+    </ScalarVariable>
+    <ScalarVariable name="lag" valueReference="2" causality="parameter" variability="fixed" initial="exact">
+      <Real unit="s" start="{LAG}"/>
+    </ScalarVariable>
+  </ModelVariables>
+  <ModelStructure>
+    <Outputs><Unknown index="2" dependencies=""/></Outputs>
+  </ModelStructure>
+</fmiModelDescription>
+"""

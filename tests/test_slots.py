@@ -1,0 +1,141 @@
+"""A user's FMU in a slot of the robot: what is refused before anything runs, and with which words."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Mapping
+from dataclasses import replace
+from pathlib import Path
+
+import fmpy
+import pytest
+
+from tautwire.errors import InputError
+from tautwire.packaging import RobotFmus, build_fmus, gathered
+from tautwire.robot import OwnFmu, slots
+from tautwire.slots import SlotError, check_own_fmus, own_fmus, slot_ports
+from tests.own_fmus import falling_mass, packed
+from tests.robots import paper_robot
+
+SHOWN = 'name="winch_speed"'
+SPEED_UNIT = '<Real unit="m.s-1" start="0"/>'
+INPUT = 'causality="input" variability="continuous"'
+FMI_3 = """<fmiModelDescription fmiVersion="3.0" modelName="a" instantiationToken="a">
+  <CoSimulation modelIdentifier="a"/>
+  <ModelVariables><Float64 name="time" valueReference="0" causality="independent" variability="continuous"/>
+  </ModelVariables>
+  <ModelStructure/>
+</fmiModelDescription>"""
+
+
+def refused(path: Path, slot: str = "winch_2") -> SlotError:
+    """The error about an FMU in a slot, after checking what every such error has."""
+    with pytest.raises(SlotError) as caught:
+        check_own_fmus(replace(paper_robot(), fmus=(OwnFmu(slot, path),)))
+    error = caught.value
+    assert str(error).startswith(f"{path}: ")
+    assert f"the FMU {slot}" in str(error)
+    assert len(str(error).splitlines()) == 1
+    return error
+
+
+def test_our_own_fmus_fit_their_slots(three_fmus: RobotFmus, winch_fmus: RobotFmus) -> None:
+    for slot, path in winch_fmus.parts.items():
+        check_own_fmus(replace(paper_robot(), fmus=(OwnFmu(slot, path),)))
+        variables = {v.name: v for v in fmpy.read_model_description(str(path)).modelVariables}
+        for port in slot_ports(slot, 3):
+            assert (variables[port.name].causality, variables[port.name].unit) == (port.causality, port.unit)
+
+
+def test_a_plain_platform_without_units_fits(tmp_path: Path) -> None:
+    check_own_fmus(replace(paper_robot(), fmus=(OwnFmu("platform", falling_mass(tmp_path)),)))
+
+
+def test_a_unit_by_another_name_is_the_same_unit(tmp_path: Path) -> None:
+    check_own_fmus(replace(paper_robot(), fmus=(OwnFmu("winch_2", packed(tmp_path / "a.fmu", b"")),)))
+
+
+@pytest.mark.parametrize(
+    ("change", "port", "words"),
+    [
+        ({SHOWN: 'name="speed"'}, "winch_speed", ["missing", "a Real output in m/s"]),
+        ({INPUT: 'causality="parameter" variability="fixed"'}, "speed_command", ["Real parameter", "a Real input"]),
+        ({SPEED_UNIT: '<Integer start="0"/>', "continuous": "discrete"}, "speed_command", ["Integer", "a Real input"]),
+        ({'<BaseUnit m="1" s="-1"/>': '<BaseUnit m="1" s="-2"/>'}, "speed_command", ["'m.s-1'", "m/s"]),
+        ({'<BaseUnit m="1" s="-1"/>': '<BaseUnit m="1" s="-1" factor="0.001"/>'}, "speed_command", ["m/s"]),
+        ({'unit="m.s-1"': 'unit="s"'}, "speed_command", ["'s'", "m/s"]),
+    ],
+)
+def test_a_port_that_does_not_fit_is_named(
+    tmp_path: Path, change: Mapping[str, str], port: str, words: list[str]
+) -> None:
+    error = refused(packed(tmp_path / "a.fmu", b"", change))
+    assert error.port == port
+    assert port in error.problem
+    assert not [word for word in words if word not in str(error)], str(error)
+
+
+def test_what_is_no_fmu_for_this_machine_is_refused(tmp_path: Path) -> None:
+    assert "no such file" in str(refused(tmp_path / "absent.fmu"))
+    assert "no such file" in str(refused(tmp_path))
+    text = tmp_path / "text.fmu"
+    text.write_text("no archive")
+    assert "cannot be read" in str(refused(text))
+    with zipfile.ZipFile(tmp_path / "empty.fmu", "w") as archive:
+        archive.writestr("a", "b")
+    assert "cannot be read" in str(refused(tmp_path / "empty.fmu"))
+    broken = packed(tmp_path / "broken.fmu", b"", {"</fmiModelDescription>": ""})
+    assert "cannot be read" in str(refused(broken))
+
+
+def test_other_kinds_and_machines_are_named(tmp_path: Path) -> None:
+    step = 'canHandleVariableCommunicationStepSize="true" '
+    exchange = packed(tmp_path / "a.fmu", b"", {"CoSimulation": "ModelExchange", step: ""})
+    assert "model exchange only" in str(refused(exchange))
+    with zipfile.ZipFile(tmp_path / "b.fmu", "w") as archive:
+        archive.writestr("modelDescription.xml", FMI_3)
+    assert "it is FMI 3.0" in str(refused(tmp_path / "b.fmu"))
+    elsewhere = packed(tmp_path / "c.fmu", b"", platform="elsewhere")
+    assert f"none for {fmpy.platform}" in str(refused(elsewhere))
+
+
+def test_an_fmu_for_one_instance_takes_one_slot(tmp_path: Path) -> None:
+    single = {'canGetAndSetFMUstate="true"': 'canBeInstantiatedOnlyOncePerProcess="true"'}
+    path = packed(tmp_path / "a.fmu", b"", single)
+    check_own_fmus(replace(paper_robot(), fmus=(OwnFmu("winch_1", path),)))
+    with pytest.raises(SlotError, match="slot winch_1 and can be instantiated only once"):
+        check_own_fmus(replace(paper_robot(), fmus=(OwnFmu("winch_1", path), OwnFmu("winch_3", path))))
+
+
+def test_users_fmus_are_copied_beside_ours_as_they_are(tmp_path: Path) -> None:
+    own = packed(tmp_path / "mine.fmu", b"library")
+    fmus = build_fmus(replace(paper_robot(), fmus=(OwnFmu("winch_2", own),)), tmp_path / "out")
+    assert fmus.parts["winch_2"] == own
+    fmus = gathered(fmus, tmp_path / "out")
+    assert fmus.winches == (None, tmp_path / "out" / "winch_2.fmu", None)
+    assert set(fmus.own) == {"winch_2"}
+    assert fmus.parts["winch_2"].read_bytes() == own.read_bytes()
+    assert list(fmus.parts) == ["platform", "winch_2", "cable_1", "cable_2", "cable_3"]
+
+
+def test_the_command_lines_fmus_are_slots_and_files() -> None:
+    given = own_fmus(["platform=a=b.fmu", "cable_2=c.fmu"], 3)
+    assert given == (OwnFmu("platform", Path("a=b.fmu")), OwnFmu("cable_2", Path("c.fmu")))
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        (["mine.fmu"], "names no slot"),
+        (["cable_4=mine.fmu"], "winch_3"),
+        (["platform="], "platform=mine.fmu"),
+        (["platform=a.fmu", "platform=b.fmu"], "given twice"),
+    ],
+)
+def test_what_is_no_slot_is_refused(given: list[str], words: str) -> None:
+    with pytest.raises(InputError, match=words):
+        own_fmus(given, 3)
+
+
+def test_slots_are_platform_cables_and_winches() -> None:
+    assert slots(2) == ("platform", "cable_1", "cable_2", "winch_1", "winch_2")
