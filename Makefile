@@ -1,5 +1,5 @@
 # make run: the main job on a shipped recording. make test: lint, types and all tests. make bench: the co-simulation's
-# speed. Each sets up what it needs.
+# speed; make bench-long: memory over a million steps. Each sets up what it needs.
 
 PYTHON ?= python3
 VENV := .venv
@@ -7,7 +7,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 EXAMPLE := system/tautwire/examples/three
 
-.PHONY: run test lint types bench clean
+.PHONY: run test lint types bench bench-long clean
 
 run: $(READY)
 	$(BIN)/tautwire trace $(EXAMPLE)/robot.toml $(EXAMPLE)/fit.csv --check $(EXAMPLE)/check.csv --out build/three
@@ -30,6 +30,9 @@ $(READY): pyproject.toml
 
 bench: $(READY)
 	$(BIN)/python -m tests.bench
+
+bench-long: $(READY)
+	$(BIN)/python -m tests.bench.long
 
 clean:
 	rm -rf $(VENV) build/* dist

@@ -1,0 +1,34 @@
+"""Wall time of a macro step over the number of cables."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from time import perf_counter
+
+import numpy as np
+
+from tautwire.cosimulation import instantiated
+from tautwire.master import FixedStep, Kept, Sampled, simulate
+from tautwire.packaging import build_fmus
+from tautwire.robot import Cable, Platform, Robot, Sensors
+from tautwire.robot_wiring import shown_ports
+
+
+def wheel_of_cables(count: int) -> Robot:
+    """A robot with any number of cables, all from above."""
+    angles = 2.0 * np.pi * np.arange(count) / count
+    anchors = [(50.0 * float(np.cos(a)), 50.0 * float(np.sin(a)), 50.0) for a in angles]
+    cables = tuple(Cable(anchor, 1e11, 1e-5, 5e8, "logarithmic") for anchor in anchors)
+    return Robot(f"{count} cables", 9.81, Platform(100.0 * count, (1.0, 2.0, 5.0)), None, Sensors(), cables)
+
+
+def time_per_step(count: int, folder: Path) -> float:
+    """Wall time of one macro step of 10 ms, s."""
+    fmus = build_fmus(wheel_of_cables(count), folder)
+    time = np.array([0.0, 1.0])
+    speeds = np.vstack([np.zeros(count), np.linspace(-0.1, 0.1, count)])
+    with instantiated(fmus) as coupling:
+        kept = Kept(2, len(shown_ports(count)))
+        begun = perf_counter()
+        simulate(coupling, Sampled(time, speeds), time, shown_ports(count), FixedStep(0.01), kept)
+        return (perf_counter() - begun) / coupling.account.steps
