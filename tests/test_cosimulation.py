@@ -43,9 +43,25 @@ def ramp_error(fmus: RobotFmus, robot: Robot, step: float) -> float:
     return float(np.linalg.norm(motion.position[-1] - exact.position[-1]))
 
 
-@pytest.mark.parametrize(("step", "bound"), [(0.05, 2e-5), (0.02, 1e-6), (0.01, 1e-7)])
+@pytest.mark.parametrize(("step", "bound"), [(0.1, 5e-7), (0.05, 2e-8), (0.01, 1e-9)])
 def test_the_papers_ramp_ends_where_the_rig_ends(three_fmus: RobotFmus, step: float, bound: float) -> None:
     assert ramp_error(three_fmus, paper_robot(), step) < bound
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "step"), [("caroca", 0.001), ("eight", 0.001), ("caroca", 0.01), ("eight", 0.01)])
+def test_with_more_cables_the_step_errs_as_little(name: str, step: float, tmp_path: Path) -> None:
+    robot = example(name)
+    time, speed = gentle_speeds(robot, 1.0, 0.01)
+    motion = cosimulate(build_fmus(robot, tmp_path), time, speed, step)
+    exact = simulate(rig_of(robot), None, SampledProgram(time, speed), time, rtol=1e-12, atol=1e-13)
+    reach = float(np.max(np.abs(exact.position - exact.position[0])))
+    assert np.max(np.abs(motion.position - exact.position)) < 1e-9 * max(reach, 1.0)
+
+
+@pytest.mark.slow
+def test_steps_of_a_millisecond_add_up_to_nothing(three_fmus: RobotFmus) -> None:
+    assert ramp_error(three_fmus, paper_robot(), 0.001) < 1e-9
 
 
 @pytest.mark.parametrize("law", ["logarithmic", "linear"])
