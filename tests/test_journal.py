@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+import fmpy
 import numpy as np
 import pytest
 
@@ -84,6 +85,19 @@ def test_every_call_is_noted_before_it_is_made(
     assert seen[0].call == call
     assert seen[0].time == (0.25 if method == "step" else 0.0)
     assert np.isfinite(list(seen[0].inputs.values())).all() and "position.x" in seen[0].inputs
+
+
+def test_unpacking_is_noted_as_such(three_fmus: RobotFmus, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    class StoppedError(Exception):
+        pass
+
+    def stop(path: str) -> str:
+        raise StoppedError
+
+    monkeypatch.setattr(fmpy, "extract", stop)
+    with pytest.raises(StoppedError):
+        WatchedComponent(Journal(tmp_path), "left", three_fmus.platform)
+    assert Journal(tmp_path).last() == Entry("left", "unpacking", 0.0, {}, ())
 
 
 def test_no_method_that_calls_the_fmu_is_forgotten() -> None:

@@ -13,19 +13,18 @@ import pytest
 from tautwire.errors import InputError
 from tautwire.packaging import RobotFmus, build_fmus, gathered
 from tautwire.robot import OwnFmu, slots
-from tautwire.slots import SlotError, check_own_fmus, own_fmus, slot_ports
-from tests.own_fmus import falling_mass, packed
+from tautwire.slots import SlotError, check_own_fmus, own_fmus, require_steps, slot_ports, unstated_units
+from tests.own_fmus import falling_mass, packed, packed_3
 from tests.robots import paper_robot
 
 SHOWN = 'name="winch_speed"'
 SPEED_UNIT = '<Real unit="m.s-1" start="0"/>'
 INPUT = 'causality="input" variability="continuous"'
-FMI_3 = """<fmiModelDescription fmiVersion="3.0" modelName="a" instantiationToken="a">
-  <CoSimulation modelIdentifier="a"/>
-  <ModelVariables><Float64 name="time" valueReference="0" causality="independent" variability="continuous"/>
-  </ModelVariables>
-  <ModelStructure/>
-</fmiModelDescription>"""
+COMMAND_3 = '<Float64 name="speed_command" valueReference="0" causality="input" declaredType="Speed" start="0"/>'
+ARRAY = COMMAND_3.replace('"0"/>', '"0 0"><Dimension start="2"/></Float64>')
+CLOCK = '<Clock name="tick" valueReference="5" causality="input" intervalVariability="triggered"/>'
+CLOCKED = COMMAND_3.replace("/>", ' variability="discrete" clocks="5"/>') + CLOCK
+SINGLE = COMMAND_3.replace("Float64", "Float32").replace('declaredType="Speed" ', "")
 
 
 def refused(path: Path, slot: str = "winch_2") -> SlotError:
@@ -75,6 +74,32 @@ def test_a_port_that_does_not_fit_is_named(
     assert not [word for word in words if word not in str(error)], str(error)
 
 
+@pytest.mark.parametrize(
+    ("change", "port", "words"),
+    [
+        ({SHOWN: 'name="speed"'}, "winch_speed", ["missing", "a Float64 output in m/s"]),
+        ({COMMAND_3: COMMAND_3.replace('declaredType="Speed"', 'unit="s"')}, "speed_command", ["'s'", "Float64"]),
+        ({COMMAND_3: ARRAY}, "speed_command", ["is a Float64 array input", "make it a Float64 input in m/s"]),
+        ({COMMAND_3: CLOCKED}, "speed_command", ["is a clocked Float64 input"]),
+        ({COMMAND_3: SINGLE}, "speed_command", ["is a Float32 input", "make it a Float64 input"]),
+    ],
+)
+def test_so_is_one_of_an_fmi_3_fmu(tmp_path: Path, change: Mapping[str, str], port: str, words: list[str]) -> None:
+    error = refused(packed_3(tmp_path / "a.fmu", b"", change))
+    assert error.port == port
+    assert not [word for word in words if word not in str(error)], str(error)
+
+
+def test_an_fmi_3_fmu_fits(tmp_path: Path) -> None:
+    own = OwnFmu("winch_2", packed_3(tmp_path / "a.fmu", b""))
+    check_own_fmus(replace(paper_robot(), fmus=(own,)))
+    assert unstated_units((own,), 3) == ()
+    require_steps({"winch_2": own.path}, chosen=True, even=False)
+    fixed = packed_3(tmp_path / "b.fmu", b"", {'canGetAndSetFMUState="true"': ""})
+    with pytest.raises(SlotError, match="cannot save its state"):
+        require_steps({"winch_2": fixed}, chosen=True, even=False)
+
+
 def test_what_is_no_fmu_for_this_machine_is_refused(tmp_path: Path) -> None:
     assert "no such file" in str(refused(tmp_path / "absent.fmu"))
     assert "no such file" in str(refused(tmp_path))
@@ -92,9 +117,12 @@ def test_other_kinds_and_machines_are_named(tmp_path: Path) -> None:
     step = 'canHandleVariableCommunicationStepSize="true" '
     exchange = packed(tmp_path / "a.fmu", b"", {"CoSimulation": "ModelExchange", step: ""})
     assert "model exchange only" in str(refused(exchange))
-    with zipfile.ZipFile(tmp_path / "b.fmu", "w") as archive:
-        archive.writestr("modelDescription.xml", FMI_3)
-    assert "it is FMI 3.0" in str(refused(tmp_path / "b.fmu"))
+    later = packed_3(tmp_path / "b.fmu", b"", {'fmiVersion="3.0"': 'fmiVersion="3.1"'})
+    assert refused(later).problem == "cannot be the FMU winch_2: it is FMI 3.1"
+    assert refused(later).mend == "export it as FMI 2.0 or 3.0 co-simulation"
+    step_3 = 'canHandleVariableCommunicationStepSize="true" canGetAndSetFMUState="true"'
+    scheduled = packed_3(tmp_path / "d.fmu", b"", {"CoSimulation": "ScheduledExecution", step_3: ""})
+    assert "scheduled execution only" in str(refused(scheduled))
     elsewhere = packed(tmp_path / "c.fmu", b"", platform="elsewhere")
     assert f"none for {fmpy.platform}" in str(refused(elsewhere))
 

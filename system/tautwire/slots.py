@@ -13,17 +13,20 @@ from tautwire_fmu.units import UNITS
 
 from .errors import InputError, shown
 from .master import Port
+from .master.component import INSTANCES
 from .master.seat import STAMP
+from .master.standard import is_real, kind_of
 from .master.units import measure, measure_of, same_unit, unit_of
 from .robot import OwnFmu, Robot, slots
 
 AXES = ("x", "y", "z")
 LONGEST_REASON = 200
+EXPORT = "export it as FMI 2.0 or 3.0 co-simulation"
 
 
 @dataclass(frozen=True)
 class SlotPort:
-    """A Real variable that the FMU in a slot has, or may have; ``causality`` as FMI names it."""
+    """A variable, Real or Float64, that the FMU in a slot has, or may have; ``causality`` as FMI names it."""
 
     name: str
     causality: str
@@ -187,11 +190,12 @@ def _description(own: OwnFmu) -> ModelDescription:
     # fmpy raises whatever the archive, the parser or its own checks do, plain Exception among them.
     except Exception as error:
         reason = shown(" ".join(str(error).split()), LONGEST_REASON)
-        raise refusal(f"it cannot be read as an FMU ({reason})", "name an FMI 2.0 co-simulation FMU") from error
-    if description.fmiVersion != "2.0":
-        raise refusal(f"it is FMI {description.fmiVersion}", "export it as FMI 2.0 co-simulation")
+        raise refusal(f"it cannot be read as an FMU ({reason})", "name an FMI 2.0 or 3.0 co-simulation FMU") from error
+    if description.fmiVersion not in INSTANCES:
+        raise refusal(f"it is FMI {description.fmiVersion}", EXPORT)
     if description.coSimulation is None:
-        raise refusal("it is for model exchange only", "export it as FMI 2.0 co-simulation")
+        kind = "scheduled execution" if description.modelExchange is None else "model exchange"
+        raise refusal(f"it is for {kind} only", EXPORT)
     if fmpy.platform not in platforms:
         runs = ", ".join(platforms) or "no platform"
         raise refusal(f"it has binaries for {runs}, none for {fmpy.platform}", f"export it for {fmpy.platform}")
@@ -199,7 +203,7 @@ def _description(own: OwnFmu) -> ModelDescription:
 
 
 def _check_port(own: OwnFmu, description: ModelDescription, variable: ScalarVariable | None, port: SlotPort) -> None:
-    expected = f"a Real {port.causality} in {port.unit}"
+    expected = f"a {INSTANCES[description.fmiVersion].real} {port.causality} in {port.unit}"
 
     def refusal(problem: str, mend: str) -> SlotError:
         return SlotError(own.path, own.slot, port.name, f"{port.name} {problem}", mend)
@@ -208,8 +212,8 @@ def _check_port(own: OwnFmu, description: ModelDescription, variable: ScalarVari
         if port.required:
             raise refusal("is missing", f"give it a variable {port.name}, {expected}")
         return
-    if variable.type != "Real" or variable.causality != port.causality:
-        raise refusal(f"is a {variable.type} {variable.causality}", f"make it {expected}")
+    if not is_real(variable) or variable.causality != port.causality:
+        raise refusal(f"is a {kind_of(variable)} {variable.causality}", f"make it {expected}")
     unit = unit_of(variable)
     stated = (unit, None if unit is None else measure(description, unit))
     if not same_unit(stated, (port.unit, measure_of(UNITS[port.unit]))):

@@ -23,6 +23,7 @@ from tautwire_fmu.units import UNITS
 from .cosimulation import wired
 from .errors import one_line
 from .master import Connection, Port
+from .master.standard import is_real
 from .master.units import BASES, measure, measure_of, unit_of
 from .output import file_in_place
 from .packaging import RobotFmus
@@ -158,7 +159,7 @@ def _component(elements: Element, name: str, part: _Part) -> None:
     values = SubElement(SubElement(bindings, "ssd:ParameterBinding"), "ssd:ParameterValues")
     settings = SubElement(values, "ssv:ParameterSet", {"version": "1.0", "name": "values"})
     numbers = SubElement(settings, "ssv:Parameters")
-    parameters = [v for v in part.variables.values() if v.causality == "parameter" and v.type == "Real"]
+    parameters = [v for v in part.variables.values() if v.causality == "parameter" and is_real(v)]
     for parameter in parameters:
         number = SubElement(numbers, "ssv:Parameter", {"name": parameter.name})
         unit = unit_of(parameter)

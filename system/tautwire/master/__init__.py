@@ -1,4 +1,4 @@
-"""The master: co-simulates any wired system of FMI 2.0 FMUs and keeps their coupling exact."""
+"""The master: co-simulates any wired system of FMI 2.0 and 3.0 FMUs and keeps their coupling exact."""
 
 from .audit import Account, Bond
 from .component import Component, ComponentError

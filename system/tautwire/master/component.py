@@ -1,11 +1,11 @@
-"""An FMI 2.0 co-simulation FMU in a slot of the master, called through kept arrays."""
+"""A co-simulation FMU in a slot of the master, called through kept arrays."""
 
 from __future__ import annotations
 
 import ctypes
 import os
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -14,22 +14,17 @@ from typing import Any
 import fmpy
 import numpy as np
 from fmpy.fmi1 import FMICallException
-from fmpy.fmi2 import (
-    FMU2Slave,
-    fmi2CallbackAllocateMemoryTYPE,
-    fmi2CallbackFreeMemoryTYPE,
-    fmi2CallbackFunctions,
-    fmi2CallbackLoggerTYPE,
-)
 from fmpy.model_description import ModelDescription, ScalarVariable
 from numpy.typing import NDArray
 
 from ..errors import TautwireError
+from .fmi2 import Fmi2Instance
+from .fmi3 import Fmi3Instance
+from .standard import FMI_WARNING, STATUS, Instance, is_real
 
 Array = NDArray[np.float64]
 
-FMI_WARNING = 1
-STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
+INSTANCES: Mapping[str, type[Fmi2Instance] | type[Fmi3Instance]] = {"2.0": Fmi2Instance, "3.0": Fmi3Instance}
 KEPT_MESSAGES = 20
 
 
@@ -89,6 +84,11 @@ class Component:
         self.time = 0.0
         self.messages: list[str] = []
         self.description: ModelDescription = fmpy.read_model_description(str(path))
+        version = self.description.fmiVersion
+        if version not in INSTANCES:
+            raise ComponentError(name, "reading its version", f"FMI {version}", 0.0, {}, ())
+        self._kind = INSTANCES[version]
+        self._calls = self._kind.calls
         self.variables: dict[str, ScalarVariable] = {v.name: v for v in self.description.modelVariables}
         self.can_restore = bool(self.description.coSimulation.canGetAndSetFMUstate)
         self.takes_any_step = bool(self.description.coSimulation.canHandleVariableCommunicationStepSize)
@@ -102,7 +102,7 @@ class Component:
     def _load(self) -> None:
         here = os.getcwd()
         try:
-            self.fmu = FMU2Slave(
+            self._instance: Instance = self._kind(
                 guid=self.description.guid,
                 unzipDirectory=self.folder,
                 modelIdentifier=self.description.coSimulation.modelIdentifier,
@@ -112,22 +112,13 @@ class Component:
             # fmpy loads from the library's folder, and stays there where that fails.
             os.chdir(here)
             raise ComponentError(self.name, "loading its library", str(error), 0.0, {}, ()) from error
-        self.callbacks = fmi2CallbackFunctions()
-        self.callbacks.logger = fmi2CallbackLoggerTYPE(self._log)
-        self.callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
-        self.callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(fmpy.free)
         try:
-            self.fmu.instantiate(callbacks=self.callbacks, loggingOn=True)
+            functions = self._instance.instantiate(self._log, self._stop)
         except Exception as error:
-            raise ComponentError(self.name, "fmi2Instantiate", str(error), 0.0, {}, self.messages) from error
-        library = self.fmu.dll
-        self._handle = ctypes.c_void_p(self.fmu.component)
-        self._get = library.fmi2GetReal
-        self._set = library.fmi2SetReal
-        self._step = library.fmi2DoStep
-        self._step.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int]
-        for function in (self._get, self._set):
-            function.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p]
+            raise ComponentError(self.name, self._calls.instantiate, str(error), 0.0, {}, self.messages) from error
+        self._handle = functions.handle
+        self._get, self._set, self._step = functions.read, functions.write, functions.step
+        self._save, self._restore, self._release = functions.save, functions.restore, functions.release
 
     def __enter__(self) -> Component:
         return self
@@ -139,10 +130,10 @@ class Component:
 
     def close(self) -> None:
         """Free the instance and the folder into which the FMU was extracted."""
-        self.fmu.freeInstance()
+        self._instance.free()
         shutil.rmtree(self.folder, ignore_errors=True)
 
-    def _log(self, environment: Any, instance: bytes, status: int, category: bytes, message: bytes) -> None:
+    def _log(self, status: int, message: bytes) -> None:
         if status >= FMI_WARNING:
             self.messages.append(message.decode("utf-8", "replace"))
             del self.messages[:-KEPT_MESSAGES]
@@ -161,16 +152,17 @@ class Component:
     def initialize(self, start: float, parameters: dict[str, float]) -> None:
         """Set parameters and enter initialization mode."""
         self.time = start
-        self._call("fmi2SetupExperiment", self.fmu.setupExperiment, startTime=start)
+        if self._calls.set_up is not None:
+            self._call(self._calls.set_up, self._instance.set_up, start=start)
         for name, value in parameters.items():
             block = self.block([name])
             block.values[0] = value
             self.write(block)
-        self._call("fmi2EnterInitializationMode", self.fmu.enterInitializationMode)
+        self._call(self._calls.enter, self._instance.enter, start=start)
 
     def run(self) -> None:
         """Leave initialization mode."""
-        self._call("fmi2ExitInitializationMode", self.fmu.exitInitializationMode)
+        self._call(self._calls.leave, self._instance.leave)
 
     def _call(self, call: str, function: Callable[..., Any], **arguments: Any) -> None:
         """One of the calls that are made once a run, and whose status fmpy looks at."""
@@ -183,38 +175,38 @@ class Component:
         """Read variables into the block's values."""
         status = self._get(self._handle, block.references, block.count, block.memory)
         if status > FMI_WARNING:
-            self._fail("fmi2GetReal", status)
+            self._fail(self._calls.read, status)
 
     def write(self, block: Block) -> None:
         """Write the block's values."""
         status = self._set(self._handle, block.references, block.count, block.memory)
         if status > FMI_WARNING:
-            self._fail("fmi2SetReal", status)
+            self._fail(self._calls.write, status)
 
     def step(self, time: float, step: float) -> None:
         """One macro step."""
         self.time = time
         status = self._step(self._handle, time, step, 0)
         if status > FMI_WARNING:
-            self._fail("fmi2DoStep", status)
+            self._fail(self._calls.step, status)
 
     def save(self) -> ctypes.c_void_p:
         """A copy of the present state, to be let go with :meth:`release`."""
         saved = ctypes.c_void_p()
-        status = self.fmu.dll.fmi2GetFMUstate(self._handle, ctypes.byref(saved))
+        status = self._save(self._handle, ctypes.byref(saved))
         if status > FMI_WARNING:
-            self._fail("fmi2GetFMUstate", status)
+            self._fail(self._calls.save, status)
         return saved
 
     def restore(self, saved: ctypes.c_void_p) -> None:
         """Go back to a saved state."""
-        status = self.fmu.dll.fmi2SetFMUstate(self._handle, saved)
+        status = self._restore(self._handle, saved)
         if status > FMI_WARNING:
-            self._fail("fmi2SetFMUstate", status)
+            self._fail(self._calls.restore, status)
 
     def release(self, saved: ctypes.c_void_p) -> None:
         """Let a saved state go."""
-        self.fmu.dll.fmi2FreeFMUstate(self._handle, ctypes.byref(saved))
+        self._release(self._handle, ctypes.byref(saved))
 
     def refuse(self, block: Block) -> None:
         """Raise ComponentError for values that are not finite."""
@@ -222,12 +214,14 @@ class Component:
         raise ComponentError(self.name, f"output {shown}", "not finite", self.time, self._inputs(), self.messages)
 
     def _fail(self, call: str, status: int) -> None:
-        alive = call != "fmi2GetReal" and status < STATUS.index("fatal")
+        self._stop(call, STATUS[min(status, 5)], call != self._calls.read and status < STATUS.index("fatal"))
+
+    def _stop(self, call: str, outcome: str, alive: bool = True) -> None:
         inputs = self._inputs() if alive else {}
-        raise ComponentError(self.name, call, STATUS[min(status, 5)], self.time, inputs, self.messages)
+        raise ComponentError(self.name, call, outcome, self.time, inputs, self.messages)
 
     def _inputs(self) -> dict[str, float]:
-        block = self.block([v.name for v in self.variables.values() if v.causality == "input" and v.type == "Real"])
+        block = self.block([v.name for v in self.variables.values() if v.causality == "input" and is_real(v)])
         if self._get(self._handle, block.references, block.count, block.memory) > FMI_WARNING:
             return {}
         return dict(zip(block.names, block.values.tolist(), strict=True))

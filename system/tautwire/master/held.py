@@ -27,7 +27,7 @@ class Held:
             (components[name], components[name].block([p.variable for p in self.ports if p.component == name]))
             for name in names
         ]
-        self.forget()
+        self._values: Array = np.full(len(self.ports), np.nan)
 
     def begin(self, shown: Array) -> bool:
         """Take the values that hold from now on; returns whether some have jumped."""
@@ -38,7 +38,7 @@ class Held:
 
     def forget(self) -> None:
         """Take the next values for new ones."""
-        self._values = np.full(len(self.ports), np.nan)
+        self._values.fill(np.nan)
 
     def hold(self, shown: Array) -> None:
         """Show the values that hold, whatever is guessed or already known of the next step."""

@@ -12,23 +12,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import one_line
+from .standard import FMI_2, FMI_3
 from .wiring import Port
 
 Array = NDArray[np.float64]
 
-CALLS = (
-    "fmi2Instantiate",
-    "fmi2SetupExperiment",
-    "fmi2EnterInitializationMode",
-    "fmi2ExitInitializationMode",
-    "fmi2GetReal",
-    "fmi2SetReal",
-    "fmi2DoStep",
-    "fmi2GetFMUstate",
-    "fmi2SetFMUstate",
-    "fmi2FreeFMUstate",
-    "fmi2FreeInstance",
-)
+UNPACKING = "unpacking"
+CALLS = (UNPACKING, *FMI_2.named(), *FMI_3.named())
 # What stands where in the mapped memory. A place counts all calls of all components from one; zero is before them.
 PLACE, TIME, STEPS, STOPPED = range(4)
 NO_CALL = -1.0

@@ -7,8 +7,9 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from .component import FMI_WARNING, Block, Component
-from .journal import PLACE, STEPS, TIME, Journal
+from .component import Block, Component
+from .journal import PLACE, STEPS, TIME, UNPACKING, Journal
+from .standard import FMI_WARNING
 
 
 class WatchedComponent(Component):
@@ -19,18 +20,25 @@ class WatchedComponent(Component):
     def __init__(self, journal: Journal, name: str, path: Path) -> None:
         self._journal = journal
         self._now = journal.now
-        self._places = places = journal.enter(name)
-        self._reading, self._writing, self._stepping = (places[f"fmi2{c}"] for c in ("GetReal", "SetReal", "DoStep"))
-        self._saving, self._restoring, self._releasing = (places[f"fmi2{c}FMUstate"] for c in ("Get", "Set", "Free"))
-        self._now[PLACE] = places["fmi2Instantiate"]
+        self._places = journal.enter(name)
+        self._now[PLACE] = self._places[UNPACKING]
         super().__init__(name, path)
+
+    def _load(self) -> None:
+        places, calls = self._places, self._calls
+        self._reading, self._writing, self._stepping = places[calls.read], places[calls.write], places[calls.step]
+        self._saving, self._restoring, self._releasing = (
+            places[call] for call in (calls.save, calls.restore, calls.release)
+        )
+        self._now[PLACE] = places[calls.instantiate]
+        super()._load()
 
     def _call(self, call: str, function: Callable[..., Any], **arguments: Any) -> None:
         self._now[PLACE] = self._places[call]
         super()._call(call, function, **arguments)
 
-    def _log(self, environment: Any, instance: bytes, status: int, category: bytes, message: bytes) -> None:
-        super()._log(environment, instance, status, category, message)
+    def _log(self, status: int, message: bytes) -> None:
+        super()._log(status, message)
         if status >= FMI_WARNING:
             self._journal.say(self.name, self.messages)
 
@@ -73,6 +81,6 @@ class WatchedComponent(Component):
 
     def close(self) -> None:
         """See :meth:`Component.close`."""
-        self._now[PLACE] = self._places["fmi2FreeInstance"]
+        self._now[PLACE] = self._places[self._calls.free]
         super().close()
         self._journal.rest(self.time)

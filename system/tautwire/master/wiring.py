@@ -10,6 +10,7 @@ from fmpy.model_description import ScalarVariable
 
 from ..errors import TautwireError
 from .component import Component
+from .standard import is_real, kind_of
 from .units import Measure, measure, same_unit, unit_of
 
 
@@ -45,8 +46,7 @@ def check(components: Mapping[str, Component], connections: Sequence[Connection]
     for connection in connections:
         source = _variable(components, connection, connection.source, "output")
         target = _variable(components, connection, connection.target, "input")
-        if source.type != "Real" or target.type != "Real":
-            raise WiringError(f"{connection}: both must be Real, they are {source.type} and {target.type}")
+        _require_reals(connection, source, target)
         given, taken = (_unit(components, end) for end in (connection.source, connection.target))
         if not same_unit(given, taken):
             raise WiringError(f"{connection}: units differ, {given[0]!r} and {taken[0]!r}")
@@ -77,9 +77,14 @@ def _variable(
 def check_rates(components: Mapping[str, Component], rates: Sequence[Connection]) -> None:
     """Refuse unknown names, wrong causality and types in pairs whose target takes the rate of the source."""
     for pair in rates:
-        ends = _variable(components, pair, pair.source, "output"), _variable(components, pair, pair.target, "input")
-        if any(end.type != "Real" for end in ends):
-            raise WiringError(f"{pair}: both must be Real, they are {ends[0].type} and {ends[1].type}")
+        source = _variable(components, pair, pair.source, "output")
+        _require_reals(pair, source, _variable(components, pair, pair.target, "input"))
+
+
+def _require_reals(connection: Connection, source: ScalarVariable, target: ScalarVariable) -> None:
+    if not (is_real(source) and is_real(target)):
+        kinds = f"{kind_of(source)} and {kind_of(target)}"
+        raise WiringError(f"{connection}: both must be Real or Float64, they are {kinds}")
 
 
 def direct_inputs(component: Component, unsaid: bool = True) -> dict[str, frozenset[str]]:
@@ -87,13 +92,24 @@ def direct_inputs(component: Component, unsaid: bool = True) -> dict[str, frozen
 
     Where the FMU does not say, all of them, or none where ``unsaid`` is False.
     """
-    inputs = frozenset(v.name for v in component.variables.values() if v.causality == "input")
-    undeclared = inputs if unsaid else frozenset()
-    found = {v.name: undeclared for v in component.variables.values() if v.causality == "output"}
-    for unknown in component.description.outputs:
-        if unknown.dependencies is not None:
-            found[unknown.variable.name] = inputs & {known.name for known in unknown.dependencies}
-    return found
+    inputs = [v for v in component.variables.values() if v.causality == "input"]
+    everything = {_identity(v) for v in inputs}
+    said = {
+        _identity(unknown.variable): {_identity(known) for known in unknown.dependencies}
+        for unknown in component.description.outputs
+        if unknown.dependencies is not None
+    }
+    undeclared = everything if unsaid else set()
+    outputs = [v for v in component.variables.values() if v.causality == "output"]
+    return {
+        v.name: frozenset(known.name for known in inputs if _identity(known) in said.get(_identity(v), undeclared))
+        for v in outputs
+    }
+
+
+def _identity(variable: ScalarVariable) -> tuple[str, int]:
+    """The same for all names of a variable, of which FMI 3.0 lists dependencies under one only."""
+    return variable.type, variable.valueReference
 
 
 def levels(components: Mapping[str, Component], connections: Sequence[Connection]) -> list[list[Connection]]:
