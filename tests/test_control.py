@@ -87,7 +87,7 @@ def test_signals_of_plant_and_regulator_are_named_alike() -> None:
 @pytest.mark.parametrize("name", NAMES)
 def test_controller_at_work_is_the_regulator_with_one_sample_of_delay(name: str) -> None:
     robot = robot_named(name)
-    design = design_controller(robot)
+    design = design_controller(robot, ControlAim(tare=False))
     count, size = robot.cable_count, 50
     start = robot.platform.start
     times = np.linspace(0.0, 0.01 * size, size + 1)
@@ -149,7 +149,7 @@ def test_speed_is_continuous_across_the_macro_steps_of_a_sample() -> None:
     times = np.linspace(0.0, 0.1, 6)
     source = PathController(robot, design, PATHS["three"], times, seed=1)
     shown = np.concatenate([robot.platform.start, np.zeros(3), design.linear.tensions])
-    assert np.array_equal(source.interval(0, 0.0, 0.0, np.zeros(9))[0], np.zeros(6))
+    assert np.array_equal(source.interval(0, 0.0, 0.0, np.zeros(9))[0][0::2], np.zeros(3))
     last = np.zeros(3)
     for index in range(5):
         for part in (0.0, 0.01):
@@ -176,6 +176,29 @@ def test_path_that_asks_a_cable_to_push_is_refused(fmus: dict[str, RobotFmus]) -
     away = Line((28.86, 0.0, 5.0), (-20.0, 0.0, 5.0), 30.0)
     with pytest.raises(UnreachableError, match="cable 3 would need -"):
         cosimulate_closed_loop(fmus["three"], robot, design_controller(robot), away, 30.0)
+
+
+def test_payload_that_nobody_declared_is_found_at_the_start(tmp_path: Path) -> None:
+    robot, path = robot_named("three"), PATHS["three"]
+    built = build_fmus(off_nominal(robot, 1.0, 0.8), tmp_path)
+    peaks = []
+    for tare in (True, False):
+        design = design_controller(robot, ControlAim(tare=tare))
+        peaks.append(errors(cosimulate_closed_loop(built, robot, design, path, 5.0), path).max())
+    assert peaks[0] < 2e-4
+    assert peaks[1] > 1e-2
+
+
+def test_limits_of_tension_are_kept_where_the_path_asks_for_more(fmus: dict[str, RobotFmus]) -> None:
+    robot = robot_named("three")
+    quick = Line((28.86, 0.0, 5.0), (28.86, 0.0, 6.0), 1.2)
+    mean = float(design_controller(robot).linear.tensions.mean())
+    free = cosimulate_closed_loop(fmus["three"], robot, design_controller(robot), quick, 8.0)
+    assert free.tension.max() > 1.4 * mean and free.tension.min() < 0.6 * mean
+    aim = ControlAim(lowest_tension=0.7 * mean, highest_tension=1.3 * mean)
+    held = cosimulate_closed_loop(fmus["three"], robot, design_controller(robot, aim), quick, 8.0)
+    assert held.tension.max() < 1.3 * mean and held.tension.min() > 0.7 * mean
+    assert errors(held, quick)[-1] < 1e-4
 
 
 @pytest.mark.slow

@@ -115,7 +115,9 @@ def instantiated(
     make = Component if journal is None else partial(WatchedComponent, journal)
     memory = None if journal is None else journal.inputs
     with ExitStack() as stack:
-        components = {name: stack.enter_context(make(name, path)) for name, path in {**fmus.parts, **beside.parts}.items()}
+        components = {
+            name: stack.enter_context(make(name, path)) for name, path in {**fmus.parts, **beside.parts}.items()
+        }
         for name, component in components.items():
             start = fmus.own.get(name, {})
             component.initialize(0.0, {key: value for key, value in start.items() if _is_parameter(component, key)})

@@ -1,0 +1,58 @@
+"""What a controller weighs, what bounds it, and what it is told of its sensors."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..robot import Robot
+
+Array = NDArray[np.float64]
+
+# What a robot file that declares no sensors is taken to have.
+POSITION_NOISE = 1e-4
+TENSION_NOISE = 1.0
+
+
+@dataclass(frozen=True)
+class ControlAim:
+    """What the controller weighs; each number is the size of a deviation that costs as much as the others.
+
+    ``period`` in s; ``position`` in m; ``tension`` as a share of the mean static tension; ``winch_speed`` in
+    m/s and ``winch_acceleration`` in m/s^2, beyond the ideal ones; ``integral_time`` in s, over which a
+    lasting error of position grows that important.
+
+    The observer expects velocity to wander by ``acceleration_disturbance`` (m/s^2) and rope by
+    ``speed_disturbance`` (m/s) within a second. A larger ``speed_disturbance`` makes the loop more robust
+    against a wrong modulus or payload, a smaller one calmer under noise (loop transfer recovery).
+
+    Limits, whatever the design: ``speed_limit`` in m/s and ``acceleration_limit`` in m/s^2 bound what is asked of any
+    winch, beside what the robot file says of it. No cable is let out below ``lowest_tension`` or reeled in above
+    ``highest_tension``, in N; where None, the bounds of the robot file's tension distribution, else 0 and none. A
+    cable beyond its limit gives way so that its tension is back in about ``yield_time``, in s.
+
+    With ``tare`` the run starts at rest, and the tensions seen there tell of a payload that nobody declared.
+    """
+
+    period: float = 0.01
+    position: float = 1e-3
+    tension: float = 0.1
+    winch_speed: float = 0.1
+    winch_acceleration: float = 0.5
+    integral_time: float = 0.25
+    speed_limit: float = 3.0
+    acceleration_disturbance: float = 0.2
+    speed_disturbance: float = 0.01
+    acceleration_limit: float = float("inf")
+    lowest_tension: float | None = None
+    highest_tension: float | None = None
+    yield_time: float = 0.06
+    tare: bool = True
+
+
+def measurement_noise(robot: Robot) -> Array:
+    """Standard deviation of one sample of x, y, z (m) and the tensions (N), shape (3 + n,)."""
+    position, tension = robot.sensors.position_noise, robot.sensors.tension_noise
+    return np.repeat([position or POSITION_NOISE, tension or TENSION_NOISE], [3, robot.cable_count])

@@ -1,0 +1,138 @@
+"""LQG with integral action: an observer of the plant, and feedback of its state.
+
+    a_k = -K (x_k, w_k, z_k),                 x the estimate from samples before t_k: one sample for computing
+    x_k+1 = F x_k + G (w_k, a_k) + L (y_k - C x_k - D w_k),           z_k+1 = z_k + (position error)_k
+
+All in deviations from the path: ``y`` from its positions and tensions, ``w`` from its winch speeds; ``a`` are the
+accelerations of the winches over the next sample.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import control
+import numpy as np
+from numpy.typing import NDArray
+
+from ..linear import LinearPlant, linearise
+from ..robot import Robot
+from ..robot_wiring import AXES
+from .aim import ControlAim, measurement_noise
+from .design import Knot, regulator_signals
+from .plant import sampled_plant
+
+Array = NDArray[np.float64]
+
+# python-control would take slycot's where it is installed, and the last digits would differ.
+RICCATI = "scipy"
+
+
+@dataclass(frozen=True)
+class Controller:
+    """A designed LQG controller; n cables, p states of the plant.
+
+    ``plant`` is the sampled ``control.StateSpace`` from winch accelerations to position, tensions and winch
+    speeds, with states (plant, winch speeds). ``feedback`` (n, p + n + 3) is K, ``observer`` (p, 3 + n) is L.
+    """
+
+    aim: ControlAim
+    linear: LinearPlant
+    plant: Any
+    feedback: Array
+    observer: Array
+
+    @property
+    def cable_count(self) -> int:
+        """Number of cables."""
+        return len(self.feedback)
+
+    @property
+    def feels(self) -> bool:
+        """See :class:`tautwire.control.Design`."""
+        return True
+
+    @property
+    def regulator(self) -> Any:
+        """The unlimited controller as a ``control.StateSpace``: outputs of ``plant`` in, its inputs out.
+
+        Signals are deviations from the path; the sign of the feedback is inside, so close the loop with
+        ``control.feedback(plant, regulator, 1)``. States are the estimate and the summed position errors.
+        """
+        count, size = self.cable_count, len(self.observer)
+        measured = self.observer @ self.plant.C[:-count]
+        A, B = self.plant.A[:size] - measured, self.plant.B[:size]
+        K_state, K_speed, K_sum = np.hsplit(self.feedback, [size, size + count])
+        sums = np.eye(3, 3 + 2 * count)
+        return control.ss(
+            np.block([[A[:, :size] - B @ K_state, -B @ K_sum], [np.zeros((3, size)), np.eye(3)]]),
+            np.vstack([np.hstack([self.observer, A[:, size:] - B @ K_speed]), sums]),
+            -np.hstack([K_state, K_sum]),
+            -np.hstack([np.zeros((count, 3 + count)), K_speed]),
+            self.aim.period,
+            states=[*self.plant.state_labels[:size], *(f"position_error_sum_{axis}" for axis in AXES)],
+            **regulator_signals(count),
+        )
+
+    @property
+    def tracking(self) -> Array:
+        """What the state makes of a limit, (p + 3, n): the observer sees what was given, the sums give way to it.
+
+        The sums go back towards those that would have asked for what was given, over ``integral_time``; so they do
+        not wind up. Source: Astrom and Hagglund (2006), Advanced PID Control, section 3.5, back-calculation.
+        """
+        size = len(self.observer)
+        back = self.aim.period / self.aim.integral_time * np.linalg.pinv(self.feedback[:, -3:])
+        return np.vstack([self.plant.B[:size], -back])
+
+    def knots(self) -> tuple[Knot, ...]:
+        """See :class:`tautwire.control.Design`; one for the whole path."""
+        return (Knot(0.0, self.regulator, self.tracking),)
+
+
+def design_controller(robot: Robot, aim: ControlAim | None = None, at: Sequence[float] | None = None) -> Controller:
+    """LQG with integral action on the plant linearised at ``at`` (m), by default the start.
+
+    Raises what :func:`tautwire.linear.linearise` raises.
+    """
+    aim = aim or ControlAim()
+    linear = linearise(robot, at)
+    plant = sampled_plant(linear, aim.period)
+    return Controller(aim, linear, plant, _feedback(aim, linear, plant), _observer(robot, aim, linear, plant))
+
+
+def _feedback(aim: ControlAim, linear: LinearPlant, plant: Any) -> Array:
+    """LQI: positions, tensions, winch speeds and summed position errors against winch accelerations."""
+    count = len(linear.tensions)
+    tension = aim.tension * float(np.mean(linear.tensions))
+    sizes = np.repeat([aim.position, tension, aim.winch_speed], [3, count, count])
+    scaled = plant.C / sizes[:, None]
+    weights = scaled.T @ scaled
+    weights = 0.5 * (weights + weights.T)  # python-control wants it symmetric to the last bit
+    sums = np.eye(3) * (aim.period / (aim.integral_time * aim.position)) ** 2
+    nothing = np.zeros((len(weights), 3))
+    gain, _, _ = control.dlqr(
+        plant,
+        np.block([[weights, nothing], [nothing.T, sums]]),
+        np.eye(count) / aim.winch_acceleration**2,
+        integral_action=plant.C[:3],
+        method=RICCATI,
+    )
+    return np.asarray(gain)
+
+
+def _observer(robot: Robot, aim: ControlAim, linear: LinearPlant, plant: Any) -> Array:
+    """The stationary Kalman gain: random walks of velocity, rope and effects against the sensors' noise."""
+    count, size = len(linear.tensions), linear.system.nstates
+    walk = np.repeat([aim.acceleration_disturbance, aim.speed_disturbance], [3, size - 6])
+    gain, _, _ = control.dlqe(
+        plant.A[:size, :size],
+        np.eye(size)[:, 3:],
+        plant.C[:-count, :size],
+        np.diag(walk**2 * aim.period),
+        np.diag(measurement_noise(robot) ** 2),
+        method=RICCATI,
+    )
+    return np.asarray(gain)
