@@ -57,6 +57,34 @@ def test_simulate_needs_only_times_and_speeds(tmp_path: Path, short: tuple[Path,
     assert len(pd.read_csv(tmp_path / "result.csv")) == 20
 
 
+def test_simulate_reads_and_writes_parquet(tmp_path: Path, short: tuple[Path, Path]) -> None:
+    recording = tmp_path / "fit.parquet"
+    pd.read_csv(short[0]).to_parquet(recording, index=False)
+    results = []
+    for place, speeds in ((tmp_path / "result.parquet", recording), (tmp_path / "result.csv", short[0])):
+        assert run(["simulate", ROBOT, "--speeds", str(speeds), "--until", "0.5", "--out", str(place)]) == 0
+        results.append(pd.read_parquet(place) if place.suffix == ".parquet" else pd.read_csv(place))
+    pd.testing.assert_frame_equal(*results, rtol=1e-14)
+
+
+@pytest.mark.parametrize("name", ["result.csv", "result.parquet"])
+def test_a_run_that_fails_leaves_what_it_had_computed(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], name: str
+) -> None:
+    recording, result = tmp_path / "torn.csv", tmp_path / name
+    speeds = pd.DataFrame(
+        {"time": [0.0, 0.1, 0.2, 0.3]} | {f"winch_speed_{i}": [0.0, 0.0, 0.0, 1e6] for i in (1, 2, 3)}
+    )
+    speeds.to_csv(recording, index=False)
+    assert run(["simulate", ROBOT, "--speeds", str(recording), "--out", str(result)]) == 1
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1
+    assert "FMU " in said and f"the run until then is in {result}" in said
+    frame = pd.read_csv(result) if name.endswith(".csv") else pd.read_parquet(result)
+    assert frame["time"].tolist() == [0.0, 0.1, 0.2]
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([name, "torn.csv"])
+
+
 def test_linearise_writes_the_model(tmp_path: Path) -> None:
     place = tmp_path / "model.json"
     assert run(["linearise", ROBOT, "--at", "28.86,0,8", "--out", str(place)]) == 0
@@ -202,6 +230,7 @@ def test_two_cables_are_too_few(tmp_path: Path, capsys: pytest.CaptureFixture[st
         ["linearise", ROBOT, "--at", "-30,0,5", "--out", "m.json"],
         ["simulate", ROBOT, "--speeds", str(THREE / "fit.csv"), "--until", "nan", "--out", "r.csv"],
         ["simulate", ROBOT, "--speeds", str(THREE / "fit.csv"), "--tolerance", "0", "--out", "r.csv"],
+        ["simulate", ROBOT, "--speeds", str(THREE / "fit.csv"), "--patience", "nan", "--out", "r.csv"],
     ],
 )
 def test_wrong_usage_is_one_line(
@@ -249,11 +278,13 @@ def test_too_few_samples_are_refused(tmp_path: Path, capsys: pytest.CaptureFixtu
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("delay", [0.3, 2.0, 6.0])
-def test_ctrl_c_leaves_nothing_behind(tmp_path: Path, delay: float) -> None:
+@pytest.mark.parametrize(("command", "delay"), [("trace", 0.3), ("trace", 2.0), ("trace", 6.0), ("simulate", 3.0)])
+def test_ctrl_c_leaves_nothing_behind(tmp_path: Path, command: str, delay: float) -> None:
     scratch = tmp_path / "scratch"
     scratch.mkdir()
-    arguments = ["trace", ROBOT, str(THREE / "fit.csv"), "--out", str(tmp_path / "out")]
+    fit = str(THREE / "fit.csv")
+    inputs = {"trace": [fit], "simulate": ["--speeds", fit, "--step", "1e-4"]}[command]
+    arguments = [command, ROBOT, *inputs, "--out", str(tmp_path / "out.parquet")]
     process = subprocess.Popen(
         [sys.executable, "-m", "tautwire.cli", *arguments],
         stderr=subprocess.PIPE,
@@ -272,3 +303,84 @@ def test_ctrl_c_leaves_nothing_behind(tmp_path: Path, delay: float) -> None:
     assert shown == ""
     assert [path.name for path in tmp_path.iterdir()] == ["scratch"]
     assert list(scratch.iterdir()) == []
+
+
+WINCH = "\n[winch]\ndrum_radius = 0.2\nacceleration_limit = 3.0\n"
+
+
+def with_tables(tmp_path: Path, tables: str) -> str:
+    """The three-cable robot file with more tables."""
+    place = tmp_path / "robot.toml"
+    place.write_text(Path(ROBOT).read_text(encoding="utf-8") + tables, encoding="utf-8")
+    return str(place)
+
+
+def test_with_winches_speeds_are_commands_and_the_result_has_what_came_of_them(
+    tmp_path: Path, short: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
+) -> None:
+    robot, result = with_tables(tmp_path, WINCH), tmp_path / "result.csv"
+    assert run(["simulate", robot, "--speeds", str(short[0]), "--until", "0.5", "--out", str(result)]) == 0
+    assert "winch speeds are what the winches are asked for" in capsys.readouterr().err
+    frame, recorded = pd.read_csv(result), pd.read_csv(short[0])
+    gap = (frame["winch_speed_2"] - recorded["winch_speed_2"][: len(frame)]).abs()
+    assert 0.0 < gap.max() < 0.05
+
+
+def test_build_writes_winches(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    assert run(["build", with_tables(tmp_path, WINCH), "--out", str(out)]) == 0
+    assert {f"winch_{i}.fmu" for i in (1, 2, 3)} < {path.name for path in out.iterdir()}
+    assert [line for line in capsys.readouterr().out.split() if "winch_" in Path(line).name] == [
+        str(out / f"winch_{i}.fmu") for i in (1, 2, 3)
+    ]
+
+
+def test_linearise_says_that_winches_have_no_part_in_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    place = tmp_path / "model.json"
+    plain = tmp_path / "plain.json"
+    assert run(["linearise", ROBOT, "--out", str(plain)]) == 0
+    assert capsys.readouterr().err == ""
+    assert run(["linearise", with_tables(tmp_path, WINCH), "--out", str(place)]) == 0
+    assert capsys.readouterr().err.startswith("[winch]: no part in this")
+    assert place.read_text() == plain.read_text()
+
+
+@pytest.mark.parametrize(
+    ("given", "words"),
+    [
+        ("platform=absent.fmu", ["absent.fmu", "FMU platform", "no such file", "check the path"]),
+        ("cable_9=a.fmu", ["--fmu", "'cable_9=a.fmu'", "winch_3"]),
+        ("robot.toml", ["--fmu", "names no slot"]),
+    ],
+)
+def test_a_wrong_fmu_is_one_line_and_nothing_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], given: str, words: list[str]
+) -> None:
+    arguments = ["simulate", ROBOT, "--speeds", str(THREE / "fit.csv"), "--out", str(tmp_path / "out.csv")]
+    assert run([*arguments, "--fmu", given]) == 2
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    assert not [word for word in words if word not in captured.err], captured.err
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_port_that_is_missing_is_named_before_anything_runs(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    assert run(["build", ROBOT, "--out", str(tmp_path)]) == 0
+    capsys.readouterr()
+    arguments = ["simulate", ROBOT, "--speeds", str(THREE / "fit.csv"), "--out", str(tmp_path / "out.csv")]
+    assert run([*arguments, "--fmu", f"platform={tmp_path / 'cable_1.fmu'}"]) == 2
+    said = capsys.readouterr().err
+    assert "cable_1.fmu: cannot be the FMU platform: position.x is a Real input; make it a Real output in m" in said
+    assert not (tmp_path / "out.csv").exists()
+
+
+def test_build_does_not_write_over_a_users_fmu(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["build", ROBOT, "--out", str(tmp_path)]) == 0
+    robot = with_tables(tmp_path, "\n[fmu]\nplatform = 'platform.fmu'\n")
+    assert run(["build", robot, "--out", str(tmp_path)]) == 2
+    assert "is an input" in capsys.readouterr().err
+    assert run(["build", robot, "--out", str(tmp_path / "out")]) == 0
+    assert (tmp_path / "out" / "platform.fmu").read_bytes() == (tmp_path / "platform.fmu").read_bytes()

@@ -1,4 +1,4 @@
-"""The command line: ``tautwire build | simulate | linearise | trace``."""
+"""The command line: ``tautwire build | simulate | linearise | workspace | trace | material``."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from rich.progress import (
 )
 
 from .errors import InputError, TautwireError, UnreachableError
-from .robot import Robot
+from .robot import Robot, slots
 from .robot_file import read_robot
 from .statics import static_tensions
 
@@ -43,6 +43,8 @@ C_HOSTS = (
     "Make FMUs that also run in importers that are not Python processes; needs a C compiler, and Python's headers "
     "and shared library (Debian: gcc, python3-dev)."
 )
+OWN_FMU = "An FMU of yours in place of ours, such as platform=mine.fmu, cable_2=... or winch_1=...; may be repeated."
+DYNAMIC_TEST = "A dynamic test of the rope; if none, Table 1 of the paper, with the pair that it uses."
 RobotFile = Annotated[Path, typer.Argument(metavar="ROBOT.toml", help="The robot file.")]
 
 
@@ -77,47 +79,52 @@ def build(
     out: Annotated[Path, typer.Option(help="Folder for the FMUs.")] = Path("build"),
     for_c_hosts: Annotated[bool, typer.Option("--for-c-hosts", help=C_HOSTS)] = False,
 ) -> None:
-    """Build the FMUs, one a cable and one for the platform, and the whole robot as an SSP archive.
+    """Build the FMUs, one a cable, one a winch and one for the platform, and the whole robot as an SSP archive.
 
     Example: tautwire build robot.toml --out build/
     """
     from .c_hosts import embeddable_python, find_compiler, make_for_c_hosts
-    from .output import folder_in_place
-    from .packaging import build_fmus
+    from .output import folder_in_place, refuse_inputs
+    from .packaging import build_fmus, gathered
     from .ssp import ssp_name, write_ssp
 
     robot = _robot(robot_file)
+    refuse_inputs([fmu.path for fmu in robot.fmus], [out / f"{slot}.fmu" for slot in slots(robot.cable_count)])
     if for_c_hosts:
         embeddable_python()
         find_compiler()
     with folder_in_place(out) as scratch:
-        fmus = build_fmus(robot, scratch)
+        fmus = gathered(build_fmus(robot, scratch), scratch)
         if for_c_hosts:
-            for path in (*fmus.cables, fmus.platform):
-                make_for_c_hosts(path)
+            for slot in fmus.parts.keys() - fmus.own.keys():
+                make_for_c_hosts(fmus.parts[slot])
         system = write_ssp(robot, fmus, scratch / ssp_name(robot))
-    for path in (*fmus.cables, fmus.platform, system):
+    for path in (*fmus.paths, system):
         print(out / path.name)
 
 
 @application.command()
 def simulate(
     robot_file: RobotFile,
-    speeds: Annotated[Path, typer.Option(metavar="RECORDING.csv", help="Winch speeds over time.")],
-    out: Annotated[Path, typer.Option(metavar="RESULT.csv", help="Where the result goes.")],
+    speeds: Annotated[Path, typer.Option(metavar="RECORDING.csv", help="Winch speeds over time; CSV or Parquet.")],
+    out: Annotated[Path, typer.Option(metavar="RESULT.csv", help="Where the result goes; Parquet if .parquet.")],
     step: Annotated[float, typer.Option(help="Longest macro step, s.")] = 0.01,
     tolerance: Annotated[
         float | None, typer.Option(help="Error allowed, m; chooses the steps, in place of --step.")
     ] = None,
     until: Annotated[float | None, typer.Option(help="Stop at this time, s.")] = None,
+    patience: Annotated[float, typer.Option(help="An FMU in the same call for so long hangs, s.")] = 60.0,
+    fmu: Annotated[list[str] | None, typer.Option(metavar="SLOT=FILE", help=OWN_FMU)] = None,
 ) -> None:
-    """Co-simulate the FMUs over recorded winch speeds.
+    """Co-simulate the FMUs over recorded winch speeds; with [winch] in the robot file these are what is asked of them.
 
     Example: tautwire simulate robot.toml --speeds recording.csv --out result.csv
     """
-    from .cosimulation import RunError
-    from .output import file_in_place, refuse_inputs
+    from .output import refuse_inputs
+    from .result_file import result_in_place
+    from .robot_wiring import result_columns
     from .simulation import simulate_recording
+    from .slots import check_own_fmus, lacking_ports, own_fmus
 
     if not step > 0.0:
         raise InputError("--step", f"{step:g} s is not positive", "give a step such as 0.01")
@@ -125,20 +132,18 @@ def simulate(
         raise InputError("--until", "nan is not a time", "give a time in s")
     if tolerance is not None and not tolerance > 0.0:
         raise InputError("--tolerance", f"{tolerance:g} m is not positive", "give an error such as 1e-6")
-    refuse_inputs([robot_file, speeds], [out])
+    if not patience > 0.0:
+        raise InputError("--patience", f"{patience:g} s is not positive", "give a time such as 60, or inf")
     robot = _robot(robot_file)
-    try:
-        with _progress() as tell:
-            motion, notes = simulate_recording(robot, speeds, step, tolerance, until, tell)
-    except RunError as failure:
-        with file_in_place(out) as scratch:
-            failure.motion.frame().to_csv(scratch, index=False)
-        raise TautwireError(f"{failure}; the run until then is in {out}") from failure
-    with file_in_place(out) as scratch:
-        motion.frame().to_csv(scratch, index=False)
+    robot = robot.with_fmus(own_fmus(fmu or [], robot.cable_count))
+    refuse_inputs([robot_file, speeds, *(own.path for own in robot.fmus)], [out])
+    check_own_fmus(robot)
+    lacking = lacking_ports({own.slot: own.path for own in robot.fmus}, robot.cable_count)
+    columns = result_columns(robot.cable_count, robot.winch_numbers, lacking)
+    with result_in_place(out, columns) as result, _progress() as tell:
+        account, notes = simulate_recording(robot, speeds, result, step, tolerance, until, tell, patience)
     for note in notes:
         print(note, file=sys.stderr)
-    account = motion.account
     estimated = "" if account.error is None else f", estimated error {account.error:.2g} m"
     print(f"{out}: {account.steps} steps, {account.redos} redos, coupling made {account.made:.2g} J{estimated}")
 
@@ -150,6 +155,8 @@ def linearise(
     at: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Position, m; by default the start.")] = None,
 ) -> None:
     """Linearise the robot at rest: modes, and A, B, C, D with named signals.
+
+    Inputs are the speeds of the drums: [winch] and [fmu] of the robot file have no part in it.
 
     Example: tautwire linearise robot.toml --at 10,5.5,4 --out model.json
     """
@@ -165,6 +172,9 @@ def linearise(
         raise UnreachableError("--at", error.position, error.cable, error.tension, error.reason) from error
     with file_in_place(out) as scratch:
         scratch.write_text(json.dumps(model_document(plant), indent=1), encoding="utf-8")
+    _say_what_is_left_out(robot)
+    for note in plant.notes:
+        print(note, file=sys.stderr)
     pairs = zip(plant.modes.frequencies, plant.modes.damping_ratios, strict=True)
     for number, (frequency, ratio) in enumerate(pairs, start=1):
         print(f"mode {number}: {frequency:.4f} Hz, damping ratio {ratio:.5f}")
@@ -172,14 +182,54 @@ def linearise(
 
 
 @application.command()
+def workspace(
+    robot_file: RobotFile,
+    out: Annotated[Path, typer.Option(metavar="WORKSPACE.csv", help="Where the table goes.")],
+    plot: Annotated[Path | None, typer.Option(metavar="FIGURE.png", help="Slices as a figure; or .pdf, .svg.")] = None,
+    lower: Annotated[
+        str | None, typer.Option(metavar="X,Y,Z", help="Lower corner, m; by default of all exit points and the start.")
+    ] = None,
+    upper: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Upper corner, m.")] = None,
+    spacing: Annotated[float | None, typer.Option(help="Grid spacing, m; by default a twentieth of the box.")] = None,
+    acceleration: Annotated[float, typer.Option(help="Required along each axis beside the weight, m/s^2.")] = 0.0,
+) -> None:
+    """Where the cables, which only pull, hold the platform: margins and static tensions on a grid.
+
+    Example: tautwire workspace robot.toml --out workspace.csv --plot workspace.png
+    """
+    from .output import file_in_place, refuse_inputs
+    from .workspace import wrench_feasible_workspace
+    from .workspace_figure import checked_format, workspace_figure
+
+    refuse_inputs([robot_file], [out, *([plot] if plot else [])])
+    if plot is not None:
+        checked_format(plot)
+    robot = read_robot(robot_file)
+    least = None if lower is None else _position(lower, "--lower")
+    most = None if upper is None else _position(upper, "--upper")
+    found = wrench_feasible_workspace(robot, least, most, spacing, acceleration)
+    with file_in_place(out) as scratch:
+        found.frame().to_csv(scratch, index=False, float_format="%.10g")
+        if plot is not None:
+            with file_in_place(plot) as drawing:
+                workspace_figure(robot, found).savefig(drawing)
+    print(f"{int(found.feasible.sum())} of {found.feasible.size} positions are wrench-feasible")
+    for path in (out, plot):
+        if path is not None:
+            print(path)
+
+
+@application.command()
 def trace(
     robot_file: RobotFile,
-    fit: Annotated[Path, typer.Argument(metavar="FIT.csv", help="The recording to fit.")],
+    fit: Annotated[Path, typer.Argument(metavar="FIT.csv", help="The recording to fit; CSV or Parquet.")],
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where the report goes.")],
     check: Annotated[Path | None, typer.Option(metavar="CHECK.csv", help="A recording to judge on.")] = None,
     alpha: Annotated[float, typer.Option(help="Rate of false alarms allowed.")] = 0.01,
 ) -> None:
     """Find what the model lacks, add it, and report the error before and after.
+
+    Recorded winch speeds are what the drums' encoders give: [winch] and [fmu] of the robot file have no part in it.
 
     Example: tautwire trace robot.toml fit.csv --check check.csv --out report/
     """
@@ -199,8 +249,54 @@ def trace(
         with _progress() as tell:
             result = traced(robot, recording, judging, tell, alpha)
         write_report(result, scratch)
+    _say_what_is_left_out(robot)
     Console().print(trace_table(result))
     print(out / "index.html")
+
+
+@application.command()
+def material(
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where fit.json and the figure go.")],
+    table: Annotated[Path | None, typer.Argument(metavar="TABLE.csv", help=DYNAMIC_TEST)] = None,
+    at: Annotated[float | None, typer.Option(help="The row, Hz, whose pair of E' and c is in use as constant.")] = None,
+    robot_file: Annotated[
+        Path | None, typer.Option("--robot", metavar="ROBOT.toml", help="A robot with this rope; written anew.")
+    ] = None,
+    shared: Annotated[float, typer.Option(help="Share of each variance that all rows have in common.")] = 0.0,
+    coverage: Annotated[float, typer.Option(help="Standard deviations that the table's uncertainties are.")] = 1.0,
+    alpha: Annotated[float, typer.Option(help="Rate of false alarms allowed.")] = 0.01,
+) -> None:
+    """Judge a constant modulus and damping by a dynamic test, and fit what the rope has besides.
+
+    Example: tautwire material dma.csv --robot robot.toml --out material/
+    """
+    from .materials import PAPER_PAIR_AT, PAPER_TABLE, Options, pair_of_row, read_material_table, trace_material
+    from .materials.output import FILES, write_material
+    from .materials.robot_material import declared_material
+    from .materials.terminal import material_table
+    from .output import folder_in_place, refuse_inputs
+
+    for name, value, least in (("--shared", shared, 0.0), ("--alpha", alpha, math.nextafter(0.0, 1.0))):
+        if not least <= value < 1.0:
+            raise InputError(name, f"{value:g} is not a share below 1", "give a number such as 0.01")
+    if not 0.0 < coverage < math.inf:
+        raise InputError("--coverage", f"{coverage:g} is not positive", "give 1, or 2 for intervals of 95 %")
+    if at is not None and robot_file:
+        raise InputError("--at", "the pair in use is the robot's", "give either --at or --robot")
+    read = read_material_table(table or PAPER_TABLE)
+    robot = _robot(robot_file) if robot_file else None
+    refuse_inputs([path for path in (table, robot_file) if path], [out / name for name in FILES])
+    declared = declared_material(robot, str(robot_file)) if robot else None
+    if table is None and robot is None and at is None:
+        at = PAPER_PAIR_AT
+    if at is not None:
+        declared = pair_of_row(read, at)
+    with folder_in_place(out) as scratch:
+        with _progress() as tell:
+            verdict = trace_material(read, declared, Options(shared=shared, coverage=coverage, alpha=alpha), tell)
+        write_material(verdict, scratch, robot)
+    Console().print(material_table(verdict))
+    print(out / "fit.json")
 
 
 def _robot(path: Path) -> Robot:
@@ -214,14 +310,21 @@ def _robot(path: Path) -> Robot:
     return robot
 
 
-def _position(text: str) -> tuple[float, float, float]:
-    mend = "give three numbers in m, such as --at 10,5.5,4"
+def _say_what_is_left_out(robot: Robot) -> None:
+    tables = [name for name, content in (("[winch]", robot.winch), ("[fmu]", robot.fmus)) if content]
+    if tables:
+        said = "no part in this: winch speeds are those of the drums' encoders, and all components the project's own"
+        print(f"{' and '.join(tables)}: {said}", file=sys.stderr)
+
+
+def _position(text: str, option: str = "--at") -> tuple[float, float, float]:
+    mend = f"give three numbers in m, such as {option} 10,5.5,4"
     try:
         x, y, z = (float(part) for part in text.split(","))
     except ValueError:
-        raise InputError("--at", f"{text!r} is not a position", mend) from None
+        raise InputError(option, f"{text!r} is not a position", mend) from None
     if not all(map(math.isfinite, (x, y, z))):
-        raise InputError("--at", f"{text!r} is not a position", mend)
+        raise InputError(option, f"{text!r} is not a position", mend)
     return x, y, z
 
 
