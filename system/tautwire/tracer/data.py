@@ -12,6 +12,9 @@ from ..robot import Robot
 from ..start import start_of
 from .filter_step import Noise
 
+HEAD_SHARE = 3
+FEWEST_IN_HEAD = 800
+
 
 @dataclass(frozen=True)
 class Sample:
@@ -20,6 +23,13 @@ class Sample:
     recording: Recording
     start: tuple[float, float, float]
     rows: NDArray[np.bool_]
+
+    @property
+    def head(self) -> Sample:
+        """The beginning of the samples that count, long enough to rank hypotheses by: a third, at least 800."""
+        places = np.flatnonzero(self.rows)
+        last = int(places[min(max(len(places) // HEAD_SHARE, FEWEST_IN_HEAD), len(places)) - 1]) + 1
+        return Sample(self.recording.first(last), self.start, self.rows[:last])
 
 
 @dataclass(frozen=True)

@@ -8,6 +8,7 @@ Source: Bierman (1977), Factorization Methods for Discrete Sequential Estimation
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -45,29 +46,37 @@ class _Filtered:
     gradient: SX
 
 
-def filter_sample(model: Model, cable_count: int, noise: Noise, substeps: Substeps) -> Function:
-    """Arguments: state, covariance, slopes, parameters, measured, seen, speed, next speed, time step, drift, roughness.
+def filter_sample(
+    model: Model, cable_count: int, noise: Noise, substeps: Substeps, uncertain: Sequence[int]
+) -> Function:
+    """Arguments: state, covariance, slopes, parameters, measured, seen, shift, speed, next speed, time step, drift,
+    roughness.
 
     Results: the first three at the next sample, then whitened innovations (m,), log of their variances (m,), and
-    the innovations' derivatives by the parameters (m, p), whitened. Measured is x, y, z and the tensions; drift (s^2)
-    times the variance of a winch speed is what its noise adds to the variance of each unstrained length.
+    the innovations' derivatives by the parameters (m, p), whitened. Measured is x, y, z and the tensions, each as shown
+    ``shift`` (s) later; drift (s^2) times the variance of a winch speed is what its noise adds to the variance of each
+    unstrained length. The covariance is that of the ``uncertain`` states; position, velocity and unstrained lengths
+    come first among them.
     """
     size, count = model.states.numel(), model.parameters.numel()
     predicted = _Filtered(
         SX.sym("state", size),
-        SX.sym("covariance", size, size),
+        SX.sym("covariance", len(uncertain), len(uncertain)),
         SX.sym("slopes", size, count),
         SX(),
         SX(),
         SX(),
     )
-    measured, seen = SX.sym("measured", 3 + cable_count), SX.sym("seen", 3 + cable_count)
+    measured, seen, shift = (SX.sym(name, 3 + cable_count) for name in ("measured", "seen", "shift"))
     speed, later = SX.sym("speed", cable_count), SX.sym("later", cable_count)
     step, drift, roughness = SX.sym("step"), SX.sym("drift"), SX.sym("roughness")
-    filtered = _take_in(model, cable_count, noise, predicted, measured, seen, speed)
+    shown = _shown(model, cable_count, later, step, shift)
+    chosen = SX.eye(size)[list(uncertain), :]
+    filtered = _take_in(model, shown, noise, predicted, measured, seen, (speed, later, step, shift), chosen)
     state, transition, direct = _advance(model, substeps, filtered.state, speed, later, step)
-    spread = casadi.mtimes([transition, filtered.covariance, transition.T])
-    variance = SX(size, 1)
+    moved = casadi.mtimes([chosen, transition, chosen.T])
+    spread = casadi.mtimes([moved, filtered.covariance, moved.T])
+    variance = SX(len(uncertain), 1)
     variance[3:6] = roughness**2 * step
     variance[6 : 6 + cable_count] = noise.winch_speed**2 * drift
     return Function(
@@ -79,6 +88,7 @@ def filter_sample(model: Model, cable_count: int, noise: Noise, substeps: Subste
             model.parameters,
             measured,
             seen,
+            shift,
             speed,
             later,
             step,
@@ -96,32 +106,57 @@ def filter_sample(model: Model, cable_count: int, noise: Noise, substeps: Subste
     )
 
 
-def _take_in(
-    model: Model, cable_count: int, noise: Noise, predicted: _Filtered, measured: SX, seen: SX, speed: SX
-) -> _Filtered:
+def _shown(model: Model, cable_count: int, later: SX, step: SX, shift: SX) -> SX:
+    """What sensors show ``shift`` (s) after this sample: of a state ``lag - shift`` before it, where they lag.
+
+    ``y - d dy/dt + d^2/2 d2y/dt2`` with ``d = lag - shift``, which is at most half a sample.
+    """
     shown = casadi.vertcat(model.outputs[:3], model.outputs[6 : 6 + cable_count])
+    if model.lags.is_zero():
+        return shown
+    slope = casadi.if_else(step > 0.0, (later - model.inputs[:cable_count]) / step, 0.0)
+    pace = casadi.vertcat(model.rates, slope)
+    moved = casadi.vertcat(model.states, model.inputs[:cable_count])
+    first = casadi.jtimes(shown, moved, pace)
+    second = casadi.jtimes(first, moved, pace)
+    late = model.lags - shift
+    return shown - late * first + 0.5 * late**2 * second
+
+
+def _take_in(
+    model: Model,
+    shown: SX,
+    noise: Noise,
+    predicted: _Filtered,
+    measured: SX,
+    seen: SX,
+    moment: tuple[SX, SX, SX, SX],
+    chosen: SX,
+) -> _Filtered:
+    speed, later, step, shift = moment
     inputs = casadi.vertcat(speed, SX(3, 1))
     outputs = Function(
         "outputs",
-        [model.states, model.inputs, model.parameters],
+        [model.states, model.inputs, model.parameters, later, step, shift],
         [shown, casadi.jacobian(shown, model.states), casadi.jacobian(shown, model.parameters)],
     )
-    expected, by_state, by_parameters = outputs(predicted.state, inputs, model.parameters)
+    expected, by_state, by_parameters = outputs(predicted.state, inputs, model.parameters, later, step, shift)
     covariance = predicted.covariance
     correction = SX(predicted.state.numel(), 1)
     slopes = predicted.slopes
     rows: list[tuple[SX, SX, SX]] = []
-    for index in range(3 + cable_count):
+    for index in range(shown.numel()):
         own = noise.position if index < 3 else noise.tension
         row = by_state[index, :]
-        spread = casadi.mtimes(covariance, row.T)
-        variance = casadi.mtimes(row, spread) + own**2
+        spread = casadi.mtimes([covariance, chosen, row.T])
+        variance = casadi.mtimes([row, chosen.T, spread]) + own**2
         error = measured[index] - expected[index] - casadi.mtimes(row, correction)
         slope = -(casadi.mtimes(row, slopes) + by_parameters[index, :])
-        gain = spread * (seen[index] / variance)
+        weighed = spread * (seen[index] / variance)
+        gain = casadi.mtimes(chosen.T, weighed)
         correction = correction + gain * error
         slopes = slopes + casadi.mtimes(gain, slope)
-        covariance = covariance - casadi.mtimes(gain, spread.T)
+        covariance = covariance - casadi.mtimes(weighed, spread.T)
         deviation = casadi.sqrt(variance)
         rows.append((error / deviation, casadi.log(variance), slope / deviation))
     errors, logs, gradients = (casadi.vertcat(*column) for column in zip(*rows, strict=True))

@@ -11,6 +11,7 @@ from scipy.optimize import least_squares
 
 from tautwire_fmu.laws.effects import BY_NAME, Parameter
 
+from ..errors import TautwireError, UnreachableError
 from ..robot import Robot
 from ..start import placed
 from ..symbolic import FreeParameter
@@ -26,6 +27,14 @@ STAGES = ((0.1, 1e-3), (0.01, 1e-3), (0.0, 1e-7))
 EVALUATIONS = 15
 KEPT = 40
 NORMAL_95 = 1.959964
+
+
+class NoFitError(TautwireError):
+    """A model has no finite innovations where its fit would begin; carries the values there."""
+
+    def __init__(self, values: Array) -> None:
+        self.values = values
+        super().__init__(f"no fit can begin at {values.tolist()}: the model has no finite output there")
 
 
 @dataclass(frozen=True)
@@ -58,9 +67,31 @@ class Fitter:
     def fit(self, robot: Robot, chosen: Collection[Hypothesis], sample: Sample) -> Fit:
         """Least squares on whitened innovations, first under a rough model, then under the exact one.
 
-        Frees the parameters of the chosen effects. The exact stage begins where the rough one ended or where that
+        Frees the parameters of the chosen hypotheses. The exact stage begins where the rough one ended or where that
         began, whichever is more probable.
         """
+        return self._fit(robot, chosen, sample, STAGES)
+
+    def fit_from(self, starts: Sequence[Robot], without: Robot, chosen: Collection[Hypothesis], sample: Sample) -> Fit:
+        """Fit from the first start that is more probable than the robot ``without``, under the exact model at once.
+
+        Where none is, the last start is fitted as :meth:`fit` does.
+
+        Raises NoFitError, UnreachableError.
+        """
+        least = self.innovations(without, sample).log_likelihood(sample.rows)
+        for start in starts:
+            try:
+                found = self.judged(start, chosen, sample).log_likelihood(sample.rows)
+            except UnreachableError:
+                continue
+            if found >= least:
+                return self._fit(start, chosen, sample, STAGES[-1:])
+        return self._fit(starts[-1], chosen, sample, STAGES)
+
+    def _fit(
+        self, robot: Robot, chosen: Collection[Hypothesis], sample: Sample, stages: Sequence[tuple[float, float]]
+    ) -> Fit:
         free = free_parameters(robot, chosen)
         if not free:
             return Fit(robot, (), np.zeros(0), np.zeros(0))
@@ -71,12 +102,14 @@ class Fitter:
         likelihood = self._likelihood(placed(robot, sample.start), free, sample)
         begun = scaled = start / scale
         slopes = np.zeros((0, len(free)))
-        for rough, stop in STAGES:
+        for rough, stop in stages:
             residual = _Residual(likelihood, sample, scale, rough, self.between)
             if rough == 0.0:
                 scaled = max((scaled, begun), key=residual.log_likelihood)
             # The first trust region is as large as the start: counted from one, a parameter near zero is not stuck.
             residual.origin = scaled - 1.0
+            if not np.all(np.isfinite(residual.values(np.ones(len(free))))):
+                raise NoFitError(scaled * scale)
             solution = least_squares(
                 residual.values,
                 np.ones(len(free)),
@@ -96,24 +129,33 @@ class Fitter:
         """Innovations of all samples of a recording under a robot as it is."""
         return self._likelihood(placed(robot, sample.start), (), sample).innovations(sample.recording, ())
 
-    def linearised(self, robot: Robot, free: Sequence[FreeParameter], sample: Sample) -> Innovations:
-        """Innovations with their slopes by some of the robot's parameters."""
+    def judged(self, robot: Robot, chosen: Collection[Hypothesis], sample: Sample) -> Innovations:
+        """As :meth:`innovations`, by what was compiled for fitting the chosen hypotheses."""
+        return self.linearised(robot, free_parameters(robot, chosen), sample)
+
+    def linearised(
+        self, robot: Robot, free: Sequence[FreeParameter], sample: Sample, exact: Collection[str] = ()
+    ) -> Innovations:
+        """Innovations with their slopes by some of the robot's parameters; ``exact`` as for :class:`Likelihood`."""
         values = [robot.effects[f.setting].values[f.name] for f in free]
-        return self._likelihood(placed(robot, sample.start), free, sample).innovations(sample.recording, values)
+        likelihood = self._likelihood(placed(robot, sample.start), free, sample, exact)
+        return likelihood.innovations(sample.recording, values)
 
     def open_loop_variances(self, robot: Robot, sample: Sample) -> Array:
         """See :meth:`tautwire.tracer.likelihood.Likelihood.open_loop_variances`."""
         return self._likelihood(placed(robot, sample.start), (), sample).open_loop_variances(sample.recording, ())
 
-    def _likelihood(self, robot: Robot, free: Sequence[FreeParameter], sample: Sample) -> Likelihood:
+    def _likelihood(
+        self, robot: Robot, free: Sequence[FreeParameter], sample: Sample, exact: Collection[str] = ()
+    ) -> Likelihood:
         self.between()
         interval = float(np.median(np.diff(sample.recording.time)))
         opened = with_values(robot, free, dict.fromkeys(free, 0.0))
-        key = (opened, tuple(free), round(interval, 9))
+        key = (opened, tuple(free), round(interval, 9), frozenset(exact))
         if key not in self._compiled:
             if len(self._compiled) >= KEPT:
                 self._compiled.pop(next(iter(self._compiled)))
-            self._compiled[key] = Likelihood(robot, free, self.noise, interval)
+            self._compiled[key] = Likelihood(robot, free, self.noise, interval, exact)
         return self._compiled[key]
 
 

@@ -1,22 +1,35 @@
-"""The hypotheses that a trace tries: each effect, on all cables and on each alone."""
+"""The hypotheses that a trace tries: each form of each effect, on all cables and on each alone."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from tautwire_fmu.laws.effects import ALL, BY_NAME, Effect, Parameter
+from tautwire_fmu.laws.effects import ALL, ANCHOR, BY_NAME, Effect, Parameter
 
-from ..robot import EffectSetting, Robot
+from ..robot import PER_CABLE, EffectSetting, Robot
 from ..symbolic import FreeParameter
+
+# All exit points moved alike are the platform's start and its sensor moved, the other way.
+ON_ONE_CABLE = (ANCHOR,)
+# What sensors show of the platform, whatever the cables named.
+OF_THE_PLATFORM = (("position_gain",), ("position_delay",))
 
 
 @dataclass(frozen=True)
 class Hypothesis:
-    """One effect on some cables; none where it acts on the platform."""
+    """One effect on some cables, none where it acts on the platform; ``form`` are the parameters that are fitted.
+
+    The other parameters of the effect stay neutral. Without a form it is the effect's first.
+    """
 
     effect: Effect
     cables: tuple[int, ...]
+    form: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        if not self.form:
+            object.__setattr__(self, "form", self.effect.forms[0])
 
     def label(self, robot: Robot) -> str:
         """The effect and, where it does not act on all cables, which it acts on."""
@@ -24,18 +37,33 @@ class Hypothesis:
             return self.effect.name
         return f"{self.effect.name} of cable {', '.join(map(str, self.cables))}"
 
+    @property
+    def parameters(self) -> tuple[Parameter, ...]:
+        """Those that are fitted."""
+        return tuple(parameter for parameter in self.effect.parameters if parameter.name in self.form)
+
     def overlaps(self, other: Hypothesis) -> bool:
         """Whether the other is the same effect in a place that both share."""
         return self.effect is other.effect and (not self.cables or bool(set(self.cables) & set(other.cables)))
 
-    def setting(self, robot: Robot) -> EffectSetting:
-        """The effect switched on at the values where fits begin."""
-        return EffectSetting(self.effect.name, dict(self._starts(robot)), self.cables)
+    def setting(self, robot: Robot, values: Mapping[str, float] | None = None) -> EffectSetting:
+        """The effect switched on at ``values``, where fits begin without them."""
+        given = dict(self._starts(robot)) if values is None else dict(values)
+        return EffectSetting(self.effect.name, self.effect.completed(given), self.cables)
+
+    def neutral(self, robot: Robot, cables: tuple[int, ...]) -> EffectSetting:
+        """The effect on some of the cables, switched on and absent."""
+        declared = {p.name: declared_value(robot, p, cables) for p in self.effect.parameters}
+        given = {name: value for name, value in declared.items() if value is not None}
+        return EffectSetting(self.effect.name, self.effect.completed(given), cables)
 
     def _starts(self, robot: Robot) -> Iterator[tuple[str, float]]:
         for parameter in self.effect.parameters:
             declared = declared_value(robot, parameter, self.cables)
-            yield parameter.name, parameter.start if not declared else parameter.start_ratio * declared
+            if parameter.name in self.form:
+                yield parameter.name, parameter.start if not declared else parameter.start_ratio * declared
+            elif declared is not None:
+                yield parameter.name, declared
 
 
 def joined(accepted: Sequence[Hypothesis], new: Hypothesis) -> list[Hypothesis]:
@@ -46,20 +74,43 @@ def joined(accepted: Sequence[Hypothesis], new: Hypothesis) -> list[Hypothesis]:
         if not old.overlaps(new):
             kept.append(old)
         elif cables:
-            kept.append(Hypothesis(old.effect, cables))
+            kept.append(Hypothesis(old.effect, cables, old.form))
     return [*kept, new]
 
 
 def hypotheses(robot: Robot) -> tuple[Hypothesis, ...]:
-    """All single effects that could act on a robot."""
+    """All single effects that could act on a robot, each in its forms that contain no smaller one."""
     found: list[Hypothesis] = []
     for effect in ALL:
-        if effect.component == "platform":
-            found.append(Hypothesis(effect, ()))
-        else:
-            found.append(Hypothesis(effect, robot.cable_numbers))
-            found += [Hypothesis(effect, (cable,)) for cable in robot.cable_numbers]
+        for form in _smallest(effect.forms):
+            if effect.component not in PER_CABLE:
+                found.append(Hypothesis(effect, (), form))
+                continue
+            if effect not in ON_ONE_CABLE:
+                found.append(Hypothesis(effect, robot.cable_numbers, form))
+            if form not in OF_THE_PLATFORM:
+                found += [Hypothesis(effect, (cable,), form) for cable in robot.cable_numbers]
     return tuple(found)
+
+
+def enlarged(accepted: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """The accepted hypotheses with one more form of their effect."""
+    found = []
+    for old in accepted:
+        for form in old.effect.forms:
+            names = tuple(p.name for p in old.effect.parameters if p.name in (*old.form, *form))
+            if set(names) != set(old.form):
+                found.append(Hypothesis(old.effect, old.cables, names))
+    return list(dict.fromkeys(found))
+
+
+def divided(accepted: Sequence[Hypothesis]) -> list[Hypothesis]:
+    """One cable less: each cable that shares its value with others gets one of its own."""
+    return [Hypothesis(a.effect, (cable,), a.form) for a in accepted if len(a.cables) > 1 for cable in a.cables]
+
+
+def _smallest(forms: Sequence[tuple[str, ...]]) -> list[tuple[str, ...]]:
+    return [form for form in forms if not any(set(other) < set(form) for other in forms)]
 
 
 def declared_value(robot: Robot, parameter: Parameter, cables: tuple[int, ...]) -> float | None:
@@ -71,13 +122,13 @@ def declared_value(robot: Robot, parameter: Parameter, cables: tuple[int, ...]) 
 
 
 def free_parameters(robot: Robot, chosen: Collection[Hypothesis]) -> tuple[FreeParameter, ...]:
-    """Every parameter of the chosen effects of a robot, in its order; what else the file declares stays fixed."""
-    names = {(hypothesis.effect.name, hypothesis.cables) for hypothesis in chosen}
+    """The parameters that the chosen hypotheses fit, in the robot's order; what else the file declares stays fixed."""
+    forms = {(hypothesis.effect.name, hypothesis.cables): hypothesis.form for hypothesis in chosen}
     return tuple(
         FreeParameter(index, parameter.name)
         for index, setting in enumerate(robot.effects)
-        if (setting.name, setting.cables) in names
         for parameter in BY_NAME[setting.name].parameters
+        if parameter.name in forms.get((setting.name, setting.cables), ())
     )
 
 

@@ -11,7 +11,7 @@ Source: Ljung (1999), System Identification, sec. 7.4.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 from math import ceil, log, pi
 
@@ -60,19 +60,31 @@ class Innovations:
 
 
 class Likelihood:
-    """Innovations of recordings under a robot whose free parameters vary; compiled once."""
+    """Innovations of recordings under a robot whose free parameters vary; compiled once.
 
-    def __init__(self, robot: Robot, free: Sequence[FreeParameter], noise: Noise, sample_time: float) -> None:
+    States of the ``exact`` effects are taken as known, which they are where an effect is switched on and neutral.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        free: Sequence[FreeParameter],
+        noise: Noise,
+        sample_time: float,
+        exact: Collection[str] = (),
+    ) -> None:
         model = symbolic_model(robot, free)
+        uncertain = [i for i, name in enumerate(model.state_names) if name.split(".")[0] not in exact]
         self.noise = noise
         self.cable_count = robot.cable_count
-        self.state_count = model.states.numel()
+        self.uncertain_count = len(uncertain)
         self._start = casadi.Function(
             "start", [model.parameters], [model.start, casadi.jacobian(model.start, model.parameters)]
         )
         angle = fastest_mode(robot) * sample_time
         substeps = Substeps(max(1, ceil(angle / STATE_ANGLE)), max(1, ceil(angle / SLOPE_ANGLE)))
-        self._sample = filter_sample(model, robot.cable_count, noise, substeps)
+        self._lags = casadi.Function("lags", [model.parameters], [model.lags])
+        self._sample = filter_sample(model, robot.cable_count, noise, substeps, uncertain)
         self._runs = {CHUNK: self._sample.mapaccum("run", CHUNK, 3)}
 
     def innovations(
@@ -83,33 +95,39 @@ class Likelihood:
         ``roughness`` (m/s^2 per root hertz) adds an unknown white acceleration of the platform: a fit that starts
         far from the solution then follows the data instead of losing phase.
         """
-        seen = np.isfinite(recording.measured())
-        values, variances, slopes = self._filter(recording, seen, parameters, self._start_covariance(), roughness)
-        values[~seen] = np.nan
-        variances[~seen] = np.nan
-        return Innovations(seen, values, slopes, variances)
+        lags = np.array(self._lags(np.asarray(parameters, dtype=float))).ravel()
+        measured, shift = as_of(recording.time, recording.measured(), lags)
+        seen = np.isfinite(measured)
+        covariance = self._start_covariance()
+        values, variances, slopes = self._filter(recording, measured, shift, parameters, covariance, roughness)
+        given = np.isfinite(recording.measured())
+        values[~given] = np.nan
+        variances[~given] = np.nan
+        _fill(values, variances, slopes, given & ~seen)
+        return Innovations(given, values, slopes, variances)
 
     def open_loop_variances(self, recording: Recording, parameters: Sequence[float] | Array) -> Array:
         """Variance of measured less simulated, shape (N, m), where the model is right and its start exact.
 
         Noise of the sensors, and of the recorded winch speeds as it integrates.
         """
-        nothing = np.zeros(recording.measured().shape, dtype=bool)
-        exact = np.zeros((self.state_count, self.state_count))
-        _, log_variances, _ = self._filter(recording, nothing, parameters, exact, 0.0)
+        nothing = np.full(recording.measured().shape, np.nan)
+        exact = np.zeros((self.uncertain_count, self.uncertain_count))
+        _, log_variances, _ = self._filter(recording, nothing, np.zeros_like(nothing), parameters, exact, 0.0)
         variances: Array = np.exp(log_variances)
         return variances
 
     def _filter(
         self,
         recording: Recording,
-        seen: NDArray[np.bool_],
+        measured: Array,
+        shift: Array,
         parameters: Sequence[float] | Array,
         start_covariance: Array,
         roughness: float,
     ) -> tuple[Array, Array, Array]:
         theta = np.asarray(parameters, dtype=float)
-        columns, rows = _columns(recording, seen)
+        columns, rows = _columns(recording, measured, shift)
         state, slopes = self._start(theta)
         carried = (state, start_covariance, slopes)
         values, logs, gradients = [], [], []
@@ -118,11 +136,11 @@ class Likelihood:
             count = part[0].shape[1]
             constant = (np.repeat(theta[:, None], count, axis=1), *part, np.full((1, count), roughness))
             result = self._run(count)(*carried, *constant)
-            width, free = self.state_count, len(theta)
+            width, free = self.uncertain_count, len(theta)
             carried = (result[0][:, -1], result[1][:, -width:], result[2][:, result[2].shape[1] - free :])
             values.append(np.array(result[3]).T)
             logs.append(np.array(result[4]).T)
-            gradients.append(np.array(result[5]).reshape(seen.shape[1], count, free).swapaxes(0, 1))
+            gradients.append(np.array(result[5]).reshape(measured.shape[1], count, free).swapaxes(0, 1))
         return np.vstack(values)[rows], np.vstack(logs)[rows], np.vstack(gradients)[rows]
 
     def _run(self, count: int) -> casadi.Function:
@@ -131,14 +149,40 @@ class Likelihood:
         return self._runs[count]
 
     def _start_covariance(self) -> Array:
-        variance = np.zeros(self.state_count)
+        variance = np.zeros(self.uncertain_count)
         variance[:3] = self.noise.start**2
         variance[6 : 6 + self.cable_count] = self.noise.start**2
         covariance: Array = np.diag(variance)
         return covariance
 
 
-def _columns(recording: Recording, seen: NDArray[np.bool_]) -> tuple[tuple[Array, ...], NDArray[np.intp]]:
+def _fill(values: Array, variances: Array, slopes: Array, alone: NDArray[np.bool_]) -> None:
+    """Samples that a lag leaves without a state count as noise: dropping them must neither pay nor cost."""
+    for column in np.flatnonzero(alone.any(axis=0)):
+        places = np.flatnonzero(alone[:, column])
+        values[places, column] = np.where(places % 2, 1.0, -1.0)
+        variances[places, column] = np.median(np.delete(variances[:, column], places))
+        slopes[places, column] = 0.0
+
+
+def as_of(time: Array, measured: Array, lags: Array) -> tuple[Array, Array]:
+    """What sensors that lag show of the state at each time: the sample nearest to the time plus the lag.
+
+    Returns the values, NaN where there is none, and by how many seconds later than the state they were shown.
+    """
+    values, shift = measured.copy(), np.zeros_like(measured)
+    half = 0.5 * float(np.median(np.diff(time)))
+    for column in np.flatnonzero(lags > half):
+        wanted = time + lags[column]
+        after = np.clip(np.searchsorted(time, wanted), 1, len(time) - 1)
+        nearest = np.where(wanted - time[after - 1] < time[after] - wanted, after - 1, after)
+        there = np.abs(time[nearest] - wanted) <= 2.0 * half
+        values[:, column] = np.where(there, measured[nearest, column], np.nan)
+        shift[:, column] = np.where(there, time[nearest] - time, 0.0)
+    return values, shift
+
+
+def _columns(recording: Recording, measured: Array, shift: Array) -> tuple[tuple[Array, ...], NDArray[np.intp]]:
     """What the filter takes, a column a sample, and which columns are the recording's own samples.
 
     A gap in time is filled with samples of which nothing was seen, so that no step is longer than usual.
@@ -148,13 +192,16 @@ def _columns(recording: Recording, seen: NDArray[np.bool_]) -> tuple[tuple[Array
     rows = np.append(0, np.cumsum(pieces))
     time = np.interp(np.arange(rows[-1] + 1), rows, recording.time)
     speed = np.array([np.interp(time, recording.time, column) for column in recording.winch_speed.T])
-    measured = np.zeros((seen.shape[1], len(time)))
-    looked = np.zeros_like(measured)
-    measured[:, rows] = np.where(seen, recording.measured(), 0.0).T
+    shown = np.zeros((measured.shape[1], len(time)))
+    looked, later = np.zeros_like(shown), np.zeros_like(shown)
+    seen = np.isfinite(measured)
+    shown[:, rows] = np.where(seen, measured, 0.0).T
     looked[:, rows] = seen.T
+    later[:, rows] = shift.T
     step = np.append(np.diff(time), 0.0)
     drift = step * np.append(np.repeat(steps, pieces), 0.0)
-    return (measured, looked, speed, np.hstack([speed[:, 1:], speed[:, -1:]]), step[None, :], drift[None, :]), rows
+    speeds = (speed, np.hstack([speed[:, 1:], speed[:, -1:]]))
+    return (shown, looked, later, *speeds, step[None, :], drift[None, :]), rows
 
 
 def fastest_mode(robot: Robot) -> float:

@@ -144,7 +144,7 @@ def _root_mean(squares: Array) -> float:
 
 
 def _cosimulated(robot: Robot, sample: Sample, what: str, progress: Progress) -> Motion:
-    here = placed(robot, sample.start)
+    here = placed(robot.as_modelled(), sample.start)
     recording = sample.recording
     with TemporaryDirectory(prefix="tautwire-trace-") as folder:
         fmus = build_fmus(here, Path(folder))
@@ -193,7 +193,7 @@ def _effects(robot: Robot, found: Found) -> tuple[FoundEffect, ...]:
     effects = []
     for hypothesis, evidence in zip(found.accepted, found.evidence, strict=True):
         estimates = {}
-        for parameter in hypothesis.effect.parameters:
+        for parameter in hypothesis.parameters:
             place = places[hypothesis.effect.name, hypothesis.cables, parameter.name]
             low, high = fit.interval(place)
             declared = declared_value(robot, parameter, hypothesis.cables)
