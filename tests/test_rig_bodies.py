@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tests.rig import RampProgram, Robot, StillProgram, make_recording, paper_robot, simulate, wander
+from tests.rig import RampProgram, Rig, Robot, StillProgram, make_recording, paper_robot, simulate, wander
 from tests.rig.solve import Method
 
 RAMP = RampProgram(np.array([0.3, 0.25, -0.25]), 1.0)
@@ -45,6 +45,13 @@ def test_swinging_load_keeps_energy_and_string_length() -> None:
     # The load starts with the platform's velocity, which belongs to its kinetic energy.
     assert np.abs(total - total[0]).max() < 1e-3
     assert np.ptp(string[:, 0]) > 0.1
+
+
+def test_filling_tank_weighs_down_and_is_carried_along() -> None:
+    rig = Rig(damped(), {"unlisted_filling": {"rate": 5.0}}, STILL)
+    assert rig.evaluate(0.0, rig.begin()).acceleration == pytest.approx([0.0, 0.0, 0.0], abs=1e-10)
+    late = rig.evaluate(4.0, rig.begin()).acceleration
+    assert late == pytest.approx([0.0, 0.0, -20.0 * 9.8 / 320.0])
 
 
 @pytest.mark.slow

@@ -50,6 +50,7 @@ CASES: list[tuple[str, dict[str, Any], dict[str, Any]]] = [
         {"stiffness_constant": 20.0, "point": [28, 2, 0]},
         {"stiffness_constant": 0, "point": [0] * 3},
     ),
+    ("unlisted_filling", {"rate": 0.5}, {"rate": 0.0}),
     (
         "unlisted_frame",
         {"stiffness_constant": 3e5, "viscosity": 2e3},
@@ -70,7 +71,7 @@ CASES: list[tuple[str, dict[str, Any], dict[str, Any]]] = [
         {"amplitude": [0] * 3, "wavelength": 4.0},
     ),
 ]
-DRIFTING = {"creep", "thermal", "unlisted_shaker"}
+DRIFTING = {"creep", "thermal", "unlisted_filling", "unlisted_shaker"}
 
 
 def damped() -> Robot:

@@ -7,7 +7,7 @@ from tests.rig.effect import Effect
 from tests.rig.material import Creep, Hysteresis, Pushing, Relaxation, Slack, Stiffening, Thermal
 from tests.rig.outside import Drag, SensorDelay, SensorGain
 from tests.rig.route import Anchor, Frame, Pulley, Sag
-from tests.rig.unlisted import Bungee, Magnet, Shaker, Sideways, Swing, Wave
+from tests.rig.unlisted import Bungee, Filling, Magnet, Shaker, Sideways, Swing, Wave
 from tests.rig.winch import Drum, Friction
 
 EFFECTS: dict[str, type[Effect]] = {
@@ -28,6 +28,7 @@ EFFECTS: dict[str, type[Effect]] = {
     "sensor_delay": SensorDelay,
     "sensor_gain": SensorGain,
     "unlisted_bungee": Bungee,
+    "unlisted_filling": Filling,
     "unlisted_frame": Frame,
     "unlisted_magnet": Magnet,
     "unlisted_pushing": Pushing,

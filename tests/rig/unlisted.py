@@ -121,3 +121,22 @@ class Swing(Effect):
         moment.acceleration = (force + pull * down) / carrier
         own = weight - (resist + pull * down) / self.mass
         moment.rates[self.part] = np.concatenate([swinging, own - moment.acceleration])
+
+
+@dataclass(kw_only=True)
+class Filling(Effect):
+    """A tank on board that fills: m(t) = `rate` t, in kg/s; what comes aboard has the platform's velocity.
+
+    (M + m) a = F - m g z, with M the platform's mass.
+    """
+
+    rate: float
+
+    def load(self, moment: Moment) -> None:
+        """Weigh down the platform."""
+        moment.force = moment.force - np.array([0.0, 0.0, self.rate * moment.time * self.rig.robot.gravity])
+
+    def couple(self, moment: Moment) -> None:
+        """Be carried along."""
+        carrier = self.rig.robot.mass
+        moment.acceleration = moment.acceleration * carrier / (carrier + self.rate * moment.time)

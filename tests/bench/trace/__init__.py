@@ -1,0 +1,1 @@
+"""Blind benchmark of the tracer on recordings of the rig: ``make bench-trace``."""

@@ -1,0 +1,84 @@
+"""``python -m tests.bench.trace``: traces the cases that have no answer yet, prints the tables, writes the page."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Sequence
+from pathlib import Path
+
+from tests.robots import EXAMPLES
+
+from . import tables
+from .cases import Case, main_cases, quick_cases
+from .document import page
+from .figure import confusion_figure, save
+from .line import Line, read_lines
+from .run import finished, run
+from .score import Scored, outcome, scored
+from .selection import alarm_cases, chosen, code_version
+
+ROOT = EXAMPLES.parents[2]
+FEWEST_EMPTY = 200
+PICTURE = "tracer-confusion.svg"
+
+
+def arguments() -> argparse.Namespace:
+    """What the call asks for."""
+    parser = argparse.ArgumentParser(prog="python -m tests.bench.trace", description=__doc__)
+    parser.add_argument("--only", action="append", default=[], metavar="TEXT", help="cases whose name holds TEXT")
+    parser.add_argument("--jobs", type=int, default=1, help="processes at once")
+    parser.add_argument("--quick", action="store_true", help="a look: robot three, middle size")
+    parser.add_argument("--empty", type=int, default=0, metavar="N", help="false alarms on N empty recordings instead")
+    parser.add_argument("--list", action="store_true", help="name the cases and stop")
+    parser.add_argument("--show", action="store_true", help="trace nothing; show the answers of the last tracer asked")
+    parser.add_argument("--folder", type=Path, default=ROOT / "build" / "bench-trace", help="where answers are kept")
+    return parser.parse_args()
+
+
+def main() -> None:
+    asked = arguments()
+    whole = alarm_cases(asked.empty) if asked.empty else quick_cases() if asked.quick else main_cases()
+    cases = chosen(whole, asked.only)
+    if asked.list:
+        print("\n".join(case.key for case in cases))
+        return
+    old = read_lines(asked.folder / "results.jsonl")
+    code = old[-1].code if asked.show and old else code_version()
+    lines = finished(cases, old, code) if asked.show else run(cases, asked.folder, code, asked.jobs, tell)
+    show(scored(cases, lines))
+    write(asked.folder, code)
+
+
+def tell(case: Case, line: Line) -> None:
+    """One line as an answer comes."""
+    said = " + ".join(f"{e.name}{list(e.cables)}" for e in line.effects) or line.verdict
+    said = said or line.failure.strip().splitlines()[-1]
+    print(f"{case.key}: {outcome(case, line)}: {said} ({line.processor:.0f} s)", flush=True)
+
+
+def show(answers: Sequence[Scored]) -> None:
+    """All tables."""
+    for text in (tables.outcomes, tables.confusions, tables.coverage, tables.times, tables.errors):
+        print(f"\n{text(answers)}")
+
+
+def write(folder: Path, code: str) -> None:
+    """The page and its picture into docs, if every case has an answer; else into the folder, as far as it goes."""
+    lines = read_lines(folder / "results.jsonl")
+    cases = main_cases()
+    keys = [line.key for line in lines if line.key.startswith("alarm-") and line.code == code]
+    alarms = alarm_cases(max((int(key.removeprefix("alarm-")) + 1 for key in keys), default=0))
+    answers = scored(cases, finished(cases, lines, code))
+    empty = scored(alarms, finished(alarms, lines, code))
+    if not answers:
+        return
+    done = len(answers) == len(cases) and len(empty) >= FEWEST_EMPTY
+    place = ROOT / "docs" if done else folder
+    place.mkdir(exist_ok=True)
+    save(confusion_figure(answers), str(place / PICTURE))
+    (place / "tracer.md").write_text(page(answers, empty, code, PICTURE), encoding="utf-8")
+    print(f"\n{place / 'tracer.md'}: {len(answers)} of {len(cases)} cases, {len(empty)} empty recordings")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,78 @@
+"""The page that a whole run leaves: docs/tracer.md, made from the lines alone."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from . import tables
+from .motion import MOTIONS
+from .score import Scored, rate
+from .sizes import NATS
+
+COMMAND = "make bench-trace"
+ALPHA = 0.01
+
+
+def page(answers: Sequence[Scored], empty: Sequence[Scored], code: str, picture: str) -> str:
+    """All of it as Markdown; ``picture`` is the file of the confusion matrix beside it."""
+    return (
+        "\n\n".join(
+            [
+                "# The tracer, blind",
+                f"Made by `{COMMAND}` from the tracer as of sources {code}; nothing here is written by hand.",
+                _how(),
+                "## Outcomes",
+                tables.outcomes(answers),
+                tables.meanings([*answers, *empty]),
+                "## False alarms",
+                _alarms(empty),
+                "## What was hidden, and what was said",
+                f"![Hidden by rows, said by columns]({picture})",
+                tables.confusions(answers),
+                "## Do the 95 % intervals hold the truth",
+                "Of rightly named effects, every fitted parameter.",
+                tables.coverage(answers),
+                "## Error, and time",
+                _errors(answers),
+                tables.times([*answers, *empty]),
+                tables.errors(answers),
+            ]
+        )
+        + "\n"
+    )
+
+
+def _how() -> str:
+    motions = "; ".join(f"`{name}` {m.duration:.0f} s at {m.rate:.0f} Hz" for name, m in MOTIONS.items())
+    sizes = ", ".join(f"{size} {nats:.0e}".replace("e+0", "e") for size, nats in NATS.items())
+    return (
+        "The recordings come from the tests' rig, which has its own equations and shares no code with the project. "
+        "The tracer gets the robot's file and two recordings whose names tell nothing. Robots: "
+        f"{motions}. The start is at rest; noise of all sensors and of the winch speeds is what the robot's file "
+        "says.\n\n"
+        "How strong an effect is, is chosen by how well it shows, from the rig alone: the mean log-likelihood ratio, "
+        "in nats, that separates the truth from the best model without the effect, where the change is linear, a "
+        "constant of each output and another modulus or damping of all cables are free, and noise of the winch "
+        "speeds lets ropes drift (`tests/bench/trace/visible.py`). No method could have more. Sizes: "
+        f"{sizes}; less where the largest plausible strength shows less. The strengths stand in "
+        "`tests/bench/trace/sizes.json`; `python -m tests.bench.trace.sizes` makes it."
+    )
+
+
+def _alarms(empty: Sequence[Scored]) -> str:
+    answered = [answer for answer in empty if answer.outcome != "failed"]
+    wrong = rate(sum(answer.outcome == "wrong" for answer in answered), len(answered))
+    alarm = rate(sum(answer.outcome == "alarm" for answer in answered), len(answered))
+    return (
+        f"Robots that do what their files say, none of them among the cases above. A name where nothing is hidden: "
+        f"{tables.shown_rate(wrong)}; `--alpha` was {ALPHA:g}. Unexplained or discovered: {tables.shown_rate(alarm)}. "
+        f"No answer: {len(empty) - len(answered)}."
+    )
+
+
+def _errors(answers: Sequence[Scored]) -> str:
+    return (
+        "Errors are those of the co-simulated FMUs on CHECK over what noise alone leaves there, of positions and of "
+        f"tensions. At most 1.2 after the right name: {tables.shown_rate(tables.reached(answers))}. Traces ran each in "
+        "a process and on a core of its own; the cases' times are of the processor, co-simulations included."
+    )

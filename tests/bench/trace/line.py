@@ -1,0 +1,145 @@
+"""The line that a traced case leaves: all that scoring needs, as JSON."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import asdict, dataclass
+from math import isfinite
+from pathlib import Path
+from typing import Any
+
+from tautwire.tracer import Trace
+from tautwire.tracer.verdict import Errors
+
+MOST_RIVALS = 6
+
+
+@dataclass(frozen=True)
+class NamedEffect:
+    """An effect that the tracer named; of each parameter (value, low, high)."""
+
+    name: str
+    cables: tuple[int, ...]
+    parameters: dict[str, tuple[float, float, float]]
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A hypothesis that the tracer fitted: evidence in nats, and what it leaves as mean square on CHECK."""
+
+    round: int
+    name: str
+    cables: tuple[int, ...]
+    evidence: float
+    mean_square: float
+    accepted: bool
+
+
+@dataclass(frozen=True)
+class Used:
+    """Processor time in s and peak memory in MB that a trace took."""
+
+    processor: float
+    memory: float
+
+
+@dataclass(frozen=True)
+class Line:
+    """What the tracer said of one case, or how it failed.
+
+    Errors are (position in m, tension in N) on CHECK, root mean squares; ``fingerprint`` is of the recordings, ``code``
+    of the tracer. ``left`` is the mean square of what is left of each output, ``rivals`` are each round's best
+    hypotheses. ``seconds`` is wall time, ``processor`` that of the cores, which other work does not lengthen;
+    ``memory`` is the peak in MB.
+    """
+
+    key: str
+    fingerprint: str
+    code: str
+    verdict: str = ""
+    sentence: str = ""
+    effects: tuple[NamedEffect, ...] = ()
+    also_possible: tuple[tuple[str, ...], ...] = ()
+    before: tuple[float, float] = (0.0, 0.0)
+    after: tuple[float, float] = (0.0, 0.0)
+    floor: tuple[float, float] = (0.0, 0.0)
+    seconds: float = 0.0
+    processor: float = 0.0
+    memory: float = 0.0
+    left: tuple[float, ...] = ()
+    rivals: tuple[Rival, ...] = ()
+    failure: str = ""
+
+    @property
+    def names(self) -> frozenset[str]:
+        """The effects that it named."""
+        return frozenset(effect.name for effect in self.effects)
+
+    def text(self) -> str:
+        """As one line of JSON."""
+        return json.dumps(asdict(self))
+
+
+def line_from(text: str) -> Line:
+    """The line that :meth:`Line.text` wrote."""
+    content: dict[str, Any] = json.loads(text)
+    for key in ("before", "after", "floor", "left"):
+        content[key] = tuple(content[key])
+    content["rivals"] = tuple(Rival(**{**rival, "cables": tuple(rival["cables"])}) for rival in content["rivals"])
+    content["also_possible"] = tuple(tuple(names) for names in content["also_possible"])
+    content["effects"] = tuple(
+        NamedEffect(
+            effect["name"],
+            tuple(effect["cables"]),
+            {key: (v[0], v[1], v[2]) for key, v in effect["parameters"].items()},
+        )
+        for effect in content["effects"]
+    )
+    return Line(**content)
+
+
+def line_of(key: str, fingerprint: str, code: str, trace: Trace, used: Used) -> Line:
+    """What a trace says of a case."""
+    check = trace.comparisons[-1]
+    return Line(
+        key=key,
+        fingerprint=fingerprint,
+        code=code,
+        verdict=trace.verdict,
+        sentence=trace.sentence,
+        effects=tuple(
+            NamedEffect(e.name, e.cables, {k: (p.value, p.low, p.high) for k, p in e.parameters.items()})
+            for e in trace.effects
+        ),
+        also_possible=trace.also_possible,
+        before=_both(check.errors_before),
+        after=_both(check.errors_after),
+        floor=_both(trace.noise_floor),
+        seconds=trace.seconds,
+        processor=used.processor,
+        memory=used.memory,
+        left=tuple(float(square) for square in trace.left),
+        rivals=_best(trace),
+    )
+
+
+def read_lines(path: Path) -> tuple[Line, ...]:
+    """All whole lines of a file, none where there is no file; a line that a stop cut short is left out."""
+    if not path.exists():
+        return ()
+    lines = path.read_text(encoding="utf-8").splitlines(keepends=True)
+    return tuple(line_from(line) for line in lines if line.endswith("\n"))
+
+
+def _best(trace: Trace) -> tuple[Rival, ...]:
+    """The best of each round, best first."""
+    found: list[Rival] = []
+    for number in dict.fromkeys(candidate.round for candidate in trace.candidates):
+        fitted = [c for c in trace.candidates if c.round == number and isfinite(c.mean_square)]
+        ranked = sorted(fitted, key=lambda candidate: -candidate.evidence)[:MOST_RIVALS]
+        found += [Rival(c.round, c.name, c.cables, c.evidence, c.mean_square, c.accepted) for c in ranked]
+    return tuple(found)
+
+
+def _both(errors: Errors) -> tuple[float, float]:
+    return (errors.position_rms, errors.tension_rms)

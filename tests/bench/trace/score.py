@@ -1,0 +1,170 @@
+"""What an answer is worth beside the truth, and sums of it over many cases."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from math import isfinite
+from typing import Literal
+
+import numpy as np
+from scipy.stats import binomtest
+
+from tautwire_fmu.laws.effects import BY_NAME
+
+from .cases import Case
+from .line import Line
+from .motion import declared
+from .sizes import strengths
+from .truth import Interval, holds, in_one_way, law_values
+
+Outcome = Literal["right", "ambiguous", "place", "part", "abstained", "missed", "alarm", "wrong", "failed"]
+MEANINGS: Mapping[Outcome, str] = {
+    "right": "what is hidden, by name and place; nothing where nothing is; abstention where it is not on the list",
+    "ambiguous": "a name that the data cannot tell from the true one, declared so with the true one in the set",
+    "place": "the right name on other cables",
+    "part": "some of the names and no wrong one",
+    "abstained": "unexplained or discovered, though it is on the list",
+    "missed": "none, though something is hidden",
+    "alarm": "unexplained or discovered where nothing is hidden",
+    "wrong": "a name that is not hidden",
+    "failed": "no answer",
+}
+
+
+@dataclass(frozen=True)
+class Scored:
+    """A case with its answer."""
+
+    case: Case
+    line: Line
+    outcome: Outcome
+
+
+@dataclass(frozen=True)
+class Held:
+    """Whether one interval holds its true value."""
+
+    case: str
+    name: str
+    parameter: str
+    truth: float
+    estimate: Interval
+    inside: bool
+
+
+@dataclass(frozen=True)
+class Rate:
+    """A share with its exact 95 % interval (Clopper and Pearson)."""
+
+    count: int
+    of: int
+    low: float
+    high: float
+
+
+def scored(cases: Iterable[Case], lines: Mapping[str, Line]) -> tuple[Scored, ...]:
+    """The cases that have a line, in their order."""
+    return tuple(Scored(c, lines[c.key], outcome(c, lines[c.key])) for c in cases if c.key in lines)
+
+
+def outcome(case: Case, line: Line) -> Outcome:
+    """See MEANINGS."""
+    if line.failure:
+        return "failed"
+    if line.verdict == "effects":
+        return _of_names(case, line) if case.kind in ("listed", "pair") else "wrong"
+    if line.verdict == "none":
+        return "right" if case.kind == "empty" else "missed"
+    if case.kind == "unlisted":
+        return "right"
+    return "alarm" if case.kind == "empty" else "abstained"
+
+
+def _of_names(case: Case, line: Line) -> Outcome:
+    if line.names == case.names:
+        return "right" if _places(case) == _named_places(line) else "place"
+    if line.names < case.names:
+        return "part"
+    return "ambiguous" if _excused(case.names, line) else "wrong"
+
+
+def _excused(truth: frozenset[str], line: Line) -> bool:
+    """Whether each wrong name stands in a declared set with a true one that is not named; or a set is the truth."""
+    sets = [frozenset(names) for names in line.also_possible]
+    absent = truth - line.names
+    return truth in sets or all(any(wrong in s and s & absent for s in sets) for wrong in line.names - truth)
+
+
+def _places(case: Case) -> dict[str, frozenset[int]]:
+    """The cables on which each hidden effect acts; none where cables do not matter."""
+    count = declared(case.robot).count
+    found = {}
+    for name, values in case.effects({part.form.key: part.form.start for part in case.parts}).items():
+        anywhere = values.get("outputs") == "position" or BY_NAME[name].component == "platform"
+        found[name] = frozenset() if anywhere else frozenset(values.get("cables", range(1, count + 1)))
+    return found
+
+
+def _named_places(line: Line) -> dict[str, frozenset[int]]:
+    found: dict[str, frozenset[int]] = {}
+    for effect in line.effects:
+        on_platform = BY_NAME[effect.name].component == "platform" or _of_position(effect.parameters)
+        places = frozenset() if on_platform else frozenset(effect.cables)
+        found[effect.name] = found.get(effect.name, frozenset()) | places
+    return found
+
+
+def _of_position(parameters: Mapping[str, tuple[float, float, float]]) -> bool:
+    """Whether only what is fitted of the measured position counts."""
+    fitted = {name for name, (_, low, high) in parameters.items() if high > low}
+    return bool(fitted) and fitted <= {"position_gain", "position_delay"}
+
+
+def held(answers: Iterable[Scored]) -> tuple[Held, ...]:
+    """Every fitted interval of a rightly named effect, against the truth."""
+    found: list[Held] = []
+    for answer in answers:
+        if answer.line.verdict != "effects" or answer.case.kind not in ("listed", "pair"):
+            continue
+        rig = answer.case.effects(strengths(answer.case))
+        places = _places(answer.case)
+        for effect in answer.line.effects:
+            here = frozenset(effect.cables)
+            if effect.name not in rig or (places[effect.name] and not here <= places[effect.name]):
+                continue
+            truth = law_values(effect.name, rig[effect.name])
+            neutral = {p.name: p.neutral for p in BY_NAME[effect.name].parameters}
+            estimates = {name: Interval(*ends) for name, ends in effect.parameters.items()}
+            for name, estimate in in_one_way(effect.name, estimates).items():
+                true = truth.get(name, neutral.get(name))
+                if true is not None and _is_fitted(estimate):
+                    inside = holds(effect.name, name, true, estimate)
+                    found.append(Held(answer.case.key, effect.name, name, true, estimate, inside))
+    return tuple(found)
+
+
+def _is_fitted(estimate: Interval) -> bool:
+    return all(isfinite(end) for end in estimate) and estimate.high > estimate.low
+
+
+def rate(count: int, of: int) -> Rate:
+    """A share of some."""
+    if of == 0:
+        return Rate(0, 0, 0.0, 1.0)
+    ends = binomtest(count, of).proportion_ci(method="exact")
+    return Rate(count, of, float(ends.low), float(ends.high))
+
+
+def confusion(answers: Sequence[Scored]) -> tuple[list[str], list[str], np.ndarray]:
+    """Rows (what is hidden), columns (what was named or said), and counts; a pair counts in each name's column."""
+    names = [*BY_NAME, "none", "unexplained", "discovered", "failed"]
+    rows = list(dict.fromkeys(answer.case.label for answer in answers))
+    counts = np.zeros((len(rows), len(names)), dtype=int)
+    for answer in answers:
+        line = answer.line
+        said = line.names if line.verdict == "effects" else {"failed" if line.failure else line.verdict}
+        for name in said:
+            counts[rows.index(answer.case.label), names.index(name)] += 1
+    used = [index for index in range(len(names)) if counts[:, index].any()]
+    return rows, [names[index] for index in used], counts[:, used]
