@@ -111,6 +111,17 @@ def test_macro_step_within_a_sample_does_not_matter(three_example_fmus: RobotFmu
     assert thirds.position == pytest.approx(whole.position, abs=1e-9)
 
 
+def test_a_watched_run_gives_the_same(three: Robot, three_example_fmus: RobotFmus, controller: Path) -> None:
+    times = sample_times(0.01, 0.5)
+    push = np.full((len(times), 3), 20.0)
+    here = cosimulate_with_controller(three_example_fmus, controller, times, push=push)
+    apart = cosimulate_with_controller(three_example_fmus, controller, times, push=push, patience=60.0)
+    assert np.array_equal(here.position, apart.position)
+    design, path = design_controller(three), PATHS["three"]
+    own = cosimulate_closed_loop(three_example_fmus, three, design, path, 0.5, push=push, patience=60.0)
+    assert own.position == pytest.approx(here.position, abs=1e-9)
+
+
 def test_description_is_valid_and_says_which_outputs_jump(controller: Path) -> None:
     assert validate_fmu(str(controller)) == []
     variables = {v.name: v for v in fmpy.read_model_description(str(controller)).modelVariables}
