@@ -2,5 +2,6 @@
 
 from .tracing import trace
 from .verdict import Candidate, Comparison, Errors, Estimate, FoundEffect, Trace
+from .workers import processors
 
-__all__ = ["Candidate", "Comparison", "Errors", "Estimate", "FoundEffect", "Trace", "trace"]
+__all__ = ["Candidate", "Comparison", "Errors", "Estimate", "FoundEffect", "Trace", "processors", "trace"]

@@ -8,7 +8,6 @@ Source: Bierman (1977), Factorization Methods for Discrete Sequential Estimation
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -46,22 +45,19 @@ class _Filtered:
     gradient: SX
 
 
-def filter_sample(
-    model: Model, cable_count: int, noise: Noise, substeps: Substeps, uncertain: Sequence[int]
-) -> Function:
+def filter_sample(model: Model, cable_count: int, noise: Noise, substeps: Substeps) -> Function:
     """Arguments: state, covariance, slopes, parameters, measured, seen, shift, speed, next speed, time step, drift,
     roughness.
 
     Results: the first three at the next sample, then whitened innovations (m,), log of their variances (m,), and
     the innovations' derivatives by the parameters (m, p), whitened. Measured is x, y, z and the tensions, each as shown
     ``shift`` (s) later; drift (s^2) times the variance of a winch speed is what its noise adds to the variance of each
-    unstrained length. The covariance is that of the ``uncertain`` states; position, velocity and unstrained lengths
-    come first among them.
+    unstrained length.
     """
     size, count = model.states.numel(), model.parameters.numel()
     predicted = _Filtered(
         SX.sym("state", size),
-        SX.sym("covariance", len(uncertain), len(uncertain)),
+        SX.sym("covariance", size, size),
         SX.sym("slopes", size, count),
         SX(),
         SX(),
@@ -70,13 +66,11 @@ def filter_sample(
     measured, seen, shift = (SX.sym(name, 3 + cable_count) for name in ("measured", "seen", "shift"))
     speed, later = SX.sym("speed", cable_count), SX.sym("later", cable_count)
     step, drift, roughness = SX.sym("step"), SX.sym("drift"), SX.sym("roughness")
-    shown = _shown(model, cable_count, later, step, shift)
-    chosen = SX.eye(size)[list(uncertain), :]
-    filtered = _take_in(model, shown, noise, predicted, measured, seen, (speed, later, step, shift), chosen)
+    shown = shown_late(model, cable_count, later, step, shift)
+    filtered = _take_in(model, shown, noise, predicted, measured, seen, (speed, later, step, shift))
     state, transition, direct = _advance(model, substeps, filtered.state, speed, later, step)
-    moved = casadi.mtimes([chosen, transition, chosen.T])
-    spread = casadi.mtimes([moved, filtered.covariance, moved.T])
-    variance = SX(len(uncertain), 1)
+    spread = _symmetric(casadi.mtimes([transition, filtered.covariance, transition.T]))
+    variance = SX(size, 1)
     variance[3:6] = roughness**2 * step
     variance[6 : 6 + cable_count] = noise.winch_speed**2 * drift
     return Function(
@@ -106,7 +100,35 @@ def filter_sample(
     )
 
 
-def _shown(model: Model, cable_count: int, later: SX, step: SX, shift: SX) -> SX:
+def filter_slopes(model: Model, cable_count: int, substeps: Substeps) -> Function:
+    """How a sample's filter moves with its state: by the state before, ``d shown``; by the state after, ``d next``.
+
+    Arguments: state before and after measurements are taken in, parameters, shift, speed, next speed, time step.
+    Results: derivatives of what sensors show (m, n), of the state at the next sample (n, n), and of that state by the
+    one half a step before it (n, n), from the cubic through both ends.
+    """
+    before, after = SX.sym("before", model.states.numel()), SX.sym("after", model.states.numel())
+    shift = SX.sym("shift", 3 + cable_count)
+    speed, later, step = SX.sym("speed", cable_count), SX.sym("later", cable_count), SX.sym("step")
+    shown = shown_late(model, cable_count, later, step, shift)
+    sensing = Function(
+        "sensing",
+        [model.states, model.inputs, model.parameters, later, step, shift],
+        [casadi.jacobian(shown, model.states)],
+    )
+    by_state = sensing(before, casadi.vertcat(speed, SX(3, 1)), model.parameters, later, step, shift)
+    _, transition, _ = _advance(model, substeps, after, speed, later, step)
+    bending = Function(
+        "bending", [model.states, model.inputs, model.parameters], [casadi.jacobian(model.rates, model.states)]
+    )
+    rates = bending(after, casadi.vertcat(speed, SX(3, 1)), model.parameters)
+    still = SX.eye(after.numel())
+    half = 0.5 * (transition + still) + step / 8.0 * casadi.mtimes(still - transition, rates)
+    arguments = [before, after, model.parameters, shift, speed, later, step]
+    return Function("filter_slopes", arguments, [casadi.densify(f) for f in (by_state, transition, half)])
+
+
+def shown_late(model: Model, cable_count: int, later: SX, step: SX, shift: SX) -> SX:
     """What sensors show ``shift`` (s) after this sample: of a state ``lag - shift`` before it, where they lag.
 
     ``y - d dy/dt + d^2/2 d2y/dt2`` with ``d = lag - shift``, which is at most half a sample.
@@ -131,7 +153,6 @@ def _take_in(
     measured: SX,
     seen: SX,
     moment: tuple[SX, SX, SX, SX],
-    chosen: SX,
 ) -> _Filtered:
     speed, later, step, shift = moment
     inputs = casadi.vertcat(speed, SX(3, 1))
@@ -148,15 +169,14 @@ def _take_in(
     for index in range(shown.numel()):
         own = noise.position if index < 3 else noise.tension
         row = by_state[index, :]
-        spread = casadi.mtimes([covariance, chosen, row.T])
-        variance = casadi.mtimes([row, chosen.T, spread]) + own**2
+        spread = casadi.mtimes(covariance, row.T)
+        variance = casadi.mtimes(row, spread) + own**2
         error = measured[index] - expected[index] - casadi.mtimes(row, correction)
         slope = -(casadi.mtimes(row, slopes) + by_parameters[index, :])
-        weighed = spread * (seen[index] / variance)
-        gain = casadi.mtimes(chosen.T, weighed)
+        gain = spread * (seen[index] / variance)
         correction = correction + gain * error
         slopes = slopes + casadi.mtimes(gain, slope)
-        covariance = covariance - casadi.mtimes(weighed, spread.T)
+        covariance = _symmetric(covariance - casadi.mtimes(gain, spread.T))
         deviation = casadi.sqrt(variance)
         rows.append((error / deviation, casadi.log(variance), slope / deviation))
     errors, logs, gradients = (casadi.vertcat(*column) for column in zip(*rows, strict=True))
@@ -166,7 +186,10 @@ def _take_in(
 def _advance(model: Model, substeps: Substeps, state: SX, speed: SX, later: SX, step: SX) -> tuple[SX, SX, SX]:
     """State after one sample, and its derivatives by the state before and by the parameters.
 
-    The derivatives weigh errors and may be coarser than the state, whose own error would pose as an effect.
+    The derivatives weigh errors and may be coarser than the state, whose own error would pose as an effect: with the
+    slopes ``F`` and ``f_p`` of the rates in the middle of a part of the step
+
+        Gamma = h (I + h F / 2 (I + h F / 3 (I + h F / 4)))        A = I + F Gamma        B = Gamma f_p
     """
     single = _runge_kutta_step(model, speed.numel())
     after = state
@@ -174,19 +197,35 @@ def _advance(model: Model, substeps: Substeps, state: SX, speed: SX, later: SX, 
         after = single(after, model.parameters, begin, end, step / substeps.state)
     slope = Function(
         "slope",
-        single.sx_in(),
-        [casadi.jacobian(single(*single.sx_in()), symbol) for symbol in single.sx_in()[:2]],
+        [model.states, model.inputs, model.parameters],
+        [casadi.jacobian(model.rates, symbol) for symbol in (model.states, model.parameters)],
     )
     transition = SX.eye(state.numel())
     direct = SX(state.numel(), model.parameters.numel())
-    along = state
-    for begin, end in _cuts(speed, later, substeps.slope):
-        arguments = (along, model.parameters, begin, end, step / substeps.slope)
-        by_state, by_parameters = slope(*arguments)
-        transition = casadi.mtimes(by_state, transition)
-        direct = casadi.mtimes(by_state, direct) + by_parameters
-        along = single(*arguments)
+    part = step / substeps.slope
+    for index, (begin, end) in enumerate(_cuts(speed, later, substeps.slope)):
+        middle = state + ((index + 0.5) / substeps.slope) * (after - state)
+        inputs = casadi.vertcat(0.5 * (begin + end), SX(3, 1))
+        by_state, by_parameters = slope(middle, inputs, model.parameters)
+        carried = _carried(by_state, part)
+        own = SX.eye(state.numel()) + casadi.mtimes(by_state, carried)
+        transition = casadi.mtimes(own, transition)
+        direct = casadi.mtimes(own, direct) + casadi.mtimes(carried, by_parameters)
     return after, transition, direct
+
+
+def _carried(slopes: SX, step: SX) -> SX:
+    """What a rate that stays makes of the state over a step."""
+    still = SX.eye(slopes.shape[0])
+    carried = still
+    for order in (4.0, 3.0, 2.0):
+        carried = still + (step / order) * casadi.mtimes(slopes, carried)
+    return step * carried
+
+
+def _symmetric(matrix: SX) -> SX:
+    """By its upper half alone: the lower one is not worked out."""
+    return casadi.triu2symm(casadi.triu(matrix))
 
 
 def _cuts(speed: SX, later: SX, count: int) -> list[tuple[SX, SX]]:

@@ -22,8 +22,9 @@ from .likelihood import Innovations, Likelihood
 
 Array = NDArray[np.float64]
 
-# Roughness of the model and relative change of the cost at which to stop, stage by stage.
-STAGES = ((0.1, 1e-3), (0.01, 1e-3), (0.0, 1e-7))
+# Roughness of the model and relative change of the cost at which to stop, stage by stage; then the exact model's.
+ROUGH_STAGES = ((0.1, 1e-3), (0.01, 1e-3))
+EXACT = 1e-7
 EVALUATIONS = 15
 KEPT = 40
 NORMAL_95 = 1.959964
@@ -70,24 +71,26 @@ class Fitter:
         Frees the parameters of the chosen hypotheses. The exact stage begins where the rough one ended or where that
         began, whichever is more probable.
         """
-        return self._fit(robot, chosen, sample, STAGES)
+        return self._fit(robot, chosen, sample, (*ROUGH_STAGES, (0.0, EXACT)))
 
-    def fit_from(self, starts: Sequence[Robot], without: Robot, chosen: Collection[Hypothesis], sample: Sample) -> Fit:
-        """Fit from the first start that is more probable than the robot ``without``, under the exact model at once.
+    def fit_from(
+        self, starts: Sequence[Robot], chosen: Collection[Hypothesis], sample: Sample, least: float, stop: float = EXACT
+    ) -> Fit:
+        """Fit from the first start whose log-likelihood reaches ``least``, under the exact model at once.
 
-        Where none is, the last start is fitted as :meth:`fit` does.
+        Where none does, the last start is fitted as :meth:`fit` does. ``stop`` is the relative change of the cost at
+        which the exact stage ends.
 
         Raises NoFitError, UnreachableError.
         """
-        least = self.innovations(without, sample).log_likelihood(sample.rows)
         for start in starts:
             try:
                 found = self.judged(start, chosen, sample).log_likelihood(sample.rows)
             except UnreachableError:
                 continue
             if found >= least:
-                return self._fit(start, chosen, sample, STAGES[-1:])
-        return self._fit(starts[-1], chosen, sample, STAGES)
+                return self._fit(start, chosen, sample, ((0.0, stop),))
+        return self._fit(starts[-1], chosen, sample, (*ROUGH_STAGES, (0.0, stop)))
 
     def _fit(
         self, robot: Robot, chosen: Collection[Hypothesis], sample: Sample, stages: Sequence[tuple[float, float]]
@@ -131,31 +134,30 @@ class Fitter:
 
     def judged(self, robot: Robot, chosen: Collection[Hypothesis], sample: Sample) -> Innovations:
         """As :meth:`innovations`, by what was compiled for fitting the chosen hypotheses."""
-        return self.linearised(robot, free_parameters(robot, chosen), sample)
-
-    def linearised(
-        self, robot: Robot, free: Sequence[FreeParameter], sample: Sample, exact: Collection[str] = ()
-    ) -> Innovations:
-        """Innovations with their slopes by some of the robot's parameters; ``exact`` as for :class:`Likelihood`."""
-        values = [robot.effects[f.setting].values[f.name] for f in free]
-        likelihood = self._likelihood(placed(robot, sample.start), free, sample, exact)
+        likelihood, values = self.likelihood(robot, chosen, sample)
         return likelihood.innovations(sample.recording, values)
+
+    def likelihood(
+        self, robot: Robot, chosen: Collection[Hypothesis], sample: Sample
+    ) -> tuple[Likelihood, list[float]]:
+        """What was compiled for fitting the chosen hypotheses, and the values that the robot has."""
+        free = free_parameters(robot, chosen)
+        values = [robot.effects[f.setting].values[f.name] for f in free]
+        return self._likelihood(placed(robot, sample.start), free, sample), values
 
     def open_loop_variances(self, robot: Robot, sample: Sample) -> Array:
         """See :meth:`tautwire.tracer.likelihood.Likelihood.open_loop_variances`."""
         return self._likelihood(placed(robot, sample.start), (), sample).open_loop_variances(sample.recording, ())
 
-    def _likelihood(
-        self, robot: Robot, free: Sequence[FreeParameter], sample: Sample, exact: Collection[str] = ()
-    ) -> Likelihood:
+    def _likelihood(self, robot: Robot, free: Sequence[FreeParameter], sample: Sample) -> Likelihood:
         self.between()
         interval = float(np.median(np.diff(sample.recording.time)))
         opened = with_values(robot, free, dict.fromkeys(free, 0.0))
-        key = (opened, tuple(free), round(interval, 9), frozenset(exact))
+        key = (opened, tuple(free), round(interval, 9))
         if key not in self._compiled:
             if len(self._compiled) >= KEPT:
                 self._compiled.pop(next(iter(self._compiled)))
-            self._compiled[key] = Likelihood(robot, free, self.noise, interval, exact)
+            self._compiled[key] = Likelihood(robot, free, self.noise, interval)
         return self._compiled[key]
 
 

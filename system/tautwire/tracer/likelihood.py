@@ -11,7 +11,7 @@ Source: Ljung (1999), System Identification, sec. 7.4.
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from math import ceil, log, pi
 
@@ -59,32 +59,40 @@ class Innovations:
         return np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0)
 
 
-class Likelihood:
-    """Innovations of recordings under a robot whose free parameters vary; compiled once.
+@dataclass(frozen=True)
+class Stretch:
+    """K successive samples as the filter took them.
 
-    States of the ``exact`` effects are taken as known, which they are where an effect is switched on and neutral.
+    ``columns`` are measured, seen and shift (m, K), speed and next speed (cables, K), time step and drift (1, K);
+    ``own`` tells which samples are the recording's, the others fill gaps. ``states`` (n, K + 1) and ``covariances``
+    (K, n, n) are those predicted; ``values``, ``log_variances`` (K, m) and ``slopes`` (K, m, p) as in Innovations.
     """
 
-    def __init__(
-        self,
-        robot: Robot,
-        free: Sequence[FreeParameter],
-        noise: Noise,
-        sample_time: float,
-        exact: Collection[str] = (),
-    ) -> None:
-        model = symbolic_model(robot, free)
-        uncertain = [i for i, name in enumerate(model.state_names) if name.split(".")[0] not in exact]
+    columns: tuple[Array, ...]
+    own: NDArray[np.bool_]
+    states: Array
+    covariances: Array
+    values: Array
+    log_variances: Array
+    slopes: Array
+
+
+class Likelihood:
+    """Innovations of recordings under a robot whose free parameters vary; compiled once."""
+
+    def __init__(self, robot: Robot, free: Sequence[FreeParameter], noise: Noise, sample_time: float) -> None:
+        self.model = symbolic_model(robot, free)
         self.noise = noise
         self.cable_count = robot.cable_count
-        self.uncertain_count = len(uncertain)
         self._start = casadi.Function(
-            "start", [model.parameters], [model.start, casadi.jacobian(model.start, model.parameters)]
+            "start",
+            [self.model.parameters],
+            [self.model.start, casadi.jacobian(self.model.start, self.model.parameters)],
         )
         angle = fastest_mode(robot) * sample_time
-        substeps = Substeps(max(1, ceil(angle / STATE_ANGLE)), max(1, ceil(angle / SLOPE_ANGLE)))
-        self._lags = casadi.Function("lags", [model.parameters], [model.lags])
-        self._sample = filter_sample(model, robot.cable_count, noise, substeps, uncertain)
+        self.substeps = Substeps(max(1, ceil(angle / STATE_ANGLE)), max(1, ceil(angle / SLOPE_ANGLE)))
+        self._lags = casadi.Function("lags", [self.model.parameters], [self.model.lags])
+        self._sample = filter_sample(self.model, robot.cable_count, noise, self.substeps)
         self._runs = {CHUNK: self._sample.mapaccum("run", CHUNK, 3)}
 
     def innovations(
@@ -95,16 +103,24 @@ class Likelihood:
         ``roughness`` (m/s^2 per root hertz) adds an unknown white acceleration of the platform: a fit that starts
         far from the solution then follows the data instead of losing phase.
         """
-        lags = np.array(self._lags(np.asarray(parameters, dtype=float))).ravel()
-        measured, shift = as_of(recording.time, recording.measured(), lags)
+        measured, shift = self._as_of(recording, parameters)
         seen = np.isfinite(measured)
-        covariance = self._start_covariance()
-        values, variances, slopes = self._filter(recording, measured, shift, parameters, covariance, roughness)
+        stretches = self._filter(recording, measured, shift, parameters, self._start_covariance(), roughness)
+        values, variances, slopes = _gathered(stretches)
         given = np.isfinite(recording.measured())
         values[~given] = np.nan
         variances[~given] = np.nan
         _fill(values, variances, slopes, given & ~seen)
         return Innovations(given, values, slopes, variances)
+
+    def stretches(self, recording: Recording, parameters: Sequence[float] | Array) -> Iterator[Stretch]:
+        """The filter's run over a recording, part by part: memory does not grow with its length."""
+        measured, shift = self._as_of(recording, parameters)
+        yield from self._filter(recording, measured, shift, parameters, self._start_covariance(), 0.0)
+
+    def _as_of(self, recording: Recording, parameters: Sequence[float] | Array) -> tuple[Array, Array]:
+        lags = np.array(self._lags(np.asarray(parameters, dtype=float))).ravel()
+        return as_of(recording.time, recording.measured(), lags)
 
     def open_loop_variances(self, recording: Recording, parameters: Sequence[float] | Array) -> Array:
         """Variance of measured less simulated, shape (N, m), where the model is right and its start exact.
@@ -112,8 +128,10 @@ class Likelihood:
         Noise of the sensors, and of the recorded winch speeds as it integrates.
         """
         nothing = np.full(recording.measured().shape, np.nan)
-        exact = np.zeros((self.uncertain_count, self.uncertain_count))
-        _, log_variances, _ = self._filter(recording, nothing, np.zeros_like(nothing), parameters, exact, 0.0)
+        size = self.model.states.numel()
+        exact = np.zeros((size, size))
+        stretches = self._filter(recording, nothing, np.zeros_like(nothing), parameters, exact, 0.0)
+        _, log_variances, _ = _gathered(stretches)
         variances: Array = np.exp(log_variances)
         return variances
 
@@ -125,23 +143,28 @@ class Likelihood:
         parameters: Sequence[float] | Array,
         start_covariance: Array,
         roughness: float,
-    ) -> tuple[Array, Array, Array]:
+    ) -> Iterator[Stretch]:
         theta = np.asarray(parameters, dtype=float)
-        columns, rows = _columns(recording, measured, shift)
+        columns, own = _columns(recording, measured, shift)
         state, slopes = self._start(theta)
-        carried = (state, start_covariance, slopes)
-        values, logs, gradients = [], [], []
-        for first in range(0, columns[0].shape[1], CHUNK):
-            part = [column[:, first : first + CHUNK] for column in columns]
+        carried = (np.array(state), start_covariance, np.array(slopes))
+        size, free = len(start_covariance), len(theta)
+        for first in range(0, len(own), CHUNK):
+            part = tuple(column[:, first : first + CHUNK] for column in columns)
             count = part[0].shape[1]
             constant = (np.repeat(theta[:, None], count, axis=1), *part, np.full((1, count), roughness))
-            result = self._run(count)(*carried, *constant)
-            width, free = self.uncertain_count, len(theta)
-            carried = (result[0][:, -1], result[1][:, -width:], result[2][:, result[2].shape[1] - free :])
-            values.append(np.array(result[3]).T)
-            logs.append(np.array(result[4]).T)
-            gradients.append(np.array(result[5]).reshape(measured.shape[1], count, free).swapaxes(0, 1))
-        return np.vstack(values)[rows], np.vstack(logs)[rows], np.vstack(gradients)[rows]
+            found = [np.array(result) for result in self._run(count)(*carried, *constant)]
+            covariances = np.hstack([carried[1], found[1]]).reshape(size, count + 1, size).swapaxes(0, 1)
+            yield Stretch(
+                part,
+                own[first : first + CHUNK],
+                np.hstack([carried[0], found[0]]),
+                covariances[:-1],
+                found[3].T,
+                found[4].T,
+                found[5].reshape(measured.shape[1], count, free).swapaxes(0, 1),
+            )
+            carried = (found[0][:, -1:], covariances[-1], found[2][:, found[2].shape[1] - free :])
 
     def _run(self, count: int) -> casadi.Function:
         if count not in self._runs:
@@ -149,11 +172,18 @@ class Likelihood:
         return self._runs[count]
 
     def _start_covariance(self) -> Array:
-        variance = np.zeros(self.uncertain_count)
+        variance = np.zeros(self.model.states.numel())
         variance[:3] = self.noise.start**2
         variance[6 : 6 + self.cable_count] = self.noise.start**2
         covariance: Array = np.diag(variance)
         return covariance
+
+
+def _gathered(stretches: Iterable[Stretch]) -> tuple[Array, Array, Array]:
+    """Values, log variances and slopes of the recording's own samples."""
+    parts = [(s.values[s.own], s.log_variances[s.own], s.slopes[s.own]) for s in stretches]
+    values, variances, slopes = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return values, variances, slopes
 
 
 def _fill(values: Array, variances: Array, slopes: Array, alone: NDArray[np.bool_]) -> None:
@@ -182,8 +212,8 @@ def as_of(time: Array, measured: Array, lags: Array) -> tuple[Array, Array]:
     return values, shift
 
 
-def _columns(recording: Recording, measured: Array, shift: Array) -> tuple[tuple[Array, ...], NDArray[np.intp]]:
-    """What the filter takes, a column a sample, and which columns are the recording's own samples.
+def _columns(recording: Recording, measured: Array, shift: Array) -> tuple[tuple[Array, ...], NDArray[np.bool_]]:
+    """What the filter takes, a column a sample, and whether each is one of the recording's own samples.
 
     A gap in time is filled with samples of which nothing was seen, so that no step is longer than usual.
     """
@@ -201,7 +231,9 @@ def _columns(recording: Recording, measured: Array, shift: Array) -> tuple[tuple
     step = np.append(np.diff(time), 0.0)
     drift = step * np.append(np.repeat(steps, pieces), 0.0)
     speeds = (speed, np.hstack([speed[:, 1:], speed[:, -1:]]))
-    return (shown, looked, later, *speeds, step[None, :], drift[None, :]), rows
+    own = np.zeros(len(time), dtype=bool)
+    own[rows] = True
+    return (shown, looked, later, *speeds, step[None, :], drift[None, :]), own
 
 
 def fastest_mode(robot: Robot) -> float:

@@ -1,17 +1,17 @@
 """What each hypothesis could gain at most, from linearisations about the present model: spares hopeless fits.
 
-An effect too small to see moves the innovations in proportion to its parameters, ``e + J d``. Evaluations with every
-parameter at its neutral value give ``J`` for all hypotheses at once; least squares on FIT gives ``d``, and what it
-gains there. Parameters that count only while others are not neutral (the time of a relaxation) have no slope there:
-the others are tried at several values of theirs.
+An effect too small to see moves the innovations in proportion to its parameters, ``e + J d``. One run of the filter,
+linearised, gives ``J`` for all hypotheses at once; least squares on FIT gives ``d``, and what it gains there.
+Parameters that count only while others are not neutral (the time of a relaxation) have no slope there: the others are
+tried at several values of theirs.
 
 Source: Rao's score test, e.g. Cox and Hinkley (1974), Theoretical Statistics, sec. 9.3.
 """
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from itertools import product
 
 import numpy as np
@@ -19,13 +19,15 @@ from numpy.typing import NDArray
 
 from tautwire_fmu.laws.effects import Effect
 
-from ..robot import PER_CABLE, EffectSetting, Robot
+from ..robot import Robot
+from ..start import placed
 from .data import Sample
+from .directions import Column, EffectDirections
 from .fit import Fitter
 from .hypotheses import OF_THE_PLATFORM, Hypothesis, free_parameters
+from .linearisation import linearise_run
 
 Array = NDArray[np.float64]
-Column = tuple[str, tuple[int, ...], str]
 
 # Directions of the parameters that move the innovations by less than this share of the others are not told apart.
 LEAST_SHARE = 1e-9
@@ -41,19 +43,16 @@ class Prospect:
 
 @dataclass(frozen=True)
 class Signatures:
-    """Innovations ``error`` (k,) of all samples that count, and how each parameter moves them.
+    """How parameters move the innovations ``e`` of all samples that count, to first order.
 
-    ``columns`` are (effect, cables, parameter); ``slopes`` (k, columns); ``values`` where they were taken.
+    ``columns`` (p) name the parameters, ``values`` (p) where the slopes ``J`` were taken; ``gram`` is ``J' J`` (p, p),
+    ``pull`` ``J' e`` (p).
     """
 
-    error: Array
     columns: tuple[Column, ...]
-    slopes: Array
     values: Array
-    gram: Array = field(init=False)
-
-    def __post_init__(self) -> None:
-        object.__setattr__(self, "gram", self.slopes.T @ self.slopes)
+    gram: Array
+    pull: Array
 
 
 def screen(
@@ -64,23 +63,61 @@ def screen(
     sample: Sample,
 ) -> dict[Hypothesis, Prospect]:
     """The best prospect of each hypothesis beside the accepted ones, whose parameters move along."""
+    signatures = signatures_of(robot, accepted, open_ones, fitter, sample)
     found: dict[Hypothesis, Prospect] = {}
-    for effects in _groups(open_ones):
-        for number in range(max(len(_trials(effect)) for effect in effects)):
-            present = [h for h in open_ones if h.effect in effects and number < _trial_count(h)]
-            signatures = _signatures(robot, accepted, present, number, fitter, sample)
-            for hypothesis in present:
-                prospect = _prospect(signatures, accepted, hypothesis, _trials(hypothesis.effect)[number])
-                if hypothesis not in found or prospect.gain > found[hypothesis].gain:
-                    found[hypothesis] = prospect
+    for hypothesis in open_ones:
+        trials = enumerate(_trials(hypothesis.effect)[: _trial_count(hypothesis)])
+        prospects = [_prospect(signatures, accepted, hypothesis, number, shapes) for number, shapes in trials]
+        found[hypothesis] = max(prospects, key=lambda prospect: prospect.gain)
     return found
 
 
-def _groups(open_ones: Iterable[Hypothesis]) -> list[list[Effect]]:
-    """Effects that are linearised together: each with states of its own apart, they may be stiff."""
-    effects = list(dict.fromkeys(hypothesis.effect for hypothesis in open_ones))
-    groups = [[e for e in effects if not e.states], *([e] for e in effects if e.states)]
-    return [group for group in groups if group]
+def signatures_of(
+    robot: Robot,
+    accepted: Sequence[Hypothesis],
+    hypotheses: Sequence[Hypothesis],
+    fitter: Fitter,
+    sample: Sample,
+) -> Signatures:
+    """Of the accepted hypotheses' parameters, and of the others' on each cable alone, switched on and neutral."""
+    likelihood, values = fitter.likelihood(robot, accepted, sample)
+    free = free_parameters(robot, accepted)
+    settings = [robot.effects[f.setting] for f in free]
+    columns = [Column(s.name, s.cables, f.name, 0) for s, f in zip(settings, free, strict=True)]
+    directions = list(_directions(placed(robot, sample.start), hypotheses, likelihood.model.state_names))
+    columns += [column for direction in directions for column in direction.columns]
+    begun = np.concatenate([np.array(values), *(direction.values for direction in directions)])
+    gram, pull = np.zeros((len(begun), len(begun))), np.zeros(len(begun))
+    slopes = np.hstack([direction.start for direction in directions])
+    last = 0
+    for run in linearise_run(likelihood, values, sample.recording):
+        fitter.between()
+        rows = np.zeros(len(run.own), dtype=bool)
+        rows[run.own] = sample.rows[last : last + int(np.sum(run.own))]
+        last += int(np.sum(run.own))
+        parts = zip(*(direction.through(run) for direction in directions), strict=True)
+        slopes, moved = run.carry(slopes, *(np.concatenate(part, axis=2) for part in parts))
+        matrix = np.concatenate([run.slopes, moved], axis=2)[rows].reshape(-1, len(begun))
+        gram += matrix.T @ matrix
+        pull += matrix.T @ run.values[rows].ravel()
+    return _finite(Signatures(tuple(columns), begun, gram, pull))
+
+
+def _finite(signatures: Signatures) -> Signatures:
+    """Without the slopes that are not finite: an effect too stiff for the filter's step has none to be trusted."""
+    fine = np.isfinite(np.diag(signatures.gram))
+    gram = np.where(np.outer(fine, fine), signatures.gram, 0.0)
+    return Signatures(signatures.columns, signatures.values, gram, np.where(fine, signatures.pull, 0.0))
+
+
+def _directions(
+    robot: Robot, hypotheses: Sequence[Hypothesis], state_names: Sequence[str]
+) -> Iterator[EffectDirections]:
+    for effect in dict.fromkeys(hypothesis.effect for hypothesis in hypotheses):
+        own = [hypothesis for hypothesis in hypotheses if hypothesis.effect is effect]
+        cables = sorted({cable for hypothesis in own for cable in hypothesis.cables})
+        forms = list(dict.fromkeys(hypothesis.form for hypothesis in own))
+        yield EffectDirections(robot, effect, cables, forms, _trials(effect), state_names)
 
 
 def _trials(effect: Effect) -> list[dict[str, float]]:
@@ -94,50 +131,15 @@ def _trial_count(hypothesis: Hypothesis) -> int:
     return len(trials) if set(trials[0]) & set(hypothesis.form) else 1
 
 
-def _signatures(
-    robot: Robot,
-    accepted: Sequence[Hypothesis],
-    hypotheses: Sequence[Hypothesis],
-    trial: int,
-    fitter: Fitter,
-    sample: Sample,
-) -> Signatures:
-    """All effects of the hypotheses switched on and neutral, one cable at a time."""
-    forms: dict[tuple[Effect, tuple[int, ...]], dict[str, None]] = {}
-    for hypothesis in hypotheses:
-        for cables in _one_each(hypothesis):
-            forms.setdefault((hypothesis.effect, cables), {}).update(dict.fromkeys(hypothesis.form))
-    whole, new = robot, []
-    for (effect, cables), form in forms.items():
-        values = {**Hypothesis(effect, cables).neutral(robot, cables).values, **_trials(effect)[trial]}
-        whole = whole.with_effect(EffectSetting(effect.name, values, cables))
-        new.append(Hypothesis(effect, cables, tuple(name for name in form if name not in _trials(effect)[trial])))
-    free = free_parameters(whole, [*accepted, *new])
-    innovations = fitter.linearised(whole, free, sample, {effect.name for effect, _ in forms})
-    chosen = innovations.seen & sample.rows[:, None]
-    settings = [whole.effects[f.setting] for f in free]
-    slopes = innovations.slopes[chosen]
-    # An effect too stiff for the filter's step has no slope that could be trusted.
-    slopes[:, ~np.isfinite(slopes).all(axis=0)] = 0.0
-    return Signatures(
-        innovations.values[chosen],
-        tuple((s.name, s.cables, f.name) for s, f in zip(settings, free, strict=True)),
-        slopes,
-        np.array([s.values[f.name] for s, f in zip(settings, free, strict=True)]),
-    )
-
-
-def _one_each(hypothesis: Hypothesis) -> list[tuple[int, ...]]:
-    if hypothesis.effect.component not in PER_CABLE:
-        return [()]
-    return [(cable,) for cable in hypothesis.cables]
-
-
 def _prospect(
-    signatures: Signatures, accepted: Sequence[Hypothesis], hypothesis: Hypothesis, shapes: Mapping[str, float]
+    signatures: Signatures,
+    accepted: Sequence[Hypothesis],
+    hypothesis: Hypothesis,
+    trial: int,
+    shapes: Mapping[str, float],
 ) -> Prospect:
-    old = _selection(signatures, [(a.effect.name, a.cables, name) for a in accepted for name in a.form])
-    names, new = _moved(signatures, hypothesis)
+    old = _first(signatures, sum(len(a.form) for a in accepted))
+    names, new = _moved(signatures, hypothesis, trial)
     without, _ = _gain(signatures, old)
     gain, move = _gain(signatures, np.hstack([old, new]))
     begun = signatures.values @ new / np.maximum(np.sum(new, axis=0), 1.0)
@@ -151,14 +153,17 @@ def _prospect(
     return Prospect(gain - without, {**kept, **values})
 
 
-def _moved(signatures: Signatures, hypothesis: Hypothesis) -> tuple[list[str], Array]:
+def _moved(signatures: Signatures, hypothesis: Hypothesis, trial: int) -> tuple[list[str], Array]:
     """The parameters of a hypothesis that have a slope, and which columns each moves (columns, parameters)."""
     names, columns = [], []
     acts = set(hypothesis.cables[:1] if hypothesis.form in OF_THE_PLATFORM else hypothesis.cables)
     for name in hypothesis.form:
         chosen = [
-            float((effect, parameter) == (hypothesis.effect.name, name) and set(cables) <= acts)
-            for effect, cables, parameter in signatures.columns
+            float(
+                (column.effect, column.parameter, column.trial) == (hypothesis.effect.name, name, trial)
+                and set(column.cables) <= acts
+            )
+            for column in signatures.columns
         ]
         if np.diag(signatures.gram) @ np.array(chosen) > 0.0:
             names.append(name)
@@ -166,9 +171,8 @@ def _moved(signatures: Signatures, hypothesis: Hypothesis) -> tuple[list[str], A
     return names, np.array(columns).reshape(len(names), len(signatures.columns)).T
 
 
-def _selection(signatures: Signatures, columns: Sequence[Column]) -> Array:
-    places = [signatures.columns.index(column) for column in columns if column in signatures.columns]
-    selected: Array = np.eye(len(signatures.columns))[:, places]
+def _first(signatures: Signatures, count: int) -> Array:
+    selected: Array = np.eye(len(signatures.columns))[:, :count]
     return selected
 
 
@@ -178,6 +182,6 @@ def _gain(signatures: Signatures, chosen: Array) -> tuple[float, Array]:
         return 0.0, np.zeros(0)
     gram = chosen.T @ signatures.gram @ chosen
     size = np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
-    pull = chosen.T @ (signatures.slopes.T @ signatures.error)
+    pull = chosen.T @ signatures.pull
     move = np.linalg.lstsq(gram / np.outer(size, size), -pull / size, rcond=LEAST_SHARE)[0] / size
     return float(-0.5 * pull @ move), move

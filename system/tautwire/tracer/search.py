@@ -9,33 +9,29 @@ Source: Wasserman, Ramdas and Balakrishnan (2020), Universal inference, PNAS 117
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from math import log
+from functools import partial
+from math import inf, log
 
-import numpy as np
-
-from ..errors import UnreachableError
 from ..robot import EffectSetting, Robot
 from .adequacy import is_noise
+from .attempts import Attempt, Task, attempt, attempt_apart
 from .data import Evidence, Sample
-from .fit import Fit, Fitter, NoFitError
+from .fit import EXACT, Fit, Fitter
 from .hypotheses import Hypothesis, divided, enlarged, hypotheses, joined
 from .screen import Prospect, screen
+from .trials import Trial, screened, setting_of, simplest, worth_fitting
 from .verdict import Candidate
+from .workers import Workers
 
 Progress = Callable[[str, float], None]
 
 ROUNDS = 4
-ALIKE = 5.0
-# A gain on FIT below this many nats is what chance gives some of the hypotheses.
-HOPELESS = 4.0
-# Only so many of the best prospects are fitted, and those that promise this share of the best.
-MOST_FITTED = 8
-MOST_OF_AN_EFFECT = 3
-PROMISING = 0.02
 # Fits to a part of FIT are told apart when they differ by more nats than this, and more than this share.
 ROUGHLY_ALIKE, SHARE_ALIKE = 50.0, 1e-3
+# Relative change of the cost at which fits to a part stop.
+PART = 1e-4
 # The best prospects, which are always fitted to all of it.
 SURE = 2
 # Mean square of innovations below which a model needs no larger form of the same effects.
@@ -54,53 +50,28 @@ class Found:
     alike: tuple[tuple[str, ...], ...]
 
 
-@dataclass(frozen=True)
-class _Trial:
-    hypothesis: Hypothesis
-    fit: Fit
-    evidence: float
-    mean_square: float
-
-    @property
-    def parameter_count(self) -> int:
-        return len(self.hypothesis.form)
-
-    def rivalled_by(self, other: _Trial) -> bool:
-        """Whether the other explains as much with no more parameters."""
-        close = self.evidence - other.evidence < ALIKE
-        return close and other.parameter_count <= self.parameter_count
-
-    def candidate(self, number: int, accepted: bool) -> Candidate:
-        return Candidate(
-            round=number,
-            name=self.hypothesis.effect.name,
-            cables=self.hypothesis.cables,
-            values=setting_of(self.fit.robot, self.hypothesis).values,
-            evidence=self.evidence,
-            mean_square=self.mean_square,
-            accepted=accepted,
-        )
-
-
-def setting_of(robot: Robot, hypothesis: Hypothesis) -> EffectSetting:
-    """The setting of a robot that a hypothesis put there."""
-    wanted = (hypothesis.effect.name, hypothesis.cables)
-    return next(setting for setting in robot.effects if (setting.name, setting.cables) == wanted)
-
-
 class Search:
     """Adds the best hypothesis while one is significant, then drops those that the others made needless.
 
     What the robot file declares, effects included, stays as it is until a hypothesis replaces it.
     """
 
-    def __init__(self, robot: Robot, fitter: Fitter, evidence: Evidence, alpha: float, progress: Progress) -> None:
+    def __init__(
+        self,
+        robot: Robot,
+        fitter: Fitter,
+        evidence: Evidence,
+        alpha: float,
+        progress: Progress,
+        workers: Workers | None = None,
+    ) -> None:
         self.robot = robot
         self.fitter = fitter
         self.evidence = evidence
         self.progress = progress
+        self.workers = workers or Workers(1, fitter.between)
         self.threshold = log(len(hypotheses(robot)) / alpha)
-        self._known: dict[tuple[Hypothesis, ...], list[_Trial]] = {}
+        self._known: dict[tuple[Hypothesis, ...], list[Trial]] = {}
 
     def run(self) -> Found:
         """The whole search."""
@@ -109,7 +80,7 @@ class Search:
         tried: list[Candidate] = []
         for number in range(1, ROUNDS + 1):
             trials = self._try_all(number, present.robot, accepted)
-            best = _simplest(trials)
+            best = simplest(trials)
             significant = best is not None and best.evidence > self.threshold
             tried += [trial.candidate(number, significant and trial is best) for trial in trials]
             if best is None or not significant:
@@ -118,22 +89,25 @@ class Search:
             present = best.fit
         return self._attributed(accepted, present, tried)
 
-    def _fit(self, chosen: Sequence[Hypothesis]) -> Fit:
+    def _fit(self, chosen: Sequence[Hypothesis], begin: Robot | None = None) -> Fit:
+        """The chosen hypotheses alone, from the values of a robot that has them."""
         robot = self.robot
         for hypothesis in chosen:
-            robot = robot.with_effect(hypothesis.setting(self.robot))
-        return self.fitter.fit(robot, chosen, self.evidence.fit)
+            robot = robot.with_effect(setting_of(begin, hypothesis) if begin else hypothesis.setting(robot))
+        return self.fitter.fit_from([robot], chosen, self.evidence.fit, -inf)
 
     def _best_on_judge(self, robot: Robot, chosen: Sequence[Hypothesis]) -> float:
         """Log-likelihood of the judging samples under a model at its best there, as an e-value's rival must be."""
         judge = self.evidence.judge
-        best = self.fitter.fit_from([robot], robot, chosen, judge) if chosen else None
-        found = self.fitter.judged(robot if best is None else best.robot, chosen, judge)
-        return found.log_likelihood(judge.rows)
+        best = self.fitter.fit_from([robot], chosen, judge, -inf) if chosen else None
+        return self._log_likelihood(robot if best is None else best.robot, chosen, judge)
+
+    def _log_likelihood(self, robot: Robot, chosen: Sequence[Hypothesis], sample: Sample) -> float:
+        return self.fitter.judged(robot, chosen, sample).log_likelihood(sample.rows)
 
     def _try_all(
         self, number: int, robot: Robot, accepted: list[Hypothesis], but: Hypothesis | None = None
-    ) -> list[_Trial]:
+    ) -> list[Trial]:
         """Every hypothesis but one beside the accepted ones; those that promise something are fitted."""
         known = self._known.get(tuple(accepted))
         if but is not None and known is not None:
@@ -146,76 +120,76 @@ class Search:
         sample = fit if adequate else fit.head
         self.progress(f"round {number}: screening", 0.0)
         prospects = screen(robot, accepted, open_ones, self.fitter, sample)
-        worth = _worth_fitting(prospects)
+        worth = worth_fitting(prospects)
         starts = {h: self._starts(robot, h, prospects[h]) for h in worth}
         without = self._best_on_judge(robot, accepted)
-        trials = self._fitted(number, robot, accepted, starts, sample, without)
+        least = self._log_likelihood(robot, accepted, sample)
+        trials = self._fitted(number, accepted, starts, sample, least, without)
         if not adequate and but is None and not any(trial.mean_square < NEARLY_NOISE for trial in trials):
             others = [*enlarged(accepted), *divided(accepted)]
-            starts = {h: [robot.with_effect(h.setting(robot))] for h in others}
-            trials += self._fitted(number, robot, accepted, starts, sample, without)
+            starts = {h: (robot.with_effect(h.setting(robot)),) for h in others}
+            trials += self._fitted(number, accepted, starts, sample, least, without)
         if not adequate:
-            trials = self._polished(number, robot, accepted, trials, worth[:SURE], without)
+            trials = self._polished(number, accepted, trials, worth[:SURE], without)
         self.progress(f"round {number}: done", 1.0)
-        trials += [_screened(robot, h, prospects[h]) for h in prospects if h not in worth]
+        trials += [screened(robot, h, prospects[h]) for h in prospects if h not in worth]
         self._known[tuple(accepted)] = trials
         return trials
 
     def _fitted(
         self,
         number: int,
-        robot: Robot,
         accepted: list[Hypothesis],
-        starts: Mapping[Hypothesis, Sequence[Robot]],
+        starts: Mapping[Hypothesis, tuple[Robot, ...]],
         sample: Sample,
+        least: float,
         without: float,
-    ) -> list[_Trial]:
-        trials = []
-        for index, hypothesis in enumerate(starts):
-            self.progress(f"round {number}: {hypothesis.label(self.robot)}", index / len(starts))
-            trials += self._tried(robot, joined(accepted, hypothesis), starts[hypothesis], sample, without)
-        return trials
+    ) -> list[Trial]:
+        stop = EXACT if sample is self.evidence.fit else PART
+        tasks = {h: Task(tuple(joined(accepted, h)), starts[h], least, stop) for h in starts}
+        tried = self._tried(f"round {number}", tasks, sample, without)
+        return [tried[hypothesis] for hypothesis in starts if hypothesis in tried]
 
-    def _starts(self, robot: Robot, hypothesis: Hypothesis, prospect: Prospect) -> list[Robot]:
+    def _starts(self, robot: Robot, hypothesis: Hypothesis, prospect: Prospect) -> tuple[Robot, ...]:
         setting = hypothesis.setting(robot)
         promised = EffectSetting(setting.name, {**setting.values, **prospect.values}, setting.cables)
-        return [robot.with_effect(promised), robot.with_effect(setting)]
+        return robot.with_effect(promised), robot.with_effect(setting)
 
     def _polished(
         self,
         number: int,
-        robot: Robot,
         accepted: list[Hypothesis],
-        trials: list[_Trial],
+        trials: list[Trial],
         sure: Sequence[Hypothesis],
         without: float,
-    ) -> list[_Trial]:
+    ) -> list[Trial]:
         """The best trials fitted to all samples."""
         top = max((trial.evidence for trial in trials), default=0.0)
         least = top - ROUGHLY_ALIKE - SHARE_ALIKE * abs(top)
-        done = []
-        for index, trial in enumerate(trials):
-            if trial.evidence < least and trial.hypothesis not in sure:
-                done.append(trial)
-                continue
-            self.progress(f"round {number}: {trial.hypothesis.label(self.robot)}, all of it", index / len(trials))
-            chosen = joined(accepted, trial.hypothesis)
-            done += self._tried(robot, chosen, [trial.fit.robot], self.evidence.fit, without) or [trial]
-        return done
+        chosen = [trial for trial in trials if trial.evidence >= least or trial.hypothesis in sure]
+        tasks = {t.hypothesis: Task(tuple(joined(accepted, t.hypothesis)), (t.fit.robot,), -inf, EXACT) for t in chosen}
+        better = self._tried(f"round {number}, all of it", tasks, self.evidence.fit, without)
+        return [better.get(trial.hypothesis, trial) for trial in trials]
 
     def _tried(
-        self, robot: Robot, chosen: list[Hypothesis], starts: Sequence[Robot], sample: Sample, without: float
-    ) -> list[_Trial]:
-        """The last of the chosen hypotheses fitted with the others; nothing where the cables cannot hold that."""
+        self, what: str, tasks: Mapping[Hypothesis, Task], sample: Sample, without: float
+    ) -> dict[Hypothesis, Trial]:
+        """The hypotheses of some tasks, fitted; without those that the cables cannot hold."""
+        order = list(tasks)
+        found = {}
+        for done, (index, made) in enumerate(self._attempts(list(tasks.values()), sample), start=1):
+            hypothesis = order[index]
+            self.progress(f"{what}: {hypothesis.label(self.robot)}", done / len(order))
+            if made is not None:
+                gain = made.log_likelihood - without
+                found[hypothesis] = Trial(hypothesis, made.fit, gain, made.mean_square)
+        return found
+
+    def _attempts(self, tasks: list[Task], sample: Sample) -> Iterator[tuple[int, Attempt | None]]:
         judge = self.evidence.judge
-        try:
-            fit = self.fitter.fit_from(starts, robot, chosen, sample)
-            innovations = self.fitter.judged(fit.robot, chosen, judge)
-        except (UnreachableError, NoFitError):
-            return []
-        gain = innovations.log_likelihood(judge.rows) - without
-        square = float(np.nanmean(innovations.mean_square(judge.rows)))
-        return [_Trial(chosen[-1], fit, gain, square)] if np.isfinite(gain) else []
+        if self.workers.processes == 1:
+            return self.workers.each(partial(attempt, self.fitter), [(task, sample, judge) for task in tasks])
+        return self.workers.each(attempt_apart, [(self.fitter.noise, task, sample, judge) for task in tasks])
 
     def _attributed(self, accepted: list[Hypothesis], present: Fit, tried: list[Candidate]) -> Found:
         """Each accepted hypothesis against its best rivals beside the others, and against nothing in its place.
@@ -230,14 +204,14 @@ class Search:
         while waiting:
             mine = waiting.pop()
             rest = [a for a in accepted if a is not mine]
-            without = self._fit(rest)
-            whole = _Trial(mine, present, self._gain(present, accepted, without, rest), float("nan"))
+            without = self._fit(rest, present.robot)
+            whole = Trial(mine, present, self._gain(present, accepted, without, rest), float("nan"))
             if whole.evidence < self.threshold:
                 accepted, present, waiting = rest, without, list(rest)
                 continue
             number = ROUNDS + 1 + len(gains) + swaps
             rivals = self._try_all(number, without.robot, rest, mine)
-            best = _simplest([whole, *rivals])
+            best = simplest([whole, *rivals])
             tried += [t.candidate(number, t is best) for t in rivals if tuple(rest) not in seen]
             seen.add(tuple(rest))
             if best is not None and best is not whole and swaps < MOST_SWAPS:
@@ -257,36 +231,17 @@ class Search:
 
     def _gain(self, fit: Fit, chosen: Sequence[Hypothesis], without: Fit, rest: Sequence[Hypothesis]) -> float:
         """What the whole explains of the judging samples more than the rest at its best there."""
-        judge = self.evidence.judge
-        whole = self.fitter.judged(fit.robot, chosen, judge).log_likelihood(judge.rows)
+        whole = self._log_likelihood(fit.robot, chosen, self.evidence.judge)
         return whole - self._best_on_judge(without.robot, rest)
 
 
-def _worth_fitting(prospects: Mapping[Hypothesis, Prospect]) -> list[Hypothesis]:
-    """The best prospects, best first, few of each effect."""
-    ranked: list[Hypothesis] = []
-    for hypothesis in sorted(prospects, key=lambda hypothesis: -prospects[hypothesis].gain):
-        if sum(hypothesis.effect is other.effect for other in ranked) < MOST_OF_AN_EFFECT:
-            ranked.append(hypothesis)
-    least = max(HOPELESS, PROMISING * prospects[ranked[0]].gain) if ranked else HOPELESS
-    return [hypothesis for hypothesis in ranked[:MOST_FITTED] if prospects[hypothesis].gain >= least]
-
-
-def _simplest(trials: Sequence[_Trial]) -> _Trial | None:
-    """Of the trials that the evidence does not tell from the best, the one with fewest parameters, then the best."""
-    top = max((trial.evidence for trial in trials), default=0.0)
-    near = [trial for trial in trials if top - trial.evidence < ALIKE]
-    return min(near, key=lambda trial: (trial.parameter_count, -trial.evidence), default=None)
-
-
-def search(robot: Robot, fitter: Fitter, evidence: Evidence, alpha: float, progress: Progress) -> Found:
+def search(
+    robot: Robot,
+    fitter: Fitter,
+    evidence: Evidence,
+    alpha: float,
+    progress: Progress,
+    workers: Workers | None = None,
+) -> Found:
     """See :class:`Search`."""
-    return Search(robot, fitter, evidence, alpha, progress).run()
-
-
-def _screened(robot: Robot, hypothesis: Hypothesis, prospect: Prospect) -> _Trial:
-    """A hypothesis that is not worth a fit; only a fit may pass the threshold."""
-    values = {**hypothesis.setting(robot).values, **prospect.values}
-    promised = robot.with_effect(EffectSetting(hypothesis.effect.name, values, hypothesis.cables))
-    empty = np.zeros(0)
-    return _Trial(hypothesis, Fit(promised, (), empty, empty), 0.0, float("nan"))
+    return Search(robot, fitter, evidence, alpha, progress, workers).run()

@@ -25,6 +25,7 @@ from .likelihood import Innovations
 from .noise import noise_of
 from .search import Found, search
 from .verdict import Comparison, Errors, Estimate, FoundEffect, Trace, VerdictName
+from .workers import Workers
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -34,16 +35,24 @@ ROLES = ("fit", "check")
 REACHED = 1.5
 
 
-def trace(robot: Robot, fit: Recording, check: Recording | None, progress: Progress, alpha: float = ALPHA) -> Trace:
+def trace(
+    robot: Robot,
+    fit: Recording,
+    check: Recording | None,
+    progress: Progress,
+    alpha: float = ALPHA,
+    processes: int = 1,
+) -> Trace:
     """Find what a robot's model lacks, and show by co-simulating its FMUs what adding it does to the error.
 
-    ``alpha`` bounds the probability of naming an effect where there is none.
+    ``alpha`` bounds the probability of naming an effect where there is none. For more ``processes`` than one the
+    calling program's main module has to be guarded, see :class:`tautwire.tracer.workers.Workers`.
 
     Raises RecordingError where a recording has no measured output, UnreachableError where the cables cannot hold
     the platform where a recording starts.
     """
-    with interrupts_held() as raise_interrupt:
-        return _trace(robot, fit, check, progress, alpha, raise_interrupt)
+    with interrupts_held() as raise_interrupt, Workers(processes, raise_interrupt) as workers:
+        return _trace(robot, fit, check, progress, alpha, workers)
 
 
 def _trace(
@@ -52,7 +61,7 @@ def _trace(
     check: Recording | None,
     progress: Progress,
     alpha: float,
-    between: Callable[[], None],
+    workers: Workers,
 ) -> Trace:
     began = perf_counter()
     for recording in (fit, check):
@@ -60,19 +69,22 @@ def _trace(
             require_outputs(recording)
     noise = noise_of(robot, fit)
     evidence = split(robot, noise, fit, check)
-    fitter = Fitter(noise, between)
+    fitter = Fitter(noise, workers.between)
     plain = _innovations(fitter, robot, evidence)
     _require_samples(plain, evidence)
     samples = (evidence.fit,) if check is None else (evidence.fit, evidence.judge)
-    before = [_cosimulated(robot, s, f"before, {r}", progress) for s, r in zip(samples, ROLES, strict=False)]
-    found = search(robot, fitter, evidence, alpha, progress)
+    running = [workers.start(_cosimulated, robot, sample) for sample in samples]
+    found = search(robot, fitter, evidence, alpha, progress, workers)
+    progress("co-simulating before", 0.0)
+    before = [run.result() for run in running]
     explained = _innovations(fitter, found.fit.robot, evidence)
     before_is_noise, after_is_noise = _all_noise(plain, evidence), _all_noise(explained, evidence)
     comparisons, floors = _compared(robot, fitter, samples, before, before)
     kept = bool(found.accepted) and after_is_noise
     if kept:
-        pairs = zip(samples, ROLES, strict=False)
-        after = [_cosimulated(found.fit.robot, sample, f"after, {role}", progress) for sample, role in pairs]
+        progress("co-simulating after", 0.0)
+        running = [workers.start(_cosimulated, found.fit.robot, sample) for sample in samples]
+        after = [run.result() for run in running]
         better, lower = _compared(found.fit.robot, fitter, samples, before, after)
         # The co-simulation has the last word: a filter follows what the model itself would not do.
         kept = all(_reached(c.errors_after, floor) for c, floor in zip(better, lower, strict=True))
@@ -143,17 +155,11 @@ def _root_mean(squares: Array) -> float:
     return float(np.sqrt(np.mean(seen))) if seen.size else float("nan")
 
 
-def _cosimulated(robot: Robot, sample: Sample, what: str, progress: Progress) -> Motion:
+def _cosimulated(robot: Robot, sample: Sample) -> Motion:
     here = placed(robot.as_modelled(), sample.start)
-    recording = sample.recording
     with TemporaryDirectory(prefix="tautwire-trace-") as folder:
         fmus = build_fmus(here, Path(folder))
-        return cosimulate(
-            fmus,
-            recording.time,
-            recording.winch_speed,
-            progress=lambda done: progress(f"co-simulating {what}", done),
-        )
+        return cosimulate(fmus, sample.recording.time, sample.recording.winch_speed)
 
 
 def _floor(fitter: Fitter, robot: Robot, sample: Sample) -> Errors:

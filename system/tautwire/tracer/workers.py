@@ -1,0 +1,106 @@
+"""Processes of their own for what a trace can do side by side: fits, co-simulations."""
+
+from __future__ import annotations
+
+import os
+import signal
+import tempfile
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from multiprocessing import get_all_start_methods, get_context
+from types import TracebackType
+from typing import Any, Generic, TypeVar
+
+from threadpoolctl import threadpool_limits
+
+Result = TypeVar("Result")
+
+# Seconds between two looks whether the user wants to stop.
+PATIENCE = 0.1
+
+
+def processors() -> int:
+    """How many processors this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+class Pending(Generic[Result]):
+    """A result that is being worked on; ``result`` waits for it."""
+
+    def __init__(self, future: Future[Result] | None, now: Callable[[], Result], between: Callable[[], None]) -> None:
+        self._future, self._now, self._between = future, now, between
+
+    def result(self) -> Result:
+        """The result, or what the work raised. Without a process of its own it is done here."""
+        if self._future is None:
+            return self._now()
+        while not wait([self._future], PATIENCE).done:
+            self._between()
+        return self._future.result()
+
+
+class Workers:
+    """Calls functions with picklable arguments, in so many processes; with one of them, here.
+
+    ``between`` is called while they are waited for. Leaving the context ends the processes, whatever they do, and
+    removes what they left in temporary folders. A program that asks for more than one process has to guard its main
+    module by ``if __name__ == "__main__"``, as multiprocessing wants.
+    """
+
+    def __init__(self, processes: int, between: Callable[[], None] = lambda: None) -> None:
+        self.processes = processes
+        self.between = between
+        self._folder = tempfile.TemporaryDirectory(prefix="tautwire-workers-") if processes > 1 else None
+        self._executor: ProcessPoolExecutor | None = None
+
+    def __enter__(self) -> Workers:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._executor is not None:
+            # The executor has no public way to end work that has begun.
+            running = list((getattr(self._executor, "_processes", None) or {}).values())
+            self._executor.shutdown(wait=False, cancel_futures=True)
+            for process in running:
+                process.terminate()
+            for process in running:
+                process.join()
+        if self._folder is not None:
+            self._folder.cleanup()
+
+    def start(self, function: Callable[..., Result], *arguments: Any) -> Pending[Result]:
+        """Begin a call; its result may be fetched once."""
+        future = None if self._pool() is None else self._pool().submit(function, *arguments)
+        return Pending(future, lambda: function(*arguments), self.between)
+
+    def each(self, function: Callable[..., Result], calls: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Result]]:
+        """Number and result of each call, in the order in which they end."""
+        if self._pool() is None:
+            for number, arguments in enumerate(calls):
+                yield number, function(*arguments)
+            return
+        futures = {self._pool().submit(function, *arguments): number for number, arguments in enumerate(calls)}
+        waiting = set(futures)
+        while waiting:
+            self.between()
+            done, waiting = wait(waiting, PATIENCE, FIRST_COMPLETED)
+            for future in sorted(done, key=futures.__getitem__):
+                yield futures[future], future.result()
+
+    def _pool(self) -> Any:
+        if self.processes > 1 and self._executor is None and self._folder is not None:
+            method = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
+            context = get_context(method)
+            if method == "forkserver":
+                context.set_forkserver_preload([__package__ + ".attempts"])
+            self._executor = ProcessPoolExecutor(self.processes, context, _begin, (self._folder.name,))
+        return self._executor
+
+
+def _begin(folder: str) -> None:
+    """Ctrl-C is the parent's to handle; temporary folders are made where the parent removes them."""
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    tempfile.tempdir = folder
+    threadpool_limits(1)

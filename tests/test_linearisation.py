@@ -1,0 +1,88 @@
+"""The linearised run against runs of the filter itself, moved a little."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tautwire.robot import PER_CABLE, EffectSetting
+from tautwire.symbolic import FreeParameter
+from tautwire.tracer.directions import EffectDirections
+from tautwire.tracer.likelihood import Likelihood
+from tautwire.tracer.linearisation import linearise_run
+from tautwire.tracer.noise import noise_of
+from tautwire_fmu.laws.effects import BY_NAME
+from tests.recordings import recorded
+from tests.robots import example
+
+ROBOT = example("three")
+RECORDING = recorded("three", 1).first(600)
+NOISE = noise_of(ROBOT, RECORDING)
+INTERVAL = float(RECORDING.time[1] - RECORDING.time[0])
+EVERYWHERE = (1, 2, 3)
+
+
+def along(name: str, form: tuple[str, ...], trial: dict[str, float]) -> np.ndarray:
+    """Slopes of the innovations by an effect's parameters, cable by cable: (N, m, p)."""
+    likelihood = Likelihood(ROBOT, (), NOISE, INTERVAL)
+    directions = EffectDirections(ROBOT, BY_NAME[name], EVERYWHERE, [form], [trial], likelihood.model.state_names)
+    slopes, parts = directions.start, []
+    for run in linearise_run(likelihood, [], RECORDING):
+        slopes, moved = run.carry(slopes, *directions.through(run))
+        parts.append(moved[run.own])
+    return np.concatenate(parts)
+
+
+def exact(name: str, parameter: str, trial: dict[str, float]) -> np.ndarray:
+    """The same for one parameter on all cables, by the filter's own sensitivities."""
+    effect = BY_NAME[name]
+    declared = {p.name: 0.0 for p in effect.parameters if p.neutral is None}
+    cables = EVERYWHERE if effect.component in PER_CABLE else ()
+    robot = ROBOT.with_effect(EffectSetting(name, effect.completed({**declared, **trial}), cables))
+    values = [robot.effects[0].values[parameter]]
+    if effect.parameters[0].neutral is None:
+        values = [float(getattr(ROBOT.cables[0], parameter))]
+    return Likelihood(robot, [FreeParameter(0, parameter)], NOISE, INTERVAL).innovations(RECORDING, values).slopes
+
+
+@pytest.mark.parametrize(
+    ("name", "parameter", "trial"),
+    [
+        ("damping", "damping", {}),
+        ("modulus", "modulus", {}),
+        ("relaxation", "modulus", {"time": 0.3}),
+        ("creep", "compliance", {"time": 10.0}),
+        ("thermal", "rise", {"time": 5.0}),
+        ("drum", "eccentricity", {"phase": 0.0, "radius": 0.2}),
+        ("payload", "mass", {}),
+        ("drag", "drag_area", {}),
+        ("pulley", "radius", {}),
+        ("sensor_gain", "tension_gain", {}),
+        ("sensor_delay", "tension_delay", {}),
+    ],
+)
+def test_slopes_of_an_absent_effect_are_those_of_the_filter_itself(
+    name: str, parameter: str, trial: dict[str, float]
+) -> None:
+    expected = exact(name, parameter, trial)[:, :, 0]
+    found = np.sum(along(name, (parameter, *trial), trial), axis=2)
+    alike = np.sum(found * expected) / np.sqrt(np.sum(found**2) * np.sum(expected**2))
+    assert alike > 0.999
+    assert np.sum(found**2) == pytest.approx(np.sum(expected**2), rel=0.02)
+
+
+def test_what_was_not_seen_moves_nothing() -> None:
+    blind = replace(RECORDING, tension=RECORDING.tension.copy())
+    blind.tension[100:300, 1] = np.nan
+    likelihood = Likelihood(ROBOT, (), NOISE, INTERVAL)
+    runs = list(linearise_run(likelihood, [], blind))
+    seen = np.concatenate([run.seen[run.own] for run in runs])
+    assert np.array_equal(seen, np.isfinite(blind.measured()))
+    whitening = np.concatenate([run.whitening[run.own] for run in runs])
+    assert not np.any(whitening[~seen])
+
+
+def test_the_run_has_the_innovations_of_the_filter() -> None:
+    likelihood = Likelihood(ROBOT, (), NOISE, INTERVAL)
+    values = np.concatenate([run.values[run.own] for run in linearise_run(likelihood, [], RECORDING)])
+    assert np.allclose(values, likelihood.innovations(RECORDING, []).values, atol=1e-12)
