@@ -78,6 +78,16 @@ def test_values_are_those_of_the_trace() -> None:
     assert list(document["left"]) == ["x", "y", "z", "tension_1", "tension_2", "tension_3"]
 
 
+def test_sizes_that_would_have_shown_and_what_looks_alike_are_there() -> None:
+    document = trace_document(made_trace())
+    payload, relaxation, slack = document["detectable"]
+    assert (payload["parameter"], payload["size"], payload["unit"]) == ("mass", 0.0195, "kg")
+    assert relaxation["beside"] == {"time": 30.0}
+    assert slack["size"] is None
+    assert document["alike"][0]["other"] == "relaxation"
+    assert document["alike"][0]["cosine"] == 0.973
+
+
 def test_without_check_recording_its_errors_are_null() -> None:
     document = trace_document(made_trace(check=False))
     for field in ("error_before", "error_after"):

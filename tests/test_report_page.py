@@ -17,11 +17,11 @@ from tautwire.report import trace_document, trace_page, write_report
 from tautwire.report.figures import MOST_POINTS, page_data
 from tautwire.report.series import envelope, envelope_times, noise_density, packed, spectrum, unpacked
 from tautwire.robot_file import read_robot
-from tautwire.tracer.verdict import Trace
+from tautwire.tracer.verdict import Separation, Trace
 from tests.traces import HOSTILE, TENSION_NOISE, made_trace, nothing_found, without_positions
 
 LINKS = {"robot.toml": "robot.toml", "cable 1": "fmus/cable 1.fmu"}
-SECTIONS = ("summary", "found", "possible", "robot", "residuals", "spectra", "candidates", "left", "notes")
+SECTIONS = ("summary", "found", "possible", "robot", "residuals", "spectra", "candidates", "left", "unseen", "notes")
 VOID = {"meta", "input", "img", "br", "link", "hr"}
 FETCHING = {"src", "srcset", "poster", "data", "action", "background"}
 
@@ -91,6 +91,14 @@ def test_page_is_well_formed_with_all_sections(kind: str) -> None:
     identities = [attributes["id"] for _, attributes in found.elements if "id" in attributes]
     assert len(identities) == len(set(identities))
     assert [len(found.all(tag)) for tag in ("h1", "main", "title")] == [1, 1, 1]
+
+
+def test_page_says_what_would_have_shown_and_what_never() -> None:
+    content = trace_page(made_trace(samples=200), {})
+    assert "0.0195" in content
+    assert "never" in content[content.index("Smallest sizes") :]
+    nothing = replace(made_trace(samples=200), separation=Separation((), ()))
+    assert "no size can be given" in trace_page(nothing, {})
 
 
 @pytest.mark.parametrize("kind", KINDS)

@@ -10,7 +10,17 @@ from numpy.typing import NDArray
 from tautwire.cosimulation import Motion
 from tautwire.recording import Recording
 from tautwire.robot import Cable, EffectSetting, Platform, Robot, Sensors
-from tautwire.tracer.verdict import Candidate, Comparison, Errors, Estimate, FoundEffect, Trace
+from tautwire.tracer.verdict import (
+    Candidate,
+    Comparison,
+    Detectable,
+    Errors,
+    Estimate,
+    FoundEffect,
+    Likeness,
+    Separation,
+    Trace,
+)
 
 Array = NDArray[np.float64]
 
@@ -87,6 +97,17 @@ def made_candidates(cables: tuple[int, ...]) -> tuple[Candidate, ...]:
     )
 
 
+def made_separation(cables: tuple[int, ...]) -> Separation:
+    """Sizes that would have shown, one of them never, and what looks like damping."""
+    sizes = (
+        Detectable("payload", (), "mass", 0.0195, "kg", {}),
+        Detectable("relaxation", cables, "modulus", 3.9e7, "Pa", {"time": 30.0}),
+        Detectable("slack", cables, "softness", float("inf"), "N", {}),
+    )
+    alike = (Likeness("damping", cables, "relaxation", cables, 0.973, 9142.7),)
+    return Separation(sizes, alike)
+
+
 def made_trace(
     eight: bool = False,
     check: bool = True,
@@ -116,6 +137,7 @@ def made_trace(
         noise_before=False,
         noise_after=True,
         left=np.concatenate(([1.01, 0.98, 1.03], np.linspace(0.97, 1.06, len(cables)))),
+        separation=made_separation(cables),
         alpha=0.01,
         notes=("The winches stood still for 62 % of the fit recording: drum effects would hardly show.",),
         seconds=12.34,

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from ..robot_wiring import AXES
-from ..tracer.verdict import Candidate, Errors, Estimate, FoundEffect, Trace
+from ..tracer.verdict import Candidate, Detectable, Errors, Estimate, FoundEffect, Likeness, Trace
 from .summary import ROLES, comparison_of
 
 
@@ -25,6 +25,8 @@ def trace_document(trace: Trace) -> dict[str, Any]:
         "noise_floor": _errors(trace.noise_floor, trace.robot_before.cable_count),
         "residual_is_noise": {"before": bool(trace.noise_before), "after": bool(trace.noise_after)},
         "left": _left(trace),
+        "detectable": [_detectable(each) for each in trace.separation.detectable],
+        "alike": [_likeness(each) for each in trace.separation.alike],
         "alpha": _number(trace.alpha),
         "candidates": [_candidate(candidate) for candidate in trace.candidates],
         "unknown_columns": _unknown_columns(trace),
@@ -62,6 +64,28 @@ def _candidate(candidate: Candidate) -> dict[str, Any]:
         "evidence": _number(candidate.evidence),
         "mean_square": _number(candidate.mean_square),
         "accepted": bool(candidate.accepted),
+    }
+
+
+def _detectable(size: Detectable) -> dict[str, Any]:
+    return {
+        "name": size.name,
+        "cables": _whole(size.cables),
+        "parameter": size.parameter,
+        "size": _number(size.size),
+        "unit": size.unit,
+        "beside": {name: _number(value) for name, value in size.beside.items()},
+    }
+
+
+def _likeness(likeness: Likeness) -> dict[str, Any]:
+    return {
+        "name": likeness.name,
+        "cables": _whole(likeness.cables),
+        "other": likeness.other,
+        "other_cables": _whole(likeness.other_cables),
+        "cosine": _number(likeness.cosine),
+        "nats": _number(likeness.nats),
     }
 
 

@@ -29,7 +29,7 @@ def trace_page(trace: Trace, links: Mapping[str, str]) -> str:
         summary=sections.summary(trace) + sections.found(trace) + sections.also_possible(trace),
         chooser=_chooser(trace),
         figures=_scene_section(trace) + _residual_section(trace) + _spectrum_section(trace),
-        details=sections.candidates(trace) + sections.left(trace) + sections.notes(trace),
+        details=sections.candidates(trace) + sections.left(trace) + sections.unseen(trace) + sections.notes(trace),
         data=inline_json(page_data(trace)),
         plotly=get_plotlyjs(),
         scripts="\n".join(_asset(name) for name in SCRIPTS),

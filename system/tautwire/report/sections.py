@@ -31,6 +31,7 @@ from .summary import (
 from .units import percent, significant
 
 SHOWN_CANDIDATES = 8
+SHOWN_ALIKE = 6
 ERROR_COLUMNS = (
     Column("Output"),
     Column("Before", True),
@@ -101,7 +102,59 @@ def also_possible(trace: Trace) -> str:
         other = "No other set of effects that was tried explains the recordings as well."
         none = "Nothing that was tried explains the recordings significantly better."
         content, lead = f"<p>{other if trace.effects else none}</p>", ""
-    return section("possible", "What else is possible", content, lead)
+    return section("possible", "What else is possible", content + _alike(trace), lead)
+
+
+def _alike(trace: Trace) -> str:
+    """What would look most like the answer."""
+    count = trace.robot_before.cable_count
+    rows = [
+        [
+            text(f"{each.name}, {cables_text(each.cables, count)}" if each.cables else each.name),
+            text(f"{each.other}, {cables_text(each.other_cables, count)}" if each.other_cables else each.other),
+            number(f"{each.cosine:.6f}".rstrip("0").rstrip(".")),
+            number(significant(each.nats)),
+        ]
+        for each in trace.separation.alike[:SHOWN_ALIKE]
+    ]
+    if not rows:
+        return ""
+    columns = (Column("Effect"), Column("What looks like it"), Column("Cosine", True), Column("Nats apart", True))
+    told = (
+        "<p>How like the answer the others look: the cosine of the angle between their signatures, 1 where nothing in "
+        "these recordings tells them apart, and the evidence that does. <code>tautwire excite</code> writes a motion "
+        "that tells them apart best.</p>"
+    )
+    return told + table("What looks like the answer", columns, rows, "alike")
+
+
+def unseen(trace: Trace) -> str:
+    """The smallest size of each effect that the recordings would have shown."""
+    sizes = trace.separation.detectable
+    if not sizes:
+        what = "More than noise is left, so that no size can be given below which an effect would not show."
+        return section("unseen", "What it could not have seen", f"<p>{what}</p>")
+    count = trace.robot_before.cable_count
+    rows = [
+        [
+            text(each.name),
+            text(cables_text(each.cables, count) if each.cables else "platform"),
+            text(each.parameter),
+            number(significant(each.size)) if math.isfinite(each.size) else text("never"),
+            text(each.unit if math.isfinite(each.size) else ""),
+            text(values_text(each.name, each.beside)),
+        ]
+        for each in sizes
+    ]
+    columns = (
+        Column("Effect"), Column("Where"), Column("Parameter"), Column("Smallest size", True), Column("Unit"),
+        Column("With"),
+    )  # fmt: skip
+    lead = (
+        "The size of each effect that these recordings would have shown in nine cases out of ten, counted from where "
+        "it is absent. What is smaller may be there."
+    )
+    return section("unseen", "What it could not have seen", table("Smallest sizes", columns, rows, "unseen"), lead)
 
 
 def candidates(trace: Trace) -> str:
@@ -224,6 +277,6 @@ def _candidate_row(trace: Trace, candidate: Candidate, largest: float) -> list[s
         number(evidence_text(candidate.evidence)),
         charts.bar(candidate.evidence, largest, name=name),
         number(significant(candidate.mean_square)),
-        number(values_text(candidate)),
+        number(values_text(candidate.name, candidate.values)),
         '<span class="taken">taken</span>' if candidate.accepted else "",
     ]

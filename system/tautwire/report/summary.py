@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
@@ -88,11 +88,9 @@ def unit_of(effect: str, parameter: str) -> str:
     return units.get(parameter, "")
 
 
-def values_text(candidate: Candidate) -> str:
-    """A candidate's values on one line, as in "damping 2.10 GPa s"."""
-    return ", ".join(
-        f"{name} {engineering(value, unit_of(candidate.name, name))}" for name, value in candidate.values.items()
-    )
+def values_text(effect: str, values: Mapping[str, float]) -> str:
+    """An effect's values on one line, as in "damping 2.10 GPa s"."""
+    return ", ".join(f"{name} {engineering(value, unit_of(effect, name))}" for name, value in values.items())
 
 
 @dataclass(frozen=True)

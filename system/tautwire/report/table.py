@@ -139,7 +139,7 @@ def _candidate_cells(candidate: Candidate, cable_count: int) -> list[Text]:
         Text(evidence_text(candidate.evidence)),
         Text(significant(candidate.mean_square)),
         Text("taken" if candidate.accepted else ""),
-        Text(one_line(values_text(candidate))),
+        Text(one_line(values_text(candidate.name, candidate.values))),
     ]
 
 

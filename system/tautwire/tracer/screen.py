@@ -66,7 +66,7 @@ def screen(
     signatures = signatures_of(robot, accepted, open_ones, fitter, sample)
     found: dict[Hypothesis, Prospect] = {}
     for hypothesis in open_ones:
-        trials = enumerate(_trials(hypothesis.effect)[: _trial_count(hypothesis)])
+        trials = enumerate(trials_of(hypothesis.effect)[: trial_count(hypothesis)])
         prospects = [_prospect(signatures, accepted, hypothesis, number, shapes) for number, shapes in trials]
         found[hypothesis] = max(prospects, key=lambda prospect: prospect.gain)
     return found
@@ -117,17 +117,18 @@ def _directions(
         own = [hypothesis for hypothesis in hypotheses if hypothesis.effect is effect]
         cables = sorted({cable for hypothesis in own for cable in hypothesis.cables})
         forms = list(dict.fromkeys(hypothesis.form for hypothesis in own))
-        yield EffectDirections(robot, effect, cables, forms, _trials(effect), state_names)
+        yield EffectDirections(robot, effect, cables, forms, trials_of(effect), state_names)
 
 
-def _trials(effect: Effect) -> list[dict[str, float]]:
+def trials_of(effect: Effect) -> list[dict[str, float]]:
+    """All combinations of the values from which fits of an effect begin; one, of nothing, where it has none."""
     tried = [p for p in effect.parameters if p.trials]
     return [dict(zip([p.name for p in tried], values, strict=True)) for values in product(*(p.trials for p in tried))]
 
 
-def _trial_count(hypothesis: Hypothesis) -> int:
+def trial_count(hypothesis: Hypothesis) -> int:
     """Of a form without parameters that have trials, one is as good as all."""
-    trials = _trials(hypothesis.effect)
+    trials = trials_of(hypothesis.effect)
     return len(trials) if set(trials[0]) & set(hypothesis.form) else 1
 
 
@@ -139,7 +140,7 @@ def _prospect(
     shapes: Mapping[str, float],
 ) -> Prospect:
     old = _first(signatures, sum(len(a.form) for a in accepted))
-    names, new = _moved(signatures, hypothesis, trial)
+    names, new = moved_by(signatures, hypothesis, trial)
     without, _ = _gain(signatures, old)
     gain, move = _gain(signatures, np.hstack([old, new]))
     begun = signatures.values @ new / np.maximum(np.sum(new, axis=0), 1.0)
@@ -153,7 +154,7 @@ def _prospect(
     return Prospect(gain - without, {**kept, **values})
 
 
-def _moved(signatures: Signatures, hypothesis: Hypothesis, trial: int) -> tuple[list[str], Array]:
+def moved_by(signatures: Signatures, hypothesis: Hypothesis, trial: int) -> tuple[list[str], Array]:
     """The parameters of a hypothesis that have a slope, and which columns each moves (columns, parameters)."""
     names, columns = [], []
     acts = set(hypothesis.cables[:1] if hypothesis.form in OF_THE_PLATFORM else hypothesis.cables)

@@ -24,7 +24,8 @@ from .hypotheses import declared_value
 from .likelihood import Innovations
 from .noise import noise_of
 from .search import Found, search
-from .verdict import Comparison, Errors, Estimate, FoundEffect, Trace, VerdictName
+from .separation import separation
+from .verdict import Comparison, Errors, Estimate, FoundEffect, Separation, Trace, VerdictName
 from .workers import Workers
 
 Array = NDArray[np.float64]
@@ -90,6 +91,10 @@ def _trace(
         kept = all(_reached(c.errors_after, floor) for c, floor in zip(better, lower, strict=True))
         comparisons, floors = (better, lower) if kept else (comparisons, floors)
     verdict, sentence = _verdict(robot, found, kept, before_is_noise)
+    shown = Separation((), ())
+    if kept or verdict == "none":
+        progress("what these recordings could show", 0.0)
+        shown = separation(found.fit.robot, robot, found.accepted, fitter, evidence.judge, alpha)
     return Trace(
         verdict=verdict,
         sentence=sentence,
@@ -104,6 +109,7 @@ def _trace(
         noise_before=before_is_noise,
         noise_after=kept or before_is_noise,
         left=(explained if kept else plain)[1].mean_square(evidence.judge.rows),
+        separation=shown,
         alpha=alpha,
         notes=_notes(evidence, samples),
         seconds=perf_counter() - began,

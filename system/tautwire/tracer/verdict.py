@@ -82,11 +82,51 @@ class Comparison:
 
 
 @dataclass(frozen=True)
+class Detectable:
+    """The size of a parameter, from where the effect is absent, that a recording would show nine times out of ten.
+
+    ``beside`` are the values of the effect's other parameters that this holds for. Infinite where no size would show,
+    or none that the parameter may have.
+    """
+
+    name: str
+    cables: tuple[int, ...]
+    parameter: str
+    size: float
+    unit: str
+    beside: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class Likeness:
+    """How much of an accepted effect another could mimic: ``cosine`` of the angle between them, 1 where all of it.
+
+    ``nats`` is what would be lost if the other stood in its place, as far as linearisation holds.
+    """
+
+    name: str
+    cables: tuple[int, ...]
+    other: str
+    other_cables: tuple[int, ...]
+    cosine: float
+    nats: float
+
+
+@dataclass(frozen=True)
+class Separation:
+    """What one recording could have shown beside the effects that were accepted."""
+
+    detectable: tuple[Detectable, ...]
+    alike: tuple[Likeness, ...]
+
+
+@dataclass(frozen=True)
 class Trace:
     """The answer to: what does this model lack.
 
     ``noise_floor`` is what noise of the sensors and of the recorded winch speeds would leave; ``left`` the mean square
     of the whitened innovations of each output (x, y, z, tensions) under the final model on unseen data, shape (3 + n,).
+    ``separation`` is what those data could have shown beside the effects; empty where the model leaves more than noise.
     """
 
     verdict: VerdictName
@@ -102,6 +142,7 @@ class Trace:
     noise_before: bool
     noise_after: bool
     left: Array
+    separation: Separation
     alpha: float
     notes: tuple[str, ...]
     seconds: float

@@ -1,0 +1,83 @@
+"""What a recording could have shown, held to what fits of recordings with something in them really gain."""
+
+from math import isfinite, sqrt
+
+import numpy as np
+import pytest
+
+from tautwire.robot import Robot
+from tautwire.tracer.data import Evidence, split
+from tautwire.tracer.fit import Fitter
+from tautwire.tracer.hypotheses import Hypothesis, hypotheses
+from tautwire.tracer.noise import noise_of
+from tautwire.tracer.separation import separation
+from tautwire.tracer.verdict import Detectable, Separation
+from tautwire_fmu.laws.effects import DAMPING, MODULUS, PAYLOAD, RELAXATION
+from tests.recordings import recorded
+from tests.robots import example
+
+THREE = example("three")
+ALL = (1, 2, 3)
+
+
+def shown_by(robot: Robot, effects: dict[str, dict[str, float]], seed: int) -> tuple[Separation, Fitter, Evidence]:
+    fit, check = recorded("three", seed, effects), recorded("three", seed + 50, effects)
+    noise = noise_of(robot, fit)
+    evidence, fitter = split(robot, noise, fit, check), Fitter(noise)
+    return separation(robot, robot, (), fitter, evidence.judge, 0.01), fitter, evidence
+
+
+def size_of(found: Separation, name: str, parameter: str) -> Detectable:
+    return next(d for d in found.detectable if (d.name, d.parameter) == (name, parameter) and d.cables in ((), ALL))
+
+
+@pytest.mark.parametrize(("hypothesis", "parameter"), [(Hypothesis(PAYLOAD, ()), "mass")], ids=str)
+def test_an_effect_of_that_size_gains_what_the_threshold_asks_for(hypothesis: Hypothesis, parameter: str) -> None:
+    found, _, _ = shown_by(THREE, {}, 11)
+    size = size_of(found, "payload", parameter)
+    threshold = np.log(len(hypotheses(THREE)) / 0.01)
+    gains = []
+    for seed in (12, 13, 14, 15):
+        _, fitter, evidence = shown_by(THREE, {"payload": {"mass": size.size}}, seed)
+        start = THREE.with_effect(hypothesis.setting(THREE))
+        fit = fitter.fit(start, [hypothesis], evidence.fit)
+        whole = fitter.judged(fit.robot, [hypothesis], evidence.judge).log_likelihood(evidence.judge.rows)
+        without = fitter.innovations(THREE, evidence.judge).log_likelihood(evidence.judge.rows)
+        gains.append(whole - without)
+    # 1.28 standard deviations of sqrt(2 gain) above the threshold on average, which is the power asked for.
+    expected = sqrt(2.0 * threshold) + 1.28
+    assert np.mean(np.sqrt(2.0 * np.array(gains))) == pytest.approx(expected, abs=1.3)
+
+
+def test_sizes_are_given_for_every_effect_and_never_beyond_its_bounds() -> None:
+    found, _, _ = shown_by(THREE, {}, 11)
+    assert {d.name for d in found.detectable} == {h.effect.name for h in hypotheses(THREE)}
+    assert all(d.size > 0.0 for d in found.detectable)
+    # No rope of this recording comes near to hanging loose.
+    assert not isfinite(size_of(found, "slack", "softness").size)
+    assert size_of(found, "payload", "mass").size < 1.0
+
+
+def test_relaxation_that_is_fast_looks_like_damping_and_payload_does_not() -> None:
+    fit, check = (recorded("three", seed, {"damping": {"damping": 9e8}}) for seed in (3, 53))
+    noise = noise_of(THREE, fit)
+    evidence, fitter = split(THREE, noise, fit, check), Fitter(noise)
+    damping = Hypothesis(DAMPING, ALL)
+    robot = THREE.with_effect(damping.setting(THREE, {"damping": 9e8}))
+    found = separation(robot, THREE, [damping], fitter, evidence.judge, 0.01)
+    alike = {(each.other, each.other_cables): each for each in found.alike}
+    assert alike[RELAXATION.name, ALL].cosine > 0.95
+    assert (PAYLOAD.name, ()) not in alike
+    assert (DAMPING.name, ALL) not in alike
+    assert all(0.9 <= each.cosine <= 1.0 and each.nats >= 0.0 for each in found.alike)
+
+
+def test_slow_relaxation_can_hardly_be_told_from_modulus() -> None:
+    fit, check = (recorded("three", seed, {"modulus": {"modulus": 1.12e11}}) for seed in (3, 53))
+    noise = noise_of(THREE, fit)
+    evidence, fitter = split(THREE, noise, fit, check), Fitter(noise)
+    modulus = Hypothesis(MODULUS, ALL)
+    robot = THREE.with_effect(modulus.setting(THREE, {"modulus": 1.12e11}))
+    found = separation(robot, THREE, [modulus], fitter, evidence.judge, 0.01)
+    assert found.alike[0].other == RELAXATION.name
+    assert found.alike[0].cosine > 0.999
