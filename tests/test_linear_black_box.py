@@ -24,8 +24,10 @@ from tautwire.linear import (
 from tautwire.master import Component, Connection, Coupling, Port
 from tautwire.packaging import RobotFmus, build_fmus
 from tautwire.robot import EffectSetting, OwnFmu, Robot, Winch
+from tests.effect_cases import CASES, Case
 from tests.own_fmus import LAG, compiler, falling_mass, lag_winch
 from tests.robots import NAMES, example, paper_robot, with_winch
+from tests.test_effects_in_memory import with_effects
 
 Array = NDArray[np.float64]
 
@@ -65,6 +67,22 @@ def test_it_is_the_plant_of_the_laws(name: str, tmp_path: Path) -> None:
     assert max(distances(found, exact).values()) < AGREES
     assert swings(found.system) == pytest.approx(swings(exact), rel=AGREES)
     assert found.error < 1e-6 and found.notes == ()
+
+
+def smooth(case: Case) -> bool:
+    """Whether an effect has a linear plant without dead time, near enough to compare."""
+    return case.name not in ("hysteresis", "sensor_delay") and "slip" not in case.law
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("case", [case for case in CASES if smooth(case)], ids=str)
+def test_it_is_the_plant_of_the_laws_with_each_effect(case: Case, tmp_path: Path) -> None:
+    robot = with_effects(paper_robot(damping=4e8), case)
+    exact = linearise(robot).system
+    # FMUs also show branches of relaxation that are not in use.
+    found = linearise_robot_fmus(build_fmus(robot, tmp_path), states=exact.state_labels)
+    assert found.system.state_labels == exact.state_labels
+    assert max(distances(found, exact).values()) < AGREES
 
 
 @pytest.mark.slow

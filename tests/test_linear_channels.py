@@ -53,6 +53,17 @@ def test_several_inputs_and_outputs_keep_their_names() -> None:
     assert reduced(5j) == pytest.approx(np.asarray(system[outputs, inputs](5j)), rel=1e-8)
 
 
+def test_none_named_are_all() -> None:
+    system = linearise(example("eight")).system
+    assert minimal(system).nstates == system.nstates
+    places = ["position_x", "position_y", "position_z"]
+    reduced = minimal(system, outputs=places)
+    assert reduced.input_labels == system.input_labels
+    # Eight ropes move three axes.
+    assert reduced.nstates == 9
+    assert reduced(5j) == pytest.approx(np.asarray(system[places, system.input_labels](5j)), rel=1e-8, abs=1e-15)
+
+
 def test_the_transfer_function_of_a_vertical_force_by_hand() -> None:
     # One mode of the eight cables is vertical: 1 / (m s^2 + c s + k).
     plant = linearise(example("eight"))

@@ -16,9 +16,14 @@ TOLERANCE = 1e-9
 
 
 def minimal(
-    system: Any, inputs: Sequence[str] | str, outputs: Sequence[str] | str, tolerance: float = TOLERANCE
+    system: Any,
+    inputs: Sequence[str] | str | None = None,
+    outputs: Sequence[str] | str | None = None,
+    tolerance: float = TOLERANCE,
 ) -> Any:
     """Minimal realisation of a ``control.StateSpace`` from some inputs to some outputs, by name, with these names.
+
+    None stands for all inputs, or all outputs.
 
     Unstrained lengths that the inputs do not drive, or that the outputs do not show, go, as do all other states
     of that kind. Scaled first, since position, force and tension differ by many powers of ten: time by the fastest
@@ -28,8 +33,8 @@ def minimal(
 
     Source: Varga (1981), Proc. 20th IEEE CDC, 42-47.
     """
-    rows = _places("output", outputs, system.output_labels)
-    columns = _places("input", inputs, system.input_labels)
+    rows = _places("output", system.output_labels if outputs is None else outputs, system.output_labels)
+    columns = _places("input", system.input_labels if inputs is None else inputs, system.input_labels)
     A, B, C, D = (np.asarray(matrix, dtype=float) for matrix in (system.A, system.B, system.C, system.D))
     pace = max(float(np.max(np.abs(np.linalg.eigvals(A)), initial=0.0)), np.finfo(float).tiny)
     A, (sizes, _) = matrix_balance(A / pace, permute=False, separate=True)

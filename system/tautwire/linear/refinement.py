@@ -38,7 +38,7 @@ def refine(bench: Bench, signals: Signals, step: float, error: float) -> Refined
 
     Raises IdentificationError where none comes near.
     """
-    table: list[Matrices] = []
+    tables: dict[int, list[Matrices]] = {}
     best: Refined | None = None
     first: Responses | None = None
     pushes: Array | None = None
@@ -49,19 +49,24 @@ def refine(bench: Bench, signals: Signals, step: float, error: float) -> Refined
         pushes = responses.pushes
         matrices = realise(responses, signals)
         if matrices is None or (reference is not None and len(matrices.A) != len(reference.A)):
-            table, reference = [], None
+            tables, reference = {}, None
         if matrices is None:
             continue
         if reference is None:
             reference = matrices
         elif signals.states is None:
             matrices = _aligned(matrices, reference, step)
-        before, table = table, _extrapolated(table, matrices, bench.order)
+        before = tables
+        # What creeps on unseen meanwhile errs in the first order, whatever that of the coupling.
+        tables = {order: _extrapolated(before.get(order, []), matrices, order) for order in (bench.order, 1)}
         if not before:
             continue
-        change = _Norm(responses, signals).distance(table[-1], before[-1])
+        norm = _Norm(responses, signals)
+        changes = {order: norm.distance(row[-1], before[order][-1]) for order, row in tables.items()}
+        order = min(changes, key=changes.__getitem__)
+        change = changes[order]
         if best is None or change < best.error:
-            best = Refined(table[-1], length, change, responses)
+            best = Refined(tables[order][-1], length, change, responses)
         if change <= error or change > DIVERGED * best.error:
             break
     if first is None or best is None or best.error > WORST:
