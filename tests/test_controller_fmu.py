@@ -23,6 +23,8 @@ from tautwire.control import (
     robot_with,
     sample_times,
     schedule_controller,
+    schedule_robust,
+    shape_along,
 )
 from tautwire.packaging import RobotFmus, build_fmus
 from tautwire.robot import Robot
@@ -57,9 +59,16 @@ def controller(three: Robot, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return build_controller_fmu(three, design_controller(three), PATHS["three"], DURATION, folder)
 
 
-def difference(robot: Robot, fmus: RobotFmus, design: Design, folder: Path, pushed: bool = False) -> float:
+def difference(
+    robot: Robot,
+    fmus: RobotFmus,
+    design: Design,
+    folder: Path,
+    pushed: bool = False,
+    moved: Trajectory | None = None,
+) -> float:
     """Largest difference of position (m) between both ways to run a controller."""
-    path = PATHS[robot.name]
+    path = moved or PATHS[robot.name]
     times = sample_times(design.aim.period, DURATION)
     push = np.zeros((len(times), 3))
     push[30:, 2] = -0.05 * robot.platform.mass * robot.gravity
@@ -84,9 +93,16 @@ def test_scheduled_and_pure_feedforward_do_so(three: Robot, three_example_fmus: 
     assert difference(three, three_example_fmus, Feedforward(3), tmp_path) < 1e-9
 
 
+def test_shaped_path_does_so(three: Robot, three_example_fmus: RobotFmus, tmp_path: Path) -> None:
+    path = shape_along(three, PATHS["three"], "EI")
+    assert difference(three, three_example_fmus, Feedforward(3), tmp_path, moved=path) < 1e-9
+
+
 @pytest.mark.slow
-def test_robust_controller_does_so(three: Robot, three_example_fmus: RobotFmus, tmp_path: Path) -> None:
+def test_robust_controllers_do_so(three: Robot, three_example_fmus: RobotFmus, tmp_path: Path) -> None:
     assert difference(three, three_example_fmus, design_robust(three), tmp_path, pushed=True) < 1e-9
+    scheduled = schedule_robust(three, PATHS["three"], places=3)
+    assert difference(three, three_example_fmus, scheduled, tmp_path, pushed=True) < 1e-9
 
 
 def test_limits_act_alike(three: Robot, three_example_fmus: RobotFmus, tmp_path: Path) -> None:

@@ -47,6 +47,7 @@ def some_plan(samples: int = 60, knots: int = 1) -> Plan:
         speeds=np.cumsum(random.uniform(-0.01, 0.01, (samples, CABLES)), axis=0).tolist(),
         stretches=np.zeros((samples, CABLES)).tolist(),
         expected=random.standard_normal((samples, 3 + CABLES)).tolist(),
+        at_rest=[1.0] * CABLES,
         knots=np.linspace(0.0, samples / 2, knots).tolist(),
         gains=gains,
         compliances=[1e-5] * CABLES,
@@ -155,9 +156,9 @@ def test_first_tensions_scale_those_to_come_and_what_cancels_stretch() -> None:
     # The first ramp begins before anything is seen.
     stretches = 0.01 * random.standard_normal((samples, CABLES)) * (np.arange(samples) > 1)[:, None]
     tensions = random.uniform(500.0, 900.0, (samples, CABLES))
-    plan = some_plan(samples)._replace(
-        stretches=stretches.tolist(), expected=np.hstack([np.ones((samples, 3)), tensions]).tolist(), tares=True
-    )
+    expected = np.hstack([np.ones((samples, 3)), tensions]).tolist()
+    rest = tensions[0].tolist()
+    plan = some_plan(samples)._replace(stretches=stretches.tolist(), expected=expected, at_rest=rest, tares=True)
     scales = np.array([1.2, 1.0, 0.8])
     truth = plan._replace(
         stretches=(scales * stretches).tolist(),
@@ -174,7 +175,7 @@ def test_first_tensions_scale_those_to_come_and_what_cancels_stretch() -> None:
 
 
 def test_tare_is_bounded_and_leaves_slack_cables_alone() -> None:
-    plan = some_plan()._replace(expected=[[0.0] * 3 + [100.0, 100.0, 0.0]] * 60, tares=True)
+    plan = some_plan()._replace(at_rest=[100.0, 100.0, 0.0], tares=True)
     memory = next_sample(plan, FREE, first_sample(plan, FREE), [0.0] * 3 + [1.0, 900.0, 5.0])
     assert memory.scales == [0.5, 2.0, 1.0]
 

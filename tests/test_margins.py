@@ -93,10 +93,17 @@ def test_all_winches_may_change_at_once_by_what_the_disk_margin_says(design: Con
     assert found.disk_gain < found.gain and found.disk_phase < found.phase
 
 
+def test_range_is_that_of_the_papers_rope_or_as_wide_about_another_one(caroca: Robot) -> None:
+    assert Range.of(caroca) == Range((102e9, 135e9), (0.8, 1.2))
+    soft = Range.of(robot_with(caroca, 60e9, 1.0))
+    assert soft.payloads == (0.8, 1.2)
+    assert soft.moduli == pytest.approx((60e9 * 102 / 118.5, 60e9 * 135 / 118.5))
+
+
 def test_each_sample_of_delay_costs_margin_until_the_loop_breaks(design: Controller) -> None:
     found = [margins_of(design.linear, late(design.knots()[0], samples)) for samples in range(6)]
     for before, after in pairwise(found[:3]):
-        assert after.phase < before.phase - 4.0 and after.winches < before.winches and after.gain < before.gain
+        assert after.phase < before.phase - 2.0 and after.winches < before.winches and after.gain < before.gain
     assert found[2].radius < 1.0 < found[5].radius
     assert found[5].winches == found[5].sensors == found[5].gain == found[5].phase == 0.0
 

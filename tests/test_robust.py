@@ -5,12 +5,14 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import control
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from tautwire.control import (
     ControlAim,
+    Knot,
     MarginError,
     Range,
     RobustAim,
@@ -19,10 +21,15 @@ from tautwire.control import (
     design_controller,
     design_robust,
     margins_over,
+    rigid_reference,
+    sample_times,
+    schedule_robust,
 )
+from tautwire.control.plan import plan_data
 from tautwire.packaging import RobotFmus, build_fmus
 from tautwire.robot import Robot
 from tautwire.trajectory import Line
+from tautwire_fmu.laws import sampled_control as law
 from tests.robots import example
 
 Array = NDArray[np.float64]
@@ -58,13 +65,25 @@ def test_margins_hold_on_a_finer_grid_than_that_of_the_design(three: Robot, desi
     assert min(found.winches, found.sensors) > 2.0 / 3.0
     assert found.gain > 2.0 and found.phase > 37.0 and found.radius < 0.99
     lqg = margins_over(three, design_controller(three).knots(), start, Range(), points=2)
-    assert lqg.winches < 0.5 * found.winches
+    assert lqg.winches < 0.8 * found.winches
 
 
 def test_loop_is_the_fastest_of_those_that_keep_the_margin(three: Robot, design: RobustController) -> None:
     slower = design_robust(three, robust=RobustAim(margin=0.85))
     assert slower.bandwidth < design.bandwidth
     assert min(slower.margins.winches, slower.margins.sensors) >= 0.85
+
+
+def test_scheduled_loop_keeps_the_margin_along_the_path_and_between_its_places(three: Robot) -> None:
+    rise = Line((28.86, 0.0, 5.0), (24.0, 3.0, 14.0), 10.0)
+    scheduled = schedule_robust(three, rise, places=3)
+    plan = law.plan_of(plan_data(three, scheduled, rigid_reference(three, rise, sample_times(0.01, 10.0))))
+    for sample in (0, 250, 500, 750, 1000):
+        gains = law.gains_at(plan, sample)
+        through = np.hstack([np.zeros((3, 6)), gains.D])
+        knot = Knot(0.0, control.ss(gains.A, gains.B, gains.C, through, 0.01), np.array(gains.M))
+        found = margins_over(three, (knot,), rise.position(np.array([0.01 * sample])), Range(), points=2)
+        assert found.least > 0.97 * 2.0 / 3.0
 
 
 def test_margin_that_no_loop_has_is_refused(three: Robot) -> None:

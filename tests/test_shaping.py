@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import cast
 
 import control
 import numpy as np
@@ -21,6 +22,7 @@ from tautwire.control import (
     shaper_for_modes,
 )
 from tautwire.control.shaping import Kind
+from tautwire.errors import InputError
 from tautwire.packaging import RobotFmus
 from tautwire.trajectory import Line, Trajectory
 from tests.robots import paper_robot
@@ -74,6 +76,11 @@ def test_shapers_are_as_robust_as_the_textbook_says() -> None:
     around = np.linspace(0.6, 1.4, 8001)
     bands = [np.ptp(around[shaper(1.0, kind=kind).residual(around) < 0.0501]) for kind in ("ZV", "ZVD", "EI")]
     assert bands == pytest.approx([0.064, 0.287, 0.399], abs=2e-3)
+
+
+def test_an_unknown_kind_is_refused() -> None:
+    with pytest.raises(InputError, match="'ZVDD' is no shaper; choose among ZV, ZVD, EI"):
+        shaper(1.0, 0.0, cast(Kind, "ZVDD"))
 
 
 def test_shaper_for_three_modes_has_no_swing_in_any() -> None:

@@ -14,9 +14,22 @@ import numpy as np
 from tautwire.control import Design
 from tautwire.cosimulation import Motion
 from tests.bench.control_figure import Curves, draw
-from tests.bench.control_runs import Controlled, Measured, Move, controlled, designs, measured, moves, robots, run
+from tests.bench.control_runs import (
+    Controlled,
+    Measured,
+    Move,
+    about_smooth,
+    controlled,
+    designs,
+    measured,
+    moves,
+    robots,
+    run,
+)
 from tests.bench.control_tables import margin_table, run_table
 
+# When the shaped ramps have ended, in s.
+SHAPED_BY = 6.5
 BEGIN, END = "<!-- bench -->\n", "<!-- end of bench -->\n"
 Runs = dict[str, tuple[Controlled, Motion]]
 Pairs = dict[str, tuple[Measured, Measured]]
@@ -48,13 +61,12 @@ def distances(runs: Runs) -> Curves:
     }
 
 
-def heights(runs: Runs) -> Curves:
-    """Height above the path from 4 s on, less its mean after 7 s."""
+def swings(runs: Runs, begin: float) -> Curves:
+    """Swing in height after a time."""
     found = {}
     for name, (controller, motion) in runs.items():
-        above = (motion.position - controller.path.position(motion.time))[:, 2]
-        late = motion.time >= 4.0
-        found[name] = motion.time[late], above[late] - np.mean(above[motion.time >= 7.0])
+        away = motion.position - controller.path.position(motion.time)
+        found[name] = motion.time[motion.time >= begin], about_smooth(motion.time, away, begin)[:, 2]
     return found
 
 
@@ -75,7 +87,7 @@ def main(docs: Path | None) -> None:
         before, rest = page.read_text(encoding="utf-8").split(BEGIN)
         _, after = rest.split(END)
         page.write_text(f"{before}{BEGIN}\n{text}\n{END}{after}", encoding="utf-8")
-        curves = distances(runs[0]), heights(runs[1]), distances(runs[2])
+        curves = distances(runs[0]), swings(runs[1], SHAPED_BY), distances(runs[2])
         draw(*curves, helix.robot, feedbacks[0], docs / "control.svg")
 
 

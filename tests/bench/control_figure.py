@@ -26,8 +26,10 @@ COLOURS = {
     "LQG": "#1f77b4",
     "LQG, scheduled": "#17becf",
     "robust": "#c0392b",
+    "robust, scheduled": "#e67e22",
 }
 PAYLOADS = {0.8: ":", 1.0: "-", 1.2: "--"}
+WINDOW = 50
 MODULI = np.linspace(102e9, 135e9, 7)
 
 
@@ -39,7 +41,7 @@ def draw(helix: Curves, ramp: Curves, push: Curves, robot: Robot, feedback: Mapp
     figure = Figure(figsize=(11.0, 7.5), layout="constrained")
     (upper_left, upper_right), (lower_left, lower_right) = figure.subplots(2, 2)
     _distances(upper_left, helix, "Distance from the helix, smoothed over 0.5 s")
-    _curves(upper_right, ramp, "Ramp: height above the path, less its mean from 7 s on")
+    _curves(upper_right, ramp, "Ramp: swing in height that is left")
     _curves(lower_left, push, "Force of 5 % of the weight: distance from the place")
     _margins(lower_right, robot, feedback)
     with matplotlib.rc_context({"svg.hashsalt": "tautwire", "svg.fonttype": "none"}):
@@ -48,12 +50,13 @@ def draw(helix: Curves, ramp: Curves, push: Curves, robot: Robot, feedback: Mapp
 
 def _distances(axes: Axes, curves: Curves, title: str) -> None:
     for name, (times, values) in curves.items():
-        smooth = np.sqrt(np.convolve(values**2, np.ones(50) / 50, mode="same"))
-        axes.semilogy(times[::10], 1e3 * smooth[::10] + 1e-6, color=COLOURS[name], label=name, lw=1.2)
+        smooth = np.sqrt(np.convolve(values**2, np.ones(WINDOW) / WINDOW, mode="valid"))
+        middles = times[WINDOW // 2 :][: len(smooth)]
+        axes.semilogy(middles[::10], 1e3 * smooth[::10] + 1e-6, color=COLOURS[name], label=name, lw=1.2)
     axes.set(title=title, xlabel="time, s", ylabel="mm")
-    axes.set_ylim(bottom=1e-3)
+    axes.set_ylim(1e-3, 1e2)
     axes.grid(alpha=0.3)
-    axes.legend(fontsize=8, ncols=2)
+    axes.legend(fontsize=7, ncols=3, loc=(0.3, 0.56))
 
 
 def _curves(axes: Axes, curves: Curves, title: str) -> None:

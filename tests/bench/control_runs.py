@@ -21,6 +21,7 @@ from tautwire.control import (
     rigid_reference,
     sample_times,
     schedule_controller,
+    schedule_robust,
     shape_along,
 )
 from tautwire.cosimulation import Motion
@@ -34,7 +35,7 @@ Array = NDArray[np.float64]
 
 PERIOD = 0.01
 SEED = 1
-OPEN, FORWARD, LQG, SCHEDULED, ROBUST = "open loop", "feedforward", "LQG", "LQG, scheduled", "robust"
+OPEN, FORWARD, LQG, ROBUST = "open loop", "feedforward", "LQG", "robust"
 SHAPED = {"ZV shaped": "ZV", "EI shaped": "EI"}
 
 
@@ -103,10 +104,11 @@ def moves() -> list[Move]:
 
 def designs(move: Move) -> dict[str, Design]:
     """The feedback designs for a move."""
-    found: dict[str, Design] = {LQG: design_controller(move.robot)}
+    found: dict[str, Design] = {LQG: design_controller(move.robot), ROBUST: design_robust(move.robot)}
     if move.push is None:
-        found[SCHEDULED] = schedule_controller(move.robot, move.path)
-    return found | {ROBUST: design_robust(move.robot)}
+        found[f"{LQG}, scheduled"] = schedule_controller(move.robot, move.path)
+        found[f"{ROBUST}, scheduled"] = schedule_robust(move.robot, move.path)
+    return found
 
 
 def controlled(move: Move, feedback: dict[str, Design]) -> dict[str, Controlled]:
@@ -171,7 +173,12 @@ def measured(move: Move, controller: Controlled, motion: Motion) -> Measured:
 
 def swing(times: Array, away: Array, begin: float) -> float:
     """Largest swing about a smooth motion after a time, in m."""
+    return float(np.max(np.linalg.norm(about_smooth(times, away, begin), axis=1)))
+
+
+def about_smooth(times: Array, away: Array, begin: float) -> Array:
+    """What is left of lengths (N, 3) after a time when their cubics in time are taken away."""
     late = times >= begin
     smooth = np.vander(np.interp(times[late], [begin, times[-1]], [-1.0, 1.0]), 4)
-    left = away[late] - smooth @ np.linalg.lstsq(smooth, away[late], rcond=None)[0]
-    return float(np.max(np.linalg.norm(left, axis=1)))
+    left: Array = away[late] - smooth @ np.linalg.lstsq(smooth, away[late], rcond=None)[0]
+    return left

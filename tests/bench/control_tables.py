@@ -55,7 +55,9 @@ def _cells(found: Measured) -> list[str]:
 
 def length(metres: float) -> str:
     """In mm, to two digits or to a micrometre."""
-    return f"{max(round(1e3 * metres, 3), 0.0):.2g}" if metres < 1e-2 else f"{1e3 * metres:.1f}"
+    if metres < 1e-6:
+        return "<0.001"
+    return f"{round(1e3 * metres, 3):.2g}" if metres < 1e-2 else f"{1e3 * metres:.1f}"
 
 
 def margin_table(robot: Robot, path: Trajectory, feedback: Mapping[str, Design]) -> str:

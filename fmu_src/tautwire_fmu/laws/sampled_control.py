@@ -10,9 +10,9 @@ what the sensors shall show and y what they show, ``w_k = V_k - F_k``:
 ``x_k`` knows samples before k only: one sample is there for computing. M tells the state what was given, so nothing
 winds up at a limit. Between the knots of a schedule all matrices are interpolated linearly.
 
-A cable's tension T is kept below a limit L by a bound on its speed, the one that would take T to L as a mode of angular
-frequency 1 / tau and damping ratio 0.7, ``V_k+1 <= V_k + h (l / E S) ((L - T) / tau - 1.4 dT/dt) / tau``, from T as
-seen a sample before; and so from below. Where statics asks for more than L the cable gives way.
+A cable's tension T is kept below a limit L by a bound on what is asked for beyond the feedforward, the one that would
+take T to L as a mode of angular frequency 1 / tau and damping ratio 0.7, ``a <= (l / E S) ((L - T) / tau - 1.4 dT/dt)
+/ tau``, from T as seen a sample before; and so from below. Where statics asks for more than L the cable gives way.
 
 A plan that ``tares`` takes the platform to rest at the start: the first tensions seen, over those expected, scale all
 that follow and the speeds that cancel stretch. So a payload that nobody declared does no harm.
@@ -45,14 +45,16 @@ class Plan(NamedTuple):
     """A controller made for a path.
 
     ``period`` h in s; at each of N samples ``speeds`` (n) for inelastic cables and ``stretches`` (n), which cancel
-    stretch and make F of these, in m/s, and ``expected`` r (3 + n), position in m and tensions in N. ``knots`` are
-    the samples at which ``gains`` hold. ``compliances`` (n) are l / (E S), in m/N, and ``yield_time`` is tau, in s.
+    stretch and make F of these, in m/s, and ``expected`` r (3 + n), position in m and tensions in N; ``at_rest`` (n)
+    are the tensions before the start. ``knots`` are the samples at which ``gains`` hold. ``compliances`` (n) are
+    l / (E S), in m/N, and ``yield_time`` is tau, in s.
     """
 
     period: float
     speeds: Matrix
     stretches: Matrix
     expected: Matrix
+    at_rest: Vector
     knots: Sequence[float]
     gains: Sequence[Gains]
     compliances: Vector
@@ -92,6 +94,7 @@ def plan_of(data: Dict[str, Any]) -> Plan:
         data["speeds"],
         data["stretches"],
         data["expected"],
+        data["at_rest"],
         [knot["sample"] for knot in data["knots"]],
         [Gains(*(knot[name] for name in Gains._fields)) for knot in data["knots"]],
         data["compliances"],
@@ -114,7 +117,7 @@ def next_sample(plan: Plan, limits: Limits, memory: Memory, measured: Vector) ->
     """The next sample, by what the sensors showed at the begin of this one: position in m, then tensions in N."""
     k, scales = memory.sample, memory.scales
     if plan.tares and k == 0:
-        scales = [_scale(seen, expected) for seen, expected in zip(measured[3:], plan.expected[0][3:])]
+        scales = [_scale(seen, expected) for seen, expected in zip(measured[3:], plan.at_rest)]
     gains = gains_at(plan, k)
     away = _less(memory.begin, _forward(plan, scales, k))
     asked = _asked(gains, memory.state, away)
@@ -158,12 +161,11 @@ def _ahead(plan: Plan, limits: Limits, memory: Memory) -> List[float]:
     for speed, then, off, wanted, compliance, tension, before in zip(
         memory.begin, there, away, asked, plan.compliances, memory.tensions, memory.earlier
     ):
-        free = then + off + plan.period * wanted
-        give = plan.period * compliance / plan.yield_time
-        rising = DAMPED * (tension - before) / plan.period
-        lower = speed + give * ((limits.lowest_tension - tension) / plan.yield_time - rising)
-        upper = speed + give * ((limits.highest_tension - tension) / plan.yield_time - rising)
-        held = _cut(_cut(free, lower, upper), speed - reach, speed + reach)
+        give, rising = compliance / plan.yield_time, DAMPED * (tension - before) / plan.period
+        lower = give * ((limits.lowest_tension - tension) / plan.yield_time - rising)
+        upper = give * ((limits.highest_tension - tension) / plan.yield_time - rising)
+        free = then + off + plan.period * _cut(wanted, lower, upper)
+        held = _cut(free, speed - reach, speed + reach)
         found.append(_cut(held, -limits.speed, limits.speed))
     return found
 

@@ -15,7 +15,7 @@ from .lqg import Controller, design_controller
 from .margins import Margins, Range, margins_of, margins_over, robot_with, speed_controller
 from .path import Reference, path_tensions, rigid_reference
 from .plant import ramp_plant, sampled_plant
-from .robust import RobustAim, RobustController, design_robust
+from .robust import RobustAim, RobustController, design_robust, schedule_robust
 from .schedule import ScheduledController, schedule_controller
 from .shaping import ShapedTrajectory, Shaper, shape_along, shaped, shaper, shaper_for_modes
 from .source import PathController
@@ -56,6 +56,7 @@ __all__ = [
     "sample_times",
     "sampled_plant",
     "schedule_controller",
+    "schedule_robust",
     "shape_along",
     "shaped",
     "shaper",

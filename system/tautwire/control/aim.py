@@ -37,14 +37,14 @@ class ControlAim:
     """
 
     period: float = 0.01
-    position: float = 1e-3
+    position: float = 2e-3
     tension: float = 0.1
-    winch_speed: float = 0.1
-    winch_acceleration: float = 0.5
-    integral_time: float = 0.25
+    winch_speed: float = 0.03
+    winch_acceleration: float = 0.2
+    integral_time: float = 0.35
     speed_limit: float = 3.0
     acceleration_disturbance: float = 0.2
-    speed_disturbance: float = 0.01
+    speed_disturbance: float = 0.03
     acceleration_limit: float = float("inf")
     lowest_tension: float | None = None
     highest_tension: float | None = None

@@ -90,8 +90,10 @@ def cosimulate_closed_loop(
 
     With winches the speeds that the controller wants are what these are asked for.
 
-    Raises UnreachableError where the path asks a cable to push, InputError where an FMU does not show a tension.
+    Raises UnreachableError where the path asks a cable to push, InputError where an FMU does not show a tension or
+    robot, controller and FMUs do not go together.
     """
+    _require_cables(fmus, robot, controller)
     _require_tensions(fmus, robot)
     times = sample_times(controller.aim.period, duration)
     source: Source = PathController(robot, controller, trajectory, times, seed, reference)
@@ -157,6 +159,13 @@ def controller_wires(fmus: RobotFmus) -> tuple[Connection, ...]:
         *(Connection(port, Port(CONTROLLER, name)) for port, name in zip(shown, seen, strict=True)),
         *(Connection(Port(CONTROLLER, asked[place]), ports[place]) for place in wiring.driven),
     )
+
+
+def _require_cables(fmus: RobotFmus, robot: Robot, controller: Design) -> None:
+    counts = {len(fmus.cables), robot.cable_count, controller.cable_count}
+    if len(counts) > 1:
+        told = f"has {robot.cable_count} cables, the controller {controller.cable_count}, the FMUs {len(fmus.cables)}"
+        raise InputError(robot.name, told, "give those of one robot")
 
 
 def _require_tensions(fmus: RobotFmus, robot: Robot) -> None:

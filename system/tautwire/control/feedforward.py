@@ -46,7 +46,8 @@ def elastic_reference(robot: Robot, trajectory: Trajectory, times: Array) -> Ref
     """Winch speeds that make the elastic model follow a path, and what its sensors then show.
 
     ``times`` (N,) in s at equal distances; speeds are linear in between. Each is the mean over the sample around it,
-    so rope let out is right also where the path's acceleration jumps. They start where inelastic cables would.
+    so rope let out is right also where the path's acceleration jumps. They start where inelastic cables would, and the
+    path is at rest before.
 
     Raises UnreachableError where a cable would have to push, StretchError where no speeds are found.
     """
@@ -63,7 +64,7 @@ def elastic_reference(robot: Robot, trajectory: Trajectory, times: Array) -> Ref
     # What the first half sample then lets out too little, the second sample does.
     means[1] += means[0] - 0.5 * ideal[0]
     means[0] = ideal[0]
-    return Reference(means, ideal, shown.reshape(len(times), STEPS, -1)[:, STEPS // 2 - 1])
+    return Reference(means, ideal, shown[STEPS // 2 - 1 :: STEPS], shown[0, 3:])
 
 
 def _moments(trajectory: Trajectory, ends: Array, step: float) -> _Moments:

@@ -16,6 +16,7 @@ import control
 import numpy as np
 from numpy.typing import NDArray
 from slycot import sb10ad
+from threadpoolctl import threadpool_limits
 
 Array = NDArray[np.float64]
 
@@ -45,8 +46,10 @@ def shaped_controller(plant: Any, weights: Any) -> Any:
             [shaped.D, each, shaped.D],
         ]
     )
-    _, _, norm, _ = control.hinfsyn(control.ss(A, B, C, D), seen, driven)
-    found = sb10ad(states, B.shape[1], C.shape[0], driven, seen, SLACK * norm, A, B, C, D, job=GIVEN_NORM)
+    # Small matrices: threads that wait for each other would cost most of the time.
+    with threadpool_limits(limits=1, user_api="blas"):
+        _, _, norm, _ = control.hinfsyn(control.ss(A, B, C, D), seen, driven)
+        found = sb10ad(states, B.shape[1], C.shape[0], driven, seen, SLACK * norm, A, B, C, D, job=GIVEN_NORM)
     return to_sampled(control.ss(*found[1:5]) * weights, period)
 
 

@@ -42,6 +42,11 @@ class Margins:
     phase: float
 
     @property
+    def least(self) -> float:
+        """The smaller of the disk margins."""
+        return min(self.winches, self.sensors)
+
+    @property
     def disk_gain(self) -> float:
         """The factor by which all winches' gains may grow or shrink at once."""
         return float("inf") if self.winches >= 2.0 else (2.0 + self.winches) / (2.0 - self.winches)
@@ -68,6 +73,16 @@ class Range:
 
     moduli: tuple[float, float] = (102e9, 135e9)
     payloads: tuple[float, float] = (0.8, 1.2)
+
+    @classmethod
+    def of(cls, robot: Robot) -> Range:
+        """Around a robot: the paper's rope from its static to its dynamic modulus, another rope by the same shares."""
+        moduli = [cable.modulus for cable in robot.cables]
+        lowest, highest = cls.moduli
+        if lowest <= min(moduli) and max(moduli) <= highest:
+            return cls()
+        middle = 0.5 * (lowest + highest)
+        return cls((min(moduli) * lowest / middle, max(moduli) * highest / middle))
 
     def robots(self, robot: Robot, points: int = 3) -> Iterator[tuple[float, float, Robot]]:
         """Modulus, payload and the robot with both, on a grid of ``points`` each."""

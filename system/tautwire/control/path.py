@@ -23,11 +23,13 @@ class Reference:
     """What a controller follows, at each of N samples: winch speeds (N, n) in m/s, and what sensors shall show.
 
     ``rigid`` (N, n) are the speeds for inelastic cables; ``expected`` (N, 3 + n): position in m, tensions in N.
+    ``at_rest`` (n,) are the tensions that sensors show before the start, in N.
     """
 
     speeds: Array
     rigid: Array
     expected: Array
+    at_rest: Array
 
 
 def path_tensions(robot: Robot, trajectory: Trajectory, times: Array) -> Array:
@@ -64,4 +66,5 @@ def rigid_reference(robot: Robot, trajectory: Trajectory, times: Array) -> Refer
     Raises UnreachableError where a cable would have to push.
     """
     speeds = ideal_winch_speeds(robot, trajectory, times)
-    return Reference(speeds, speeds, np.hstack([trajectory.position(times), path_tensions(robot, trajectory, times)]))
+    expected = np.hstack([trajectory.position(times), path_tensions(robot, trajectory, times)])
+    return Reference(speeds, speeds, expected, path_tensions(robot, trajectory, times[:1] - 1.0)[0])

@@ -30,6 +30,7 @@ def plan_data(robot: Robot, design: Design, reference: Reference) -> dict[str, A
         "speeds": reference.rigid.tolist(),
         "stretches": (reference.speeds - reference.rigid).tolist(),
         "expected": reference.expected.tolist(),
+        "at_rest": reference.at_rest.tolist(),
         "knots": [_knot_data(knot, period) for knot in design.knots()],
         "compliances": compliances(robot).tolist(),
         "yield_time": design.aim.yield_time,

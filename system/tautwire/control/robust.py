@@ -1,7 +1,8 @@
 """A controller that keeps its margins over a range of moduli and payloads: H-infinity loop shaping.
 
 The loop is as fast as the margins allow: of several bandwidths the largest is kept at which the worst disk margin
-over the whole range, of all winches at once and of each sensor alone, is what was asked for.
+over the whole range, of all winches at once and of each sensor alone, is what was asked for. Along a path designs at
+its places follow each other: their states are estimates of the same quantities, so gains can be interpolated.
 """
 
 from __future__ import annotations
@@ -16,12 +17,14 @@ from numpy.typing import NDArray
 
 from ..linear import LinearPlant, linearise
 from ..robot import Robot
+from ..trajectory import Trajectory
 from .aim import ControlAim
 from .design import Knot, regulator_signals
 from .errors import MarginError
 from .loop_shaping import shaped_controller
 from .margins import Margins, Range, margins_of
 from .plant import ramp_plant
+from .schedule import PLACES, ScheduledController
 
 Array = NDArray[np.float64]
 
@@ -85,20 +88,73 @@ def design_robust(
 ) -> RobustController:
     """The fastest loop whose margins hold over a range, at a position (m), by default the start.
 
+    The range is :meth:`Range.of` the robot where none is given.
+
     Raises MarginError where none does, and what :func:`tautwire.linear.linearise` raises.
     """
-    aim, uncertain, robust = aim or ControlAim(), uncertain or Range(), robust or RobustAim()
-    linear = linearise(uncertain.middle(robot), at)
-    plants = [linearise(each, at) for _, _, each in uncertain.robots(robot)]
+    start = robot.platform.start if at is None else at
+    (design,) = _fastest(
+        robot, np.array([start]), aim or ControlAim(), uncertain or Range.of(robot), robust or RobustAim()
+    )
+    return design
+
+
+def schedule_robust(
+    robot: Robot,
+    trajectory: Trajectory,
+    aim: ControlAim | None = None,
+    uncertain: Range | None = None,
+    robust: RobustAim | None = None,
+    places: int = PLACES,
+) -> ScheduledController:
+    """As :func:`design_robust`, at equally many times of a path, from its start to its end.
+
+    Raises MarginError where none does, and what :func:`tautwire.linear.linearise` raises.
+    """
+    times = np.linspace(0.0, trajectory.duration, places)
+    positions = trajectory.position(times)
+    designs = _fastest(robot, positions, aim or ControlAim(), uncertain or Range.of(robot), robust or RobustAim())
+    return ScheduledController(tuple(times.tolist()), tuple(designs))
+
+
+def _fastest(
+    robot: Robot, positions: Array, aim: ControlAim, uncertain: Range, robust: RobustAim
+) -> list[RobustController]:
+    """Designs of one bandwidth at all positions, the largest at which all keep their margin."""
+    middles = [linearise(uncertain.middle(robot), position) for position in positions]
+    plants = [[linearise(each, position) for _, _, each in uncertain.robots(robot)] for position in positions]
     reached = 0.0
     for bandwidth in BANDWIDTHS:
-        regulator = _regulator(robot, linear, aim.period, bandwidth, robust)
-        tracking = back_calculation(regulator, YIELDING * robust.integral * _lowest(linear) * aim.period)
-        worst = _worst(plants, Knot(0.0, regulator, tracking), robust.margin)
-        reached = max(reached, min(worst.winches, worst.sensors))
-        if reached >= robust.margin:
-            return RobustController(aim, linear, regulator, tracking, bandwidth, worst)
+        found: list[RobustController] = []
+        for middle, around in zip(middles, plants, strict=True):
+            design = _design(robot, middle, around, aim, robust, bandwidth)
+            if design.margins.least < robust.margin:
+                reached = max(reached, design.margins.least)
+                break
+            found.append(design)
+        else:
+            return found
     raise MarginError(robot.name, robust.margin, reached, "ask for less, narrow the range, or sample faster")
+
+
+def _design(
+    robot: Robot,
+    linear: LinearPlant,
+    plants: Sequence[LinearPlant],
+    aim: ControlAim,
+    robust: RobustAim,
+    bandwidth: float,
+) -> RobustController:
+    """A design with its worst margins on some plants, or on the first of them that fall short."""
+    regulator = _regulator(robot, linear, aim.period, bandwidth, robust)
+    tracking = back_calculation(regulator, YIELDING * robust.integral * _lowest(linear) * aim.period)
+    knot = Knot(0.0, regulator, tracking)
+    worst = margins_of(plants[0], knot)
+    for plant in plants[1:]:
+        if worst.least < robust.margin:
+            break
+        worst = worst.worst(margins_of(plant, knot))
+    return RobustController(aim, linear, regulator, tracking, bandwidth, worst)
 
 
 def back_calculation(regulator: Any, share: float) -> Array:
@@ -119,16 +175,6 @@ def back_calculation(regulator: Any, share: float) -> Array:
 def _lowest(linear: LinearPlant) -> float:
     """Angular frequency of the lowest mode, in rad/s."""
     return 2.0 * np.pi * float(linear.modes.frequencies[0])
-
-
-def _worst(plants: Sequence[LinearPlant], knot: Knot, enough: float) -> Margins:
-    """The worst margins, or those of the first plants that fall short."""
-    worst = margins_of(plants[0], knot)
-    for plant in plants[1:]:
-        if min(worst.winches, worst.sensors) < enough:
-            break
-        worst = worst.worst(margins_of(plant, knot))
-    return worst
 
 
 def _regulator(robot: Robot, linear: LinearPlant, period: float, bandwidth: float, robust: RobustAim) -> Any:

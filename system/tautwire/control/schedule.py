@@ -1,12 +1,13 @@
 """A controller that is designed at several places of a path, with its gains interpolated in between.
 
-All designs estimate the same quantities, so nothing jumps where one takes over from another: the state goes on, and
-gains that change continuously ask for accelerations that do.
+All designs must estimate the same quantities. Then nothing jumps where one takes over from another: the state goes
+on, and gains that change continuously ask for accelerations that do.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Protocol
 
 import numpy as np
 
@@ -14,18 +15,27 @@ from ..linear import LinearPlant
 from ..robot import Robot
 from ..trajectory import Trajectory
 from .aim import ControlAim
-from .design import Knot
-from .lqg import Controller, design_controller
+from .design import Design, Knot
+from .lqg import design_controller
 
 PLACES = 9
 
 
+class DesignOfOnePlant(Design, Protocol):
+    """A design for one place."""
+
+    @property
+    def linear(self) -> LinearPlant:
+        """The plant that it is designed on."""
+        ...
+
+
 @dataclass(frozen=True)
 class ScheduledController:
-    """LQG controllers for ``times`` (s), rising, along a path."""
+    """Controllers of one kind for ``times`` (s), rising, along a path."""
 
     times: tuple[float, ...]
-    controllers: tuple[Controller, ...]
+    controllers: tuple[DesignOfOnePlant, ...]
 
     @property
     def aim(self) -> ControlAim:

@@ -22,6 +22,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
+from ..errors import InputError
 from ..linear import modes_along
 from ..robot import Robot
 from ..trajectory import Trajectory
@@ -60,10 +61,16 @@ class Shaper:
 
 
 def shaper(frequency: float, damping_ratio: float = 0.0, kind: Kind = "ZV", tolerated: float = TOLERATED) -> Shaper:
-    """A shaper for one mode: ``frequency`` in Hz, undamped; ``tolerated`` is the V of EI, as a share."""
+    """A shaper for one mode: ``frequency`` in Hz, undamped; ``tolerated`` is the V of EI, as a share.
+
+    Raises InputError where the kind is unknown.
+    """
     root = np.sqrt(1.0 - damping_ratio**2)
     outer, inner = 1.0 + tolerated, 2.0 - 2.0 * tolerated
-    pattern = np.array({"ZV": [1.0, 1.0], "ZVD": [1.0, 2.0, 1.0], "EI": [outer, inner, outer]}[kind])
+    patterns = {"ZV": [1.0, 1.0], "ZVD": [1.0, 2.0, 1.0], "EI": [outer, inner, outer]}
+    if kind not in patterns:
+        raise InputError("kind", f"{kind!r} is no shaper", f"choose among {', '.join(patterns)}")
+    pattern = np.array(patterns[kind])
     places = np.arange(len(pattern))
     amplitudes = pattern * np.exp(-damping_ratio * np.pi / root) ** places
     return Shaper(amplitudes / np.sum(amplitudes), 0.5 * places / (frequency * root))
