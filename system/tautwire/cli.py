@@ -256,6 +256,40 @@ def trace(
 
 
 @application.command()
+def excite(
+    robot_file: RobotFile,
+    out: Annotated[Path, typer.Option(metavar="PROGRAM.csv", help="Where the winch speeds go; a recording's form.")],
+    effects: Annotated[str | None, typer.Option(help="Effects to tell apart, with commas; all when absent.")] = None,
+    speed: Annotated[float | None, typer.Option(help="Largest winch speed, m/s; [winch] or 0.5.", min=1e-6)] = None,
+    reach: Annotated[float | None, typer.Option(help="Farthest from the start along an axis, m.", min=1e-6)] = None,
+    duration: Annotated[float, typer.Option(help="s", min=1.0, max=3600.0)] = 30.0,
+    rate: Annotated[float, typer.Option(help="Samples per second.", min=1.0, max=1000.0)] = 50.0,
+    programs: Annotated[int, typer.Option(help="About how many programs are tried.", min=1, max=100_000)] = 64,
+    seed: Annotated[int, typer.Option(help="The same seed gives the same program.", min=0)] = 0,
+) -> None:
+    """A winch program after which effects can be told apart: the largest smallest separation within the limits.
+
+    Example: tautwire excite robot.toml --effects damping,relaxation,hysteresis --out program.csv
+    """
+    from .excitation import default_limits
+    from .excitation import excite as excited
+    from .excitation.limits import named_effects
+    from .output import file_in_place, refuse_inputs
+
+    refuse_inputs([robot_file], [out])
+    robot = _robot(robot_file)
+    chosen = named_effects(robot, effects)
+    with _progress() as tell:
+        found = excited(robot, chosen, default_limits(robot, speed, reach), duration, 1.0 / rate, programs, seed, tell)
+    with file_in_place(out) as scratch:
+        found.frame().to_csv(scratch, index=False, float_format="%.10g")
+    for pair in found.pairs[:5]:
+        print(f"{pair.effect.label(robot)}, and {pair.other.label(robot)} in its place: {pair.nats:.3g} nats apart")
+    print(f"closest pair of the median program: {found.typical:.3g} nats")
+    print(out)
+
+
+@application.command()
 def material(
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where fit.json and the figure go.")],
     table: Annotated[Path | None, typer.Argument(metavar="TABLE.csv", help=DYNAMIC_TEST)] = None,

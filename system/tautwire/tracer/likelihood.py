@@ -118,6 +118,23 @@ class Likelihood:
         measured, shift = self._as_of(recording, parameters)
         yield from self._filter(recording, measured, shift, parameters, self._start_covariance(), 0.0)
 
+    def simulated(self, recording: Recording, parameters: Sequence[float] | Array) -> Array:
+        """What sensors without noise or lag would show of a run over a recording's winch speeds, shape (N, m)."""
+        nothing = np.full(recording.measured().shape, np.nan)
+        shown = casadi.vertcat(self.model.outputs[:3], self.model.outputs[6 : 6 + self.cable_count])
+        function = casadi.Function("shown", [self.model.states, self.model.inputs, self.model.parameters], [shown])
+        still = np.zeros(self.model.inputs.numel() - self.cable_count)
+        parts = []
+        for stretch in self._filter(
+            recording, nothing, np.zeros_like(nothing), parameters, self._start_covariance(), 0.0
+        ):
+            states, speeds = stretch.states[:, :-1][:, stretch.own], stretch.columns[3][:, stretch.own]
+            count = states.shape[1]
+            inputs = np.vstack([speeds, np.repeat(still[:, None], count, axis=1)])
+            theta = np.repeat(np.asarray(parameters, dtype=float)[:, None], count, axis=1)
+            parts.append(np.array(function.map(count)(states, inputs, theta)).T)
+        return np.vstack(parts)
+
     def _as_of(self, recording: Recording, parameters: Sequence[float] | Array) -> tuple[Array, Array]:
         lags = np.array(self._lags(np.asarray(parameters, dtype=float))).ravel()
         return as_of(recording.time, recording.measured(), lags)

@@ -57,6 +57,33 @@ def separation(
     return Separation(sizes, tuple(sorted(alike, key=lambda found: found.nats)))
 
 
+def apart(signatures: Signatures, move: Array, other: Hypothesis, rest: Sequence[int] = ()) -> float:
+    """Nats between a move of the parameters (columns, 1) and the best that another hypothesis can do in its place."""
+    whole = float(_beside(signatures.gram, move, list(rest))[0, 0])
+    return 0.5 * whole * (1.0 - _mimicked(signatures, move, other, rest, whole)) if whole > 0.0 else 0.0
+
+
+def start_moves(signatures: Signatures, robot: Robot, hypothesis: Hypothesis) -> Array:
+    """The move (columns, 1) from where an effect is absent to where fits of it begin, at its first trial."""
+    names, columns = moved_by(signatures, hypothesis, 0)
+    absent = hypothesis.neutral(robot, hypothesis.cables).values
+    begun = hypothesis.setting(robot).values
+    steps = np.array([float(begun[name]) - float(absent[name]) for name in names])
+    moves: Array = (columns @ steps)[:, None]
+    return moves
+
+
+def _mimicked(signatures: Signatures, move: Array, other: Hypothesis, rest: Sequence[int], whole: float) -> float:
+    """Share of a move's squared length that another hypothesis can take, at the trial that takes most."""
+    best = 0.0
+    for number in range(trial_count(other)):
+        _, columns = moved_by(signatures, other, number)
+        if columns.shape[1]:
+            both = _beside(signatures.gram, np.hstack([move, columns]), list(rest))
+            best = max(best, float(both[0, 1:] @ _solved(both[1:, 1:], both[1:, :1])[:, 0]) / whole)
+    return min(max(best, 0.0), 1.0)
+
+
 def _places(accepted: Sequence[Hypothesis]) -> list[list[int]]:
     """Which columns are whose."""
     places, first = [], 0
@@ -122,17 +149,10 @@ def _likeness(
     rest = [column for group in places if group is not mine for column in group]
     move = np.zeros((len(signatures.columns), 1))
     move[mine, 0] = _moves(robot, declared, hypothesis)
-    best = 0.0
     whole = float(_beside(signatures.gram, move, rest)[0, 0])
     if whole <= 0.0:
         return None
-    for number in range(trial_count(other)):
-        _, columns = moved_by(signatures, other, number)
-        if columns.shape[1]:
-            both = _beside(signatures.gram, np.hstack([move, columns]), rest)
-            mimicked = float(both[0, 1:] @ _solved(both[1:, 1:], both[1:, :1])[:, 0])
-            best = max(best, mimicked / whole)
-    cosine = sqrt(min(max(best, 0.0), 1.0))
+    cosine = sqrt(_mimicked(signatures, move, other, rest, whole))
     if cosine < ALIKE:
         return None
     nats = 0.5 * whole * (1.0 - cosine**2)
