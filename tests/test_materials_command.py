@@ -70,3 +70,23 @@ def test_an_input_is_never_written_over(tmp_path: Path, capsys: pytest.CaptureFi
     table.write_text(PAPER_TABLE.read_text(encoding="utf-8"), encoding="utf-8")
     assert run(["material", str(table), "--out", str(tmp_path)]) == 2
     assert "is an input" in capsys.readouterr().err
+
+
+@pytest.mark.slow
+def test_trace_takes_a_dynamic_test_for_a_recording(tmp_path: Path) -> None:
+    assert run(["trace", str(ROBOT), str(PAPER_TABLE), "--out", str(tmp_path)]) == 0
+    report = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))
+    assert report["verdict"] == "effects"
+    assert "relaxation" in {effect["name"] for effect in report["effects"]}
+    before, after = report["error_before"]["fit"], report["error_after"]["fit"]
+    assert after["damping_rms"] < before["damping_rms"]
+    assert read_robot(tmp_path / "robot.toml").effects[0].name == "relaxation"
+    assert (tmp_path / "cable_1.fmu").exists()
+
+
+def test_a_dynamic_test_needs_no_check_recording(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    out = tmp_path / "out"
+    status = run(["trace", str(ROBOT), str(PAPER_TABLE), "--check", str(PAPER_TABLE), "--out", str(out)])
+    assert status == 2
+    assert "leave it out" in capsys.readouterr().err
+    assert not out.exists()

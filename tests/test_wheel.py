@@ -24,6 +24,7 @@ def test_both_packages_and_the_examples_are_in_it(wheel: Path) -> None:
     names = set(zipfile.ZipFile(wheel).namelist())
     assert {
         "tautwire/cli.py",
+        "tautwire/commands/tracing.py",
         "tautwire/py.typed",
         "tautwire/examples/three/robot.toml",
         "tautwire/examples/three/fit.csv",

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
 from io import StringIO
+from itertools import islice
 from pathlib import Path
 
 from ..checked_table import NumberRule, nearest
@@ -21,6 +22,8 @@ PAPER_PAIR_AT = 2.0
 LEAST_ROWS, MOST_ROWS = 4, 500
 LARGEST_FILE = 10_000_000
 LARGEST_EXPONENT = 300
+# Lines of remarks, and characters of a header, that are looked at to tell a table from a recording.
+LONGEST_REMARK, LONGEST_HEADER = 100, 10_000
 
 RULES: Mapping[str, NumberRule] = {
     "frequency": NumberRule("the loading frequency, 0 for a static test,", "Hz", 0.0, 1e6),
@@ -105,6 +108,18 @@ def read_material_table(path: str | Path) -> MaterialTable:
     )
     _require_rows(table)
     return table
+
+
+def is_material_table(path: str | Path) -> bool:
+    """Whether the first line of a file that is no remark names a column "frequency" and none "time"."""
+    try:
+        with Path(path).open("rb") as file:
+            lines = (line.decode("utf-8-sig", "replace").strip() for line in islice(file, LONGEST_REMARK))
+            header = next((line for line in lines if line and not line.startswith("#")), "")
+    except OSError:
+        return False
+    names = {name.strip() for name in header[:LONGEST_HEADER].split(",")}
+    return "frequency" in names and "time" not in names
 
 
 def _is_measured(row: MaterialRow, name: str) -> bool:

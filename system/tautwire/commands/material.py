@@ -1,0 +1,86 @@
+"""A rope's dynamic test."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from ..errors import InputError
+from ..robot_file import read_robot
+from .shared import progress_bar, robot_of
+
+DYNAMIC_TEST = "A dynamic test of the rope; if none, Table 1 of the paper, with the pair that it uses."
+
+
+def material(
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where fit.json and the figure go.")],
+    table: Annotated[Path | None, typer.Argument(metavar="TABLE.csv", help=DYNAMIC_TEST)] = None,
+    at: Annotated[float | None, typer.Option(help="The row, Hz, whose pair of E' and c is in use as constant.")] = None,
+    robot_file: Annotated[
+        Path | None, typer.Option("--robot", metavar="ROBOT.toml", help="A robot with this rope; written anew.")
+    ] = None,
+    shared: Annotated[float, typer.Option(help="Share of each variance that all rows have in common.")] = 0.0,
+    coverage: Annotated[float, typer.Option(help="Standard deviations that the table's uncertainties are.")] = 1.0,
+    alpha: Annotated[float, typer.Option(help="Rate of false alarms allowed.")] = 0.01,
+) -> None:
+    """Judge a constant modulus and damping by a dynamic test, and fit what the rope has besides.
+
+    Example: tautwire material dma.csv --robot robot.toml --out material/
+    """
+    from ..materials import PAPER_PAIR_AT, PAPER_TABLE, Options, pair_of_row, read_material_table, trace_material
+    from ..materials.output import FILES, write_material
+    from ..materials.robot_material import declared_material
+    from ..materials.terminal import material_table
+    from ..output import folder_in_place, refuse_inputs
+
+    for name, value, least in (("--shared", shared, 0.0), ("--alpha", alpha, math.nextafter(0.0, 1.0))):
+        if not least <= value < 1.0:
+            raise InputError(name, f"{value:g} is not a share below 1", "give a number such as 0.01")
+    if not 0.0 < coverage < math.inf:
+        raise InputError("--coverage", f"{coverage:g} is not positive", "give 1, or 2 for intervals of 95 %")
+    if at is not None and robot_file:
+        raise InputError("--at", "the pair in use is the robot's", "give either --at or --robot")
+    read = read_material_table(table or PAPER_TABLE)
+    robot = robot_of(robot_file) if robot_file else None
+    refuse_inputs([path for path in (table, robot_file) if path], [out / name for name in FILES])
+    declared = declared_material(robot, str(robot_file)) if robot else None
+    if table is None and robot is None and at is None:
+        at = PAPER_PAIR_AT
+    if at is not None:
+        declared = pair_of_row(read, at)
+    with folder_in_place(out) as scratch:
+        with progress_bar() as tell:
+            verdict = trace_material(read, declared, Options(shared=shared, coverage=coverage, alpha=alpha), tell)
+        write_material(verdict, scratch, robot)
+    Console().print(material_table(verdict))
+    print(out / "fit.json")
+
+
+def judge_rope(table: Path, robot_file: Path, out: Path, alpha: float) -> None:
+    """A trace at the level of the rope: the robot's constants judged by a dynamic test, the better robot with its FMUs.
+
+    Writes what :func:`material` does, the same verdict as ``report.json``, and the FMUs.
+    """
+    from ..materials import Options, read_material_table, trace_material
+    from ..materials.output import FILES, write_material
+    from ..materials.robot_material import declared_material
+    from ..materials.terminal import material_table
+    from ..output import folder_in_place, refuse_inputs
+    from ..packaging import build_fmus
+
+    read, robot = read_material_table(table), robot_of(robot_file)
+    refuse_inputs([table, robot_file], [out / name for name in (*FILES, "report.json")])
+    declared = declared_material(robot, str(robot_file))
+    with folder_in_place(out) as scratch:
+        with progress_bar() as tell:
+            verdict = trace_material(read, declared, Options(alpha=alpha), tell)
+        write_material(verdict, scratch, robot)
+        shutil.copyfile(scratch / "fit.json", scratch / "report.json")
+        build_fmus(read_robot(scratch / "robot.toml"), scratch)
+    Console().print(material_table(verdict))
+    print(out / "report.json")
