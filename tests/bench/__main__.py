@@ -7,7 +7,7 @@ import tempfile
 from pathlib import Path
 
 from .cables import time_per_step
-from .precision import Curve, by_importers, by_tautwire, in_memory, picture
+from .precision import Curve, by_importers, by_tautwire, in_memory, picture, turn_about
 
 CABLES = (3, 6, 12, 24, 48)
 RUNS = 3
@@ -20,6 +20,9 @@ def main(target: Path | None) -> None:
         curves = [*ours, *memory, *theirs]
         show(curves)
         ratios(ours, memory, theirs)
+        for tolerance in (1e-6, 3e-6):
+            found = turn_about(Path(name) / f"turns-{tolerance:g}", 0.14, tolerance)
+            print(f"140 ms, in turn with DOP853 at rtol {tolerance:g}: {found:.2f} times its processor time")
         if target is not None:
             picture(curves).savefig(target)
         print("\n| cables | time per macro step | per cable |\n| --- | --- | --- |")

@@ -49,22 +49,26 @@ def laws_in_memory(robot: Robot) -> Callable[[float, np.ndarray], list[float]]:
     return rates
 
 
-def by_solve_ivp(robot: Robot, method: str, tolerance: float) -> tuple[np.ndarray, float]:
-    """End position and wall time, begun anew at each corner of the winch speeds."""
+def by_solve_ivp(
+    robot: Robot, method: str, tolerance: float, clock: Callable[[], float] = perf_counter
+) -> tuple[np.ndarray, float]:
+    """End position and wall time, or that of another clock; begun anew at each corner of the winch speeds."""
     rates = laws_in_memory(robot)
     lengths = [np.linalg.norm(np.array(a) - robot.platform.start) for a in robot.anchors]
     state = np.array([*robot.platform.start, 0.0, 0.0, 0.0, *lengths])
-    begun = perf_counter()
+    begun = clock()
     for first, last in pairwise(CORNERS):
         state = solve_ivp(rates, (first, last), state, method=method, rtol=tolerance, atol=tolerance * 1e-2).y[:, -1]
-    return state[:3], perf_counter() - begun
+    return state[:3], clock() - begun
 
 
-def by_fmus(fmus: RobotFmus, stepping: Stepping) -> tuple[np.ndarray, float, int]:
-    """End position, wall time of the run and macro steps."""
+def by_fmus(
+    fmus: RobotFmus, stepping: Stepping, clock: Callable[[], float] = perf_counter
+) -> tuple[np.ndarray, float, int]:
+    """End position, wall time of the run, or that of another clock, and macro steps."""
     speeds = np.array([ramp(time) for time in CORNERS])
     with instantiated(fmus) as coupling:
         kept = Kept(len(CORNERS), len(shown_ports(3)))
-        begun = perf_counter()
+        begun = clock()
         simulate(coupling, Sampled(CORNERS, speeds), CORNERS, shown_ports(3), stepping, kept)
-        return kept.rows[-1, :3], perf_counter() - begun, coupling.account.steps
+        return kept.rows[-1, :3], clock() - begun, coupling.account.steps

@@ -9,69 +9,88 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-MEMORY = 20
 LENGTHS = 4
 SAME_LENGTH = 0.1
-LEAST_DIFFERENCE = 1e-10
-LEAST_SINGULAR = 1e-9
+LEAST_DIFFERENCE = 1e-12
+LEAST_NEW = 1e-3
+# Of the share that a redo has once left over, how much is still held against the next step's.
+REMEMBERED = 0.8
 
 
 class Secants:
-    """Differences between passes of the same step: of what they were given, and of what they showed.
+    """How passes answer to what they are given, learnt from what the passes of a step differ by.
 
-    With ``r = F(z) - z`` and columns ``dr``, ``dF`` of earlier passes, the next pass is given
+    A pass that is given ``z`` shows ``F(z)``; with its residual ``r = F(z) - z`` the next one is given
 
-        z' = F(z) + dF c,   c = argmin |r + dr c|
+        z' = F(z) - A r,   A dr = dF for any two passes of a step
 
-    All vectors are in units of their nominal values. Pairs are kept from step to step, since the coupling changes
-    slowly; :meth:`forget` drops them where it does not.
+    ``A`` is kept from step to step, since the coupling changes slowly, and changes as little as the newest passes ask
+    for; :meth:`forget` drops it where the coupling jumps. All vectors are in units of their nominal values.
 
-    Source: Degroote, Bathe and Vierendeels (2009), Performance of a new partitioned procedure versus a monolithic
-    procedure in fluid-structure interaction, Computers & Structures 87, 793-801.
+    Source: Bogaers, Kok, Reddy and Franz (2014), Quasi-Newton methods for implicit black-box FSI coupling, Computer
+    Methods in Applied Mechanics and Engineering 279, 113-132.
     """
 
-    def __init__(self) -> None:
-        self._pairs: deque[tuple[Array, Array, float]] = deque(maxlen=MEMORY)
-        self._last: tuple[Array, Array] | None = None
+    def __init__(self, count: int) -> None:
+        self._answers = np.zeros((count, count))
+        self._directions: list[Array] = []
+        self._last: tuple[Array, Array, float] | None = None
+        self._correction = np.zeros(count)
+        self._left = 1.0
 
     def begin(self) -> None:
         """A new step: its first pass is no neighbour of the last step's."""
         self._last = None
+        self._directions = []
 
     def forget(self) -> None:
-        """Drop all pairs."""
-        self._pairs.clear()
+        """Drop all that was learnt."""
+        self._answers.fill(0.0)
+        self._directions = []
+        self._left = 1.0
 
     def learn(self, given: Array, shown: Array) -> None:
         """One pass: it was given ``given`` and showed ``shown``."""
+        residual = shown - given
+        size = float(np.abs(residual).max(initial=0.0))
         if self._last is not None:
-            change, response = given - self._last[0], shown - self._last[1]
-            if np.max(np.abs(response - change)) > LEAST_DIFFERENCE:
-                shrinks = float(np.linalg.norm(response) / np.linalg.norm(change))
-                self._pairs.appendleft((response - change, response, shrinks))
-        self._last = given, shown
+            earlier, shown_earlier, size_earlier = self._last
+            if size > size_earlier:
+                self.forget()
+            if size_earlier > LEAST_DIFFERENCE:
+                self._left = min(1.0, max(size / size_earlier, REMEMBERED * self._left))
+            self._take(residual - earlier, shown - shown_earlier)
+        self._last = residual, shown, size
+        self._correction = self._answers @ residual
 
-    def contraction(self) -> float:
-        """By how much a plain pass shrinks an error at most, as far as is known; one where nothing is."""
-        return min(1.0, max((pair[2] for pair in self._pairs), default=1.0))
+    def _take(self, change: Array, answer: Array) -> None:
+        """Answer so to this change of the residual, as before to those across it and across this step's others."""
+        new = change.copy()
+        for direction in self._directions:
+            new -= (direction @ new) * direction
+        length = float(np.sqrt(new @ new))
+        if length > max(LEAST_DIFFERENCE, LEAST_NEW * float(np.sqrt(change @ change))):
+            new /= length
+            self._answers += np.outer((answer - self._answers @ change) / (new @ change), new)
+            self._directions.append(new)
+
+    def error(self) -> float:
+        """By how much the outputs of the last pass still err: what the next would change, and what that would miss."""
+        assert self._last is not None
+        return float(np.abs(self._correction).max(initial=0.0)) + self._left * self._last[2]
 
     def next(self) -> Array:
         """What to give to the next pass."""
         assert self._last is not None
-        given, shown = self._last
-        if not self._pairs:
-            return shown
-        residuals = np.column_stack([pair[0] for pair in self._pairs])
-        responses = np.column_stack([pair[1] for pair in self._pairs])
-        weights = np.linalg.lstsq(residuals, given - shown, rcond=LEAST_SINGULAR)[0]
-        improved: Array = shown + responses @ weights
+        improved: Array = self._last[1] - self._correction
         return improved
 
 
 class Lessons:
     """Secants by the length of the step, since a coupling is not the same for another; the last few lengths."""
 
-    def __init__(self) -> None:
+    def __init__(self, count: int) -> None:
+        self._count = count
         self._taught: deque[tuple[float, Secants]] = deque(maxlen=LENGTHS)
 
     def of(self, step: float) -> Secants:
@@ -79,7 +98,7 @@ class Lessons:
         for length, secants in self._taught:
             if abs(step - length) <= SAME_LENGTH * length:
                 return secants
-        self._taught.appendleft((step, Secants()))
+        self._taught.appendleft((step, Secants(self._count)))
         return self._taught[0][1]
 
     def forget(self) -> None:

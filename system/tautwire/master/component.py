@@ -59,12 +59,14 @@ class ComponentError(TautwireError):
 
 @dataclass(frozen=True)
 class Block:
-    """Some real variables of one FMU with the memory through which they are read or written; shape (n,)."""
+    """Some real variables of one FMU with the memory through which they are read or written; shape (n,).
+
+    ``arguments`` are references, count and memory as the FMU's functions take them.
+    """
 
     names: tuple[str, ...]
-    references: ctypes.Array[ctypes.c_uint]
     values: Array
-    memory: Any
+    arguments: tuple[Any, ...]
 
     @property
     def count(self) -> int:
@@ -142,12 +144,8 @@ class Component:
         """Memory for some variables, by name: the contiguous ``values`` handed in, or memory of its own."""
         references = [self.variables[name].valueReference for name in names]
         values = np.zeros(len(names)) if values is None else values
-        return Block(
-            tuple(names),
-            (ctypes.c_uint * len(names))(*references),
-            values,
-            values.ctypes.data_as(ctypes.c_void_p),
-        )
+        kept = ctypes.cast((ctypes.c_uint * len(names))(*references), ctypes.c_void_p)
+        return Block(tuple(names), values, (kept, ctypes.c_size_t(len(names)), values.ctypes.data_as(ctypes.c_void_p)))
 
     def initialize(self, start: float, parameters: dict[str, float]) -> None:
         """Set parameters and enter initialization mode."""
@@ -173,13 +171,13 @@ class Component:
 
     def read(self, block: Block) -> None:
         """Read variables into the block's values."""
-        status = self._get(self._handle, block.references, block.count, block.memory)
+        status = self._get(self._handle, *block.arguments)
         if status > FMI_WARNING:
             self._fail(self._calls.read, status)
 
     def write(self, block: Block) -> None:
         """Write the block's values."""
-        status = self._set(self._handle, block.references, block.count, block.memory)
+        status = self._set(self._handle, *block.arguments)
         if status > FMI_WARNING:
             self._fail(self._calls.write, status)
 
@@ -222,6 +220,6 @@ class Component:
 
     def _inputs(self) -> dict[str, float]:
         block = self.block([v.name for v in self.variables.values() if v.causality == "input" and is_real(v)])
-        if self._get(self._handle, block.references, block.count, block.memory) > FMI_WARNING:
+        if self._get(self._handle, *block.arguments) > FMI_WARNING:
             return {}
         return dict(zip(block.names, block.values.tolist(), strict=True))

@@ -12,38 +12,31 @@ iterated coupling; the polynomial through value and rate at both ends is the Her
 
 from __future__ import annotations
 
-import ctypes
-from collections import deque
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .acceleration import Lessons, Secants
 from .audit import Account, Bond
+from .bends import Bends
+from .checkpoint import Checkpoint
 from .component import Component
 from .fallback import fallback
 from .held import Held
+from .hermite import chains_of
+from .prediction import Prediction
 from .rates import Rates
-from .seat import MIDDLE_STAMP, STAMP, Level, Places, Seat, downstream, fed_back, gauss_seidel_order, takes_middle
+from .seat import MIDDLE_STAMP, STAMP, Level, Places, Seat, order_of, takes_middle
+from .turns import downstream, fed_back, gauss_seidel_order
+from .units import nominal_of
 from .wiring import Connection, Port, WiringError, check, check_rates, levels
 
 Array = NDArray[np.float64]
 
-PAST = 4
 MOST_ROUNDS, SETTLED = 20, 1e-12
-
-
-@dataclass(frozen=True)
-class Checkpoint:
-    """All that a coupling needs to go back to a time."""
-
-    states: tuple[ctypes.c_void_p, ...]
-    shown: Array
-    driven: Array
-    account: Account
-    past: tuple[tuple[float, Array], ...]
+ROUNDING = 1e-13
 
 
 class Coupling:
@@ -51,11 +44,12 @@ class Coupling:
 
     ``drives`` are the input ports that the master itself sets; ``bonds`` are audited for energy; ``kinks`` are
     outputs at whose sign changes other outputs have a kink, see :mod:`.kinks`. ``tolerance`` is relative to the
-    nominal values of the connected outputs; ``redos`` bounds the redos of a step. What a redo is given is improved
-    by what earlier ones have shown, see :class:`Secants`. ``can_redo`` and ``can_cut`` are False where some FMU
-    cannot save its state: then no step is redone, or cut at kinks. ``rates`` are pairs whose target takes the rate of
-    the source, worked out from its past, see :class:`Rates`. ``memory`` gives the array in which the values of
-    all inputs stand, so that a watching process may see them.
+    nominal values of the connected outputs; with a ``share``, that of what the polynomials of a step miss, see
+    :class:`Bends`, is enough. ``redos`` bounds the redos of a step. What a redo is given is improved by what earlier
+    ones have shown, see :class:`Secants`. ``can_redo`` and ``can_cut`` are False where some FMU cannot save its
+    state: then no step is redone, or cut at kinks. ``order`` is that of the error in the step. ``rates`` are pairs
+    whose target takes the rate of the source, worked out from its past, see :class:`Rates`. ``memory`` gives the array
+    in which the values of all inputs stand, so that a watching process may see them.
     """
 
     def __init__(
@@ -65,7 +59,7 @@ class Coupling:
         drives: Sequence[Port],
         bonds: Sequence[Bond] = (),
         kinks: Sequence[Port] = (),
-        tolerance: float = 1e-9,
+        tolerance: float = 1e-10,
         redos: int = 8,
         memory: Callable[[Sequence[Port]], Array] | None = None,
         rates: Sequence[Connection] = (),
@@ -76,6 +70,7 @@ class Coupling:
         self.drives = tuple(drives)
         self.tolerance = tolerance
         self.redos = redos
+        self.share = 0.0
         self.can_redo = all(c.can_restore for c in components.values())
         self.can_cut = self.can_redo and all(c.takes_any_step for c in components.values())
         without = fallback(components, connections, drives, rates)
@@ -89,7 +84,7 @@ class Coupling:
         wires = [*connections, *(Connection(_rate_of(pair.source), pair.target) for pair in rates)]
         self._shown = np.zeros(len(all_shown))
         self._rates = Rates(_places(shown, estimated), np.arange(len(shown), len(all_shown)))
-        self._nominal = np.array([float(components[p.component].variables[p.variable].nominal or 1.0) for p in shown])
+        self._nominal = np.array([nominal_of(components[p.component].variables[p.variable]) for p in shown])
         given = [port for name in names for port in self._inputs_of(name, wires)]
         self._given = np.zeros(len(given)) if memory is None else memory(given)
         self._seats = {name: self._seat(name, wires, all_shown, given) for name in names}
@@ -99,17 +94,22 @@ class Coupling:
         self._levels = [self._level(group, shown) for group in groups]
         self._held = Held(components, shown)
         jumping = [*drives, *self._held.targets(connections)]
+        self._jumping = [self._seats[name] for name in dict.fromkeys(port.component for port in jumping)]
         self._after_jumps = [self._level(group, shown) for group in downstream(components, groups, jumping)]
         efforts, flows = [bond.effort for bond in bonds], [bond.flow for bond in bonds]
         self._bond_sent = _places(shown, [c.source for c in efforts]), _places(shown, [c.source for c in flows])
         self._bond_given = _places(given, [c.target for c in efforts]), _places(given, [c.target for c in flows])
         self._kink_places = _places(shown, kinks)
         self._driven = np.full(len(drives), np.nan)
-        self._past: deque[tuple[float, Array]] = deque(maxlen=PAST)
-        self._fed_back = fed_back([seat.component.name for seat in self._order], connections, shown)
+        self._fed_back = fed_back([seat.component.name for seat in self._order], (*connections, *rates), shown)
         self._scale = self._nominal[self._fed_back]
-        self._lessons = Lessons()
-        self._secants = Secants()
+        self._guessing = [seat for seat in self._order if np.isin(seat.sources, self._fed_back).any()]
+        chains = chains_of(components, shown, set(self._fed_back.tolist()))
+        self._prediction = Prediction(chains, self._fed_back, self._scale)
+        self._bends = Bends(chains, self._nominal)
+        self.order = order_of(self._order, wires)
+        self._lessons = Lessons(len(self._fed_back))
+        self._secants = Secants(len(self._fed_back))
 
     def _inputs_of(self, name: str, connections: Sequence[Connection]) -> list[Port]:
         component = self.components[name]
@@ -123,12 +123,14 @@ class Coupling:
         outputs = [place for place, port in enumerate(shown) if port.component == name]
         inputs = [place for place, port in enumerate(given) if port.component == name]
         mine, taken = slice(*_ends(outputs)), slice(*_ends(inputs))
+        sources = _places(shown, [c.source for c in connections if c.target.component == name])
         return Seat(
             component=component,
             outputs=component.block([port.variable for port in shown[mine]], self._shown[mine]),
             inputs=component.block([port.variable for port in given[taken]], self._given[taken]),
             taken=taken,
-            sources=_places(shown, [c.source for c in connections if c.target.component == name]),
+            sources=sources,
+            fed=self._given[taken][len(inputs) - len(sources) :],
             stamped=STAMP in component.variables,
             middle=takes_middle(component, connections),
         )
@@ -147,7 +149,7 @@ class Coupling:
         self._drive(drives)
         for _ in range(MOST_ROUNDS):
             before = self._shown.copy()
-            self._pass_on(time, self._levels)
+            self._pass_on(time, self._order, self._levels)
             if np.allclose(self._shown, before, rtol=SETTLED, atol=SETTLED, equal_nan=True):
                 break
         else:
@@ -159,14 +161,7 @@ class Coupling:
     def forget(self, time: float) -> None:
         """Carry nothing over ``time``, which is now: some output has a kink there."""
         self._lessons.forget()
-        self._past.clear()
-        self._past.append((time, self._shown.copy()))
-
-    @property
-    def order(self) -> int:
-        """Of the error in the step: six where all fed components take what holds in its middle, four if stamped."""
-        fed = [seat for seat in self._order if len(seat.sources)]
-        return 6 if all(seat.middle for seat in fed) else 4 if all(seat.stamped for seat in fed) else 2
+        self._prediction.forget(time, self._shown)
 
     def kinks(self) -> Array:
         """The outputs whose signs tell of kinks, as last shown."""
@@ -177,57 +172,64 @@ class Coupling:
         self._given[self._drive_places] = values
         self._driven = values
 
-    def _pass_on(self, time: float, among: Sequence[Level]) -> None:
-        for seat in self._order:
+    def _pass_on(self, time: float, seats: Sequence[Seat], among: Sequence[Level] = ()) -> None:
+        for seat in seats:
             seat.write(time, self._shown)
         for level in among:
             level.pass_on(time, self._shown)
 
     def step(self, time: float, step: float, start: Array, end: Array) -> None:
         """One macro step under driven inputs that are ``start`` at its begin and ``end`` at its end."""
-        jumped = not np.array_equal(start, self._driven)
+        before = self.attempt(time, step, start, end)
+        if before is not None:
+            self.release(before)
+
+    def attempt(self, time: float, step: float, start: Array, end: Array) -> Checkpoint | None:
+        """A step as :meth:`step` makes it; returns where it began, to be let go, if the components can go back."""
+        jumped = not (np.abs(start - self._driven) <= ROUNDING * np.abs(start)).all()
         jumped |= self._held.begin(self._shown)
-        self._drive(start)
-        self._pass_on(time, self._after_jumps if jumped else ())
+        if jumped:
+            self._drive(start)
+            self._pass_on(time, self._jumping, self._after_jumps)
         before = self.save() if self.can_redo else None
-        begun = self._given.copy()
+        try:
+            redos = self._iterate(time, step, end, before)
+        except BaseException:
+            if before is not None:
+                self.release(before)
+            raise
+        self._enter_books(step, redos)
+        # What was guessed is known now.
+        self._pass_on(time + step, self._guessing)
+        self._held.end(self._shown)
+        self._prediction.end(time + step, self._shown)
+        return before
+
+    def _iterate(self, time: float, step: float, end: Array, before: Checkpoint | None) -> int:
+        """Pass until outputs agree with what was guessed of them; returns the number of redos."""
+        begun, shown = self._given.copy(), self._shown.copy()
         self._secants = self._lessons.of(step)
         self._secants.begin()
-        self._guess(time + step)
-        self._rates.begin(tuple(self._past), time + step)
+        self._prediction.begin(time + step, self._shown)
+        self._rates.begin(self._prediction.memory.past, time + step)
         self._drive(end)
         error = self._pass(time, step, begun)
-        redo = 0
-        while before and redo < self.redos and error > self.tolerance:
+        redos = 0
+        while before is not None and redos < self.redos and error > self._enough(shown, step):
             self._shown[self._fed_back] = self._secants.next() * self._scale
             self._restore_states(before)
-            redo += 1
-            # What the outputs still err by is less than what their inputs do.
-            earlier, error = error, self._pass(time, step, begun) * self._secants.contraction()
-            if error > earlier:
-                self._secants.forget()
-        if before:
-            self.release(before)
-        self._held.end(self._shown)
-        self._past.append((time + step, self._shown.copy()))
-        self._enter_books(step, redo)
+            redos += 1
+            error = self._pass(time, step, begun)
+        return redos
 
-    def _guess(self, time: float) -> None:
-        """Extrapolate all outputs by the polynomial through their past."""
-        times = [at for at, _ in self._past]
-        guess = np.zeros_like(self._shown)
-        for index, (at, values) in enumerate(self._past):
-            weight = 1.0
-            for other in times[:index] + times[index + 1 :]:
-                weight *= (time - other) / (at - other)
-            guess += weight * values
-        self._shown[:] = guess
+    def _enough(self, begun: Array, step: float) -> float:
+        """The error with which redos end."""
+        if not self.share:
+            return self.tolerance
+        return max(self.tolerance, self.share * self._bends.largest(begun, self._shown, step))
 
     def _pass(self, time: float, step: float, begun: Array) -> float:
-        """Each component steps in turn; returns by how much an output at most is not what others were given.
-
-        Relative to the nominal value.
-        """
+        """Each component steps in turn; returns by how much outputs still err at most, relative to nominal values."""
         self.account.passes += 1
         given = self._shown[self._fed_back] / self._scale
         self._rates.fill(self._shown)
@@ -238,7 +240,7 @@ class Coupling:
             self._held.hold(self._shown)
         shown = self._shown[self._fed_back] / self._scale
         self._secants.learn(given, shown)
-        return float(np.max(np.abs(shown - given), initial=0.0))
+        return self._secants.error()
 
     def _enter_books(self, step: float, redos: int) -> None:
         (sent_effort, sent_flow), (given_effort, given_flow) = self._bond_sent, self._bond_given
@@ -254,16 +256,19 @@ class Coupling:
     def save(self) -> Checkpoint:
         """Where everything is now; let it go with :meth:`release`."""
         states = tuple(seat.component.save() for seat in self._order)
-        return Checkpoint(states, self._shown.copy(), self._driven, replace(self.account), tuple(self._past))
+        return Checkpoint(
+            states, self._shown.copy(), self._given.copy(), self._driven, replace(self.account), self._prediction.memory
+        )
 
     def restore(self, checkpoint: Checkpoint) -> None:
         """Go back to a checkpoint."""
         self._restore_states(checkpoint)
         self._shown[:] = checkpoint.shown
+        self._given[:] = checkpoint.given
         self._held.forget()
         self._driven = checkpoint.driven
         self.account = replace(checkpoint.account, passes=self.account.passes)
-        self._past = deque(checkpoint.past, maxlen=PAST)
+        self._prediction.memory = checkpoint.memory
 
     def release(self, checkpoint: Checkpoint) -> None:
         """Let a checkpoint go."""

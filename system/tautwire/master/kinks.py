@@ -44,10 +44,11 @@ def step_over(coupling: Coupling, time: float, step: float, drives: Drives) -> f
 
 def _step_to_kink(coupling: Coupling, time: float, step: float, drives: Drives) -> float | None:
     """Step up to the first kink, or over it where it is near; returns how far, None where the whole step is made."""
-    before = coupling.save()
+    signs = np.sign(coupling.kinks())
+    before = coupling.attempt(time, step, *drives(time, step))
+    if before is None:
+        return None
     try:
-        signs = np.sign(coupling.kinks())
-        coupling.step(time, step, *drives(time, step))
         end = coupling.kinks()
         changed = np.flatnonzero(np.sign(end) != signs)
         if not len(changed) or step <= 2.0 * WIDTH:

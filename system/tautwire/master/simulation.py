@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cache
 from typing import Protocol
 
 import numpy as np
 from numpy.typing import NDArray
-from threadpoolctl import threadpool_limits
+from threadpoolctl import ThreadpoolController
 
 from .component import Block, Component
 from .coupling import Coupling
@@ -17,6 +18,9 @@ from .wiring import Port
 
 Array = NDArray[np.float64]
 Progress = Callable[[float], None]
+
+# Of what the polynomials of a step miss: redos that would find less than this add nothing.
+SHARE = 0.01
 
 
 class Source(Protocol):
@@ -45,10 +49,14 @@ class Sampled:
         """See :class:`Source`."""
         slope = (self.values[index + 1] - self.values[index]) / (self.time[index + 1] - self.time[index])
         start = self.values[index] + (time - self.time[index]) * slope
-        return (
-            np.column_stack([start, slope]).ravel(),
-            np.column_stack([start + step * slope, slope]).ravel(),
-        )
+        return _paired(start, slope), _paired(start + step * slope, slope)
+
+
+def _paired(values: Array, rates: Array) -> Array:
+    pairs = np.empty(2 * len(values))
+    pairs[0::2] = values
+    pairs[1::2] = rates
+    return pairs
 
 
 class Recorder(Protocol):
@@ -95,6 +103,7 @@ def simulate(
     """
     if stepping.agreement is not None:
         coupling.tolerance = stepping.agreement
+    coupling.share = SHARE
     window = _Window(coupling, observed)
     shown = np.zeros(len(observed))
     start, _ = source.interval(0, float(times[0]), 0.0, shown)
@@ -104,8 +113,14 @@ def simulate(
     window.read(shown)
     recorder.add(float(times[0]), shown)
     # The master's own systems of equations are small: threads of BLAS only wait for each other.
-    with threadpool_limits(limits=1, user_api="blas"):
+    with _thread_pools().limit(limits=1, user_api="blas"):
         _march(coupling, source, times, shown, stepping, recorder, window, progress)
+
+
+@cache
+def _thread_pools() -> ThreadpoolController:
+    """To look for them among all libraries takes longer than many a step."""
+    return ThreadpoolController()
 
 
 def _march(

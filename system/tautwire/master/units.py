@@ -16,6 +16,12 @@ def unit_of(variable: ScalarVariable) -> str | None:
     return str(stated) if stated else None
 
 
+def nominal_of(variable: ScalarVariable) -> float:
+    """The size that a variable or its type states; one where neither does, or where it is zero, which FMI forbids."""
+    stated = variable.nominal or getattr(variable.declaredType, "nominal", None)
+    return abs(float(stated or 1.0)) or 1.0
+
+
 def measure(description: ModelDescription, unit: str) -> Measure | None:
     """Exponents of the SI base units, then factor and offset; None where the FMU does not define the unit."""
     for known in description.unitDefinitions:

@@ -1,0 +1,104 @@
+"""What outputs will be at the end of a step, from their past."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from tautwire.master.bends import Bends
+from tautwire.master.hermite import Chain
+from tautwire.master.prediction import Prediction
+
+STEP = 0.1
+# Value, rate and its rate, each at the end and in the middle of a step.
+CHAIN = Chain((0, 1, 2), (3, 4, 5))
+VALUE_ONLY = Chain((0,), None)
+
+
+def swing(time: float, frequency: float = 10.0) -> list[float]:
+    phase = frequency * time
+    return [np.sin(phase), frequency * np.cos(phase), -(frequency**2) * np.sin(phase)]
+
+
+def shown(motion: Callable[[float], list[float]], time: float) -> np.ndarray:
+    return np.array([*motion(time), *motion(time - 0.5 * STEP)])
+
+
+def misses(motion: Callable[[float], list[float]], steps: int, chain: Chain = CHAIN) -> list[float]:
+    """Of each step in turn, the largest relative to the size of a swing's value and rates."""
+    count = len(chain.ends) * (1 if chain.middles is None else 2)
+    places = np.array([*chain.ends, *(chain.middles or ())])
+    prediction = Prediction([chain], places, np.array([1.0, 10.0, 100.0] * 2)[:count])
+    prediction.forget(0.0, shown(motion, 0.0))
+    found = []
+    for number in range(1, steps + 1):
+        time = number * STEP
+        expected, true = shown(motion, time - STEP), shown(motion, time)
+        prediction.begin(time, expected)
+        found.append(float(np.max(np.abs(expected - true)[places] / np.array([1.0, 10.0, 100.0] * 2)[:count])))
+        prediction.end(time, true)
+    return found
+
+
+def test_a_parabola_is_known_from_one_point() -> None:
+    assert max(misses(lambda time: [3.0 + time - 2.0 * time**2, 1.0 - 4.0 * time, -4.0], 4)) < 1e-12
+
+
+def test_a_value_alone_is_extrapolated_from_three_points() -> None:
+    found = misses(lambda time: [3.0 + time - 2.0 * time**2, 0.0, 0.0], 6, VALUE_ONLY)
+    assert found[0] > 1e-3
+    assert max(found[4:]) < 1e-12
+
+
+def test_a_swing_is_known_better_the_longer_its_past_is() -> None:
+    found = misses(swing, 20)
+    assert found[0] > 0.05
+    assert found[3] < 0.02 * found[0]
+
+
+def test_what_the_polynomial_misses_of_a_swing_is_learnt() -> None:
+    found = misses(swing, 20)
+    assert max(found[12:]) < 1e-3 * found[3]
+
+
+def test_what_rests_is_known_to_rest() -> None:
+    assert max(misses(lambda time: [3.0, 0.0, 0.0], 12)) == 0.0
+
+
+def test_after_a_corner_only_what_follows_it_counts() -> None:
+    def cornered(time: float) -> list[float]:
+        late = max(time - 1.0, 0.0)
+        return [a + b for a, b in zip(swing(time), [1e3 * late**3, 3e3 * late**2, 6e3 * late], strict=True)]
+
+    found = misses(cornered, 20)
+    assert found[10] > 1.0
+    assert max(found[11:]) < 0.03 * found[10]
+
+
+def test_a_memory_taken_back_predicts_the_same() -> None:
+    prediction = Prediction([CHAIN], np.arange(6), np.ones(6))
+    prediction.forget(0.0, shown(swing, 0.0))
+    for number in range(1, 10):
+        prediction.begin(number * STEP, np.zeros(6))
+        prediction.end(number * STEP, shown(swing, number * STEP))
+    memory, found = prediction.memory, []
+    for _ in range(2):
+        expected = np.zeros(6)
+        prediction.begin(10 * STEP, expected)
+        prediction.end(10 * STEP, shown(swing, 10 * STEP) + 1.0)
+        found.append(expected)
+        prediction.memory = memory
+    assert np.array_equal(found[0], found[1])
+
+
+def test_the_middle_of_a_quintic_bends_nowhere() -> None:
+    quintic = np.polynomial.Polynomial([1.0, -2.0, 3.0, 4.0, -5.0, 6.0])
+    bends = Bends([CHAIN, VALUE_ONLY], np.ones(6))
+    begun, end = (shown(lambda at: [quintic.deriv(k)(at) for k in range(3)], time) for time in (0.2, 0.2 + STEP))
+    assert bends.largest(begun, end, STEP) < 1e-11
+
+
+def test_the_middle_bends_by_the_sixth_rate() -> None:
+    bends = Bends([CHAIN], np.array([1.0, 1e9, 1e9, 1.0, 1e9, 1e9]))
+    begun, end = (shown(lambda at: [at**6, 6.0 * at**5, 30.0 * at**4], time) for time in (0.0, STEP))
+    assert bends.largest(begun, end, STEP) == pytest.approx(720.0 * STEP**6 / 46080.0)
