@@ -32,3 +32,10 @@ def test_kinks_choose_by_the_real_part() -> None:
 
 def test_a_constant_has_no_rate() -> None:
     assert rate_of(4.0) == 0.0  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("function", ["log", "sqrt"])
+def test_a_number_with_its_rate_is_refused_where_the_real_one_is(function: str) -> None:
+    for mathematics, number in ((REAL, -2.0), (COMPLEX_STEP, along(-2.0, 1.0))):
+        with pytest.raises(ValueError):
+            getattr(mathematics, function)(number)

@@ -1,16 +1,15 @@
 """The cable as an FMI slave: the platform's motion and the winch speed in, tension and force out."""
 
-from typing import Any, Dict, List, NamedTuple, Sequence, Tuple
+from typing import Any, List, NamedTuple, Optional, Sequence, Tuple
 
 from .cable_variables import cable_variables
 from .inner_steps import integrate
 from .interpolation import cubic, extrapolate, quintic
 from .laws import cable as law
 from .laws import stages
-from .laws.effects import BY_NAME
 from .laws.mathematics import COMPLEX_STEP, REAL, along, rate_of
 from .past import Seen, remember, seen
-from .slave import Slave, active_effects, read_resource
+from .slave import Slave, active_effects, effects_of, read_resource
 
 POSITION, VELOCITY, ACCELERATION, WINCH_SPEED, WINCH_ACCELERATION, MIDDLE = 2, 5, 8, 11, 12, 13
 FIRST_OUTPUT = 22
@@ -38,11 +37,12 @@ class Cable(Slave):
 
     def __init__(self, **kwargs: Any) -> None:
         data = read_resource(kwargs["resources"], "cable.json")
-        self.settings: List[Dict[str, Any]] = data["effects"]
+        self.acting = effects_of(data)
         self.tension_law = law.LAWS[data["law"]]
-        self.end_of_state = FIRST_STATE + 2 + sum(len(BY_NAME[s["name"]].states) for s in self.settings)
-        own = (state.scale for setting in self.settings for state in BY_NAME[setting["name"]].states)
+        self.end_of_state = FIRST_STATE + 2 + sum(len(effect.states) for effect in self.acting)
+        own = (state.scale for effect in self.acting for state in effect.states)
         self.scales = (LENGTH_SCALE, LENGTH_SCALE, *own)
+        self.end_line: Optional[law.Span] = None
         super().__init__(data, cable_variables(data), slice(FIRST_STATE, self.end_of_state), **kwargs)
         self.parameters_changed()
 
@@ -50,7 +50,7 @@ class Cable(Slave):
         numbers = self.real[self.first_parameter :]
         anchor, start = tuple(numbers[0:3]), tuple(numbers[3:6])
         modulus, area, damping, start_tension, gravity = numbers[6:11]
-        self.effects = active_effects(self.settings, numbers[11:])
+        self.effects = active_effects(self.acting, numbers[11:])
         self.lag = stages.delays(REAL, self.effects)[0]
         line = stages.route(REAL, self.effects, anchor, start)
         self.constants = law.CableConstants(
@@ -72,16 +72,41 @@ class Cable(Slave):
         """The state under inputs that move on polynomials, and what the cable shows in the middle of the step."""
         state = self.real[FIRST_STATE : self.end_of_state]
         middle = self._moved(step, 0.5, ends)
-        half = self._line(middle)
-        if len(state) == 2:
-            between, after = self._in_one_step(state, step, ends, middle, half)
+        if not self.effects:
+            half = self._carried_line(middle)
+            between, after = self._without_effects(state, step, ends, middle, half)
+            shown = self._show_without_effects(between, middle.winch_speed, middle.winch_acceleration, half)
         else:
-            between, after = self._in_inner_steps(state, step, ends)
-        shown = self._show(between, middle, half)
+            line = self._line(middle)
+            if len(state) == 2:
+                between, after = self._in_one_step(state, step, ends, middle, line)
+            else:
+                between, after = self._in_inner_steps(state, step, ends)
+            shown = self._show(between, middle, line)
         if self.lag > 0.0:
             self._remember(step, ends, state, shown, after)
         self.real[MIDDLE_FORCE:FIRST_STATE] = [*(f.real for f in shown.force), *map(rate_of, shown.force)]
         self.real[FIRST_STATE : self.end_of_state] = after
+
+    def _without_effects(
+        self, state: List[float], step: float, ends: bool, middle: Motion, half: law.Span
+    ) -> Tuple[List[float], List[float]]:
+        """As :meth:`_in_one_step`, where the rope is straight and follows the winch."""
+        start, end = self._at_start(ends), self._moved(step, 1.0, ends)
+        self.end_line = last = self._carried_line(end)
+        first = law.span(REAL, self.constants, law.CableInputs(start.position, start.velocity, start.winch_speed))
+        slope, sixth, (unstrained, wound) = self.tension_law.unstrained_length_rate, step / 6.0, state
+        begin, there, away = start.winch_speed, middle.winch_speed, end.winch_speed
+        k1 = slope(REAL, begin, first.length, unstrained)
+        k2 = slope(REAL, there, half.length.real, unstrained + 0.5 * step * k1)
+        k3 = slope(REAL, there, half.length.real, unstrained + 0.5 * step * k2)
+        k4 = slope(REAL, away, last.length.real, unstrained + step * k3)
+        after = [
+            unstrained + sixth * (k1 + 2.0 * (k2 + k3) + k4),
+            wound + sixth * (begin + 2.0 * (there + there) + away),
+        ]
+        changes = zip(state, after, (k1, begin), (k4, away))
+        return [0.5 * (s + e) + 0.125 * step * (a - d) for s, e, a, d in changes], after
 
     def _in_one_step(
         self, state: List[float], step: float, ends: bool, middle: Motion, half: law.Span
@@ -121,10 +146,9 @@ class Cable(Slave):
 
     def refresh(self) -> None:
         real = self.real
-        now = self._moved(self.elapsed, 1.0, False)
-        shown = self._show(real[FIRST_STATE : self.end_of_state], now, self._line(now))
+        shown = self._show_now(real[FIRST_STATE : self.end_of_state])
         values = (*shown.force, shown.tension, shown.length, shown.elongation, shown.strain, shown.pull)
-        real[FIRST_OUTPUT:FIRST_RATE] = [complex(value).real for value in values]
+        real[FIRST_OUTPUT:FIRST_RATE] = [value.real for value in values]
         real[FIRST_RATE:MIDDLE_FORCE] = [*map(rate_of, shown.force), rate_of(shown.tension)]
         if self.lag > 0.0 and self.pasts:
             real[TENSION], real[TENSION_RATE] = seen(self.pasts[0], self.lag)
@@ -149,6 +173,33 @@ class Cable(Slave):
             carried.winch_speed,
         )
         return law.reading(COMPLEX_STEP, self.constants, self.effects, state, moving)
+
+    def _show_now(self, numbers: List[float]) -> law.CableReading:
+        if self.effects:
+            now = self._moved(self.elapsed, 1.0, False)
+            return self._show(numbers, now, self._line(now))
+        line = self.end_line if self.untouched else None
+        if line is None:
+            line = self._carried_line(self._moved(self.elapsed, 1.0, False))
+        rate = self.real[WINCH_ACCELERATION]
+        return self._show_without_effects(numbers, self.real[WINCH_SPEED] + self.elapsed * rate, rate, line)
+
+    def _show_without_effects(
+        self, numbers: List[float], speed: float, rate: float, line: law.Span
+    ) -> law.CableReading:
+        """As :meth:`_show`, on a line that carries its rates and with the winch's speed and its rate."""
+        unstrained, wound = numbers
+        slope = self.tension_law.unstrained_length_rate(REAL, speed, line.length.real, unstrained)
+        state = law.CableState(along(unstrained, slope), along(wound, speed), ())
+        moving = law.motion(COMPLEX_STEP, self.constants, (), state, line, along(speed, rate))
+        return law.reading(COMPLEX_STEP, self.constants, (), state, moving)
+
+    def _carried_line(self, now: Motion) -> law.Span:
+        """Without effects, numbers that carry their rates."""
+        carried = law.CableInputs(
+            tuple(map(along, now.position, now.velocity)), tuple(map(along, now.velocity, now.acceleration)), 0.0
+        )
+        return law.span(COMPLEX_STEP, self.constants, carried)
 
     def _line(self, now: Motion) -> law.Span:
         inputs = law.CableInputs(now.position, now.velocity, now.winch_speed)

@@ -3,8 +3,7 @@
 from typing import Any, Dict, Tuple
 
 from .description import Variable, axes, vector
-from .laws.effects import BY_NAME
-from .slave import INPUT_TIME, MIDDLE_TIME, effect_variables
+from .slave import INPUT_TIME, MIDDLE_TIME, effect_states, effect_variables
 
 MOTION = (*axes("position", "velocity"), "winch_speed")
 RATED = (*MOTION, *axes("acceleration"), "winch_acceleration")
@@ -32,7 +31,8 @@ def _inputs(data: Dict[str, Any]) -> Tuple[Variable, ...]:
 
 
 def _outputs(data: Dict[str, Any]) -> Tuple[Variable, ...]:
-    tension, length = float(data["start_tension"]), float(data["start_length"])
+    # A nominal value is never zero.
+    tension, length = float(data["start_tension"]) or None, float(data["start_length"])
     cell = "tension at the load cell, between winch and exit point"
     chord = "rope from exit point to platform, as if it did not sag"
     stretch = "length less start length and rope let out"
@@ -45,10 +45,18 @@ def _outputs(data: Dict[str, Any]) -> Tuple[Variable, ...]:
         Variable("elongation", "output", "m", stretch, depends_on=place),
         Variable("strain", "output", "1", "strain by the tension law", nominal=1e-3, depends_on=place),
         Variable("pull", "output", "N", pull, nominal=tension, depends_on=MOTION),
-        *vector("force_rate", "output", "N/s", "rate of force", nominal=tension, depends_on=RATED),
-        Variable("tension_rate", "output", "N/s", "rate of tension", nominal=tension, depends_on=RATED),
+        *vector("force_rate", "output", "N/s", "rate of force", nominal=tension, depends_on=RATED, rate_of="force"),
+        Variable(
+            "tension_rate",
+            "output",
+            "N/s",
+            "rate of tension",
+            nominal=tension,
+            depends_on=RATED,
+            rate_of="tension",
+        ),
         *vector("middle_force", "output", "N", "force in the middle of the last step", nominal=tension),
-        *vector("middle_force_rate", "output", "N/s", "rate of force there", nominal=tension),
+        *vector("middle_force_rate", "output", "N/s", "rate of force there", nominal=tension, rate_of="middle_force"),
     )
 
 
@@ -57,11 +65,7 @@ def _states(data: Dict[str, Any]) -> Tuple[Variable, ...]:
     return (
         Variable("unstrained_length", "local", "m", "state: rope in the span if it were unloaded", nominal=length),
         Variable("wound_length", "local", "m", "state: rope reeled in since the start", nominal=length),
-        *(
-            Variable(f"effect.{s['name']}.{state.name}", "local", state.unit, f"state: {state.description}")
-            for s in data["effects"]
-            for state in BY_NAME[s["name"]].states
-        ),
+        *effect_states(data),
     )
 
 

@@ -9,7 +9,8 @@ from .units import UNITS
 class Variable(NamedTuple):
     """One real FMI variable of a slave.
 
-    ``depends_on`` names the inputs that act on an output without delay; a ``discrete`` one holds over a step.
+    ``depends_on`` names the inputs that act on an output without delay, ``rate_of`` the variable before it whose rate
+    this is; a ``discrete`` one holds over a step.
     """
 
     name: str
@@ -23,6 +24,7 @@ class Variable(NamedTuple):
     nominal: Optional[float] = None
     depends_on: Tuple[str, ...] = ()
     discrete: bool = False
+    rate_of: Optional[str] = None
 
 
 def vector(
@@ -33,6 +35,7 @@ def vector(
     start: Tuple[float, float, float] = (0.0, 0.0, 0.0),
     nominal: Optional[float] = None,
     depends_on: Tuple[str, ...] = (),
+    rate_of: Optional[str] = None,
 ) -> Tuple[Variable, ...]:
     """Three variables ``name.x``, ``name.y``, ``name.z``."""
     return tuple(
@@ -44,6 +47,7 @@ def vector(
             start=value,
             nominal=nominal,
             depends_on=depends_on,
+            rate_of=None if rate_of is None else f"{rate_of}.{axis}",
         )
         for axis, value in zip("xyz", start)
     )
@@ -67,19 +71,21 @@ def complete(root: Element, variables: Sequence[Variable]) -> Element:
         name = node.attrib["name"]
         index[name] = position
         if name in by_name:
-            _complete_real(node[0], by_name[name])
+            _complete_real(node[0], by_name[name], index)
     root.insert(1, _unit_definitions(variables))
     _complete_structure(root, variables, index)
     return root
 
 
-def _complete_real(real: Element, variable: Variable) -> None:
+def _complete_real(real: Element, variable: Variable, index: Dict[str, int]) -> None:
     real.set("unit", variable.unit)
     for key, value in (("min", variable.minimum), ("max", variable.maximum), ("nominal", variable.nominal)):
         if value is not None:
             real.set(key, repr(float(value)))
     if "start" in real.attrib:
         real.set("start", repr(float(variable.start)))
+    if variable.rate_of is not None:
+        real.set("derivative", str(index[variable.rate_of]))
 
 
 def _unit_definitions(variables: Sequence[Variable]) -> Element:

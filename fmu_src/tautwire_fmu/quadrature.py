@@ -12,13 +12,14 @@ Pairs = Tuple[Tuple[float, float], ...]
 class Weights(NamedTuple):
     """Where in the step (0 to 1), and what each node's (acceleration, its rate) adds there.
 
-    Times (h^2, h^3) to the position, (h, h^2) to the velocity, (1, h) to the acceleration.
+    Times (h^2, h^3) to the position, (h, h^2) to the velocity, (1, h) to the acceleration; the last are left out where
+    a node stands there.
     """
 
     fraction: float
     position: Pairs
     velocity: Pairs
-    acceleration: Pairs
+    acceleration: Pairs = ()
 
 
 CUBIC_MIDDLE = Weights(
@@ -31,19 +32,16 @@ CUBIC_END = Weights(
     1.0,
     ((7 / 20, 1 / 20), (3 / 20, -1 / 30)),
     ((1 / 2, 1 / 12), (1 / 2, -1 / 12)),
-    ((0.0, 0.0), (1.0, 0.0)),
 )
 QUINTIC_MIDDLE = Weights(
     0.5,
     ((13 / 168, 59 / 13440), (1 / 24, -1 / 105), (1 / 168, -11 / 13440)),
     ((101 / 480, 13 / 960), (4 / 15, -1 / 24), (11 / 480, -1 / 320)),
-    ((0.0, 0.0), (1.0, 0.0), (0.0, 0.0)),
 )
 QUINTIC_END = Weights(
     1.0,
     ((79 / 420, 1 / 84), (4 / 15, -2 / 105), (19 / 420, -1 / 210)),
     ((7 / 30, 1 / 60), (8 / 15, 0.0), (7 / 30, -1 / 60)),
-    ((0.0, 0.0), (0.0, 0.0), (1.0, 0.0)),
 )
 
 
@@ -64,23 +62,30 @@ class Place(NamedTuple):
 
 def integrate(start: Place, nodes: Sequence[Node], step: float, weights: Weights) -> Place:
     """Where the polynomial leads from ``start``, at the weights' fraction of the step."""
-    reach = weights.fraction * step
-    moved = _weighted(nodes, step, weights.position)
-    sped = _weighted(nodes, step, weights.velocity)
-    return Place(
-        [x + reach * v + step * step * d for x, v, d in zip(start.position, start.velocity, moved)],
-        [v + step * d for v, d in zip(start.velocity, sped)],
-        _weighted(nodes, step, weights.acceleration),
-    )
+    reach, square = weights.fraction * step, step * step
+    straight = [x + reach * v for x, v in zip(start.position, start.velocity)]
+    position = _moved(straight, nodes, square, step * square, weights.position)
+    velocity = _moved(start.velocity, nodes, step, square, weights.velocity)
+    if weights.acceleration:
+        acceleration = _moved([0.0] * len(straight), nodes, 1.0, step, weights.acceleration)
+    else:
+        acceleration = nodes[int(weights.fraction * (len(nodes) - 1))].acceleration
+    return Place(position, velocity, acceleration)
 
 
-def _weighted(nodes: Sequence[Node], step: float, weights: Pairs) -> Sequence[float]:
+def _moved(
+    start: Sequence[float], nodes: Sequence[Node], scale: float, rate_scale: float, weights: Pairs
+) -> Sequence[float]:
     if len(nodes) == 2:
         first, last = nodes
         (a0, j0), (a1, j1) = weights
-        j0, j1 = step * j0, step * j1
-        return [a0 * p + j0 * q + a1 * r + j1 * s for p, q, r, s in zip(*first, *last)]
+        a0, a1, j0, j1 = scale * a0, scale * a1, rate_scale * j0, rate_scale * j1
+        return [x + (a0 * p + j0 * q + a1 * r + j1 * s) for x, p, q, r, s in zip(start, *first, *last)]
     first, middle, last = nodes
     (a0, j0), (am, jm), (a1, j1) = weights
-    j0, jm, j1 = step * j0, step * jm, step * j1
-    return [a0 * p + j0 * q + am * r + jm * s + a1 * t + j1 * u for p, q, r, s, t, u in zip(*first, *middle, *last)]
+    a0, am, a1 = scale * a0, scale * am, scale * a1
+    j0, jm, j1 = rate_scale * j0, rate_scale * jm, rate_scale * j1
+    return [
+        x + (a0 * p + j0 * q + am * r + jm * s + a1 * t + j1 * u)
+        for x, p, q, r, s, t, u in zip(start, *first, *middle, *last)
+    ]

@@ -16,7 +16,8 @@ from pythonfmu import Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability, Re
 from pythonfmu.enums import Fmi2Status
 
 from .description import Variable, complete
-from .laws.effects import BY_NAME, ActiveEffect
+from .laws.effects import BY_NAME, ActiveEffect, Effect
+from .laws.formula import formula_effect
 from .past import Pieces
 
 Snapshot = Tuple[Tuple[float, ...], Optional[Tuple[float, ...]], float, bool, Tuple[Pieces, ...]]
@@ -64,6 +65,8 @@ class Slave(Fmi2Slave):
         self.pasts: Tuple[Pieces, ...] = ()
         self.started = False
         self.stale = True
+        # Whether nothing was set since the last step.
+        self.untouched = False
         self.fault = ""
         for variable in self.variables:
             self.register_variable(_fmi_variable(variable, self), nested=False)
@@ -92,7 +95,7 @@ class Slave(Fmi2Slave):
         if not vrs:
             return
         real = self.real
-        if 0 in vrs and values[list(vrs).index(0)] != real[0]:
+        if 0 in vrs and values[vrs.index(0)] != real[0]:
             self.earlier = tuple(real[: self.input_count])
         for reference, value in zip(vrs, values):
             if reference < len(real):
@@ -100,6 +103,7 @@ class Slave(Fmi2Slave):
             else:
                 self._unknown(reference)
         self.stale = True
+        self.untouched = False
         self.elapsed = 0.0
         if max(vrs) >= self.first_parameter:
             self.parameters_changed()
@@ -126,7 +130,7 @@ class Slave(Fmi2Slave):
             return False
         self.started = True
         self.elapsed = 0.0 if ends else step_size
-        self.stale = True
+        self.stale = self.untouched = True
         return True
 
     def _holds_in_middle(self, time: float, step: float) -> bool:
@@ -171,6 +175,7 @@ class Slave(Fmi2Slave):
         parameters = self.real[self.first_parameter :]
         self.real = list(real)
         self.stale = True
+        self.untouched = False
         if parameters != self.real[self.first_parameter :]:
             self.parameters_changed()
 
@@ -227,12 +232,26 @@ def effect_variables(settings: Sequence[Dict[str, Any]]) -> Tuple[Variable, ...]
     )
 
 
-def active_effects(settings: Sequence[Dict[str, Any]], numbers: Sequence[float]) -> Tuple[ActiveEffect, ...]:
-    """The effects that are switched on, with the present values of their parameters."""
+def effects_of(data: Dict[str, Any]) -> Tuple[Effect, ...]:
+    """The effects that act on a component, by its resource: those switched on, then its formulas if it has any."""
+    listed = [BY_NAME[setting["name"]] for setting in data["effects"]]
+    return (*listed, formula_effect(data["formulas"])) if data.get("formulas") else tuple(listed)
+
+
+def effect_states(data: Dict[str, Any]) -> Tuple[Variable, ...]:
+    """A local variable for every state of every effect."""
+    return tuple(
+        Variable(f"effect.{effect.name}.{state.name}", "local", state.unit, f"state: {state.description}")
+        for effect in effects_of(data)
+        for state in effect.states
+    )
+
+
+def active_effects(effects: Sequence[Effect], numbers: Sequence[float]) -> Tuple[ActiveEffect, ...]:
+    """The effects with the present values of their parameters."""
     active = []
     rest = list(numbers)
-    for setting in settings:
-        effect = BY_NAME[setting["name"]]
+    for effect in effects:
         count = len(effect.parameters)
         active.append(ActiveEffect(effect, effect.values(*rest[:count])))
         rest = rest[count:]

@@ -25,12 +25,13 @@ class CableComponent:
 
 @dataclass(frozen=True)
 class Assembly:
-    """A robot as the laws see it; positions in m."""
+    """A robot as the laws see it; positions in m, the start's velocity in m/s."""
 
     cables: tuple[CableComponent, ...]
     platform: PointMassConstants
     platform_effects: tuple[ActiveEffect, ...]
     start: tuple[float, float, float]
+    velocity: tuple[float, float, float]
 
 
 def assemble(robot: Robot, start_tensions: Sequence[Any] | None = None, m: Mathematics = REAL) -> Assembly:
@@ -41,6 +42,8 @@ def assemble(robot: Robot, start_tensions: Sequence[Any] | None = None, m: Mathe
     Raises UnreachableError where the cables cannot hold the platform at its start.
     """
     tensions = static_tensions(robot) if start_tensions is None else start_tensions
+    if robot.release:
+        tensions = [tension + beside for tension, beside in zip(tensions, robot.release.tensions, strict=True)]
     lines = routes(m, robot, robot.platform.start)
     cables = tuple(
         CableComponent(
@@ -64,4 +67,5 @@ def assemble(robot: Robot, start_tensions: Sequence[Any] | None = None, m: Mathe
         platform=PointMassConstants(robot.platform.mass, robot.gravity),
         platform_effects=platform_effects(robot),
         start=robot.platform.start,
+        velocity=robot.release.velocity if robot.release else (0.0, 0.0, 0.0),
     )

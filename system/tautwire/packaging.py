@@ -23,7 +23,7 @@ from tautwire_fmu.laws.winch_drive import NO_LIMIT
 from .assembly import assemble
 from .robot import EffectSetting, Robot
 from .slots import check_own_fmus
-from .statics import has_sensor_effects, platform_settings, static_forces, static_tensions
+from .statics import formula_texts, has_sensor_effects, platform_settings, static_forces, static_tensions
 from .wrapper import mend_exit
 
 # pythonfmu 0.7.0 runs the script at every instantiation and then gives up a reference to its globals that it does
@@ -143,6 +143,7 @@ def cable_data(robot: Robot) -> list[dict[str, Any]]:
             "damping": cable.damping,
             "gravity": robot.gravity,
             "effects": [_effect_data(s) for s in robot.effects_on_cable(index)],
+            "formulas": formula_texts(robot.formulas_on(index)),
         }
         for index, (cable, component) in enumerate(zip(robot.cables, assemble(robot).cables, strict=True), start=1)
     ]
@@ -156,8 +157,10 @@ def platform_data(robot: Robot) -> dict[str, Any]:
         "mass": robot.platform.mass,
         "gravity": robot.gravity,
         "start": list(robot.platform.start),
+        "start_velocity": list(assemble(robot).velocity),
         "start_forces": forces.tolist(),
         "effects": [_effect_data(s) for s in platform_settings(robot)],
+        "formulas": formula_texts(robot.formulas_on()),
     }
 
 

@@ -47,11 +47,15 @@ class Platform:
 
 @dataclass(frozen=True)
 class TensionLimits:
-    """Bounds and aim of the tension distribution, in N; used where there are more than three cables."""
+    """Bounds and aim of the tension distribution, in N; used where there are more than three cables.
+
+    ``preferred_uncertainty``: by how much true start tensions may differ from the rule's, a standard deviation.
+    """
 
     minimum: float
     maximum: float
     preferred: float
+    preferred_uncertainty: float | None = None
 
 
 @dataclass(frozen=True)
@@ -121,11 +125,37 @@ class EffectSetting:
 
 
 @dataclass(frozen=True)
+class Release:
+    """How a run begins that does not begin at rest: ``velocity`` (m/s), and ``tensions`` beside the static ones (N)."""
+
+    velocity: Point
+    tensions: tuple[float, ...]
+
+
+@dataclass(frozen=True)
+class Formula:
+    """What no known effect is, as arithmetic: ``text`` gives N (kg of ``mass``) in a ``place`` of the laws.
+
+    Places: :data:`tautwire_fmu.laws.formula.PLACES`. ``cables`` counts from 1, empty on the platform. ``numbers`` are
+    values of names that the text uses beside those of its place; a file has none.
+    """
+
+    place: str
+    text: str
+    cables: tuple[int, ...] = ()
+    numbers: Mapping[str, float] = Numbers({})
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "numbers", Numbers(self.numbers))
+        object.__setattr__(self, "cables", tuple(sorted(set(self.cables))))
+
+
+@dataclass(frozen=True)
 class Robot:
     """A cable-driven robot as declared; ``gravity`` in m/s^2.
 
     Without a ``winch`` rope runs at the speed asked for. Settings of one effect stand together in ``effects``, as they
-    do in a file; otherwise their order is kept.
+    do in a file; otherwise their order is kept. A ``release`` belongs to a run, no file has one.
     """
 
     name: str
@@ -137,6 +167,8 @@ class Robot:
     effects: tuple[EffectSetting, ...] = ()
     winch: Winch | None = None
     fmus: tuple[OwnFmu, ...] = ()
+    formulas: tuple[Formula, ...] = ()
+    release: Release | None = None
 
     def __post_init__(self) -> None:
         names = list(dict.fromkeys(setting.name for setting in self.effects))
@@ -172,6 +204,10 @@ class Robot:
         """The settings that act on no cable or winch, such as those on the platform."""
         return tuple(setting for setting in self.effects if not setting.cables)
 
+    def formulas_on(self, cable: int = 0) -> tuple[Formula, ...]:
+        """The formulas that act in one cable, or on the platform; ``cable`` counts from 1."""
+        return tuple(f for f in self.formulas if (cable in f.cables if cable else not f.cables))
+
     def with_effect(self, setting: EffectSetting) -> "Robot":
         """This robot with one more effect; the new setting wins wherever the same effect acted before."""
         kept: list[EffectSetting] = []
@@ -198,5 +234,5 @@ class Robot:
         return replace(self, winch=None, fmus=())
 
     def without_effects(self) -> "Robot":
-        """This robot as its owner declares it, with no effect switched on."""
-        return replace(self, effects=())
+        """This robot as its owner declares it, with no effect switched on and no formula."""
+        return replace(self, effects=(), formulas=())

@@ -10,6 +10,8 @@ from typing import Any
 
 from tautwire_fmu.laws.cable import LAWS
 from tautwire_fmu.laws.effects import BY_NAME, Effect, Parameter
+from tautwire_fmu.laws.expression import ExpressionError, read_expression
+from tautwire_fmu.laws.formula import PLACES
 
 from .checked_table import CheckedTable, NumberRule, nearest
 from .errors import RobotFileError, one_line, shown
@@ -18,6 +20,7 @@ from .robot import (
     PER_CABLE,
     Cable,
     EffectSetting,
+    Formula,
     OwnFmu,
     Platform,
     Point,
@@ -36,6 +39,7 @@ else:
 
 __all__ = ["read_robot", "robot_text", "write_robot"]
 
+KEYS = ("name", "gravity", "platform", "tension", "sensors", "cable", "effect", "winch", "fmu", "formula")
 LARGEST_FILE = 10_000_000  # bytes
 SAME_POINT = 1e-6  # m, closer than any two exit points can be built
 
@@ -44,6 +48,7 @@ MASS = NumberRule("the platform's mass", "kg", positive=True)
 MINIMUM = NumberRule("the least tension", "N", minimum=0.0)
 MAXIMUM = NumberRule("the largest tension", "N", positive=True)
 PREFERRED = NumberRule("the tension to aim at", "N", minimum=0.0)
+UNCERTAINTY = NumberRule("the standard deviation of true start tensions from the rule's", "N", minimum=0.0)
 NOISES = {
     "position_noise": NumberRule("the standard deviation of one position", "m", minimum=0.0),
     "tension_noise": NumberRule("the standard deviation of one tension", "N", minimum=0.0),
@@ -109,7 +114,7 @@ def _parsed(text: str, file: str) -> dict[str, Any]:
 
 
 def _robot(root: CheckedTable, default_name: str) -> Robot:
-    root.require_known(("name", "gravity", "platform", "tension", "sensors", "cable", "effect", "winch", "fmu"))
+    root.require_known(KEYS)
     name = _name(root, default_name)
     gravity = root.number("gravity", GRAVITY)
     platform = _platform(root)
@@ -124,6 +129,7 @@ def _robot(root: CheckedTable, default_name: str) -> Robot:
         effects=_effects(root.table("effect"), len(cables)) if "effect" in root.content else (),
         winch=_winch(root.table("winch")) if "winch" in root.content else None,
         fmus=_fmus(root.table("fmu"), len(cables)) if "fmu" in root.content else (),
+        formulas=_formulas(root, len(cables)) if "formula" in root.content else (),
     )
 
 
@@ -146,7 +152,7 @@ def _platform(root: CheckedTable) -> Platform:
 
 
 def _tension(table: CheckedTable) -> TensionLimits:
-    table.require_known(("minimum", "maximum", "preferred"))
+    table.require_known(("minimum", "maximum", "preferred", "preferred_uncertainty"))
     minimum, maximum = table.number("minimum", MINIMUM), table.number("maximum", MAXIMUM)
     preferred = table.number("preferred", PREFERRED)
     if minimum > maximum:
@@ -155,7 +161,7 @@ def _tension(table: CheckedTable) -> TensionLimits:
     if not minimum <= preferred <= maximum:
         problem = f"is {preferred!r}, must lie between minimum and maximum, {minimum!r} and {maximum!r} N"
         raise table.refusal("preferred", problem, "choose a tension between them")
-    return TensionLimits(minimum, maximum, preferred)
+    return TensionLimits(minimum, maximum, preferred, table.optional_number("preferred_uncertainty", UNCERTAINTY))
 
 
 def _sensors(table: CheckedTable) -> Sensors:
@@ -251,6 +257,31 @@ def _effect(table: CheckedTable, effect: Effect, cable_count: int) -> EffectSett
         mend = f"give {effect.parameters[0].description}, as in {names[0]} = {effect.parameters[0].start:g}"
         raise table.refusal("", "sets none of its numbers", mend)
     return EffectSetting(effect.name, values, _cables_of_effect(table, cable_count) if per_cable else ())
+
+
+def _formulas(root: CheckedTable, cable_count: int) -> tuple[Formula, ...]:
+    several = isinstance(root.content["formula"], list)
+    tables = root.tables("formula") if several else (root.table("formula"),)
+    return tuple(formula for table in tables for formula in _formulas_of(table, cable_count))
+
+
+def _formulas_of(table: CheckedTable, cable_count: int) -> tuple[Formula, ...]:
+    table.require_known((*PLACES, "cables"))
+    places = [place for place in PLACES if place in table.content]
+    if not places:
+        raise table.refusal("", "holds no formula", 'write one, as in force_x = "-20 * vx"')
+    if "cables" in table.content and "tension" not in places:
+        raise table.refusal("cables", "only a formula of the tension acts in cables", "remove cables")
+    found = []
+    for place in places:
+        text = table.text(place, 'write it as a text, as in "-20 * vx"')
+        try:
+            read_expression(text, PLACES[place])
+        except ExpressionError as error:
+            raise table.refusal(place, f"character {error.place}: {error.problem}", error.mend) from error
+        cables = _cables_of_effect(table, cable_count) if place == "tension" else ()
+        found.append(Formula(place, text, cables))
+    return tuple(found)
 
 
 def _rule(parameter: Parameter) -> NumberRule:

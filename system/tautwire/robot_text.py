@@ -4,8 +4,9 @@ import json
 from collections.abc import Sequence
 
 from tautwire_fmu.laws.effects import BY_NAME
+from tautwire_fmu.laws.formula import PLACES
 
-from .robot import PER_CABLE, Cable, EffectSetting, OwnFmu, Point, Robot, Sensors, TensionLimits, Winch
+from .robot import PER_CABLE, Cable, EffectSetting, Formula, OwnFmu, Point, Robot, Sensors, TensionLimits, Winch
 
 
 def robot_text(robot: Robot) -> str:
@@ -27,6 +28,7 @@ def robot_text(robot: Robot) -> str:
         _fmus(robot.fmus),
         *(_cable(number, cable) for number, cable in enumerate(robot.cables, 1)),
         *(_effect(robot, setting) for setting in robot.effects),
+        *_formulas(robot),
     ]
     return "\n\n".join("\n".join(block) for block in blocks if block) + "\n"
 
@@ -45,7 +47,12 @@ def _tension(tension: TensionLimits) -> list[str]:
         _number("minimum", tension.minimum, "N"),
         _number("maximum", tension.maximum, "N"),
         _number("preferred", tension.preferred, "N"),
+        *_uncertainty(tension.preferred_uncertainty),
     ]
+
+
+def _uncertainty(deviation: float | None) -> list[str]:
+    return [] if deviation is None else [_number("preferred_uncertainty", deviation, "N, standard deviation")]
 
 
 def _sensors(sensors: Sensors) -> list[str]:
@@ -100,3 +107,21 @@ def _effect(robot: Robot, setting: EffectSetting) -> list[str]:
     if (per_cable or setting.cables) and setting.cables != robot.cable_numbers:
         lines.append(f"cables = {list(setting.cables)}")
     return lines
+
+
+def _formulas(robot: Robot) -> list[list[str]]:
+    """As few tables as read back in the same order."""
+    order = list(PLACES)
+    groups: list[list[Formula]] = []
+    for formula in robot.formulas:
+        if not groups or order.index(formula.place) <= order.index(groups[-1][-1].place):
+            groups.append([])
+        groups[-1].append(formula)
+    header = "[formula]" if len(groups) == 1 else "[[formula]]"
+    return [[f"{header}  # N, mass in kg", *_formula_lines(robot, group)] for group in groups]
+
+
+def _formula_lines(robot: Robot, group: Sequence[Formula]) -> list[str]:
+    lines = [f"{formula.place} = {json.dumps(formula.text)}" for formula in group]
+    cables = [formula.cables for formula in group if formula.cables and formula.cables != robot.cable_numbers]
+    return [*lines, *(f"cables = {list(some)}" for some in cables)]

@@ -10,13 +10,14 @@ from numpy.typing import NDArray
 
 from tautwire_fmu.laws import point_mass, stages
 from tautwire_fmu.laws.effects import BY_NAME, ActiveEffect
+from tautwire_fmu.laws.formula import formula_effect
 from tautwire_fmu.laws.mathematics import REAL, Mathematics
 from tautwire_fmu.laws.stages import Route
 from tautwire_fmu.laws.vectors import Vector, add, scale, subtract
 
 from .distribution import excess_tensions, nearest_tensions
 from .errors import UnreachableError
-from .robot import EffectSetting, Robot, TensionLimits
+from .robot import EffectSetting, Formula, Robot, TensionLimits
 
 Array = NDArray[np.float64]
 
@@ -35,7 +36,20 @@ def active(setting: EffectSetting) -> ActiveEffect:
 
 def cable_effects(robot: Robot, cable: int) -> tuple[ActiveEffect, ...]:
     """The effects of the robot file that act on a cable, its winch or its load cell; ``cable`` counts from 1."""
-    return tuple(active(s) for s in robot.effects_on_cable(cable))
+    return (*map(active, robot.effects_on_cable(cable)), *_active_formulas(robot.formulas_on(cable)))
+
+
+def formula_texts(formulas: Sequence[Formula]) -> dict[str, list[str]]:
+    """The texts of some formulas by their places."""
+    return {place: [f.text for f in formulas if f.place == place] for place in dict.fromkeys(f.place for f in formulas)}
+
+
+def _active_formulas(formulas: Sequence[Formula]) -> tuple[ActiveEffect, ...]:
+    """All formulas of a component as one effect, none where there are none."""
+    if not formulas:
+        return ()
+    numbers = {name: value for formula in formulas for name, value in formula.numbers.items()}
+    return (ActiveEffect(formula_effect(formula_texts(formulas), tuple(numbers)), numbers),)
 
 
 def platform_settings(robot: Robot) -> tuple[EffectSetting, ...]:
@@ -49,8 +63,8 @@ def has_sensor_effects(robot: Robot) -> bool:
 
 
 def platform_effects(robot: Robot) -> tuple[ActiveEffect, ...]:
-    """Those of :func:`platform_settings` as the laws take them."""
-    return tuple(map(active, platform_settings(robot)))
+    """Those of :func:`platform_settings` and the formulas on the platform, as the laws take them."""
+    return (*map(active, platform_settings(robot)), *_active_formulas(robot.formulas_on()))
 
 
 def routes(m: Mathematics, robot: Robot, position: Sequence[Any]) -> tuple[Route, ...]:
@@ -85,7 +99,7 @@ def weight(robot: Robot, m: Mathematics = REAL) -> Any:
 def load(m: Mathematics, robot: Robot, position: Sequence[Any]) -> Vector:
     """What the cables have to hold of the platform at rest, in N: its weight less what effects push it with."""
     effects = platform_effects(robot)
-    pushed = point_mass.wrench(m, effects, tuple(() for _ in effects), position, (0.0, 0.0, 0.0))
+    pushed = point_mass.wrench(m, effects, point_mass.start_states(effects), position, (0.0, 0.0, 0.0))
     return subtract((0.0, 0.0, weight(robot, m)), pushed)
 
 

@@ -15,6 +15,8 @@ from tautwire_fmu.laws import cable as cable_law
 from tautwire_fmu.laws import point_mass as platform_law
 from tautwire_fmu.laws import stages
 from tautwire_fmu.laws.effects import State
+from tautwire_fmu.laws.formula import NAME as FORMULA_NAME
+from tautwire_fmu.laws.formula import TIME
 from tautwire_fmu.laws.mathematics import Mathematics
 from tautwire_fmu.laws.vectors import add, scale
 
@@ -26,6 +28,8 @@ Array = NDArray[np.float64]
 
 AXES = ("x", "y", "z")
 AT_BOUND = 1e-6
+# In the place of an effect's setting: a number of the formulas.
+OF_FORMULAS = -1
 # Of the start tensions, where ropes have weight: each gains some three digits.
 SWEEPS = 6
 
@@ -45,7 +49,10 @@ CASADI = Mathematics(
 
 @dataclass(frozen=True)
 class FreeParameter:
-    """A parameter of an effect of the robot that stays a symbol; ``setting`` counts the robot's effects from 0."""
+    """A parameter of an effect of the robot that stays a symbol; ``setting`` counts the robot's effects from 0.
+
+    It is OF_FORMULAS for a number of the formulas.
+    """
 
     setting: int
     name: str
@@ -85,7 +92,7 @@ class _Equations:
 
 @dataclass(frozen=True)
 class _EffectState:
-    """A state of an effect with its symbol; ``cable`` counts from 1."""
+    """A state of an effect with its symbol; ``cable`` counts from 1 and is 0 on the platform."""
 
     effect: str
     cable: int
@@ -94,7 +101,7 @@ class _EffectState:
 
     @property
     def name(self) -> str:
-        return f"{self.effect}.{self.state.name}_{self.cable}"
+        return f"{self.effect}.{self.state.name}_{self.cable}" if self.cable else f"{self.effect}.{self.state.name}"
 
 
 def symbolic_model(robot: Robot, free: Sequence[FreeParameter] = ()) -> Model:
@@ -103,7 +110,7 @@ def symbolic_model(robot: Robot, free: Sequence[FreeParameter] = ()) -> Model:
     The static start follows the free parameters; with more than three cables, cables at a tension limit stay there.
     Not valid across a change of which cables are at a limit.
     """
-    symbols = [SX.sym(f"{robot.effects[f.setting].name}.{f.name}") for f in free]
+    symbols = [SX.sym(f"{_owner(robot, f)}.{f.name}") for f in free]
     opened = _with_symbols(robot, free, symbols)
     assembly = assemble(opened, _start_tensions(robot, opened), CASADI)
     count = len(assembly.cables)
@@ -113,6 +120,10 @@ def symbolic_model(robot: Robot, free: Sequence[FreeParameter] = ()) -> Model:
     own = _effect_states(assembly)
     equations = _equations(assembly, position, velocity, unstrained, speeds, external, [e.symbol for e in own])
     always = casadi.vertcat(position, velocity, unstrained)
+    once = [place for place, state in enumerate(own) if state not in own[:place]]
+    own = [own[place] for place in once]
+    rows = [*range(always.numel()), *(always.numel() + place for place in once)]
+    equations = replace(equations, rates=equations.rates[rows])
     kept = _felt(casadi.vertcat(always, *(e.symbol for e in own)), always.numel(), equations)
     lengths = [SX(c.constants.start_length) for c in assembly.cables]
     return Model(
@@ -123,7 +134,7 @@ def symbolic_model(robot: Robot, free: Sequence[FreeParameter] = ()) -> Model:
         outputs=equations.outputs,
         span_tensions=equations.span_tensions,
         lags=_lags(assembly),
-        start=casadi.vertcat(SX(list(assembly.start)), SX(3, 1), *lengths, SX(len(kept), 1)),
+        start=casadi.vertcat(SX(list(assembly.start)), SX(list(assembly.velocity)), *lengths, SX(len(kept), 1)),
         drifting=tuple(always.numel() + i for i, place in enumerate(kept) if own[place].state.drifts),
         state_names=(
             *_vector("position"),
@@ -162,12 +173,16 @@ def with_drifts_held(model: Model) -> Model:
 
 
 def _effect_states(assembly: Assembly) -> list[_EffectState]:
-    return [
+    """Those of the cables, then those of the platform; the time of all formulas is one state."""
+    parts = [*enumerate((component.effects for component in assembly.cables), start=1), (0, assembly.platform_effects)]
+    found = [
         _EffectState(active.effect.name, index, state, SX.sym(state.name))
-        for index, component in enumerate(assembly.cables, start=1)
-        for active in component.effects
+        for index, effects in parts
+        for active in effects
         for state in active.effect.states
     ]
+    time = _EffectState(FORMULA_NAME, 0, TIME, SX.sym(TIME.name))
+    return [time if (each.effect, each.state) == (FORMULA_NAME, TIME) else each for each in found]
 
 
 def _felt(states: SX, always: int, equations: _Equations) -> list[int]:
@@ -188,11 +203,24 @@ def _present(matrix: SX) -> NDArray[np.bool_]:
 
 def _with_symbols(robot: Robot, free: Sequence[FreeParameter], symbols: Sequence[SX]) -> Robot:
     effects = list(robot.effects)
+    numbers: dict[str, Any] = {
+        p.name: symbol for p, symbol in zip(free, symbols, strict=True) if p.setting == OF_FORMULAS
+    }
+    formulas = [
+        replace(f, numbers={name: numbers.get(name, value) for name, value in f.numbers.items()})
+        for f in robot.formulas
+    ]
     for parameter, symbol in zip(free, symbols, strict=True):
+        if parameter.setting == OF_FORMULAS:
+            continue
         old = effects[parameter.setting]
         values: dict[str, Any] = {**old.values, parameter.name: symbol}
         effects[parameter.setting] = EffectSetting(old.name, values, old.cables)
-    return replace(robot, effects=tuple(effects))
+    return replace(robot, effects=tuple(effects), formulas=tuple(formulas))
+
+
+def _owner(robot: Robot, free: FreeParameter) -> str:
+    return FORMULA_NAME if free.setting == OF_FORMULAS else robot.effects[free.setting].name
 
 
 def _start_tensions(nominal: Robot, opened: Robot) -> list[SX]:
@@ -266,9 +294,11 @@ def _equations(
         shown.append(reading)
         cable_rates.append(rate.unstrained_length)
         effect_rates += [r for rates in rate.effects for r in rates]
-    none = tuple(() for _ in assembly.platform_effects)
+    on_platform = tuple(tuple(next(symbols) for _ in a.effect.states) for a in assembly.platform_effects)
+    # Of the effects, formulas alone have states on the platform: the time since the start.
+    effect_rates += [SX(1.0) for states in on_platform for _ in states]
     acceleration = platform_law.acceleration(
-        CASADI, assembly.platform, assembly.platform_effects, none, _three(position), _three(velocity), force
+        CASADI, assembly.platform, assembly.platform_effects, on_platform, _three(position), _three(velocity), force
     )
     measured = scale(stages.gains(CASADI, assembly.platform_effects)[1], _three(position))
     return _Equations(

@@ -59,10 +59,13 @@ class Robot:
         return len(self.anchors)
 
 
+LIMITS = ("minimum", "maximum", "preferred")
+
+
 def robot_from(content: Mapping[str, Any]) -> Robot:
     """The robot that the content of a robot file declares; its [effect] tables are not read here."""
     cables = content["cable"]
-    sensors = content.get("sensors", {})
+    sensors, limits = content.get("sensors", {}), content.get("tension") or {}
 
     def column(key: str, default: float | None = None) -> Vector:
         rows = [cable[key] if default is None else cable.get(key, default) for cable in cables]
@@ -78,7 +81,7 @@ def robot_from(content: Mapping[str, Any]) -> Robot:
         area=column("area"),
         damping=column("damping", 0.0),
         linear=np.array([cable.get("law", "logarithmic") == "linear" for cable in cables]),
-        tension=TensionLimits(**content.get("tension", {})),
+        tension=TensionLimits(**{key: float(limits[key]) for key in LIMITS if key in limits}),
         noise=Noise(**{key.removesuffix("_noise"): float(value) for key, value in sensors.items()}),
     )
 

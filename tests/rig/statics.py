@@ -37,7 +37,9 @@ def nearest_to_preferred(directions: Vector, load: Vector, limits: TensionLimits
         free = (raw > limits.minimum) & (raw < limits.maximum)
         return (directions * free[:, None]).T @ directions
 
-    guess = -np.linalg.solve(directions.T @ directions, load + limits.preferred * directions.sum(axis=0))
+    missing = load + limits.preferred * directions.sum(axis=0)
+    # Cables in one plane leave the multiplier across it open.
+    guess = -np.linalg.lstsq(directions.T @ directions, missing, rcond=None)[0]
     scale = np.linalg.norm(load) + 1.0
     found = optimize.least_squares(imbalance, guess, jacobian, xtol=1e-15, ftol=1e-15, gtol=1e-15)
     if np.linalg.norm(imbalance(found.x)) > 1e-9 * scale:

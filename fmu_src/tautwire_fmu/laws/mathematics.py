@@ -32,6 +32,19 @@ def _real_where(condition: float, a: float, b: float) -> float:
     return a if condition > 0.0 else b
 
 
+def _complex_log(a: complex) -> complex:
+    """Refuses what the real one refuses: a rope reeled in past its end has no strain."""
+    if not a.real > 0.0:
+        raise ValueError(f"the logarithm of {a.real} is not a real number")
+    return cmath.log(a)
+
+
+def _complex_sqrt(a: complex) -> complex:
+    if a.real < 0.0:
+        raise ValueError(f"the square root of {a.real} is not a real number")
+    return cmath.sqrt(a)
+
+
 def _complex_atan2(y: complex, x: complex) -> complex:
     """To first order in the imaginary parts, which is all that a complex step has."""
     a, b = complex(y), complex(x)
@@ -65,9 +78,9 @@ REAL = Mathematics(
 )
 
 COMPLEX_STEP = Mathematics(
-    log=cmath.log,
+    log=_complex_log,
     exp=cmath.exp,
-    sqrt=cmath.sqrt,
+    sqrt=_complex_sqrt,
     sin=cmath.sin,
     cos=cmath.cos,
     tanh=cmath.tanh,
@@ -93,4 +106,4 @@ def along(value: float, rate: float) -> complex:
 
 def rate_of(value: complex) -> float:
     """The rate that a law passed on, see :func:`along`."""
-    return complex(value).imag / STEP
+    return value.imag / STEP

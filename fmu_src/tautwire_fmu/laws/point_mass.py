@@ -5,7 +5,7 @@
 The z axis points up. Source: Baklouti et al. 2017, Eq. 5.
 """
 
-from typing import Any, NamedTuple, Sequence, Tuple
+from typing import Any, NamedTuple, Optional, Sequence, Tuple
 
 from .effects import ActiveEffect
 from .mathematics import Mathematics
@@ -19,12 +19,22 @@ class PointMassConstants(NamedTuple):
     gravity: Any
 
 
-def total_mass(m: Mathematics, platform: PointMassConstants, effects: Sequence[ActiveEffect]) -> Any:
-    """Declared mass and what the effects add to it, in kg."""
+def start_states(effects: Sequence[ActiveEffect]) -> Tuple[Tuple[Any, ...], ...]:
+    """What the effects remember at the start: nothing."""
+    return tuple((0.0,) * len(active.effect.states) for active in effects)
+
+
+def total_mass(
+    m: Mathematics,
+    platform: PointMassConstants,
+    effects: Sequence[ActiveEffect],
+    states: Optional[Sequence[Tuple[Any, ...]]] = None,
+) -> Any:
+    """Declared mass and what the effects add to it, in kg; at the start where no states are given."""
     mass = platform.mass
-    for active in effects:
+    for active, own in zip(effects, start_states(effects) if states is None else states):
         if active.effect.inertia is not None:
-            mass = mass + active.effect.inertia(m, active.values)
+            mass = mass + active.effect.inertia(m, active.values, own)
     return mass
 
 
@@ -54,5 +64,5 @@ def acceleration(
 ) -> Vector:
     """Acceleration in m/s^2 under the summed force of the cables."""
     force = add(cable_force, wrench(m, effects, states, position, velocity))
-    pulled = scale(1.0 / total_mass(m, platform, effects), force)
+    pulled = scale(1.0 / total_mass(m, platform, effects, states), force)
     return (pulled[0], pulled[1], pulled[2] - platform.gravity)

@@ -9,6 +9,7 @@ from pathlib import Path
 
 import fmpy
 
+from tautwire_fmu.laws import formula
 from tautwire_fmu.laws.effects import BY_NAME
 
 from ..cosimulation import instantiated, wired
@@ -98,9 +99,9 @@ def _states(fmus: RobotFmus) -> dict[str, Port]:
 def _effect_states(path: Path) -> list[str]:
     """The states of effects in an FMU that settle where the robot rests."""
     variables = fmpy.read_model_description(str(path)).modelVariables
-    drifting = {
-        f"{EFFECT}{effect.name}.{state.name}" for effect in BY_NAME.values() for state in effect.states if state.drifts
-    }
+    states = [(effect.name, state) for effect in BY_NAME.values() for state in effect.states]
+    states += [(formula.NAME, state) for state in (formula.TRAVEL, formula.TIME)]
+    drifting = {f"{EFFECT}{name}.{state.name}" for name, state in states if state.drifts}
     locals_ = [v.name for v in variables if v.causality == "local" and v.name.startswith(EFFECT)]
     return [name for name in locals_ if name not in drifting]
 

@@ -60,7 +60,7 @@ class Effect(NamedTuple):
     ``softening``        ``cable, pull``                                N, added to ``max(pull, 0)``
     ``ends``             ``gravity, line, tension``                     N, vector on the platform; N at the load cell
     ``transmission``     ``motion``                                     ln(tension / that of the span) at platform, cell
-    ``inertia``                                                         kg, added on the platform
+    ``inertia``          ``states``                                     kg, added on the platform
     ``wrench``           ``states, position, velocity``                 N, vector on the platform
     ``gain``                                                            factors of measured tension and position
     ``delay``                                                           s, of measured tension and position

@@ -1,6 +1,6 @@
 """A load that the platform carries and its file does not know."""
 
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, Tuple
 
 from ..mathematics import Mathematics
 from .effect import Effect, Parameter
@@ -12,7 +12,7 @@ class Values(NamedTuple):
     mass: Any
 
 
-def inertia(m: Mathematics, values: Values) -> Any:
+def inertia(m: Mathematics, values: Values, states: Tuple[Any, ...]) -> Any:
     """Added mass, in kg; it weighs and resists acceleration alike."""
     return values.mass
 

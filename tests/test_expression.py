@@ -1,0 +1,121 @@
+"""Formulas are read as data: arithmetic comes through, everything else is refused with its place."""
+
+from __future__ import annotations
+
+import math
+
+import casadi
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from tautwire.symbolic import CASADI
+from tautwire_fmu.laws.expression import DEEPEST, LONGEST, ExpressionError, evaluate, names_in, read_expression
+from tautwire_fmu.laws.mathematics import COMPLEX_STEP, REAL, along, rate_of
+
+NAMES = ("x", "vx", "time")
+AT = {"x": 0.7, "vx": -1.3, "time": 2.0}
+
+
+@pytest.mark.parametrize(
+    ("text", "value"),
+    [
+        ("1 + 2*3 - 4/8", 6.5),
+        ("-x**2", -0.49),
+        ("x**-2 + x**0", 0.7**-2 + 1.0),
+        ("2e-3*sin(3*time)*exp(-x) + cos(x)/sqrt(time)", 2e-3 * math.sin(6) * math.exp(-0.7) + math.cos(0.7) / 2**0.5),
+        ("tanh(vx)*abs(vx) + log(time)", math.tanh(-1.3) * 1.3 + math.log(2.0)),
+        ("+(x - 28.9)*--vx", (0.7 - 28.9) * -1.3),
+    ],
+)
+def test_arithmetic_has_its_value(text: str, value: float) -> None:
+    assert evaluate(REAL, read_expression(text, NAMES), AT) == pytest.approx(value, rel=1e-14)
+
+
+def test_one_tree_serves_every_mathematics() -> None:
+    tree = read_expression("sin(x)**3*vx", NAMES)
+    carried = evaluate(COMPLEX_STEP, tree, {**AT, "x": along(0.7, 1.0)})
+    assert rate_of(carried) == pytest.approx(3.0 * math.sin(0.7) ** 2 * math.cos(0.7) * -1.3, rel=1e-14)
+    x = casadi.SX.sym("x")
+    function = casadi.Function("f", [x], [evaluate(CASADI, tree, {**AT, "x": x})])
+    assert float(function(0.7)) == pytest.approx(evaluate(REAL, tree, AT), rel=1e-14)
+
+
+def test_it_says_which_names_it_uses() -> None:
+    assert names_in(read_expression("x*time + sin(x)", NAMES)) == ("x", "time")
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("__import__('os').system('true')", 1),
+        ("x + (1).__class__", 5),
+        ("x.real", 1),
+        ("[x for x in (1, 2)]", 1),
+        ("(lambda: x)()", 1),
+        ("x if x else vx", 1),
+        ("x and vx", 1),
+        ("x < vx", 1),
+        ("1 + open('a')", 5),
+        ("sin(x, vx)", 1),
+        ("sin(*x)", 5),
+        ("sin(x=1)", 1),
+        ("sin", 1),
+        ("x[0]", 1),
+        ("'x'", 1),
+        ("f'{x}'", 1),
+        ("True", 1),
+        ("1j", 1),
+        ("None", 1),
+        ("...", 1),
+        ("y + 1", 1),
+        ("x := 1", 3),
+        ("x ** 9", 6),
+        ("9 ** 9 ** 9", 6),
+        ("x ** vx", 6),
+        ("x ** 0.5", 6),
+        ("x ** True", 6),
+        ("x % 2", 1),
+        ("x // 2", 1),
+        ("x @ vx", 1),
+        ("~x", 1),
+        ("x; vx", 2),
+        ("", 1),
+        ("1e999", 1),
+        ("9" * 400, 1),
+    ],
+)
+def test_all_else_is_refused_with_its_place(text: str, place: int) -> None:
+    with pytest.raises(ExpressionError) as caught:
+        read_expression(text, NAMES)
+    assert caught.value.place == place
+    assert caught.value.mend
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "(" * 300 + "x" + ")" * 300,
+        "-" * 1500 + "x",
+        "+".join(["x"] * (DEEPEST + 2)),
+        "sin(" * (DEEPEST + 1) + "x" + ")" * (DEEPEST + 1),
+        "x" + " " * LONGEST,
+        "\uff58",
+        "x\u200b",
+        "x\nvx",
+        "x\x00",
+    ],
+)
+def test_what_is_too_long_too_deep_or_looks_like_something_else_is_refused(text: str) -> None:
+    with pytest.raises(ExpressionError):
+        read_expression(text, NAMES)
+
+
+@given(st.text(max_size=60))
+@settings(max_examples=200, deadline=None)
+def test_any_text_is_read_or_refused(text: str) -> None:
+    try:
+        tree = read_expression(text, NAMES)
+    except ExpressionError:
+        return
+    assert set(names_in(tree)) <= set(NAMES)
