@@ -38,6 +38,17 @@ def bar(value: float, largest: float, mark: float | None = None, name: str = "af
     return _drawing(marks)
 
 
+def log_bar(value: float, low: float, high: float, mark: float, name: str = "after") -> str:
+    """A bar from a mark to a value on a logarithmic scale from ``low`` to ``high``; the mark is a tick across it."""
+    if not _is_positive(value) or not 0.0 < low < high:
+        return ""
+    x = _log_place(mark, low, high)
+    left, right = sorted((x, _log_place(value, low, high)))
+    marks = f'<rect class="{name}" x="{left:.1f}" y="5" width="{max(right - left, 1.0):.1f}" height="8" rx="1.5"/>'
+    marks += f'<line class="floor" x1="{x:.1f}" x2="{x:.1f}" y1="1" y2="{HEIGHT - 1:.0f}"/>'
+    return _drawing(marks)
+
+
 def whisker(value: float, low: float, high: float, declared: float | None) -> str:
     """An interval with its estimate, and the declared value as a tick, on a linear scale."""
     points = [point for point in (value, low, high, declared) if point is not None and math.isfinite(point)]

@@ -7,6 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from ..robot_wiring import AXES
+from ..tracer.port_residuals import ComponentResidual
 from ..tracer.verdict import Candidate, Detectable, Errors, Estimate, FoundEffect, Likeness, Trace
 from .summary import ROLES, comparison_of
 
@@ -27,6 +28,16 @@ def trace_document(trace: Trace) -> dict[str, Any]:
         "left": _left(trace),
         "detectable": [_detectable(each) for each in trace.separation.detectable],
         "alike": [_likeness(each) for each in trace.separation.alike],
+        "components": [_component(part) for part in trace.components.ranking],
+        "where": {
+            "component": trace.components.blamed,
+            "sentence": trace.components.sentence,
+            "untold": list(trace.components.untold),
+        },
+        "resonance": [
+            {"frequency_hz": _number(each.frequency), "outputs": list(each.outputs), "on": list(each.on)}
+            for each in trace.resonances
+        ],
         "alpha": _number(trace.alpha),
         "candidates": [_candidate(candidate) for candidate in trace.candidates],
         "unknown_columns": _unknown_columns(trace),
@@ -52,6 +63,22 @@ def _estimate(estimate: Estimate) -> dict[str, Any]:
         "low": _number(estimate.low),
         "high": _number(estimate.high),
         "declared": _number(estimate.declared),
+    }
+
+
+def _component(part: ComponentResidual) -> dict[str, Any]:
+    moved = part.moves_with
+    return {
+        "component": part.component,
+        "quantity": part.quantity,
+        "unit": part.unit,
+        "rms": _number(part.rms),
+        "expected_rms": _number(part.expected_rms),
+        "ratio": _number(part.ratio),
+        "limit": _number(part.limit),
+        "mean": _number(part.mean),
+        "moves_with": {"name": moved.name, "correlation": _number(moved.correlation)} if moved else None,
+        "rings_at_hz": _number(part.rings_at),
     }
 
 

@@ -12,8 +12,10 @@ from .figures import ROLE_LABELS, noise_of, outputs, page_data
 from .markup import inline_json, section, text
 from .summary import Output
 from .units import significant
+from .where import where
 
 SCRIPTS = ("drawing.js", "panels.js", "scene.js", "page.js")
+DETAILS = (where, sections.candidates, sections.left, sections.unseen, sections.notes)
 VIEWS = ("Perspective", "Top", "Front", "Side")
 
 
@@ -29,7 +31,7 @@ def trace_page(trace: Trace, links: Mapping[str, str]) -> str:
         summary=sections.summary(trace) + sections.found(trace) + sections.also_possible(trace),
         chooser=_chooser(trace),
         figures=_scene_section(trace) + _residual_section(trace) + _spectrum_section(trace),
-        details=sections.candidates(trace) + sections.left(trace) + sections.unseen(trace) + sections.notes(trace),
+        details="".join(part(trace) for part in DETAILS),
         data=inline_json(page_data(trace)),
         plotly=get_plotlyjs(),
         scripts="\n".join(_asset(name) for name in SCRIPTS),

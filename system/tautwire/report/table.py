@@ -38,6 +38,7 @@ def trace_table(trace: Trace) -> RenderableType:
         Text(f"{VERDICTS[trace.verdict]}: {one_line(trace.sentence)}", style="bold"),
         Text(noise_sentence(trace) + "\n"),
         _error_table(trace),
+        _paragraph("Where, before any effect is fitted", [trace.components.sentence]),
     ]
     if trace.effects:
         blocks.append(_effect_table(trace))

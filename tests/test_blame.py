@@ -1,0 +1,66 @@
+"""Which component is in question: each row of the table, and the words."""
+
+import numpy as np
+import pytest
+
+from tautwire.tracer.blame import blame, named, verdict_of
+from tautwire.tracer.port_residuals import ComponentResidual
+
+FINE = {1: False, 2: False, 3: False}
+SECOND = {1: False, 2: True, 3: False}
+ALL = {1: True, 2: True, 3: True}
+
+
+@pytest.mark.parametrize(
+    ("off", "platform", "closes", "exits", "said"),
+    [
+        (FINE, False, False, (), "nothing"),
+        (FINE, True, False, (), "platform"),
+        (SECOND, False, False, (), "cable 2 (rope or winch)"),
+        (SECOND, False, False, (2,), "cable 2 (rope, winch or exit point)"),
+        (ALL, False, False, (2,), "cables 1, 2, 3 (rope or winch) or the position sensor"),
+        (SECOND, True, True, (), "load cell 2 or friction before it"),
+        (SECOND, True, False, (), "load cell 2; exit point 2 or several components"),
+        (
+            ALL,
+            True,
+            False,
+            (),
+            "load cells 1, 2, 3; exit points 1, 2, 3; the position sensor or several components",
+        ),
+        ({1: False, 3: True}, None, False, (), "cable 3 (rope, winch, load cell or exit point)"),
+        ({1: False, 3: False}, None, False, (), "nothing in cables 1, 3; cannot tell more"),
+        ({}, None, False, (), "cannot tell"),
+    ],
+)
+def test_each_row(off: dict[int, bool], platform: bool | None, closes: bool, exits: tuple[int, ...], said: str) -> None:
+    assert blame(off, platform, closes, exits) == said
+
+
+def part(component: str, quantity: str, rms: float, rings_at: float | None = None) -> ComponentResidual:
+    return ComponentResidual(component, quantity, "N", np.zeros(3), 0.0, rms, 1.3, 1.2, None, rings_at)
+
+
+def test_the_sentence_has_the_figures() -> None:
+    cables = [part("cable 1", "tension", 1.2), part("cable 2", "tension", 14.1)]
+    platform = [part("platform", "force x", 1.3)]
+    assert verdict_of(cables, platform) == (
+        "cable 2 (rope or winch)",
+        "Cable 2's tension is off by 14 N rms (expected 1.3 N); the platform's force balance is within its noise. "
+        "In question: cable 2 (rope or winch).",
+    )
+
+
+def test_the_sentence_tells_what_rings_at_the_platform_alone() -> None:
+    cables, wrong = [part("cable 1", "tension", 1.3)], [part("cable 1", "tension", 14.0)]
+    platform = [part("platform", "force x", 9.0, 0.451), part("platform", "force z", 2.0, 0.9)]
+    assert "rings at 0.45 Hz" in verdict_of(cables, platform)[1]
+    assert "rings" not in verdict_of(wrong, platform)[1]
+
+
+def test_where_nothing_was_looked_at_the_sentence_says_so() -> None:
+    assert verdict_of((), ()) == ("cannot tell", "Cannot tell which component is off.")
+
+
+def test_names_are_counted() -> None:
+    assert [named("cable", [2]), named("exit point", [1, 3])] == ["cable 2", "exit points 1, 3"]
