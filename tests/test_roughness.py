@@ -15,3 +15,9 @@ def test_roughness_passes_over_what_is_smooth_what_is_missing_and_outliers() -> 
 
 def test_a_sensor_that_saw_nothing_has_some_noise() -> None:
     assert roughness(np.full((50, 3), np.nan)) == 1.0
+
+
+def test_a_sensor_that_shows_less_often_is_as_noisy_as_it_is() -> None:
+    signal = np.random.default_rng(4).normal(scale=0.5, size=20000)
+    signal[np.arange(20000) % 10 > 0] = np.nan
+    assert roughness(signal[:, None]) == pytest.approx(0.5, rel=0.2)

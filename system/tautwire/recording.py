@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from .errors import RecordingError, shown
 from .recording_csv import open_csv
 from .recording_header import AXES
+from .recording_mdf import is_mdf, open_mdf
 from .recording_parquet import is_parquet, open_parquet
 from .recording_rules import HUGE, raise_first_fault
 
@@ -75,8 +76,9 @@ class Recording:
 
 
 def read_recording(path: str | Path, cable_count: int) -> Recording:
-    """The recording in a CSV or Parquet file of a robot with ``cable_count`` cables; raises RecordingError."""
-    table = open_parquet(path, cable_count) if is_parquet(path) else open_csv(path, cable_count)
+    """The recording in a CSV, Parquet or MDF file of a robot with ``cable_count`` cables; raises RecordingError."""
+    opened = open_parquet if is_parquet(path) else open_mdf if is_mdf(path) else open_csv
+    table = opened(path, cable_count)
     numbers = table.numbers()
     if numbers is None:
         raise_first_fault(table.rows(), table.header, table.file)

@@ -1,9 +1,5 @@
 """Recordings in Parquet files: the columns that a CSV file would have, as numbers."""
 
-import math
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from itertools import repeat
 from pathlib import Path
 
 import numpy as np
@@ -13,8 +9,8 @@ from numpy.typing import NDArray
 
 from .errors import RecordingError, shown
 from .input_file import readable_file
-from .recording_header import Header, header_of
-from .recording_rules import Row
+from .recording_columns import ColumnTable
+from .recording_header import header_of
 
 BATCH = 2**16
 
@@ -23,32 +19,13 @@ _ANEW = "write it anew as Parquet, or as CSV under another name"
 _NUMERIC = (pa.types.is_integer, pa.types.is_floating, pa.types.is_decimal, pa.types.is_null)
 
 
-@dataclass(frozen=True)
-class ParquetTable:
-    """The known columns of a Parquet file in memory."""
-
-    file: str
-    header: Header
-    columns: Mapping[str, NDArray[np.float64]]
-
-    def numbers(self) -> Mapping[str, NDArray[np.float64]]:
-        """The known columns, each of shape (N,), NaN where a cell is null."""
-        return self.columns
-
-    def rows(self) -> Iterator[Row]:
-        """The samples, counted from 1, each with the file and its number, as a CSV file would have them."""
-        columns = [self.columns.get(name, repeat(math.nan)) for name in self.header.names]
-        for number, row in enumerate(zip(*columns, strict=False), 1):
-            yield f"{self.file}: row {number}", [repr(float(value)) for value in row]
-
-
 def is_parquet(path: str | Path) -> bool:
     """Whether a file is Parquet by its name or its first bytes; raises RecordingError where it cannot be read."""
     with readable_file(path, RecordingError) as file, file.open("rb") as content:
         return file.suffix.lower() == ".parquet" or content.read(len(_MAGIC)) == _MAGIC
 
 
-def open_parquet(path: str | Path, cable_count: int) -> ParquetTable:
+def open_parquet(path: str | Path, cable_count: int) -> ColumnTable:
     """The Parquet file of a recording; raises RecordingError where it is none, or a column is missing or no number."""
     file = str(path)
     try:
@@ -58,7 +35,7 @@ def open_parquet(path: str | Path, cable_count: int) -> ParquetTable:
             columns = {name: _column(content, name, f"{file}: column {name}") for name in header.known}
     except (pa.ArrowException, OSError, ValueError) as problem:
         raise RecordingError(file, f"cannot be read as Parquet ({shown(str(problem), 200)})", _ANEW) from problem
-    return ParquetTable(file, header, columns)
+    return ColumnTable(file, header, columns)
 
 
 def _column(content: pq.ParquetFile, name: str, where: str) -> NDArray[np.float64]:

@@ -51,7 +51,7 @@ def build(
 
 def simulate(
     robot_file: RobotFile,
-    speeds: Annotated[Path, typer.Option(metavar="RECORDING.csv", help="Winch speeds over time; CSV or Parquet.")],
+    speeds: Annotated[Path, typer.Option(metavar="RECORDING.csv", help="Winch speeds over time; CSV, Parquet or MDF.")],
     out: Annotated[Path, typer.Option(metavar="RESULT.csv", help="Where the result goes; Parquet if .parquet.")],
     step: Annotated[float, typer.Option(help="Longest macro step, s.")] = 0.01,
     tolerance: Annotated[

@@ -15,7 +15,7 @@ from .shared import RobotFile, progress_bar, robot_of, say_what_is_left_out
 
 def trace(
     robot_file: RobotFile,
-    fit: Annotated[Path, typer.Argument(metavar="FIT.csv", help="The recording to fit; CSV or Parquet.")],
+    fit: Annotated[Path, typer.Argument(metavar="FIT.csv", help="The recording to fit; CSV, Parquet or MDF.")],
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where the report goes.")],
     check: Annotated[Path | None, typer.Option(metavar="CHECK.csv", help="A recording to judge on.")] = None,
     alpha: Annotated[float, typer.Option(help="Rate of false alarms allowed.")] = 0.01,
