@@ -21,7 +21,19 @@ from tautwire.tracer.verdict import Separation, Trace
 from tests.traces import HOSTILE, TENSION_NOISE, made_trace, nothing_found, without_positions
 
 LINKS = {"robot.toml": "robot.toml", "cable 1": "fmus/cable 1.fmu"}
-SECTIONS = ("summary", "found", "possible", "robot", "residuals", "spectra", "candidates", "left", "unseen", "notes")
+SECTIONS = (
+    "summary",
+    "found",
+    "possible",
+    "robot",
+    "residuals",
+    "spectra",
+    "where",
+    "candidates",
+    "left",
+    "unseen",
+    "notes",
+)
 VOID = {"meta", "input", "img", "br", "link", "hr"}
 FETCHING = {"src", "srcset", "poster", "data", "action", "background"}
 

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from tautwire.cosimulation import Motion
 from tautwire.recording import Recording
 from tautwire.robot import Cable, EffectSetting, Platform, Robot, Sensors
+from tautwire.tracer.associations import Association
+from tautwire.tracer.port_residuals import ComponentResidual, Components
 from tautwire.tracer.verdict import (
     Candidate,
     Comparison,
@@ -108,6 +110,20 @@ def made_separation(cables: tuple[int, ...]) -> Separation:
     return Separation(sizes, alike)
 
 
+def made_components(cables: tuple[int, ...]) -> Components:
+    """Cables whose tensions move with the strain rate, over a platform in balance."""
+    noise = np.random.default_rng(5).normal(0.0, 1.0, 400)
+    moved = Association("strain rate", 0.98)
+    tensions = [
+        ComponentResidual(f"cable {i}", "tension", "N", 14.0 * noise, 0.3, 14.0, 2.8, 1.3, moved) for i in cables
+    ]
+    balance = [
+        ComponentResidual("platform", f"force {a}", "N", 0.25 * noise, 0.0, 0.25, 0.25, 1.4, None) for a in "xyz"
+    ]
+    sentence = "The tensions of all cables are off; the platform's force balance is within its noise."
+    return Components(np.linspace(0.0, 40.0, 400), (*tensions, *balance), "cables (rope or winch)", sentence, ())
+
+
 def made_trace(
     eight: bool = False,
     check: bool = True,
@@ -138,6 +154,8 @@ def made_trace(
         noise_after=True,
         left=np.concatenate(([1.01, 0.98, 1.03], np.linspace(0.97, 1.06, len(cables)))),
         separation=made_separation(cables),
+        components=made_components(cables),
+        resonances=(),
         alpha=0.01,
         notes=("The winches stood still for 62 % of the fit recording: drum effects would hardly show.",),
         seconds=12.34,

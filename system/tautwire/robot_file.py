@@ -5,22 +5,21 @@ import os
 import re
 import sys
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
 from tautwire_fmu.laws.cable import LAWS
 from tautwire_fmu.laws.effects import BY_NAME, Effect, Parameter
-from tautwire_fmu.laws.expression import ExpressionError, read_expression
-from tautwire_fmu.laws.formula import PLACES
 
 from .checked_table import CheckedTable, NumberRule, nearest
 from .errors import RobotFileError, one_line, shown
+from .formula_table import formulas_in
 from .input_file import read_bytes, require_text
 from .robot import (
     PER_CABLE,
     Cable,
     EffectSetting,
-    Formula,
     OwnFmu,
     Platform,
     Point,
@@ -129,7 +128,7 @@ def _robot(root: CheckedTable, default_name: str) -> Robot:
         effects=_effects(root.table("effect"), len(cables)) if "effect" in root.content else (),
         winch=_winch(root.table("winch")) if "winch" in root.content else None,
         fmus=_fmus(root.table("fmu"), len(cables)) if "fmu" in root.content else (),
-        formulas=_formulas(root, len(cables)) if "formula" in root.content else (),
+        formulas=formulas_in(root, partial(_cables_of_effect, cable_count=len(cables))),
     )
 
 
@@ -257,31 +256,6 @@ def _effect(table: CheckedTable, effect: Effect, cable_count: int) -> EffectSett
         mend = f"give {effect.parameters[0].description}, as in {names[0]} = {effect.parameters[0].start:g}"
         raise table.refusal("", "sets none of its numbers", mend)
     return EffectSetting(effect.name, values, _cables_of_effect(table, cable_count) if per_cable else ())
-
-
-def _formulas(root: CheckedTable, cable_count: int) -> tuple[Formula, ...]:
-    several = isinstance(root.content["formula"], list)
-    tables = root.tables("formula") if several else (root.table("formula"),)
-    return tuple(formula for table in tables for formula in _formulas_of(table, cable_count))
-
-
-def _formulas_of(table: CheckedTable, cable_count: int) -> tuple[Formula, ...]:
-    table.require_known((*PLACES, "cables"))
-    places = [place for place in PLACES if place in table.content]
-    if not places:
-        raise table.refusal("", "holds no formula", 'write one, as in force_x = "-20 * vx"')
-    if "cables" in table.content and "tension" not in places:
-        raise table.refusal("cables", "only a formula of the tension acts in cables", "remove cables")
-    found = []
-    for place in places:
-        text = table.text(place, 'write it as a text, as in "-20 * vx"')
-        try:
-            read_expression(text, PLACES[place])
-        except ExpressionError as error:
-            raise table.refusal(place, f"character {error.place}: {error.problem}", error.mend) from error
-        cables = _cables_of_effect(table, cable_count) if place == "tension" else ()
-        found.append(Formula(place, text, cables))
-    return tuple(found)
 
 
 def _rule(parameter: Parameter) -> NumberRule:

@@ -27,8 +27,12 @@ class Sample:
     @property
     def head(self) -> Sample:
         """The beginning of the samples that count, long enough to rank hypotheses by: a third, at least 800."""
+        return self.beginning(max(int(np.sum(self.rows)) // HEAD_SHARE, FEWEST_IN_HEAD))
+
+    def beginning(self, count: int) -> Sample:
+        """The first so many samples that count, all where there are no more."""
         places = np.flatnonzero(self.rows)
-        last = int(places[min(max(len(places) // HEAD_SHARE, FEWEST_IN_HEAD), len(places)) - 1]) + 1
+        last = int(places[min(count, len(places)) - 1]) + 1
         return Sample(self.recording.first(last), self.start, self.rows[:last])
 
 

@@ -19,12 +19,24 @@ from ..symbolic import Model
 
 @dataclass(frozen=True)
 class Noise:
-    """Standard deviations: position (m), tension (N), winch speed (m/s), and of the start's place (m)."""
+    """Standard deviations: position (m), tension (N), winch speed (m/s), and of the start's place (m).
+
+    Of a start that is not known at rest: its velocity (m/s), how far it is from equilibrium (m), and tensions that hold
+    nothing (N). ``own`` are those of single outputs (3 + n) where they differ from the others of their kind.
+    """
 
     position: float
     tension: float
     winch_speed: float
     start: float
+    start_velocity: float = 0.0
+    start_stretch: float = 0.0
+    self_stress: float = 0.0
+    own: tuple[float, ...] = ()
+
+    def of_outputs(self, cable_count: int) -> tuple[float, ...]:
+        """Of x, y, z and each tension."""
+        return self.own or (*[self.position] * 3, *[self.tension] * cable_count)
 
 
 @dataclass(frozen=True)
@@ -167,7 +179,7 @@ def _take_in(
     slopes = predicted.slopes
     rows: list[tuple[SX, SX, SX]] = []
     for index in range(shown.numel()):
-        own = noise.position if index < 3 else noise.tension
+        own = noise.of_outputs(shown.numel() - 3)[index]
         row = by_state[index, :]
         spread = casadi.mtimes(covariance, row.T)
         variance = casadi.mtimes(row, spread) + own**2

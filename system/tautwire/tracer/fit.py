@@ -14,10 +14,11 @@ from tautwire_fmu.laws.effects import BY_NAME, Parameter
 from ..errors import TautwireError, UnreachableError
 from ..robot import Robot
 from ..start import placed
-from ..symbolic import FreeParameter
+from ..symbolic import OF_FORMULAS, FreeParameter
+from .compression import compressed
 from .data import Sample
 from .filter_step import Noise
-from .hypotheses import Hypothesis, free_parameters, with_values
+from .hypotheses import Hypothesis, free_parameters, value_of, with_values
 from .likelihood import Innovations, Likelihood
 
 Array = NDArray[np.float64]
@@ -98,7 +99,7 @@ class Fitter:
         free = free_parameters(robot, chosen)
         if not free:
             return Fit(robot, (), np.zeros(0), np.zeros(0))
-        start = np.array([robot.effects[f.setting].values[f.name] for f in free])
+        start = np.array([value_of(robot, f) for f in free])
         known = _parameters(robot, free)
         scale = np.maximum(np.abs(start), [abs(parameter.start) for parameter in known])
         lower, upper = (np.array([p.minimum for p in known]) / scale, np.array([p.maximum for p in known]) / scale)
@@ -142,7 +143,7 @@ class Fitter:
     ) -> tuple[Likelihood, list[float]]:
         """What was compiled for fitting the chosen hypotheses, and the values that the robot has."""
         free = free_parameters(robot, chosen)
-        values = [robot.effects[f.setting].values[f.name] for f in free]
+        values = [value_of(robot, f) for f in free]
         return self._likelihood(placed(robot, sample.start), free, sample), values
 
     def open_loop_variances(self, robot: Robot, sample: Sample) -> Array:
@@ -162,12 +163,17 @@ class Fitter:
 
 
 def _parameters(robot: Robot, free: Sequence[FreeParameter]) -> list[Parameter]:
-    """What the effects say of each free parameter."""
-    return [{p.name: p for p in BY_NAME[robot.effects[f.setting].name].parameters}[f.name] for f in free]
+    """What the effects say of each free parameter; a number of a formula may be any."""
+    return [
+        Parameter(f.name, "", "", -np.inf, np.inf, 0.0, value_of(robot, f) or 1.0)
+        if f.setting == OF_FORMULAS
+        else {p.name: p for p in BY_NAME[robot.effects[f.setting].name].parameters}[f.name]
+        for f in free
+    ]
 
 
 class _Residual:
-    """Innovations and their slopes at the last point asked for, in scaled parameters."""
+    """Innovations and their slopes, compressed, at the last point asked for, in scaled parameters."""
 
     def __init__(
         self, likelihood: Likelihood, sample: Sample, scale: Array, roughness: float, between: Callable[[], None]
@@ -195,8 +201,7 @@ class _Residual:
     def _evaluate(self, scaled: Array) -> tuple[Array, Array]:
         if self._at is None or not np.array_equal(self._at, scaled):
             self.between()
-            found = self.likelihood.innovations(self.sample.recording, scaled * self.scale, self.roughness)
-            chosen = found.seen & self.sample.rows[:, None]
-            self._found = (found.values[chosen], found.slopes[chosen] * self.scale)
+            residuals, slopes = compressed(self.likelihood, scaled * self.scale, self.sample, self.roughness)
+            self._found = (residuals, slopes * self.scale)
             self._at = scaled.copy()
         return self._found

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from tautwire_fmu.laws.effects import ALL, ANCHOR, BY_NAME, Effect, Parameter
 
 from ..robot import PER_CABLE, EffectSetting, Robot
-from ..symbolic import FreeParameter
+from ..symbolic import OF_FORMULAS, FreeParameter
 
 # All exit points moved alike are the platform's start and its sensor moved, the other way.
 ON_ONE_CABLE = (ANCHOR,)
@@ -122,20 +122,39 @@ def declared_value(robot: Robot, parameter: Parameter, cables: tuple[int, ...]) 
 
 
 def free_parameters(robot: Robot, chosen: Collection[Hypothesis]) -> tuple[FreeParameter, ...]:
-    """The parameters that the chosen hypotheses fit, in the robot's order; what else the file declares stays fixed."""
+    """The parameters that the chosen hypotheses fit, in the robot's order, and the numbers of its formulas.
+
+    What else the file declares stays fixed.
+    """
+    numbers = dict.fromkeys(name for formula in robot.formulas for name in formula.numbers)
     forms = {(hypothesis.effect.name, hypothesis.cables): hypothesis.form for hypothesis in chosen}
-    return tuple(
+    of_effects = (
         FreeParameter(index, parameter.name)
         for index, setting in enumerate(robot.effects)
         for parameter in BY_NAME[setting.name].parameters
         if parameter.name in forms.get((setting.name, setting.cables), ())
     )
+    return (*of_effects, *(FreeParameter(OF_FORMULAS, name) for name in numbers))
+
+
+def value_of(robot: Robot, free: FreeParameter) -> float:
+    """The value that the robot has."""
+    if free.setting == OF_FORMULAS:
+        return next(formula.numbers[free.name] for formula in robot.formulas if free.name in formula.numbers)
+    return robot.effects[free.setting].values[free.name]
 
 
 def with_values(robot: Robot, free: Sequence[FreeParameter], values: Mapping[FreeParameter, float]) -> Robot:
-    """The robot with its effects' parameters set anew."""
+    """The robot with its effects' parameters, and the numbers of its formulas, set anew."""
+    numbers = {parameter.name: values[parameter] for parameter in free if parameter.setting == OF_FORMULAS}
+    formulas = (
+        replace(f, numbers={name: numbers.get(name, old) for name, old in f.numbers.items()}) for f in robot.formulas
+    )
+    robot = replace(robot, formulas=tuple(formulas))
     effects = list(robot.effects)
     for parameter in free:
+        if parameter.setting == OF_FORMULAS:
+            continue
         old = effects[parameter.setting]
         effects[parameter.setting] = EffectSetting(
             old.name, {**old.values, parameter.name: values[parameter]}, old.cables

@@ -23,6 +23,7 @@ from ..recording import Recording
 from ..robot import Robot
 from ..symbolic import FreeParameter, symbolic_model
 from .filter_step import Noise, Substeps, filter_sample
+from .start_state import start_covariance
 
 Array = NDArray[np.float64]
 
@@ -82,6 +83,7 @@ class Likelihood:
 
     def __init__(self, robot: Robot, free: Sequence[FreeParameter], noise: Noise, sample_time: float) -> None:
         self.model = symbolic_model(robot, free)
+        self.robot = robot
         self.noise = noise
         self.cable_count = robot.cable_count
         self._start = casadi.Function(
@@ -113,10 +115,20 @@ class Likelihood:
         _fill(values, variances, slopes, given & ~seen)
         return Innovations(given, values, slopes, variances)
 
-    def stretches(self, recording: Recording, parameters: Sequence[float] | Array) -> Iterator[Stretch]:
-        """The filter's run over a recording, part by part: memory does not grow with its length."""
+    def start(self, parameters: Sequence[float] | Array) -> tuple[Array, Array]:
+        """State (n,) and covariance (n, n) with which the filter begins."""
+        state, _ = self._start(np.asarray(parameters, dtype=float))
+        return np.array(state).ravel(), self._start_covariance()
+
+    def stretches(
+        self, recording: Recording, parameters: Sequence[float] | Array, roughness: float = 0.0
+    ) -> Iterator[Stretch]:
+        """The filter's run over a recording, part by part: memory does not grow with its length.
+
+        For ``roughness`` see :meth:`innovations`.
+        """
         measured, shift = self._as_of(recording, parameters)
-        yield from self._filter(recording, measured, shift, parameters, self._start_covariance(), 0.0)
+        yield from self._filter(recording, measured, shift, parameters, self._start_covariance(), roughness)
 
     def simulated(self, recording: Recording, parameters: Sequence[float] | Array) -> Array:
         """What sensors without noise or lag would show of a run over a recording's winch speeds, shape (N, m)."""
@@ -189,11 +201,7 @@ class Likelihood:
         return self._runs[count]
 
     def _start_covariance(self) -> Array:
-        variance = np.zeros(self.model.states.numel())
-        variance[:3] = self.noise.start**2
-        variance[6 : 6 + self.cable_count] = self.noise.start**2
-        covariance: Array = np.diag(variance)
-        return covariance
+        return start_covariance(self.robot, self.noise, self.model.states.numel())
 
 
 def _gathered(stretches: Iterable[Stretch]) -> tuple[Array, Array, Array]:

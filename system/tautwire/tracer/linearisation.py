@@ -64,13 +64,18 @@ class Linearised:
         return slopes, -(self.whitening @ moved)
 
 
-def linearise_run(likelihood: Likelihood, values: list[float], recording: Recording) -> Iterator[Linearised]:
-    """Each stretch of a filter's run over a recording, at some values of its free parameters."""
+def linearise_run(
+    likelihood: Likelihood, values: list[float], recording: Recording, roughness: float = 0.0
+) -> Iterator[Linearised]:
+    """Each stretch of a filter's run over a recording, at some values of its free parameters.
+
+    With ``roughness`` (m/s^2 per root hertz) the run follows what was measured where the model does not.
+    """
     function = filter_slopes(likelihood.model, likelihood.cable_count, likelihood.substeps)
     maps: dict[int, Function] = {}
     noise = likelihood.noise
-    variances = np.append(np.full(3, noise.position**2), np.full(likelihood.cable_count, noise.tension**2))
-    for stretch in likelihood.stretches(recording, values):
+    variances = np.square(noise.of_outputs(likelihood.cable_count))
+    for stretch in likelihood.stretches(recording, values, roughness):
         measured, seen, shift, speed, later, step, _ = stretch.columns
         count = measured.shape[1]
         before = stretch.states[:, :-1]

@@ -16,17 +16,22 @@ from ..interrupt import interrupts_held
 from ..packaging import build_fmus
 from ..recording import Recording, require_outputs
 from ..robot import Robot
-from ..start import placed
 from .adequacy import FEWEST, enough_samples, is_noise
+from .clock import with_clocks_set
+from .components import cut_at_ports
 from .data import Evidence, Sample, split
+from .discovery import Discovery
 from .fit import Fitter
 from .hypotheses import declared_value
 from .likelihood import Innovations
-from .noise import noise_of
+from .preparation import prepare
+from .release import release_note, released
 from .search import Found, search
 from .separation import separation
+from .unexplained import Rest, what_is_left
 from .verdict import Comparison, Errors, Estimate, FoundEffect, Separation, Trace, VerdictName
 from .workers import Workers
+from .written import formula_text
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -68,13 +73,18 @@ def _trace(
     for recording in (fit, check):
         if recording is not None:
             require_outputs(recording)
-    noise = noise_of(robot, fit)
-    evidence = split(robot, noise, fit, check)
-    fitter = Fitter(noise, workers.between)
+    prepared = prepare(robot, fit, check)
+    evidence = split(robot, prepared.noise, prepared.fit, prepared.check)
+    fitter = Fitter(prepared.noise, workers.between)
     plain = _innovations(fitter, robot, evidence)
     _require_samples(plain, evidence)
+    clocks: tuple[str, ...] = ()
+    if not _all_noise(plain, evidence):
+        evidence, clocks = with_clocks_set(fitter, robot, evidence)
+        plain = _innovations(fitter, robot, evidence) if clocks else plain
     samples = (evidence.fit,) if check is None else (evidence.fit, evidence.judge)
-    running = [workers.start(_cosimulated, robot, sample) for sample in samples]
+    running = [workers.start(_cosimulated, released(fitter, robot, sample), sample) for sample in samples]
+    ports = workers.start(cut_at_ports, robot, evidence.fit, prepared.noise)
     found = search(robot, fitter, evidence, alpha, progress, workers)
     progress("co-simulating before", 0.0)
     before = [run.result() for run in running]
@@ -82,15 +92,17 @@ def _trace(
     before_is_noise, after_is_noise = _all_noise(plain, evidence), _all_noise(explained, evidence)
     comparisons, floors = _compared(robot, fitter, samples, before, before)
     kept = bool(found.accepted) and after_is_noise
-    if kept:
-        progress("co-simulating after", 0.0)
-        running = [workers.start(_cosimulated, found.fit.robot, sample) for sample in samples]
-        after = [run.result() for run in running]
-        better, lower = _compared(found.fit.robot, fitter, samples, before, after)
-        # The co-simulation has the last word: a filter follows what the model itself would not do.
-        kept = all(_reached(c.errors_after, floor) for c, floor in zip(better, lower, strict=True))
-        comparisons, floors = (better, lower) if kept else (comparisons, floors)
-    verdict, sentence = _verdict(robot, found, kept, before_is_noise)
+    progress("co-simulating after", 0.0)
+    better = _reaching(found.fit.robot, fitter, samples, before, workers) if kept else None
+    kept, rest = better is not None, Rest()
+    if not kept and (found.accepted or not before_is_noise):
+        rest = what_is_left(robot, found, fitter, evidence, alpha, progress)
+        better = _reaching(rest.discovery.robot, fitter, samples, before, workers) if rest.discovery else None
+    comparisons, floors = better or (comparisons, floors)
+    discovered = rest.discovery if better else None
+    final = discovered.robot if discovered else (found.fit.robot if kept else robot)
+    verdict, sentence = _verdict(robot, found, kept, before_is_noise, discovered)
+    begun = [note for s in samples for note in release_note(released(fitter, final, s), s.recording.path)]
     shown = Separation((), ())
     if kept or verdict == "none":
         progress("what these recordings could show", 0.0)
@@ -99,21 +111,36 @@ def _trace(
         verdict=verdict,
         sentence=sentence,
         robot_before=robot,
-        robot_after=found.fit.robot if kept else robot,
+        robot_after=final,
         effects=_effects(robot, found) if kept else (),
         also_possible=found.alike if kept else (),
         candidates=found.candidates,
-        formula=None,
+        formula=formula_text(robot, discovered.formulas) if discovered else None,
         comparisons=comparisons,
         noise_floor=floors[-1],
         noise_before=before_is_noise,
-        noise_after=kept or before_is_noise,
-        left=(explained if kept else plain)[1].mean_square(evidence.judge.rows),
+        noise_after=better is not None or before_is_noise,
+        left=fitter.innovations(final, evidence.judge).mean_square(evidence.judge.rows),
         separation=shown,
+        components=ports.result(),
+        resonances=rest.resonances,
         alpha=alpha,
-        notes=_notes(evidence, samples),
+        notes=(*prepared.notes, *clocks, *_notes(evidence, samples), *rest.notes, *begun),
         seconds=perf_counter() - began,
     )
+
+
+def _reaching(
+    after: Robot, fitter: Fitter, samples: Sequence[Sample], before: Sequence[Motion], workers: Workers
+) -> tuple[tuple[Comparison, ...], list[Errors]] | None:
+    """What the co-simulation of a better robot leaves; None where that is more than noise.
+
+    It has the last word: a filter follows what the model itself would not do.
+    """
+    running = [workers.start(_cosimulated, released(fitter, after, sample), sample) for sample in samples]
+    better, lower = _compared(after, fitter, samples, before, [run.result() for run in running])
+    reached = all(_reached(c.errors_after, floor) for c, floor in zip(better, lower, strict=True))
+    return (better, lower) if reached else None
 
 
 def _innovations(fitter: Fitter, robot: Robot, evidence: Evidence) -> tuple[Innovations, Innovations]:
@@ -162,9 +189,9 @@ def _root_mean(squares: Array) -> float:
 
 
 def _cosimulated(robot: Robot, sample: Sample) -> Motion:
-    here = placed(robot.as_modelled(), sample.start)
+    """The run of a robot placed where a recording starts."""
     with TemporaryDirectory(prefix="tautwire-trace-") as folder:
-        fmus = build_fmus(here, Path(folder))
+        fmus = build_fmus(robot.as_modelled(), Path(folder))
         return cosimulate(fmus, sample.recording.time, sample.recording.winch_speed)
 
 
@@ -186,10 +213,15 @@ def _reached(after: Errors, floor: Errors) -> bool:
     return all(not error > REACHED * least for error, least in pairs)
 
 
-def _verdict(robot: Robot, found: Found, kept: bool, noise_alone: bool) -> tuple[VerdictName, str]:
+def _verdict(
+    robot: Robot, found: Found, kept: bool, noise_alone: bool, discovered: Discovery | None
+) -> tuple[VerdictName, str]:
     names = " and ".join(h.label(robot) for h in found.accepted)
     if kept:
         return "effects", f"The model lacks {names}; with it, what is left is noise."
+    if discovered:
+        said = f"No known effect explains the residual; a formula does: {formula_text(robot, discovered.formulas)}."
+        return "discovered", f"{said} With it, what is left is noise."
     if not found.accepted and noise_alone:
         return "none", "The residual is noise: this recording shows nothing that the model lacks."
     closest = f"; {names} comes closest but leaves too much" if found.accepted else ""

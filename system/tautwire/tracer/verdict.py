@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..cosimulation import Motion
 from ..recording import Recording
 from ..robot import Robot
+from .port_residuals import Components
 
 Array = NDArray[np.float64]
 VerdictName = Literal["effects", "none", "discovered", "unexplained"]
@@ -121,12 +122,28 @@ class Separation:
 
 
 @dataclass(frozen=True)
+class Resonance:
+    """A frequency (Hz) at which something swings, the outputs in which it shows, and the recordings it was seen on."""
+
+    frequency: float
+    outputs: tuple[str, ...]
+    on: tuple[str, ...]
+
+    @property
+    def sentence(self) -> str:
+        """In words."""
+        places = ", ".join(self.outputs)
+        return f"something swings at {self.frequency:.2g} Hz that the model does not have: it shows in {places}"
+
+
+@dataclass(frozen=True)
 class Trace:
     """The answer to: what does this model lack.
 
     ``noise_floor`` is what noise of the sensors and of the recorded winch speeds would leave; ``left`` the mean square
     of the whitened innovations of each output (x, y, z, tensions) under the final model on unseen data, shape (3 + n,).
     ``separation`` is what those data could have shown beside the effects; empty where the model leaves more than noise.
+    ``components`` tells where the fit recording errs, before any effect is fitted.
     """
 
     verdict: VerdictName
@@ -143,6 +160,8 @@ class Trace:
     noise_after: bool
     left: Array
     separation: Separation
+    components: Components
+    resonances: tuple[Resonance, ...]
     alpha: float
     notes: tuple[str, ...]
     seconds: float

@@ -1,0 +1,50 @@
+"""Hidden degrees of freedom are told with frequency and place; what moves with the motion is none."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tautwire.tracer.data import split
+from tautwire.tracer.fit import Fitter
+from tautwire.tracer.noise import noise_of
+from tautwire.tracer.resonance import resonances
+from tautwire.tracer.verdict import Resonance
+from tests.recordings import recorded
+from tests.robots import example
+
+ROBOT = example("three")
+
+
+def seen(effects: dict[str, Any]) -> tuple[Resonance, ...]:
+    fit, check = recorded("three", 3, effects), recorded("three", 53, effects)
+    noise = noise_of(ROBOT, fit)
+    return resonances(ROBOT, Fitter(noise), split(ROBOT, noise, fit, check))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("mass", "length"), [(20.0, 2.0), (5.0, 1.0)])
+def test_a_load_that_swings(mass: float, length: float) -> None:
+    (found,) = seen({"unlisted_swing": {"mass": mass, "length": length}})
+    # Of a string from a platform that is held: the platform's own modes are far above.
+    assert found.frequency == pytest.approx(np.sqrt(ROBOT.gravity / length) / (2.0 * np.pi), rel=0.06)
+    assert set(found.outputs) <= {"x", "y"}
+    assert found.on == ("fit", "check")
+    assert "swings" in found.sentence
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "effects",
+    [
+        {},
+        {"unlisted_sideways": {"constant": 30.0}},
+        {"unlisted_bungee": {"stiffness_constant": 10.0, "point": [30.0, -2.0, 1.0], "rest": 3.0}},
+        {"damping": {"damping": 9e8}},
+    ],
+    ids=["nothing", "sideways", "bungee", "damping"],
+)
+def test_nothing_swings_where_nothing_does(effects: dict[str, Any]) -> None:
+    assert seen(effects) == ()
