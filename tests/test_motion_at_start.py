@@ -8,13 +8,13 @@ import pytest
 from tautwire.errors import RecordingError
 from tautwire.recording import Recording
 from tautwire.tracer.adequacy import is_noise
+from tautwire.tracer.cosimulated import cosimulated, errors, floor_of
 from tautwire.tracer.data import split
 from tautwire.tracer.fit import Fitter
 from tautwire.tracer.motion_at_start import beginning_of, with_motion_at_start
 from tautwire.tracer.noise import noise_of
 from tautwire.tracer.preparation import prepare
 from tautwire.tracer.release import release_note, released
-from tautwire.tracer.tracing import _cosimulated, _floor, errors
 from tests.recordings import recorded
 from tests.rig import SampledProgram, load_robot, make_recording, wander
 from tests.robots import EXAMPLES, NAMES, example
@@ -57,7 +57,7 @@ def runs(name: str, *recordings: Recording) -> list[tuple[bool, float, float]]:
     for sample in (evidence.fit, evidence.judge):
         begun = released(fitter, robot, sample)
         assert "the run starts with tensions of" in release_note(begun, sample.recording.path)[0]
-        error, floor = errors(sample.recording, _cosimulated(begun, sample)), _floor(fitter, robot, sample)
+        error, floor = errors(sample.recording, cosimulated(begun, sample)), floor_of(fitter, robot, sample)
         quiet = is_noise(fitter.innovations(robot, sample), sample.rows)
         found.append((quiet, error.position_rms / floor.position_rms, error.tension_rms / floor.tension_rms))
     return found

@@ -8,7 +8,7 @@ import pytest
 
 from tautwire.cosimulation import Motion, cosimulate
 from tautwire.tracer import Trace, trace
-from tautwire.tracer.tracing import errors
+from tautwire.tracer.cosimulated import errors
 from tests.recordings import recorded
 from tests.robots import example
 
@@ -41,7 +41,7 @@ def test_no_name_is_given_where_the_rebuilt_fmus_miss_the_recording(monkeypatch:
         runs.append(motion)
         return replace(motion, position=motion.position + 0.01) if len(runs) > 2 else motion
 
-    monkeypatch.setattr("tautwire.tracer.tracing.cosimulate", astray)
+    monkeypatch.setattr("tautwire.tracer.cosimulated.cosimulate", astray)
     found = traced()
     assert len(runs) == 4
     assert found.verdict == "unexplained"

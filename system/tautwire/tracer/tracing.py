@@ -3,22 +3,18 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from pathlib import Path
-from tempfile import TemporaryDirectory
+from dataclasses import dataclass
 from time import perf_counter
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ..cosimulation import Motion, cosimulate
+from ..cosimulation import Motion
 from ..errors import RecordingError
 from ..interrupt import interrupts_held
-from ..packaging import build_fmus
 from ..recording import Recording, require_outputs
 from ..robot import Robot
 from .adequacy import FEWEST, enough_samples, is_noise
 from .clock import with_clocks_set
 from .components import cut_at_ports
+from .cosimulated import compared, reaching, started
 from .data import Evidence, Sample, split
 from .discovery import Discovery
 from .fit import Fitter
@@ -33,12 +29,9 @@ from .verdict import Comparison, Errors, Estimate, FoundEffect, Separation, Trac
 from .workers import Workers
 from .written import formula_text
 
-Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
 ALPHA = 0.01
-ROLES = ("fit", "check")
-REACHED = 1.5
 
 
 def trace(
@@ -61,6 +54,35 @@ def trace(
         return _trace(robot, fit, check, progress, alpha, workers)
 
 
+@dataclass(frozen=True)
+class _Ready:
+    """Recordings made fit for judging, the plain model's innovations on them, and what was done to them."""
+
+    evidence: Evidence
+    samples: tuple[Sample, ...]
+    fitter: Fitter
+    plain: tuple[Innovations, Innovations]
+    notes: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Answer:
+    """The effects or the formula that the FMUs, too, bear out; else neither, and what is left."""
+
+    found: Found
+    effects_hold: bool
+    discovered: Discovery | None
+    rest: Rest
+    comparisons: tuple[Comparison, ...]
+    floors: Sequence[Errors]
+
+    def robot(self, declared: Robot) -> Robot:
+        """The best model that holds."""
+        if self.discovered:
+            return self.discovered.robot
+        return self.found.fit.robot if self.effects_hold else declared
+
+
 def _trace(
     robot: Robot,
     fit: Recording,
@@ -70,6 +92,44 @@ def _trace(
     workers: Workers,
 ) -> Trace:
     began = perf_counter()
+    ready = _ready(robot, fit, check, workers)
+    runs = started(workers, ready.fitter, robot, ready.samples)
+    ports = workers.start(cut_at_ports, robot, ready.evidence.fit, ready.fitter.noise)
+    found = search(robot, ready.fitter, ready.evidence, alpha, progress, workers)
+    progress("co-simulating before", 0.0)
+    before = [run.result() for run in runs]
+    noise_alone = _all_noise(ready.plain, ready.evidence)
+    answer = _answer(robot, ready, found, before, noise_alone, alpha, progress, workers)
+    final, kept = answer.robot(robot), answer.effects_hold
+    verdict, sentence = _verdict(robot, answer, noise_alone)
+    shown = Separation((), ())
+    if kept or verdict == "none":
+        progress("what these recordings could show", 0.0)
+        shown = separation(found.fit.robot, robot, found.accepted, ready.fitter, ready.evidence.judge, alpha)
+    return Trace(
+        verdict=verdict,
+        sentence=sentence,
+        robot_before=robot,
+        robot_after=final,
+        effects=_effects(robot, found) if kept else (),
+        also_possible=found.alike if kept else (),
+        candidates=found.candidates,
+        formula=formula_text(robot, answer.discovered.formulas) if answer.discovered else None,
+        comparisons=answer.comparisons,
+        noise_floor=answer.floors[-1],
+        noise_before=noise_alone,
+        noise_after=kept or answer.discovered is not None or noise_alone,
+        left=ready.fitter.innovations(final, ready.evidence.judge).mean_square(ready.evidence.judge.rows),
+        separation=shown,
+        components=ports.result(),
+        resonances=answer.rest.resonances,
+        alpha=alpha,
+        notes=(*ready.notes, *answer.rest.notes, *_begun(ready, final)),
+        seconds=perf_counter() - began,
+    )
+
+
+def _ready(robot: Robot, fit: Recording, check: Recording | None, workers: Workers) -> _Ready:
     for recording in (fit, check):
         if recording is not None:
             require_outputs(recording)
@@ -83,64 +143,40 @@ def _trace(
         evidence, clocks = with_clocks_set(fitter, robot, evidence)
         plain = _innovations(fitter, robot, evidence) if clocks else plain
     samples = (evidence.fit,) if check is None else (evidence.fit, evidence.judge)
-    running = [workers.start(_cosimulated, released(fitter, robot, sample), sample) for sample in samples]
-    ports = workers.start(cut_at_ports, robot, evidence.fit, prepared.noise)
-    found = search(robot, fitter, evidence, alpha, progress, workers)
-    progress("co-simulating before", 0.0)
-    before = [run.result() for run in running]
-    explained = _innovations(fitter, found.fit.robot, evidence)
-    before_is_noise, after_is_noise = _all_noise(plain, evidence), _all_noise(explained, evidence)
-    comparisons, floors = _compared(robot, fitter, samples, before, before)
-    kept = bool(found.accepted) and after_is_noise
+    return _Ready(evidence, samples, fitter, plain, (*prepared.notes, *clocks, *_notes(evidence, samples)))
+
+
+def _answer(
+    robot: Robot,
+    ready: _Ready,
+    found: Found,
+    before: Sequence[Motion],
+    noise_alone: bool,
+    alpha: float,
+    progress: Progress,
+    workers: Workers,
+) -> _Answer:
+    """Effects if they leave noise, to the filter and in the FMUs; else a formula that does."""
+    fitter, samples = ready.fitter, ready.samples
+    comparisons, floors = compared(robot, fitter, samples, before, before)
     progress("co-simulating after", 0.0)
-    better = _reaching(found.fit.robot, fitter, samples, before, workers) if kept else None
-    kept, rest = better is not None, Rest()
-    if not kept and (found.accepted or not before_is_noise):
-        rest = what_is_left(robot, found, fitter, evidence, alpha, progress)
-        better = _reaching(rest.discovery.robot, fitter, samples, before, workers) if rest.discovery else None
-    comparisons, floors = better or (comparisons, floors)
-    discovered = rest.discovery if better else None
-    final = discovered.robot if discovered else (found.fit.robot if kept else robot)
-    verdict, sentence = _verdict(robot, found, kept, before_is_noise, discovered)
-    begun = [note for s in samples for note in release_note(released(fitter, final, s), s.recording.path)]
-    shown = Separation((), ())
-    if kept or verdict == "none":
-        progress("what these recordings could show", 0.0)
-        shown = separation(found.fit.robot, robot, found.accepted, fitter, evidence.judge, alpha)
-    return Trace(
-        verdict=verdict,
-        sentence=sentence,
-        robot_before=robot,
-        robot_after=final,
-        effects=_effects(robot, found) if kept else (),
-        also_possible=found.alike if kept else (),
-        candidates=found.candidates,
-        formula=formula_text(robot, discovered.formulas) if discovered else None,
-        comparisons=comparisons,
-        noise_floor=floors[-1],
-        noise_before=before_is_noise,
-        noise_after=better is not None or before_is_noise,
-        left=fitter.innovations(final, evidence.judge).mean_square(evidence.judge.rows),
-        separation=shown,
-        components=ports.result(),
-        resonances=rest.resonances,
-        alpha=alpha,
-        notes=(*prepared.notes, *clocks, *_notes(evidence, samples), *rest.notes, *begun),
-        seconds=perf_counter() - began,
-    )
+    if found.accepted and _all_noise(_innovations(fitter, found.fit.robot, ready.evidence), ready.evidence):
+        better = reaching(found.fit.robot, fitter, samples, before, workers)
+        if better is not None:
+            return _Answer(found, True, None, Rest(), *better)
+    if not found.accepted and noise_alone:
+        return _Answer(found, False, None, Rest(), comparisons, floors)
+    rest = what_is_left(robot, found, fitter, ready.evidence, alpha, progress)
+    better = reaching(rest.discovery.robot, fitter, samples, before, workers) if rest.discovery else None
+    if better is None:
+        return _Answer(found, False, None, rest, comparisons, floors)
+    return _Answer(found, False, rest.discovery, rest, *better)
 
 
-def _reaching(
-    after: Robot, fitter: Fitter, samples: Sequence[Sample], before: Sequence[Motion], workers: Workers
-) -> tuple[tuple[Comparison, ...], list[Errors]] | None:
-    """What the co-simulation of a better robot leaves; None where that is more than noise.
-
-    It has the last word: a filter follows what the model itself would not do.
-    """
-    running = [workers.start(_cosimulated, released(fitter, after, sample), sample) for sample in samples]
-    better, lower = _compared(after, fitter, samples, before, [run.result() for run in running])
-    reached = all(_reached(c.errors_after, floor) for c, floor in zip(better, lower, strict=True))
-    return (better, lower) if reached else None
+def _begun(ready: _Ready, final: Robot) -> list[str]:
+    """What the last model says of how fast each recording begins."""
+    starts = [(released(ready.fitter, final, sample), sample.recording.path) for sample in ready.samples]
+    return [note for start, path in starts for note in release_note(start, path)]
 
 
 def _innovations(fitter: Fitter, robot: Robot, evidence: Evidence) -> tuple[Innovations, Innovations]:
@@ -154,70 +190,16 @@ def _require_samples(innovations: tuple[Innovations, Innovations], evidence: Evi
             raise RecordingError(sample.recording.path, "too few samples to tell noise from more", mend)
 
 
-def _compared(
-    robot: Robot,
-    fitter: Fitter,
-    samples: Sequence[Sample],
-    before: Sequence[Motion],
-    after: Sequence[Motion],
-) -> tuple[tuple[Comparison, ...], list[Errors]]:
-    """Both runs beside each recording, and what noise alone would leave there under the later robot."""
-    comparisons = tuple(
-        Comparison(role, s.recording, b, a, errors(s.recording, b), errors(s.recording, a))
-        for role, s, b, a in zip(ROLES, samples, before, after, strict=False)
-    )
-    return comparisons, [_floor(fitter, robot, sample) for sample in samples]
-
-
-def errors(recording: Recording, motion: Motion) -> Errors:
-    """Root mean squares of measured less co-simulated."""
-    return _root_mean_squares((recording.measured() - motion.measured()) ** 2)
-
-
-def _root_mean_squares(squares: Array) -> Errors:
-    return Errors(
-        position_rms=_root_mean(squares[:, :3]),
-        tension_rms=_root_mean(squares[:, 3:]),
-        axes=np.array([_root_mean(column) for column in squares[:, :3].T]),
-        cables=np.array([_root_mean(column) for column in squares[:, 3:].T]),
-    )
-
-
-def _root_mean(squares: Array) -> float:
-    seen = squares[np.isfinite(squares)]
-    return float(np.sqrt(np.mean(seen))) if seen.size else float("nan")
-
-
-def _cosimulated(robot: Robot, sample: Sample) -> Motion:
-    """The run of a robot placed where a recording starts."""
-    with TemporaryDirectory(prefix="tautwire-trace-") as folder:
-        fmus = build_fmus(robot.as_modelled(), Path(folder))
-        return cosimulate(fmus, sample.recording.time, sample.recording.winch_speed)
-
-
-def _floor(fitter: Fitter, robot: Robot, sample: Sample) -> Errors:
-    """What sensors and the recorded winch speeds' noise alone would leave in a simulation of this recording."""
-    variances = fitter.open_loop_variances(robot, sample)
-    return _root_mean_squares(np.where(np.isfinite(sample.recording.measured()), variances, np.nan))
-
-
 def _all_noise(innovations: Sequence[Innovations], evidence: Evidence) -> bool:
     """Whether nothing but noise is left, where the model was fitted as where it is judged."""
     samples = (evidence.fit, evidence.judge)
     return all(is_noise(found, sample.rows) for found, sample in zip(innovations, samples, strict=True))
 
 
-def _reached(after: Errors, floor: Errors) -> bool:
-    """Whether a co-simulation errs by no more than half over what noise alone leaves."""
-    pairs = ((after.position_rms, floor.position_rms), (after.tension_rms, floor.tension_rms))
-    return all(not error > REACHED * least for error, least in pairs)
-
-
-def _verdict(
-    robot: Robot, found: Found, kept: bool, noise_alone: bool, discovered: Discovery | None
-) -> tuple[VerdictName, str]:
+def _verdict(robot: Robot, answer: _Answer, noise_alone: bool) -> tuple[VerdictName, str]:
+    found, discovered = answer.found, answer.discovered
     names = " and ".join(h.label(robot) for h in found.accepted)
-    if kept:
+    if answer.effects_hold:
         return "effects", f"The model lacks {names}; with it, what is left is noise."
     if discovered:
         said = f"No known effect explains the residual; a formula does: {formula_text(robot, discovered.formulas)}."
