@@ -7,7 +7,8 @@ import signal
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
-from multiprocessing import get_all_start_methods, get_context
+from contextlib import contextmanager
+from multiprocessing import get_context
 from types import TracebackType
 from typing import Any, Generic, TypeVar
 
@@ -72,7 +73,7 @@ class Workers:
 
     def start(self, function: Callable[..., Result], *arguments: Any) -> Pending[Result]:
         """Begin a call; its result may be fetched once."""
-        future = None if self._pool() is None else self._pool().submit(function, *arguments)
+        future = None if self._pool() is None else self._submit(function, *arguments)
         return Pending(future, lambda: function(*arguments), self.between)
 
     def each(self, function: Callable[..., Result], calls: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Result]]:
@@ -81,7 +82,7 @@ class Workers:
             for number, arguments in enumerate(calls):
                 yield number, function(*arguments)
             return
-        futures = {self._pool().submit(function, *arguments): number for number, arguments in enumerate(calls)}
+        futures = {self._submit(function, *arguments): number for number, arguments in enumerate(calls)}
         waiting = set(futures)
         while waiting:
             self.between()
@@ -89,14 +90,29 @@ class Workers:
             for future in sorted(done, key=futures.__getitem__):
                 yield futures[future], future.result()
 
+    def _submit(self, function: Callable[..., Result], *arguments: Any) -> Future[Result]:
+        with _interrupts_blocked():
+            future: Future[Result] = self._pool().submit(function, *arguments)
+            return future
+
     def _pool(self) -> Any:
         if self.processes > 1 and self._executor is None and self._folder is not None:
-            method = "forkserver" if "forkserver" in get_all_start_methods() else "spawn"
-            context = get_context(method)
-            if method == "forkserver":
-                context.set_forkserver_preload([__package__ + ".attempts"])
-            self._executor = ProcessPoolExecutor(self.processes, context, _begin, (self._folder.name,))
+            # Not forked: threads of libraries would be missing. No fork server: its socket's path may be too long.
+            self._executor = ProcessPoolExecutor(self.processes, get_context("spawn"), _begin, (self._folder.name,))
         return self._executor
+
+
+@contextmanager
+def _interrupts_blocked() -> Iterator[None]:
+    """Processes that are started in the block do not get Ctrl-C; here it is only late."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, before)
 
 
 def _begin(folder: str) -> None:
