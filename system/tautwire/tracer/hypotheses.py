@@ -79,7 +79,7 @@ def joined(accepted: Sequence[Hypothesis], new: Hypothesis) -> list[Hypothesis]:
 
 
 def hypotheses(robot: Robot) -> tuple[Hypothesis, ...]:
-    """All single effects that could act on a robot, unlisted ones too; each in its forms that contain no smaller one."""
+    """Single effects that could act on a robot, unlisted ones too, each in its forms that contain no smaller one."""
     found: list[Hypothesis] = []
     for effect in (*ALL, *UNLISTED):
         for form in _smallest(effect.forms):
