@@ -81,15 +81,6 @@ def test_where_nothing_is_hidden_nothing_is_found(name: str) -> None:
 
 
 @pytest.mark.slow
-def test_a_frame_that_gives_way_is_no_softer_rope() -> None:
-    frame = {"unlisted_frame": {"stiffness_constant": 3e6, "viscosity": 2e3, "mass": 50.0}}
-    found, noise_is_left = searched("three", 9, frame)
-    assert [h.effect.name for h in found.accepted] == ["frame"]
-    assert found.fit.values[0] == pytest.approx(1.0 / 3e6, rel=0.03)
-    assert noise_is_left
-
-
-@pytest.mark.slow
 def test_an_effect_outside_the_list_leaves_more_than_noise() -> None:
     _, noise_is_left = searched("three", 7, {"unlisted_swing": {"mass": 20.0, "length": 2.0}})
     assert not noise_is_left

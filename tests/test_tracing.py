@@ -48,15 +48,3 @@ def test_no_name_is_given_where_the_rebuilt_fmus_miss_the_recording(monkeypatch:
     assert found.effects == ()
     assert found.robot_after == found.robot_before
     assert all(np.array_equal(c.after.position, c.before.position) for c in found.comparisons)
-
-
-@pytest.mark.slow
-def test_a_frame_that_gives_way_is_discovered_and_not_named_after_a_rope() -> None:
-    frame = {"unlisted_frame": {"stiffness_constant": 3e6, "viscosity": 2e3, "mass": 50.0}}
-    found = trace(example("three"), recorded("three", 9, frame), recorded("three", 59, frame), lambda what, done: None)
-    assert found.verdict == "discovered"
-    assert found.effects == ()
-    assert found.formula is not None
-    assert found.formula.startswith("frame: compliance = 3.")
-    assert found.robot_after.effects[0].values["compliance"] == pytest.approx(1.0 / 3e6, rel=0.03)
-    assert all(c.errors_after.tension_rms < 1.2 * found.noise_floor.tension_rms for c in found.comparisons)

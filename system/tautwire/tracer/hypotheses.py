@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from tautwire_fmu.laws.effects import ALL, ANCHOR, BY_NAME, UNLISTED, Effect, Parameter
+from tautwire_fmu.laws.effects import ALL, ANCHOR, BY_NAME, Effect, Parameter
 
 from ..robot import PER_CABLE, EffectSetting, Robot
 from ..symbolic import OF_FORMULAS, FreeParameter
@@ -79,9 +79,9 @@ def joined(accepted: Sequence[Hypothesis], new: Hypothesis) -> list[Hypothesis]:
 
 
 def hypotheses(robot: Robot) -> tuple[Hypothesis, ...]:
-    """Single effects that could act on a robot, unlisted ones too, each in its forms that contain no smaller one."""
+    """All single effects that could act on a robot, each in its forms that contain no smaller one."""
     found: list[Hypothesis] = []
-    for effect in (*ALL, *UNLISTED):
+    for effect in ALL:
         for form in _smallest(effect.forms):
             if effect.component not in PER_CABLE:
                 found.append(Hypothesis(effect, (), form))

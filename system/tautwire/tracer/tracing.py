@@ -6,8 +6,6 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 
-from tautwire_fmu.laws.effects import UNLISTED
-
 from ..cosimulation import Motion
 from ..errors import RecordingError
 from ..interrupt import interrupts_held
@@ -26,7 +24,6 @@ from .preparation import prepare
 from .release import release_note, released
 from .search import Found, search
 from .separation import separation
-from .trials import setting_of
 from .unexplained import Rest, what_is_left
 from .verdict import Comparison, Errors, Estimate, FoundEffect, Separation, Trace, VerdictName
 from .workers import Workers
@@ -35,7 +32,6 @@ from .written import formula_text
 Progress = Callable[[str, float], None]
 
 ALPHA = 0.01
-UNLISTED_NAMES = frozenset(effect.name for effect in UNLISTED)
 
 
 def trace(
@@ -115,10 +111,10 @@ def _trace(
         sentence=sentence,
         robot_before=robot,
         robot_after=final,
-        effects=tuple(e for e in _effects(robot, found) if e.name not in UNLISTED_NAMES) if kept else (),
+        effects=_effects(robot, found) if kept else (),
         also_possible=found.alike if kept else (),
         candidates=found.candidates,
-        formula=_formula(robot, answer),
+        formula=formula_text(robot, answer.discovered.formulas) if answer.discovered else None,
         comparisons=answer.comparisons,
         noise_floor=answer.floors[-1],
         noise_before=noise_alone,
@@ -203,8 +199,6 @@ def _all_noise(innovations: Sequence[Innovations], evidence: Evidence) -> bool:
 def _verdict(robot: Robot, answer: _Answer, noise_alone: bool) -> tuple[VerdictName, str]:
     found, discovered = answer.found, answer.discovered
     names = " and ".join(h.label(robot) for h in found.accepted)
-    if answer.effects_hold and _formula(robot, answer):
-        return "discovered", f"The model lacks {names}, {_formula(robot, answer)}; with it, what is left is noise."
     if answer.effects_hold:
         return "effects", f"The model lacks {names}; with it, what is left is noise."
     if discovered:
@@ -214,16 +208,6 @@ def _verdict(robot: Robot, answer: _Answer, noise_alone: bool) -> tuple[VerdictN
         return "none", "The residual is noise: this recording shows nothing that the model lacks."
     closest = f"; {names} comes closest but leaves too much" if found.accepted else ""
     return "unexplained", f"The residual is more than noise, and no known effect explains it{closest}."
-
-
-def _formula(robot: Robot, answer: _Answer) -> str | None:
-    """Of what is no kind of the list; None where there is nothing such."""
-    if answer.discovered:
-        return formula_text(robot, answer.discovered.formulas)
-    unlisted = [h for h in answer.found.accepted if h.effect in UNLISTED] if answer.effects_hold else []
-    settings = [setting_of(answer.found.fit.robot, hypothesis) for hypothesis in unlisted]
-    texts = [", ".join(f"{name} = {value:.4g}" for name, value in setting.values.items()) for setting in settings]
-    return "; ".join(f"{h.label(robot)}: {text}" for h, text in zip(unlisted, texts, strict=True)) or None
 
 
 def _effects(robot: Robot, found: Found) -> tuple[FoundEffect, ...]:

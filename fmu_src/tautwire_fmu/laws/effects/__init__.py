@@ -8,7 +8,6 @@ from .damping import DAMPING
 from .drag import DRAG
 from .drum import DRUM
 from .effect import ActiveEffect, Effect, Parameter, State
-from .frame import FRAME
 from .friction import FRICTION
 from .hysteresis import HYSTERESIS
 from .modulus import MODULUS
@@ -40,9 +39,6 @@ ALL: Tuple[Effect, ...] = (
     SENSOR_GAIN,
 )
 
-# What is no kind of the list: a trace that finds one has discovered it.
-UNLISTED: Tuple[Effect, ...] = (FRAME,)
+BY_NAME: Dict[str, Effect] = {effect.name: effect for effect in ALL}
 
-BY_NAME: Dict[str, Effect] = {effect.name: effect for effect in (*ALL, *UNLISTED)}
-
-__all__ = ["ALL", "BY_NAME", "UNLISTED", "ActiveEffect", "Effect", "Parameter", "State"]
+__all__ = ["ALL", "BY_NAME", "ActiveEffect", "Effect", "Parameter", "State"]
