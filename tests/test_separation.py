@@ -58,13 +58,17 @@ def test_sizes_are_given_for_every_effect_and_never_beyond_its_bounds() -> None:
     assert size_of(found, "payload", "mass").size < 1.0
 
 
-def test_relaxation_that_is_fast_looks_like_damping_and_payload_does_not() -> None:
-    fit, check = (recorded("three", seed, {"damping": {"damping": 9e8}}) for seed in (3, 53))
+def separation_beside(hypothesis: Hypothesis, value: float) -> Separation:
+    """Of recordings that hide an effect of one parameter, by the model that has it."""
+    (name,) = hypothesis.form
+    fit, check = (recorded("three", seed, {hypothesis.effect.name: {name: value}}) for seed in (3, 53))
     noise = noise_of(THREE, fit)
-    evidence, fitter = split(THREE, noise, fit, check), Fitter(noise)
-    damping = Hypothesis(DAMPING, ALL)
-    robot = THREE.with_effect(damping.setting(THREE, {"damping": 9e8}))
-    found = separation(robot, THREE, [damping], fitter, evidence.judge, 0.01)
+    robot = THREE.with_effect(hypothesis.setting(THREE, {name: value}))
+    return separation(robot, THREE, [hypothesis], Fitter(noise), split(THREE, noise, fit, check).judge, 0.01)
+
+
+def test_relaxation_that_is_fast_looks_like_damping_and_payload_does_not() -> None:
+    found = separation_beside(Hypothesis(DAMPING, ALL), 9e8)
     alike = {(each.other, each.other_cables): each for each in found.alike}
     assert alike[RELAXATION.name, ALL].cosine > 0.95
     assert (PAYLOAD.name, ()) not in alike
@@ -73,11 +77,6 @@ def test_relaxation_that_is_fast_looks_like_damping_and_payload_does_not() -> No
 
 
 def test_slow_relaxation_can_hardly_be_told_from_modulus() -> None:
-    fit, check = (recorded("three", seed, {"modulus": {"modulus": 1.12e11}}) for seed in (3, 53))
-    noise = noise_of(THREE, fit)
-    evidence, fitter = split(THREE, noise, fit, check), Fitter(noise)
-    modulus = Hypothesis(MODULUS, ALL)
-    robot = THREE.with_effect(modulus.setting(THREE, {"modulus": 1.12e11}))
-    found = separation(robot, THREE, [modulus], fitter, evidence.judge, 0.01)
+    found = separation_beside(Hypothesis(MODULUS, ALL), 1.12e11)
     assert found.alike[0].other == RELAXATION.name
     assert found.alike[0].cosine > 0.999
