@@ -1,6 +1,6 @@
 import pytest
 
-from tautwire.packaging import RobotFmus, build_fmus
+from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tests.robots import LIMITED, example, paper_robot, with_damping, with_winch
 
 

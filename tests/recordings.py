@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from tautwire.recording import AXES, Recording
+from tautwire.recordings.recording import AXES, Recording
 from tests.rig import SampledProgram, load_robot, make_recording, wander
 from tests.robots import EXAMPLES
 

@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tautwire.robot import Cable, Platform, Robot, Sensors, Winch
-from tautwire.robot_file import read_robot
+from tautwire.robots.reading import read_robot
+from tautwire.robots.robot import Cable, Platform, Robot, Sensors, Winch
 
 EXAMPLES = Path(str(files("tautwire"))) / "examples"
 NAMES = ("three", "caroca", "eight")

@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from tautwire.tracer.associations import strongest
+from tautwire.tracer.where.associations import strongest
 
 Array = NDArray[np.float64]
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tautwire.tracer.blame import blame, named, verdict_of
-from tautwire.tracer.port_residuals import ComponentResidual
+from tautwire.tracer.where.blame import blame, named, verdict_of
+from tautwire.tracer.where.port_residuals import ComponentResidual
 
 FINE = {1: False, 2: False, 3: False}
 SECOND = {1: False, 2: True, 3: False}

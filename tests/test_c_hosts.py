@@ -17,10 +17,10 @@ from fmpy.fmi2 import FMU2Slave
 from fmpy.model_description import ModelDescription
 from fmpy.validation import validate_fmu
 
-from tautwire import c_hosts
-from tautwire.c_hosts import CHostError, EmbeddablePython, make_for_c_hosts
-from tautwire.packaging import RobotFmus, build_fmus
-from tautwire.reference import integrate
+from tautwire.fmus import c_hosts
+from tautwire.fmus.c_hosts import CHostError, EmbeddablePython, make_for_c_hosts
+from tautwire.fmus.packaging import RobotFmus, build_fmus
+from tautwire.model.reference import integrate
 from tests.robots import paper_robot
 
 RAMPS = (0.3, 0.25, -0.25)

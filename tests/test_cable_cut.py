@@ -7,10 +7,10 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 
-from tautwire.cosimulation import Motion, cosimulate
-from tautwire.packaging import build_fmus
-from tautwire.tracer.cable_cut import CableRun, drift_variance, exit_shift, run_cable, tension_variance
-from tautwire.tracer.path import Path
+from tautwire.fmus.packaging import build_fmus
+from tautwire.runs.cosimulation import Motion, cosimulate
+from tautwire.tracer.where.cable_cut import CableRun, drift_variance, exit_shift, run_cable, tension_variance
+from tautwire.tracer.where.path import Path
 from tests.robots import example, gentle_speeds
 
 RATE = 100.0

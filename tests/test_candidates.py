@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tautwire.tracer.candidates import MOST_TERMS, Slopes, best_terms
-from tautwire.tracer.library import Term
+from tautwire.tracer.discovery.candidates import MOST_TERMS, Slopes, best_terms
+from tautwire.tracer.discovery.library import Term
 
 ROWS, MANY = 2000, 60
 TERMS = tuple(Term("force_x", f"vx**{power % 8}*{power}") for power in range(MANY))

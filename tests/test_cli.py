@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 from tautwire.cli import run
-from tautwire.robot_file import read_robot
+from tautwire.robots.reading import read_robot
 from tests.robots import EXAMPLES, example
 
 THREE = EXAMPLES / "three"

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from tautwire.errors import RecordingError
-from tautwire.recording import Recording
+from tautwire.recordings.recording import Recording
 from tautwire.tracer.adequacy import is_noise
-from tautwire.tracer.clock import CHANNELS, shifted, with_clocks_set
 from tautwire.tracer.data import Evidence, split
 from tautwire.tracer.fit import Fitter
-from tautwire.tracer.noise import noise_of
+from tautwire.tracer.preparation.clock import CHANNELS, shifted, with_clocks_set
+from tautwire.tracer.preparation.noise import noise_of
 from tests.recordings import recorded
 from tests.robots import example
 

@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tautwire.cosimulation import RunError, cosimulate, instantiated
+from tautwire.fmus.packaging import RobotFmus
 from tautwire.master import Component, ComponentError, FixedStep, Kept, Sampled, simulate
-from tautwire.packaging import RobotFmus
-from tautwire.robot_wiring import shown_ports
+from tautwire.runs.cosimulation import RunError, cosimulate, instantiated
+from tautwire.runs.wiring import shown_ports
 
 
 def test_a_failing_fmu_is_named_with_time_and_inputs(three_fmus: RobotFmus) -> None:

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tautwire.recording import Recording
-from tautwire.robot import Cable, Robot
-from tautwire.statics import static_tensions
-from tautwire.tracer.components import cut_at_ports
+from tautwire.recordings.recording import Recording
+from tautwire.robots.robot import Cable, Robot
+from tautwire.statics.equilibrium import static_tensions
 from tautwire.tracer.data import split
-from tautwire.tracer.noise import noise_of
-from tautwire.tracer.port_residuals import ComponentResidual, Components
+from tautwire.tracer.preparation.noise import noise_of
+from tautwire.tracer.where.components import cut_at_ports
+from tautwire.tracer.where.port_residuals import ComponentResidual, Components
 from tests.recordings import recorded
 from tests.robots import example
 

@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tautwire.robot import EffectSetting
-from tautwire.symbolic import FreeParameter
-from tautwire.tracer.compression import compressed
+from tautwire.model.symbolic import FreeParameter
+from tautwire.robots.robot import EffectSetting
 from tautwire.tracer.data import Sample
 from tautwire.tracer.likelihood import Likelihood
-from tautwire.tracer.noise import noise_of
+from tautwire.tracer.preparation.compression import compressed
+from tautwire.tracer.preparation.noise import noise_of
 from tests.recordings import recorded
 from tests.robots import example
 

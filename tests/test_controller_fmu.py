@@ -26,8 +26,8 @@ from tautwire.control import (
     schedule_robust,
     shape_along,
 )
-from tautwire.packaging import RobotFmus, build_fmus
-from tautwire.robot import Robot
+from tautwire.fmus.packaging import RobotFmus, build_fmus
+from tautwire.robots.robot import Robot
 from tautwire.trajectory import Line, Trajectory
 from tests.fmus import Hand, in_hand
 from tests.robots import LIMITED, example, with_winch

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from tautwire.cosimulation import instantiated
+from tautwire.fmus.packaging import RobotFmus
 from tautwire.master import AdaptiveStep, Coupling, FixedStep, Kept, Sampled, StepError, simulate
-from tautwire.packaging import RobotFmus
-from tautwire.robot_wiring import connections, shown_ports, winch_ports
+from tautwire.runs.cosimulation import instantiated
+from tautwire.runs.wiring import connections, shown_ports, winch_ports
 from tests.rig import RampProgram
 from tests.rig import simulate as rig_simulate
 from tests.robots import paper_robot

@@ -1,7 +1,7 @@
 import numpy as np
 
 from tautwire.tracer.data import split
-from tautwire.tracer.noise import noise_of
+from tautwire.tracer.preparation.noise import noise_of
 from tests.recordings import recorded
 from tests.robots import example
 

@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 
-from tautwire.robot import Formula, Robot
+from tautwire.robots.robot import Formula, Robot
 from tautwire.tracer.data import split
-from tautwire.tracer.discovery import Discovery, discover
+from tautwire.tracer.discovery.discovery import Discovery, discover
+from tautwire.tracer.discovery.written import formula_text
 from tautwire.tracer.fit import Fitter
-from tautwire.tracer.noise import noise_of
-from tautwire.tracer.written import formula_text
+from tautwire.tracer.preparation.noise import noise_of
 from tests.recordings import recorded
 from tests.robots import example
 

@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from tautwire.distribution import excess_tensions, nearest_tensions
-from tautwire.robot import TensionLimits
+from tautwire.robots.robot import TensionLimits
+from tautwire.statics.distribution import excess_tensions, nearest_tensions
 
 DRAWS = np.random.default_rng(7)
 SKETCHES = [DRAWS.normal(size=(3, int(count))) for count in (4, 5, 6, 8)]

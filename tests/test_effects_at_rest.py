@@ -13,10 +13,10 @@ from scipy.integrate import trapezoid
 from tautwire.control import path_tensions
 from tautwire.errors import RobotFileError, UnreachableError
 from tautwire.linear import linearise
-from tautwire.robot import PER_CABLE, EffectSetting, Platform, Robot
-from tautwire.robot_file import read_robot, robot_text, write_robot
-from tautwire.statics import directions, routes, static_forces, static_tensions
-from tautwire.symbolic import FreeParameter, Model, symbolic_model
+from tautwire.model.symbolic import FreeParameter, Model, symbolic_model
+from tautwire.robots.reading import read_robot, robot_text, write_robot
+from tautwire.robots.robot import PER_CABLE, EffectSetting, Platform, Robot
+from tautwire.statics.equilibrium import directions, routes, static_forces, static_tensions
 from tautwire.trajectory import Line, ideal_winch_speeds
 from tautwire_fmu.laws.effects import ALL, BY_NAME, Effect
 from tautwire_fmu.laws.mathematics import REAL

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tautwire.reference import ReferenceRun, integrate
-from tautwire.robot import Robot
+from tautwire.model.reference import ReferenceRun, integrate
+from tautwire.robots.robot import Robot
 from tests.effect_cases import CASES, PAIRS, Case
 from tests.rig import Rig, SampledProgram
 from tests.rig.record import Accuracy, outputs

@@ -8,7 +8,7 @@ import pytest
 from tautwire.cli import run
 from tautwire.excitation import ExcitationError, Limits, MultisinePath, default_limits, excite
 from tautwire.excitation.limits import named_effects
-from tautwire.reference import integrate
+from tautwire.model.reference import integrate
 from tests.robots import EXAMPLES, example
 
 THREE = example("three")

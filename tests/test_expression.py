@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tautwire.symbolic import CASADI
+from tautwire.model.symbolic import CASADI
 from tautwire_fmu.laws.expression import DEEPEST, LONGEST, ExpressionError, evaluate, names_in, read_expression
 from tautwire_fmu.laws.mathematics import COMPLEX_STEP, REAL, along, rate_of
 

@@ -17,10 +17,10 @@ from tautwire.control import (
     rigid_reference,
     sample_times,
 )
-from tautwire.cosimulation import Motion
 from tautwire.errors import UnreachableError
-from tautwire.packaging import RobotFmus, build_fmus
-from tautwire.robot import EffectSetting, Robot
+from tautwire.fmus.packaging import RobotFmus, build_fmus
+from tautwire.robots.robot import EffectSetting, Robot
+from tautwire.runs.cosimulation import Motion
 from tautwire.trajectory import Line, Trajectory
 from tests.robots import example, paper_robot
 from tests.winch_ramp import WinchRamp

@@ -1,10 +1,10 @@
 import pytest
 
-from tautwire.robot import EffectSetting
+from tautwire.robots.robot import EffectSetting
 from tautwire.tracer.data import split
 from tautwire.tracer.fit import Fitter
 from tautwire.tracer.hypotheses import Hypothesis
-from tautwire.tracer.noise import noise_of
+from tautwire.tracer.preparation.noise import noise_of
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.recordings import recorded
 from tests.robots import example

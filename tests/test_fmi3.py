@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 
-from tautwire.cosimulation import Motion, RunError, cosimulate
+from tautwire.fmus.packaging import build_fmus
 from tautwire.master import Component, ComponentError, Journal, LostError, WatchedComponent
 from tautwire.master.journal import Entry
 from tautwire.master.wiring import direct_inputs
-from tautwire.packaging import build_fmus
-from tautwire.robot import OwnFmu
-from tautwire.ssp import write_ssp
+from tautwire.robots.robot import OwnFmu
+from tautwire.runs.cosimulation import Motion, RunError, cosimulate
+from tautwire.runs.ssp import write_ssp
 from tests.own_fmus import LAG, compiler, lag_winch, lag_winch_3, packed_3
 from tests.robots import paper_robot
 

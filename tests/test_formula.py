@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tautwire.cosimulation import cosimulate
+from tautwire.fmus.packaging import build_fmus
 from tautwire.linear import linearise
-from tautwire.packaging import build_fmus
-from tautwire.reference import integrate
-from tautwire.robot import Formula, Robot
-from tautwire.statics import static_tensions
-from tautwire.symbolic import OF_FORMULAS, FreeParameter, symbolic_model
+from tautwire.model.reference import integrate
+from tautwire.model.symbolic import OF_FORMULAS, FreeParameter, symbolic_model
+from tautwire.robots.robot import Formula, Robot
+from tautwire.runs.cosimulation import cosimulate
+from tautwire.statics.equilibrium import static_tensions
 from tests.fmus import in_hand
 from tests.rig import Rig, SampledProgram
 from tests.rig.record import outputs

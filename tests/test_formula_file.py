@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from tautwire.errors import RobotFileError
-from tautwire.robot import Formula, Robot
-from tautwire.robot_file import read_robot, robot_text, write_robot
+from tautwire.robots.reading import read_robot, robot_text, write_robot
+from tautwire.robots.robot import Formula, Robot
 from tests.robots import example
 
 ROBOT = example("three")

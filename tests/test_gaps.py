@@ -2,9 +2,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from tautwire.recording import Recording
-from tautwire.tracer.gaps import without_gaps
-from tautwire.tracer.noise import noise_of
+from tautwire.recordings.recording import Recording
+from tautwire.tracer.preparation.gaps import without_gaps
+from tautwire.tracer.preparation.noise import noise_of
 from tests.recordings import recorded
 from tests.robots import example
 

@@ -3,10 +3,10 @@
 import numpy as np
 import pytest
 
-from tautwire.cosimulation import instantiated
+from tautwire.fmus.packaging import RobotFmus
 from tautwire.master import Port
 from tautwire.master.hermite import Chain, chains_of, scaled, shares
-from tautwire.packaging import RobotFmus
+from tautwire.runs.cosimulation import instantiated
 
 NAMES = ("position", "velocity", "acceleration")
 

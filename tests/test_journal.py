@@ -6,10 +6,10 @@ import fmpy
 import numpy as np
 import pytest
 
-from tautwire.cosimulation import instantiated
+from tautwire.fmus.packaging import RobotFmus
 from tautwire.master import Component, Journal, Port, WatchedComponent
 from tautwire.master.journal import PLACE, TIME, Entry
-from tautwire.packaging import RobotFmus
+from tautwire.runs.cosimulation import instantiated
 
 PORTS = [Port("left", "push"), Port("right", "push"), Port("right", "pull")]
 

@@ -5,11 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tautwire.cosimulation import instantiated
+from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.master import Account, FixedStep, Kept, Sampled, simulate
-from tautwire.packaging import RobotFmus, build_fmus
-from tautwire.robot import Platform
-from tautwire.robot_wiring import shown_ports
+from tautwire.robots.robot import Platform
+from tautwire.runs.cosimulation import instantiated
+from tautwire.runs.wiring import shown_ports
 from tests.rig import SampledProgram
 from tests.rig import simulate as rig_simulate
 from tests.robots import paper_robot

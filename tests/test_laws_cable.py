@@ -9,7 +9,7 @@ import numpy as np
 import pint
 import pytest
 
-from tautwire.symbolic import CASADI
+from tautwire.model.symbolic import CASADI
 from tautwire_fmu.laws.cable import (
     LAWS,
     CableConstants,

@@ -3,9 +3,9 @@
 import casadi
 import numpy as np
 
-from tautwire.symbolic import CASADI
-from tautwire.tracer.library import SHAPE, Term, library, reach_of
-from tautwire.tracer.ports import Along
+from tautwire.model.symbolic import CASADI
+from tautwire.tracer.discovery.library import SHAPE, Term, library, reach_of
+from tautwire.tracer.discovery.ports import Along
 from tautwire_fmu.laws.expression import evaluate, read_expression
 from tautwire_fmu.laws.formula import FORCES, IN_ROPE, ON_PLATFORM, PLACES
 from tests.robots import example

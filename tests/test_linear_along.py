@@ -3,7 +3,7 @@ import pytest
 
 from tautwire.errors import InputError, UnreachableError
 from tautwire.linear import linearise, modes_along
-from tautwire.robot import Cable, Platform, Robot, Sensors, TensionLimits
+from tautwire.robots.robot import Cable, Platform, Robot, Sensors, TensionLimits
 from tautwire.trajectory import PAPER_HELIX, Line
 from tests.robots import example, paper_robot
 

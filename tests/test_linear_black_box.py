@@ -14,6 +14,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tautwire.errors import InputError
+from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.linear import (
     BlackBoxPlant,
     IdentificationError,
@@ -22,8 +23,7 @@ from tautwire.linear import (
     linearise_robot_fmus,
 )
 from tautwire.master import Component, Connection, Coupling, Port
-from tautwire.packaging import RobotFmus, build_fmus
-from tautwire.robot import EffectSetting, OwnFmu, Robot, Winch
+from tautwire.robots.robot import EffectSetting, OwnFmu, Robot, Winch
 from tests.effect_cases import CASES, Case
 from tests.own_fmus import LAG, compiler, falling_mass, lag_winch
 from tests.robots import NAMES, example, paper_robot, with_winch

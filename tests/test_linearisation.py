@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tautwire.robot import PER_CABLE, EffectSetting
-from tautwire.symbolic import FreeParameter
+from tautwire.model.symbolic import FreeParameter
+from tautwire.robots.robot import PER_CABLE, EffectSetting
 from tautwire.tracer.directions import EffectDirections
 from tautwire.tracer.likelihood import Likelihood
 from tautwire.tracer.linearisation import linearise_run
-from tautwire.tracer.noise import noise_of
+from tautwire.tracer.preparation.noise import noise_of
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.recordings import recorded
 from tests.robots import example

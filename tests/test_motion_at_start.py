@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from tautwire.errors import RecordingError
-from tautwire.recording import Recording
+from tautwire.recordings.recording import Recording
 from tautwire.tracer.adequacy import is_noise
 from tautwire.tracer.cosimulated import cosimulated, errors, floor_of
 from tautwire.tracer.data import split
 from tautwire.tracer.fit import Fitter
-from tautwire.tracer.motion_at_start import beginning_of, with_motion_at_start
-from tautwire.tracer.noise import noise_of
-from tautwire.tracer.preparation import prepare
-from tautwire.tracer.release import release_note, released
+from tautwire.tracer.preparation.motion_at_start import beginning_of, with_motion_at_start
+from tautwire.tracer.preparation.noise import noise_of
+from tautwire.tracer.preparation.preparation import prepare
+from tautwire.tracer.preparation.release import release_note, released
 from tests.recordings import recorded
 from tests.rig import SampledProgram, load_robot, make_recording, wander
 from tests.robots import EXAMPLES, NAMES, example

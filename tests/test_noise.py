@@ -2,8 +2,8 @@ from dataclasses import replace
 
 import pytest
 
-from tautwire.robot import Sensors
-from tautwire.tracer.noise import noise_of
+from tautwire.robots.robot import Sensors
+from tautwire.tracer.preparation.noise import noise_of
 from tests.recordings import recorded
 from tests.robots import example
 

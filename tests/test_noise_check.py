@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
-from tautwire.recording import Recording
-from tautwire.robot import Robot, Sensors
-from tautwire.tracer.noise import noise_of
-from tautwire.tracer.noise_check import CheckedNoise, checked_noise
+from tautwire.recordings.recording import Recording
+from tautwire.robots.robot import Robot, Sensors
+from tautwire.tracer.preparation.noise import noise_of
+from tautwire.tracer.preparation.noise_check import CheckedNoise, checked_noise
 from tests.recordings import recorded
 from tests.robots import NAMES, example
 

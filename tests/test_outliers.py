@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tautwire.errors import RecordingError
-from tautwire.recording import Recording
-from tautwire.tracer.outliers import outliers, without_outliers
+from tautwire.recordings.recording import Recording
+from tautwire.tracer.preparation.outliers import outliers, without_outliers
 from tests.recordings import recorded
 from tests.robots import NAMES
 

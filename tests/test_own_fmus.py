@@ -13,12 +13,12 @@ import pandas as pd
 import pytest
 
 from tautwire.cli import run
-from tautwire.cosimulation import RunError, cosimulate
-from tautwire.packaging import RobotFmus, build_fmus
-from tautwire.robot import OwnFmu
-from tautwire.robot_file import write_robot
-from tautwire.robot_wiring import wiring_of
-from tautwire.slots import SlotError, lacking_ports
+from tautwire.fmus.packaging import RobotFmus, build_fmus
+from tautwire.fmus.slots import SlotError, lacking_ports
+from tautwire.robots.reading import write_robot
+from tautwire.robots.robot import OwnFmu
+from tautwire.runs.cosimulation import RunError, cosimulate
+from tautwire.runs.wiring import wiring_of
 from tests.own_fmus import LAG, compiler, falling_mass, lag_winch, packed, spring_cable
 from tests.rig import RampProgram, simulate
 from tests.robots import paper_robot

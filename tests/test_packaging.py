@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 
-from tautwire.packaging import RobotFmus, build_fmus
-from tautwire.robot import EffectSetting
+from tautwire.fmus.packaging import RobotFmus, build_fmus
+from tautwire.robots.robot import EffectSetting
 from tests.fmus import in_hand
 from tests.robots import paper_robot
 

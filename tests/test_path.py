@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tautwire.recording import Recording
-from tautwire.tracer.path import Path, likeliest_intensity, smooth, smoothed_path
+from tautwire.recordings.recording import Recording
+from tautwire.tracer.where.path import Path, likeliest_intensity, smooth, smoothed_path
 
 Array = NDArray[np.float64]
 

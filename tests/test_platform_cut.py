@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tautwire.packaging import build_fmus
-from tautwire.robot import EffectSetting, Robot
-from tautwire.tracer.cable_cut import CableRun
-from tautwire.tracer.path import Path
-from tautwire.tracer.platform_cut import balance, measured_forces, run_platform
+from tautwire.fmus.packaging import build_fmus
+from tautwire.robots.robot import EffectSetting, Robot
+from tautwire.tracer.where.cable_cut import CableRun
+from tautwire.tracer.where.path import Path
+from tautwire.tracer.where.platform_cut import balance, measured_forces, run_platform
 from tests.robots import example
 
 Array = NDArray[np.float64]

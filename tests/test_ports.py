@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tautwire.robot import Formula, Robot
-from tautwire.symbolic import OF_FORMULAS, FreeParameter
-from tautwire.tracer.library import Term
+from tautwire.model.symbolic import OF_FORMULAS, FreeParameter
+from tautwire.robots.robot import Formula, Robot
+from tautwire.tracer.discovery.library import Term
+from tautwire.tracer.discovery.ports import Ports, moves
 from tautwire.tracer.likelihood import Likelihood
 from tautwire.tracer.linearisation import linearise_run
-from tautwire.tracer.noise import noise_of
-from tautwire.tracer.ports import Ports, moves
+from tautwire.tracer.preparation.noise import noise_of
 from tests.recordings import recorded
 from tests.robots import example
 

@@ -10,11 +10,11 @@ import pytest
 
 from tautwire.cli import run
 from tautwire.errors import RecordingError
-from tautwire.recording import Recording
+from tautwire.recordings.recording import Recording
 from tautwire.tracer.adequacy import is_noise
 from tautwire.tracer.data import split
 from tautwire.tracer.fit import Fitter
-from tautwire.tracer.preparation import Prepared, prepare
+from tautwire.tracer.preparation.preparation import Prepared, prepare
 from tautwire.tracer.tracing import trace
 from tests.recordings import recorded
 from tests.robots import EXAMPLES, example

@@ -11,7 +11,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tautwire.errors import InputError, RecordingError
-from tautwire.recording import Recording, read_recording, require_outputs
+from tautwire.recordings.recording import Recording, read_recording, require_outputs
 
 HEADER = "time,winch_speed_1,winch_speed_2,winch_speed_3,tension_1,tension_2,tension_3,x,y,z"
 PLAIN = f"""{HEADER}

@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 
 from tautwire.errors import RecordingError
-from tautwire.recording import read_recording
+from tautwire.recordings.recording import read_recording
 from tests.test_recording_parquet import COLUMNS, same
 
 asammdf = pytest.importorskip("asammdf")

@@ -14,7 +14,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tautwire.errors import InputError, RecordingError
-from tautwire.recording import Recording, read_recording
+from tautwire.recordings.recording import Recording, read_recording
 
 COLUMNS: dict[str, Any] = {
     "time": [0.0, 0.01, 0.02],

@@ -16,7 +16,7 @@ import pytest
 from tautwire.report import trace_document, trace_page, write_report
 from tautwire.report.figures import MOST_POINTS, page_data
 from tautwire.report.series import envelope, envelope_times, noise_density, packed, spectrum, unpacked
-from tautwire.robot_file import read_robot
+from tautwire.robots.reading import read_robot
 from tautwire.tracer.verdict import Separation, Trace
 from tests.traces import HOSTILE, TENSION_NOISE, made_trace, nothing_found, without_positions
 

@@ -7,7 +7,7 @@ import numpy as np
 from tautwire.report import trace_document
 from tautwire.report.charts import log_bar
 from tautwire.report.where import where
-from tautwire.tracer.port_residuals import Components
+from tautwire.tracer.where.port_residuals import Components
 from tests.test_report_page import Page
 from tests.traces import HOSTILE, made_trace
 

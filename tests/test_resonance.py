@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 
 from tautwire.tracer.data import split
+from tautwire.tracer.discovery.resonance import resonances
 from tautwire.tracer.fit import Fitter
-from tautwire.tracer.noise import noise_of
-from tautwire.tracer.resonance import resonances
+from tautwire.tracer.preparation.noise import noise_of
 from tautwire.tracer.verdict import Resonance
 from tests.recordings import recorded
 from tests.robots import example

@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from tautwire.tracer.ringing import ringing
+from tautwire.tracer.where.ringing import ringing
 
 Array = NDArray[np.float64]
 

@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tautwire.errors import RobotFileError
-from tautwire.robot import (
+from tautwire.robots.reading import read_robot, robot_text, write_robot
+from tautwire.robots.robot import (
     PER_CABLE,
     Cable,
     EffectSetting,
@@ -23,7 +24,6 @@ from tautwire.robot import (
     Winch,
     slots,
 )
-from tautwire.robot_file import read_robot, robot_text, write_robot
 from tautwire_fmu.laws.cable import LAWS
 from tautwire_fmu.laws.effects import ALL
 

@@ -26,8 +26,8 @@ from tautwire.control import (
     schedule_robust,
 )
 from tautwire.control.plan import plan_data
-from tautwire.packaging import RobotFmus, build_fmus
-from tautwire.robot import Robot
+from tautwire.fmus.packaging import RobotFmus, build_fmus
+from tautwire.robots.robot import Robot
 from tautwire.trajectory import Line
 from tautwire_fmu.laws import sampled_control as law
 from tests.robots import example

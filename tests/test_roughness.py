@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tautwire.roughness import roughness
+from tautwire.recordings.roughness import roughness
 
 
 def test_roughness_passes_over_what_is_smooth_what_is_missing_and_outliers() -> None:

@@ -16,8 +16,8 @@ from tautwire.control import (
     sample_times,
     schedule_controller,
 )
-from tautwire.packaging import RobotFmus, build_fmus
-from tautwire.robot import Robot
+from tautwire.fmus.packaging import RobotFmus, build_fmus
+from tautwire.robots.robot import Robot
 from tautwire.trajectory import PAPER_HELIX, Line
 from tests.robots import example
 

@@ -6,12 +6,12 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tautwire.recording import Recording
-from tautwire.robot import EffectSetting, Robot
+from tautwire.recordings.recording import Recording
+from tautwire.robots.robot import EffectSetting, Robot
 from tautwire.tracer.adequacy import is_noise
 from tautwire.tracer.data import split
 from tautwire.tracer.fit import Fitter
-from tautwire.tracer.noise import noise_of
+from tautwire.tracer.preparation.noise import noise_of
 from tautwire.tracer.search import Found, search
 from tests.recordings import recorded
 from tests.robots import example

@@ -5,11 +5,11 @@ from math import isfinite, sqrt
 import numpy as np
 import pytest
 
-from tautwire.robot import Robot
+from tautwire.robots.robot import Robot
 from tautwire.tracer.data import Evidence, split
 from tautwire.tracer.fit import Fitter
 from tautwire.tracer.hypotheses import Hypothesis, hypotheses
-from tautwire.tracer.noise import noise_of
+from tautwire.tracer.preparation.noise import noise_of
 from tautwire.tracer.separation import separation
 from tautwire.tracer.verdict import Detectable, Separation
 from tautwire_fmu.laws.effects import DAMPING, MODULUS, PAYLOAD, RELAXATION

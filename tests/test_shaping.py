@@ -23,7 +23,7 @@ from tautwire.control import (
 )
 from tautwire.control.shaping import Kind
 from tautwire.errors import InputError
-from tautwire.packaging import RobotFmus
+from tautwire.fmus.packaging import RobotFmus
 from tautwire.trajectory import Line, Trajectory
 from tests.robots import paper_robot
 from tests.winch_ramp import WinchRamp

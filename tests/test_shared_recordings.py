@@ -4,8 +4,8 @@ from pathlib import Path
 
 import pytest
 
-from tautwire.recording import read_recording
-from tautwire.robot_file import read_robot
+from tautwire.recordings.recording import read_recording
+from tautwire.robots.reading import read_robot
 from tautwire.tracer import Trace, trace
 
 FOLDER = Path(__file__).parent.parent.parent / "shared" / "recordings"

@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tautwire.recording import Recording
-from tautwire.tracer.silent import without_silent
+from tautwire.recordings.recording import Recording
+from tautwire.tracer.preparation.silent import without_silent
 from tests.recordings import recorded
 from tests.robots import NAMES
 

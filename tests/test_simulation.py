@@ -8,12 +8,12 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from tautwire import result_file
 from tautwire.errors import RecordingError
 from tautwire.master.watch import PATIENCE
-from tautwire.result_file import result_in_place
-from tautwire.robot_wiring import result_columns
-from tautwire.simulation import simulate_recording
+from tautwire.runs import result_file
+from tautwire.runs.result_file import result_in_place
+from tautwire.runs.simulation import simulate_recording
+from tautwire.runs.wiring import result_columns
 from tests.bench.long import STEP, write_recording
 from tests.memory import TOLD, resident_memory
 from tests.robots import example

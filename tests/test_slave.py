@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from tautwire.packaging import RobotFmus
+from tautwire.fmus.packaging import RobotFmus
 from tests.fmus import Hand, in_hand
 
 MOTION = {"position__z": 5.1, "velocity__x": 0.2, "velocity__z": -0.3, "winch_speed": 0.4}

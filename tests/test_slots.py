@@ -11,9 +11,9 @@ import fmpy
 import pytest
 
 from tautwire.errors import InputError
-from tautwire.packaging import RobotFmus, build_fmus, gathered
-from tautwire.robot import OwnFmu, slots
-from tautwire.slots import SlotError, check_own_fmus, own_fmus, require_steps, slot_ports, unstated_units
+from tautwire.fmus.packaging import RobotFmus, build_fmus, gathered
+from tautwire.fmus.slots import SlotError, check_own_fmus, own_fmus, require_steps, slot_ports, unstated_units
+from tautwire.robots.robot import OwnFmu, slots
 from tests.own_fmus import falling_mass, packed, packed_3
 from tests.robots import paper_robot
 

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
+from tautwire.tracer.discovery.spectrum import rhythms
 from tautwire.tracer.likelihood import Innovations
-from tautwire.tracer.spectrum import rhythms
 
 TIME = np.arange(1500) / 50.0
 EVERY = np.ones(1500, dtype=bool)

@@ -13,10 +13,10 @@ from fmpy.ssp.ssd import read_ssd, validate_tree
 from lxml import etree
 
 from tautwire.errors import InputError
-from tautwire.packaging import RobotFmus, build_fmus
-from tautwire.robot import EffectSetting
-from tautwire.robot_wiring import connections, shown_ports, winch_ports
-from tautwire.ssp import COMPONENTS_ONLY, OPEN, ssp_name, write_ssp
+from tautwire.fmus.packaging import RobotFmus, build_fmus
+from tautwire.robots.robot import EffectSetting
+from tautwire.runs.ssp import COMPONENTS_ONLY, OPEN, ssp_name, write_ssp
+from tautwire.runs.wiring import connections, shown_ports, winch_ports
 from tautwire_fmu.units import UNITS
 from tests.robots import paper_robot
 

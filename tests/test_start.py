@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tautwire.errors import UnreachableError
-from tautwire.recording import Recording
-from tautwire.start import placed, start_of
+from tautwire.recordings.recording import Recording
+from tautwire.runs.start import placed, start_of
 from tests.recordings import recorded
 from tests.robots import example
 

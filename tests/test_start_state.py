@@ -5,14 +5,14 @@ import casadi
 import numpy as np
 import pytest
 
-from tautwire.recording import Recording
-from tautwire.robot import Release
-from tautwire.robot_file import read_robot, robot_text, write_robot
-from tautwire.statics import static_tensions
-from tautwire.symbolic import symbolic_model
+from tautwire.model.symbolic import symbolic_model
+from tautwire.recordings.recording import Recording
+from tautwire.robots.reading import read_robot, robot_text, write_robot
+from tautwire.robots.robot import Release
+from tautwire.statics.equilibrium import static_tensions
 from tautwire.tracer.filter_step import Noise
-from tautwire.tracer.noise import noise_of
-from tautwire.tracer.start_state import self_stress_of, self_stresses, start_covariance
+from tautwire.tracer.preparation.noise import noise_of
+from tautwire.tracer.preparation.start_state import self_stress_of, self_stresses, start_covariance
 from tests.recordings import recorded
 from tests.robots import example
 

@@ -5,8 +5,8 @@ import pytest
 from scipy.optimize import minimize
 
 from tautwire.errors import UnreachableError
-from tautwire.robot import EffectSetting, TensionLimits
-from tautwire.statics import directions, static_tensions
+from tautwire.robots.robot import EffectSetting, TensionLimits
+from tautwire.statics.equilibrium import directions, static_tensions
 from tests.robots import NAMES, example, paper_robot
 
 

@@ -4,9 +4,9 @@ import casadi
 import numpy as np
 import pytest
 
-from tautwire.robot import EffectSetting
-from tautwire.statics import static_tensions
-from tautwire.symbolic import FreeParameter, symbolic_model
+from tautwire.model.symbolic import FreeParameter, symbolic_model
+from tautwire.robots.robot import EffectSetting
+from tautwire.statics.equilibrium import static_tensions
 from tests.robots import NAMES, example
 
 

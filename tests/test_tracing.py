@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tautwire.cosimulation import Motion, cosimulate
+from tautwire.runs.cosimulation import Motion, cosimulate
 from tautwire.tracer import Trace, trace
 from tautwire.tracer.cosimulated import errors
 from tests.recordings import recorded

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tautwire.cosimulation import cosimulate
-from tautwire.packaging import build_fmus
+from tautwire.fmus.packaging import build_fmus
 from tautwire.report.document import trace_document
-from tautwire.robot_file import read_robot, write_robot
+from tautwire.robots.reading import read_robot, write_robot
+from tautwire.runs.cosimulation import cosimulate
 from tautwire.tracer import Trace, trace
 from tests.recordings import recorded
 from tests.robots import example

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 
 from tautwire.control import cosimulate_closed_loop, design_controller
-from tautwire.cosimulation import Motion, RunError, cosimulate
+from tautwire.fmus.packaging import RobotFmus
 from tautwire.master import (
     Account,
     ComponentError,
@@ -30,7 +30,7 @@ from tautwire.master import (
     simulate_watched,
     watch,
 )
-from tautwire.packaging import RobotFmus
+from tautwire.runs.cosimulation import Motion, RunError, cosimulate
 from tautwire.trajectory import PAPER_HELIX
 from tests.faults import FAULT, NUMBERS, build_faulty, coupled
 from tests.robots import paper_robot

@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from tautwire.packaging import RobotFmus, build_fmus
-from tautwire.robot import Winch
+from tautwire.fmus.packaging import RobotFmus, build_fmus
+from tautwire.robots.robot import Winch
 from tests.fmus import Hand, in_hand
 from tests.rig import Drive
 from tests.robots import LIMITED, paper_robot, with_winch

@@ -2,10 +2,10 @@ from collections.abc import Iterator
 
 import pytest
 
+from tautwire.fmus.packaging import RobotFmus
 from tautwire.master import Component, Connection, Port, WiringError
 from tautwire.master.wiring import check, levels
-from tautwire.packaging import RobotFmus
-from tautwire.robot_wiring import connections
+from tautwire.runs.wiring import connections
 
 
 @pytest.fixture

@@ -4,11 +4,11 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tautwire.distribution import nearest_tensions
 from tautwire.errors import InputError, UnreachableError
-from tautwire.robot import Cable, EffectSetting, Platform, Robot, Sensors, TensionLimits
-from tautwire.statics import directions, static_tensions
-from tautwire.workspace import wrench_feasible_workspace, wrench_margin
+from tautwire.robots.robot import Cable, EffectSetting, Platform, Robot, Sensors, TensionLimits
+from tautwire.statics.distribution import nearest_tensions
+from tautwire.statics.equilibrium import directions, static_tensions
+from tautwire.statics.workspace import wrench_feasible_workspace, wrench_margin
 from tests.robots import NAMES, example, paper_robot
 
 

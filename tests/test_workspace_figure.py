@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from tautwire.errors import InputError
-from tautwire.workspace import wrench_feasible_workspace
-from tautwire.workspace_figure import checked_format, workspace_figure
+from tautwire.statics.workspace import wrench_feasible_workspace
+from tautwire.statics.workspace_figure import checked_format, workspace_figure
 from tests.robots import example
 
 

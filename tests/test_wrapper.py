@@ -8,8 +8,8 @@ from pathlib import Path
 
 import pytest
 
-from tautwire.packaging import RobotFmus
-from tautwire.wrapper import RETURN, mend_exit, returning_at_once
+from tautwire.fmus.packaging import RobotFmus
+from tautwire.fmus.wrapper import RETURN, mend_exit, returning_at_once
 
 LIBRARY = files("pythonfmu") / "resources/binaries/linux64/libpythonfmu-export.so"
 MANY = """

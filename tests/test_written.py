@@ -4,9 +4,9 @@ from dataclasses import replace
 
 import pytest
 
-from tautwire.robot import Formula
-from tautwire.tracer.library import SHAPE, Term
-from tautwire.tracer.written import closed, formula_text, known_digits, opened
+from tautwire.robots.robot import Formula
+from tautwire.tracer.discovery.library import SHAPE, Term
+from tautwire.tracer.discovery.written import closed, formula_text, known_digits, opened
 from tests.robots import example
 
 WAVE = Term("force_x", f"sin({SHAPE}*time)", family="time", shape=10.68129)

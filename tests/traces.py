@@ -7,11 +7,9 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tautwire.cosimulation import Motion
-from tautwire.recording import Recording
-from tautwire.robot import Cable, EffectSetting, Platform, Robot, Sensors
-from tautwire.tracer.associations import Association
-from tautwire.tracer.port_residuals import ComponentResidual, Components
+from tautwire.recordings.recording import Recording
+from tautwire.robots.robot import Cable, EffectSetting, Platform, Robot, Sensors
+from tautwire.runs.cosimulation import Motion
 from tautwire.tracer.verdict import (
     Candidate,
     Comparison,
@@ -23,6 +21,8 @@ from tautwire.tracer.verdict import (
     Separation,
     Trace,
 )
+from tautwire.tracer.where.associations import Association
+from tautwire.tracer.where.port_residuals import ComponentResidual, Components
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tautwire.robot import Robot
+from tautwire.robots.robot import Robot
 from tautwire.trajectory import cable_directions
 
 Array = NDArray[np.float64]

@@ -9,9 +9,9 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from .robot import Point, Robot
-from .statics import directions as rope_directions
-from .statics import has_routes
+from .robots.robot import Point, Robot
+from .statics.equilibrium import directions as rope_directions
+from .statics.equilibrium import has_routes
 
 Array = NDArray[np.float64]
 

@@ -7,11 +7,11 @@ from time import perf_counter
 
 import numpy as np
 
-from tautwire.cosimulation import instantiated
+from tautwire.fmus.packaging import build_fmus
 from tautwire.master import FixedStep, Kept, Sampled, simulate
-from tautwire.packaging import build_fmus
-from tautwire.robot import Cable, Platform, Robot, Sensors
-from tautwire.robot_wiring import shown_ports
+from tautwire.robots.robot import Cable, Platform, Robot, Sensors
+from tautwire.runs.cosimulation import instantiated
+from tautwire.runs.wiring import shown_ports
 
 
 def wheel_of_cables(count: int) -> Robot:

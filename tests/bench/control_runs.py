@@ -24,9 +24,9 @@ from tautwire.control import (
     schedule_robust,
     shape_along,
 )
-from tautwire.cosimulation import Motion
-from tautwire.packaging import RobotFmus, build_fmus
-from tautwire.robot import Robot
+from tautwire.fmus.packaging import RobotFmus, build_fmus
+from tautwire.robots.robot import Robot
+from tautwire.runs.cosimulation import Motion
 from tautwire.trajectory import CAROCA_HELIX, PAPER_HELIX, Line, Trajectory
 from tests.robots import example
 from tests.winch_ramp import WinchRamp

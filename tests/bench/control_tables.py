@@ -19,7 +19,7 @@ from tautwire.control import (
     speed_controller,
 )
 from tautwire.linear import LinearPlant, linearise
-from tautwire.robot import Robot
+from tautwire.robots.robot import Robot
 from tautwire.trajectory import Trajectory
 from tests.bench.control_runs import Measured
 

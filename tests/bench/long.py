@@ -12,9 +12,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from tautwire.master.watch import PATIENCE
-from tautwire.result_file import result_in_place
-from tautwire.robot_wiring import result_columns
-from tautwire.simulation import simulate_recording
+from tautwire.runs.result_file import result_in_place
+from tautwire.runs.simulation import simulate_recording
+from tautwire.runs.wiring import result_columns
 from tests.memory import resident_memory
 from tests.robots import example, gentle_speeds
 

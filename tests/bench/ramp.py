@@ -9,12 +9,12 @@ from time import perf_counter
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from tautwire.assembly import assemble
-from tautwire.cosimulation import instantiated
+from tautwire.fmus.packaging import RobotFmus
 from tautwire.master import Kept, Sampled, Stepping, simulate
-from tautwire.packaging import RobotFmus
-from tautwire.robot import Robot
-from tautwire.robot_wiring import shown_ports
+from tautwire.model.assembly import assemble
+from tautwire.robots.robot import Robot
+from tautwire.runs.cosimulation import instantiated
+from tautwire.runs.wiring import shown_ports
 from tautwire_fmu.laws import cable as cable_law
 from tautwire_fmu.laws import point_mass as platform_law
 from tautwire_fmu.laws.mathematics import REAL

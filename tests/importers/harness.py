@@ -21,11 +21,11 @@ from typing import Any
 
 import numpy as np
 
-from tautwire.packaging import build_fmus
-from tautwire.reference import integrate
-from tautwire.robot import Robot
-from tautwire.robot_wiring import AXES, PLATFORM, cable_name, connections
-from tautwire.ssp import COMPONENTS_ONLY, OPEN, ssp_name, write_ssp
+from tautwire.fmus.packaging import build_fmus
+from tautwire.model.reference import integrate
+from tautwire.robots.robot import Robot
+from tautwire.runs.ssp import COMPONENTS_ONLY, OPEN, ssp_name, write_ssp
+from tautwire.runs.wiring import AXES, PLATFORM, cable_name, connections
 
 from .ramps import LIMIT, RAMP, STOP
 

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from ..errors import InputError
-from ..robot import slots
+from ..robots.robot import slots
 from .shared import RobotFile, progress_bar, robot_of
 
 C_HOSTS = (
@@ -29,10 +29,10 @@ def build(
 
     Example: tautwire build robot.toml --out build/
     """
-    from ..c_hosts import embeddable_python, find_compiler, make_for_c_hosts
+    from ..fmus.c_hosts import embeddable_python, find_compiler, make_for_c_hosts
+    from ..fmus.packaging import build_fmus, gathered
     from ..output import folder_in_place, refuse_inputs
-    from ..packaging import build_fmus, gathered
-    from ..ssp import ssp_name, write_ssp
+    from ..runs.ssp import ssp_name, write_ssp
 
     robot = robot_of(robot_file)
     refuse_inputs([fmu.path for fmu in robot.fmus], [out / f"{slot}.fmu" for slot in slots(robot.cable_count)])
@@ -65,11 +65,11 @@ def simulate(
 
     Example: tautwire simulate robot.toml --speeds recording.csv --out result.csv
     """
+    from ..fmus.slots import check_own_fmus, lacking_ports, own_fmus
     from ..output import refuse_inputs
-    from ..result_file import result_in_place
-    from ..robot_wiring import result_columns
-    from ..simulation import simulate_recording
-    from ..slots import check_own_fmus, lacking_ports, own_fmus
+    from ..runs.result_file import result_in_place
+    from ..runs.simulation import simulate_recording
+    from ..runs.wiring import result_columns
 
     if not step > 0.0:
         raise InputError("--step", f"{step:g} s is not positive", "give a step such as 0.01")

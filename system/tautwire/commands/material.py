@@ -11,7 +11,7 @@ import typer
 from rich.console import Console
 
 from ..errors import InputError
-from ..robot_file import read_robot
+from ..robots.reading import read_robot
 from .shared import progress_bar, robot_of
 
 DYNAMIC_TEST = "A dynamic test of the rope; if none, Table 1 of the paper, with the pair that it uses."
@@ -66,12 +66,12 @@ def judge_rope(table: Path, robot_file: Path, out: Path, alpha: float) -> None:
 
     Writes what :func:`material` does, the same verdict as ``report.json``, and the FMUs.
     """
+    from ..fmus.packaging import build_fmus
     from ..materials import Options, read_material_table, trace_material
     from ..materials.output import FILES, write_material
     from ..materials.robot_material import declared_material
     from ..materials.terminal import material_table
     from ..output import folder_in_place, refuse_inputs
-    from ..packaging import build_fmus
 
     read, robot = read_material_table(table), robot_of(robot_file)
     refuse_inputs([table, robot_file], [out / name for name in (*FILES, "report.json")])

@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from ..errors import UnreachableError
-from ..robot_file import read_robot
+from ..robots.reading import read_robot
 from .shared import RobotFile, position_of, robot_of, say_what_is_left_out
 
 
@@ -62,8 +62,8 @@ def workspace(
     Example: tautwire workspace robot.toml --out workspace.csv --plot workspace.png
     """
     from ..output import file_in_place, refuse_inputs
-    from ..workspace import wrench_feasible_workspace
-    from ..workspace_figure import checked_format, workspace_figure
+    from ..statics.workspace import wrench_feasible_workspace
+    from ..statics.workspace_figure import checked_format, workspace_figure
 
     refuse_inputs([robot_file], [out, *([plot] if plot else [])])
     if plot is not None:

@@ -21,9 +21,9 @@ from rich.progress import (
 )
 
 from ..errors import InputError, UnreachableError
-from ..robot import Robot
-from ..robot_file import read_robot
-from ..statics import static_tensions
+from ..robots.reading import read_robot
+from ..robots.robot import Robot
+from ..statics.equilibrium import static_tensions
 
 RobotFile = Annotated[Path, typer.Argument(metavar="ROBOT.toml", help="The robot file.")]
 

@@ -30,7 +30,7 @@ def trace(
     """
     from ..materials.table import is_material_table
     from ..output import folder_in_place, refuse_inputs
-    from ..recording import read_recording
+    from ..recordings.recording import read_recording
     from ..report import trace_table, write_report
     from ..tracer import trace as traced
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..robot import Robot
+from ..robots.robot import Robot
 
 Array = NDArray[np.float64]
 

@@ -8,12 +8,12 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cosimulation import ALONE, STEP, Beside, Motion, run, wired
 from ..errors import InputError
+from ..fmus.packaging import RobotFmus, build_controller
 from ..master import Connection, FixedStep, Port, Progress, Source
-from ..packaging import RobotFmus, build_controller
-from ..robot import Robot
-from ..robot_wiring import AXES, PLATFORM, winch_ports
+from ..robots.robot import Robot
+from ..runs.cosimulation import ALONE, STEP, Beside, Motion, run, wired
+from ..runs.wiring import AXES, PLATFORM, winch_ports
 from ..trajectory import Trajectory
 from .design import Design
 from .feedforward import elastic_reference
@@ -85,8 +85,8 @@ def cosimulate_closed_loop(
 
     ``robot`` is what the controller believes; it follows ``reference``, by default that of the elastic model. ``step``
     bounds the macro step in s; ``seed`` switches the noise of the robot's sensors on; ``push`` (N, 3) is an external
-    force in N, held from sample to sample. ``patience`` is as for :func:`tautwire.cosimulation.record`. Returns the
-    run at the controller's samples.
+    force in N, held from sample to sample. ``patience`` is as for :func:`tautwire.runs.cosimulation.record`. Returns
+    the run at the controller's samples.
 
     With winches the speeds that the controller wants are what these are asked for.
 

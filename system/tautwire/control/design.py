@@ -9,7 +9,7 @@ import control
 import numpy as np
 from numpy.typing import NDArray
 
-from ..robot_wiring import AXES
+from ..runs.wiring import AXES
 from .aim import ControlAim
 
 Array = NDArray[np.float64]

@@ -21,9 +21,9 @@ from casadi import SX
 from numpy.typing import NDArray
 from scipy.linalg import null_space
 
-from ..robot import Robot
-from ..statics import static_tensions
-from ..symbolic import Model, symbolic_model
+from ..model.symbolic import Model, symbolic_model
+from ..robots.robot import Robot
+from ..statics.equilibrium import static_tensions
 from ..trajectory import Trajectory, cable_directions, ideal_winch_speeds
 from .errors import StretchError
 from .path import Reference, path_tensions

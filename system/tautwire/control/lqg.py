@@ -18,8 +18,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..linear import LinearPlant, linearise
-from ..robot import Robot
-from ..robot_wiring import AXES
+from ..robots.robot import Robot
+from ..runs.wiring import AXES
 from .aim import ControlAim, measurement_noise
 from .design import Knot, regulator_signals
 from .plant import sampled_plant

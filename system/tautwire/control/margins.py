@@ -17,7 +17,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..linear import LinearPlant, linearise
-from ..robot import Robot
+from ..robots.robot import Robot
 from .design import Knot
 from .plant import ramp_plant
 

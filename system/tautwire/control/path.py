@@ -11,8 +11,8 @@ from tautwire_fmu.laws.mathematics import REAL
 from tautwire_fmu.laws.point_mass import PointMassConstants, total_mass
 
 from ..errors import UnreachableError
-from ..robot import Robot
-from ..statics import held_by, platform_effects, static_tensions
+from ..robots.robot import Robot
+from ..statics.equilibrium import held_by, platform_effects, static_tensions
 from ..trajectory import Trajectory, cable_directions, ideal_winch_speeds
 
 Array = NDArray[np.float64]

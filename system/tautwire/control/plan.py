@@ -11,7 +11,7 @@ from tautwire_fmu.laws.sampled_control import Limits
 from tautwire_fmu.laws.winch_drive import NO_LIMIT
 
 from ..errors import InputError
-from ..robot import Robot
+from ..robots.robot import Robot
 from .design import Design, Knot
 from .path import Reference
 

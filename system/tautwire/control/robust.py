@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..linear import LinearPlant, linearise
-from ..robot import Robot
+from ..robots.robot import Robot
 from ..trajectory import Trajectory
 from .aim import ControlAim
 from .design import Knot, regulator_signals

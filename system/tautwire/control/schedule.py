@@ -12,7 +12,7 @@ from typing import Protocol
 import numpy as np
 
 from ..linear import LinearPlant
-from ..robot import Robot
+from ..robots.robot import Robot
 from ..trajectory import Trajectory
 from .aim import ControlAim
 from .design import Design, Knot

@@ -24,7 +24,7 @@ from scipy.interpolate import CubicSpline
 
 from ..errors import InputError
 from ..linear import modes_along
-from ..robot import Robot
+from ..robots.robot import Robot
 from ..trajectory import Trajectory
 
 Array = NDArray[np.float64]

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from tautwire_fmu.laws import sampled_control as law
 
-from ..robot import Robot
+from ..robots.robot import Robot
 from ..trajectory import Trajectory
 from .aim import measurement_noise
 from .design import Design

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ..errors import InputError
-from ..robot import Robot
-from ..statics import static_tensions
+from ..robots.robot import Robot
+from ..statics.equilibrium import static_tensions
 from ..tracer.hypotheses import Hypothesis, hypotheses
 from .search import Limits
 

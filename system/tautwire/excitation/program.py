@@ -8,7 +8,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
-from ..robot import Point
+from ..robots.robot import Point
 
 Array = NDArray[np.float64]
 

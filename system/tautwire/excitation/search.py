@@ -20,14 +20,14 @@ from numpy.typing import NDArray
 from scipy.optimize import Bounds, differential_evolution
 
 from ..errors import TautwireError
-from ..recording import Recording
-from ..robot import Robot
+from ..recordings.recording import Recording
+from ..robots.robot import Robot
 from ..tracer.data import Sample
 from ..tracer.filter_step import Noise
 from ..tracer.fit import Fitter
 from ..tracer.hypotheses import Hypothesis
 from ..tracer.likelihood import Likelihood
-from ..tracer.noise import noise_of
+from ..tracer.preparation.noise import noise_of
 from ..tracer.screen import signatures_of
 from ..tracer.separation import apart, start_moves
 from ..trajectory import ideal_winch_speeds

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from ..errors import InputError
-from ..robot import Robot
+from ..robots.robot import Robot
 from ..trajectory import Trajectory
 from .modes import Modes, cable_shares
 from .plant import linearise

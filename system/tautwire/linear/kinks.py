@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from ..robot import Robot
-from ..symbolic import Model
+from ..model.symbolic import Model
+from ..robots.robot import Robot
 from .modes import POSITION, Modes
 from .rest import slack_cables
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.optimize import linear_sum_assignment
 
-from ..robot import Robot
-from ..statics import directions
+from ..robots.robot import Robot
+from ..statics.equilibrium import directions
 from .rest import OperatingPointError
 
 Array = NDArray[np.float64]

@@ -11,9 +11,9 @@ import control
 import numpy as np
 from numpy.typing import NDArray
 
-from ..robot import Robot
-from ..statics import static_tensions
-from ..symbolic import Model, symbolic_model, with_drifts_held
+from ..model.symbolic import Model, symbolic_model, with_drifts_held
+from ..robots.robot import Robot
+from ..statics.equilibrium import static_tensions
 from .kinks import SWING, Rest, kink_notes
 from .modes import POSITION, Modes, modes_of
 from .rest import position_of, rest_state

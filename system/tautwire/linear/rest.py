@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from tautwire_fmu.laws.mathematics import REAL
 
 from ..errors import InputError, TautwireError
-from ..robot import Robot
-from ..statics import routes, static_tensions
-from ..symbolic import Model
+from ..model.symbolic import Model
+from ..robots.robot import Robot
+from ..statics.equilibrium import routes, static_tensions
 
 Array = NDArray[np.float64]
 

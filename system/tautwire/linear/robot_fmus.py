@@ -12,11 +12,11 @@ import fmpy
 from tautwire_fmu.laws import formula
 from tautwire_fmu.laws.effects import BY_NAME
 
-from ..cosimulation import instantiated, wired
 from ..errors import InputError
+from ..fmus.packaging import RobotFmus
 from ..master import Port
-from ..packaging import RobotFmus
-from ..robot_wiring import AXES, PLATFORM, cable_name, winch_name
+from ..runs.cosimulation import instantiated, wired
+from ..runs.wiring import AXES, PLATFORM, cable_name, winch_name
 from .black_box import ERROR, STEP, BlackBoxPlant, linearise_fmus
 
 DRIVEN = ("winch_speed", "speed_command")

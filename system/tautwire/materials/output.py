@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from ..robot import Robot
-from ..robot_text import robot_text
+from ..robots.robot import Robot
+from ..robots.writing import robot_text
 from .document import material_document
 from .figure import material_figure
 from .robot_material import robot_material, with_material

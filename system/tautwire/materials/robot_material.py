@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 from tautwire_fmu.laws.effects import BY_NAME
 
 from ..errors import InputError
-from ..robot import EffectSetting, Robot
+from ..robots.robot import EffectSetting, Robot
 from .modulus import Branch, Material
 
 # What the declared constants and the branches replace in a robot.

@@ -11,10 +11,10 @@ from io import StringIO
 from itertools import islice
 from pathlib import Path
 
-from ..checked_table import NumberRule, nearest
 from ..errors import MaterialTableError, shown
 from ..input_file import read_bytes, require_text
-from ..recording_rules import MISSING
+from ..recordings.rules import MISSING
+from ..robots.checked_table import NumberRule, nearest
 
 PAPER_TABLE = Path(__file__).parent / "steel_wire_rope_baklouti_2017.csv"
 # The row, in Hz, whose pair the paper takes as constant (sec. 4.3).

@@ -6,9 +6,9 @@ import math
 from collections.abc import Iterable
 from typing import Any
 
-from ..robot_wiring import AXES
-from ..tracer.port_residuals import ComponentResidual
+from ..runs.wiring import AXES
 from ..tracer.verdict import Candidate, Detectable, Errors, Estimate, FoundEffect, Likeness, Trace
+from ..tracer.where.port_residuals import ComponentResidual
 from .summary import ROLES, comparison_of
 
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
-from ..packaging import RobotFmus, build_fmus, gathered
-from ..robot_file import write_robot
+from ..fmus.packaging import RobotFmus, build_fmus, gathered
+from ..robots.reading import write_robot
 from ..tracer.verdict import Trace
 from .document import trace_document
 from .page import trace_page

@@ -9,7 +9,7 @@ from itertools import groupby
 
 from tautwire_fmu.laws.effects import BY_NAME
 
-from ..robot_wiring import AXES
+from ..runs.wiring import AXES
 from ..tracer.verdict import Candidate, Comparison, Errors, Estimate, Trace
 from .units import ABSENT, engineering, together
 

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import math
 
-from ..tracer.port_residuals import ComponentResidual
 from ..tracer.verdict import Trace
+from ..tracer.where.port_residuals import ComponentResidual
 from . import charts
 from .markup import Column, bullets, number, section, table, text
 from .units import ABSENT, significant

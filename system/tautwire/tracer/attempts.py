@@ -8,7 +8,7 @@ from functools import lru_cache
 import numpy as np
 
 from ..errors import UnreachableError
-from ..robot import Robot
+from ..robots.robot import Robot
 from .data import Sample
 from .filter_step import Noise
 from .fit import Fit, Fitter, NoFitError

@@ -9,13 +9,13 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cosimulation import Motion, cosimulate
-from ..packaging import build_fmus
-from ..recording import Recording
-from ..robot import Robot
+from ..fmus.packaging import build_fmus
+from ..recordings.recording import Recording
+from ..robots.robot import Robot
+from ..runs.cosimulation import Motion, cosimulate
 from .data import Sample
 from .fit import Fitter
-from .release import released
+from .preparation.release import released
 from .verdict import Comparison, Errors
 from .workers import Pending, Workers
 

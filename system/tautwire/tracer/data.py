@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..recording import Recording
-from ..robot import Robot
-from ..start import start_of
+from ..recordings.recording import Recording
+from ..robots.robot import Robot
+from ..runs.start import start_of
 from .filter_step import Noise
 
 HEAD_SHARE = 3

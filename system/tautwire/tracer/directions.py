@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from tautwire_fmu.laws.effects import Effect
 
-from ..robot import PER_CABLE, Robot
-from ..symbolic import FreeParameter, symbolic_model
+from ..model.symbolic import FreeParameter, symbolic_model
+from ..robots.robot import PER_CABLE, Robot
 from .filter_step import shown_late
 from .hypotheses import Hypothesis
 from .linearisation import Linearised

@@ -14,7 +14,7 @@ from itertools import pairwise
 import casadi
 from casadi import SX, Function
 
-from ..symbolic import Model
+from ..model.symbolic import Model
 
 
 @dataclass(frozen=True)

@@ -12,14 +12,14 @@ from scipy.optimize import least_squares
 from tautwire_fmu.laws.effects import BY_NAME, Parameter
 
 from ..errors import TautwireError, UnreachableError
-from ..robot import Robot
-from ..start import placed
-from ..symbolic import OF_FORMULAS, FreeParameter
-from .compression import compressed
+from ..model.symbolic import OF_FORMULAS, FreeParameter
+from ..robots.robot import Robot
+from ..runs.start import placed
 from .data import Sample
 from .filter_step import Noise
 from .hypotheses import Hypothesis, free_parameters, value_of, with_values
 from .likelihood import Innovations, Likelihood
+from .preparation.compression import compressed
 
 Array = NDArray[np.float64]
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass, replace
 
 from tautwire_fmu.laws.effects import ALL, ANCHOR, BY_NAME, Effect, Parameter
 
-from ..robot import PER_CABLE, EffectSetting, Robot
-from ..symbolic import OF_FORMULAS, FreeParameter
+from ..model.symbolic import OF_FORMULAS, FreeParameter
+from ..robots.robot import PER_CABLE, EffectSetting, Robot
 
 # All exit points moved alike are the platform's start and its sensor moved, the other way.
 ON_ONE_CABLE = (ANCHOR,)

@@ -19,11 +19,11 @@ import casadi
 import numpy as np
 from numpy.typing import NDArray
 
-from ..recording import Recording
-from ..robot import Robot
-from ..symbolic import FreeParameter, symbolic_model
+from ..model.symbolic import FreeParameter, symbolic_model
+from ..recordings.recording import Recording
+from ..robots.robot import Robot
 from .filter_step import Noise, Substeps, filter_sample
-from .start_state import start_covariance
+from .preparation.start_state import start_covariance
 
 Array = NDArray[np.float64]
 

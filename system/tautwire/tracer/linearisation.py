@@ -19,7 +19,7 @@ import numpy as np
 from casadi import Function
 from numpy.typing import NDArray
 
-from ..recording import Recording
+from ..recordings.recording import Recording
 from .filter_step import filter_slopes
 from .likelihood import Likelihood
 

@@ -19,8 +19,8 @@ from numpy.typing import NDArray
 
 from tautwire_fmu.laws.effects import Effect
 
-from ..robot import Robot
-from ..start import placed
+from ..robots.robot import Robot
+from ..runs.start import placed
 from .data import Sample
 from .directions import Column, EffectDirections
 from .fit import Fitter

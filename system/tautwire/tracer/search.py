@@ -14,7 +14,7 @@ from dataclasses import dataclass
 from functools import partial
 from math import inf, log
 
-from ..robot import EffectSetting, Robot
+from ..robots.robot import EffectSetting, Robot
 from .adequacy import is_noise
 from .attempts import Attempt, Task, attempt, attempt_apart
 from .data import Evidence, Sample

@@ -15,7 +15,7 @@ from math import inf, log, sqrt
 import numpy as np
 from numpy.typing import NDArray
 
-from ..robot import Robot
+from ..robots.robot import Robot
 from .data import Sample
 from .fit import Fitter
 from .hypotheses import ON_ONE_CABLE, Hypothesis, hypotheses

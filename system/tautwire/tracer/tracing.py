@@ -6,28 +6,28 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 
-from ..cosimulation import Motion
 from ..errors import RecordingError
 from ..interrupt import interrupts_held
-from ..recording import Recording, require_outputs
-from ..robot import Robot
+from ..recordings.recording import Recording, require_outputs
+from ..robots.robot import Robot
+from ..runs.cosimulation import Motion
 from .adequacy import FEWEST, enough_samples, is_noise
-from .clock import with_clocks_set
-from .components import cut_at_ports
 from .cosimulated import compared, reaching, started
 from .data import Evidence, Sample, split
-from .discovery import Discovery
+from .discovery.discovery import Discovery
+from .discovery.unexplained import Rest, what_is_left
+from .discovery.written import formula_text
 from .fit import Fitter
 from .hypotheses import declared_value
 from .likelihood import Innovations
-from .preparation import prepare
-from .release import release_note, released
+from .preparation.clock import with_clocks_set
+from .preparation.preparation import prepare
+from .preparation.release import release_note, released
 from .search import Found, search
 from .separation import separation
-from .unexplained import Rest, what_is_left
 from .verdict import Comparison, Errors, Estimate, FoundEffect, Separation, Trace, VerdictName
+from .where.components import cut_at_ports
 from .workers import Workers
-from .written import formula_text
 
 Progress = Callable[[str, float], None]
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..robot import EffectSetting, Robot
+from ..robots.robot import EffectSetting, Robot
 from .fit import Fit
 from .hypotheses import Hypothesis
 from .screen import Prospect

@@ -9,10 +9,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cosimulation import Motion
-from ..recording import Recording
-from ..robot import Robot
-from .port_residuals import Components
+from ..recordings.recording import Recording
+from ..robots.robot import Robot
+from ..runs.cosimulation import Motion
+from .where.port_residuals import Components
 
 Array = NDArray[np.float64]
 VerdictName = Literal["effects", "none", "discovered", "unexplained"]

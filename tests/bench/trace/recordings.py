@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
-from tautwire.recording import Recording, read_recording
+from tautwire.recordings.recording import Recording, read_recording
 from tests.rig import make_recording
 
 from .cases import Case

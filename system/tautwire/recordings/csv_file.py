@@ -1,0 +1,116 @@
+"""Recordings in CSV files: one header line, then one line a sample."""
+
+import csv
+import re
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from io import BytesIO, TextIOWrapper
+from itertools import islice
+from pathlib import Path
+
+import numpy as np
+import pandas as pd  # type: ignore[import-untyped,unused-ignore]
+from numpy.typing import NDArray
+
+from ..errors import RecordingError, shown
+from ..input_file import read_bytes, require_text
+from .header import Header, header_of
+from .rules import MISSING, Row
+
+_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
+_NUMBER = re.compile(r"[-+]?[0-9]*[.,]?[0-9]+([eE][-+]?[0-9]+)?")
+
+
+@dataclass(frozen=True)
+class CsvTable:
+    """A CSV file in memory, its header read."""
+
+    file: str
+    content: bytes
+    header: Header
+
+    def numbers(self) -> Mapping[str, NDArray[np.float64]] | None:
+        """The known columns, each (N,), NaN where a cell is missing; None where this is no table of numbers."""
+        header, content = self.header, self.content
+        # Where the first row has more cells than the header, pandas would take some for an index.
+        if not self._is_rectangular(row_count=1):
+            return None
+        try:
+            frame = pd.read_csv(
+                BytesIO(content),
+                header=0,
+                names=list(header.names),
+                dtype={name: str if name in header.unknown else np.float64 for name in header.names},
+                encoding="utf-8",
+                skipinitialspace=True,
+                keep_default_na=False,
+                na_values=list(MISSING),
+            )
+        except (ValueError, OverflowError):
+            return None
+        return {name: frame[name].to_numpy() for name in header.known} if self._is_rectangular(len(frame)) else None
+
+    def rows(self) -> Iterator[Row]:
+        """Rows below the header that are not blank, each with the file and the line on which it begins."""
+        rows = csv.reader(_as_text(self.content), skipinitialspace=True, strict=True)
+        begin = 1
+        try:
+            next(rows)
+            begin = rows.line_num + 1
+            for row in rows:
+                if len(row) > 1 or "".join(row).strip():
+                    yield f"{self.file}: line {begin}", row
+                begin = rows.line_num + 1
+        except csv.Error as problem:
+            mend = "check the quotation marks from this line on"
+            raise RecordingError(f"{self.file}: line {begin}", f"is no CSV ({problem})", mend) from problem
+
+    def _is_rectangular(self, row_count: int) -> bool:
+        """Whether the first rows are as wide as the header; pandas fills short ones up without a word."""
+        width = len(self.header.names)
+        if row_count > 1 and b'"' not in self.content:
+            return self.content.count(b",") == (row_count + 1) * (width - 1)
+        try:
+            rows = csv.reader(_as_text(self.content), skipinitialspace=True)
+            filled = (row for row in rows if len(row) > 1 or "".join(row).strip())
+            return all(len(row) == width for row in islice(filled, row_count + 1))
+        except csv.Error:
+            return False
+
+
+def open_csv(path: str | Path, cable_count: int) -> CsvTable:
+    """The CSV file of a recording; raises RecordingError where it is no text or its header is wrong."""
+    file = str(path)
+    content = read_bytes(path, RecordingError)
+    require_text(content, file, RecordingError, "CSV")
+    content = content.removeprefix(_BYTE_ORDER_MARK)
+    cells = _first_row(content, file)
+    where = f"{file}: line 1"
+    _require_header(cells, where)
+    return CsvTable(file, content, header_of(cells, where, cable_count))
+
+
+def _as_text(content: bytes) -> TextIOWrapper:
+    """The lines of a CSV file, as the csv module wants them."""
+    return TextIOWrapper(BytesIO(content), encoding="utf-8", newline="")
+
+
+def _first_row(content: bytes, file: str) -> list[str]:
+    if not content.strip():
+        raise RecordingError(file, "is empty", "write a header line and two or more samples")
+    try:
+        return [cell.strip() for cell in next(csv.reader(_as_text(content), skipinitialspace=True))]
+    except csv.Error as problem:
+        raise RecordingError(f"{file}: line 1", f"is no CSV ({problem})", "write a header line") from problem
+
+
+def _require_header(cells: list[str], where: str) -> None:
+    if not any(cells):
+        raise RecordingError(where, "is blank, the header is missing", "begin with the names of the columns")
+    for separator, name in ((";", "semicolons"), ("\t", "tabs")):
+        if "time" not in cells and any(separator in cell for cell in cells):
+            mend = "separate them with commas, and write numbers with a decimal point"
+            raise RecordingError(where, f"the columns are separated with {name}", mend)
+    if all(_NUMBER.fullmatch(cell) for cell in cells):
+        mend = "begin with a line that names the columns, as in time,winch_speed_1"
+        raise RecordingError(where, f"has numbers ({shown(cells[0])}), so the header is missing", mend)

@@ -1,0 +1,1 @@
+"""Robots: what a robot file says, read, checked and written again."""

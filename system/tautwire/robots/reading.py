@@ -1,0 +1,279 @@
+"""Robot files: reading one with every key checked, writing one that reads back equal."""
+
+import math
+import os
+import re
+import sys
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from tautwire_fmu.laws.cable import LAWS
+from tautwire_fmu.laws.effects import BY_NAME, Effect, Parameter
+
+from ..errors import RobotFileError, one_line, shown
+from ..input_file import read_bytes, require_text
+from .checked_table import CheckedTable, NumberRule, nearest
+from .formula_table import formulas_in
+from .robot import (
+    PER_CABLE,
+    Cable,
+    EffectSetting,
+    OwnFmu,
+    Platform,
+    Point,
+    Robot,
+    Sensors,
+    TensionLimits,
+    Winch,
+    slots,
+)
+from .writing import robot_text
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib  # type: ignore[import-not-found,unused-ignore]
+
+__all__ = ["read_robot", "robot_text", "write_robot"]
+
+KEYS = ("name", "gravity", "platform", "tension", "sensors", "cable", "effect", "winch", "fmu", "formula")
+LARGEST_FILE = 10_000_000  # bytes
+SAME_POINT = 1e-6  # m, closer than any two exit points can be built
+
+GRAVITY = NumberRule("the gravity along -z", "m/s^2", minimum=0.0, default=9.81)
+MASS = NumberRule("the platform's mass", "kg", positive=True)
+MINIMUM = NumberRule("the least tension", "N", minimum=0.0)
+MAXIMUM = NumberRule("the largest tension", "N", positive=True)
+PREFERRED = NumberRule("the tension to aim at", "N", minimum=0.0)
+UNCERTAINTY = NumberRule("the standard deviation of true start tensions from the rule's", "N", minimum=0.0)
+NOISES = {
+    "position_noise": NumberRule("the standard deviation of one position", "m", minimum=0.0),
+    "tension_noise": NumberRule("the standard deviation of one tension", "N", minimum=0.0),
+    "winch_speed_noise": NumberRule("the standard deviation of one winch speed", "m/s", minimum=0.0),
+}
+MODULUS = NumberRule("the modulus of elasticity", "Pa", positive=True)
+AREA = NumberRule("the area of the rope's cross-section", "m^2", positive=True)
+DAMPING = NumberRule("the damping", "Pa s", minimum=0.0, default=0.0)
+DRUM_RADIUS = NumberRule("the radius at which rope lies on the drum", "m", positive=True)
+GEAR = NumberRule("the turns of the motor for one turn of the drum", "", positive=True, default=Winch.gear)
+BANDWIDTH = NumberRule("the natural frequency of the speed loop", "Hz", 0.01, 1000.0, default=Winch.bandwidth)
+DAMPING_RATIO = NumberRule("the damping ratio of the speed loop", "", 0.05, 20.0, default=Winch.damping_ratio)
+LIMITS = {
+    "speed_limit": NumberRule("the largest speed of the rope", "m/s", positive=True),
+    "acceleration_limit": NumberRule("the largest acceleration of the rope", "m/s^2", positive=True),
+}
+
+
+def read_robot(path: str | Path) -> Robot:
+    """The robot that a file declares; raises RobotFileError where it declares none."""
+    file = str(path)
+    content = read_bytes(path, RobotFileError, LARGEST_FILE)
+    require_text(content, file, RobotFileError, "TOML")
+    parsed = _parsed(content.decode("utf-8-sig"), file)
+    return _robot(CheckedTable(file, "", parsed), default_name=one_line(Path(path).stem))
+
+
+def write_robot(robot: Robot, path: str | Path) -> None:
+    """Writes a file that reads back equal, whole or not at all.
+
+    Raises RobotFileError where the robot is one that no file may declare, OSError where the disk refuses.
+    """
+    text = robot_text(robot)
+    if _robot(CheckedTable(str(path), "", _parsed(text, str(path))), robot.name) != _completed(robot):
+        raise RobotFileError(str(path), "would not read back equal", "build the robot as read_robot does")
+    target = Path(path)
+    beside = target.with_name(f".{target.name}.{os.getpid()}.part")
+    try:
+        beside.write_bytes(text.encode("utf-8"))
+        beside.replace(target)
+    finally:
+        beside.unlink(missing_ok=True)
+
+
+def _completed(robot: Robot) -> Robot:
+    """The robot with the neutral values that its effects' settings leave out."""
+    effects = (replace(s, values=BY_NAME[s.name].completed(s.values)) for s in robot.effects)
+    return replace(robot, effects=tuple(effects))
+
+
+def _parsed(text: str, file: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except RecursionError as problem:
+        raise RobotFileError(file, "is nested too deeply", "write it as a flat robot file") from problem
+    except ValueError as problem:
+        reason, _, place = str(problem).partition(" (at ")
+        said = re.match(r"line (\d+), column (\d+)", place)
+        line = int(said.group(1)) if said else text.count("\n") + 1
+        column = f", column {said.group(2)}" if said else ""
+        where = f"{file}: line {line}"
+        raise RobotFileError(where, f"is not TOML ({reason}{column})", "correct this line") from problem
+
+
+def _robot(root: CheckedTable, default_name: str) -> Robot:
+    root.require_known(KEYS)
+    name = _name(root, default_name)
+    gravity = root.number("gravity", GRAVITY)
+    platform = _platform(root)
+    cables = _cables(root, platform.start)
+    return Robot(
+        name=name,
+        gravity=gravity,
+        platform=platform,
+        tension=_tension(root.table("tension")) if "tension" in root.content else None,
+        sensors=_sensors(root.table("sensors")) if "sensors" in root.content else Sensors(),
+        cables=cables,
+        effects=_effects(root.table("effect"), len(cables)) if "effect" in root.content else (),
+        winch=_winch(root.table("winch")) if "winch" in root.content else None,
+        fmus=_fmus(root.table("fmu"), len(cables)) if "fmu" in root.content else (),
+        formulas=formulas_in(root, partial(_cables_of_effect, cable_count=len(cables))),
+    )
+
+
+def _name(root: CheckedTable, default: str) -> str:
+    if "name" not in root.content:
+        return default
+    mend = 'give the robot a name, as in name = "hall"'
+    name = root.text("name", mend)
+    if not name.strip() or not name.isprintable():
+        raise root.refusal("name", f"is {shown(name)}, must be one line of printable text", mend)
+    return name
+
+
+def _platform(root: CheckedTable) -> Platform:
+    if "platform" not in root.content:
+        raise root.refusal("platform", "is missing", "add a table [platform] with mass and start")
+    table = root.table("platform")
+    table.require_known(("mass", "start"))
+    return Platform(table.number("mass", MASS), table.point("start", "where the run starts"))
+
+
+def _tension(table: CheckedTable) -> TensionLimits:
+    table.require_known(("minimum", "maximum", "preferred", "preferred_uncertainty"))
+    minimum, maximum = table.number("minimum", MINIMUM), table.number("maximum", MAXIMUM)
+    preferred = table.number("preferred", PREFERRED)
+    if minimum > maximum:
+        problem = f"is {minimum!r}, must be at most the maximum, {maximum!r} N"
+        raise table.refusal("minimum", problem, "lower minimum or raise maximum")
+    if not minimum <= preferred <= maximum:
+        problem = f"is {preferred!r}, must lie between minimum and maximum, {minimum!r} and {maximum!r} N"
+        raise table.refusal("preferred", problem, "choose a tension between them")
+    return TensionLimits(minimum, maximum, preferred, table.optional_number("preferred_uncertainty", UNCERTAINTY))
+
+
+def _sensors(table: CheckedTable) -> Sensors:
+    table.require_known(NOISES)
+    return Sensors(**{key: table.optional_number(key, rule) for key, rule in NOISES.items()})
+
+
+def _cables(root: CheckedTable, start: Point) -> tuple[Cable, ...]:
+    tables = root.tables("cable") if "cable" in root.content else ()
+    if len(tables) < 3:
+        problem = f"{len(tables)} given, a robot has three or more"
+        raise root.refusal("cable", problem, "add one table [[cable]] for each cable")
+    cables = tuple(_cable(table) for table in tables)
+    for place, (table, cable) in enumerate(zip(tables, cables, strict=True)):
+        if math.dist(cable.anchor, start) < SAME_POINT:
+            problem = f"is {list(cable.anchor)}, the same as platform.start"
+            raise table.refusal("anchor", problem, "move one of them")
+        for other in range(place):
+            if math.dist(cable.anchor, cables[other].anchor) < SAME_POINT:
+                problem = f"is {list(cable.anchor)}, the same as that of cable {other + 1}"
+                raise table.refusal("anchor", problem, "give each cable its own exit point")
+    return cables
+
+
+def _cable(table: CheckedTable) -> Cable:
+    table.require_known(("anchor", "modulus", "area", "damping", "law"))
+    laws = " or ".join(f'"{law}"' for law in LAWS)
+    law = table.text("law", f"write law = {laws}")
+    if law not in LAWS:
+        raise table.refusal("law", f"is {shown(law)}, must be {laws}", f"write {nearest(law, LAWS)}")
+    return Cable(
+        anchor=table.point("anchor", "the exit point on the frame"),
+        modulus=table.number("modulus", MODULUS),
+        area=table.number("area", AREA),
+        damping=table.number("damping", DAMPING),
+        law=law,
+    )
+
+
+def _winch(table: CheckedTable) -> Winch:
+    table.require_known(("drum_radius", "gear", "bandwidth", "damping_ratio", *LIMITS))
+    return Winch(
+        drum_radius=table.number("drum_radius", DRUM_RADIUS),
+        gear=table.number("gear", GEAR),
+        bandwidth=table.number("bandwidth", BANDWIDTH),
+        damping_ratio=table.number("damping_ratio", DAMPING_RATIO),
+        **{key: table.optional_number(key, rule) for key, rule in LIMITS.items()},
+    )
+
+
+def _fmus(table: CheckedTable, cable_count: int) -> tuple[OwnFmu, ...]:
+    table.require_known(slots(cable_count))
+    mend = 'name an FMU, as in platform = "mine.fmu"'
+    found = []
+    for slot in table.content:
+        name = table.text(slot, mend)
+        if not name.strip() or not name.isprintable():
+            raise table.refusal(slot, f"is {shown(name)}, must be the path of a file", mend)
+        # Whoever writes the robot elsewhere must still find the FMU.
+        found.append(OwnFmu(slot, Path(os.path.abspath(Path(table.file).parent / name))))
+    return tuple(found)
+
+
+def _effects(table: CheckedTable, cable_count: int) -> tuple[EffectSetting, ...]:
+    settings: list[EffectSetting] = []
+    for name, content in table.content.items():
+        if name not in BY_NAME:
+            mend = f"write {nearest(name, BY_NAME)}, or remove it"
+            raise table.refusal(name[:80], "is not an effect that the project knows", mend)
+        several = isinstance(content, list)
+        taken: dict[int, str] = {}
+        for one in table.tables(name) if several else (table.table(name),):
+            setting = _effect(one, BY_NAME[name], cable_count)
+            # Effects that act on no cable take the place of cable 0, so that they too are set once.
+            for cable in setting.cables or (0,):
+                if cable in taken:
+                    which = f"cable {cable}" if cable else "the robot"
+                    problem = f"is set twice for {which}, in {taken[cable]} too"
+                    raise one.refusal("cables" if cable else "", problem, "set it once")
+                taken[cable] = one.key
+            settings.append(setting)
+    return tuple(settings)
+
+
+def _effect(table: CheckedTable, effect: Effect, cable_count: int) -> EffectSetting:
+    per_cable = effect.component in PER_CABLE
+    if "cables" in table.content and not per_cable:
+        raise table.refusal("cables", f"{effect.name} acts on the {effect.component}", "remove cables")
+    names = [parameter.name for parameter in effect.parameters]
+    table.require_known([*names, "cables"] if per_cable else names)
+    values = {each.name: table.number(each.name, _rule(each)) for each in effect.parameters}
+    if not any(name in table.content for name in names):
+        mend = f"give {effect.parameters[0].description}, as in {names[0]} = {effect.parameters[0].start:g}"
+        raise table.refusal("", "sets none of its numbers", mend)
+    return EffectSetting(effect.name, values, _cables_of_effect(table, cable_count) if per_cable else ())
+
+
+def _rule(parameter: Parameter) -> NumberRule:
+    bounds = (parameter.minimum, parameter.maximum)
+    return NumberRule(parameter.description, parameter.unit, *bounds, default=parameter.neutral)
+
+
+def _cables_of_effect(table: CheckedTable, cable_count: int) -> tuple[int, ...]:
+    if "cables" not in table.content:
+        return tuple(range(1, cable_count + 1))
+    mend = "list cables as in cables = [2], or remove the key for all cables"
+    given = table.content["cables"]
+    if not isinstance(given, list) or not given:
+        problem = "is empty" if given == [] else f"is {shown(given)}, not a list of cables"
+        raise table.refusal("cables", problem, mend)
+    for cable in given:
+        if isinstance(cable, bool) or not isinstance(cable, int) or not 1 <= cable <= cable_count:
+            raise table.refusal("cables", f"has {shown(cable)}, must be from 1 to {cable_count}", mend)
+        if given.count(cable) > 1:
+            raise table.refusal("cables", f"names cable {cable} twice", mend)
+    return tuple(given)

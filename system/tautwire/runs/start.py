@@ -1,0 +1,47 @@
+"""Where a recording starts, and the robot placed there."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from ..errors import UnreachableError
+from ..recordings.recording import AXES, Recording
+from ..robots.robot import Robot
+from ..statics.equilibrium import static_tensions
+
+START_SIGNIFICANCE = 6.0
+# The robot starts at rest: its first samples are of one place.
+START_ROWS, START_SAMPLES = 10, 5
+
+
+def start_of(
+    robot: Robot, position_noise: float, recording: Recording
+) -> tuple[tuple[float, float, float], tuple[str, ...]]:
+    """Where a recording starts, and a note if that is not the robot file's start but where it says.
+
+    Raises UnreachableError, which names the recording, where the cables cannot hold the platform there.
+    """
+    declared = np.array(robot.platform.start)
+    away, spread = np.zeros(3), np.full(3, np.inf)
+    for axis, column in enumerate(recording.position[:START_ROWS].T):
+        seen = column[np.isfinite(column)][:START_SAMPLES]
+        if len(seen):
+            away[axis], spread[axis] = float(np.mean(seen)) - declared[axis], position_noise / len(seen) ** 0.5
+    if np.all(np.abs(away) <= START_SIGNIFICANCE * spread):
+        return robot.platform.start, ()
+    x, y, z = (declared + away).tolist()
+    try:
+        static_tensions(placed(robot, (x, y, z)))
+    except UnreachableError as error:
+        where = f"{recording.path}: first positions"
+        raise UnreachableError(where, error.position, error.cable, error.tension, error.reason) from error
+    shown = ", ".join(f"{axis} {value:.6g}" for axis, value in zip(AXES, (x, y, z), strict=True))
+    note = f"{recording.path} starts at {shown} m, not at the robot file's start; the run starts where it says"
+    return (x, y, z), (note,)
+
+
+def placed(robot: Robot, start: tuple[float, float, float]) -> Robot:
+    """The robot at another start."""
+    return robot if start == robot.platform.start else replace(robot, platform=replace(robot.platform, start=start))

@@ -1,0 +1,1 @@
+"""Effects outside the list: formulas and resonances that the residual at the ports shows."""
