@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 
+from tautwire_fmu.laws.effects import UNLISTED
+
 from ..errors import RecordingError
 from ..interrupt import interrupts_held
 from ..recordings.recording import Recording, require_outputs
@@ -15,16 +17,18 @@ from .adequacy import FEWEST, enough_samples, is_noise
 from .cosimulated import compared, reaching, started
 from .data import Evidence, Sample, split
 from .discovery.discovery import Discovery
+from .discovery.rivals import with_rivals
 from .discovery.unexplained import Rest, what_is_left
-from .discovery.written import formula_text
+from .discovery.written import effects_text, formula_text
 from .fit import Fitter
-from .hypotheses import declared_value
+from .hypotheses import Hypothesis, declared_value
 from .likelihood import Innovations
 from .preparation.clock import with_clocks_set
 from .preparation.preparation import prepare
 from .preparation.release import release_note, released
 from .search import Found, search
 from .separation import separation
+from .trials import setting_of
 from .verdict import Comparison, Errors, Estimate, FoundEffect, Separation, Trace, VerdictName
 from .where.components import cut_at_ports
 from .workers import Workers
@@ -96,6 +100,7 @@ def _trace(
     runs = started(workers, ready.fitter, robot, ready.samples)
     ports = workers.start(cut_at_ports, robot, ready.evidence.fit, ready.fitter.noise)
     found = search(robot, ready.fitter, ready.evidence, alpha, progress, workers)
+    found = with_rivals(robot, found, ready.fitter, ready.evidence, alpha, progress)
     progress("co-simulating before", 0.0)
     before = [run.result() for run in runs]
     noise_alone = _all_noise(ready.plain, ready.evidence)
@@ -114,7 +119,7 @@ def _trace(
         effects=_effects(robot, found) if kept else (),
         also_possible=found.alike if kept else (),
         candidates=found.candidates,
-        formula=formula_text(robot, answer.discovered.formulas) if answer.discovered else None,
+        formula=_formula(robot, answer),
         comparisons=answer.comparisons,
         noise_floor=answer.floors[-1],
         noise_before=noise_alone,
@@ -199,6 +204,9 @@ def _all_noise(innovations: Sequence[Innovations], evidence: Evidence) -> bool:
 def _verdict(robot: Robot, answer: _Answer, noise_alone: bool) -> tuple[VerdictName, str]:
     found, discovered = answer.found, answer.discovered
     names = " and ".join(h.label(robot) for h in found.accepted)
+    if answer.effects_hold and _unlisted(answer):
+        said = f"The model lacks {names}; with it, what is left is noise."
+        return "discovered", f"{said} No kind of the list does it: {_formula(robot, answer)}."
     if answer.effects_hold:
         return "effects", f"The model lacks {names}; with it, what is left is noise."
     if discovered:
@@ -210,6 +218,19 @@ def _verdict(robot: Robot, answer: _Answer, noise_alone: bool) -> tuple[VerdictN
     return "unexplained", f"The residual is more than noise, and no known effect explains it{closest}."
 
 
+def _unlisted(answer: _Answer) -> list[Hypothesis]:
+    """Accepted effects that are no kind of the list."""
+    return [hypothesis for hypothesis in answer.found.accepted if hypothesis.effect in UNLISTED]
+
+
+def _formula(robot: Robot, answer: _Answer) -> str | None:
+    """Of what is no kind of the list; None where there is nothing such."""
+    if answer.discovered:
+        return formula_text(robot, answer.discovered.formulas)
+    unlisted = _unlisted(answer) if answer.effects_hold else []
+    return effects_text([(h.label(robot), setting_of(answer.found.fit.robot, h)) for h in unlisted]) or None
+
+
 def _effects(robot: Robot, found: Found) -> tuple[FoundEffect, ...]:
     fit = found.fit
     places = {}
@@ -218,6 +239,8 @@ def _effects(robot: Robot, found: Found) -> tuple[FoundEffect, ...]:
         places[setting.name, setting.cables, free.name] = index
     effects = []
     for hypothesis, evidence in zip(found.accepted, found.evidence, strict=True):
+        if hypothesis.effect in UNLISTED:
+            continue
         estimates = {}
         for parameter in hypothesis.parameters:
             place = places[hypothesis.effect.name, hypothesis.cables, parameter.name]

@@ -8,6 +8,7 @@ from .damping import DAMPING
 from .drag import DRAG
 from .drum import DRUM
 from .effect import ActiveEffect, Effect, Parameter, State
+from .frame import FRAME
 from .friction import FRICTION
 from .hysteresis import HYSTERESIS
 from .modulus import MODULUS
@@ -39,6 +40,9 @@ ALL: Tuple[Effect, ...] = (
     SENSOR_GAIN,
 )
 
-BY_NAME: Dict[str, Effect] = {effect.name: effect for effect in ALL}
+# What is no kind of the list: a trace that finds one has discovered it.
+UNLISTED: Tuple[Effect, ...] = (FRAME,)
 
-__all__ = ["ALL", "BY_NAME", "ActiveEffect", "Effect", "Parameter", "State"]
+BY_NAME: Dict[str, Effect] = {effect.name: effect for effect in (*ALL, *UNLISTED)}
+
+__all__ = ["ALL", "BY_NAME", "UNLISTED", "ActiveEffect", "Effect", "Parameter", "State"]

@@ -7,7 +7,7 @@ from math import floor, isfinite, log10
 
 from tautwire_fmu.laws.formula import PLACES
 
-from ...robots.robot import Formula, Robot
+from ...robots.robot import EffectSetting, Formula, Robot
 from .library import SHAPE, Term
 from .ports import Site
 
@@ -77,6 +77,15 @@ def known_digits(value: float, deviation: float) -> str:
 def formula_text(robot: Robot, formulas: Sequence[Formula]) -> str:
     """Formulas with their places in a robot, as in ``force_y = -31.2*vx; tension_2 = 4*travel``."""
     return "; ".join(f"{_place(robot, formula)} = {formula.text}" for formula in formulas)
+
+
+def effects_text(settings: Iterable[tuple[str, EffectSetting]]) -> str:
+    """Labels of effects with their numbers, as in ``frame: compliance = 3.3e-07``."""
+    texts = (
+        f"{label}: {', '.join(f'{name} = {value:.4g}' for name, value in setting.values.items())}"
+        for label, setting in settings
+    )
+    return "; ".join(texts)
 
 
 def _place(robot: Robot, formula: Formula) -> str:
