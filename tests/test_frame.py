@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from tautwire.model.reference import integrate
-from tautwire.robots.robot import EffectSetting
 from tautwire.robots.reading import read_robot
+from tautwire.robots.robot import EffectSetting
 from tautwire.robots.writing import robot_text
 from tautwire_fmu.laws.cable import LINEAR, CableConstants, CableInputs, CableState, motion, reading, span
 from tautwire_fmu.laws.effects import ALL, BY_NAME, UNLISTED, ActiveEffect
