@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tautwire.tracer.workers import Workers, processors
+from tautwire.tracer.workers import WorkerLostError, Workers, processors
 
 
 def square(number: int) -> int:
@@ -17,9 +17,17 @@ def fail(number: int) -> int:
     raise ValueError(f"no {number}")
 
 
-def process(number: int) -> int:
-    time.sleep(0.05 * number)
+def process(folder: Path, expected: int) -> int:
+    """Its process, once as many as expected have begun."""
+    (folder / str(os.getpid())).touch()
+    until = time.monotonic() + 120.0
+    while len(list(folder.iterdir())) < expected and time.monotonic() < until:
+        time.sleep(0.01)
     return os.getpid()
+
+
+def end_at_once() -> None:
+    os._exit(3)
 
 
 def sleep_for_long(folder: Path) -> None:
@@ -34,10 +42,13 @@ def test_each_call_is_answered_by_its_number(count: int) -> None:
         assert workers.start(square, 6).result() == 36
 
 
-def test_one_worker_is_this_process_and_two_are_others() -> None:
+def test_one_worker_is_this_process_and_two_are_others(tmp_path: Path) -> None:
+    here, there = tmp_path / "here", tmp_path / "there"
+    here.mkdir()
+    there.mkdir()
     with Workers(1) as alone, Workers(2) as apart:
-        assert {result for _, result in alone.each(process, [(0,), (0,)])} == {os.getpid()}
-        others = {result for _, result in apart.each(process, [(1,), (1,), (1,), (1,)])}
+        assert {result for _, result in alone.each(process, [(here, 1), (here, 1)])} == {os.getpid()}
+        others = {result for _, result in apart.each(process, [(there, 2), (there, 2)])}
     assert len(others) == 2
     assert os.getpid() not in others
 
@@ -60,6 +71,13 @@ def test_an_interrupt_ends_work_that_has_begun(tmp_path: Path) -> None:
     with pytest.raises(KeyboardInterrupt), Workers(2, stop_when_begun) as workers:
         workers.start(sleep_for_long, tmp_path).result()
     assert time.perf_counter() - began < 60.0
+
+
+def test_a_worker_that_ends_by_itself_is_told() -> None:
+    with Workers(2) as workers, pytest.raises(WorkerLostError, match="one of 2 worker processes"):
+        workers.start(end_at_once).result()
+    with Workers(2) as workers, pytest.raises(WorkerLostError, match="memory"):
+        list(workers.each(end_at_once, [(), ()]))
 
 
 def test_there_is_at_least_one_processor() -> None:

@@ -32,6 +32,7 @@ def trace(
     from ..output import folder_in_place, refuse_inputs
     from ..recordings.recording import read_recording
     from ..report import trace_table, write_report
+    from ..tracer import processors
     from ..tracer import trace as traced
 
     if not 0.0 < alpha < 1.0:
@@ -48,7 +49,7 @@ def trace(
     refuse_inputs([robot_file, fit, *([check] if check else [])], [out / name for name in made])
     with folder_in_place(out) as scratch:
         with progress_bar() as tell:
-            result = traced(robot, recording, judging, tell, alpha)
+            result = traced(robot, recording, judging, tell, alpha, processors())
         write_report(result, scratch)
     say_what_is_left_out(robot)
     Console().print(trace_table(result))

@@ -7,6 +7,7 @@ import signal
 import tempfile
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import get_context
 from types import TracebackType
@@ -14,10 +15,23 @@ from typing import Any, Generic, TypeVar
 
 from threadpoolctl import threadpool_limits
 
+from ..errors import TautwireError
+
 Result = TypeVar("Result")
 
 # Seconds between two looks whether the user wants to stop.
 PATIENCE = 0.1
+
+
+class WorkerLostError(TautwireError):
+    """A process that worked for a trace ended before its work did; carries how many there were."""
+
+    def __init__(self, processes: int) -> None:
+        self.processes = processes
+        super().__init__(
+            f"one of {processes} worker processes ended by itself: was it killed, or memory full? Run it again where "
+            "more memory is free, or with fewer processors (taskset on Linux)"
+        )
 
 
 def processors() -> int:
@@ -28,8 +42,10 @@ def processors() -> int:
 class Pending(Generic[Result]):
     """A result that is being worked on; ``result`` waits for it."""
 
-    def __init__(self, future: Future[Result] | None, now: Callable[[], Result], between: Callable[[], None]) -> None:
-        self._future, self._now, self._between = future, now, between
+    def __init__(
+        self, future: Future[Result] | None, now: Callable[[], Result], between: Callable[[], None], processes: int
+    ) -> None:
+        self._future, self._now, self._between, self._processes = future, now, between, processes
 
     def result(self) -> Result:
         """The result, or what the work raised. Without a process of its own it is done here."""
@@ -37,7 +53,8 @@ class Pending(Generic[Result]):
             return self._now()
         while not wait([self._future], PATIENCE).done:
             self._between()
-        return self._future.result()
+        with _loss_told(self._processes):
+            return self._future.result()
 
 
 class Workers:
@@ -74,7 +91,7 @@ class Workers:
     def start(self, function: Callable[..., Result], *arguments: Any) -> Pending[Result]:
         """Begin a call; its result may be fetched once."""
         future = None if self._pool() is None else self._submit(function, *arguments)
-        return Pending(future, lambda: function(*arguments), self.between)
+        return Pending(future, lambda: function(*arguments), self.between, self.processes)
 
     def each(self, function: Callable[..., Result], calls: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Result]]:
         """Number and result of each call, in the order in which they end."""
@@ -88,10 +105,12 @@ class Workers:
             self.between()
             done, waiting = wait(waiting, PATIENCE, FIRST_COMPLETED)
             for future in sorted(done, key=futures.__getitem__):
-                yield futures[future], future.result()
+                with _loss_told(self.processes):
+                    result = future.result()
+                yield futures[future], result
 
     def _submit(self, function: Callable[..., Result], *arguments: Any) -> Future[Result]:
-        with _interrupts_blocked():
+        with _interrupts_blocked(), _loss_told(self.processes):
             future: Future[Result] = self._pool().submit(function, *arguments)
             return future
 
@@ -100,6 +119,14 @@ class Workers:
             # Not forked: threads of libraries would be missing. No fork server: its socket's path may be too long.
             self._executor = ProcessPoolExecutor(self.processes, get_context("spawn"), _begin, (self._folder.name,))
         return self._executor
+
+
+@contextmanager
+def _loss_told(processes: int) -> Iterator[None]:
+    try:
+        yield
+    except BrokenProcessPool as error:
+        raise WorkerLostError(processes) from error
 
 
 @contextmanager
