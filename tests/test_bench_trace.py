@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tautwire_fmu.laws.effects import BY_NAME
+from tautwire_fmu.laws.effects import ALL
 from tests.bench.trace import run as runner
 from tests.bench.trace.cases import SIZES, Case, Kind, Part, main_cases, quick_cases
 from tests.bench.trace.document import page
@@ -48,7 +48,7 @@ def test_the_cases_are_all_that_was_asked_for() -> None:
     listed = {
         (name, part.size) for case in cases if case.kind == "listed" for part in case.parts for name in case.names
     }
-    assert listed == {(name, size) for name in BY_NAME for size in SIZES}
+    assert listed == {(effect.name, size) for effect in ALL for size in SIZES}
     unlisted = [case.parts[0].form.name for case in cases if case.kind == "unlisted"]
     assert set(unlisted) == {name for name in EFFECTS if name not in BY_NAME}
     assert len(unlisted) >= 10

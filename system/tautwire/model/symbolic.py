@@ -21,17 +21,15 @@ from tautwire_fmu.laws.mathematics import Mathematics
 from tautwire_fmu.laws.vectors import add, scale
 
 from ..robots.robot import EffectSetting, Robot
-from ..statics.equilibrium import DEFAULT_LIMITS, PARALLEL, directions, has_weight, hung, load, routes, static_tensions
 from .assembly import Assembly, assemble
+from .start_tensions import start_tensions
+from .uncertain import UncertainNumber, offsets, with_moves
 
 Array = NDArray[np.float64]
 
 AXES = ("x", "y", "z")
-AT_BOUND = 1e-6
 # In the place of an effect's setting: a number of the formulas.
 OF_FORMULAS = -1
-# Of the start tensions, where ropes have weight: each gains some three digits.
-SWEEPS = 6
 
 CASADI = Mathematics(
     log=casadi.log,
@@ -104,15 +102,19 @@ class _EffectState:
         return f"{self.effect}.{self.state.name}_{self.cable}" if self.cable else f"{self.effect}.{self.state.name}"
 
 
-def symbolic_model(robot: Robot, free: Sequence[FreeParameter] = ()) -> Model:
+def symbolic_model(
+    robot: Robot, free: Sequence[FreeParameter] = (), uncertain: Sequence[UncertainNumber] = ()
+) -> Model:
     """Assemble the equations of a robot with some parameters of its effects left free.
 
+    Each ``uncertain`` number is one more state, after all others: in standard deviations, zero at the start.
     The static start follows the free parameters; with more than three cables, cables at a tension limit stay there.
     Not valid across a change of which cables are at a limit.
     """
     symbols = [SX.sym(f"{_owner(robot, f)}.{f.name}") for f in free]
-    opened = _with_symbols(robot, free, symbols)
-    assembly = assemble(opened, _start_tensions(robot, opened), CASADI)
+    moves = [SX.sym(number.label) for number in uncertain]
+    opened = _with_symbols(with_moves(robot, uncertain, moves), free, symbols)
+    assembly = assemble(opened, start_tensions(robot, opened, CASADI), CASADI)
     count = len(assembly.cables)
     position, velocity = SX.sym("position", 3), SX.sym("velocity", 3)
     unstrained = SX.sym("unstrained_length", count)
@@ -126,21 +128,26 @@ def symbolic_model(robot: Robot, free: Sequence[FreeParameter] = ()) -> Model:
     equations = replace(equations, rates=equations.rates[rows])
     kept = _felt(casadi.vertcat(always, *(e.symbol for e in own)), always.numel(), equations)
     lengths = [SX(c.constants.start_length) for c in assembly.cables]
+    begun = casadi.vertcat(SX(list(assembly.start)), SX(list(assembly.velocity)), *lengths, SX(len(kept), 1))
+    shown_off = casadi.vertcat(*map(SX, offsets(uncertain, moves, count)))
     return Model(
-        states=casadi.vertcat(always, *(own[place].symbol for place in kept)),
+        states=casadi.vertcat(always, *(own[place].symbol for place in kept), *moves),
         inputs=casadi.vertcat(speeds, external),
         parameters=casadi.vertcat(*symbols) if symbols else SX(0, 1),
-        rates=equations.rates[[*range(always.numel()), *(always.numel() + place for place in kept)]],
-        outputs=equations.outputs,
+        rates=casadi.vertcat(
+            equations.rates[[*range(always.numel()), *(always.numel() + place for place in kept)]], SX(len(moves), 1)
+        ),
+        outputs=equations.outputs + casadi.vertcat(shown_off[:3], SX(3, 1), shown_off[3:], SX(count, 1)),
         span_tensions=equations.span_tensions,
         lags=_lags(assembly),
-        start=casadi.vertcat(SX(list(assembly.start)), SX(list(assembly.velocity)), *lengths, SX(len(kept), 1)),
+        start=casadi.vertcat(_at_rest(begun, moves), SX(len(moves), 1)),
         drifting=tuple(always.numel() + i for i, place in enumerate(kept) if own[place].state.drifts),
         state_names=(
             *_vector("position"),
             *_vector("velocity"),
             *_numbered("unstrained_length", count),
             *(own[place].name for place in kept),
+            *(f"uncertain {number.label}" for number in uncertain),
         ),
         input_names=(*_numbered("winch_speed", count), *_vector("external_force")),
         output_names=(
@@ -150,6 +157,11 @@ def symbolic_model(robot: Robot, free: Sequence[FreeParameter] = ()) -> Model:
             *_numbered("length", count),
         ),
     )
+
+
+def _at_rest(start: SX, moves: Sequence[SX]) -> SX:
+    """The start's states by what is declared, whatever the uncertain numbers are."""
+    return casadi.substitute(start, casadi.vertcat(*moves), SX.zeros(len(moves), 1)) if moves else start
 
 
 def with_drifts_held(model: Model) -> Model:
@@ -221,56 +233,6 @@ def _with_symbols(robot: Robot, free: Sequence[FreeParameter], symbols: Sequence
 
 def _owner(robot: Robot, free: FreeParameter) -> str:
     return FORMULA_NAME if free.setting == OF_FORMULAS else robot.effects[free.setting].name
-
-
-def _start_tensions(nominal: Robot, opened: Robot) -> list[SX]:
-    """Static tensions as expressions: cables at a limit stay there, the others share the rest."""
-    tensions = static_tensions(nominal)
-    limits = nominal.tension or DEFAULT_LIMITS
-    span = max(float(np.max(tensions)), 1.0) * AT_BOUND
-    held = np.zeros(len(tensions), dtype=bool)
-    if len(tensions) > 3:
-        held = (tensions - limits.minimum < span) | (limits.maximum - tensions < span)
-    start = nominal.platform.start
-    lines = routes(CASADI, opened, start)
-    across = SX(_spanned(directions(nominal))).T
-    unit = casadi.mtimes(across, casadi.horzcat(*(casadi.vertcat(*line.direction) for line in lines)))
-    weight = SX(casadi.vertcat(*load(CASADI, opened, start)))
-    result = [SX(float(tension)) for tension in tensions]
-    for _ in range(SWEEPS if has_weight(opened) else 1):
-        rest = casadi.mtimes(across, weight - casadi.vertcat(*hung(CASADI, opened, lines, result)))
-        result = _shared(unit, rest, result, held, limits.preferred)
-    return result
-
-
-def _spanned(unit: Array) -> Array:
-    """A basis of what the cables can push in; the axes themselves where that is everything."""
-    basis, size, _ = np.linalg.svd(unit)
-    return np.eye(3) if size[-1] > PARALLEL else basis[:, size > PARALLEL]
-
-
-def _shared(unit: SX, rest: SX, tensions: list[SX], held: NDArray[np.bool_], preferred: float) -> list[SX]:
-    """The tensions with those that are not held chosen anew, to hold ``rest``."""
-    sharing = np.flatnonzero(~held).tolist()
-    for index in np.flatnonzero(held).tolist():
-        rest = rest - unit[:, index] * tensions[index]
-    own = unit[:, sharing]
-    if len(tensions) == 3:
-        shares = casadi.solve(own, rest)
-    else:
-        missing = rest - preferred * casadi.sum2(own)
-        shares = preferred + casadi.mtimes(_pseudo_inverse(own), missing)
-    result = list(tensions)
-    for place, index in enumerate(sharing):
-        result[index] = shares[place]
-    return result
-
-
-def _pseudo_inverse(matrix: SX) -> SX:
-    """Of a matrix of full rank."""
-    if matrix.shape[1] < matrix.shape[0]:
-        return casadi.solve(casadi.mtimes(matrix.T, matrix), matrix.T)
-    return casadi.solve(casadi.mtimes(matrix, matrix.T), matrix).T
 
 
 def _equations(

@@ -53,6 +53,17 @@ NOISES = {
     "tension_noise": NumberRule("the standard deviation of one tension", "N", minimum=0.0),
     "winch_speed_noise": NumberRule("the standard deviation of one winch speed", "m/s", minimum=0.0),
 }
+OFFSETS = {
+    "tension_offset_uncertainty": NumberRule(
+        "the standard deviation of a load cell's constant error", "N", minimum=0.0, default=0.0
+    ),
+    "position_offset_uncertainty": NumberRule(
+        "the standard deviation of the tracker's constant error", "m", minimum=0.0, default=0.0
+    ),
+}
+MASS_UNCERTAINTY = NumberRule("the standard deviation of the true mass", "kg", minimum=0.0, default=0.0)
+MODULUS_UNCERTAINTY = NumberRule("the standard deviation of the true modulus", "Pa", minimum=0.0, default=0.0)
+DAMPING_UNCERTAINTY = NumberRule("the standard deviation of the true damping", "Pa s", minimum=0.0, default=0.0)
 MODULUS = NumberRule("the modulus of elasticity", "Pa", positive=True)
 AREA = NumberRule("the area of the rope's cross-section", "m^2", positive=True)
 DAMPING = NumberRule("the damping", "Pa s", minimum=0.0, default=0.0)
@@ -146,8 +157,12 @@ def _platform(root: CheckedTable) -> Platform:
     if "platform" not in root.content:
         raise root.refusal("platform", "is missing", "add a table [platform] with mass and start")
     table = root.table("platform")
-    table.require_known(("mass", "start"))
-    return Platform(table.number("mass", MASS), table.point("start", "where the run starts"))
+    table.require_known(("mass", "start", "mass_uncertainty"))
+    return Platform(
+        table.number("mass", MASS),
+        table.point("start", "where the run starts"),
+        table.number("mass_uncertainty", MASS_UNCERTAINTY),
+    )
 
 
 def _tension(table: CheckedTable) -> TensionLimits:
@@ -164,8 +179,16 @@ def _tension(table: CheckedTable) -> TensionLimits:
 
 
 def _sensors(table: CheckedTable) -> Sensors:
-    table.require_known(NOISES)
-    return Sensors(**{key: table.optional_number(key, rule) for key, rule in NOISES.items()})
+    table.require_known([*NOISES, *OFFSETS])
+    noises = {key: table.optional_number(key, rule) for key, rule in NOISES.items()}
+    offsets = {key: table.number(key, rule) for key, rule in OFFSETS.items()}
+    return Sensors(
+        noises["position_noise"],
+        noises["tension_noise"],
+        noises["winch_speed_noise"],
+        offsets["tension_offset_uncertainty"],
+        offsets["position_offset_uncertainty"],
+    )
 
 
 def _cables(root: CheckedTable, start: Point) -> tuple[Cable, ...]:
@@ -186,7 +209,7 @@ def _cables(root: CheckedTable, start: Point) -> tuple[Cable, ...]:
 
 
 def _cable(table: CheckedTable) -> Cable:
-    table.require_known(("anchor", "modulus", "area", "damping", "law"))
+    table.require_known(("anchor", "modulus", "area", "damping", "law", "modulus_uncertainty", "damping_uncertainty"))
     laws = " or ".join(f'"{law}"' for law in LAWS)
     law = table.text("law", f"write law = {laws}")
     if law not in LAWS:
@@ -197,6 +220,8 @@ def _cable(table: CheckedTable) -> Cable:
         area=table.number("area", AREA),
         damping=table.number("damping", DAMPING),
         law=law,
+        modulus_uncertainty=table.number("modulus_uncertainty", MODULUS_UNCERTAINTY),
+        damping_uncertainty=table.number("damping_uncertainty", DAMPING_UNCERTAINTY),
     )
 
 

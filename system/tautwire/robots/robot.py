@@ -39,10 +39,14 @@ class Numbers(Mapping[str, float]):
 
 @dataclass(frozen=True)
 class Platform:
-    """The moved point mass: ``mass`` in kg; ``start``, where the run starts at rest, in m."""
+    """The moved point mass: ``mass`` in kg; ``start``, where the run starts at rest, in m.
+
+    ``mass_uncertainty``: standard deviation of the true mass, in kg.
+    """
 
     mass: float
     start: Point
+    mass_uncertainty: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -60,22 +64,33 @@ class TensionLimits:
 
 @dataclass(frozen=True)
 class Sensors:
-    """Standard deviation of one sample: position in m, tension in N, winch speed in m/s; None if unknown."""
+    """Standard deviation of one sample: position in m, tension in N, winch speed in m/s; None if unknown.
+
+    ``tension_offset_uncertainty`` (N) and ``position_offset_uncertainty`` (m): standard deviations of what each load
+    cell, and the tracker on each axis, may show too much all the time.
+    """
 
     position_noise: float | None = None
     tension_noise: float | None = None
     winch_speed_noise: float | None = None
+    tension_offset_uncertainty: float = 0.0
+    position_offset_uncertainty: float = 0.0
 
 
 @dataclass(frozen=True)
 class Cable:
-    """One cable: ``anchor`` in m, ``modulus`` in Pa, ``area`` in m^2, ``damping`` in Pa s; ``law``."""
+    """One cable: ``anchor`` in m, ``modulus`` in Pa, ``area`` in m^2, ``damping`` in Pa s; ``law``.
+
+    ``modulus_uncertainty`` and ``damping_uncertainty``: standard deviations of the true values, in the same units.
+    """
 
     anchor: Point
     modulus: float
     area: float
     damping: float
     law: str
+    modulus_uncertainty: float = 0.0
+    damping_uncertainty: float = 0.0
 
 
 @dataclass(frozen=True)

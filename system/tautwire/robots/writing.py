@@ -21,6 +21,7 @@ def robot_text(robot: Robot) -> str:
             "[platform]",
             _number("mass", robot.platform.mass, "kg"),
             _point("start", robot.platform.start, "m, where the run starts at rest"),
+            *_deviation("mass_uncertainty", robot.platform.mass_uncertainty, "kg"),
         ],
         _tension(robot.tension) if robot.tension else [],
         _sensors(robot.sensors),
@@ -35,6 +36,10 @@ def robot_text(robot: Robot) -> str:
 
 def _number(key: str, value: float, comment: str) -> str:
     return f"{key} = {float(value)!r}" + (f"  # {comment}" if comment else "")
+
+
+def _deviation(key: str, value: float, unit: str) -> list[str]:
+    return [_number(key, value, f"{unit}, standard deviation")] if value > 0.0 else []
 
 
 def _point(key: str, point: Point, comment: str) -> str:
@@ -62,6 +67,8 @@ def _sensors(sensors: Sensors) -> list[str]:
         ("winch_speed_noise", sensors.winch_speed_noise, "m/s"),
     )
     lines = [_number(key, value, unit) for key, value, unit in noises if value is not None]
+    lines += _deviation("tension_offset_uncertainty", sensors.tension_offset_uncertainty, "N")
+    lines += _deviation("position_offset_uncertainty", sensors.position_offset_uncertainty, "m")
     return ["[sensors]  # standard deviation of one sample", *lines] if lines else []
 
 
@@ -90,6 +97,8 @@ def _cable(number: int, cable: Cable) -> list[str]:
         _number("area", cable.area, "m^2"),
         _number("damping", cable.damping, "Pa s"),
         f"law = {json.dumps(cable.law, ensure_ascii=False)}",
+        *_deviation("modulus_uncertainty", cable.modulus_uncertainty, "Pa"),
+        *_deviation("damping_uncertainty", cable.damping_uncertainty, "Pa s"),
     ]
 
 

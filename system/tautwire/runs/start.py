@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import hypot
 
 import numpy as np
 
@@ -28,7 +29,8 @@ def start_of(
     for axis, column in enumerate(recording.position[:START_ROWS].T):
         seen = column[np.isfinite(column)][:START_SAMPLES]
         if len(seen):
-            away[axis], spread[axis] = float(np.mean(seen)) - declared[axis], position_noise / len(seen) ** 0.5
+            away[axis] = float(np.mean(seen)) - declared[axis]
+            spread[axis] = hypot(position_noise / len(seen) ** 0.5, robot.sensors.position_offset_uncertainty)
     if np.all(np.abs(away) <= START_SIGNIFICANCE * spread):
         return robot.platform.start, ()
     x, y, z = (declared + away).tolist()

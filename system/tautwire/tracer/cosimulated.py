@@ -15,6 +15,7 @@ from ..robots.robot import Robot
 from ..runs.cosimulation import Motion, cosimulate
 from .data import Sample
 from .fit import Fitter
+from .preparation.calibration import calibrated
 from .preparation.release import released
 from .verdict import Comparison, Errors
 from .workers import Pending, Workers
@@ -57,10 +58,14 @@ def compared(
     before: Sequence[Motion],
     after: Sequence[Motion],
 ) -> tuple[tuple[Comparison, ...], list[Errors]]:
-    """Both runs beside each recording, and what noise alone would leave there under the later robot."""
+    """Both runs beside each recording, and what noise alone would leave there under the later robot.
+
+    Recordings are shown without the constant errors that their sensors may have, as far as those are stated.
+    """
+    shown = [calibrated(fitter, robot, sample).recording(sample.recording) for sample in samples]
     comparisons = tuple(
-        Comparison(role, s.recording, b, a, errors(s.recording, b), errors(s.recording, a))
-        for role, s, b, a in zip(ROLES, samples, before, after, strict=False)
+        Comparison(role, recording, b, a, errors(recording, b), errors(recording, a))
+        for role, recording, b, a in zip(ROLES, shown, before, after, strict=False)
     )
     return comparisons, [floor_of(fitter, robot, sample) for sample in samples]
 

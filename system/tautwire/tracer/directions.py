@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from tautwire_fmu.laws.effects import Effect
 
 from ..model.symbolic import FreeParameter, symbolic_model
+from ..model.uncertain import uncertain_numbers
 from ..robots.robot import PER_CABLE, Robot
 from .filter_step import shown_late
 from .hypotheses import Hypothesis
@@ -88,7 +89,7 @@ class EffectDirections:
         state_names: Sequence[str],
         cable_count: int,
     ) -> None:
-        model = symbolic_model(whole, [*free, *fixed])
+        model = symbolic_model(whole, [*free, *fixed], uncertain_numbers(whole))
         places = [model.state_names.index(name) for name in state_names]
         mine = [place for place in range(len(model.state_names)) if place not in places]
         z, theta, p = model.states[mine], model.parameters, model.parameters[: len(free)]

@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..model.symbolic import FreeParameter, symbolic_model
+from ..model.uncertain import uncertain_numbers
 from ..recordings.recording import Recording
 from ..robots.robot import Robot
 from .filter_step import Noise, Substeps, filter_sample
@@ -82,7 +83,8 @@ class Likelihood:
     """Innovations of recordings under a robot whose free parameters vary; compiled once."""
 
     def __init__(self, robot: Robot, free: Sequence[FreeParameter], noise: Noise, sample_time: float) -> None:
-        self.model = symbolic_model(robot, free)
+        self.uncertain = uncertain_numbers(robot)
+        self.model = symbolic_model(robot, free, self.uncertain)
         self.robot = robot
         self.noise = noise
         self.cable_count = robot.cable_count
@@ -201,7 +203,7 @@ class Likelihood:
         return self._runs[count]
 
     def _start_covariance(self) -> Array:
-        return start_covariance(self.robot, self.noise, self.model.states.numel())
+        return start_covariance(self.robot, self.noise, self.model.states.numel(), len(self.uncertain))
 
 
 def _gathered(stretches: Iterable[Stretch]) -> tuple[Array, Array, Array]:

@@ -10,6 +10,7 @@ from tautwire_fmu.laws.effects import UNLISTED
 
 from ..errors import RecordingError
 from ..interrupt import interrupts_held
+from ..model.uncertain import uncertain_numbers
 from ..recordings.recording import Recording, require_outputs
 from ..robots.robot import Robot
 from ..runs.cosimulation import Motion
@@ -23,6 +24,7 @@ from .discovery.written import effects_text, formula_text
 from .fit import Fitter
 from .hypotheses import Hypothesis, declared_value
 from .likelihood import Innovations
+from .preparation.calibration import calibrated
 from .preparation.clock import with_clocks_set
 from .preparation.preparation import prepare
 from .preparation.release import release_note, released
@@ -41,13 +43,15 @@ ALPHA = 0.01
 def trace(
     robot: Robot,
     fit: Recording,
-    check: Recording | None,
-    progress: Progress,
+    check: Recording | None = None,
+    progress: Progress | None = None,
     alpha: float = ALPHA,
     processes: int = 1,
 ) -> Trace:
     """Find what a robot's model lacks, and show by co-simulating its FMUs what adding it does to the error.
 
+    What fits ``fit`` is judged on ``check``; without one, on the second half of ``fit``. ``progress`` gets what is being
+    done and the share of it that is done.
     ``alpha`` bounds the probability of naming an effect where there is none. For more ``processes`` than one the
     calling program's main module has to be guarded, see :class:`tautwire.tracer.workers.Workers`.
 
@@ -55,7 +59,11 @@ def trace(
     the platform where a recording starts.
     """
     with interrupts_held() as raise_interrupt, Workers(processes, raise_interrupt) as workers:
-        return _trace(robot, fit, check, progress, alpha, workers)
+        return _trace(robot, fit, check, progress or _silently, alpha, workers)
+
+
+def _silently(what: str, done: float) -> None:
+    """Tells nobody."""
 
 
 @dataclass(frozen=True)
@@ -71,20 +79,18 @@ class _Ready:
 
 @dataclass(frozen=True)
 class _Answer:
-    """The effects or the formula that the FMUs, too, bear out; else neither, and what is left."""
+    """The effects or the formula that the FMUs, too, bear out; else neither, and what is left.
 
+    ``robot`` is the best model that holds, with uncertain numbers as FIT has them.
+    """
+
+    robot: Robot
     found: Found
     effects_hold: bool
     discovered: Discovery | None
     rest: Rest
     comparisons: tuple[Comparison, ...]
     floors: Sequence[Errors]
-
-    def robot(self, declared: Robot) -> Robot:
-        """The best model that holds."""
-        if self.discovered:
-            return self.discovered.robot
-        return self.found.fit.robot if self.effects_hold else declared
 
 
 def _trace(
@@ -105,7 +111,7 @@ def _trace(
     before = [run.result() for run in runs]
     noise_alone = _all_noise(ready.plain, ready.evidence)
     answer = _answer(robot, ready, found, before, noise_alone, alpha, progress, workers)
-    final, kept = answer.robot(robot), answer.effects_hold
+    final, kept = answer.robot, answer.effects_hold
     verdict, sentence = _verdict(robot, answer, noise_alone)
     shown = Separation((), ())
     if kept or verdict == "none":
@@ -129,7 +135,7 @@ def _trace(
         components=ports.result(),
         resonances=answer.rest.resonances,
         alpha=alpha,
-        notes=(*ready.notes, *answer.rest.notes, *_begun(ready, final)),
+        notes=(*ready.notes, *answer.rest.notes, *_begun(ready, final), *_numbers(ready, answer)),
         seconds=perf_counter() - began,
     )
 
@@ -163,19 +169,47 @@ def _answer(
 ) -> _Answer:
     """Effects if they leave noise, to the filter and in the FMUs; else a formula that does."""
     fitter, samples = ready.fitter, ready.samples
-    comparisons, floors = compared(robot, fitter, samples, before, before)
+
+    def borne_out(better: Robot) -> tuple[Robot, tuple[Comparison, ...], Sequence[Errors]] | None:
+        after = calibrated(fitter, better, ready.evidence.fit).robot(better)
+        reached = reaching(after, fitter, samples, before, workers)
+        return None if reached is None else (after, *reached)
+
+    plain = robot, *compared(robot, fitter, samples, before, before)
     progress("co-simulating after", 0.0)
     if found.accepted and _all_noise(_innovations(fitter, found.fit.robot, ready.evidence), ready.evidence):
-        better = reaching(found.fit.robot, fitter, samples, before, workers)
+        better = borne_out(found.fit.robot)
         if better is not None:
-            return _Answer(found, True, None, Rest(), *better)
+            return _answered(better, found, True, None, Rest())
     if not found.accepted and noise_alone:
-        return _Answer(found, False, None, Rest(), comparisons, floors)
+        better = borne_out(robot) if uncertain_numbers(robot) else None
+        return _answered(better or plain, found, False, None, Rest())
     rest = what_is_left(robot, found, fitter, ready.evidence, alpha, progress)
-    better = reaching(rest.discovery.robot, fitter, samples, before, workers) if rest.discovery else None
-    if better is None:
-        return _Answer(found, False, None, rest, comparisons, floors)
-    return _Answer(found, False, rest.discovery, rest, *better)
+    better = borne_out(rest.discovery.robot) if rest.discovery else None
+    return _answered(better or plain, found, False, rest.discovery if better else None, rest)
+
+
+def _answered(
+    shown: tuple[Robot, tuple[Comparison, ...], Sequence[Errors]],
+    found: Found,
+    effects_hold: bool,
+    discovered: Discovery | None,
+    rest: Rest,
+) -> _Answer:
+    robot, comparisons, floors = shown
+    return _Answer(robot, found, effects_hold, discovered, rest, comparisons, floors)
+
+
+def _numbers(ready: _Ready, answer: _Answer) -> list[str]:
+    """What the recordings say of declared numbers that the robot file calls uncertain, if a model holds."""
+    if answer.rest.notes or answer.rest.resonances:
+        return []
+    best = answer.found.fit.robot if answer.discovered is None else answer.discovered.robot
+    return [
+        note
+        for sample in ready.samples
+        for note in calibrated(ready.fitter, best, sample).notes(best, sample.recording.path)
+    ]
 
 
 def _begun(ready: _Ready, final: Robot) -> list[str]:

@@ -13,8 +13,10 @@ from .cases import Case, empty_cases, main_cases, quick_cases
 ALARM = "alarm"
 MOST_EMPTY = 100_000
 # Where the verdict comes from: the tracer, the laws, and what builds and runs them.
-FOLDERS = ("system/tautwire/tracer", "system/tautwire/master", "fmu_src/tautwire_fmu")
-FILES = tuple(f"system/tautwire/{name}.py" for name in ("assembly", "cosimulation", "robot", "start", "symbolic"))
+FOLDERS = (
+    *(f"system/tautwire/{name}" for name in ("tracer", "master", "model", "runs", "statics", "robots")),
+    "fmu_src/tautwire_fmu",
+)
 
 
 def alarm_cases(count: int) -> tuple[Case, ...]:
@@ -40,7 +42,7 @@ def code_version() -> str:
     root = EXAMPLES.parents[2]
     content = hashlib.sha256()
     paths = [path for folder in FOLDERS for path in sorted((root / folder).rglob("*.py"))]
-    for path in (*paths, *(root / name for name in FILES)):
+    for path in paths:
         content.update(path.relative_to(root).as_posix().encode())
         content.update(path.read_bytes())
     return content.hexdigest()[:16]

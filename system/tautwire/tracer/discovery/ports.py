@@ -21,6 +21,7 @@ from tautwire_fmu.laws.mathematics import Mathematics
 
 from ...model.assembly import Assembly, assemble
 from ...model.symbolic import OF_FORMULAS, FreeParameter, symbolic_model
+from ...model.uncertain import uncertain_numbers
 from ...robots.robot import Formula, Robot
 from ..filter_step import shown_late
 from ..linearisation import Linearised
@@ -157,7 +158,8 @@ def _moved(site: Site, values: Array, first: Array, now: Array, begun: Array) ->
 
 def _slopes(whole: Robot, numbers: Sequence[str], state_names: Sequence[str]) -> Function:
     """Of a moment: states of the run, time, inputs, next speed, step, shift; gives the four results of ``through``."""
-    model = symbolic_model(whole, [FreeParameter(OF_FORMULAS, number) for number in numbers])
+    free = [FreeParameter(OF_FORMULAS, number) for number in numbers]
+    model = symbolic_model(whole, free, uncertain_numbers(whole))
     count = whole.cable_count
     places = [model.state_names.index(name) for name in state_names]
     later, step, shift = SX.sym("later", count), SX.sym("step"), SX.sym("shift", 3 + count)

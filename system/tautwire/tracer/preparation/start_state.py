@@ -17,8 +17,9 @@ UNSEEN_SHARE = 0.25
 SINGULAR = 1e-9
 
 
-def start_covariance(robot: Robot, noise: Noise, states: int) -> Array:
-    """Covariance (states, states) of the first state; other states than positions, velocities and lengths are known.
+def start_covariance(robot: Robot, noise: Noise, states: int, uncertain: int = 0) -> Array:
+    """Covariance (states, states) of the first state; of others than positions, velocities and lengths only the last
+    ``uncertain`` ones are not known.
 
     Tensions that hold nothing, of which robots with more cables than directions have some, are uncertain by
     ``noise.self_stress``: with ``U`` the ropes' directions and ``F = l / (E S)``, unstrained lengths by
@@ -31,6 +32,7 @@ def start_covariance(robot: Robot, noise: Noise, states: int) -> Array:
     covariance[:3, :3] = np.diag(place)
     covariance[3:6, 3:6] = np.diag(np.full(3, noise.start_velocity**2))
     covariance[lengths, lengths] = np.diag(np.full(count, noise.start**2 + noise.start_stretch**2))
+    covariance[states - uncertain :, states - uncertain :] = np.eye(uncertain)
     if noise.self_stress > 0.0:
         give = _compliances(robot)[:, None] * self_stresses(robot)
         covariance[lengths, lengths] += noise.self_stress**2 * give @ give.T
