@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tautwire_fmu.laws.effects import ALL
+from tautwire_fmu.laws.effects import ALL, BY_NAME
 from tests.bench.trace import run as runner
 from tests.bench.trace.cases import SIZES, Case, Kind, Part, main_cases, quick_cases
 from tests.bench.trace.document import page

@@ -10,7 +10,7 @@ from typing import Literal
 import numpy as np
 from scipy.stats import binomtest
 
-from tautwire_fmu.laws.effects import BY_NAME
+from tautwire_fmu.laws.effects import ALL, BY_NAME
 
 from .cases import Case
 from .line import Line
@@ -158,7 +158,7 @@ def rate(count: int, of: int) -> Rate:
 
 def confusion(answers: Sequence[Scored]) -> tuple[list[str], list[str], np.ndarray]:
     """Rows (what is hidden), columns (what was named or said), and counts; a pair counts in each name's column."""
-    names = [*BY_NAME, "none", "unexplained", "discovered", "failed"]
+    names = [*(effect.name for effect in ALL), "none", "unexplained", "discovered", "failed"]
     rows = list(dict.fromkeys(answer.case.label for answer in answers))
     counts = np.zeros((len(rows), len(names)), dtype=int)
     for answer in answers:
