@@ -48,6 +48,8 @@ ROUGHNESS = (0.01, 0.03, 0.1, 0.3)
 FOLLOWS = 3.0
 # Nats on both samples together and on each, and how much more than at any other frequency.
 TOGETHER, EACH, MORE = 20.0, 5.0, 2.5
+# So much more is enough where both samples peak so near each other, as a share of the frequency.
+SHARP, MORE_OF_SHARP = 0.035, 1.8
 # How far apart two frequencies are the same, as a share, or one over the duration; twice as far they are not.
 SAME = 0.12
 MODE_SHARE = 0.06
@@ -123,7 +125,8 @@ def _agree(frequencies: Array, fit: _Scan, judge: _Scan, duration: float) -> boo
         tops += float(scan.together[place])
         others += float(np.max(scan.together[np.abs(frequencies - frequencies[place]) > 2.0 * same], initial=0.0))
     (first, near), (second, close) = peaks
-    return bool(abs(first - second) < max(near, close) and tops > TOGETHER and tops > MORE * others)
+    more = MORE_OF_SHARP if abs(first - second) < SHARP * first else MORE
+    return bool(abs(first - second) < max(near, close) and tops > TOGETHER and tops > more * others)
 
 
 def _scans(robot: Robot, fitter: Fitter, sample: Sample, frequencies: Array) -> tuple[_Scan, _Scan]:

@@ -36,7 +36,10 @@ def what_is_left(
     formula = _earned(discover(robot, (), fitter, evidence, progress), threshold)
     if formula is not None and formula.leaves_noise:
         return Rest(formula)
+    # Effects that only come closest may have taken the line's place.
     lines = resonances(found.fit.robot, fitter, evidence)
+    if not lines and found.accepted:
+        lines = resonances(robot, fitter, evidence)
     notes = [line.sentence for line in lines]
     if formula is not None:
         said = formula_text(robot, formula.formulas)
