@@ -9,10 +9,10 @@ import pytest
 
 from tautwire.tracer import trace
 from tautwire.tracer.data import split
-from tautwire.tracer.discovery.rivals import with_rivals
 from tautwire.tracer.fit import Fitter
 from tautwire.tracer.hypotheses import Hypothesis
 from tautwire.tracer.preparation.noise import noise_of
+from tautwire.tracer.rivals import with_rivals
 from tautwire.tracer.search import Found
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.recordings import recorded

@@ -9,7 +9,8 @@ Source: Wasserman, Ramdas and Balakrishnan (2020), Universal inference, PNAS 117
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Generator, Mapping, Sequence
+from contextlib import closing
 from dataclasses import dataclass
 from functools import partial
 from math import inf, log
@@ -37,6 +38,8 @@ SURE = 2
 # Mean square of innovations below which a model needs no larger form of the same effects.
 NEARLY_NOISE = 1.1
 MOST_SWAPS = 4
+# Samples by which rivals that come near enough to be fitted to all are told from the others.
+OF_RIVALS = 600
 
 
 @dataclass(frozen=True)
@@ -89,51 +92,74 @@ class Search:
             present = best.fit
         return self._attributed(accepted, present, tried)
 
-    def _fit(self, chosen: Sequence[Hypothesis], begin: Robot | None = None) -> Fit:
-        """The chosen hypotheses alone, from the values of a robot that has them."""
+    def _fit(self, chosen: Sequence[Hypothesis], begin: Robot | None = None, roughly: bool = False) -> Fit:
+        """The chosen hypotheses alone, from the values of a robot that has them; roughly by a part of the samples."""
         robot = self.robot
         for hypothesis in chosen:
             robot = robot.with_effect(setting_of(begin, hypothesis) if begin else hypothesis.setting(robot))
-        return self.fitter.fit_from([robot], chosen, self.evidence.fit, -inf)
+        sample = self.evidence.fit.head if roughly else self.evidence.fit
+        return self.fitter.fit_from([robot], chosen, sample, -inf, PART if roughly else EXACT)
 
-    def _best_on_judge(self, robot: Robot, chosen: Sequence[Hypothesis]) -> float:
-        """Log-likelihood of the judging samples under a model at its best there, as an e-value's rival must be."""
+    def _best_on_judge(self, robot: Robot, chosen: Sequence[Hypothesis], clear: float = inf) -> float:
+        """Log-likelihood of the judging samples under a model at its best there, as an e-value's rival must be.
+
+        Roughly so where it stays clearly below ``clear``: by more than the fit's stop can be wrong.
+        """
         judge = self.evidence.judge
-        best = self.fitter.fit_from([robot], chosen, judge, -inf) if chosen else None
-        return self._log_likelihood(robot if best is None else best.robot, chosen, judge)
+        if not chosen:
+            return self._log_likelihood(robot, chosen, judge)
+        for stop in (PART, EXACT):
+            robot = self.fitter.fit_from([robot], chosen, judge, -inf, stop).robot
+            found = self._log_likelihood(robot, chosen, judge)
+            if clear - found > ROUGHLY_ALIKE + SHARE_ALIKE * abs(found):
+                break
+        return found
 
     def _log_likelihood(self, robot: Robot, chosen: Sequence[Hypothesis], sample: Sample) -> float:
         return self.fitter.judged(robot, chosen, sample).log_likelihood(sample.rows)
 
-    def _try_all(
-        self, number: int, robot: Robot, accepted: list[Hypothesis], but: Hypothesis | None = None
-    ) -> list[Trial]:
-        """Every hypothesis but one beside the accepted ones; those that promise something are fitted."""
+    def _rivals(self, number: int, robot: Robot, accepted: list[Hypothesis], whole: Trial) -> list[Trial]:
+        """What could stand in the place of one hypothesis beside the accepted ones."""
         known = self._known.get(tuple(accepted))
-        if but is not None and known is not None:
-            return [trial for trial in known if not trial.hypothesis.overlaps(but)]
+        if known is not None:
+            return [trial for trial in known if not trial.hypothesis.overlaps(whole.hypothesis)]
+        return self._try_all(number, robot, accepted, whole)
+
+    def _try_all(
+        self, number: int, robot: Robot, accepted: list[Hypothesis], rival: Trial | None = None
+    ) -> list[Trial]:
+        """Every hypothesis beside the accepted ones; those that promise something are fitted.
+
+        With a ``rival`` only what comes near it is fitted to all samples. Without one, and beside others, the first
+        that leaves noise is enough: rivals of all that is accepted are tried later.
+        """
         judge, fit = self.evidence.judge, self.evidence.fit
-        taken = [*accepted, but] if but else accepted
+        taken = [*accepted, rival.hypothesis] if rival else accepted
         open_ones = [h for h in hypotheses(self.robot) if not any(a.overlaps(h) for a in taken)]
         adequate = all(is_noise(self.fitter.innovations(robot, sample), sample.rows) for sample in (judge, fit))
         # What is far from noise shows in a part of the recording; what is near needs all of it.
-        sample = fit if adequate else fit.head
+        looked = fit if adequate else fit.head
+        sample = looked if adequate or rival is None else fit.beginning(OF_RIVALS)
         self.progress(f"round {number}: screening", 0.0)
-        prospects = screen(robot, accepted, open_ones, self.fitter, sample)
+        prospects = screen(robot, accepted, open_ones, self.fitter, looked)
         worth = worth_fitting(prospects)
         starts = {h: self._starts(robot, h, prospects[h]) for h in worth}
-        without = self._best_on_judge(robot, accepted)
+        # Far from noise the trials need only be told from each other.
+        without = self._best_on_judge(robot, accepted, -inf if adequate else inf)
         least = self._log_likelihood(robot, accepted, sample)
-        trials = self._fitted(number, accepted, starts, sample, least, without)
-        if not adequate and but is None and not any(trial.mean_square < NEARLY_NOISE for trial in trials):
+        hasty = bool(accepted) and rival is None and not adequate
+        trials = self._fitted(number, accepted, starts, sample, least, without, hasty)
+        if not adequate and rival is None and not any(trial.mean_square < NEARLY_NOISE for trial in trials):
             others = [*enlarged(accepted), *divided(accepted)]
             starts = {h: (robot.with_effect(h.setting(robot)),) for h in others}
             trials += self._fitted(number, accepted, starts, sample, least, without)
         if not adequate:
-            trials = self._polished(number, accepted, trials, worth[:SURE], without)
+            trials = self._polished(number, accepted, trials, () if rival else worth[:SURE], without, rival)
         self.progress(f"round {number}: done", 1.0)
-        trials += [screened(robot, h, prospects[h]) for h in prospects if h not in worth]
-        self._known[tuple(accepted)] = trials
+        tried = {trial.hypothesis for trial in trials}
+        trials += [screened(robot, h, prospects[h]) for h in prospects if h not in tried]
+        if not hasty or tried.issuperset(worth):
+            self._known[tuple(accepted)] = trials
         return trials
 
     def _fitted(
@@ -144,10 +170,11 @@ class Search:
         sample: Sample,
         least: float,
         without: float,
+        hasty: bool = False,
     ) -> list[Trial]:
         stop = EXACT if sample is self.evidence.fit else PART
         tasks = {h: Task(tuple(joined(accepted, h)), starts[h], least, stop) for h in starts}
-        tried = self._tried(f"round {number}", tasks, sample, without)
+        tried = self._tried(f"round {number}", tasks, sample, without, hasty)
         return [tried[hypothesis] for hypothesis in starts if hypothesis in tried]
 
     def _starts(self, robot: Robot, hypothesis: Hypothesis, prospect: Prospect) -> tuple[Robot, ...]:
@@ -162,9 +189,10 @@ class Search:
         trials: list[Trial],
         sure: Sequence[Hypothesis],
         without: float,
+        rival: Trial | None,
     ) -> list[Trial]:
         """The best trials fitted to all samples."""
-        top = max((trial.evidence for trial in trials), default=0.0)
+        top = max((trial.evidence for trial in (*trials, *([rival] if rival else []))), default=0.0)
         least = top - ROUGHLY_ALIKE - SHARE_ALIKE * abs(top)
         chosen = [trial for trial in trials if trial.evidence >= least or trial.hypothesis in sure]
         tasks = {t.hypothesis: Task(tuple(joined(accepted, t.hypothesis)), (t.fit.robot,), -inf, EXACT) for t in chosen}
@@ -172,20 +200,26 @@ class Search:
         return [better.get(trial.hypothesis, trial) for trial in trials]
 
     def _tried(
-        self, what: str, tasks: Mapping[Hypothesis, Task], sample: Sample, without: float
+        self, what: str, tasks: Mapping[Hypothesis, Task], sample: Sample, without: float, hasty: bool = False
     ) -> dict[Hypothesis, Trial]:
-        """The hypotheses of some tasks, fitted; without those that the cables cannot hold."""
+        """The hypotheses of some tasks, fitted; without those that the cables cannot hold.
+
+        In haste only until one leaves noise.
+        """
         order = list(tasks)
         found = {}
-        for done, (index, made) in enumerate(self._attempts(list(tasks.values()), sample), start=1):
-            hypothesis = order[index]
-            self.progress(f"{what}: {hypothesis.label(self.robot)}", done / len(order))
-            if made is not None:
-                gain = made.log_likelihood - without
-                found[hypothesis] = Trial(hypothesis, made.fit, gain, made.mean_square)
+        with closing(self._attempts(list(tasks.values()), sample)) as attempts:
+            for done, (index, made) in enumerate(attempts, start=1):
+                hypothesis = order[index]
+                self.progress(f"{what}: {hypothesis.label(self.robot)}", done / len(order))
+                if made is not None:
+                    gain = made.log_likelihood - without
+                    found[hypothesis] = Trial(hypothesis, made.fit, gain, made.mean_square)
+                if hasty and made is not None and made.mean_square < NEARLY_NOISE:
+                    break
         return found
 
-    def _attempts(self, tasks: list[Task], sample: Sample) -> Iterator[tuple[int, Attempt | None]]:
+    def _attempts(self, tasks: list[Task], sample: Sample) -> Generator[tuple[int, Attempt | None]]:
         judge = self.evidence.judge
         if self.workers.processes == 1:
             return self.workers.each(partial(attempt, self.fitter), [(task, sample, judge) for task in tasks])
@@ -202,15 +236,15 @@ class Search:
         swaps = 0
         seen = set(self._known)
         while waiting:
-            mine = waiting.pop()
+            mine = waiting.pop(0)
             rest = [a for a in accepted if a is not mine]
-            without = self._fit(rest, present.robot)
+            without = self._fit(rest, present.robot, roughly=True)
             whole = Trial(mine, present, self._gain(present, accepted, without, rest), float("nan"))
             if whole.evidence < self.threshold:
-                accepted, present, waiting = rest, without, list(rest)
+                accepted, present, waiting = rest, self._fit(rest, without.robot), list(rest)
                 continue
             number = ROUNDS + 1 + len(gains) + swaps
-            rivals = self._try_all(number, without.robot, rest, mine)
+            rivals = self._rivals(number, without.robot, rest, whole)
             best = simplest([whole, *rivals])
             tried += [t.candidate(number, t is best) for t in rivals if tuple(rest) not in seen]
             seen.add(tuple(rest))
@@ -232,7 +266,7 @@ class Search:
     def _gain(self, fit: Fit, chosen: Sequence[Hypothesis], without: Fit, rest: Sequence[Hypothesis]) -> float:
         """What the whole explains of the judging samples more than the rest at its best there."""
         whole = self._log_likelihood(fit.robot, chosen, self.evidence.judge)
-        return whole - self._best_on_judge(without.robot, rest)
+        return whole - self._best_on_judge(without.robot, rest, whole - self.threshold)
 
 
 def search(

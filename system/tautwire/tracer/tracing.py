@@ -18,7 +18,6 @@ from .adequacy import FEWEST, enough_samples, is_noise
 from .cosimulated import compared, reaching, started
 from .data import Evidence, Sample, split
 from .discovery.discovery import Discovery
-from .discovery.rivals import with_rivals
 from .discovery.unexplained import Rest, what_is_left
 from .discovery.written import effects_text, formula_text
 from .fit import Fitter
@@ -28,6 +27,7 @@ from .preparation.calibration import calibrated
 from .preparation.clock import with_clocks_set
 from .preparation.preparation import prepare
 from .preparation.release import release_note, released
+from .rivals import with_rivals
 from .search import Found, search
 from .separation import separation
 from .trials import setting_of
@@ -50,10 +50,10 @@ def trace(
 ) -> Trace:
     """Find what a robot's model lacks, and show by co-simulating its FMUs what adding it does to the error.
 
-    What fits ``fit`` is judged on ``check``; without one, on the second half of ``fit``. ``progress`` gets what is being
-    done and the share of it that is done.
-    ``alpha`` bounds the probability of naming an effect where there is none. For more ``processes`` than one the
-    calling program's main module has to be guarded, see :class:`tautwire.tracer.workers.Workers`.
+    What fits ``fit`` is judged on ``check``; without one, on the second half of ``fit``. ``progress`` gets what is
+    being done, and the share of it that is done. ``alpha`` bounds the probability of naming an effect where there is
+    none. For more ``processes`` than one the calling program's main module has to be guarded, see
+    :class:`tautwire.tracer.workers.Workers`.
 
     Raises RecordingError where a recording has no measured output, UnreachableError where the cables cannot hold
     the platform where a recording starts.

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 import signal
 import tempfile
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
@@ -93,21 +93,25 @@ class Workers:
         future = None if self._pool() is None else self._submit(function, *arguments)
         return Pending(future, lambda: function(*arguments), self.between, self.processes)
 
-    def each(self, function: Callable[..., Result], calls: Sequence[tuple[Any, ...]]) -> Iterator[tuple[int, Result]]:
-        """Number and result of each call, in the order in which they end."""
+    def each(self, function: Callable[..., Result], calls: Sequence[tuple[Any, ...]]) -> Generator[tuple[int, Result]]:
+        """Number and result of each call, in the order in which they end; closing it drops those not begun."""
         if self._pool() is None:
             for number, arguments in enumerate(calls):
                 yield number, function(*arguments)
             return
         futures = {self._submit(function, *arguments): number for number, arguments in enumerate(calls)}
         waiting = set(futures)
-        while waiting:
-            self.between()
-            done, waiting = wait(waiting, PATIENCE, FIRST_COMPLETED)
-            for future in sorted(done, key=futures.__getitem__):
-                with _loss_told(self.processes):
-                    result = future.result()
-                yield futures[future], result
+        try:
+            while waiting:
+                self.between()
+                done, waiting = wait(waiting, PATIENCE, FIRST_COMPLETED)
+                for future in sorted(done, key=futures.__getitem__):
+                    with _loss_told(self.processes):
+                        result = future.result()
+                    yield futures[future], result
+        finally:
+            for future in waiting:
+                future.cancel()
 
     def _submit(self, function: Callable[..., Result], *arguments: Any) -> Future[Result]:
         with _interrupts_blocked(), _loss_told(self.processes):

@@ -1,4 +1,7 @@
-"""Known effects that are no kind of the list, in the place of those found, whose names must not go to their likes."""
+"""Other models in the place of what was found, so that nothing gets the name of its likes.
+
+They are known effects that are no kind of the list, and larger forms of fewer effects.
+"""
 
 from __future__ import annotations
 
@@ -9,14 +12,14 @@ from math import inf, log
 
 from tautwire_fmu.laws.effects import UNLISTED
 
-from ...errors import UnreachableError
-from ...robots.robot import Robot
-from ..adequacy import is_noise
-from ..data import Evidence, Sample
-from ..fit import EXACT, Fit, Fitter, NoFitError
-from ..hypotheses import Hypothesis, hypotheses, joined
-from ..search import PART, ROUGHLY_ALIKE, SHARE_ALIKE, Found
-from ..trials import ALIKE, setting_of
+from ..errors import UnreachableError
+from ..robots.robot import EffectSetting, Robot
+from .adequacy import is_noise
+from .data import Evidence, Sample
+from .fit import EXACT, Fit, Fitter, NoFitError
+from .hypotheses import Hypothesis, enlarged, hypotheses, joined
+from .search import PART, ROUGHLY_ALIKE, SHARE_ALIKE, Found
+from .trials import ALIKE, setting_of
 
 Progress = Callable[[str, float], None]
 
@@ -24,7 +27,7 @@ Progress = Callable[[str, float], None]
 def with_rivals(
     robot: Robot, found: Found, fitter: Fitter, evidence: Evidence, alpha: float, progress: Progress
 ) -> Found:
-    """What a search found, or an unlisted effect in the place of some of it.
+    """What a search found, or an unlisted effect or a larger form of one effect in the place of some of it.
 
     That is where it explains more with no more parameters, or as much with fewer. Where what was found leaves more than
     noise, an unlisted effect is tried beside it too, and has to leave noise. Judged on samples that did not fit it.
@@ -35,7 +38,7 @@ def with_rivals(
         return found
     significant = log((len(hypotheses(robot)) + 1) / alpha)
     best, worth = found, _worth(fitter, found.fit, found.accepted, judge)
-    tried = list(_tried(robot, found.accepted, enough))
+    tried = [*_unlisted(robot, found.accepted, enough), *_larger(found.accepted)]
     for number, chosen in enumerate(tried):
         progress(f"rivals: {chosen[-1].label(robot)}", number / len(tried))
         fit = _fit(robot, found, chosen, fitter, evidence)
@@ -48,7 +51,17 @@ def with_rivals(
     return best
 
 
-def _tried(robot: Robot, accepted: Sequence[Hypothesis], enough: bool) -> Iterator[tuple[Hypothesis, ...]]:
+def _larger(accepted: Sequence[Hypothesis]) -> Iterator[tuple[Hypothesis, ...]]:
+    """One more form of each accepted effect beside parts of the others."""
+    for old in accepted:
+        others = [hypothesis for hypothesis in accepted if hypothesis is not old]
+        for size in range(len(others)):
+            for part in combinations(others, size):
+                for larger in enlarged([old]):
+                    yield (*part, larger)
+
+
+def _unlisted(robot: Robot, accepted: Sequence[Hypothesis], enough: bool) -> Iterator[tuple[Hypothesis, ...]]:
     """Each unlisted effect beside parts of what was accepted; all of that only where it is not enough."""
     largest = len(accepted) - 1 if enough else len(accepted)
     parts = list(chain.from_iterable(combinations(accepted, size) for size in range(largest + 1)))
@@ -64,8 +77,7 @@ def _fit(robot: Robot, found: Found, chosen: Sequence[Hypothesis], fitter: Fitte
     head = evidence.fit.head
     start = robot
     for hypothesis in chosen:
-        old = hypothesis in found.accepted
-        start = start.with_effect(setting_of(found.fit.robot, hypothesis) if old else hypothesis.setting(robot))
+        start = start.with_effect(_begun(robot, found, hypothesis))
     reached = _worth(fitter, found.fit, found.accepted, head)
     try:
         rough = fitter.fit_from([start], chosen, head, -inf, PART)
@@ -74,6 +86,16 @@ def _fit(robot: Robot, found: Found, chosen: Sequence[Hypothesis], fitter: Fitte
         return fitter.fit_from([rough.robot], chosen, evidence.fit, -inf, EXACT)
     except (UnreachableError, NoFitError):
         return None
+
+
+def _begun(robot: Robot, found: Found, hypothesis: Hypothesis) -> EffectSetting:
+    """Where a fit begins: what was found of the same effect is kept."""
+    begun = hypothesis.setting(robot)
+    for old in found.accepted:
+        if (old.effect, old.cables) == (hypothesis.effect, hypothesis.cables):
+            known = setting_of(found.fit.robot, old).values
+            return replace(begun, values={**begun.values, **{name: known[name] for name in old.form}})
+    return begun
 
 
 def _worth(fitter: Fitter, fit: Fit, chosen: Sequence[Hypothesis], sample: Sample) -> float:
