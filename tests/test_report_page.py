@@ -6,7 +6,6 @@ import json
 import re
 from dataclasses import replace
 from functools import cache
-from html.parser import HTMLParser
 from pathlib import Path
 from typing import Any
 
@@ -18,6 +17,7 @@ from tautwire.report.figures import MOST_POINTS, page_data
 from tautwire.report.series import envelope, envelope_times, noise_density, packed, spectrum, unpacked
 from tautwire.robots.reading import read_robot
 from tautwire.tracer.verdict import Separation, Trace
+from tests.pages import FETCHING, Page
 from tests.traces import HOSTILE, TENSION_NOISE, made_trace, nothing_found, without_positions
 
 LINKS = {"robot.toml": "robot.toml", "cable 1": "fmus/cable 1.fmu"}
@@ -34,49 +34,6 @@ SECTIONS = (
     "unseen",
     "notes",
 )
-VOID = {"meta", "input", "img", "br", "link", "hr"}
-FETCHING = {"src", "srcset", "poster", "data", "action", "background"}
-
-
-class Page(HTMLParser):
-    """What a page holds: elements with attributes, text, and the content of each script."""
-
-    def __init__(self, content: str) -> None:
-        super().__init__()
-        self.elements: list[tuple[str, dict[str, str]]] = []
-        self.open: list[str] = []
-        self.scripts: list[str] = []
-        self.text = ""
-        self.feed(content)
-        self.close()
-
-    def handle_starttag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
-        self.elements.append((tag, {name: value or "" for name, value in attributes}))
-        if tag == "script":
-            self.scripts.append("")
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_startendtag(self, tag: str, attributes: list[tuple[str, str | None]]) -> None:
-        self.elements.append((tag, {name: value or "" for name, value in attributes}))
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open and self.open.pop() == tag, f"</{tag}> closes nothing"
-
-    def handle_data(self, data: str) -> None:
-        if self.open and self.open[-1] == "script":
-            self.scripts[-1] += data
-        elif "style" not in self.open:
-            self.text += data
-
-    def all(self, tag: str) -> list[dict[str, str]]:
-        """Attributes of all elements of a kind."""
-        return [attributes for name, attributes in self.elements if name == tag]
-
-    def data(self) -> dict[str, Any]:
-        """What the figures draw."""
-        found: dict[str, Any] = json.loads(self.scripts[0])
-        return found
 
 
 @cache
@@ -188,8 +145,8 @@ def test_every_figure_has_data_for_both_recordings(kind: str, cables: int) -> No
     found, data = page(kind), page(kind).data()
     panels = [each for each in found.all("figure") if "data-kind" in each]
     assert len(panels) == 2 * (3 + cables)
-    assert [each["role"] for each in data["recordings"]] == ["fit", "check"]
-    for recording in data["recordings"]:
+    assert [each["role"] for each in data["choices"]] == ["fit", "check"]
+    for recording in data["choices"]:
         time = unpacked(recording["time"])
         for panel in panels:
             channel = recording["channels"][int(panel["data-channel"])]
@@ -200,15 +157,16 @@ def test_every_figure_has_data_for_both_recordings(kind: str, cables: int) -> No
                 assert values.size == across.size > 50
                 assert np.isfinite(values).mean() > 0.9
         scene = recording["scene"]
-        for columns in (scene["before"], scene["after"], scene["measured"], scene["tension"]):
+        assert [path["name"] for path in scene["paths"]] == ["measured", "before", "after"]
+        for columns in (*(path["columns"] for path in scene["paths"]), scene["platform"], scene["tension"]):
             assert all(unpacked(column).size == unpacked(scene["time"]).size for column in columns)
     assert len(data["anchors"]) == cables
 
 
 def test_what_was_not_measured_is_null_not_nan() -> None:
-    recording = page("tensions only").data()["recordings"][0]
+    recording = page("tensions only").data()["choices"][0]
     assert recording["channels"][0]["before"] is None and recording["channels"][0]["sigma"] is None
-    assert recording["scene"]["measured"] is None
+    assert [path["name"] for path in recording["scene"]["paths"]] == ["before", "after"]
     assert recording["channels"][3]["before"] is not None
     assert recording["channels"][3]["sigma"] == TENSION_NOISE  # the floor, as the file declares none
 
@@ -231,7 +189,7 @@ def test_page_follows_light_and_dark() -> None:
 
 def test_short_recordings_and_still_robots_make_a_page() -> None:
     short = made_trace(samples=8)
-    assert page_data(short)["recordings"][0]["channels"][0]["spectrum"] is None
+    assert page_data(short)["choices"][0]["channels"][0]["spectrum"] is None
     assert Page(trace_page(short, {})).open == []
 
 
@@ -240,7 +198,7 @@ def test_diverged_model_makes_a_page() -> None:
     gone = replace(trace.comparisons[0].before, position=np.full((400, 3), np.nan), tension=np.full((400, 3), np.inf))
     errors = replace(trace.comparisons[0].errors_before, position_rms=np.inf, tension_rms=np.nan)
     comparison = replace(trace.comparisons[0], before=gone, errors_before=errors)
-    assert Page(trace_page(replace(trace, comparisons=(comparison,)), {})).data()["recordings"]
+    assert Page(trace_page(replace(trace, comparisons=(comparison,)), {})).data()["choices"]
 
 
 def test_envelope_keeps_peaks_order_and_gaps() -> None:

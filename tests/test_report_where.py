@@ -8,7 +8,7 @@ from tautwire.report import trace_document
 from tautwire.report.charts import log_bar
 from tautwire.report.where import where
 from tautwire.tracer.where.port_residuals import Components
-from tests.test_report_page import Page
+from tests.pages import Page
 from tests.traces import HOSTILE, made_trace
 
 

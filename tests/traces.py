@@ -7,7 +7,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
+from tautwire.master import Account
 from tautwire.recordings.recording import Recording
+from tautwire.report.overview import Overview
+from tautwire.report.run import Run
 from tautwire.robots.robot import Cable, EffectSetting, Platform, Robot, Sensors
 from tautwire.runs.cosimulation import Motion
 from tautwire.tracer.verdict import (
@@ -160,6 +163,19 @@ def made_trace(
         notes=("The winches stood still for 62 % of the fit recording: drum effects would hardly show.",),
         seconds=12.34,
     )
+
+
+def made_run(name: str = "three", samples: int = 801, eight: bool = False) -> Run:
+    """A run of a robot that swings, beside a recording of it; nothing is simulated."""
+    robot = made_robot(eight, name)
+    motion = made_motion(robot, np.linspace(0.0, 20.0, samples), 0.4, 1)
+    overview = Overview(1500)
+    frame = motion.frame()
+    for row in frame.to_numpy():
+        overview.add(float(row[0]), row[1:])
+    recording = made_recording("run.csv", motion, np.random.default_rng(4))
+    account = Account(steps=2000, redos=17, made=1e-7, exchanged=250.0)
+    return Run(robot, tuple(frame.columns[1:]), overview, recording, account, ("The winches were slow.",))
 
 
 def nothing_found(trace: Trace) -> Trace:

@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..tracer.verdict import Comparison, Trace
+from .bands import Band, mode_bands, strange_bands
+from .scene import Path, Scene, scene_data
 from .series import envelope, envelope_times, noise_density, packed, spectrum, thinned
 from .summary import Output, axis_outputs, cable_outputs
 from .units import significant
@@ -20,7 +23,7 @@ MOST_POINTS, FEWEST_POINTS = 3000, 400  # a trace
 PATH_POINTS = 900
 MAGNIFICATIONS = (1, 10, 100, 1000)
 # Deviations are drawn larger until the largest is this share of the robot.
-VISIBLE_SHARE = 0.05
+VISIBLE_SHARE = 0.03
 ROLE_LABELS = {"fit": "Fit recording", "check": "Check recording"}
 
 
@@ -29,7 +32,7 @@ def page_data(trace: Trace) -> dict[str, Any]:
     return {
         "anchors": [[float(value) for value in anchor] for anchor in trace.robot_before.anchors],
         "magnifications": list(MAGNIFICATIONS),
-        "recordings": [_recording(trace, comparison) for comparison in trace.comparisons],
+        "choices": [_recording(trace, comparison) for comparison in trace.comparisons],
     }
 
 
@@ -58,8 +61,15 @@ def _recording(trace: Trace, comparison: Comparison) -> dict[str, Any]:
         "label": ROLE_LABELS.get(comparison.role, comparison.role),
         "time": packed(envelope_times(comparison.recording.time, points)),
         "channels": [_channel(trace, comparison, output, place, points) for place, output in enumerate(shown)],
-        "scene": _scene(trace, comparison),
+        "bands": [band.document() for band in bands_of(trace, comparison)],
+        "scene": scene_data(_scene(trace, comparison)),
     }
+
+
+def bands_of(trace: Trace, comparison: Comparison) -> list[Band]:
+    """The modes of the extended model along a run, and what swings in that recording without being in the model."""
+    seen = [each for each in trace.resonances if comparison.role in each.on]
+    return [*mode_bands(trace.robot_after, comparison.after.position), *strange_bands(seen)]
 
 
 def _channel(trace: Trace, comparison: Comparison, output: Output, place: int, points: int) -> dict[str, Any]:
@@ -98,36 +108,39 @@ def _spectrum(time: Array, before: Array, after: Array, sigma: float) -> dict[st
     }
 
 
-def _scene(trace: Trace, comparison: Comparison) -> dict[str, Any]:
-    """Paths (m) and tensions (N) at times that the slider stops at."""
+def _scene(trace: Trace, comparison: Comparison) -> Scene:
+    """The run of the extended model, and the paths of the declared one and of the recording beside it."""
     recording = comparison.recording
     kept = thinned(recording.time.size, PATH_POINTS)
-    tensions = comparison.after.tension[kept]
-    finite = tensions[np.isfinite(tensions)]
-    return {
-        "time": packed(recording.time[kept]),
-        "before": _columns(comparison.before.position[kept]),
-        "after": _columns(comparison.after.position[kept]),
-        "measured": _columns(recording.position[kept]) if recording.has_position else None,
-        "tension": _columns(tensions),
-        "measuredTension": _columns(recording.tension[kept]) if recording.has_tension else None,
-        "tensionRange": [float(finite.min()), float(finite.max())] if finite.size else [0.0, 1.0],
-        "magnify": _magnification(trace, comparison),
-    }
-
-
-def _columns(values: Array) -> list[str]:
-    return [packed(column) for column in values.T]
+    paths = [
+        Path("before", comparison.before.position[kept], "before", 4),
+        Path("after", comparison.after.position[kept], "accent", 5),
+    ]
+    if recording.has_position:
+        paths.insert(0, Path("measured", recording.position[kept], "measured", 2, "dot"))
+    return Scene(
+        time=recording.time[kept],
+        platform=comparison.after.position[kept],
+        tension=comparison.after.tension[kept],
+        paths=tuple(paths),
+        measured_tension=recording.tension[kept] if recording.has_tension else None,
+        magnify=_magnification(trace, comparison),
+    )
 
 
 def _magnification(trace: Trace, comparison: Comparison) -> int:
-    """How many times larger to draw deviations from the path, so that a reader sees them."""
-    points = np.vstack((np.array(trace.robot_before.anchors), comparison.after.position))
-    size = float(np.max(np.ptp(points, axis=0)))
-    gap = np.linalg.norm(comparison.before.position - comparison.after.position, axis=1)
+    """How many times larger to draw what the declared model and the recording have other than the extended one."""
+    path = comparison.after.position
+    apart = [comparison.before.position - path]
     if comparison.recording.has_position:
-        apart = comparison.recording.position - comparison.after.position
-        gap = np.concatenate((gap, np.sqrt(np.nansum(apart**2, axis=1))))
-    largest = float(np.max(gap[np.isfinite(gap)], initial=0.0))
-    fitting = [times for times in MAGNIFICATIONS if times * largest <= VISIBLE_SHARE * size]
-    return max(fitting, default=1) if largest > 0.0 else 1
+        apart.append(comparison.recording.position - path)
+    return magnification(np.vstack((np.array(trace.robot_before.anchors), path)), apart)
+
+
+def magnification(points: Array, apart: Sequence[Array]) -> int:
+    """How many times larger to draw deviations ``apart`` (N, 3) in a scene of ``points`` (M, 3), to be seen."""
+    known = points[np.isfinite(points).all(axis=1)]
+    gaps = np.concatenate([np.linalg.norm(each, axis=1) for each in apart])
+    largest = float(np.max(gaps[np.isfinite(gaps)], initial=0.0))
+    reach = VISIBLE_SHARE * float(np.max(np.ptp(known, axis=0)))
+    return max((times for times in MAGNIFICATIONS if times * largest <= reach), default=1) if largest > 0.0 else 1

@@ -13,10 +13,11 @@ from .page import trace_page
 
 
 def write_report(trace: Trace, folder: Path) -> RobotFmus:
-    """Write ``robot.toml``, its FMUs, ``report.json`` and ``index.html`` into an existing folder.
+    """Write ``robot.toml``, its FMUs, ``report.json`` and ``index.html`` into a folder, which is made if absent.
 
     Raises OSError where the disk refuses; returns where the FMUs are.
     """
+    folder.mkdir(parents=True, exist_ok=True)
     write_robot(trace.robot_after, folder / "robot.toml")
     fmus = gathered(build_fmus(trace.robot_after, folder), folder)
     document = json.dumps(trace_document(trace), indent=1, allow_nan=False)

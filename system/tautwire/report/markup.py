@@ -4,23 +4,27 @@ from __future__ import annotations
 
 import html
 import json
-from collections.abc import Sequence
+import re
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 from urllib.parse import quote
 
 from ..errors import one_line
 
+# Sign and digits of the power of ten in a number such as 1.5e-08.
+POWER = re.compile(r"(?<=\d)e([+-])0*(\d+)\b")
 # Written as escapes, these cannot end a script element or a line of JavaScript.
 UNSAFE_IN_SCRIPT = {character: f"\\u{ord(character):04x}" for character in "<>&\u2028\u2029"}
 
 
 @dataclass(frozen=True)
 class Column:
-    """A column of a table; numbers are set to the right in figures of equal width."""
+    """A column of a table; numbers are set to the right, and ``wide`` cells have a narrow screen's whole width."""
 
     title: str
     numeric: bool = False
+    wide: bool = False
 
 
 def text(value: str) -> str:
@@ -29,15 +33,24 @@ def text(value: str) -> str:
 
 
 def number(value: str) -> str:
-    """A formatted number as HTML, with a true minus sign and a dash where there is none."""
+    """A formatted number as HTML, with a true minus sign and powers of ten, and a dash where there is none."""
     if value == "-":
         return '<span class="absent" aria-label="none">&ndash;</span>'
-    return text(value).replace("-", "&minus;").replace(" %", "&nbsp;%")
+    typeset = POWER.sub(r"&nbsp;&times;&nbsp;10<sup>\1\2</sup>", text(value)).replace("<sup>+", "<sup>")
+    return typeset.replace("-", "&minus;").replace(" %", "&nbsp;%")
 
 
 def href(target: str) -> str:
     """A relative path as the value of href; whatever it contains, it stays a path beside the page."""
     return html.escape(quote(one_line(target), safe="/._-~"), quote=True)
+
+
+def downloads(links: Mapping[str, str]) -> str:
+    """Links to the files beside the page, by their labels; empty where there are none."""
+    anchors = "".join(
+        f'<li><a href="{href(target)}" download>{text(label)}</a></li>' for label, target in links.items()
+    )
+    return f'<nav class="files" aria-label="Downloads"><span>Download</span><ul>{anchors}</ul></nav>' if anchors else ""
 
 
 def inline_json(value: Any) -> str:
@@ -54,12 +67,14 @@ def table(
     ``rows`` hold HTML; a ``quiet`` caption is for readers that do not see the heading above.
     """
     hidden = ' class="quiet"' if quiet else ""
-    heads = "".join(f'<th scope="col"{_kind(column)}>{text(column.title)}</th>' for column in columns)
+    heads = "".join(
+        f'<th scope="col" role="columnheader"{_kind(column)}>{text(column.title)}</th>' for column in columns
+    )
     body = "".join(_row(columns, row) for row in rows)
     return (
         f'<div class="scroll" role="region" aria-label="{text(caption)}" tabindex="0">'
-        f'<table class="{text(name)}"><caption{hidden}>{text(caption)}</caption>'
-        f"<thead><tr>{heads}</tr></thead><tbody>{body}</tbody></table></div>"
+        f'<table class="{text(name)}" role="table"><caption{hidden}>{text(caption)}</caption>'
+        f'<thead role="rowgroup"><tr role="row">{heads}</tr></thead><tbody role="rowgroup">{body}</tbody></table></div>'
     )
 
 
@@ -78,10 +93,15 @@ def bullets(lines: Sequence[str]) -> str:
 
 
 def _row(columns: Sequence[Column], cells: Sequence[str]) -> str:
-    first = f'<th scope="row"{_kind(columns[0])}>{cells[0]}</th>'
-    rest = "".join(f"<td{_kind(column)}>{cell}</td>" for column, cell in zip(columns[1:], cells[1:], strict=True))
-    return f"<tr>{first}{rest}</tr>"
+    """A row; a narrow screen stacks its cells, each with its column's title before it."""
+    first = f'<th scope="row" role="rowheader"{_kind(columns[0])}>{cells[0]}</th>'
+    rest = "".join(
+        f'<td role="cell" data-title="{text(column.title)}"{_kind(column)}>{cell}</td>'
+        for column, cell in zip(columns[1:], cells[1:], strict=True)
+    )
+    return f'<tr role="row">{first}{rest}</tr>'
 
 
 def _kind(column: Column) -> str:
-    return ' class="number"' if column.numeric else ""
+    names = [name for name, holds in (("number", column.numeric), ("wide", column.wide)) if holds]
+    return f' class="{" ".join(names)}"' if names else ""

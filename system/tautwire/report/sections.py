@@ -7,10 +7,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..tracer.verdict import Candidate, FoundEffect, Trace
+from ..tracer.verdict import FoundEffect, Trace
 from . import charts
 from .figures import ROLE_LABELS, outputs
-from .markup import Column, bullets, href, number, section, table, text
+from .markup import Column, bullets, downloads, number, section, table, text
 from .summary import (
     POSITION,
     ROLES,
@@ -24,13 +24,11 @@ from .summary import (
     estimate_text,
     evidence_text,
     noise_sentence,
-    ranking,
     share_explained,
     values_text,
 )
-from .units import percent, significant
+from .units import engineering, percent, significant
 
-SHOWN_CANDIDATES = 8
 SHOWN_ALIKE = 6
 ERROR_COLUMNS = (
     Column("Output"),
@@ -44,15 +42,13 @@ ERROR_COLUMNS = (
 
 def masthead(trace: Trace, links: Mapping[str, str]) -> str:
     """What the page is about, the verdict in one sentence, and where the files are."""
-    anchors = "".join(f'<li><a href="{href(target)}">{text(label)}</a></li>' for label, target in links.items())
-    files = f'<nav class="files" aria-label="Files"><ul>{anchors}</ul></nav>' if anchors else ""
     robot = trace.robot_before
     return (
         f'<header><p class="eyebrow"><strong>Tautwire trace</strong> '
         f"<span>{text(robot.name)}, {robot.cable_count} cables</span></p>"
         f'<p class="verdict verdict-{trace.verdict}">{VERDICTS[trace.verdict]}</p>'
         f"<h1>{text(trace.sentence)}</h1>"
-        f'<p class="aside">{text(noise_sentence(trace))}</p>{files}</header>'
+        f'<p class="aside">{text(noise_sentence(trace))}</p>{downloads(links)}</header>'
     )
 
 
@@ -81,8 +77,8 @@ def found(trace: Trace) -> str:
     if rows:
         columns = (
             Column("Effect"), Column("Where"), Column("Parameter"), Column("Value", True),
-            Column("95 % interval", True), Column("Declared", True), Column("Unit"), Column("Estimate and declared"),
-            Column("Evidence", True),
+            Column("95 % interval", True, True), Column("Declared", True), Column("Unit"),
+            Column("Estimate and declared"), Column("Evidence", True),
         )  # fmt: skip
         content += table("Effects found, with their parameters", columns, rows, "effects", True)
         content += '<p class="keys dots"><span class="key key-after">estimate with its interval</span>'
@@ -119,7 +115,12 @@ def _alike(trace: Trace) -> str:
     ]
     if not rows:
         return ""
-    columns = (Column("Effect"), Column("What looks like it"), Column("Cosine", True), Column("Nats apart", True))
+    columns = (
+        Column("Effect"),
+        Column("What looks like it", wide=True),
+        Column("Cosine", True),
+        Column("Nats apart", True),
+    )
     told = (
         "<p>How like the answer the others look: the cosine of the angle between their signatures, 1 where nothing in "
         "these recordings tells them apart, and the evidence that does. <code>tautwire excite</code> writes a motion "
@@ -140,32 +141,22 @@ def unseen(trace: Trace) -> str:
             text(each.name),
             text(cables_text(each.cables, count) if each.cables else "platform"),
             text(each.parameter),
-            number(significant(each.size)) if math.isfinite(each.size) else text("never"),
-            text(each.unit if math.isfinite(each.size) else ""),
-            text(values_text(each.name, each.beside)),
+            number(engineering(each.size, each.unit)) if math.isfinite(each.size) else text("never"),
+            number(values_text(each.name, each.beside)),
         ]
         for each in sizes
     ]
     columns = (
-        Column("Effect"), Column("Where"), Column("Parameter"), Column("Smallest size", True), Column("Unit"),
-        Column("With"),
+        Column("Effect"), Column("Where"), Column("Parameter"), Column("Smallest size", True, True),
+        Column("With", wide=True),
     )  # fmt: skip
     lead = (
         "The size of each effect that these recordings would have shown in nine cases out of ten, counted from where "
         "it is absent. What is smaller may be there."
     )
-    return section("unseen", "What it could not have seen", table("Smallest sizes", columns, rows, "unseen"), lead)
-
-
-def candidates(trace: Trace) -> str:
-    """What was tried in each round, the best first."""
-    lead = (
-        "One effect at a time, fitted on one part of the data and judged on another. Left is the mean square of "
-        "the whitened innovations there: 1 where only noise is left."
+    return section(
+        "unseen", "What it could not have seen", table("Smallest sizes", columns, rows, "unseen", True), lead
     )
-    largest = max((each.evidence for each in trace.candidates if math.isfinite(each.evidence)), default=0.0)
-    content = "".join(_round(trace, place, group, largest) for place, group in ranking(trace.candidates))
-    return section("candidates", "What was tried", content or "<p>Nothing was tried.</p>", lead)
 
 
 def left(trace: Trace) -> str:
@@ -253,30 +244,3 @@ def _effect_rows(trace: Trace, effect: FoundEffect) -> list[list[str]]:
             interval, number(told.declared), text(told.unit), drawing, evidence,
         ])  # fmt: skip
     return rows
-
-
-def _round(trace: Trace, place: int, group: Sequence[Candidate], largest: float) -> str:
-    """The table of one round; weak candidates are folded away. ``largest`` evidence fills a bar."""
-    columns = (
-        Column("Effect"), Column("Where"), Column("Evidence", True), Column("On unseen data"),
-        Column("Left", True), Column("Values"), Column(""),
-    )  # fmt: skip
-    rows = [_candidate_row(trace, each, largest) for each in group]
-    content = table(f"Round {place}", columns, rows[:SHOWN_CANDIDATES], "candidates")
-    if rest := rows[SHOWN_CANDIDATES:]:
-        folded = table(f"Round {place}, the others", columns, rest, "candidates")
-        content += f"<details><summary>{len(rest)} more with less evidence</summary>{folded}</details>"
-    return content
-
-
-def _candidate_row(trace: Trace, candidate: Candidate, largest: float) -> list[str]:
-    name = "after" if candidate.accepted else "before"
-    return [
-        text(candidate.name),
-        number(cables_text(candidate.cables, trace.robot_before.cable_count)),
-        number(evidence_text(candidate.evidence)),
-        charts.bar(candidate.evidence, largest, name=name),
-        number(significant(candidate.mean_square)),
-        number(values_text(candidate.name, candidate.values)),
-        '<span class="taken">taken</span>' if candidate.accepted else "",
-    ]

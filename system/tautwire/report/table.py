@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 from rich import box
 from rich.console import Group, RenderableType
 from rich.padding import Padding
@@ -122,12 +124,15 @@ def _candidate_table(trace: Trace) -> Table:
     caption = "left: mean square of the whitened innovations, 1 where only noise is left"
     hidden = 0
     for number, candidates in ranking(trace.candidates):
-        for place, candidate in enumerate(candidates[:SHOWN_CANDIDATES]):
+        fitted = [candidate for candidate in candidates if math.isfinite(candidate.mean_square)][:SHOWN_CANDIDATES]
+        for place, candidate in enumerate(fitted):
             label = str(number) if place == 0 else ""
             table.add_row(label, *_candidate_cells(candidate, trace.robot_before.cable_count))
-        hidden += len(candidates[SHOWN_CANDIDATES:])
+        if not fitted:
+            table.add_row(str(number), *["-"] * 5, "nothing promised enough to be fitted")
+        hidden += len(candidates) - len(fitted)
     if hidden:
-        caption += f"\n{hidden} more with less evidence: in report.json and on the page"
+        caption += f"\n{hidden} more with less evidence, or not fitted: in report.json and on the page"
     table.caption, table.caption_justify = caption, "left"
     return table
 

@@ -11,6 +11,9 @@ PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "
 # Units that engineers scale, and by which prefixes; any other unit is shown as it is.
 SCALED = {"Pa": "GMk", "N": "kMm", "m": "mµ", "s": "mµ", "Hz": "kM", "W": "kM", "J": "kM"}
 SMALL_AREA = 1e-2  # m^2, below it an area is shown in mm^2
+# As in "m^2", and in "m2" as FMI writes it.
+POWER = re.compile(r"(?<=[A-Za-z])\^?([23])(?!\d)")
+POWERS = {"2": "²", "3": "³"}
 PLAIN_FROM, PLAIN_TO = 1e-4, 1e6
 
 
@@ -81,4 +84,5 @@ def _decimals(size: float, digits: int) -> int:
 
 
 def _typeset(unit: str) -> str:
-    return unit.replace("^2", "²").replace("^3", "³")
+    """A unit as it is printed: powers raised, and nothing where a number has no unit."""
+    return "" if unit == "1" else POWER.sub(lambda found: POWERS[found[1]], unit)

@@ -12,7 +12,7 @@ from .units import ABSENT, significant
 
 COLUMNS = (
     Column("Component"), Column("Quantity"), Column("Residual", True), Column("Expected", True), Column("Ratio", True),
-    Column("Ratio, logarithmic"), Column("Moves with"),
+    Column("Ratio, logarithmic"), Column("Moves with", wide=True),
 )  # fmt: skip
 LEAST_SPAN = (0.5, 4.0)
 

@@ -3,6 +3,9 @@
 
 const report = JSON.parse(document.getElementById("report-data").textContent);
 
+/** What each kind of panel draws of a choice: (choice, place of the channel, scale) => what drawPanel takes. */
+const panelKinds = {};
+
 /** Numbers from base64 of little-endian float32; NaN is a gap. */
 function unpack(text) {
   const bytes = Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0));
@@ -25,7 +28,7 @@ function series(text) {
 function colours() {
   const style = getComputedStyle(document.documentElement);
   const names = ["page", "surface", "text", "muted", "rule", "strong-rule", "accent", "before", "measured", "band",
-    "grid", "low", "middle", "high"];
+    "grid", "low", "middle", "high", "mode", "mode-band", "warn", "warn-band"];
   return Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
 }
 

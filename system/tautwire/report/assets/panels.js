@@ -1,82 +1,62 @@
-// Residuals and their spectra, one small figure for each output.
+// Small figures, one for each output; each kind of page adds its own to panelKinds.
 
-function residualFigure(recording, channel, scale) {
-  const colour = colours();
-  const time = series(recording.time);
-  const sigma = channel.sigma;
-  const line = (name, shade, width) => ({
-    type: "scatter", mode: "lines", name, x: time, y: series(channel[name]), line: { color: shade, width },
-    hovertemplate: `%{y:.3~g} ${channel.unit}`, connectgaps: false,
-    // Close up, the error before runs off the scale and would only be in the way.
-    opacity: scale === "left" && name === "before" ? 0.35 : 1,
-  });
-  const y = axis(colour, channel.unit);
-  if (scale === "left") {
-    const reach = 1.15 * Math.max(channel.reach, 2.5 * (sigma || 0)) || 1;
-    y.range = [-reach, reach];
-  }
-  // Edges in front: where only noise is left, the residual covers the band.
-  const edge = (level) => ({
-    type: "line", xref: "paper", x0: 0, x1: 1, y0: level, y1: level, line: { color: colour.text, width: 1, dash: "dot" },
-  });
-  const band = sigma === null ? [] : [{
-    type: "rect", xref: "paper", x0: 0, x1: 1, y0: -2 * sigma, y1: 2 * sigma, fillcolor: colour.band,
-    line: { width: 0 }, layer: "below",
-  }, edge(-2 * sigma), edge(2 * sigma)];
+/** A line of a panel from packed numbers. */
+function lineTrace(name, x, y, shade, more) {
   return {
-    traces: [line("before", colour.before, 1), line("after", colour.accent, 1)],
-    layout: layout(colour, { xaxis: axis(colour, "Time (s)", { hoverformat: ".4~g" }), yaxis: y, shapes: band }),
+    type: "scatter", mode: "lines", name, x: series(x), y: series(y), connectgaps: false,
+    line: { color: shade, width: 1.25 }, hovertemplate: "%{y:.3~g}", ...more,
   };
 }
 
-function spectrumFigure(recording, channel) {
-  const colour = colours();
-  const found = channel.spectrum;
-  const frequency = series(found.frequency);
-  const line = (name, shade) => ({
-    type: "scatter", mode: "lines", name, x: frequency, y: series(found[name]), line: { color: shade, width: 1.25 },
-    hovertemplate: "%{y:.3~g}",
-  });
-  const floor = found.floor === null ? [] : [{
-    type: "line", xref: "paper", x0: 0, x1: 1, y0: found.floor, y1: found.floor,
-    line: { color: colour.text, width: 1, dash: "dash" },
-  }];
-  const logarithmic = { type: "log", dtick: 1, tickformat: ".6~g" };
-  return {
-    traces: [line("before", colour.before), line("after", colour.accent)],
-    layout: layout(colour, {
-      xaxis: axis(colour, "Frequency (Hz)", { ...logarithmic, hoverformat: ".3~g" }),
-      yaxis: axis(colour, `${channel.unit}/√Hz`, logarithmic), shapes: floor,
-    }),
-  };
+/** A line across a panel at one value of y. */
+function levelLine(level, line) {
+  return { type: "line", xref: "paper", x0: 0, x1: 1, y0: level, y1: level, line };
 }
 
-/** Say in words what a panel shows, for its caption and for those who cannot see it. */
-function describePanel(panel, recording, channel) {
-  const [before, after] = channel.rms;
-  const known = channel.before !== null;
-  panel.querySelector(".numbers").textContent = known ? `${before} → ${after} ${channel.unit}` : "";
-  const what = panel.dataset.kind === "residual" ? "Residual over time" : "Spectrum of the residual";
-  const noise = channel.sigma === null ? "" : `, noise ${significant(channel.sigma)} ${channel.unit}`;
-  const numbers = known
-    ? `root mean square ${before} ${channel.unit} before, ${after} ${channel.unit} after${noise}`
-    : "not measured";
-  panel.querySelector(".plot").setAttribute("aria-label", `${what}, ${channel.label}, ${recording.label}: ${numbers}.`);
+const logarithmic = { type: "log", dtick: 1, tickformat: ".6~g" };
+
+/** A logarithmic axis over frequencies, with ticks at 1, 2 and 5 where there is room for these. */
+function frequencyAxis(colour, frequencies, more) {
+  const known = frequencies.filter((value) => value > 0);
+  const [low, high] = [Math.min(...known), Math.max(...known)];
+  const decades = Array.from({ length: 40 }, (_, place) => 10 ** (place - 20));
+  const steps = high / low < 200 ? [1, 2, 5] : [1];
+  const tickvals = decades.flatMap((decade) => steps.map((step) => step * decade)).filter((f) => f >= low && f <= high);
+  const ticktext = tickvals.map((value) => String(Number(value.toPrecision(3))));
+  return axis(colour, "Frequency (Hz)", { type: "log", tickmode: "array", tickvals, ticktext, hoverformat: ".3~g", ...more });
 }
 
-function drawPanel(panel, recording, scale) {
-  const channel = recording.channels[Number(panel.dataset.channel)];
+/** Bands over frequencies with a label above each, and the room that the labels need; for logarithmic axes. */
+function frequencyBands(bands, colour) {
+  const shapes = bands.map(({ low, high, strange }) => ({
+    type: "rect", yref: "paper", y0: 0, y1: 1, x0: low, x1: high, layer: "below",
+    fillcolor: strange ? colour["warn-band"] : colour["mode-band"],
+    line: { color: strange ? colour.warn : colour.mode, width: 1 },
+  }));
+  const annotations = bands.map(({ low, high, label, strange }) => ({
+    text: label, showarrow: false, x: 0.5 * (Math.log10(low) + Math.log10(high)), yref: "paper", y: 1,
+    yanchor: "bottom", font: { size: 11, color: strange ? colour.warn : colour.mode },
+  }));
+  return { shapes, annotations, margin: { l: 8, r: 8, t: bands.length ? 20 : 4, b: 8 } };
+}
+
+/**
+ * Draw what a panel's kind makes of a choice.
+ *
+ * A kind gives traces and layout, or why there is nothing to draw (empty); numbers for the caption; words for those
+ * who cannot see the figure.
+ */
+function drawPanel(panel, choice, scale) {
+  const drawn = panelKinds[panel.dataset.kind](choice, Number(panel.dataset.channel), scale);
   const plot = panel.querySelector(".plot");
-  const isResidual = panel.dataset.kind === "residual";
-  describePanel(panel, recording, channel);
-  const empty = isResidual ? channel.before === null : channel.spectrum === null;
-  plot.classList.toggle("empty", empty);
-  if (empty) {
+  panel.querySelector(".numbers").textContent = drawn.numbers;
+  plot.setAttribute("aria-label", drawn.words);
+  plot.classList.toggle("empty", Boolean(drawn.empty));
+  if (drawn.empty) {
     Plotly.purge(plot);
-    plot.textContent = channel.before === null ? "Not measured in this recording" : "Too short for a spectrum";
+    plot.textContent = drawn.empty;
     return;
   }
   if (!plot.classList.contains("js-plotly-plot")) plot.textContent = "";
-  const figure = isResidual ? residualFigure(recording, channel, scale) : spectrumFigure(recording, channel);
-  Plotly.react(plot, figure.traces, figure.layout, config);
+  Plotly.react(plot, drawn.traces, drawn.layout, config);
 }

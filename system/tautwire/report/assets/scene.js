@@ -1,7 +1,6 @@
 // The robot in space: cables, paths and a slider that moves the platform.
 
-// Places of the traces that the slider moves.
-const CABLES = 3, PLATFORM = 5;
+const sceneFigure = document.getElementById("scene");
 const views = {
   perspective: { eye: { x: 1.2, y: -1.4, z: 0.55 }, center: { x: 0, y: 0, z: -0.13 }, up: { x: 0, y: 0, z: 1 } },
   top: { eye: { x: 0, y: 0, z: 2.2 }, up: { x: 0, y: 1, z: 0 } },
@@ -11,13 +10,31 @@ const views = {
 
 /** A view from far enough away that all fits into a narrow figure too. */
 function camera(name) {
-  const { clientWidth, clientHeight } = document.getElementById("scene");
-  const further = Math.max(1, 1.25 * clientHeight / Math.max(1, clientWidth));
+  const { clientWidth, clientHeight } = sceneFigure;
+  const further = Math.max(1, 1.5 * clientHeight / Math.max(1, clientWidth));
   const { x, y, z } = views[name].eye;
   return { center: { x: 0, y: 0, z: 0 }, ...views[name], eye: { x: further * x, y: further * y, z: further * z } };
 }
 
-/** A path with its distance from the reference drawn ``times`` larger. */
+/** A view from near the platform, where deviations that are drawn larger can be seen. */
+function closeUp(scene) {
+  const { aspectratio, ...axes } = sceneFigure._fullLayout.scene;
+  const sizes = [], center = {};
+  ["x", "y", "z"].forEach((name, k) => {
+    const [low, high] = axes[`${name}axis`].range;
+    const scale = aspectratio[name] / (high - low);
+    const columns = [scene.platform, ...(scene.paths.map((path) => path.columns))].map((path) => series(path[k]));
+    const values = columns.flat().filter((value) => value !== null);
+    const [first, last] = [Math.min(...values), Math.max(...values)];
+    sizes.push(scale * (last - first));
+    center[name] = scale * (0.5 * (first + last) - 0.5 * (low + high));
+  });
+  const away = Math.max(0.25, 1.1 * Math.max(...sizes));
+  const eye = { x: center.x + 0.62 * away, y: center.y - 0.72 * away, z: center.z + 0.3 * away };
+  return { center, eye, up: views.perspective.up };
+}
+
+/** A path with its distance from the platform's drawn ``times`` larger. */
 function magnified(path, reference, times) {
   return path.map((column, k) => series(column).map((value, i) => {
     const base = series(reference[k])[i];
@@ -26,7 +43,7 @@ function magnified(path, reference, times) {
 }
 
 function positionAt(scene, place) {
-  return scene.after.map((column) => series(column)[place]);
+  return scene.platform.map((column) => series(column)[place]);
 }
 
 /** Lines from every anchor to the platform, a gap after each, and the tension along each. */
@@ -41,10 +58,11 @@ function cableLines(scene, place) {
   return lines;
 }
 
-function pathTrace(name, columns, colour, width, dash) {
+function pathTrace(path, scene, times, colour) {
+  const columns = magnified(path.columns, scene.platform, times);
   return {
-    type: "scatter3d", mode: "lines", name, x: columns[0], y: columns[1], z: columns[2], hoverinfo: "name",
-    line: { color: colour, width, dash: dash || "solid" }, connectgaps: false,
+    type: "scatter3d", mode: "lines", name: path.name, x: columns[0], y: columns[1], z: columns[2], hoverinfo: "name",
+    line: { color: colour[path.colour], width: path.width, dash: path.dash }, connectgaps: false,
   };
 }
 
@@ -60,7 +78,8 @@ function cableTrace(scene, place, colour) {
       colorscale: [[0, colour.low], [0.5, colour.middle], [1, colour.high]],
       colorbar: {
         orientation: "h", thickness: 10, len: 0.5, x: 0.5, y: 0, yanchor: "bottom", outlinewidth: 0, nticks: 5,
-        title: { text: "Tension (N)", side: "top", font: { size: 12 } }, tickfont: { color: colour.muted, size: 11 },
+        title: { text: scene.tensionTitle, side: "top", font: { size: 12 } },
+        tickfont: { color: colour.muted, size: 11 },
       },
     },
   };
@@ -85,8 +104,8 @@ function pointTraces(scene, place, colour) {
 
 function sceneLayout(colour) {
   const spatial = (name) => ({
-    title: { text: `${name} (m)` }, color: colour.muted, gridcolor: colour["strong-rule"], zerolinecolor: colour["strong-rule"],
-    showbackground: false, nticks: 6, showspikes: false,
+    title: { text: `${name} (m)` }, color: colour.muted, gridcolor: colour["strong-rule"],
+    zerolinecolor: colour["strong-rule"], showbackground: false, nticks: 6, showspikes: false,
   });
   return layout(colour, {
     margin: { l: 0, r: 0, t: 0, b: 0 }, hovermode: "closest",
@@ -97,41 +116,40 @@ function sceneLayout(colour) {
   });
 }
 
-function drawScene(recording, place, times) {
+function drawScene(choice, place, times, view) {
   const colour = colours();
-  const scene = recording.scene;
-  const path = (name) => (scene[name] ? magnified(scene[name], scene.after, times) : [[null], [null], [null]]);
-  const traces = [
-    pathTrace("measured", path("measured"), colour.measured, 2, "dot"),
-    pathTrace("before", path("before"), colour.before, 4),
-    pathTrace("after", path("after"), colour.accent, 5),
-    cableTrace(scene, place, colour), ...pointTraces(scene, place, colour),
-  ];
-  return Plotly.react(document.getElementById("scene"), traces, sceneLayout(colour), config);
+  const scene = choice.scene;
+  const paths = scene.paths.map((path) => pathTrace(path, scene, times, colour));
+  const traces = [cableTrace(scene, place, colour), ...pointTraces(scene, place, colour), ...paths];
+  if (!has3d) return drawFlat(traces, view, colour);
+  return Plotly.react(sceneFigure, traces, sceneLayout(colour), config);
 }
 
-function moveRobot(recording, place) {
-  const lines = cableLines(recording.scene, place);
-  const end = positionAt(recording.scene, place);
-  const [x, y, z] = end.map((value) => [value]);
-  Plotly.restyle(document.getElementById("scene"), {
+/** Move what the slider moves: the cables, the first trace, and the platform, the third. */
+function moveRobot(choice, place, times, view) {
+  if (!has3d) return drawScene(choice, place, times, view);
+  const lines = cableLines(choice.scene, place);
+  const [x, y, z] = positionAt(choice.scene, place).map((value) => [value]);
+  return Plotly.restyle(sceneFigure, {
     x: [lines.x, x], y: [lines.y, y], z: [lines.z, z], "line.color": [lines.tension, undefined],
-  }, [CABLES, PLATFORM]);
+  }, [0, 2]);
 }
 
 /** Tensions of all cables at one time, in words. */
-function showTensions(recording, place) {
-  const scene = recording.scene;
+function showTensions(choice, place) {
+  const scene = choice.scene;
   const rows = scene.tension.map((column, cable) => {
     const row = document.createElement("div");
-    const label = document.createElement("span");
-    label.textContent = `Cable ${cable + 1}`;
-    const value = document.createElement("b");
-    value.textContent = `${significant(series(column)[place])} N`;
-    const measured = document.createElement("span");
-    const seen = scene.measuredTension ? series(scene.measuredTension[cable])[place] : null;
-    measured.textContent = seen === null ? "not measured" : `measured ${significant(seen)} N`;
-    row.append(label, value, measured);
+    const cells = [["span", `Cable ${cable + 1}`], ["b", `${significant(series(column)[place])} ${scene.tensionUnit}`]];
+    if (scene.measuredTension) {
+      const seen = series(scene.measuredTension[cable])[place];
+      cells.push(["span", seen === null ? "not measured" : `measured ${significant(seen)} ${scene.tensionUnit}`]);
+    }
+    row.append(...cells.map(([kind, words]) => {
+      const cell = document.createElement(kind);
+      cell.textContent = words;
+      return cell;
+    }));
     return row;
   });
   document.getElementById("tensions").replaceChildren(...rows);

@@ -1,14 +1,14 @@
 // Controls, and drawing of what comes into view.
 
-const state = { recording: 0, place: 0, times: 1, scale: "all", timer: 0 };
+const state = { choice: 0, place: 0, times: 1, view: "perspective", scale: "all", timer: 0 };
 const slider = document.getElementById("time");
-const chosen = () => report.recordings[state.recording];
+const chosen = () => report.choices[state.choice];
 const stale = new Set();
 
 /** Draw a figure now: a panel or the scene. */
 function drawFigure(figure) {
   stale.delete(figure);
-  if (figure.classList.contains("scene")) drawScene(chosen(), state.place, state.times);
+  if (figure.classList.contains("scene")) drawScene(chosen(), state.place, state.times, state.view);
   else drawPanel(figure, chosen(), state.scale);
   document.documentElement.dataset.drawn = String(document.querySelectorAll(".js-plotly-plot").length);
 }
@@ -31,8 +31,8 @@ function redraw(selector) {
 }
 
 function showTime() {
-  const time = series(chosen().scene.time)[state.place];
-  const words = `${time.toFixed(2)} s`;
+  const { scene } = chosen();
+  const words = `${series(scene.time)[state.place].toFixed(2)} ${scene.clock}`;
   document.getElementById("time-shown").textContent = words;
   slider.value = String(state.place);
   slider.setAttribute("aria-valuetext", words);
@@ -42,7 +42,13 @@ function showTime() {
 function goTo(place) {
   state.place = place;
   showTime();
-  if (document.getElementById("scene").classList.contains("js-plotly-plot")) moveRobot(chosen(), place);
+  if (sceneFigure.classList.contains("js-plotly-plot")) moveRobot(chosen(), place, state.times, state.view);
+}
+
+function turn(view) {
+  state.view = view;
+  if (!has3d) redraw("figure.scene");
+  else Plotly.relayout(sceneFigure, { "scene.camera": view === "close" ? closeUp(chosen().scene) : camera(view) });
 }
 
 function stop() {
@@ -53,31 +59,38 @@ function stop() {
   button.setAttribute("aria-pressed", "false");
 }
 
-/** Play at the recording's own pace, from the start again where it had ended. */
+/** Play at the scene's pace, from the start again where it had ended; a cycle goes round. */
 function play() {
-  const times = series(chosen().scene.time);
-  if (state.place >= times.length - 1) state.place = 0;
+  const { time, pace, cycle } = chosen().scene;
+  const times = series(time);
+  const last = times.length - 1;
+  if (state.place >= last) state.place = 0;
   const button = document.getElementById("play");
   button.textContent = "Pause";
   button.setAttribute("aria-pressed", "true");
-  const began = performance.now() - 1000 * (times[state.place] - times[0]);
+  let began = performance.now() - 1000 * pace * (times[state.place] - times[0]);
   const frame = (now) => {
-    const passed = times[0] + (now - began) / 1000;
+    let passed = times[0] + (now - began) / (1000 * pace);
     let place = state.place;
-    while (place < times.length - 1 && times[place + 1] <= passed) place += 1;
+    if (cycle && passed >= times[last]) {
+      began = now;
+      [passed, place] = [times[0], 0];
+    }
+    while (place < last && times[place + 1] <= passed) place += 1;
     if (place !== state.place) goTo(place);
-    if (place >= times.length - 1) stop();
+    if (place >= last && !cycle) stop();
     else state.timer = requestAnimationFrame(frame);
   };
   state.timer = requestAnimationFrame(frame);
 }
 
-function chooseRecording(index) {
+function choose(index) {
   stop();
-  state.recording = index;
+  state.choice = index;
   state.place = 0;
   state.times = chosen().scene.magnify;
-  document.getElementById("magnify").value = String(state.times);
+  const magnify = document.getElementById("magnify");
+  if (magnify) magnify.value = String(state.times);
   slider.max = String(series(chosen().scene.time).length - 1);
   showTime();
   redraw("figure");
@@ -85,6 +98,7 @@ function chooseRecording(index) {
 
 function fillMagnify() {
   const select = document.getElementById("magnify");
+  if (!select) return;
   select.replaceChildren(...report.magnifications.map((times) => {
     const label = times === 1 ? "to scale" : `${times} times larger`;
     return new Option(label, String(times));
@@ -95,22 +109,20 @@ function fillMagnify() {
   });
 }
 
+/** Call back when a radio button of a group is chosen; gives the value chosen now, which browsers may restore. */
+function radio(name, chose) {
+  const inputs = [...document.querySelectorAll(`input[name=${name}]`)];
+  for (const input of inputs) input.addEventListener("change", () => chose(input.value));
+  const checked = inputs.find((input) => input.checked);
+  return checked ? checked.value : null;
+}
+
 function start() {
+  if (!has3d) document.getElementById("flat").hidden = false;
   fillMagnify();
   for (const figure of document.querySelectorAll("figure")) watcher.observe(figure);
-  for (const input of document.querySelectorAll("input[name=recording]")) {
-    input.addEventListener("change", () => chooseRecording(Number(input.value)));
-  }
-  for (const input of document.querySelectorAll("input[name=scale]")) {
-    input.addEventListener("change", () => {
-      state.scale = input.value;
-      redraw("figure[data-kind=residual]");
-    });
-  }
   for (const button of document.querySelectorAll("[data-view]")) {
-    button.addEventListener("click", () => {
-      Plotly.relayout(document.getElementById("scene"), { "scene.camera": camera(button.dataset.view) });
-    });
+    button.addEventListener("click", () => turn(button.dataset.view));
   }
   slider.addEventListener("input", () => {
     stop();
@@ -119,10 +131,9 @@ function start() {
   document.getElementById("play").addEventListener("click", () => (state.timer ? stop() : play()));
   window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => redraw("figure"));
   window.addEventListener("beforeprint", () => [...stale].forEach(drawFigure));
-  // Browsers restore a chosen radio button when a page is loaded again.
-  const checked = document.querySelector("input[name=recording]:checked");
-  state.scale = document.querySelector("input[name=scale]:checked").value;
-  chooseRecording(checked ? Number(checked.value) : 0);
+  state.scale = radio("scale", (value) => {
+    state.scale = value;
+    redraw("figure[data-kind=residual]");
+  });
+  choose(Number(radio("choice", (value) => choose(Number(value)))));
 }
-
-if (report.recordings.length > 0) start();

@@ -1,0 +1,2 @@
+// Last, when all kinds of panels are known.
+if (report.choices.length > 0) start();

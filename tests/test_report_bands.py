@@ -1,0 +1,51 @@
+"""Where modes are marked in spectra."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tautwire.linear import modes_along
+from tautwire.report.bands import joined, mode_bands, strange_bands
+from tautwire.report.figures import page_data
+from tautwire.report.page import trace_page
+from tautwire.tracer.verdict import Resonance
+from tests.pages import Page
+from tests.robots import example
+from tests.traces import made_trace
+
+
+def test_bands_span_the_modes_along_the_path() -> None:
+    robot = example("three")
+    path = np.linspace((28.86, 0.0, 5.0), (35.0, 4.0, 12.0), 400)
+    frequencies = modes_along(robot, path[::5]).frequencies
+    bands = mode_bands(robot, path)
+    assert min(band.low for band in bands) == pytest.approx(frequencies.min(), rel=0.01)
+    assert max(band.high for band in bands) == pytest.approx(frequencies.max(), rel=0.01)
+
+
+def test_modes_that_lie_apart_have_bands_of_their_own_and_others_share_one() -> None:
+    bands = joined(np.array([[1.0, 1.05, 4.0], [1.2, 1.3, 4.4]]))
+    assert [(band.label, band.low, band.high) for band in bands] == [("1\N{EN DASH}2", 1.0, 1.3), ("3", 4.0, 4.4)]
+    assert bands[0].words == "Modes 1 to 2 lie between 1.00 and 1.30 Hz"
+    still = joined(np.array([[2.0, 7.0]]))
+    assert still[0].words == "Mode 1 lies at 2.00 Hz" and still[0].low < 2.0 < still[0].high
+
+
+def test_path_where_the_cables_cannot_hold_the_platform_has_no_bands() -> None:
+    robot = example("three")
+    assert mode_bands(robot, np.linspace((200.0, 0.0, 5.0), (300.0, 0.0, 5.0), 50)) == []
+    assert mode_bands(robot, np.full((20, 3), np.nan)) == []
+
+
+def test_page_tells_modes_and_what_the_model_does_not_have() -> None:
+    swinging = Resonance(0.45, ("x", "tension_1"), ("check",))
+    trace = replace(made_trace(samples=800), resonances=(swinging,))
+    fit, check = page_data(trace)["choices"]
+    assert [band["strange"] for band in fit["bands"]] == [False] * len(fit["bands"]) and fit["bands"]
+    assert [band["strange"] for band in check["bands"]].count(True) == 1
+    text = Page(trace_page(trace, {})).text
+    assert f"Check recording: {strange_bands([swinging])[0].words}" in text
+    assert "Something swings at 0.45 Hz" in text and "Fit recording: Mode" in text
