@@ -1,0 +1,26 @@
+// Gain and phase of a linear plant from the chosen input.
+
+const source = document.getElementById("source");
+source.addEventListener("change", () => redraw("figure[data-kind=gain]"));
+
+panelKinds.gain = (choice, place) => {
+  const output = report.gains[place];
+  const { gain, phase, peak, unit, by } = output.from[Number(source.value)];
+  const what = `Gain and phase over frequency, ${output.label} by ${by}`;
+  if (gain === null) return { numbers: "", words: `${what}: none.`, empty: "This input does not act here" };
+  const colour = colours();
+  const { shapes, ...room } = frequencyBands(report.bands, colour);
+  const traces = [
+    lineTrace("gain", report.frequency, gain, colour.accent, { hovertemplate: `%{y:.3~g} ${unit}` }),
+    lineTrace("phase", report.frequency, phase, colour.accent, { yaxis: "y2", hovertemplate: "%{y:.0f}°" }),
+  ];
+  const words = `${what}: at most ${peak} ${unit}. ${report.bands.map((band) => `${band.words}.`).join(" ")}`;
+  return {
+    numbers: `at most ${peak}`, words, traces,
+    layout: layout(colour, {
+      xaxis: frequencyAxis(colour, series(report.frequency), { anchor: "y2" }),
+      yaxis: axis(colour, unit, { ...logarithmic, domain: [0.4, 1] }),
+      yaxis2: axis(colour, "Phase (°)", { domain: [0, 0.3], nticks: 4 }), shapes, ...room,
+    }),
+  };
+};
