@@ -7,7 +7,7 @@ from .inner_steps import integrate
 from .interpolation import cubic, extrapolate, quintic
 from .laws import cable as law
 from .laws import stages
-from .laws.mathematics import COMPLEX_STEP, REAL, along, rate_of
+from .laws.mathematics import COMPLEX_STEP, REAL, all_along, along, rate_of
 from .past import Seen, remember, seen
 from .slave import Slave, active_effects, effects_of, read_resource
 
@@ -43,10 +43,13 @@ class Cable(Slave):
         own = (state.scale for effect in self.acting for state in effect.states)
         self.scales = (LENGTH_SCALE, LENGTH_SCALE, *own)
         self.end_line: Optional[law.Span] = None
+        # Of the inputs at a step's start, from which redos begin too.
+        self.begun: Tuple[Optional[Sequence[float]], float] = (None, 0.0)
         super().__init__(data, cable_variables(data), slice(FIRST_STATE, self.end_of_state), **kwargs)
         self.parameters_changed()
 
     def parameters_changed(self) -> None:
+        self.begun = (None, 0.0)
         numbers = self.real[self.first_parameter :]
         anchor, start = tuple(numbers[0:3]), tuple(numbers[3:6])
         modulus, area, damping, start_tension, gravity = numbers[6:11]
@@ -92,12 +95,11 @@ class Cable(Slave):
         self, state: List[float], step: float, ends: bool, middle: Motion, half: law.Span
     ) -> Tuple[List[float], List[float]]:
         """As :meth:`_in_one_step`, where the rope is straight and follows the winch."""
-        start, end = self._at_start(ends), self._moved(step, 1.0, ends)
+        end = self._moved(step, 1.0, ends)
         self.end_line = last = self._carried_line(end)
-        first = law.span(REAL, self.constants, law.CableInputs(start.position, start.velocity, start.winch_speed))
         slope, sixth, (unstrained, wound) = self.tension_law.unstrained_length_rate, step / 6.0, state
-        begin, there, away = start.winch_speed, middle.winch_speed, end.winch_speed
-        k1 = slope(REAL, begin, first.length, unstrained)
+        begin, there, away = self._speed_at_start(ends), middle.winch_speed, end.winch_speed
+        k1 = slope(REAL, begin, self._length_at_start(ends), unstrained)
         k2 = slope(REAL, there, half.length.real, unstrained + 0.5 * step * k1)
         k3 = slope(REAL, there, half.length.real, unstrained + 0.5 * step * k2)
         k4 = slope(REAL, away, last.length.real, unstrained + step * k3)
@@ -159,11 +161,11 @@ class Cable(Slave):
         """One complex step gives the outputs and their rates."""
         rates = self._rates(numbers, line, now.winch_speed)
         carried = law.CableInputs(
-            tuple(map(along, now.position, now.velocity)),
-            tuple(map(along, now.velocity, now.acceleration)),
+            all_along(now.position, now.velocity),
+            all_along(now.velocity, now.acceleration),
             along(now.winch_speed, now.winch_acceleration),
         )
-        state = self._state(list(map(along, numbers, rates)))
+        state = self._state(all_along(numbers, rates))
         moving = law.motion(
             COMPLEX_STEP,
             self.constants,
@@ -196,10 +198,8 @@ class Cable(Slave):
 
     def _carried_line(self, now: Motion) -> law.Span:
         """Without effects, numbers that carry their rates."""
-        carried = law.CableInputs(
-            tuple(map(along, now.position, now.velocity)), tuple(map(along, now.velocity, now.acceleration)), 0.0
-        )
-        return law.span(COMPLEX_STEP, self.constants, carried)
+        place, motion = all_along(now.position, now.velocity), all_along(now.velocity, now.acceleration)
+        return law.span(COMPLEX_STEP, self.constants, law.CableInputs(place, motion, 0.0))
 
     def _line(self, now: Motion) -> law.Span:
         inputs = law.CableInputs(now.position, now.velocity, now.winch_speed)
@@ -222,7 +222,22 @@ class Cable(Slave):
         return law.CableState(numbers[0], numbers[1], tuple(own))
 
     def _at_start(self, ends: bool) -> Motion:
-        return _motion(self.earlier if ends and self.earlier is not None else self.real)
+        return _motion(self._inputs_at_start(ends))
+
+    def _inputs_at_start(self, ends: bool) -> Sequence[float]:
+        return self.earlier if ends and self.earlier is not None else self.real
+
+    def _speed_at_start(self, ends: bool) -> float:
+        return self._inputs_at_start(ends)[WINCH_SPEED]
+
+    def _length_at_start(self, ends: bool) -> float:
+        """Without effects."""
+        inputs = self._inputs_at_start(ends)
+        if inputs is self.real or inputs != self.begun[0]:
+            start = _motion(inputs)
+            line = law.span(REAL, self.constants, law.CableInputs(start.position, start.velocity, start.winch_speed))
+            self.begun = (inputs if ends else None, line.length)
+        return self.begun[1]
 
     def _moved(self, step: float, fraction: float, ends: bool) -> Motion:
         """What acts on the cable after a fraction of a step."""

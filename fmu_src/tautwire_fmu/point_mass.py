@@ -7,7 +7,7 @@ from .interpolation import cubic
 from .laws import point_mass as law
 from .laws import stages
 from .laws.effects import Effect
-from .laws.mathematics import COMPLEX_STEP, REAL, Mathematics, along, rate_of
+from .laws.mathematics import COMPLEX_STEP, REAL, Mathematics, all_along, along, rate_of
 from .laws.vectors import Vector
 from .past import Seen, remember, seen
 from .quadrature import CUBIC_END, CUBIC_MIDDLE, QUINTIC_END, QUINTIC_MIDDLE, Node, Place, integrate
@@ -42,10 +42,13 @@ class PointMass(Slave):
         self.start_velocity: Tuple[float, ...] = tuple(data.get("start_velocity", (0.0, 0.0, 0.0)))
         self.couples = any(effect.wrench is not None for effect in self.acting)
         self.end_acceleration: Vector = ()
+        # Of the inputs at a step's start, from which redos begin too.
+        self.begun: Tuple[Sequence[float], Tuple[Vector, Vector], Node] = ((), ((), ()), Node((), ()))
         super().__init__(data, _variables(data), slice(self.first_output, self.first_output + 6), **kwargs)
         self.parameters_changed()
 
     def parameters_changed(self) -> None:
+        self.begun = ((), ((), ()), Node((), ()))
         numbers = self.real[self.first_parameter :]
         self.effects = active_effects(self.acting, numbers[5:])
         self.constants = law.PointMassConstants(mass=numbers[0], gravity=numbers[1])
@@ -62,10 +65,11 @@ class PointMass(Slave):
         first = self.first_output
         now = self._time()
         start = Place(self.real[first : first + 3], self.real[first + 3 : first + 6], ())
-        pushes = self._pushes(step, ends)
+        begun, known = self._begin(start, now, ends)
+        pushes = [begun, *self._later_pushes(begun, step, ends)]
         to_middle, to_end = (QUINTIC_MIDDLE, QUINTIC_END) if len(pushes) == 3 else (CUBIC_MIDDLE, CUBIC_END)
         times = (now, now + step) if len(pushes) == 2 else (now, now + 0.5 * step, now + step)
-        nodes = [self._node(start, push, time) for push, time in zip(pushes, times)]
+        nodes = [known, *(self._node(start, push, time) for push, time in zip(pushes[1:], times[1:]))]
         middle, end = integrate(start, nodes, step, to_middle), integrate(start, nodes, step, to_end)
         for _ in range(SWEEPS if self.couples else 0):
             before = end.position
@@ -108,18 +112,26 @@ class PointMass(Slave):
         ended = [Seen(self.time + step, numbers) for numbers in zip(end.position, end.velocity, nodes[-1].acceleration)]
         self.pasts = tuple(remember(past, b, e, self.lag) for past, b, e in zip(pasts, begun, ended))
 
-    def _pushes(self, step: float, ends: bool) -> List[Tuple[Vector, Vector]]:
-        """Summed force and its rate at the start, in the middle where it is known, and at the end."""
-        now = self._force(self.real)
+    def _begin(self, start: Place, time: float, ends: bool) -> Tuple[Tuple[Vector, Vector], Node]:
+        """Summed force and its rate at the start of a step, and the node there."""
+        inputs = self.earlier if ends and self.earlier is not None else self.real[: self.input_count]
+        moves = self.couples or self.timed
+        if moves or self.begun[0] != inputs:
+            push = self._force(inputs)
+            self.begun = (inputs, push, self._node(start, push, time))
+        return self.begun[1:]
+
+    def _later_pushes(self, begun: Tuple[Vector, Vector], step: float, ends: bool) -> List[Tuple[Vector, Vector]]:
+        """Summed force and its rate in the middle where it is known, and at the end."""
         if not ends:
-            force, rate = now
-            return [now, (tuple(f + step * r for f, r in zip(force, rate)), rate)]
+            force, rate = begun
+            return [(tuple(f + step * r for f, r in zip(force, rate)), rate)]
         assert self.earlier is not None
         between = [self._middle_force(self.earlier, step)] if self.middle_given else []
-        return [self._force(self.earlier), *between, now]
+        return [*between, self._force(self.real)]
 
     def _force(self, inputs: Any) -> Tuple[Vector, Vector]:
-        x, y, z, rx, ry, rz = (sum(inputs[FIRST_FORCE + k : self.first_middle : 6]) for k in range(6))
+        x, y, z, rx, ry, rz = [sum(inputs[FIRST_FORCE + k : self.first_middle : 6]) for k in range(6)]
         return (x, y, z), (rx, ry, rz)
 
     def _middle_force(self, then: Sequence[float], step: float) -> Tuple[Vector, Vector]:
@@ -145,9 +157,9 @@ class PointMass(Slave):
         if self.couples:
             # Only a wrench makes the acceleration's rate depend on the motion, and on the acceleration itself.
             acceleration = self._acceleration(REAL, position, velocity, force, time)
-            position = tuple(map(along, position, velocity))
-            velocity = tuple(map(along, velocity, acceleration))
-        forced = tuple(map(along, force, rate))
+            position = all_along(position, velocity)
+            velocity = all_along(velocity, acceleration)
+        forced = all_along(force, rate)
         carried = self._acceleration(COMPLEX_STEP, position, velocity, forced, along(time, 1.0))
         return Node([a.real for a in carried], [rate_of(a) for a in carried])
 

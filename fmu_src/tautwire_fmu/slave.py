@@ -94,18 +94,17 @@ class Slave(Fmi2Slave):
     def set_real(self, vrs: Sequence[int], values: Sequence[float]) -> None:
         if not vrs:
             return
-        real = self.real
+        real, highest = self.real, max(vrs)
         if 0 in vrs and values[vrs.index(0)] != real[0]:
             self.earlier = tuple(real[: self.input_count])
+        if highest >= len(real):
+            vrs, values = self._known(vrs, values)
         for reference, value in zip(vrs, values):
-            if reference < len(real):
-                real[reference] = value
-            else:
-                self._unknown(reference)
+            real[reference] = value
         self.stale = True
         self.untouched = False
         self.elapsed = 0.0
-        if max(vrs) >= self.first_parameter:
+        if highest >= self.first_parameter:
             self.parameters_changed()
 
     def do_step(self, current_time: float, step_size: float) -> bool:
@@ -151,6 +150,13 @@ class Slave(Fmi2Slave):
 
     def _is_state(self, reference: int) -> bool:
         return self.states.start <= reference < self.states.stop
+
+    def _known(self, vrs: Sequence[int], values: Sequence[float]) -> Tuple[Sequence[int], Sequence[float]]:
+        for reference in vrs:
+            if reference >= len(self.real):
+                self._unknown(reference)
+        known = [place for place, reference in enumerate(vrs) if reference < len(self.real)]
+        return [vrs[place] for place in known], [values[place] for place in known]
 
     def _unknown(self, reference: int) -> float:
         self.fault = f"no real variable has the value reference {reference}"

@@ -7,7 +7,7 @@ numbers for exact rates, and on arrays or symbols outside. Kinks are written wit
 
 import cmath
 import math
-from typing import Any, Callable, NamedTuple
+from typing import Any, Callable, List, NamedTuple, Sequence
 
 
 class Mathematics(NamedTuple):
@@ -91,6 +91,7 @@ COMPLEX_STEP = Mathematics(
 )
 
 STEP = 1e-30
+UNIT = complex(0.0, STEP)
 
 
 def along(value: float, rate: float) -> complex:
@@ -102,6 +103,11 @@ def along(value: float, rate: float) -> complex:
     Source: Martins, Sturdza and Alonso (2003), ACM Transactions on Mathematical Software 29(3), 245-262.
     """
     return complex(value, STEP * rate)
+
+
+def all_along(values: Sequence[float], rates: Sequence[float]) -> List[complex]:
+    """As :func:`along`, number by number."""
+    return [value + rate * UNIT for value, rate in zip(values, rates)]
 
 
 def rate_of(value: complex) -> float:
