@@ -1,6 +1,7 @@
 """What Tautwire raises on purpose; each error carries its values, and its text is one line."""
 
 from collections.abc import Sequence
+from typing import NoReturn
 
 
 class TautwireError(Exception):
@@ -34,11 +35,26 @@ class InputError(TautwireError):
 
 
 class RobotFileError(InputError):
-    """A robot file that cannot be read or declares something impossible."""
+    """A robot file that cannot be read or declares something impossible.
+
+    ``place`` leads to what is wrong: keys and, from 0, places in lists; empty where it is the whole file. ``line``,
+    from 1, is known of what is not even TOML.
+    """
+
+    def __init__(
+        self, where: str, problem: str, mend: str, place: tuple[str | int, ...] = (), line: int | None = None
+    ) -> None:
+        super().__init__(where, problem, mend)
+        self.place = place
+        self.line = line
 
 
 class RecordingError(InputError):
-    """A recording that cannot be read or does not fit the robot."""
+    """A recording that cannot be read or does not fit the robot; ``line``, from 1, or the row of a binary file."""
+
+    def __init__(self, where: str, problem: str, mend: str, line: int | None = None) -> None:
+        super().__init__(where, problem, mend)
+        self.line = line
 
 
 class MaterialTableError(InputError):
@@ -68,6 +84,22 @@ class UnreachableError(InputError):
         self.cable = cable
         self.tension = tension
         self.reason = reason
+
+
+class DiskFullError(TautwireError):
+    """There was no room to write ``target``; ``reason`` is the system's, ``temporary`` the temporary folder."""
+
+    def __init__(self, target: str, reason: str, temporary: str) -> None:
+        mend = f"make room there or in {temporary}, or choose another --out"
+        super().__init__(one_line(f"{target}: was not written, the disk refuses more ({reason}); {mend}"))
+        self.target = target
+        self.reason = reason
+        self.temporary = temporary
+
+
+def at_once(error: InputError) -> NoReturn:
+    """What readers do with an error unless they are told otherwise: raise it."""
+    raise error
 
 
 def one_line(text: str) -> str:

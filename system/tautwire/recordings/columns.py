@@ -28,4 +28,4 @@ class ColumnTable:
         """The samples, counted from 1, each with the file and its number, as a CSV file would have them."""
         columns = [self.columns.get(name, repeat(math.nan)) for name in self.header.names]
         for number, row in enumerate(zip(*columns, strict=False), 1):
-            yield f"{self.file}: row {number}", [repr(float(value)) for value in row]
+            yield Row(f"{self.file}: row {number}", number, [repr(float(value)) for value in row])

@@ -7,14 +7,15 @@ from dataclasses import dataclass
 from io import BytesIO, TextIOWrapper
 from itertools import islice
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pandas as pd  # type: ignore[import-untyped,unused-ignore]
 from numpy.typing import NDArray
 
-from ..errors import RecordingError, shown
+from ..errors import RecordingError, at_once, shown
 from ..input_file import read_bytes, require_text
-from .header import Header, header_of
+from .header import Header, Refuse, header_of
 from .rules import MISSING, Row
 
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
@@ -45,6 +46,7 @@ class CsvTable:
                 skipinitialspace=True,
                 keep_default_na=False,
                 na_values=list(MISSING),
+                **_exactly(),
             )
         except (ValueError, OverflowError):
             return None
@@ -59,11 +61,11 @@ class CsvTable:
             begin = rows.line_num + 1
             for row in rows:
                 if len(row) > 1 or "".join(row).strip():
-                    yield f"{self.file}: line {begin}", row
+                    yield Row(f"{self.file}: line {begin}", begin, row)
                 begin = rows.line_num + 1
         except csv.Error as problem:
             mend = "check the quotation marks from this line on"
-            raise RecordingError(f"{self.file}: line {begin}", f"is no CSV ({problem})", mend) from problem
+            raise RecordingError(f"{self.file}: line {begin}", f"is no CSV ({problem})", mend, begin) from problem
 
     def _is_rectangular(self, row_count: int) -> bool:
         """Whether the first rows are as wide as the header; pandas fills short ones up without a word."""
@@ -78,8 +80,11 @@ class CsvTable:
             return False
 
 
-def open_csv(path: str | Path, cable_count: int) -> CsvTable:
-    """The CSV file of a recording; raises RecordingError where it is no text or its header is wrong."""
+def open_csv(path: str | Path, cable_count: int, sink: Refuse = at_once) -> CsvTable:
+    """The CSV file of a recording; raises RecordingError where it is no text or its header is wrong.
+
+    What is wrong with columns of the header goes to the ``sink``.
+    """
     file = str(path)
     content = read_bytes(path, RecordingError)
     require_text(content, file, RecordingError, "CSV")
@@ -87,7 +92,13 @@ def open_csv(path: str | Path, cable_count: int) -> CsvTable:
     cells = _first_row(content, file)
     where = f"{file}: line 1"
     _require_header(cells, where)
-    return CsvTable(file, content, header_of(cells, where, cable_count))
+    return CsvTable(file, content, header_of(cells, where, cable_count, sink, line=1))
+
+
+def _exactly() -> dict[str, Any]:
+    """What makes pandas read each number as Python does; from 3.1 on it does so anyway, and deprecates the argument."""
+    version = tuple(int(part) for part in pd.__version__.split(".")[:2])
+    return {} if version >= (3, 1) else {"float_precision": "round_trip"}
 
 
 def _as_text(content: bytes) -> TextIOWrapper:

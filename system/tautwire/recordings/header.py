@@ -1,13 +1,15 @@
 """The columns of a recording: which there are and which are missing."""
 
 import re
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
-from ..errors import RecordingError, shown
+from ..errors import RecordingError, at_once, shown
 from ..robots.checked_table import nearest
 
 AXES = ("x", "y", "z")
+
+Refuse = Callable[[RecordingError], None]
 
 _OF_A_CABLE = re.compile(r"(?:winch_speed|tension)_(0|[1-9][0-9]{0,5})")
 
@@ -25,22 +27,27 @@ class Header:
         return tuple(name for name in self.names if name not in self.unknown)
 
 
-def header_of(cells: Sequence[str], where: str, cable_count: int) -> Header:
-    """The header in these cells; raises RecordingError unless time and every winch speed have a column."""
+def header_of(
+    cells: Sequence[str], where: str, cable_count: int, sink: Refuse = at_once, line: int | None = None
+) -> Header:
+    """The header in these cells; raises RecordingError unless time and every winch speed have a column.
+
+    With a ``sink`` each error goes there, and those that follow too where it does not raise.
+    """
     known = known_columns(cable_count)
     names = tuple(cell or f"(column {place})" for place, cell in enumerate(cells, 1))
     for place, name in enumerate(names):
         if name in names[:place]:
-            raise RecordingError(where, f"the column {shown(name)} is there twice", "keep one of the two")
+            sink(RecordingError(where, f"the column {shown(name)} is there twice", "keep one of the two", line))
         of_a_cable = _OF_A_CABLE.fullmatch(name)
         if of_a_cable and not 1 <= int(of_a_cable.group(1)) <= cable_count:
             problem = f"the column {name} is of no cable, the robot has cables 1 to {cable_count}"
-            raise RecordingError(where, problem, "give the robot file that belongs to this recording")
+            sink(RecordingError(where, problem, "give the robot file that belongs to this recording", line))
     unknown = tuple(name for name in names if name not in known)
     for needed in ("time", *(f"winch_speed_{cable}" for cable in range(1, cable_count + 1))):
         if needed not in names:
             mend = f"add it, or rename {nearest(needed, unknown)}" if unknown else "add it"
-            raise RecordingError(where, f"the column {needed} is missing", mend)
+            sink(RecordingError(where, f"the column {needed} is missing", mend, line))
     return Header(names, unknown)
 
 

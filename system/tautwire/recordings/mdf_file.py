@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import RecordingError, shown
+from ..errors import RecordingError, at_once, shown
 from ..input_file import readable_file
 from .columns import ColumnTable
-from .header import AXES, Header, header_of
+from .header import AXES, Header, Refuse, header_of
 
 SUFFIXES = (".mf4", ".mdf")
 _MAGIC = b"MDF     "
@@ -35,13 +35,14 @@ def is_mdf(path: str | Path) -> bool:
         return file.suffix.lower() in SUFFIXES or content.read(len(_MAGIC)) == _MAGIC
 
 
-def open_mdf(path: str | Path, cable_count: int) -> ColumnTable:
+def open_mdf(path: str | Path, cable_count: int, sink: Refuse = at_once) -> ColumnTable:
     """The MDF file of a recording, a row at each time of any of its channels that are read.
 
     Winch speeds are linear between their samples, as everywhere; an output has no value at the times of others. What
     lies before or after some winch speed is left out. Needs asammdf, which comes with ``tautwire[mdf]``.
 
     Raises RecordingError where it is no MDF file, a channel is missing, there twice or no number, or a unit is not SI.
+    What is wrong with the names of channels goes to the ``sink``.
     """
     file = str(path)
     try:
@@ -51,7 +52,7 @@ def open_mdf(path: str | Path, cable_count: int) -> ColumnTable:
         raise RecordingError(file, said, "install tautwire[mdf], or give the recording as CSV or Parquet") from problem
     try:
         with MDF(Path(path)) as content:
-            header, channels = _read(content, file, cable_count)
+            header, channels = _read(content, file, cable_count, sink)
     except RecordingError:
         raise
     # A file that is broken may raise anything there.
@@ -60,11 +61,11 @@ def open_mdf(path: str | Path, cable_count: int) -> ColumnTable:
     return ColumnTable(file, header, _on_one_time(channels, file))
 
 
-def _read(content: Any, file: str, cable_count: int) -> tuple[Header, dict[str, Channel]]:
+def _read(content: Any, file: str, cable_count: int, sink: Refuse) -> tuple[Header, dict[str, Channel]]:
     masters = set(content.masters_db.items())
     places = {name: [at for at in found if at not in masters] for name, found in content.channels_db.items()}
     names = [name for name, found in places.items() if found and name != "time"]
-    header = header_of(["time", *names], file, cable_count)
+    header = header_of(["time", *names], file, cable_count, sink)
     channels = {}
     for name in header.known:
         if name == "time":

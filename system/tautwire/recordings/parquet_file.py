@@ -7,10 +7,10 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from ..errors import RecordingError, shown
+from ..errors import RecordingError, at_once, shown
 from ..input_file import readable_file
 from .columns import ColumnTable
-from .header import header_of
+from .header import Refuse, header_of
 
 BATCH = 2**16
 
@@ -25,12 +25,15 @@ def is_parquet(path: str | Path) -> bool:
         return file.suffix.lower() == ".parquet" or content.read(len(_MAGIC)) == _MAGIC
 
 
-def open_parquet(path: str | Path, cable_count: int) -> ColumnTable:
-    """The Parquet file of a recording; raises RecordingError where it is none, or a column is missing or no number."""
+def open_parquet(path: str | Path, cable_count: int, sink: Refuse = at_once) -> ColumnTable:
+    """The Parquet file of a recording; raises RecordingError where it is none, or a column is missing or no number.
+
+    What is wrong with the names of columns goes to the ``sink``.
+    """
     file = str(path)
     try:
         with pq.ParquetFile(path) as content:
-            header = header_of(content.schema_arrow.names, file, cable_count)
+            header = header_of(content.schema_arrow.names, file, cable_count, sink)
             # One by one, so that what Arrow holds is never more than one column.
             columns = {name: _column(content, name, f"{file}: column {name}") for name in header.known}
     except (pa.ArrowException, OSError, ValueError) as problem:

@@ -1,18 +1,20 @@
 """Recordings: the speeds that the winches reported and what was measured, sample by sample."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+import pandas as pd  # type: ignore[import-untyped,unused-ignore]
 from numpy.typing import NDArray
 
-from ..errors import RecordingError, shown
-from .csv_file import open_csv
-from .header import AXES
+from ..errors import RecordingError, at_once, shown
+from .columns import ColumnTable
+from .csv_file import CsvTable, open_csv
+from .header import AXES, Refuse, header_of
 from .mdf_file import is_mdf, open_mdf
 from .parquet_file import is_parquet, open_parquet
-from .rules import HUGE, raise_first_fault
+from .rules import HUGE, faults, no_table
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,14 +76,22 @@ class Recording:
         """All outputs, shape (N, 3 + n), in the order of ``channel_names``, in m and N; NaN where missing."""
         return np.hstack((self.position, self.tension))
 
+    def frame(self) -> pd.DataFrame:
+        """The recording as a table with the columns of a recording file; all of them, NaN where missing."""
+        speeds = [f"winch_speed_{cable}" for cable in range(1, self.cable_count + 1)]
+        rows = np.column_stack([self.time, self.winch_speed, self.measured()])
+        return pd.DataFrame(rows, columns=["time", *speeds, *self.channel_names])
+
 
 def read_recording(path: str | Path, cable_count: int) -> Recording:
     """The recording in a CSV, Parquet or MDF file of a robot with ``cable_count`` cables; raises RecordingError."""
-    opened = open_parquet if is_parquet(path) else open_mdf if is_mdf(path) else open_csv
-    table = opened(path, cable_count)
+    return _checked(_opened(path, cable_count, at_once), cable_count)
+
+
+def _checked(table: CsvTable | ColumnTable, cable_count: int) -> Recording:
     numbers = table.numbers()
     if numbers is None:
-        raise_first_fault(table.rows(), table.header, table.file)
+        raise _first_fault(table)
     cables = range(1, cable_count + 1)
     recording = Recording(
         path=table.file,
@@ -92,8 +102,49 @@ def read_recording(path: str | Path, cable_count: int) -> Recording:
         unknown_columns=table.header.unknown,
     )
     if not _is_sound(recording):
-        raise_first_fault(table.rows(), table.header, table.file)
+        raise _first_fault(table)
     return recording
+
+
+def recording_faults(path: str | Path, cable_count: int) -> Iterator[RecordingError]:
+    """All that is wrong with a recording, in the file's order; nothing where it can be read. Takes its time.
+
+    Raises RecordingError where the file cannot be read as a recording at all.
+    """
+    of_header: list[RecordingError] = []
+    table = _opened(path, cable_count, of_header.append)
+    yield from of_header
+    yield from faults(table.rows(), table.header, table.file)
+
+
+def _opened(path: str | Path, cable_count: int, sink: Refuse) -> CsvTable | ColumnTable:
+    opened = open_parquet if is_parquet(path) else open_mdf if is_mdf(path) else open_csv
+    return opened(path, cable_count, sink)
+
+
+def _first_fault(table: CsvTable | ColumnTable) -> RecordingError:
+    return next(faults(table.rows(), table.header, table.file), no_table(table.file))
+
+
+def recording_from_frame(frame: pd.DataFrame, cable_count: int, name: str = "frame") -> Recording:
+    """The recording in a table with the columns of a recording file: ``time`` (s), ``winch_speed_1`` (m/s) ...
+
+    One row a sample; NaN where an output was not measured. ``name`` is what messages call it.
+
+    Raises RecordingError as :func:`read_recording` does.
+    """
+    header = header_of([str(column) for column in frame.columns], name, cable_count)
+    numbers = frame.set_axis(list(header.names), axis="columns")
+    columns = {column: _floats(numbers[column], f"{name}: column {column}") for column in header.known}
+    return _checked(ColumnTable(name, header, columns), cable_count)
+
+
+def _floats(column: pd.Series, where: str) -> NDArray[np.float64]:
+    try:
+        return column.to_numpy(dtype=np.float64, na_value=np.nan)
+    except (TypeError, ValueError) as problem:
+        said = f"holds {shown(str(column.dtype))}, not numbers"
+        raise RecordingError(where, said, "convert it to float64, in SI units") from problem
 
 
 def require_outputs(recording: Recording) -> None:

@@ -1,14 +1,18 @@
 """A table of a robot file that checks what it hands out."""
 
 import math
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable
 from difflib import get_close_matches
 from typing import Any, NamedTuple
 
-from ..errors import RobotFileError, shown
+from ..errors import RobotFileError, at_once, shown
+
+Refuse = Callable[[RobotFileError], None]
+Place = tuple[str | int, ...]
 
 # Beyond this no quantity of a cable robot lies, and squares of numbers still stay finite.
 LARGEST = 1e15
+LONGEST_KEY = 80
 
 
 class NumberRule(NamedTuple):
@@ -38,38 +42,45 @@ class NumberRule(NamedTuple):
 
 
 class CheckedTable:
-    """One table; every method raises RobotFileError, which names the file and the full key."""
+    """One table at a ``place`` of a file.
 
-    def __init__(self, file: str, key: str, content: Any) -> None:
+    What is wrong in it goes to ``sink`` as a RobotFileError, which names the file and the full key. Where that does
+    not raise, as :func:`tautwire.errors.at_once` does, reading goes on: with NaN for a number, None for a text.
+    """
+
+    def __init__(self, file: str, key: str, content: dict[str, Any], sink: Refuse = at_once, place: Place = ()) -> None:
         self.file = file
         self.key = key
-        if not isinstance(content, dict):
-            raise self.refusal("", f"is {shown(content)}, not a table", "write it as a table")
-        self.content: dict[str, Any] = content
+        self.content = content
+        self.sink = sink
+        self.place = place
 
-    def refusal(self, key: str, problem: str, mend: str) -> RobotFileError:
-        """The error about one key of this table, or about the table where ``key`` is empty."""
-        path = ".".join(part for part in (self.key, key) if part)
-        return RobotFileError(f"{self.file}: {path}" if path else self.file, problem, mend)
+    def refuse(self, key: str, problem: str, mend: str, entry: int | None = None) -> None:
+        """Refuse a key of this table, or an entry of its list; or the table where ``key`` is empty."""
+        named = key[:LONGEST_KEY] if entry is None else f"{key}[{entry + 1}]"
+        path = ".".join(part for part in (self.key, named) if part)
+        place = (*self.place, *([key] if key else []), *([] if entry is None else [entry]))
+        self.sink(RobotFileError(f"{self.file}: {path}" if path else self.file, problem, mend, place))
 
     def require_known(self, known: Iterable[str]) -> None:
         """Refuses a key that is not among the known ones and names the nearest."""
         names = tuple(known)
         for key in self.content:
             if key not in names:
-                mend = f"write {nearest(key, names)}, or remove it"
-                raise self.refusal(key[:80], "is not a known key", mend)
+                self.refuse(key, "is not a known key", f"write {nearest(key, names)}, or remove it")
 
     def number(self, key: str, rule: NumberRule) -> float:
         """The number under a key, or the rule's default."""
         if key not in self.content:
             if rule.default is None:
-                raise self.refusal(key, "is missing", rule.mend())
+                self.refuse(key, "is missing", rule.mend())
+                return math.nan
             return rule.default
         value = self._finite(key, self.content[key], rule.mend())
         bound = rule.broken_bound(value)
         if bound:
-            raise self.refusal(key, f"is {value!r}, must be {bound}", rule.mend())
+            self.refuse(key, f"is {value!r}, must be {bound}", rule.mend())
+            return math.nan
         return value
 
     def optional_number(self, key: str, rule: NumberRule) -> float | None:
@@ -79,59 +90,81 @@ class CheckedTable:
     def point(self, key: str, meaning: str) -> tuple[float, float, float]:
         """Three coordinates, in m."""
         mend = f"give {meaning} as [x, y, z] in m"
+        value = self.content.get(key)
         if key not in self.content:
-            raise self.refusal(key, "is missing", mend)
-        value = self.content[key]
-        if not isinstance(value, list):
-            raise self.refusal(key, f"is {shown(value)}, not a list of 3 numbers", mend)
-        if len(value) != 3:
-            raise self.refusal(key, f"has {len(value)} entries, must have 3", mend)
-        x, y, z = (self._coordinate(f"{key}[{place}]", entry, mend) for place, entry in enumerate(value, 1))
-        return (x, y, z)
+            self.refuse(key, "is missing", mend)
+        elif not isinstance(value, list):
+            self.refuse(key, f"is {shown(value)}, not a list of 3 numbers", mend)
+        elif len(value) != 3:
+            self.refuse(key, f"has {len(value)} entries, must have 3", mend)
+        else:
+            x, y, z = (self._coordinate(key, entry, each, mend) for entry, each in enumerate(value))
+            return (x, y, z)
+        return (math.nan, math.nan, math.nan)
 
-    def text(self, key: str, mend: str) -> str:
+    def text(self, key: str, mend: str) -> str | None:
         """The text under a key."""
+        value = self.content.get(key)
         if key not in self.content:
-            raise self.refusal(key, "is missing", mend)
-        value = self.content[key]
-        if not isinstance(value, str):
-            raise self.refusal(key, f"is {shown(value)}, not text", mend)
-        return value
+            self.refuse(key, "is missing", mend)
+        elif not isinstance(value, str):
+            self.refuse(key, f"is {shown(value)}, not text", mend)
+        else:
+            return value
+        return None
 
-    def table(self, key: str) -> "CheckedTable":
-        """The table under a key."""
-        path = f"{self.key}.{key}" if self.key else key
-        return CheckedTable(self.file, path, self.content[key])
+    def table(self, key: str) -> "CheckedTable | None":
+        """The table under a key; None where there is none."""
+        if key not in self.content:
+            return None
+        return self._inner(f"{self.key}.{key}" if self.key else key, self.content[key], (*self.place, key))
 
     def tables(self, key: str) -> "tuple[CheckedTable, ...]":
         """The array of tables under a key, their paths counted from 1."""
         path = f"{self.key}.{key}" if self.key else key
         value = self.content[key]
         if not isinstance(value, list):
-            raise self.refusal(key, f"is {shown(value)}, not an array of tables", f"write it as [[{path}]]")
-        entries = enumerate(value, 1)
-        return tuple(CheckedTable(self.file, f"{path}[{place}]", entry) for place, entry in entries)
+            self.refuse(key, f"is {shown(value)}, not an array of tables", f"write it as [[{path}]]")
+            return ()
+        inner = (self._inner(f"{path}[{at + 1}]", one, (*self.place, key, at)) for at, one in enumerate(value))
+        return tuple(table for table in inner if table is not None)
 
-    def _finite(self, key: str, value: Any, mend: str) -> float:
+    def one_or_several(self, key: str) -> "tuple[CheckedTable, ...]":
+        """The table under a key, or the array of tables."""
+        if isinstance(self.content[key], list):
+            return self.tables(key)
+        table = self.table(key)
+        return () if table is None else (table,)
+
+    def _inner(self, path: str, content: Any, place: Place) -> "CheckedTable | None":
+        if isinstance(content, dict):
+            return CheckedTable(self.file, path, content, self.sink, place)
+        problem = f"is {shown(content)}, not a table"
+        self.sink(RobotFileError(f"{self.file}: {path}", problem, "write it as a table", place))
+        return None
+
+    def _finite(self, key: str, value: Any, mend: str, entry: int | None = None) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
-            raise self.refusal(key, f"is {shown(value)}, not a number", mend)
+            self.refuse(key, f"is {shown(value)}, not a number", mend, entry)
+            return math.nan
         try:
             number = float(value)
         except OverflowError:
             number = math.inf
         if not math.isfinite(number):
-            raise self.refusal(key, f"is {shown(value)}, must be finite", mend)
+            self.refuse(key, f"is {shown(value)}, must be finite", mend, entry)
+            return math.nan
         return number
 
-    def _coordinate(self, key: str, value: Any, mend: str) -> float:
-        number = self._finite(key, value, mend)
+    def _coordinate(self, key: str, entry: int, value: Any, mend: str) -> float:
+        number = self._finite(key, value, mend, entry)
         if abs(number) > LARGEST:
-            raise self.refusal(key, f"is {number!r}, must be at most {LARGEST:g} m from the origin", mend)
+            self.refuse(key, f"is {number!r}, must be at most {LARGEST:g} m from the origin", mend, entry)
         return number
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
     """The known name that looks most like ``name``, quoted; letter case does not count."""
     by_lower_case = {candidate.lower(): candidate for candidate in known}
-    found = get_close_matches(name[:80].lower(), by_lower_case, n=1, cutoff=0.0)
+    found = get_close_matches(name[:LONGEST_KEY].lower(), by_lower_case, n=1, cutoff=0.0)
     return f"'{by_lower_case[found[0]]}'" if found else "one that is known"

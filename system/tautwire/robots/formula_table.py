@@ -18,24 +18,24 @@ def formulas_in(root: CheckedTable, cables_of: Callable[[CheckedTable], tuple[in
     """
     if "formula" not in root.content:
         return ()
-    several = isinstance(root.content["formula"], list)
-    tables = root.tables("formula") if several else (root.table("formula"),)
-    return tuple(formula for table in tables for formula in _formulas_of(table, cables_of))
+    return tuple(formula for table in root.one_or_several("formula") for formula in _formulas_of(table, cables_of))
 
 
 def _formulas_of(table: CheckedTable, cables_of: Callable[[CheckedTable], tuple[int, ...]]) -> list[Formula]:
     table.require_known((*PLACES, "cables"))
     places = [place for place in PLACES if place in table.content]
     if not places:
-        raise table.refusal("", "holds no formula", 'write one, as in force_x = "-20 * vx"')
-    if "cables" in table.content and "tension" not in places:
-        raise table.refusal("cables", "only a formula of the tension acts in cables", "remove cables")
+        table.refuse("", "holds no formula", 'write one, as in force_x = "-20 * vx"')
+    elif "cables" in table.content and "tension" not in places:
+        table.refuse("cables", "only a formula of the tension acts in cables", "remove cables")
     found = []
     for place in places:
         text = table.text(place, 'write it as a text, as in "-20 * vx"')
+        if text is None:
+            continue
         try:
             read_expression(text, PLACES[place])
         except ExpressionError as error:
-            raise table.refusal(place, f"character {error.place}: {error.problem}", error.mend) from error
+            table.refuse(place, f"character {error.place}: {error.problem}", error.mend)
         found.append(Formula(place, text, cables_of(table) if place == "tension" else ()))
     return found

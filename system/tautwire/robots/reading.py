@@ -10,16 +10,15 @@ from pathlib import Path
 from typing import Any
 
 from tautwire_fmu.laws.cable import LAWS
-from tautwire_fmu.laws.effects import BY_NAME, Effect, Parameter
+from tautwire_fmu.laws.effects import BY_NAME
 
-from ..errors import RobotFileError, one_line, shown
+from ..errors import RobotFileError, at_once, one_line, shown
 from ..input_file import read_bytes, require_text
-from .checked_table import CheckedTable, NumberRule, nearest
+from .checked_table import CheckedTable, NumberRule, Refuse, nearest
+from .effect_table import cables_of, effects_in
 from .formula_table import formulas_in
 from .robot import (
-    PER_CABLE,
     Cable,
-    EffectSetting,
     OwnFmu,
     Platform,
     Point,
@@ -77,13 +76,32 @@ LIMITS = {
 }
 
 
-def read_robot(path: str | Path) -> Robot:
-    """The robot that a file declares; raises RobotFileError where it declares none."""
+def read_robot(path: str | Path, sink: Refuse = at_once) -> Robot:
+    """The robot that a file declares; raises RobotFileError where it declares none.
+
+    With a ``sink`` each error goes there. Where that does not raise, reading goes on to the next one, and the robot is
+    not to be used. What is no TOML is raised all the same.
+    """
     file = str(path)
+    parsed = _parsed(robot_file_text(path), file)
+    return _robot(CheckedTable(file, "", parsed, sink), default_name=one_line(Path(path).stem))
+
+
+def robot_content(path: str | Path) -> dict[str, Any]:
+    """The keys and values of a robot file, unchecked; raises RobotFileError where it is no TOML."""
+    return _parsed(robot_file_text(path), str(path))
+
+
+def robot_from(content: dict[str, Any], path: str | Path) -> Robot:
+    """The robot that keys and values declare as if a file ``path`` held them; raises RobotFileError for none."""
+    return _robot(CheckedTable(str(path), "", content), default_name=one_line(Path(path).stem))
+
+
+def robot_file_text(path: str | Path) -> str:
+    """What stands in a robot file; raises RobotFileError where that is no text."""
     content = read_bytes(path, RobotFileError, LARGEST_FILE)
-    require_text(content, file, RobotFileError, "TOML")
-    parsed = _parsed(content.decode("utf-8-sig"), file)
-    return _robot(CheckedTable(file, "", parsed), default_name=one_line(Path(path).stem))
+    require_text(content, str(path), RobotFileError, "TOML")
+    return content.decode("utf-8-sig")
 
 
 def write_robot(robot: Robot, path: str | Path) -> None:
@@ -120,7 +138,7 @@ def _parsed(text: str, file: str) -> dict[str, Any]:
         line = int(said.group(1)) if said else text.count("\n") + 1
         column = f", column {said.group(2)}" if said else ""
         where = f"{file}: line {line}"
-        raise RobotFileError(where, f"is not TOML ({reason}{column})", "correct this line") from problem
+        raise RobotFileError(where, f"is not TOML ({reason}{column})", "correct this line", line=line) from problem
 
 
 def _robot(root: CheckedTable, default_name: str) -> Robot:
@@ -129,17 +147,19 @@ def _robot(root: CheckedTable, default_name: str) -> Robot:
     gravity = root.number("gravity", GRAVITY)
     platform = _platform(root)
     cables = _cables(root, platform.start)
+    tension, sensors, effect = root.table("tension"), root.table("sensors"), root.table("effect")
+    winch, fmu = root.table("winch"), root.table("fmu")
     return Robot(
         name=name,
         gravity=gravity,
         platform=platform,
-        tension=_tension(root.table("tension")) if "tension" in root.content else None,
-        sensors=_sensors(root.table("sensors")) if "sensors" in root.content else Sensors(),
+        tension=_tension(tension) if tension else None,
+        sensors=_sensors(sensors) if sensors else Sensors(),
         cables=cables,
-        effects=_effects(root.table("effect"), len(cables)) if "effect" in root.content else (),
-        winch=_winch(root.table("winch")) if "winch" in root.content else None,
-        fmus=_fmus(root.table("fmu"), len(cables)) if "fmu" in root.content else (),
-        formulas=formulas_in(root, partial(_cables_of_effect, cable_count=len(cables))),
+        effects=effects_in(effect, len(cables)) if effect else (),
+        winch=_winch(winch) if winch else None,
+        fmus=_fmus(fmu, len(cables)) if fmu else (),
+        formulas=formulas_in(root, partial(cables_of, cable_count=len(cables))),
     )
 
 
@@ -148,15 +168,17 @@ def _name(root: CheckedTable, default: str) -> str:
         return default
     mend = 'give the robot a name, as in name = "hall"'
     name = root.text("name", mend)
-    if not name.strip() or not name.isprintable():
-        raise root.refusal("name", f"is {shown(name)}, must be one line of printable text", mend)
-    return name
+    if name is not None and (not name.strip() or not name.isprintable()):
+        root.refuse("name", f"is {shown(name)}, must be one line of printable text", mend)
+    return name or default
 
 
 def _platform(root: CheckedTable) -> Platform:
-    if "platform" not in root.content:
-        raise root.refusal("platform", "is missing", "add a table [platform] with mass and start")
     table = root.table("platform")
+    if table is None:
+        if "platform" not in root.content:
+            root.refuse("platform", "is missing", "add a table [platform] with mass and start")
+        return Platform(math.nan, (math.nan, math.nan, math.nan))
     table.require_known(("mass", "start", "mass_uncertainty"))
     return Platform(
         table.number("mass", MASS),
@@ -171,10 +193,10 @@ def _tension(table: CheckedTable) -> TensionLimits:
     preferred = table.number("preferred", PREFERRED)
     if minimum > maximum:
         problem = f"is {minimum!r}, must be at most the maximum, {maximum!r} N"
-        raise table.refusal("minimum", problem, "lower minimum or raise maximum")
-    if not minimum <= preferred <= maximum:
+        table.refuse("minimum", problem, "lower minimum or raise maximum")
+    elif preferred < minimum or preferred > maximum:
         problem = f"is {preferred!r}, must lie between minimum and maximum, {minimum!r} and {maximum!r} N"
-        raise table.refusal("preferred", problem, "choose a tension between them")
+        table.refuse("preferred", problem, "choose a tension between them")
     return TensionLimits(minimum, maximum, preferred, table.optional_number("preferred_uncertainty", UNCERTAINTY))
 
 
@@ -192,19 +214,20 @@ def _sensors(table: CheckedTable) -> Sensors:
 
 
 def _cables(root: CheckedTable, start: Point) -> tuple[Cable, ...]:
+    given = root.content.get("cable", [])
     tables = root.tables("cable") if "cable" in root.content else ()
-    if len(tables) < 3:
-        problem = f"{len(tables)} given, a robot has three or more"
-        raise root.refusal("cable", problem, "add one table [[cable]] for each cable")
+    if isinstance(given, list) and len(given) < 3:
+        problem = f"{len(given)} given, a robot has three or more"
+        root.refuse("cable", problem, "add one table [[cable]] for each cable")
     cables = tuple(_cable(table) for table in tables)
     for place, (table, cable) in enumerate(zip(tables, cables, strict=True)):
         if math.dist(cable.anchor, start) < SAME_POINT:
             problem = f"is {list(cable.anchor)}, the same as platform.start"
-            raise table.refusal("anchor", problem, "move one of them")
+            table.refuse("anchor", problem, "move one of them")
         for other in range(place):
             if math.dist(cable.anchor, cables[other].anchor) < SAME_POINT:
                 problem = f"is {list(cable.anchor)}, the same as that of cable {other + 1}"
-                raise table.refusal("anchor", problem, "give each cable its own exit point")
+                table.refuse("anchor", problem, "give each cable its own exit point")
     return cables
 
 
@@ -212,14 +235,14 @@ def _cable(table: CheckedTable) -> Cable:
     table.require_known(("anchor", "modulus", "area", "damping", "law", "modulus_uncertainty", "damping_uncertainty"))
     laws = " or ".join(f'"{law}"' for law in LAWS)
     law = table.text("law", f"write law = {laws}")
-    if law not in LAWS:
-        raise table.refusal("law", f"is {shown(law)}, must be {laws}", f"write {nearest(law, LAWS)}")
+    if law is not None and law not in LAWS:
+        table.refuse("law", f"is {shown(law)}, must be {laws}", f"write {nearest(law, LAWS)}")
     return Cable(
         anchor=table.point("anchor", "the exit point on the frame"),
         modulus=table.number("modulus", MODULUS),
         area=table.number("area", AREA),
         damping=table.number("damping", DAMPING),
-        law=law,
+        law=law or "",
         modulus_uncertainty=table.number("modulus_uncertainty", MODULUS_UNCERTAINTY),
         damping_uncertainty=table.number("damping_uncertainty", DAMPING_UNCERTAINTY),
     )
@@ -242,63 +265,10 @@ def _fmus(table: CheckedTable, cable_count: int) -> tuple[OwnFmu, ...]:
     found = []
     for slot in table.content:
         name = table.text(slot, mend)
+        if name is None:
+            continue
         if not name.strip() or not name.isprintable():
-            raise table.refusal(slot, f"is {shown(name)}, must be the path of a file", mend)
+            table.refuse(slot, f"is {shown(name)}, must be the path of a file", mend)
         # Whoever writes the robot elsewhere must still find the FMU.
         found.append(OwnFmu(slot, Path(os.path.abspath(Path(table.file).parent / name))))
     return tuple(found)
-
-
-def _effects(table: CheckedTable, cable_count: int) -> tuple[EffectSetting, ...]:
-    settings: list[EffectSetting] = []
-    for name, content in table.content.items():
-        if name not in BY_NAME:
-            mend = f"write {nearest(name, BY_NAME)}, or remove it"
-            raise table.refusal(name[:80], "is not an effect that the project knows", mend)
-        several = isinstance(content, list)
-        taken: dict[int, str] = {}
-        for one in table.tables(name) if several else (table.table(name),):
-            setting = _effect(one, BY_NAME[name], cable_count)
-            # Effects that act on no cable take the place of cable 0, so that they too are set once.
-            for cable in setting.cables or (0,):
-                if cable in taken:
-                    which = f"cable {cable}" if cable else "the robot"
-                    problem = f"is set twice for {which}, in {taken[cable]} too"
-                    raise one.refusal("cables" if cable else "", problem, "set it once")
-                taken[cable] = one.key
-            settings.append(setting)
-    return tuple(settings)
-
-
-def _effect(table: CheckedTable, effect: Effect, cable_count: int) -> EffectSetting:
-    per_cable = effect.component in PER_CABLE
-    if "cables" in table.content and not per_cable:
-        raise table.refusal("cables", f"{effect.name} acts on the {effect.component}", "remove cables")
-    names = [parameter.name for parameter in effect.parameters]
-    table.require_known([*names, "cables"] if per_cable else names)
-    values = {each.name: table.number(each.name, _rule(each)) for each in effect.parameters}
-    if not any(name in table.content for name in names):
-        mend = f"give {effect.parameters[0].description}, as in {names[0]} = {effect.parameters[0].start:g}"
-        raise table.refusal("", "sets none of its numbers", mend)
-    return EffectSetting(effect.name, values, _cables_of_effect(table, cable_count) if per_cable else ())
-
-
-def _rule(parameter: Parameter) -> NumberRule:
-    bounds = (parameter.minimum, parameter.maximum)
-    return NumberRule(parameter.description, parameter.unit, *bounds, default=parameter.neutral)
-
-
-def _cables_of_effect(table: CheckedTable, cable_count: int) -> tuple[int, ...]:
-    if "cables" not in table.content:
-        return tuple(range(1, cable_count + 1))
-    mend = "list cables as in cables = [2], or remove the key for all cables"
-    given = table.content["cables"]
-    if not isinstance(given, list) or not given:
-        problem = "is empty" if given == [] else f"is {shown(given)}, not a list of cables"
-        raise table.refusal("cables", problem, mend)
-    for cable in given:
-        if isinstance(cable, bool) or not isinstance(cable, int) or not 1 <= cable <= cable_count:
-            raise table.refusal("cables", f"has {shown(cable)}, must be from 1 to {cable_count}", mend)
-        if given.count(cable) > 1:
-            raise table.refusal("cables", f"names cable {cable} twice", mend)
-    return tuple(given)
