@@ -1,1 +1,84 @@
-"""Cable-driven parallel robots as FMI components, and a tracer that finds what their model lacks."""
+"""Cable-driven parallel robots as FMI components, and a tracer that finds what their model lacks.
+
+The names here are all that most programs need; each comes with its module when it is first asked for.
+
+========================== ========================================================================================
+``read_robot``             the robot that a TOML file declares
+``build_fmus``             its FMUs, for other tools and for our master
+``cosimulate``             a run of the FMUs over winch speeds, as arrays or a pandas frame
+``Line``                   a straight path from rest to rest
+``ideal_winch_speeds``     the winch speeds of a path, for inelastic cables
+``linearise``              the linear plant as a python-control state space, with its modes
+``bode_figure``            a channel of it as a matplotlib figure
+``modes_along_figure``     the modes along a path as one; ``modes_along`` gives the numbers
+``design_controller``      LQG with integral action on it
+``cosimulate_closed_loop`` a run of the FMUs with a controller
+``read_recording``         winch speeds and what sensors saw, from CSV, Parquet or MDF
+``recording_from_frame``   the same from a pandas frame
+``trace``                  what the model lacks, from recordings
+``write_report``           the report, the better robot file and its FMUs, into a folder
+========================== ========================================================================================
+"""
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from .control import cosimulate_closed_loop, design_controller
+    from .fmus.packaging import build_fmus
+    from .linear import bode_figure, linearise, modes_along, modes_along_figure
+    from .recordings.recording import read_recording, recording_from_frame
+    from .report import write_report
+    from .robots.reading import read_robot
+    from .runs.cosimulation import cosimulate
+    from .tracer import trace
+    from .trajectory import Line, ideal_winch_speeds
+
+__version__ = "0.1.0"
+
+__all__ = [
+    "Line",
+    "bode_figure",
+    "build_fmus",
+    "cosimulate",
+    "cosimulate_closed_loop",
+    "design_controller",
+    "ideal_winch_speeds",
+    "linearise",
+    "modes_along",
+    "modes_along_figure",
+    "read_recording",
+    "read_robot",
+    "recording_from_frame",
+    "trace",
+    "write_report",
+]
+
+# CasADi, python-control and plotly take a second to import; who reads a robot file needs none of them.
+_MODULES = {
+    "Line": ".trajectory",
+    "bode_figure": ".linear",
+    "build_fmus": ".fmus.packaging",
+    "cosimulate": ".runs.cosimulation",
+    "cosimulate_closed_loop": ".control",
+    "design_controller": ".control",
+    "ideal_winch_speeds": ".trajectory",
+    "linearise": ".linear",
+    "modes_along": ".linear",
+    "modes_along_figure": ".linear",
+    "read_recording": ".recordings.recording",
+    "read_robot": ".robots.reading",
+    "recording_from_frame": ".recordings.recording",
+    "trace": ".tracer",
+    "write_report": ".report",
+}
+
+
+def __getattr__(name: str) -> Any:
+    if name not in _MODULES:
+        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+    return getattr(import_module(_MODULES[name], __name__), name)
+
+
+def __dir__() -> list[str]:
+    return sorted({*globals(), *__all__})

@@ -119,7 +119,7 @@ def instantiated(
             name: stack.enter_context(make(name, path)) for name, path in {**fmus.parts, **beside.parts}.items()
         }
         for name, component in components.items():
-            start = fmus.own.get(name, {})
+            start = {**fmus.own.get(name, {}), **fmus.settings.get(name, {})}
             component.initialize(0.0, {key: value for key, value in start.items() if _is_parameter(component, key)})
         _require_start(fmus, components[PLATFORM])
         yield Coupling(
@@ -168,13 +168,14 @@ def cosimulate(
 ) -> Motion:
     """Co-simulate a robot over sampled winch speeds, linear between samples.
 
-    ``time`` (N,) in s, rising; ``winch_speed`` (N, n) in m/s, positive reels in, is what the rope does, or what winches
-    are asked for where the robot has such. Macro steps are no longer than
-    ``step`` (s); or such that their estimated errors of all lengths sum to at most ``tolerance`` (m), where one is
+    ``time`` (N,) in s, rising, and ``winch_speed`` (N, n) in m/s, positive reels in, are arrays or columns of a frame.
+    Speeds are what the rope does, or what winches are asked for where the robot has such. Macro steps are no longer
+    than ``step`` (s); or such that their estimated errors of all lengths sum to at most ``tolerance`` (m), where one is
     given. ``patience`` is as for :func:`record`. Returns the run at ``time``.
 
     Raises RunError where an FMU fails, StepError where no step meets the tolerance.
     """
+    time, winch_speed = np.asarray(time, dtype=float), np.asarray(winch_speed, dtype=float)
     return run(fmus, Sampled(time, winch_speed), time, stepping_by(step, tolerance, time), progress, patience)
 
 

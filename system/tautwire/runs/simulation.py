@@ -50,7 +50,7 @@ def simulate_recording(
         notes = (*notes, f"{path}: winch speeds are what the winches are asked for")
     notes = (*notes, *unstated_units(robot.fmus, robot.cable_count))
     with TemporaryDirectory(prefix="tautwire-simulate-") as folder:
-        fmus = build_fmus(placed(robot, start), Path(folder))
+        fmus = build_fmus(placed(robot, start), Path(folder), partial(progress, "building"))
         source, begun = Sampled(time, winch_speed), Beginning(count, recorder)
 
         def run(rows: int, stepping: Stepping, into: Recorder, what: str = "estimating the error") -> Account:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import combinations, product
 
@@ -14,6 +14,7 @@ from tautwire_fmu.laws.mathematics import REAL
 from tautwire_fmu.laws.point_mass import PointMassConstants, total_mass
 
 from ..errors import InputError, UnreachableError
+from ..interrupt import interrupts_held
 from ..robots.robot import Robot, TensionLimits
 from .equilibrium import DEFAULT_LIMITS, has_weight, hung, load, platform_effects, routes, static_tensions
 
@@ -60,13 +61,14 @@ def wrench_feasible_workspace(
     upper: Sequence[float] | None = None,
     spacing: float | None = None,
     acceleration: float = 0.0,
+    progress: Callable[[float], None] | None = None,
 ) -> Workspace:
     """The wrench-feasible workspace on a grid that has the robot's start among its points.
 
     ``lower`` and ``upper`` are corners of a box in m, by default about all exit points and the start; ``spacing`` in
     m, by default a twentieth of its longest side. Required are the weight and every acceleration whose components are
     at most ``acceleration``, in m/s^2. The tensions keep within the limits of the robot file where there are more
-    than three cables; else they are only not negative.
+    than three cables; else they are only not negative. ``progress`` gets the share that is done.
 
     All forces that the cables can make are ``{U T : T_min <= T_i <= T_max}``, a polytope with faces normal to every
     ``n = u_i x u_j``. The margin is the least of ``h(n) - n . w`` over faces and required forces w, with
@@ -81,14 +83,18 @@ def wrench_feasible_workspace(
     axes = _grid(robot, lower, upper, spacing)
     shape = tuple(len(axis) for axis in axes)
     margin, lowest, highest = (np.full(shape, np.nan) for _ in range(3))
-    for place in np.ndindex(*shape):
-        position = np.array([axis[k] for axis, k in zip(axes, place, strict=True)])
-        try:
-            margin[place] = wrench_margin(robot, position, acceleration)
-            tensions = static_tensions(robot, position)
-        except UnreachableError:
-            continue
-        lowest[place], highest[place] = np.min(tensions), np.max(tensions)
+    with interrupts_held() as raise_interrupt:
+        for count, place in enumerate(np.ndindex(*shape)):
+            raise_interrupt()
+            if progress is not None:
+                progress(count / margin.size)
+            position = np.array([axis[k] for axis, k in zip(axes, place, strict=True)])
+            try:
+                margin[place] = wrench_margin(robot, position, acceleration)
+                tensions = static_tensions(robot, position)
+            except UnreachableError:
+                continue
+            lowest[place], highest[place] = np.min(tensions), np.max(tensions)
     return Workspace(axes, margin, lowest, highest)
 
 
