@@ -1,0 +1,54 @@
+"""Figs 3 and 4: the tensile test and the loops of the dynamic tests."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from .material import BREAKING_FORCE, LEAST, METALLIC_AREA, MOST, MaterialRuns, eq_7
+from .parameters import SetName
+from .style import COLOURS, RULE, WIDTH, Drawn
+
+# Axes as printed: mm and N.
+TENSILE_AXES = ((0.0, 1.8), (-500.0, 3500.0))
+LOOP_AXES = ((-0.2, 0.25), (-600.0, 600.0))
+
+
+def draw_material(runs: Mapping[SetName, MaterialRuns]) -> Iterator[Drawn]:
+    """Both figures of section 3."""
+    yield _tensile(runs)
+    yield _loops(runs["corrected"])
+
+
+def _tensile(runs: Mapping[SetName, MaterialRuns]) -> Drawn:
+    figure = Figure(figsize=(1.5 * WIDTH, 3.3), layout="constrained")
+    axes = figure.add_subplot()
+    labels: dict[SetName, str] = {"corrected": "with relaxation", "printed": "102.2 GPa"}
+    for (name, label), line, colour in zip(labels.items(), ("-", "-."), COLOURS, strict=False):
+        test = runs[name].tensile
+        modulus = 1e-9 * eq_7(test, METALLIC_AREA)
+        axes.plot(1e3 * test.elongation, test.load, line, color=colour, label=f"{label}; Eq. 7: {modulus:.1f} GPa")
+    for share, mark in ((LEAST, "F_{10\\%}"), (MOST, "F_{30\\%}")):
+        axes.axhline(share * BREAKING_FORCE, color=RULE, linewidth=0.8, linestyle=":")
+        axes.text(0.02, share * BREAKING_FORCE + 40.0, f"${mark}$")
+    axes.set(xlim=TENSILE_AXES[0], ylim=TENSILE_AXES[1], xlabel="Elongation (mm)", ylabel="Load (N)")
+    axes.legend(loc="lower right")
+    told = "Load over elongation of a cable FMU pulled at 0.05 mm/s up to 30 % of the breaking force and back."
+    return Drawn("fig_03", "Fig. 3: load and elongation at 0.05 mm/s", told, figure)
+
+
+def _loops(runs: MaterialRuns) -> Drawn:
+    figure = Figure(figsize=(1.5 * WIDTH, 3.3), layout="constrained")
+    axes = figure.add_subplot()
+    shades = np.linspace(0.0, 1.0, len(runs.loops))
+    for (frequency, loop), shade in zip(runs.loops.items(), shades, strict=True):
+        colour = np.array([0.12, 0.5, 0.65]) * (1.0 - shade) + np.array([0.82, 0.42, 0.15]) * shade
+        axes.plot(1e3 * loop.elongation, loop.load, color=colour, label=f"{frequency:g} Hz", linewidth=1.2)
+    axes.set(xlim=LOOP_AXES[0], ylim=LOOP_AXES[1], xlabel="Elongation (mm)", ylabel="Sinusoidal load (N)")
+    axes.legend(loc="lower right", ncols=2)
+    told = (
+        "Loops of load over elongation at six frequencies, about a preload of 1500 N, of a cable FMU with relaxation."
+    )
+    return Drawn("fig_04", "Fig. 4: loops of the dynamic tests", told, figure)

@@ -1,0 +1,59 @@
+"""The rules by which a number of the paper is reproduced or not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from tautwire.paper.claims import Claim, Entry, text_claims
+
+CLAIM = Claim("it", "4.1", "a length", "mm", paper=2.4, tolerance=0.1, below=0.05, corrections=("another area",))
+
+
+@pytest.mark.parametrize(("ours", "agrees"), [(2.36, True), (2.49, True), (2.5, True), (2.51, False), (2.34, False)])
+def test_number_agrees_that_rounds_or_is_cut_off_to_the_printed_digits(ours: float, agrees: bool) -> None:
+    assert CLAIM.agrees(ours) is agrees
+    assert replace(CLAIM, paper=-2.4).agrees(-ours) is agrees, "size counts, not sign"
+
+
+def test_bounds_and_ranges_are_kept_or_broken() -> None:
+    assert replace(CLAIM, rule="below").agrees(2.3) and not replace(CLAIM, rule="below").agrees(2.5)
+    assert replace(CLAIM, rule="above").agrees(2.5) and not replace(CLAIM, rule="above").agrees(2.3)
+    within = replace(CLAIM, paper=(1.0, 2.0), rule="within")
+    assert within.agrees(1.5) and not within.agrees(2.1)
+    assert not CLAIM.agrees(None)
+
+
+FITTING = ((0.0, 10.0), (1.0, 7.0), (-0.1, 9.0))
+BEYOND, TOO_SHORT = (-1.0, 9.0), (4.0, 8.0)
+
+
+@pytest.mark.parametrize("ours", [*FITTING, BEYOND, TOO_SHORT])
+def test_curve_agrees_that_lies_on_the_printed_axis_and_fills_it(ours: tuple[float, float]) -> None:
+    assert replace(CLAIM, paper=(0.0, 10.0), rule="axis").agrees(ours) is (ours in FITTING)
+
+
+def test_verdict_says_which_parameters_it_took() -> None:
+    assert Entry(CLAIM, printed=2.4, corrected=3.0).verdict == "reproduced"
+    after = Entry(CLAIM, printed=3.0, corrected=2.4)
+    assert after.verdict == "reproduced after correction" and after.why == "another area"
+    assert Entry(CLAIM, printed=3.0, corrected=3.1).verdict == "not reproducible"
+
+
+def test_printed_parameters_count_only_where_their_motion_is_the_papers() -> None:
+    assert Entry(CLAIM, printed=2.4, corrected=3.0, same_motion=False).verdict == "not reproducible"
+
+
+def test_claims_are_told_apart_and_need_claims_that_there_are() -> None:
+    claims = text_claims()
+    ids = [claim.id for claim in claims]
+    assert len(set(ids)) == len(ids) > 80
+    assert {claim.needs for claim in claims} - {""} <= set(ids)
+
+
+def test_digits_of_the_paper_make_the_tolerance() -> None:
+    by_id = {claim.id: claim for claim in text_claims()}
+    claim = by_id["caroca.elongation_gap"]
+    assert (claim.paper, claim.tolerance, claim.below) == pytest.approx((0.034, 0.001, 0.0005))
+    assert by_id["ramp.three.stiffening"].tolerance == 3.0, "about 30 %"
