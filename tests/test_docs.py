@@ -1,19 +1,101 @@
-"""The Python in the pages under docs/ runs as it stands."""
+"""The pages under docs/: their Python runs as it stands, and together they make a site without a warning."""
 
+import os
 import re
+import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
 
-DOCS = Path(__file__).parent.parent / "docs"
+ROOT = Path(__file__).parent.parent
+DOCS = ROOT / "docs"
+
+# Of the page about an effect of one's own, run after its example.
+EFFECT_HOLDS = """
+from tautwire.robots.reading import write_robot
+assert abs(still.position - plain.platform.start).max() < 1e-6
+assert np.allclose(heavier, 1.0 + 15.0 * 5.0 / (300.0 * 9.81))
+assert not np.allclose(swings, linearise(plain).modes.frequencies, rtol=1e-6)
+assert "hose" in tried
+write_robot(hosed, "hosed.toml")
+assert read_robot("hosed.toml").effects == hosed.effects
+neutral = plain.with_effect(EffectSetting("hose", {"weight": 0.0}))
+assert np.array_equal(static_tensions(neutral), static_tensions(plain))
+"""
+
+
+def code_of(page: str) -> dict[str, str]:
+    """The Python of a page, by its title; numbered where it has none."""
+    blocks = re.findall(
+        r"```python(?: title=\"(.*?)\")?\n(.*?)```", (DOCS / page).read_text(encoding="utf-8"), re.DOTALL
+    )
+    return {title or str(number): code for number, (title, code) in enumerate(blocks)}
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("page", ["index.md", "linear.md"])
+def test_examples_of_a_page_run(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    for code in code_of(page).values():
+        exec(compile(code, page, "exec"), {})
 
 
 @pytest.mark.slow
 def test_example_of_the_controllers_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    page = (DOCS / "control.md").read_text(encoding="utf-8")
-    (example,) = re.findall(r"```python\n(.*?)```", page, re.DOTALL)
+    (example,) = code_of("control.md").values()
     found: dict[str, object] = {}
     exec(compile(example, "control.md", "exec"), found)
     difference = found["motion"].position - found["same"].position  # type: ignore[attr-defined]
     assert abs(difference).max() < 1e-9
+
+
+@pytest.mark.slow
+def test_an_effect_is_added_by_following_its_page(tmp_path: Path) -> None:
+    for source in ("system/tautwire", "fmu_src/tautwire_fmu"):
+        shutil.copytree(ROOT / source, tmp_path / source, ignore=shutil.ignore_patterns("__pycache__"))
+    code = code_of("effect.md")
+    for title, text in code.items():
+        place, _, where = title.partition(": ")
+        if where:
+            put_in(tmp_path / place, where, text)
+        elif place.endswith(".py"):
+            (tmp_path / place).write_text(text, encoding="utf-8")
+    (tmp_path / "try_it.py").write_text(code["try it"] + EFFECT_HOLDS, encoding="utf-8")
+    paths = os.pathsep.join(str(tmp_path / folder) for folder in ("system", "fmu_src"))
+    environment = {**os.environ, "PYTHONPATH": paths}
+    # Not from site-packages: an editable install comes after PYTHONPATH.
+    subprocess.run([sys.executable, "try_it.py"], cwd=tmp_path, env=environment, check=True, timeout=300)
+
+
+def put_in(file: Path, where: str, text: str) -> None:
+    """Puts a line of the page into a file, where the page says."""
+    content = file.read_text(encoding="utf-8")
+    marks = {"beside the other imports": r"(?=^from \.hysteresis)", "in ALL": r"(?<=^    HYSTERESIS,\n)"}
+    mark = marks.get(where, r"(?<=^UNITS: Dict\[str, Dict\[str, int\]\] = \{\n)")
+    changed, count = re.subn(mark, lambda match: text, content, flags=re.MULTILINE)
+    assert count == 1, where
+    file.write_text(changed, encoding="utf-8")
+
+
+@pytest.mark.slow
+def test_the_site_builds_without_a_warning_and_asks_nothing_of_the_network(tmp_path: Path) -> None:
+    pytest.importorskip("material", reason="mkdocs-material is not installed: pip install tautwire[docs]")
+    build = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path)]
+    subprocess.run(build, cwd=ROOT, env={**os.environ, "NO_MKDOCS_2_WARNING": "1"}, check=True, timeout=120)
+    pages = list(tmp_path.glob("*.html"))
+    assert {path.stem for path in DOCS.glob("*.md")} <= {page.stem for page in pages}
+    for page in pages:
+        loaded = re.findall(
+            r"<(?:script|link|img|iframe)[^>]*?(?:src|href)=\"?([^\s\">]+)", page.read_text(encoding="utf-8")
+        )
+        assert loaded
+        assert not [address for address in loaded if address.startswith(("http:", "https:", "//"))]
+
+
+def test_pages_name_only_what_is_there() -> None:
+    for page in (*DOCS.glob("*.md"), ROOT / "README.md", ROOT / "CONTRIBUTING.md"):
+        for place in re.findall(r"`((?:tests|system|fmu_src|docs)/[\w/.]+)`", page.read_text(encoding="utf-8")):
+            assert (ROOT / place).exists(), f"{page.name}: {place}"

@@ -1,0 +1,23 @@
+"""Draws the pictures of README and docs that come from runs, into a folder: ``python -m tests.pictures docs``."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+
+from tautwire import read_recording, read_robot, trace
+from tests.pictures.traced_run import draw
+from tests.robots import EXAMPLES
+
+THREE = EXAMPLES / "three"
+
+
+def main(folder: Path) -> None:
+    """Trace the shipped three-cable robot, and draw its run with what was left before and after."""
+    robot = read_robot(THREE / "robot.toml")
+    fit, check = (read_recording(THREE / f"{name}.csv", robot.cable_count) for name in ("fit", "check"))
+    draw(trace(robot, fit, check), folder / "traced_run.png")
+
+
+if __name__ == "__main__":
+    main(Path(sys.argv[1]))
