@@ -1,14 +1,19 @@
 # make run: the main job on a shipped recording. make test: lint, types and all tests. make bench: the co-simulation's
 # speed; make bench-long: memory over a million steps; make bench-trace: the tracer on blind recordings, goes on where it
-# was stopped; make bench-control: the controllers. Each sets up what it needs.
+# was stopped; make bench-control: the controllers. make docs: the pages in docs/, into build/docs; make pictures: those
+# of README and docs that come from runs. make floors: tests with the lowest versions that pyproject.toml declares, on a
+# Python of at most 3.12. Each sets up what it needs.
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 EXAMPLE := system/tautwire/examples/three
+FLOORS := .venv-floors
+FLOOR_TESTS := $(addprefix tests/test_,$(addsuffix .py,checking cli control cosimulation linear linear_figures \
+	materials_command package preparation recording recording_mdf recording_parquet report_page robust statics))
 
-.PHONY: run test lint types bench bench-long bench-trace bench-control clean
+.PHONY: run test lint types docs pictures floors bench bench-long bench-trace bench-control clean
 
 run: $(READY)
 	$(BIN)/tautwire trace $(EXAMPLE)/robot.toml $(EXAMPLE)/fit.csv --check $(EXAMPLE)/check.csv --out build/three
@@ -29,6 +34,18 @@ $(READY): pyproject.toml
 	$(BIN)/python -m pip install --quiet --editable ".[dev]"
 	touch $@
 
+docs: $(READY)
+	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+
+pictures: $(READY)
+	$(BIN)/python -m tests.pictures docs
+
+floors: $(READY)
+	$(BIN)/python -m tests.floors > build/floors.txt
+	$(PYTHON) -m venv --clear $(FLOORS)
+	$(FLOORS)/bin/python -m pip install --quiet --constraint build/floors.txt --editable ".[mdf]" pytest hypothesis
+	$(FLOORS)/bin/python -m pytest -m "not slow" $(FLOOR_TESTS)
+
 bench: $(READY)
 	$(BIN)/python -m tests.bench
 
@@ -43,5 +60,5 @@ bench-control: $(READY)
 	$(BIN)/python -m tests.bench.control docs
 
 clean:
-	rm -rf $(VENV) build/* dist
+	rm -rf $(VENV) $(FLOORS) build/* dist
 	git checkout -- build/README.md
