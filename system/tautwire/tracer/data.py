@@ -13,7 +13,7 @@ from ..runs.start import start_of
 from .filter_step import Noise
 
 HEAD_SHARE = 3
-FEWEST_IN_HEAD = 800
+FEWEST_IN_HEAD, MOST_IN_HEAD = 800, 20_000
 
 
 @dataclass(frozen=True)
@@ -26,8 +26,9 @@ class Sample:
 
     @property
     def head(self) -> Sample:
-        """The beginning of the samples that count, long enough to rank hypotheses by: a third, at least 800."""
-        return self.beginning(max(int(np.sum(self.rows)) // HEAD_SHARE, FEWEST_IN_HEAD))
+        """The beginning of the samples that count, long enough to rank hypotheses by: a third, of 800 to 20,000."""
+        third = int(np.sum(self.rows)) // HEAD_SHARE
+        return self.beginning(min(max(third, FEWEST_IN_HEAD), MOST_IN_HEAD))
 
     def beginning(self, count: int) -> Sample:
         """The first so many samples that count, all where there are no more."""
