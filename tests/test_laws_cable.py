@@ -9,6 +9,7 @@ import numpy as np
 import pint
 import pytest
 
+from tautwire.model.arrays import NUMPY
 from tautwire.model.symbolic import CASADI
 from tautwire_fmu.laws.cable import (
     LAWS,
@@ -26,18 +27,6 @@ from tautwire_fmu.laws.cable import (
 from tautwire_fmu.laws.effects import BY_NAME, ActiveEffect
 from tautwire_fmu.laws.mathematics import COMPLEX_STEP, REAL, Mathematics, along, rate_of
 
-NUMPY = Mathematics(
-    log=np.log,
-    exp=np.exp,
-    sqrt=np.sqrt,
-    sin=np.sin,
-    cos=np.cos,
-    tanh=np.tanh,
-    atan2=np.arctan2,
-    absolute=np.abs,
-    maximum=np.maximum,
-    where=lambda c, a, b: np.where(c > 0, a, b),
-)
 MODULUS, AREA, DAMPING, LENGTH, TENSION = 1.0e11, 1.2e-5, 5.0e8, 5.0, 900.0
 DAMPED = (ActiveEffect(BY_NAME["damping"], BY_NAME["damping"].values(2e9)),)
 

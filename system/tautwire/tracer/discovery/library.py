@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from tautwire_fmu.laws.expression import evaluate, read_expression
 from tautwire_fmu.laws.formula import FORCES, PLACES
 
+from ...model.arrays import NUMPY
 from ...robots.robot import Robot
-from .ports import NUMPY, Along, Site
+from .ports import Along, Site
 
 Array = NDArray[np.float64]
 

@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from tautwire_fmu.laws import cable as cable_law
 from tautwire_fmu.laws.formula import FORCES, NAME, TIME
-from tautwire_fmu.laws.mathematics import Mathematics
 
+from ...model.arrays import NUMPY
 from ...model.assembly import Assembly, assemble
 from ...model.symbolic import OF_FORMULAS, FreeParameter, symbolic_model
 from ...model.uncertain import uncertain_numbers
@@ -28,18 +28,6 @@ from ..linearisation import Linearised
 
 Array = NDArray[np.float64]
 
-NUMPY = Mathematics(
-    log=np.log,
-    exp=np.exp,
-    sqrt=np.sqrt,
-    sin=np.sin,
-    cos=np.cos,
-    tanh=np.tanh,
-    atan2=np.arctan2,
-    absolute=np.abs,
-    maximum=np.maximum,
-    where=lambda condition, a, b: np.where(condition > 0.0, a, b),
-)
 # One from the first moment after the start: a tension does not act there, nor does a mass that grows.
 AFTER_START = f"tanh(1e9*{TIME.name})"
 CLOCK = f"{NAME}.{TIME.name}"
