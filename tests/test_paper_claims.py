@@ -52,8 +52,18 @@ def test_claims_are_told_apart_and_need_claims_that_there_are() -> None:
     assert {claim.needs for claim in claims} - {""} <= set(ids)
 
 
+def test_claims_on_a_fitted_rope_share_one_allowance_where_digits_are_finer() -> None:
+    by_id = {claim.id: claim for claim in text_claims()}
+    fine, coarse = by_id["fast.tension_gap"], by_id["caroca.error_gap"]
+    assert (fine.tolerance, fine.below) == pytest.approx((0.03 * 71.35, 0.03 * 71.35))
+    assert "3 % allowed" in fine.why
+    assert (coarse.tolerance, coarse.below) == pytest.approx((0.01, 0.005))
+    assert "allowed" not in coarse.why
+
+
 def test_digits_of_the_paper_make_the_tolerance() -> None:
     by_id = {claim.id: claim for claim in text_claims()}
     claim = by_id["caroca.elongation_gap"]
     assert (claim.paper, claim.tolerance, claim.below) == pytest.approx((0.034, 0.001, 0.0005))
-    assert by_id["ramp.three.stiffening"].tolerance == 3.0, "about 30 %"
+    about = by_id["ramp.three.stiffening"]
+    assert about.tolerance == 3.0 and about.why == '"about 30 %"; 3 % allowed', "a tolerance is named"

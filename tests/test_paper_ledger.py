@@ -10,10 +10,11 @@ import numpy as np
 import pytest
 
 from tautwire.paper import write_paper
-from tautwire.paper.beyond import LIMITS, compare_sizes
+from tautwire.paper.beyond import LIMITS, OWN_SIZE, compare_sizes
 from tautwire.paper.claims import Entry
 from tautwire.paper.page import FIGURES
 from tautwire.paper.panels import draw_time_figures
+from tautwire.paper.ramps import amplitude_kept
 from tautwire.paper.records import Records
 from tautwire.paper.style import style
 from tautwire.paper.tried import elongations_by_reading
@@ -52,7 +53,65 @@ CORRECTED = {
     "ramp.caroca.gap_z": (1.232, 0.01),
     "ramp.three.frequency_ratio": ((134.8 / 102.2) ** 0.5, 1e-3),
 }
-COMES_OUT = ("helix.end_z", "helix.start_tension", "caroca.elongation_gap", "ramp.three.end_x", *CORRECTED)
+# mm, each law less the exact rope, on the robot of 100 m.
+OFF_THE_DRUM = {
+    ("up", "linear"): 4.7,
+    ("up", "logarithmic"): 1.5,
+    ("down", "linear"): 3.4,
+    ("down", "logarithmic"): 5.8,
+}
+# All others do come out: so every reproduced number is held to the tolerance of its claim.
+NOT_REPRODUCIBLE = {
+    "material.length_over_diameter",
+    "helix.cable_1_elongation_gap",
+    "caroca.cable_length",
+    "caroca.end_x",
+    "caroca.strain_relative",
+    "caroca.moment",
+    "fast.height",
+    "fast.width",
+    "fast.moment",
+    "fast.tension_gap",
+    "fast.error_gap",
+    "ramp.three.gap_x",
+    "ramp.three.gap_y",
+    "ramp.three.gap_z",
+    "ramp.three.frequency_dynamic",
+    "ramp.three.frequency_static",
+    "ramp.caroca.frequency",
+    "ramp.caroca.gap_y",
+    "ramp.caroca.error_relative",
+    "damping.duration",
+    *(f"axis.{panel}" for panel in ("11b", "14a", "14c", "15a", "15b", "15c", "18a")),
+    *(f"table_1.{frequency}_hz.dynamic_modulus_uncertainty" for frequency in ("0.1", "1", "2", "5", "10", "20")),
+    *(f"table_1.{frequency}_hz.storage_modulus_uncertainty" for frequency in ("2", "5", "10", "20")),
+    *(f"table_1.{frequency}_hz.storage_modulus" for frequency in ("2", "5")),
+}
+# With the numbers as printed, and nothing corrected.
+REPRODUCED_AS_PRINTED = {
+    "material.test_force",
+    "material.modulus",
+    "material.modulus_disc",
+    "material.load_amplitude",
+    "material.rise",
+    "material.constant_above",
+    "helix.start_length",
+    "helix.end_x",
+    "helix.end_y",
+    "caroca.height",
+    "caroca.width",
+    "caroca.end_y",
+    "fast.end_x",
+    "fast.end_y",
+    "fast.end_z",
+    "ramp.three.modulus",
+    "ramp.three.stiffening",
+    "ramp.three.frequency_ratio",
+    "ramp.caroca.modulus",
+    "damping.coefficient",
+    "damping.modulus",
+    "damping.first_phase",
+}
 
 
 @pytest.fixture(scope="module")
@@ -84,8 +143,7 @@ def test_every_claim_has_a_number_and_every_number_a_claim(paper: Paper) -> None
     assert set(paper.runs["corrected"].values) == claims
     assert set(paper.runs["printed"].values) <= claims
     lacking = {entry.claim.id for entry in paper.entries if entry.printed is None}
-    unprinted = ("fast.", "axis.10", "axis.11")
-    assert all(name.startswith(unprinted) or name.endswith("dynamic_modulus_uncertainty") for name in lacking)
+    assert all(name.startswith(("fast.", "axis.10", "axis.11")) for name in lacking), "no exit points are printed"
 
 
 def test_every_row_is_whole_and_what_is_not_reproduced_says_why(paper: Paper) -> None:
@@ -102,14 +160,18 @@ def test_corrected_parameters_give(entries: dict[str, Entry], name: str) -> None
     assert entries[name].corrected == pytest.approx(expected, abs=off)
 
 
-@pytest.mark.parametrize("name", COMES_OUT)
-def test_claim_comes_out(entries: dict[str, Entry], name: str) -> None:
-    assert entries[name].verdict in ("reproduced", "reproduced after correction")
+def test_every_claim_comes_out_but_those_named(entries: dict[str, Entry]) -> None:
+    by_verdict: dict[str, set[str]] = {}
+    for name, entry in entries.items():
+        by_verdict.setdefault(entry.verdict, set()).add(name)
+    assert by_verdict["not reproducible"] == NOT_REPRODUCIBLE
+    as_printed = {name for name in by_verdict["reproduced"] if not name.startswith("table_1.")}
+    assert as_printed == REPRODUCED_AS_PRINTED
+    corrected = [entries[name] for name in by_verdict["reproduced after correction"]]
+    assert all(entry.claim.corrections for entry in corrected), "each names its correction"
 
 
-def test_most_claims_come_out_and_fig_15_does_not(paper: Paper, entries: dict[str, Entry]) -> None:
-    assert paper.counts["not reproducible"] < 0.3 * len(paper.entries)
-    assert entries["ramp.three.frequency_static"].verdict == "not reproducible"
+def test_frequency_at_p1_is_that_of_three_equal_cables_about_their_middle(entries: dict[str, Entry]) -> None:
     ours = entries["ramp.three.frequency_static"].corrected
     # Horizontal stiffness of three equal cables about their middle, with their tension across.
     length, out, pull, stiffness = 73.1977, 57.737 / 73.1977, 1594.27, 102.2e9 * np.pi * 0.002**2
@@ -160,11 +222,22 @@ def test_size_and_direction_decide_which_law_is_nearer_to_a_rope_on_a_drum(paper
     sizes = compare_sizes(runs.parameters, runs.records)
     for (direction, law), errors in sizes.errors.items():
         assert errors / sizes.sizes == pytest.approx(errors[0] / sizes.sizes[0], rel=1e-3), (direction, law)
+    place = sizes.sizes.index(OWN_SIZE)
+    own = {key: 1e3 * errors[place] for key, errors in sizes.errors.items()}
+    assert own == pytest.approx(OFF_THE_DRUM, abs=0.06), "as docs/paper.md says"
     assert np.all(sizes.errors["up", "logarithmic"] < 0.5 * sizes.errors["up", "linear"])
     assert np.all(sizes.errors["down", "linear"] < sizes.errors["down", "logarithmic"])
     for law, found in sizes.cosimulated.items():
         slow = dict(zip(sizes.sizes, sizes.errors["up", law], strict=True))
         assert [found[size] / slow[size] for size in found] == pytest.approx([1.0] * len(found), abs=0.1)
+
+
+def test_relaxing_rope_keeps_more_of_its_swing_and_is_the_static_one_on_the_helix(records: Records) -> None:
+    kept = [amplitude_kept(records[f"three/{key}"]) for key in ("damped", "relaxing")]
+    assert kept == pytest.approx([40.0, 59.0], abs=1.0), "as docs/paper.md says"
+    errors = [largest(records[f"three/{key}"]["error_norm"]) for key in ("constant helix", "relaxing helix")]
+    assert errors == pytest.approx([0.0462, 0.0604], abs=1e-4)
+    assert errors[1] == pytest.approx(largest(records["three/logarithmic"]["error_norm"]), rel=0.02)
 
 
 def test_eight_cables_follow_the_helix_within_their_limits(records: Records) -> None:

@@ -29,12 +29,17 @@ def test_printed_helix_turns_three_times_and_ends_below_p2() -> None:
     assert printed.position(np.array([50.0]))[0] == pytest.approx([28.86, 0.0, 5.0 + 3.0 * pi], abs=1e-9)
 
 
-@pytest.mark.parametrize("name", SETS)
-def test_every_robot_can_be_held_where_its_motions_start(name: SetName) -> None:
-    parameters = read_parameters(name)
-    for robot, helix in parameters.helices.items():
-        assert helix.position(np.zeros(1))[0] == pytest.approx(parameters.robots[robot].platform.start)
-        assert np.all(static_tensions(parameters.robots[robot]) > 0.0)
+def test_helix_of_fast_ends_at_p2_with_the_printed_numbers() -> None:
+    printed = read_parameters("printed").helices["fast"]
+    assert printed.position(np.array([40.0]))[0] == pytest.approx([-19.64, 14.27, -138.7], abs=0.02)
+
+
+@pytest.mark.parametrize("which", SETS)
+def test_every_robot_can_be_held_where_its_motions_start(which: SetName) -> None:
+    parameters = read_parameters(which)
+    for name, robot in parameters.robots.items():
+        assert parameters.helices[name].position(np.zeros(1))[0] == pytest.approx(robot.platform.start)
+        assert np.all(static_tensions(robot) > 0.0)
 
 
 def test_assumed_fast_has_the_cable_length_of_table_2_and_the_tension_of_figure_10() -> None:

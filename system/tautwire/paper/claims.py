@@ -110,7 +110,7 @@ def judged(claims: Sequence[Claim], printed: Values, corrected: Values) -> tuple
 def text_claims() -> tuple[Claim, ...]:
     """The claims of the text."""
     content = read_data(DATA / "claims.toml")
-    return tuple(_claim(table, content["correction"]) for table in content["claim"])
+    return tuple(_claim(table, content) for table in content["claim"])
 
 
 def axis_claims() -> Iterator[Claim]:
@@ -143,9 +143,16 @@ def _lies_on(ours: tuple[float, float], axis: tuple[float, float]) -> bool:
     return inside and ours[1] - ours[0] >= FILLED * span
 
 
-def _claim(table: Mapping[str, Any], named: Mapping[str, str]) -> Claim:
+def _claim(table: Mapping[str, Any], named: Mapping[str, Mapping[str, Any]]) -> Claim:
     paper, rule = table["paper"], table.get("rule", "near")
     digit = 0.0 if isinstance(paper, list) else _last_digit(paper)
+    allowed, reasons = 0.0, [table.get("why", "")]
+    if "tolerance" in table:
+        reasons.append(f"{table['tolerance']:g} {table['unit']}".removesuffix(" 1") + " allowed")
+    if "allowance" in table:
+        allowance = named["allowance"][table["allowance"]]
+        allowed = allowance["share"] * abs(float(paper))
+        reasons += [allowance["why"]] if allowed > 0.5 * digit else []
     return Claim(
         id=table["id"],
         section=table["section"],
@@ -153,11 +160,11 @@ def _claim(table: Mapping[str, Any], named: Mapping[str, str]) -> Claim:
         unit=table["unit"],
         paper=float(paper) if isinstance(paper, str) else (float(paper[0]), float(paper[1])),
         # Rounded digits are half a unit off either way, cut off ones up to a whole one below.
-        tolerance=table.get("tolerance", digit),
-        below=table.get("tolerance", 0.5 * digit),
+        tolerance=table.get("tolerance", max(digit, allowed)),
+        below=table.get("tolerance", max(0.5 * digit, allowed)),
         rule=rule,
-        corrections=tuple(named[key] for key in table.get("corrections", ())),
-        why=table.get("why", ""),
+        corrections=tuple(named["correction"][key] for key in table.get("corrections", ())),
+        why="; ".join(filter(None, reasons)),
         needs=table.get("needs", ""),
         digits=paper if isinstance(paper, str) else "",
     )

@@ -35,8 +35,8 @@ def quantities(parameters: Parameters, records: Records) -> Values:
     """What section 4.1.1 says in numbers."""
     logarithmic, linear = records["three/logarithmic"], records["three/linear"]
     values: Values = {
-        "helix.start_length": logarithmic["length_1"][0],
-        "helix.start_tension": logarithmic["tension_1"][0],
+        "helix.start_length": float(np.mean([logarithmic[f"length_{i}"][0] for i in (1, 2, 3)])),
+        "helix.start_tension": float(np.mean([logarithmic[f"tension_{i}"][0] for i in (1, 2, 3)])),
         "helix.tension_gap": max(largest(gap(records, "three", f"tension_{i}")) for i in (1, 2, 3)),
         "helix.least_tension": min(float(np.min(logarithmic[f"tension_{i}"])) for i in (1, 2, 3)),
     }

@@ -22,7 +22,7 @@ FAST_MOMENT = 38.0
 def cases(parameters: Parameters) -> Iterator[tuple[str, Case]]:
     """Both laws on the helix of each robot whose parameters are known."""
     for name, samples in SAMPLES.items():
-        if name in parameters.helices:
+        if name in parameters.robots:
             for law in LAWS:
                 robot = with_law(parameters.robots[name], law)
                 yield f"{name}/{law}", helix_case(robot, parameters.helices[name], samples)
@@ -36,8 +36,9 @@ def quantities(parameters: Parameters, records: Records) -> Values:
             path = parameters.helices[name]
             end = path.position(np.array([path.duration]))[0]
             values |= {f"{name}.end_{axis}": float(end[place]) for place, axis in enumerate("xyz")}
+        if name in parameters.robots:
             values |= _table_2(name, parameters.robots[name], records)
-    if "fast" in parameters.helices:
+    if "fast" in parameters.robots:
         values |= _fast(records)
     return values
 

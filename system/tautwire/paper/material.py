@@ -70,10 +70,10 @@ def run_material(rope: RobotMaterial) -> MaterialRuns:
     return MaterialRuns(table, rope, tensile, loops)
 
 
-def quantities(runs: MaterialRuns) -> Values:
-    """What section 3 says in numbers, Table 1 apart."""
+def quantities(runs: MaterialRuns, error_share: float) -> Values:
+    """What section 3 says in numbers, Table 1 apart; ``error_share`` as in :class:`Parameters`."""
     modulus = eq_7(runs.tensile, METALLIC_AREA)
-    relative = elongation_error(runs.tensile)
+    relative = eq_7_error(runs.tensile, error_share)
     sizes = {row.frequency: row.quantities for row in runs.table.rows}
     stiffness = [sizes[f]["dynamic_modulus"].value for f in sizes if f >= 1.0]
     storage = {f: row["dynamic_modulus"].value * math.cos(row["phase"].value) for f, row in sizes.items()}
@@ -93,16 +93,23 @@ def quantities(runs: MaterialRuns) -> Values:
 def eq_7(test: Pulled, area: float) -> float:
     """``E = l_c (F30 - F10) / (A (x2 - x1))`` on the loading path, in Pa; Eq. 7."""
     low, high = LEAST * BREAKING_FORCE, MOST * BREAKING_FORCE
-    x1, x2 = _elongations(test)
+    x1, x2 = eq_7_elongations(test)
     return LENGTH * (high - low) / (area * (x2 - x1))
 
 
-def elongation_error(test: Pulled, share: float = 0.5) -> float:
+def eq_7_error(test: Pulled, share: float) -> float:
     """Relative error of Eq. 7 by those of two forces and two elongations, each ``share`` of what is printed."""
-    x1, x2 = _elongations(test)
+    x1, x2 = eq_7_elongations(test)
     force = share * FORCE_ERROR / ((MOST - LEAST) * BREAKING_FORCE)
     elongation = share * ELONGATION_ERROR / (x2 - x1)
     return math.sqrt(2.0 * force**2 + 2.0 * elongation**2)
+
+
+def amplitude_error(row: MaterialRow, share: float) -> float:
+    """Relative error of |E*| by those of the amplitudes of force and elongation, each ``share`` of what is printed."""
+    force = row.quantities["stress_amplitude"].value * METALLIC_AREA
+    elongation = row.quantities["strain_amplitude"].value * LENGTH
+    return share * math.hypot(FORCE_ERROR / force, ELONGATION_ERROR / elongation)
 
 
 def loop_modulus(frequency: float, loop: Pulled) -> complex:
@@ -123,8 +130,11 @@ def loop_value(column: str, modulus: complex, frequency: float) -> float:
     }[column]
 
 
-def _elongations(test: Pulled) -> tuple[float, float]:
-    """At 10 % and 30 % of the breaking force while the load rises, in m; beyond the last load by its last slope."""
+def eq_7_elongations(test: Pulled) -> tuple[float, float]:
+    """Elongations at 10 % and 30 % of the breaking force while the load rises, in m.
+
+    Beyond the last load by its last slope.
+    """
     top = int(np.argmax(test.load)) + 1
     load, elongation = test.load[:top], test.elongation[:top]
     slope = (elongation[-1] - elongation[-2]) / (load[-1] - load[-2])

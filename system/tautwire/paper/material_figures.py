@@ -7,9 +7,9 @@ from collections.abc import Iterator, Mapping
 import numpy as np
 from matplotlib.figure import Figure
 
-from .material import BREAKING_FORCE, LEAST, METALLIC_AREA, MOST, MaterialRuns, eq_7
+from .material import BREAKING_FORCE, LEAST, METALLIC_AREA, MOST, MaterialRuns, eq_7, eq_7_elongations
 from .parameters import SetName
-from .style import COLOURS, RULE, WIDTH, Drawn
+from .style import COLOURS, RULE, WIDTH, Drawn, legend_above
 
 # Axes as printed: mm and N.
 TENSILE_AXES = ((0.0, 1.8), (-500.0, 3500.0))
@@ -25,17 +25,23 @@ def draw_material(runs: Mapping[SetName, MaterialRuns]) -> Iterator[Drawn]:
 def _tensile(runs: Mapping[SetName, MaterialRuns]) -> Drawn:
     figure = Figure(figsize=(1.5 * WIDTH, 3.3), layout="constrained")
     axes = figure.add_subplot()
-    labels: dict[SetName, str] = {"corrected": "with relaxation", "printed": "102.2 GPa"}
+    labels: dict[SetName, str] = {"corrected": "with relaxation", "printed": "elastic"}
     for (name, label), line, colour in zip(labels.items(), ("-", "-."), COLOURS, strict=False):
         test = runs[name].tensile
         modulus = 1e-9 * eq_7(test, METALLIC_AREA)
-        axes.plot(1e3 * test.elongation, test.load, line, color=colour, label=f"{label}; Eq. 7: {modulus:.1f} GPa")
+        axes.plot(1e3 * test.elongation, test.load, line, color=colour, label=f"{label}: {modulus:.1f} GPa")
     for share, mark in ((LEAST, "F_{10\\%}"), (MOST, "F_{30\\%}")):
         axes.axhline(share * BREAKING_FORCE, color=RULE, linewidth=0.8, linestyle=":")
         axes.text(0.02, share * BREAKING_FORCE + 40.0, f"${mark}$")
+    for place, mark in zip(eq_7_elongations(runs["corrected"].tensile), ("x_1", "x_2"), strict=True):
+        axes.axvline(1e3 * place, color=RULE, linewidth=0.8, linestyle=":")
+        axes.text(1e3 * place + 0.015, TENSILE_AXES[1][0] + 60.0, f"${mark}$")
     axes.set(xlim=TENSILE_AXES[0], ylim=TENSILE_AXES[1], xlabel="Elongation (mm)", ylabel="Load (N)")
-    axes.legend(loc="lower right")
-    told = "Load over elongation of a cable FMU pulled at 0.05 mm/s up to 30 % of the breaking force and back."
+    legend_above(figure, axes)
+    told = (
+        "Load over elongation of a cable FMU pulled at 0.05 mm/s up to 30 % of the breaking force and back; moduli by "
+        "Eq. 7."
+    )
     return Drawn("fig_03", "Fig. 3: load and elongation at 0.05 mm/s", told, figure)
 
 

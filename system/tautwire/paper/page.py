@@ -90,9 +90,9 @@ TRIED = (
 LEAD = (
     "Baklouti, Courteille, Caro and Dkhil (2017), doi:10.1115/1.4038068. Every number that the text claims, Table 1 "
     "and the axes of its figures, beside what co-simulated FMUs give with the parameters as printed, and with those "
-    "that give the printed figures. A number agrees that rounds, or is cut off, to the printed digits. With the "
-    "printed parameters it only counts where the motion itself is the paper's. Settings of a run, such as its masses "
-    "and speeds, are no claims: they are the parameters."
+    "that give the printed figures. A number agrees that rounds, or is cut off, to the printed digits, or lies within "
+    "a tolerance that the row names. With the printed parameters it only counts where the motion itself is the "
+    "paper's. Settings of a run, such as its masses and speeds, are no claims: they are the parameters."
 )
 
 

@@ -57,12 +57,16 @@ class Ramp:
 
 @dataclass(frozen=True)
 class Parameters:
-    """One set of parameters; robots, helices and ramps by name, those that the set does not have left out."""
+    """One set of parameters; robots, helices and ramps by name, those that the set does not have left out.
+
+    ``error_share`` is how much of the printed errors of force and elongation each reading has.
+    """
 
     name: SetName
     robots: Mapping[str, Robot]
     helices: Mapping[str, Helix]
     ramps: Mapping[str, Ramp]
+    error_share: float
 
 
 def read_parameters(name: SetName) -> Parameters:
@@ -74,6 +78,7 @@ def read_parameters(name: SetName) -> Parameters:
         robots={path.stem: read_robot(path) for path in sorted(folder.glob("*.toml")) if path.stem != "motions"},
         helices={robot: _helix(table) for robot, table in motions["helix"].items()},
         ramps={robot: _ramp(table) for robot, table in motions["ramp"].items()},
+        error_share=motions["error_share"],
     )
 
 

@@ -91,7 +91,7 @@ def run_paper(workers: Workers, tell: Tell) -> Paper:
         runs[name] = _collected(parameters[name], own, pulled[name].result())
     claims = (*text_claims(), *axis_claims())
     rows = judged(claims, runs["printed"].values, runs["corrected"].values)
-    entries = sorted((*rows, *table_entries(runs["corrected"].material)), key=lambda row: row.claim.section)
+    entries = sorted((*rows, *table_entries(runs["corrected"].material, parameters)), key=lambda row: row.claim.section)
     return Paper(runs, tuple(entries))
 
 
@@ -111,7 +111,7 @@ def _run(cases: Mapping[tuple[SetName, str], Case], workers: Workers, tell: Tell
 
 def _collected(parameters: Parameters, records: dict[str, Record], material: MaterialRuns) -> PaperRuns:
     records |= ramps.modes(parameters, records)
-    values = quantities(material)
+    values = quantities(material, parameters.error_share)
     for part in PARTS:
         values |= part.quantities(parameters, records)
     return PaperRuns(parameters, records, material, values | axis_values(records, parameters.name))
