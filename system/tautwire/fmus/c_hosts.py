@@ -28,6 +28,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from ..errors import TautwireError, one_line
+from ..master.archive import require_sound
 from ..output import file_in_place
 
 BINARIES = "binaries/linux64/"
@@ -74,10 +75,12 @@ def make_for_c_hosts(fmu: Path) -> None:
     All other members keep their bytes. An FMU that is for C hosts already is made anew for the Python at hand, with
     the same bytes where that is the same Python.
 
-    Raises CHostError where the FMU is none of pythonfmu's, or Python or the machine lacks something.
+    Raises CHostError where the FMU is none of pythonfmu's, or Python or the machine lacks something, ArchiveError where
+    it is no sound archive.
     """
     library = _compiled(embeddable_python(), find_compiler())
     own, kept = _members(fmu)
+    require_sound(fmu)
     with zipfile.ZipFile(fmu) as archive, file_in_place(fmu) as scratch:
         wrapper = archive.read(kept if kept in archive.namelist() else own)
         with zipfile.ZipFile(scratch, "w") as rewritten:

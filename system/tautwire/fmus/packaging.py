@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import hashlib
+import itertools
 import json
 import shutil
 import sys
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -48,7 +49,8 @@ class RobotFmus:
 
     A winch is None where rope runs at the speed asked for. ``own`` are the slots with FMUs of the user's; each is to
     start with these values, by the names of our parameters. ``measured`` tells that the platform also shows its
-    position as its sensor does.
+    position as its sensor does. ``settings`` are parameters that our own are to start with in place of what they hold,
+    by component; names that are no parameter of it are passed over.
     """
 
     cables: tuple[Path, ...]
@@ -56,6 +58,7 @@ class RobotFmus:
     winches: tuple[Path | None, ...] = ()
     own: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     measured: bool = False
+    settings: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     @property
     def parts(self) -> dict[str, Path]:
@@ -75,19 +78,24 @@ class RobotFmus:
         return tuple(index for index, path in enumerate(self.winches, start=1) if path is not None)
 
 
-def build_fmus(robot: Robot, folder: Path) -> RobotFmus:
+def build_fmus(robot: Robot, folder: Path, progress: Callable[[float], None] | None = None) -> RobotFmus:
     """Write ``platform.fmu``, ``cable_1.fmu`` ... and, where there are winches, ``winch_1.fmu`` ... into ``folder``.
 
     FMI 2.0 co-simulation; what a component is lies inside as a JSON resource. FMUs of the user's stay where they are.
+    ``progress`` gets the share that is done.
 
     Raises SlotError where an FMU of the user's does not fit.
     """
     check_own_fmus(robot)
     folder.mkdir(parents=True, exist_ok=True)
     own = {fmu.slot: fmu.path for fmu in robot.fmus}
+    count, done = 1 + robot.cable_count + len(robot.winch_numbers), itertools.count(1)
 
     def made(module: str, base: str, name: str, data: dict[str, Any]) -> Path:
-        return own[name] if name in own else _build(module, base, name, data, folder)
+        path = own[name] if name in own else _build(module, base, name, data, folder)
+        if progress is not None:
+            progress(next(done) / count)
+        return path
 
     return RobotFmus(
         cables=tuple(made("cable", "Cable", f"cable_{i}", data) for i, data in enumerate(cable_data(robot), start=1)),

@@ -13,6 +13,7 @@ from tautwire_fmu.units import UNITS
 
 from ..errors import InputError, shown
 from ..master import Port
+from ..master.archive import ArchiveError, description_of
 from ..master.component import INSTANCES
 from ..master.seat import STAMP
 from ..master.standard import is_real, kind_of
@@ -165,7 +166,7 @@ def check_own_fmus(robot: Robot) -> None:
     """Refuse a user's FMU that does not fit its slot; raises SlotError."""
     single: dict[Path, str] = {}
     for own in robot.fmus:
-        description = _description(own)
+        description = _description(own, whole=True)
         if description.coSimulation.canBeInstantiatedOnlyOncePerProcess:
             taken = single.setdefault(own.path.resolve(), own.slot)
             if taken != own.slot:
@@ -176,8 +177,8 @@ def check_own_fmus(robot: Robot) -> None:
             _check_port(own, description, variables.get(port.name), port)
 
 
-def _description(own: OwnFmu) -> ModelDescription:
-    """What the FMU says of itself, if it is one that can run here."""
+def _description(own: OwnFmu, whole: bool = False) -> ModelDescription:
+    """What the FMU says of itself, if it is one that can run here; read through as a ``whole`` if asked to."""
 
     def refusal(problem: str, mend: str) -> SlotError:
         return SlotError(own.path, own.slot, None, problem, mend)
@@ -185,8 +186,10 @@ def _description(own: OwnFmu) -> ModelDescription:
     if not own.path.is_file():
         raise refusal("there is no such file", "check the path")
     try:
-        description = fmpy.read_model_description(str(own.path))
+        description = description_of(own.path, whole)
         platforms = fmpy.supported_platforms(str(own.path))
+    except ArchiveError as error:
+        raise refusal(f"it {error.problem}", error.mend) from error
     # fmpy raises whatever the archive, the parser or its own checks do, plain Exception among them.
     except Exception as error:
         reason = shown(" ".join(str(error).split()), LONGEST_REASON)

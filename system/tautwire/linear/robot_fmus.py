@@ -7,14 +7,13 @@ from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 
-import fmpy
-
 from tautwire_fmu.laws import formula
 from tautwire_fmu.laws.effects import BY_NAME
 
 from ..errors import InputError
 from ..fmus.packaging import RobotFmus
 from ..master import Port
+from ..master.archive import description_of
 from ..runs.cosimulation import instantiated, wired
 from ..runs.wiring import AXES, PLATFORM, cable_name, winch_name
 from .black_box import ERROR, STEP, BlackBoxPlant, linearise_fmus
@@ -45,7 +44,7 @@ def robot_signals(fmus: RobotFmus) -> RobotSignals:
     the platform takes one. Outputs that an FMU does not show are left out.
     """
     wiring = wired(fmus)
-    platform = fmpy.read_model_description(str(fmus.platform))
+    platform = description_of(fmus.platform)
     there = {variable.name for variable in platform.modelVariables}
     pushed = [Port(PLATFORM, f"external_force.{axis}") for axis in AXES]
     inputs = [port for port in wiring.drives if port.variable in DRIVEN] + [p for p in pushed if p.variable in there]
@@ -98,7 +97,7 @@ def _states(fmus: RobotFmus) -> dict[str, Port]:
 
 def _effect_states(path: Path) -> list[str]:
     """The states of effects in an FMU that settle where the robot rests."""
-    variables = fmpy.read_model_description(str(path)).modelVariables
+    variables = description_of(path).modelVariables
     states = [(effect.name, state) for effect in BY_NAME.values() for state in effect.states]
     states += [(formula.NAME, state) for state in (formula.TRAVEL, formula.TIME)]
     drifting = {f"{EFFECT}{name}.{state.name}" for name, state in states if state.drifts}

@@ -5,22 +5,20 @@ from __future__ import annotations
 import gc
 import os
 import pickle
-import shutil
-import signal
 import sys
 import tempfile
-import threading
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, suppress
 from dataclasses import dataclass
-from multiprocessing import parent_process
-from multiprocessing.connection import Connection, wait
+from multiprocessing.connection import Connection
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..child import end_with_parent
+from ..interrupt import as_by_default
 from .coupling import Coupling
 from .journal import Journal
 from .simulation import Source, simulate
@@ -63,7 +61,7 @@ def work(job: Job, folder: Path, sender: Connection) -> None:
 
 def _settle_in(folder: Path) -> None:
     """Make this process one that leaves no trace and does not outlive the one that watches it."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    as_by_default()
     if sys.platform != "win32":
         # With what FMUs may start, so that all of it can be ended together.
         os.setpgid(0, 0)
@@ -76,15 +74,7 @@ def _settle_in(folder: Path) -> None:
     for number, name in ((1, "stdout"), (2, "stderr")):
         with suppress(OSError):
             setattr(sys, name, open(number, "w", buffering=1, encoding="utf-8", closefd=False))  # noqa: SIM115
-    threading.Thread(target=_end_with_parent, args=(folder,), daemon=True).start()
-
-
-def _end_with_parent(folder: Path) -> None:
-    parent = parent_process()
-    if parent is not None:
-        wait([parent.sentinel])
-        shutil.rmtree(folder, ignore_errors=True)
-        os._exit(1)
+    end_with_parent(folder)
 
 
 @contextmanager

@@ -5,19 +5,20 @@ from __future__ import annotations
 import ctypes
 import os
 import shutil
+import tempfile
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-import fmpy
 import numpy as np
 from fmpy.fmi1 import FMICallException
 from fmpy.model_description import ModelDescription, ScalarVariable
 from numpy.typing import NDArray
 
 from ..errors import TautwireError
+from .archive import description_of, unpack
 from .fmi2 import Fmi2Instance
 from .fmi3 import Fmi3Instance
 from .standard import FMI_WARNING, STATUS, Instance, is_real
@@ -77,7 +78,8 @@ class Block:
 class Component:
     """An instance of an FMU: extracted, loaded, and freed again on leaving its ``with`` block.
 
-    Raises ComponentError where the FMU cannot be instantiated or any of its calls fails.
+    Raises ArchiveError where the FMU is no sound archive, ComponentError where it cannot be instantiated or any of its
+    calls fails.
     """
 
     def __init__(self, name: str, path: Path) -> None:
@@ -85,7 +87,7 @@ class Component:
         self.path = path
         self.time = 0.0
         self.messages: list[str] = []
-        self.description: ModelDescription = fmpy.read_model_description(str(path))
+        self.description: ModelDescription = description_of(path)
         version = self.description.fmiVersion
         if version not in INSTANCES:
             raise ComponentError(name, "reading its version", f"FMI {version}", 0.0, {}, ())
@@ -94,8 +96,9 @@ class Component:
         self.variables: dict[str, ScalarVariable] = {v.name: v for v in self.description.modelVariables}
         self.can_restore = bool(self.description.coSimulation.canGetAndSetFMUstate)
         self.takes_any_step = bool(self.description.coSimulation.canHandleVariableCommunicationStepSize)
-        self.folder = fmpy.extract(str(path))
+        self.folder = tempfile.mkdtemp(prefix="tautwire-fmu-")
         try:
+            unpack(path, Path(self.folder))
             self._load()
         except Exception:
             shutil.rmtree(self.folder, ignore_errors=True)

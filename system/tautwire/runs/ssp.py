@@ -15,7 +15,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from xml.etree.ElementTree import Element, SubElement, indent, tostring
 
-import fmpy
 from fmpy.model_description import ModelDescription, ScalarVariable
 
 from tautwire_fmu.units import UNITS
@@ -24,6 +23,7 @@ from ..errors import one_line
 from ..fmus.packaging import RobotFmus
 from ..fmus.slots import slot_ports
 from ..master import Connection, Port
+from ..master.archive import description_of
 from ..master.standard import is_real
 from ..master.units import BASES, measure, measure_of, unit_of
 from ..output import file_in_place
@@ -101,7 +101,7 @@ def _parts(fmus: RobotFmus, ports: Iterable[Port]) -> dict[str, _Part]:
 
 
 def _part(name: str, path: Path, connectors: Iterable[str], cable_count: int) -> _Part:
-    description = fmpy.read_model_description(str(path))
+    description = description_of(path)
     variables = {variable.name: variable for variable in description.modelVariables}
     ours = {port.name: port.unit for port in slot_ports(name, cable_count)}
     units = {connector: unit_of(variables[connector]) or ours[connector] for connector in connectors}
