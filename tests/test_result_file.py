@@ -82,7 +82,7 @@ def test_without_rows_or_after_anything_else_nothing_is_left(
 @pytest.mark.parametrize("name", NAMES)
 def test_rows_go_to_disk_as_they_come(tmp_path: Path, name: str) -> None:
     with result_in_place(tmp_path / name, COLUMNS) as result:
-        (folder,) = tmp_path.iterdir()
+        (folder,) = tmp_path.glob("*/new")
         row, sizes = np.array([1.0, 2.0]), []
         for block in range(4):
             for index in range(BLOCK_BYTES // 24):

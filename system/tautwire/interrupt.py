@@ -1,4 +1,4 @@
-"""Holds Ctrl-C back while foreign code runs.
+"""Holds Ctrl-C back while foreign code runs, and lets other requests to end be like it.
 
 Inside an FMU it would end the process, inside CasADi it would become another error.
 """
@@ -11,10 +11,26 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
+# Ways to ask a process to end; some systems lack the last.
+ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+
+
+def end_like_interrupts() -> None:
+    """Let what else asks this process to end raise KeyboardInterrupt, as Ctrl-C does; not what it is to ignore."""
+    for number in ENDING:
+        if signal.getsignal(number) is signal.SIG_DFL:
+            signal.signal(number, signal.default_int_handler)
+
+
+def as_by_default() -> None:
+    """Let this process be ended as any other; Ctrl-C is for the one that started it."""
+    for number in ENDING:
+        signal.signal(number, signal.SIG_IGN if number == signal.SIGINT else signal.SIG_DFL)
+
 
 @contextmanager
 def interrupts_held() -> Iterator[Callable[[], None]]:
-    """Within the block Ctrl-C is only noted.
+    """Within the block Ctrl-C, and what is like it, is only noted.
 
     Call what the block gets, where nothing foreign is running, to have KeyboardInterrupt raised there. Only the main
     thread receives signals; elsewhere nothing is changed.
@@ -31,8 +47,12 @@ def interrupts_held() -> Iterator[Callable[[], None]]:
         if noted:
             raise KeyboardInterrupt
 
-    before = signal.signal(signal.SIGINT, note)
+    before = {number: signal.getsignal(number) for number in ENDING}
+    held = [n for n in ENDING if n == signal.SIGINT or before[n] is signal.default_int_handler]
+    for number in held:
+        signal.signal(number, note)
     try:
         yield raise_noted
     finally:
-        signal.signal(signal.SIGINT, before)
+        for number in held:
+            signal.signal(number, before[number])

@@ -10,12 +10,15 @@ from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wai
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
 from multiprocessing import get_context
+from pathlib import Path
 from types import TracebackType
 from typing import Any, Generic, TypeVar
 
 from threadpoolctl import threadpool_limits
 
+from ..child import end_with_parent
 from ..errors import TautwireError
+from ..interrupt import ENDING
 
 Result = TypeVar("Result")
 
@@ -82,7 +85,7 @@ class Workers:
             running = list((getattr(self._executor, "_processes", None) or {}).values())
             self._executor.shutdown(wait=False, cancel_futures=True)
             for process in running:
-                process.terminate()
+                process.kill()
             for process in running:
                 process.join()
         if self._folder is not None:
@@ -135,11 +138,11 @@ def _loss_told(processes: int) -> Iterator[None]:
 
 @contextmanager
 def _interrupts_blocked() -> Iterator[None]:
-    """Processes that are started in the block do not get Ctrl-C; here it is only late."""
+    """Processes that are started in the block do not get Ctrl-C and what is like it; here it is only late."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})
+    before = signal.pthread_sigmask(signal.SIG_BLOCK, set(ENDING))
     try:
         yield
     finally:
@@ -147,7 +150,9 @@ def _interrupts_blocked() -> Iterator[None]:
 
 
 def _begin(folder: str) -> None:
-    """Ctrl-C is the parent's to handle; temporary folders are made where the parent removes them."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    """To be ended is the parent's to handle; temporary folders are made where the parent removes them."""
+    for number in ENDING:
+        signal.signal(number, signal.SIG_IGN)
+    end_with_parent(Path(folder))
     tempfile.tempdir = folder
     threadpool_limits(1)
