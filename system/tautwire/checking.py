@@ -9,7 +9,7 @@ from functools import partial
 from itertools import islice
 from pathlib import Path
 
-from .errors import InputError, RobotFileError
+from .errors import InputError, RobotFileError, one_line
 from .fmus.slots import check_own_fmus
 from .recordings.recording import Recording, read_recording, recording_faults
 from .recordings.roughness import roughness
@@ -22,6 +22,9 @@ from .tracer.preparation.preparation import prepare
 
 # Of one file; a recording with a wrong separator breaks rules in each of its cells.
 MOST = 1000
+# Of a robot file; to find the line of each takes its time, and is left out where the file is long.
+MOST_OF_ROBOT = 50
+LONGEST_TEXT = 50_000  # characters
 FEWEST_CABLES = 3
 
 
@@ -36,7 +39,7 @@ class Problem:
     mend: str
 
     def __str__(self) -> str:
-        return f"{self.where}: {self.problem}; {self.mend}"
+        return one_line(f"{self.where}: {self.problem}; {self.mend}")
 
 
 @dataclass(frozen=True)
@@ -73,17 +76,17 @@ def _checked_robot(path: Path, problems: list[Problem], notes: list[str]) -> Rob
     faults: list[RobotFileError] = []
     try:
         text = robot_file_text(path)
-        robot = read_robot(path, _at_most(faults, MOST))
+        robot = read_robot(path, _at_most(faults, MOST_OF_ROBOT))
     except RobotFileError as error:
         problems.append(Problem(str(path), error.line, error.where, error.problem, error.mend))
         return None
     except _EnoughError:
-        notes.append(f"{path}: no more than {MOST} problems are told")
+        notes.append(f"{path}: no more than {MOST_OF_ROBOT} problems are told")
         robot = None
     problems += sorted((_in_robot_file(path, text, error) for error in faults), key=_by_line)
     if not problems and robot is not None:
         for check, place in _of_the_whole(robot):
-            with _gathered(problems, path, line_of(text, place)):
+            with _gathered(problems, path, _line(text, place)):
                 check()
     return robot
 
@@ -129,7 +132,11 @@ def _at_most(faults: list[RobotFileError], most: int) -> Callable[[RobotFileErro
 
 
 def _in_robot_file(path: Path, text: str, error: RobotFileError) -> Problem:
-    return _problem(path, line_of(text, error.place), error)
+    return _problem(path, _line(text, error.place), error)
+
+
+def _line(text: str, place: tuple[str | int, ...]) -> int | None:
+    return line_of(text, place) if len(text) <= LONGEST_TEXT else None
 
 
 def _problem(path: Path, line: int | None, error: InputError) -> Problem:

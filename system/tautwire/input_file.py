@@ -6,6 +6,8 @@ from pathlib import Path
 
 from .errors import InputError
 
+HEAD = 2**16  # bytes that are looked at before all are read
+
 _UTF_16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 
 
@@ -16,6 +18,19 @@ def read_bytes(path: str | Path, error: type[InputError], largest: int | None = 
         if largest is not None and size > largest:
             raise error(str(path), f"has {size} bytes, at most {largest} are read", "check the path")
         return file.read_bytes()
+
+
+def read_text(path: str | Path, error: type[InputError], kind: str, largest: int | None = None) -> bytes:
+    """All bytes of a regular file of UTF-8 text; ``kind`` is what it should be.
+
+    Raises ``error`` where there is none, it is larger than ``largest``, or is no text: if its beginning tells, before
+    the rest of it is read.
+    """
+    with readable_file(path, error) as file, file.open("rb") as beginning:
+        _require_no_binary(beginning.read(HEAD), str(path), error, kind)
+    content = read_bytes(path, error, largest)
+    require_text(content, str(path), error, kind)
+    return content
 
 
 @contextmanager
@@ -38,14 +53,7 @@ def readable_file(path: str | Path, error: type[InputError]) -> Iterator[Path]:
 
 def require_text(content: bytes, where: str, error: type[InputError], kind: str) -> None:
     """Raises ``error`` unless the bytes are UTF-8 text; ``kind`` is what the file should be."""
-    mend = f"save it as {kind} in UTF-8"
-    if content.startswith(b"PK\x03\x04"):
-        raise error(where, "is a zip archive or a spreadsheet, not text", mend)
-    if content.startswith(_UTF_16_MARKS):
-        raise error(where, "is UTF-16, not UTF-8", mend)
-    zero = content.find(b"\0")
-    if zero >= 0:
-        raise error(_line(content, where, zero), "is binary (it has a zero byte), not text", mend)
+    _require_no_binary(content, where, error, kind)
     if content.isascii():
         return
     try:
@@ -53,7 +61,21 @@ def require_text(content: bytes, where: str, error: type[InputError], kind: str)
     except UnicodeDecodeError as problem:
         line = _line(content, where, problem.start)
         byte = content[problem.start]
-        raise error(line, f"byte 0x{byte:02x} is not UTF-8", mend) from problem
+        raise error(line, f"byte 0x{byte:02x} is not UTF-8", f"save it as {kind} in UTF-8") from problem
+
+
+def _require_no_binary(content: bytes, where: str, error: type[InputError], kind: str) -> None:
+    """Raises ``error`` where the bytes, or the first of them, show that a file is something else than text."""
+    mend = f"save it as {kind} in UTF-8"
+    if content.startswith(b"PK\x03\x04"):
+        raise error(where, "is a zip archive or a spreadsheet, not text", mend)
+    if content.startswith(b"\x1f\x8b"):
+        raise error(where, "is packed by gzip, not text", "unpack it first")
+    if content.startswith(_UTF_16_MARKS):
+        raise error(where, "is UTF-16, not UTF-8", mend)
+    zero = content.find(b"\0")
+    if zero >= 0:
+        raise error(_line(content, where, zero), "is binary (it has a zero byte), not text", mend)
 
 
 def _line(content: bytes, where: str, position: int) -> str:

@@ -7,12 +7,13 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal, InvalidOperation
+from functools import partial
 from io import StringIO
 from itertools import islice
 from pathlib import Path
 
 from ..errors import MaterialTableError, shown
-from ..input_file import read_bytes, require_text
+from ..input_file import read_text, readable_file
 from ..recordings.rules import MISSING
 from ..robots.checked_table import NumberRule, nearest
 
@@ -93,8 +94,7 @@ def read_material_table(path: str | Path) -> MaterialTable:
     in Hz, Pa, Pa s and rad, or degrees in ``phase_degrees``. A row of frequency 0 gives the storage modulus alone.
     """
     file = str(path)
-    content = read_bytes(path, MaterialTableError, LARGEST_FILE)
-    require_text(content, file, MaterialTableError, "CSV")
+    content = read_text(path, MaterialTableError, "CSV", LARGEST_FILE)
     lines = list(_cells(content.decode("utf-8-sig"), file))
     if not lines:
         raise MaterialTableError(file, "is empty", "write a header line and four or more rows")
@@ -113,12 +113,13 @@ def read_material_table(path: str | Path) -> MaterialTable:
 def is_material_table(path: str | Path) -> bool:
     """Whether the first line of a file that is no remark names a column "frequency" and none "time"."""
     try:
-        with Path(path).open("rb") as file:
-            lines = (line.decode("utf-8-sig", "replace").strip() for line in islice(file, LONGEST_REMARK))
+        with readable_file(path, MaterialTableError) as place, place.open("rb") as file:
+            read = islice(iter(partial(file.readline, LONGEST_HEADER), b""), LONGEST_REMARK)
+            lines = (line.decode("utf-8-sig", "replace").strip() for line in read)
             header = next((line for line in lines if line and not line.startswith("#")), "")
-    except OSError:
+    except MaterialTableError:
         return False
-    names = {name.strip() for name in header[:LONGEST_HEADER].split(",")}
+    names = {name.strip() for name in header.split(",")}
     return "frequency" in names and "time" not in names
 
 

@@ -14,9 +14,11 @@ import pandas as pd  # type: ignore[import-untyped,unused-ignore]
 from numpy.typing import NDArray
 
 from ..errors import RecordingError, at_once, shown
-from ..input_file import read_bytes, require_text
+from ..input_file import read_text
 from .header import Header, Refuse, header_of
 from .rules import MISSING, Row
+
+LARGEST_FILE = 2**31  # bytes; it is held in memory
 
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _NUMBER = re.compile(r"[-+]?[0-9]*[.,]?[0-9]+([eE][-+]?[0-9]+)?")
@@ -86,8 +88,7 @@ def open_csv(path: str | Path, cable_count: int, sink: Refuse = at_once) -> CsvT
     What is wrong with columns of the header goes to the ``sink``.
     """
     file = str(path)
-    content = read_bytes(path, RecordingError)
-    require_text(content, file, RecordingError, "CSV")
+    content = read_text(path, RecordingError, "CSV", LARGEST_FILE)
     content = content.removeprefix(_BYTE_ORDER_MARK)
     cells = _first_row(content, file)
     where = f"{file}: line 1"

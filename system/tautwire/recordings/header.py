@@ -9,6 +9,10 @@ from ..robots.checked_table import nearest
 
 AXES = ("x", "y", "z")
 
+# Beyond these a file is none of a cable robot, or does not fit into memory.
+MOST_COLUMNS = 10_000
+MOST_SAMPLES = 20_000_000
+
 Refuse = Callable[[RecordingError], None]
 
 _OF_A_CABLE = re.compile(r"(?:winch_speed|tension)_(0|[1-9][0-9]{0,5})")
@@ -34,6 +38,9 @@ def header_of(
 
     With a ``sink`` each error goes there, and those that follow too where it does not raise.
     """
+    if len(cells) > MOST_COLUMNS:
+        problem = f"has {len(cells)} columns, at most {MOST_COLUMNS} are read"
+        raise RecordingError(where, problem, "keep those of the robot", line)
     known = known_columns(cable_count)
     names = tuple(cell or f"(column {place})" for place, cell in enumerate(cells, 1))
     for place, name in enumerate(names):
@@ -49,6 +56,13 @@ def header_of(
             mend = f"add it, or rename {nearest(needed, unknown)}" if unknown else "add it"
             sink(RecordingError(where, f"the column {needed} is missing", mend, line))
     return Header(names, unknown)
+
+
+def require_samples(count: int, where: str) -> None:
+    """Raises RecordingError where a file has, or claims to have, more samples than are read."""
+    if count > MOST_SAMPLES:
+        problem = f"has {count} samples, at most {MOST_SAMPLES} are read"
+        raise RecordingError(where, problem, "cut it into several recordings")
 
 
 def known_columns(cable_count: int) -> frozenset[str]:

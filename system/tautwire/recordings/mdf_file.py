@@ -1,6 +1,9 @@
 """Recordings in MDF files (ASAM): channels named as the columns of a CSV file, each group at its own times."""
 
-from collections.abc import Mapping, Sequence
+import gc
+import sys
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -11,7 +14,7 @@ from numpy.typing import NDArray
 from ..errors import RecordingError, at_once, shown
 from ..input_file import readable_file
 from .columns import ColumnTable
-from .header import AXES, Header, Refuse, header_of
+from .header import AXES, Header, Refuse, header_of, require_samples
 
 SUFFIXES = (".mf4", ".mdf")
 _MAGIC = b"MDF     "
@@ -50,18 +53,37 @@ def open_mdf(path: str | Path, cable_count: int, sink: Refuse = at_once) -> Colu
     except ImportError as problem:
         said = "reading MDF needs the package asammdf, which is not installed"
         raise RecordingError(file, said, "install tautwire[mdf], or give the recording as CSV or Parquet") from problem
-    try:
-        with MDF(Path(path)) as content:
-            header, channels = _read(content, file, cable_count, sink)
-    except RecordingError:
-        raise
-    # A file that is broken may raise anything there.
-    except Exception as problem:
-        raise RecordingError(file, f"cannot be read as MDF ({shown(str(problem), 200)})", _ANEW) from problem
+    reason = ""
+    with _unraised_unsaid():
+        try:
+            with MDF(Path(path)) as content:
+                header, channels = _read(content, file, cable_count, sink)
+        except RecordingError:
+            raise
+        # A file that is broken may raise anything there.
+        except Exception as problem:
+            reason = shown(str(problem), 200)
+        if reason:
+            gc.collect()
+    if reason:
+        raise RecordingError(file, f"cannot be read as MDF ({reason})", _ANEW)
     return ColumnTable(file, header, _on_one_time(channels, file))
 
 
+@contextmanager
+def _unraised_unsaid() -> Iterator[None]:
+    """Keep Python from printing what asammdf's objects raise as they go, where their file was broken."""
+    before = sys.unraisablehook
+    sys.unraisablehook = lambda unraisable: None
+    try:
+        yield
+    finally:
+        sys.unraisablehook = before
+
+
 def _read(content: Any, file: str, cable_count: int, sink: Refuse) -> tuple[Header, dict[str, Channel]]:
+    for group in content.groups:
+        require_samples(group.channel_group.cycles_nr, file)
     masters = set(content.masters_db.items())
     places = {name: [at for at in found if at not in masters] for name, found in content.channels_db.items()}
     names = [name for name, found in places.items() if found and name != "time"]

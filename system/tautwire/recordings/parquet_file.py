@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..errors import RecordingError, at_once, shown
 from ..input_file import readable_file
 from .columns import ColumnTable
-from .header import Refuse, header_of
+from .header import Refuse, header_of, require_samples
 
 BATCH = 2**16
 
@@ -33,6 +33,7 @@ def open_parquet(path: str | Path, cable_count: int, sink: Refuse = at_once) -> 
     file = str(path)
     try:
         with pq.ParquetFile(path) as content:
+            require_samples(content.metadata.num_rows, file)
             header = header_of(content.schema_arrow.names, file, cable_count, sink)
             # One by one, so that what Arrow holds is never more than one column.
             columns = {name: _column(content, name, f"{file}: column {name}") for name in header.known}

@@ -167,4 +167,4 @@ def nearest(name: str, known: Iterable[str]) -> str:
     """The known name that looks most like ``name``, quoted; letter case does not count."""
     by_lower_case = {candidate.lower(): candidate for candidate in known}
     found = get_close_matches(name[:LONGEST_KEY].lower(), by_lower_case, n=1, cutoff=0.0)
-    return f"'{by_lower_case[found[0]]}'" if found else "one that is known"
+    return shown(by_lower_case[found[0]]) if found else "one that is known"

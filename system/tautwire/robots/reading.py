@@ -39,6 +39,7 @@ __all__ = ["read_robot", "robot_text", "write_robot"]
 
 KEYS = ("name", "gravity", "platform", "tension", "sensors", "cable", "effect", "winch", "fmu", "formula")
 LARGEST_FILE = 10_000_000  # bytes
+MOST_CABLES = 100
 SAME_POINT = 1e-6  # m, closer than any two exit points can be built
 
 GRAVITY = NumberRule("the gravity along -z", "m/s^2", minimum=0.0, default=9.81)
@@ -219,6 +220,9 @@ def _cables(root: CheckedTable, start: Point) -> tuple[Cable, ...]:
     if isinstance(given, list) and len(given) < 3:
         problem = f"{len(given)} given, a robot has three or more"
         root.refuse("cable", problem, "add one table [[cable]] for each cable")
+    if len(tables) > MOST_CABLES:
+        root.refuse("cable", f"{len(tables)} given, at most {MOST_CABLES} are read", "leave out the others")
+        tables = tables[:MOST_CABLES]
     cables = tuple(_cable(table) for table in tables)
     for place, (table, cable) in enumerate(zip(tables, cables, strict=True)):
         if math.dist(cable.anchor, start) < SAME_POINT:
