@@ -2,6 +2,7 @@
 
 import ast
 import inspect
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -38,6 +39,17 @@ def test_type_checkers_see_the_same_names() -> None:
     }
     assert imported == tautwire._MODULES
     assert Path(str(tautwire.__file__)).with_name("py.typed").exists()
+
+
+@pytest.mark.slow
+def test_a_type_checker_refuses_names_that_are_not_ours(tmp_path: Path) -> None:
+    (tmp_path / "user.py").write_text("from tautwire import tracee\n", encoding="utf-8")
+    root = Path(str(tautwire.__file__)).parents[1]
+    paths = f"{root}{os.pathsep}{root.parent / 'fmu_src'}"
+    call = [sys.executable, "-m", "mypy", "--config-file", os.devnull, "--follow-imports", "silent", "user.py"]
+    environment = {**os.environ, "MYPYPATH": paths}
+    shown = subprocess.run(call, capture_output=True, text=True, check=False, cwd=tmp_path, env=environment).stdout
+    assert 'Module "tautwire" has no attribute "tracee"' in shown
 
 
 def test_the_package_and_its_command_line_import_nothing_slow() -> None:

@@ -33,6 +33,14 @@ if TYPE_CHECKING:
     from .runs.cosimulation import cosimulate
     from .tracer import trace
     from .trajectory import Line, ideal_winch_speeds
+else:
+
+    def __getattr__(name: str) -> Any:
+        # Hidden from type checkers, to which any name would be one of ours.
+        if name not in _MODULES:
+            raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
+        return getattr(import_module(_MODULES[name], __name__), name)
+
 
 __version__ = "0.1.0"
 
@@ -72,12 +80,6 @@ _MODULES = {
     "trace": ".tracer",
     "write_report": ".report",
 }
-
-
-def __getattr__(name: str) -> Any:
-    if name not in _MODULES:
-        raise AttributeError(f"module {__name__!r} has no attribute {name!r}")
-    return getattr(import_module(_MODULES[name], __name__), name)
 
 
 def __dir__() -> list[str]:
