@@ -1,8 +1,8 @@
 # make run: the main job on a shipped recording. make test: lint, types and all tests. make bench: the co-simulation's
-# speed; make bench-long: memory over a million steps; make bench-trace: the tracer on blind recordings, goes on where it
-# was stopped; make bench-control: the controllers. make docs: the pages in docs/, into build/docs; make pictures: those
-# of README and docs that come from runs. make floors: tests with the lowest versions that pyproject.toml declares, on a
-# Python of at most 3.12. Each sets up what it needs.
+# speed; make bench-long: memory over a million steps; make bench-trace: the tracer on blind recordings, goes on where
+# it was stopped; make bench-control: the controllers; make bench-campaign: many runs. make docs: the pages in docs/,
+# into build/docs; make pictures: those of README and docs that come from runs. make floors: tests with the lowest
+# versions that pyproject.toml declares, on a Python of at most 3.12. Each sets up what it needs.
 
 PYTHON ?= python3
 VENV := .venv
@@ -13,7 +13,7 @@ FLOORS := .venv-floors
 FLOOR_TESTS := $(addprefix tests/test_,$(addsuffix .py,checking cli control cosimulation linear linear_figures \
 	materials_command package preparation recording recording_mdf recording_parquet report_page robust statics))
 
-.PHONY: run test lint types docs pictures floors bench bench-long bench-trace bench-control clean
+.PHONY: run test lint types docs pictures floors bench bench-long bench-trace bench-control bench-campaign clean
 
 run: $(READY)
 	$(BIN)/tautwire trace $(EXAMPLE)/robot.toml $(EXAMPLE)/fit.csv --check $(EXAMPLE)/check.csv --out build/three
@@ -58,6 +58,9 @@ bench-trace: $(READY)
 
 bench-control: $(READY)
 	$(BIN)/python -m tests.bench.control docs
+
+bench-campaign: $(READY)
+	$(BIN)/python -m tests.bench.campaign
 
 clean:
 	rm -rf $(VENV) $(FLOORS) build/* dist

@@ -12,7 +12,7 @@ from rich.console import Console
 
 from ..errors import InputError
 from ..robots.reading import read_robot
-from .shared import progress_bar, robot_of
+from .shared import AsJson, Quiet, Voice, progress_bar, robot_of
 
 DYNAMIC_TEST = "A dynamic test of the rope; if none, Table 1 of the paper, with the pair that it uses."
 
@@ -27,12 +27,17 @@ def material(
     shared: Annotated[float, typer.Option(help="Share of each variance that all rows have in common.")] = 0.0,
     coverage: Annotated[float, typer.Option(help="Standard deviations that the table's uncertainties are.")] = 1.0,
     alpha: Annotated[float, typer.Option(help="Rate of false alarms allowed.")] = 0.01,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
 ) -> None:
-    """Judge a constant modulus and damping by a dynamic test, and fit what the rope has besides.
+    """Fit a rope's constants and relaxation to a dynamic test.
+
+    Judges a constant modulus and damping, and fits what the rope has besides.
 
     Example: tautwire material dma.csv --robot robot.toml --out material/
     """
     from ..materials import PAPER_PAIR_AT, PAPER_TABLE, Options, pair_of_row, read_material_table, trace_material
+    from ..materials.document import material_document
     from ..materials.output import FILES, write_material
     from ..materials.robot_material import declared_material
     from ..materials.terminal import material_table
@@ -45,6 +50,7 @@ def material(
         raise InputError("--coverage", f"{coverage:g} is not positive", "give 1, or 2 for intervals of 95 %")
     if at is not None and robot_file:
         raise InputError("--at", "the pair in use is the robot's", "give either --at or --robot")
+    voice = Voice(as_json, quiet)
     read = read_material_table(table or PAPER_TABLE)
     robot = robot_of(robot_file) if robot_file else None
     refuse_inputs([path for path in (table, robot_file) if path], [out / name for name in FILES])
@@ -54,20 +60,24 @@ def material(
     if at is not None:
         declared = pair_of_row(read, at)
     with folder_in_place(out) as scratch:
-        with progress_bar() as tell:
+        with progress_bar(voice) as tell:
             verdict = trace_material(read, declared, Options(shared=shared, coverage=coverage, alpha=alpha), tell)
         write_material(verdict, scratch, robot)
-    Console().print(material_table(verdict))
-    print(out / "fit.json")
+    if not (quiet or as_json):
+        Console().print(material_table(verdict))
+    voice.result([out / "fit.json"], {"folder": out, **material_document(verdict)})
+    if robot is not None:
+        voice.next(f"tautwire check {out / 'robot.toml'} RECORDING.csv, and trace: does the robot move like that?")
 
 
-def judge_rope(table: Path, robot_file: Path, out: Path, alpha: float) -> None:
+def judge_rope(table: Path, robot_file: Path, out: Path, alpha: float, voice: Voice) -> None:
     """A trace at the level of the rope: the robot's constants judged by a dynamic test, the better robot with its FMUs.
 
     Writes what :func:`material` does, the same verdict as ``report.json``, and the FMUs.
     """
     from ..fmus.packaging import build_fmus
     from ..materials import Options, read_material_table, trace_material
+    from ..materials.document import material_document
     from ..materials.output import FILES, write_material
     from ..materials.robot_material import declared_material
     from ..materials.terminal import material_table
@@ -77,10 +87,11 @@ def judge_rope(table: Path, robot_file: Path, out: Path, alpha: float) -> None:
     refuse_inputs([table, robot_file], [out / name for name in (*FILES, "report.json")])
     declared = declared_material(robot, str(robot_file))
     with folder_in_place(out) as scratch:
-        with progress_bar() as tell:
+        with progress_bar(voice) as tell:
             verdict = trace_material(read, declared, Options(alpha=alpha), tell)
         write_material(verdict, scratch, robot)
         shutil.copyfile(scratch / "fit.json", scratch / "report.json")
         build_fmus(read_robot(scratch / "robot.toml"), scratch)
-    Console().print(material_table(verdict))
-    print(out / "report.json")
+    if not (voice.quiet or voice.as_json):
+        Console().print(material_table(verdict))
+    voice.result([out / "report.json"], {"folder": out, **material_document(verdict)})

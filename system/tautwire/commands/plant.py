@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-import sys
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -11,39 +11,65 @@ import typer
 
 from ..errors import UnreachableError
 from ..robots.reading import read_robot
-from .shared import RobotFile, position_of, robot_of, say_what_is_left_out
+from .shared import (
+    AsJson,
+    Quiet,
+    RobotFile,
+    Voice,
+    links_beside,
+    position_of,
+    progress_bar,
+    robot_of,
+    say_what_is_left_out,
+)
 
 
 def linearise(
     robot_file: RobotFile,
     out: Annotated[Path, typer.Option(metavar="MODEL.json", help="Where the model goes.")],
     at: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Position, m; by default the start.")] = None,
+    report: Annotated[
+        Path | None, typer.Option(metavar="PAGE.html", help="Modes in motion and gains, as a page.")
+    ] = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
 ) -> None:
-    """Linearise the robot at rest: modes, and A, B, C, D with named signals.
+    """Linearise the robot at rest: modes, and A, B, C, D.
 
     Inputs are the speeds of the drums: [winch] and [fmu] of the robot file have no part in it.
 
-    Example: tautwire linearise robot.toml --at 10,5.5,4 --out model.json
+    Example: tautwire linearise robot.toml --at 10,5.5,4 --out model.json --report modes.html
     """
     from ..linear import linearise as linearised
     from ..linear import model_document
-    from ..output import file_in_place, refuse_inputs
+    from ..output import file_in_place, refuse_inputs, refuse_same
 
-    refuse_inputs([robot_file], [out])
+    refuse_inputs([robot_file], [out, *([report] if report else [])])
+    refuse_same(out, report)
+    voice = Voice(as_json, quiet)
     robot = robot_of(robot_file)
     try:
-        plant = linearised(robot, None if at is None else position_of(at))
+        with progress_bar(voice) as tell:
+            tell("linearising", 0.0)
+            plant = linearised(robot, None if at is None else position_of(at))
     except UnreachableError as error:
         raise UnreachableError("--at", error.position, error.cable, error.tension, error.reason) from error
+    document = model_document(plant)
     with file_in_place(out) as scratch:
-        scratch.write_text(json.dumps(model_document(plant), indent=1), encoding="utf-8")
-    say_what_is_left_out(robot)
+        scratch.write_text(json.dumps(document, indent=1), encoding="utf-8")
+        if report is not None:
+            from ..report.modes_page import modes_page
+
+            links = links_beside(report, robot_file, out)
+            with file_in_place(report) as page:
+                page.write_text(modes_page(robot, plant, links), encoding="utf-8")
+    say_what_is_left_out(robot, voice)
     for note in plant.notes:
-        print(note, file=sys.stderr)
+        voice.note(note)
     pairs = zip(plant.modes.frequencies, plant.modes.damping_ratios, strict=True)
-    for number, (frequency, ratio) in enumerate(pairs, start=1):
-        print(f"mode {number}: {frequency:.4f} Hz, damping ratio {ratio:.5f}")
-    print(out)
+    modes = [f"mode {i}: {hertz:.4f} Hz, damping ratio {ratio:.5f}" for i, (hertz, ratio) in enumerate(pairs, 1)]
+    written = {"model": out} | ({"report": report} if report else {})
+    voice.result([*modes, *written.values()], {**written, **document, "notes": plant.notes})
 
 
 def workspace(
@@ -56,8 +82,12 @@ def workspace(
     upper: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Upper corner, m.")] = None,
     spacing: Annotated[float | None, typer.Option(help="Grid spacing, m; by default a twentieth of the box.")] = None,
     acceleration: Annotated[float, typer.Option(help="Required along each axis beside the weight, m/s^2.")] = 0.0,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
 ) -> None:
-    """Where the cables, which only pull, hold the platform: margins and static tensions on a grid.
+    """Find where the cables, which only pull, hold the platform.
+
+    Margins and static tensions on a grid.
 
     Example: tautwire workspace robot.toml --out workspace.csv --plot workspace.png
     """
@@ -68,16 +98,19 @@ def workspace(
     refuse_inputs([robot_file], [out, *([plot] if plot else [])])
     if plot is not None:
         checked_format(plot)
+    voice = Voice(as_json, quiet)
     robot = read_robot(robot_file)
     least = None if lower is None else position_of(lower, "--lower")
     most = None if upper is None else position_of(upper, "--upper")
-    found = wrench_feasible_workspace(robot, least, most, spacing, acceleration)
+    with progress_bar(voice) as tell:
+        ahead = partial(tell, "looking where the cables hold it")
+        found = wrench_feasible_workspace(robot, least, most, spacing, acceleration, ahead)
     with file_in_place(out) as scratch:
         found.frame().to_csv(scratch, index=False, float_format="%.10g")
         if plot is not None:
             with file_in_place(plot) as drawing:
                 workspace_figure(robot, found).savefig(drawing)
-    print(f"{int(found.feasible.sum())} of {found.feasible.size} positions are wrench-feasible")
-    for path in (out, plot):
-        if path is not None:
-            print(path)
+    feasible, positions = int(found.feasible.sum()), int(found.feasible.size)
+    written = {"workspace": out} | ({"plot": plot} if plot else {})
+    said = f"{feasible} of {positions} positions are wrench-feasible"
+    voice.result([said, *written.values()], {**written, "feasible": feasible, "positions": positions})

@@ -10,7 +10,7 @@ from rich.console import Console
 
 from ..errors import InputError
 from .material import judge_rope
-from .shared import RobotFile, progress_bar, robot_of, say_what_is_left_out
+from .shared import AsJson, Quiet, RobotFile, Voice, progress_bar, robot_of, say_what_is_left_out
 
 
 def trace(
@@ -19,8 +19,12 @@ def trace(
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where the report goes.")],
     check: Annotated[Path | None, typer.Option(metavar="CHECK.csv", help="A recording to judge on.")] = None,
     alpha: Annotated[float, typer.Option(help="Rate of false alarms allowed.")] = 0.01,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
 ) -> None:
-    """Find what the model lacks, add it, and report the error before and after.
+    """Find what the model lacks, and add it to the FMUs.
+
+    The report shows the error before and after.
 
     FIT may also be a dynamic test of the rope, a table with a column "frequency": see "tautwire material".
 
@@ -31,29 +35,32 @@ def trace(
     from ..materials.table import is_material_table
     from ..output import folder_in_place, refuse_inputs
     from ..recordings.recording import read_recording
-    from ..report import trace_table, write_report
+    from ..report import trace_document, trace_table, write_report
     from ..tracer import processors
     from ..tracer import trace as traced
 
     if not 0.0 < alpha < 1.0:
         raise InputError("--alpha", f"{alpha:g} is not a rate", "give a number between 0 and 1, such as 0.01")
+    voice = Voice(as_json, quiet)
     if is_material_table(fit):
         if check is not None:
             raise InputError("--check", f"{fit} is a dynamic test of a rope", "leave it out: its rows judge each other")
-        judge_rope(fit, robot_file, out, alpha)
+        judge_rope(fit, robot_file, out, alpha, voice)
         return
     robot = robot_of(robot_file)
     recording = read_recording(fit, robot.cable_count)
     judging = None if check is None else read_recording(check, robot.cable_count)
     made = ["robot.toml", "report.json", "index.html"]
     refuse_inputs([robot_file, fit, *([check] if check else [])], [out / name for name in made])
-    with folder_in_place(out) as scratch:
-        with progress_bar() as tell:
-            result = traced(robot, recording, judging, tell, alpha, processors())
+    with folder_in_place(out) as scratch, progress_bar(voice) as tell:
+        result = traced(robot, recording, judging, tell, alpha, processors())
+        tell("writing the report", 0.0)
         write_report(result, scratch)
-    say_what_is_left_out(robot)
-    Console().print(trace_table(result))
-    print(out / "index.html")
+    say_what_is_left_out(robot, voice)
+    if not (quiet or as_json):
+        Console().print(trace_table(result))
+    voice.result([out / "index.html"], {"folder": out, **trace_document(result)})
+    voice.next(f"open {out / 'index.html'}; {out / 'robot.toml'} is the robot as found, its FMUs are beside it")
 
 
 def excite(
@@ -66,8 +73,12 @@ def excite(
     rate: Annotated[float, typer.Option(help="Samples per second.", min=1.0, max=1000.0)] = 50.0,
     programs: Annotated[int, typer.Option(help="About how many programs are tried.", min=1, max=100_000)] = 64,
     seed: Annotated[int, typer.Option(help="The same seed gives the same program.", min=0)] = 0,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
 ) -> None:
-    """A winch program after which effects can be told apart: the largest smallest separation within the limits.
+    """Design a motion after which effects can be told apart.
+
+    The largest smallest separation within the limits, as winch speeds.
 
     Example: tautwire excite robot.toml --effects damping,relaxation,hysteresis --out program.csv
     """
@@ -76,14 +87,17 @@ def excite(
     from ..excitation.limits import named_effects
     from ..output import file_in_place, refuse_inputs
 
+    voice = Voice(as_json, quiet)
     refuse_inputs([robot_file], [out])
     robot = robot_of(robot_file)
     chosen = named_effects(robot, effects)
-    with progress_bar() as tell:
+    with progress_bar(voice) as tell:
         found = excited(robot, chosen, default_limits(robot, speed, reach), duration, 1.0 / rate, programs, seed, tell)
     with file_in_place(out) as scratch:
         found.frame().to_csv(scratch, index=False, float_format="%.10g")
-    for pair in found.pairs[:5]:
-        print(f"{pair.effect.label(robot)}, and {pair.other.label(robot)} in its place: {pair.nats:.3g} nats apart")
-    print(f"closest pair of the median program: {found.typical:.3g} nats")
-    print(out)
+    pairs = [(pair.effect.label(robot), pair.other.label(robot), pair.nats) for pair in found.pairs]
+    lines = [f"{effect}, and {other} in its place: {nats:.3g} nats apart" for effect, other, nats in pairs[:5]]
+    median = f"closest pair of the median program: {found.typical:.3g} nats"
+    named = [{"effect": effect, "other": other, "nats": nats} for effect, other, nats in pairs]
+    voice.result([*lines, median, out], {"program": out, "pairs": named, "median": found.typical})
+    voice.next(f"run it on the robot, record positions and tensions, then tautwire trace {robot_file} RECORDING.csv")

@@ -1,0 +1,161 @@
+"""Campaigns: runs a minute, what a run costs beside itself, and memory over 100,000 runs.
+
+``python -m tests.bench.campaign [RUNS] [CHEAP]``; Linux only. A run is the paper's robot along a line, about a second
+of computing. The bare loop makes the same runs in one process, which has their FMUs and its libraries already, as
+workers have once they are prepared; rounds alternate, and each figure is the median of its rounds.
+"""
+
+from __future__ import annotations
+
+import sys
+import tempfile
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from statistics import median
+from time import perf_counter, process_time
+
+import numpy as np
+from psutil import Process
+from threadpoolctl import threadpool_limits
+
+from tautwire.campaign.cluster import Task, connected, results, shared_future
+from tautwire.campaign.dataset import done_rows, opened
+from tautwire.campaign.plan import Plan
+from tautwire.campaign.run import run_job, shared_of
+from tautwire.campaign.running import jobs_of, make_rows
+from tests.campaigns import read
+from tests.memory import resident_memory
+
+RUNS, CHEAP, ROUNDS = 8, 100_000, 3
+ALONG = """
+robot = "robot.toml"
+[sample]
+method = "random"
+count = {count}
+[vary]
+cable.modulus = {{normal = [1.022e11, 2.2e9]}}
+platform.mass = {{uniform = [280.0, 320.0]}}
+[[path]]
+end = [29.2, 0.3, 5.5]
+duration = 4.0
+"""
+CHEAPLY = """
+robot = "robot.toml"
+[sample]
+method = "random"
+count = {count}
+[vary]
+platform.mass = {{uniform = [280.0, 320.0]}}
+[compute]
+modes = false
+"""
+
+
+def bare(plan: Plan, folder: Path) -> float:
+    """Seconds for all runs one after the other in this process."""
+    shared = shared_of(plan, {})
+    jobs = list(jobs_of(plan, np.ones(plan.count, dtype=bool)))
+    run_job(shared, jobs[0], folder)
+    with threadpool_limits(1):
+        begun = perf_counter()
+        for job in jobs:
+            run_job(shared, job, folder)
+        return perf_counter() - begun
+
+
+def over_workers(plan: Plan, folder: Path, workers: int) -> float:
+    """Seconds from when workers are prepared to when all rows are there."""
+    begun = 0.0
+
+    def tell(what: str, done: float) -> None:
+        nonlocal begun
+        if what == "running" and done == 0.0:
+            begun = perf_counter()
+
+    with connected(None, workers) as client:
+        # Each worker imports what it needs, and unpacks its FMUs, in a campaign before.
+        before = replace(plan, count=2 * workers)
+        with opened(folder / "warm", before):
+            make_rows(before, folder / "warm", client, tell)
+        with opened(folder / "rows", plan):
+            make_rows(plan, folder / "rows", client, tell)
+            return perf_counter() - begun
+
+
+def speed(folder: Path, runs: int) -> None:
+    """A table of runs a minute, and the overhead of one worker against the bare loop."""
+    (folder / "plan").mkdir()
+    plan = read(folder / "plan", ALONG.format(count=runs))
+    ways: dict[str, Callable[[Path], float]] = {
+        "bare loop": lambda place: bare(plan, place),
+        "1 worker": lambda place: over_workers(plan, place, 1),
+        "2 workers": lambda place: over_workers(plan, place, 2),
+    }
+    found: dict[str, list[float]] = {way: [] for way in ways}
+    for round_ in range(ROUNDS):
+        for way, timed in ways.items():
+            found[way].append(timed(folder / f"{way} {round_}"))
+    print(f"{runs} runs, medians of {ROUNDS} rounds\n\n| | s a run | runs a minute | against the bare loop |")
+    print("| --- | --- | --- | --- |")
+    loop = median(found["bare loop"])
+    for way, seconds in found.items():
+        took = median(seconds)
+        ratios = [a / b for a, b in zip(seconds, found["bare loop"], strict=True)]
+        print(f"| {way} | {took / runs:.3f} | {60.0 * runs / took:.0f} | {median(ratios):.3f} |")
+    print(f"\noverhead of one worker: {100.0 * (median(found['1 worker']) / loop - 1.0):.1f} % of the bare loop's time")
+
+
+def cost(folder: Path, tasks: int = 300) -> None:
+    """What a task costs beside its run, by tasks of one run of less than a millisecond."""
+    (folder / "little").mkdir()
+    plan = read(folder / "little", CHEAPLY.format(count=tasks))
+    with connected(None, 1) as client:
+        workers = Process().children(recursive=True)
+
+        def processor_time() -> tuple[float, float]:
+            return process_time(), sum(sum(each.cpu_times()[:2]) for each in workers)
+
+        shared = shared_future(client, plan, {})
+        jobs = jobs_of(plan, np.ones(tasks, dtype=bool))
+        begun, before = perf_counter(), processor_time()
+        made = sum(len(some) for some in results(client, shared, plan, (Task((job,)) for job in jobs)))
+        wall, after = perf_counter() - begun, processor_time()
+    own, others = (1e3 * (b - a) / made for a, b in zip(before, after, strict=True))
+    print(
+        f"\na task beside its run: {1e3 * wall / made:.1f} ms; processor time {own:.1f} ms here, {others:.1f} ms there"
+    )
+
+
+def memory(folder: Path, runs: int) -> None:
+    """A table of memory while many cheap runs are made: of this process, with Dask's scheduler, and of its workers."""
+    (folder / "cheap").mkdir()
+    plan = read(folder / "cheap", CHEAPLY.format(count=runs))
+    print(f"\n{runs} cheap runs on 2 workers\n\n| done | this process | its workers | wall time |")
+    print("| --- | --- | --- | --- |")
+    begun, tenths = perf_counter(), list(range(1, 11))
+
+    def tell(what: str, done: float) -> None:
+        if what == "running" and tenths and done >= 0.1 * tenths[0] - 1e-9:
+            own, workers = resident_memory()
+            seconds = perf_counter() - begun
+            print(f"| {10 * tenths.pop(0)} % | {own:.0f} MB | {workers:.0f} MB | {seconds:.0f} s |", flush=True)
+
+    out = folder / "many"
+    with connected(None, 2) as client, opened(out, plan):
+        make_rows(plan, out, client, tell)
+        assert done_rows(out, runs).all()
+    size = sum(part.stat().st_size for part in out.rglob("*.parquet"))
+    print(f"\n{len(list(out.rglob('*.parquet')))} parts, {size / 1e6:.1f} MB on disk")
+
+
+def main() -> None:
+    runs, cheap = (int(each) for each in (*sys.argv[1:], *(str(n) for n in (RUNS, CHEAP)[len(sys.argv) - 1 :])))
+    with tempfile.TemporaryDirectory() as name:
+        speed(Path(name), runs)
+        cost(Path(name))
+        memory(Path(name), cheap)
+
+
+if __name__ == "__main__":
+    main()

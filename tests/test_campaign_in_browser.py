@@ -1,0 +1,68 @@
+"""A campaign's page in a real browser: nothing fails, nothing is asked for, all is drawn, the chooser works."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("selenium", reason="the pages are not tried in a browser: selenium is in the dev extra")
+
+from tautwire.campaign.writing import write_summary
+from tests.browser.browser import LAPTOP, MISSING, PHONE_DARK, Browser, Screen, browser_at, chromium
+from tests.campaigns import moving
+from tests.test_campaign_summary import GRID, written
+
+FIND_CHROMIUM = chromium()
+pytestmark = pytest.mark.skipif(FIND_CHROMIUM is None, reason=f"the pages are not tried in a browser: {MISSING}")
+
+DRAW_ALL = "window.dispatchEvent(new Event('beforeprint'))"
+MEDIANS = "return document.querySelector('figure[data-kind=band] .plot').data[2].y"
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """One browser for all tests of this file."""
+    assert FIND_CHROMIUM is not None
+    with browser_at(FIND_CHROMIUM) as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module", params=["path", "grid"])
+def page(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The page of samples along a path, and that of a grid at rest."""
+    plan, out = written(tmp_path_factory.mktemp(request.param), moving(64) if request.param == "path" else GRID)
+    write_summary(plan, out)
+    return out / "index.html"
+
+
+@pytest.mark.parametrize("screen", [LAPTOP, PHONE_DARK], ids=lambda screen: screen.name)
+def test_page_loads_in_silence_fits_its_screen_and_draws_every_figure(
+    browser: Browser, page: Path, screen: Screen
+) -> None:
+    browser.show(screen)
+    browser.open(page)
+    browser.run(DRAW_ALL)
+    assert browser.heard() == []
+    assert [url for url in browser.requests() if not url.startswith(("data:", "blob:"))] == [page.resolve().as_uri()]
+    assert browser.run("return document.documentElement.scrollWidth") <= screen.width
+    figures = browser.run("return document.querySelectorAll('figure').length")
+    assert figures >= 10
+    assert browser.run("return document.querySelectorAll('.js-plotly-plot .trace').length") >= figures
+
+
+def test_another_path_or_input_is_drawn_when_it_is_chosen(browser: Browser, page: Path) -> None:
+    browser.show(LAPTOP)
+    browser.open(page)
+    if page.parent.parent.name.startswith("grid"):
+        browser.see("figure[data-kind=against]")
+        script = "return document.querySelector('figure[data-kind=against] .plot').data[0].x"
+        change = "const s = document.getElementById('against'); s.value = '1'; s.dispatchEvent(new Event('change'))"
+    else:
+        browser.see("figure[data-kind=band]")
+        script, change = MEDIANS, "document.querySelectorAll('input[name=choice]')[1].click()"
+    before = browser.run(script)
+    browser.run(change)
+    browser.wait(lambda: browser.run(script) != before, "the other one to be drawn")
+    assert browser.heard() == []
