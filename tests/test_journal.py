@@ -91,7 +91,7 @@ def test_unpacking_is_noted_as_such(three_fmus: RobotFmus, tmp_path: Path, monke
     class StoppedError(Exception):
         pass
 
-    def stop(path: str) -> str:
+    def stop(path: str, folder: str) -> str:
         raise StoppedError
 
     monkeypatch.setattr(fmpy, "extract", stop)
