@@ -66,7 +66,7 @@ def cluster(folder: Path, workers: int = 2) -> Iterator[tuple[str, list[subproce
         wait_for(file.exists)
         processes += [subprocess.Popen(worker, **quiet) for _ in range(workers)]  # type: ignore[call-overload]
         with Client(scheduler_file=str(file), set_as_default=False) as client:
-            client.wait_for_workers(workers, timeout=60)
+            client.wait_for_workers(workers, timeout=300)
             address = client.scheduler.address
         yield address, processes
     finally:
@@ -75,7 +75,7 @@ def cluster(folder: Path, workers: int = 2) -> Iterator[tuple[str, list[subproce
             process.wait()
 
 
-def wait_for(holds: Callable[[], bool], seconds: float = 90.0) -> None:
+def wait_for(holds: Callable[[], bool], seconds: float = 300.0) -> None:
     """Waits until something holds."""
     until = time.monotonic() + seconds
     while not holds():
