@@ -98,14 +98,7 @@ def simulate(
     from ..runs.simulation import simulate_recording
     from ..runs.wiring import result_columns
 
-    if not step > 0.0:
-        raise InputError("--step", f"{step:g} s is not positive", "give a step such as 0.01")
-    if until is not None and math.isnan(until):
-        raise InputError("--until", "nan is not a time", "give a time in s")
-    if tolerance is not None and not tolerance > 0.0:
-        raise InputError("--tolerance", f"{tolerance:g} m is not positive", "give an error such as 1e-6")
-    if not patience > 0.0:
-        raise InputError("--patience", f"{patience:g} s is not positive", "give a time such as 60, or inf")
+    _require_sensible(step, tolerance, until, patience)
     voice = Voice(as_json, quiet)
     robot = robot_of(robot_file)
     robot = robot.with_fmus(own_fmus(fmu or [], robot.cable_count))
@@ -131,6 +124,18 @@ def simulate(
     books = {"steps": account.steps, "redos": account.redos, "energy_made": account.made, "error": account.error}
     voice.result([*said, *([report] if report else [])], {**written, **books, "notes": notes})
     voice.next(f"tautwire trace {robot_file} {speeds} --out report/, if positions or tensions were measured too")
+
+
+def _require_sensible(step: float, tolerance: float | None, until: float | None, patience: float) -> None:
+    """Raises InputError for options that no run can have."""
+    if not step > 0.0:
+        raise InputError("--step", f"{step:g} s is not positive", "give a step such as 0.01")
+    if until is not None and math.isnan(until):
+        raise InputError("--until", "nan is not a time", "give a time in s")
+    if tolerance is not None and not tolerance > 0.0:
+        raise InputError("--tolerance", f"{tolerance:g} m is not positive", "give an error such as 1e-6")
+    if not patience > 0.0:
+        raise InputError("--patience", f"{patience:g} s is not positive", "give a time such as 60, or inf")
 
 
 def fmus(robot_file: RobotFile, as_json: AsJson = False, quiet: Quiet = False) -> None:
