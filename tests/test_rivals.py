@@ -33,7 +33,8 @@ def judged(hidden: dict[str, Any], chosen: list[Hypothesis]) -> Found:
     for hypothesis in chosen:
         start = start.with_effect(hypothesis.setting(robot))
     fit = fitter.fit_from([start], chosen, evidence.fit, -inf)
-    found = Found(tuple(chosen), (100.0,) * len(chosen), fit, (), ())
+    alike = tuple((hypothesis.effect.name, "creep") for hypothesis in chosen)
+    found = Found(tuple(chosen), (100.0,) * len(chosen), fit, (), alike)
     return with_rivals(robot, found, fitter, evidence, 0.01, lambda what, done: None)
 
 
@@ -47,6 +48,8 @@ def test_softer_ropes_with_damping_make_room_for_the_frame_that_they_stood_for()
     found = judged(FRAME, both)
     assert [hypothesis.effect.name for hypothesis in found.accepted] == ["frame"]
     assert found.fit.values[0] == pytest.approx(1.0 / 3e6, rel=0.03)
+    assert found.evidence[0] > 1000.0
+    assert found.alike == ()
 
 
 def test_a_frame_that_gives_way_is_discovered_and_not_named_after_a_rope() -> None:

@@ -47,7 +47,8 @@ def with_rivals(
         gain = _worth(fitter, fit, chosen, judge) - worth
         more = _count(chosen) - _count(best.accepted)
         if gain > (-ALIKE if more < 0 else ALIKE if more == 0 else significant):
-            best, worth = _found(found, chosen, fit, gain), worth + gain
+            worth += gain
+            best = _found(found, chosen, fit, worth - _without_last(robot, fit, chosen, fitter, judge))
     return best
 
 
@@ -106,7 +107,18 @@ def _count(chosen: Sequence[Hypothesis]) -> int:
     return sum(len(hypothesis.form) for hypothesis in chosen)
 
 
-def _found(found: Found, chosen: Sequence[Hypothesis], fit: Fit, gain: float) -> Found:
-    """The chosen in the place of what was found; evidence of the last is what it gains over that."""
-    kept = [found.evidence[found.accepted.index(h)] if h in found.accepted else gain for h in chosen]
-    return replace(found, accepted=tuple(chosen), evidence=tuple(kept), fit=fit)
+def _without_last(robot: Robot, fit: Fit, chosen: Sequence[Hypothesis], fitter: Fitter, judge: Sample) -> float:
+    """Log-likelihood of the judging samples under the others at their best there."""
+    others = chosen[:-1]
+    for hypothesis in others:
+        robot = robot.with_effect(setting_of(fit.robot, hypothesis))
+    best = fitter.fit_from([robot], others, judge, -inf) if others else replace(fit, robot=robot)
+    return _worth(fitter, best, others, judge)
+
+
+def _found(found: Found, chosen: Sequence[Hypothesis], fit: Fit, evidence: float) -> Found:
+    """The chosen in the place of what was found, with the evidence of the last of them."""
+    kept = [found.evidence[found.accepted.index(h)] if h in found.accepted else evidence for h in chosen]
+    names = {hypothesis.effect.name for hypothesis in chosen}
+    alike = tuple(pair for pair in found.alike if pair[0] in names)
+    return replace(found, accepted=tuple(chosen), evidence=tuple(kept), fit=fit, alike=alike)

@@ -100,7 +100,7 @@ class Search:
         sample = self.evidence.fit.head if roughly else self.evidence.fit
         return self.fitter.fit_from([robot], chosen, sample, -inf, PART if roughly else EXACT)
 
-    def _best_on_judge(self, robot: Robot, chosen: Sequence[Hypothesis], clear: float = inf) -> float:
+    def _best_on_judge(self, robot: Robot, chosen: Sequence[Hypothesis], clear: float) -> float:
         """Log-likelihood of the judging samples under a model at its best there, as an e-value's rival must be.
 
         Roughly so where it stays clearly below ``clear``: by more than the fit's stop can be wrong.

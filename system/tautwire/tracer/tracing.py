@@ -113,6 +113,7 @@ def _trace(
     answer = _answer(robot, ready, found, before, noise_alone, alpha, progress, workers)
     final, kept = answer.robot, answer.effects_hold
     verdict, sentence = _verdict(robot, answer, noise_alone)
+    numbers = [] if verdict == "unexplained" else _numbers(ready, answer)
     shown = Separation((), ())
     if kept or verdict == "none":
         progress("what these recordings could show", 0.0)
@@ -135,7 +136,7 @@ def _trace(
         components=ports.result(),
         resonances=answer.rest.resonances,
         alpha=alpha,
-        notes=(*ready.notes, *answer.rest.notes, *_begun(ready, final), *_numbers(ready, answer)),
+        notes=(*ready.notes, *answer.rest.notes, *_begun(ready, final), *numbers),
         seconds=perf_counter() - began,
     )
 
@@ -201,9 +202,7 @@ def _answered(
 
 
 def _numbers(ready: _Ready, answer: _Answer) -> list[str]:
-    """What the recordings say of declared numbers that the robot file calls uncertain, if a model holds."""
-    if answer.rest.notes or answer.rest.resonances:
-        return []
+    """What the recordings say of declared numbers that the robot file calls uncertain."""
     best = answer.found.fit.robot if answer.discovered is None else answer.discovered.robot
     return [
         note
