@@ -122,7 +122,7 @@ def test_an_effect_is_found_beside_load_cells_that_are_off_zero() -> None:
     found = traced(unsure(tension=10.0), DAMPING, off)
     assert [effect.name for effect in found.effects] == ["damping"]
     assert found.effects[0].parameters["damping"].value == pytest.approx(9e8, rel=0.01)
-    assert any("offset of tension 3 +12" in note or "offset of tension 3 +11.9" in note for note in found.notes)
+    assert any("offset of tension 3 12" in note or "offset of tension 3 11.9" in note for note in found.notes)
     for comparison in found.comparisons:
         assert comparison.errors_after.tension_rms < 1.2 * found.noise_floor.tension_rms
 

@@ -23,11 +23,10 @@ from tautwire_fmu.laws.vectors import add, scale
 from ..robots.robot import EffectSetting, Robot
 from .assembly import Assembly, assemble
 from .start_tensions import start_tensions
-from .uncertain import UncertainNumber, offsets, with_moves
+from .uncertain import AXES, UncertainNumber, offsets, with_moves
 
 Array = NDArray[np.float64]
 
-AXES = ("x", "y", "z")
 # In the place of an effect's setting: a number of the formulas.
 OF_FORMULAS = -1
 

@@ -14,6 +14,7 @@ from ..robots.robot import Robot
 AXES = ("x", "y", "z")
 MODULUS, DAMPING, MASS = "modulus", "damping", "mass"
 TENSION_OFFSET, POSITION_OFFSET = "tension_offset", "position_offset"
+UNITS = {MODULUS: "Pa", DAMPING: "Pa s", MASS: "kg", TENSION_OFFSET: "N", POSITION_OFFSET: "m"}
 
 
 @dataclass(frozen=True)
@@ -23,6 +24,19 @@ class UncertainNumber:
     kind: str
     place: int
     deviation: float
+
+    @property
+    def unit(self) -> str:
+        """As in ``Pa s``."""
+        return UNITS[self.kind]
+
+    def declared(self, robot: Robot) -> float:
+        """What the robot file has; nothing is declared of a sensor's constant error, which is zero then."""
+        if self.kind == MASS:
+            return robot.platform.mass
+        if self.kind in (MODULUS, DAMPING):
+            return float(getattr(robot.cables[self.place - 1], self.kind))
+        return 0.0
 
     @property
     def label(self) -> str:

@@ -18,7 +18,6 @@ from ..fit import Fitter
 
 Array = NDArray[np.float64]
 
-UNITS = {MASS: "kg", MODULUS: "Pa", DAMPING: "Pa s"}
 # Standard deviations by which a number has to differ from what is declared to be told.
 TOLD = 2.0
 
@@ -52,16 +51,12 @@ class Calibration:
 
     def notes(self, robot: Robot, path: str) -> tuple[str, ...]:
         """What is told of the numbers: each that clearly differs from what is declared."""
-        found = with_moves(robot, self.numbers, self.moves.tolist())
         told = []
         for number, move, left in zip(self.numbers, self.moves.tolist(), self.left.tolist(), strict=True):
             if abs(move) < TOLD * left:
                 continue
-            value = _value(found, number)
-            said = f"{number.deviation * move:+.3g} {'m' if number.label.endswith(('x', 'y', 'z')) else 'N'}"
-            if value is not None:
-                said = f"{value:.4g} {UNITS[number.kind]}"
-            told.append(f"{number.label} {said}, +- {1.96 * number.deviation * left:.2g}")
+            value, reach = number.declared(robot) + number.deviation * move, 1.96 * number.deviation * left
+            told.append(f"{number.label} {value:.4g} {number.unit}, +- {reach:.2g}")
         if not told:
             return ()
         return (f"{path}: within what the robot file says of its own uncertainty, {'; '.join(told)}",)
@@ -77,12 +72,3 @@ def calibrated(fitter: Fitter, robot: Robot, sample: Sample) -> Calibration:
     count = len(numbers)
     left = np.sqrt(np.maximum(np.diag(last.covariances[-1])[-count:], 0.0))
     return Calibration(numbers, last.states[-count:, -1], left)
-
-
-def _value(robot: Robot, number: UncertainNumber) -> float | None:
-    """In the robot's own unit; None of a sensor's constant error."""
-    if number.kind == MASS:
-        return robot.platform.mass
-    if number.kind in (MODULUS, DAMPING):
-        return float(getattr(robot.cables[number.place - 1], number.kind))
-    return None
