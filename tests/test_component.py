@@ -1,7 +1,5 @@
 """What the master does with FMUs that fail."""
 
-import subprocess
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -57,14 +55,3 @@ def test_a_run_that_fails_keeps_what_came_before(three_fmus: RobotFmus) -> None:
     assert caught.value.motion.time.tolist() == [0.0, 0.1, 0.2]
     assert np.isfinite(caught.value.motion.tension).all()
     assert caught.value.cause.component == "cable_2"
-
-
-def test_fmus_can_be_built_once_one_was_loaded(three_fmus: RobotFmus) -> None:
-    code = f"""
-from pathlib import Path
-from tautwire.master.component import Component
-with Component("loaded", Path({str(three_fmus.platform)!r})):
-    from tautwire.fmus.packaging import FmuBuilder
-    assert FmuBuilder.has_binary()
-"""
-    subprocess.run([sys.executable, "-c", code], check=True)

@@ -6,16 +6,12 @@ import hashlib
 import itertools
 import json
 import shutil
-import sys
 import tempfile
-from collections.abc import Callable, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 from uuid import NAMESPACE_URL, uuid5
-
-from pythonfmu.builder import FmuBuilder
 
 import tautwire_fmu
 from tautwire_fmu.laws.effects import BY_NAME
@@ -24,6 +20,7 @@ from tautwire_fmu.laws.winch_drive import NO_LIMIT
 from ..model.assembly import assemble
 from ..robots.robot import EffectSetting, Robot
 from ..statics.equilibrium import formula_texts, has_sensor_effects, platform_settings, static_forces, static_tensions
+from .builder import builder
 from .slots import check_own_fmus
 from .wrapper import mend_exit
 
@@ -196,8 +193,8 @@ def _build(module: str, base: str, name: str, data: dict[str, Any], folder: Path
         script = scratch / f"{name}_{guid.replace('-', '')[:12]}.py"
         script.write_text(LAUNCHER.format(package=package, base=base), encoding="utf-8")
         unfinished = scratch / "built" / f"{name}.fmu"
-        with _imports_from(scratch):
-            FmuBuilder.build_FMU(script, dest=unfinished, project_files=[scratch / package, resource], **OPTIONS)
+        with builder(scratch, (package, script.stem)) as fmu_builder:
+            fmu_builder.build_FMU(script, dest=unfinished, project_files=[scratch / package, resource], **OPTIONS)
         finished = scratch / f"{name}.fmu"
         mend_exit(unfinished, finished)
         return _move(finished, folder / f"{name}.fmu")
@@ -209,22 +206,6 @@ def _digest(sources: Path) -> str:
         digest.update(path.relative_to(sources).as_posix().encode())
         digest.update(path.read_bytes())
     return digest.hexdigest()[:12]
-
-
-@contextmanager
-def _imports_from(scratch: Path) -> Iterator[None]:
-    """Let pythonfmu import the script, and leave neither its folder nor its module behind."""
-    before = list(sys.path)
-    modules = set(sys.modules)
-    sys.path.insert(0, str(scratch))
-    try:
-        yield
-    finally:
-        sys.path[:] = before
-        for name in set(sys.modules) - modules:
-            origin = getattr(sys.modules[name], "__file__", None)
-            if origin is not None and Path(origin).is_relative_to(scratch):
-                del sys.modules[name]
 
 
 def _copy(source: Path, target: Path) -> Path:

@@ -13,9 +13,6 @@ from types import TracebackType
 from typing import Any
 
 import numpy as np
-
-# Before any FMU is loaded: later the name would lead into one, to a copy that cannot build others.
-import pythonfmu.builder  # noqa: F401
 from fmpy.fmi1 import FMICallException
 from fmpy.model_description import ModelDescription, ScalarVariable
 from numpy.typing import NDArray
