@@ -46,6 +46,7 @@ HIDDEN: list[tuple[str, dict[str, Any]]] = [
     ("three", {"modulus": {"modulus": 1.12e11}}),
     ("three", {"modulus": {"modulus": 0.9e11, "cables": [2]}}),
     ("three", {"modulus": {"modulus": 1.1e11, "cables": [1, 2]}}),
+    ("three", {"slack": {"softness": 400.0}}),
     ("caroca", {"payload": {"mass": 1.5}}),
     ("caroca", {"damping": {"damping": 1.6e8, "cables": [3]}}),
 ]

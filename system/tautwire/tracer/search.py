@@ -21,6 +21,7 @@ from .attempts import Attempt, Task, attempt, attempt_apart
 from .data import Evidence, Sample
 from .fit import EXACT, Fit, Fitter
 from .hypotheses import Hypothesis, divided, enlarged, hypotheses, joined
+from .scan import scanned, silent
 from .screen import Prospect, screen
 from .trials import Trial, screened, setting_of, simplest, worth_fitting
 from .verdict import Candidate
@@ -142,7 +143,10 @@ class Search:
         sample = looked if adequate or rival is None else fit.beginning(OF_RIVALS)
         self.progress(f"round {number}: screening", 0.0)
         prospects = screen(robot, accepted, open_ones, self.fitter, looked)
+        prospects |= scanned(robot, accepted, self.fitter, looked, silent(prospects))
         worth = worth_fitting(prospects)
+        if not adequate:
+            prospects |= scanned(robot, accepted, self.fitter, looked, {h: prospects[h] for h in worth})
         starts = {h: self._starts(robot, h, prospects[h]) for h in worth}
         # Far from noise the trials need only be told from each other.
         without = self._best_on_judge(robot, accepted, -inf if adequate else inf)

@@ -10,7 +10,8 @@ class Parameter(NamedTuple):
     absent. None where that is the value that the robot file declares for the cable under the key of the same name;
     such a parameter has to be given. Fits begin at ``start_ratio`` times the declared value, or at ``start`` where
     nothing or zero is declared; neither is the neutral value. ``trials`` are values from which fits begin where one
-    start could end in the wrong valley: of parameters that count only while others are not neutral.
+    start could end in the wrong valley: of parameters that count only while others are not neutral. ``scanned`` are
+    values to look at, too, of a parameter whose slope where it is neutral is none or misleads.
     """
 
     name: str
@@ -22,6 +23,7 @@ class Parameter(NamedTuple):
     start: float
     start_ratio: float = 1.0
     trials: Tuple[float, ...] = ()
+    scanned: Tuple[float, ...] = ()
 
 
 class State(NamedTuple):

@@ -43,6 +43,7 @@ HYSTERESIS = Effect(
             maximum=1e6,
             neutral=0.0,
             start=20.0,
+            scanned=(10.0, 100.0, 1000.0),
         ),
         Parameter(
             name="yield_strain",

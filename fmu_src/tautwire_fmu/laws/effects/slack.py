@@ -39,6 +39,7 @@ SLACK = Effect(
             maximum=1e5,
             neutral=0.0,
             start=50.0,
+            scanned=(1.0, 3.0, 10.0, 30.0, 100.0, 300.0, 1000.0, 3000.0),
         ),
     ),
     values=Values,

@@ -1,0 +1,77 @@
+"""What hypotheses gain at values that their effects name: where slopes about the model without them mislead.
+
+A rope softens near slackness by ``s ln(1 + exp(T / s))``: at ``s = 0`` all derivatives vanish, so linearisations
+promise nothing however much it would explain. A friction force far above the first slope's reach ends a fit in the
+wrong valley. The model itself is run at some values instead.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from itertools import product
+from math import isfinite
+
+from ..errors import UnreachableError
+from ..robots.robot import EffectSetting, Robot
+from .data import Sample
+from .fit import Fitter
+from .hypotheses import Hypothesis, joined
+from .screen import Prospect
+
+# Nats that do not count: smaller values of the parameter are not felt either.
+UNFELT = 0.01
+
+
+def silent(prospects: Mapping[Hypothesis, Prospect]) -> dict[Hypothesis, Prospect]:
+    """Those of parameters that name values to look at and have no slope."""
+    return {h: p for h, p in prospects.items() if any(q.scanned and q.name not in p.values for q in h.parameters)}
+
+
+def scanned(
+    robot: Robot,
+    accepted: Sequence[Hypothesis],
+    fitter: Fitter,
+    sample: Sample,
+    prospects: Mapping[Hypothesis, Prospect],
+) -> dict[Hypothesis, Prospect]:
+    """The prospects that name values to look at, better where a run at one gains more than a run at what they promise.
+
+    ``robot`` has the accepted hypotheses, whose parameters stay as they are.
+    """
+    without = fitter.judged(robot, accepted, sample).log_likelihood(sample.rows)
+    found = {}
+    for hypothesis, prospect in prospects.items():
+        chosen = joined(accepted, hypothesis)
+        gains = [(_run(robot, chosen, fitter, sample, prospect.values) - without, prospect)] if prospect.values else []
+        for values in looked_at(hypothesis):
+            gain = _run(robot, chosen, fitter, sample, {**prospect.values, **values}) - without
+            if isfinite(gain):
+                gains.append((gain, Prospect(gain, {**prospect.values, **values})))
+            if abs(gain) < UNFELT:
+                break
+        found[hypothesis] = max(gains, key=lambda each: each[0], default=(0.0, prospect))[1]
+    return found
+
+
+def looked_at(hypothesis: Hypothesis) -> Iterator[dict[str, float]]:
+    """All combinations of the values to look at, the largest first; none where a hypothesis has none."""
+    scales = [p for p in hypothesis.parameters if p.scanned]
+    shapes = [p for p in hypothesis.parameters if p.trials]
+    if not scales:
+        return
+    names = [p.name for p in (*scales, *shapes)]
+    ranges = [*(sorted(p.scanned, reverse=True) for p in scales), *(p.trials for p in shapes)]
+    for values in product(*ranges):
+        yield dict(zip(names, values, strict=True))
+
+
+def _run(
+    robot: Robot, chosen: Sequence[Hypothesis], fitter: Fitter, sample: Sample, values: Mapping[str, float]
+) -> float:
+    """Log-likelihood with the last of the chosen at some values; NaN where the cables cannot hold them."""
+    begun = chosen[-1].setting(robot)
+    setting = EffectSetting(begun.name, {**begun.values, **values}, begun.cables)
+    try:
+        return fitter.judged(robot.with_effect(setting), chosen, sample).log_likelihood(sample.rows)
+    except UnreachableError:
+        return float("nan")
