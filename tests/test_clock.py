@@ -54,6 +54,12 @@ def test_a_sensor_that_is_late_in_both_is_left_to_the_effect(kind: str) -> None:
     assert evidence.fit.recording is recorded("three", 1, LATE[kind])
 
 
+def test_a_delay_of_half_a_swing_in_both_is_no_clock() -> None:
+    late = {"sensor_delay": {"seconds": 0.1}}
+    _, notes, _ = clocks_set("caroca", recorded("caroca", 1, late), recorded("caroca", 2, late))
+    assert notes == ()
+
+
 def test_positions_before_their_motion_are_a_clock_even_in_both() -> None:
     pair = [shifted(recorded("three", seed), 0.015, POSITIONS) for seed in (1, 2)]
     _, notes, noise_is_left = clocks_set("three", *pair)

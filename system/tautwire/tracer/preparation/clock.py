@@ -24,7 +24,8 @@ from ..linearisation import Linearised, linearise_run
 Array = NDArray[np.float64]
 
 PARTS, SIGMAS = 6, 6.0
-ROUNDS, SETTLED = 5, 0.002
+# An offset of half a swing's period takes some ten rounds.
+ROUNDS, SETTLED = 25, 0.002
 # Of a sample interval: less is no matter of clocks.
 LEAST = 0.1
 # Of the innovations' mean square: what an offset leaves at first order where it is worth a look, and in the end where
@@ -80,8 +81,9 @@ def with_clocks_set(fitter: Fitter, robot: Robot, evidence: Evidence) -> tuple[E
         begun = [first.get(channels) for first in firsts]
         if None in begun or not any(o and o.left < WORTH * o.without for o in begun):
             continue
-        offsets = [_offset(fitter, robot, sample, channels) for sample in samples]
-        why = _why(offsets, interval)
+        settled = [_offset(fitter, robot, sample, channels) for sample in samples]
+        offsets = [offset for offset in settled if offset is not None]
+        why = _why(offsets, interval) if len(offsets) == len(samples) else None
         if why is None:
             continue
         fit, judge = (_moved(sample, offset, channels) for sample, offset in zip(samples, offsets, strict=True))
@@ -110,17 +112,20 @@ def _moved(sample: Sample, offset: Offset, channels: Channels) -> Sample:
     return replace(sample, recording=shifted(sample.recording, offset.seconds, channels))
 
 
-def _offset(fitter: Fitter, robot: Robot, sample: Sample, channels: Channels) -> Offset:
-    """By Gauss and Newton's method, each step from the outputs as the last one shifted them."""
+def _offset(fitter: Fitter, robot: Robot, sample: Sample, channels: Channels) -> Offset | None:
+    """By Gauss and Newton's method, each step from the outputs as the last one shifted them; None if it does not end.
+
+    An offset that is still on its way would differ from the other recording's and pass for a clock.
+    """
     found = _steps(fitter, robot, sample)[channels]
     without, total = found.without, found.seconds
     for _ in range(ROUNDS):
         if abs(found.seconds) < max(SETTLED * abs(total), 0.2 * found.deviation):
-            break
+            return Offset(total, found.deviation, without, found.left)
         current = replace(sample, recording=shifted(sample.recording, total, channels))
         found = _steps(fitter, robot, current)[channels]
         total += found.seconds
-    return Offset(total, found.deviation, without, found.left)
+    return None
 
 
 def _steps(fitter: Fitter, robot: Robot, sample: Sample) -> dict[Channels, Offset]:
