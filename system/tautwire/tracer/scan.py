@@ -9,7 +9,12 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
-from math import isfinite
+from math import exp, inf, isfinite, log
+
+import numpy as np
+from scipy.optimize import brentq
+
+from tautwire_fmu.laws.effects import Parameter
 
 from ..errors import UnreachableError
 from ..robots.robot import EffectSetting, Robot
@@ -20,6 +25,8 @@ from .screen import Prospect
 
 # Nats that do not count: smaller values of the parameter are not felt either.
 UNFELT = 0.01
+# Relative.
+PRECISION = 0.01
 
 
 def silent(prospects: Mapping[Hypothesis, Prospect]) -> dict[Hypothesis, Prospect]:
@@ -51,6 +58,38 @@ def scanned(
                 break
         found[hypothesis] = max(gains, key=lambda each: each[0], default=(0.0, prospect))[1]
     return found
+
+
+def felt_from(
+    robot: Robot,
+    accepted: Sequence[Hypothesis],
+    fitter: Fitter,
+    sample: Sample,
+    hypothesis: Hypothesis,
+    parameter: Parameter,
+    distance: float,
+) -> float:
+    """The value of a scanned parameter that moves the whitened innovations by so much, as root of the sum of squares.
+
+    Infinite where the largest value to look at does not. The other parameters are where fits begin.
+    """
+    chosen = joined(accepted, hypothesis)
+    without = fitter.judged(robot, accepted, sample).values[sample.rows]
+
+    def excess(scale: float) -> float:
+        begun = hypothesis.setting(robot)
+        setting = EffectSetting(begun.name, {**begun.values, parameter.name: exp(scale)}, begun.cables)
+        try:
+            moved = fitter.judged(robot.with_effect(setting), chosen, sample).values[sample.rows] - without
+        except UnreachableError:
+            return distance
+        found = float(np.sqrt(np.nansum(moved**2)))
+        return min(found, 2.0 * distance) - distance if isfinite(found) else distance
+
+    least, most = log(min(parameter.scanned)), log(max(parameter.scanned))
+    if excess(most) < 0.0:
+        return inf
+    return exp(least if excess(least) > 0.0 else brentq(excess, least, most, xtol=PRECISION))
 
 
 def looked_at(hypothesis: Hypothesis) -> Iterator[dict[str, float]]:

@@ -10,15 +10,19 @@ Source: Kay (1998), Fundamentals of Statistical Signal Processing II, sec. 4.4; 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from math import inf, log, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
 
+from tautwire_fmu.laws.effects import BY_NAME
+
 from ..robots.robot import Robot
 from .data import Sample
 from .fit import Fitter
 from .hypotheses import ON_ONE_CABLE, Hypothesis, hypotheses
+from .scan import felt_from
 from .screen import Signatures, moved_by, signatures_of, trial_count, trials_of
 from .verdict import Detectable, Likeness, Separation
 
@@ -47,14 +51,15 @@ def separation(
     threshold = log(len(every) / alpha)
     shown = [h for h in others if h.cables in ((), declared.cable_numbers) or h.effect in ON_ONE_CABLE]
     known = [column for group in places for column in group]
-    sizes = tuple(d for h in shown for d in _sizes(signatures, h, known, threshold))
+    sizes = [d for h in shown for d in _sizes(signatures, h, known, threshold)]
+    sizes = [_by_runs(robot, accepted, fitter, sample, size, threshold) for size in sizes]
     alike = [
         likeness
         for index, own in enumerate(accepted)
         for other in others
         if (likeness := _likeness(signatures, robot, declared, (own, places[index]), other, places)) is not None
     ]
-    return Separation(sizes, tuple(sorted(alike, key=lambda found: found.nats)))
+    return Separation(tuple(sizes), tuple(sorted(alike, key=lambda found: found.nats)))
 
 
 def apart(signatures: Signatures, move: Array, other: Hypothesis, rest: Sequence[int] = ()) -> float:
@@ -106,9 +111,8 @@ def _sizes(signatures: Signatures, hypothesis: Hypothesis, known: list[int], thr
         for index, name in enumerate(names):
             parameter = next(p for p in hypothesis.parameters if p.name == name)
             strength = sqrt(max(own[index, index], 0.0))
-            needed = POWER + sqrt(POWER**2 + 2.0 * (threshold + FITTED))
             begun = float(signatures.values @ columns[:, index] / np.sum(columns[:, index]))
-            size = needed / strength if strength > 0.0 else inf
+            size = _needed(threshold) / strength if strength > 0.0 else inf
             if size > max(parameter.maximum - begun, begun - parameter.minimum):
                 size = inf
             beside = {key: value for key, value in shapes.items() if key in hypothesis.form}
@@ -116,6 +120,23 @@ def _sizes(signatures: Signatures, hypothesis: Hypothesis, known: list[int], thr
             if size < best[name].size:
                 best[name] = found
     return list(best.values())
+
+
+def _needed(threshold: float) -> float:
+    """By how much an effect has to move the whitened innovations, as root of the sum of squares."""
+    return POWER + sqrt(POWER**2 + 2.0 * (threshold + FITTED))
+
+
+def _by_runs(
+    robot: Robot, accepted: Sequence[Hypothesis], fitter: Fitter, sample: Sample, found: Detectable, threshold: float
+) -> Detectable:
+    """The size by runs of the model where slopes see none at all."""
+    effect = BY_NAME[found.name]
+    parameter = next(p for p in effect.parameters if p.name == found.parameter)
+    if not parameter.scanned or found.size < inf:
+        return found
+    hypothesis = Hypothesis(effect, found.cables)
+    return replace(found, size=felt_from(robot, accepted, fitter, sample, hypothesis, parameter, _needed(threshold)))
 
 
 def _beside(gram: Array, columns: Array, known: list[int]) -> Array:
