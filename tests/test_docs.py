@@ -5,9 +5,27 @@ import re
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import pytest
+
+from tautwire.campaign import reading as plans
+from tautwire.linear import linearise
+from tautwire.linear.document import model_document
+from tautwire.materials.table import RULES
+from tautwire.recordings.header import known_columns
+from tautwire.report import trace_document
+from tautwire.robots import reading as robots
+from tautwire.robots.template import new_robot_text
+from tautwire.runs.wiring import result_columns
+from tautwire.tracer.verdict import Correlation, Fitted, Resonance
+from tautwire_fmu.laws.effects import BY_NAME
+from tautwire_fmu.laws.formula import PLACES
+from tests.robots import example
+from tests.traces import made_trace
 
 ROOT = Path(__file__).parent.parent
 DOCS = ROOT / "docs"
@@ -82,7 +100,7 @@ def put_in(file: Path, where: str, text: str) -> None:
 
 @pytest.mark.slow
 def test_the_site_builds_without_a_warning_and_asks_nothing_of_the_network(tmp_path: Path) -> None:
-    pytest.importorskip("material", reason="mkdocs-material is not installed: pip install tautwire[docs]")
+    pytest.importorskip("material", reason="mkdocs-material is not installed: pip install mkdocs-material")
     build = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path)]
     subprocess.run(build, cwd=ROOT, env={**os.environ, "NO_MKDOCS_2_WARNING": "1"}, check=True, timeout=120)
     pages = list(tmp_path.glob("*.html"))
@@ -93,6 +111,71 @@ def test_the_site_builds_without_a_warning_and_asks_nothing_of_the_network(tmp_p
         )
         assert loaded
         assert not [address for address in loaded if address.startswith(("http:", "https:", "//"))]
+
+
+def named_in(page: str) -> set[str]:
+    """All words that a page writes as code."""
+    code = re.findall(r"`([^`\n]+)`", (DOCS / page).read_text(encoding="utf-8"))
+    return {word for each in code for word in re.findall(r"\w+", each)}
+
+
+def keys_in(document: Any) -> Iterator[str]:
+    """The keys of a document and of all in it."""
+    if isinstance(document, dict):
+        yield from document
+    for each in document.values() if isinstance(document, dict) else document if isinstance(document, list) else ():
+        yield from keys_in(each)
+
+
+def of_cable(names: Iterator[str]) -> set[str]:
+    """Names with the number of a cable written as "i"."""
+    return {re.sub(r"_\d+$", "_i", name) for name in names}
+
+
+def test_page_of_files_tells_every_key_of_a_robot_file() -> None:
+    keys = {*robots.KEYS, *robots.NOISES, *robots.OFFSETS, *robots.LIMITS, *PLACES, "cables"}
+    written = set(re.findall(r"^(?:# )?(\w+) = ", new_robot_text("hall"), re.MULTILINE))
+    assert len(written) > 25
+    assert (keys | written) - named_in("formats.md") == set()
+
+
+def test_page_of_files_tells_every_number_of_every_effect() -> None:
+    page = (DOCS / "formats.md").read_text(encoding="utf-8").partition("### Effects")[2]
+    units = {"m2": "m²", "kg/m3": "kg/m³", "1": ""}
+    for effect in BY_NAME.values():
+        rows = [
+            f"| `{each.name}` | {units.get(each.unit, each.unit)} | "
+            f"{'' if each.neutral is None else f'{each.neutral:g}'} | {each.description} |"
+            for each in effect.parameters
+        ]
+        table = page[page.index(f"\n| `{effect.name}` ") :]
+        shown = [re.sub(r"^\|[^|]*", "", line) for line in table.splitlines()[1 : len(rows) + 1]]
+        assert shown == rows
+
+
+def test_page_of_files_tells_every_column_of_recordings_and_results() -> None:
+    columns = {*known_columns(1), *(column.name for column in result_columns(1, winches=(1,)))}
+    assert of_cable(iter(columns)) - named_in("formats.md") == set()
+    # One for phase_degrees, one for each uncertainty.
+    assert {name.removesuffix("_uncertainty") for name in RULES} - named_in("formats.md") == set()
+
+
+def test_page_of_files_tells_every_key_of_a_model() -> None:
+    assert set(model_document(linearise(example("three")))) - named_in("formats.md") == set()
+
+
+def test_page_of_files_tells_every_key_of_a_report() -> None:
+    trace = made_trace(samples=200)
+    swinging = Resonance(0.45, ("x",), ("fit",))
+    together = Correlation((Fitted("damping", (1,), "damping"), Fitted("drum", (1,), "slip")), 0.3)
+    document = trace_document(replace(trace, resonances=(swinging,), correlations=(together,)))
+    parameters = {p.name for effect in BY_NAME.values() for p in effect.parameters}
+    assert {"between", "moves_with", "other_cables", "frequency_hz"} <= set(keys_in(document))
+    assert of_cable(keys_in(document)) - parameters - named_in("formats.md") == set()
+
+
+def test_page_of_campaigns_tells_every_key_of_a_plan() -> None:
+    assert set(plans.KEYS) - named_in("campaign.md") == set()
 
 
 def test_pages_name_only_what_is_there() -> None:

@@ -28,10 +28,18 @@ def test_bands_span_the_modes_along_the_path() -> None:
 
 def test_modes_that_lie_apart_have_bands_of_their_own_and_others_share_one() -> None:
     bands = joined(np.array([[1.0, 1.05, 4.0], [1.2, 1.3, 4.4]]))
-    assert [(band.label, band.low, band.high) for band in bands] == [("1\N{EN DASH}2", 1.0, 1.3), ("3", 4.0, 4.4)]
-    assert bands[0].words == "Modes 1 to 2 lie between 1.00 and 1.30 Hz"
+    assert [(band.label, band.low, band.high) for band in bands] == [("1 and 2", 1.0, 1.3), ("3", 4.0, 4.4)]
+    each = "mode 1 between 1.000 and 1.200 Hz, mode 2 between 1.050 and 1.300 Hz"
+    assert bands[0].words == f"Modes 1 and 2 lie close together: {each}"
+    assert bands[0].spans == ((1.0, 1.2), (1.05, 1.3)) and bands[1].spans == ((4.0, 4.4),)
     still = joined(np.array([[2.0, 7.0]]))
-    assert still[0].words == "Mode 1 lies at 2.00 Hz" and still[0].low < 2.0 < still[0].high
+    assert still[0].words == "Mode 1 lies at 2.000 Hz" and still[0].low < 2.0 < still[0].high
+
+
+def test_three_close_modes_are_told_from_first_to_last_and_drawn_each() -> None:
+    (band,) = joined(np.array([[1.1773, 1.1774, 1.2973]]))
+    assert band.label == "1 to 3" and len(band.spans) == 3
+    assert band.words.endswith("mode 1 at 1.177 Hz, mode 2 at 1.177 Hz, mode 3 at 1.297 Hz")
 
 
 def test_path_where_the_cables_cannot_hold_the_platform_has_no_bands() -> None:

@@ -79,7 +79,7 @@ def test_page_tells_modes_tensions_and_shares_without_scripts() -> None:
     robot, plant = plant_of("three")
     page = Page(modes_page(robot, plant, {"model.json": "model.json"}))
     assert page.open == []
-    for words in ("The platform swings at 1.18", "1.177 Hz", "0.0144", "Cable 3", "28.86, 0, 5.000"):
+    for words in ("swings at 1.18 Hz (2 modes) and 1.30 Hz", "1.177 Hz", "1.44\u00a0%", "Cable 3", "28.86, 0, 5.000"):
         assert words in page.text
     assert [each["href"] for each in page.all("a")][1:] == ["model.json"]
     assert len(page.all("option")) == len(plant.system.input_labels)

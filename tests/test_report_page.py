@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from tautwire.report import trace_document, trace_page, write_report
-from tautwire.report.figures import MOST_POINTS, page_data
+from tautwire.report.figures import MOST_POINTS, magnification, page_data
 from tautwire.report.series import envelope, envelope_times, noise_density, packed, spectrum, unpacked
 from tautwire.robots.reading import read_robot
 from tautwire.tracer.verdict import Separation, Trace
@@ -60,6 +60,54 @@ def test_page_is_well_formed_with_all_sections(kind: str) -> None:
     identities = [attributes["id"] for _, attributes in found.elements if "id" in attributes]
     assert len(identities) == len(set(identities))
     assert [len(found.all(tag)) for tag in ("h1", "main", "title")] == [1, 1, 1]
+
+
+@pytest.mark.parametrize("kind", ["three", "eight"])
+def test_terms_of_art_are_explained_where_they_first_stand(kind: str) -> None:
+    text = " ".join(page(kind).text.split())
+    for term, explained in {
+        "rms": "Root mean square (rms) of measured minus co-simulated",
+        "oise floor": "The noise floor is what noise of the sensors",
+        "xtended model": "with what was found (the extended model)",
+        "xplained": "Explained is the share of the mean square above the floor",
+        "vidence": "Evidence tells how much more probable",
+        "95 % interval": "In 95 of 100 such recordings the 95 % interval holds the true value",
+        "spectral density": "How strongly the same residuals swing at each frequency: their amplitude spectral density",
+        "correlation": "follows best, with the correlation: 100 % where it does so exactly",
+        "innovations": "off when it predicts each sample from those before it",
+    }.items():
+        place = text.index(explained)
+        body = text.index("Before and after")
+        assert text.find(term, body) >= 0 and place <= text.find(term, body) + len(explained), term
+    for jargon in ("nats", "Nats", "cosine", "Cosine", "e-value", "\u03c3"):
+        assert jargon not in text
+
+
+def test_page_says_what_effects_were_judged_on() -> None:
+    assert "judged on “check”" in page("three").text
+    alone = page("tensions only").text
+    assert "one part of the recording and judged on another" in alone and "“check”" not in alone
+
+
+def test_numbers_of_the_page_have_four_digits_at_most_but_where_an_interval_asks() -> None:
+    found = made_trace(samples=400)
+    loud = replace(found, candidates=(replace(found.candidates[0], evidence=163595.3645), *found.candidates[1:]))
+    text = Page(trace_page(loud, {})).text
+    assert "163600" in text and "163595" not in text
+    assert "13.3\u00b0" in text and "0.973" not in text  # how like relaxation is to damping
+    digits = re.findall(r"(?<![\w.])\d+\.\d+(?![\w.])", text)
+    assert digits
+    assert [each for each in digits if len(each.replace(".", "").lstrip("0")) > 4] == []
+
+
+def test_deviations_are_drawn_so_large_that_they_are_seen_and_the_path_too() -> None:
+    anchors = np.array(((0.0, 0.0, 50.0), (100.0, 0.0, 50.0)))
+    path = np.linspace((50.0, 0.0, 5.0), (58.0, 0.0, 5.0), 50)
+    apart = np.zeros((50, 3))
+    apart[7, 2] = 2e-3
+    assert magnification(anchors, path, [apart]) == 100  # 1000 times would be 2 m beside a path of 8 m
+    assert magnification(anchors, path[:1].repeat(50, axis=0), [apart]) == 1000
+    assert magnification(anchors, path, [np.zeros((50, 3))]) == 1
 
 
 def test_page_says_what_would_have_shown_and_what_never() -> None:

@@ -25,7 +25,13 @@ THREE = EXAMPLES / "three"
 def test_page_says_how_long_how_far_and_under_what() -> None:
     page = Page(run_page(made_run(), {"result.csv": "result.csv"}))
     assert page.open == []
-    for words in ("Complete", "20.0 s along", "2000 steps, 17 redos", "The winches were slow.", "cable 3"):
+    for words in (
+        "Complete",
+        "20.0 s along",
+        "2000 steps of the master, and 17 repeats",
+        "The winches were slow.",
+        "cable 3",
+    ):
         assert words in page.text
     assert [each["href"] for each in page.all("a")][1:] == ["result.csv"]
 
@@ -34,15 +40,30 @@ def test_every_output_has_its_panel_with_what_was_recorded() -> None:
     run = made_run()
     page = Page(run_page(run, {}))
     channels = page.data()["choices"][0]["channels"]
-    panels = [each for each in page.all("figure") if each.get("data-kind") == "output"]
+    panels = [each for each in page.all("figure") if each.get("data-kind") in ("output", "compared")]
+    assert [each["data-kind"] for each in panels] == 6 * ["compared"] + 6 * ["output"]
     assert [int(each["data-channel"]) for each in panels] == list(range(len(channels)))
     assert [each["title"] for each in channels] == 3 * ["Position"] + 3 * ["Tension"] + 3 * ["Velocity"] + [
         "Elongation"
     ] * 3
     tension = channels[3]
     assert unpacked(tension["values"]) == pytest.approx(run.overview.rows[:, 6], rel=1e-6)
-    assert float(tension["recorded"]["apart"]) == pytest.approx(2.0, rel=0.1)
-    assert channels[6]["recorded"] is None
+    assert float(tension["difference"]["apart"]) == pytest.approx(2.0, rel=0.1)
+    assert channels[6]["recorded"] is None and channels[6]["difference"] is None
+
+
+def test_difference_is_recorded_minus_co_simulated_in_a_handy_unit() -> None:
+    run = made_run()
+    channels = Page(run_page(run, {})).data()["choices"][0]["channels"]
+    for channel, recorded, column, unit, one in (
+        (channels[2], run.recording.position[:, 2], "z", "µm", 1e-6),
+        (channels[3], run.recording.tension[:, 0], "tension_1", "N", 1.0),
+    ):
+        simulated = run.overview.rows[:, run.columns.index(column)]
+        assert channel["difference"]["unit"] == unit
+        expected = (recorded - simulated) / one
+        assert unpacked(channel["difference"]["values"]) == pytest.approx(expected, rel=1e-5, abs=1e-3)
+        assert unpacked(channel["difference"]["time"]) == pytest.approx(run.overview.time)
 
 
 def test_page_stays_small_for_long_runs() -> None:

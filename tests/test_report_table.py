@@ -10,7 +10,7 @@ import pytest
 from rich.console import Console
 
 from tautwire.report import trace_table
-from tautwire.report.summary import ROLES, comparison_of, share_explained
+from tautwire.report.summary import ROLES, comparison_of, evidence_text, share_explained
 from tautwire.report.units import engineering, handy_unit, percent, significant, together
 from tautwire.tracer.verdict import Estimate, Trace
 from tests.traces import HOSTILE, made_trace, nothing_found, without_positions
@@ -59,7 +59,7 @@ def test_large_numbers_are_not_cut() -> None:
     errors = replace(trace.comparisons[0].errors_before, position_rms=123.456789, tension_rms=98765.4)
     comparisons = tuple(replace(each, errors_before=errors, errors_after=errors) for each in trace.comparisons)
     text = rendered(replace(trace, comparisons=comparisons))
-    assert text.count("123457") == 4 and text.count("98765") == 4
+    assert text.count("123500") == 4 and text.count("98770") == 4
 
 
 def test_effects_with_intervals_and_ranking_are_there() -> None:
@@ -128,10 +128,23 @@ def test_unknown_units_are_left_alone() -> None:
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(0.0999, "0.0999"), (9.996, "10.0"), (999.6, "1000"), (12345.6, "12346"), (1.5e-7, "1.50e-07"), (-2.0, "-2.00")],
+    [
+        (0.0999, "0.0999"),
+        (9.996, "10.0"),
+        (999.6, "1000"),
+        (1846.4, "1846"),
+        (12345.6, "12350"),
+        (1.5e-7, "1.50e-07"),
+        (-2.0, "-2.00"),
+    ],
 )
-def test_numbers_have_three_significant_digits(value: float, text: str) -> None:
+def test_numbers_have_three_significant_digits_and_four_where_whole(value: float, text: str) -> None:
     assert significant(value) == text
+
+
+@pytest.mark.parametrize(("evidence", "text"), [(812.43, "812.4"), (163595.4, "163600"), (math.nan, "-")])
+def test_evidence_has_four_digits_at_most(evidence: float, text: str) -> None:
+    assert evidence_text(evidence) == text
 
 
 def test_decimals_follow_the_interval() -> None:

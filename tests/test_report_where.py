@@ -17,7 +17,7 @@ def test_each_component_has_its_figures_and_a_bar() -> None:
     page = Page(where(trace))
     assert len(page.all("tr")) == 1 + len(trace.components.parts)
     assert len(page.all("svg")) == len(trace.components.parts)
-    for words in (trace.components.sentence, "cable 3", "force z", "5.00", "strain rate (+0.98)"):
+    for words in (trace.components.sentence, "cable 3", "force z", "5.00", "strain rate (98\u00a0%)"):
         assert words in page.text
 
 

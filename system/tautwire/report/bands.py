@@ -19,7 +19,7 @@ from .units import significant
 Array = NDArray[np.float64]
 
 PLACES = 9
-# Bands whose edges are nearer than this factor are drawn as one.
+# Modes whose edges are nearer than this factor share a label: two would cover each other.
 TOUCHING = 1.2
 # A mode that does not move along the path is drawn this factor wide.
 LEAST_WIDTH = 1.01
@@ -27,12 +27,16 @@ LEAST_WIDTH = 1.01
 
 @dataclass(frozen=True)
 class Band:
-    """Frequencies from ``low`` to ``high`` (Hz) with a short label, what is there in words; ``strange`` is no mode."""
+    """Frequencies from ``low`` to ``high`` (Hz) with a short label, and what is there in words.
+
+    ``spans`` are those of each mode in it, from low to high; ``strange`` is no mode.
+    """
 
     low: float
     high: float
     label: str
     words: str
+    spans: tuple[tuple[float, float], ...]
     strange: bool = False
 
     def document(self) -> dict[str, Any]:
@@ -41,7 +45,7 @@ class Band:
 
 
 def mode_bands(robot: Robot, path: Array) -> list[Band]:
-    """The bands of a robot's modes along a ``path`` (N, 3) in m, neighbours that touch in one; none where none rest."""
+    """The bands of a robot's modes along a ``path`` (N, 3) in m, close ones in one; none where none rest."""
     finite = path[np.isfinite(path).all(axis=1)]
     if len(finite) < 2:
         return []
@@ -53,7 +57,7 @@ def mode_bands(robot: Robot, path: Array) -> list[Band]:
 
 
 def joined(frequencies: Array) -> list[Band]:
-    """Bands of modes by frequency, ``frequencies`` (N, modes) in Hz ascending in each row; those that touch in one."""
+    """Bands of modes by frequency, ``frequencies`` (N, modes) in Hz ascending in each row; close ones in one."""
     groups: list[list[int]] = []
     for mode in range(frequencies.shape[1]):
         if groups and frequencies[:, mode].min() <= TOUCHING * frequencies[:, groups[-1]].max():
@@ -65,20 +69,30 @@ def joined(frequencies: Array) -> list[Band]:
 
 def strange_bands(resonances: Sequence[Resonance]) -> list[Band]:
     """Lines where something swings that the model does not have."""
-    return [
-        Band(*_widened(each.frequency, each.frequency), "?", f"{each.sentence[0].upper()}{each.sentence[1:]}", True)
-        for each in resonances
-    ]
+    return [_strange(each) for each in resonances]
+
+
+def _strange(resonance: Resonance) -> Band:
+    span = _widened(resonance.frequency, resonance.frequency)
+    return Band(*span, "?", f"{resonance.sentence[0].upper()}{resonance.sentence[1:]}", (span,), True)
 
 
 def _band(frequencies: Array, modes: Sequence[int]) -> Band:
-    low, high = float(frequencies.min()), float(frequencies.max())
+    ends = [(float(each.min()), float(each.max())) for each in frequencies.T]
+    spans = tuple(_widened(*each) for each in ends)
+    low, high = min(low for low, _ in spans), max(high for _, high in spans)
     first, last = modes[0] + 1, modes[-1] + 1
-    label = f"{first}" if first == last else f"{first}\N{EN DASH}{last}"
-    which = f"Mode {first} lies" if first == last else f"Modes {first} to {last} lie"
-    apart = significant(high) != significant(low)
-    span = f"between {significant(low)} and {significant(high)} Hz" if apart else f"at {significant(low)} Hz"
-    return Band(*_widened(low, high), label, f"{which} {span}")
+    if first == last:
+        return Band(low, high, f"{first}", f"Mode {first} lies {_span(*ends[0])}", spans)
+    several = f"{first} {'and' if last == first + 1 else 'to'} {last}"
+    each = ", ".join(f"mode {mode + 1} {_span(*span)}" for mode, span in zip(modes, ends, strict=True))
+    return Band(low, high, several, f"Modes {several} lie close together: {each}", spans)
+
+
+def _span(low: float, high: float) -> str:
+    """Where a mode lies, in words."""
+    ends = significant(low, 4), significant(high, 4)
+    return f"at {ends[0]} Hz" if ends[0] == ends[1] else f"between {ends[0]} and {ends[1]} Hz"
 
 
 def _widened(low: float, high: float) -> tuple[float, float]:

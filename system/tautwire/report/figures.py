@@ -22,8 +22,8 @@ ALL_POINTS = 260_000  # of all residuals on a page, so that it stays a few MB
 MOST_POINTS, FEWEST_POINTS = 3000, 400  # a trace
 PATH_POINTS = 900
 MAGNIFICATIONS = (1, 10, 100, 1000)
-# Deviations are drawn larger until the largest is this share of the robot.
-VISIBLE_SHARE = 0.03
+# Deviations are drawn larger until the largest is this share of the robot, or that of the path's own size.
+VISIBLE_SHARE, PATH_SHARE = 0.03, 0.15
 ROLE_LABELS = {"fit": "Fit recording", "check": "Check recording"}
 
 
@@ -134,13 +134,19 @@ def _magnification(trace: Trace, comparison: Comparison) -> int:
     apart = [comparison.before.position - path]
     if comparison.recording.has_position:
         apart.append(comparison.recording.position - path)
-    return magnification(np.vstack((np.array(trace.robot_before.anchors), path)), apart)
+    return magnification(np.array(trace.robot_before.anchors), path, apart)
 
 
-def magnification(points: Array, apart: Sequence[Array]) -> int:
-    """How many times larger to draw deviations ``apart`` (N, 3) in a scene of ``points`` (M, 3), to be seen."""
-    known = points[np.isfinite(points).all(axis=1)]
+def magnification(anchors: Array, path: Array, apart: Sequence[Array]) -> int:
+    """How many times larger to draw deviations ``apart`` (N, 3) from a ``path`` (N, 3), to be seen beside ``anchors``.
+
+    A robot at rest has no path that they could hide.
+    """
     gaps = np.concatenate([np.linalg.norm(each, axis=1) for each in apart])
     largest = float(np.max(gaps[np.isfinite(gaps)], initial=0.0))
-    reach = VISIBLE_SHARE * float(np.max(np.ptp(known, axis=0)))
+    known = path[np.isfinite(path).all(axis=1)]
+    reach = VISIBLE_SHARE * float(np.max(np.ptp(np.vstack((anchors, known)), axis=0)))
+    travelled = float(np.max(np.ptp(known, axis=0))) if len(known) else 0.0
+    if travelled > largest:
+        reach = min(reach, PATH_SHARE * travelled)
     return max((times for times in MAGNIFICATIONS if times * largest <= reach), default=1) if largest > 0.0 else 1

@@ -48,7 +48,7 @@ def signal_label(name: str) -> str:
 
 
 def _mode(robot: Robot, plant: LinearPlant, mode: int) -> dict[str, Any]:
-    """One mode as a scene that goes round; "time" is a period's share."""
+    """One mode as a scene that goes round; "time" is a period's share in per cent."""
     phase = np.linspace(0.0, 1.0, STOPS)
     swing = np.cos(2.0 * np.pi * phase)[:, None]
     shape = plant.modes.shapes[:, mode]
@@ -56,11 +56,12 @@ def _mode(robot: Robot, plant: LinearPlant, mode: int) -> dict[str, Any]:
     platform = plant.position + SWING_SHARE * size * swing * shape
     change = SWING * swing * (plant.tension_slopes @ shape)
     largest = float(np.max(np.abs(change), initial=0.0)) or 1.0
-    scene = scene_data(Scene(phase, platform, change, (Path("swing", platform, "accent", 5),)))
+    scene = scene_data(Scene(100.0 * phase, platform, change, (Path("swing", platform, "accent", 5),)))
     label = f"{mode + 1}: {significant(float(plant.modes.frequencies[mode]))} Hz"
     told = {
-        "clock": "of a period",
-        "pace": PERIOD,
+        "clock": "% of a period",
+        "decimals": 0,
+        "pace": PERIOD / 100.0,
         "cycle": True,
         "tensionRange": [-largest, largest],
         "tensionTitle": "Change of tension for 1 mm (N)",

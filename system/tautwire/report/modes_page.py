@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Mapping
 
 from ..linear import LinearPlant
@@ -47,29 +48,34 @@ def _masthead(robot: Robot, plant: LinearPlant, links: Mapping[str, str]) -> str
 def _sentence(plant: LinearPlant) -> str:
     """The modes in one sentence."""
     modes = plant.modes
-    hertz = [significant(float(value)) for value in modes.frequencies]
+    hertz = Counter(f"{significant(float(value))} Hz" for value in modes.frequencies)
+    said = [shown if count == 1 else f"{shown} ({count} modes)" for shown, count in hertz.items()]
+    swings = said[0] if len(said) == 1 else f"{', '.join(said[:-1])} and {said[-1]}"
     least, most = (percent(float(value)) for value in (modes.damping_ratios.min(), modes.damping_ratios.max()))
     ratios = f"a damping ratio of {least}" if least == most else f"damping ratios of {least} to {most}"
-    return f"The platform swings at {', '.join(hertz[:-1])} and {hertz[-1]} Hz, with {ratios}."
+    return f"The platform swings at {swings}, with {ratios}."
 
 
 def _modes_section(plant: LinearPlant) -> str:
     modes = plant.modes
     columns = (
-        Column("Mode"), Column("Frequency", True), Column("Damping ratio", True), Column("Damped", True),
+        Column("Mode"), Column("Frequency", True), Column("Damping ratio", True), Column("When damped", True),
         *(Column(f"Along {axis}", True) for axis in AXES),
     )  # fmt: skip
     rows = [
         [
             f"Mode {place + 1}",
             f"{significant(float(modes.frequencies[place]), 4)} Hz",
-            number(significant(float(modes.damping_ratios[place]))),
+            number(f"{significant(100.0 * float(modes.damping_ratios[place]))} %"),
             "overdamped" if turning == 0.0 else f"{significant(float(turning), 4)} Hz",
             *(number(f"{round(float(value), 3) + 0.0:.3f}") for value in modes.shapes[:, place]),
         ]
         for place, turning in enumerate(modes.damped_frequencies)
     ]
-    lead = "Undamped frequencies and unit shapes with the winches held; damping from the plant&rsquo;s eigenvalues."
+    lead = (
+        "How the platform swings by itself about rest, with the winches held: undamped frequency, damping ratio (100 % "
+        "where it just no longer swings), frequency with that damping, and the direction, as a vector of length one."
+    )
     return section("modes", "Modes", table("Modes of the platform", columns, rows, "modes", True), lead)
 
 
@@ -113,8 +119,11 @@ def _gains_section(plant: LinearPlant) -> str:
     shown = [name for name in plant.system.output_labels if name.rpartition("_")[0] in GAIN_OUTPUTS]
     for place, name in enumerate(shown):
         groups[GAIN_OUTPUTS[name.rpartition("_")[0]]].append((place, signal_label(name)))
-    keys = f'<p class="keys">{key("after", "gain, and below it the phase")}{key("mode", "modes, numbered")}</p>'
-    lead = "How much each output swings for each unit of the input that swings, over frequency."
+    keys = f'<p class="keys">{key("after", "gain, and below it the phase")}{key("mode", "modes, by number")}</p>'
+    lead = (
+        "How much each output swings for each unit of the input that swings, over frequency (gain), and how far ahead "
+        "of the input it is (phase; behind where negative)."
+    )
     return section("gains", "Gains", control + keys + panel_groups("gain", groups, "Gain and phase"), lead)
 
 

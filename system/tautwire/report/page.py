@@ -39,8 +39,8 @@ def trace_page(trace: Trace, links: Mapping[str, str]) -> str:
 def _scene_section(trace: Trace) -> str:
     """The robot in space with its controls."""
     lead = (
-        "Cables are coloured by their tension in the extended model. Differences from the extended model&rsquo;s path "
-        "are drawn larger, by the factor chosen below the picture."
+        "Cables are coloured by their tension in the extended model. The other paths are drawn farther from its path "
+        "than they are, by the factor chosen below the picture."
     )
     label = (
         f"The robot in space: {trace.robot_before.cable_count} cables from their exit points to the platform, coloured "
@@ -57,19 +57,22 @@ def _residual_section(trace: Trace) -> str:
         '<label><input type="radio" name="scale" value="all" checked><span>All</span></label>'
         '<label><input type="radio" name="scale" value="left"><span>What is left</span></label></fieldset>'
     )
-    lead = f"Measured minus co-simulated, over time. {_band_text(trace)}"
-    keys = '<p class="keys">' + key("before") + key("after") + key("band", "± 2 &sigma; of the noise") + "</p>"
-    content = f'<div class="bar">{keys}{scale}</div>' + _panels(trace, "residual", "Residual over time")
+    lead = f"The residual, measured minus co-simulated, over time. {_band_text(trace)}"
+    keys = key("before") + key("after") + key("band", "± 2 standard deviations of the noise")
+    content = f'<div class="bar"><p class="keys">{keys}</p>{scale}</div>' + _panels(
+        trace, "residual", "Residual over time"
+    )
     return section("residuals", "What the models leave", content, lead)
 
 
 def _spectrum_section(trace: Trace, choices: Sequence[Mapping[str, Any]]) -> str:
     """A panel for each output: spectra of what the models leave, with the modes marked."""
     lead = (
-        "Amplitude spectral density of the same residuals (Welch, Hann windows). White sensor noise alone would "
-        "lie on the dashed line. The bands are where the modes of the extended model lie along the path."
+        "How strongly the same residuals swing at each frequency: their amplitude spectral density (Welch, Hann "
+        "windows). Sensor noise alone, alike at all frequencies (white), would lie on the dashed line. The bands are "
+        "where the modes of the extended model, in which it swings by itself, lie along the path."
     )
-    keys = key("before") + key("after") + key("floor-line", "noise") + key("mode", "modes, numbered")
+    keys = key("recorded", "before") + key("after") + key("floor-line", "noise") + key("mode", "modes, by number")
     told = [f"{choice['label']}: {band['words']}" for choice in choices for band in choice["bands"]]
     modes = bullets(told) if told else "<p>No modes are marked: along this path the model does not rest.</p>"
     panels = _panels(trace, "spectrum", "Spectrum of the residual")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -14,10 +15,12 @@ from .figures import MAGNIFICATIONS, magnification
 from .run import Run
 from .scene import Path, Scene, scene_data
 from .series import envelope, envelope_times, packed, thinned
-from .units import significant
+from .units import handy_unit, significant
 
 Array = NDArray[np.float64]
 
+# Of units in which outputs are shown, those that are not SI.
+SI_UNITS = {"mm": "m"}
 LINE_POINTS = 3000
 PATH_POINTS = 900
 
@@ -27,7 +30,7 @@ class Line:
     """One output of a run: where it stands among the columns, what to call it, and what was recorded of it.
 
     ``scale`` turns SI into ``unit``. ``recorded`` (N,) is over the recording's time, None where it has none;
-    ``apart`` is the root mean square of recorded minus co-simulated, in SI, NaN where nothing can be compared.
+    ``difference`` (M,) is recorded minus co-simulated at the overview's first M rows, in SI.
     """
 
     place: int
@@ -36,7 +39,19 @@ class Line:
     unit: str
     scale: float
     recorded: Array | None
-    apart: float
+    difference: Array
+
+    @property
+    def apart(self) -> float:
+        """The root mean square of the difference, in SI; NaN where nothing can be compared."""
+        seen = self.difference[np.isfinite(self.difference)]
+        return float(np.sqrt(np.mean(seen**2))) if seen.size else math.nan
+
+    @property
+    def difference_unit(self) -> tuple[str, float]:
+        """The unit that suits the difference, and how many SI units one of it is."""
+        seen = np.abs(self.difference[np.isfinite(self.difference)])
+        return handy_unit(float(np.max(seen, initial=0.0)), SI_UNITS.get(self.unit, self.unit))
 
 
 def lines_of(run: Run) -> list[Line]:
@@ -75,12 +90,10 @@ def run_data(run: Run, lines: Sequence[Line]) -> dict[str, Any]:
 
 def _line(run: Run, place: int, title: str, label: str, unit: str, scale: float, recorded: Array | None) -> Line:
     if recorded is None or not np.isfinite(recorded).any():
-        return Line(place, title, label, unit, scale, None, float("nan"))
+        return Line(place, title, label, unit, scale, None, np.zeros(0))
     sampled, rows = recorded[:: run.overview.size], run.overview.rows[:, place]
     count = min(len(sampled), len(rows))
-    apart = sampled[:count] - rows[:count]
-    seen = apart[np.isfinite(apart)]
-    return Line(place, title, label, unit, scale, recorded, float(np.sqrt(np.mean(seen**2))) if seen.size else np.nan)
+    return Line(place, title, label, unit, scale, recorded, sampled[:count] - rows[:count])
 
 
 def _channel(run: Run, line: Line) -> dict[str, Any]:
@@ -89,14 +102,26 @@ def _channel(run: Run, line: Line) -> dict[str, Any]:
     described: dict[str, Any] = {"label": line.label, "title": line.title, "unit": line.unit}
     shown = {"time": packed(time), "values": packed(line.scale * values), "range": _range(line.scale * values)}
     if line.recorded is None:
-        return {**described, **shown, "recorded": None}
+        return {**described, **shown, "recorded": None, "difference": None}
     until = int(np.searchsorted(run.recording.time, run.overview.last_time, side="right"))
     recorded = {
         "time": packed(envelope_times(run.recording.time[:until], LINE_POINTS)),
         "values": packed(line.scale * envelope(line.recorded[:until], LINE_POINTS)),
-        "apart": significant(line.scale * line.apart),
     }
-    return {**described, **shown, "recorded": recorded}
+    return {**described, **shown, "recorded": recorded, "difference": _difference(run, line)}
+
+
+def _difference(run: Run, line: Line) -> dict[str, Any] | None:
+    """Recorded minus co-simulated over time, in a unit of its own size; None where nothing can be compared."""
+    if not math.isfinite(line.apart):
+        return None
+    unit, one = line.difference_unit
+    return {
+        "time": packed(run.overview.time[: len(line.difference)]),
+        "values": packed(line.difference / one),
+        "apart": significant(line.apart / one),
+        "unit": unit,
+    }
 
 
 def _range(values: Array) -> list[str]:
@@ -115,8 +140,8 @@ def _scene(run: Run) -> Scene:
     recording, magnify = run.recording, 1
     if recording.has_position:
         measured = recording.position[samples]
-        paths.insert(0, Path("measured", measured, "measured", 2, "dot"))
-        magnify = magnification(np.vstack((np.array(run.robot.anchors), platform)), [measured - platform])
+        paths.insert(0, Path("recorded", measured, "before", 2, "dot"))
+        magnify = magnification(np.array(run.robot.anchors), platform, [measured - platform])
     return Scene(
         time=run.overview.time[kept],
         platform=platform,

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping, Sequence
 
 import numpy as np
@@ -29,11 +30,12 @@ def _masthead(run: Run, links: Mapping[str, str]) -> str:
     verdict, kind = _verdict(run)
     books = run.account
     cost = "" if books is None else (
-        f"{books.steps} steps, {books.redos} redos; the coupling made {engineering(books.made, 'J')} of the "
-        f"{engineering(books.exchanged, 'J')} exchanged."
+        f"{books.steps} steps of the master, and {books.redos} repeats of steps until the FMUs agreed at their ends. "
+        f"Of the {engineering(books.exchanged, 'J')} that the FMUs exchanged, {engineering(books.made, 'J')} came from "
+        "the coupling."
     )  # fmt: skip
     if books is not None and books.error is not None:
-        cost += f" Estimated error {engineering(books.error, 'm')}."
+        cost += f" Estimated error of the path: {engineering(books.error, 'm')}."
     return (
         f'<header><p class="eyebrow"><strong>Tautwire run</strong> '
         f"<span>{text(run.robot.name)}, {run.robot.cable_count} cables</span></p>"
@@ -75,7 +77,7 @@ def _extremes(run: Run, lines: Sequence[Line]) -> str:
     """Least, largest and last value of each output, and how far the recording is from it."""
     titles = list(dict.fromkeys(line.title for line in lines))
     content = "".join(_table(run, title, [line for line in lines if line.title == title]) for title in titles)
-    lead = "From the recording: root mean square of measured minus co-simulated."
+    lead = "Apart: root mean square (rms) of recorded minus co-simulated."
     return section("summary", "In figures", content, lead)
 
 
@@ -86,9 +88,14 @@ def _table(run: Run, title: str, lines: Sequence[Line]) -> str:
     columns = [Column("Output"), *(Column(name, True) for name in ("At the start", "At the end", "Least", "Largest"))]
     rows = [[text(line.label), *(_value(line, end[line.place]) for end in ends)] for line in lines]
     if any(line.recorded is not None for line in lines):
-        columns.append(Column("From the recording", True, True))
-        rows = [[*row, number(engineering(line.apart, line.unit))] for row, line in zip(rows, lines, strict=True)]
+        columns.append(Column("Apart, rms", True))
+        rows = [[*row, _apart(line)] for row, line in zip(rows, lines, strict=True)]
     return table(title, columns, rows, "extremes")
+
+
+def _apart(line: Line) -> str:
+    unit, one = line.difference_unit
+    return number("-") if math.isnan(line.apart) else f"{number(significant(line.apart / one))} {text(unit)}"
 
 
 def _value(line: Line, value: float) -> str:
@@ -103,20 +110,30 @@ def _scene_section(run: Run) -> str:
         f"The robot in space: {run.robot.cable_count} cables from their exit points to the platform, coloured by "
         "tension, and its path."
     )
-    keys = key("after", "co-simulated") + (key("measured") if run.recording.has_position else "")
+    recorded = run.recording.has_position
+    keys = key("after", "co-simulated") + (key("recorded-path", "recorded") if recorded else "")
     lead = "Cables are coloured by their tension."
-    return scene_section("The robot in motion", lead, label, keys, magnified=run.recording.has_position)
+    if recorded:
+        lead += " What was recorded is drawn farther from the path than it is, by the factor chosen below the picture."
+    return scene_section("The robot in motion", lead, label, keys, magnified=recorded)
 
 
 def _outputs_section(run: Run, lines: Sequence[Line]) -> str:
     """A panel for each output over time."""
-    keys = key("after", "co-simulated") + key("before", "recorded")
+    keys = key("after", "co-simulated")
+    lead = "What the FMUs showed over time"
+    if any(line.recorded is not None for line in lines):
+        keys += key("recorded") + key("difference", "recorded minus co-simulated")
+        lead += "; behind it, as a broader line, what was recorded, and below it the difference of the two"
     groups: dict[str, list[tuple[int, str]]] = {}
     for place, line in enumerate(lines):
         groups.setdefault(line.title, []).append((place, line.label))
-    lead = "What the FMUs showed over time; beside it what the recording holds, where it holds that."
-    content = f'<p class="keys">{keys}</p>' + panel_groups("output", groups, "Course over time")
-    return section("outputs", "Over time", content, lead)
+    compared = {line.title for line in lines if line.recorded is not None}
+    panels = "".join(
+        panel_groups("compared" if title in compared else "output", {title: group}, "Course over time")
+        for title, group in groups.items()
+    )
+    return section("outputs", "Over time", f'<p class="keys">{keys}</p>{panels}', f"{lead}.")
 
 
 def _notes(run: Run) -> str:

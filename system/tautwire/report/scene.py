@@ -58,6 +58,7 @@ def scene_data(scene: Scene) -> dict[str, Any]:
     return {
         "time": packed(scene.time),
         "clock": "s",
+        "decimals": 2,
         "pace": min(1.0, LONGEST_PLAY / duration) if duration > 0.0 else 1.0,
         "cycle": False,
         "platform": columns(scene.platform),

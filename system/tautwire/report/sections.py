@@ -61,13 +61,21 @@ def summary(trace: Trace) -> str:
             rows += _error_rows(trace, role, [POSITION, TENSION], f"{role.capitalize()}, ")
             details += _error_details(trace, role)
     lead = (
-        "Root mean square of measured minus co-simulated, before and after. The noise floor is what noise of "
-        "the sensors and of the recorded winch speeds would leave; “explained” is the share of the mean square above "
-        "it that is gone."
+        "Root mean square (rms) of measured minus co-simulated: before, by the robot as its file declares it, and "
+        f"after, with what was found (the extended model). {_judged(trace)} The noise floor is what noise of the "
+        "sensors and of the recorded winch speeds alone would leave: no model comes below it but by chance. Explained "
+        "is the share of the mean square above the floor that is gone."
     )
     key = _key("before", "after") + '<span class="key key-floor">noise floor, logarithmic scale</span>'
     main = table("Error of the co-simulation over all axes and all cables", ERROR_COLUMNS, rows, "errors", True)
     return section("summary", "Before and after", f'{main}<p class="keys dots">{key}</p>{details}', lead)
+
+
+def _judged(trace: Trace) -> str:
+    """What effects were fitted to and judged on."""
+    if comparison_of(trace, "check"):
+        return "Effects were fitted to the recording “fit” and judged on “check”."
+    return "Effects were fitted to one part of the recording and judged on another."
 
 
 def found(trace: Trace) -> str:
@@ -85,7 +93,11 @@ def found(trace: Trace) -> str:
         content += '<span class="key key-floor">declared</span></p>'
     elif not content:
         content = "<p>No effect was added to the model.</p>"
-    lead = "Evidence is the natural logarithm of the likelihood ratio on data that the fit did not see."
+    lead = (
+        "Evidence tells how much more probable data that the fit did not see are with the effect than without it, as a "
+        "natural logarithm (log of the likelihood ratio): 2.3 is ten times, 6.9 a thousand times. In 95 of 100 such "
+        "recordings the 95 % interval holds the true value."
+    )
     return section("found", "What the model lacked", content, lead if rows else "")
 
 
@@ -108,7 +120,7 @@ def _alike(trace: Trace) -> str:
         [
             text(f"{each.name}, {cables_text(each.cables, count)}" if each.cables else each.name),
             text(f"{each.other}, {cables_text(each.other_cables, count)}" if each.other_cables else each.other),
-            number(f"{each.cosine:.6f}".rstrip("0").rstrip(".")),
+            number(f"{significant(_angle(each.cosine))}°"),
             number(significant(each.nats)),
         ]
         for each in trace.separation.alike[:SHOWN_ALIKE]
@@ -118,15 +130,21 @@ def _alike(trace: Trace) -> str:
     columns = (
         Column("Effect"),
         Column("What looks like it", wide=True),
-        Column("Cosine", True),
-        Column("Nats apart", True),
+        Column("Angle between", True),
+        Column("Evidence lost", True),
     )
     told = (
-        "<p>How like the answer the others look: the cosine of the angle between their signatures, 1 where nothing in "
-        "these recordings tells them apart, and the evidence that does. <code>tautwire excite</code> writes a motion "
-        "that tells them apart best.</p>"
+        '<p class="lead">How like the answer others look in these recordings: the angle between what each changes in '
+        "the measurements, 0° where nothing tells them apart and 90° where they have nothing in common; and the "
+        "evidence that would be lost with the other in its place. <code>tautwire excite</code> writes a motion that "
+        "tells them apart best.</p>"
     )
     return told + table("What looks like the answer", columns, rows, "alike")
+
+
+def _angle(cosine: float) -> float:
+    """The angle in degrees, whatever rounding has left of a cosine."""
+    return math.degrees(math.acos(max(-1.0, min(1.0, cosine))))
 
 
 def unseen(trace: Trace) -> str:
@@ -152,7 +170,7 @@ def unseen(trace: Trace) -> str:
     )  # fmt: skip
     lead = (
         "The size of each effect that these recordings would have shown in nine cases out of ten, counted from where "
-        "it is absent. What is smaller may be there."
+        "it is absent. What is smaller may be there. “Never”: no size that it may have would show."
     )
     return section(
         "unseen", "What it could not have seen", table("Smallest sizes", columns, rows, "unseen", True), lead
@@ -166,10 +184,12 @@ def left(trace: Trace) -> str:
         [text(output.label), number(significant(float(value))), charts.bar(float(value), largest, mark=1.0)]
         for output, value in zip(outputs(trace), trace.left, strict=True)
     ]
-    columns = (Column("Output"), Column("Mean square", True), Column("Against 1"))
+    columns = (Column("Output"), Column("Times the noise", True), Column("Against 1"))
     lead = (
-        "Mean square of the whitened innovations of each output under the final model, on unseen data: 1 where "
-        f"only sensor noise is left. Significance level of the tests: {text(significant(trace.alpha, 2))}."
+        "How far the final model is off when it predicts each sample from those before it, on data that the fit did "
+        "not see: the mean square, in times of what noise alone makes it (in other words, of the whitened "
+        "innovations). 1 is noise. Where nothing is to be found, the tests find something in "
+        f"{number(f'{significant(100.0 * trace.alpha, 2)} %')} of recordings at most."
     )
     return section("left", "What is left", table("What is left in each output", columns, rows, "left", True), lead)
 

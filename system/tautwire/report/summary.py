@@ -11,7 +11,7 @@ from tautwire_fmu.laws.effects import BY_NAME
 
 from ..runs.wiring import AXES
 from ..tracer.verdict import Candidate, Comparison, Errors, Estimate, Trace
-from .units import ABSENT, engineering, together
+from .units import ABSENT, engineering, significant, together
 
 ROLES = ("fit", "check")
 VERDICTS = {
@@ -136,7 +136,7 @@ def noise_sentence(trace: Trace) -> str:
 
 
 def evidence_text(evidence: float) -> str:
-    """Evidence in natural logarithms, to a tenth; whole where it is large."""
+    """Evidence in natural logarithms, to a tenth; to four digits where it is large."""
     if not math.isfinite(evidence):
         return ABSENT
-    return f"{evidence:.{0 if abs(evidence) >= 1000.0 else 1}f}"
+    return significant(evidence, 4) if abs(evidence) >= 1000.0 else f"{evidence:.1f}"

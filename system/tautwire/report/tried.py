@@ -23,8 +23,8 @@ OTHER_COLUMNS = (Column("Effect"), Column("Where"), Column("Values", wide=True))
 def tried(trace: Trace) -> str:
     """What was tried in each round, the best first."""
     lead = (
-        "One effect at a time, fitted on one part of the data and judged on another. Left is the mean square of "
-        "the whitened innovations there: 1 where only noise is left."
+        "One effect at a time, fitted on one part of the data and judged on another, by its evidence there. Left is "
+        "what its predictions still miss there, as a mean square in times of what noise makes it: 1 is noise."
     )
     largest = max((each.evidence for each in trace.candidates if math.isfinite(each.evidence)), default=0.0)
     content = "".join(_round(trace, place, group, largest) for place, group in ranking(trace.candidates))
@@ -45,7 +45,8 @@ def _round(trace: Trace, place: int, group: Sequence[Candidate], largest: float)
         content += f"<details><summary>{len(rest)} more with less evidence</summary>{folded}</details>"
     if others:
         folded = table(f"Round {place}, not fitted", OTHER_COLUMNS, others, "others", True)
-        content += f"<details><summary>{len(others)} not fitted, they promised too little</summary>{folded}</details>"
+        said = "it promised" if len(others) == 1 else "they promised"
+        content += f"<details><summary>{len(others)} not fitted, {said} too little</summary>{folded}</details>"
     return content
 
 

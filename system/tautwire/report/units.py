@@ -15,10 +15,11 @@ SMALL_AREA = 1e-2  # m^2, below it an area is shown in mm^2
 POWER = re.compile(r"(?<=[A-Za-z])\^?([23])(?!\d)")
 POWERS = {"2": "²", "3": "³"}
 PLAIN_FROM, PLAIN_TO = 1e-4, 1e6
+WHOLE_DIGITS = 4
 
 
 def significant(value: float | None, digits: int = 3) -> str:
-    """A number to so many significant digits; a dash where there is none."""
+    """A number to so many significant digits, to four where these are whole; a dash where there is none."""
     if value is None or not math.isfinite(value):
         return ABSENT
     if value == 0.0:
@@ -26,7 +27,8 @@ def significant(value: float | None, digits: int = 3) -> str:
     size = abs(value)
     if not PLAIN_FROM <= size < PLAIN_TO:
         return f"{value:.{digits - 1}e}"
-    return f"{value:.{_decimals(size, digits)}f}"
+    rounded = float(f"{value:.{max(digits, WHOLE_DIGITS) - 1}e}")
+    return f"{rounded:.{_decimals(size, digits)}f}"
 
 
 def handy_unit(value: float, unit: str) -> tuple[str, float]:

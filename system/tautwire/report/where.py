@@ -11,8 +11,8 @@ from .markup import Column, bullets, number, section, table, text
 from .units import ABSENT, significant
 
 COLUMNS = (
-    Column("Component"), Column("Quantity"), Column("Residual", True), Column("Expected", True), Column("Ratio", True),
-    Column("Ratio, logarithmic"), Column("Moves with", wide=True),
+    Column("Component"), Column("Quantity"), Column("Residual", True), Column("Expected", True), Column("Times", True),
+    Column("Times expected, logarithmic"), Column("Moves with", wide=True),
 )  # fmt: skip
 LEAST_SPAN = (0.5, 4.0)
 
@@ -23,7 +23,9 @@ def where(trace: Trace) -> str:
     lead = (
         "Before any effect is fitted, each FMU runs alone along the fit recording: a cable on the measured path with "
         "the recorded winch speed, against its load cell; the platform under the measured tensions, against its path. "
-        "A ratio near one, the line, is noise."
+        "Expected is what noise alone would leave; once that, the line, is noise. “Moves with” names what the residual "
+        "(measured minus computed) follows best, with the correlation: 100 % where it does so exactly, negative where "
+        "it runs against it."
     )
     ratios = [part.ratio for part in found.parts if math.isfinite(part.ratio) and part.ratio > 0.0]
     low = min([LEAST_SPAN[0], *(0.8 * ratio for ratio in ratios)])
@@ -40,7 +42,7 @@ def where(trace: Trace) -> str:
 def _row(part: ComponentResidual, low: float, high: float) -> list[str]:
     unit = f'<span class="unit">{text(part.unit)}</span>'
     moved = part.moves_with
-    told = f"{moved.name} ({moved.correlation:+.2f})" if moved else ABSENT
+    told = f"{moved.name} ({100.0 * moved.correlation:.0f} %)" if moved else ABSENT
     if part.rings_at is not None and part.is_off:
         told = f"rings at {part.rings_at:.2f} Hz"
     return [

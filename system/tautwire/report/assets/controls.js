@@ -32,7 +32,7 @@ function redraw(selector) {
 
 function showTime() {
   const { scene } = chosen();
-  const words = `${series(scene.time)[state.place].toFixed(2)} ${scene.clock}`;
+  const words = `${series(scene.time)[state.place].toFixed(scene.decimals)} ${scene.clock}`;
   document.getElementById("time-shown").textContent = words;
   slider.value = String(state.place);
   slider.setAttribute("aria-valuetext", words);

@@ -56,11 +56,11 @@ function layout(colour, more) {
 
 const config = { displayModeBar: false, responsive: true, showTips: false };
 
-/** A number with three significant digits, as the tables write it. */
+/** A number with three significant digits, with four where these are whole, as the tables write it. */
 function significant(value) {
   if (value === null || !Number.isFinite(value)) return "–";
   const size = Math.abs(value);
   if (size !== 0 && (size < 1e-4 || size >= 1e6)) return value.toExponential(2);
   const decimals = size === 0 ? 0 : Math.max(0, 2 - Math.floor(Math.log10(size)));
-  return value.toFixed(decimals).replace("-", "−");
+  return Number(value.toPrecision(4)).toFixed(decimals).replace("-", "−");
 }

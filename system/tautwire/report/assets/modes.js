@@ -3,13 +3,20 @@
 const source = document.getElementById("source");
 source.addEventListener("change", () => redraw("figure[data-kind=gain]"));
 
+/** Right angles between ticks, or more of them where the phase turns far. */
+function phaseTick(phase) {
+  const known = phase.filter((value) => value !== null);
+  return 90 * Math.max(1, Math.ceil((Math.max(...known) - Math.min(...known)) / 280));
+}
+
 panelKinds.gain = (choice, place) => {
   const output = report.gains[place];
   const { gain, phase, peak, unit, by } = output.from[Number(source.value)];
   const what = `Gain and phase over frequency, ${output.label} by ${by}`;
   if (gain === null) return { numbers: "", words: `${what}: none.`, empty: "This input does not act here" };
   const colour = colours();
-  const { shapes, ...room } = frequencyBands(report.bands, colour);
+  const frequencies = series(report.frequency);
+  const { shapes, ...room } = frequencyBands(report.bands, frequencies, colour);
   const traces = [
     lineTrace("gain", report.frequency, gain, colour.accent, { hovertemplate: `%{y:.3~g} ${unit}` }),
     lineTrace("phase", report.frequency, phase, colour.accent, { yaxis: "y2", hovertemplate: "%{y:.0f}°" }),
@@ -18,9 +25,9 @@ panelKinds.gain = (choice, place) => {
   return {
     numbers: `at most ${peak}`, words, traces,
     layout: layout(colour, {
-      xaxis: frequencyAxis(colour, series(report.frequency), { anchor: "y2" }),
-      yaxis: axis(colour, unit, { ...logarithmic, domain: [0.4, 1] }),
-      yaxis2: axis(colour, "Phase (°)", { domain: [0, 0.3], nticks: 4 }), shapes, ...room,
+      xaxis: frequencyAxis(colour, frequencies, { anchor: "y2" }),
+      yaxis: logAxis(colour, unit, positiveRange(series(gain)), 5, { domain: [0.4, 1] }),
+      yaxis2: axis(colour, "Phase (°)", { domain: [0, 0.3], dtick: phaseTick(series(phase)) }), shapes, ...room,
     }),
   };
 };

@@ -8,36 +8,64 @@ function lineTrace(name, x, y, shade, more) {
   };
 }
 
+/** How to draw a line that another one may cover: so broad that both are seen where they agree. */
+function behind(shade) {
+  return { line: { color: shade, width: 4.5 } };
+}
+
 /** A line across a panel at one value of y. */
 function levelLine(level, line) {
   return { type: "line", xref: "paper", x0: 0, x1: 1, y0: level, y1: level, line };
 }
 
-const logarithmic = { type: "log", dtick: 1, tickformat: ".6~g" };
-
-/** A logarithmic axis over frequencies, with ticks at 1, 2 and 5 where there is room for these. */
-function frequencyAxis(colour, frequencies, more) {
-  const known = frequencies.filter((value) => value > 0);
-  const [low, high] = [Math.min(...known), Math.max(...known)];
-  const decades = Array.from({ length: 40 }, (_, place) => 10 ** (place - 20));
-  const steps = high / low < 200 ? [1, 2, 5] : [1];
-  const tickvals = decades.flatMap((decade) => steps.map((step) => step * decade)).filter((f) => f >= low && f <= high);
-  const ticktext = tickvals.map((value) => String(Number(value.toPrecision(3))));
-  return axis(colour, "Frequency (Hz)", { type: "log", tickmode: "array", tickvals, ticktext, hoverformat: ".3~g", ...more });
+/** The least and the largest of numbers that a logarithmic axis can show. */
+function positiveRange(values) {
+  const known = values.filter((value) => value > 0);
+  return known.length ? [Math.min(...known), Math.max(...known)] : [0.1, 1];
 }
 
-/** Bands over frequencies with a label above each, and the room that the labels need; for logarithmic axes. */
-function frequencyBands(bands, colour) {
-  const shapes = bands.map(({ low, high, strange }) => ({
-    type: "rect", yref: "paper", y0: 0, y1: 1, x0: low, x1: high, layer: "below",
+/** A logarithmic axis from low to high, with ticks at 1, 2 and 5 where fewer than ``most`` come of that. */
+function logAxis(colour, title, [low, high], most, more) {
+  const decades = Array.from({ length: 40 }, (_, place) => 10 ** (place - 20));
+  const ticks = [[1, 2, 5], [1, 3], [1]].map((steps) => decades.flatMap((decade) => steps.map((step) => step * decade))
+    .filter((value) => value >= 0.99 * low && value <= 1.01 * high));
+  const tickvals = ticks.find((each) => each.length <= most) ?? ticks[2];
+  const ticktext = tickvals.map((value) => String(Number(value.toPrecision(3))));
+  return axis(colour, title, { type: "log", tickmode: "array", tickvals, ticktext, hoverformat: ".3~g", ...more });
+}
+
+function frequencyAxis(colour, frequencies, more) {
+  return logAxis(colour, "Frequency (Hz)", positiveRange(frequencies), 7, more);
+}
+
+// The share of a panel's width that a letter of a label takes.
+const letterShare = 0.027;
+
+/**
+ * Bands over frequencies with a label above each, and the room that the labels need; for logarithmic axes.
+ *
+ * A label that would run into the one before stands a line higher.
+ */
+function frequencyBands(bands, frequencies, colour) {
+  const shapes = bands.flatMap(({ spans, strange }) => spans.map(([x0, x1]) => ({
+    type: "rect", yref: "paper", y0: 0, y1: 1, x0, x1, layer: "below",
     fillcolor: strange ? colour["warn-band"] : colour["mode-band"],
-    line: { color: strange ? colour.warn : colour.mode, width: 1 },
-  }));
-  const annotations = bands.map(({ low, high, label, strange }) => ({
-    text: label, showarrow: false, x: 0.5 * (Math.log10(low) + Math.log10(high)), yref: "paper", y: 1,
-    yanchor: "bottom", font: { size: 11, color: strange ? colour.warn : colour.mode },
-  }));
-  return { shapes, annotations, margin: { l: 8, r: 8, t: bands.length ? 20 : 4, b: 8 } };
+    line: { color: strange ? colour.warn : colour.mode, width: 0.75 },
+  })));
+  const [low, high] = positiveRange(frequencies).map(Math.log10);
+  const middle = (band) => 0.5 * (Math.log10(band.low) + Math.log10(band.high));
+  let end = -Infinity, line = 0, lines = 0;
+  const annotations = [...bands].sort((one, other) => middle(one) - middle(other)).map((band) => {
+    const x = middle(band), half = 0.5 * letterShare * (band.label.length + 0.5);
+    const share = (x - low) / (high - low);
+    line = share - half < end ? line + 1 : 0;
+    [end, lines] = [share + half, Math.max(lines, line + 1)];
+    return {
+      text: band.label, showarrow: false, x, yref: "paper", y: 1, yanchor: "bottom", yshift: 14 * line,
+      font: { size: 11, color: band.strange ? colour.warn : colour.mode },
+    };
+  });
+  return { shapes, annotations, margin: { l: 8, r: 8, t: 4 + 16 * lines, b: 8 } };
 }
 
 /**

@@ -8,10 +8,10 @@ const views = {
   side: { eye: { x: 2.2, y: 0, z: 0 }, up: { x: 0, y: 0, z: 1 } },
 };
 
-/** A view from far enough away that all fits into a narrow figure too. */
+/** A view from far enough away that all fits into a narrow figure too, with the axes' titles. */
 function camera(name) {
   const { clientWidth, clientHeight } = sceneFigure;
-  const further = Math.max(1, 1.5 * clientHeight / Math.max(1, clientWidth));
+  const further = Math.max(1, 1.9 * clientHeight / Math.max(1, clientWidth));
   const { x, y, z } = views[name].eye;
   return { center: { x: 0, y: 0, z: 0 }, ...views[name], eye: { x: further * x, y: further * y, z: further * z } };
 }

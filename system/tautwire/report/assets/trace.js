@@ -52,16 +52,20 @@ panelKinds.spectrum = (choice, place) => {
   if (channel.spectrum === null) return { ...said, empty: "Too short for a spectrum" };
   const colour = colours();
   const found = channel.spectrum;
-  const line = (name, shade) => lineTrace(name, found.frequency, found[name], shade);
+  const densities = positiveRange([...series(found.before), ...series(found.after)]);
   const noise = { color: colour.text, width: 1, dash: "dash" };
-  const { shapes, ...room } = frequencyBands(choice.bands, colour);
+  const frequencies = series(found.frequency);
+  const { shapes, ...room } = frequencyBands(choice.bands, frequencies, colour);
   const floor = found.floor === null ? [] : [levelLine(found.floor, noise)];
   return {
     ...said, words: [said.words, ...choice.bands.map((band) => `${band.words}.`)].join(" "),
-    traces: [line("before", colour.before), line("after", colour.accent)],
+    traces: [
+      lineTrace("before", found.frequency, found.before, colour.before, behind(colour.before)),
+      lineTrace("after", found.frequency, found.after, colour.accent),
+    ],
     layout: layout(colour, {
-      xaxis: frequencyAxis(colour, series(found.frequency)),
-      yaxis: axis(colour, `${channel.unit}/√Hz`, logarithmic), shapes: [...shapes, ...floor], ...room,
+      xaxis: frequencyAxis(colour, frequencies), yaxis: logAxis(colour, `${channel.unit}/√Hz`, densities, 5),
+      shapes: [...shapes, ...floor], ...room,
     }),
   };
 };
