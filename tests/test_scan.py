@@ -9,6 +9,7 @@ from tautwire.tracer.hypotheses import Hypothesis
 from tautwire.tracer.preparation.noise import noise_of
 from tautwire.tracer.scan import looked_at, scanned, silent
 from tautwire.tracer.screen import Prospect, screen
+from tautwire.tracer.workers import Workers
 from tautwire_fmu.laws.effects import DAMPING, HYSTERESIS, SLACK
 from tests.recordings import recorded
 from tests.robots import example
@@ -30,23 +31,23 @@ def test_a_softness_that_slopes_cannot_see_is_seen_by_a_run() -> None:
     slopes = screen(robot, (), [SOFT, VISCOUS], fitter, sample)
     assert slopes[SOFT].gain == 0.0
     assert set(silent(slopes)) == {SOFT}
-    found = scanned(robot, (), fitter, sample, silent(slopes))
+    found = scanned(robot, (), fitter, sample, silent(slopes), Workers(1))
     assert found[SOFT].values == {"softness": 300.0}
     assert found[SOFT].gain > slopes[VISCOUS].gain > 0.0
 
 
 def test_nothing_is_promised_where_nothing_is_hidden() -> None:
     robot, fitter, sample = looked({})
-    found = scanned(robot, (), fitter, sample, {SOFT: Prospect(0.0, {})})
+    found = scanned(robot, (), fitter, sample, {SOFT: Prospect(0.0, {})}, Workers(1))
     assert found[SOFT].gain < 4.0
 
 
 def test_a_promise_that_a_run_holds_better_stays() -> None:
     robot, fitter, sample = looked({"hysteresis": {"force": 30.0, "yield_strain": 1e-4}})
     true = Prospect(1.0, {"force": 30.0, "yield_strain": 1e-4})
-    assert scanned(robot, (), fitter, sample, {STICKY: true}) == {STICKY: true}
+    assert scanned(robot, (), fitter, sample, {STICKY: true}, Workers(1)) == {STICKY: true}
     wrong = Prospect(1.0, {"force": 0.5, "yield_strain": 1e-5})
-    better = scanned(robot, (), fitter, sample, {STICKY: wrong})[STICKY]
+    better = scanned(robot, (), fitter, sample, {STICKY: wrong}, Workers(1))[STICKY]
     assert better.values["force"] > wrong.values["force"]
     assert better.gain > 1000.0
 
@@ -63,5 +64,5 @@ def test_smaller_values_are_spared_once_one_is_not_felt(monkeypatch: pytest.Monk
     runs = []
     judged = fitter.judged
     monkeypatch.setattr(fitter, "judged", lambda *asked: runs.append(asked[0]) or judged(*asked))
-    scanned(robot, (), fitter, sample, {SOFT: Prospect(0.0, {})})
+    scanned(robot, (), fitter, sample, {SOFT: Prospect(0.0, {})}, Workers(1))
     assert 2 < len(runs) < 1 + len(SLACK.parameters[0].scanned)

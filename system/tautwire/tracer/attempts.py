@@ -51,10 +51,10 @@ def attempt(fitter: Fitter, task: Task, sample: Sample, judge: Sample) -> Attemp
 
 def attempt_apart(noise: Noise, task: Task, sample: Sample, judge: Sample) -> Attempt | None:
     """As :func:`attempt`, in a process that keeps a fitter of its own."""
-    return attempt(_fitter(noise), task, sample, judge)
+    return attempt(fitter_apart(noise), task, sample, judge)
 
 
 @lru_cache(maxsize=1)
-def _fitter(noise: Noise) -> Fitter:
-    """Its compiled likelihoods serve the next task of the same process."""
+def fitter_apart(noise: Noise) -> Fitter:
+    """A worker's own. Its compiled likelihoods serve the next task of the same process."""
     return Fitter(noise)

@@ -8,8 +8,10 @@ wrong valley. The model itself is run at some values instead.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from functools import partial
 from itertools import product
 from math import exp, inf, isfinite, log
+from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
@@ -18,10 +20,13 @@ from tautwire_fmu.laws.effects import Parameter
 
 from ..errors import UnreachableError
 from ..robots.robot import EffectSetting, Robot
+from .attempts import fitter_apart
 from .data import Sample
+from .filter_step import Noise
 from .fit import Fitter
 from .hypotheses import Hypothesis, joined
 from .screen import Prospect
+from .workers import Workers
 
 # Nats that do not count: smaller values of the parameter are not felt either.
 UNFELT = 0.01
@@ -40,24 +45,44 @@ def scanned(
     fitter: Fitter,
     sample: Sample,
     prospects: Mapping[Hypothesis, Prospect],
+    workers: Workers,
 ) -> dict[Hypothesis, Prospect]:
     """The prospects that name values to look at, better where a run at one gains more than a run at what they promise.
 
     ``robot`` has the accepted hypotheses, whose parameters stay as they are.
     """
+    asked = [hypothesis for hypothesis in prospects if any(p.scanned for p in hypothesis.parameters)]
+    if not asked:
+        return {}
     without = fitter.judged(robot, accepted, sample).log_likelihood(sample.rows)
-    found = {}
-    for hypothesis, prospect in prospects.items():
-        chosen = joined(accepted, hypothesis)
-        gains = [(_run(robot, chosen, fitter, sample, prospect.values) - without, prospect)] if prospect.values else []
-        for values in looked_at(hypothesis):
-            gain = _run(robot, chosen, fitter, sample, {**prospect.values, **values}) - without
-            if isfinite(gain):
-                gains.append((gain, Prospect(gain, {**prospect.values, **values})))
-            if abs(gain) < UNFELT:
-                break
-        found[hypothesis] = max(gains, key=lambda each: each[0], default=(0.0, prospect))[1]
-    return found
+    tasks = [(robot, joined(accepted, h), sample, prospects[h], without) for h in asked]
+    if workers.processes == 1:
+        made = workers.each(partial(better, fitter), tasks)
+    else:
+        made = workers.each(better_apart, [(fitter.noise, *task) for task in tasks])
+    return {asked[number]: prospect for number, prospect in made}
+
+
+def better(
+    fitter: Fitter, robot: Robot, chosen: Sequence[Hypothesis], sample: Sample, prospect: Prospect, without: float
+) -> Prospect:
+    """Of the last of the chosen hypotheses: what it promises, or what gains more by a run.
+
+    ``without`` is the log-likelihood of the sample without it.
+    """
+    gains = [(_run(robot, chosen, fitter, sample, prospect.values) - without, prospect)] if prospect.values else []
+    for values in looked_at(chosen[-1]):
+        gain = _run(robot, chosen, fitter, sample, {**prospect.values, **values}) - without
+        if isfinite(gain):
+            gains.append((gain, Prospect(gain, {**prospect.values, **values})))
+        if abs(gain) < UNFELT:
+            break
+    return max(gains, key=lambda each: each[0], default=(0.0, prospect))[1]
+
+
+def better_apart(noise: Noise, *asked: Any) -> Prospect:
+    """As :func:`better`, in a process that keeps a fitter of its own."""
+    return better(fitter_apart(noise), *asked)
 
 
 def felt_from(

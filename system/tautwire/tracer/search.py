@@ -39,7 +39,7 @@ SURE = 2
 # Mean square of innovations below which a model needs no larger form of the same effects.
 NEARLY_NOISE = 1.1
 MOST_SWAPS = 4
-# Samples by which rivals that come near enough to be fitted to all are told from the others.
+# Samples by which values to begin at, and rivals that come near enough to be fitted to all, are told from the others.
 OF_RIVALS = 600
 
 
@@ -143,10 +143,11 @@ class Search:
         sample = looked if adequate or rival is None else fit.beginning(OF_RIVALS)
         self.progress(f"round {number}: screening", 0.0)
         prospects = screen(robot, accepted, open_ones, self.fitter, looked)
-        prospects |= scanned(robot, accepted, self.fitter, looked, silent(prospects))
+        prospects |= scanned(robot, accepted, self.fitter, looked, silent(prospects), self.workers)
         worth = worth_fitting(prospects)
         if not adequate:
-            prospects |= scanned(robot, accepted, self.fitter, looked, {h: prospects[h] for h in worth})
+            few, near = fit.beginning(OF_RIVALS), {h: prospects[h] for h in worth}
+            prospects |= scanned(robot, accepted, self.fitter, few, near, self.workers)
         starts = {h: self._starts(robot, h, prospects[h]) for h in worth}
         # Far from noise the trials need only be told from each other.
         without = self._best_on_judge(robot, accepted, -inf if adequate else inf)
