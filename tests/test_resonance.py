@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
+from tautwire.recordings.recording import Recording
 from tautwire.tracer.data import split
 from tautwire.tracer.discovery.resonance import resonances
 from tautwire.tracer.fit import Fitter
@@ -16,6 +18,13 @@ from tests.recordings import recorded
 from tests.robots import example
 
 ROBOT = example("three")
+
+
+def without_outputs_after(recording: Recording, row: int) -> Recording:
+    outputs = {name: getattr(recording, name).copy() for name in ("position", "tension")}
+    for values in outputs.values():
+        values[row:] = np.nan
+    return replace(recording, **outputs)
 
 
 def seen(effects: dict[str, Any]) -> tuple[Resonance, ...]:
@@ -48,3 +57,11 @@ def test_a_load_that_swings(mass: float, length: float) -> None:
 )
 def test_nothing_swings_where_nothing_does(effects: dict[str, Any]) -> None:
     assert seen(effects) == ()
+
+
+def test_sensors_that_fall_silent_for_good_are_no_matter() -> None:
+    effects = {"unlisted_swing": {"mass": 20.0, "length": 2.0}}
+    noise = noise_of(ROBOT, recorded("three", 3, effects))
+    pair = [without_outputs_after(recorded("three", seed, effects), 400) for seed in (3, 53)]
+    found = resonances(ROBOT, Fitter(noise), split(ROBOT, noise, *pair))
+    assert all(0.0 < each.frequency < 25.0 for each in found)

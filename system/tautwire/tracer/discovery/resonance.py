@@ -232,7 +232,7 @@ def _gains(
         number += len(values_seen)
         inner += matrix[:, :still].T @ matrix[:, :still]
         across += matrix[:, :still].T @ matrix[:, still:]
-        apart = matrix[:, still:].reshape(len(matrix), -1, width)
+        apart = matrix[:, still:].reshape(len(matrix), len(own), width)
         own += np.einsum("rfg,rfh->fgh", apart, apart, optimize=True)
         pull += matrix.T @ values_seen
     beyond_chance = 0.5 * (squares - number) - CHANCE * np.sqrt(0.5 * number)
