@@ -11,6 +11,7 @@ from tautwire.checking import MOST, Problem, check_files
 from tautwire.errors import InputError, RobotFileError
 from tautwire.robots.reading import read_robot
 from tautwire.statics.equilibrium import static_tensions
+from tests.own_fmus import packed
 from tests.robots import EXAMPLES
 
 THREE = EXAMPLES / "three"
@@ -125,6 +126,33 @@ def test_each_fmu_that_does_not_fit_is_told(tmp_path: Path) -> None:
     text = (THREE / "robot.toml").read_text(encoding="utf-8") + "\n[fmu]\nplatform = 'a.fmu'\ncable_2 = 'b.fmu'\n"
     problems = check_files(written(tmp_path, text)).problems
     assert [text.split("\n")[int(problem.line or 0) - 1][:8] for problem in problems] == ["platform", "cable_2 "]
+
+
+def test_fmus_and_formulas_are_told_beside_all_else(tmp_path: Path) -> None:
+    text = (THREE / "robot.toml").read_text(encoding="utf-8").replace("mass = 300.0", "mass = -300.0")
+    text += "\n[fmu]\nplatform = 'a.fmu'\ncable_9 = 'b.fmu'\n\n[formula]\nforce_x = '-20*q + foo(p)**2.5'\nmass = 'w'\n"
+    problems = check_files(written(tmp_path, text)).problems
+    lines = text.split("\n")
+    told = [(lines[int(problem.line or 0) - 1].partition(" ")[0], problem.problem) for problem in problems]
+    words = ["-300.0", "a.fmu", "not a known key", "'q'", "function", "'p'", "no small whole power", "'w'"]
+    assert [key for key, _ in told] == ["mass", "platform", "cable_9", *["force_x"] * 4, "mass"]
+    for problem, word in zip(problems, words, strict=True):
+        assert word in str(problem)
+
+
+def test_a_start_that_cables_cannot_hold_is_told_beside_what_has_no_part_in_it(tmp_path: Path) -> None:
+    text = (THREE / "robot.toml").read_text(encoding="utf-8").replace("[28.86, 0.0, 5.0]", "[-30.0, 0.0, 5.0]")
+    problems = check_files(written(tmp_path, f"{text}\n[winch]\ndrum_radius = -1.0\n")).problems
+    assert ["cannot be held" in problem.problem for problem in problems] == [True, False]
+
+
+def test_one_fmu_in_two_slots_that_runs_only_once_is_told(tmp_path: Path) -> None:
+    single = {'canGetAndSetFMUstate="true"': 'canBeInstantiatedOnlyOncePerProcess="true"'}
+    packed(tmp_path / "once.fmu", b"", single)
+    text = (THREE / "robot.toml").read_text(encoding="utf-8") + "\n[fmu]\nwinch_1 = 'once.fmu'\nwinch_2 = 'once.fmu'\n"
+    (problem,) = check_files(written(tmp_path, text)).problems
+    assert "can be instantiated only once" in problem.problem
+    assert text.split("\n")[int(problem.line or 0) - 1] == "[fmu]"
 
 
 def test_all_of_a_recording_is_told_with_its_lines(tmp_path: Path) -> None:

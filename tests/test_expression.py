@@ -10,7 +10,15 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tautwire.model.symbolic import CASADI
-from tautwire_fmu.laws.expression import DEEPEST, LONGEST, ExpressionError, evaluate, names_in, read_expression
+from tautwire_fmu.laws.expression import (
+    DEEPEST,
+    LONGEST,
+    ExpressionError,
+    evaluate,
+    expression_faults,
+    names_in,
+    read_expression,
+)
 from tautwire_fmu.laws.mathematics import COMPLEX_STEP, REAL, along, rate_of
 
 NAMES = ("x", "vx", "time")
@@ -39,6 +47,26 @@ def test_one_tree_serves_every_mathematics() -> None:
     x = casadi.SX.sym("x")
     function = casadi.Function("f", [x], [evaluate(CASADI, tree, {**AT, "x": x})])
     assert float(function(0.7)) == pytest.approx(evaluate(REAL, tree, AT), rel=1e-14)
+
+
+@pytest.mark.parametrize(
+    ("text", "places"),
+    [
+        ("x + 2*vx", []),
+        ("q + x*p", [1, 7]),
+        ("q**2.5 + foo(p, x) - 'a'", [1, 4, 10, 14, 22]),
+        ("sin(q, p) + sin(x)", [1, 5, 8]),
+        ("x +", [1]),
+        ("x" * (LONGEST + 1), [LONGEST]),
+    ],
+)
+def test_all_that_is_wrong_is_told_from_left_to_right(text: str, places: list[int]) -> None:
+    faults = expression_faults(text, NAMES)
+    assert [fault.place for fault in faults] == places
+    if places:
+        with pytest.raises(ExpressionError) as caught:
+            read_expression(text, NAMES)
+        assert str(caught.value) == str(faults[0])
 
 
 def test_it_says_which_names_it_uses() -> None:

@@ -1,3 +1,4 @@
+import json
 from pathlib import Path
 
 import pandas as pd
@@ -38,6 +39,24 @@ def test_what_is_wrong_is_one_line_and_nothing_written(
     captured = capsys.readouterr()
     assert told in captured.err and captured.err.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def test_json_without_a_file_prints_the_table_and_writes_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refuse(constant: str) -> None:
+        pytest.fail(f"{constant} is no JSON")
+
+    monkeypatch.chdir(tmp_path)
+    arguments = ["workspace", CAROCA, "--spacing", "2"]
+    assert run([*arguments, "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out, parse_constant=refuse)
+    assert list(tmp_path.iterdir()) == []
+    assert run([*arguments, "--out", "w.csv"]) == 0
+    written = pd.read_csv("w.csv")
+    assert written.lowest_tension.isna().any()
+    pd.testing.assert_frame_equal(pd.DataFrame(printed["rows"]).astype(float), written.astype(float), rtol=1e-9)
+    assert (printed["feasible"], printed["positions"]) == (written.feasible.sum(), len(written))
 
 
 def test_a_robot_that_its_start_does_not_hold_is_mapped_too(tmp_path: Path) -> None:

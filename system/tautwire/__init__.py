@@ -1,6 +1,7 @@
 """Cable-driven parallel robots as FMI components, and a tracer that finds what their model lacks.
 
-The names here are all that most programs need; each comes with its module when it is first asked for.
+The names here are all that most programs need; each comes with its module when it is first asked for. Arguments are
+checked: wrong ones raise ``tautwire.errors.ArgumentError``; whatever is raised on purpose is a ``TautwireError``.
 
 ========================== ========================================================================================
 ``read_robot``             the robot that a TOML file declares

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from functools import partial
 from itertools import islice
 from pathlib import Path
 
@@ -14,8 +13,8 @@ from .fmus.slots import check_own_fmus
 from .recordings.recording import Recording, read_recording, recording_faults
 from .recordings.roughness import roughness
 from .robots.lines import line_of
-from .robots.reading import read_robot, robot_file_text
-from .robots.robot import Robot
+from .robots.reading import read_robot_telling, robot_file_text
+from .robots.robot import Robot, slots
 from .runs.start import start_of
 from .statics.equilibrium import static_tensions
 from .tracer.preparation.preparation import prepare
@@ -26,6 +25,8 @@ MOST = 1000
 MOST_OF_ROBOT = 50
 LONGEST_TEXT = 50_000  # characters
 FEWEST_CABLES = 3
+# What has no part in whether the cables hold the platform at the start.
+APART = frozenset((("name",), ("sensors",), ("winch",), ("fmu",)))
 
 
 @dataclass(frozen=True)
@@ -76,7 +77,7 @@ def _checked_robot(path: Path, problems: list[Problem], notes: list[str]) -> Rob
     faults: list[RobotFileError] = []
     try:
         text = robot_file_text(path)
-        robot = read_robot(path, _at_most(faults, MOST_OF_ROBOT))
+        robot = read_robot_telling(path, _at_most(faults, MOST_OF_ROBOT))
     except RobotFileError as error:
         problems.append(Problem(str(path), error.line, error.where, error.problem, error.mend))
         return None
@@ -84,18 +85,26 @@ def _checked_robot(path: Path, problems: list[Problem], notes: list[str]) -> Rob
         notes.append(f"{path}: no more than {MOST_OF_ROBOT} problems are told")
         robot = None
     problems += sorted((_in_robot_file(path, text, error) for error in faults), key=_by_line)
-    if not problems and robot is not None:
-        for check, place in _of_the_whole(robot):
-            with _gathered(problems, path, _line(text, place)):
-                check()
+    if robot is not None:
+        if not {error.place[:1] for error in faults} - APART:
+            with _gathered(problems, path, _line(text, ("platform", "start"))):
+                static_tensions(robot)
+        problems += _of_fmus(path, text, robot)
+    problems.sort(key=_by_line)
     return robot
 
 
-def _of_the_whole(robot: Robot) -> Iterator[tuple[Callable[[], object], tuple[str, ...]]]:
-    """What is checked of a robot that can be read, and the place in the file that a problem would be about."""
-    yield partial(static_tensions, robot), ("platform", "start")
-    for own in robot.fmus:
-        yield partial(check_own_fmus, replace(robot, fmus=(own,))), ("fmu", own.slot)
+def _of_fmus(path: Path, text: str, robot: Robot) -> list[Problem]:
+    """What is wrong with FMUs of the user's in slots that there are, whatever else is wrong."""
+    problems: list[Problem] = []
+    there = tuple(fmu for fmu in robot.fmus if fmu.slot in slots(robot.cable_count))
+    for fmu in there:
+        with _gathered(problems, path, _line(text, ("fmu", fmu.slot))):
+            check_own_fmus(replace(robot, fmus=(fmu,)))
+    if not problems:
+        with _gathered(problems, path, _line(text, ("fmu",))):
+            check_own_fmus(replace(robot, fmus=there))
+    return problems
 
 
 def _checked_recording(path: Path, cable_count: int, problems: list[Problem], notes: list[str]) -> Recording | None:

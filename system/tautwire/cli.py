@@ -28,9 +28,17 @@ UsageError: type[Exception] = typer.BadParameter.__bases__[0]
 DONE, FAILED, WRONG_INPUT = 0, 1, 2
 
 
+COMMANDS = (new, check, build, fmus, simulate, linearise, workspace, trace, excite, material, campaign, paper)
+
+
+def _text_and_example(command: Callable[..., None]) -> tuple[str, str]:
+    text, _, example = inspect.cleandoc(command.__doc__ or "").partition("Example: ")
+    return text, example
+
+
 def help_of(command: Callable[..., None]) -> str:
     """What a command's docstring says, with its last paragraph, the example, on a line of its own."""
-    text, _, example = inspect.cleandoc(command.__doc__ or "").partition("Example: ")
+    text, example = _text_and_example(command)
     # A line with a backspace alone keeps click from breaking the lines of a paragraph anew.
     return f"{text}\b\nExample: {example}" if example else text
 
@@ -41,7 +49,7 @@ application = typer.Typer(
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
-for command in (new, check, build, fmus, simulate, linearise, workspace, trace, excite, material, campaign, paper):
+for command in COMMANDS:
     application.command(help=help_of(command))(command)
 
 
@@ -72,9 +80,11 @@ def run(arguments: list[str]) -> int:
     try:
         status = application(arguments or ["--help"], prog_name="tautwire", standalone_mode=False)
         sys.stdout.flush()
-    except (InputError, UsageError) as error:
-        message = str(error) if isinstance(error, InputError) else error.format_message()  # type: ignore[attr-defined]
-        return _say(message, WRONG_INPUT)
+    except InputError as error:
+        return _say(f"{error}{_example(arguments) if _is_of_usage(error) else ''}", WRONG_INPUT)
+    except UsageError as error:
+        message = error.format_message().rstrip(".")  # type: ignore[attr-defined]
+        return _say(f"{message}{_example(arguments)}", WRONG_INPUT)
     except TautwireError as error:
         return _say(str(error), FAILED)
     except OSError as error:
@@ -89,6 +99,18 @@ def run(arguments: list[str]) -> int:
         return WRONG_INPUT
     # Newer typer turns Ctrl-C into a status that it returns.
     return _say("interrupted; nothing was written", FAILED) if status else DONE
+
+
+def _is_of_usage(error: InputError) -> bool:
+    """Whether an option or argument is wrong, not a file: files and their keys have no dashes in front."""
+    return error.where.startswith("--") or error.where == "NAME"
+
+
+def _example(arguments: list[str]) -> str:
+    """The example of the command that was asked for, to end a line with; that of help where there is none such."""
+    examples = {command.__name__: _text_and_example(command)[1] for command in COMMANDS}
+    asked = next((examples[word] for word in arguments if word in examples), "tautwire --help")
+    return f"; example: {asked}"
 
 
 def _system_error(error: OSError) -> str:

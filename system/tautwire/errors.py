@@ -34,6 +34,17 @@ class InputError(TautwireError):
         return one_line(f"{self.where}: {self.problem}; {self.mend}")
 
 
+class ArgumentError(InputError):
+    """A function of the library was given what it cannot work with.
+
+    ``where`` names the function and its argument (``cosimulate: step``); ``value`` is what it was given.
+    """
+
+    def __init__(self, where: str, value: object, problem: str, mend: str) -> None:
+        super().__init__(where, problem, mend)
+        self.value = value
+
+
 class RobotFileError(InputError):
     """A robot file that cannot be read or declares something impossible.
 
@@ -122,3 +133,15 @@ def shown(value: object, longest: int = 60) -> str:
     else:
         text = str(value)
     return text if len(text) <= longest else f"{text[:longest]}..."
+
+
+def described(value: object) -> str:
+    """A value that a program handed over as an error message shows it: a text or number itself, others by class."""
+    if value is None or isinstance(value, str | int | float):
+        return shown(value)
+    return f"the class {value.__name__}" if isinstance(value, type) else with_article(type(value).__name__)
+
+
+def with_article(name: str) -> str:
+    """A name as in ``a Robot``, ``an array``."""
+    return f"{'an' if name[:1].lower() in 'aeio' else 'a'} {name}"

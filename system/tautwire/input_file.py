@@ -1,14 +1,22 @@
 """Reading files that others wrote."""
 
+import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from .errors import InputError
+from .errors import ArgumentError, InputError, described
 
 HEAD = 2**16  # bytes that are looked at before all are read
 
 _UTF_16_MARKS = (b"\xff\xfe", b"\xfe\xff")
+
+
+def path_of(where: str, value: object) -> Path:
+    """The path that a text or a path names; raises ArgumentError."""
+    if isinstance(value, str | os.PathLike):
+        return Path(value)
+    raise ArgumentError(where, value, f"is {described(value)}, not a path", "give a text or a pathlib.Path")
 
 
 def read_bytes(path: str | Path, error: type[InputError], largest: int | None = None) -> bytes:

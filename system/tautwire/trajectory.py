@@ -4,16 +4,25 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from math import pi
-from typing import Protocol
+from typing import Protocol, cast
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from .arguments import having, number_of, robot_of
+from .array_arguments import array_of, point_of
+from .errors import ArgumentError
+from .robots.checked_table import NumberRule
 from .robots.robot import Point, Robot
 from .statics.equilibrium import directions as rope_directions
 from .statics.equilibrium import has_routes
 
 Array = NDArray[np.float64]
+
+DURATION = NumberRule("how long the path takes", "s", positive=True)
+RADIUS = NumberRule("the radius", "m", minimum=0.0)
+RISE = NumberRule("the rise over the whole helix", "m")
+ANGLE = NumberRule("the angle turned", "rad")
 
 
 class Trajectory(Protocol):
@@ -42,11 +51,18 @@ class Line:
     """A straight line from rest at ``start`` to rest at ``end``, in m, within ``duration``, in s.
 
     ``p = start + s(t) (end - start)`` with the fifth-order law s of :func:`quintic_law`.
+
+    Raises ArgumentError where a point is not three finite coordinates, or the duration is not above 0.
     """
 
     start: Point
     end: Point
     duration: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "start", point_of("Line: start", self.start))
+        object.__setattr__(self, "end", point_of("Line: end", self.end))
+        object.__setattr__(self, "duration", number_of("Line: duration", self.duration, DURATION))
 
     def position(self, times: Array) -> Array:
         """Where the platform shall be, (N, 3) in m."""
@@ -71,6 +87,8 @@ class Helix:
 
     ``p = centre + (R cos q, R sin q, rise q / angle)``, ``q = angle s(t)`` with the fifth-order law s of
     :func:`quintic_law`; ``radius`` R and ``rise`` in m, ``angle`` in rad. Baklouti et al. 2017, Eqs. 13, 14.
+
+    Raises ArgumentError where the centre is not three finite coordinates, the angle is 0, or a number breaks a bound.
     """
 
     centre: Point
@@ -78,6 +96,13 @@ class Helix:
     rise: float
     angle: float
     duration: float
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "centre", point_of("Helix: centre", self.centre))
+        for name, rule in (("radius", RADIUS), ("rise", RISE), ("angle", ANGLE), ("duration", DURATION)):
+            object.__setattr__(self, name, number_of(f"Helix: {name}", getattr(self, name), rule))
+        if self.angle == 0.0:
+            raise ArgumentError("Helix: angle", 0.0, "is 0, which is no turn", "give another angle, or take a Line")
 
     def position(self, times: Array) -> Array:
         """Where the platform shall be, (N, 3) in m."""
@@ -132,8 +157,28 @@ def cable_directions(robot: Robot, positions: Array) -> Array:
     return directions
 
 
-def ideal_winch_speeds(robot: Robot, trajectory: Trajectory, times: Array) -> Array:
-    """Speeds that reel inelastic cables along a path, ``V_i = -dl_i/dt = u_i . v``, shape (N, n), in m/s."""
-    unit = cable_directions(robot, trajectory.position(times))
-    speeds: Array = np.einsum("kai,ka->ki", unit, trajectory.velocity(times))
+def ideal_winch_speeds(robot: Robot, trajectory: Trajectory, times: ArrayLike) -> Array:
+    """Speeds that reel inelastic cables along a path, at ``times`` (N,) in s; positive reels in.
+
+    ``V_i = -dl_i/dt = u_i . v``, shape (N, n), in m/s; ``u_i`` from the platform along the rope, ``v`` the velocity.
+
+    Raises ArgumentError where an argument is none of these, or the path leads through an exit point.
+    """
+    robot_of("ideal_winch_speeds: robot", robot)
+    trajectory_of("ideal_winch_speeds: trajectory", trajectory)
+    moments = array_of("ideal_winch_speeds: times", times, (None,), "finite times (N,) in s")
+    with np.errstate(invalid="ignore", divide="ignore"):
+        unit = cable_directions(robot, trajectory.position(moments))
+    speeds: Array = np.einsum("kai,ka->ki", unit, trajectory.velocity(moments))
+    lost = np.argwhere(~np.isfinite(speeds))
+    if len(lost):
+        row, cable = lost[0]
+        problem = f"has no winch speed of cable {cable + 1} at {moments[row]:g} s: it leads through the exit point"
+        raise ArgumentError("ideal_winch_speeds: trajectory", trajectory, problem, "lead the path past all exit points")
     return speeds
+
+
+def trajectory_of(where: str, value: object) -> Trajectory:
+    """The value if it is a path over time; raises ArgumentError."""
+    names = ("duration", "position", "velocity", "acceleration")
+    return cast(Trajectory, having(where, value, names, "path", "give a path, such as Line(start, end, duration)"))

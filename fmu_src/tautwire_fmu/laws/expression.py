@@ -7,7 +7,7 @@ Everything else is refused with its place. The tree is evaluated with the mathem
 
 import ast
 import math
-from typing import Any, Callable, Collection, Dict, Mapping, NamedTuple, Tuple
+from typing import Any, Callable, Collection, Dict, List, Mapping, NamedTuple, Tuple
 
 from .mathematics import Mathematics
 
@@ -44,11 +44,37 @@ class Node(NamedTuple):
     parts: Tuple[Any, ...]
 
 
+NOTHING = Node("number", (math.nan,))
+
+
 def read_expression(text: str, names: Collection[str]) -> Node:
     """The tree of a formula in some names.
 
-    Raises ExpressionError where the text is anything else.
+    Raises ExpressionError, the first, where the text is anything else.
     """
+    faults: List[ExpressionError] = []
+    tree = _read(text, names, faults)
+    if faults:
+        raise min(faults, key=_place)
+    return tree
+
+
+def expression_faults(text: str, names: Collection[str]) -> Tuple[ExpressionError, ...]:
+    """All for which a text is no formula in some names, from left to right; none where it is one."""
+    faults: List[ExpressionError] = []
+    try:
+        _read(text, names, faults)
+    except ExpressionError as error:
+        return (error,)
+    return tuple(sorted(faults, key=_place))
+
+
+def _place(error: ExpressionError) -> int:
+    return error.place
+
+
+def _read(text: str, names: Collection[str], faults: List[ExpressionError]) -> Node:
+    """The tree, of use where it adds nothing to the faults; raises ExpressionError where there is no tree at all."""
     if len(text) > LONGEST:
         raise ExpressionError(LONGEST, f"has {len(text)} characters, at most {LONGEST} are read", "write it shorter")
     strange = next((place for place, letter in enumerate(text) if not " " <= letter <= "~"), None)
@@ -62,7 +88,7 @@ def read_expression(text: str, names: Collection[str]) -> Node:
         raise ExpressionError(error.offset or 1, f"is no formula ({error.msg})", "correct it there") from error
     except (ValueError, RecursionError, MemoryError) as error:
         raise ExpressionError(1, "cannot be read", "write it shorter and with fewer brackets") from error
-    return _node(body, frozenset(names), DEEPEST)
+    return _node(body, frozenset(names), DEEPEST, faults)
 
 
 def evaluate(m: Mathematics, node: Node, values: Mapping[str, Any]) -> Any:
@@ -102,7 +128,15 @@ def _power(base: Any, exponent: int) -> Any:
     return result if exponent >= 0 else 1.0 / result
 
 
-def _node(found: ast.AST, names: Collection[str], depth: int) -> Node:
+def _node(found: ast.AST, names: Collection[str], depth: int, faults: List[ExpressionError]) -> Node:
+    try:
+        return _operation(found, names, depth, faults)
+    except ExpressionError as error:
+        faults.append(error)
+        return NOTHING
+
+
+def _operation(found: ast.AST, names: Collection[str], depth: int, faults: List[ExpressionError]) -> Node:
     if depth == 0:
         raise _refusal(found, f"is nested more than {DEEPEST} deep", "use fewer brackets, or multiply out")
     if isinstance(found, ast.Constant):
@@ -112,17 +146,20 @@ def _node(found: ast.AST, names: Collection[str], depth: int) -> Node:
             raise _refusal(found, f"{found.id[:40]!r} is no name here", f"use {', '.join(sorted(names))}")
         return Node("name", (found.id,))
     if isinstance(found, ast.UnaryOp) and isinstance(found.op, (ast.USub, ast.UAdd)):
-        inner = _node(found.operand, names, depth - 1)
+        inner = _node(found.operand, names, depth - 1, faults)
         return Node("negative", (inner,)) if isinstance(found.op, ast.USub) else inner
     if isinstance(found, ast.BinOp) and isinstance(found.op, ast.Pow):
-        return Node("power", (_node(found.left, names, depth - 1), _exponent(found.right)))
+        base = _node(found.left, names, depth - 1, faults)
+        return Node("power", (base, _exponent(found.right)))
     if isinstance(found, ast.BinOp) and type(found.op) in OPERATORS:
-        parts = (_node(found.left, names, depth - 1), _node(found.right, names, depth - 1))
+        parts = tuple(_node(side, names, depth - 1, faults) for side in (found.left, found.right))
         return Node(OPERATORS[type(found.op)], parts)
-    if isinstance(found, ast.Call) and isinstance(found.func, ast.Name) and found.func.id in FUNCTIONS:
-        if len(found.args) != 1 or found.keywords:
-            raise _refusal(found, f"{found.func.id} takes one number", f"write {found.func.id}(...)")
-        return Node(found.func.id, (_node(found.args[0], names, depth - 1),))
+    if isinstance(found, ast.Call) and isinstance(found.func, ast.Name):
+        parts = tuple(_node(argument, names, depth - 1, faults) for argument in found.args)
+        if found.func.id in FUNCTIONS:
+            if len(found.args) != 1 or found.keywords:
+                raise _refusal(found, f"{found.func.id} takes one number", f"write {found.func.id}(...)")
+            return Node(found.func.id, parts)
     raise _refusal(found, "is neither arithmetic nor a known function", f"use + - * / ** and {', '.join(FUNCTIONS)}")
 
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import json
+import math
+from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from ..errors import UnreachableError
+from ..errors import InputError, UnreachableError
 from ..robots.reading import read_robot
 from .shared import (
     AsJson,
@@ -23,10 +25,15 @@ from .shared import (
     say_what_is_left_out,
 )
 
+if TYPE_CHECKING:
+    from ..statics.workspace import Workspace
+
 
 def linearise(
     robot_file: RobotFile,
-    out: Annotated[Path, typer.Option(metavar="MODEL.json", help="Where the model goes.")],
+    out: Annotated[
+        Path | None, typer.Option(metavar="MODEL.json", help="Where the model goes; not needed with --json.")
+    ] = None,
     at: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Position, m; by default the start.")] = None,
     report: Annotated[
         Path | None, typer.Option(metavar="PAGE.html", help="Modes in motion and gains, as a page.")
@@ -44,8 +51,10 @@ def linearise(
     from ..linear import model_document
     from ..output import file_in_place, refuse_inputs, refuse_same
 
-    refuse_inputs([robot_file], [out, *([report] if report else [])])
-    refuse_same(out, report)
+    require_out(out, as_json, "model.json")
+    refuse_inputs([robot_file], [path for path in (out, report) if path])
+    if out is not None:
+        refuse_same(out, report)
     voice = Voice(as_json, quiet)
     robot = robot_of(robot_file)
     try:
@@ -55,26 +64,30 @@ def linearise(
     except UnreachableError as error:
         raise UnreachableError("--at", error.position, error.cable, error.tension, error.reason) from error
     document = model_document(plant)
-    with file_in_place(out) as scratch:
-        scratch.write_text(json.dumps(document, indent=1), encoding="utf-8")
+    with ExitStack() as both:
+        if out is not None:
+            scratch = both.enter_context(file_in_place(out))
+            scratch.write_text(json.dumps(document, indent=1), encoding="utf-8")
         if report is not None:
             from ..report.modes_page import modes_page
 
-            links = links_beside(report, robot_file, out)
-            with file_in_place(report) as page:
-                page.write_text(modes_page(robot, plant, links), encoding="utf-8")
+            links = links_beside(report, robot_file, *([out] if out else []))
+            page = both.enter_context(file_in_place(report))
+            page.write_text(modes_page(robot, plant, links), encoding="utf-8")
     say_what_is_left_out(robot, voice)
     for note in plant.notes:
         voice.note(note)
     pairs = zip(plant.modes.frequencies, plant.modes.damping_ratios, strict=True)
     modes = [f"mode {i}: {hertz:.4f} Hz, damping ratio {ratio:.5f}" for i, (hertz, ratio) in enumerate(pairs, 1)]
-    written = {"model": out} | ({"report": report} if report else {})
+    written = ({"model": out} if out else {}) | ({"report": report} if report else {})
     voice.result([*modes, *written.values()], {**written, **document, "notes": plant.notes})
 
 
 def workspace(
     robot_file: RobotFile,
-    out: Annotated[Path, typer.Option(metavar="WORKSPACE.csv", help="Where the table goes.")],
+    out: Annotated[
+        Path | None, typer.Option(metavar="WORKSPACE.csv", help="Where the table goes; not needed with --json.")
+    ] = None,
     plot: Annotated[Path | None, typer.Option(metavar="FIGURE.png", help="Slices as a figure; or .pdf, .svg.")] = None,
     lower: Annotated[
         str | None, typer.Option(metavar="X,Y,Z", help="Lower corner, m; by default of all exit points and the start.")
@@ -95,7 +108,8 @@ def workspace(
     from ..statics.workspace import wrench_feasible_workspace
     from ..statics.workspace_figure import checked_format, workspace_figure
 
-    refuse_inputs([robot_file], [out, *([plot] if plot else [])])
+    require_out(out, as_json, "workspace.csv")
+    refuse_inputs([robot_file], [path for path in (out, plot) if path])
     if plot is not None:
         checked_format(plot)
     voice = Voice(as_json, quiet)
@@ -105,12 +119,27 @@ def workspace(
     with progress_bar(voice) as tell:
         ahead = partial(tell, "looking where the cables hold it")
         found = wrench_feasible_workspace(robot, least, most, spacing, acceleration, ahead)
-    with file_in_place(out) as scratch:
-        found.frame().to_csv(scratch, index=False, float_format="%.10g")
+    with ExitStack() as both:
+        if out is not None:
+            found.frame().to_csv(both.enter_context(file_in_place(out)), index=False, float_format="%.10g")
         if plot is not None:
-            with file_in_place(plot) as drawing:
-                workspace_figure(robot, found).savefig(drawing)
+            workspace_figure(robot, found).savefig(both.enter_context(file_in_place(plot)))
     feasible, positions = int(found.feasible.sum()), int(found.feasible.size)
-    written = {"workspace": out} | ({"plot": plot} if plot else {})
+    written = ({"workspace": out} if out else {}) | ({"plot": plot} if plot else {})
     said = f"{feasible} of {positions} positions are wrench-feasible"
-    voice.result([said, *written.values()], {**written, "feasible": feasible, "positions": positions})
+    document = {**written, "feasible": feasible, "positions": positions}
+    # What no file holds, a machine gets here.
+    rows = {} if out else {"rows": _rows(found)}
+    voice.result([said, *written.values()], {**document, **rows})
+
+
+def require_out(out: Path | None, as_json: bool, name: str) -> None:
+    """Raises InputError where the result would go nowhere."""
+    if out is None and not as_json:
+        raise InputError("--out", "is missing", f"name a file, as in --out {name}, or add --json")
+
+
+def _rows(found: Workspace) -> list[dict[str, float | None]]:
+    """A record a position, None where there is no number."""
+    records = found.frame().to_dict("records")
+    return [{str(key): value if math.isfinite(value) else None for key, value in record.items()} for record in records]

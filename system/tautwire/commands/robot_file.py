@@ -33,12 +33,13 @@ def new(
 
     voice = Voice(as_json, quiet)
     target = Path(name if name.endswith(SUFFIX) else f"{name}{SUFFIX}")
-    if not target.stem.strip() or not target.stem.isprintable():
-        raise InputError("NAME", f"{target.stem!r} is no name", "give one line of printable text, such as hall")
+    robot = target.name.removesuffix(SUFFIX)
+    if not robot.strip() or not robot.isprintable():
+        raise InputError("NAME", f"{robot!r} is no name", "give one line of printable text, such as hall")
     if target.exists() and not overwrite:
         raise InputError(str(target), "is there already", "choose another name, or add --overwrite")
     with file_in_place(target) as scratch:
-        scratch.write_text(new_robot_text(target.stem, cables), encoding="utf-8")
+        scratch.write_text(new_robot_text(robot, cables), encoding="utf-8")
     voice.result([target], {"robot": target})
     voice.next(f"put your robot's numbers into {target}, then tautwire check {target}")
 

@@ -7,6 +7,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arguments import number_of
+from ..errors import ArgumentError
+from ..robots.checked_table import NumberRule
 from ..robots.robot import Robot
 
 Array = NDArray[np.float64]
@@ -14,6 +17,24 @@ Array = NDArray[np.float64]
 # What a robot file that declares no sensors is taken to have.
 POSITION_NOISE = 1e-4
 TENSION_NOISE = 1.0
+
+RULES = {
+    "period": NumberRule("the sample period", "s", positive=True),
+    "position": NumberRule("a deviation of position", "m", positive=True),
+    "tension": NumberRule("a share of the mean static tension", "", positive=True),
+    "winch_speed": NumberRule("a winch speed", "m/s", positive=True),
+    "winch_acceleration": NumberRule("a winch acceleration", "m/s^2", positive=True),
+    "integral_time": NumberRule("a time", "s", positive=True),
+    "speed_limit": NumberRule("the largest winch speed", "m/s", positive=True),
+    "acceleration_disturbance": NumberRule("a wander of velocity", "m/s^2", positive=True),
+    "speed_disturbance": NumberRule("a wander of rope", "m/s", positive=True),
+    "acceleration_limit": NumberRule("the largest winch acceleration", "m/s^2", positive=True),
+    "lowest_tension": NumberRule("the least tension", "N", minimum=0.0),
+    "highest_tension": NumberRule("the largest tension", "N", positive=True),
+    "yield_time": NumberRule("a time", "s", positive=True),
+}
+ENDLESS = ("speed_limit", "acceleration_limit", "highest_tension")
+OPTIONAL = ("lowest_tension", "highest_tension")
 
 
 @dataclass(frozen=True)
@@ -34,6 +55,8 @@ class ControlAim:
     cable beyond its limit gives way so that its tension is back in about ``yield_time``, in s.
 
     With ``tare`` the run starts at rest, and the tensions seen there tell of a payload that nobody declared.
+
+    Raises ArgumentError where a number is not finite or not above 0; limits may be infinite, the lowest tension 0.
     """
 
     period: float = 0.01
@@ -50,6 +73,16 @@ class ControlAim:
     highest_tension: float | None = None
     yield_time: float = 0.06
     tare: bool = True
+
+    def __post_init__(self) -> None:
+        for name, rule in RULES.items():
+            value = getattr(self, name)
+            if not (value is None and name in OPTIONAL):
+                number_of(f"ControlAim: {name}", value, rule, or_infinite=name in ENDLESS)
+        lowest, highest = self.lowest_tension, self.highest_tension
+        if lowest is not None and highest is not None and lowest > highest:
+            problem = f"is {lowest:g} N, above highest_tension, {highest:g} N"
+            raise ArgumentError("ControlAim: lowest_tension", lowest, problem, "lower it, or raise the other")
 
 
 def measurement_noise(robot: Robot) -> Array:

@@ -6,15 +6,19 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from ..arguments import file_of, folder_of, having, number_of, of_kind, robot_of, whole_number_of
+from ..array_arguments import array_of, rising_of
 from ..errors import InputError
 from ..fmus.packaging import RobotFmus, build_controller
 from ..master import Connection, FixedStep, Port, Progress, Source
+from ..robots.checked_table import NumberRule
 from ..robots.robot import Robot
-from ..runs.cosimulation import ALONE, STEP, Beside, Motion, run, wired
+from ..runs.asked import require_fmus, require_options
+from ..runs.cosimulation import ALONE, STEP, TIMES, Beside, Motion, run, wired
 from ..runs.wiring import AXES, PLATFORM, winch_ports
-from ..trajectory import Trajectory
+from ..trajectory import Trajectory, trajectory_of
 from .design import Design
 from .feedforward import elastic_reference
 from .path import Reference
@@ -24,6 +28,8 @@ from .source import PathController
 Array = NDArray[np.float64]
 
 CONTROLLER = "controller"
+DURATION = NumberRule("how long the run takes", "s", positive=True)
+DESIGN = ("aim", "cable_count", "feels", "knots")
 PUSHED = tuple(Port(PLATFORM, f"{name}.{axis}") for axis in AXES for name in ("external_force", "external_force_rate"))
 
 
@@ -79,27 +85,37 @@ def cosimulate_closed_loop(
     progress: Progress | None = None,
     patience: float | None = None,
     reference: Reference | None = None,
-    push: Array | None = None,
+    push: ArrayLike | None = None,
 ) -> Motion:
-    """Co-simulate the FMUs with the controller over whole samples until ``duration`` (s) is reached.
+    """Co-simulate the FMUs with the controller over whole samples until ``duration`` (s) is reached, N of them.
 
-    ``robot`` is what the controller believes; it follows ``reference``, by default that of the elastic model. ``step``
-    bounds the macro step in s; ``seed`` switches the noise of the robot's sensors on; ``push`` (N, 3) is an external
-    force in N, held from sample to sample. ``patience`` is as for :func:`tautwire.runs.cosimulation.record`. Returns
-    the run at the controller's samples.
+    ``robot`` is what the controller believes; it follows ``reference`` at its samples, by default that of the elastic
+    model. ``step`` bounds the macro step in s; ``seed`` switches the noise of the robot's sensors on; ``push`` (N, 3)
+    is an external force in N, held from sample to sample. ``progress`` and ``patience`` are as for
+    :func:`tautwire.cosimulate`. Returns the run at the controller's samples.
 
     With winches the speeds that the controller wants are what these are asked for.
 
-    Raises UnreachableError where the path asks a cable to push, InputError where an FMU does not show a tension or
-    robot, controller and FMUs do not go together.
+    Raises UnreachableError where the path asks a cable to push, StretchError where no speeds follow it, RunError where
+    an FMU fails, InputError where an FMU does not show a tension or robot, controller and FMUs do not go together,
+    ArgumentError where an argument is none of these.
     """
+    require_fmus("cosimulate_closed_loop: fmus", fmus)
+    _require_design("cosimulate_closed_loop", robot, controller, trajectory)
+    number_of("cosimulate_closed_loop: duration", duration, DURATION)
+    require_options("cosimulate_closed_loop", step, None, progress, patience)
+    if seed is not None:
+        whole_number_of("cosimulate_closed_loop: seed", seed, 0, "give a whole number, or None for no noise")
     _require_cables(fmus, robot, controller)
     _require_tensions(fmus, robot)
     times = sample_times(controller.aim.period, duration)
+    if reference is not None:
+        _require_reference("cosimulate_closed_loop", reference, len(times), robot.cable_count)
     source: Source = PathController(robot, controller, trajectory, times, seed, reference)
     beside = ALONE
     if push is not None:
-        source, beside = Joined((source, Push(push))), Beside(also=PUSHED)
+        forces = _require_push("cosimulate_closed_loop", push, len(times))
+        source, beside = Joined((source, Push(forces))), Beside(also=PUSHED)
     return run(fmus, source, times, FixedStep(step), progress, patience, beside)
 
 
@@ -108,7 +124,7 @@ def build_controller_fmu(
     controller: Design,
     trajectory: Trajectory,
     duration: float,
-    folder: Path,
+    folder: str | Path,
     reference: Reference | None = None,
 ) -> Path:
     """Write ``controller.fmu`` into ``folder``: the controller with its path until ``duration`` (s), where it rests.
@@ -116,19 +132,25 @@ def build_controller_fmu(
     ``reference`` is at the controller's samples, by default that of the elastic model. Its inputs are the measured
     position and tensions, its outputs winch speeds and their rates.
 
-    Raises UnreachableError where the path asks a cable to push.
+    Raises UnreachableError where the path asks a cable to push, ArgumentError where an argument is none of these.
     """
+    _require_design("build_controller_fmu", robot, controller, trajectory)
+    number_of("build_controller_fmu: duration", duration, DURATION)
+    place = folder_of("build_controller_fmu: folder", folder)
     times = sample_times(controller.aim.period, duration)
-    reference = reference or elastic_reference(robot, trajectory, times)
-    return build_controller(plan_data(robot, controller, reference), folder)
+    if reference is not None:
+        _require_reference("build_controller_fmu", reference, len(times), robot.cable_count)
+    return build_controller(
+        plan_data(robot, controller, reference or elastic_reference(robot, trajectory, times)), place
+    )
 
 
 def cosimulate_with_controller(
     fmus: RobotFmus,
-    controller: Path,
-    time: Array,
+    controller: str | Path,
+    time: ArrayLike,
     step: float = STEP,
-    push: Array | None = None,
+    push: ArrayLike | None = None,
     progress: Progress | None = None,
     patience: float | None = None,
 ) -> Motion:
@@ -137,15 +159,21 @@ def cosimulate_with_controller(
     ``time`` (N,) in s, rising, from 0; macro steps are no longer than ``step`` (s) and end at each of these times: let
     them hold the controller's samples. ``push`` (N, 3) is an external force in N, held from time to time.
 
-    Raises RunError where an FMU fails.
+    Raises RunError where an FMU fails, ArgumentError where an argument is none of these.
     """
+    name = "cosimulate_with_controller"
+    require_fmus(f"{name}: fmus", fmus)
+    parts = {CONTROLLER: file_of(f"{name}: controller", controller)}
+    moments = rising_of(f"{name}: time", time, TIMES)
+    require_options(name, step, None, progress, patience)
     wires = controller_wires(fmus)
     still = Still(len(winch_ports(len(fmus.cables))))
     if push is None:
-        beside, source = Beside({CONTROLLER: controller}, wires), Joined((still,))
+        beside, source = Beside(parts, wires), Joined((still,))
     else:
-        beside, source = Beside({CONTROLLER: controller}, wires, PUSHED), Joined((still, Push(push)))
-    return run(fmus, source, time, FixedStep(step), progress, patience, beside)
+        forces = _require_push(name, push, len(moments))
+        beside, source = Beside(parts, wires, PUSHED), Joined((still, Push(forces)))
+    return run(fmus, source, moments, FixedStep(step), progress, patience, beside)
 
 
 def controller_wires(fmus: RobotFmus) -> tuple[Connection, ...]:
@@ -159,6 +187,26 @@ def controller_wires(fmus: RobotFmus) -> tuple[Connection, ...]:
         *(Connection(port, Port(CONTROLLER, name)) for port, name in zip(shown, seen, strict=True)),
         *(Connection(Port(CONTROLLER, asked[place]), ports[place]) for place in wiring.driven),
     )
+
+
+def _require_design(name: str, robot: Robot, controller: Design, trajectory: Trajectory) -> None:
+    robot_of(f"{name}: robot", robot)
+    having(f"{name}: controller", controller, DESIGN, "controller", "give what design_controller returns")
+    trajectory_of(f"{name}: trajectory", trajectory)
+
+
+def _require_push(name: str, push: ArrayLike, count: int) -> Array:
+    meaning = "finite forces in N, a row for each sample and columns x, y, z"
+    return array_of(f"{name}: push", push, (count, 3), meaning)
+
+
+def _require_reference(name: str, reference: Reference, count: int, cables: int) -> None:
+    where = f"{name}: reference"
+    of_kind(where, reference, Reference, "give what elastic_reference returns")
+    widths = {"speeds": cables, "rigid": cables, "expected": 3 + cables}
+    for name, width in widths.items():
+        meaning = f"that of the controller's {count} samples, sample_times(period, duration)"
+        array_of(f"{where}.{name}", getattr(reference, name), (count, width), meaning)
 
 
 def _require_cables(fmus: RobotFmus, robot: Robot, controller: Design) -> None:

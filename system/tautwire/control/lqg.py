@@ -17,6 +17,7 @@ import control
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arguments import of_kind, robot_of
 from ..linear import LinearPlant, linearise
 from ..robots.robot import Robot
 from ..runs.wiring import AXES
@@ -93,11 +94,17 @@ class Controller:
 
 
 def design_controller(robot: Robot, aim: ControlAim | None = None, at: Sequence[float] | None = None) -> Controller:
-    """LQG with integral action on the plant linearised at ``at`` (m), by default the start.
+    """LQG with integral action on the plant linearised at ``at``, three coordinates in m, by default the start.
 
-    Raises what :func:`tautwire.linear.linearise` raises.
+    ``a_k = -K (x_k, w_k, z_k)``: winch accelerations (n,) in m/s^2 from the estimate of a Kalman filter, winch speeds
+    and summed position errors, sampled at ``aim.period``. ``aim`` holds what is weighed, and the limits.
+
+    Raises UnreachableError where the cables cannot hold the platform there, OperatingPointError where they do not hold
+    it stably, ArgumentError where an argument is none of these. Source: Franklin, Powell and Workman (1998), Digital
+    Control of Dynamic Systems, chapter 9.
     """
-    aim = aim or ControlAim()
+    robot_of("design_controller: robot", robot)
+    aim = ControlAim() if aim is None else of_kind("design_controller: aim", aim, ControlAim, "give a ControlAim")
     linear = linearise(robot, at)
     plant = sampled_plant(linear, aim.period)
     return Controller(aim, linear, plant, _feedback(aim, linear, plant), _observer(robot, aim, linear, plant))

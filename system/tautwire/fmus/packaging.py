@@ -17,6 +17,7 @@ import tautwire_fmu
 from tautwire_fmu.laws.effects import BY_NAME
 from tautwire_fmu.laws.winch_drive import NO_LIMIT
 
+from ..arguments import callable_or_none, folder_of, robot_of
 from ..model.assembly import assemble
 from ..robots.robot import EffectSetting, Robot
 from ..statics.equilibrium import formula_texts, has_sensor_effects, platform_settings, static_forces, static_tensions
@@ -75,14 +76,19 @@ class RobotFmus:
         return tuple(index for index, path in enumerate(self.winches, start=1) if path is not None)
 
 
-def build_fmus(robot: Robot, folder: Path, progress: Callable[[float], None] | None = None) -> RobotFmus:
+def build_fmus(robot: Robot, folder: str | Path, progress: Callable[[float], None] | None = None) -> RobotFmus:
     """Write ``platform.fmu``, ``cable_1.fmu`` ... and, where there are winches, ``winch_1.fmu`` ... into ``folder``.
 
     FMI 2.0 co-simulation; what a component is lies inside as a JSON resource. FMUs of the user's stay where they are.
-    ``progress`` gets the share that is done.
+    The folder is made if absent, and has to stay while the FMUs are run. ``progress`` gets the share that is done, from
+    0 to 1. Returns where the FMUs lie.
 
-    Raises SlotError where an FMU of the user's does not fit.
+    Raises SlotError where an FMU of the user's does not fit, UnreachableError where the cables cannot hold the
+    platform at the start, ArgumentError where an argument is none of these, OSError where the disk refuses.
     """
+    robot_of("build_fmus: robot", robot)
+    folder = folder_of("build_fmus: folder", folder)
+    callable_or_none("build_fmus: progress", progress)
     check_own_fmus(robot)
     folder.mkdir(parents=True, exist_ok=True)
     own = {fmu.slot: fmu.path for fmu in robot.fmus}

@@ -8,12 +8,14 @@ from functools import partial
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
-from ..errors import InputError
+from ..arguments import robot_of, whole_number_of
+from ..array_arguments import array_of, rising_of
+from ..errors import ArgumentError
 from ..robots.robot import Robot
-from ..trajectory import Trajectory
+from ..trajectory import Trajectory, trajectory_of
 from .modes import Modes, cable_shares
 from .plant import linearise
 
@@ -55,7 +57,9 @@ class ModesAlong:
     likeness: Array
 
 
-def modes_along(robot: Robot, path: Trajectory | Array, times: Array | None = None, points: int = POINTS) -> ModesAlong:
+def modes_along(
+    robot: Robot, path: Trajectory | ArrayLike, times: ArrayLike | None = None, points: int = POINTS
+) -> ModesAlong:
     """The modes of a robot at rest at places along a path; the paper's Fig. 15 in one call.
 
     ``path`` is a trajectory, taken at ``times`` (N,) in s or at equally many ``points`` of its duration, or positions
@@ -64,8 +68,11 @@ def modes_along(robot: Robot, path: Trajectory | Array, times: Array | None = No
     turn into each other at the least change: their shapes are turned back to look like those before, so that modes
     that come so near cross.
 
-    Raises InputError where the path is none, and what :func:`tautwire.linear.linearise` raises.
+    Raises ArgumentError where an argument is none of these, or the path has fewer than two places, and what
+    :func:`tautwire.linear.linearise` raises.
     """
+    robot_of("modes_along: robot", robot)
+    whole_number_of("modes_along: points", points, 2, "give two or more")
     place, abscissa, timed = _path(path, times, points)
     count = len(abscissa)
 
@@ -81,36 +88,30 @@ def modes_along(robot: Robot, path: Trajectory | Array, times: Array | None = No
     return ModesAlong(abscissa=abscissa, timed=timed, positions=positions, likeness=np.array(likeness), **stacked)
 
 
-def _path(path: Trajectory | Array, times: Array | None, points: int) -> tuple[Callable[[float], Array], Array, bool]:
+def _path(
+    path: Trajectory | ArrayLike, times: ArrayLike | None, points: int
+) -> tuple[Callable[[float], Array], Array, bool]:
     """The place at a number of points, fractions between neighbours, with the abscissa and whether that is time."""
-    if not isinstance(path, np.ndarray | list | tuple):
-        if times is None:
-            times = np.linspace(0.0, path.duration, points)
-        instants = np.asarray(times, dtype=float)
+    if not hasattr(path, "__len__"):
+        trajectory = trajectory_of("modes_along: path", path)
+        asked = np.linspace(0.0, trajectory.duration, points) if times is None else times
+        instants = rising_of("modes_along: times", asked, "finite times (N,) in s that rise, two or more")
         numbers = np.arange(len(instants))
-        _refuse_short(len(instants))
-        return (lambda where: path.position(np.array([np.interp(where, numbers, instants)]))[0]), instants, True
-    positions = np.asarray(path, dtype=float)
-    if positions.ndim != 2 or positions.shape[1] != 3 or not np.all(np.isfinite(positions)):
-        raise InputError("path", f"has the shape {positions.shape}", "give positions (N, 3) in m, all finite")
-    _refuse_short(len(positions))
+        return (lambda where: trajectory.position(np.array([np.interp(where, numbers, instants)]))[0]), instants, True
+    positions = array_of("modes_along: path", path, (None, 3), "a path, or finite positions (N, 3) in m")
+    if len(positions) < 2:
+        raise ArgumentError("modes_along: path", path, f"has {len(positions)} places", "give two or more")
     numbers = np.arange(len(positions))
     travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(positions, axis=0), axis=1))])
-    abscissa = travelled if times is None else np.asarray(times, dtype=float)
-    if abscissa.shape != (len(positions),):
-        raise InputError(
-            "times", f"has the shape {abscissa.shape}", f"give one time for each of {len(positions)} positions"
-        )
+    abscissa = travelled
+    if times is not None:
+        meaning = f"one time for each of {len(positions)} positions, in s"
+        abscissa = array_of("modes_along: times", times, (len(positions),), meaning)
     return (
         (lambda where: np.array([np.interp(where, numbers, axis) for axis in positions.T])),
         abscissa,
         times is not None,
     )
-
-
-def _refuse_short(count: int) -> None:
-    if count < 2:
-        raise InputError("path", f"has {count} places", "give two or more")
 
 
 def _followed(here: Callable[[float], _Here], count: int) -> list[Modes]:

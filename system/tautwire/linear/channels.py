@@ -65,6 +65,8 @@ def transfer_function(system: Any, source: str, target: str, tolerance: float = 
 
 def _places(kind: str, names: Sequence[str] | str, labels: Sequence[str]) -> list[int]:
     wanted = [names] if isinstance(names, str) else list(names)
+    if not wanted:
+        raise InputError(kind, f"no {kind} is named", f"choose among {', '.join(labels)}")
     for name in wanted:
         if name not in labels:
             raise InputError(kind, f"there is no {kind} {name!r}", f"choose among {', '.join(labels)}")

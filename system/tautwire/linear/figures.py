@@ -5,14 +5,17 @@ All are returned, none is shown: ``figure.savefig("bode.png")``.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import control
 import numpy as np
 from matplotlib.figure import Figure
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from ..arguments import of_kind
+from ..array_arguments import rising_of
+from ..errors import ArgumentError, described
 from .along import ModesAlong
 from .channels import minimal
 
@@ -24,14 +27,21 @@ MARGIN = 1.15
 STYLES = ("-", "--", ":", "-.")
 
 
-def bode_figure(system: Any, source: str, targets: Sequence[str] | str, frequencies: Array | None = None) -> Figure:
-    """Bode diagram from one named input to some named outputs of a ``control.StateSpace``.
+def bode_figure(system: Any, source: str, targets: Sequence[str] | str, frequencies: ArrayLike | None = None) -> Figure:
+    """Bode diagram from one named input to some named outputs of a ``control.StateSpace``: gain and phase of G(i w).
 
-    ``frequencies`` in Hz; by default from a tenth of the slowest oscillation to ten times the fastest. Raises
-    InputError where a signal is unknown.
+    ``frequencies`` (N,) in Hz, rising, above 0; by default from a tenth of the slowest oscillation to ten times the
+    fastest. The figure is returned, not shown.
+
+    Raises InputError where a signal is unknown or no output is named, ArgumentError where an argument is none of these.
     """
-    names = [targets] if isinstance(targets, str) else list(targets)
-    omega = _around(system) if frequencies is None else 2.0 * np.pi * np.asarray(frequencies, dtype=float)
+    of_kind("bode_figure: system", system, control.StateSpace, "give a state space, such as linearise(robot).system")
+    of_kind("bode_figure: source", source, str, f"name one of {', '.join(system.input_labels)}")
+    names = _names("bode_figure: targets", targets, system.output_labels)
+    omega = _around(system)
+    if frequencies is not None:
+        meaning = "finite frequencies (N,) in Hz that rise, two or more"
+        omega = 2.0 * np.pi * rising_of("bode_figure: frequencies", frequencies, meaning, above=0.0)
     figure = Figure(figsize=(8.0, 6.0), layout="constrained")
     axes = figure.subplots(2, 1, sharex=True)
     for name in names:
@@ -71,8 +81,11 @@ def modes_along_figure(runs: ModesAlong | Mapping[str, ModesAlong]) -> Figure:
     """Frequencies and damping ratios of the modes along a path, a colour for each mode.
 
     Several runs by name, as with the quasi-static and the dynamic modulus, get a line style each; the paper's Fig. 15.
+    Over time in s, or distance travelled in m; frequencies in Hz. The figure is returned, not shown.
+
+    Raises ArgumentError where ``runs`` is neither what ``modes_along`` returns nor a mapping of names to such.
     """
-    named: Mapping[str, ModesAlong] = {"": runs} if isinstance(runs, ModesAlong) else runs
+    named = _runs(runs)
     figure = Figure(figsize=(8.0, 6.0), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True)
     for (name, run), style in zip(named.items(), STYLES * len(named), strict=False):
@@ -90,6 +103,28 @@ def modes_along_figure(runs: ModesAlong | Mapping[str, ModesAlong]) -> Figure:
     handles, labels = upper.get_legend_handles_labels()
     figure.legend(handles, labels, loc="outside upper center", ncols=len(named) if len(named) > 1 else 3)
     return figure
+
+
+def _names(where: str, names: Sequence[str] | str, labels: Sequence[str]) -> list[str]:
+    """One name or several as a list; raises ArgumentError for none."""
+    mend = f"name some of {', '.join(labels)}"
+    listed = [names] if isinstance(names, str) else names if isinstance(names, Iterable) else []
+    found = [of_kind(where, name, str, mend) for name in listed]
+    if not found:
+        raise ArgumentError(where, names, f"is {described(names)} that names no output", mend)
+    return found
+
+
+def _runs(runs: ModesAlong | Mapping[str, ModesAlong]) -> Mapping[str, ModesAlong]:
+    """The runs by name; raises ArgumentError."""
+    if isinstance(runs, ModesAlong):
+        return {"": runs}
+    where, mend = "modes_along_figure: runs", "give what modes_along returns, or several by name"
+    if not isinstance(runs, Mapping) or not runs:
+        raise ArgumentError(where, runs, f"is {described(runs)} that holds no run", mend)
+    for name, run in runs.items():
+        of_kind(f"{where}[{name!r}]", run, ModesAlong, mend)
+    return runs
 
 
 def _around(system: Any) -> Array:

@@ -11,7 +11,9 @@ import control
 import numpy as np
 from numpy.typing import NDArray
 
+from ..arguments import number_of, robot_of
 from ..model.symbolic import Model, symbolic_model, with_drifts_held
+from ..robots.checked_table import NumberRule
 from ..robots.robot import Robot
 from ..statics.equilibrium import static_tensions
 from .kinks import SWING, Rest, kink_notes
@@ -19,6 +21,8 @@ from .modes import POSITION, Modes, modes_of
 from .rest import position_of, rest_state
 
 Array = NDArray[np.float64]
+
+SWING_RULE = NumberRule("the swing of a mode", "m", minimum=0.0)
 
 
 @dataclass(frozen=True)
@@ -43,7 +47,10 @@ class LinearPlant:
 
 
 def linearise(robot: Robot, at: Sequence[float] | Array | None = None, swing: float = SWING) -> LinearPlant:
-    """Linearise about rest at a position in m, by default the start, with exact derivatives of the laws.
+    """Linearise about rest at a position, three coordinates in m, by default the start, with exact derivatives.
+
+    ``dx/dt = A x + B u, y = C x + D u``: u are n winch speeds (m/s) and an external force (N), y is position (m),
+    velocity (m/s), tensions (N) and lengths (m).
 
     Elsewhere it is the same robot, moved there by its winches: start lengths and start tensions stay, the
     unstrained lengths are those at which the laws give the static tensions, and states of effects have
@@ -51,8 +58,10 @@ def linearise(robot: Robot, at: Sequence[float] | Array | None = None, swing: fl
     swing of ``swing`` (m) in one of the modes meets, see :func:`tautwire.linear.kinks.kink_notes`.
 
     Raises UnreachableError where the cables cannot hold the platform, OperatingPointError where they do not hold
-    it stably, or where the states of an effect never settle.
+    it stably, or where the states of an effect never settle, ArgumentError where an argument is none of these.
     """
+    robot_of("linearise: robot", robot)
+    number_of("linearise: swing", swing, SWING_RULE)
     position = position_of(robot, at)
     tensions = static_tensions(robot, position)
     model = with_drifts_held(symbolic_model(robot))

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from tautwire_fmu.laws.mathematics import REAL
 
-from ..errors import InputError, TautwireError
+from ..array_arguments import point_of
+from ..errors import TautwireError
 from ..model.symbolic import Model
 from ..robots.robot import Robot
 from ..statics.equilibrium import routes, static_tensions
@@ -39,11 +40,8 @@ def place(position: Sequence[float] | Array) -> str:
 
 
 def position_of(robot: Robot, at: Sequence[float] | Array | None) -> Array:
-    """A position in m, by default the start; raises InputError where it is none."""
-    position = np.array(robot.platform.start if at is None else at, dtype=float)
-    if position.shape != (3,) or not np.all(np.isfinite(position)):
-        raise InputError("at", f"is {position.tolist()}, must be three finite coordinates in m", "give X,Y,Z")
-    return position
+    """A position in m, by default the start; raises ArgumentError where it is none."""
+    return np.array(robot.platform.start if at is None else point_of("at", at))
 
 
 def slack_cables(tensions: Array) -> NDArray[np.intp]:

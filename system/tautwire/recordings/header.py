@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 from ..errors import RecordingError, at_once, shown
-from ..robots.checked_table import nearest
+from ..robots.checked_table import likely
 
 AXES = ("x", "y", "z")
 
@@ -53,7 +53,8 @@ def header_of(
     unknown = tuple(name for name in names if name not in known)
     for needed in ("time", *(f"winch_speed_{cable}" for cable in range(1, cable_count + 1))):
         if needed not in names:
-            mend = f"add it, or rename {nearest(needed, unknown)}" if unknown else "add it"
+            near = likely(needed, unknown)
+            mend = "add it" if near is None else f"add it, or rename {shown(near)}"
             sink(RecordingError(where, f"the column {needed} is missing", mend, line))
     return Header(names, unknown)
 

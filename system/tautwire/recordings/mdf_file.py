@@ -42,7 +42,7 @@ def open_mdf(path: str | Path, cable_count: int, sink: Refuse = at_once) -> Colu
     """The MDF file of a recording, a row at each time of any of its channels that are read.
 
     Winch speeds are linear between their samples, as everywhere; an output has no value at the times of others. What
-    lies before or after some winch speed is left out. Needs asammdf, which comes with ``tautwire[mdf]``.
+    lies before or after some winch speed is left out. Needs the package asammdf.
 
     Raises RecordingError where it is no MDF file, a channel is missing, there twice or no number, or a unit is not SI.
     What is wrong with the names of channels goes to the ``sink``.
@@ -52,7 +52,8 @@ def open_mdf(path: str | Path, cable_count: int, sink: Refuse = at_once) -> Colu
         from asammdf import MDF
     except ImportError as problem:
         said = "reading MDF needs the package asammdf, which is not installed"
-        raise RecordingError(file, said, "install tautwire[mdf], or give the recording as CSV or Parquet") from problem
+        mend = "run pip install asammdf, or give the recording as CSV or Parquet"
+        raise RecordingError(file, said, mend) from problem
     reason = ""
     with _unraised_unsaid():
         try:

@@ -8,13 +8,17 @@ import numpy as np
 import pandas as pd  # type: ignore[import-untyped,unused-ignore]
 from numpy.typing import NDArray
 
+from ..arguments import of_kind, whole_number_of
 from ..errors import RecordingError, at_once, shown
+from ..input_file import path_of
 from .columns import ColumnTable
 from .csv_file import CsvTable, open_csv
 from .header import AXES, Refuse, header_of
 from .mdf_file import is_mdf, open_mdf
 from .parquet_file import is_parquet, open_parquet
 from .rules import HUGE, faults, no_table
+
+CABLES = "give the robot's cable_count"
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,7 +88,15 @@ class Recording:
 
 
 def read_recording(path: str | Path, cable_count: int) -> Recording:
-    """The recording in a CSV, Parquet or MDF file of a robot with ``cable_count`` cables; raises RecordingError."""
+    """The recording in a CSV, Parquet or MDF file of a robot with n = ``cable_count`` cables, N samples.
+
+    Columns are ``time`` (s), ``winch_speed_1`` ... (m/s), ``tension_1`` ... (N), ``x``, ``y``, ``z`` (m).
+
+    Raises RecordingError, which names the line or row, where the file holds none; ArgumentError where ``path`` is no
+    path or ``cable_count`` no whole number from 1.
+    """
+    path_of("read_recording: path", path)
+    whole_number_of("read_recording: cable_count", cable_count, 1, CABLES)
     return _checked(_opened(path, cable_count, at_once), cable_count)
 
 
@@ -127,12 +139,16 @@ def _first_fault(table: CsvTable | ColumnTable) -> RecordingError:
 
 
 def recording_from_frame(frame: pd.DataFrame, cable_count: int, name: str = "frame") -> Recording:
-    """The recording in a table with the columns of a recording file: ``time`` (s), ``winch_speed_1`` (m/s) ...
+    """The recording in a table with the columns of a recording file, of a robot with n = ``cable_count`` cables.
 
-    One row a sample; NaN where an output was not measured. ``name`` is what messages call it.
+    Columns are those of :func:`read_recording`, in SI units; one row a sample, N rows; NaN where an output was not
+    measured. ``name`` is what messages call it.
 
-    Raises RecordingError as :func:`read_recording` does.
+    Raises RecordingError as :func:`read_recording` does, ArgumentError where ``frame`` is no frame.
     """
+    of_kind("recording_from_frame: frame", frame, pd.DataFrame, "give a pandas frame with a column time")
+    whole_number_of("recording_from_frame: cable_count", cable_count, 1, CABLES)
+    of_kind("recording_from_frame: name", name, str, "give what messages shall call it")
     header = header_of([str(column) for column in frame.columns], name, cable_count)
     numbers = frame.set_axis(list(header.names), axis="columns")
     columns = {column: _floats(numbers[column], f"{name}: column {column}") for column in header.known}

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from pathlib import Path
 
+from ..arguments import folder_of, of_kind
 from ..fmus.packaging import RobotFmus, build_fmus, gathered
 from ..robots.reading import write_robot
 from ..tracer.verdict import Trace
@@ -12,11 +13,14 @@ from .document import trace_document
 from .page import trace_page
 
 
-def write_report(trace: Trace, folder: Path) -> RobotFmus:
+def write_report(trace: Trace, folder: str | Path) -> RobotFmus:
     """Write ``robot.toml``, its FMUs, ``report.json`` and ``index.html`` into a folder, which is made if absent.
 
-    Raises OSError where the disk refuses; returns where the FMUs are.
+    Returns where the FMUs are. Raises ArgumentError where ``trace`` is not what :func:`tautwire.trace` returns or
+    ``folder`` names none, OSError where the disk refuses.
     """
+    of_kind("write_report: trace", trace, Trace, "give what trace returns")
+    folder = folder_of("write_report: folder", folder)
     folder.mkdir(parents=True, exist_ok=True)
     write_robot(trace.robot_after, folder / "robot.toml")
     fmus = gathered(build_fmus(trace.robot_after, folder), folder)

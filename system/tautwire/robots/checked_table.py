@@ -1,7 +1,8 @@
 """A table of a robot file that checks what it hands out."""
 
 import math
-from collections.abc import Callable, Iterable
+import re
+from collections.abc import Callable, Iterable, Sequence
 from difflib import get_close_matches
 from typing import Any, NamedTuple
 
@@ -13,6 +14,11 @@ Place = tuple[str | int, ...]
 # Beyond this no quantity of a cable robot lies, and squares of numbers still stay finite.
 LARGEST = 1e15
 LONGEST_KEY = 80
+# Of difflib's ratio; below it names have little but a few letters in common.
+ALIKE = 0.6
+SHORT_SERIES, MOST_LISTED = 2, 30
+
+_NUMBER = re.compile("[0-9]+")
 
 
 class NumberRule(NamedTuple):
@@ -63,7 +69,7 @@ class CheckedTable:
         self.sink(RobotFileError(f"{self.file}: {path}" if path else self.file, problem, mend, place))
 
     def require_known(self, known: Iterable[str]) -> None:
-        """Refuses a key that is not among the known ones and names the nearest."""
+        """Refuses a key that is not among the known ones; names the one that is likely meant, or all."""
         names = tuple(known)
         for key in self.content:
             if key not in names:
@@ -164,7 +170,45 @@ class CheckedTable:
 
 
 def nearest(name: str, known: Iterable[str]) -> str:
-    """The known name that looks most like ``name``, quoted; letter case does not count."""
+    """The known name that ``name`` is likely meant to be, quoted; else ``one of`` and all that are known."""
+    names = tuple(known)
+    found = likely(name, names)
+    if found is not None or len(names) == 1:
+        return shown(found or names[0])
+    return f"one of {listed(names)}" if names else "one that is known"
+
+
+def likely(name: str, known: Iterable[str]) -> str | None:
+    """The known name that looks most like ``name``, letter case aside; None where none does.
+
+    A name with other numbers in it is of something else, however alike: ``cable_9`` is no slip for ``cable_3``.
+    """
+    given = name[:LONGEST_KEY].lower()
     by_lower_case = {candidate.lower(): candidate for candidate in known}
-    found = get_close_matches(name[:LONGEST_KEY].lower(), by_lower_case, n=1, cutoff=0.0)
-    return shown(by_lower_case[found[0]]) if found else "one that is known"
+    numbers = _numbers(given)
+    alike = [each for each in by_lower_case if not (numbers and _numbers(each)) or numbers == _numbers(each)]
+    found = get_close_matches(given, alike, n=1, cutoff=ALIKE)
+    return by_lower_case[found[0]] if found else None
+
+
+def listed(names: Sequence[str]) -> str:
+    """Names with commas; of a long series, such as ``cable_1 ... cable_8``, the ends."""
+    parts: list[str] = []
+    for series in _series(names):
+        parts += series if len(series) <= SHORT_SERIES else [f"{series[0]} ... {series[-1]}"]
+    return ", ".join(parts[:MOST_LISTED]) + (" ..." if len(parts) > MOST_LISTED else "")
+
+
+def _series(names: Sequence[str]) -> list[list[str]]:
+    """Neighbours together that differ in their numbers only."""
+    found: list[list[str]] = []
+    for name in names:
+        if found and _NUMBER.search(name) and _NUMBER.sub("", name) == _NUMBER.sub("", found[-1][-1]):
+            found[-1].append(name)
+        else:
+            found.append([name])
+    return found
+
+
+def _numbers(name: str) -> list[int]:
+    return [int(digits) for digits in _NUMBER.findall(name)]

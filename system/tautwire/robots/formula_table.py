@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 
-from tautwire_fmu.laws.expression import ExpressionError, read_expression
+from tautwire_fmu.laws.expression import expression_faults
 from tautwire_fmu.laws.formula import PLACES
 
 from .checked_table import CheckedTable
@@ -33,9 +33,7 @@ def _formulas_of(table: CheckedTable, cables_of: Callable[[CheckedTable], tuple[
         text = table.text(place, 'write it as a text, as in "-20 * vx"')
         if text is None:
             continue
-        try:
-            read_expression(text, PLACES[place])
-        except ExpressionError as error:
+        for error in expression_faults(text, PLACES[place]):
             table.refuse(place, f"character {error.place}: {error.problem}", error.mend)
         found.append(Formula(place, text, cables_of(table) if place == "tension" else ()))
     return found

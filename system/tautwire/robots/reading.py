@@ -13,7 +13,7 @@ from tautwire_fmu.laws.cable import LAWS
 from tautwire_fmu.laws.effects import BY_NAME
 
 from ..errors import RobotFileError, at_once, one_line, shown
-from ..input_file import read_bytes, require_text
+from ..input_file import path_of, read_bytes, require_text
 from .checked_table import CheckedTable, NumberRule, Refuse, nearest
 from .effect_table import cables_of, effects_in
 from .formula_table import formulas_in
@@ -77,11 +77,20 @@ LIMITS = {
 }
 
 
-def read_robot(path: str | Path, sink: Refuse = at_once) -> Robot:
-    """The robot that a file declares; raises RobotFileError where it declares none.
+def read_robot(path: str | Path) -> Robot:
+    """The robot that a TOML file declares, with n cables; lengths in m, forces in N, moduli in Pa, masses in kg.
 
-    With a ``sink`` each error goes there. Where that does not raise, reading goes on to the next one, and the robot is
-    not to be used. What is no TOML is raised all the same.
+    Raises RobotFileError, which names the first key that is wrong, where the file declares none; ArgumentError where
+    ``path`` is none. All that is wrong at once: ``tautwire check``.
+    """
+    return read_robot_telling(path_of("read_robot: path", path), at_once)
+
+
+def read_robot_telling(path: str | Path, sink: Refuse) -> Robot:
+    """The robot that a file declares, each error handed to ``sink``.
+
+    Where that does not raise, reading goes on to the next one, and the robot is not to be used. What is no TOML is
+    raised as RobotFileError all the same.
     """
     file = str(path)
     parsed = _parsed(robot_file_text(path), file)

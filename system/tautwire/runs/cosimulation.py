@@ -10,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
+from ..array_arguments import array_of, rising_of
 from ..errors import TautwireError
 from ..fmus.packaging import RobotFmus
 from ..fmus.slots import SlotError, lacking_ports, require_steps
@@ -36,6 +37,7 @@ from ..master import (
     simulate,
     simulate_watched,
 )
+from .asked import require_fmus, require_options
 from .wiring import AXES, PLATFORM, SHOWN_OF_CABLE, RobotWiring, result_columns, wired_beside, wiring_of
 
 Array = NDArray[np.float64]
@@ -43,6 +45,9 @@ Array = NDArray[np.float64]
 STEP = 0.01
 SAME_START = 1e-6  # m
 SAME_STEP = 1e-6
+
+SPEEDS = "finite speeds in m/s, a row for each time and a column for each of the {count} cables"
+TIMES = "rising, finite times (N,) in s, two or more"
 
 
 @dataclass(frozen=True)
@@ -159,8 +164,8 @@ def wired(fmus: RobotFmus) -> RobotWiring:
 
 def cosimulate(
     fmus: RobotFmus,
-    time: Array,
-    winch_speed: Array,
+    time: ArrayLike,
+    winch_speed: ArrayLike,
     step: float = STEP,
     tolerance: float | None = None,
     progress: Progress | None = None,
@@ -171,12 +176,18 @@ def cosimulate(
     ``time`` (N,) in s, rising, and ``winch_speed`` (N, n) in m/s, positive reels in, are arrays or columns of a frame.
     Speeds are what the rope does, or what winches are asked for where the robot has such. Macro steps are no longer
     than ``step`` (s); or such that their estimated errors of all lengths sum to at most ``tolerance`` (m), where one is
-    given. ``patience`` is as for :func:`record`. Returns the run at ``time``.
+    given. ``progress`` gets the share that is done. With a ``patience`` (s) an FMU that is in one call for so long, or
+    takes its process down, is one that fails. Returns the run at ``time``: arrays (N, 3) and (N, n) in SI units.
 
-    Raises RunError where an FMU fails, StepError where no step meets the tolerance.
+    Raises RunError where an FMU fails, StepError where no step meets the tolerance, SlotError where an FMU of the
+    user's starts elsewhere or cannot make such steps, ArgumentError where an argument is none of these.
     """
-    time, winch_speed = np.asarray(time, dtype=float), np.asarray(winch_speed, dtype=float)
-    return run(fmus, Sampled(time, winch_speed), time, stepping_by(step, tolerance, time), progress, patience)
+    require_fmus("cosimulate: fmus", fmus)
+    moments = rising_of("cosimulate: time", time, TIMES)
+    count = len(fmus.cables)
+    speeds = array_of("cosimulate: winch_speed", winch_speed, (len(moments), count), SPEEDS.format(count=count))
+    require_options("cosimulate", step, tolerance, progress, patience)
+    return run(fmus, Sampled(moments, speeds), moments, stepping_by(step, tolerance, moments), progress, patience)
 
 
 def stepping_by(step: float, tolerance: float | None, time: Array) -> Stepping:

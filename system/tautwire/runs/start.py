@@ -11,6 +11,7 @@ from ..errors import UnreachableError
 from ..recordings.recording import AXES, Recording
 from ..robots.robot import Robot
 from ..statics.equilibrium import static_tensions
+from .belonging import MEND, require_near, require_ropes, start_told
 
 START_SIGNIFICANCE = 6.0
 # The robot starts at rest: its first samples are of one place.
@@ -22,7 +23,8 @@ def start_of(
 ) -> tuple[tuple[float, float, float], tuple[str, ...]]:
     """Where a recording starts, and a note if that is not the robot file's start but where it says.
 
-    Raises UnreachableError, which names the recording, where the cables cannot hold the platform there.
+    Raises RecordingError where the recording cannot be this robot's, UnreachableError where the cables cannot hold the
+    platform there; both name the recording.
     """
     declared = np.array(robot.platform.start)
     away, spread = np.zeros(3), np.full(3, np.inf)
@@ -34,11 +36,14 @@ def start_of(
     if np.all(np.abs(away) <= START_SIGNIFICANCE * spread):
         return robot.platform.start, ()
     x, y, z = (declared + away).tolist()
+    where = f"{recording.path}: first positions"
+    require_near(robot, declared + away, where)
     try:
         static_tensions(placed(robot, (x, y, z)))
     except UnreachableError as error:
-        where = f"{recording.path}: first positions"
-        raise UnreachableError(where, error.position, error.cable, error.tension, error.reason) from error
+        reason = f"it is {start_told(robot, declared + away)}; {error.reason}"
+        raise UnreachableError(where, error.position, error.cable, error.tension, reason, MEND) from error
+    require_ropes(robot, recording, declared + away, where)
     shown = ", ".join(f"{axis} {value:.6g}" for axis, value in zip(AXES, (x, y, z), strict=True))
     note = f"{recording.path} starts at {shown} m, not at the robot file's start; the run starts where it says"
     return (x, y, z), (note,)

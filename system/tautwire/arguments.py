@@ -1,0 +1,91 @@
+"""What the library's own functions take: single values, checked where a program hands them in."""
+
+from __future__ import annotations
+
+import math
+from numbers import Integral, Real
+from pathlib import Path
+from typing import TypeVar
+
+from .errors import ArgumentError, described, shown, with_article
+from .input_file import path_of
+from .robots.checked_table import NumberRule
+from .robots.robot import Robot
+
+Kind = TypeVar("Kind")
+
+
+def of_kind(where: str, value: object, kind: type[Kind], mend: str) -> Kind:
+    """The value if it is of a class; raises ArgumentError."""
+    if isinstance(value, kind):
+        return value
+    raise ArgumentError(where, value, f"is {described(value)}, must be {with_article(kind.__name__)}", mend)
+
+
+def robot_of(where: str, value: object) -> Robot:
+    """The value if it is a robot; raises ArgumentError."""
+    return of_kind(where, value, Robot, "give what read_robot returns")
+
+
+def having(where: str, value: Kind, names: tuple[str, ...], wanted: str, mend: str) -> Kind:
+    """The value if it has all these attributes, as a protocol asks; ``wanted`` is what it should be.
+
+    Raises ArgumentError.
+    """
+    # A class has the names of its instances, and is none.
+    lacking = [name for name in names if isinstance(value, type) or not hasattr(value, name)]
+    if lacking:
+        problem = f"is {described(value)}, which is no {wanted}: it has no {', '.join(lacking)}"
+        raise ArgumentError(where, value, problem, mend)
+    return value
+
+
+def callable_or_none(where: str, value: Kind) -> Kind:
+    """The value if it can be called, or None; raises ArgumentError."""
+    if value is None or callable(value):
+        return value
+    raise ArgumentError(where, value, f"is {described(value)}, cannot be called", "give a function, or leave it out")
+
+
+def folder_of(where: str, value: object) -> Path:
+    """The path of a folder, which need not be there; raises ArgumentError, also where something else is there."""
+    folder = path_of(where, value)
+    if "\0" in str(folder) or (folder.exists() and not folder.is_dir()):
+        raise ArgumentError(where, value, f"is {shown(str(folder))}, which is no folder", "name a folder")
+    return folder
+
+
+def file_of(where: str, value: object) -> Path:
+    """The path of a file that is there; raises ArgumentError."""
+    file = path_of(where, value)
+    if not file.is_file():
+        raise ArgumentError(where, value, f"is {shown(str(file))}, where no file is", "check the path")
+    return file
+
+
+def number_of(where: str, value: object, rule: NumberRule, or_infinite: bool = False) -> float:
+    """The number that keeps a rule; raises ArgumentError. Infinity may pass where it means that there is no bound."""
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise ArgumentError(where, value, f"is {described(value)}, not a number", rule.mend())
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if or_infinite and number == math.inf:
+        return number
+    if not math.isfinite(number):
+        raise ArgumentError(where, value, f"is {shown(number)}, must be finite", rule.mend())
+    bound = rule.broken_bound(number)
+    if bound is not None:
+        raise ArgumentError(where, value, f"is {number!r}, must be {bound}", rule.mend())
+    return number
+
+
+def whole_number_of(where: str, value: object, least: int, mend: str) -> int:
+    """The whole number, not below ``least``; raises ArgumentError."""
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        raise ArgumentError(where, value, f"is {described(value)}, not a whole number", mend)
+    number = int(value)
+    if number < least:
+        raise ArgumentError(where, value, f"is {shown(number)}, must be at least {least}", mend)
+    return number

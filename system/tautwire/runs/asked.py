@@ -1,0 +1,38 @@
+"""What a program asks of a run, checked before anything runs."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from ..arguments import callable_or_none, number_of, of_kind
+from ..errors import ArgumentError
+from ..fmus.packaging import RobotFmus
+from ..robots.checked_table import NumberRule
+
+STEP = NumberRule("the longest macro step", "s", positive=True)
+TOLERANCE = NumberRule("the error allowed", "m", positive=True)
+PATIENCE = NumberRule("how long an FMU may take for one call, or infinity,", "s", positive=True)
+
+
+def require_fmus(where: str, fmus: RobotFmus) -> None:
+    """Raises ArgumentError unless these are a robot's FMUs, and ours lie where they were built."""
+    of_kind(where, fmus, RobotFmus, "give what build_fmus returns")
+    lost = [path for name, path in fmus.parts.items() if name not in fmus.own and not path.is_file()]
+    if lost:
+        raise ArgumentError(where, fmus, f"{lost[0]} is not there", "build them again, into a folder that stays")
+
+
+def require_options(
+    name: str,
+    step: float,
+    tolerance: float | None,
+    progress: Callable[[float], None] | None,
+    patience: float | None,
+) -> None:
+    """Raises ArgumentError, which names the function, for options that no run can have."""
+    number_of(f"{name}: step", step, STEP)
+    if tolerance is not None:
+        number_of(f"{name}: tolerance", tolerance, TOLERANCE)
+    callable_or_none(f"{name}: progress", progress)
+    if patience is not None:
+        number_of(f"{name}: patience", patience, PATIENCE, or_infinite=True)
