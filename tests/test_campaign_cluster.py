@@ -10,11 +10,12 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
+from types import SimpleNamespace
 
 import pyarrow.parquet as pq
 import pytest
 
-pytest.importorskip("distributed", reason="Dask is not installed: pip install tautwire[campaign]")
+pytest.importorskip("distributed", reason='Dask is not installed: pip install "dask[distributed]" SALib')
 
 import dask
 from distributed import Client
@@ -99,6 +100,19 @@ def test_a_worker_killed_in_the_middle_costs_no_row_and_changes_none(tmp_path: P
     assert rows_of(out) == bare_rows(plan, tmp_path / "bare")
     series = read_rows(out, ["z"], "series")
     assert series.num_rows == 16 * 5
+
+
+def test_a_cluster_of_ours_spends_little_beside_runs() -> None:
+    with connected(None, 1) as client:
+        (found,) = client.run(lambda: {name: dask.config.get(name) for name in clusters.FRUGAL}).values()
+    assert found == clusters.FRUGAL and not found["distributed.worker.profile.enabled"]
+
+
+def test_the_dashboard_of_ours_needs_a_library_here_that_of_others_there(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(clusters, "find_spec", lambda name: None)
+    link = "http://10.0.0.5:8787/status"
+    assert "needs bokeh" in dashboard(SimpleNamespace(cluster=object(), dashboard_link=link))
+    assert dashboard(SimpleNamespace(cluster=None, dashboard_link=link)) == f"Dask's dashboard: {link}"
 
 
 def test_the_same_rows_come_from_one_worker_and_from_two(tmp_path: Path) -> None:

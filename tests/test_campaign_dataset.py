@@ -77,8 +77,8 @@ def test_what_a_killed_process_left_half_written_is_cleared(tmp_path: Path) -> N
 @pytest.mark.parametrize(("old", "new"), [("seed = 7", "seed = 8"), ("count = 8", "count = 16"), ("2.2e9", "2.3e9")])
 def test_rows_of_another_plan_are_refused(old: str, new: str, tmp_path: Path) -> None:
     plan = read(tmp_path, AT_REST)
-    with opened(tmp_path / "out", plan):
-        pass
+    with opened(tmp_path / "out", plan), Parts(tmp_path / "out", columns_of(plan, 3)) as parts:
+        parts.add([result(0)])
     other = read(tmp_path, AT_REST.replace(old, new))
     with (
         pytest.raises(OtherPlanError, match=f"{plan.digest()}, this one is {other.digest()}"),
@@ -86,6 +86,16 @@ def test_rows_of_another_plan_are_refused(old: str, new: str, tmp_path: Path) ->
     ):
         pass
     with opened(tmp_path / "out", plan):
+        pass
+
+
+def test_a_plan_that_made_no_row_may_be_changed(tmp_path: Path) -> None:
+    plan, other = read(tmp_path, AT_REST), read(tmp_path, AT_REST.replace("seed = 7", "seed = 8"))
+    with opened(tmp_path / "out", plan):
+        pass
+    with opened(tmp_path / "out", other), Parts(tmp_path / "out", columns_of(other, 3)) as parts:
+        parts.add([result(0)])
+    with pytest.raises(OtherPlanError), opened(tmp_path / "out", plan):
         pass
 
 

@@ -11,13 +11,16 @@ pytest.importorskip("selenium", reason="the pages are not tried in a browser: se
 
 from tautwire.campaign.writing import write_summary
 from tests.browser.browser import LAPTOP, MISSING, PHONE_DARK, Browser, Screen, browser_at, chromium
-from tests.campaigns import moving
+from tests.campaigns import AT_REST, moving
 from tests.test_campaign_summary import GRID, written
 
 FIND_CHROMIUM = chromium()
 pytestmark = pytest.mark.skipif(FIND_CHROMIUM is None, reason=f"the pages are not tried in a browser: {MISSING}")
 
 DRAW_ALL = "window.dispatchEvent(new Event('beforeprint'))"
+INDICES = AT_REST.replace('"sobol"\ncount = 8', '"saltelli"\ncount = 16').replace(
+    "cable.modulus = {normal = [1.022e11, 2.2e9]}", '"cable[*].anchor[*]" = {normal = [40.0, 0.1]}'
+)
 MEDIANS = "return document.querySelector('figure[data-kind=band] .plot').data[2].y"
 
 
@@ -29,10 +32,11 @@ def browser() -> Iterator[Browser]:
         yield opened
 
 
-@pytest.fixture(scope="module", params=["path", "grid"])
+@pytest.fixture(scope="module", params=["path", "grid", "indices"])
 def page(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The page of samples along a path, and that of a grid at rest."""
-    plan, out = written(tmp_path_factory.mktemp(request.param), moving(64) if request.param == "path" else GRID)
+    """The page of samples along a path, that of a grid at rest, and one with Sobol indices of many inputs."""
+    texts = {"path": moving(64), "grid": GRID, "indices": INDICES}
+    plan, out = written(tmp_path_factory.mktemp(request.param), texts[request.param])
     write_summary(plan, out)
     return out / "index.html"
 
@@ -52,6 +56,7 @@ def test_page_loads_in_silence_fits_its_screen_and_draws_every_figure(
     assert browser.run("return document.querySelectorAll('.js-plotly-plot .trace').length") >= figures
 
 
+@pytest.mark.parametrize("page", ["path", "grid"], indirect=True)
 def test_another_path_or_input_is_drawn_when_it_is_chosen(browser: Browser, page: Path) -> None:
     browser.show(LAPTOP)
     browser.open(page)

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tautwire.campaign import writing
 from tautwire.campaign.distributions import KINDS, Distribution
-from tautwire.campaign.found import UNCORRELATED
 from tautwire.campaign.keys import KeyPathError, paths_of, with_values
 from tautwire.campaign.plan import Compute
 from tautwire.campaign.reading import KEYS, read_plan
-from tautwire.campaign.running import run_count
+from tautwire.campaign.running import jobs_of, run_count
 from tautwire.campaign.sampling import correlated_groups, samples
 from tautwire.cli import run as command
 from tautwire.errors import InputError
@@ -56,6 +56,9 @@ def sampled(vary: str, method: str = "sobol", count: int = 8, more: str = "") ->
         (sampled("cable.modulus = {linspace = [1.0, 2.0, 2.5]}"), "has a count of 2.5"),
         (sampled("cable.modulus = {list = []}"), "is empty, a list has one value or more"),
         (sampled("cable.modulus = {list = [nan]}"), "not finite numbers"),
+        (sampled('cable.law = {list = ["linear", 2.0]}'), "not finite numbers"),
+        (sampled('cable.law = {list = ["linear", "logaritmic", "logarithmic"]}'), "write 'logarithmic'"),
+        (sampled('cable.modulus = {list = ["stiff"]}'), "cable[1].modulus is 'stiff', not a number"),
         (sampled("cable.modulus = {gauss = [1.0, 2.0]}"), "vary.cable.modulus: is a table of 1 keys"),
         (sampled("cable.modulus = {list = [1.0], normal = [1.0, 2.0]}"), "is several, not one distribution"),
         (sampled("cable.modulus = 3.0"), "vary.cable.modulus: is 3.0, not one distribution"),
@@ -148,6 +151,17 @@ def test_a_grid_has_every_step_of_one_with_every_step_of_another(tmp_path: Path)
     assert samples(plan).tolist() == [[m, d] for m in (290.0, 300.0) for d in (0.0, 2e8, 4e8)]
 
 
+def test_texts_are_steps_like_numbers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    text = sampled('platform.mass = {list = [290, 300]}\n"cable[2].law" = {list = ["linear", "logarithmic"]}', "grid")
+    plan = read(tmp_path, text)
+    wanted = [(290.0, "linear"), (290.0, "logarithmic"), (300.0, "linear"), (300.0, "logarithmic")]
+    assert [job.values for job in jobs_of(plan, np.ones(4, dtype=bool))] == wanted
+    assert command(["campaign", str(tmp_path / "plan.toml"), "--dry-run"]) == 0
+    assert capsys.readouterr().out.splitlines()[1] == "0,0,290,linear"
+    other = read(tmp_path, text.replace('"linear", "logarithmic"', '"logarithmic", "linear"'))
+    assert other.digest() != plan.digest()
+
+
 def test_correlations_are_those_asked_for(tmp_path: Path) -> None:
     more = '[[correlation]]\nbetween = ["cable.modulus", "platform.mass"]\nvalue = -0.8'
     vary = f'{NORMAL}\nplatform.mass = {{normal = [300.0, 5.0]}}\n"cable.damping" = {{uniform = [1e8, 4e8]}}'
@@ -168,31 +182,6 @@ def test_correlations_that_contradict_each_other_are_refused(tmp_path: Path) -> 
         samples(plan)
 
 
-def test_what_a_trace_found_varies_by_its_intervals(tmp_path: Path) -> None:
-    interval = {"value": 2.0e9, "unit": "Pa s", "low": 1.9e9, "high": 2.1e9}
-    certain = {"value": 7.0, "unit": "1", "low": None, "high": None}
-    effects = [
-        {"name": "damping", "cables": [1, 2, 3], "parameters": {"damping": interval}},
-        {
-            "name": "modulus",
-            "cables": [2],
-            "parameters": {"modulus": {**interval, "value": 1e11, "low": 9e10, "high": 1.1e11}},
-        },
-    ]
-    report = tmp_path / "report.json"
-    report.write_text(json.dumps({"effects": effects}), encoding="utf-8")
-    text = 'robot = "robot.toml"\n[sample]\nmethod = "random"\ncount = 4\n[found]\nreport = "report.json"'
-    plan = read(tmp_path, text)
-    assert plan.keys == ("effect.damping.damping", "effect.modulus.modulus")
-    assert plan.inputs[0].distribution.numbers == pytest.approx((2.0e9, 1e8 / 1.959963985))
-    assert plan.content["effect"]["modulus"]["cables"] == [2] and plan.notes == (UNCORRELATED,)
-    effects[0]["parameters"]["damping"] = {**certain, "value": 2e9}  # type: ignore[index]
-    report.write_text(json.dumps({"effects": effects}), encoding="utf-8")
-    held = read(tmp_path, text)
-    assert held.keys == ("effect.modulus.modulus",) and held.content["effect"]["damping"] == {"damping": 2e9}
-    assert "stays at 2e+09" in held.notes[0]
-
-
 def test_paths_and_controllers_multiply_the_samples(tmp_path: Path) -> None:
     plan = read(tmp_path, moving(4))
     assert plan.variants == ((0, "none"), (0, "feedforward")) and run_count(plan) == 8
@@ -209,6 +198,15 @@ def test_plans_that_make_other_rows_have_other_digests_wherever_they_stand(tmp_p
     assert here.digest() != read_plan(tmp_path / "b" / "plan.toml").digest()
 
 
+def test_a_recording_is_left_after_its_second_sample_at_the_earliest(tmp_path: Path) -> None:
+    rows = ["time,winch_speed_1,winch_speed_2,winch_speed_3", "0.0,0,0,0", "0.1,0,0,0", "0.2,0,0,0"]
+    (tmp_path / "speeds.csv").write_text("\n".join(rows), encoding="utf-8")
+    path = '[[path]]\nrecording = "speeds.csv"\nuntil = {}'
+    assert read(tmp_path, sampled(NORMAL, more=path.format(0.1))).paths[0].numbers["duration"] == 0.1
+    with pytest.raises(InputError, match=r"path\[1\].until: is 0.05, before .* second sample; write 0.1 or more"):
+        read(tmp_path, sampled(NORMAL, more=path.format(0.05)))
+
+
 def test_a_dry_run_prints_the_rows_and_writes_nothing(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     file = plan_file(tmp_path, moving(4))
     assert command(["campaign", str(file), "--dry-run"]) == 0
@@ -223,6 +221,17 @@ def test_a_dry_run_prints_the_rows_and_writes_nothing(tmp_path: Path, capsys: py
 def test_without_a_folder_it_says_so(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert command(["campaign", str(plan_file(tmp_path, AT_REST))]) == 2
     assert "--out: is missing" in capsys.readouterr().err
+
+
+@pytest.mark.parametrize(("missing", "said"), [("distributed", "dask[distributed]"), ("SALib", "SALib")])
+def test_a_library_that_is_missing_is_named_before_anything_is_written(
+    missing: str, said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(writing, "find_spec", lambda name: None if name == missing else object())
+    file = plan_file(tmp_path, AT_REST)
+    assert command(["campaign", str(file), "--out", str(tmp_path / "out")]) == 2
+    assert f"campaign: needs {said}, which is not installed; run pip install" in capsys.readouterr().err
+    assert not (tmp_path / "out").exists()
 
 
 def test_the_plan_of_the_page_is_one(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ from tautwire.campaign.built import Bundle, bundled, fmus_of, structure_of
 from tautwire.campaign.keys import with_values
 from tautwire.campaign.plan import Plan
 from tautwire.campaign.run import Job, run_job, shared_of
+from tautwire.campaign.running import recordings_of
 from tautwire.control import cosimulate_closed_loop
 from tautwire.fmus.packaging import build_fmus
 from tautwire.linear import linearise
@@ -28,7 +29,7 @@ VALUES = (1.04e11, 310.0)
 HIGH = 20_000.0
 
 
-def varied(plan: Plan, values: tuple[float, ...] = VALUES) -> Robot:
+def varied(plan: Plan, values: tuple[float | str, ...] = VALUES) -> Robot:
     """The robot of a run."""
     return robot_from(with_values(plan.content, dict(zip(plan.keys, values, strict=True))), plan.file)
 
@@ -115,6 +116,31 @@ def test_numbers_set_in_fmus_do_what_numbers_built_into_them_do(changed: str, tm
     assert np.allclose(found.tension, built.tension, rtol=1e-9, atol=0.0)
 
 
+def test_a_law_may_vary_and_has_fmus_of_its_own(tmp_path: Path) -> None:
+    plan = read(
+        tmp_path,
+        moving().replace(
+            "cable.modulus = {normal = [1.022e11, 2.2e9]}", 'cable.law = {list = ["linear", "logarithmic"]}'
+        ),
+    )
+    shared = shared_of(plan, {})
+    linear, other = (
+        run_job(shared, Job(i, i, 0, (law, 310.0)), tmp_path / "kept").row
+        for i, law in enumerate(plan.inputs[0].distribution.texts)
+    )
+    assert linear["cable.law"] == "linear" and "failure" not in linear and "failure" not in other
+    assert len(list((tmp_path / "kept").iterdir())) == 2
+    robot = varied(plan, (*plan.inputs[0].distribution.texts[:1], 310.0))
+    speeds = shared.drives[0].speeds
+    assert speeds is not None
+    motion = cosimulate(build_fmus(robot, tmp_path / "built"), shared.drives[0].time, speeds)
+    assert (
+        [linear[f"end_{axis}"] for axis in "xyz"]
+        == motion.position[-1].tolist()
+        != [other[f"end_{axis}"] for axis in "xyz"]
+    )
+
+
 def test_a_robot_of_another_structure_gets_fmus_of_its_own_once(tmp_path: Path) -> None:
     base = example("three")
     other = base.with_effect(EffectSetting("payload", {"mass": 3.0}))
@@ -124,6 +150,35 @@ def test_a_robot_of_another_structure_gets_fmus_of_its_own_once(tmp_path: Path) 
     again = fmus_of(other.with_effect(EffectSetting("payload", {"mass": 4.0})), bundle, tmp_path)
     assert again.platform == first.platform and again.platform.stat().st_mtime_ns == made
     assert [each.name for each in tmp_path.iterdir()] == [structure_of(other)]
+
+
+@pytest.mark.parametrize("softness", [0.0, 20.0])
+def test_a_cable_is_slack_where_nothing_pulls_at_it(softness: float, tmp_path: Path) -> None:
+    # Paid out faster than the platform falls, then held.
+    times = np.linspace(0.0, 0.6, 61)
+    speeds = np.interp(times, (0.0, 0.1, 0.2, 0.3), (0.0, -3.0, -3.0, 0.0))
+    rows = [f"{time},{speed},{speed},{speed}" for time, speed in zip(times, speeds, strict=True)]
+    header = "time,winch_speed_1,winch_speed_2,winch_speed_3"
+    (tmp_path / "speeds.csv").write_text("\n".join([header, *rows]), encoding="utf-8")
+    text = """
+robot = "robot.toml"
+[sample]
+method = "grid"
+[vary]
+"effect.slack.softness" = {list = [0.0, 20.0]}
+[[path]]
+recording = "speeds.csv"
+until = 0.04
+[[path]]
+name = "all"
+recording = "speeds.csv"
+"""
+    plan = read(tmp_path, text)
+    shared = shared_of(plan, recordings_of(plan, 3))
+    begun, whole = (run_job(shared, Job(i, 0, i, (softness,)), tmp_path / "kept").row for i in (0, 1))
+    assert begun["slack"] is False and whole["slack"] is True
+    least = min(whole[f"tension_{cable}_least"] for cable in (1, 2, 3))
+    assert 0.0 <= least <= softness * np.log(2.0)
 
 
 def test_a_run_that_fails_is_a_row_with_its_reason_and_what_came_before(tmp_path: Path) -> None:

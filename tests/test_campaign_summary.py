@@ -31,6 +31,7 @@ GRID = (
     .replace("normal = [1.022e11, 2.2e9]", "list = [1e11, 1.1e11]")
     .replace("uniform = [280.0, 320.0]", "linspace = [280.0, 320.0, 4]")
 )
+LAWS = GRID.replace("cable.modulus = {list = [1e11, 1.1e11]}", 'cable.law = {list = ["linear", "logarithmic"]}')
 COLUMNS = (
     RowColumn("index", "whole", role="run"),
     RowColumn("cable.modulus", "number", role="input"),
@@ -143,7 +144,7 @@ def test_probability_of_what_never_happened_is_not_zero_for_sure(tmp_path: Path)
 
 
 def written(tmp_path: Path, text: str, failure: str = "UnreachableError: a cable cannot push") -> tuple[Plan, Path]:
-    """A folder with made-up rows of a plan, one of which failed."""
+    """A folder with made-up rows of a plan, one of which failed; outputs depend on the first input."""
     plan, out = read(tmp_path, text), tmp_path / "out"
     values, variants = samples(plan), plan.variants
     generator = np.random.default_rng(1)
@@ -154,7 +155,7 @@ def written(tmp_path: Path, text: str, failure: str = "UnreachableError: a cable
             row: dict[str, Any] = {
                 "index": index,
                 "sample": sample,
-                **dict(zip(plan.keys, values[sample], strict=True)),
+                **{each.key: each.distribution.value(v) for each, v in zip(plan.inputs, values[sample], strict=True)},
             }
             series = {}
             if path >= 0:
@@ -162,7 +163,8 @@ def written(tmp_path: Path, text: str, failure: str = "UnreachableError: a cable
                 drawn = generator.normal(variant, 1.0, 5)
                 series = {"time": np.linspace(0.0, 0.15, 5)} | dict.fromkeys(("x", "y", "z"), drawn)
                 series |= {f"tension_{cable}": 100.0 + drawn for cable in (1, 2, 3)}
-            numbers = {c.name: float(generator.normal()) for c in columns_of(plan, 3) if c.role == "output"}
+            outputs = [column.name for column in columns_of(plan, 3) if column.role == "output"]
+            numbers = {name: float(values[sample, 0] / 1e9 + 0.05 * generator.normal()) for name in outputs}
             flags = {c.name: False for c in columns_of(plan, 3) if c.kind == "flag"}
             parts.add(
                 [Result({**row, "failure": failure})] if index == 3 else [Result({**numbers, **row, **flags}, series)]
@@ -181,7 +183,7 @@ def test_bands_are_quantiles_of_each_path_with_each_controller(tmp_path: Path) -
     assert bands.time.tolist() == pytest.approx(np.linspace(0.0, 0.15, 5).tolist())
 
 
-@pytest.mark.parametrize("text", [moving(64), AT_REST, GRID])
+@pytest.mark.parametrize("text", [moving(64), AT_REST, GRID, LAWS])
 def test_pages_are_whole_and_ask_nothing_of_the_network(text: str, tmp_path: Path) -> None:
     plan, out = written(tmp_path, text)
     document = write_summary(plan, out)
@@ -195,6 +197,27 @@ def test_pages_are_whole_and_ask_nothing_of_the_network(text: str, tmp_path: Pat
     assert len(variants) == len(plan.variants)
     panels = [each for each in page.all("figure") if each.get("data-kind") == "band"]
     assert len(panels) == (6 if plan.paths else 0)
+
+
+def test_texts_of_a_grid_stand_on_an_axis_by_their_places(tmp_path: Path) -> None:
+    plan, out = written(tmp_path, LAWS)
+    write_summary(plan, out)
+    assert read_rows(out, ["cable.law"])["cable.law"].to_pylist() == ["linear"] * 4 + ["logarithmic"] * 4
+    page = Page((out / "index.html").read_text(encoding="utf-8"))
+    assert [each["label"] for each in page.data()["inputs"]] == ["cable.law (0 linear, 1 logarithmic)", "platform.mass"]
+    assert "linear, logarithmic" in page.text
+
+
+def test_the_page_names_the_inputs_that_make_much_of_an_output(tmp_path: Path) -> None:
+    plan, out = written(tmp_path, AT_REST.replace('"sobol"\ncount = 8', '"saltelli"\ncount = 64'))
+    found = write_summary(plan, out)["dependences"]
+    shown = [each for each in found if max(each["first"], each["total"]) >= 0.05]
+    assert 0 < len(shown) < len(found)
+    page = (out / "index.html").read_text(encoding="utf-8")
+    section = page[page.index('id="dependences"') :].split("</section>")[0]
+    assert section.count("<tr") - 1 == len(shown)
+    for each in shown:
+        assert each["output"].replace("_", " ") in section and f"{each['total']:.2f} \N{PLUS-MINUS SIGN}" in section
 
 
 def test_hostile_reasons_do_nothing(tmp_path: Path) -> None:

@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 
 from tautwire.report import trace_document
+from tautwire.tracer.verdict import Correlation, Fitted
 from tests.traces import HOSTILE, made_trace, nothing_found, without_positions
 
 # The example of the agreed format, with one entry of each kind.
@@ -86,6 +87,21 @@ def test_sizes_that_would_have_shown_and_what_looks_alike_are_there() -> None:
     assert slack["size"] is None
     assert document["alike"][0]["other"] == "relaxation"
     assert document["alike"][0]["cosine"] == 0.973
+
+
+def test_correlations_name_the_parameters_as_the_effects_do() -> None:
+    between = (Fitted("damping", (1, 2, 3), "damping"), Fitted("payload", (), "mass"))
+    document = trace_document(replace(made_trace(), correlations=(Correlation(between, np.float64(-0.42)),)))
+    assert document["correlations"] == [
+        {
+            "between": [
+                {"name": "damping", "cables": [1, 2, 3], "parameter": "damping"},
+                {"name": "payload", "cables": [], "parameter": "mass"},
+            ],
+            "value": -0.42,
+        }
+    ]
+    assert plain(document)
 
 
 def test_without_check_recording_its_errors_are_null() -> None:

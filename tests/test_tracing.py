@@ -33,6 +33,17 @@ def test_the_rebuilt_fmus_give_the_error_after() -> None:
 
 
 @pytest.mark.slow
+def test_what_was_found_comes_with_its_correlations() -> None:
+    # Load cells that show too much weigh like a heavier platform.
+    hidden = {"payload": {"mass": 1.5}, "sensor_gain": {"gain": 1.01}}
+    found = trace(example("three"), recorded("three", 3, hidden))
+    assert {effect.name for effect in found.effects} == {"payload", "sensor_gain"}
+    (correlation,) = found.correlations
+    assert {each.name for each in correlation.between} == {"payload", "sensor_gain"}
+    assert -1.0 < correlation.value < -0.9
+
+
+@pytest.mark.slow
 def test_no_name_is_given_where_the_rebuilt_fmus_miss_the_recording(monkeypatch: pytest.MonkeyPatch) -> None:
     runs = []
 

@@ -148,6 +148,7 @@ def made_trace(
         robot_before=robot,
         robot_after=robot.with_effect(EffectSetting("damping", {"damping": 2.1034e9}, cables)),
         effects=(found,),
+        correlations=(),
         also_possible=(("relaxation",), ("creep", "thermal")),
         candidates=made_candidates(cables),
         formula=None,

@@ -2,7 +2,8 @@
 
 ``python -m tests.bench.campaign [RUNS] [CHEAP]``; Linux only. A run is the paper's robot along a line, about a second
 of computing. The bare loop makes the same runs in one process, which has their FMUs and its libraries already, as
-workers have once they are prepared; rounds alternate, and each figure is the median of its rounds.
+workers have once they are prepared; rounds alternate, and each figure is the median of its rounds. What a task costs
+beside its run is told as processor time too, which other processes disturb less.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 from statistics import median
-from time import perf_counter, process_time
+from time import perf_counter, process_time, thread_time
 
 import numpy as np
 from psutil import Process
@@ -106,8 +107,19 @@ def speed(folder: Path, runs: int) -> None:
     print(f"\noverhead of one worker: {100.0 * (median(found['1 worker']) / loop - 1.0):.1f} % of the bare loop's time")
 
 
-def cost(folder: Path, tasks: int = 300) -> None:
-    """What a task costs beside its run, by tasks of one run of less than a millisecond."""
+def busy(seconds: float) -> float:
+    """Computes for so long, and returns the processor time that its thread had."""
+    until, before = perf_counter() + seconds, thread_time()
+    while perf_counter() < until:
+        sum(range(1000))
+    return thread_time() - before
+
+
+def cost(folder: Path, tasks: int = 300, seconds: float = 10.0) -> None:
+    """What a task costs beside its run, by tasks of one run of less than a millisecond, and what time costs.
+
+    Of one long task: all that this process and its worker do beside it, by their processor time.
+    """
     (folder / "little").mkdir()
     plan = read(folder / "little", CHEAPLY.format(count=tasks))
     with connected(None, 1) as client:
@@ -121,10 +133,14 @@ def cost(folder: Path, tasks: int = 300) -> None:
         begun, before = perf_counter(), processor_time()
         made = sum(len(some) for some in results(client, shared, plan, (Task((job,)) for job in jobs)))
         wall, after = perf_counter() - begun, processor_time()
-    own, others = (1e3 * (b - a) / made for a, b in zip(before, after, strict=True))
-    print(
-        f"\na task beside its run: {1e3 * wall / made:.1f} ms; processor time {own:.1f} ms here, {others:.1f} ms there"
-    )
+        own, others = (1e3 * (b - a) / made for a, b in zip(before, after, strict=True))
+        shown = f"processor time {own:.1f} ms here, {others:.1f} ms there"
+        print(f"\na task beside its run: {1e3 * wall / made:.1f} ms; {shown}")
+        begun, before = perf_counter(), processor_time()
+        inside = client.submit(busy, seconds, pure=False).result()
+        wall, after = perf_counter() - begun, processor_time()
+    own, others = (1e3 * (b - a) / wall for a, b in zip(before, after, strict=True))
+    print(f"a second beside its task: processor time {own:.1f} ms here, {others - 1e3 * inside / wall:.1f} ms there")
 
 
 def memory(folder: Path, runs: int) -> None:

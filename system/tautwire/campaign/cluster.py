@@ -21,7 +21,15 @@ CONNECT = 15.0  # s
 # Tasks in flight for each thread: enough that none waits, few enough that memory stays flat.
 AHEAD = 4
 LOOK_AGAIN = 2.0  # s
-LOG_LENGTH = 20
+# A profiler and checks up to a hundred times a second would take some per cent of what runs take; the scheduler's
+# memory of tasks grows with what these hold.
+FRUGAL = {
+    "distributed.worker.profile.enabled": False,
+    "distributed.worker.memory.monitor-interval": "1s",
+    "distributed.admin.tick.interval": "1s",
+    "distributed.admin.system-monitor.interval": "2s",
+    "distributed.admin.low-level-log-length": 20,
+}
 LOST = "its worker was lost again and again: out of memory, or an FMU ended its process"
 
 
@@ -62,8 +70,7 @@ def connected(scheduler: str | None, workers: int) -> Iterator[Any]:
         with client:
             yield client
         return
-    # Otherwise the scheduler keeps the last thousand tasks of each worker, which grows with what they hold.
-    with config.set({"distributed.admin.low-level-log-length": LOG_LENGTH}):
+    with config.set(FRUGAL):
         cluster = LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
@@ -78,7 +85,7 @@ def connected(scheduler: str | None, workers: int) -> Iterator[Any]:
 
 def dashboard(client: Any) -> str:
     """What to say of the dashboard: its address, or that there is none."""
-    if find_spec("bokeh") is None:
+    if client.cluster is not None and find_spec("bokeh") is None:
         return "Dask's dashboard is off: it needs bokeh"
     return f"Dask's dashboard: {client.dashboard_link}"
 
@@ -139,13 +146,14 @@ def results(client: Any, shared: Any, plan: Plan, tasks: Iterable[Task]) -> Iter
                 return
             submit(task)
 
-    with _scheduler_lost():
+    with _scheduler_lost(client):
         fill()
     while running:
-        with _scheduler_lost():
+        with _scheduler_lost(client):
             future = next(completed)
-            task, error = running.pop(future.key), future.exception()
-            found = None if error is not None else future.result()
+            task = running.pop(future.key)
+            found = future.result() if future.status == "finished" else None
+            error = future.exception() if found is None else None
         if found is not None:
             yield found
         elif isinstance(error, OSError):
@@ -156,21 +164,23 @@ def results(client: Any, shared: Any, plan: Plan, tasks: Iterable[Task]) -> Iter
         else:
             reason = LOST if isinstance(error, KilledWorker) else f"{type(error).__name__}: {error}"
             yield [failed(plan, task, job, reason) for job in task.jobs]
-        with _scheduler_lost():
+        with _scheduler_lost(client):
             future.release()
             fill()
 
 
 @contextmanager
-def _scheduler_lost() -> Iterator[None]:
-    """Tell in the campaign's own words that the scheduler is gone."""
+def _scheduler_lost(client: Any) -> Iterator[None]:
+    """Tell in the campaign's own words that the scheduler is gone, whatever Dask calls it where it is found out."""
     from distributed.client import FutureCancelledError
     from distributed.comm import CommClosedError
 
     try:
         yield
-    except (CommClosedError, FutureCancelledError) as error:
-        raise SchedulerLostError("Dask's scheduler was lost") from error
+    except Exception as error:
+        if isinstance(error, CommClosedError | FutureCancelledError) or client.status != "running":
+            raise SchedulerLostError("Dask's scheduler was lost") from error
+        raise
 
 
 class _Room:

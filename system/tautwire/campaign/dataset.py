@@ -52,12 +52,11 @@ def opened(folder: Path, plan: Plan) -> Iterator[None]:
 
 def _require_same(folder: Path, plan: Plan) -> None:
     book = folder / BOOK
-    told = {"digest": plan.digest(), "tautwire": __version__}
-    if not book.exists():
-        if any((folder / RUNS).glob("*.parquet")):
-            raise OtherPlanError(str(folder), "unknown", plan.digest())
-        _write_whole(book, json.dumps(told).encode())
+    if not any((folder / RUNS).glob("*.parquet")):
+        _write_whole(book, json.dumps({"digest": plan.digest(), "tautwire": __version__}).encode())
         return
+    if not book.exists():
+        raise OtherPlanError(str(folder), "unknown", plan.digest())
     try:
         made_by = str(json.loads(book.read_text(encoding="utf-8"))["digest"])
     except (ValueError, KeyError, TypeError) as error:

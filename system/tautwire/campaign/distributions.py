@@ -33,10 +33,14 @@ KINDS = (*SHAPES, LIST)
 
 @dataclass(frozen=True)
 class Distribution:
-    """A number's distribution: its ``kind``, one of :data:`KINDS`, and its ``numbers`` in the order of `SHAPES`."""
+    """A value's distribution: its ``kind``, one of :data:`KINDS`, and its ``numbers`` in the order of `SHAPES`.
+
+    The numbers of a list of ``texts`` are their places, from zero.
+    """
 
     kind: str
     numbers: tuple[float, ...]
+    texts: tuple[str, ...] = ()
 
     @property
     def steps(self) -> tuple[float, ...]:
@@ -45,6 +49,10 @@ class Distribution:
             first, last, count = self.numbers
             return tuple(np.linspace(first, last, int(count)).tolist())
         return self.numbers if self.kind == LIST else ()
+
+    def value(self, number: float) -> float | str:
+        """What one of the numbers stands for."""
+        return self.texts[int(number)] if self.texts else number
 
     def quantile(self, share: Array) -> Array:
         """The values below which these shares (N,) of the probability lie; steps are equally probable."""

@@ -23,7 +23,8 @@ class MissingExtraError(InputError):
     """A library that only campaigns need is not installed; ``library`` is its name."""
 
     def __init__(self, library: str) -> None:
-        super().__init__("campaign", f"needs {library}, which is not installed", 'run pip install "tautwire[campaign]"')
+        mend = 'run pip install "dask[distributed]" SALib'
+        super().__init__("campaign", f"needs {library}, which is not installed", mend)
         self.library = library
 
 

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from ..report.series import packed, thinned
 from ..report.units import significant
 from .bands import Bands, bands_of
-from .plan import Plan
+from .plan import Input, Plan
 from .rows import RowColumn, series_columns
 from .summary import Summary, numbers_of, parts_by_variant
 
@@ -43,12 +43,25 @@ def figures_of(
                 "label": variant_label(path, controller),
                 **bands,
                 "spreads": [_spread(part, kept, each, quantiles, plan.method == "grid") for each in shown],
-                "inputs": [packed(numbers_of(kept, key)) for key in plan.keys] if plan.method == "grid" else [],
+                "inputs": [packed(_steps_of(kept, each)) for each in plan.inputs] if plan.method == "grid" else [],
             }
         )
-    inputs = [{"label": key, "place": place} for place, key in enumerate(plan.keys)]
+    inputs = [{"label": _axis(each), "place": place} for place, each in enumerate(plan.inputs)]
     # The scripts shared by all pages begin with choices where there are any; these begin by themselves.
     return {"choices": [], "variants": variants, "inputs": inputs}
+
+
+def _axis(one: Input) -> str:
+    """An input's key, and where its texts stand on an axis."""
+    places = ", ".join(f"{place} {words}" for place, words in enumerate(one.distribution.texts))
+    return f"{one.key} ({places})" if places else one.key
+
+
+def _steps_of(rows: pa.Table, one: Input) -> Array:
+    """What an input is in each run; of texts their places."""
+    if not one.distribution.texts:
+        return numbers_of(rows, one.key)
+    return np.array([float(one.distribution.texts.index(each)) for each in rows[one.key].to_pylist()])
 
 
 def numbers_shown(columns: Sequence[RowColumn]) -> list[RowColumn]:

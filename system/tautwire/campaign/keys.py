@@ -48,8 +48,8 @@ def paths_of(content: Mapping[str, Any], path: str) -> tuple[str, ...]:
     return (path,)
 
 
-def with_values(content: Mapping[str, Any], values: Mapping[str, float]) -> dict[str, Any]:
-    """The content with numbers in place of those at some paths; a path through a list without entry is for all of it.
+def with_values(content: Mapping[str, Any], values: Mapping[str, float | str]) -> dict[str, Any]:
+    """The content with values in place of those at some paths; a path through a list without entry is for all of it.
 
     Raises KeyPathError where a path leads nowhere.
     """
@@ -59,7 +59,7 @@ def with_values(content: Mapping[str, Any], values: Mapping[str, float]) -> dict
     return changed
 
 
-def _put(table: dict[str, Any], steps: Sequence[Step], value: float) -> None:
+def _put(table: dict[str, Any], steps: Sequence[Step], value: float | str) -> None:
     step, rest = steps[0], steps[1:]
     if not rest:
         _put_last(table, step, value)
@@ -76,7 +76,7 @@ def _put(table: dict[str, Any], steps: Sequence[Step], value: float) -> None:
         _put(each, rest, value)
 
 
-def _put_last(table: dict[str, Any], step: Step, value: float) -> None:
+def _put_last(table: dict[str, Any], step: Step, value: float | str) -> None:
     old = table.get(step.name)
     if step.entry:
         if not isinstance(old, list):

@@ -22,6 +22,8 @@ from .season import Finding, Season
 from .summary import Dependence, Probability, Spread, Summary
 
 SCRIPTS = ("campaign.js",)
+# Sobol indices below this are in the summary alone.
+SMALLEST_SHARE = 0.05
 GROUPS = {
     "static_tension": "Static tension",
     "frequency": "Frequency",
@@ -132,7 +134,8 @@ def _probabilities(found: Sequence[Probability]) -> str:
 def _inputs(plan: Plan) -> str:
     if not plan.inputs:
         return ""
-    rows = [[text(each.key), number(_distribution(each.distribution))] for each in plan.inputs]
+    told = {each.key: _distribution(each.distribution) for each in plan.inputs}
+    rows = [[text(each.key), (text if each.distribution.texts else number)(told[each.key])] for each in plan.inputs]
     rows += [
         [text(f"{plan.keys[each.first]} and {plan.keys[each.second]}"), number(f"correlation {each.value:g}")]
         for each in plan.correlations
@@ -143,7 +146,7 @@ def _inputs(plan: Plan) -> str:
 def _distribution(distribution: Distribution) -> str:
     steps = distribution.steps
     if steps:
-        shown = ", ".join(f"{each:g}" for each in steps[:6])
+        shown = ", ".join(distribution.texts[:6] or [f"{each:g}" for each in steps[:6]])
         return f"{shown}, ... ({len(steps)} values)" if len(steps) > 6 else shown
     names = SHAPES[distribution.kind]
     told = ", ".join(f"{name} {value:g}" for name, value in zip(names, distribution.numbers, strict=True))
@@ -185,31 +188,37 @@ def _group(name: str) -> str:
 
 
 def _dependences(found: Sequence[Dependence]) -> str:
-    """A table for each path and controller: a row for each output, a column for each input."""
+    """A table for each path and controller: for each output a row for each input that makes much of it."""
     if not found:
         return ""
-    inputs = list(dict.fromkeys(each.input for each in found))
+    columns = [Column("Output"), Column("Input"), Column("Alone", True), Column(""), Column("In all", True)]
     content = ""
     for path, controller in dict.fromkeys((each.path, each.controller) for each in found):
         here = [each for each in found if (each.path, each.controller) == (path, controller)]
         rows = [
-            [text(label_of(output)), *(_index(each) for each in here if each.output == output)]
+            [text(label_of(each.output)), text(each.input), *_index(each)]
             for output in dict.fromkeys(each.output for each in here)
+            for each in sorted((one for one in here if one.output == output), key=_share, reverse=True)
+            if _share(each) >= SMALLEST_SHARE
         ]
-        columns = [Column("Output"), *(Column(name, True) for name in inputs)]
         content += table(variant_label(path, controller), columns, rows, "shares")
     lead = (
-        "Sobol indices: the part of an output&rsquo;s variance that an input makes alone, and in brackets with all its "
-        "interactions where the samples tell that; &plusmn; half the 95 % interval."
+        "Sobol indices: the part of an output&rsquo;s variance that an input makes alone, and with all its "
+        "interactions where the samples tell that; &plusmn; half the 95 % interval. "
+        f"Those below {SMALLEST_SHARE:g} are in the summary alone."
     )
     return section("dependences", "What outputs depend on", content, lead)
 
 
-def _index(each: Dependence) -> str:
-    said = f"{each.first:.2f} \N{PLUS-MINUS SIGN} {each.first_width:.2f}"
-    if each.total is not None and each.total_width is not None:
-        said += f" ({each.total:.2f} \N{PLUS-MINUS SIGN} {each.total_width:.2f})"
-    return number(said)
+def _share(each: Dependence) -> float:
+    return max(each.first, each.total or 0.0)
+
+
+def _index(each: Dependence) -> tuple[str, str, str]:
+    first = number(f"{each.first:.2f} \N{PLUS-MINUS SIGN} {each.first_width:.2f}")
+    known = each.total is not None and each.total_width is not None
+    total = number(f"{each.total:.2f} \N{PLUS-MINUS SIGN} {each.total_width:.2f}") if known else ""
+    return first, charts.bar(max(0.0, min(each.first, 1.0)), 1.0), total
 
 
 def _spreads_tables(spreads: Sequence[Spread]) -> str:

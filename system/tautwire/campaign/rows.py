@@ -33,7 +33,7 @@ def columns_of(plan: Plan, cable_count: int) -> tuple[RowColumn, ...]:
         RowColumn("index", "whole", role="run"),
         RowColumn("sample", "whole", role="run"),
         *((RowColumn("path", "text", role="run"), RowColumn("controller", "text", role="run")) if plan.paths else ()),
-        *(RowColumn(key, "number", role="input") for key in plan.keys),
+        *(RowColumn(each.key, "text" if each.distribution.texts else "number", role="input") for each in plan.inputs),
         *(_statics(cable_count) if plan.compute.statics else ()),
         *(_modes() if plan.compute.modes else ()),
         *(_motion(plan, cable_count) if plan.paths else ()),

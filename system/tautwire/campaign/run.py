@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from math import log
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+
+from tautwire_fmu.laws.effects.slack import SLACK
 
 from ..control import cosimulate_closed_loop
 from ..errors import one_line
@@ -42,7 +45,7 @@ class Job:
     index: int
     sample: int
     variant: int
-    values: tuple[float, ...] = ()
+    values: tuple[float | str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -179,10 +182,19 @@ def _numbers(robot: Robot, drive: Drive, motion: Motion) -> Row:
     for cable in robot.cable_numbers:
         row |= {f"tension_{cable}_least": float(least[cable - 1])}
         row |= {f"tension_{cable}_largest": float(largest[cable - 1])}
-    row["slack"] = bool(least.min() <= 0.0)
+    row["slack"] = bool(np.any(least <= _without_pull(robot)))
     if robot.tension is not None:
         row["limit_broken"] = bool(least.min() < robot.tension.minimum or largest.max() > robot.tension.maximum)
     return row
+
+
+def _without_pull(robot: Robot) -> Array:
+    """The tension (n,) in N of a cable that nothing pulls at: zero, or ``s ln 2`` of the effect slack's softness s."""
+    left = np.zeros(robot.cable_count)
+    for setting in robot.effects:
+        if setting.name == SLACK.name:
+            left[[cable - 1 for cable in setting.cables]] = setting.values["softness"] * log(2.0)
+    return left
 
 
 def _series(motion: Motion, points: int) -> Series:

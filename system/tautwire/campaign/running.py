@@ -48,7 +48,8 @@ def jobs_of(plan: Plan, wanted: NDArray[np.bool_]) -> Iterator[Job]:
     values, variants = samples(plan), len(plan.variants)
     for index in np.flatnonzero(wanted):
         sample, variant = divmod(int(index), variants)
-        yield Job(int(index), sample, variant, tuple(values[sample].tolist()))
+        given = zip(plan.inputs, values[sample].tolist(), strict=True)
+        yield Job(int(index), sample, variant, tuple(each.distribution.value(number) for each, number in given))
 
 
 def tasks_of(plan: Plan, wanted: NDArray[np.bool_], cable_count: int) -> Iterator[Task]:

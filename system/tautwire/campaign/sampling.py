@@ -16,13 +16,15 @@ Array = NDArray[np.float64]
 
 # A share of 0 or 1 would be infinitely far out.
 FARTHEST = 1e-12
+# By rounding the least eigenvalue of correlations may lie this far below zero.
+SINGULAR = 1e-9
 
 
 def samples(plan: Plan) -> Array:
     """The inputs of all samples, shape (count, inputs).
 
     Samples are drawn in a unit cube. Correlations are those of normal variables there (a Gaussian copula): shares of
-    probability go to normal variables, through the Cholesky factor of their correlations, and back; each input is then
+    probability go to normal variables, through a factor of their correlations, and back; each input is then
     its quantile. A grid is the product of its steps, the last input fastest.
 
     Raises PlanError where correlations contradict each other.
@@ -35,9 +37,9 @@ def samples(plan: Plan) -> Array:
     return np.column_stack([each.distribution.quantile(shares[:, i]) for i, each in enumerate(plan.inputs)])
 
 
-def middle(one: Input) -> float:
+def middle(one: Input) -> float | str:
     """The median of an input."""
-    return float(one.distribution.quantile(np.array([0.5]))[0])
+    return one.distribution.value(float(one.distribution.quantile(np.array([0.5]))[0]))
 
 
 def correlation_matrix(plan: Plan) -> Array:
@@ -99,9 +101,16 @@ def _saltelli() -> Any:
 def _correlated(plan: Plan, shares: Array) -> Array:
     if not plan.correlations:
         return shares
+    return np.clip(norm.cdf(norm.ppf(shares) @ _factor(correlation_matrix(plan)).T), FARTHEST, 1.0 - FARTHEST)
+
+
+def _factor(matrix: Array) -> Array:
+    """A matrix F with ``F F' = matrix``: Cholesky's, or by eigenvectors where the matrix is barely singular."""
     try:
-        factor = np.linalg.cholesky(correlation_matrix(plan))
+        return np.asarray(np.linalg.cholesky(matrix))
     except np.linalg.LinAlgError as error:
-        problem = "contradict each other: no inputs are correlated like that"
-        raise PlanError("correlation", problem, "make them smaller") from error
-    return np.clip(norm.cdf(norm.ppf(shares) @ factor.T), FARTHEST, 1.0 - FARTHEST)
+        sizes, vectors = np.linalg.eigh(matrix)
+        if sizes[0] < -SINGULAR:
+            problem = "contradict each other: no inputs are correlated like that"
+            raise PlanError("correlation", problem, "make them smaller") from error
+    return np.asarray(vectors * np.sqrt(np.maximum(sizes, 0.0)))

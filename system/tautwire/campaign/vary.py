@@ -47,6 +47,8 @@ def _distribution(table: CheckedTable, key: str, given: Any) -> Distribution:
         told = "several" if isinstance(given, dict) and len(given) > 1 else shown(given)
         table.refuse(key, f"is {told}, not one distribution", mend)
     ((kind, numbers),) = given.items()
+    if kind == LIST and isinstance(numbers, list) and numbers and all(isinstance(each, str) for each in numbers):
+        return Distribution(kind, tuple(map(float, range(len(numbers)))), tuple(numbers))
     shape = f"{kind} = [{', '.join(SHAPES.get(kind, ('value', '...')))}]"
     if not isinstance(numbers, list) or not all(map(_is_number, numbers)):
         table.refuse(key, f"has {shown(numbers)}, not finite numbers", f"write {shape}")

@@ -114,7 +114,8 @@ def progress_bar(voice: Voice = ALOUD) -> Iterator[Callable[[str, float], None]]
         TimeElapsedColumn(),
         TimeRemainingColumn(),
     )
-    with Progress(*columns, console=console, transient=True) as bar:
+    # A campaign's runs may come minutes apart; what is left of time is told from the last hour.
+    with Progress(*columns, console=console, transient=True, speed_estimate_period=3600.0) as bar:
         task = bar.add_task("", total=1.0)
         current = ""
 

@@ -7,7 +7,7 @@ from collections.abc import Iterable
 from typing import Any
 
 from ..runs.wiring import AXES
-from ..tracer.verdict import Candidate, Detectable, Errors, Estimate, FoundEffect, Likeness, Trace
+from ..tracer.verdict import Candidate, Correlation, Detectable, Errors, Estimate, FoundEffect, Likeness, Trace
 from ..tracer.where.port_residuals import ComponentResidual
 from .summary import ROLES, comparison_of
 
@@ -19,6 +19,7 @@ def trace_document(trace: Trace) -> dict[str, Any]:
         "sentence": trace.sentence,
         "robot": trace.robot_before.name,
         "effects": [_effect(effect) for effect in trace.effects],
+        "correlations": [_correlation(each) for each in trace.correlations],
         "also_possible": [list(names) for names in trace.also_possible],
         "formula": trace.formula,
         "error_before": _errors_of_roles(trace, "errors_before"),
@@ -64,6 +65,13 @@ def _estimate(estimate: Estimate) -> dict[str, Any]:
         "high": _number(estimate.high),
         "declared": _number(estimate.declared),
     }
+
+
+def _correlation(correlation: Correlation) -> dict[str, Any]:
+    between = [
+        {"name": each.name, "cables": _whole(each.cables), "parameter": each.parameter} for each in correlation.between
+    ]
+    return {"between": between, "value": _number(correlation.value)}
 
 
 def _component(part: ComponentResidual) -> dict[str, Any]:

@@ -43,14 +43,18 @@ class NoFitError(TautwireError):
 class Fit:
     """A robot some of whose effects' parameters are fitted.
 
-    ``values`` of the ``free`` ones have shape (p,); ``deviations`` are their standard deviations from the curvature
-    of the likelihood.
+    ``values`` of the ``free`` ones have shape (p,); ``covariance`` (p, p) is from the curvature of the likelihood.
     """
 
     robot: Robot
     free: tuple[FreeParameter, ...]
     values: Array
-    deviations: Array
+    covariance: Array
+
+    @property
+    def deviations(self) -> Array:
+        """Standard deviations (p,)."""
+        return np.sqrt(np.diag(self.covariance))
 
     def interval(self, index: int) -> tuple[float, float]:
         """95 % interval of one parameter."""
@@ -98,7 +102,7 @@ class Fitter:
     ) -> Fit:
         free = free_parameters(robot, chosen)
         if not free:
-            return Fit(robot, (), np.zeros(0), np.zeros(0))
+            return Fit(robot, (), np.zeros(0), np.zeros((0, 0)))
         start = np.array([value_of(robot, f) for f in free])
         known = _parameters(robot, free)
         scale = np.maximum(np.abs(start), [abs(parameter.start) for parameter in known])
@@ -125,9 +129,9 @@ class Fitter:
             )
             scaled, slopes = residual.origin + solution.x, np.asarray(solution.jac, dtype=float)
         values = scaled * scale
-        covariance = np.linalg.pinv(slopes.T @ slopes)
+        covariance = np.linalg.pinv(slopes.T @ slopes) * np.outer(scale, scale)
         fitted = with_values(robot, free, dict(zip(free, values.tolist(), strict=True)))
-        return Fit(fitted, free, values, np.sqrt(np.diag(covariance)) * scale)
+        return Fit(fitted, free, values, covariance)
 
     def innovations(self, robot: Robot, sample: Sample) -> Innovations:
         """Innovations of all samples of a recording under a robot as it is."""

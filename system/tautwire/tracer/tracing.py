@@ -11,17 +11,19 @@ from tautwire_fmu.laws.effects import UNLISTED
 from ..errors import RecordingError
 from ..interrupt import interrupts_held
 from ..model.uncertain import uncertain_numbers
-from ..recordings.recording import Recording, require_outputs
+from ..recordings.recording import Recording
 from ..robots.robot import Robot
 from ..runs.cosimulation import Motion
 from .adequacy import FEWEST, enough_samples, is_noise
+from .asked import require_asked
 from .cosimulated import compared, reaching, started
 from .data import Evidence, Sample, split
 from .discovery.discovery import Discovery
 from .discovery.unexplained import Rest, what_is_left
 from .discovery.written import effects_text, formula_text
+from .estimates import correlations_of, found_effects
 from .fit import Fitter
-from .hypotheses import Hypothesis, declared_value
+from .hypotheses import Hypothesis
 from .likelihood import Innovations
 from .preparation.calibration import calibrated
 from .preparation.clock import with_clocks_set
@@ -31,7 +33,7 @@ from .rivals import with_rivals
 from .search import Found, search
 from .separation import separation
 from .trials import setting_of
-from .verdict import Comparison, Errors, Estimate, FoundEffect, Separation, Trace, VerdictName
+from .verdict import Comparison, Errors, Separation, Trace, VerdictName
 from .where.components import cut_at_ports
 from .workers import Workers
 
@@ -55,9 +57,11 @@ def trace(
     none. For more ``processes`` than one the calling program's main module has to be guarded, see
     :class:`tautwire.tracer.workers.Workers`.
 
-    Raises RecordingError where a recording has no measured output, UnreachableError where the cables cannot hold
-    the platform where a recording starts.
+    Raises RecordingError where a recording has no measured output, is too short or cannot be this robot's,
+    UnreachableError where the cables cannot hold the platform where a recording starts, ArgumentError where an
+    argument is none of these.
     """
+    require_asked(robot, fit, check, progress, alpha, processes)
     with interrupts_held() as raise_interrupt, Workers(processes, raise_interrupt) as workers:
         return _trace(robot, fit, check, progress or _silently, alpha, workers)
 
@@ -114,6 +118,7 @@ def _trace(
     final, kept = answer.robot, answer.effects_hold
     verdict, sentence = _verdict(robot, answer, noise_alone)
     numbers = [] if verdict == "unexplained" else _numbers(ready, answer)
+    effects = found_effects(robot, found) if kept else ()
     shown = Separation((), ())
     if kept or verdict == "none":
         progress("what these recordings could show", 0.0)
@@ -123,7 +128,8 @@ def _trace(
         sentence=sentence,
         robot_before=robot,
         robot_after=final,
-        effects=_effects(robot, found) if kept else (),
+        effects=effects,
+        correlations=correlations_of(found.fit, effects),
         also_possible=found.alike if kept else (),
         candidates=found.candidates,
         formula=_formula(robot, answer),
@@ -142,9 +148,6 @@ def _trace(
 
 
 def _ready(robot: Robot, fit: Recording, check: Recording | None, workers: Workers) -> _Ready:
-    for recording in (fit, check):
-        if recording is not None:
-            require_outputs(recording)
     prepared = prepare(robot, fit, check)
     evidence = split(robot, prepared.noise, prepared.fit, prepared.check)
     fitter = Fitter(prepared.noise, workers.between)
@@ -262,28 +265,6 @@ def _formula(robot: Robot, answer: _Answer) -> str | None:
         return formula_text(robot, answer.discovered.formulas)
     unlisted = _unlisted(answer) if answer.effects_hold else []
     return effects_text([(h.label(robot), setting_of(answer.found.fit.robot, h)) for h in unlisted]) or None
-
-
-def _effects(robot: Robot, found: Found) -> tuple[FoundEffect, ...]:
-    fit = found.fit
-    places = {}
-    for index, free in enumerate(fit.free):
-        setting = fit.robot.effects[free.setting]
-        places[setting.name, setting.cables, free.name] = index
-    effects = []
-    for hypothesis, evidence in zip(found.accepted, found.evidence, strict=True):
-        if hypothesis.effect in UNLISTED:
-            continue
-        estimates = {}
-        for parameter in hypothesis.parameters:
-            place = places[hypothesis.effect.name, hypothesis.cables, parameter.name]
-            low, high = fit.interval(place)
-            declared = declared_value(robot, parameter, hypothesis.cables)
-            estimates[parameter.name] = Estimate(float(fit.values[place]), parameter.unit, low, high, declared)
-        effects.append(
-            FoundEffect(hypothesis.effect.name, hypothesis.effect.component, hypothesis.cables, estimates, evidence)
-        )
-    return tuple(effects)
 
 
 def _notes(evidence: Evidence, samples: tuple[Sample, ...]) -> tuple[str, ...]:

@@ -83,5 +83,4 @@ def screened(robot: Robot, hypothesis: Hypothesis, prospect: Prospect) -> Trial:
     """A hypothesis that is not worth a fit; only a fit may pass the threshold."""
     values = {**hypothesis.setting(robot).values, **prospect.values}
     promised = robot.with_effect(EffectSetting(hypothesis.effect.name, values, hypothesis.cables))
-    empty = np.zeros(0)
-    return Trial(hypothesis, Fit(promised, (), empty, empty), 0.0, float("nan"))
+    return Trial(hypothesis, Fit(promised, (), np.zeros(0), np.zeros((0, 0))), 0.0, float("nan"))

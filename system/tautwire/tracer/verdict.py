@@ -41,6 +41,23 @@ class FoundEffect:
 
 
 @dataclass(frozen=True)
+class Fitted:
+    """Which parameter of a found effect is meant."""
+
+    name: str
+    cables: tuple[int, ...]
+    parameter: str
+
+
+@dataclass(frozen=True)
+class Correlation:
+    """How the errors of two estimates go together: their correlation, of -1 to 1."""
+
+    between: tuple[Fitted, Fitted]
+    value: float
+
+
+@dataclass(frozen=True)
 class Candidate:
     """A hypothesis that was tried: one effect more than the model had in its round.
 
@@ -140,8 +157,9 @@ class Resonance:
 class Trace:
     """The answer to: what does this model lack.
 
-    ``noise_floor`` is what noise of the sensors and of the recorded winch speeds would leave; ``left`` the mean square
-    of the whitened innovations of each output (x, y, z, tensions) under the final model on unseen data, shape (3 + n,).
+    ``correlations`` are those of each two parameters of the effects. ``noise_floor`` is what noise of the sensors and
+    of the recorded winch speeds would leave; ``left`` the mean square of the whitened innovations of each output (x, y,
+    z, tensions) under the final model on unseen data, shape (3 + n,).
     ``separation`` is what those data could have shown beside the effects; empty where the model leaves more than noise.
     ``components`` tells where the fit recording errs, before any effect is fitted.
     """
@@ -151,6 +169,7 @@ class Trace:
     robot_before: Robot
     robot_after: Robot
     effects: tuple[FoundEffect, ...]
+    correlations: tuple[Correlation, ...]
     also_possible: tuple[tuple[str, ...], ...]
     candidates: tuple[Candidate, ...]
     formula: str | None

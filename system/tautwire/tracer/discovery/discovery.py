@@ -98,7 +98,7 @@ def discover(
 
 
 def _start(base: Robot) -> _State:
-    return _State({}, Fit(base, (), np.zeros(0), np.zeros(0)), -inf)
+    return _State({}, Fit(base, (), np.zeros(0), np.zeros((0, 0))), -inf)
 
 
 def _worth(fitter: Fitter, state: _State, accepted: Sequence[Hypothesis], sample: Sample) -> _State:
