@@ -1,5 +1,6 @@
 """FMUs get a library whatever FMUs the process has loaded."""
 
+import os
 import subprocess
 import sys
 from pathlib import Path
@@ -28,8 +29,9 @@ def unpacked(three_fmus: RobotFmus, tmp_path_factory: pytest.TempPathFactory) ->
     return folder / "resources"
 
 
-def run(code: str) -> None:
-    subprocess.run([sys.executable, "-c", code], check=True)
+def run(*arguments: str) -> None:
+    path = os.pathsep.join([str(Path(__file__).parents[1]), *sys.path])
+    subprocess.run([sys.executable, *arguments], check=True, env={**os.environ, "PYTHONPATH": path})
 
 
 def test_after_an_fmu_was_loaded(three_fmus: RobotFmus, tmp_path: Path) -> None:
@@ -37,17 +39,17 @@ def test_after_an_fmu_was_loaded(three_fmus: RobotFmus, tmp_path: Path) -> None:
 import fmpy
 fmpy.simulate_fmu({str(three_fmus.platform)!r}, stop_time=0.01)
 """
-    run(loaded + BUILD.format(folder=str(tmp_path)))
+    run("-c", loaded + BUILD.format(folder=str(tmp_path)))
 
 
 def test_beside_an_fmu_whose_folder_is_first_on_the_path(unpacked: Path, tmp_path: Path) -> None:
-    run(f"import sys; sys.path.insert(0, {str(unpacked)!r})\n" + BUILD.format(folder=str(tmp_path)))
+    run("-c", f"import sys; sys.path.insert(0, {str(unpacked)!r})\n" + BUILD.format(folder=str(tmp_path)))
 
 
 def test_where_an_fmus_copy_of_the_builder_was_imported(unpacked: Path, tmp_path: Path) -> None:
     copy = f"import sys; sys.path.insert(0, {str(unpacked)!r})\nimport pythonfmu.builder\n"
     copy += "assert not pythonfmu.builder.FmuBuilder.has_binary()\n"
-    run(copy + BUILD.format(folder=str(tmp_path)))
+    run("-c", copy + BUILD.format(folder=str(tmp_path)))
 
 
 def test_a_process_spawned_beside_a_loaded_fmu_builds_too(unpacked: Path, tmp_path: Path) -> None:
@@ -73,7 +75,7 @@ if __name__ == "__main__":
 """,
         encoding="utf-8",
     )
-    subprocess.run([sys.executable, str(script)], check=True)
+    run(str(script))
 
 
 def test_a_library_without_binaries_is_told(tmp_path: Path) -> None:
@@ -95,4 +97,4 @@ except FmuLibraryError as error:
 else:
     raise SystemExit("not told")
 """
-    run(code)
+    run("-c", code)
