@@ -27,6 +27,7 @@ from .hypotheses import Hypothesis
 from .likelihood import Innovations
 from .preparation.calibration import calibrated
 from .preparation.clock import with_clocks_set
+from .preparation.length import shortened
 from .preparation.preparation import prepare
 from .preparation.release import release_note, released
 from .rivals import with_rivals
@@ -52,7 +53,8 @@ def trace(
 ) -> Trace:
     """Find what a robot's model lacks, and show by co-simulating its FMUs what adding it does to the error.
 
-    What fits ``fit`` is judged on ``check``; without one, on the second half of ``fit``. ``progress`` gets what is
+    What fits ``fit`` is judged on ``check``; without one, on the second half of ``fit``. Of recordings of more than
+    100,000 samples (200,000 of the only one) the beginning is traced, and a note says so. ``progress`` gets what is
     being done, and the share of it that is done. ``alpha`` bounds the probability of naming an effect where there is
     none. For more ``processes`` than one the calling program's main module has to be guarded, see
     :class:`tautwire.tracer.workers.Workers`.
@@ -148,6 +150,7 @@ def _trace(
 
 
 def _ready(robot: Robot, fit: Recording, check: Recording | None, workers: Workers) -> _Ready:
+    fit, check, short = shortened(fit, check)
     prepared = prepare(robot, fit, check)
     evidence = split(robot, prepared.noise, prepared.fit, prepared.check)
     fitter = Fitter(prepared.noise, workers.between)
@@ -158,7 +161,7 @@ def _ready(robot: Robot, fit: Recording, check: Recording | None, workers: Worke
         evidence, clocks = with_clocks_set(fitter, robot, evidence)
         plain = _innovations(fitter, robot, evidence) if clocks else plain
     samples = (evidence.fit,) if check is None else (evidence.fit, evidence.judge)
-    return _Ready(evidence, samples, fitter, plain, (*prepared.notes, *clocks, *_notes(evidence, samples)))
+    return _Ready(evidence, samples, fitter, plain, (*short, *prepared.notes, *clocks, *_notes(evidence, samples)))
 
 
 def _answer(
