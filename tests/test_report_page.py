@@ -16,7 +16,7 @@ from tautwire.report import trace_document, trace_page, write_report
 from tautwire.report.figures import MOST_POINTS, magnification, page_data
 from tautwire.report.series import envelope, envelope_times, noise_density, packed, spectrum, unpacked
 from tautwire.robots.reading import read_robot
-from tautwire.tracer.verdict import Separation, Trace
+from tautwire.tracer.verdict import Correlation, Fitted, Separation, Trace
 from tests.pages import FETCHING, Page
 from tests.traces import HOSTILE, TENSION_NOISE, made_trace, nothing_found, without_positions
 
@@ -286,3 +286,13 @@ def test_folder_holds_robot_fmus_report_and_page_that_links_them(tmp_path: Path)
     links = [each["href"] for each in Page((tmp_path / "index.html").read_text(encoding="utf-8")).all("a")][1:]
     assert sorted(links) == sorted(path.name for path in tmp_path.iterdir() if path.name != "index.html")
     assert {path.name for path in (*fmus.cables, fmus.platform)} < set(links)
+
+
+def test_estimates_that_err_together_are_told() -> None:
+    strong = (Fitted("damping", (1, 2, 3), "damping"), Fitted("payload", (), "mass"))
+    weak = (Fitted("damping", (1, 2, 3), "damping"), Fitted("sag", (2,), "linear_density"))
+    correlations = (Correlation(strong, -0.954), Correlation(weak, 0.2))
+    html = trace_page(replace(made_trace(), correlations=correlations), LINKS)
+    assert "damping of damping (all cables) and mass of payload: where one is too large the other is too small" in html
+    assert "(-95 %)" in html and "linear_density of sag" not in html
+    assert "err together" not in trace_page(made_trace(), LINKS)

@@ -7,7 +7,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from ..tracer.verdict import FoundEffect, Trace
+from ..tracer.verdict import Fitted, FoundEffect, Trace
 from . import charts
 from .figures import ROLE_LABELS, outputs
 from .markup import Column, bullets, downloads, number, section, table, text
@@ -30,6 +30,8 @@ from .summary import (
 from .units import engineering, percent, significant
 
 SHOWN_ALIKE = 6
+# Correlations below this are not worth a line.
+TOGETHER = 0.5
 ERROR_COLUMNS = (
     Column("Output"),
     Column("Before", True),
@@ -90,7 +92,7 @@ def found(trace: Trace) -> str:
         )  # fmt: skip
         content += table("Effects found, with their parameters", columns, rows, "effects", True)
         content += '<p class="keys dots"><span class="key key-after">estimate with its interval</span>'
-        content += '<span class="key key-floor">declared</span></p>'
+        content += '<span class="key key-floor">declared</span></p>' + _together(trace)
     elif not content:
         content = "<p>No effect was added to the model.</p>"
     lead = (
@@ -99,6 +101,22 @@ def found(trace: Trace) -> str:
         "recordings the 95 % interval holds the true value."
     )
     return section("found", "What the model lacked", content, lead if rows else "")
+
+
+def _together(trace: Trace) -> str:
+    """Which estimates err together, so that their intervals must not be taken one by one."""
+    strong = [found for found in trace.correlations if abs(found.value) >= TOGETHER]
+    said = []
+    for found in strong:
+        one, other = (f"{each.parameter} of {_named(trace, each)}" for each in found.between)
+        way = "too large" if found.value > 0.0 else "too small"
+        said.append(f"{one} and {other}: where one is too large the other is {way} ({100.0 * found.value:.0f} %)")
+    return f"<p>Estimates that err together (correlation):</p>{bullets(said)}" if said else ""
+
+
+def _named(trace: Trace, fitted: Fitted) -> str:
+    cables = f" ({cables_text(fitted.cables, trace.robot_before.cable_count)})" if fitted.cables else ""
+    return fitted.name + cables
 
 
 def also_possible(trace: Trace) -> str:
