@@ -74,6 +74,7 @@ WRONG_RUNS: list[tuple[str, Any, tuple[str, ...]]] = [
     ("time", TIME[:, None], ("(4, 1)", "(N,)")),
     ("time", "now", ("'now'", "array of numbers")),
     ("time", None, ("shape ()", "(N,)")),
+    ("time", [0, 10**400], ("a list", "array of numbers")),
     ("winch_speed", np.zeros((4, 4)), ("(4, 4)", "(4, 3)", "3 cables")),
     ("winch_speed", np.zeros((4, 2)), ("(4, 2)", "(4, 3)")),
     ("winch_speed", np.zeros(4), ("(4,)", "(4, 3)")),
@@ -102,6 +103,11 @@ def test_a_run_refuses(three_fmus: RobotFmus, name: str, value: Any, words: tupl
 def test_a_run_takes_lists_and_whole_numbers(three_fmus: RobotFmus) -> None:
     motion = tautwire.cosimulate(three_fmus, [0, 1], [[0, 0, 0]] * 2, step=np.int64(1), patience=None)
     assert motion.position.shape == (2, 3)
+
+
+def test_a_run_has_no_bound_on_its_steps_where_the_longest_is_infinite(three_fmus: RobotFmus) -> None:
+    motions = [tautwire.cosimulate(three_fmus, TIME, SPEEDS, step=step) for step in (np.inf, 0.01)]
+    assert np.array_equal(*(motion.position for motion in motions))
 
 
 def test_a_run_refuses_fmus_that_are_none_or_are_gone(three_fmus: RobotFmus, tmp_path: Path) -> None:

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from math import inf
 from typing import Any
 
 import pytest
 
+from tautwire.errors import UnreachableError
+from tautwire.robots.robot import Robot
 from tautwire.tracer import trace
-from tautwire.tracer.data import split
+from tautwire.tracer.data import Sample, split
 from tautwire.tracer.fit import Fitter
 from tautwire.tracer.hypotheses import Hypothesis
+from tautwire.tracer.likelihood import Innovations
 from tautwire.tracer.preparation.noise import noise_of
 from tautwire.tracer.rivals import with_rivals
 from tautwire.tracer.search import Found
@@ -50,6 +54,20 @@ def test_softer_ropes_with_damping_make_room_for_the_frame_that_they_stood_for()
     assert found.fit.values[0] == pytest.approx(1.0 / 3e6, rel=0.03)
     assert found.evidence[0] > 1000.0
     assert found.alike == ()
+
+
+def test_a_frame_without_which_nothing_can_be_run_has_evidence_beyond_measure(monkeypatch: pytest.MonkeyPatch) -> None:
+    as_it_is = Fitter.judged
+
+    def unheld(fitter: Fitter, robot: Robot, chosen: Collection[Hypothesis], sample: Sample) -> Innovations:
+        if not chosen:
+            raise UnreachableError("here", robot.platform.start, None, None)
+        return as_it_is(fitter, robot, chosen, sample)
+
+    monkeypatch.setattr(Fitter, "judged", unheld)
+    found = judged(FRAME, [Hypothesis(BY_NAME[name], (1, 2, 3)) for name in ("modulus", "damping")])
+    assert [hypothesis.effect.name for hypothesis in found.accepted] == ["frame"]
+    assert found.evidence == (inf,)
 
 
 def test_a_frame_that_gives_way_is_discovered_and_not_named_after_a_rope() -> None:

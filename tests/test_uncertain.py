@@ -96,6 +96,7 @@ def test_a_mass_within_what_is_stated_is_no_payload() -> None:
         302.0, abs=4.0 * found.robot_after.platform.mass_uncertainty
     )
     assert found.robot_after.platform.mass_uncertainty < 0.3
+    assert found.components.blamed == "nothing"
 
 
 @pytest.mark.slow
@@ -107,6 +108,7 @@ def test_a_tracker_off_its_frame_is_no_anchor_elsewhere() -> None:
     shifted = [replace(each, position=each.position + off) for each in (fit, check)]
     found = trace(robot, *shifted, lambda what, done: None)
     assert found.verdict == "none"
+    assert found.components.blamed == "nothing"
 
 
 @pytest.mark.slow
@@ -130,5 +132,9 @@ def test_an_effect_is_found_beside_load_cells_that_are_off_zero() -> None:
 @pytest.mark.slow
 def test_load_cells_off_zero_are_none_where_that_is_stated_and_no_listed_effect_where_not() -> None:
     off = (8.0, -5.0, 12.0)
-    assert traced(unsure(tension=10.0), {}, off).verdict == "none"
-    assert traced(example("three"), {}, off).effects == ()
+    found = traced(unsure(tension=10.0), {}, off)
+    assert found.verdict == "none"
+    assert found.components.blamed == "nothing"
+    without = traced(example("three"), {}, off)
+    assert without.effects == ()
+    assert without.components.blamed != "nothing"

@@ -41,6 +41,13 @@ def test_what_is_wrong_is_one_line_and_nothing_written(
     assert list(tmp_path.iterdir()) == []
 
 
+def test_table_and_figure_are_not_written_to_one_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    one = str(tmp_path / "w.png")
+    assert run(["workspace", CAROCA, "--out", one, "--plot", one]) == 2
+    assert "--plot: " in (told := capsys.readouterr().err) and "is what --out writes; choose another --plot" in told
+    assert list(tmp_path.iterdir()) == []
+
+
 def test_json_without_a_file_prints_the_table_and_writes_nothing(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -22,7 +22,7 @@ def array_of(where: str, value: object, shape: Shape, meaning: str) -> Array:
         if np.iscomplexobj(array) or array.dtype.kind in "mM":
             raise TypeError
         array = array.astype(np.float64)
-    except (TypeError, ValueError) as error:
+    except (TypeError, ValueError, OverflowError) as error:
         raise ArgumentError(where, value, f"is {described(value)}, not an array of numbers", mend) from error
     if array.ndim != len(shape) or any(want not in (None, got) for want, got in zip(shape, array.shape, strict=True)):
         raise ArgumentError(where, value, f"has the shape {_shape(array.shape)}, must have {_shape(shape)}", mend)

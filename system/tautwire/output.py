@@ -55,10 +55,10 @@ def refuse_inputs(inputs: Iterable[Path], outputs: Iterable[Path]) -> None:
             raise InputError(str(output), "is an input, the output would take its place", "choose another --out")
 
 
-def refuse_same(out: Path, report: Path | None) -> None:
-    """Raises InputError where a page would take the place of the result beside which it is written."""
-    if report is not None and os.path.realpath(out) == os.path.realpath(report):
-        raise InputError("--report", f"{report} is what --out writes", "choose another --report")
+def refuse_same(out: Path | None, other: Path | None, option: str = "--report") -> None:
+    """Raises InputError where a page or figure would take the place of the result beside which it is written."""
+    if out is not None and other is not None and os.path.realpath(out) == os.path.realpath(other):
+        raise InputError(option, f"{other} is what --out writes", f"choose another {option}")
 
 
 @contextmanager

@@ -6,6 +6,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import combinations
+from math import isfinite
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -80,12 +81,12 @@ def _read(report: Path) -> _Report:
     try:
         document = json.loads(read_bytes(report, PlanError, LARGEST_REPORT).decode("utf-8"))
         numbers = {
-            Name(str(effect["name"]), _cables(effect), str(key)): (float(each["value"]), _deviation(each))
+            Name(str(effect["name"]), _cables(effect), str(key)): (_finite(each["value"]), _deviation(each))
             for effect in document["effects"]
             for key, each in effect["parameters"].items()
         }
         correlations = dict(_pairs(document))
-    except (ValueError, KeyError, TypeError, AttributeError) as problem:
+    except (ArithmeticError, AttributeError, KeyError, RecursionError, TypeError, ValueError) as problem:
         raise PlanError(str(report), "is no report of a trace", MEND) from problem
     if not numbers:
         raise PlanError(str(report), "found no effect whose numbers could vary", "leave [found] out")
@@ -100,7 +101,13 @@ def _deviation(estimate: Mapping[str, Any]) -> float | None:
     low, high = estimate.get("low"), estimate.get("high")
     if low is None or high is None or not high > low:
         return None
-    return (float(high) - float(low)) / (2.0 * HALF_INTERVAL)
+    return _finite(float(high) - float(low)) / (2.0 * HALF_INTERVAL)
+
+
+def _finite(number: Any) -> float:
+    if not isfinite(number):
+        raise ValueError(number)
+    return float(number)
 
 
 def _pairs(document: Mapping[str, Any]) -> Iterator[tuple[frozenset[Name], float]]:

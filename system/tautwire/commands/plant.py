@@ -53,8 +53,7 @@ def linearise(
 
     require_out(out, as_json, "model.json")
     refuse_inputs([robot_file], [path for path in (out, report) if path])
-    if out is not None:
-        refuse_same(out, report)
+    refuse_same(out, report)
     voice = Voice(as_json, quiet)
     robot = robot_of(robot_file)
     try:
@@ -104,12 +103,13 @@ def workspace(
 
     Example: tautwire workspace robot.toml --out workspace.csv --plot workspace.png
     """
-    from ..output import file_in_place, refuse_inputs
+    from ..output import file_in_place, refuse_inputs, refuse_same
     from ..statics.workspace import wrench_feasible_workspace
     from ..statics.workspace_figure import checked_format, workspace_figure
 
     require_out(out, as_json, "workspace.csv")
     refuse_inputs([robot_file], [path for path in (out, plot) if path])
+    refuse_same(out, plot, "--plot")
     if plot is not None:
         checked_format(plot)
     voice = Voice(as_json, quiet)

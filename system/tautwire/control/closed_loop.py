@@ -203,10 +203,9 @@ def _require_push(name: str, push: ArrayLike, count: int) -> Array:
 def _require_reference(name: str, reference: Reference, count: int, cables: int) -> None:
     where = f"{name}: reference"
     of_kind(where, reference, Reference, "give what elastic_reference returns")
-    widths = {"speeds": cables, "rigid": cables, "expected": 3 + cables}
-    for name, width in widths.items():
-        meaning = f"that of the controller's {count} samples, sample_times(period, duration)"
-        array_of(f"{where}.{name}", getattr(reference, name), (count, width), meaning)
+    meaning = f"that of the controller's {count} samples, sample_times(period, duration)"
+    for part, width in {"speeds": cables, "rigid": cables, "expected": 3 + cables}.items():
+        array_of(f"{where}.{part}", getattr(reference, part), (count, width), meaning)
 
 
 def _require_cables(fmus: RobotFmus, robot: Robot, controller: Design) -> None:

@@ -30,7 +30,7 @@ def require_options(
     patience: float | None,
 ) -> None:
     """Raises ArgumentError, which names the function, for options that no run can have."""
-    number_of(f"{name}: step", step, STEP)
+    number_of(f"{name}: step", step, STEP, or_infinite=True)
     if tolerance is not None:
         number_of(f"{name}: tolerance", tolerance, TOLERANCE)
     callable_or_none(f"{name}: progress", progress)

@@ -108,12 +108,15 @@ def _count(chosen: Sequence[Hypothesis]) -> int:
 
 
 def _without_last(robot: Robot, fit: Fit, chosen: Sequence[Hypothesis], fitter: Fitter, judge: Sample) -> float:
-    """Log-likelihood of the judging samples under the others at their best there."""
+    """Log-likelihood of the judging samples under the others at their best there; -inf where they cannot be run."""
     others = chosen[:-1]
     for hypothesis in others:
         robot = robot.with_effect(setting_of(fit.robot, hypothesis))
-    best = fitter.fit_from([robot], others, judge, -inf) if others else replace(fit, robot=robot)
-    return _worth(fitter, best, others, judge)
+    try:
+        best = fitter.fit_from([robot], others, judge, -inf) if others else replace(fit, robot=robot)
+        return _worth(fitter, best, others, judge)
+    except (UnreachableError, NoFitError):
+        return -inf
 
 
 def _found(found: Found, chosen: Sequence[Hypothesis], fit: Fit, evidence: float) -> Found:

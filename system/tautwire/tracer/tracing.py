@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from time import perf_counter
 
 from tautwire_fmu.laws.effects import UNLISTED
@@ -110,7 +110,7 @@ def _trace(
     began = perf_counter()
     ready = _ready(robot, fit, check, workers)
     runs = started(workers, ready.fitter, robot, ready.samples)
-    ports = workers.start(cut_at_ports, robot, ready.evidence.fit, ready.fitter.noise)
+    ports = workers.start(cut_at_ports, *_calibrated(ready, robot), ready.fitter.noise)
     found = search(robot, ready.fitter, ready.evidence, alpha, progress, workers)
     found = with_rivals(robot, found, ready.fitter, ready.evidence, alpha, progress)
     progress("co-simulating before", 0.0)
@@ -162,6 +162,13 @@ def _ready(robot: Robot, fit: Recording, check: Recording | None, workers: Worke
         plain = _innovations(fitter, robot, evidence) if clocks else plain
     samples = (evidence.fit,) if check is None else (evidence.fit, evidence.judge)
     return _Ready(evidence, samples, fitter, plain, (*short, *prepared.notes, *clocks, *_notes(evidence, samples)))
+
+
+def _calibrated(ready: _Ready, robot: Robot) -> tuple[Robot, Sample]:
+    """Robot and FIT with uncertain numbers as FIT has them: what is within their bounds is no component's residual."""
+    sample = ready.evidence.fit
+    numbers = calibrated(ready.fitter, robot, sample)
+    return numbers.robot(robot), replace(sample, recording=numbers.recording(sample.recording))
 
 
 def _answer(
