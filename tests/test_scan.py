@@ -1,11 +1,15 @@
 """Effects whose slopes tell nothing are seen by running the model."""
 
+from collections.abc import Sequence
+
 import pytest
 
+from tautwire.errors import UnreachableError
 from tautwire.robots.robot import Robot
 from tautwire.tracer.data import Sample, split
 from tautwire.tracer.fit import Fitter
 from tautwire.tracer.hypotheses import Hypothesis
+from tautwire.tracer.likelihood import Innovations
 from tautwire.tracer.preparation.noise import noise_of
 from tautwire.tracer.scan import looked_at, scanned, silent
 from tautwire.tracer.screen import Prospect, screen
@@ -52,8 +56,24 @@ def test_a_promise_that_a_run_holds_better_stays() -> None:
     assert better.gain > 1000.0
 
 
+def test_a_promise_that_cannot_be_run_gives_way(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot, fitter, sample = looked({"hysteresis": {"force": 30.0, "yield_strain": 1e-4}})
+    judged = fitter.judged
+
+    def unheld(robot: Robot, chosen: Sequence[Hypothesis], sample: Sample) -> Innovations:
+        if any(setting.values["force"] == 0.5 for setting in robot.effects):
+            raise UnreachableError("here", robot.platform.start, None, None)
+        return judged(robot, chosen, sample)
+
+    monkeypatch.setattr(fitter, "judged", unheld)
+    unrun = Prospect(1.0, {"force": 0.5, "yield_strain": 1e-5})
+    assert scanned(robot, (), fitter, sample, {STICKY: unrun}, Workers(1))[STICKY].gain > 1000.0
+
+
 def test_scales_are_looked_at_from_the_largest_each_with_all_shapes() -> None:
-    values = list(looked_at(STICKY))
+    groups = list(looked_at(STICKY))
+    values = [each for group in groups for each in group]
+    assert [len(group) for group in groups] == [3, 3, 3]
     assert [each["force"] for each in values] == [1000.0] * 3 + [100.0] * 3 + [10.0] * 3
     assert len({tuple(each.items()) for each in values}) == 9
     assert list(looked_at(VISCOUS)) == []

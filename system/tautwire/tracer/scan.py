@@ -70,12 +70,14 @@ def better(
 
     ``without`` is the log-likelihood of the sample without it.
     """
-    gains = [(_run(robot, chosen, fitter, sample, prospect.values) - without, prospect)] if prospect.values else []
-    for values in looked_at(chosen[-1]):
-        gain = _run(robot, chosen, fitter, sample, {**prospect.values, **values}) - without
-        if isfinite(gain):
-            gains.append((gain, Prospect(gain, {**prospect.values, **values})))
-        if abs(gain) < UNFELT:
+    gains = []
+    if prospect.values and isfinite(promised := _run(robot, chosen, fitter, sample, prospect.values) - without):
+        gains.append((promised, prospect))
+    for shapes in looked_at(chosen[-1]):
+        tried = [{**prospect.values, **values} for values in shapes]
+        found = [_run(robot, chosen, fitter, sample, values) - without for values in tried]
+        gains += [(g, Prospect(g, values)) for g, values in zip(found, tried, strict=True) if isfinite(g)]
+        if all(abs(gain) < UNFELT for gain in found):
             break
     return max(gains, key=lambda each: each[0], default=(0.0, prospect))[1]
 
@@ -117,16 +119,16 @@ def felt_from(
     return exp(least if excess(least) > 0.0 else brentq(excess, least, most, xtol=PRECISION))
 
 
-def looked_at(hypothesis: Hypothesis) -> Iterator[dict[str, float]]:
-    """All combinations of the values to look at, the largest first; none where a hypothesis has none."""
+def looked_at(hypothesis: Hypothesis) -> Iterator[list[dict[str, float]]]:
+    """The values to look at, the largest first, each with all trials of the parameters that shape the effect."""
     scales = [p for p in hypothesis.parameters if p.scanned]
     shapes = [p for p in hypothesis.parameters if p.trials]
     if not scales:
         return
     names = [p.name for p in (*scales, *shapes)]
-    ranges = [*(sorted(p.scanned, reverse=True) for p in scales), *(p.trials for p in shapes)]
-    for values in product(*ranges):
-        yield dict(zip(names, values, strict=True))
+    for sizes in product(*(sorted(p.scanned, reverse=True) for p in scales)):
+        shaped = product(*(p.trials for p in shapes))
+        yield [dict(zip(names, (*sizes, *values), strict=True)) for values in shaped]
 
 
 def _run(
