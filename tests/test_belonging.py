@@ -83,6 +83,15 @@ def test_what_a_model_may_lack_does_not_make_it_another_robots(effects: dict[str
     require_ropes(far, recording, recording.position[0], "here")
 
 
+@pytest.mark.parametrize("name", ["three", "caroca", "eight"])
+def test_a_tracker_that_jumps_now_and_then_does_not_make_it_another_robots(name: str) -> None:
+    recording = of(name)
+    position = recording.position.copy()
+    position[[0, 500, 501, 900]] += 100.0
+    far = elsewhere(example(name), [0.0, 0.0, -1.5 * FAR * size_of(example(name))])
+    require_ropes(far, replace(recording, position=position), recording.position[1], "here")
+
+
 def test_a_recording_without_positions_or_motion_is_no_other_robots() -> None:
     far, still = elsewhere(THREE, [0.0, 0.0, 15.0]), recorded("three", 1)
     at_rest = replace(still, winch_speed=np.zeros_like(still.winch_speed))

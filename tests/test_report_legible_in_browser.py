@@ -87,7 +87,8 @@ def test_titles_of_axes_and_labels_of_modes_can_be_read(
 @pytest.mark.parametrize("axis", ["x", "y", "z"])
 @pytest.mark.parametrize("kind", [*KINDS, "close"])
 def test_titles_in_space_are_whole_on_a_phone(browser: Browser, pages: dict[str, Path], kind: str, axis: str) -> None:
-    titled = opened(browser, pages[kind], PHONE).pixels("#scene")
+    opened(browser, pages[kind], PHONE).see("figure.scene")
+    titled = browser.pixels("#scene")
     browser.run(f"return Plotly.relayout('scene', {{ 'scene.{axis}axis.title.text': '' }})")
     rows, columns = np.nonzero((browser.pixels("#scene") != titled).any(axis=2))
     assert len(rows) > 40

@@ -210,5 +210,6 @@ def _series(names: Sequence[str]) -> list[list[str]]:
     return found
 
 
-def _numbers(name: str) -> list[int]:
-    return [int(digits) for digits in _NUMBER.findall(name)]
+def _numbers(name: str) -> list[str]:
+    # As digits: Python refuses to count beyond some thousands of them.
+    return [digits.lstrip("0") for digits in _NUMBER.findall(name)]

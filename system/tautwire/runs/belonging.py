@@ -18,6 +18,8 @@ FAR, LEAST = 0.1, 1e-3
 # Of what was reeled. Stretch, wrong drums and drift stay far below, another robot's ropes are wrong by all of it.
 APART = 0.5
 LOOKED_AT = 60.0  # s
+# Rows at rest at the start, and the share of all rows that counts: a tracker may jump now and then.
+FIRST, COUNTED = 5, 0.95
 MEND = "give a recording of this robot, with positions in m in the robot file's frame, or correct the robot file"
 
 
@@ -48,7 +50,10 @@ def require_ropes(robot: Robot, recording: Recording, start: Array, where: str) 
 
 
 def reeled_and_missed(robot: Robot, recording: Recording) -> tuple[float, float]:
-    """Rope reeled by the winches, and what of it the lengths at the recorded positions do not show; rms in m."""
+    """Rope reeled by the winches, and what of it the lengths at the recorded positions do not show; rms in m.
+
+    Without the rows at which most is missed, which may be outliers.
+    """
     time, speeds = recording.time, recording.winch_speed
     reeled = np.zeros_like(speeds)
     np.cumsum(0.5 * (speeds[1:] + speeds[:-1]) * np.diff(time)[:, None], axis=0, out=reeled[1:])
@@ -57,7 +62,10 @@ def reeled_and_missed(robot: Robot, recording: Recording) -> tuple[float, float]
         return 0.0, 0.0
     lengths = np.linalg.norm(np.array(robot.anchors) - recording.position[rows][:, None], axis=2)
     wound = reeled[rows] - reeled[rows][0]
-    return _rms(wound), _rms(wound + lengths - lengths[0])
+    errors = wound + lengths - np.median(lengths[:FIRST], axis=0)
+    missed = np.mean(errors**2, axis=1)
+    kept = missed <= np.quantile(missed, COUNTED)
+    return _rms(wound[kept]), _rms(errors[kept])
 
 
 def size_of(robot: Robot) -> float:
