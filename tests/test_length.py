@@ -5,7 +5,7 @@ from functools import partial
 import numpy as np
 import pytest
 
-from tautwire.tracer import trace, tracing
+from tautwire.tracer import ready, trace
 from tautwire.tracer.preparation.length import shortened
 from tests.recordings import recorded
 from tests.robots import example
@@ -35,7 +35,7 @@ def test_the_only_one_keeps_twice_as_much_since_it_judges_too() -> None:
 
 @pytest.mark.slow
 def test_a_trace_takes_the_beginning_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(tracing, "shortened", partial(shortened, most=300))
+    monkeypatch.setattr(ready, "shortened", partial(shortened, most=300))
     found = trace(example("three"), FIT, CHECK)
     assert found.verdict == "none"
     assert [c.recording.sample_count for c in found.comparisons] == [300, 300]

@@ -3,40 +3,33 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from time import perf_counter
 
 from tautwire_fmu.laws.effects import UNLISTED
 
-from ..errors import RecordingError
 from ..interrupt import interrupts_held
 from ..model.uncertain import uncertain_numbers
 from ..recordings.recording import Recording
 from ..robots.robot import Robot
 from ..runs.cosimulation import Motion
-from .adequacy import FEWEST, enough_samples, is_noise
 from .asked import require_asked
 from .cosimulated import compared, reaching, started
-from .data import Evidence, Sample, split
 from .discovery.discovery import Discovery
 from .discovery.unexplained import Rest, what_is_left
 from .discovery.written import effects_text, formula_text
 from .estimates import correlations_of, found_effects
-from .fit import Fitter
 from .hypotheses import Hypothesis
-from .likelihood import Innovations
 from .preparation.calibration import calibrated
-from .preparation.clock import with_clocks_set
-from .preparation.length import shortened
-from .preparation.preparation import prepare
 from .preparation.release import release_note, released
+from .ready import Ready, all_noise, calibrated_fit, innovations_of, readings
 from .rivals import with_rivals
 from .search import Found, search
 from .separation import separation
 from .trials import setting_of
 from .verdict import Comparison, Errors, Separation, Trace, VerdictName
-from .where.components import cut_at_ports
-from .workers import Workers
+from .where.components import Components, cut_at_ports
+from .workers import Pending, Workers
 
 Progress = Callable[[str, float], None]
 
@@ -73,17 +66,6 @@ def _silently(what: str, done: float) -> None:
 
 
 @dataclass(frozen=True)
-class _Ready:
-    """Recordings made fit for judging, the plain model's innovations on them, and what was done to them."""
-
-    evidence: Evidence
-    samples: tuple[Sample, ...]
-    fitter: Fitter
-    plain: tuple[Innovations, Innovations]
-    notes: tuple[str, ...]
-
-
-@dataclass(frozen=True)
 class _Answer:
     """The effects or the formula that the FMUs, too, bear out; else neither, and what is left.
 
@@ -108,14 +90,17 @@ def _trace(
     workers: Workers,
 ) -> Trace:
     began = perf_counter()
-    ready = _ready(robot, fit, check, workers)
-    runs = started(workers, ready.fitter, robot, ready.samples)
-    ports = workers.start(cut_at_ports, *_calibrated(ready, robot), ready.fitter.noise)
+    ready, *others = readings(robot, fit, check, workers)
+    runs, ports = _aside(ready, robot, workers)
     found = search(robot, ready.fitter, ready.evidence, alpha, progress, workers)
+    if others and not (found.accepted and _leaves_noise(ready, found)):
+        ready = others[0]
+        runs, ports = _aside(ready, robot, workers)
+        found = search(robot, ready.fitter, ready.evidence, alpha, progress, workers)
     found = with_rivals(robot, found, ready.fitter, ready.evidence, alpha, progress)
     progress("co-simulating before", 0.0)
     before = [run.result() for run in runs]
-    noise_alone = _all_noise(ready.plain, ready.evidence)
+    noise_alone = all_noise(ready.plain, ready.evidence)
     answer = _answer(robot, ready, found, before, noise_alone, alpha, progress, workers)
     final, kept = answer.robot, answer.effects_hold
     verdict, sentence = _verdict(robot, answer, noise_alone)
@@ -149,31 +134,19 @@ def _trace(
     )
 
 
-def _ready(robot: Robot, fit: Recording, check: Recording | None, workers: Workers) -> _Ready:
-    fit, check, short = shortened(fit, check)
-    prepared = prepare(robot, fit, check)
-    evidence = split(robot, prepared.noise, prepared.fit, prepared.check)
-    fitter = Fitter(prepared.noise, workers.between)
-    plain = _innovations(fitter, robot, evidence)
-    _require_samples(plain, evidence)
-    clocks: tuple[str, ...] = ()
-    if not _all_noise(plain, evidence):
-        evidence, clocks = with_clocks_set(fitter, robot, evidence)
-        plain = _innovations(fitter, robot, evidence) if clocks else plain
-    samples = (evidence.fit,) if check is None else (evidence.fit, evidence.judge)
-    return _Ready(evidence, samples, fitter, plain, (*short, *prepared.notes, *clocks, *_notes(evidence, samples)))
+def _aside(ready: Ready, robot: Robot, workers: Workers) -> tuple[list[Pending[Motion]], Pending[Components]]:
+    """What goes on beside the search: the co-simulations before, and the cut at the ports."""
+    runs = started(workers, ready.fitter, robot, ready.samples)
+    return runs, workers.start(cut_at_ports, *calibrated_fit(ready, robot), ready.fitter.noise)
 
 
-def _calibrated(ready: _Ready, robot: Robot) -> tuple[Robot, Sample]:
-    """Robot and FIT with uncertain numbers as FIT has them: what is within their bounds is no component's residual."""
-    sample = ready.evidence.fit
-    numbers = calibrated(ready.fitter, robot, sample)
-    return numbers.robot(robot), replace(sample, recording=numbers.recording(sample.recording))
+def _leaves_noise(ready: Ready, found: Found) -> bool:
+    return all_noise(innovations_of(ready.fitter, found.fit.robot, ready.evidence), ready.evidence)
 
 
 def _answer(
     robot: Robot,
-    ready: _Ready,
+    ready: Ready,
     found: Found,
     before: Sequence[Motion],
     noise_alone: bool,
@@ -191,7 +164,7 @@ def _answer(
 
     plain = robot, *compared(robot, fitter, samples, before, before)
     progress("co-simulating after", 0.0)
-    if found.accepted and _all_noise(_innovations(fitter, found.fit.robot, ready.evidence), ready.evidence):
+    if found.accepted and _leaves_noise(ready, found):
         better = borne_out(found.fit.robot)
         if better is not None:
             return _answered(better, found, True, None, Rest())
@@ -214,7 +187,7 @@ def _answered(
     return _Answer(robot, found, effects_hold, discovered, rest, comparisons, floors)
 
 
-def _numbers(ready: _Ready, answer: _Answer) -> list[str]:
+def _numbers(ready: Ready, answer: _Answer) -> list[str]:
     """What the recordings say of declared numbers that the robot file calls uncertain."""
     best = answer.found.fit.robot if answer.discovered is None else answer.discovered.robot
     return [
@@ -224,27 +197,10 @@ def _numbers(ready: _Ready, answer: _Answer) -> list[str]:
     ]
 
 
-def _begun(ready: _Ready, final: Robot) -> list[str]:
+def _begun(ready: Ready, final: Robot) -> list[str]:
     """What the last model says of how fast each recording begins."""
     starts = [(released(ready.fitter, final, sample), sample.recording.path) for sample in ready.samples]
     return [note for start, path in starts for note in release_note(start, path)]
-
-
-def _innovations(fitter: Fitter, robot: Robot, evidence: Evidence) -> tuple[Innovations, Innovations]:
-    return fitter.innovations(robot, evidence.fit), fitter.innovations(robot, evidence.judge)
-
-
-def _require_samples(innovations: tuple[Innovations, Innovations], evidence: Evidence) -> None:
-    for found, sample in zip(innovations, (evidence.fit, evidence.judge), strict=True):
-        if not enough_samples(found, sample.rows):
-            mend = f"record at least {FEWEST} samples, {2 * FEWEST} where there is no check recording"
-            raise RecordingError(sample.recording.path, "too few samples to tell noise from more", mend)
-
-
-def _all_noise(innovations: Sequence[Innovations], evidence: Evidence) -> bool:
-    """Whether nothing but noise is left, where the model was fitted as where it is judged."""
-    samples = (evidence.fit, evidence.judge)
-    return all(is_noise(found, sample.rows) for found, sample in zip(innovations, samples, strict=True))
 
 
 def _verdict(robot: Robot, answer: _Answer, noise_alone: bool) -> tuple[VerdictName, str]:
@@ -275,12 +231,3 @@ def _formula(robot: Robot, answer: _Answer) -> str | None:
         return formula_text(robot, answer.discovered.formulas)
     unlisted = _unlisted(answer) if answer.effects_hold else []
     return effects_text([(h.label(robot), setting_of(answer.found.fit.robot, h)) for h in unlisted]) or None
-
-
-def _notes(evidence: Evidence, samples: tuple[Sample, ...]) -> tuple[str, ...]:
-    unknown = tuple(
-        f"{s.recording.path}: columns not used: {', '.join(s.recording.unknown_columns)}"
-        for s in samples
-        if s.recording.unknown_columns
-    )
-    return (*evidence.notes, *unknown)

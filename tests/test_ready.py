@@ -1,0 +1,69 @@
+"""Recordings as a trace takes them: as they are first, where a clock would explain only a part."""
+
+from dataclasses import replace
+from typing import Any
+
+import pytest
+
+from tautwire.recordings.recording import Recording
+from tautwire.robots.robot import Robot
+from tautwire.tracer import ready, trace
+from tautwire.tracer.data import Evidence
+from tautwire.tracer.fit import Fitter
+from tautwire.tracer.preparation.clock import CHANNELS, shifted
+from tautwire.tracer.ready import Ready, readings
+from tautwire.tracer.workers import Workers
+from tests.recordings import recorded
+from tests.robots import example
+
+THREE = example("three")
+LATE: dict[str, Any] = {"sensor_delay": {"seconds": 0.015, "outputs": "position"}}
+PAYLOAD: dict[str, Any] = {"payload": {"mass": 1.5}}
+
+
+def read(fit: dict[str, Any], check: dict[str, Any]) -> tuple[Ready, ...]:
+    return readings(THREE, recorded("three", 1, fit), recorded("three", 2, check), Workers(1))
+
+
+def told(found: Ready) -> bool:
+    return any("a clock, no effect" in note for note in found.notes)
+
+
+def test_what_is_noise_is_taken_as_it_is() -> None:
+    (found,) = read({}, {})
+    assert not told(found)
+
+
+def test_a_clock_that_explains_all_is_set_at_once() -> None:
+    (found,) = read(LATE, {})
+    assert told(found)
+
+
+def test_a_clock_that_leaves_more_than_noise_waits_behind_the_recordings_as_they_are() -> None:
+    first, second = read({**PAYLOAD, **LATE}, PAYLOAD)
+    assert not told(first) and told(second)
+    assert first.evidence.fit.recording is recorded("three", 1, {**PAYLOAD, **LATE})
+    assert second.evidence.fit.recording is not first.evidence.fit.recording
+
+
+@pytest.mark.slow
+def test_an_effect_that_explains_all_goes_before_a_clock(monkeypatch: pytest.MonkeyPatch) -> None:
+    def always(fitter: Fitter, robot: Robot, evidence: Evidence) -> tuple[Evidence, tuple[str, ...]]:
+        late = shifted(evidence.fit.recording, 0.01, CHANNELS[1])
+        return Evidence(replace(evidence.fit, recording=late), evidence.judge, ()), ("a clock, no effect",)
+
+    monkeypatch.setattr(ready, "with_clocks_set", always)
+    found = trace(THREE, *pair({"damping": {"damping": 9e8}}))
+    assert [effect.name for effect in found.effects] == ["damping"]
+    assert not any("clock" in note for note in found.notes)
+
+
+@pytest.mark.slow
+def test_a_clock_beside_an_effect_is_set_once_no_effect_explains_all() -> None:
+    found = trace(THREE, recorded("three", 1, {"payload": {"mass": 6.0}, **LATE}), pair({"payload": {"mass": 6.0}})[1])
+    assert [effect.name for effect in found.effects] == ["payload"]
+    assert any("a clock, no effect" in note for note in found.notes)
+
+
+def pair(effects: dict[str, Any]) -> tuple[Recording, Recording]:
+    return recorded("three", 1, effects), recorded("three", 2, effects)
