@@ -117,6 +117,7 @@ def robot_is_sound(place: Path) -> bool | None:
     return None if robot.fmus else True
 
 
+@pytest.mark.slow
 @settings(HOSTILE, max_examples=EXAMPLES_OF_ROBOTS)
 @given(content=described(ROBOT_TEXT), command=st.sampled_from(sorted(ROBOT_COMMANDS)))
 def test_any_robot_file_is_read_or_refused(
@@ -147,6 +148,7 @@ RECORDING_COMMANDS = {
 SUFFIXES = (".csv", ".csv", ".csv", ".parquet", ".mf4", ".txt", "")
 
 
+@pytest.mark.slow
 @settings(HOSTILE, max_examples=EXAMPLES_OF_RECORDINGS)
 @given(
     content=recorded(RECORDED) | damaged(as_parquet(RECORDED)),

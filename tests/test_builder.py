@@ -31,7 +31,7 @@ def unpacked(three_fmus: RobotFmus, tmp_path_factory: pytest.TempPathFactory) ->
 
 def run(*arguments: str) -> None:
     path = os.pathsep.join([str(Path(__file__).parents[1]), *sys.path])
-    subprocess.run([sys.executable, *arguments], check=True, env={**os.environ, "PYTHONPATH": path})
+    subprocess.run([sys.executable, *arguments], check=True, env={**os.environ, "PYTHONPATH": path}, timeout=120)
 
 
 def test_after_an_fmu_was_loaded(three_fmus: RobotFmus, tmp_path: Path) -> None:

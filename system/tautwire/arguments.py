@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from numbers import Integral, Real
 from pathlib import Path
+from stat import S_ISDIR, S_ISREG
 from typing import TypeVar
 
 from .errors import ArgumentError, described, shown, with_article
@@ -48,9 +49,10 @@ def callable_or_none(where: str, value: Kind) -> Kind:
 
 
 def folder_of(where: str, value: object) -> Path:
-    """The path of a folder, which need not be there; raises ArgumentError, also where something else is there."""
+    """The path of a folder, which need not be there; raises ArgumentError where something else is, or none can be."""
     folder = path_of(where, value)
-    if "\0" in str(folder) or (folder.exists() and not folder.is_dir()):
+    mode = _mode_of(where, value, folder, "name a folder")
+    if mode is not None and not S_ISDIR(mode):
         raise ArgumentError(where, value, f"is {shown(str(folder))}, which is no folder", "name a folder")
     return folder
 
@@ -58,9 +60,26 @@ def folder_of(where: str, value: object) -> Path:
 def file_of(where: str, value: object) -> Path:
     """The path of a file that is there; raises ArgumentError."""
     file = path_of(where, value)
-    if not file.is_file():
+    mode = _mode_of(where, value, file, "check the path")
+    if mode is None or not S_ISREG(mode):
         raise ArgumentError(where, value, f"is {shown(str(file))}, where no file is", "check the path")
     return file
+
+
+def _mode_of(where: str, value: object, path: Path, mend: str) -> int | None:
+    """What kind of thing a path leads to, as ``os.stat`` tells; None where nothing is there.
+
+    Raises ArgumentError where the system takes no such path: a name in it is too long, or cannot be encoded.
+    """
+    try:
+        return path.stat().st_mode
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or getattr(error, "reason", None) or str(error)
+        raise ArgumentError(
+            where, value, f"is {shown(str(path))}, which cannot be looked up ({reason})", mend
+        ) from error
 
 
 def number_of(where: str, value: object, rule: NumberRule, or_infinite: bool = False) -> float:
@@ -81,11 +100,13 @@ def number_of(where: str, value: object, rule: NumberRule, or_infinite: bool = F
     return number
 
 
-def whole_number_of(where: str, value: object, least: int, mend: str) -> int:
-    """The whole number, not below ``least``; raises ArgumentError."""
+def whole_number_of(where: str, value: object, least: int, mend: str, most: int | None = None) -> int:
+    """The whole number from ``least`` to ``most``, where there is such a bound; raises ArgumentError."""
     if isinstance(value, bool) or not isinstance(value, Integral):
         raise ArgumentError(where, value, f"is {described(value)}, not a whole number", mend)
     number = int(value)
     if number < least:
         raise ArgumentError(where, value, f"is {shown(number)}, must be at least {least}", mend)
+    if most is not None and number > most:
+        raise ArgumentError(where, value, f"is {shown(number)}, must be at most {most}", mend)
     return number

@@ -162,20 +162,28 @@ def ideal_winch_speeds(robot: Robot, trajectory: Trajectory, times: ArrayLike) -
 
     ``V_i = -dl_i/dt = u_i . v``, shape (N, n), in m/s; ``u_i`` from the platform along the rope, ``v`` the velocity.
 
-    Raises ArgumentError where an argument is none of these, or the path leads through an exit point.
+    Raises ArgumentError where an argument is none of these, a path of the user's gives anything but finite (N, 3), or
+    the path leads through an exit point.
     """
     robot_of("ideal_winch_speeds: robot", robot)
     trajectory_of("ideal_winch_speeds: trajectory", trajectory)
     moments = array_of("ideal_winch_speeds: times", times, (None,), "finite times (N,) in s")
+    place, velocity = (_along("ideal_winch_speeds", trajectory, name, moments) for name in ("position", "velocity"))
     with np.errstate(invalid="ignore", divide="ignore"):
-        unit = cable_directions(robot, trajectory.position(moments))
-    speeds: Array = np.einsum("kai,ka->ki", unit, trajectory.velocity(moments))
+        unit = cable_directions(robot, place)
+    speeds: Array = np.einsum("kai,ka->ki", unit, velocity)
     lost = np.argwhere(~np.isfinite(speeds))
     if len(lost):
         row, cable = lost[0]
         problem = f"has no winch speed of cable {cable + 1} at {moments[row]:g} s: it leads through the exit point"
         raise ArgumentError("ideal_winch_speeds: trajectory", trajectory, problem, "lead the path past all exit points")
     return speeds
+
+
+def _along(where: str, trajectory: Trajectory, name: str, times: Array) -> Array:
+    """What a path, maybe of the user's, is or does at times (N,): finite numbers (N, 3); raises ArgumentError."""
+    meaning = f"a path whose {name}(times) has a finite row x, y, z for each of the {len(times)} times"
+    return array_of(f"{where}: trajectory.{name}", getattr(trajectory, name)(times), (len(times), 3), meaning)
 
 
 def trajectory_of(where: str, value: object) -> Trajectory:

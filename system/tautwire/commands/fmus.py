@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
@@ -16,7 +15,6 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from ..errors import InputError
 from ..robots.robot import slots
 from .shared import AsJson, Quiet, RobotFile, Voice, links_beside, progress_bar, robot_of
 
@@ -94,11 +92,12 @@ def simulate(
     from ..output import refuse_inputs, refuse_same
     from ..report.overview import Both, Overview
     from ..report.run_in_place import page_in_place
+    from ..runs.asked import require_numbers
     from ..runs.result_file import result_in_place
     from ..runs.simulation import simulate_recording
     from ..runs.wiring import result_columns
 
-    _require_sensible(step, tolerance, until, patience)
+    require_numbers("--", step, tolerance, patience, until)
     voice = Voice(as_json, quiet)
     robot = robot_of(robot_file)
     robot = robot.with_fmus(own_fmus(fmu or [], robot.cable_count))
@@ -124,18 +123,6 @@ def simulate(
     books = {"steps": account.steps, "redos": account.redos, "energy_made": account.made, "error": account.error}
     voice.result([*said, *([report] if report else [])], {**written, **books, "notes": notes})
     voice.next(f"tautwire trace {robot_file} {speeds} --out report/, if positions or tensions were measured too")
-
-
-def _require_sensible(step: float, tolerance: float | None, until: float | None, patience: float) -> None:
-    """Raises InputError for options that no run can have."""
-    if not step > 0.0:
-        raise InputError("--step", f"{step:g} s is not positive", "give a step such as 0.01")
-    if until is not None and math.isnan(until):
-        raise InputError("--until", "nan is not a time", "give a time in s")
-    if tolerance is not None and not tolerance > 0.0:
-        raise InputError("--tolerance", f"{tolerance:g} m is not positive", "give an error such as 1e-6")
-    if not patience > 0.0:
-        raise InputError("--patience", f"{patience:g} s is not positive", "give a time such as 60, or inf")
 
 
 def fmus(robot_file: RobotFile, as_json: AsJson = False, quiet: Quiet = False) -> None:

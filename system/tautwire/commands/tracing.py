@@ -38,9 +38,9 @@ def trace(
     from ..report import trace_document, trace_table, write_report
     from ..tracer import processors
     from ..tracer import trace as traced
+    from ..tracer.asked import rate_of
 
-    if not 0.0 < alpha < 1.0:
-        raise InputError("--alpha", f"{alpha:g} is not a rate", "give a number between 0 and 1, such as 0.01")
+    rate_of("--alpha", alpha)
     voice = Voice(as_json, quiet)
     if is_material_table(fit):
         if check is not None:
@@ -100,4 +100,5 @@ def excite(
     median = f"closest pair of the median program: {found.typical:.3g} nats"
     named = [{"effect": effect, "other": other, "nats": nats} for effect, other, nats in pairs]
     voice.result([*lines, median, out], {"program": out, "pairs": named, "median": found.typical})
-    voice.next(f"run it on the robot, record positions and tensions, then tautwire trace {robot_file} RECORDING.csv")
+    tracing = f"tautwire trace {robot_file} RECORDING.csv --out report/"
+    voice.next(f"run it on the robot, record positions and tensions, then {tracing}")

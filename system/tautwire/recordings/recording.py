@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..arguments import of_kind, whole_number_of
 from ..errors import RecordingError, at_once, shown
 from ..input_file import path_of
+from ..robots.reading import MOST_CABLES
 from .columns import ColumnTable
 from .csv_file import CsvTable, open_csv
 from .header import AXES, Refuse, header_of
@@ -93,10 +94,10 @@ def read_recording(path: str | Path, cable_count: int) -> Recording:
     Columns are ``time`` (s), ``winch_speed_1`` ... (m/s), ``tension_1`` ... (N), ``x``, ``y``, ``z`` (m).
 
     Raises RecordingError, which names the line or row, where the file holds none; ArgumentError where ``path`` is no
-    path or ``cable_count`` no whole number from 1.
+    path or ``cable_count`` no whole number from 1 to 100.
     """
     path_of("read_recording: path", path)
-    whole_number_of("read_recording: cable_count", cable_count, 1, CABLES)
+    whole_number_of("read_recording: cable_count", cable_count, 1, CABLES, MOST_CABLES)
     return _checked(_opened(path, cable_count, at_once), cable_count)
 
 
@@ -147,7 +148,7 @@ def recording_from_frame(frame: pd.DataFrame, cable_count: int, name: str = "fra
     Raises RecordingError as :func:`read_recording` does, ArgumentError where ``frame`` is no frame.
     """
     of_kind("recording_from_frame: frame", frame, pd.DataFrame, "give a pandas frame with a column time")
-    whole_number_of("recording_from_frame: cable_count", cable_count, 1, CABLES)
+    whole_number_of("recording_from_frame: cable_count", cable_count, 1, CABLES, MOST_CABLES)
     of_kind("recording_from_frame: name", name, str, "give what messages shall call it")
     header = header_of([str(column) for column in frame.columns], name, cable_count)
     numbers = frame.set_axis(list(header.names), axis="columns")

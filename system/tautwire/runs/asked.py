@@ -11,6 +11,7 @@ from ..robots.checked_table import NumberRule
 
 STEP = NumberRule("the longest macro step", "s", positive=True)
 TOLERANCE = NumberRule("the error allowed", "m", positive=True)
+UNTIL = NumberRule("the time at which to stop", "s")
 PATIENCE = NumberRule("how long an FMU may take for one call, or infinity,", "s", positive=True)
 
 
@@ -30,9 +31,18 @@ def require_options(
     patience: float | None,
 ) -> None:
     """Raises ArgumentError, which names the function, for options that no run can have."""
-    number_of(f"{name}: step", step, STEP, or_infinite=True)
-    if tolerance is not None:
-        number_of(f"{name}: tolerance", tolerance, TOLERANCE)
+    require_numbers(f"{name}: ", step, tolerance, patience)
     callable_or_none(f"{name}: progress", progress)
+
+
+def require_numbers(
+    before: str, step: float, tolerance: float | None, patience: float | None, until: float | None = None
+) -> None:
+    """Raises ArgumentError for numbers that no run can have; ``before`` is what stands before an option's name."""
+    number_of(f"{before}step", step, STEP, or_infinite=True)
+    if tolerance is not None:
+        number_of(f"{before}tolerance", tolerance, TOLERANCE)
     if patience is not None:
-        number_of(f"{name}: patience", patience, PATIENCE, or_infinite=True)
+        number_of(f"{before}patience", patience, PATIENCE, or_infinite=True)
+    if until is not None:
+        number_of(f"{before}until", until, UNTIL, or_infinite=True)

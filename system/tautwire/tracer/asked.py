@@ -27,8 +27,7 @@ def require_asked(
     """
     robot_of("trace: robot", robot)
     callable_or_none("trace: progress", progress)
-    if number_of("trace: alpha", alpha, ALPHA) >= 1.0:
-        raise ArgumentError("trace: alpha", alpha, f"is {alpha:g}, must be below 1", ALPHA.mend())
+    rate_of("trace: alpha", alpha)
     whole_number_of("trace: processes", processes, 1, "give how many processes may work at a time")
     recordings = {"fit": fit} | ({} if check is None else {"check": check})
     for name, recording in recordings.items():
@@ -38,3 +37,11 @@ def require_asked(
             problem = f"has winch speeds of {recording.cable_count} cables, the robot has {robot.cable_count}"
             raise ArgumentError(where, recording, problem, "give robot and recording that belong together")
         require_outputs(recording)
+
+
+def rate_of(where: str, value: object) -> float:
+    """The rate of false alarms, above 0 and below 1; raises ArgumentError."""
+    rate = number_of(where, value, ALPHA)
+    if rate >= 1.0:
+        raise ArgumentError(where, value, f"is {rate!r}, must be below 1", ALPHA.mend())
+    return rate
