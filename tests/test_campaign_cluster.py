@@ -6,9 +6,6 @@ import os
 import signal
 import subprocess
 import sys
-import time
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -18,70 +15,24 @@ import pytest
 pytest.importorskip("distributed", reason='Dask is not installed: pip install "dask[distributed]" SALib')
 
 import dask
-from distributed import Client
 
 from tautwire.campaign import cluster as clusters
 from tautwire.campaign.cluster import LOST, connected, dashboard
 from tautwire.campaign.dataset import opened, parts_of, read_rows
 from tautwire.campaign.errors import UnfinishedError
-from tautwire.campaign.plan import Plan
 from tautwire.campaign.reading import read_plan
-from tautwire.campaign.rows import columns_of
 from tautwire.campaign.running import make_rows, run_count
 from tautwire.cli import run as command
-from tests.campaigns import AT_REST, bare_results, moving, plan_file, read
+from tests.campaigns import AT_REST, moving, plan_file, read
+from tests.clusters import bare_rows, cluster, rows_of, wait_for
 from tests.faults import FAULT, build_faulty
 from tests.robots import EXAMPLES
 
 pytestmark = pytest.mark.slow
-DASK = (sys.executable, "-m", "dask")
 
 
 def silently(what: str, done: float) -> None:
     """Tells nobody."""
-
-
-def rows_of(folder: Path) -> list[dict[str, object]]:
-    """All rows; refuses a run with two."""
-    rows: list[dict[str, object]] = read_rows(folder).to_pylist()
-    assert [row["index"] for row in rows] == list(range(len(rows)))
-    return rows
-
-
-def bare_rows(plan: Plan, folder: Path) -> list[dict[str, object]]:
-    """What a bare loop makes of it, with a null wherever a run says nothing."""
-    names = [column.name for column in columns_of(plan, 3)]
-    return [{**dict.fromkeys(names), **result.row} for result in bare_results(plan, folder)]
-
-
-@contextmanager
-def cluster(folder: Path, workers: int = 2) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
-    """The address of a scheduler on loopback; it and its workers, each a process as Dask's commands start them."""
-    file = folder / "scheduler.json"
-    quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
-    common = ["--scheduler-file", str(file), "--no-dashboard"]
-    scheduler = [*DASK, "scheduler", "--host", "127.0.0.1", "--port", "0", *common]
-    worker = [*DASK, "worker", "--nthreads", "1", "--no-nanny", "--local-directory", str(folder / "local"), *common]
-    processes = [subprocess.Popen(scheduler, **quiet)]  # type: ignore[call-overload]
-    try:
-        wait_for(file.exists)
-        processes += [subprocess.Popen(worker, **quiet) for _ in range(workers)]  # type: ignore[call-overload]
-        with Client(scheduler_file=str(file), set_as_default=False) as client:
-            client.wait_for_workers(workers, timeout=300)
-            address = client.scheduler.address
-        yield address, processes
-    finally:
-        for process in processes:
-            process.kill()
-            process.wait()
-
-
-def wait_for(holds: Callable[[], bool], seconds: float = 300.0) -> None:
-    """Waits until something holds."""
-    until = time.monotonic() + seconds
-    while not holds():
-        assert time.monotonic() < until
-        time.sleep(0.05)
 
 
 def test_a_worker_killed_in_the_middle_costs_no_row_and_changes_none(tmp_path: Path) -> None:

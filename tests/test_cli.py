@@ -114,7 +114,9 @@ def test_trace_finds_the_damping_of_the_shipped_robot(
         assert after["position_rms"] < 1.2 * floor["position_rms"]
         assert after["tension_rms"] < 1.2 * floor["tension_rms"] < report["error_before"][role]["tension_rms"]
     assert report["residual_is_noise"] == {"before": False, "after": True}
-    assert "damping" in capsys.readouterr().out
+    told = capsys.readouterr()
+    assert "damping" in told.out
+    assert told.err.splitlines()[-1].startswith(f"next: open {out / 'index.html'}; {out / 'robot.toml'} is the robot")
     assert (out / "index.html").stat().st_size > 10_000
     again = read_robot(out / "robot.toml")
     assert again.effects[0].values["damping"] == found["value"]

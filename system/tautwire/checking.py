@@ -55,10 +55,18 @@ class _EnoughError(Exception):
     """There are as many problems as are told of one file."""
 
 
-def check_files(robot_file: Path, recording_file: Path | None = None) -> Checked:
-    """All that is wrong with a robot file and, if there is one, with a recording of that robot; raises nothing."""
+def check_files(
+    robot_file: Path,
+    recording_file: Path | None = None,
+    tell: Callable[[str, float], None] = lambda what, done: None,
+) -> Checked:
+    """All that is wrong with a robot file and, if there is one, with a recording of that robot; raises nothing.
+
+    ``tell`` gets what is being looked at, and the share of it that is done.
+    """
     problems: list[Problem] = []
     notes: list[str] = []
+    tell("reading the robot file", 0.0)
     robot = _checked_robot(robot_file, problems, notes)
     if recording_file is None:
         return Checked(tuple(problems), tuple(notes))
@@ -66,8 +74,10 @@ def check_files(robot_file: Path, recording_file: Path | None = None) -> Checked
         notes.append(f"{recording_file} was not looked at: how many cables there are is not known")
         return Checked(tuple(problems), tuple(notes))
     of_recording: list[Problem] = []
+    tell("reading the recording", 0.0)
     recording = _checked_recording(recording_file, robot.cable_count, of_recording, notes)
     if recording is not None and not problems:
+        tell("looking at both together", 0.0)
         _check_together(robot, recording, of_recording, notes)
     return Checked((*problems, *of_recording), tuple(notes))
 

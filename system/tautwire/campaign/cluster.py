@@ -127,31 +127,14 @@ def results(client: Any, shared: Any, plan: Plan, tasks: Iterable[Task]) -> Iter
 
     Raises OSError where a worker's machine fails, SchedulerLostError where the scheduler is gone.
     """
-    from distributed import KilledWorker, as_completed
+    from distributed import KilledWorker
 
-    waiting = iter(tasks)
-    running: dict[str, Task] = {}
-    completed = as_completed(loop=client.loop)
-    room = _Room(client)
-
-    def submit(task: Task) -> None:
-        future = client.submit(work, shared, task, pure=False)
-        running[future.key] = task
-        completed.add(future)
-
-    def fill() -> None:
-        while len(running) < room.size():
-            task = next(waiting, None)
-            if task is None:
-                return
-            submit(task)
-
+    flight = _Flight(client, shared, tasks)
     with _scheduler_lost(client):
-        fill()
-    while running:
+        flight.fill()
+    while flight.running:
         with _scheduler_lost(client):
-            future = next(completed)
-            task = running.pop(future.key)
+            task, future = flight.landed()
             found = future.result() if future.status == "finished" else None
             error = future.exception() if found is None else None
         if found is not None:
@@ -160,13 +143,13 @@ def results(client: Any, shared: Any, plan: Plan, tasks: Iterable[Task]) -> Iter
             raise error
         elif isinstance(error, KilledWorker) and len(task.jobs) > 1:
             for job in task.jobs:
-                submit(Task((job,)))
+                flight.submit(Task((job,)))
         else:
             reason = LOST if isinstance(error, KilledWorker) else f"{type(error).__name__}: {error}"
             yield [failed(plan, task, job, reason) for job in task.jobs]
         with _scheduler_lost(client):
             future.release()
-            fill()
+            flight.fill()
 
 
 @contextmanager
@@ -181,6 +164,39 @@ def _scheduler_lost(client: Any) -> Iterator[None]:
         if isinstance(error, CommClosedError | FutureCancelledError) or client.status != "running":
             raise SchedulerLostError("Dask's scheduler was lost") from error
         raise
+
+
+class _Flight:
+    """Tasks that workers have: no more than there is room for, each until it :meth:`landed`."""
+
+    def __init__(self, client: Any, shared: Any, tasks: Iterable[Task]) -> None:
+        from distributed import as_completed
+
+        self.running: dict[str, Task] = {}
+        self._client = client
+        self._shared = shared
+        self._waiting = iter(tasks)
+        self._completed = as_completed(loop=client.loop)
+        self._room = _Room(client)
+
+    def submit(self, task: Task) -> None:
+        """Send a task to a worker."""
+        future = self._client.submit(work, self._shared, task, pure=False)
+        self.running[future.key] = task
+        self._completed.add(future)
+
+    def fill(self) -> None:
+        """Send tasks that wait for as long as there is room."""
+        while len(self.running) < self._room.size():
+            task = next(self._waiting, None)
+            if task is None:
+                return
+            self.submit(task)
+
+    def landed(self) -> tuple[Task, Any]:
+        """Wait for the next task that comes back, with its future."""
+        future = next(self._completed)
+        return self.running.pop(future.key), future
 
 
 class _Room:

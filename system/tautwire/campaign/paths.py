@@ -5,15 +5,18 @@ from __future__ import annotations
 from ..errors import shown
 from ..recordings.recording import read_recording
 from ..robots.checked_table import CheckedTable, NumberRule
+from ..trajectory import ANGLE, RADIUS, RISE
+from ..trajectory import DURATION as OF_PATH
 from .plan import Input, PathPlan
 from .values import digest_of, file_beside
 
-DURATION = NumberRule("how long the path takes", "s", 1e-3, 1e5)
+# Narrower than for one run: a slip in a plan is made many times over.
+DURATION = OF_PATH._replace(minimum=1e-3, maximum=1e5)
 UNTIL = NumberRule("where the recording is left", "s", 1e-3, 1e6)
 HELIX = {
-    "radius": NumberRule("the helix's radius", "m", positive=True),
-    "rise": NumberRule("how far the helix rises", "m"),
-    "angle": NumberRule("how far the helix turns", "rad"),
+    "radius": RADIUS._replace(positive=True),
+    "rise": RISE,
+    "angle": ANGLE,
     "duration": DURATION,
 }
 

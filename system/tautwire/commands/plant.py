@@ -4,15 +4,17 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping
 from contextlib import ExitStack
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from ..errors import InputError, UnreachableError
 from ..robots.reading import read_robot
+from ..robots.robot import Robot
 from .shared import (
     AsJson,
     Quiet,
@@ -26,6 +28,7 @@ from .shared import (
 )
 
 if TYPE_CHECKING:
+    from ..linear.plant import LinearPlant
     from ..statics.workspace import Workspace
 
 
@@ -49,7 +52,7 @@ def linearise(
     """
     from ..linear import linearise as linearised
     from ..linear import model_document
-    from ..output import file_in_place, refuse_inputs, refuse_same
+    from ..output import refuse_inputs, refuse_same
 
     require_out(out, as_json, "model.json")
     refuse_inputs([robot_file], [path for path in (out, report) if path])
@@ -63,6 +66,29 @@ def linearise(
     except UnreachableError as error:
         raise UnreachableError("--at", error.position, error.cable, error.tension, error.reason) from error
     document = model_document(plant)
+    written = _write_model(document, out, robot, plant, report, robot_file)
+    say_what_is_left_out(robot, voice)
+    for note in plant.notes:
+        voice.note(note)
+    voice.result([*_modes_told(plant), *written.values()], {**written, **document, "notes": plant.notes})
+
+
+def _modes_told(plant: LinearPlant) -> list[str]:
+    pairs = zip(plant.modes.frequencies, plant.modes.damping_ratios, strict=True)
+    return [f"mode {i}: {hertz:.4f} Hz, damping ratio {ratio:.5f}" for i, (hertz, ratio) in enumerate(pairs, 1)]
+
+
+def _write_model(
+    document: Mapping[str, Any],
+    out: Path | None,
+    robot: Robot,
+    plant: LinearPlant,
+    report: Path | None,
+    robot_file: Path,
+) -> dict[str, Path]:
+    """Write the model and its page where they are asked for, both or none; returns what was written, by name."""
+    from ..output import file_in_place
+
     with ExitStack() as both:
         if out is not None:
             scratch = both.enter_context(file_in_place(out))
@@ -73,13 +99,7 @@ def linearise(
             links = links_beside(report, robot_file, *([out] if out else []))
             page = both.enter_context(file_in_place(report))
             page.write_text(modes_page(robot, plant, links), encoding="utf-8")
-    say_what_is_left_out(robot, voice)
-    for note in plant.notes:
-        voice.note(note)
-    pairs = zip(plant.modes.frequencies, plant.modes.damping_ratios, strict=True)
-    modes = [f"mode {i}: {hertz:.4f} Hz, damping ratio {ratio:.5f}" for i, (hertz, ratio) in enumerate(pairs, 1)]
-    written = ({"model": out} if out else {}) | ({"report": report} if report else {})
-    voice.result([*modes, *written.values()], {**written, **document, "notes": plant.notes})
+    return ({"model": out} if out else {}) | ({"report": report} if report else {})
 
 
 def workspace(
@@ -103,9 +123,9 @@ def workspace(
 
     Example: tautwire workspace robot.toml --out workspace.csv --plot workspace.png
     """
-    from ..output import file_in_place, refuse_inputs, refuse_same
+    from ..output import refuse_inputs, refuse_same
     from ..statics.workspace import wrench_feasible_workspace
-    from ..statics.workspace_figure import checked_format, workspace_figure
+    from ..statics.workspace_figure import checked_format
 
     require_out(out, as_json, "workspace.csv")
     refuse_inputs([robot_file], [path for path in (out, plot) if path])
@@ -119,18 +139,24 @@ def workspace(
     with progress_bar(voice) as tell:
         ahead = partial(tell, "looking where the cables hold it")
         found = wrench_feasible_workspace(robot, least, most, spacing, acceleration, ahead)
+    written = _write_workspace(found, out, robot, plot)
+    counts = {"feasible": int(found.feasible.sum()), "positions": int(found.feasible.size)}
+    said = "{feasible} of {positions} positions are wrench-feasible".format_map(counts)
+    # What no file holds, a machine gets here.
+    voice.result([said, *written.values()], {**written, **counts, **({} if out else {"rows": _rows(found)})})
+
+
+def _write_workspace(found: Workspace, out: Path | None, robot: Robot, plot: Path | None) -> dict[str, Path]:
+    """Write the table and the figure where they are asked for, both or none; returns what was written, by name."""
+    from ..output import file_in_place
+    from ..statics.workspace_figure import workspace_figure
+
     with ExitStack() as both:
         if out is not None:
             found.frame().to_csv(both.enter_context(file_in_place(out)), index=False, float_format="%.10g")
         if plot is not None:
             workspace_figure(robot, found).savefig(both.enter_context(file_in_place(plot)))
-    feasible, positions = int(found.feasible.sum()), int(found.feasible.size)
-    written = ({"workspace": out} if out else {}) | ({"plot": plot} if plot else {})
-    said = f"{feasible} of {positions} positions are wrench-feasible"
-    document = {**written, "feasible": feasible, "positions": positions}
-    # What no file holds, a machine gets here.
-    rows = {} if out else {"rows": _rows(found)}
-    voice.result([said, *written.values()], {**document, **rows})
+    return ({"workspace": out} if out else {}) | ({"plot": plot} if plot else {})
 
 
 def require_out(out: Path | None, as_json: bool, name: str) -> None:

@@ -9,7 +9,7 @@ from typing import Annotated
 import typer
 
 from ..errors import InputError
-from .shared import AsJson, Quiet, RobotFile, Voice
+from .shared import AsJson, Quiet, RobotFile, Voice, progress_bar
 
 SUFFIX = ".toml"
 WRONG_INPUT = 2
@@ -62,7 +62,8 @@ def check(
     from ..checking import check_files
 
     voice = Voice(as_json, quiet)
-    checked = check_files(robot_file, recording)
+    with progress_bar(voice) as tell:
+        checked = check_files(robot_file, recording, tell)
     problems = [asdict(problem) for problem in checked.problems]
     for note in () if as_json else checked.notes:
         voice.note(note)

@@ -13,11 +13,11 @@ from ..array_arguments import array_of, rising_of
 from ..errors import InputError
 from ..fmus.packaging import RobotFmus, build_controller
 from ..master import Connection, FixedStep, Port, Progress, Source
-from ..robots.checked_table import NumberRule
 from ..robots.robot import Robot
 from ..runs.asked import require_fmus, require_options
 from ..runs.cosimulation import ALONE, STEP, TIMES, Beside, Motion, run, wired
 from ..runs.wiring import AXES, PLATFORM, winch_ports
+from ..trajectory import DURATION as OF_PATH
 from ..trajectory import Trajectory, trajectory_of
 from .design import Design
 from .feedforward import elastic_reference
@@ -28,7 +28,7 @@ from .source import PathController
 Array = NDArray[np.float64]
 
 CONTROLLER = "controller"
-DURATION = NumberRule("how long the run takes", "s", positive=True)
+DURATION = OF_PATH._replace(meaning="how long the run takes")
 DESIGN = ("aim", "cable_count", "feels", "knots")
 PUSHED = tuple(Port(PLATFORM, f"{name}.{axis}") for axis in AXES for name in ("external_force", "external_force_rate"))
 
@@ -100,21 +100,16 @@ def cosimulate_closed_loop(
     an FMU fails, InputError where an FMU does not show a tension or robot, controller and FMUs do not go together,
     ArgumentError where an argument is none of these.
     """
-    require_fmus("cosimulate_closed_loop: fmus", fmus)
-    _require_design("cosimulate_closed_loop", robot, controller, trajectory)
-    number_of("cosimulate_closed_loop: duration", duration, DURATION)
-    require_options("cosimulate_closed_loop", step, None, progress, patience)
-    if seed is not None:
-        whole_number_of("cosimulate_closed_loop: seed", seed, 0, "give a whole number, or None for no noise")
-    _require_cables(fmus, robot, controller)
-    _require_tensions(fmus, robot)
+    name = "cosimulate_closed_loop"
+    _require_loop(name, fmus, robot, controller, trajectory, duration, seed)
+    require_options(name, step, None, progress, patience)
     times = sample_times(controller.aim.period, duration)
     if reference is not None:
-        _require_reference("cosimulate_closed_loop", reference, len(times), robot.cable_count)
+        _require_reference(name, reference, len(times), robot.cable_count)
     source: Source = PathController(robot, controller, trajectory, times, seed, reference)
     beside = ALONE
     if push is not None:
-        forces = _require_push("cosimulate_closed_loop", push, len(times))
+        forces = _require_push(name, push, len(times))
         source, beside = Joined((source, Push(forces))), Beside(also=PUSHED)
     return run(fmus, source, times, FixedStep(step), progress, patience, beside)
 
@@ -187,6 +182,25 @@ def controller_wires(fmus: RobotFmus) -> tuple[Connection, ...]:
         *(Connection(port, Port(CONTROLLER, name)) for port, name in zip(shown, seen, strict=True)),
         *(Connection(Port(CONTROLLER, asked[place]), ports[place]) for place in wiring.driven),
     )
+
+
+def _require_loop(
+    name: str,
+    fmus: RobotFmus,
+    robot: Robot,
+    controller: Design,
+    trajectory: Trajectory,
+    duration: float,
+    seed: int | None,
+) -> None:
+    """Refuse what no controller can be run with."""
+    require_fmus(f"{name}: fmus", fmus)
+    _require_design(name, robot, controller, trajectory)
+    number_of(f"{name}: duration", duration, DURATION)
+    if seed is not None:
+        whole_number_of(f"{name}: seed", seed, 0, "give a whole number, or None for no noise")
+    _require_cables(fmus, robot, controller)
+    _require_tensions(fmus, robot)
 
 
 def _require_design(name: str, robot: Robot, controller: Design, trajectory: Trajectory) -> None:
