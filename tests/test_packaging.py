@@ -1,5 +1,6 @@
 """FMUs as other tools see them."""
 
+import signal
 import subprocess
 import sys
 import zipfile
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 
+from tautwire.fmus import packaging
 from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.robots.robot import EffectSetting
 from tests.fmus import in_hand
@@ -131,3 +133,15 @@ def test_it_runs_in_a_fresh_process(three_fmus: RobotFmus) -> None:
         " output=['tension']); assert len(r) == 11 and 1590 < r['tension'][-1] < 1600, r"
     )
     subprocess.run([sys.executable, "-c", code, str(three_fmus.cables[0])], check=True, timeout=120)
+
+
+def test_an_interrupt_while_pythonfmu_works_ends_the_build_and_leaves_no_fmu(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(unfinished: Path, finished: Path) -> None:
+        signal.raise_signal(signal.SIGINT)
+
+    monkeypatch.setattr(packaging, "mend_exit", interrupted)
+    with pytest.raises(KeyboardInterrupt):
+        build_fmus(paper_robot(), tmp_path)
+    assert list(tmp_path.iterdir()) == []

@@ -33,7 +33,7 @@ def interrupts_held() -> Iterator[Callable[[], None]]:
     """Within the block Ctrl-C, and what is like it, is only noted.
 
     Call what the block gets, where nothing foreign is running, to have KeyboardInterrupt raised there. Only the main
-    thread receives signals; elsewhere nothing is changed.
+    thread receives signals; elsewhere nothing is changed. What the process ignores stays ignored.
     """
     if threading.current_thread() is not threading.main_thread():
         yield lambda: None
@@ -48,7 +48,8 @@ def interrupts_held() -> Iterator[Callable[[], None]]:
             raise KeyboardInterrupt
 
     before = {number: signal.getsignal(number) for number in ENDING}
-    held = [n for n in ENDING if n == signal.SIGINT or before[n] is signal.default_int_handler]
+    heard = [n for n in ENDING if before[n] is not signal.SIG_IGN]
+    held = [n for n in heard if n == signal.SIGINT or before[n] is signal.default_int_handler]
     for number in held:
         signal.signal(number, note)
     try:

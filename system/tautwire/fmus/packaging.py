@@ -18,6 +18,7 @@ from tautwire_fmu.laws.effects import BY_NAME
 from tautwire_fmu.laws.winch_drive import NO_LIMIT
 
 from ..arguments import callable_or_none, folder_of, robot_of
+from ..interrupt import interrupts_held
 from ..model.assembly import assemble
 from ..robots.robot import EffectSetting, Robot
 from ..statics.equilibrium import formula_texts, has_sensor_effects, platform_settings, static_forces, static_tensions
@@ -191,7 +192,8 @@ def _build(module: str, base: str, name: str, data: dict[str, Any], folder: Path
     package = f"tautwire_fmu_{_digest(sources)}"
     text = json.dumps(data | {"model_name": name}, sort_keys=True)
     guid = str(uuid5(NAMESPACE_URL, package + module + text))
-    with tempfile.TemporaryDirectory(prefix="tautwire-build-") as scratch_name:
+    # An interrupt within one of the many imports may end in a callback that nobody hears of.
+    with interrupts_held() as raise_interrupt, tempfile.TemporaryDirectory(prefix="tautwire-build-") as scratch_name:
         scratch = Path(scratch_name)
         shutil.copytree(sources, scratch / package, ignore=shutil.ignore_patterns("__pycache__", "*.pyc"))
         resource = scratch / f"{module}.json"
@@ -203,6 +205,7 @@ def _build(module: str, base: str, name: str, data: dict[str, Any], folder: Path
             fmu_builder.build_FMU(script, dest=unfinished, project_files=[scratch / package, resource], **OPTIONS)
         finished = scratch / f"{name}.fmu"
         mend_exit(unfinished, finished)
+        raise_interrupt()
         return _move(finished, folder / f"{name}.fmu")
 
 

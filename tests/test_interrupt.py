@@ -1,0 +1,40 @@
+"""Interrupts are noted while foreign code runs, and raised where the program asks."""
+
+import signal
+from collections.abc import Iterator
+
+import pytest
+
+from tautwire.interrupt import interrupts_held
+
+
+@pytest.fixture(autouse=True)
+def handlers() -> Iterator[None]:
+    before = signal.getsignal(signal.SIGINT)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+def test_an_interrupt_waits_until_it_is_asked_for() -> None:
+    reached = False
+    with pytest.raises(KeyboardInterrupt), interrupts_held() as raise_interrupt:
+        signal.raise_signal(signal.SIGINT)
+        reached = True
+        raise_interrupt()
+    assert reached
+
+
+def test_the_outer_of_two_blocks_hears_what_the_inner_raised() -> None:
+    with interrupts_held():
+        with pytest.raises(KeyboardInterrupt), interrupts_held() as raise_interrupt:
+            signal.raise_signal(signal.SIGINT)
+            raise_interrupt()
+    assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
+
+
+def test_a_process_that_ignores_interrupts_goes_on_doing_so() -> None:
+    signal.signal(signal.SIGINT, signal.SIG_IGN)
+    with interrupts_held() as raise_interrupt:
+        signal.raise_signal(signal.SIGINT)
+        raise_interrupt()
+    assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN
