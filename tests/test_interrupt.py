@@ -25,10 +25,9 @@ def test_an_interrupt_waits_until_it_is_asked_for() -> None:
 
 
 def test_the_outer_of_two_blocks_hears_what_the_inner_raised() -> None:
-    with interrupts_held():
-        with pytest.raises(KeyboardInterrupt), interrupts_held() as raise_interrupt:
-            signal.raise_signal(signal.SIGINT)
-            raise_interrupt()
+    with interrupts_held(), pytest.raises(KeyboardInterrupt), interrupts_held() as raise_interrupt:
+        signal.raise_signal(signal.SIGINT)
+        raise_interrupt()
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
 
