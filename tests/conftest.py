@@ -1,7 +1,16 @@
+from __future__ import annotations
+
+from collections.abc import Iterator
+from pathlib import Path
+from typing import TYPE_CHECKING
+
 import pytest
 
 from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tests.robots import LIMITED, example, paper_robot, with_damping, with_winch
+
+if TYPE_CHECKING:
+    from tests.browser.browser import Browser
 
 
 @pytest.fixture(scope="session")
@@ -26,3 +35,22 @@ def winch_fmus(tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
 def eight_fmus(tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
     """The example with eight cables."""
     return build_fmus(with_damping(example("eight"), 3e8), tmp_path_factory.mktemp("eight"))
+
+
+@pytest.fixture(scope="module")
+def browser() -> Iterator[Browser]:
+    """One browser for all tests of a file, which skips itself where there is none."""
+    from tests.browser.browser import browser_at, chromium
+
+    found = chromium()
+    assert found is not None
+    with browser_at(found) as opened:
+        yield opened
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Report pages of all kinds, for the browser."""
+    from tests.browser.report_pages import report_pages
+
+    return report_pages(tmp_path_factory.mktemp("pages"))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -10,26 +9,17 @@ import pytest
 pytest.importorskip("selenium", reason="the pages are not tried in a browser: selenium is in the dev extra")
 
 from tautwire.campaign.writing import write_summary
-from tests.browser.browser import LAPTOP, MISSING, PHONE_DARK, Browser, Screen, browser_at, chromium
+from tests.browser.browser import LAPTOP, MISSING, PHONE_DARK, Browser, Screen, chromium
 from tests.campaigns import AT_REST, moving
 from tests.test_campaign_summary import GRID, written
 
-FIND_CHROMIUM = chromium()
-pytestmark = pytest.mark.skipif(FIND_CHROMIUM is None, reason=f"the pages are not tried in a browser: {MISSING}")
+pytestmark = pytest.mark.skipif(chromium() is None, reason=f"the pages are not tried in a browser: {MISSING}")
 
 DRAW_ALL = "window.dispatchEvent(new Event('beforeprint'))"
 INDICES = AT_REST.replace('"sobol"\ncount = 8', '"saltelli"\ncount = 16').replace(
     "cable.modulus = {normal = [1.022e11, 2.2e9]}", '"cable[*].anchor[*]" = {normal = [40.0, 0.1]}'
 )
 MEDIANS = "return document.querySelector('figure[data-kind=band] .plot').data[2].y"
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    """One browser for all tests of this file."""
-    assert FIND_CHROMIUM is not None
-    with browser_at(FIND_CHROMIUM) as opened:
-        yield opened
 
 
 @pytest.fixture(scope="module", params=["path", "grid", "indices"])

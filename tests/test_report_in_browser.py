@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from itertools import pairwise
 from pathlib import Path
 
@@ -13,32 +12,17 @@ from numpy.typing import NDArray
 pytest.importorskip("selenium", reason="the pages are not tried in a browser: selenium is in the dev extra")
 
 from tests.browser.browser import LAPTOP, LAPTOP_DARK, MISSING, PHONE_DARK, Browser, Screen, browser_at, chromium
-from tests.browser.report_pages import DRAW_ALL, KINDS, near, opened, report_pages
+from tests.browser.report_pages import DRAW_ALL, KINDS, near, opened
 from tests.test_report_style import themes
 from tests.traces import HOSTILE
 
-FIND_CHROMIUM = chromium()
-pytestmark = pytest.mark.skipif(FIND_CHROMIUM is None, reason=f"the pages are not tried in a browser: {MISSING}")
+pytestmark = pytest.mark.skipif(chromium() is None, reason=f"the pages are not tried in a browser: {MISSING}")
 
 NAMED = ("time-shown", "tensions")
 SLIDE = """const slider = document.getElementById('time');
 slider.value = String(Math.round(arguments[0] * slider.max));
 slider.dispatchEvent(new Event('input'));"""
 PLATFORM = "const t = document.getElementById('scene').data[2]; return [t.x[0], t.y[0], t.z[0]]"
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    """One browser for all tests of this file."""
-    assert FIND_CHROMIUM is not None
-    with browser_at(FIND_CHROMIUM) as opened:
-        yield opened
-
-
-@pytest.fixture(scope="module")
-def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """The pages that all tests of this file open."""
-    return report_pages(tmp_path_factory.mktemp("pages"))
 
 
 def drawn_share(picture: NDArray[np.uint8]) -> float:
@@ -201,8 +185,9 @@ def test_hostile_names_are_shown_as_text(browser: Browser, pages: dict[str, Path
 
 
 def test_robot_is_drawn_flat_where_there_is_no_3d(pages: dict[str, Path]) -> None:
-    assert FIND_CHROMIUM is not None
-    with browser_at(FIND_CHROMIUM, "--disable-3d-apis") as flat:
+    found = chromium()
+    assert found is not None
+    with browser_at(found, "--disable-3d-apis") as flat:
         opened(flat, pages["trace"]).see("figure.scene")
         assert "drawn flat" in flat.run("return document.getElementById('flat').innerText")
         pictures = [flat.pixels("#scene")]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -18,14 +17,12 @@ from tests.browser.browser import (
     PHONE_DARK,
     Browser,
     Screen,
-    browser_at,
     chromium,
 )
-from tests.browser.report_pages import DRAW_ALL, KINDS, near, opened, report_pages
+from tests.browser.report_pages import DRAW_ALL, KINDS, near, opened
 from tests.test_report_style import TEXT, themes
 
-FIND_CHROMIUM = chromium()
-pytestmark = pytest.mark.skipif(FIND_CHROMIUM is None, reason=f"the pages are not tried in a browser: {MISSING}")
+pytestmark = pytest.mark.skipif(chromium() is None, reason=f"the pages are not tried in a browser: {MISSING}")
 
 SCREENS = (LAPTOP, LAPTOP_DARK, PHONE, PHONE_DARK)
 CONTRAST = (Path(__file__).parent / "browser" / "contrast.js").read_text(encoding="utf-8")
@@ -46,20 +43,6 @@ for (const plot of document.querySelectorAll('.panel > .plot.js-plotly-plot')) {
 }
 return cut;
 """
-
-
-@pytest.fixture(scope="module")
-def browser() -> Iterator[Browser]:
-    """One browser for all tests of this file."""
-    assert FIND_CHROMIUM is not None
-    with browser_at(FIND_CHROMIUM) as opened:
-        yield opened
-
-
-@pytest.fixture(scope="module")
-def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """The pages that all tests of this file open."""
-    return report_pages(tmp_path_factory.mktemp("pages"))
 
 
 @pytest.mark.parametrize("screen", SCREENS, ids=lambda screen: screen.name)
