@@ -21,6 +21,7 @@ from tautwire_fmu.laws.effects import Effect
 
 from ..model.symbolic import FreeParameter, symbolic_model
 from ..model.uncertain import uncertain_numbers
+from ..native.repeated import Repeated, stacked
 from ..robots.robot import PER_CABLE, Robot
 from .filter_step import shown_late
 from .hypotheses import Hypothesis
@@ -104,11 +105,13 @@ class EffectDirections:
             )
 
         self._own_count, self._free_count = len(mine), len(free)
-        self._moved = _Mapped(
+        self._moved = Repeated(
             Function("moved", [*given, later, step, shift], [moved(model.rates[places]), moved(shown)])
         )
         rates = Function("rates", given, [casadi.densify(model.rates[mine]), moved(model.rates[mine])])
-        self._advance = _Mapped(_own_step(rates, len(places), len(mine), len(free), cable_count, theta.numel()))
+        self._advance = Repeated(
+            _own_step(rates, len(places), len(mine), len(free), cable_count, theta.numel()), carried=2
+        )
         begin = casadi.jacobian(model.start[places], p)
         self._start = Function("start", [theta], [casadi.densify(model.start[mine]), casadi.densify(begin)])
         self._inputs = model.inputs.numel()
@@ -129,57 +132,25 @@ class EffectDirections:
 
     def _trial_through(self, run: Linearised, number: int) -> tuple[Array, Array]:
         """Taken along the predicted states, which the noise of what they predict has not touched."""
-        theta = np.repeat(self._theta(number)[:, None], run.states.shape[1], axis=1)
-        inputs = np.vstack([run.speeds, np.zeros((self._inputs - len(run.speeds), theta.shape[1]))])
-        own, slopes = self._own_states(run, theta[:, 1:], number)
-        wide = slopes.swapaxes(0, 1).reshape(len(own), -1 if len(own) else slopes.shape[0] * slopes.shape[2])
+        theta, count = self._theta(number)[:, None], run.states.shape[1]
+        inputs = np.vstack([run.speeds, np.zeros((self._inputs - len(run.speeds), count))])
+        own, slopes = self._own_states(run, theta, number)
         moment = [_longer(column) for column in (run.speeds[:, 1:], run.step[None, :], run.shift)]
-        found = self._moved(run.states, own, wide, inputs, theta, *moment)
-        rates, shown = (_stacked(part, self._free_count)[:, :, self._chosen[number]] for part in found)
+        found = self._moved(count, run.states, own, slopes, inputs, theta, *moment)
+        rates, shown = (stacked(part, count)[:, :, self._chosen[number]] for part in found)
         begin, end = rates[:-1], rates[1:]
         by_rates = run.step[:, None, None] / 6.0 * (run.transition @ begin + 2.0 * run.half @ (begin + end) + end)
         return by_rates, shown[:-1]
 
     def _own_states(self, run: Linearised, theta: Array, number: int) -> tuple[Array, Array]:
-        """The effect's states (own, K + 1) and their slopes (K + 1, own, p)."""
-        count = theta.shape[1]
+        """The effect's states (own, K + 1) and their slopes (own, p x (K + 1))."""
+        count, width = len(run.step), self._free_count
         if not self._own_count:
-            return np.zeros((0, count + 1)), np.zeros((count + 1, 0, self._free_count))
-        state, slopes = self._states[number]
+            return np.zeros((0, count + 1)), np.zeros((0, width * (count + 1)))
         ends = (run.states[:, :-1], run.states[:, 1:], run.speeds[:, :-1], run.speeds[:, 1:])
-        found = self._advance.along(state, slopes, *ends, run.step[None, :], theta)
-        own = np.hstack([state, np.array(found[0])])
-        stacked = _stacked(np.hstack([slopes, np.array(found[1])]), self._free_count)
-        self._states[number] = (own[:, -1:], stacked[-1])
-        return own, stacked
-
-
-class _Mapped:
-    """A function over the samples of a stretch; made once for each length."""
-
-    def __init__(self, function: Function) -> None:
-        self._function = function
-        self._maps: dict[int, Function] = {}
-
-    def __call__(self, *columns: Array) -> list[casadi.DM]:
-        count = columns[-1].shape[1]
-        if count not in self._maps:
-            self._maps[count] = self._function.map(count)
-        return list(self._maps[count](*columns))
-
-    def along(self, *columns: Array) -> list[casadi.DM]:
-        """One sample after the other: the first two arguments are results of the sample before."""
-        count = columns[-1].shape[1]
-        if count not in self._maps:
-            self._maps[count] = self._function.mapaccum("along", count, 2)
-        return list(self._maps[count](*columns))
-
-
-def _stacked(columns: casadi.DM | Array, width: int) -> Array:
-    """(rows, samples x width) as (samples, rows, width)."""
-    wide = np.array(columns)
-    stacked: Array = wide.reshape(wide.shape[0], wide.shape[1] // width, width).swapaxes(0, 1)
-    return stacked
+        own, slopes = self._advance(count, *self._states[number], *ends, run.step[None, :], theta)
+        self._states[number] = (own[:, -1:], slopes[:, width * count :])
+        return own, slopes
 
 
 def _longer(columns: Array) -> Array:

@@ -21,6 +21,7 @@ from numpy.typing import NDArray
 
 from ..model.symbolic import FreeParameter, symbolic_model
 from ..model.uncertain import uncertain_numbers
+from ..native.repeated import Repeated, stacked
 from ..recordings.recording import Recording
 from ..robots.robot import Robot
 from .filter_step import Noise, Substeps, filter_sample
@@ -96,8 +97,7 @@ class Likelihood:
         angle = fastest_mode(robot) * sample_time
         self.substeps = Substeps(max(1, ceil(angle / STATE_ANGLE)), max(1, ceil(angle / SLOPE_ANGLE)))
         self._lags = casadi.Function("lags", [self.model.parameters], [self.model.lags])
-        self._sample = filter_sample(self.model, robot.cable_count, noise, self.substeps)
-        self._runs = {CHUNK: self._sample.mapaccum("run", CHUNK, 3)}
+        self._run = Repeated(filter_sample(self.model, robot.cable_count, noise, self.substeps), carried=3)
 
     def innovations(
         self, recording: Recording, parameters: Sequence[float] | Array, roughness: float = 0.0
@@ -183,24 +183,18 @@ class Likelihood:
         for first in range(0, len(own), CHUNK):
             part = tuple(column[:, first : first + CHUNK] for column in columns)
             count = part[0].shape[1]
-            constant = (np.repeat(theta[:, None], count, axis=1), *part, np.full((1, count), roughness))
-            found = [np.array(result) for result in self._run(count)(*carried, *constant)]
-            covariances = np.hstack([carried[1], found[1]]).reshape(size, count + 1, size).swapaxes(0, 1)
+            found = self._run(count, *carried, theta[:, None], *part, np.full((1, 1), roughness))
+            states, covariances, state_slopes, values, log_variances, moved = found
             yield Stretch(
                 part,
                 own[first : first + CHUNK],
-                np.hstack([carried[0], found[0]]),
-                covariances[:-1],
-                found[3].T,
-                found[4].T,
-                found[5].reshape(measured.shape[1], count, free).swapaxes(0, 1),
+                states,
+                stacked(covariances, count + 1)[:-1],
+                values.T,
+                log_variances.T,
+                stacked(moved, count),
             )
-            carried = (found[0][:, -1:], covariances[-1], found[2][:, found[2].shape[1] - free :])
-
-    def _run(self, count: int) -> casadi.Function:
-        if count not in self._runs:
-            self._runs[count] = self._sample.mapaccum("run", count, 3)
-        return self._runs[count]
+            carried = (states[:, -1:], covariances[:, size * count :], state_slopes[:, free * count :])
 
     def _start_covariance(self) -> Array:
         return start_covariance(self.robot, self.noise, self.model.states.numel(), len(self.uncertain))

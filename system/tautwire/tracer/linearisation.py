@@ -16,9 +16,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from casadi import Function
 from numpy.typing import NDArray
 
+from ..native.repeated import Repeated, stacked
 from ..recordings.recording import Recording
 from .filter_step import filter_slopes
 from .likelihood import Likelihood
@@ -71,8 +71,8 @@ def linearise_run(
 
     With ``roughness`` (m/s^2 per root hertz) the run follows what was measured where the model does not.
     """
-    function = filter_slopes(likelihood.model, likelihood.cable_count, likelihood.substeps)
-    maps: dict[int, Function] = {}
+    slopes = Repeated(filter_slopes(likelihood.model, likelihood.cable_count, likelihood.substeps))
+    theta = np.array(values, dtype=float)[:, None]
     noise = likelihood.noise
     variances = np.square(noise.of_outputs(likelihood.cable_count))
     for stretch in likelihood.stretches(recording, values, roughness):
@@ -81,9 +81,7 @@ def linearise_run(
         before = stretch.states[:, :-1]
         looked = seen.T[:, :, None] > 0.0
         innovations = np.where(looked[:, :, 0], stretch.values, 0.0)
-        theta = np.repeat(np.array(values, dtype=float)[:, None], count, axis=1)
-        mapped = maps[count] if count in maps else maps.setdefault(count, function.map(count))
-        sensing = _stacked(mapped(before, before, theta, shift, speed, later, step)[0], count)
+        sensing = stacked(slopes(count, before, before, theta, shift, speed, later, step)[0], count)
         spread = stretch.covariances @ np.where(looked, sensing, 0.0).swapaxes(1, 2)
         covariance = np.where(looked, sensing, 0.0) @ spread + np.diag(variances)
         root = np.linalg.cholesky(covariance)
@@ -91,8 +89,8 @@ def linearise_run(
         gain = spread @ np.linalg.inv(covariance)
         moved = np.einsum("kij,kjl,kl->ki", gain, root, innovations)
         after = before + moved.T
-        _, *ahead = mapped(before, after, theta, shift, speed, later, step)
-        transition, half = (_stacked(matrix, count) for matrix in ahead)
+        _, *ahead = slopes(count, before, after, theta, shift, speed, later, step)
+        transition, half = (stacked(matrix, count) for matrix in ahead)
         yield Linearised(
             stretch.states,
             np.hstack([speed, later[:, -1:]]),
@@ -108,10 +106,3 @@ def linearise_run(
             innovations,
             np.where(looked, stretch.slopes, 0.0),
         )
-
-
-def _stacked(columns: object, count: int) -> Array:
-    """(rows, columns x count) as (count, rows, columns)."""
-    wide = np.array(columns)
-    stacked: Array = wide.reshape(wide.shape[0], count, -1).swapaxes(0, 1)
-    return stacked

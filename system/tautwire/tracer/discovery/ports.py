@@ -22,6 +22,7 @@ from ...model.arrays import NUMPY
 from ...model.assembly import Assembly, assemble
 from ...model.symbolic import OF_FORMULAS, FreeParameter, symbolic_model
 from ...model.uncertain import uncertain_numbers
+from ...native.repeated import Repeated, stacked
 from ...robots.robot import Formula, Robot
 from ..filter_step import shown_late
 from ..linearisation import Linearised
@@ -66,7 +67,7 @@ class Ports:
             for (place, cables), text, number in zip(sites, texts, numbers, strict=True)
         ]
         whole = replace(robot, formulas=(*robot.formulas, *formulas))
-        self._slopes = _slopes(whole, numbers, state_names)
+        self._slopes = Repeated(_slopes(whole, numbers, state_names))
         self._elapsed, self._travel = 0.0, np.zeros(robot.cable_count)
 
     def along(self, run: Linearised) -> Along:
@@ -108,8 +109,8 @@ class Ports:
         """
         speeds = np.vstack([run.speeds, np.zeros((3, len(time)))])
         longer = [np.hstack([c, c[:, -1:]]) for c in (run.speeds[:, 1:], run.step[None, :], run.shift)]
-        found = self._slopes.map(len(time))(run.states, time[None, :], speeds, *longer)
-        shaped = [np.array(part).reshape(part.shape[0], len(time), -1).swapaxes(0, 1) for part in found]
+        found = self._slopes(len(time), run.states, time[None, :], speeds, *longer)
+        shaped = [stacked(part, len(time)) for part in found]
         return shaped[0], shaped[1], shaped[2], shaped[3]
 
 

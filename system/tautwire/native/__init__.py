@@ -1,0 +1,1 @@
+"""CasADi functions in machine code."""

@@ -1,0 +1,164 @@
+"""A CasADi function's instructions as LLVM assembly, one for one: rounding is the same to the last bit.
+
+Within a part each value is named where it is worked out and never changes; only what other parts need goes through
+CasADi's work vector. In one part, large functions would take LLVM long and need more stack than a thread has.
+
+Source: LLVM Language Reference Manual; Andersson et al. (2019), CasADi, Mathematical Programming Computation 11, 1-36.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import casadi
+import numpy as np
+from casadi import Function
+
+from ..errors import TautwireError
+
+# Instructions.
+PART = 4_000
+# What is called by name, mostly of C's mathematics library, and how many arguments it takes.
+CALLED = {
+    casadi.OP_EXP: ("exp", 1),
+    casadi.OP_LOG: ("log", 1),
+    casadi.OP_POW: ("pow", 2),
+    casadi.OP_CONSTPOW: ("pow", 2),
+    casadi.OP_SQRT: ("llvm.sqrt.f64", 1),
+    casadi.OP_SIN: ("sin", 1),
+    casadi.OP_COS: ("cos", 1),
+    casadi.OP_TAN: ("tan", 1),
+    casadi.OP_ASIN: ("asin", 1),
+    casadi.OP_ACOS: ("acos", 1),
+    casadi.OP_ATAN: ("atan", 1),
+    casadi.OP_ATAN2: ("atan2", 2),
+    casadi.OP_SINH: ("sinh", 1),
+    casadi.OP_COSH: ("cosh", 1),
+    casadi.OP_TANH: ("tanh", 1),
+    casadi.OP_FABS: ("llvm.fabs.f64", 1),
+    casadi.OP_FMIN: ("fmin", 2),
+    casadi.OP_FMAX: ("fmax", 2),
+}
+# {v} is the value's name, {0} and {1} those of what it is made from.
+WRITTEN = {
+    casadi.OP_ASSIGN: "{v} = fadd double {0}, -0.0",
+    casadi.OP_ADD: "{v} = fadd double {0}, {1}",
+    casadi.OP_SUB: "{v} = fsub double {0}, {1}",
+    casadi.OP_MUL: "{v} = fmul double {0}, {1}",
+    casadi.OP_DIV: "{v} = fdiv double {0}, {1}",
+    casadi.OP_NEG: "{v} = fneg double {0}",
+    casadi.OP_SQ: "{v} = fmul double {0}, {0}",
+    casadi.OP_TWICE: "{v} = fadd double {0}, {0}",
+    casadi.OP_INV: "{v} = fdiv double 1.0, {0}",
+    casadi.OP_LT: "{v}c = fcmp olt double {0}, {1}\n{v} = uitofp i1 {v}c to double",
+    casadi.OP_LE: "{v}c = fcmp ole double {0}, {1}\n{v} = uitofp i1 {v}c to double",
+    casadi.OP_EQ: "{v}c = fcmp oeq double {0}, {1}\n{v} = uitofp i1 {v}c to double",
+    casadi.OP_NE: "{v}c = fcmp une double {0}, {1}\n{v} = uitofp i1 {v}c to double",
+    casadi.OP_NOT: "{v}c = fcmp oeq double {0}, 0.0\n{v} = uitofp i1 {v}c to double",
+    casadi.OP_IF_ELSE_ZERO: "{v}c = fcmp une double {0}, 0.0\n{v} = select i1 {v}c, double {1}, double 0.0",
+    casadi.OP_SIGN: (
+        "{v}a = fcmp olt double {0}, 0.0\n{v}b = fcmp ogt double {0}, 0.0\n"
+        "{v}c = select i1 {v}b, double 1.0, double {0}\n{v} = select i1 {v}a, double -1.0, double {v}c"
+    ),
+}
+RUN = """define void @run(i64 %count, ptr %places, ptr %strides) {{
+begin:
+%any = icmp ugt i64 %count, 0
+br i1 %any, label %each, label %end
+each:
+%k = phi i64 [0, %begin], [%next, %each]
+{places}
+{calls}
+%next = add i64 %k, 1
+%more = icmp ult i64 %next, %count
+br i1 %more, label %each, label %end
+end:
+ret void
+}}"""
+PLACE = """%place{0} = getelementptr ptr, ptr %places, i64 {0}
+%first{0} = load ptr, ptr %place{0}
+%stride{0} = getelementptr i64, ptr %strides, i64 {0}
+%size{0} = load i64, ptr %stride{0}
+%moved{0} = mul i64 %size{0}, %k
+%at{0} = getelementptr double, ptr %first{0}, i64 %moved{0}"""
+
+
+class UntranslatableError(TautwireError):
+    """A function has an operation that is not in the tables here; carries the function's name and CasADi's number."""
+
+    def __init__(self, function: str, operation: int) -> None:
+        self.function, self.operation = function, operation
+        super().__init__(f"function {function}: CasADi's operation {operation} has no assembly; write it in this table")
+
+
+def assembly(function: Function) -> str:
+    """Defines ``run(count, places, strides)``: the function, so many times.
+
+    ``places`` has a pointer to the first number of each argument, then of each result, and to room for
+    ``function.sz_w()`` numbers; ``strides`` by how many numbers each moves from one time to the next. Arguments and
+    results are dense, column after column.
+
+    Raises UntranslatableError.
+    """
+    pointers = range(function.n_in() + function.n_out() + 1)
+    declared = [f"declare double @{name}({', '.join(['double'] * n)})" for name, n in sorted(set(CALLED.values()))]
+    parts = range(0, function.n_instructions(), PART)
+    given = ", ".join(f"ptr %at{j}" for j in pointers)
+    run = RUN.format(
+        places="\n".join(PLACE.format(j) for j in pointers),
+        calls="\n".join(f"call void @part{first}({given})" for first in parts),
+    )
+    return "\n".join([*declared, *(line for first in parts for line in _part(function, first)), run])
+
+
+def _part(function: Function, first: int) -> Iterator[str]:
+    """Some instructions. They find in the room, and leave there, what is needed before and after them."""
+    pointers = [f"%p{j}" for j in range(function.n_in() + function.n_out() + 1)]
+    *_, room = pointers
+    values: dict[int, str] = {}
+    written: list[int] = []
+    yield f"define void @part{first}({', '.join(f'ptr {name}' for name in pointers)}) {{"
+    for k in range(first, min(first + PART, function.n_instructions())):
+        operation, name = function.instruction_id(k), f"%v{k}"
+        sources, targets = function.instruction_input(k), function.instruction_output(k)
+        if operation == casadi.OP_INPUT:
+            yield _loaded(name, pointers[sources[0]], sources[1])
+        elif operation == casadi.OP_CONST:
+            name = _constant(function.instruction_constant(k))
+        else:
+            for place in sources:
+                if place not in values:
+                    values[place] = f"%w{k}_{place}"
+                    yield _loaded(values[place], room, place)
+            known = [values[place] for place in sources]
+            if operation == casadi.OP_OUTPUT:
+                yield _stored(known[0], name, pointers[function.n_in() + targets[0]], targets[1])
+                continue
+            yield _worked_out(function, operation, name, known)
+        values[targets[0]] = name
+        written.append(targets[0])
+    for place in dict.fromkeys(written):
+        yield _stored(values[place], f"%s{place}", room, place)
+    yield "ret void\n}"
+
+
+def _loaded(name: str, pointer: str, place: int) -> str:
+    return f"{name}a = getelementptr double, ptr {pointer}, i64 {place}\n{name} = load double, ptr {name}a"
+
+
+def _stored(value: str, name: str, pointer: str, place: int) -> str:
+    return f"{name}a = getelementptr double, ptr {pointer}, i64 {place}\nstore double {value}, ptr {name}a"
+
+
+def _worked_out(function: Function, operation: int, name: str, sources: list[str]) -> str:
+    if operation in WRITTEN:
+        return WRITTEN[operation].format(*sources, v=name)
+    if operation in CALLED:
+        called, _ = CALLED[operation]
+        return f"{name} = call double @{called}({', '.join(f'double {source}' for source in sources)})"
+    raise UntranslatableError(function.name(), operation)
+
+
+def _constant(value: float) -> str:
+    """All 64 bits, as LLVM reads them."""
+    return f"0x{int(np.float64(value).view(np.uint64)):016X}"

@@ -1,0 +1,96 @@
+"""Functions over samples against CasADi's own interpreter, to the last bit."""
+
+from dataclasses import replace
+
+import casadi
+import numpy as np
+import pytest
+from casadi import SX, Function
+
+from tautwire.model.symbolic import FreeParameter, symbolic_model
+from tautwire.native.repeated import Repeated, stacked
+from tautwire.tracer.filter_step import Substeps, filter_sample
+from tautwire.tracer.preparation.noise import noise_of
+from tautwire.tracer.preparation.start_state import start_covariance
+from tests.effect_cases import CASES, Case
+from tests.recordings import recorded
+from tests.robots import example
+
+GENERATOR = np.random.default_rng(1)
+
+
+def falling() -> Function:
+    """Carries a state (2) and a matrix (2, 2); takes a step and a constant vector; sparse on purpose."""
+    state, matrix, step, pull = SX.sym("state", 2), SX.sym("matrix", 2, 2), SX.sym("step"), SX.sym("pull", 2)
+    turned = casadi.vertcat(casadi.horzcat(1.0, step), casadi.horzcat(SX(1, 1), 1.0))
+    after = casadi.mtimes(turned, state) + step * pull
+    return Function("falling", [state, matrix, step, pull], [after, casadi.mtimes(turned, matrix), turned])
+
+
+def test_a_function_is_taken_over_columns() -> None:
+    a, b = SX.sym("a", 2, 3), SX.sym("b", 3)
+    function = Function("product", [a, b], [casadi.mtimes(a, b), casadi.sin(b)])
+    many, vectors = GENERATOR.normal(size=(2, 3 * 7)), GENERATOR.normal(size=(3, 7))
+    for ours, theirs in zip(Repeated(function)(7, many, vectors), function.map(7)(many, vectors), strict=True):
+        np.testing.assert_array_equal(ours, np.array(theirs))
+
+
+def test_results_are_carried_to_the_next_sample() -> None:
+    state, matrix = GENERATOR.normal(size=(2, 1)), GENERATOR.normal(size=(2, 2))
+    steps, pull = GENERATOR.normal(size=(1, 5)), GENERATOR.normal(size=(2, 1))
+    ours = Repeated(falling(), carried=2)(5, state, matrix, steps, pull)
+    theirs = falling().mapaccum("run", 5, 2)(state, matrix, steps, np.repeat(pull, 5, axis=1))
+    np.testing.assert_array_equal(ours[0], np.hstack([state, np.array(theirs[0])]))
+    np.testing.assert_array_equal(ours[1], np.hstack([matrix, np.array(theirs[1])]))
+    np.testing.assert_array_equal(ours[2], np.array(theirs[2]))
+
+
+def test_no_samples_give_what_was_carried() -> None:
+    state, matrix = np.ones((2, 1)), np.eye(2)
+    found = Repeated(falling(), carried=2)(0, state, matrix, np.zeros((1, 0)), np.zeros((2, 0)))
+    assert [result.shape for result in found] == [(2, 1), (2, 2), (2, 0)]
+    np.testing.assert_array_equal(found[1], matrix)
+
+
+def test_arguments_of_other_sizes_are_refused() -> None:
+    repeated = Repeated(falling(), carried=2)
+    with pytest.raises(ValueError, match=r"shape \(1, 4\), where \(1, 1\) is one of 5 samples"):
+        repeated(5, np.ones((2, 1)), np.eye(2), np.ones((1, 4)), np.ones((2, 1)))
+
+
+def test_results_are_stacked_by_sample() -> None:
+    wide = np.arange(12.0).reshape(2, 6)
+    np.testing.assert_array_equal(stacked(wide, 3)[1], wide[:, 2:4])
+    assert stacked(np.zeros((2, 0)), 3).shape == (3, 2, 0)
+    assert stacked(np.zeros((0, 6)), 3).shape == (3, 0, 2)
+
+
+@pytest.mark.parametrize("case", CASES, ids=str)
+def test_the_filter_of_every_effect_is_casadis_to_the_last_bit(case: Case) -> None:
+    robot, recording = example("three"), recorded("three", 1)
+    noise, count = noise_of(robot, recording), 50
+    model = symbolic_model(
+        replace(robot, effects=(case.setting(robot),)), [FreeParameter(0, name) for name in case.law]
+    )
+    function = filter_sample(model, robot.cable_count, noise, Substeps(5, 1))
+    theta = np.array(list(case.law.values()))[:, None]
+    start = Function("start", [model.parameters], [model.start, casadi.jacobian(model.start, model.parameters)])
+    size = model.states.numel()
+    carried = (*map(np.array, start(theta)), start_covariance(robot, noise, size, 0))
+    carried = (carried[0], carried[2], carried[1])
+    columns = (
+        recording.measured()[:count].T,
+        np.ones((6, count)),
+        np.zeros((6, count)),
+        recording.winch_speed[:count].T,
+        recording.winch_speed[1 : count + 1].T,
+        np.diff(recording.time[: count + 1])[None, :],
+        np.full((1, count), 1e-4),
+        np.zeros((1, count)),
+    )
+    ours = Repeated(function, carried=3)(count, *carried, theta, *columns)
+    theirs = function.mapaccum("run", count, 3)(*carried, np.repeat(theta, count, axis=1), *columns)
+    for index, (a, b) in enumerate(zip(ours, theirs, strict=True)):
+        first = carried[index].shape[1] if index < 3 else 0
+        np.testing.assert_array_equal(a[:, first:], np.array(b))
+        assert index >= 3 or np.all(np.isfinite(a))
