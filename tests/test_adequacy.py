@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tautwire.tracer.adequacy import enough_samples, is_noise
+from tautwire.tracer.adequacy import enough_samples, is_noise, largest_autocorrelations
 from tautwire.tracer.likelihood import Innovations
 
 
@@ -51,3 +51,22 @@ def test_a_hundred_samples_are_the_least() -> None:
     rows = np.ones(150, dtype=bool)
     assert enough_samples(innovations(white(7, 150)), rows)
     assert not enough_samples(innovations(white(7, 150)), np.arange(150) < 99)
+
+
+def largest(values: np.ndarray) -> np.ndarray:
+    return largest_autocorrelations(innovations(values), np.ones(len(values), dtype=bool))
+
+
+def test_noise_is_like_itself_no_more_than_chance_says() -> None:
+    found = np.concatenate([largest(white(seed)) for seed in range(200)])
+    assert np.mean(found < 3.0 / np.sqrt(1000)) == pytest.approx(0.95, abs=0.03)
+
+
+def test_the_largest_autocorrelation_is_that_of_what_is_alike() -> None:
+    values = white(6, 100_000)
+    values[7:, 2] += 0.75 * values[:-7, 2]
+    values[:, 3] = np.nan
+    found = largest(values)
+    assert found[2] == pytest.approx(0.75 / (1.0 + 0.75**2), abs=0.02)
+    assert np.isnan(found[3])
+    assert np.all(found[[0, 1, 4, 5]] < 0.02)

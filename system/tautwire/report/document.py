@@ -26,7 +26,8 @@ def trace_document(trace: Trace) -> dict[str, Any]:
         "error_after": _errors_of_roles(trace, "errors_after"),
         "noise_floor": _errors(trace.noise_floor, trace.robot_before.cable_count),
         "residual_is_noise": {"before": bool(trace.noise_before), "after": bool(trace.noise_after)},
-        "left": _left(trace),
+        "left": _by_output(trace, trace.left),
+        "autocorrelation": _by_output(trace, trace.autocorrelations),
         "detectable": [_detectable(each) for each in trace.separation.detectable],
         "alike": [_likeness(each) for each in trace.separation.alike],
         "components": [_component(part) for part in trace.components.ranking],
@@ -142,9 +143,9 @@ def _errors(errors: Errors | None, cable_count: int) -> dict[str, Any]:
     }
 
 
-def _left(trace: Trace) -> dict[str, float | None]:
+def _by_output(trace: Trace, values: Iterable[float]) -> dict[str, float | None]:
     names = [*AXES, *(f"tension_{cable}" for cable in trace.robot_before.cable_numbers)]
-    return {name: _number(value) for name, value in zip(names, trace.left, strict=True)}
+    return {name: _number(value) for name, value in zip(names, values, strict=True)}
 
 
 def _unknown_columns(trace: Trace) -> dict[str, list[str]]:

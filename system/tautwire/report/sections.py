@@ -199,14 +199,21 @@ def left(trace: Trace) -> str:
     """Mean squares of the whitened innovations of each output, against one."""
     largest = float(np.max(trace.left[np.isfinite(trace.left)], initial=1.5))
     rows = [
-        [text(output.label), number(significant(float(value))), charts.bar(float(value), largest, mark=1.0)]
-        for output, value in zip(outputs(trace), trace.left, strict=True)
+        [
+            text(output.label),
+            number(significant(float(value))),
+            charts.bar(float(value), largest, mark=1.0),
+            number(significant(float(alike), 2)),
+        ]
+        for output, value, alike in zip(outputs(trace), trace.left, trace.autocorrelations, strict=True)
     ]
-    columns = (Column("Output"), Column("Times the noise", True), Column("Against 1"))
+    columns = (Column("Output"), Column("Times the noise", True), Column("Against 1"), Column("Like itself", True))
     lead = (
         "How far the final model is off when it predicts each sample from those before it, on data that the fit did "
         "not see: the mean square, in times of what noise alone makes it (in other words, of the whitened "
-        "innovations). 1 is noise. Where nothing is to be found, the tests find something in "
+        "innovations). 1 is noise. Beside it the largest correlation of these errors with themselves one to twenty "
+        "samples later (their whiteness): what swings or drifts is like itself, noise is not. Where nothing is to be "
+        "found, the tests find something in "
         f"{number(f'{significant(100.0 * trace.alpha, 2)} %')} of recordings at most."
     )
     return section("left", "What is left", table("What is left in each output", columns, rows, "left", True), lead)

@@ -9,15 +9,18 @@ from tautwire_fmu.laws.effects import UNLISTED
 
 from ..model.symbolic import OF_FORMULAS
 from ..robots.robot import Robot
-from .fit import Fit
+from .data import Sample
+from .fit import Fit, Fitter
 from .hypotheses import declared_value
+from .profile import intervals
 from .search import Found
 from .verdict import Correlation, Estimate, Fitted, FoundEffect
 
 
-def found_effects(robot: Robot, found: Found) -> tuple[FoundEffect, ...]:
-    """The accepted effects of the list, in the order found; ``robot`` is as declared."""
+def found_effects(robot: Robot, found: Found, fitter: Fitter, sample: Sample) -> tuple[FoundEffect, ...]:
+    """The accepted effects of the list, in the order found; ``robot`` is as declared, ``sample`` what was fitted."""
     places = _places(found.fit)
+    ends = intervals(fitter, found.fit, found.accepted, sample)
     effects = []
     for hypothesis, evidence in zip(found.accepted, found.evidence, strict=True):
         if hypothesis.effect in UNLISTED:
@@ -25,7 +28,7 @@ def found_effects(robot: Robot, found: Found) -> tuple[FoundEffect, ...]:
         estimates = {}
         for parameter in hypothesis.parameters:
             place = places[Fitted(hypothesis.effect.name, hypothesis.cables, parameter.name)]
-            low, high = found.fit.interval(place)
+            low, high = ends[place]
             declared = declared_value(robot, parameter, hypothesis.cables)
             estimates[parameter.name] = Estimate(float(found.fit.values[place]), parameter.unit, low, high, declared)
         effects.append(

@@ -104,9 +104,8 @@ class Fitter:
         if not free:
             return Fit(robot, (), np.zeros(0), np.zeros((0, 0)))
         start = np.array([value_of(robot, f) for f in free])
-        known = _parameters(robot, free)
-        scale = np.maximum(np.abs(start), [abs(parameter.start) for parameter in known])
-        lower, upper = (np.array([p.minimum for p in known]) / scale, np.array([p.maximum for p in known]) / scale)
+        scale = np.maximum(np.abs(start), [abs(parameter.start) for parameter in _parameters(robot, free)])
+        lower, upper = (bounds / scale for bounds in bounds_of(robot, free))
         likelihood = self._likelihood(placed(robot, sample.start), free, sample)
         begun = scaled = start / scale
         slopes = np.zeros((0, len(free)))
@@ -164,6 +163,12 @@ class Fitter:
                 self._compiled.pop(next(iter(self._compiled)))
             self._compiled[key] = Likelihood(robot, free, self.noise, interval)
         return self._compiled[key]
+
+
+def bounds_of(robot: Robot, free: Sequence[FreeParameter]) -> tuple[Array, Array]:
+    """Least and largest value of each free parameter, (p,) each."""
+    known = _parameters(robot, free)
+    return np.array([p.minimum for p in known], dtype=float), np.array([p.maximum for p in known], dtype=float)
 
 
 def _parameters(robot: Robot, free: Sequence[FreeParameter]) -> list[Parameter]:

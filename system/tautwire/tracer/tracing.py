@@ -13,6 +13,7 @@ from ..model.uncertain import uncertain_numbers
 from ..recordings.recording import Recording
 from ..robots.robot import Robot
 from ..runs.cosimulation import Motion
+from .adequacy import largest_autocorrelations
 from .asked import require_asked
 from .cosimulated import compared, reaching, started
 from .discovery.discovery import Discovery
@@ -105,11 +106,13 @@ def _trace(
     final, kept = answer.robot, answer.effects_hold
     verdict, sentence = _verdict(robot, answer, noise_alone)
     numbers = [] if verdict == "unexplained" else _numbers(ready, answer)
-    effects = found_effects(robot, found) if kept else ()
+    effects = found_effects(robot, found, ready.fitter, ready.evidence.fit) if kept else ()
+    judge = ready.evidence.judge
+    left = ready.fitter.innovations(final, judge)
     shown = Separation((), ())
     if kept or verdict == "none":
         progress("what these recordings could show", 0.0)
-        shown = separation(found.fit.robot, robot, found.accepted, ready.fitter, ready.evidence.judge, alpha)
+        shown = separation(found.fit.robot, robot, found.accepted, ready.fitter, judge, alpha)
     return Trace(
         verdict=verdict,
         sentence=sentence,
@@ -124,7 +127,8 @@ def _trace(
         noise_floor=answer.floors[-1],
         noise_before=noise_alone,
         noise_after=kept or answer.discovered is not None or noise_alone,
-        left=ready.fitter.innovations(final, ready.evidence.judge).mean_square(ready.evidence.judge.rows),
+        left=left.mean_square(judge.rows),
+        autocorrelations=largest_autocorrelations(left, judge.rows),
         separation=shown,
         components=ports.result(),
         resonances=answer.rest.resonances,
