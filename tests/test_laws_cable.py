@@ -20,6 +20,7 @@ from tautwire_fmu.laws.cable import (
     CableState,
     motion,
     reading,
+    simplified,
     span,
     start_state,
     state_rates,
@@ -175,3 +176,27 @@ def test_units_come_out_right() -> None:
     assert shown.tension.check("[force]")
     assert all(force.check("[force]") for force in shown.force)
     assert rates.unstrained_length.check("[velocity]")
+
+
+MODULI = (*DAMPED, ActiveEffect(BY_NAME["modulus"], BY_NAME["modulus"].values(0.9e11)))
+
+
+@pytest.mark.parametrize("law", LAWS)
+def test_other_constants_do_what_the_effects_do_that_set_them(law: str) -> None:
+    cable = constants(law)
+    plain, none = simplified(REAL, cable, MODULI)
+    assert none == ()
+    state, inputs = CableState(4.98, 0.1, ((), ())), at((0.1, 0.2, -0.1), (0.03, -0.2, 0.1), 0.4)
+    found, expected = show(REAL, plain, state, inputs), show(REAL, cable, state, inputs, MODULI)
+    assert found.force == pytest.approx(expected.force, rel=1e-14)
+    assert found.tension == pytest.approx(expected.tension, rel=1e-14)
+
+
+def test_a_cable_with_an_effect_that_does_more_is_left_as_it_is() -> None:
+    creep = ActiveEffect(BY_NAME["creep"], BY_NAME["creep"].values(1e-12, 5.0, 0.0))
+    for effects in ((), (creep,), (*DAMPED, creep)):
+        assert simplified(REAL, constants(), effects) == (constants(), effects)
+
+
+def test_only_modulus_and_damping_set_constants() -> None:
+    assert {name for name, effect in BY_NAME.items() if effect.sets_constants} == {"damping", "modulus"}

@@ -56,7 +56,7 @@ class Cable(Slave):
         self.effects = active_effects(self.acting, numbers[11:])
         self.lag = stages.delays(REAL, self.effects)[0]
         line = stages.route(REAL, self.effects, anchor, start)
-        self.constants = law.CableConstants(
+        declared = law.CableConstants(
             law=self.tension_law,
             anchor=anchor,
             modulus=modulus,
@@ -67,6 +67,7 @@ class Cable(Slave):
             start_direction=line.direction,
             gravity=gravity,
         )
+        self.constants, self.effects = law.simplified(REAL, declared, self.effects)
         if not self.started:
             state = law.start_state(self.constants, self.effects)
             self.real[FIRST_STATE : self.end_of_state] = _flat(state)

@@ -122,6 +122,16 @@ class CableReading(NamedTuple):
     strain: Any
 
 
+def simplified(
+    m: Mathematics, cable: CableConstants, effects: Tuple[ActiveEffect, ...]
+) -> Tuple[CableConstants, Tuple[ActiveEffect, ...]]:
+    """A cable whose effects do nothing but set constants: with these, and no effects. Any other as it is."""
+    if not effects or not all(active.effect.sets_constants for active in effects):
+        return cable, effects
+    modulus, _ = stages.stiffness(m, effects, [()] * len(effects), cable)
+    return cable._replace(modulus=modulus, damping=stages.viscosity(m, effects, cable)), ()
+
+
 def start_state(cable: CableConstants, effects: Sequence[ActiveEffect]) -> CableState:
     """The state at the static start: nothing wound, the unstrained length equal to the length."""
     return CableState(

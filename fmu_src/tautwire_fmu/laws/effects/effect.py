@@ -99,6 +99,12 @@ class Effect(NamedTuple):
     gain: Optional[Callable[..., Any]] = None
     delay: Optional[Callable[..., Any]] = None
 
+    @property
+    def sets_constants(self) -> bool:
+        """Whether it does nothing but put other constants in the place of a rope's modulus and damping."""
+        acts = {name for name in self._fields[self._fields.index("states") :] if getattr(self, name)}
+        return bool(acts) and acts <= {"stiffness", "viscosity"}
+
     def completed(self, given: Mapping[str, Any]) -> Dict[str, Any]:
         """All parameters by name: those given, the others neutral; KeyError where one that has to be is not given."""
         return {p.name: given[p.name] if p.neutral is None else given.get(p.name, p.neutral) for p in self.parameters}
