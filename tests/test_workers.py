@@ -35,6 +35,13 @@ def sleep_for_long(folder: Path) -> None:
     time.sleep(600.0)
 
 
+def test_processes_may_be_begun_before_there_is_work() -> None:
+    with Workers(1) as here, Workers(2) as apart:
+        here.begin()
+        apart.begin()
+        assert here.start(square, 3).result() == apart.start(square, 3).result() == 9
+
+
 @pytest.mark.parametrize("count", [1, 2])
 def test_each_call_is_answered_by_its_number(count: int) -> None:
     with Workers(count) as workers:

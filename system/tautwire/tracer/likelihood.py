@@ -13,6 +13,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from math import ceil, log, pi
 
 import casadi
@@ -24,7 +25,7 @@ from ..model.uncertain import uncertain_numbers
 from ..native.repeated import Repeated, stacked
 from ..recordings.recording import Recording
 from ..robots.robot import Robot
-from .filter_step import Noise, Substeps, filter_sample
+from .filter_step import Noise, Substeps, filter_sample, filter_slopes
 from .preparation.start_state import start_covariance
 
 Array = NDArray[np.float64]
@@ -116,6 +117,11 @@ class Likelihood:
         variances[~given] = np.nan
         _fill(values, variances, slopes, given & ~seen)
         return Innovations(given, values, slopes, variances)
+
+    @cached_property
+    def slopes(self) -> Repeated:
+        """See :func:`tautwire.tracer.filter_step.filter_slopes`; compiled when first asked for."""
+        return Repeated(filter_slopes(self.model, self.cable_count, self.substeps))
 
     def start(self, parameters: Sequence[float] | Array) -> tuple[Array, Array]:
         """State (n,) and covariance (n, n) with which the filter begins."""

@@ -18,9 +18,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..native.repeated import Repeated, stacked
+from ..native.repeated import stacked
 from ..recordings.recording import Recording
-from .filter_step import filter_slopes
 from .likelihood import Likelihood
 
 Array = NDArray[np.float64]
@@ -71,7 +70,6 @@ def linearise_run(
 
     With ``roughness`` (m/s^2 per root hertz) the run follows what was measured where the model does not.
     """
-    slopes = Repeated(filter_slopes(likelihood.model, likelihood.cable_count, likelihood.substeps))
     theta = np.array(values, dtype=float)[:, None]
     noise = likelihood.noise
     variances = np.square(noise.of_outputs(likelihood.cable_count))
@@ -81,7 +79,7 @@ def linearise_run(
         before = stretch.states[:, :-1]
         looked = seen.T[:, :, None] > 0.0
         innovations = np.where(looked[:, :, 0], stretch.values, 0.0)
-        sensing = stacked(slopes(count, before, before, theta, shift, speed, later, step)[0], count)
+        sensing = stacked(likelihood.slopes(count, before, before, theta, shift, speed, later, step)[0], count)
         spread = stretch.covariances @ np.where(looked, sensing, 0.0).swapaxes(1, 2)
         covariance = np.where(looked, sensing, 0.0) @ spread + np.diag(variances)
         root = np.linalg.cholesky(covariance)
@@ -89,7 +87,7 @@ def linearise_run(
         gain = spread @ np.linalg.inv(covariance)
         moved = np.einsum("kij,kjl,kl->ki", gain, root, innovations)
         after = before + moved.T
-        _, *ahead = slopes(count, before, after, theta, shift, speed, later, step)
+        _, *ahead = likelihood.slopes(count, before, after, theta, shift, speed, later, step)
         transition, half = (stacked(matrix, count) for matrix in ahead)
         yield Linearised(
             stretch.states,

@@ -21,11 +21,14 @@ from tautwire_fmu.laws.effects import Effect
 
 from ..robots.robot import Robot
 from ..runs.start import placed
+from .attempts import fitter_apart
 from .data import Sample
 from .directions import Column, EffectDirections
+from .filter_step import Noise
 from .fit import Fitter
 from .hypotheses import OF_THE_PLATFORM, Hypothesis, free_parameters
 from .linearisation import linearise_run
+from .workers import Workers
 
 Array = NDArray[np.float64]
 
@@ -70,6 +73,31 @@ def screen(
         prospects = [_prospect(signatures, accepted, hypothesis, number, shapes) for number, shapes in trials]
         found[hypothesis] = max(prospects, key=lambda prospect: prospect.gain)
     return found
+
+
+def screened_apart(
+    robot: Robot,
+    accepted: Sequence[Hypothesis],
+    open_ones: Sequence[Hypothesis],
+    fitter: Fitter,
+    sample: Sample,
+    workers: Workers,
+) -> dict[Hypothesis, Prospect]:
+    """As :func:`screen`, the effects dealt out to the workers."""
+    count = workers.processes
+    if count == 1:
+        return screen(robot, accepted, open_ones, fitter, sample)
+    effects = list(dict.fromkeys(hypothesis.effect for hypothesis in open_ones))
+    dealt = [[h for h in open_ones if h.effect in effects[number::count]] for number in range(count)]
+    calls = [(fitter.noise, robot, accepted, own, sample) for own in dealt if own]
+    found = {h: prospect for _, prospects in workers.each(_screen_alone, calls) for h, prospect in prospects.items()}
+    return {hypothesis: found[hypothesis] for hypothesis in open_ones}
+
+
+def _screen_alone(
+    noise: Noise, robot: Robot, accepted: Sequence[Hypothesis], open_ones: Sequence[Hypothesis], sample: Sample
+) -> dict[Hypothesis, Prospect]:
+    return screen(robot, accepted, open_ones, fitter_apart(noise), sample)
 
 
 def signatures_of(

@@ -22,7 +22,7 @@ from .data import Evidence, Sample
 from .fit import EXACT, Fit, Fitter
 from .hypotheses import Hypothesis, divided, enlarged, hypotheses, joined
 from .scan import scanned, silent
-from .screen import Prospect, screen
+from .screen import Prospect, screened_apart
 from .trials import Trial, screened, setting_of, simplest, worth_fitting
 from .verdict import Candidate
 from .workers import Workers
@@ -142,7 +142,7 @@ class Search:
         looked = fit if adequate else fit.head
         sample = looked if adequate or rival is None else fit.beginning(OF_RIVALS)
         self.progress(f"round {number}: screening", 0.0)
-        prospects = screen(robot, accepted, open_ones, self.fitter, looked)
+        prospects = screened_apart(robot, accepted, open_ones, self.fitter, looked, self.workers)
         prospects |= scanned(robot, accepted, self.fitter, looked, silent(prospects), self.workers)
         worth = worth_fitting(prospects)
         if not adequate:

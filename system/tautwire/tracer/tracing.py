@@ -6,6 +6,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from time import perf_counter
 
+from threadpoolctl import threadpool_limits
+
 from tautwire_fmu.laws.effects import UNLISTED
 
 from ..interrupt import interrupts_held
@@ -58,7 +60,12 @@ def trace(
     argument is none of these.
     """
     require_asked(robot, fit, check, progress, alpha, processes)
-    with interrupts_held() as raise_interrupt, Workers(processes, raise_interrupt) as workers:
+    # What threads of BLAS round differently from one, the workers' processes could not repeat.
+    with (
+        interrupts_held() as raise_interrupt,
+        threadpool_limits(1, "blas"),
+        Workers(processes, raise_interrupt) as workers,
+    ):
         return _trace(robot, fit, check, progress or _silently, alpha, workers)
 
 
@@ -91,6 +98,7 @@ def _trace(
     workers: Workers,
 ) -> Trace:
     began = perf_counter()
+    workers.begin()
     ready, *others = readings(robot, fit, check, workers)
     runs, ports = _aside(ready, robot, workers)
     found = search(robot, ready.fitter, ready.evidence, alpha, progress, workers)
@@ -175,7 +183,7 @@ def _answer(
     if not found.accepted and noise_alone:
         better = borne_out(robot) if uncertain_numbers(robot) else None
         return _answered(better or plain, found, False, None, Rest())
-    rest = what_is_left(robot, found, fitter, ready.evidence, alpha, progress)
+    rest = what_is_left(robot, found, fitter, ready.evidence, alpha, progress, workers)
     better = borne_out(rest.discovery.robot) if rest.discovery else None
     return _answered(better or plain, found, False, rest.discovery if better else None, rest)
 

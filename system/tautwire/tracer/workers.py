@@ -91,6 +91,11 @@ class Workers:
         if self._folder is not None:
             self._folder.cleanup()
 
+    def begin(self) -> None:
+        """Begin the processes, which takes them a while; else the first call does."""
+        if self._pool() is not None:
+            self._submit(_begun)
+
     def start(self, function: Callable[..., Result], *arguments: Any) -> Pending[Result]:
         """Begin a call; its result may be fetched once."""
         future = None if self._pool() is None else self._submit(function, *arguments)
@@ -147,6 +152,10 @@ def _interrupts_blocked() -> Iterator[None]:
         yield
     finally:
         signal.pthread_sigmask(signal.SIG_SETMASK, before)
+
+
+def _begun() -> None:
+    """Something to do first."""
 
 
 def _begin(folder: str) -> None:
