@@ -2,7 +2,7 @@ import math
 
 import pytest
 
-from tautwire_fmu.laws.mathematics import COMPLEX_STEP, REAL, along, rate_of
+from tautwire_fmu.laws.mathematics import COMPLEX_STEP, REAL, all_along, along, rate_of, rates_of, vector_along
 
 
 @pytest.mark.parametrize(
@@ -28,6 +28,13 @@ def test_kinks_choose_by_the_real_part() -> None:
     assert rate_of(COMPLEX_STEP.where(along(-1.0, 1.0), along(0.0, 2.0), along(0.0, 5.0))) == 5.0
     assert REAL.where(1.0, 2.0, 3.0) == 2.0
     assert REAL.where(0.0, 2.0, 3.0) == 3.0
+
+
+def test_vectors_carry_their_rates_as_numbers_do() -> None:
+    values, rates = (1.5, -2.0, 0.25), (3.0, 0.1, -7.0)
+    carried = vector_along(values, rates)
+    assert list(carried) == all_along(values, rates) == [along(v, r) for v, r in zip(values, rates, strict=True)]
+    assert rates_of(carried) == tuple(map(rate_of, carried)) == pytest.approx(rates, rel=1e-15)
 
 
 def test_a_constant_has_no_rate() -> None:

@@ -71,6 +71,26 @@ def test_stamped_inputs_run_on_the_cubic_through_both_ends(three_fmus: RobotFmus
     assert position - 28.86 == pytest.approx(acceleration.integ(2)(0.1), rel=1e-9)
 
 
+def test_inputs_may_be_set_all_at_once_in_any_order_or_one_by_one(damped_fmus: RobotFmus) -> None:
+    generator, shown = np.random.default_rng(2), []
+    for way in ("one by one", "in order", "in another order"):
+        values = np.random.default_rng(3)
+        with in_hand(damped_fmus.cables[1]) as cable:
+            inputs = [v.name for v in cable.description.modelVariables if v.causality == "input"]
+            start = dict(zip(inputs, cable.get(*inputs), strict=True))
+            cable.run()
+            for k in range(1, 4):
+                now = {n: v + 0.01 * values.normal() for n, v in start.items()} | {"input_time": 0.1 * k}
+                now |= {"middle_time": 0.1 * k - 0.05}
+                order = generator.permutation(inputs).tolist() if way == "in another order" else inputs
+                groups = [[name] for name in inputs] if way == "one by one" else [order]
+                for group in groups:
+                    cable.set(**{name.replace(".", "__"): now[name] for name in group})
+                cable.step(0.1 * (k - 1), 0.1)
+            shown.append(cable.get(*SHOWN, "unstrained_length"))
+    assert shown[0] == shown[1] == shown[2]
+
+
 def shown_after_steps(cable: Hand) -> list[float]:
     for k in range(3):
         cable.set(position__z=5.0 + 0.01 * k, winch_speed=0.1 * k)

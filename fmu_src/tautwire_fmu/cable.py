@@ -7,7 +7,7 @@ from .inner_steps import integrate
 from .interpolation import cubic, extrapolate, quintic
 from .laws import cable as law
 from .laws import stages
-from .laws.mathematics import COMPLEX_STEP, REAL, all_along, along, rate_of
+from .laws.mathematics import COMPLEX_STEP, REAL, all_along, along, rate_of, rates_of, vector_along
 from .past import Seen, remember, seen
 from .slave import Slave, active_effects, effects_of, read_resource
 
@@ -89,7 +89,7 @@ class Cable(Slave):
             shown = self._show(between, middle, line)
         if self.lag > 0.0:
             self._remember(step, ends, state, shown, after)
-        self.real[MIDDLE_FORCE:FIRST_STATE] = [*(f.real for f in shown.force), *map(rate_of, shown.force)]
+        self.real[MIDDLE_FORCE:FIRST_STATE] = _values_and_rates(shown.force)
         self.real[FIRST_STATE : self.end_of_state] = after
 
     def _without_effects(
@@ -104,12 +104,14 @@ class Cable(Slave):
         k2 = slope(REAL, there, half.length.real, unstrained + 0.5 * step * k1)
         k3 = slope(REAL, there, half.length.real, unstrained + 0.5 * step * k2)
         k4 = slope(REAL, away, last.length.real, unstrained + step * k3)
-        after = [
-            unstrained + sixth * (k1 + 2.0 * (k2 + k3) + k4),
-            wound + sixth * (begin + 2.0 * (there + there) + away),
+        reeled = unstrained + sixth * (k1 + 2.0 * (k2 + k3) + k4)
+        turned = wound + sixth * (begin + 2.0 * (there + there) + away)
+        eighth = 0.125 * step
+        between = [
+            0.5 * (unstrained + reeled) + eighth * (k1 - k4),
+            0.5 * (wound + turned) + eighth * (begin - away),
         ]
-        changes = zip(state, after, (k1, begin), (k4, away))
-        return [0.5 * (s + e) + 0.125 * step * (a - d) for s, e, a, d in changes], after
+        return between, [reeled, turned]
 
     def _in_one_step(
         self, state: List[float], step: float, ends: bool, middle: Motion, half: law.Span
@@ -152,18 +154,18 @@ class Cable(Slave):
         shown = self._show_now(real[FIRST_STATE : self.end_of_state])
         values = (*shown.force, shown.tension, shown.length, shown.elongation, shown.strain, shown.pull)
         real[FIRST_OUTPUT:FIRST_RATE] = [value.real for value in values]
-        real[FIRST_RATE:MIDDLE_FORCE] = [*map(rate_of, shown.force), rate_of(shown.tension)]
+        real[FIRST_RATE:MIDDLE_FORCE] = (*rates_of(shown.force), rate_of(shown.tension))
         if self.lag > 0.0 and self.pasts:
             real[TENSION], real[TENSION_RATE] = seen(self.pasts[0], self.lag)
         if not self.started:
-            real[MIDDLE_FORCE:FIRST_STATE] = [*(f.real for f in shown.force), *map(rate_of, shown.force)]
+            real[MIDDLE_FORCE:FIRST_STATE] = _values_and_rates(shown.force)
 
     def _show(self, numbers: List[float], now: Motion, line: law.Span) -> law.CableReading:
         """One complex step gives the outputs and their rates."""
         rates = self._rates(numbers, line, now.winch_speed)
         carried = law.CableInputs(
-            all_along(now.position, now.velocity),
-            all_along(now.velocity, now.acceleration),
+            vector_along(now.position, now.velocity),
+            vector_along(now.velocity, now.acceleration),
             along(now.winch_speed, now.winch_acceleration),
         )
         state = self._state(all_along(numbers, rates))
@@ -199,7 +201,7 @@ class Cable(Slave):
 
     def _carried_line(self, now: Motion) -> law.Span:
         """Without effects, numbers that carry their rates."""
-        place, motion = all_along(now.position, now.velocity), all_along(now.velocity, now.acceleration)
+        place, motion = vector_along(now.position, now.velocity), vector_along(now.velocity, now.acceleration)
         return law.span(COMPLEX_STEP, self.constants, law.CableInputs(place, motion, 0.0))
 
     def _line(self, now: Motion) -> law.Span:
@@ -280,6 +282,11 @@ def _motion(inputs: Sequence[float]) -> Motion:
         inputs[WINCH_SPEED],
         inputs[WINCH_ACCELERATION],
     )
+
+
+def _values_and_rates(vector: Sequence[complex]) -> Tuple[float, ...]:
+    x, y, z = vector
+    return (x.real, y.real, z.real, *rates_of(vector))
 
 
 def _value_and_rate(number: complex) -> Tuple[float, float]:

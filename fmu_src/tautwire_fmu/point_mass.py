@@ -7,7 +7,7 @@ from .interpolation import cubic
 from .laws import point_mass as law
 from .laws import stages
 from .laws.effects import Effect
-from .laws.mathematics import COMPLEX_STEP, REAL, Mathematics, all_along, along, rate_of
+from .laws.mathematics import COMPLEX_STEP, REAL, Mathematics, along, rates_of, vector_along
 from .laws.vectors import Vector
 from .past import Seen, remember, seen
 from .quadrature import CUBIC_END, CUBIC_MIDDLE, QUINTIC_END, QUINTIC_MIDDLE, Node, Place, integrate
@@ -157,11 +157,12 @@ class PointMass(Slave):
         if self.couples:
             # Only a wrench makes the acceleration's rate depend on the motion, and on the acceleration itself.
             acceleration = self._acceleration(REAL, position, velocity, force, time)
-            position = all_along(position, velocity)
-            velocity = all_along(velocity, acceleration)
-        forced = all_along(force, rate)
+            position = vector_along(position, velocity)
+            velocity = vector_along(velocity, acceleration)
+        forced = vector_along(force, rate)
         carried = self._acceleration(COMPLEX_STEP, position, velocity, forced, along(time, 1.0))
-        return Node([a.real for a in carried], [rate_of(a) for a in carried])
+        x, y, z = carried
+        return Node((x.real, y.real, z.real), rates_of(carried))
 
     def _acceleration(self, m: Mathematics, position: Vector, velocity: Vector, force: Vector, time: Any) -> Vector:
         return law.acceleration(m, self.constants, self.effects, self._states(time), position, velocity, force)

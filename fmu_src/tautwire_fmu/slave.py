@@ -8,8 +8,9 @@ the middle.
 
 import json
 import math
+from operator import itemgetter
 from pathlib import Path
-from typing import Any, Dict, List, Optional, Sequence, Tuple
+from typing import Any, Callable, Dict, List, NamedTuple, Optional, Sequence, Tuple
 from xml.etree.ElementTree import Element
 
 from pythonfmu import Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability, Real
@@ -37,6 +38,13 @@ MIDDLE_TIME = Variable(
 )
 
 
+class AllInputs(NamedTuple):
+    """References that were last set; ``in_order`` sorts their values where they are all inputs, else None."""
+
+    references: Sequence[int]
+    in_order: Optional[Callable[[Sequence[float]], Tuple[float, ...]]]
+
+
 class Slave(Fmi2Slave):
     """A slave whose variables are the entries of one list, in the order of their value references.
 
@@ -60,6 +68,7 @@ class Slave(Fmi2Slave):
         self.middle_place = next((i for i, v in enumerate(self.variables) if v.name == MIDDLE_TIME.name), None)
         self.middle_given = False
         self.earlier: Optional[Tuple[float, ...]] = None
+        self.all_inputs = AllInputs((), None)
         self.elapsed = 0.0
         self.time = 0.0
         self.pasts: Tuple[Pieces, ...] = ()
@@ -94,6 +103,21 @@ class Slave(Fmi2Slave):
     def set_real(self, vrs: Sequence[int], values: Sequence[float]) -> None:
         if not vrs:
             return
+        real = self.real
+        if vrs != self.all_inputs.references:
+            self.all_inputs = _all_inputs(vrs, self.input_count)
+        if self.all_inputs.in_order is not None:
+            given = self.all_inputs.in_order(values)
+            if given[0] != real[0]:
+                self.earlier = tuple(real[: self.input_count])
+            real[: self.input_count] = given
+        else:
+            self._set_some(vrs, values)
+        self.stale = True
+        self.untouched = False
+        self.elapsed = 0.0
+
+    def _set_some(self, vrs: Sequence[int], values: Sequence[float]) -> None:
         real, highest = self.real, max(vrs)
         if 0 in vrs and values[vrs.index(0)] != real[0]:
             self.earlier = tuple(real[: self.input_count])
@@ -101,9 +125,6 @@ class Slave(Fmi2Slave):
             vrs, values = self._known(vrs, values)
         for reference, value in zip(vrs, values):
             real[reference] = value
-        self.stale = True
-        self.untouched = False
-        self.elapsed = 0.0
         if highest >= self.first_parameter:
             self.parameters_changed()
 
@@ -212,6 +233,13 @@ class Slave(Fmi2Slave):
 
     def to_xml(self, model_options: Dict[str, str] = {}) -> Element:  # noqa: B006 (pythonfmu's signature)
         return complete(super().to_xml(model_options), self.variables)
+
+
+def _all_inputs(references: Sequence[int], count: int) -> AllInputs:
+    """Inputs come first, with the lowest references."""
+    order = sorted(range(len(references)), key=references.__getitem__)
+    whole = count > 1 and [references[place] for place in order] == list(range(count))
+    return AllInputs(list(references), itemgetter(*order) if whole else None)
 
 
 def read_resource(resources: str, name: str) -> Dict[str, Any]:

@@ -7,7 +7,7 @@ numbers for exact rates, and on arrays or symbols outside. Kinks are written wit
 
 import cmath
 import math
-from typing import Any, Callable, List, NamedTuple, Sequence
+from typing import Any, Callable, List, NamedTuple, Sequence, Tuple
 
 
 class Mathematics(NamedTuple):
@@ -108,6 +108,19 @@ def along(value: float, rate: float) -> complex:
 def all_along(values: Sequence[float], rates: Sequence[float]) -> List[complex]:
     """As :func:`along`, number by number."""
     return [value + rate * UNIT for value, rate in zip(values, rates)]
+
+
+def vector_along(values: Sequence[float], rates: Sequence[float]) -> Tuple[complex, complex, complex]:
+    """As :func:`along`, for the three numbers of a vector."""
+    x, y, z = values
+    dx, dy, dz = rates
+    return (x + dx * UNIT, y + dy * UNIT, z + dz * UNIT)
+
+
+def rates_of(vector: Sequence[complex]) -> Tuple[float, float, float]:
+    """As :func:`rate_of`, for the three numbers of a vector."""
+    x, y, z = vector
+    return (x.imag / STEP, y.imag / STEP, z.imag / STEP)
 
 
 def rate_of(value: complex) -> float:
