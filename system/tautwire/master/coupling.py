@@ -13,6 +13,7 @@ iterated coupling; the polynomial through value and rate at both ends is the Her
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
+from copy import copy
 from dataclasses import replace
 
 import numpy as np
@@ -213,25 +214,29 @@ class Coupling:
         self._prediction.begin(time + step, self._shown)
         self._rates.begin(self._prediction.memory.past, time + step)
         self._drive(end)
-        error = self._pass(time, step, begun)
+        error = self._pass(time, step, begun, self._shown[self._fed_back] / self._scale)
         redos = 0
-        while before is not None and redos < self.redos and error > self._enough(shown, step):
-            self._shown[self._fed_back] = self._secants.next() * self._scale
+        enough = self._enough(shown, step)
+        while before is not None and redos < self.redos and error > enough:
+            guess = self._secants.next()
+            self._shown[self._fed_back] = guess * self._scale
             self._restore_states(before)
             redos += 1
-            error = self._pass(time, step, begun)
+            error = self._pass(time, step, begun, guess)
         return redos
 
     def _enough(self, begun: Array, step: float) -> float:
-        """The error with which redos end."""
+        """The error with which redos end; what the polynomials miss, the first pass shows well enough."""
         if not self.share:
             return self.tolerance
         return max(self.tolerance, self.share * self._bends.largest(begun, self._shown, step))
 
-    def _pass(self, time: float, step: float, begun: Array) -> float:
-        """Each component steps in turn; returns by how much outputs still err at most, relative to nominal values."""
+    def _pass(self, time: float, step: float, begun: Array, given: Array) -> float:
+        """Each component steps in turn; returns by how much outputs still err at most.
+
+        Like what is ``given`` of those fed back, relative to nominal values.
+        """
         self.account.passes += 1
-        given = self._shown[self._fed_back] / self._scale
         self._rates.fill(self._shown)
         self._held.hold(self._shown)
         for seat in self._order:
@@ -257,7 +262,7 @@ class Coupling:
         """Where everything is now; let it go with :meth:`release`."""
         states = tuple(seat.component.save() for seat in self._order)
         return Checkpoint(
-            states, self._shown.copy(), self._given.copy(), self._driven, replace(self.account), self._prediction.memory
+            states, self._shown.copy(), self._given.copy(), self._driven, copy(self.account), self._prediction.memory
         )
 
     def restore(self, checkpoint: Checkpoint) -> None:

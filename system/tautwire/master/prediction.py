@@ -33,14 +33,15 @@ KEPT_WEIGHTS = 64
 class Memory(NamedTuple):
     """What predictions are made from: the ``past``, oldest first, and the ``misses`` of the longest polynomial.
 
-    Of the past, ``smooth`` points lie behind no corner. ``choice`` did best in the last step, and missed by ``miss``.
+    Misses have a row for each of the last steps, the newest first; None right behind a corner. Of the past, ``smooth``
+    points lie behind no corner. ``choice`` did best in the last step, and missed by ``miss``.
     """
 
     past: Past
     smooth: int = 1
     choice: int = 0
     miss: float = np.inf
-    misses: tuple[Array, ...] = ()
+    misses: Array | None = None
 
 
 class Prediction:
@@ -72,14 +73,15 @@ class Prediction:
         memory = self.memory
         points = memory.past[-min(memory.smooth, POINTS) :]
         values = np.array([value for _, value in points])
+        weights = self._weights_for([at for at, _ in points], time)
         parts = [
-            (weight @ values[:, ends].reshape(-1, ends.shape[1])).reshape(len(points), -1)
-            for ends, weight in zip(self._ends, self._weights_for([at for at, _ in points], time), strict=True)
+            (weight @ values.take(ends, axis=1).reshape(-1, ends.shape[1])).reshape(len(points), -1)
+            for ends, weight in zip(self._ends, weights, strict=True)
         ]
         self._found = np.concatenate(parts, axis=1).take(self._order, axis=1)
-        if len(memory.misses) >= LEAST_MISSES:
-            swung = self._found[-1] + _next_miss(np.array(memory.misses)) * self._nominal
-            self._found = np.vstack([self._found, swung])
+        if memory.misses is not None and len(memory.misses) >= LEAST_MISSES:
+            swung = self._found[-1] + _next_miss(memory.misses) * self._nominal
+            self._found = np.concatenate([self._found, swung[None, :]])
         shown[self._places] = self._found[min(memory.choice, len(self._found) - 1)]
 
     def end(self, time: float, shown: Array) -> None:
@@ -100,7 +102,9 @@ class Prediction:
             # There is one point more from now on, which is tried where all points were of use.
             self.memory = Memory(past, points + 1, choice + (choice == points - 1), miss)
         else:
-            kept = (misses[POINTS - 1], *memory.misses[: MOST_MISSES - 1])
+            newest = misses[POINTS - 1 : POINTS]
+            before = memory.misses
+            kept = newest if before is None else np.concatenate([newest, before[: MOST_MISSES - 1]])
             self.memory = Memory(past, points, choice, miss, kept)
 
     def _weights_for(self, times: Sequence[float], end: float) -> list[Array]:

@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 Progress = Callable[[float], None]
 
 # Of what the polynomials of a step miss: redos that would find less than this add nothing.
-SHARE = 0.01
+SHARE = 0.03
 
 
 class Source(Protocol):
