@@ -99,18 +99,10 @@ def _trace(
 ) -> Trace:
     began = perf_counter()
     workers.begin()
-    ready, *others = readings(robot, fit, check, workers)
-    runs, ports = _aside(ready, robot, workers)
-    found = search(robot, ready.fitter, ready.evidence, alpha, progress, workers)
-    if others and not (found.accepted and _leaves_noise(ready, found)):
-        ready = others[0]
-        runs, ports = _aside(ready, robot, workers)
-        found = search(robot, ready.fitter, ready.evidence, alpha, progress, workers)
-    found = with_rivals(robot, found, ready.fitter, ready.evidence, alpha, progress)
-    progress("co-simulating before", 0.0)
-    before = [run.result() for run in runs]
+    searched = _searched(robot, fit, check, progress, alpha, workers)
+    ready, found = searched.ready, searched.found
     noise_alone = all_noise(ready.plain, ready.evidence)
-    answer = _answer(robot, ready, found, before, noise_alone, alpha, progress, workers)
+    answer = _answer(robot, ready, found, searched.before, noise_alone, alpha, progress, workers)
     final, kept = answer.robot, answer.effects_hold
     verdict, sentence = _verdict(robot, answer, noise_alone)
     numbers = [] if verdict == "unexplained" else _numbers(ready, answer)
@@ -138,7 +130,7 @@ def _trace(
         left=left.mean_square(judge.rows),
         autocorrelations=largest_autocorrelations(left, judge.rows),
         separation=shown,
-        components=ports.result(),
+        components=searched.components.result(),
         resonances=answer.rest.resonances,
         alpha=alpha,
         notes=(*ready.notes, *answer.rest.notes, *_begun(ready, final), *numbers),
@@ -146,8 +138,33 @@ def _trace(
     )
 
 
+@dataclass(frozen=True)
+class _Searched:
+    """What a search found in which recordings, and what went on beside it: runs before, and the cut at the ports."""
+
+    ready: Ready
+    found: Found
+    before: Sequence[Motion]
+    components: Pending[Components]
+
+
+def _searched(
+    robot: Robot, fit: Recording, check: Recording | None, progress: Progress, alpha: float, workers: Workers
+) -> _Searched:
+    """In the recordings as they are; with clocks set where no effects explain those."""
+    ready, *others = readings(robot, fit, check, workers)
+    runs, components = _aside(ready, robot, workers)
+    found = search(robot, ready.fitter, ready.evidence, alpha, progress, workers)
+    if others and not (found.accepted and _leaves_noise(ready, found)):
+        ready = others[0]
+        runs, components = _aside(ready, robot, workers)
+        found = search(robot, ready.fitter, ready.evidence, alpha, progress, workers)
+    found = with_rivals(robot, found, ready.fitter, ready.evidence, alpha, progress)
+    progress("co-simulating before", 0.0)
+    return _Searched(ready, found, [run.result() for run in runs], components)
+
+
 def _aside(ready: Ready, robot: Robot, workers: Workers) -> tuple[list[Pending[Motion]], Pending[Components]]:
-    """What goes on beside the search: the co-simulations before, and the cut at the ports."""
     runs = started(workers, ready.fitter, robot, ready.samples)
     return runs, workers.start(cut_at_ports, *calibrated_fit(ready, robot), ready.fitter.noise)
 
