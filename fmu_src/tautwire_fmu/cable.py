@@ -2,6 +2,7 @@
 
 from typing import Any, List, NamedTuple, Optional, Sequence, Tuple
 
+from .acting import active_effects, effects_of
 from .cable_variables import cable_variables
 from .inner_steps import integrate
 from .interpolation import cubic, extrapolate, quintic
@@ -9,7 +10,7 @@ from .laws import cable as law
 from .laws import stages
 from .laws.mathematics import COMPLEX_STEP, REAL, all_along, along, rate_of, rates_of, vector_along
 from .past import Seen, remember, seen
-from .slave import Slave, active_effects, effects_of, read_resource
+from .slave import Slave, read_resource
 
 POSITION, VELOCITY, ACCELERATION, WINCH_SPEED, WINCH_ACCELERATION, MIDDLE = 2, 5, 8, 11, 12, 13
 FIRST_OUTPUT = 22

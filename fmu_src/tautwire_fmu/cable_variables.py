@@ -2,8 +2,9 @@
 
 from typing import Any, Dict, Tuple
 
+from .acting import effect_states, effect_variables
 from .description import Variable, axes, vector
-from .slave import INPUT_TIME, MIDDLE_TIME, effect_states, effect_variables
+from .slave import INPUT_TIME, MIDDLE_TIME
 
 MOTION = (*axes("position", "velocity"), "winch_speed")
 RATED = (*MOTION, *axes("acceleration"), "winch_acceleration")

@@ -2,6 +2,7 @@
 
 from typing import Any, Dict, List, Sequence, Tuple
 
+from .acting import active_effects, effect_states, effect_variables, effects_of
 from .description import Variable, axes, vector
 from .interpolation import cubic
 from .laws import point_mass as law
@@ -11,16 +12,7 @@ from .laws.mathematics import COMPLEX_STEP, REAL, Mathematics, along, rates_of, 
 from .laws.vectors import Vector
 from .past import Seen, remember, seen
 from .quadrature import CUBIC_END, CUBIC_MIDDLE, QUINTIC_END, QUINTIC_MIDDLE, Node, Place, integrate
-from .slave import (
-    INPUT_TIME,
-    MIDDLE_TIME,
-    Slave,
-    active_effects,
-    effect_states,
-    effect_variables,
-    effects_of,
-    read_resource,
-)
+from .slave import INPUT_TIME, MIDDLE_TIME, Slave, read_resource
 
 FIRST_FORCE = 2
 SWEEPS = 8
