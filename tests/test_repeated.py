@@ -13,6 +13,7 @@ from tautwire.tracer.filter_step import Substeps, filter_sample
 from tautwire.tracer.preparation.noise import noise_of
 from tautwire.tracer.preparation.start_state import start_covariance
 from tests.effect_cases import CASES, Case
+from tests.memory import TOLD, resident_memory
 from tests.recordings import recorded
 from tests.robots import example
 
@@ -63,6 +64,19 @@ def test_results_are_stacked_by_sample() -> None:
     np.testing.assert_array_equal(stacked(wide, 3)[1], wide[:, 2:4])
     assert stacked(np.zeros((2, 0)), 3).shape == (3, 2, 0)
     assert stacked(np.zeros((0, 6)), 3).shape == (3, 0, 2)
+
+
+@pytest.mark.skipif(not TOLD, reason="only Linux tells the memory of a process")
+def test_functions_that_are_kept_take_little_memory() -> None:
+    a = SX.sym("a", 16, 16)
+    function = Function("cube", [a], [casadi.mtimes(a, casadi.mtimes(a, a))])
+    kept = [Repeated(function)]
+    before, _ = resident_memory()
+    kept += [Repeated(function) for _ in range(10)]
+    after, _ = resident_memory()
+    # 17,000 instructions, of some twenty bytes each.
+    assert after - before < 10 * 3.0
+    assert len(kept) == 11
 
 
 @pytest.mark.parametrize("case", CASES, ids=str)

@@ -95,10 +95,13 @@ def _dense(function: Function) -> Function:
 
 
 def _engine(text: str) -> llvm.ExecutionEngine:
+    """The assembly as machine code. LLVM's own form of it is some thirty times as large, and let go at once."""
     processor, features = _processor()
-    target = llvm.Target.from_default_triple()
-    machine = target.create_target_machine(opt=0, cpu=processor, features=features)
-    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(text), machine)
+    machine = llvm.Target.from_default_triple().create_target_machine(opt=0, cpu=processor, features=features)
+    with llvm.parse_assembly(text) as module:
+        code = machine.emit_object(module)
+    engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
+    engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()
     return engine
 
