@@ -7,14 +7,16 @@ import pytest
 from scipy.optimize import minimize_scalar
 
 from tautwire.tracer.data import Sample, split
-from tautwire.tracer.fit import Fit, Fitter
+from tautwire.tracer.fit import Fit, Fitter, bounds_of
 from tautwire.tracer.hypotheses import Hypothesis
 from tautwire.tracer.preparation.noise import noise_of
 from tautwire.tracer.profile import WITHIN, intervals
+from tautwire.tracer.workers import Workers
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.recordings import recorded
 from tests.robots import example
 
+HERE = Workers(1)
 Made = tuple[Fitter, list[Hypothesis], Sample, Fit]
 
 
@@ -38,14 +40,14 @@ def left_at(made: Made, values: list[float]) -> float:
 
 def test_a_round_surface_keeps_the_curvatures_interval() -> None:
     fitter, chosen, sample, fit = fitted("damping", {"damping": {"damping": 8e8}})
-    assert intervals(fitter, fit, chosen, sample) == [fit.interval(0)]
+    assert intervals(fitter, fit, chosen, sample, HERE) == [fit.interval(0)]
 
 
 def test_ends_leave_as_much_as_the_level_says_with_the_other_parameter_at_its_best() -> None:
     made = fitted("relaxation", {"relaxation": {"modulus": 2e9, "time": 5.0}})
     fitter, chosen, sample, fit = made
     least = left_at(made, list(fit.values))
-    found = intervals(fitter, fit, chosen, sample)
+    found = intervals(fitter, fit, chosen, sample, HERE)
     bent = 0
     for index, ends in enumerate(found):
         for end, by_curvature in zip(ends, fit.interval(index), strict=True):
@@ -65,10 +67,42 @@ def test_ends_leave_as_much_as_the_level_says_with_the_other_parameter_at_its_be
 
 def test_an_interval_ends_where_the_parameter_does() -> None:
     fitter, chosen, sample, fit = fitted("payload", {})
-    ((low, high),) = intervals(fitter, fit, chosen, sample)
+    ((low, high),) = intervals(fitter, fit, chosen, sample, HERE)
     assert low == fit.interval(0)[0] or low == chosen[0].parameters[0].minimum
     assert low < fit.values[0] < high
     fitter, chosen, sample, fit = fitted("hysteresis", {})
-    (low, high), _ = intervals(fitter, fit, chosen, sample)
+    (low, high), _ = intervals(fitter, fit, chosen, sample, HERE)
     assert low == 0.0
     assert high > fit.values[0]
+
+
+def several(names: tuple[str, ...], truth: dict[str, dict[str, float]]) -> Made:
+    """The fit of several effects, with all numbers of their smallest forms."""
+    robot, recording = example("three"), recorded("three", 3, truth)
+    noise = noise_of(robot, recording)
+    chosen = [Hypothesis(BY_NAME[name], robot.cable_numbers) for name in names]
+    for hypothesis in chosen:
+        robot = robot.with_effect(hypothesis.setting(robot))
+    sample, fitter = split(robot, noise, recording, None).fit, Fitter(noise)
+    return fitter, chosen, sample, fitter.fit(robot, chosen, sample)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    "names", [("modulus", "relaxation"), ("relaxation", "hysteresis"), ("friction", "thermal")], ids="-".join
+)
+def test_intervals_hold_their_values_whatever_the_samples_tell(names: tuple[str, ...]) -> None:
+    fitter, chosen, sample, fit = several(names, {"relaxation": {"modulus": 2e9, "time": 5.0}})
+    lower, upper = bounds_of(fit.robot, fit.free)
+    for (low, high), value, least, most in zip(
+        intervals(fitter, fit, chosen, sample, HERE), fit.values, lower, upper, strict=True
+    ):
+        assert least <= low <= value <= high <= most
+        assert low < high
+
+
+def test_workers_find_the_same_ends() -> None:
+    fitter, chosen, sample, fit = fitted("relaxation", {"relaxation": {"modulus": 2e9, "time": 5.0}})
+    with Workers(2) as workers:
+        apart = intervals(fitter, fit, chosen, sample, workers)
+    assert np.array(apart) == pytest.approx(np.array(intervals(fitter, fit, chosen, sample, HERE)), rel=1e-9)

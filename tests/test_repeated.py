@@ -59,6 +59,24 @@ def test_arguments_of_other_sizes_are_refused() -> None:
         repeated(5, np.ones((2, 1)), np.eye(2), np.ones((1, 4)), np.ones((2, 1)))
 
 
+def test_what_is_carried_has_to_fit() -> None:
+    repeated = Repeated(falling(), carried=2)
+    with pytest.raises(ValueError, match=r"shape \(2, 1\), where \(2, 2\) is one of 1 samples"):
+        repeated(5, np.ones((2, 1)), np.ones((2, 1)), np.ones((1, 5)), np.ones((2, 1)))
+    with pytest.raises(ValueError, match="3 results of falling are to be carried"):
+        Repeated(falling(), carried=3)
+
+
+@pytest.mark.parametrize("count", [0, 1, 6])
+def test_what_is_interpreted_is_the_same(count: int) -> None:
+    state, matrix = GENERATOR.normal(size=(2, 1)), GENERATOR.normal(size=(2, 2))
+    steps, pull = GENERATOR.normal(size=(1, count)), GENERATOR.normal(size=(2, 1))
+    for carried, first in ((2, (state, matrix)), (0, (np.tile(state, count), matrix))):
+        ways = [Repeated(falling(), carried, most)(count, *first, steps, pull) for most in (0, 10_000)]
+        for one, other in zip(*ways, strict=True):
+            np.testing.assert_array_equal(one, other)
+
+
 def test_results_are_stacked_by_sample() -> None:
     wide = np.arange(12.0).reshape(2, 6)
     np.testing.assert_array_equal(stacked(wide, 3)[1], wide[:, 2:4])

@@ -119,7 +119,7 @@ def test_null_replaces_what_is_not_finite(strange: float) -> None:
     trace = replace(
         trace,
         left=np.full(6, strange),
-        autocorrelations=np.full(6, strange),
+        autocorrelations=(np.full(6, strange), np.full(6, strange)),
         noise_floor=replace(trace.noise_floor, tension_rms=strange),
         effects=(replace(trace.effects[0], evidence=strange),),
     )
@@ -127,7 +127,7 @@ def test_null_replaces_what_is_not_finite(strange: float) -> None:
     assert document["noise_floor"]["tension_rms"] is None
     assert document["effects"][0]["evidence"] is None
     assert set(document["left"].values()) == {None}
-    assert set(document["autocorrelation"].values()) == {None}
+    assert set(document["autocorrelation"].values()) == set(document["autocorrelation_of_noise"].values()) == {None}
 
 
 @pytest.mark.parametrize(

@@ -157,7 +157,7 @@ def made_trace(
         noise_before=False,
         noise_after=True,
         left=np.concatenate(([1.01, 0.98, 1.03], np.linspace(0.97, 1.06, len(cables)))),
-        autocorrelations=np.linspace(0.01, 0.05, 3 + len(cables)),
+        autocorrelations=(np.linspace(0.01, 0.05, 3 + len(cables)), np.full(3 + len(cables), 0.047)),
         separation=made_separation(cables),
         components=made_components(cables),
         resonances=(),
@@ -204,6 +204,6 @@ def without_positions(trace: Trace) -> Trace:
         comparisons.append(Comparison(each.role, recording, each.before, each.after, *errors))
     robot = replace(trace.robot_before, sensors=Sensors())
     floor = replace(trace.noise_floor, position_rms=float("nan"), axes=np.full(3, np.nan))
-    left, alike = (np.append([np.nan] * 3, values[3:]) for values in (trace.left, trace.autocorrelations))
-    shown = replace(trace, left=left, autocorrelations=alike)
+    left, one, other = (np.append([np.nan] * 3, values[3:]) for values in (trace.left, *trace.autocorrelations))
+    shown = replace(trace, left=left, autocorrelations=(one, other))
     return replace(shown, robot_before=robot, comparisons=tuple(comparisons), noise_floor=floor)

@@ -216,8 +216,7 @@ class Coupling:
         self._drive(end)
         error = self._pass(time, step, begun, self._shown[self._fed_back] / self._scale)
         redos = 0
-        enough = self._enough(shown, step)
-        while before is not None and redos < self.redos and error > enough:
+        while before is not None and redos < self.redos and error > self._enough(shown, step):
             guess = self._secants.next()
             self._shown[self._fed_back] = guess * self._scale
             self._restore_states(before)
@@ -226,7 +225,7 @@ class Coupling:
         return redos
 
     def _enough(self, begun: Array, step: float) -> float:
-        """The error with which redos end; what the polynomials miss, the first pass shows well enough."""
+        """The error with which redos end."""
         if not self.share:
             return self.tolerance
         return max(self.tolerance, self.share * self._bends.largest(begun, self._shown, step))

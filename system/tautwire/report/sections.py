@@ -204,16 +204,19 @@ def left(trace: Trace) -> str:
             number(significant(float(value))),
             charts.bar(float(value), largest, mark=1.0),
             number(significant(float(alike), 2)),
+            number(significant(float(of_noise), 2)),
         ]
-        for output, value, alike in zip(outputs(trace), trace.left, trace.autocorrelations, strict=True)
+        for output, value, alike, of_noise in zip(outputs(trace), trace.left, *trace.autocorrelations, strict=True)
     ]
-    columns = (Column("Output"), Column("Times the noise", True), Column("Against 1"), Column("Like itself", True))
+    alike_to_itself = Column("Correlation with itself", True), Column("Of noise, at most", True)
+    columns = (Column("Output"), Column("Times the noise", True), Column("Against 1"), *alike_to_itself)
     lead = (
         "How far the final model is off when it predicts each sample from those before it, on data that the fit did "
         "not see: the mean square, in times of what noise alone makes it (in other words, of the whitened "
         "innovations). 1 is noise. Beside it the largest correlation of these errors with themselves one to twenty "
-        "samples later (their whiteness): what swings or drifts is like itself, noise is not. Where nothing is to be "
-        "found, the tests find something in "
+        "samples later (their whiteness), whatever its sign: large where something swings or drifts; of noise, it is "
+        "below what stands beside it nineteen times of twenty. Where nothing is to be found, the tests find something "
+        "in "
         f"{number(f'{significant(100.0 * trace.alpha, 2)} %')} of recordings at most."
     )
     return section("left", "What is left", table("What is left in each output", columns, rows, "left", True), lead)

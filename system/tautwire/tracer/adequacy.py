@@ -40,18 +40,20 @@ def is_noise(innovations: Innovations, rows: NDArray[np.bool_]) -> bool:
     return average <= chance + MATERIAL**2
 
 
-def largest_autocorrelations(innovations: Innovations, rows: NDArray[np.bool_]) -> Array:
-    """Of each output, shape (m,), the largest correlation with itself at lags 1 to 20; NaN where too little is seen.
+def largest_autocorrelations(innovations: Innovations, rows: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Of each output the largest correlation with itself at lags 1 to 20, whatever its sign, and that of noise.
 
-    Of N independent samples all 20 stay below ``3 / sqrt(N)`` nineteen times of twenty.
+    Of N independent samples all 20 stay below ``3 / sqrt(N)`` nineteen times of twenty. Shapes (m,), NaN where too
+    little is seen.
     """
     values, seen = innovations.values[rows], innovations.seen[rows]
-    return np.array(
-        [
-            np.max(np.abs(autocorrelation(np.where(s, v, 0.0)))) if np.sum(s) > LAGS else np.nan
-            for v, s in zip(values.T, seen.T, strict=True)
-        ]
-    )
+    counts = np.sum(seen, axis=0)
+    largest = [
+        np.max(np.abs(autocorrelation(np.where(s, v, 0.0)))) if count > LAGS else np.nan
+        for v, s, count in zip(values.T, seen.T, counts, strict=True)
+    ]
+    of_noise = np.where(counts > LAGS, 3.0 / np.sqrt(np.maximum(counts, 1)), np.nan)
+    return np.array(largest), of_noise
 
 
 def enough_samples(innovations: Innovations, rows: NDArray[np.bool_]) -> bool:

@@ -15,12 +15,15 @@ from .hypotheses import declared_value
 from .profile import intervals
 from .search import Found
 from .verdict import Correlation, Estimate, Fitted, FoundEffect
+from .workers import Workers
 
 
-def found_effects(robot: Robot, found: Found, fitter: Fitter, sample: Sample) -> tuple[FoundEffect, ...]:
+def found_effects(
+    robot: Robot, found: Found, fitter: Fitter, sample: Sample, workers: Workers
+) -> tuple[FoundEffect, ...]:
     """The accepted effects of the list, in the order found; ``robot`` is as declared, ``sample`` what was fitted."""
     places = _places(found.fit)
-    ends = intervals(fitter, found.fit, found.accepted, sample)
+    ends = intervals(fitter, found.fit, found.accepted, sample, workers)
     effects = []
     for hypothesis, evidence in zip(found.accepted, found.evidence, strict=True):
         if hypothesis.effect in UNLISTED:

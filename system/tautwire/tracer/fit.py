@@ -54,7 +54,7 @@ class Fit:
     @property
     def deviations(self) -> Array:
         """Standard deviations (p,)."""
-        return np.sqrt(np.diag(self.covariance))
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
     def interval(self, index: int) -> tuple[float, float]:
         """95 % interval of one parameter."""
@@ -104,7 +104,7 @@ class Fitter:
         if not free:
             return Fit(robot, (), np.zeros(0), np.zeros((0, 0)))
         start = np.array([value_of(robot, f) for f in free])
-        scale = np.maximum(np.abs(start), [abs(parameter.start) for parameter in _parameters(robot, free)])
+        scale = sizes_of(robot, free)
         lower, upper = (bounds / scale for bounds in bounds_of(robot, free))
         likelihood = self._likelihood(placed(robot, sample.start), free, sample)
         begun = scaled = start / scale
@@ -169,6 +169,12 @@ def bounds_of(robot: Robot, free: Sequence[FreeParameter]) -> tuple[Array, Array
     """Least and largest value of each free parameter, (p,) each."""
     known = _parameters(robot, free)
     return np.array([p.minimum for p in known], dtype=float), np.array([p.maximum for p in known], dtype=float)
+
+
+def sizes_of(robot: Robot, free: Sequence[FreeParameter]) -> Array:
+    """What the free parameters are measured by (p,): their values, or where fits begin if that is more."""
+    known = _parameters(robot, free)
+    return np.array([max(abs(value_of(robot, f)), abs(p.start)) for f, p in zip(free, known, strict=True)])
 
 
 def _parameters(robot: Robot, free: Sequence[FreeParameter]) -> list[Parameter]:

@@ -13,17 +13,19 @@ Statistics 37(1), 87-94.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import brentq, least_squares
+from scipy.optimize import brentq
 
+from .attempts import fitter_apart
 from .data import Sample
+from .filter_step import Noise
 from .fit import NORMAL_95, Fit, Fitter, bounds_of
 from .hypotheses import Hypothesis
-from .likelihood import Likelihood
-from .preparation.compression import compressed
+from .surface import LowerError, Surface, TooManyRunsError
+from .workers import Workers
 
 Array = NDArray[np.float64]
 
@@ -31,133 +33,85 @@ WITHIN = NORMAL_95**2
 # Relative difference of the rise at both ends from that of a parabola, up to which the surface counts as round.
 ROUND = 0.1
 # Of the distance from the fit to an end.
-PRECISION = 1e-3
-# How often the distance is doubled in search of an end.
-MOST_DOUBLINGS = 20
-EVALUATIONS = 15
+PRECISION = 0.01
+# Of its size: how far from the fit an end is looked for first where curvature tells nothing.
+FIRST_REACH = 1e-3
+# How often the distance is doubled in search of an end, and how often the fit may turn out not to be the best.
+MOST_DOUBLINGS, MOST_LOWER = 20, 3
 
 
-def intervals(fitter: Fitter, fit: Fit, chosen: Sequence[Hypothesis], sample: Sample) -> list[tuple[float, float]]:
+def intervals(
+    fitter: Fitter, fit: Fit, chosen: Sequence[Hypothesis], sample: Sample, workers: Workers
+) -> list[tuple[float, float]]:
     """Low and high end for each free parameter of the fit, which was made with ``chosen`` on the sample.
 
-    An end is where the parameter's range ends if nothing tells before; infinite where neither does.
+    An end is where the parameter's range ends if nothing tells before; infinite where neither does. It is by curvature
+    where :class:`Surface` takes too many runs to find it.
     """
+    ends = [(index, side) for index in range(len(fit.free)) for side in (-1.0, 1.0)]
+    if workers.processes == 1:
+        found = [end(fitter, fit, chosen, sample, *each) for each in ends]
+    else:
+        calls = [(fitter.noise, fit, chosen, sample, *each) for each in ends]
+        found = [value for _, value in sorted(workers.each(_end_apart, calls))]
+    return list(zip(found[0::2], found[1::2], strict=True))
+
+
+def end(fitter: Fitter, fit: Fit, chosen: Sequence[Hypothesis], sample: Sample, index: int, side: float) -> float:
+    """Where the interval of one parameter ends, below (-1) or above (1) its value; never on the other side of it."""
     likelihood, _ = fitter.likelihood(fit.robot, chosen, sample)
     lower, upper = bounds_of(fit.robot, fit.free)
-    surface = _Surface(likelihood, fit, sample, lower, upper, fitter.between)
-    ends = []
-    for index in range(len(fit.free)):
-        low, high = (surface.end(index, side) for side in (-1.0, 1.0))
-        ends.append((low, high))
-    return ends
+    value, deviation = float(fit.values[index]), float(fit.deviations[index])
+    bound = float((lower if side < 0.0 else upper)[index])
+    by_curvature = value + side * min(NORMAL_95 * deviation, abs(bound - value)) if deviation > 0.0 else bound
+    surface = Surface(likelihood, fit, sample, lower, upper, fitter.between)
+    try:
+        found = _best_searched(surface, index, side, bound, MOST_LOWER)
+    except (LowerError, TooManyRunsError):
+        return by_curvature
+    return side * max(side * found, side * value)
 
 
-class _Surface:
-    """Sum of squares about a fit, with one parameter held and the others at their best."""
-
-    def __init__(
-        self,
-        likelihood: Likelihood,
-        fit: Fit,
-        sample: Sample,
-        lower: Array,
-        upper: Array,
-        between: Callable[[], None],
-    ) -> None:
-        self._likelihood, self._fit, self._sample, self._between = likelihood, fit, sample, between
-        self._lower, self._upper = lower, upper
-        self._least = self._sum(fit.values)
-
-    def end(self, index: int, side: float) -> float:
-        """Where the interval of one parameter ends, below (-1) or above (1)."""
-        middle, deviation = float(self._fit.values[index]), float(self._fit.deviations[index])
-        bound = float((self._lower if side < 0.0 else self._upper)[index])
-        reach = NORMAL_95 * deviation
-        if not 0.0 < reach < np.inf:
-            return middle
-        inside, rise = 0.0, -WITHIN
-        for _ in range(MOST_DOUBLINGS):
-            reach = min(reach, abs(bound - middle))
-            rise = self._rise(index, middle + side * reach) - WITHIN
-            first = inside == 0.0 and reach == NORMAL_95 * deviation
-            if first and abs(rise) < ROUND * WITHIN:
-                return middle + side * reach
-            if rise > 0.0:
-                break
-            if reach == abs(bound - middle):
-                return bound
-            inside, reach = reach, 2.0 * reach
-        else:
-            return side * np.inf
-
-        def excess(distance: float) -> float:
-            return self._rise(index, middle + side * distance) - WITHIN if distance > 0.0 else -WITHIN
-
-        return middle + side * float(brentq(excess, inside, reach, xtol=PRECISION * reach, rtol=PRECISION))
-
-    def _rise(self, index: int, value: float) -> float:
-        """How much more is left with one parameter at a value; much, where the model has no finite output."""
-        others = np.arange(len(self._fit.values)) != index
-        if not np.any(others):
-            return self._finite(self._sum(np.array([value])) - self._least)
-        begun, deviations = self._beside(index, value), self._fit.deviations[others]
-        deviations = np.where(deviations > 0.0, deviations, 1.0)
-        residual = _Beside(self._rows, index, value, begun, deviations)
-        start = np.zeros(len(begun))
-        if not np.all(np.isfinite(residual.values(start))):
-            return self._finite(np.inf)
-        solution = least_squares(
-            residual.values,
-            start,
-            jac=residual.slopes,
-            bounds=((self._lower[others] - begun) / deviations, (self._upper[others] - begun) / deviations),
-            max_nfev=EVALUATIONS,
-        )
-        return self._finite(2.0 * float(solution.cost) - self._least)
-
-    def _beside(self, index: int, value: float) -> Array:
-        """Where the others would be if the surface were round, within their ranges."""
-        fit = self._fit
-        moved = fit.values + fit.covariance[:, index] / fit.covariance[index, index] * (value - fit.values[index])
-        return np.delete(np.clip(moved, self._lower, self._upper), index)
-
-    def _sum(self, values: Array) -> float:
-        residuals, _ = self._rows(values)
-        return float(residuals @ residuals)
-
-    def _rows(self, values: Array) -> tuple[Array, Array]:
-        self._between()
-        return compressed(self._likelihood, values, self._sample, 0.0)
-
-    def _finite(self, rise: float) -> float:
-        """Numbers that a root finder can work with."""
-        return rise if np.isfinite(rise) else 1e3 * WITHIN
+def _end_apart(noise: Noise, fit: Fit, chosen: Sequence[Hypothesis], sample: Sample, index: int, side: float) -> float:
+    return end(fitter_apart(noise), fit, chosen, sample, index, side)
 
 
-class _Beside:
-    """Rows and their slopes by the other parameters, which count deviations from where they begin."""
+def _best_searched(surface: Surface, index: int, side: float, bound: float, left: int) -> float:
+    """As :func:`_searched`, about better values where some turn up."""
+    try:
+        return _searched(surface, index, side, bound)
+    except LowerError as lower:
+        if not left:
+            raise
+        return _best_searched(surface.about(lower.values), index, side, bound, left - 1)
 
-    def __init__(
-        self,
-        rows: Callable[[Array], tuple[Array, Array]],
-        index: int,
-        held: float,
-        begun: Array,
-        deviations: Array,
-    ) -> None:
-        self._rows, self._index, self._held, self._begun, self._deviations = rows, index, held, begun, deviations
-        self._at: Array | None = None
-        self._found: tuple[Array, Array] = (np.zeros(0), np.zeros((0, 0)))
 
-    def values(self, moved: Array) -> Array:
-        return self._evaluate(moved)[0]
+def _searched(surface: Surface, index: int, side: float, bound: float) -> float:
+    middle, deviation = float(surface.values[index]), float(surface.deviations[index])
+    inside = 0.0
+    for reach in _reaches(NORMAL_95 * deviation, FIRST_REACH * float(surface.sizes[index]), abs(bound - middle)):
+        rise = surface.rise(index, middle + side * reach) - WITHIN
+        if inside == 0.0 and reach == NORMAL_95 * deviation and abs(rise) < ROUND * WITHIN:
+            return middle + side * reach
+        if rise > 0.0:
+            break
+        inside = reach
+    else:
+        return bound
 
-    def slopes(self, moved: Array) -> Array:
-        return self._evaluate(moved)[1]
+    def excess(distance: float) -> float:
+        return surface.rise(index, middle + side * distance) - WITHIN if distance > 0.0 else -WITHIN
 
-    def _evaluate(self, moved: Array) -> tuple[Array, Array]:
-        if self._at is None or not np.array_equal(self._at, moved):
-            residuals, slopes = self._rows(np.insert(self._begun + moved * self._deviations, self._index, self._held))
-            self._found = residuals, np.delete(slopes, self._index, axis=1) * self._deviations
-            self._at = moved.copy()
-        return self._found
+    return middle + side * float(brentq(excess, inside, reach, xtol=PRECISION * reach, rtol=PRECISION))
+
+
+def _reaches(by_curvature: float, by_size: float, farthest: float) -> Iterator[float]:
+    """Distances at which to look, each twice the last, up to the farthest if that is not infinite."""
+    reach = by_curvature if by_curvature > 0.0 else by_size
+    for _ in range(MOST_DOUBLINGS):
+        if reach >= farthest:
+            break
+        yield reach
+        reach = max(2.0 * reach, by_size)
+    if 0.0 < farthest < np.inf:
+        yield farthest

@@ -106,7 +106,8 @@ def _trace(
     final, kept = answer.robot, answer.effects_hold
     verdict, sentence = _verdict(robot, answer, noise_alone)
     numbers = [] if verdict == "unexplained" else _numbers(ready, answer)
-    effects = found_effects(robot, found, ready.fitter, ready.evidence.fit) if kept else ()
+    progress("intervals", 0.0)
+    effects = found_effects(robot, found, ready.fitter, ready.evidence.fit, workers) if kept else ()
     judge = ready.evidence.judge
     left = ready.fitter.innovations(final, judge)
     shown = Separation((), ())

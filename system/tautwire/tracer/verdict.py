@@ -160,8 +160,8 @@ class Trace:
     ``correlations`` are those of each two parameters of the effects. ``noise_floor`` is what noise of the sensors and
     of the recorded winch speeds would leave; ``left`` the mean square of the whitened innovations of each output (x, y,
     z, tensions) under the final model on unseen data, shape (3 + n,), and ``autocorrelations`` the largest correlation
-    of each with itself at lags 1 to 20. ``separation`` is what those data could have shown beside the effects; empty
-    where the model leaves more than noise.
+    of each with itself, and what noise stays below, as :func:`adequacy.largest_autocorrelations` gives them.
+    ``separation`` is what those data could have shown beside the effects; empty where the model leaves more than noise.
     ``components`` tells where the fit recording errs, before any effect is fitted.
     """
 
@@ -179,7 +179,7 @@ class Trace:
     noise_before: bool
     noise_after: bool
     left: Array
-    autocorrelations: Array
+    autocorrelations: tuple[Array, Array]
     separation: Separation
     components: Components
     resonances: tuple[Resonance, ...]

@@ -94,7 +94,8 @@ class Workers:
     def begin(self) -> None:
         """Begin the processes, which takes them a while; else the first call does."""
         if self._pool() is not None:
-            self._submit(_begun)
+            for _ in range(self.processes):
+                self._submit(_begun)
 
     def start(self, function: Callable[..., Result], *arguments: Any) -> Pending[Result]:
         """Begin a call; its result may be fetched once."""

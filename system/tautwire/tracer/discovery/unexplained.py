@@ -41,7 +41,8 @@ def what_is_left(
     workers: Workers,
 ) -> Rest:
     """Of a robot whose recordings known effects do not explain; ``found`` are those that come closest."""
-    together = workers.start(_beside, fitter.noise, found, evidence) if found.accepted else None
+    apart = found.accepted and workers.processes > 1
+    together = workers.start(_beside, fitter.noise, found, evidence) if apart else None
     threshold = log((len(hypotheses(robot)) + 1) / alpha)
     formula = _earned(discover(robot, (), fitter, evidence, progress), threshold)
     if formula is not None and formula.leaves_noise:
@@ -54,8 +55,12 @@ def what_is_left(
     if formula is not None:
         said = formula_text(robot, formula.formulas)
         notes.append(f"a formula explains part of the residual, not all of it: {said}")
-    progress("looking for a formula beside effects", 0.0)
-    beside = _earned(together.result() if together else None, threshold)
+    if together is not None:
+        progress("looking for a formula beside effects", 0.0)
+        beside = together.result()
+    else:
+        beside = discover(found.fit.robot, found.accepted, fitter, evidence, progress) if found.accepted else None
+    beside = _earned(beside, threshold)
     if beside is not None and beside.leaves_noise:
         names = " and ".join(hypothesis.label(robot) for hypothesis in found.accepted)
         said = formula_text(robot, beside.formulas)
