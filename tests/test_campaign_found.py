@@ -19,6 +19,7 @@ from tautwire.report import trace_document
 from tautwire.robots.reading import robot_from
 from tautwire.tracer.estimates import correlations_of, found_effects
 from tautwire.tracer.search import Found
+from tautwire.tracer.workers import Workers
 from tests.campaigns import plan_file, read
 from tests.test_estimates import fitted
 from tests.traces import made_trace
@@ -143,8 +144,9 @@ def test_what_is_no_report_is_refused(document: dict[str, Any], said: str, tmp_p
 
 @pytest.mark.slow
 def test_samples_spread_as_the_fit_of_a_recording_does(tmp_path: Path) -> None:
-    _, chosen, _, fit = fitted(3)
-    effects = found_effects(fit.robot, Found(tuple(chosen), (1.0, 1.0), fit, (), ()))
+    fitter, chosen, sample, fit = fitted(3)
+    found = Found(tuple(chosen), (1.0, 1.0), fit, (), ())
+    effects = found_effects(fit.robot, found, fitter, sample, Workers(1))
     trace = replace(made_trace(), effects=effects, correlations=correlations_of(fit, effects))
     (tmp_path / "report.json").write_text(json.dumps(trace_document(trace)), encoding="utf-8")
     plan = read(tmp_path, SAMPLED)
