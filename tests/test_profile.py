@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
@@ -99,6 +101,14 @@ def test_intervals_hold_their_values_whatever_the_samples_tell(names: tuple[str,
     ):
         assert least <= low <= value <= high <= most
         assert low < high
+
+
+def test_a_fit_that_is_not_the_best_gets_the_interval_about_the_best() -> None:
+    fitter, chosen, sample, fit = fitted("damping", {"damping": {"damping": 8e8}})
+    ((low, high),) = intervals(fitter, fit, chosen, sample, HERE)
+    beside = replace(fit, values=fit.values + 1.5 * fit.deviations)
+    ((found, reached),) = intervals(fitter, beside, chosen, sample, HERE)
+    assert (found, reached) == pytest.approx((low, high), abs=0.05 * (high - low))
 
 
 def test_workers_find_the_same_ends() -> None:

@@ -48,42 +48,41 @@ def intervals(
     An end is where the parameter's range ends if nothing tells before; infinite where neither does. It is by curvature
     where :class:`Surface` takes too many runs to find it.
     """
-    ends = [(index, side) for index in range(len(fit.free)) for side in (-1.0, 1.0)]
+    count = len(fit.free)
     if workers.processes == 1:
-        found = [end(fitter, fit, chosen, sample, *each) for each in ends]
-    else:
-        calls = [(fitter.noise, fit, chosen, sample, *each) for each in ends]
-        found = [value for _, value in sorted(workers.each(_end_apart, calls))]
-    return list(zip(found[0::2], found[1::2], strict=True))
+        return [ends(fitter, fit, chosen, sample, index) for index in range(count)]
+    calls = [(fitter.noise, fit, chosen, sample, index) for index in range(count)]
+    return [found for _, found in sorted(workers.each(_ends_apart, calls))]
 
 
-def end(fitter: Fitter, fit: Fit, chosen: Sequence[Hypothesis], sample: Sample, index: int, side: float) -> float:
-    """Where the interval of one parameter ends, below (-1) or above (1) its value; never on the other side of it."""
+def ends(fitter: Fitter, fit: Fit, chosen: Sequence[Hypothesis], sample: Sample, index: int) -> tuple[float, float]:
+    """Where the interval of one parameter ends; its value is inside."""
     likelihood, _ = fitter.likelihood(fit.robot, chosen, sample)
     lower, upper = bounds_of(fit.robot, fit.free)
-    value, deviation = float(fit.values[index]), float(fit.deviations[index])
-    bound = float((lower if side < 0.0 else upper)[index])
-    by_curvature = value + side * min(NORMAL_95 * deviation, abs(bound - value)) if deviation > 0.0 else bound
+    least, most = float(lower[index]), float(upper[index])
+    value, reach = float(fit.values[index]), NORMAL_95 * float(fit.deviations[index])
     surface = Surface(likelihood, fit, sample, lower, upper, fitter.between)
     try:
-        found = _best_searched(surface, index, side, bound, MOST_LOWER)
+        low, high = _both(surface, index, (least, most), MOST_LOWER)
     except (LowerError, TooManyRunsError):
-        return by_curvature
-    return side * max(side * found, side * value)
+        return (max(value - reach, least), min(value + reach, most)) if reach > 0.0 else (least, most)
+    return min(low, value), max(high, value)
 
 
-def _end_apart(noise: Noise, fit: Fit, chosen: Sequence[Hypothesis], sample: Sample, index: int, side: float) -> float:
-    return end(fitter_apart(noise), fit, chosen, sample, index, side)
+def _ends_apart(
+    noise: Noise, fit: Fit, chosen: Sequence[Hypothesis], sample: Sample, index: int
+) -> tuple[float, float]:
+    return ends(fitter_apart(noise), fit, chosen, sample, index)
 
 
-def _best_searched(surface: Surface, index: int, side: float, bound: float, left: int) -> float:
-    """As :func:`_searched`, about better values where some turn up."""
+def _both(surface: Surface, index: int, bounds: tuple[float, float], left: int) -> tuple[float, float]:
+    """Both ends, about better values where some turn up."""
     try:
-        return _searched(surface, index, side, bound)
+        return _searched(surface, index, -1.0, bounds[0]), _searched(surface, index, 1.0, bounds[1])
     except LowerError as lower:
         if not left:
             raise
-        return _best_searched(surface.about(lower.values), index, side, bound, left - 1)
+        return _both(surface.about(lower.values), index, bounds, left - 1)
 
 
 def _searched(surface: Surface, index: int, side: float, bound: float) -> float:

@@ -22,7 +22,7 @@ MUCH = 1e4
 # A fall below the fit that its stop does not explain.
 LOWER = 0.1
 # Runs over the sample, in all and in one fit of the others; and the least distance from bounds, in deviations.
-MOST_RUNS, RUNS_OF_A_FIT, INSIDE = 150, 15, 1e-6
+MOST_RUNS, RUNS_OF_A_FIT, INSIDE = 300, 15, 1e-6
 
 
 class LowerError(TautwireError):
