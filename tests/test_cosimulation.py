@@ -184,4 +184,4 @@ def test_the_coupling_neither_makes_nor_eats_energy(three_fmus: RobotFmus) -> No
     vibration = np.max(0.5 * 300.0 * np.sum(motion.velocity[free] ** 2, axis=1))
     assert np.max(np.abs(energy - energy[0])) < 1e-6 * vibration
     assert motion.account.share < 1e-9
-    assert motion.account.warning() is None
+    assert motion.account.warnings() == ()

@@ -12,7 +12,8 @@ from .wiring import Connection
 
 Array = NDArray[np.float64]
 
-WARNED_SHARE = 0.01
+# Of the energy exchanged, and of all steps.
+WARNED_SHARE, WARNED_UNSETTLED = 0.01, 0.1
 
 
 @dataclass(frozen=True)
@@ -30,7 +31,8 @@ class Account:
     Over a step h, a bond sends ``effort sent x flow received`` and gets ``effort received x flow sent``; half of h
     times their difference at its end is energy (J) that no component made. Zero where inputs equal outputs at both
     ends; what the polynomials between them err by does not show. ``error`` is the sum of the steps' estimated errors
-    (m), where steps were chosen by a tolerance. ``doubted`` sums the squares of what estimated rates may err by.
+    (m), where steps were chosen by a tolerance. In ``unsettled`` steps inputs and outputs did not agree after all
+    redos. ``doubted`` sums the squares of what estimated rates may err by.
 
     Source: Sadjina, Kyllingstad, Skjong and Pedersen (2017), Energy conservation and power bonds in co-simulations,
     Engineering with Computers 33(3), 607-620.
@@ -39,16 +41,20 @@ class Account:
     steps: int = 0
     redos: int = 0
     passes: int = 0
+    unsettled: int = 0
     made: float = 0.0
     exchanged: float = 0.0
     error: float | None = None
     without: Fallback = field(default_factory=Fallback, repr=False)
     doubted: Array = field(default_factory=lambda: np.zeros(0), repr=False, compare=False)
 
-    def enter(self, step: float, redos: int, sent: tuple[Array, Array], received: tuple[Array, Array]) -> None:
+    def enter(
+        self, step: float, redos: int, agreed: bool, sent: tuple[Array, Array], received: tuple[Array, Array]
+    ) -> None:
         """One step; ``sent`` and ``received`` are (efforts, flows) of all bonds at its end."""
         self.steps += 1
         self.redos += redos
+        self.unsettled += not agreed and redos > 0
         effort_sent, flow_sent = sent
         effort_received, flow_received = received
         self.made += 0.5 * step * float(effort_received @ flow_sent - effort_sent @ flow_received)
@@ -67,11 +73,14 @@ class Account:
         """Energy made by the coupling, as a share of all that was exchanged; zero where nothing was."""
         return abs(self.made) / self.exchanged if self.exchanged else 0.0
 
-    def warning(self) -> str | None:
-        """What a user should know, where the coupling made more than a hundredth of the energy exchanged."""
-        if self.share <= WARNED_SHARE:
-            return None
-        return (
+    def warnings(self) -> tuple[str, ...]:
+        """What a user should know: where the coupling made energy, or steps ended before inputs and outputs agreed."""
+        made = (
             f"the coupling made {self.made:.3g} J, {100.0 * self.share:.2g} % of the energy exchanged: "
             "take a smaller --step, or FMUs that save their states"
         )
+        unsettled = (
+            f"in {self.unsettled} of {self.steps} steps inputs and outputs did not agree after all redos: "
+            "take a smaller --step"
+        )
+        return (made,) * (self.share > WARNED_SHARE) + (unsettled,) * (self.unsettled > WARNED_UNSETTLED * self.steps)

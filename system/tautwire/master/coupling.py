@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .acceleration import Lessons, Secants
+from .agreement import Agreement
 from .audit import Account, Bond
 from .bends import Bends
 from .checkpoint import Checkpoint
@@ -45,8 +46,8 @@ class Coupling:
 
     ``drives`` are the input ports that the master itself sets; ``bonds`` are audited for energy; ``kinks`` are
     outputs at whose sign changes other outputs have a kink, see :mod:`.kinks`. ``tolerance`` is relative to the
-    nominal values of the connected outputs; with a ``share``, that of what the polynomials of a step miss, see
-    :class:`Bends`, is enough. ``redos`` bounds the redos of a step. What a redo is given is improved by what earlier
+    nominal values of the connected outputs; with a ``share``, that of what the polynomials of a step miss is enough,
+    see :class:`Agreement`. ``redos`` bounds the redos of a step. What a redo is given is improved by what earlier
     ones have shown, see :class:`Secants`. ``can_redo`` and ``can_cut`` are False where some FMU cannot save its
     state: then no step is redone, or cut at kinks. ``order`` is that of the error in the step. ``rates`` are pairs
     whose target takes the rate of the source, worked out from its past, see :class:`Rates`. ``memory`` gives the array
@@ -107,7 +108,7 @@ class Coupling:
         self._guessing = [seat for seat in self._order if np.isin(seat.sources, self._fed_back).any()]
         chains = chains_of(components, shown, set(self._fed_back.tolist()))
         self._prediction = Prediction(chains, self._fed_back, self._scale)
-        self._bends = Bends(chains, self._nominal)
+        self._agreement = Agreement(Bends(chains, self._nominal))
         self.order = order_of(self._order, wires)
         self._lessons = Lessons(len(self._fed_back))
         self._secants = Secants(len(self._fed_back))
@@ -194,20 +195,21 @@ class Coupling:
             self._pass_on(time, self._jumping, self._after_jumps)
         before = self.save() if self.can_redo else None
         try:
-            redos = self._iterate(time, step, end, before)
+            redos, agreed = self._iterate(time, step, end, before)
         except BaseException:
             if before is not None:
                 self.release(before)
             raise
-        self._enter_books(step, redos)
-        # What was guessed is known now.
-        self._pass_on(time + step, self._guessing)
+        self._enter_books(step, redos, agreed)
+        if not agreed:
+            # What was guessed is known now.
+            self._pass_on(time + step, self._guessing)
         self._held.end(self._shown)
         self._prediction.end(time + step, self._shown)
         return before
 
-    def _iterate(self, time: float, step: float, end: Array, before: Checkpoint | None) -> int:
-        """Pass until outputs agree with what was guessed of them; returns the number of redos."""
+    def _iterate(self, time: float, step: float, end: Array, before: Checkpoint | None) -> tuple[int, bool]:
+        """Pass until outputs agree with what was guessed of them; returns the number of redos, and if they do."""
         begun, shown = self._given.copy(), self._shown.copy()
         self._secants = self._lessons.of(step)
         self._secants.begin()
@@ -216,19 +218,15 @@ class Coupling:
         self._drive(end)
         error = self._pass(time, step, begun, self._shown[self._fed_back] / self._scale)
         redos = 0
-        while before is not None and redos < self.redos and error > self._enough(shown, step):
+        while self._agreement.lacking(error, self.tolerance, self.share, shown, self._shown, step):
+            if before is None or redos == self.redos:
+                return redos, False
             guess = self._secants.next()
             self._shown[self._fed_back] = guess * self._scale
             self._restore_states(before)
             redos += 1
             error = self._pass(time, step, begun, guess)
-        return redos
-
-    def _enough(self, begun: Array, step: float) -> float:
-        """The error with which redos end."""
-        if not self.share:
-            return self.tolerance
-        return max(self.tolerance, self.share * self._bends.largest(begun, self._shown, step))
+        return redos, True
 
     def _pass(self, time: float, step: float, begun: Array, given: Array) -> float:
         """Each component steps in turn; returns by how much outputs still err at most.
@@ -246,11 +244,12 @@ class Coupling:
         self._secants.learn(given, shown)
         return self._secants.error()
 
-    def _enter_books(self, step: float, redos: int) -> None:
+    def _enter_books(self, step: float, redos: int, agreed: bool) -> None:
         (sent_effort, sent_flow), (given_effort, given_flow) = self._bond_sent, self._bond_given
         self.account.enter(
             step,
             redos,
+            agreed,
             (self._shown[sent_effort], self._shown[sent_flow]),
             (self._given[given_effort], self._given[given_flow]),
         )

@@ -60,8 +60,7 @@ def simulate_recording(
         notes = (*notes, *lacking_notes(wired(fmus)), *account.fallbacks())
         if account.fallbacks() and tolerance is None:
             notes = (*notes, error_by_halving(run, time, step, begun.positions))
-    warning = account.warning()
-    return account, notes if warning is None else (*notes, warning)
+    return account, (*notes, *account.warnings())
 
 
 def _count(recording: Recording, until: float | None) -> int:

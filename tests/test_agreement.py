@@ -1,0 +1,68 @@
+"""Redos end with the tolerance, or with a share of what the polynomials of a step miss."""
+
+import numpy as np
+import pytest
+
+from tautwire.master.agreement import FAR, Agreement
+from tautwire.master.bends import Bends
+from tautwire.master.hermite import Chain
+
+STEP, TOLERANCE, SHARE = 0.1, 1e-10, 0.1
+MISSED = 720.0 * STEP**6 / 46080.0
+
+
+class Looks(Bends):
+    """Bends that count how often they are looked at."""
+
+    count = 0
+
+    def largest(self, begun: np.ndarray, shown: np.ndarray, step: float) -> float:
+        self.count += 1
+        return super().largest(begun, shown, step)
+
+
+@pytest.fixture
+def bends() -> Looks:
+    return Looks([Chain((0, 1, 2), (3, 4, 5))], np.array([1.0, 1e9, 1e9, 1.0, 1e9, 1e9]))
+
+
+def sixth_power(time: float) -> np.ndarray:
+    """Value and rates at a time, and at half of it."""
+    return np.array([k for at in (time, 0.5 * time) for k in (at**6, 6.0 * at**5, 30.0 * at**4)])
+
+
+def lacking(agreement: Agreement, error: float, share: float = SHARE, step: float = STEP) -> bool:
+    return agreement.lacking(error, TOLERANCE, share, sixth_power(0.0), sixth_power(step), step)
+
+
+def test_without_a_share_the_tolerance_decides(bends: Looks) -> None:
+    agreement = Agreement(bends)
+    assert lacking(agreement, 1.1 * TOLERANCE, share=0.0)
+    assert not lacking(agreement, 0.9 * TOLERANCE, share=0.0)
+    assert bends.count == 0
+
+
+def test_a_share_of_what_the_polynomials_miss_is_enough(bends: Looks) -> None:
+    agreement = Agreement(bends)
+    assert lacking(agreement, 1.01 * SHARE * MISSED)
+    assert not lacking(agreement, 0.99 * SHARE * MISSED)
+
+
+def test_what_is_far_off_is_not_looked_at_closely(bends: Looks) -> None:
+    agreement = Agreement(bends)
+    lacking(agreement, SHARE * MISSED)
+    assert lacking(agreement, 1.01 * FAR * SHARE * MISSED)
+    assert bends.count == 1
+    assert lacking(agreement, 0.99 * FAR * SHARE * MISSED)
+    assert bends.count == 2
+
+
+def test_a_step_of_another_length_is_looked_at_closely(bends: Looks) -> None:
+    agreement = Agreement(bends)
+    lacking(agreement, SHARE * MISSED)
+    assert not lacking(agreement, 20.0 * SHARE * MISSED, step=2.0 * STEP)
+
+
+def test_an_error_that_is_no_number_ends_redos(bends: Looks) -> None:
+    """It is refused where outputs are recorded, with the name of the FMU."""
+    assert not lacking(Agreement(bends), np.nan)
