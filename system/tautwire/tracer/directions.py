@@ -23,9 +23,9 @@ from ..model.symbolic import FreeParameter, symbolic_model
 from ..model.uncertain import uncertain_numbers
 from ..native.repeated import Repeated, stacked
 from ..robots.robot import PER_CABLE, Robot
-from .filter_step import shown_late
 from .hypotheses import Hypothesis
 from .linearisation import Linearised
+from .sensing import shown_late
 
 Array = NDArray[np.float64]
 

@@ -8,6 +8,7 @@ Source: Bierman (1977), Factorization Methods for Discrete Sequential Estimation
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -15,6 +16,7 @@ import casadi
 from casadi import SX, Function
 
 from ..model.symbolic import Model
+from .sensing import sensing
 
 
 @dataclass(frozen=True)
@@ -41,10 +43,11 @@ class Noise:
 
 @dataclass(frozen=True)
 class Substeps:
-    """Integration steps between two samples: of the state itself, and of its derivatives."""
+    """Integration steps between two samples: of the state itself, and of its derivatives, whose series has an order."""
 
     state: int
     slope: int
+    order: int = 4
 
 
 @dataclass(frozen=True)
@@ -78,8 +81,9 @@ def filter_sample(model: Model, cable_count: int, noise: Noise, substeps: Subste
     measured, seen, shift = (SX.sym(name, 3 + cable_count) for name in ("measured", "seen", "shift"))
     speed, later = SX.sym("speed", cable_count), SX.sym("later", cable_count)
     step, drift, roughness = SX.sym("step"), SX.sym("drift"), SX.sym("roughness")
-    shown = shown_late(model, cable_count, later, step, shift)
-    filtered = _take_in(model, shown, noise, predicted, measured, seen, (speed, later, step, shift))
+    moment = [casadi.vertcat(speed, SX(3, 1)), model.parameters, later, step, shift]
+    shown = sensing(model, cable_count).call([predicted.state, *moment])
+    filtered = _take_in(shown, noise, predicted, measured, seen)
     state, transition, direct = _advance(model, substeps, filtered.state, speed, later, step)
     spread = _symmetric(casadi.mtimes([transition, filtered.covariance, transition.T]))
     variance = SX(size, 1)
@@ -122,13 +126,8 @@ def filter_slopes(model: Model, cable_count: int, substeps: Substeps) -> Functio
     before, after = SX.sym("before", model.states.numel()), SX.sym("after", model.states.numel())
     shift = SX.sym("shift", 3 + cable_count)
     speed, later, step = SX.sym("speed", cable_count), SX.sym("later", cable_count), SX.sym("step")
-    shown = shown_late(model, cable_count, later, step, shift)
-    sensing = Function(
-        "sensing",
-        [model.states, model.inputs, model.parameters, later, step, shift],
-        [casadi.jacobian(shown, model.states)],
-    )
-    by_state = sensing(before, casadi.vertcat(speed, SX(3, 1)), model.parameters, later, step, shift)
+    moment = [casadi.vertcat(speed, SX(3, 1)), model.parameters, later, step, shift]
+    _, by_state, _ = sensing(model, cable_count).call([before, *moment])
     _, transition, _ = _advance(model, substeps, after, speed, later, step)
     bending = Function(
         "bending", [model.states, model.inputs, model.parameters], [casadi.jacobian(model.rates, model.states)]
@@ -140,46 +139,13 @@ def filter_slopes(model: Model, cable_count: int, substeps: Substeps) -> Functio
     return Function("filter_slopes", arguments, [casadi.densify(f) for f in (by_state, transition, half)])
 
 
-def shown_late(model: Model, cable_count: int, later: SX, step: SX, shift: SX) -> SX:
-    """What sensors show ``shift`` (s) after this sample: of a state ``lag - shift`` before it, where they lag.
-
-    ``y - d dy/dt + d^2/2 d2y/dt2`` with ``d = lag - shift``, which is at most half a sample.
-    """
-    shown = casadi.vertcat(model.outputs[:3], model.outputs[6 : 6 + cable_count])
-    if model.lags.is_zero():
-        return shown
-    slope = casadi.if_else(step > 0.0, (later - model.inputs[:cable_count]) / step, 0.0)
-    pace = casadi.vertcat(model.rates, slope)
-    moved = casadi.vertcat(model.states, model.inputs[:cable_count])
-    first = casadi.jtimes(shown, moved, pace)
-    second = casadi.jtimes(first, moved, pace)
-    late = model.lags - shift
-    return shown - late * first + 0.5 * late**2 * second
-
-
-def _take_in(
-    model: Model,
-    shown: SX,
-    noise: Noise,
-    predicted: _Filtered,
-    measured: SX,
-    seen: SX,
-    moment: tuple[SX, SX, SX, SX],
-) -> _Filtered:
-    speed, later, step, shift = moment
-    inputs = casadi.vertcat(speed, SX(3, 1))
-    outputs = Function(
-        "outputs",
-        [model.states, model.inputs, model.parameters, later, step, shift],
-        [shown, casadi.jacobian(shown, model.states), casadi.jacobian(shown, model.parameters)],
-    )
-    expected, by_state, by_parameters = outputs(predicted.state, inputs, model.parameters, later, step, shift)
+def _take_in(shown: Sequence[SX], noise: Noise, predicted: _Filtered, measured: SX, seen: SX) -> _Filtered:
+    expected, by_state, by_parameters = shown
     covariance = predicted.covariance
     correction = SX(predicted.state.numel(), 1)
     slopes = predicted.slopes
     rows: list[tuple[SX, SX, SX]] = []
-    for index in range(shown.numel()):
-        own = noise.of_outputs(shown.numel() - 3)[index]
+    for index, own in enumerate(noise.of_outputs(expected.numel() - 3)):
         row = by_state[index, :]
         spread = casadi.mtimes(covariance, row.T)
         variance = casadi.mtimes(row, spread) + own**2
@@ -199,14 +165,14 @@ def _advance(model: Model, substeps: Substeps, state: SX, speed: SX, later: SX, 
     """State after one sample, and its derivatives by the state before and by the parameters.
 
     The derivatives weigh errors and may be coarser than the state, whose own error would pose as an effect: with the
-    slopes ``F`` and ``f_p`` of the rates in the middle of a part of the step
+    slopes ``F`` and ``f_p`` of the rates in the middle of a part of the step, to the fourth order
 
         Gamma = h (I + h F / 2 (I + h F / 3 (I + h F / 4)))        A = I + F Gamma        B = Gamma f_p
     """
     single = _runge_kutta_step(model, speed.numel())
-    after = state
+    path = [state]
     for begin, end in _cuts(speed, later, substeps.state):
-        after = single(after, model.parameters, begin, end, step / substeps.state)
+        path.append(single(path[-1], model.parameters, begin, end, step / substeps.state))
     slope = Function(
         "slope",
         [model.states, model.inputs, model.parameters],
@@ -216,22 +182,29 @@ def _advance(model: Model, substeps: Substeps, state: SX, speed: SX, later: SX, 
     direct = SX(state.numel(), model.parameters.numel())
     part = step / substeps.slope
     for index, (begin, end) in enumerate(_cuts(speed, later, substeps.slope)):
-        middle = state + ((index + 0.5) / substeps.slope) * (after - state)
+        middle = _on(path, (index + 0.5) / substeps.slope)
         inputs = casadi.vertcat(0.5 * (begin + end), SX(3, 1))
         by_state, by_parameters = slope(middle, inputs, model.parameters)
-        carried = _carried(by_state, part)
+        carried = _carried(by_state, part, substeps.order)
         own = SX.eye(state.numel()) + casadi.mtimes(by_state, carried)
         transition = casadi.mtimes(own, transition)
         direct = casadi.mtimes(own, direct) + casadi.mtimes(carried, by_parameters)
-    return after, transition, direct
+    return path[-1], transition, direct
 
 
-def _carried(slopes: SX, step: SX) -> SX:
+def _on(path: list[SX], fraction: float) -> SX:
+    """A point of a path of equal steps, straight between its points."""
+    steps = len(path) - 1
+    before = min(int(fraction * steps), steps - 1)
+    return path[before] + (fraction * steps - before) * (path[before + 1] - path[before])
+
+
+def _carried(slopes: SX, step: SX, order: int) -> SX:
     """What a rate that stays makes of the state over a step."""
     still = SX.eye(slopes.shape[0])
     carried = still
-    for order in (4.0, 3.0, 2.0):
-        carried = still + (step / order) * casadi.mtimes(slopes, carried)
+    for term in range(order, 1, -1):
+        carried = still + (step / float(term)) * casadi.mtimes(slopes, carried)
     return step * carried
 
 

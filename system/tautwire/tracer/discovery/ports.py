@@ -24,8 +24,8 @@ from ...model.symbolic import OF_FORMULAS, FreeParameter, symbolic_model
 from ...model.uncertain import uncertain_numbers
 from ...native.repeated import Repeated, stacked
 from ...robots.robot import Formula, Robot
-from ..filter_step import shown_late
 from ..linearisation import Linearised
+from ..sensing import shown_late
 
 Array = NDArray[np.float64]
 
