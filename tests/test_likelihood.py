@@ -1,14 +1,17 @@
 """Innovations against what a Kalman filter must do."""
 
 from dataclasses import replace
+from math import factorial
 
 import numpy as np
 import pytest
 
 from tautwire.model.symbolic import FreeParameter
 from tautwire.robots.robot import EffectSetting
-from tautwire.tracer.likelihood import Likelihood
+from tautwire.tracer.filter_step import Substeps
+from tautwire.tracer.likelihood import Likelihood, substeps_for
 from tautwire.tracer.preparation.noise import noise_of
+from tests.effect_cases import Case, same
 from tests.recordings import recorded
 from tests.robots import example
 
@@ -82,3 +85,58 @@ def test_the_open_loop_variance_starts_at_the_sensors_and_grows_with_the_winches
     variance = Likelihood(ROBOT, (), NOISE, 0.02).open_loop_variances(RECORDING, [])
     assert variance[0] == pytest.approx([NOISE.position**2] * 3 + [NOISE.tension**2] * 3)
     assert np.all(variance[-1] > variance[0])
+
+
+@pytest.mark.parametrize("angle", [0.01, 0.3, 0.45, 0.65, 0.99, 2.5, 6.3])
+def test_the_series_of_the_derivatives_follows_a_vibration(angle: float) -> None:
+    substeps = substeps_for(np.array([1j * angle, -0.1 * angle]))
+    assert abs(series(1j * angle, substeps) - np.exp(1j * angle)) < 2.5e-5 * substeps.slope
+    assert angle / substeps.state <= 0.05
+
+
+@pytest.mark.parametrize("decay", [0.1, 0.9, 3.0, 10.0, 50.0])
+def test_a_decay_within_a_sample_takes_few_steps(decay: float) -> None:
+    substeps = substeps_for(np.array([0.1j, -decay]))
+    assert abs(series(-decay, substeps) - np.exp(-decay)) < 1e-3
+    assert substeps.slope <= 1 + decay / 2.0
+    assert substeps.state <= 2 + 2.0 * decay
+
+
+def series(turn: complex, substeps: Substeps) -> complex:
+    part = turn / substeps.slope
+    return complex(sum(part**k / factorial(k) for k in range(substeps.order + 1)) ** substeps.slope)
+
+
+@pytest.mark.parametrize(
+    ("effect", "within"),
+    [
+        (same("damping", damping=1.7e9), 1e-4),
+        (same("relaxation", modulus=3e10, time=0.5), 1e-4),
+        (same("relaxation", modulus=3e10, time=0.001), 0.02),
+        # It yields within the sample.
+        (same("hysteresis", force=60.0, yield_strain=1e-4), 0.02),
+    ],
+    ids=str,
+)
+def test_the_transition_of_a_sample_is_the_derivative_of_the_next_state(effect: Case, within: float) -> None:
+    """Of eight cables, whose vibrations turn by half a radian and more in a sample."""
+    robot, recording = example("eight"), recorded("eight", 1)
+    robot = robot.with_effect(effect.setting(robot))
+    likelihood = Likelihood(robot, (), noise_of(robot, recording), 0.01)
+    assert likelihood.substeps.order > 4 or likelihood.substeps.slope > 1
+    state, speeds = likelihood.start([])[0][:, None], np.full((8, 1), 0.02)
+    unseen, moment = np.zeros((11, 1)), (speeds, 1.1 * speeds, np.full((1, 1), 0.01))
+
+    def moved(begun: np.ndarray) -> np.ndarray:
+        size = len(begun)
+        carried = (begun, np.eye(size), np.zeros((size, 0)), np.zeros((0, 1)))
+        return likelihood._run(1, *carried, unseen, unseen, unseen, *moment, np.zeros((1, 1)), np.zeros((1, 1)))[0][
+            :, 1
+        ]
+
+    _, transition, _ = likelihood.slopes(1, state, state, np.zeros((0, 1)), unseen, *moment)
+    for place, width in ((0, 1e-7), (4, 1e-5), (6, 1e-7), (len(state) - 1, 1e-7)):
+        step = np.zeros_like(state)
+        step[place] = width
+        difference = (moved(state + step) - moved(state - step)) / (2.0 * width)
+        assert np.max(np.abs(difference - transition[:, place])) < within * np.max(np.abs(difference))

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import ceil, log, pi
+from math import ceil, factorial, log, pi
 
 import casadi
 import numpy as np
@@ -30,8 +30,11 @@ from .preparation.start_state import start_covariance
 
 Array = NDArray[np.float64]
 
-# Radians of the fastest vibration in one integration step.
-STATE_ANGLE, SLOPE_ANGLE = 0.05, 0.3
+# Radians of the fastest vibration in one integration step, and time constants of the fastest decay, which soon has
+# nothing left to err by; and what the series of the derivatives may leave out of each.
+STATE_ANGLE, SLOPE_ANGLE, LEFT_OUT = 0.05, 0.7, 2e-5
+STATE_DECAY, SLOPE_DECAY, LEFT_OUT_OF_DECAY = 0.5, 2.0, 1e-3
+LEAST_ORDER = 4
 CHUNK = 500
 # In medians of the sample interval.
 LONGEST_STEP = 1.5
@@ -95,8 +98,7 @@ class Likelihood:
             [self.model.parameters],
             [self.model.start, casadi.jacobian(self.model.start, self.model.parameters)],
         )
-        angle = fastest_mode(robot) * sample_time
-        self.substeps = Substeps(max(1, ceil(angle / STATE_ANGLE)), max(1, ceil(angle / SLOPE_ANGLE)))
+        self.substeps = substeps_for(modes(robot) * sample_time)
         self._lags = casadi.Function("lags", [self.model.parameters], [self.model.lags])
         self._run = Repeated(filter_sample(self.model, robot.cable_count, noise, self.substeps), carried=3)
 
@@ -263,10 +265,24 @@ def _columns(recording: Recording, measured: Array, shift: Array) -> tuple[tuple
     return (shown, looked, later, *speeds, step[None, :], drift[None, :]), own
 
 
-def fastest_mode(robot: Robot) -> float:
-    """Largest magnitude of an eigenvalue at the start, in rad/s."""
+def substeps_for(turns: NDArray[np.complex128]) -> Substeps:
+    """How often to step between samples over which the modes go on by ``exp(turns)``."""
+    vibration, decay = float(np.max(np.abs(turns.imag))), float(np.max(np.abs(turns)))
+    state = max(1, ceil(vibration / STATE_ANGLE), ceil(decay / STATE_DECAY))
+    slope = max(1, ceil(vibration / SLOPE_ANGLE), ceil(decay / SLOPE_DECAY))
+    order = LEAST_ORDER
+    while any(
+        turn ** (order + 1) / factorial(order + 1) > left
+        for turn, left in ((vibration / slope, LEFT_OUT), (decay / slope, LEFT_OUT_OF_DECAY))
+    ):
+        order += 1
+    return Substeps(state, slope, order)
+
+
+def modes(robot: Robot) -> NDArray[np.complex128]:
+    """Eigenvalues at the start, in rad/s."""
     model = symbolic_model(robot)
     slope = casadi.Function("a", [model.states, model.inputs], [casadi.jacobian(model.rates, model.states)])
     start = casadi.Function("start", [], [model.start])
     matrix = np.array(slope(start()["o0"], 0.0))
-    return float(np.max(np.abs(np.linalg.eigvals(matrix))))
+    return np.linalg.eigvals(matrix).astype(complex)
