@@ -7,7 +7,7 @@ from tautwire.master.agreement import FAR, Agreement
 from tautwire.master.bends import Bends
 from tautwire.master.hermite import Chain
 
-STEP, TOLERANCE, SHARE = 0.1, 1e-10, 0.1
+STEP, TOLERANCE, SHARE = 0.1, 1e-13, 0.1
 MISSED = 720.0 * STEP**6 / 46080.0
 
 
@@ -66,3 +66,27 @@ def test_a_step_of_another_length_is_looked_at_closely(bends: Looks) -> None:
 def test_an_error_that_is_no_number_ends_redos(bends: Looks) -> None:
     """It is refused where outputs are recorded, with the name of the FMU."""
     assert not lacking(Agreement(bends), np.nan)
+
+
+def test_what_is_far_off_is_looked_at_when_no_redo_is_left(bends: Looks) -> None:
+    """Else a step at rest would hold those of a motion to what itself was allowed."""
+    agreement = Agreement(bends)
+    agreement.lacking(1e-6, TOLERANCE, SHARE, np.zeros(6), np.zeros(6), STEP)
+    few = 0.5 * SHARE * MISSED
+    assert lacking(agreement, few)
+    assert not agreement.lacking(few, TOLERANCE, SHARE, sixth_power(0.0), sixth_power(STEP), STEP, last=True)
+    assert not lacking(agreement, few)
+
+
+def test_behind_a_kink_what_was_allowed_does_not_count(bends: Looks) -> None:
+    agreement = Agreement(bends)
+    agreement.lacking(1e-6, TOLERANCE, SHARE, np.zeros(6), np.zeros(6), STEP)
+    agreement.forget()
+    assert not lacking(agreement, 0.5 * SHARE * MISSED)
+
+
+def test_steps_that_differ_by_rounding_are_of_one_length(bends: Looks) -> None:
+    agreement = Agreement(bends)
+    lacking(agreement, SHARE * MISSED)
+    assert lacking(agreement, 1.01 * FAR * SHARE * MISSED, step=STEP * (1.0 + 1e-12))
+    assert bends.count == 1

@@ -27,3 +27,11 @@ def test_steps_that_are_too_long_for_their_redos_are_counted(redos: int, settles
         end_error(coupling, 0.14)
         assert (coupling.account.unsettled == 0) is settles
         assert (coupling.account.warnings() == ()) is settles
+
+
+def test_steps_that_cannot_be_redone_are_told_elsewhere(three_fmus: RobotFmus) -> None:
+    """They are a fallback of their own."""
+    with instantiated(three_fmus) as coupling:
+        coupling.can_redo = False
+        end_error(coupling, 0.05)
+        assert coupling.account.unsettled == 0

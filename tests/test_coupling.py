@@ -81,3 +81,31 @@ def test_without_the_middle_the_order_is_four(three_fmus: RobotFmus) -> None:
             errors.append(end_error(plain, step))
     assert errors[0] < 2e-5
     assert 10.0 < errors[0] / errors[1] < 30.0
+
+
+def parted(coupling: Coupling) -> float:
+    """By how much what a cable was given of the platform's place differs from what the platform shows."""
+    platform, cable = coupling.components["platform"], coupling.components["cable_1"]
+    shown, given = (c.block(["position.x", "position.y", "position.z"]) for c in (platform, cable))
+    platform.read(shown)
+    cable.read(given)
+    return float(np.abs(shown.values - given.values).max())
+
+
+def test_what_is_recorded_follows_from_the_place_that_is_recorded(three_fmus: RobotFmus) -> None:
+    with instantiated(three_fmus) as coupling:
+        end_error(coupling, 0.1)
+        assert parted(coupling) == 0.0
+
+
+@pytest.mark.parametrize("can_redo", [True, False])
+def test_inputs_that_agree_wait_until_outputs_are_read(can_redo: bool, three_fmus: RobotFmus) -> None:
+    with instantiated(three_fmus) as coupling:
+        simulate(coupling, RAMPS, CORNERS[:2], shown_ports(3), FixedStep(0.1), Kept(2, 18))
+        coupling.can_redo = can_redo
+        checkpoint = coupling.attempt(CORNERS[1], 0.1, *RAMPS.interval(1, CORNERS[1], 0.1, np.zeros(0)))
+        assert (parted(coupling) > 0.0) is can_redo
+        coupling.pass_on_guessed()
+        assert parted(coupling) == 0.0
+        if checkpoint is not None:
+            coupling.release(checkpoint)

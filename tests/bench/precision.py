@@ -19,7 +19,7 @@ from tests.robots import paper_robot
 from .ramp import by_fmus, by_solve_ivp
 
 RUNS, TURNS = 9, 25
-STEPS = (0.56, 0.4, 0.2, 0.14, 0.1, 0.05, 0.02, 0.01, 0.005)
+STEPS = (0.56, 0.4, 0.2, 0.145, 0.14, 0.1, 0.05, 0.02, 0.01, 0.005)
 TOLERANCES = (1e-4, 1e-5, 1e-6, 1e-7, 1e-8)
 RELATIVE = (1e-4, 1e-5, 3e-6, 1e-6, 1e-7, 1e-8, 1e-9)
 THEIR_STEPS = (0.05, 0.04, 0.02, 0.01, 0.005, 0.002, 0.001)

@@ -81,6 +81,6 @@ class Account:
         )
         unsettled = (
             f"in {self.unsettled} of {self.steps} steps inputs and outputs did not agree after all redos: "
-            "take a smaller --step"
+            "take a smaller --step; where that does not help, some FMU rounds its outputs"
         )
         return (made,) * (self.share > WARNED_SHARE) + (unsettled,) * (self.unsettled > WARNED_UNSETTLED * self.steps)

@@ -103,6 +103,7 @@ class Coupling:
         self._bond_given = _places(given, [c.target for c in efforts]), _places(given, [c.target for c in flows])
         self._kink_places = _places(shown, kinks)
         self._driven = np.full(len(drives), np.nan)
+        self._reached: float | None = None
         self._fed_back = fed_back([seat.component.name for seat in self._order], (*connections, *rates), shown)
         self._scale = self._nominal[self._fed_back]
         self._guessing = [seat for seat in self._order if np.isin(seat.sources, self._fed_back).any()]
@@ -163,6 +164,7 @@ class Coupling:
     def forget(self, time: float) -> None:
         """Carry nothing over ``time``, which is now: some output has a kink there."""
         self._lessons.forget()
+        self._agreement.forget()
         self._prediction.forget(time, self._shown)
 
     def kinks(self) -> Array:
@@ -185,6 +187,7 @@ class Coupling:
         before = self.attempt(time, step, start, end)
         if before is not None:
             self.release(before)
+        self.pass_on_guessed()
 
     def attempt(self, time: float, step: float, start: Array, end: Array) -> Checkpoint | None:
         """A step as :meth:`step` makes it; returns where it began, to be let go, if the components can go back."""
@@ -201,12 +204,21 @@ class Coupling:
                 self.release(before)
             raise
         self._enter_books(step, redos, agreed)
+        self._reached = time + step
         if not agreed:
-            # What was guessed is known now.
-            self._pass_on(time + step, self._guessing)
+            self.pass_on_guessed()
         self._held.end(self._shown)
         self._prediction.end(time + step, self._shown)
         return before
+
+    def pass_on_guessed(self) -> None:
+        """Set the inputs that were guessed for the end of the last attempt as they are known now.
+
+        Where inputs and outputs agree that moves what is shown by no more than these differ: it waits until it is read.
+        """
+        if self._reached is not None:
+            self._pass_on(self._reached, self._guessing)
+            self._reached = None
 
     def _iterate(self, time: float, step: float, end: Array, before: Checkpoint | None) -> tuple[int, bool]:
         """Pass until outputs agree with what was guessed of them; returns the number of redos, and if they do."""
@@ -218,8 +230,9 @@ class Coupling:
         self._drive(end)
         error = self._pass(time, step, begun, self._shown[self._fed_back] / self._scale)
         redos = 0
-        while self._agreement.lacking(error, self.tolerance, self.share, shown, self._shown, step):
-            if before is None or redos == self.redos:
+        most = 0 if before is None else self.redos
+        while self._agreement.lacking(error, self.tolerance, self.share, shown, self._shown, step, last=redos == most):
+            if before is None or redos == most:
                 return redos, False
             guess = self._secants.next()
             self._shown[self._fed_back] = guess * self._scale
@@ -271,6 +284,7 @@ class Coupling:
         self._held.forget()
         self._driven = checkpoint.driven
         self.account = replace(checkpoint.account, passes=self.account.passes)
+        self._reached = None
         self._prediction.memory = checkpoint.memory
 
     def release(self, checkpoint: Checkpoint) -> None:

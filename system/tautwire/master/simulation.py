@@ -20,7 +20,7 @@ Array = NDArray[np.float64]
 Progress = Callable[[float], None]
 
 # Of what the polynomials of a step miss: redos that would find less than this add nothing.
-SHARE = 0.03
+SHARE = 0.06
 
 
 class Source(Protocol):
@@ -150,6 +150,7 @@ class _Window:
     """Reads the observed outputs, and those of them that are lengths."""
 
     def __init__(self, coupling: Coupling, observed: Sequence[Port]) -> None:
+        self._coupling = coupling
         self._blocks: list[tuple[Component, Block, NDArray[np.intp]]] = []
         units = [coupling.components[p.component].variables[p.variable].unit for p in observed]
         self._lengths = np.array([unit == "m" for unit in units], dtype=bool)
@@ -159,6 +160,7 @@ class _Window:
             self._blocks.append((coupling.components[name], block, np.array(places)))
 
     def read(self, row: Array) -> None:
+        self._coupling.pass_on_guessed()
         for component, block, places in self._blocks:
             component.read(block)
             if not np.all(np.isfinite(block.values)):
