@@ -14,14 +14,14 @@ from tests.robots import example
 
 DELAYS = {"tension_delay": 0.004, "position_delay": 0.003}
 FREE = [FreeParameter(0, "tension_delay"), FreeParameter(1, "mass"), FreeParameter(2, "damping")]
-THETA = np.array([DELAYS["tension_delay"], 2.0, 6e8])
+THETA = np.array([DELAYS["tension_delay"], 2.0, 6e9])
 STEP, SPEEDS, LATER = 0.01, np.array([0.02, -0.01, 0.03]), np.array([0.03, -0.02, 0.02])
 
 
 def model_of(*cables: int) -> Model:
     robot = example("three").with_effect(EffectSetting("sensor_delay", DELAYS, cables or (1, 2, 3)))
     robot = robot.with_effect(EffectSetting("payload", {"mass": 2.0}))
-    return symbolic_model(robot.with_effect(EffectSetting("damping", {"damping": 6e8}, (1, 2, 3))), FREE)
+    return symbolic_model(robot.with_effect(EffectSetting("damping", {"damping": 6e9}, (1, 2, 3))), FREE)
 
 
 def moving_state(model: Model) -> np.ndarray:
@@ -96,12 +96,14 @@ def test_slopes_are_those_of_what_is_shown() -> None:
         moved[place] = width
         difference = (sensed(model, state + moved)[0] - sensed(model, state - moved)[0]).ravel() / (2.0 * width)
         assert np.max(np.abs(by_state[:, place] - difference)) < 2e-3 * np.max(np.abs(difference))
-    for place, width in enumerate((1e-6, 1e-3, 1e4)):
+    for place, width in enumerate((1e-6, 0.1, 1e7)):
         moved = np.zeros(3)
         moved[place] = width
         more, less = (sensed(model, state, THETA + sign * moved)[0] for sign in (1.0, -1.0))
         difference = (more - less).ravel() / (2.0 * width)
-        assert np.max(np.abs(by_parameters[:, place] - difference)) < 0.02 * np.max(np.abs(difference))
+        for kind in (slice(0, 3), slice(3, 6)):
+            apart = np.max(np.abs(by_parameters[kind, place] - difference[kind]))
+            assert apart <= 0.02 * np.max(np.abs(difference[kind]))
 
 
 def test_the_expression_is_that_of_the_function() -> None:

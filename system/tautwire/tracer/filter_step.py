@@ -165,7 +165,7 @@ def _advance(model: Model, substeps: Substeps, state: SX, speed: SX, later: SX, 
     """State after one sample, and its derivatives by the state before and by the parameters.
 
     The derivatives weigh errors and may be coarser than the state, whose own error would pose as an effect: with the
-    slopes ``F`` and ``f_p`` of the rates in the middle of a part of the step, to the fourth order
+    slopes ``F`` and ``f_p`` of the rates in the middle of a part of the step, to the fourth order or a higher one
 
         Gamma = h (I + h F / 2 (I + h F / 3 (I + h F / 4)))        A = I + F Gamma        B = Gamma f_p
     """

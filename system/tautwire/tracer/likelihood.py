@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import ceil, factorial, log, pi
+from math import log, pi
 
 import casadi
 import numpy as np
@@ -25,17 +25,16 @@ from ..model.uncertain import uncertain_numbers
 from ..native.repeated import Repeated, stacked
 from ..recordings.recording import Recording
 from ..robots.robot import Robot
-from .filter_step import Noise, Substeps, filter_sample, filter_slopes
+from .filter_step import Noise, filter_sample, filter_slopes
+from .hypotheses import value_of
 from .preparation.start_state import start_covariance
+from .substeps import Pace, covers, substeps_for
 
 Array = NDArray[np.float64]
 
-# Radians of the fastest vibration in one integration step, and time constants of the fastest decay, which soon has
-# nothing left to err by; and what the series of the derivatives may leave out of each.
-STATE_ANGLE, SLOPE_ANGLE, LEFT_OUT = 0.05, 0.7, 2e-5
-STATE_DECAY, SLOPE_DECAY, LEFT_OUT_OF_DECAY = 0.5, 2.0, 1e-3
-LEAST_ORDER = 4
 CHUNK = 500
+# Times the steps that are needed.
+TOO_LONG = 1.5
 # In medians of the sample interval.
 LONGEST_STEP = 1.5
 
@@ -85,9 +84,20 @@ class Stretch:
 
 
 class Likelihood:
-    """Innovations of recordings under a robot whose free parameters vary; compiled once."""
+    """Innovations of recordings under a robot whose free parameters vary; compiled once.
 
-    def __init__(self, robot: Robot, free: Sequence[FreeParameter], noise: Noise, sample_time: float) -> None:
+    The steps between samples serve the values that the robot has, with ropes that strain by ``strain_rates`` (n,) in
+    1/s, at rest where None is given.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        free: Sequence[FreeParameter],
+        noise: Noise,
+        sample_time: float,
+        strain_rates: Array | None = None,
+    ) -> None:
         self.uncertain = uncertain_numbers(robot)
         self.model = symbolic_model(robot, free, self.uncertain)
         self.robot = robot
@@ -98,9 +108,17 @@ class Likelihood:
             [self.model.parameters],
             [self.model.start, casadi.jacobian(self.model.start, self.model.parameters)],
         )
-        self.substeps = substeps_for(modes(robot) * sample_time)
+        first = 6 + robot.cable_count
+        own = slice(first, self.model.states.numel() - len(self.uncertain))
+        self._pace = Pace(self.model, robot.cable_count, own, sample_time)
+        rates = np.zeros(robot.cable_count) if strain_rates is None else strain_rates
+        self.substeps = substeps_for(self._pace.turns([value_of(robot, f) for f in free], rates))
         self._lags = casadi.Function("lags", [self.model.parameters], [self.model.lags])
         self._run = Repeated(filter_sample(self.model, robot.cable_count, noise, self.substeps), carried=3)
+
+    def serves(self, parameters: Sequence[float] | Array, strain_rates: Array) -> bool:
+        """Whether its steps are short enough, or nearly so, for other values of the parameters and other motions."""
+        return covers(self.substeps, self._pace.turns(parameters, strain_rates) / TOO_LONG)
 
     def innovations(
         self, recording: Recording, parameters: Sequence[float] | Array, roughness: float = 0.0
@@ -263,26 +281,3 @@ def _columns(recording: Recording, measured: Array, shift: Array) -> tuple[tuple
     own = np.zeros(len(time), dtype=bool)
     own[rows] = True
     return (shown, looked, later, *speeds, step[None, :], drift[None, :]), own
-
-
-def substeps_for(turns: NDArray[np.complex128]) -> Substeps:
-    """How often to step between samples over which the modes go on by ``exp(turns)``."""
-    vibration, decay = float(np.max(np.abs(turns.imag))), float(np.max(np.abs(turns)))
-    state = max(1, ceil(vibration / STATE_ANGLE), ceil(decay / STATE_DECAY))
-    slope = max(1, ceil(vibration / SLOPE_ANGLE), ceil(decay / SLOPE_DECAY))
-    order = LEAST_ORDER
-    while any(
-        turn ** (order + 1) / factorial(order + 1) > left
-        for turn, left in ((vibration / slope, LEFT_OUT), (decay / slope, LEFT_OUT_OF_DECAY))
-    ):
-        order += 1
-    return Substeps(state, slope, order)
-
-
-def modes(robot: Robot) -> NDArray[np.complex128]:
-    """Eigenvalues at the start, in rad/s."""
-    model = symbolic_model(robot)
-    slope = casadi.Function("a", [model.states, model.inputs], [casadi.jacobian(model.rates, model.states)])
-    start = casadi.Function("start", [], [model.start])
-    matrix = np.array(slope(start()["o0"], 0.0))
-    return np.linalg.eigvals(matrix).astype(complex)

@@ -4,7 +4,8 @@ A sensor that shows the state of ``d`` seconds ago is given that state, to secon
 
     y = h(x_d, u_d)        x_d = x - d f + d^2/2 (F f + f_u du/dt)        u_d = u - d du/dt
 
-with the rates ``f`` and their slopes ``F`` and ``f_u`` at ``x``. Its slopes are those of ``h`` there, carried back:
+with the rates ``f`` and their slopes ``F`` and ``f_u`` at ``x``. Its slopes are those of ``h`` there, carried back with
+``F`` and ``f_p`` as they are at ``x``:
 
     y_x = h_x (I - d F (I - d F / 2))        y_p = h_p - d h_x (I - d F / 2) f_p - dy/dt dd/dp
 """
@@ -20,7 +21,7 @@ from ..model.symbolic import Model
 
 
 @dataclass(frozen=True)
-class _Pace:
+class _Motion:
     """Rates of the states, of these rates and of the inputs; slopes of the rates by states and parameters."""
 
     rates: SX
@@ -35,11 +36,11 @@ def shown_late(model: Model, cable_count: int, later: SX, step: SX, shift: SX) -
 
     That is at most half a sample. ``later`` are the winch speeds at the next sample, in ``step`` seconds.
     """
-    pace, late = _pace(model, cable_count, later, step), model.lags - shift
+    motion, late = _motion(model, cable_count, later, step), model.lags - shift
     shown = casadi.vertsplit(_shown(model, cable_count))
     for index in _lagging(model):
         read = Function("read", [model.states, model.inputs, model.parameters], [shown[index]])
-        shown[index] = read(*_before(model, pace, late[index]), model.parameters)
+        shown[index] = read(*_before(model, motion, late[index]), model.parameters)
     return casadi.vertcat(*shown)
 
 
@@ -52,37 +53,37 @@ def sensing(model: Model, cable_count: int) -> Function:
     shown = _shown(model, cable_count)
     results = [shown, casadi.jacobian(shown, model.states), casadi.jacobian(shown, model.parameters)]
     if _lagging(model):
-        pace, late = _pace(model, cable_count, later, step), model.lags - shift
+        motion, late = _motion(model, cable_count, later, step), model.lags - shift
         slopes = casadi.jacobian(model.lags, model.parameters)
         rows = list(zip(*map(casadi.vertsplit, results), strict=True))
         for index in _lagging(model):
-            rows[index] = _row(model, shown[index], pace, late[index], slopes[index, :])
+            rows[index] = _row(model, shown[index], motion, late[index], slopes[index, :])
         results = [casadi.vertcat(*column) for column in zip(*rows, strict=True)]
     return Function("sensing", [*at, later, step, shift], results)
 
 
-def _row(model: Model, shown: SX, pace: _Pace, late: SX, late_slope: SX) -> tuple[SX, SX, SX]:
+def _row(model: Model, shown: SX, motion: _Motion, late: SX, late_slope: SX) -> tuple[SX, SX, SX]:
     """One sensor: what it shows, and the derivatives."""
     at = [model.states, model.inputs, model.parameters]
     read = Function("read", at, [shown, *(casadi.jacobian(shown, symbol) for symbol in at)])
-    value, by_state, by_inputs, by_parameters = read(*_before(model, pace, late), model.parameters)
-    turned = by_state - 0.5 * late * casadi.mtimes(by_state, pace.by_state)
-    moved = by_state - late * casadi.mtimes(turned, pace.by_state)
-    rate = casadi.mtimes(by_state, pace.rates - late * pace.bend) + casadi.mtimes(by_inputs, pace.inputs)
-    sensitive = by_parameters - late * casadi.mtimes(turned, pace.by_parameters) - rate * late_slope
+    value, by_state, by_inputs, by_parameters = read(*_before(model, motion, late), model.parameters)
+    turned = by_state - 0.5 * late * casadi.mtimes(by_state, motion.by_state)
+    moved = by_state - late * casadi.mtimes(turned, motion.by_state)
+    rate = casadi.mtimes(by_state, motion.rates - late * motion.bend) + casadi.mtimes(by_inputs, motion.inputs)
+    sensitive = by_parameters - late * casadi.mtimes(turned, motion.by_parameters) - rate * late_slope
     return value, moved, sensitive
 
 
-def _before(model: Model, pace: _Pace, late: SX) -> tuple[SX, SX]:
+def _before(model: Model, motion: _Motion, late: SX) -> tuple[SX, SX]:
     """State and inputs so many seconds ago."""
-    return model.states - late * pace.rates + 0.5 * late**2 * pace.bend, model.inputs - late * pace.inputs
+    return model.states - late * motion.rates + 0.5 * late**2 * motion.bend, model.inputs - late * motion.inputs
 
 
-def _pace(model: Model, cable_count: int, later: SX, step: SX) -> _Pace:
+def _motion(model: Model, cable_count: int, later: SX, step: SX) -> _Motion:
     slope = casadi.if_else(step > 0.0, (later - model.inputs[:cable_count]) / step, 0.0)
     inputs = casadi.vertcat(slope, SX(model.inputs.numel() - cable_count, 1))
     moved = casadi.vertcat(model.states, model.inputs)
-    return _Pace(
+    return _Motion(
         rates=model.rates,
         bend=casadi.jtimes(model.rates, moved, casadi.vertcat(model.rates, inputs)),
         inputs=inputs,
