@@ -22,22 +22,6 @@ def test_a_fit_arrives_wherever_it_begins(begin: float) -> None:
     assert fit.deviations[0] < 0.05
 
 
-def test_steps_get_shorter_where_a_fit_comes_to_quicker_effects() -> None:
-    robot, recording = example("three"), recorded("three", 1)
-    noise = noise_of(robot, recording)
-    sample, fitter = split(robot, noise, recording, None).fit, Fitter(noise)
-    strands = Hypothesis(BY_NAME["hysteresis"], (1, 2, 3))
-
-    def steps_at(yield_strain: float) -> int:
-        setting = EffectSetting("hysteresis", {"force": 1.0, "yield_strain": yield_strain, "exponent": 1.0}, (1, 2, 3))
-        return fitter.likelihood(robot.with_effect(setting), [strands], sample)[0].substeps.state
-
-    slow = steps_at(1e-2)
-    quick = steps_at(1e-6)
-    assert quick > 2 * slow
-    assert steps_at(1e-2) == quick
-
-
 @pytest.mark.slow
 def test_a_relaxation_is_found_that_is_quicker_than_where_the_fit_begins() -> None:
     truth = {"modulus": 3e10, "time": 0.003}

@@ -43,11 +43,15 @@ class Noise:
 
 @dataclass(frozen=True)
 class Substeps:
-    """Integration steps between two samples: of the state itself, and of its derivatives, whose series has an order."""
+    """Integration steps between two samples: of the state itself, and of its derivatives.
+
+    The latter go by a series of some order, of a part so small that ``doublings`` make it a whole step.
+    """
 
     state: int
     slope: int
     order: int = 4
+    doublings: int = 0
 
 
 @dataclass(frozen=True)
@@ -168,6 +172,9 @@ def _advance(model: Model, substeps: Substeps, state: SX, speed: SX, later: SX, 
     slopes ``F`` and ``f_p`` of the rates in the middle of a part of the step, to the fourth order or a higher one
 
         Gamma = h (I + h F / 2 (I + h F / 3 (I + h F / 4)))        A = I + F Gamma        B = Gamma f_p
+
+    Over twice the time that is ``Gamma + A Gamma``: decays which are far quicker than the step then die, where the
+    series would blow up.
     """
     single = _runge_kutta_step(model, speed.numel())
     path = [state]
@@ -185,7 +192,9 @@ def _advance(model: Model, substeps: Substeps, state: SX, speed: SX, later: SX, 
         middle = _on(path, (index + 0.5) / substeps.slope)
         inputs = casadi.vertcat(0.5 * (begin + end), SX(3, 1))
         by_state, by_parameters = slope(middle, inputs, model.parameters)
-        carried = _carried(by_state, part, substeps.order)
+        carried = _carried(by_state, part / 2**substeps.doublings, substeps.order)
+        for _ in range(substeps.doublings):
+            carried = 2.0 * carried + casadi.mtimes(casadi.mtimes(by_state, carried), carried)
         own = SX.eye(state.numel()) + casadi.mtimes(by_state, carried)
         transition = casadi.mtimes(own, transition)
         direct = casadi.mtimes(own, direct) + casadi.mtimes(carried, by_parameters)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass
-from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,7 +20,6 @@ from .filter_step import Noise
 from .hypotheses import Hypothesis, free_parameters, value_of, with_values
 from .likelihood import Innovations, Likelihood
 from .preparation.compression import compressed
-from .substeps import remembers, strain_rates
 
 Array = NDArray[np.float64]
 
@@ -108,12 +106,11 @@ class Fitter:
         start = np.array([value_of(robot, f) for f in free])
         scale = sizes_of(robot, free)
         lower, upper = (bounds / scale for bounds in bounds_of(robot, free))
+        likelihood = self._likelihood(placed(robot, sample.start), free, sample)
         begun = scaled = start / scale
         slopes = np.zeros((0, len(free)))
-        begins = placed(robot, sample.start)
-        likelihood_at = partial(self._likelihood_at, begins, free, sample, self._likelihood(begins, free, sample))
         for rough, stop in stages:
-            residual = _Residual(likelihood_at, sample, scale, rough, self.between)
+            residual = _Residual(likelihood, sample, scale, rough, self.between)
             if rough == 0.0:
                 scaled = max((scaled, begun), key=residual.log_likelihood)
             # The first trust region is as large as the start: counted from one, a parameter near zero is not stuck.
@@ -156,24 +153,15 @@ class Fitter:
         """See :meth:`tautwire.tracer.likelihood.Likelihood.open_loop_variances`."""
         return self._likelihood(placed(robot, sample.start), (), sample).open_loop_variances(sample.recording, ())
 
-    def _likelihood_at(
-        self, robot: Robot, free: Sequence[FreeParameter], sample: Sample, begun: Likelihood, values: Array
-    ) -> Likelihood:
-        """As it ``begun``, or with shorter steps where effects that remember have become quicker."""
-        if not remembers(robot):
-            return begun
-        return self._likelihood(with_values(robot, free, dict(zip(free, values.tolist(), strict=True))), free, sample)
-
     def _likelihood(self, robot: Robot, free: Sequence[FreeParameter], sample: Sample) -> Likelihood:
         self.between()
         interval = float(np.median(np.diff(sample.recording.time)))
         opened = with_values(robot, free, dict.fromkeys(free, 0.0))
         key = (opened, tuple(free), round(interval, 9))
-        rates, known = strain_rates(robot, sample.recording), self._compiled.get(key)
-        if known is None or not known.serves([value_of(robot, f) for f in free], rates):
+        if key not in self._compiled:
             if len(self._compiled) >= KEPT:
                 self._compiled.pop(next(iter(self._compiled)))
-            self._compiled[key] = Likelihood(robot, free, self.noise, interval, rates)
+            self._compiled[key] = Likelihood(robot, free, self.noise, interval)
         return self._compiled[key]
 
 
@@ -203,15 +191,10 @@ class _Residual:
     """Innovations and their slopes, compressed, at the last point asked for, in scaled parameters."""
 
     def __init__(
-        self,
-        likelihood_at: Callable[[Array], Likelihood],
-        sample: Sample,
-        scale: Array,
-        roughness: float,
-        between: Callable[[], None],
+        self, likelihood: Likelihood, sample: Sample, scale: Array, roughness: float, between: Callable[[], None]
     ) -> None:
         self.between = between
-        self.likelihood_at = likelihood_at
+        self.likelihood = likelihood
         self.sample = sample
         self.scale = scale
         self.roughness = roughness
@@ -220,8 +203,7 @@ class _Residual:
         self._found: tuple[Array, Array] = (np.zeros(0), np.zeros((0, 0)))
 
     def log_likelihood(self, scaled: Array) -> float:
-        values = scaled * self.scale
-        found = self.likelihood_at(values).innovations(self.sample.recording, values, self.roughness)
+        found = self.likelihood.innovations(self.sample.recording, scaled * self.scale, self.roughness)
         value = found.log_likelihood(self.sample.rows)
         return value if np.isfinite(value) else -np.inf
 
@@ -234,8 +216,7 @@ class _Residual:
     def _evaluate(self, scaled: Array) -> tuple[Array, Array]:
         if self._at is None or not np.array_equal(self._at, scaled):
             self.between()
-            values = scaled * self.scale
-            residuals, slopes = compressed(self.likelihood_at(values), values, self.sample, self.roughness)
+            residuals, slopes = compressed(self.likelihood, scaled * self.scale, self.sample, self.roughness)
             self._found = (residuals, slopes * self.scale)
             self._at = scaled.copy()
         return self._found

@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import log, pi
+from math import ceil, factorial, log, pi
 
 import casadi
 import numpy as np
@@ -25,16 +25,20 @@ from ..model.uncertain import uncertain_numbers
 from ..native.repeated import Repeated, stacked
 from ..recordings.recording import Recording
 from ..robots.robot import Robot
-from .filter_step import Noise, filter_sample, filter_slopes
-from .hypotheses import value_of
+from .filter_step import Noise, Substeps, filter_sample, filter_slopes
 from .preparation.start_state import start_covariance
-from .substeps import Pace, covers, substeps_for
 
 Array = NDArray[np.float64]
 
+# Radians of the fastest vibration in one integration step, and what the series of the derivatives may leave out.
+STATE_ANGLE, SLOPE_ANGLE, LEFT_OUT = 0.05, 0.7, 2e-5
+# Time constants of the fastest decay likewise; it soon has nothing left to err by, so above some steps few do.
+STATE_DECAY, SLOPE_DECAY, LEFT_OUT_OF_DECAY = 0.5, 2.0, 1e-3
+MANY_STEPS = 40
+LEAST_ORDER = 2
+# For effects that remember: they may be quicker under way than at rest, and in a fit than where it begins.
+DOUBLINGS, DOUBLINGS_OF_MANY, MANY_STATES = 4, 2, 24
 CHUNK = 500
-# Times the steps that are needed.
-TOO_LONG = 1.5
 # In medians of the sample interval.
 LONGEST_STEP = 1.5
 
@@ -84,20 +88,9 @@ class Stretch:
 
 
 class Likelihood:
-    """Innovations of recordings under a robot whose free parameters vary; compiled once.
+    """Innovations of recordings under a robot whose free parameters vary; compiled once."""
 
-    The steps between samples serve the values that the robot has, with ropes that strain by ``strain_rates`` (n,) in
-    1/s, at rest where None is given.
-    """
-
-    def __init__(
-        self,
-        robot: Robot,
-        free: Sequence[FreeParameter],
-        noise: Noise,
-        sample_time: float,
-        strain_rates: Array | None = None,
-    ) -> None:
+    def __init__(self, robot: Robot, free: Sequence[FreeParameter], noise: Noise, sample_time: float) -> None:
         self.uncertain = uncertain_numbers(robot)
         self.model = symbolic_model(robot, free, self.uncertain)
         self.robot = robot
@@ -108,17 +101,12 @@ class Likelihood:
             [self.model.parameters],
             [self.model.start, casadi.jacobian(self.model.start, self.model.parameters)],
         )
-        first = 6 + robot.cable_count
-        own = slice(first, self.model.states.numel() - len(self.uncertain))
-        self._pace = Pace(self.model, robot.cable_count, own, sample_time)
-        rates = np.zeros(robot.cable_count) if strain_rates is None else strain_rates
-        self.substeps = substeps_for(self._pace.turns([value_of(robot, f) for f in free], rates))
+        states = self.model.states.numel()
+        remembers = states > 6 + robot.cable_count + len(self.uncertain)
+        doublings = DOUBLINGS_OF_MANY if states > MANY_STATES else DOUBLINGS
+        self.substeps = substeps_for(modes(robot) * sample_time, doublings if remembers else 0)
         self._lags = casadi.Function("lags", [self.model.parameters], [self.model.lags])
         self._run = Repeated(filter_sample(self.model, robot.cable_count, noise, self.substeps), carried=3)
-
-    def serves(self, parameters: Sequence[float] | Array, strain_rates: Array) -> bool:
-        """Whether its steps are short enough, or nearly so, for other values of the parameters and other motions."""
-        return covers(self.substeps, self._pace.turns(parameters, strain_rates) / TOO_LONG)
 
     def innovations(
         self, recording: Recording, parameters: Sequence[float] | Array, roughness: float = 0.0
@@ -281,3 +269,27 @@ def _columns(recording: Recording, measured: Array, shift: Array) -> tuple[tuple
     own = np.zeros(len(time), dtype=bool)
     own[rows] = True
     return (shown, looked, later, *speeds, step[None, :], drift[None, :]), own
+
+
+def substeps_for(turns: NDArray[np.complex128], doublings: int = 0) -> Substeps:
+    """How often to step between samples over which the modes go on by ``exp(turns)``."""
+    vibration, decay = float(np.max(np.abs(turns.imag))), float(np.max(np.abs(turns)))
+    many = min(ceil(decay / STATE_ANGLE), MANY_STEPS)
+    state = max(1, ceil(vibration / STATE_ANGLE), many, ceil(decay / STATE_DECAY))
+    slope = max(1, ceil(vibration / SLOPE_ANGLE), ceil(decay / SLOPE_DECAY))
+    parts, order = slope * 2**doublings, LEAST_ORDER
+    while any(
+        2**doublings * (turn / parts) ** (order + 1) / factorial(order + 1) > left
+        for turn, left in ((vibration, LEFT_OUT), (decay, LEFT_OUT_OF_DECAY))
+    ):
+        order += 1
+    return Substeps(state, slope, order, doublings)
+
+
+def modes(robot: Robot) -> NDArray[np.complex128]:
+    """Eigenvalues at the start, in rad/s."""
+    model = symbolic_model(robot)
+    slope = casadi.Function("a", [model.states, model.inputs], [casadi.jacobian(model.rates, model.states)])
+    start = casadi.Function("start", [], [model.start])
+    matrix = np.array(slope(start()["o0"], 0.0))
+    return np.linalg.eigvals(matrix).astype(complex)
