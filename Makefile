@@ -10,7 +10,7 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 EXAMPLE := system/tautwire/examples/three
 FLOORS := .venv-floors
-FLOOR_TESTS := $(addprefix tests/test_,$(addsuffix .py,checking cli control cosimulation linear linear_figures \
+FLOOR_TESTS := $(addprefix tests/test_,$(addsuffix .py,checking cli cli_refusals control cosimulation linear linear_figures \
 	materials_command package preparation recording recording_mdf recording_parquet report_page robust statics))
 
 .PHONY: run test lint types docs pictures floors bench bench-long bench-trace bench-control bench-campaign clean
