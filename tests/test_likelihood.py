@@ -1,15 +1,13 @@
 """Innovations against what a Kalman filter must do."""
 
 from dataclasses import replace
-from math import factorial
 
 import numpy as np
 import pytest
 
 from tautwire.model.symbolic import FreeParameter
 from tautwire.robots.robot import EffectSetting
-from tautwire.tracer.filter_step import Substeps
-from tautwire.tracer.likelihood import Likelihood, substeps_for
+from tautwire.tracer.likelihood import Likelihood
 from tautwire.tracer.preparation.noise import noise_of
 from tests.effect_cases import Case, same
 from tests.recordings import recorded
@@ -85,39 +83,6 @@ def test_the_open_loop_variance_starts_at_the_sensors_and_grows_with_the_winches
     variance = Likelihood(ROBOT, (), NOISE, 0.02).open_loop_variances(RECORDING, [])
     assert variance[0] == pytest.approx([NOISE.position**2] * 3 + [NOISE.tension**2] * 3)
     assert np.all(variance[-1] > variance[0])
-
-
-@pytest.mark.parametrize("angle", [0.01, 0.3, 0.45, 0.65, 0.99, 2.5, 6.3])
-def test_the_series_of_the_derivatives_follows_a_vibration(angle: float) -> None:
-    substeps = substeps_for(np.array([1j * angle, -0.1 * angle]))
-    assert abs(series(1j * angle, substeps) - np.exp(1j * angle)) < 2.5e-5 * substeps.slope
-    assert angle / substeps.state <= 0.05
-
-
-@pytest.mark.parametrize("decay", [0.1, 0.9, 3.0, 10.0, 50.0])
-def test_a_decay_within_a_sample_takes_few_steps(decay: float) -> None:
-    substeps = substeps_for(np.array([0.1j, -decay]))
-    assert abs(series(-decay, substeps) - np.exp(-decay)) < 1e-3
-    assert substeps.slope <= 1 + decay / 2.0
-    assert 2.0 * decay <= substeps.state <= 1.0 + max(2.0 * decay, min(20.0 * decay, 40.0))
-
-
-@pytest.mark.parametrize("decay", [0.1, 0.9, 3.0, 10.0, 20.0])
-def test_doublings_let_a_decay_die_that_has_become_quicker(decay: float) -> None:
-    """Where effects remember: steps are chosen where a fit begins, and at rest."""
-    substeps = substeps_for(np.array([0.3j, -0.5]), doublings=4)
-    assert substeps.slope == 1
-    assert abs(series(-decay, substeps) - np.exp(-decay)) < 0.06
-    assert abs(series(0.3j, substeps) - np.exp(0.3j)) < 2.5e-5
-
-
-def series(turn: complex, substeps: Substeps) -> complex:
-    """What the filter makes of a rate that stays."""
-    parts = substeps.slope * 2**substeps.doublings
-    carried = sum((turn / parts) ** (k - 1) / factorial(k) for k in range(1, substeps.order + 1)) / parts
-    for _ in range(substeps.doublings):
-        carried = 2.0 * carried + turn * carried * carried
-    return complex((1.0 + turn * carried) ** substeps.slope)
 
 
 @pytest.mark.parametrize(

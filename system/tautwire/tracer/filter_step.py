@@ -213,7 +213,7 @@ def _carried(slopes: SX, step: SX, order: int) -> SX:
     still = SX.eye(slopes.shape[0])
     carried = still
     for term in range(order, 1, -1):
-        carried = still + (step / float(term)) * casadi.mtimes(slopes, carried)
+        carried = still + (step / term) * casadi.mtimes(slopes, carried)
     return step * carried
 
 

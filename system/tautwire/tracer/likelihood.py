@@ -14,7 +14,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from math import ceil, factorial, log, pi
+from math import log, pi
 
 import casadi
 import numpy as np
@@ -25,19 +25,12 @@ from ..model.uncertain import uncertain_numbers
 from ..native.repeated import Repeated, stacked
 from ..recordings.recording import Recording
 from ..robots.robot import Robot
-from .filter_step import Noise, Substeps, filter_sample, filter_slopes
+from .filter_step import Noise, filter_sample, filter_slopes
 from .preparation.start_state import start_covariance
+from .substeps import substeps_between
 
 Array = NDArray[np.float64]
 
-# Radians of the fastest vibration in one integration step, and what the series of the derivatives may leave out.
-STATE_ANGLE, SLOPE_ANGLE, LEFT_OUT = 0.05, 0.7, 2e-5
-# Time constants of the fastest decay likewise; it soon has nothing left to err by, so above some steps few do.
-STATE_DECAY, SLOPE_DECAY, LEFT_OUT_OF_DECAY = 0.5, 2.0, 1e-3
-MANY_STEPS = 40
-LEAST_ORDER = 2
-# For effects that remember: they may be quicker under way than at rest, and in a fit than where it begins.
-DOUBLINGS, DOUBLINGS_OF_MANY, MANY_STATES = 4, 2, 24
 CHUNK = 500
 # In medians of the sample interval.
 LONGEST_STEP = 1.5
@@ -103,8 +96,7 @@ class Likelihood:
         )
         states = self.model.states.numel()
         remembers = states > 6 + robot.cable_count + len(self.uncertain)
-        doublings = DOUBLINGS_OF_MANY if states > MANY_STATES else DOUBLINGS
-        self.substeps = substeps_for(modes(robot) * sample_time, doublings if remembers else 0)
+        self.substeps = substeps_between(robot, sample_time, states, remembers)
         self._lags = casadi.Function("lags", [self.model.parameters], [self.model.lags])
         self._run = Repeated(filter_sample(self.model, robot.cable_count, noise, self.substeps), carried=3)
 
@@ -269,27 +261,3 @@ def _columns(recording: Recording, measured: Array, shift: Array) -> tuple[tuple
     own = np.zeros(len(time), dtype=bool)
     own[rows] = True
     return (shown, looked, later, *speeds, step[None, :], drift[None, :]), own
-
-
-def substeps_for(turns: NDArray[np.complex128], doublings: int = 0) -> Substeps:
-    """How often to step between samples over which the modes go on by ``exp(turns)``."""
-    vibration, decay = float(np.max(np.abs(turns.imag))), float(np.max(np.abs(turns)))
-    many = min(ceil(decay / STATE_ANGLE), MANY_STEPS)
-    state = max(1, ceil(vibration / STATE_ANGLE), many, ceil(decay / STATE_DECAY))
-    slope = max(1, ceil(vibration / SLOPE_ANGLE), ceil(decay / SLOPE_DECAY))
-    parts, order = slope * 2**doublings, LEAST_ORDER
-    while any(
-        2**doublings * (turn / parts) ** (order + 1) / factorial(order + 1) > left
-        for turn, left in ((vibration, LEFT_OUT), (decay, LEFT_OUT_OF_DECAY))
-    ):
-        order += 1
-    return Substeps(state, slope, order, doublings)
-
-
-def modes(robot: Robot) -> NDArray[np.complex128]:
-    """Eigenvalues at the start, in rad/s."""
-    model = symbolic_model(robot)
-    slope = casadi.Function("a", [model.states, model.inputs], [casadi.jacobian(model.rates, model.states)])
-    start = casadi.Function("start", [], [model.start])
-    matrix = np.array(slope(start()["o0"], 0.0))
-    return np.linalg.eigvals(matrix).astype(complex)
