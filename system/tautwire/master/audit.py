@@ -75,12 +75,15 @@ class Account:
 
     def warnings(self) -> tuple[str, ...]:
         """What a user should know: where the coupling made energy, or steps ended before inputs and outputs agreed."""
-        made = (
-            f"the coupling made {self.made:.3g} J, {100.0 * self.share:.2g} % of the energy exchanged: "
-            "take a smaller --step, or FMUs that save their states"
-        )
-        unsettled = (
-            f"in {self.unsettled} of {self.steps} steps inputs and outputs did not agree after all redos: "
-            "take a smaller --step; where that does not help, some FMU rounds its outputs"
-        )
-        return (made,) * (self.share > WARNED_SHARE) + (unsettled,) * (self.unsettled > WARNED_UNSETTLED * self.steps)
+        told = []
+        if self.share > WARNED_SHARE:
+            told.append(
+                f"the coupling made {self.made:.3g} J, {100.0 * self.share:.2g} % of the energy exchanged: "
+                "take a smaller --step, or FMUs that save their states"
+            )
+        if self.unsettled > WARNED_UNSETTLED * self.steps:
+            told.append(
+                f"in {self.unsettled} of {self.steps} steps inputs and outputs did not agree after all redos: "
+                "take a smaller --step; where that does not help, some FMU rounds its outputs"
+            )
+        return tuple(told)

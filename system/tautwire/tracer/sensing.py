@@ -45,7 +45,9 @@ def shown_late(model: Model, cable_count: int, later: SX, step: SX, shift: SX) -
 
 
 def sensing(model: Model, cable_count: int) -> Function:
-    """Arguments: state, inputs, parameters, next winch speeds, time step, shift. Results: as :func:`shown_late`, its
+    """What sensors show, with its derivatives.
+
+    Arguments: state, inputs, parameters, next winch speeds, time step, shift. Results: as :func:`shown_late`, and its
     derivatives by the state (m, n) and by the parameters (m, p).
     """
     later, step, shift = SX.sym("later", cable_count), SX.sym("step"), SX.sym("shift", 3 + cable_count)
