@@ -27,6 +27,8 @@ LEAST_MISSES, MOST_MISSES = 3, 8
 DAMPED, LEAST_SQUARE = 1e-10, 1e-100
 # So many times worse than a step before, and even the best prediction has met a corner.
 CORNER, NEGLIGIBLE = 10.0, 1e-9
+# So many times farther than points lie apart, a polynomial through them tells no more than their errors.
+FARTHEST = 5.0
 KEPT_WEIGHTS = 64
 
 
@@ -70,7 +72,7 @@ class Prediction:
         """A step that ends at ``time``: set ``shown`` to what is expected of it."""
         if not len(self._places):
             return
-        memory = self.memory
+        memory = self.memory = _within_reach(self.memory, time)
         points = memory.past[-min(memory.smooth, POINTS) :]
         values = np.array([value for _, value in points])
         weights = self._weights_for([at for at, _ in points], time)
@@ -117,6 +119,18 @@ class Prediction:
                 self._weights.clear()
             self._weights[key] = [_all_weights(key[1:], ends.shape[0], step) for ends in self._ends]
         return self._weights[key]
+
+
+def _within_reach(memory: Memory, time: float) -> Memory:
+    """Without the points that lie too close together for ``time`` to be foretold from them."""
+    times = [at for at, _ in memory.past[-min(memory.smooth, POINTS) :]]
+    least = (time - times[-1]) / FARTHEST
+    far = 1
+    while far < len(times) and times[-far] - times[-far - 1] >= least:
+        far += 1
+    if far == len(times):
+        return memory
+    return memory._replace(smooth=far, choice=min(memory.choice, far - 1), misses=None)
 
 
 def _targets(group: Sequence[Chain]) -> list[int]:
