@@ -127,7 +127,8 @@ class Fitter:
                 max_nfev=EVALUATIONS,
             )
             scaled, slopes = residual.origin + solution.x, np.asarray(solution.jac, dtype=float)
-        values = scaled * scale
+        # What is scaled back may end beyond a bound by its last digit.
+        values = np.clip(scaled * scale, *bounds_of(robot, free))
         covariance = np.linalg.pinv(slopes.T @ slopes) * np.outer(scale, scale)
         fitted = with_values(robot, free, dict(zip(free, values.tolist(), strict=True)))
         return Fit(fitted, free, values, covariance)

@@ -66,7 +66,7 @@ def ends(fitter: Fitter, fit: Fit, chosen: Sequence[Hypothesis], sample: Sample,
         low, high = _both(surface, index, (least, most), MOST_LOWER)
     except (LowerError, TooManyRunsError):
         return (max(value - reach, least), min(value + reach, most)) if reach > 0.0 else (least, most)
-    return min(low, value), max(high, value)
+    return max(min(low, value), least), min(max(high, value), most)
 
 
 def _ends_apart(
