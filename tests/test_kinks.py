@@ -7,6 +7,7 @@ import pytest
 
 from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.master import Account, FixedStep, Kept, Sampled, simulate
+from tautwire.master.kinks import _landing
 from tautwire.robots.robot import Platform
 from tautwire.runs.cosimulation import instantiated
 from tautwire.runs.wiring import shown_ports
@@ -53,6 +54,22 @@ def test_without_cuts_a_slack_cable_costs_the_order(fmus: RobotFmus, exact: np.n
 
 def test_each_kink_costs_few_steps(fmus: RobotFmus) -> None:
     assert run(fmus, 0.01)[1].steps < 150 + 6 * 4
+
+
+def test_the_way_back_from_a_root_ends_where_every_step_tried_there_is_bent() -> None:
+    """A sign may hold in search of the root, and not any more on the way back from it."""
+    bent = {1.0, *(0.5 - near * 4.0**k for near in (1e-3, 5e-4) for k in range(5))}
+    tried: list[float] = []
+
+    def at(span: float) -> np.ndarray:
+        tried.append(span)
+        assert len(tried) < 100
+        return np.array([-1.0 if any(abs(span - place) < 1e-5 for place in bent) else 0.5 - span])
+
+    landed = _landing(at, 1.0, np.ones(1), -0.5 * np.ones(1), np.array([0]))
+    assert tried[-1] == landed
+    assert 0.0 < landed < 0.5
+    assert at(landed)[0] > 0.0
 
 
 def test_the_cable_pulls_less_than_nothing_only_while_its_tension_is_zero(fmus: RobotFmus) -> None:

@@ -27,6 +27,7 @@ Array = NDArray[np.float64]
 
 INSTANCES: Mapping[str, type[Fmi2Instance] | type[Fmi3Instance]] = {"2.0": Fmi2Instance, "3.0": Fmi3Instance}
 KEPT_MESSAGES = 20
+RESTORABLE = ("discard", "error")
 
 
 class ComponentError(TautwireError):
@@ -56,6 +57,11 @@ class ComponentError(TautwireError):
     def outcome(self) -> str:
         """What became of the call, in words."""
         return f"gave '{self.status}'"
+
+    @property
+    def can_restore(self) -> bool:
+        """Whether the standard lets the FMU go back to a saved state from there, to try a shorter step."""
+        return self.status in RESTORABLE
 
 
 @dataclass(frozen=True)

@@ -24,7 +24,7 @@ from .agreement import Agreement
 from .audit import Account, Bond
 from .bends import Bends
 from .checkpoint import Checkpoint
-from .component import Component
+from .component import Component, ComponentError
 from .fallback import fallback
 from .held import Held
 from .hermite import chains_of
@@ -39,6 +39,8 @@ Array = NDArray[np.float64]
 
 MOST_ROUNDS, SETTLED = 20, 1e-12
 ROUNDING = 1e-13
+# Of nominal values: who errs by more after all redos has not merely rounded.
+LOST = 1e-3
 
 
 class Coupling:
@@ -104,6 +106,7 @@ class Coupling:
         self._kink_places = _places(shown, kinks)
         self._driven = np.full(len(drives), np.nan)
         self._reached: float | None = None
+        self.lost = False
         self._fed_back = fed_back([seat.component.name for seat in self._order], (*connections, *rates), shown)
         self._scale = self._nominal[self._fed_back]
         self._guessing = [seat for seat in self._order if np.isin(seat.sources, self._fed_back).any()]
@@ -190,7 +193,10 @@ class Coupling:
         self.pass_on_guessed()
 
     def attempt(self, time: float, step: float, start: Array, end: Array) -> Checkpoint | None:
-        """A step as :meth:`step` makes it; returns where it began, to be let go, if the components can go back."""
+        """A step as :meth:`step` makes it; returns where it began, to be let go, if the components can go back.
+
+        Where an FMU fails that can go back all of them have done so when ComponentError is raised.
+        """
         jumped = not (np.abs(start - self._driven) <= ROUNDING * np.abs(start)).all()
         jumped |= self._held.begin(self._shown)
         if jumped:
@@ -199,11 +205,14 @@ class Coupling:
         before = self.save() if self.can_redo else None
         try:
             redos, agreed = self._iterate(time, step, end, before)
-        except BaseException:
+        except BaseException as error:
             if before is not None:
+                if isinstance(error, ComponentError) and error.can_restore:
+                    self.restore(before)
                 self.release(before)
             raise
         self._enter_books(step, redos, agreed)
+        self.lost = not agreed and redos > 0 and not self._secants.error() < LOST
         self._reached = time + step
         if not agreed:
             self.pass_on_guessed()

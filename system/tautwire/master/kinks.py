@@ -13,46 +13,52 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from .coupling import Coupling
+from .halving import Drives, step_held
 
 Array = NDArray[np.float64]
-Drives = Callable[[float, float], tuple[Array, Array]]
 
 # A kink nearer than this is stepped over; the error is of second order in it.
 WIDTH = 1e-6
 NEAREST = 0.2 * WIDTH
-MOST_CUTS = 20
+MOST_PIECES = 40
+# Of what is left of a step: no piece leaves less.
+LEAST_REST = 1e-6
 LANDING = 1e-3
 
 
 def step_over(coupling: Coupling, time: float, step: float, drives: Drives) -> float:
-    """One macro step from ``time``, cut at the kinks inside it where states can be restored.
+    """One macro step from ``time``, where states can be restored in pieces: cut at kinks, and where redos are lost.
 
     ``drives(time, step)`` gives the driven inputs at both ends. A sign that changes twice within a step is not seen.
-    Returns the length of the first piece: ``step`` where there was no kink.
+    Returns the length of the first piece: ``step`` where it was made whole.
     """
-    done, first = 0.0, step
-    if coupling.can_cut and coupling.kinks().size:
-        for _ in range(MOST_CUTS):
-            cut = _step_to_kink(coupling, time + done, step - done, drives)
-            if cut is None:
-                return first
-            first = first if done else cut
-            done += cut
+    if not (coupling.can_redo and coupling.can_cut):
+        coupling.step(time, step, *drives(time, step))
+        return step
+    done, first, reach = 0.0, step, step
+    for _ in range(MOST_PIECES):
+        rest = step - done
+        piece = rest if reach > (1.0 - LEAST_REST) * rest else reach
+        made, lost = _step_to_kink(coupling, time + done, piece, drives)
+        first = first if done else made
+        if made == rest:
+            return first
+        done += made
+        reach = made if lost else 2.0 * reach
     coupling.step(time + done, step - done, *drives(time + done, step - done))
     return first
 
 
-def _step_to_kink(coupling: Coupling, time: float, step: float, drives: Drives) -> float | None:
-    """Step up to the first kink, or over it where it is near; returns how far, None where the whole step is made."""
+def _step_to_kink(coupling: Coupling, time: float, step: float, drives: Drives) -> tuple[float, bool]:
+    """Step up to the first kink, or over it where it is near; returns how far, and whether a longer step was lost."""
     signs = np.sign(coupling.kinks())
-    before = coupling.attempt(time, step, *drives(time, step))
-    if before is None:
-        return None
+    reached, before = step_held(coupling, time, step, drives)
+    lost, step = reached < step, reached
     try:
         end = coupling.kinks()
         changed = np.flatnonzero(np.sign(end) != signs)
         if not len(changed) or step <= 2.0 * WIDTH:
-            return None
+            return step, lost
 
         def at(span: float) -> Array:
             coupling.restore(before)
@@ -61,10 +67,10 @@ def _step_to_kink(coupling: Coupling, time: float, step: float, drives: Drives) 
 
         before_kink = _landing(at, step, signs, end, changed)
         if before_kink > WIDTH:
-            return before_kink
+            return before_kink, lost
         at(2.0 * WIDTH)
         coupling.forget(time + 2.0 * WIDTH)
-        return 2.0 * WIDTH
+        return 2.0 * WIDTH, lost
     finally:
         coupling.release(before)
 
@@ -76,20 +82,27 @@ def _landing(at: Callable[[float], Array], step: float, signs: Array, end: Array
     """
     if np.any(np.sign(at(WIDTH)) != signs):
         return 0.0
-    near = max(LANDING * step, NEAREST)
-
-    def shown(span: float, place: int) -> float:
-        return float((end if span == step else at(span))[place])
-
+    reached, back = step, 0.0
     while True:
-        root = min(float(brentq(shown, WIDTH, step, args=(int(place),), xtol=near)) for place in changed)
-        back = near
-        while root - back > WIDTH:
-            if np.all(np.sign(at(root - back)) == signs):
-                return float(root - back)
-            back *= 4.0
-        if near <= NEAREST:
+        near = max(LANDING * reached, NEAREST)
+        if reached - WIDTH <= near:
             at(WIDTH)
             return 0.0
-        # The kink is not much farther than its place is uncertain: look closer.
-        near = max(LANDING * root, NEAREST)
+        root = min(_root(at, WIDTH, (reached, end), int(place), near) for place in changed)
+        # Never less far back than half of what is left, so that this comes to an end.
+        back = max(near, 4.0 * back)
+        reached = max(root - back, 0.5 * (WIDTH + root))
+        end = at(reached)
+        changed = np.flatnonzero(np.sign(end) != signs)
+        if not len(changed):
+            return reached
+
+
+def _root(at: Callable[[float], Array], low: float, high: tuple[float, Array], place: int, near: float) -> float:
+    """Where the output at ``place`` changes its sign between ``low`` and the end that is known already."""
+    span, end = high
+
+    def shown(tried: float) -> float:
+        return float((end if tried == span else at(tried))[place])
+
+    return float(brentq(shown, low, span, xtol=near))

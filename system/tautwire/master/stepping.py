@@ -12,10 +12,10 @@ from numpy.typing import NDArray
 
 from ..errors import TautwireError
 from .coupling import Coupling
+from .halving import Drives
 from .kinks import WIDTH, step_over
 
 Array = NDArray[np.float64]
-Drives = Callable[[float, float], tuple[Array, Array]]
 Watch = Callable[[], Array]
 
 SAFETY = 0.9
