@@ -64,9 +64,14 @@ def screen(
     open_ones: Sequence[Hypothesis],
     fitter: Fitter,
     sample: Sample,
+    roughness: float = 0.0,
 ) -> dict[Hypothesis, Prospect]:
-    """The best prospect of each hypothesis beside the accepted ones, whose parameters move along."""
-    signatures = signatures_of(robot, accepted, open_ones, fitter, sample)
+    """The best prospect of each hypothesis beside the accepted ones, whose parameters move along.
+
+    Far from noise slopes mislead: an oscillation that is out of phase after a while asks for damping whatever it lacks.
+    With ``roughness`` (m/s^2 per root hertz) the run stays beside what was measured, and slopes tell the truth.
+    """
+    signatures = signatures_of(robot, accepted, open_ones, fitter, sample, roughness)
     found: dict[Hypothesis, Prospect] = {}
     for hypothesis in open_ones:
         trials = enumerate(trials_of(hypothesis.effect)[: trial_count(hypothesis)])
@@ -82,22 +87,28 @@ def screened_apart(
     fitter: Fitter,
     sample: Sample,
     workers: Workers,
+    roughness: float = 0.0,
 ) -> dict[Hypothesis, Prospect]:
     """As :func:`screen`, the effects dealt out to the workers."""
     count = workers.processes
     if count == 1:
-        return screen(robot, accepted, open_ones, fitter, sample)
+        return screen(robot, accepted, open_ones, fitter, sample, roughness)
     effects = list(dict.fromkeys(hypothesis.effect for hypothesis in open_ones))
     dealt = [[h for h in open_ones if h.effect in effects[number::count]] for number in range(count)]
-    calls = [(fitter.noise, robot, accepted, own, sample) for own in dealt if own]
+    calls = [(fitter.noise, robot, accepted, own, sample, roughness) for own in dealt if own]
     found = {h: prospect for _, prospects in workers.each(_screen_alone, calls) for h, prospect in prospects.items()}
     return {hypothesis: found[hypothesis] for hypothesis in open_ones}
 
 
 def _screen_alone(
-    noise: Noise, robot: Robot, accepted: Sequence[Hypothesis], open_ones: Sequence[Hypothesis], sample: Sample
+    noise: Noise,
+    robot: Robot,
+    accepted: Sequence[Hypothesis],
+    open_ones: Sequence[Hypothesis],
+    sample: Sample,
+    roughness: float,
 ) -> dict[Hypothesis, Prospect]:
-    return screen(robot, accepted, open_ones, fitter_apart(noise), sample)
+    return screen(robot, accepted, open_ones, fitter_apart(noise), sample, roughness)
 
 
 def signatures_of(
@@ -106,6 +117,7 @@ def signatures_of(
     hypotheses: Sequence[Hypothesis],
     fitter: Fitter,
     sample: Sample,
+    roughness: float = 0.0,
 ) -> Signatures:
     """Of the accepted hypotheses' parameters, and of the others' on each cable alone, switched on and neutral."""
     likelihood, values = fitter.likelihood(robot, accepted, sample)
@@ -118,7 +130,7 @@ def signatures_of(
     gram, pull = np.zeros((len(begun), len(begun))), np.zeros(len(begun))
     slopes = np.hstack([direction.start for direction in directions])
     last = 0
-    for run in linearise_run(likelihood, values, sample.recording):
+    for run in linearise_run(likelihood, values, sample.recording, roughness):
         fitter.between()
         rows = np.zeros(len(run.own), dtype=bool)
         rows[run.own] = sample.rows[last : last + int(np.sum(run.own))]
@@ -175,11 +187,18 @@ def _prospect(
     values = dict(zip(names, (begun + move[old.shape[1] :]).tolist(), strict=True))
     bounds = {p.name: (p.minimum, p.maximum) for p in hypothesis.parameters}
     if any(not bounds[name][0] <= value <= bounds[name][1] for name, value in values.items()):
+        inside = {name: float(np.clip(value, *bounds[name])) for name, value in values.items()}
         # A bound crossed by one parameter of several is for the fit to see to.
-        gain = without if len(values) == 1 else gain
-        values = {name: float(np.clip(value, *bounds[name])) for name, value in values.items()}
+        if len(values) == 1:
+            gain = without + (gain - without) * _kept(begun[0], values[names[0]], inside[names[0]])
+        values = inside
     kept = {name: value for name, value in shapes.items() if name in hypothesis.form}
     return Prospect(gain - without, {**kept, **values})
+
+
+def _kept(begun: float, best: float, bound: float) -> float:
+    """Of a parabola's gain between where it has ``begun`` and its ``best``, the share at a bound between."""
+    return 1.0 - ((best - bound) / (best - begun)) ** 2
 
 
 def moved_by(signatures: Signatures, hypothesis: Hypothesis, trial: int) -> tuple[list[str], Array]:

@@ -34,6 +34,8 @@ ROUNDS = 4
 ROUGHLY_ALIKE, SHARE_ALIKE = 50.0, 1e-3
 # Relative change of the cost at which fits to a part stop.
 PART = 1e-4
+# Roughness (m/s^2 per root hertz) under which a model far from noise is looked at, too.
+ROUGH = 0.1
 # The best prospects, which are always fitted to all of it.
 SURE = 2
 # Mean square of innovations below which a model needs no larger form of the same effects.
@@ -144,11 +146,12 @@ class Search:
         self.progress(f"round {number}: screening", 0.0)
         prospects = screened_apart(robot, accepted, open_ones, self.fitter, looked, self.workers)
         prospects |= scanned(robot, accepted, self.fitter, looked, silent(prospects), self.workers)
-        worth = worth_fitting(prospects)
+        near = {} if adequate else screened_apart(robot, accepted, open_ones, self.fitter, looked, self.workers, ROUGH)
+        worth = worth_fitting(prospects, near)
         if not adequate:
-            few, near = fit.beginning(OF_RIVALS), {h: prospects[h] for h in worth}
-            prospects |= scanned(robot, accepted, self.fitter, few, near, self.workers)
-        starts = {h: self._starts(robot, h, prospects[h]) for h in worth}
+            few, promising = fit.beginning(OF_RIVALS), {h: prospects[h] for h in worth}
+            prospects |= scanned(robot, accepted, self.fitter, few, promising, self.workers)
+        starts = {h: self._starts(robot, h, [p[h] for p in (prospects, near) if h in p]) for h in worth}
         # Far from noise the trials need only be told from each other.
         without = self._best_on_judge(robot, accepted, -inf if adequate else inf)
         least = self._log_likelihood(robot, accepted, sample)
@@ -182,10 +185,10 @@ class Search:
         tried = self._tried(f"round {number}", tasks, sample, without, hasty)
         return [tried[hypothesis] for hypothesis in starts if hypothesis in tried]
 
-    def _starts(self, robot: Robot, hypothesis: Hypothesis, prospect: Prospect) -> tuple[Robot, ...]:
-        setting = hypothesis.setting(robot)
-        promised = EffectSetting(setting.name, {**setting.values, **prospect.values}, setting.cables)
-        return robot.with_effect(promised), robot.with_effect(setting)
+    def _starts(self, robot: Robot, hypothesis: Hypothesis, prospects: Sequence[Prospect]) -> tuple[Robot, ...]:
+        begun = hypothesis.setting(robot)
+        promised = [EffectSetting(begun.name, {**begun.values, **p.values}, begun.cables) for p in prospects]
+        return tuple(robot.with_effect(setting) for setting in (*promised, begun))
 
     def _polished(
         self,

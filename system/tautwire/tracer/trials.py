@@ -17,7 +17,7 @@ ALIKE = 5.0
 # A gain on FIT below this many nats is what chance gives some of the hypotheses.
 HOPELESS = 4.0
 # Only so many of the best prospects are fitted, and those that promise this share of the best.
-MOST_FITTED = 8
+MOST_FITTED, MOST_BESIDE = 8, 3
 MOST_OF_AN_EFFECT = 3
 PROMISING = 0.02
 
@@ -62,8 +62,21 @@ def setting_of(robot: Robot, hypothesis: Hypothesis) -> EffectSetting:
     return next(setting for setting in robot.effects if (setting.name, setting.cables) == wanted)
 
 
-def worth_fitting(prospects: Mapping[Hypothesis, Prospect]) -> list[Hypothesis]:
-    """The best prospects, best first, few of each effect."""
+def worth_fitting(
+    prospects: Mapping[Hypothesis, Prospect], beside: Mapping[Hypothesis, Prospect] | None = None
+) -> list[Hypothesis]:
+    """The best prospects, best first, few of each effect; then the best ``beside`` them, in place of the last.
+
+    Those are promised by another look at the same hypotheses.
+    """
+    ranked, others = _ranked(prospects), _ranked(beside or {})
+    sure = ranked[: MOST_FITTED - MOST_BESIDE]
+    new = [hypothesis for hypothesis in others[:MOST_BESIDE] if hypothesis not in sure]
+    kept = [hypothesis for hypothesis in ranked if hypothesis not in new]
+    return [*kept[: MOST_FITTED - len(new)], *new]
+
+
+def _ranked(prospects: Mapping[Hypothesis, Prospect]) -> list[Hypothesis]:
     ranked: list[Hypothesis] = []
     for hypothesis in sorted(prospects, key=lambda hypothesis: -prospects[hypothesis].gain):
         if sum(hypothesis.effect is other.effect for other in ranked) < MOST_OF_AN_EFFECT:
