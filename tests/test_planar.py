@@ -44,6 +44,7 @@ HIDDEN = [
     (VERTICAL, {"payload": {"mass": 1.0}}, 80.0),
     (VERTICAL, {"modulus": {"modulus": 0.7e10}}, 60.0),
     (VERTICAL, {"pulley": {"radius": 0.03}}, 80.0),
+    (VERTICAL, {"payload": {"mass": -1.0}}, 30.0),
 ]
 
 

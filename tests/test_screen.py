@@ -1,14 +1,22 @@
 """What hypotheses promise, worked out here and by workers."""
 
+from pathlib import Path
+
+import numpy as np
 import pytest
 
+from tautwire.recordings.recording import read_recording
+from tautwire.robots.reading import read_robot
 from tautwire.tracer.data import split
+from tautwire.tracer.directions import Column
 from tautwire.tracer.fit import Fitter
 from tautwire.tracer.hypotheses import Hypothesis, hypotheses
 from tautwire.tracer.preparation.noise import noise_of
-from tautwire.tracer.screen import screen, screened_apart
+from tautwire.tracer.ready import readings
+from tautwire.tracer.screen import Signatures, _prospect, screen, screened_apart
 from tautwire.tracer.workers import Workers
 from tautwire_fmu.laws.effects import BY_NAME
+from tests.planar import VERTICAL, planar_case
 from tests.recordings import recorded
 from tests.robots import example
 
@@ -36,3 +44,31 @@ def test_workers_promise_the_same() -> None:
     for hypothesis, prospect in here.items():
         assert apart[hypothesis].gain == pytest.approx(prospect.gain, rel=1e-6, abs=1e-6)
         assert apart[hypothesis].values == pytest.approx(dict(prospect.values), rel=1e-6)
+
+
+def test_far_from_noise_a_rough_look_tells_what_slopes_do_not(tmp_path: Path) -> None:
+    """After a second the oscillations of a platform a fifth lighter are out of phase with the model's."""
+    robot_file, fit, check = planar_case(tmp_path, VERTICAL, {"payload": {"mass": -1.0}}, 1, preferred=30.0)
+    robot = read_robot(robot_file)
+    with Workers(1) as workers:
+        ready, *_ = readings(robot, read_recording(fit, 4), read_recording(check, 4), workers)
+    sample = ready.evidence.fit.head
+    found = [screen(robot, (), hypotheses(robot), ready.fitter, sample, roughness) for roughness in (0.0, 0.1)]
+    ranks = [sorted(prospects, key=lambda h: -prospects[h].gain) for prospects in found]
+    payload = Hypothesis(BY_NAME["payload"], ())
+    assert ranks[0].index(payload) > 10
+    assert ranks[1].index(payload) == 0
+    assert found[1][payload].values["mass"] == pytest.approx(-1.0, rel=0.2)
+
+
+@pytest.mark.parametrize(("best", "kept", "value"), [(1.0, 1.0, 1.0), (20.0, 0.75, 10.0), (-1.0, 0.0, 0.0)])
+def test_a_bound_before_the_best_value_leaves_what_the_way_there_gains(best: float, kept: float, value: float) -> None:
+    pulley = Hypothesis(BY_NAME["pulley"], (1,))
+    least, most = pulley.parameters[0].minimum, pulley.parameters[0].maximum
+    assert least == 0.0
+    unit = most / 10.0
+    column = Column("pulley", (1,), "radius", 0)
+    signatures = Signatures((column,), np.zeros(1), np.ones((1, 1)), np.array([-best * unit]))
+    found = _prospect(signatures, (), pulley, 0, {})
+    assert found.gain == pytest.approx(kept * 0.5 * (best * unit) ** 2)
+    assert found.values["radius"] == pytest.approx(value * unit)
