@@ -6,7 +6,7 @@ iterated: the polynomial through value and rate at both ends cannot bend.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
@@ -80,7 +80,8 @@ def _landing(at: Callable[[float], Array], step: float, signs: Array, end: Array
 
     Near a kink two solutions of a step can agree with themselves, one bent, one not; hence the way back from the root.
     """
-    if np.any(np.sign(at(WIDTH)) != signs):
+    begin = at(WIDTH)
+    if np.any(np.sign(begin) != signs):
         return 0.0
     reached, back = step, 0.0
     while True:
@@ -88,7 +89,8 @@ def _landing(at: Callable[[float], Array], step: float, signs: Array, end: Array
         if reached - WIDTH <= near:
             at(WIDTH)
             return 0.0
-        root = min(_root(at, WIDTH, (reached, end), int(place), near) for place in changed)
+        known = {WIDTH: begin, reached: end}
+        root = min(_root(at, known, int(place), near) for place in changed)
         # Never less far back than half of what is left, so that this comes to an end.
         back = max(near, 4.0 * back)
         reached = max(root - back, 0.5 * (WIDTH + root))
@@ -98,11 +100,10 @@ def _landing(at: Callable[[float], Array], step: float, signs: Array, end: Array
             return reached
 
 
-def _root(at: Callable[[float], Array], low: float, high: tuple[float, Array], place: int, near: float) -> float:
-    """Where the output at ``place`` changes its sign between ``low`` and the end that is known already."""
-    span, end = high
+def _root(at: Callable[[float], Array], known: Mapping[float, Array], place: int, near: float) -> float:
+    """Where the output at ``place`` changes its sign between two spans at which it is known already."""
 
-    def shown(tried: float) -> float:
-        return float((end if tried == span else at(tried))[place])
+    def shown(span: float) -> float:
+        return float((known[span] if span in known else at(span))[place])
 
-    return float(brentq(shown, low, span, xtol=near))
+    return float(brentq(shown, min(known), max(known), xtol=near))
