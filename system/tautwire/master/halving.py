@@ -27,21 +27,26 @@ def step_held(coupling: Coupling, time: float, step: float, drives: Drives) -> t
     ``drives(time, step)`` gives the driven inputs at both ends. States have to be restorable; the one returned is to
     be let go. The shortest step is kept even if it is lost.
 
-    Raises ComponentError where an FMU fails even in the shortest.
+    Raises ComponentError where an FMU fails even in the shortest: the first, of the whole step.
     """
+    failed: ComponentError | None = None
     for _ in range(MOST_HALVINGS):
         try:
             before = _attempt(coupling, time, step, drives)
         except ComponentError as error:
             if not error.can_restore:
                 raise
+            failed = failed or error
         else:
             if not coupling.lost:
                 return step, before
             coupling.restore(before)
             coupling.release(before)
         step *= 0.5
-    return step, _attempt(coupling, time, step, drives)
+    try:
+        return step, _attempt(coupling, time, step, drives)
+    except ComponentError as error:
+        raise failed or error from error
 
 
 def _attempt(coupling: Coupling, time: float, step: float, drives: Drives) -> Checkpoint:
