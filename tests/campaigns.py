@@ -9,9 +9,9 @@ import numpy as np
 
 from tautwire.campaign.plan import Plan
 from tautwire.campaign.reading import read_plan
-from tautwire.campaign.run import Result, run_job, shared_of
-from tautwire.campaign.running import jobs_of, recordings_of, run_count
-from tautwire.robots.reading import robot_from
+from tautwire.campaign.run import RunResult, build_context, run_job
+from tautwire.campaign.running import path_recordings, planned_jobs, run_count
+from tautwire.robots.reading import robot_from_content
 from tests.robots import EXAMPLES
 
 AT_REST = """
@@ -58,8 +58,8 @@ def read(folder: Path, text: str, robot: str = "three") -> Plan:
     return read_plan(plan_file(folder, text, robot))
 
 
-def bare_results(plan: Plan, folder: Path) -> list[Result]:
+def bare_results(plan: Plan, folder: Path) -> list[RunResult]:
     """All runs in a bare loop of this process."""
-    cables = robot_from(dict(plan.content), plan.file).cable_count
-    shared = shared_of(plan, recordings_of(plan, cables))
-    return [run_job(shared, job, folder) for job in jobs_of(plan, np.ones(run_count(plan), dtype=bool))]
+    cables = robot_from_content(dict(plan.content), plan.file).cable_count
+    shared = build_context(plan, path_recordings(plan, cables))
+    return [run_job(shared, job, folder) for job in planned_jobs(plan, np.ones(run_count(plan), dtype=bool))]

@@ -13,7 +13,7 @@ from distributed import Client
 
 from tautwire.campaign.dataset import read_rows
 from tautwire.campaign.plan import Plan
-from tautwire.campaign.rows import columns_of
+from tautwire.campaign.rows import row_columns
 from tests.campaigns import bare_results
 
 Processes = list[subprocess.Popen[bytes]]
@@ -30,7 +30,7 @@ def rows_of(folder: Path) -> list[dict[str, object]]:
 
 def bare_rows(plan: Plan, folder: Path) -> list[dict[str, object]]:
     """What a bare loop makes of it, with a null wherever a run says nothing."""
-    names = [column.name for column in columns_of(plan, 3)]
+    names = [column.name for column in row_columns(plan, 3)]
     return [{**dict.fromkeys(names), **result.row} for result in bare_results(plan, folder)]
 
 

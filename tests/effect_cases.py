@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from tautwire.robots.robot import PER_CABLE, EffectSetting, Robot
+from tautwire.robots.robot import PER_CABLE_COMPONENTS, EffectSetting, Robot
 from tautwire_fmu.laws.effects import BY_NAME
 
 
@@ -21,7 +21,7 @@ class Case:
 
     def setting(self, robot: Robot) -> EffectSetting:
         """As the robot has it."""
-        everywhere = robot.cable_numbers if BY_NAME[self.name].component in PER_CABLE else ()
+        everywhere = robot.cable_numbers if BY_NAME[self.name].component in PER_CABLE_COMPONENTS else ()
         return EffectSetting(self.name, self.law, self.cables or everywhere)
 
     def for_rig(self) -> dict[str, Any]:

@@ -15,5 +15,5 @@ def refused(call: Callable[[], object], argument: str, *words: str) -> None:
         call()
     error = caught.value
     assert error.where == argument
-    assert error.problem and error.mend and "\n" not in str(error)
+    assert error.problem and error.hint and "\n" not in str(error)
     assert not [word for word in words if word not in str(error)], str(error)

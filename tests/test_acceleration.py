@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tautwire.master.acceleration import Lessons, Secants
+from tautwire.master.acceleration import QuasiNewton, QuasiNewtonHistory
 
 SLOWLY = np.array([[0.6, 0.2, 0.0], [0.1, 0.5, -0.3], [0.0, 0.2, 0.4]])
 OFFSET = np.array([1.0, -2.0, 0.5])
@@ -14,76 +14,76 @@ def passed(given: np.ndarray, matrix: np.ndarray = SLOWLY) -> np.ndarray:
     return matrix @ given + OFFSET
 
 
-def error_after(redos: int, secants: Secants, given: np.ndarray, matrix: np.ndarray = SLOWLY) -> float:
-    secants.begin()
-    secants.learn(given, passed(given, matrix))
+def error_after(redos: int, secants: QuasiNewton, given: np.ndarray, matrix: np.ndarray = SLOWLY) -> float:
+    secants.begin_step()
+    secants.update(given, passed(given, matrix))
     for _ in range(redos):
-        given = secants.next()
-        secants.learn(given, passed(given, matrix))
+        given = secants.next_input()
+        secants.update(given, passed(given, matrix))
     solution = np.linalg.solve(np.eye(3) - matrix, OFFSET)
     return float(np.max(np.abs(passed(given, matrix) - solution)))
 
 
 def test_a_linear_coupling_of_three_is_solved_by_four_redos() -> None:
-    assert error_after(4, Secants(3), np.zeros(3)) < 1e-12
+    assert error_after(4, QuasiNewton(3), np.zeros(3)) < 1e-12
 
 
 def test_what_one_step_taught_serves_the_next() -> None:
-    secants = Secants(3)
+    secants = QuasiNewton(3)
     error_after(4, secants, np.zeros(3))
     assert error_after(1, secants, np.array([5.0, -1.0, 2.0])) < 1e-10
-    secants.forget()
+    secants.reset()
     assert error_after(1, secants, np.array([5.0, -1.0, 2.0])) > 1e-3
 
 
 def test_a_coupling_that_has_changed_a_little_is_still_known() -> None:
-    secants = Secants(3)
+    secants = QuasiNewton(3)
     error_after(4, secants, np.zeros(3))
     start = np.array([5.0, -1.0, 2.0])
-    assert error_after(1, secants, start, 1.01 * SLOWLY) < 0.03 * error_after(1, Secants(3), start, 1.01 * SLOWLY)
+    assert error_after(1, secants, start, 1.01 * SLOWLY) < 0.03 * error_after(1, QuasiNewton(3), start, 1.01 * SLOWLY)
 
 
 def test_passes_that_lead_away_are_solved_too() -> None:
-    assert error_after(4, Secants(3), np.zeros(3), -3.0 * SLOWLY) < 1e-12
+    assert error_after(4, QuasiNewton(3), np.zeros(3), -3.0 * SLOWLY) < 1e-12
 
 
 def test_the_first_redo_of_all_is_a_plain_one() -> None:
-    secants = Secants(3)
-    secants.begin()
-    secants.learn(np.zeros(3), passed(np.zeros(3)))
-    assert secants.next() == pytest.approx(passed(np.zeros(3)))
+    secants = QuasiNewton(3)
+    secants.begin_step()
+    secants.update(np.zeros(3), passed(np.zeros(3)))
+    assert secants.next_input() == pytest.approx(passed(np.zeros(3)))
 
 
 def test_a_pass_that_repeats_itself_teaches_nothing() -> None:
-    secants = Secants(3)
-    secants.begin()
+    secants = QuasiNewton(3)
+    secants.begin_step()
     for _ in range(2):
-        secants.learn(SOLUTION, passed(SOLUTION))
-    assert secants.next() == pytest.approx(SOLUTION)
+        secants.update(SOLUTION, passed(SOLUTION))
+    assert secants.next_input() == pytest.approx(SOLUTION)
 
 
 def test_the_error_is_told_without_another_pass() -> None:
-    secants = Secants(3)
+    secants = QuasiNewton(3)
     error_after(4, secants, np.zeros(3))
     given = np.array([5.0, -1.0, 2.0])
-    secants.begin()
-    secants.learn(given, passed(given))
+    secants.begin_step()
+    secants.update(given, passed(given))
     true = float(np.max(np.abs(passed(given) - SOLUTION)))
-    assert true < secants.error() < 3.0 * true
+    assert true < secants.error_estimate() < 3.0 * true
 
 
 def test_what_is_not_learnt_yet_is_taken_for_an_error() -> None:
-    secants = Secants(3)
-    secants.begin()
-    secants.learn(np.zeros(3), passed(np.zeros(3)))
-    assert secants.error() == pytest.approx(np.max(np.abs(OFFSET)))
+    secants = QuasiNewton(3)
+    secants.begin_step()
+    secants.update(np.zeros(3), passed(np.zeros(3)))
+    assert secants.error_estimate() == pytest.approx(np.max(np.abs(OFFSET)))
 
 
 def test_lessons_are_kept_by_the_length_of_the_step() -> None:
-    lessons = Lessons(3)
-    long, short = lessons.of(0.1), lessons.of(0.05)
+    lessons = QuasiNewtonHistory(3)
+    long, short = lessons.for_step_size(0.1), lessons.for_step_size(0.05)
     assert long is not short
-    assert lessons.of(0.104) is long
-    assert lessons.of(0.052) is short
-    lessons.forget()
-    assert lessons.of(0.1) is not long
+    assert lessons.for_step_size(0.104) is long
+    assert lessons.for_step_size(0.052) is short
+    lessons.reset()
+    assert lessons.for_step_size(0.1) is not long

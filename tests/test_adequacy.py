@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tautwire.tracer.adequacy import enough_samples, is_noise, largest_autocorrelations
+from tautwire.tracer.adequacy import has_enough_samples, largest_autocorrelations, residuals_are_white
 from tautwire.tracer.likelihood import Innovations
 
 
@@ -11,7 +11,7 @@ def innovations(values: np.ndarray, seen: np.ndarray | None = None) -> Innovatio
 
 
 def judged(values: np.ndarray, seen: np.ndarray | None = None) -> bool:
-    return is_noise(innovations(values, seen), np.ones(len(values), dtype=bool))
+    return residuals_are_white(innovations(values, seen), np.ones(len(values), dtype=bool))
 
 
 def white(seed: int, count: int = 1000) -> np.ndarray:
@@ -49,8 +49,8 @@ def test_a_measured_cell_without_a_finite_innovation_is_not_noise() -> None:
 
 def test_a_hundred_samples_are_the_least() -> None:
     rows = np.ones(150, dtype=bool)
-    assert enough_samples(innovations(white(7, 150)), rows)
-    assert not enough_samples(innovations(white(7, 150)), np.arange(150) < 99)
+    assert has_enough_samples(innovations(white(7, 150)), rows)
+    assert not has_enough_samples(innovations(white(7, 150)), np.arange(150) < 99)
 
 
 def largest(values: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -3,27 +3,27 @@
 import numpy as np
 import pytest
 
-from tautwire.master.agreement import FAR, Agreement
-from tautwire.master.bends import Bends
-from tautwire.master.hermite import Chain
+from tautwire.master.agreement import MAX_TOLERANCE_GROWTH, ConvergenceCriterion
+from tautwire.master.bends import InterpolationErrorEstimate
+from tautwire.master.hermite import DerivativeChain
 
 STEP, TOLERANCE, SHARE = 0.1, 1e-13, 0.1
 MISSED = 720.0 * STEP**6 / 46080.0
 
 
-class Looks(Bends):
+class Looks(InterpolationErrorEstimate):
     """Bends that count how often they are looked at."""
 
     count = 0
 
     def largest(self, begun: np.ndarray, shown: np.ndarray, step: float) -> float:
         self.count += 1
-        return super().largest(begun, shown, step)
+        return super().max_error(begun, shown, step)
 
 
 @pytest.fixture
 def bends() -> Looks:
-    return Looks([Chain((0, 1, 2), (3, 4, 5))], np.array([1.0, 1e9, 1e9, 1.0, 1e9, 1e9]))
+    return Looks([DerivativeChain((0, 1, 2), (3, 4, 5))], np.array([1.0, 1e9, 1e9, 1.0, 1e9, 1e9]))
 
 
 def sixth_power(time: float) -> np.ndarray:
@@ -31,62 +31,64 @@ def sixth_power(time: float) -> np.ndarray:
     return np.array([k for at in (time, 0.5 * time) for k in (at**6, 6.0 * at**5, 30.0 * at**4)])
 
 
-def lacking(agreement: Agreement, error: float, share: float = SHARE, step: float = STEP) -> bool:
-    return agreement.lacking(error, TOLERANCE, share, sixth_power(0.0), sixth_power(step), step)
+def lacking(agreement: ConvergenceCriterion, error: float, share: float = SHARE, step: float = STEP) -> bool:
+    return agreement.is_unconverged(error, TOLERANCE, share, sixth_power(0.0), sixth_power(step), step)
 
 
 def test_without_a_share_the_tolerance_decides(bends: Looks) -> None:
-    agreement = Agreement(bends)
+    agreement = ConvergenceCriterion(bends)
     assert lacking(agreement, 1.1 * TOLERANCE, share=0.0)
     assert not lacking(agreement, 0.9 * TOLERANCE, share=0.0)
     assert bends.count == 0
 
 
 def test_a_share_of_what_the_polynomials_miss_is_enough(bends: Looks) -> None:
-    agreement = Agreement(bends)
+    agreement = ConvergenceCriterion(bends)
     assert lacking(agreement, 1.01 * SHARE * MISSED)
     assert not lacking(agreement, 0.99 * SHARE * MISSED)
 
 
 def test_what_is_far_off_is_not_looked_at_closely(bends: Looks) -> None:
-    agreement = Agreement(bends)
+    agreement = ConvergenceCriterion(bends)
     lacking(agreement, SHARE * MISSED)
-    assert lacking(agreement, 1.01 * FAR * SHARE * MISSED)
+    assert lacking(agreement, 1.01 * MAX_TOLERANCE_GROWTH * SHARE * MISSED)
     assert bends.count == 1
-    assert lacking(agreement, 0.99 * FAR * SHARE * MISSED)
+    assert lacking(agreement, 0.99 * MAX_TOLERANCE_GROWTH * SHARE * MISSED)
     assert bends.count == 2
 
 
 def test_a_step_of_another_length_is_looked_at_closely(bends: Looks) -> None:
-    agreement = Agreement(bends)
+    agreement = ConvergenceCriterion(bends)
     lacking(agreement, SHARE * MISSED)
     assert not lacking(agreement, 20.0 * SHARE * MISSED, step=2.0 * STEP)
 
 
 def test_an_error_that_is_no_number_ends_redos(bends: Looks) -> None:
     """It is refused where outputs are recorded, with the name of the FMU."""
-    assert not lacking(Agreement(bends), np.nan)
+    assert not lacking(ConvergenceCriterion(bends), np.nan)
 
 
 def test_what_is_far_off_is_looked_at_when_no_redo_is_left(bends: Looks) -> None:
     """Else a step at rest would hold those of a motion to what itself was allowed."""
-    agreement = Agreement(bends)
-    agreement.lacking(1e-6, TOLERANCE, SHARE, np.zeros(6), np.zeros(6), STEP)
+    agreement = ConvergenceCriterion(bends)
+    agreement.is_unconverged(1e-6, TOLERANCE, SHARE, np.zeros(6), np.zeros(6), STEP)
     few = 0.5 * SHARE * MISSED
     assert lacking(agreement, few)
-    assert not agreement.lacking(few, TOLERANCE, SHARE, sixth_power(0.0), sixth_power(STEP), STEP, last=True)
+    assert not agreement.is_unconverged(
+        few, TOLERANCE, SHARE, sixth_power(0.0), sixth_power(STEP), STEP, is_last_iteration=True
+    )
     assert not lacking(agreement, few)
 
 
 def test_behind_a_kink_what_was_allowed_does_not_count(bends: Looks) -> None:
-    agreement = Agreement(bends)
-    agreement.lacking(1e-6, TOLERANCE, SHARE, np.zeros(6), np.zeros(6), STEP)
-    agreement.forget()
+    agreement = ConvergenceCriterion(bends)
+    agreement.is_unconverged(1e-6, TOLERANCE, SHARE, np.zeros(6), np.zeros(6), STEP)
+    agreement.reset()
     assert not lacking(agreement, 0.5 * SHARE * MISSED)
 
 
 def test_steps_that_differ_by_rounding_are_of_one_length(bends: Looks) -> None:
-    agreement = Agreement(bends)
+    agreement = ConvergenceCriterion(bends)
     lacking(agreement, SHARE * MISSED)
-    assert lacking(agreement, 1.01 * FAR * SHARE * MISSED, step=STEP * (1.0 + 1e-12))
+    assert lacking(agreement, 1.01 * MAX_TOLERANCE_GROWTH * SHARE * MISSED, step=STEP * (1.0 + 1e-12))
     assert bends.count == 1

@@ -10,7 +10,15 @@ from pathlib import Path
 
 import pytest
 
-from tautwire.arguments import callable_or_none, file_of, folder_of, having, number_of, of_kind, whole_number_of
+from tautwire.arguments import (
+    validate_attributes,
+    validate_callable,
+    validate_file,
+    validate_folder,
+    validate_instance,
+    validate_integer,
+    validate_number,
+)
 from tautwire.errors import ArgumentError, InputError, TautwireError
 from tautwire.robots.checked_table import NumberRule
 from tests.refusals import refused
@@ -33,12 +41,12 @@ SPAN = NumberRule("the span", "m", positive=True)
     ],
 )
 def test_a_number_keeps_its_rule(value: object, words: tuple[str, ...]) -> None:
-    refused(lambda: number_of("span: length", value, SPAN), "span: length", "give the span in m", *words)
+    refused(lambda: validate_number("span: length", value, SPAN), "span: length", "give the span in m", *words)
 
 
 def test_infinity_passes_where_it_means_no_bound() -> None:
-    assert number_of("span: length", math.inf, SPAN, or_infinite=True) == math.inf
-    refused(lambda: number_of("span: length", -math.inf, SPAN, or_infinite=True), "span: length", "finite")
+    assert validate_number("span: length", math.inf, SPAN, allow_infinite=True) == math.inf
+    refused(lambda: validate_number("span: length", -math.inf, SPAN, allow_infinite=True), "span: length", "finite")
 
 
 @pytest.mark.parametrize(
@@ -52,17 +60,23 @@ def test_infinity_passes_where_it_means_no_bound() -> None:
     ],
 )
 def test_a_whole_number_lies_between_its_bounds(value: object, words: tuple[str, ...]) -> None:
-    refused(lambda: whole_number_of("span: count", value, 2, "give some", 100), "span: count", *words)
-    assert [whole_number_of("span: count", good, 2, "give some", 100) for good in (2, 100)] == [2, 100]
-    assert whole_number_of("span: count", 10**9, 2, "give some") == 10**9
+    refused(lambda: validate_integer("span: count", value, 2, "give some", 100), "span: count", *words)
+    assert [validate_integer("span: count", good, 2, "give some", 100) for good in (2, 100)] == [2, 100]
+    assert validate_integer("span: count", 10**9, 2, "give some") == 10**9
 
 
 def test_a_value_is_of_its_class_or_has_what_is_asked_of_it() -> None:
-    refused(lambda: of_kind("a", "text", int, "give one"), "a", "'text'", "must be an int")
-    refused(lambda: having("a", 3, ("real", "duration"), "path", "give one"), "a", "no path", "no duration")
-    refused(lambda: having("a", int, ("real",), "number", "give one"), "a", "the class int")
-    refused(lambda: callable_or_none("a", 3), "a", "cannot be called")
-    assert (of_kind("a", 3, int, ""), having("a", 3, ("real",), "", ""), callable_or_none("a", None)) == (3, 3, None)
+    refused(lambda: validate_instance("a", "text", int, "give one"), "a", "'text'", "must be an int")
+    refused(
+        lambda: validate_attributes("a", 3, ("real", "duration"), "path", "give one"), "a", "no path", "no duration"
+    )
+    refused(lambda: validate_attributes("a", int, ("real",), "number", "give one"), "a", "the class int")
+    refused(lambda: validate_callable("a", 3), "a", "cannot be called")
+    assert (
+        validate_instance("a", 3, int, ""),
+        validate_attributes("a", 3, ("real",), "", ""),
+        validate_callable("a", None),
+    ) == (3, 3, None)
 
 
 @pytest.mark.parametrize(
@@ -79,28 +93,28 @@ def test_a_path_that_the_system_does_not_take_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, name: str, words: tuple[str, ...]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    refused(lambda: folder_of("build: folder", name), "build: folder", "name a folder", *words)
-    refused(lambda: file_of("build: file", name), "build: file", "check the path", *words)
+    refused(lambda: validate_folder("build: folder", name), "build: folder", "name a folder", *words)
+    refused(lambda: validate_file("build: file", name), "build: file", "check the path", *words)
 
 
 def test_a_folder_may_be_absent_but_nothing_else_may_be_in_its_place(tmp_path: Path) -> None:
     file = tmp_path / "file"
     file.touch()
-    assert folder_of("a", str(tmp_path)) == folder_of("a", tmp_path) == tmp_path
-    assert folder_of("a", tmp_path / "absent" / "inner") == tmp_path / "absent" / "inner"
-    refused(lambda: folder_of("a", file), "a", "no folder")
-    refused(lambda: folder_of("a", 3), "a", "3", "not a path")
+    assert validate_folder("a", str(tmp_path)) == validate_folder("a", tmp_path) == tmp_path
+    assert validate_folder("a", tmp_path / "absent" / "inner") == tmp_path / "absent" / "inner"
+    refused(lambda: validate_folder("a", file), "a", "no folder")
+    refused(lambda: validate_folder("a", 3), "a", "3", "not a path")
     (tmp_path / "loop").symlink_to("loop")
     for nowhere in (file / "inner", tmp_path / "loop"):
-        refused(lambda nowhere=nowhere: folder_of("a", nowhere), "a", "cannot be looked up")  # type: ignore[misc]
+        refused(lambda nowhere=nowhere: validate_folder("a", nowhere), "a", "cannot be looked up")  # type: ignore[misc]
 
 
 def test_a_file_is_there_and_is_no_folder(tmp_path: Path) -> None:
     file = tmp_path / "file"
     file.touch()
-    assert file_of("a", os.fspath(file)) == file
+    assert validate_file("a", os.fspath(file)) == file
     for wrong in (tmp_path, tmp_path / "absent"):
-        refused(lambda wrong=wrong: file_of("a", wrong), "a", "where no file is")  # type: ignore[misc]
+        refused(lambda wrong=wrong: validate_file("a", wrong), "a", "where no file is")  # type: ignore[misc]
 
 
 def test_the_error_keeps_the_value_on_its_way_between_processes() -> None:

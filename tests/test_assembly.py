@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 from casadi import SX, Function
 
-from tautwire.native.assembly import CALLED, WRITTEN, UntranslatableError, assembly
-from tautwire.native.repeated import Repeated
+from tautwire.native.assembly import INSTRUCTIONS, LIBRARY_CALLS, UntranslatableError, llvm_assembly
+from tautwire.native.repeated import CompiledFunction
 
 NUMBERS = (-np.inf, -1e300, -2.5, -1.0, -0.3, -1e-310, -0.0, 0.0, 1e-310, 0.3, 1.0, 2.5, 1e300, np.inf, np.nan)
 PAIRS = np.array([[a, b] for a in NUMBERS for b in NUMBERS]).T
@@ -51,7 +51,7 @@ OPERATIONS: dict[int, Callable[[SX, SX], SX]] = {
 
 
 def test_every_operation_of_the_tables_is_tried_here() -> None:
-    assert {*CALLED, *WRITTEN} - {casadi.OP_ASSIGN} == set(OPERATIONS)
+    assert {*LIBRARY_CALLS, *INSTRUCTIONS} - {casadi.OP_ASSIGN} == set(OPERATIONS)
 
 
 @pytest.mark.parametrize("operation", OPERATIONS)
@@ -60,7 +60,7 @@ def test_an_operation_gives_what_casadi_gives(operation: int) -> None:
     function = Function("one", [a, b], [OPERATIONS[operation](a, b)])
     used = [function.instruction_id(k) for k in range(function.n_instructions())]
     assert operation in used
-    ours = Repeated(function)(PAIRS.shape[1], PAIRS[:1], PAIRS[1:])[0].ravel()
+    ours = CompiledFunction(function)(PAIRS.shape[1], PAIRS[:1], PAIRS[1:])[0].ravel()
     theirs = np.array(function.map(PAIRS.shape[1])(PAIRS[:1], PAIRS[1:])).ravel()
     np.testing.assert_array_equal(ours, theirs)
     # C leaves open which of two zeros is the smaller.
@@ -70,12 +70,12 @@ def test_an_operation_gives_what_casadi_gives(operation: int) -> None:
 
 def test_constants_keep_all_their_bits() -> None:
     values = [0.1, -1e-310, np.pi, np.inf, -np.inf, np.nan, 1.0000000000000002]
-    ours = Repeated(Function("constants", [SX.sym("a")], [SX(values)]))(1, np.zeros((1, 1)))[0]
+    ours = CompiledFunction(Function("constants", [SX.sym("a")], [SX(values)]))(1, np.zeros((1, 1)))[0]
     np.testing.assert_array_equal(ours.ravel(), values)
 
 
 def test_an_operation_that_is_in_no_table_is_told() -> None:
     a = SX.sym("a")
     with pytest.raises(UntranslatableError, match="function bell") as told:
-        assembly(Function("bell", [a], [casadi.erf(a)]))
+        llvm_assembly(Function("bell", [a], [casadi.erf(a)]))
     assert told.value.operation == casadi.OP_ERF

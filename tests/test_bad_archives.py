@@ -19,7 +19,7 @@ import pytest
 from tautwire.cli import run
 from tautwire.fmus.packaging import RobotFmus
 from tautwire.master import Component, archive
-from tautwire.master.archive import ArchiveError, description_of, require_sound, unpack
+from tautwire.master.archive import ArchiveError, read_model_description, require_valid_archive, unpack
 from tests.own_fmus import DESCRIPTION, packed
 from tests.robots import EXAMPLES
 
@@ -105,7 +105,7 @@ def claiming(size: int) -> Make:
 def crowd(path: Path) -> Path:
     packed(path, b"library")
     with zipfile.ZipFile(path, "a") as content:
-        for number in range(archive.MOST_ENTRIES):
+        for number in range(archive.MAX_ENTRIES):
             content.writestr(str(number), b"")
     return path
 
@@ -262,12 +262,12 @@ def test_the_master_refuses_it_too(tmp_path: Path, monkeypatch: pytest.MonkeyPat
     scratch = tmp_path / "scratch"
     scratch.mkdir()
     monkeypatch.setattr(tempfile, "tempdir", str(scratch))
-    for refuse in (description_of, lambda path: unpack(path, scratch), lambda path: Component("a", path)):
+    for refuse in (read_model_description, lambda path: unpack(path, scratch), lambda path: Component("a", path)):
         with pytest.raises(ArchiveError, match="leads out"):
             refuse(fmu)
     assert list(scratch.iterdir()) == []
     with pytest.raises(ArchiveError, match="is no file"):
-        require_sound(tmp_path)
+        require_valid_archive(tmp_path)
 
 
 def test_what_unpacking_leaves_when_the_disk_is_full_is_removed(
@@ -289,9 +289,9 @@ def test_what_unpacking_leaves_when_the_disk_is_full_is_removed(
 
 def test_sound_fmus_pass(tmp_path: Path, three_fmus: RobotFmus) -> None:
     for path in (*three_fmus.paths, packed(tmp_path / "a.fmu", b"library")):
-        require_sound(path, whole=True)
+        require_valid_archive(path, check_contents=True)
     tight = tmp_path / "tight.fmu"
     with zipfile.ZipFile(packed(tight, b"library"), "a", zipfile.ZIP_DEFLATED) as content:
         content.writestr("resources/", b"")
         content.writestr("resources/Prüfung (1)/table.csv", bytes(2**23))
-    require_sound(tight, whole=True)
+    require_valid_archive(tight, check_contents=True)

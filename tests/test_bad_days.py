@@ -17,7 +17,7 @@ import pytest
 
 from tautwire.cli import run
 from tautwire.errors import DiskFullError, InputError
-from tautwire.output import HOLDER, file_in_place, folder_in_place
+from tautwire.output import STAGING_PREFIX, atomic_file, atomic_folder
 from tests.robots import EXAMPLES
 
 THREE = EXAMPLES / "three"
@@ -79,7 +79,7 @@ def begun(folder: Path, arguments: list[str], out: Path) -> Iterator[subprocess.
         text=True,
     )
     try:
-        assert until(lambda: list(folder.glob(f"{HOLDER}*/new")))
+        assert until(lambda: list(folder.glob(f"{STAGING_PREFIX}*/new")))
         yield process
     finally:
         process.kill()
@@ -109,7 +109,7 @@ def test_what_a_killed_run_leaves_is_cleared_by_the_next(
         assert until(lambda: not others & parents().keys(), 20.0)
     left = names(tmp_path)
     assert "out" not in left
-    assert [name for name in left if name.startswith(HOLDER)]
+    assert [name for name in left if name.startswith(STAGING_PREFIX)]
     assert run([*QUICK, "--out", str(tmp_path / "workspace.csv"), "--quiet"]) == 0
     assert names(tmp_path) == ["scratch", "workspace.csv"]
 
@@ -151,10 +151,10 @@ def test_a_second_run_to_the_same_target_is_refused(tmp_path: Path, capsys: pyte
 def test_neither_are_two_runs_mixed_in_one_folder(tmp_path: Path) -> None:
     (tmp_path / "link").symlink_to(tmp_path / "out")
     (tmp_path / "out").mkdir()
-    with folder_in_place(tmp_path / "out") as scratch:
+    with atomic_folder(tmp_path / "out") as scratch:
         (scratch / "a").write_text("first")
         for target in (tmp_path / "out", tmp_path / "link", tmp_path / "out" / ".." / "out"):
-            with pytest.raises(InputError, match="another run is writing there"), folder_in_place(target):
+            with pytest.raises(InputError, match="another run is writing there"), atomic_folder(target):
                 pass
     assert names(tmp_path / "out") == ["a"]
 
@@ -219,7 +219,7 @@ def test_a_full_disk_is_told_and_nothing_is_half_written(tmp_path: Path, already
 
 def test_no_other_refusal_is_taken_for_a_full_disk(tmp_path: Path) -> None:
     for problem, expected in ((OSError(28, "No space left on device"), DiskFullError), (OSError(5, "I/O"), OSError)):
-        with pytest.raises(expected) as caught, file_in_place(tmp_path / "a"):
+        with pytest.raises(expected) as caught, atomic_file(tmp_path / "a"):
             raise problem
         assert isinstance(caught.value, DiskFullError) == (expected is DiskFullError)
     assert names(tmp_path) == []
@@ -312,15 +312,15 @@ def test_what_is_wrong_does_not_end_up_in_the_result(tmp_path: Path) -> None:
 
 
 def test_a_held_folder_is_not_taken_for_a_leftover(tmp_path: Path) -> None:
-    left = tmp_path / f"{HOLDER}0123456789ab"
+    left = tmp_path / f"{STAGING_PREFIX}0123456789ab"
     (left / "new").mkdir(parents=True)
     (left / "new" / "half").write_text("half")
     (left / "lock").touch()
-    mine = tmp_path / f"{HOLDER}of-mine"
+    mine = tmp_path / f"{STAGING_PREFIX}of-mine"
     mine.mkdir()
-    with file_in_place(tmp_path / "a") as first:
+    with atomic_file(tmp_path / "a") as first:
         first.write_text("first")
-        with file_in_place(tmp_path / "b") as second:
+        with atomic_file(tmp_path / "b") as second:
             second.write_text("second")
         assert first.read_text() == "first"
         assert not left.exists()

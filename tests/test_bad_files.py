@@ -238,7 +238,7 @@ def vast(place: Path) -> None:
 def vast_text(place: Path) -> None:
     """A text at first, then the same."""
     with place.open("wb") as file:
-        file.write(RECORDED.encode() + b"\n" + b" " * input_file.HEAD)
+        file.write(RECORDED.encode() + b"\n" + b" " * input_file.HEAD_SIZE)
         file.truncate(10 * 2**30)
 
 

@@ -14,8 +14,14 @@ from tautwire.cli import run
 from tautwire.errors import RecordingError, UnreachableError
 from tautwire.recordings.recording import Recording, read_recording
 from tautwire.robots.robot import Robot
-from tautwire.runs.belonging import APART, FAR, reeled_and_missed, require_ropes, size_of
-from tautwire.runs.start import start_of
+from tautwire.runs.belonging import (
+    MAX_REELING_MISMATCH,
+    MIN_CHECKED_START_SHARE,
+    reeling_mismatch,
+    require_matching_reeling,
+    robot_size,
+)
+from tautwire.runs.start import start_position
 from tests.recordings import recorded
 from tests.robots import EXAMPLES, example
 
@@ -39,26 +45,26 @@ def elsewhere(robot: Robot, offset: list[float]) -> Robot:
 
 def test_another_robots_recording_is_refused_by_its_ropes() -> None:
     with pytest.raises(RecordingError, match=r"first positions: they begin at .*28\.1 m from .*28\.86, 0, 5\]") as e:
-        start_of(THREE, NOISE, of("caroca"))
-    assert "would not be reeled so" in e.value.problem and "correct the robot file" in e.value.mend
+        start_position(THREE, NOISE, of("caroca"))
+    assert "would not be reeled so" in e.value.problem and "correct the robot file" in e.value.hint
 
 
 def test_a_start_farther_away_than_the_robot_is_large_is_refused() -> None:
-    assert size_of(CAROCA) == pytest.approx(7.0, rel=1e-3)
+    assert robot_size(CAROCA) == pytest.approx(7.0, rel=1e-3)
     with pytest.raises(RecordingError, match=r"28\.1 m from .*\[1, 0, 1\] m, and the robot is no larger than 7 m"):
-        start_of(CAROCA, NOISE, of("three"))
+        start_position(CAROCA, NOISE, of("three"))
 
 
 def test_a_start_that_cables_cannot_hold_tells_how_far_it_is_from_the_robot_files() -> None:
     with pytest.raises(UnreachableError, match=r"60 m from where the robot file starts it.*cable \d would need -") as e:
-        start_of(THREE, NOISE, moved(recorded("three", 1), [-60.0, 0.0, 0.0]))
-    assert "correct the robot file" in e.value.mend
+        start_position(THREE, NOISE, moved(recorded("three", 1), [-60.0, 0.0, 0.0]))
+    assert "correct the robot file" in e.value.hint
 
 
 @pytest.mark.parametrize("name", ["three", "caroca", "eight"])
 def test_a_start_far_from_the_robot_files_is_taken_where_the_ropes_fit(name: str) -> None:
-    away = elsewhere(example(name), [0.0, 0.0, -1.5 * FAR * size_of(example(name))])
-    start, notes = start_of(away, NOISE, of(name))
+    away = elsewhere(example(name), [0.0, 0.0, -1.5 * MIN_CHECKED_START_SHARE * robot_size(example(name))])
+    start, notes = start_position(away, NOISE, of(name))
     assert start == pytest.approx(example(name).platform.start, abs=2e-3)
     assert "starts where it says" in notes[0]
 
@@ -78,9 +84,9 @@ def test_a_start_far_from_the_robot_files_is_taken_where_the_ropes_fit(name: str
 def test_what_a_model_may_lack_does_not_make_it_another_robots(effects: dict[str, dict[str, float]]) -> None:
     recording = recorded("three", 3, effects)
     far = elsewhere(THREE, [0.0, 0.0, 15.0])
-    reeled, missed = reeled_and_missed(far, recording)
-    assert missed < 0.5 * APART * reeled
-    require_ropes(far, recording, recording.position[0], "here")
+    reeled, missed = reeling_mismatch(far, recording)
+    assert missed < 0.5 * MAX_REELING_MISMATCH * reeled
+    require_matching_reeling(far, recording, recording.position[0], "here")
 
 
 @pytest.mark.parametrize("name", ["three", "caroca", "eight"])
@@ -88,8 +94,8 @@ def test_a_tracker_that_jumps_now_and_then_does_not_make_it_another_robots(name:
     recording = of(name)
     position = recording.position.copy()
     position[[0, 500, 501, 900]] += 100.0
-    far = elsewhere(example(name), [0.0, 0.0, -1.5 * FAR * size_of(example(name))])
-    require_ropes(far, replace(recording, position=position), recording.position[1], "here")
+    far = elsewhere(example(name), [0.0, 0.0, -1.5 * MIN_CHECKED_START_SHARE * robot_size(example(name))])
+    require_matching_reeling(far, replace(recording, position=position), recording.position[1], "here")
 
 
 def test_a_recording_without_positions_or_motion_is_no_other_robots() -> None:
@@ -97,8 +103,8 @@ def test_a_recording_without_positions_or_motion_is_no_other_robots() -> None:
     at_rest = replace(still, winch_speed=np.zeros_like(still.winch_speed))
     unseen = replace(still, position=np.full_like(still.position, np.nan))
     start = np.array(THREE.platform.start)
-    require_ropes(far, at_rest, start, "here")
-    require_ropes(far, unseen, start, "here")
+    require_matching_reeling(far, at_rest, start, "here")
+    require_matching_reeling(far, unseen, start, "here")
 
 
 @pytest.mark.parametrize("command", ["trace", "simulate", "check"])

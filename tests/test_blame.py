@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tautwire.tracer.where.blame import blame, named, verdict_of
+from tautwire.tracer.where.blame import isolate_fault, isolation_verdict, numbered
 from tautwire.tracer.where.port_residuals import ComponentResidual
 
 FINE = {1: False, 2: False, 3: False}
@@ -34,7 +34,7 @@ ALL = {1: True, 2: True, 3: True}
     ],
 )
 def test_each_row(off: dict[int, bool], platform: bool | None, closes: bool, exits: tuple[int, ...], said: str) -> None:
-    assert blame(off, platform, closes, exits) == said
+    assert isolate_fault(off, platform, closes, exits) == said
 
 
 def part(component: str, quantity: str, rms: float, rings_at: float | None = None) -> ComponentResidual:
@@ -44,7 +44,7 @@ def part(component: str, quantity: str, rms: float, rings_at: float | None = Non
 def test_the_sentence_has_the_figures() -> None:
     cables = [part("cable 1", "tension", 1.2), part("cable 2", "tension", 14.1)]
     platform = [part("platform", "force x", 1.3)]
-    assert verdict_of(cables, platform) == (
+    assert isolation_verdict(cables, platform) == (
         "cable 2 (rope or winch)",
         "Cable 2's tension is off by 14 N rms (expected 1.3 N); the platform's force balance is within its noise. "
         "In question: cable 2 (rope or winch).",
@@ -54,13 +54,13 @@ def test_the_sentence_has_the_figures() -> None:
 def test_the_sentence_tells_what_rings_at_the_platform_alone() -> None:
     cables, wrong = [part("cable 1", "tension", 1.3)], [part("cable 1", "tension", 14.0)]
     platform = [part("platform", "force x", 9.0, 0.451), part("platform", "force z", 2.0, 0.9)]
-    assert "rings at 0.45 Hz" in verdict_of(cables, platform)[1]
-    assert "rings" not in verdict_of(wrong, platform)[1]
+    assert "rings at 0.45 Hz" in isolation_verdict(cables, platform)[1]
+    assert "rings" not in isolation_verdict(wrong, platform)[1]
 
 
 def test_where_nothing_was_looked_at_the_sentence_says_so() -> None:
-    assert verdict_of((), ()) == ("cannot tell", "Cannot tell which component is off.")
+    assert isolation_verdict((), ()) == ("cannot tell", "Cannot tell which component is off.")
 
 
 def test_names_are_counted() -> None:
-    assert [named("cable", [2]), named("exit point", [1, 3])] == ["cable 2", "exit points 1, 3"]
+    assert [numbered("cable", [2]), numbered("exit point", [1, 3])] == ["cable 2", "exit points 1, 3"]

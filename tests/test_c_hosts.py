@@ -215,7 +215,7 @@ def test_the_robot_in_a_c_program_is_that_in_python_and_near_the_one_model(host:
 def test_a_winch_in_a_c_program_is_that_in_python(
     ready: tuple[str, ...], host: Host, winch_fmus: RobotFmus, tmp_path: Path
 ) -> None:
-    fmu = Path(shutil.copy(winch_fmus.parts["winch_1"], tmp_path))
+    fmu = Path(shutil.copy(winch_fmus.by_component["winch_1"], tmp_path))
     make_for_c_hosts(fmu)
     with zipfile.ZipFile(fmu) as archive:
         archive.extractall(tmp_path / "winch")
@@ -361,7 +361,7 @@ def test_a_missing_compiler_is_named_with_the_mend(monkeypatch: pytest.MonkeyPat
     monkeypatch.setenv("CC", "no-such-compiler -m64")
     with pytest.raises(CHostError, match=r"no no-such-compiler -m64 \(from CC\); install a C compiler") as caught:
         make_for_c_hosts(platform)
-    assert "apt install gcc" in caught.value.mend
+    assert "apt install gcc" in caught.value.hint
 
 
 def test_a_compiler_that_fails_is_quoted(monkeypatch: pytest.MonkeyPatch, platform: Path) -> None:

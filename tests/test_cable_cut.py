@@ -8,16 +8,22 @@ import numpy as np
 import pytest
 
 from tautwire.fmus.packaging import build_fmus
-from tautwire.runs.cosimulation import Motion, cosimulate
-from tautwire.tracer.where.cable_cut import CableRun, drift_variance, exit_shift, run_cable, tension_variance
-from tautwire.tracer.where.path import Path
+from tautwire.runs.cosimulation import CosimulationResult, cosimulate
+from tautwire.tracer.where.cable_cut import (
+    CableSimulation,
+    drift_variance,
+    exit_shift,
+    simulate_cable,
+    tension_variance,
+)
+from tautwire.tracer.where.path import SmoothedPath
 from tests.robots import example, gentle_speeds
 
 RATE = 100.0
 
 
 @cache
-def runs() -> tuple[Motion, Path, CableRun]:
+def runs() -> tuple[CosimulationResult, SmoothedPath, CableSimulation]:
     """The three-cable robot co-simulated, its path, and its second cable alone along it."""
     robot = example("three")
     time, speeds = gentle_speeds(robot, 6.0, 1.0 / RATE)
@@ -26,10 +32,10 @@ def runs() -> tuple[Motion, Path, CableRun]:
         motion = cosimulate(fmus, time, speeds)
         acceleration = np.gradient(motion.velocity, time, axis=0)
         covariance = np.zeros((len(time), 3, 3, 3))
-        path = Path(
+        path = SmoothedPath(
             time, motion.position, motion.velocity, acceleration, covariance, np.ones(3), np.ones(3, dtype=bool)
         )
-        return motion, path, run_cable("cable_2", fmus.cables[1], path, speeds[:, 1])
+        return motion, path, simulate_cable("cable_2", fmus.cables[1], path, speeds[:, 1])
 
 
 def test_alone_it_shows_the_tension_and_force_of_the_whole() -> None:
@@ -50,15 +56,17 @@ def test_slopes_are_those_of_the_law() -> None:
     stiffness = cable.modulus * cable.area / run.length
     viscosity = cable.damping * cable.area / run.length
     assert run.stiffness == pytest.approx(stiffness, rel=2e-3)
-    assert np.allclose(run.slopes[:, 3:6], -viscosity[:, None] * direction, rtol=2e-3, atol=1e-3 * np.max(viscosity))
-    assert run.slopes[:, 6] == pytest.approx(viscosity, rel=2e-3)
+    assert np.allclose(
+        run.sensitivities[:, 3:6], -viscosity[:, None] * direction, rtol=2e-3, atol=1e-3 * np.max(viscosity)
+    )
+    assert run.sensitivities[:, 6] == pytest.approx(viscosity, rel=2e-3)
 
 
 def test_noise_of_the_path_counts_by_the_stiffness() -> None:
     _, path, run = runs()
     known = np.zeros((len(path.time), 3, 3, 3))
     known[:, :, 0, 0] = 1e-4**2
-    loose = Path(path.time, path.position, path.velocity, path.acceleration, known, path.cutoff, path.measured)
+    loose = SmoothedPath(path.time, path.position, path.velocity, path.acceleration, known, path.cutoff, path.measured)
     expected = 2.0**2 + (1e-4 * run.stiffness) ** 2
     assert tension_variance(run, loose, 2.0, 0.0) == pytest.approx(expected, rel=1e-6)
 
@@ -78,7 +86,7 @@ def test_noise_of_winch_speeds_drifts_as_many_tries_show() -> None:
 def test_a_shift_of_the_exit_point_is_read_off_the_residual() -> None:
     _, _, run = runs()
     shift = np.array([0.02, -0.05, 0.03])
-    direction = -run.slopes[:, :3] / run.stiffness[:, None]
+    direction = -run.sensitivities[:, :3] / run.stiffness[:, None]
     residual = run.stiffness * ((direction - direction[0]) @ shift)
     residual -= np.mean(residual)
     found, left = exit_shift(run, residual, 0.01 * float(np.std(residual)), 10.0)
@@ -88,7 +96,7 @@ def test_a_shift_of_the_exit_point_is_read_off_the_residual() -> None:
 
 def test_a_shift_that_would_be_too_large_explains_nothing() -> None:
     _, _, run = runs()
-    residual = run.slopes[:, :3] @ np.array([0.02, -0.05, 0.03])
+    residual = run.sensitivities[:, :3] @ np.array([0.02, -0.05, 0.03])
     residual -= np.mean(residual)
     _, left = exit_shift(run, residual, 0.1 * float(np.std(residual)), 1e-4)
     assert np.std(left) > 0.9 * np.std(residual)

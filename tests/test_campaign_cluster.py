@@ -17,11 +17,11 @@ pytest.importorskip("distributed", reason='Dask is not installed: pip install "d
 import dask
 
 from tautwire.campaign import cluster as clusters
-from tautwire.campaign.cluster import LOST, connected, dashboard
-from tautwire.campaign.dataset import opened, parts_of, read_rows
+from tautwire.campaign.cluster import WORKER_LOST, dashboard_message, dask_client
+from tautwire.campaign.dataset import open_dataset, part_files, read_rows
 from tautwire.campaign.errors import UnfinishedError
 from tautwire.campaign.reading import read_plan
-from tautwire.campaign.running import make_rows, run_count
+from tautwire.campaign.running import run_campaign, run_count
 from tautwire.cli import run as command
 from tests.campaigns import AT_REST, moving, plan_file, read
 from tests.clusters import bare_rows, cluster, rows_of, wait_for
@@ -38,32 +38,32 @@ def silently(what: str, done: float) -> None:
 def test_a_worker_killed_in_the_middle_costs_no_row_and_changes_none(tmp_path: Path) -> None:
     plan = read(tmp_path, moving(8))
     out = tmp_path / "out"
-    with cluster(tmp_path) as (address, (_, *workers)), connected(address, 0) as client, opened(out, plan):
-        assert "http://127.0.0.1:" in dashboard(client)
+    with cluster(tmp_path) as (address, (_, *workers)), dask_client(address, 0) as client, open_dataset(out, plan):
+        assert "http://127.0.0.1:" in dashboard_message(client)
 
         def kill(what: str, done: float) -> None:
             if done > 0.2 and workers[0].poll() is None:
                 workers[0].kill()
 
-        assert make_rows(plan, out, client, kill) == run_count(plan) == 16
+        assert run_campaign(plan, out, client, kill) == run_count(plan) == 16
         assert workers[0].poll() is not None and workers[1].poll() is None
-        assert make_rows(plan, out, client, silently) == 0
+        assert run_campaign(plan, out, client, silently) == 0
     assert rows_of(out) == bare_rows(plan, tmp_path / "bare")
     series = read_rows(out, ["z"], "series")
     assert series.num_rows == 16 * 5
 
 
 def test_a_cluster_of_ours_spends_little_beside_runs() -> None:
-    with connected(None, 1) as client:
-        (found,) = client.run(lambda: {name: dask.config.get(name) for name in clusters.FRUGAL}).values()
-    assert found == clusters.FRUGAL and not found["distributed.worker.profile.enabled"]
+    with dask_client(None, 1) as client:
+        (found,) = client.run(lambda: {name: dask.config.get(name) for name in clusters.LOW_OVERHEAD_CONFIG}).values()
+    assert found == clusters.LOW_OVERHEAD_CONFIG and not found["distributed.worker.profile.enabled"]
 
 
 def test_the_dashboard_of_ours_needs_a_library_here_that_of_others_there(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(clusters, "find_spec", lambda name: None)
     link = "http://10.0.0.5:8787/status"
-    assert "needs bokeh" in dashboard(SimpleNamespace(cluster=object(), dashboard_link=link))
-    assert dashboard(SimpleNamespace(cluster=None, dashboard_link=link)) == f"Dask's dashboard: {link}"
+    assert "needs bokeh" in dashboard_message(SimpleNamespace(cluster=object(), dashboard_link=link))
+    assert dashboard_message(SimpleNamespace(cluster=None, dashboard_link=link)) == f"Dask's dashboard: {link}"
 
 
 def test_the_same_rows_come_from_one_worker_and_from_two(tmp_path: Path) -> None:
@@ -71,9 +71,9 @@ def test_the_same_rows_come_from_one_worker_and_from_two(tmp_path: Path) -> None
     found = []
     for count in (1, 2):
         out = tmp_path / f"out_{count}"
-        with connected(None, count) as client, opened(out, plan):
+        with dask_client(None, count) as client, open_dataset(out, plan):
             assert len(client.nthreads()) == count
-            make_rows(plan, out, client, silently)
+            run_campaign(plan, out, client, silently)
         found.append(rows_of(out))
     assert found[0] == found[1] == bare_rows(plan, tmp_path / "bare")
 
@@ -91,7 +91,7 @@ def test_a_campaign_that_was_stopped_goes_on_where_it_was(how: signal.Signals, t
     if how == signal.SIGINT:
         assert process.returncode == 1 and "the same command goes on where it stopped" in said
         assert "Traceback" not in said
-    written = {part: part.stat().st_mtime_ns for part in parts_of(out)}
+    written = {part: part.stat().st_mtime_ns for part in part_files(out)}
     before = sum(pq.read_metadata(part).num_rows for part in written)
     assert 0 < before < 32
     again = subprocess.run(call, capture_output=True, text=True, timeout=300, check=True)
@@ -110,12 +110,12 @@ def test_a_run_that_ends_its_workers_is_a_row_that_says_so(tmp_path: Path, monke
     plan, out = read_plan(file), tmp_path / "out"
     with (
         dask.config.set({"distributed.scheduler.allowed-failures": 1}),
-        connected(None, 1) as client,
-        opened(out, plan),
+        dask_client(None, 1) as client,
+        open_dataset(out, plan),
     ):
-        assert make_rows(plan, out, client, silently) == 2
+        assert run_campaign(plan, out, client, silently) == 2
     rows = rows_of(out)
-    assert [row["failure"] for row in rows] == [LOST, LOST]
+    assert [row["failure"] for row in rows] == [WORKER_LOST, WORKER_LOST]
     assert rows[0]["platform.mass"] is not None
 
 
@@ -123,15 +123,15 @@ def test_a_scheduler_that_is_lost_leaves_what_came_until_then(tmp_path: Path, mo
     plan = read(tmp_path, moving(16))
     out = tmp_path / "out"
     monkeypatch.setattr(clusters, "CONNECT", 2.0)
-    with cluster(tmp_path, 1) as (address, (scheduler, _)), connected(address, 0) as client, opened(out, plan):
+    with cluster(tmp_path, 1) as (address, (scheduler, _)), dask_client(address, 0) as client, open_dataset(out, plan):
 
         def end(what: str, done: float) -> None:
             if done > 0.1:
                 scheduler.kill()
 
         with pytest.raises(UnfinishedError, match=r"scheduler was lost after \d+ of 32 runs; the same command goes on"):
-            make_rows(plan, out, client, end)
-    assert parts_of(out)
+            run_campaign(plan, out, client, end)
+    assert part_files(out)
 
 
 def test_recordings_are_traced_each_to_a_row(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -12,14 +12,14 @@ import pytest
 
 from tautwire.campaign.plan import Plan
 from tautwire.campaign.reading import read_plan
-from tautwire.campaign.run import Job, run_job, shared_of
-from tautwire.campaign.sampling import samples
+from tautwire.campaign.run import Job, build_context, run_job
+from tautwire.campaign.sampling import draw_samples
 from tautwire.errors import InputError
 from tautwire.report import trace_document
-from tautwire.robots.reading import robot_from
-from tautwire.tracer.estimates import correlations_of, found_effects
-from tautwire.tracer.search import Found
-from tautwire.tracer.workers import Workers
+from tautwire.robots.reading import robot_from_content
+from tautwire.tracer.estimates import estimated_effects, parameter_correlations
+from tautwire.tracer.search import SelectionResult
+from tautwire.tracer.workers import WorkerPool
 from tests.campaigns import plan_file, read
 from tests.test_estimates import fitted
 from tests.traces import made_trace
@@ -54,7 +54,7 @@ def test_numbers_vary_by_their_intervals_and_effects_are_on(tmp_path: Path) -> N
     assert plan.keys == ("effect.damping.damping", "effect.modulus.modulus")
     assert plan.inputs[0].distribution.numbers == pytest.approx((2.0e9, 1e8 / 1.959963985))
     assert plan.content["effect"]["modulus"] == {"modulus": 1e11, "cables": [2]}
-    assert np.quantile(samples(plan)[:, 0], [0.025, 0.975]) == pytest.approx([1.9e9, 2.1e9], rel=1e-3)
+    assert np.quantile(draw_samples(plan)[:, 0], [0.025, 0.975]) == pytest.approx([1.9e9, 2.1e9], rel=1e-3)
 
 
 def test_a_number_without_interval_stays(tmp_path: Path) -> None:
@@ -69,9 +69,9 @@ def test_numbers_vary_together_as_the_report_says(tmp_path: Path) -> None:
     pairs = [(0, 1, 0.9), (0, 2, -0.3), (1, 2, -0.6)]
     plan = planned(tmp_path, found, [together(found[k], found[i], value) for i, k, value in pairs])
     expected = np.array([[1.0, 0.9, -0.3], [0.9, 1.0, -0.6], [-0.3, -0.6, 1.0]])
-    assert plan.notes == () and np.allclose(np.corrcoef(samples(plan).T), expected, atol=0.02)
+    assert plan.notes == () and np.allclose(np.corrcoef(draw_samples(plan).T), expected, atol=0.02)
     apart = planned(tmp_path, found, [together(found[0], found[1], 0.9)], "correlated = false")
-    assert apart.notes == () and np.allclose(np.corrcoef(samples(apart).T), np.eye(3), atol=0.02)
+    assert apart.notes == () and np.allclose(np.corrcoef(draw_samples(apart).T), np.eye(3), atol=0.02)
     assert apart.digest() != plan.digest()
 
 
@@ -95,7 +95,7 @@ def test_the_plan_has_the_last_word_on_correlations(tmp_path: Path) -> None:
 
 def test_numbers_of_which_one_tells_the_other_are_sampled(tmp_path: Path) -> None:
     found = [effect("damping", ALL, DAMPING), effect("payload", [], MASS)]
-    values = samples(planned(tmp_path, found, [together(*found, -1.0)]))
+    values = draw_samples(planned(tmp_path, found, [together(*found, -1.0)]))
     scaled = (values - [2e9, 1.5]) / [1e8, 0.1]
     assert np.allclose(scaled[:, 0], -scaled[:, 1], atol=1e-6) and np.ptp(scaled[:, 0]) > 2.0
 
@@ -109,8 +109,8 @@ def test_what_was_found_takes_the_place_of_what_was_declared(tmp_path: Path) -> 
     plan = read_plan(file)
     assert plan.keys == ("effect.damping[2].damping", "effect.damping[3].damping")
     job = Job(0, 0, 0, (2.1e9, 3.1e9))
-    assert "failure" not in run_job(shared_of(plan, {}), job, tmp_path).row
-    settings = robot_from(dict(plan.content), plan.file).effects
+    assert "failure" not in run_job(build_context(plan, {}), job, tmp_path).row
+    settings = robot_from_content(dict(plan.content), plan.file).effects
     assert [(each.values["damping"], each.cables) for each in settings] == [(1e9, (1,)), (2e9, (2,)), (3e9, (3,))]
 
 
@@ -145,12 +145,12 @@ def test_what_is_no_report_is_refused(document: dict[str, Any], said: str, tmp_p
 @pytest.mark.slow
 def test_samples_spread_as_the_fit_of_a_recording_does(tmp_path: Path) -> None:
     fitter, chosen, sample, fit = fitted(3)
-    found = Found(tuple(chosen), (1.0, 1.0), fit, (), ())
-    effects = found_effects(fit.robot, found, fitter, sample, Workers(1))
-    trace = replace(made_trace(), effects=effects, correlations=correlations_of(fit, effects))
+    found = SelectionResult(tuple(chosen), (1.0, 1.0), fit, (), ())
+    effects = estimated_effects(fit.robot, found, fitter, sample, WorkerPool(1))
+    trace = replace(made_trace(), effects=effects, correlations=parameter_correlations(fit, effects))
     (tmp_path / "report.json").write_text(json.dumps(trace_document(trace)), encoding="utf-8")
     plan = read(tmp_path, SAMPLED)
     assert plan.keys == ("effect.payload.mass", "effect.sensor_gain.tension_gain") and plan.notes == ()
-    values = samples(plan)
+    values = draw_samples(plan)
     assert values.mean(axis=0) == pytest.approx(fit.values, rel=1e-3)
     assert np.cov(values.T) == pytest.approx(fit.covariance, rel=0.01)

@@ -11,12 +11,12 @@ import numpy as np
 import pytest
 
 from tautwire.campaign import writing
-from tautwire.campaign.distributions import KINDS, Distribution
-from tautwire.campaign.keys import KeyPathError, paths_of, with_values
+from tautwire.campaign.distributions import DISTRIBUTION_KINDS, Distribution
+from tautwire.campaign.keys import KeyPathError, expand_key_path, with_values
 from tautwire.campaign.plan import Compute
-from tautwire.campaign.reading import KEYS, read_plan
-from tautwire.campaign.running import jobs_of, run_count
-from tautwire.campaign.sampling import correlated_groups, samples
+from tautwire.campaign.reading import PLAN_KEYS, read_plan
+from tautwire.campaign.running import planned_jobs, run_count
+from tautwire.campaign.sampling import correlated_groups, draw_samples
 from tautwire.cli import run as command
 from tautwire.errors import InputError
 from tautwire.robots.reading import robot_content
@@ -109,8 +109,8 @@ def test_a_path_changes_one_number_and_nothing_else() -> None:
 def test_a_key_without_entry_is_of_all_and_each_entry_of_a_star_is_one() -> None:
     everywhere = with_values(CONTENT, {"cable.modulus": 1e11})
     assert [cable["modulus"] for cable in everywhere["cable"]] == [1e11] * 3
-    assert paths_of(CONTENT, "cable[*].modulus") == tuple(f"cable[{i}].modulus" for i in (1, 2, 3))
-    assert len(paths_of(CONTENT, "cable[*].anchor[*]")) == 9
+    assert expand_key_path(CONTENT, "cable[*].modulus") == tuple(f"cable[{i}].modulus" for i in (1, 2, 3))
+    assert len(expand_key_path(CONTENT, "cable[*].anchor[*]")) == 9
     with pytest.raises(KeyPathError, match="no list"):
         with_values(CONTENT, {"platform[1].mass": 1.0})
 
@@ -134,10 +134,10 @@ def test_quantiles_are_those_of_the_distribution(distribution: Distribution, med
 def test_the_same_seed_gives_the_same_samples_of_the_distributions(method: str, tmp_path: Path) -> None:
     vary = f'{NORMAL}\n"platform.mass" = {{uniform = [280.0, 320.0]}}'
     plan = read(tmp_path, sampled(vary, method, 1024))
-    values = samples(plan)
+    values = draw_samples(plan)
     assert values.shape == (plan.count, 2)
-    assert np.array_equal(values, samples(plan))
-    other = samples(read(tmp_path, sampled(vary, method, 1024).replace("seed = 5", "seed = 6")))
+    assert np.array_equal(values, draw_samples(plan))
+    other = draw_samples(read(tmp_path, sampled(vary, method, 1024).replace("seed = 5", "seed = 6")))
     assert not np.array_equal(values, other)
     assert np.quantile(values[:, 0], [0.16, 0.5, 0.84]) == pytest.approx([0.99e11, 1e11, 1.01e11], rel=2e-3)
     assert values[:, 1].min() >= 280.0 and values[:, 1].max() <= 320.0
@@ -148,14 +148,14 @@ def test_a_grid_has_every_step_of_one_with_every_step_of_another(tmp_path: Path)
     plan = read(
         tmp_path, sampled("platform.mass = {list = [290, 300]}\ncable.damping = {linspace = [0, 4e8, 3]}", "grid")
     )
-    assert samples(plan).tolist() == [[m, d] for m in (290.0, 300.0) for d in (0.0, 2e8, 4e8)]
+    assert draw_samples(plan).tolist() == [[m, d] for m in (290.0, 300.0) for d in (0.0, 2e8, 4e8)]
 
 
 def test_texts_are_steps_like_numbers(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     text = sampled('platform.mass = {list = [290, 300]}\n"cable[2].law" = {list = ["linear", "logarithmic"]}', "grid")
     plan = read(tmp_path, text)
     wanted = [(290.0, "linear"), (290.0, "logarithmic"), (300.0, "linear"), (300.0, "logarithmic")]
-    assert [job.values for job in jobs_of(plan, np.ones(4, dtype=bool))] == wanted
+    assert [job.values for job in planned_jobs(plan, np.ones(4, dtype=bool))] == wanted
     assert command(["campaign", str(tmp_path / "plan.toml"), "--dry-run"]) == 0
     assert capsys.readouterr().out.splitlines()[1] == "0,0,290,linear"
     other = read(tmp_path, text.replace('"linear", "logarithmic"', '"logarithmic", "linear"'))
@@ -166,7 +166,7 @@ def test_correlations_are_those_asked_for(tmp_path: Path) -> None:
     more = '[[correlation]]\nbetween = ["cable.modulus", "platform.mass"]\nvalue = -0.8'
     vary = f'{NORMAL}\nplatform.mass = {{normal = [300.0, 5.0]}}\n"cable.damping" = {{uniform = [1e8, 4e8]}}'
     plan = read(tmp_path, sampled(vary, "sobol", 2048, more))
-    found = np.corrcoef(samples(plan).T)
+    found = np.corrcoef(draw_samples(plan).T)
     assert found[0, 1] == pytest.approx(-0.8, abs=0.02)
     assert np.abs(found[2, :2]).max() < 0.05
     assert correlated_groups(plan) == (0, 0, 1)
@@ -179,7 +179,7 @@ def test_correlations_that_contradict_each_other_are_refused(tmp_path: Path) -> 
     more = "".join(f"[[correlation]]\nbetween = {[keys[i], keys[k]]}\nvalue = {v}\n" for i, k, v in pairs)
     plan = read(tmp_path, sampled('"cable[*].modulus" = {normal = [1e11, 1e9]}', more=more))
     with pytest.raises(InputError, match="contradict"):
-        samples(plan)
+        draw_samples(plan)
 
 
 def test_paths_and_controllers_multiply_the_samples(tmp_path: Path) -> None:
@@ -239,7 +239,7 @@ def test_the_plan_of_the_page_is_one(tmp_path: Path) -> None:
     (text,) = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
     plan = read(tmp_path, text)
     assert run_count(plan) == 512 and plan.keys[0] == "cable[1].modulus"
-    for kind in KINDS:
+    for kind in DISTRIBUTION_KINDS:
         assert f"| `{kind}` |" in page
-    for key in (*KEYS, *(each.name for each in fields(Compute))):
+    for key in (*PLAN_KEYS, *(each.name for each in fields(Compute))):
         assert f"`{key}`" in page or f"[{key}]" in page, key

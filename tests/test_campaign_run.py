@@ -8,16 +8,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tautwire.campaign.built import Bundle, bundled, fmus_of, structure_of
+from tautwire.campaign.built import FmuBundle, build_bundle, cached_fmus, structure_digest
 from tautwire.campaign.keys import with_values
 from tautwire.campaign.plan import Plan
-from tautwire.campaign.run import Job, run_job, shared_of
-from tautwire.campaign.running import recordings_of
+from tautwire.campaign.run import Job, build_context, run_job
+from tautwire.campaign.running import path_recordings
 from tautwire.control import cosimulate_closed_loop
 from tautwire.fmus.packaging import build_fmus
 from tautwire.linear import linearise
 from tautwire.recordings.recording import read_recording
-from tautwire.robots.reading import robot_from
+from tautwire.robots.reading import robot_from_content
 from tautwire.robots.robot import EffectSetting, Robot
 from tautwire.runs.cosimulation import cosimulate
 from tautwire.statics.equilibrium import static_tensions
@@ -31,12 +31,12 @@ HIGH = 20_000.0
 
 def varied(plan: Plan, values: tuple[float | str, ...] = VALUES) -> Robot:
     """The robot of a run."""
-    return robot_from(with_values(plan.content, dict(zip(plan.keys, values, strict=True))), plan.file)
+    return robot_from_content(with_values(plan.content, dict(zip(plan.keys, values, strict=True))), plan.file)
 
 
 def test_statics_and_modes_are_those_of_the_varied_robot(tmp_path: Path) -> None:
     plan = read(tmp_path, AT_REST)
-    row = run_job(shared_of(plan, {}), Job(3, 3, 0, VALUES), tmp_path).row
+    row = run_job(build_context(plan, {}), Job(3, 3, 0, VALUES), tmp_path).row
     robot = varied(plan)
     tensions = [row[f"static_tension_{cable}"] for cable in (1, 2, 3)]
     assert tensions == static_tensions(robot).tolist() and row["held"] is True
@@ -49,14 +49,14 @@ def test_statics_and_modes_are_those_of_the_varied_robot(tmp_path: Path) -> None
 
 def test_a_motion_is_that_of_fmus_built_for_the_varied_robot(tmp_path: Path) -> None:
     plan = read(tmp_path, moving())
-    shared = shared_of(plan, {})
+    shared = build_context(plan, {})
     found = run_job(shared, Job(0, 0, 0, VALUES), tmp_path / "kept")
-    drive = shared.drives[0]
-    assert drive.speeds is not None and drive.wanted is not None
-    motion = cosimulate(build_fmus(varied(plan), tmp_path / "built"), drive.time, drive.speeds)
+    drive = shared.reference_inputs[0]
+    assert drive.winch_speeds is not None and drive.desired_position is not None
+    motion = cosimulate(build_fmus(varied(plan), tmp_path / "built"), drive.time, drive.winch_speeds)
     assert [found.row[f"end_{axis}"] for axis in "xyz"] == motion.position[-1].tolist()
     assert found.row["tension_2_largest"] == motion.tension[:, 1].max()
-    apart = np.linalg.norm(motion.position - drive.wanted, axis=1)
+    apart = np.linalg.norm(motion.position - drive.desired_position, axis=1)
     assert found.row["path_error_largest"] == apart.max() > 0.0
     assert found.row["slack"] is False and "limit_broken" not in found.row
     assert found.series["time"].tolist() == pytest.approx(np.linspace(0.0, 0.15, 5).tolist())
@@ -65,27 +65,27 @@ def test_a_motion_is_that_of_fmus_built_for_the_varied_robot(tmp_path: Path) -> 
 
 def test_controllers_believe_the_declared_robot_unless_told_otherwise(tmp_path: Path) -> None:
     plan = read(tmp_path, moving().replace("5.001", "5.02").replace("duration = 0.1", "duration = 0.8"))
-    row = run_job(shared_of(plan, {}), Job(1, 0, 1, VALUES), tmp_path / "kept").row
+    row = run_job(build_context(plan, {}), Job(1, 0, 1, VALUES), tmp_path / "kept").row
     assert row["controller"] == "feedforward"
-    shared = shared_of(replace(plan, belief="varied"), {})
+    shared = build_context(replace(plan, belief="varied"), {})
     knowing = run_job(shared, Job(1, 0, 1, VALUES), tmp_path / "kept").row
-    assert not shared.drives
+    assert not shared.reference_inputs
     assert knowing["path_error_largest"] < 0.1 * row["path_error_largest"]
 
 
 def test_noise_of_sensors_depends_on_seed_and_run_alone(tmp_path: Path) -> None:
     text = moving().replace('"feedforward"', '"lqg"').replace("[compute]", "[compute]\nnoise = true")
     plan = read(tmp_path, text)
-    shared = shared_of(plan, {})
+    shared = build_context(plan, {})
     one, again, other = (run_job(shared, Job(i, 0, 1, VALUES), tmp_path / "kept").row for i in (1, 1, 3))
     assert one == again
     assert one["end_z"] != other["end_z"]
-    drive = shared.drives[1]
+    drive = shared.reference_inputs[1]
     assert drive.design is not None and drive.trajectory is not None
     seed = int(np.random.SeedSequence((plan.seed, 1)).generate_state(1)[0])
     fmus = build_fmus(varied(plan), tmp_path / "built")
     motion = cosimulate_closed_loop(
-        fmus, drive.believed, drive.design, drive.trajectory, 0.15, seed=seed, reference=drive.reference
+        fmus, drive.nominal_robot, drive.design, drive.trajectory, 0.15, seed=seed, reference=drive.reference
     )
     assert one["end_z"] == motion.position[-1, 2]
 
@@ -105,11 +105,11 @@ def test_numbers_set_in_fmus_do_what_numbers_built_into_them_do(changed: str, tm
         other = other.with_effect(EffectSetting("damping", {"damping": 2e9}, base.cable_numbers))
     if changed == "winch":
         other = with_winch(other, replace(LIMITED, bandwidth=6.0))
-    assert structure_of(other) == structure_of(base)
+    assert structure_digest(other) == structure_digest(base)
     time = np.linspace(0.0, 0.2, 21)
     speeds = 0.05 * np.sin(20.0 * time)[:, None] * np.ones(base.cable_count)
-    bundle = bundled(base)
-    found = cosimulate(fmus_of(other, bundle, tmp_path / "kept"), time, speeds)
+    bundle = build_bundle(base)
+    found = cosimulate(cached_fmus(other, bundle, tmp_path / "kept"), time, speeds)
     built = cosimulate(build_fmus(other, tmp_path / "built"), time, speeds)
     # Not to the bit: nominal values, which scale what the coupling calls agreement, stay those built in.
     assert np.allclose(found.position, built.position, rtol=1e-12, atol=0.0)
@@ -123,7 +123,7 @@ def test_a_law_may_vary_and_has_fmus_of_its_own(tmp_path: Path) -> None:
             "cable.modulus = {normal = [1.022e11, 2.2e9]}", 'cable.law = {list = ["linear", "logarithmic"]}'
         ),
     )
-    shared = shared_of(plan, {})
+    shared = build_context(plan, {})
     linear, other = (
         run_job(shared, Job(i, i, 0, (law, 310.0)), tmp_path / "kept").row
         for i, law in enumerate(plan.inputs[0].distribution.texts)
@@ -131,9 +131,9 @@ def test_a_law_may_vary_and_has_fmus_of_its_own(tmp_path: Path) -> None:
     assert linear["cable.law"] == "linear" and "failure" not in linear and "failure" not in other
     assert len(list((tmp_path / "kept").iterdir())) == 2
     robot = varied(plan, (*plan.inputs[0].distribution.texts[:1], 310.0))
-    speeds = shared.drives[0].speeds
+    speeds = shared.reference_inputs[0].winch_speeds
     assert speeds is not None
-    motion = cosimulate(build_fmus(robot, tmp_path / "built"), shared.drives[0].time, speeds)
+    motion = cosimulate(build_fmus(robot, tmp_path / "built"), shared.reference_inputs[0].time, speeds)
     assert (
         [linear[f"end_{axis}"] for axis in "xyz"]
         == motion.position[-1].tolist()
@@ -144,12 +144,12 @@ def test_a_law_may_vary_and_has_fmus_of_its_own(tmp_path: Path) -> None:
 def test_a_robot_of_another_structure_gets_fmus_of_its_own_once(tmp_path: Path) -> None:
     base = example("three")
     other = base.with_effect(EffectSetting("payload", {"mass": 3.0}))
-    bundle = Bundle(structure_of(base), {"platform": b"no FMU"})
-    first = fmus_of(other, bundle, tmp_path)
+    bundle = FmuBundle(structure_digest(base), {"platform": b"no FMU"})
+    first = cached_fmus(other, bundle, tmp_path)
     made = first.platform.stat().st_mtime_ns
-    again = fmus_of(other.with_effect(EffectSetting("payload", {"mass": 4.0})), bundle, tmp_path)
+    again = cached_fmus(other.with_effect(EffectSetting("payload", {"mass": 4.0})), bundle, tmp_path)
     assert again.platform == first.platform and again.platform.stat().st_mtime_ns == made
-    assert [each.name for each in tmp_path.iterdir()] == [structure_of(other)]
+    assert [each.name for each in tmp_path.iterdir()] == [structure_digest(other)]
 
 
 @pytest.mark.parametrize("softness", [0.0, 20.0])
@@ -174,7 +174,7 @@ name = "all"
 recording = "speeds.csv"
 """
     plan = read(tmp_path, text)
-    shared = shared_of(plan, recordings_of(plan, 3))
+    shared = build_context(plan, path_recordings(plan, 3))
     begun, whole = (run_job(shared, Job(i, 0, i, (softness,)), tmp_path / "kept").row for i in (0, 1))
     assert begun["slack"] is False and whole["slack"] is True
     least = min(whole[f"tension_{cable}_least"] for cable in (1, 2, 3))
@@ -186,7 +186,7 @@ def test_a_run_that_fails_is_a_row_with_its_reason_and_what_came_before(tmp_path
         tmp_path,
         AT_REST.replace("platform.mass = {uniform = [280.0, 320.0]}", '"platform.start[3]" = {uniform = [5.0, 60.0]}'),
     )
-    shared = shared_of(plan, {})
+    shared = build_context(plan, {})
     above = run_job(shared, Job(0, 0, 0, (1e11, 55.0)), tmp_path).row
     assert above["held"] is False and above["failure"].startswith("UnreachableError: ")
     below = run_job(shared, Job(1, 1, 0, (1e11, 6.0)), tmp_path).row
@@ -200,7 +200,7 @@ def test_a_machine_that_fails_is_no_row(tmp_path: Path) -> None:
     plan = read(tmp_path, moving())
     (tmp_path / "file").write_text("", encoding="utf-8")
     with pytest.raises(OSError):
-        run_job(shared_of(plan, {}), Job(0, 0, 0, VALUES), tmp_path / "file" / "folder")
+        run_job(build_context(plan, {}), Job(0, 0, 0, VALUES), tmp_path / "file" / "folder")
 
 
 def test_recorded_winch_speeds_are_a_path_and_limits_of_tension_are_held_against_the_robot_file(tmp_path: Path) -> None:
@@ -217,7 +217,7 @@ recording = "speeds.csv"
 until = 0.3
 """
     plan = read(tmp_path, text, "eight")
-    shared = shared_of(plan, {"path 1": read_recording(tmp_path / "speeds.csv", 8)})
+    shared = build_context(plan, {"path 1": read_recording(tmp_path / "speeds.csv", 8)})
     row = run_job(shared, Job(0, 0, 0, (HIGH,)), tmp_path / "kept").row
     assert row["path"] == "path 1" and "path_error_rms" not in row and row["limit_broken"] is False
     largest = max(row[f"tension_{cable}_largest"] for cable in range(1, 9))

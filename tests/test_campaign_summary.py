@@ -12,14 +12,14 @@ import pyarrow as pa
 import pytest
 from scipy.stats import norm
 
-from tautwire.campaign.bands import bands_of
-from tautwire.campaign.dataset import Parts, opened, read_rows
+from tautwire.campaign.bands import quantile_bands
+from tautwire.campaign.dataset import PartWriter, open_dataset, read_rows
 from tautwire.campaign.plan import Plan
-from tautwire.campaign.rows import RowColumn, columns_of
-from tautwire.campaign.run import Result
-from tautwire.campaign.sampling import samples
-from tautwire.campaign.season import season_of
-from tautwire.campaign.summary import Summary, summary_of
+from tautwire.campaign.rows import RowColumn, row_columns
+from tautwire.campaign.run import RunResult
+from tautwire.campaign.sampling import draw_samples
+from tautwire.campaign.season import summarise_traces
+from tautwire.campaign.summary import Summary, summarise_runs
 from tautwire.campaign.writing import write_summary
 from tautwire.errors import InputError
 from tests.campaigns import AT_REST, moving, read
@@ -45,7 +45,7 @@ COLUMNS = (
 
 def made_up(plan: Plan, weights: tuple[float, float] = (3.0, 4.0), values: np.ndarray | None = None) -> pa.Table:
     """Rows whose output is a weighted sum of the inputs, each scaled to a variance of one."""
-    values = samples(plan) if values is None else values
+    values = draw_samples(plan) if values is None else values
     scaled = (values - [1.022e11, 300.0]) / [2.2e9, 40.0 / np.sqrt(12.0)]
     out = scaled @ np.array(weights)
     return pa.table(
@@ -64,7 +64,7 @@ def made_up(plan: Plan, weights: tuple[float, float] = (3.0, 4.0), values: np.nd
 def summed(tmp_path: Path, method: str, count: int, **changed: Any) -> tuple[Plan, Summary]:
     text = AT_REST.replace('"sobol"', f'"{method}"').replace("count = 8", f"count = {count}")
     plan = replace(read(tmp_path, text), **changed)
-    return plan, summary_of(plan, COLUMNS, made_up(plan))
+    return plan, summarise_runs(plan, COLUMNS, made_up(plan))
 
 
 @pytest.mark.parametrize(("method", "count", "precision"), [("saltelli", 512, 0.02), ("latin hypercube", 2000, 0.06)])
@@ -85,10 +85,10 @@ def test_sobol_indices_are_the_shares_of_the_variance(
 def test_correlated_inputs_share_one_index(tmp_path: Path) -> None:
     more = 'gravity = {uniform = [9.7, 9.9]}\n[[correlation]]\nbetween = ["cable.modulus", "gravity"]\nvalue = 0.5'
     plan = read(tmp_path, AT_REST.replace('"sobol"', '"saltelli"').replace("count = 8", "count = 512") + more)
-    values = samples(plan)
+    values = draw_samples(plan)
     rows = made_up(replace(plan, inputs=plan.inputs[:2], correlations=()), values=values[:, :2])
     rows = rows.append_column("gravity", pa.array(values[:, 2]))
-    found = {each.input: each.first for each in summary_of(plan, COLUMNS, rows).dependences if each.output == "out"}
+    found = {each.input: each.first for each in summarise_runs(plan, COLUMNS, rows).dependences if each.output == "out"}
     assert found["cable.modulus and gravity"] == pytest.approx(9.0 / 25.0, abs=0.02)
     assert found["platform.mass"] == pytest.approx(16.0 / 25.0, abs=0.02)
 
@@ -104,7 +104,7 @@ def test_blocks_with_a_failed_run_are_left_out(tmp_path: Path) -> None:
     rows = made_up(plan)
     out = rows["out"].to_numpy().copy()
     out[::37] = np.nan
-    holed = summary_of(plan, COLUMNS, rows.set_column(3, "out", pa.array(out, from_pandas=True)))
+    holed = summarise_runs(plan, COLUMNS, rows.set_column(3, "out", pa.array(out, from_pandas=True)))
     pairs = zip(holed.dependences, whole.dependences, strict=True)
     assert all(mine.first == pytest.approx(other.first, abs=0.1) for mine, other in pairs)
 
@@ -116,7 +116,7 @@ def test_blocks_with_a_failed_run_are_left_out(tmp_path: Path) -> None:
 def test_why_there_are_no_sobol_indices_is_said(changed: dict[str, Any], said: str, tmp_path: Path) -> None:
     plan = replace(read(tmp_path, AT_REST), **changed)
     rows = made_up(read(tmp_path, AT_REST))
-    summary = summary_of(plan, COLUMNS, rows)
+    summary = summarise_runs(plan, COLUMNS, rows)
     assert not summary.dependences and said in summary.notes[-1]
 
 
@@ -132,23 +132,23 @@ def test_spreads_and_probabilities_are_those_of_the_distribution(tmp_path: Path)
     assert (spread.mean, spread.standard_deviation) == (pytest.approx(0.0, abs=0.01), pytest.approx(5.0, rel=0.01))
     assert spread.quantiles[0] == pytest.approx(-1.96 * 5.0, rel=0.02)
     (slack,) = summary.probabilities
-    assert slack.share == pytest.approx(norm.sf(1.0), abs=0.005) and slack.low < norm.sf(1.0) < slack.high
+    assert slack.relative_frequency == pytest.approx(norm.sf(1.0), abs=0.005) and slack.low < norm.sf(1.0) < slack.high
 
 
 def test_probability_of_what_never_happened_is_not_zero_for_sure(tmp_path: Path) -> None:
     plan = read(tmp_path, AT_REST)
     never = pa.array([False] * 7 + [None])
     rows = made_up(plan).set_column(5, "slack", never)
-    (slack,) = summary_of(plan, COLUMNS, rows).probabilities
+    (slack,) = summarise_runs(plan, COLUMNS, rows).probabilities
     assert (slack.times, slack.count, slack.low) == (0, 7, 0.0) and slack.high == pytest.approx(0.354, abs=0.002)
 
 
 def written(tmp_path: Path, text: str, failure: str = "UnreachableError: a cable cannot push") -> tuple[Plan, Path]:
     """A folder with made-up rows of a plan, one of which failed; outputs depend on the first input."""
     plan, out = read(tmp_path, text), tmp_path / "out"
-    values, variants = samples(plan), plan.variants
+    values, variants = draw_samples(plan), plan.variants
     generator = np.random.default_rng(1)
-    with opened(out, plan), Parts(out, columns_of(plan, 3)) as parts:
+    with open_dataset(out, plan), PartWriter(out, row_columns(plan, 3)) as parts:
         for index in range(len(values) * len(variants)):
             sample, variant = divmod(index, len(variants))
             path, controller = variants[variant]
@@ -163,11 +163,13 @@ def written(tmp_path: Path, text: str, failure: str = "UnreachableError: a cable
                 drawn = generator.normal(variant, 1.0, 5)
                 series = {"time": np.linspace(0.0, 0.15, 5)} | dict.fromkeys(("x", "y", "z"), drawn)
                 series |= {f"tension_{cable}": 100.0 + drawn for cable in (1, 2, 3)}
-            outputs = [column.name for column in columns_of(plan, 3) if column.role == "output"]
+            outputs = [column.name for column in row_columns(plan, 3) if column.role == "output"]
             numbers = {name: float(values[sample, 0] / 1e9 + 0.05 * generator.normal()) for name in outputs}
-            flags = {c.name: False for c in columns_of(plan, 3) if c.kind == "flag"}
+            flags = {c.name: False for c in row_columns(plan, 3) if c.kind == "flag"}
             parts.add(
-                [Result({**row, "failure": failure})] if index == 3 else [Result({**numbers, **row, **flags}, series)]
+                [RunResult({**row, "failure": failure})]
+                if index == 3
+                else [RunResult({**numbers, **row, **flags}, series)]
             )
     return plan, out
 
@@ -176,9 +178,9 @@ def test_bands_are_quantiles_of_each_path_with_each_controller(tmp_path: Path) -
     plan, out = written(tmp_path, moving(64))
     rows = read_rows(out, ["z"], "series")
     for variant in (0, 1):
-        bands = bands_of(plan, out, variant, ("z",))
+        bands = quantile_bands(plan, out, variant, ("z",))
         mine = rows["z"].to_numpy()[rows["index"].to_numpy() % 2 == variant].reshape(-1, 5)
-        assert bands.runs == len(mine) == 64 - variant
+        assert bands.run_count == len(mine) == 64 - variant
         assert np.array_equal(bands.quantiles["z"], np.quantile(mine, (0.025, 0.5, 0.975), axis=0))
     assert bands.time.tolist() == pytest.approx(np.linspace(0.0, 0.15, 5).tolist())
 
@@ -240,7 +242,7 @@ def test_a_season_lists_what_each_recording_showed(tmp_path: Path) -> None:
             "failure": [None, None, "RecordingError: no"],
         }
     )
-    season = season_of(rows)
+    season = summarise_traces(rows)
     assert (season.count, season.failed, season.verdicts) == (3, 1, (("effects", 2),))
     assert [(each.recording, each.value, each.low) for each in season.findings] == [
         ("may.csv", 2e9, 0.9 * 2e9),

@@ -3,25 +3,25 @@
 import numpy as np
 import pytest
 
-from tautwire.tracer.discovery.candidates import MOST_TERMS, Slopes, best_terms
+from tautwire.tracer.discovery.candidates import MAX_TERMS, NormalEquations, select_terms
 from tautwire.tracer.discovery.library import Term
 
 ROWS, MANY = 2000, 60
 TERMS = tuple(Term("force_x", f"vx**{power % 8}*{power}") for power in range(MANY))
 
 
-def slopes(seed: int, truth: dict[int, float], nuisance: float = 0.0) -> Slopes:
+def slopes(seed: int, truth: dict[int, float], nuisance: float = 0.0) -> NormalEquations:
     """Of innovations that these coefficients explain, beside one nuisance, with noise of one."""
     random = np.random.default_rng(seed)
     matrix = random.normal(size=(ROWS, 1 + MANY)) @ (np.eye(1 + MANY) + 0.3 * random.normal(size=(1 + MANY, 1 + MANY)))
     values = random.normal(size=ROWS) - nuisance * matrix[:, 0]
     for term, coefficient in truth.items():
         values = values - coefficient * matrix[:, 1 + term]
-    return Slopes(1, TERMS, matrix.T @ matrix, matrix.T @ values, ROWS)
+    return NormalEquations(1, TERMS, matrix.T @ matrix, matrix.T @ values, ROWS)
 
 
-def chosen(found: Slopes, present: dict[Term, float]) -> dict[Term, float]:
-    return best_terms(found, present, lambda: None)
+def chosen(found: NormalEquations, present: dict[Term, float]) -> dict[Term, float]:
+    return select_terms(found, present, lambda: None)
 
 
 @pytest.mark.parametrize("seed", range(5))
@@ -46,10 +46,10 @@ def test_a_term_that_was_wrong_goes() -> None:
 
 
 def test_no_more_than_a_few_are_chosen() -> None:
-    assert len(chosen(slopes(3, dict.fromkeys(range(12), 0.5)), {})) == MOST_TERMS
+    assert len(chosen(slopes(3, dict.fromkeys(range(12), 0.5)), {})) == MAX_TERMS
 
 
 def test_a_term_without_slopes_is_left_alone() -> None:
     found = slopes(4, {3: 0.5})
-    found.gram[8, :] = found.gram[:, 8] = found.pull[8] = 0.0
+    found.fisher_information[8, :] = found.fisher_information[:, 8] = found.score[8] = 0.0
     assert set(chosen(found, {})) == {TERMS[3]}

@@ -7,7 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tautwire.checking import MOST, Problem, check_files
+from tautwire.checking import MAX_PROBLEMS_PER_FILE, Problem, check_files
 from tautwire.errors import InputError, RobotFileError
 from tautwire.robots.reading import read_robot
 from tautwire.statics.equilibrium import static_tensions
@@ -106,7 +106,7 @@ def test_reading_raises_what_checking_tells_first(tmp_path: Path) -> None:
     place = written(tmp_path, WRONG.replace("name = 3", "").replace("gravty", "gravity"))
     with pytest.raises(RobotFileError) as caught:
         read_robot(place)
-    assert caught.value.place == ("platform", "mass")
+    assert caught.value.key_path == ("platform", "mass")
     assert caught.value.problem == check_files(place).problems[0].problem
 
 
@@ -175,11 +175,11 @@ def test_robot_and_recording_are_both_told(tmp_path: Path) -> None:
 
 
 def test_no_more_than_is_read_is_told(tmp_path: Path) -> None:
-    rows = "".join(f"{k},a,b,c\n" for k in range(MOST))
+    rows = "".join(f"{k},a,b,c\n" for k in range(MAX_PROBLEMS_PER_FILE))
     text = f"time,winch_speed_1,winch_speed_2,winch_speed_3\n{rows}"
     checked = check_files(THREE / "robot.toml", written(tmp_path, text, "fit.csv"))
-    assert len(checked.problems) == MOST
-    assert f"no more than {MOST}" in checked.notes[-1]
+    assert len(checked.problems) == MAX_PROBLEMS_PER_FILE
+    assert f"no more than {MAX_PROBLEMS_PER_FILE}" in checked.notes[-1]
 
 
 @pytest.mark.parametrize("name", ["three", "caroca", "eight"])

@@ -12,7 +12,7 @@ import pandas as pd
 import pytest
 
 import tautwire
-from tautwire.cli import application, run
+from tautwire.cli import app, run
 from tautwire.robots.reading import read_robot
 from tests.robots import EXAMPLES, example
 
@@ -140,7 +140,7 @@ def test_trace_without_a_check_recording_judges_on_the_second_half(
     assert any("no check recording" in note for note in report["notes"])
 
 
-COMMANDS = [str(command.callback.__name__) for command in application.registered_commands if command.callback]
+COMMANDS = [str(command.callback.__name__) for command in app.registered_commands if command.callback]
 
 
 @pytest.mark.parametrize("command", COMMANDS)

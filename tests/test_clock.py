@@ -8,29 +8,29 @@ import pytest
 
 from tautwire.errors import RecordingError
 from tautwire.recordings.recording import Recording
-from tautwire.tracer.adequacy import is_noise
-from tautwire.tracer.data import Evidence, split
+from tautwire.tracer.adequacy import residuals_are_white
+from tautwire.tracer.data import DataSplit, split_data
 from tautwire.tracer.fit import Fitter
-from tautwire.tracer.preparation.clock import CHANNELS, shifted, with_clocks_set
-from tautwire.tracer.preparation.noise import noise_of
+from tautwire.tracer.preparation.clock import CHANNEL_GROUPS, shifted, with_clocks_set
+from tautwire.tracer.preparation.noise import estimate_noise
 from tests.recordings import recorded
 from tests.robots import example
 
-POSITIONS, TENSIONS = CHANNELS
+POSITIONS, TENSIONS = CHANNEL_GROUPS
 LATE: dict[str, dict[str, Any]] = {
     "positions": {"sensor_delay": {"seconds": 0.015, "outputs": "position"}},
     "tensions": {"sensor_delay": {"seconds": 0.015}},
 }
 
 
-def clocks_set(name: str, fit: Recording, check: Recording) -> tuple[Evidence, tuple[str, ...], bool]:
+def clocks_set(name: str, fit: Recording, check: Recording) -> tuple[DataSplit, tuple[str, ...], bool]:
     """The evidence after, the notes, and whether noise alone is left."""
     robot = example(name)
-    noise = noise_of(robot, fit)
+    noise = estimate_noise(robot, fit)
     fitter = Fitter(noise)
-    evidence, notes = with_clocks_set(fitter, robot, split(robot, noise, fit, check))
-    samples = (evidence.fit, evidence.judge)
-    return evidence, notes, all(is_noise(fitter.innovations(robot, s), s.rows) for s in samples)
+    evidence, notes = with_clocks_set(fitter, robot, split_data(robot, noise, fit, check))
+    samples = (evidence.estimation, evidence.validation)
+    return evidence, notes, all(residuals_are_white(fitter.innovations(robot, s), s.rows) for s in samples)
 
 
 def milliseconds(note: str) -> float:
@@ -51,7 +51,7 @@ def test_outputs_that_are_late_in_one_recording_only_are_shifted_back(name: str,
 def test_a_sensor_that_is_late_in_both_is_left_to_the_effect(kind: str) -> None:
     evidence, notes, _ = clocks_set("three", recorded("three", 1, LATE[kind]), recorded("three", 2, LATE[kind]))
     assert notes == ()
-    assert evidence.fit.recording is recorded("three", 1, LATE[kind])
+    assert evidence.estimation.recording is recorded("three", 1, LATE[kind])
 
 
 def test_a_delay_of_half_a_swing_in_both_is_no_clock() -> None:

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tautwire.fmus.packaging import RobotFmus
-from tautwire.master import Component, ComponentError, FixedStep, Kept, Sampled, simulate
-from tautwire.runs.cosimulation import RunError, cosimulate, instantiated
-from tautwire.runs.wiring import shown_ports
+from tautwire.master import Component, ComponentError, FixedStep, MemoryRecorder, PiecewiseLinearInput, simulate
+from tautwire.runs.cosimulation import RunError, cosimulate, instantiate_robot
+from tautwire.runs.wiring import recorded_ports
 
 
 def test_a_failing_fmu_is_named_with_time_and_inputs(three_fmus: RobotFmus) -> None:
@@ -28,14 +28,14 @@ def test_a_failing_fmu_is_named_with_time_and_inputs(three_fmus: RobotFmus) -> N
 
 def test_a_value_that_is_not_finite_stops_the_run(three_fmus: RobotFmus) -> None:
     speeds = np.array([[0.0, 0.0, 0.0], [0.0, np.inf, 0.0]])
-    with instantiated(three_fmus) as coupling, pytest.raises(ComponentError, match="not finite"):
+    with instantiate_robot(three_fmus) as coupling, pytest.raises(ComponentError, match="not finite"):
         simulate(
             coupling,
-            Sampled(np.array([0.0, 0.1]), speeds),
+            PiecewiseLinearInput(np.array([0.0, 0.1]), speeds),
             np.array([0.0, 0.1]),
-            shown_ports(3),
+            recorded_ports(3),
             FixedStep(0.01),
-            Kept(2, 18),
+            MemoryRecorder(2, 18),
         )
 
 
@@ -52,6 +52,6 @@ def test_a_run_that_fails_keeps_what_came_before(three_fmus: RobotFmus) -> None:
     speeds[3, 1] = 1e300
     with pytest.raises(RunError, match=r"FMU cable_2: fmi2DoStep gave 'discard' at 0\.2") as caught:
         cosimulate(three_fmus, time, speeds)
-    assert caught.value.motion.time.tolist() == [0.0, 0.1, 0.2]
-    assert np.isfinite(caught.value.motion.tension).all()
+    assert caught.value.result.time.tolist() == [0.0, 0.1, 0.2]
+    assert np.isfinite(caught.value.result.tension).all()
     assert caught.value.cause.component == "cable_2"

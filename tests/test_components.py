@@ -11,10 +11,10 @@ import pytest
 from tautwire.recordings.recording import Recording
 from tautwire.robots.robot import Cable, Robot
 from tautwire.statics.equilibrium import static_tensions
-from tautwire.tracer.data import split
-from tautwire.tracer.preparation.noise import noise_of
-from tautwire.tracer.where.components import cut_at_ports
-from tautwire.tracer.where.port_residuals import ComponentResidual, Components
+from tautwire.tracer.data import split_data
+from tautwire.tracer.preparation.noise import estimate_noise
+from tautwire.tracer.where.components import localise_residual
+from tautwire.tracer.where.port_residuals import ComponentResidual, FaultLocalisation
 from tests.recordings import recorded
 from tests.robots import example
 
@@ -39,38 +39,38 @@ HIDDEN: list[tuple[dict[str, Any], str]] = [
 ]
 
 
-def cut(robot: Robot, recording: Recording) -> Components:
-    noise = noise_of(robot, recording)
-    return cut_at_ports(robot, split(robot, noise, recording, recording).fit, noise)
+def cut(robot: Robot, recording: Recording) -> FaultLocalisation:
+    noise = estimate_noise(robot, recording)
+    return localise_residual(robot, split_data(robot, noise, recording, recording).estimation, noise)
 
 
 @cache
-def _found(text: str) -> Components:
+def _found(text: str) -> FaultLocalisation:
     return cut(example("three"), recorded("three", 3, json.loads(text)))
 
 
-def found(effects: dict[str, Any]) -> Components:
+def found(effects: dict[str, Any]) -> FaultLocalisation:
     """The components of the three-cable robot with an effect hidden in it; made once."""
     return _found(json.dumps(effects))
 
 
-def part(components: Components, component: str, quantity: str = "tension") -> ComponentResidual:
-    return next(p for p in components.parts if (p.component, p.quantity) == (component, quantity))
+def part(components: FaultLocalisation, component: str, quantity: str = "tension") -> ComponentResidual:
+    return next(p for p in components.residuals if (p.component, p.quantity) == (component, quantity))
 
 
 @pytest.mark.parametrize(("effects", "blamed"), HIDDEN, ids=str)
 def test_the_component_in_question_is_named(effects: dict[str, Any], blamed: str) -> None:
-    assert found(effects).blamed == blamed
+    assert found(effects).faulty_component == blamed
 
 
 def test_where_nothing_is_hidden_residuals_are_as_large_as_expected() -> None:
     components = found({})
-    assert [p.component for p in components.parts] == ["cable 1", "cable 2", "cable 3", *["platform"] * 3]
-    for each in components.parts:
+    assert [p.component for p in components.residuals] == ["cable 1", "cable 2", "cable 3", *["platform"] * 3]
+    for each in components.residuals:
         assert 0.8 < each.ratio < 1.2
-        assert each.moves_with is None and each.rings_at is None
+        assert each.correlated_signal is None and each.resonance_frequency is None
         assert each.residual.shape == components.time.shape
-    assert components.untold == ()
+    assert components.limitations == ()
 
 
 @pytest.mark.parametrize(
@@ -86,7 +86,7 @@ def test_where_nothing_is_hidden_residuals_are_as_large_as_expected() -> None:
 def test_what_a_residual_moves_with_is_named(
     effects: dict[str, Any], component: str, quantity: str, signal: str, sign: int
 ) -> None:
-    moved = part(found(effects), component, quantity).moves_with
+    moved = part(found(effects), component, quantity).correlated_signal
     assert moved is not None and moved.name == signal
     assert sign * moved.correlation > 0.8
 
@@ -94,14 +94,14 @@ def test_what_a_residual_moves_with_is_named(
 def test_a_payload_shows_by_its_weight_and_not_at_the_cables() -> None:
     components = found({"payload": {"mass": 6.0}})
     assert part(components, "platform", "force z").mean == pytest.approx(-6.0 * 9.81, rel=0.02)
-    assert not any(p.is_off for p in components.parts if p.component != "platform")
+    assert not any(p.is_significant for p in components.residuals if p.component != "platform")
     assert components.ranking[0].quantity == "force z"
 
 
 def test_a_swinging_load_rings_at_the_platform_with_its_frequency() -> None:
     components = found({"unlisted_swing": {"mass": 20.0, "length": 2.0}})
-    assert components.blamed == "platform"
-    frequency = part(components, "platform", "force x").rings_at
+    assert components.faulty_component == "platform"
+    frequency = part(components, "platform", "force x").resonance_frequency
     assert frequency == pytest.approx(np.sqrt(9.81 / 2.0) / (2.0 * np.pi), rel=0.06)
     assert "rings at 0.3" in components.sentence
 
@@ -110,18 +110,18 @@ def test_without_positions_nothing_can_be_told() -> None:
     recording = recorded("three", 3)
     blind = replace(recording, position=np.full_like(recording.position, np.nan))
     components = cut(example("three"), blind)
-    assert (components.parts, components.blamed) == ((), "cannot tell")
-    assert "positions are missing" in components.untold[0]
+    assert (components.residuals, components.faulty_component) == ((), "cannot tell")
+    assert "positions are missing" in components.limitations[0]
     one_axis = recording.position.copy()
     one_axis[:, 1] = np.nan
-    assert cut(example("three"), replace(recording, position=one_axis)).blamed == "cannot tell"
+    assert cut(example("three"), replace(recording, position=one_axis)).faulty_component == "cannot tell"
 
 
 def test_without_tensions_nothing_can_be_told() -> None:
     recording = recorded("three", 3)
     components = cut(example("three"), replace(recording, tension=np.full_like(recording.tension, np.nan)))
-    assert (components.parts, components.blamed) == ((), "cannot tell")
-    assert "no tensions" in components.untold[0]
+    assert (components.residuals, components.faulty_component) == ((), "cannot tell")
+    assert "no tensions" in components.limitations[0]
 
 
 def test_without_one_load_cell_the_other_cables_are_still_told() -> None:
@@ -129,9 +129,9 @@ def test_without_one_load_cell_the_other_cables_are_still_told() -> None:
     tension = recording.tension.copy()
     tension[:, 2] = np.nan
     components = cut(example("three"), replace(recording, tension=tension))
-    assert [p.component for p in components.parts] == ["cable 1", "cable 2"]
-    assert components.blamed == "cable 2 (rope, winch, load cell or exit point)"
-    assert "cable 3" in components.untold[0]
+    assert [p.component for p in components.residuals] == ["cable 1", "cable 2"]
+    assert components.faulty_component == "cable 2 (rope, winch, load cell or exit point)"
+    assert "cable 3" in components.limitations[0]
 
 
 def test_dropouts_do_no_harm() -> None:
@@ -140,7 +140,7 @@ def test_dropouts_do_no_harm() -> None:
     position[np.arange(len(position)) % 5 != 0] = np.nan
     tension[300:330, 1] = np.nan
     components = cut(example("three"), replace(recording, position=position, tension=tension))
-    assert components.blamed == "nothing"
+    assert components.faulty_component == "nothing"
     assert np.all(np.isnan(part(components, "cable 2").residual[300:330]))
 
 
@@ -155,13 +155,15 @@ def test_a_flat_robot_needs_no_positions_across_it() -> None:
     place[:, 1] = np.nan
     tension = static_tensions(robot) + random.normal(0.0, 2.0, still.shape)
     components = cut(robot, Recording("flat", time, still, tension, place))
-    assert {p.quantity for p in components.parts} == {"tension", "force x", "force z"}
-    assert components.blamed == "nothing"
+    assert {p.quantity for p in components.residuals} == {"tension", "force x", "force z"}
+    assert components.faulty_component == "nothing"
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", ["caroca", "eight"])
 def test_other_robots_are_cut_as_well(name: str) -> None:
     robot = example(name)
-    assert cut(robot, recorded(name, 3)).blamed == "nothing"
-    assert cut(robot, recorded(name, 3, {"payload": {"mass": 0.02 * robot.platform.mass}})).blamed == "platform"
+    assert cut(robot, recorded(name, 3)).faulty_component == "nothing"
+    assert (
+        cut(robot, recorded(name, 3, {"payload": {"mass": 0.02 * robot.platform.mass}})).faulty_component == "platform"
+    )

@@ -7,10 +7,10 @@ import pytest
 
 from tautwire.model.symbolic import FreeParameter
 from tautwire.robots.robot import EffectSetting
-from tautwire.tracer.data import Sample
+from tautwire.tracer.data import DataSet
 from tautwire.tracer.likelihood import Likelihood
-from tautwire.tracer.preparation.compression import compressed
-from tautwire.tracer.preparation.noise import noise_of
+from tautwire.tracer.preparation.compression import compressed_residuals
+from tautwire.tracer.preparation.noise import estimate_noise
 from tests.recordings import recorded
 from tests.robots import example
 
@@ -25,7 +25,7 @@ def likelihood() -> Likelihood:
     robot = robot.with_effect(EffectSetting("payload", {"mass": 2.0}))
     robot = robot.with_effect(EffectSetting("sensor_delay", {"tension_delay": 0.05, "position_delay": 0.0}, (1, 2, 3)))
     free = [FreeParameter(0, "damping"), FreeParameter(1, "mass"), FreeParameter(2, "tension_delay")]
-    return Likelihood(robot, free, noise_of(robot, RECORDING), 0.02)
+    return Likelihood(robot, free, estimate_noise(robot, RECORDING), 0.02)
 
 
 def test_few_rows_have_the_cost_gradient_and_curvature_of_all() -> None:
@@ -33,11 +33,11 @@ def test_few_rows_have_the_cost_gradient_and_curvature_of_all() -> None:
     sparse[::7, 1] = np.nan
     recording = replace(RECORDING, position=sparse)
     whole = likelihood()
-    residuals, slopes = compressed(whole, VALUES, Sample(recording, (0.0, 0.0, 0.0), ROWS), 0.1)
+    residuals, slopes = compressed_residuals(whole, VALUES, DataSet(recording, (0.0, 0.0, 0.0), ROWS), 0.1)
     assert residuals.shape == (4,) and slopes.shape == (4, 3)
     all_of_them = whole.innovations(recording, VALUES, 0.1)
-    chosen = all_of_them.seen & ROWS[:, None]
-    e, jacobian = all_of_them.values[chosen], all_of_them.slopes[chosen]
+    chosen = all_of_them.observed & ROWS[:, None]
+    e, jacobian = all_of_them.values[chosen], all_of_them.sensitivities[chosen]
     assert residuals @ residuals == pytest.approx(e @ e, rel=1e-10)
     assert slopes.T @ residuals == pytest.approx(jacobian.T @ e, rel=1e-6)
     assert slopes.T @ slopes == pytest.approx(jacobian.T @ jacobian, rel=1e-8)
@@ -45,5 +45,5 @@ def test_few_rows_have_the_cost_gradient_and_curvature_of_all() -> None:
 
 def test_what_is_not_finite_stays_so() -> None:
     wild = np.array([9e8, np.nan, 0.05])
-    residuals, _ = compressed(likelihood(), wild, Sample(RECORDING, (0.0, 0.0, 0.0), ROWS), 0.0)
+    residuals, _ = compressed_residuals(likelihood(), wild, DataSet(RECORDING, (0.0, 0.0, 0.0), ROWS), 0.0)
     assert np.isnan(residuals).all()

@@ -17,7 +17,7 @@ from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.master import FixedStep
 from tautwire.robots.reading import read_robot
 from tautwire.robots.robot import Robot
-from tautwire.runs.cosimulation import Motion, cosimulate, run
+from tautwire.runs.cosimulation import CosimulationResult, cosimulate, run_cosimulation
 from tautwire.trajectory import CAROCA_HELIX, PAPER_HELIX, Helix, Line, Trajectory, ideal_winch_speeds
 from tests.robots import paper_robot
 from tests.winch_ramp import WinchRamp
@@ -48,7 +48,7 @@ def off_nominal(robot: Robot, modulus: float, mass: float) -> Robot:
     return replace(robot, cables=cables, platform=replace(robot.platform, mass=mass * robot.platform.mass))
 
 
-def errors(motion: Motion, path: Trajectory) -> Array:
+def errors(motion: CosimulationResult, path: Trajectory) -> Array:
     """Distance from the path over time, in m."""
     return np.asarray(np.linalg.norm(motion.position - path.position(motion.time), axis=1))
 
@@ -133,7 +133,7 @@ def test_limit_of_speed_is_kept_and_nothing_winds_up(fmus: dict[str, RobotFmus])
     design = design_controller(robot, ControlAim(speed_limit=0.3))
     times = np.linspace(0.0, 8.0, 801)
     source = PathController(robot, design, path, times)
-    motion = run(fmus["three"], source, times, FixedStep(0.01))
+    motion = run_cosimulation(fmus["three"], source, times, FixedStep(0.01))
     assert np.abs(ideal_winch_speeds(robot, path, times)).max() > 0.35
     assert np.abs(source.speeds).max() == pytest.approx(0.3, abs=1e-12)
     assert errors(motion, path).max() > 0.05

@@ -73,9 +73,9 @@ def difference(
     push = np.zeros((len(times), 3))
     push[30:, 2] = -0.05 * robot.platform.mass * robot.gravity
     force = push if pushed else None
-    own = cosimulate_closed_loop(fmus, robot, design, path, DURATION, push=force)
+    own = cosimulate_closed_loop(fmus, robot, design, path, DURATION, external_force=force)
     fmu = build_controller_fmu(robot, design, path, DURATION, folder)
-    other = cosimulate_with_controller(fmus, fmu, times, push=force)
+    other = cosimulate_with_controller(fmus, fmu, times, external_force=force)
     assert np.max(np.abs(own.position - own.position[0])) > 0.3
     assert other.tension == pytest.approx(own.tension, abs=1e-5)
     return float(np.max(np.abs(own.position - other.position)))
@@ -88,7 +88,7 @@ def test_lqg_gives_the_same_numbers_as_fmu(name: str, tmp_path: Path) -> None:
 
 
 def test_scheduled_and_pure_feedforward_do_so(three: Robot, three_example_fmus: RobotFmus, tmp_path: Path) -> None:
-    scheduled = schedule_controller(three, PATHS["three"], places=4)
+    scheduled = schedule_controller(three, PATHS["three"], points=4)
     assert difference(three, three_example_fmus, scheduled, tmp_path) < 1e-9
     assert difference(three, three_example_fmus, Feedforward(3), tmp_path) < 1e-9
 
@@ -101,7 +101,7 @@ def test_shaped_path_does_so(three: Robot, three_example_fmus: RobotFmus, tmp_pa
 @pytest.mark.slow
 def test_robust_controllers_do_so(three: Robot, three_example_fmus: RobotFmus, tmp_path: Path) -> None:
     assert difference(three, three_example_fmus, design_robust(three), tmp_path, pushed=True) < 1e-9
-    scheduled = schedule_robust(three, PATHS["three"], places=3)
+    scheduled = schedule_robust(three, PATHS["three"], points=3)
     assert difference(three, three_example_fmus, scheduled, tmp_path, pushed=True) < 1e-9
 
 
@@ -130,11 +130,11 @@ def test_macro_step_within_a_sample_does_not_matter(three_example_fmus: RobotFmu
 def test_a_watched_run_gives_the_same(three: Robot, three_example_fmus: RobotFmus, controller: Path) -> None:
     times = sample_times(0.01, 0.5)
     push = np.full((len(times), 3), 20.0)
-    here = cosimulate_with_controller(three_example_fmus, controller, times, push=push)
-    apart = cosimulate_with_controller(three_example_fmus, controller, times, push=push, patience=60.0)
+    here = cosimulate_with_controller(three_example_fmus, controller, times, external_force=push)
+    apart = cosimulate_with_controller(three_example_fmus, controller, times, external_force=push, call_timeout=60.0)
     assert np.array_equal(here.position, apart.position)
     design, path = design_controller(three), PATHS["three"]
-    own = cosimulate_closed_loop(three_example_fmus, three, design, path, 0.5, push=push, patience=60.0)
+    own = cosimulate_closed_loop(three_example_fmus, three, design, path, 0.5, external_force=push, call_timeout=60.0)
     assert own.position == pytest.approx(here.position, abs=1e-9)
 
 

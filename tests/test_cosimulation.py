@@ -9,7 +9,7 @@ import pytest
 from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.model.reference import integrate
 from tautwire.robots.robot import EffectSetting, Platform, Robot
-from tautwire.runs.cosimulation import Motion, cosimulate
+from tautwire.runs.cosimulation import CosimulationResult, cosimulate
 from tests.rig import RampProgram, SampledProgram, robot_from, simulate
 from tests.rig import Robot as RigRobot
 from tests.robots import NAMES, example, gentle_speeds, paper_robot, with_damping
@@ -160,11 +160,11 @@ def test_steps_chosen_by_a_tolerance_keep_it(three_fmus: RobotFmus, tolerance: f
     motion = cosimulate(three_fmus, CORNERS, speeds, tolerance=tolerance)
     exact = simulate(rig_of(paper_robot()), None, RampProgram(RAMP, 1.0), CORNERS, rtol=1e-12, atol=1e-13)
     assert np.max(np.abs(motion.position[-1] - exact.position[-1])) < tolerance
-    assert motion.account.error is not None and motion.account.error <= tolerance
-    assert motion.account.steps < 600
+    assert motion.statistics.estimated_error is not None and motion.statistics.estimated_error <= tolerance
+    assert motion.statistics.steps < 600
 
 
-def swing_energy(robot: Robot, motion: Motion) -> np.ndarray:
+def swing_energy(robot: Robot, motion: CosimulationResult) -> np.ndarray:
     """Kinetic, potential and elastic energy in J while the winches stand, logarithmic law."""
     axial = robot.cables[0].modulus * robot.cables[0].area
     kinetic = 0.5 * robot.platform.mass * np.sum(motion.velocity**2, axis=1)
@@ -183,5 +183,5 @@ def test_the_coupling_neither_makes_nor_eats_energy(three_fmus: RobotFmus) -> No
     energy = swing_energy(paper_robot(), motion)[free]
     vibration = np.max(0.5 * 300.0 * np.sum(motion.velocity[free] ** 2, axis=1))
     assert np.max(np.abs(energy - energy[0])) < 1e-6 * vibration
-    assert motion.account.share < 1e-9
-    assert motion.account.warnings() == ()
+    assert motion.statistics.energy_residual_share < 1e-9
+    assert motion.statistics.warnings() == ()

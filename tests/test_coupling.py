@@ -4,45 +4,53 @@ import numpy as np
 import pytest
 
 from tautwire.fmus.packaging import RobotFmus
-from tautwire.master import AdaptiveStep, Coupling, FixedStep, Kept, Sampled, StepError, simulate
-from tautwire.runs.cosimulation import instantiated
-from tautwire.runs.wiring import connections, shown_ports, winch_ports
+from tautwire.master import (
+    AdaptiveStep,
+    Coupling,
+    FixedStep,
+    MemoryRecorder,
+    PiecewiseLinearInput,
+    StepSizeError,
+    simulate,
+)
+from tautwire.runs.cosimulation import instantiate_robot
+from tautwire.runs.wiring import recorded_ports, robot_connections, winch_input_ports
 from tests.rig import RampProgram
 from tests.rig import simulate as rig_simulate
 from tests.robots import paper_robot
 from tests.test_cosimulation import CORNERS, RAMP, rig_of
 
-RAMPS = Sampled(CORNERS, np.clip(RAMP * CORNERS[:, None], -1.0, 1.0))
+RAMPS = PiecewiseLinearInput(CORNERS, np.clip(RAMP * CORNERS[:, None], -1.0, 1.0))
 
 
 def end_error(coupling: Coupling, step: float) -> float:
-    kept = Kept(len(CORNERS), 18)
-    simulate(coupling, RAMPS, CORNERS, shown_ports(3), FixedStep(step), kept)
+    kept = MemoryRecorder(len(CORNERS), 18)
+    simulate(coupling, RAMPS, CORNERS, recorded_ports(3), FixedStep(step), kept)
     exact = rig_simulate(rig_of(paper_robot()), None, RampProgram(RAMP, 1.0), CORNERS, rtol=1e-12, atol=1e-13)
     return float(np.linalg.norm(kept.rows[-1, :3] - exact.position[-1]))
 
 
 def test_without_saved_states_it_goes_on_with_one_pass(three_fmus: RobotFmus) -> None:
-    with instantiated(three_fmus) as coupling:
-        coupling.can_redo = False
+    with instantiate_robot(three_fmus) as coupling:
+        coupling.supports_rollback = False
         assert end_error(coupling, 0.01) < 1e-4
-        assert coupling.account.redos == 0
-        assert coupling.account.passes == coupling.account.steps
+        assert coupling.statistics.iterations == 0
+        assert coupling.statistics.sweeps == coupling.statistics.steps
 
 
 def test_the_books_show_what_a_coupling_without_redo_makes(three_fmus: RobotFmus) -> None:
     shares = []
     for can_redo in (True, False):
-        with instantiated(three_fmus) as coupling:
-            coupling.can_redo = can_redo
+        with instantiate_robot(three_fmus) as coupling:
+            coupling.supports_rollback = can_redo
             end_error(coupling, 0.05)
-            shares.append(coupling.account.share)
+            shares.append(coupling.statistics.energy_residual_share)
     assert shares[1] > 100.0 * shares[0]
 
 
 def test_a_checkpoint_takes_everything_back(three_fmus: RobotFmus) -> None:
-    with instantiated(three_fmus) as coupling:
-        simulate(coupling, RAMPS, CORNERS[:2], shown_ports(3), FixedStep(0.02), Kept(2, 18))
+    with instantiate_robot(three_fmus) as coupling:
+        simulate(coupling, RAMPS, CORNERS[:2], recorded_ports(3), FixedStep(0.02), MemoryRecorder(2, 18))
         drives = RAMPS.interval(1, CORNERS[1], 0.02, np.zeros(0))
         checkpoint = coupling.save()
         ends = []
@@ -58,15 +66,15 @@ def test_a_checkpoint_takes_everything_back(three_fmus: RobotFmus) -> None:
 
 
 def test_a_tolerance_that_no_step_meets_is_said(three_fmus: RobotFmus) -> None:
-    with instantiated(three_fmus) as coupling, pytest.raises(StepError, match="larger --tolerance"):
-        simulate(coupling, RAMPS, CORNERS, shown_ports(3), AdaptiveStep(1e-22, 7.0), Kept(4, 18))
+    with instantiate_robot(three_fmus) as coupling, pytest.raises(StepSizeError, match="larger --tolerance"):
+        simulate(coupling, RAMPS, CORNERS, recorded_ports(3), AdaptiveStep(1e-22, 7.0), MemoryRecorder(4, 18))
 
 
 def test_what_holds_in_the_middle_of_a_step_gives_the_sixth_order(three_fmus: RobotFmus) -> None:
     errors = []
     for step in (0.1, 0.05):
-        with instantiated(three_fmus) as coupling:
-            assert coupling.order == 6
+        with instantiate_robot(three_fmus) as coupling:
+            assert coupling.convergence_order == 6
             errors.append(end_error(coupling, step))
     assert errors[0] < 2e-7
     assert 25.0 < errors[0] / errors[1] < 100.0
@@ -75,9 +83,9 @@ def test_what_holds_in_the_middle_of_a_step_gives_the_sixth_order(three_fmus: Ro
 def test_without_the_middle_the_order_is_four(three_fmus: RobotFmus) -> None:
     errors = []
     for step in (0.05, 0.025):
-        with instantiated(three_fmus) as coupling:
-            plain = Coupling(coupling.components, connections(3), winch_ports(3))
-            assert plain.order == 4
+        with instantiate_robot(three_fmus) as coupling:
+            plain = Coupling(coupling.components, robot_connections(3), winch_input_ports(3))
+            assert plain.convergence_order == 4
             errors.append(end_error(plain, step))
     assert errors[0] < 2e-5
     assert 10.0 < errors[0] / errors[1] < 30.0
@@ -93,19 +101,19 @@ def parted(coupling: Coupling) -> float:
 
 
 def test_what_is_recorded_follows_from_the_place_that_is_recorded(three_fmus: RobotFmus) -> None:
-    with instantiated(three_fmus) as coupling:
+    with instantiate_robot(three_fmus) as coupling:
         end_error(coupling, 0.1)
         assert parted(coupling) == 0.0
 
 
 @pytest.mark.parametrize("can_redo", [True, False])
 def test_inputs_that_agree_wait_until_outputs_are_read(can_redo: bool, three_fmus: RobotFmus) -> None:
-    with instantiated(three_fmus) as coupling:
-        simulate(coupling, RAMPS, CORNERS[:2], shown_ports(3), FixedStep(0.1), Kept(2, 18))
-        coupling.can_redo = can_redo
-        checkpoint = coupling.attempt(CORNERS[1], 0.1, *RAMPS.interval(1, CORNERS[1], 0.1, np.zeros(0)))
+    with instantiate_robot(three_fmus) as coupling:
+        simulate(coupling, RAMPS, CORNERS[:2], recorded_ports(3), FixedStep(0.1), MemoryRecorder(2, 18))
+        coupling.supports_rollback = can_redo
+        checkpoint = coupling.attempt_step(CORNERS[1], 0.1, *RAMPS.interval(1, CORNERS[1], 0.1, np.zeros(0)))
         assert (parted(coupling) > 0.0) is can_redo
-        coupling.pass_on_guessed()
+        coupling.update_inputs()
         assert parted(coupling) == 0.0
         if checkpoint is not None:
             coupling.release(checkpoint)

@@ -6,24 +6,24 @@ import numpy as np
 import pytest
 
 from tautwire.recordings.recording import Recording
-from tautwire.tracer.data import Sample, split
-from tautwire.tracer.preparation.noise import noise_of
+from tautwire.tracer.data import DataSet, split_data
+from tautwire.tracer.preparation.noise import estimate_noise
 from tests.recordings import recorded
 from tests.robots import example
 
 ROBOT = example("three")
 FIT = recorded("three", 1)
-NOISE = noise_of(ROBOT, FIT)
+NOISE = estimate_noise(ROBOT, FIT)
 
 
 def test_no_sample_both_fits_and_judges() -> None:
-    alone = split(ROBOT, NOISE, FIT, None)
-    assert alone.fit.recording is alone.judge.recording
-    assert not np.any(alone.fit.rows & alone.judge.rows)
+    alone = split_data(ROBOT, NOISE, FIT, None)
+    assert alone.estimation.recording is alone.validation.recording
+    assert not np.any(alone.estimation.rows & alone.validation.rows)
     assert "no check recording" in alone.notes[-1]
-    pair = split(ROBOT, NOISE, FIT, recorded("three", 2))
-    assert pair.fit.rows.all() and pair.judge.rows.all()
-    assert pair.fit.recording is not pair.judge.recording
+    pair = split_data(ROBOT, NOISE, FIT, recorded("three", 2))
+    assert pair.estimation.rows.all() and pair.validation.rows.all()
+    assert pair.estimation.recording is not pair.validation.recording
 
 
 def blank(count: int) -> Recording:
@@ -34,5 +34,5 @@ def blank(count: int) -> Recording:
 
 @pytest.mark.parametrize(("count", "ranked"), [(500, 500), (900, 800), (6000, 2000), (90_000, 20_000)])
 def test_hypotheses_are_ranked_by_a_third_within_bounds(count: int, ranked: int) -> None:
-    sample = Sample(blank(count), (0.0, 0.0, 0.0), np.ones(count, dtype=bool))
+    sample = DataSet(blank(count), (0.0, 0.0, 0.0), np.ones(count, dtype=bool))
     assert np.sum(sample.head.rows) == len(sample.head.recording.time) == ranked

@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 
 from tautwire.robots.robot import Formula, Robot
-from tautwire.tracer.data import split
-from tautwire.tracer.discovery.discovery import Discovery, discover
+from tautwire.tracer.data import split_data
+from tautwire.tracer.discovery.discovery import Discovery, discover_formula
 from tautwire.tracer.discovery.written import formula_text
 from tautwire.tracer.fit import Fitter
-from tautwire.tracer.preparation.noise import noise_of
+from tautwire.tracer.preparation.noise import estimate_noise
 from tests.recordings import recorded
 from tests.robots import example
 
@@ -25,16 +25,16 @@ THRESHOLD = log(100 / 0.01)
 
 def discovered(effects: dict[str, Any], seed: int = 3, robot: Robot = ROBOT) -> Discovery | None:
     fit, check = recorded("three", seed, effects), recorded("three", seed + 50, effects)
-    noise = noise_of(robot, fit)
-    return discover(robot, (), Fitter(noise), split(robot, noise, fit, check), lambda what, done: None)
+    noise = estimate_noise(robot, fit)
+    return discover_formula(robot, (), Fitter(noise), split_data(robot, noise, fit, check), lambda what, done: None)
 
 
 def found_in(effects: dict[str, Any], pattern: str) -> list[float]:
     """The numbers in a formula of this form, which has to be good enough for a verdict."""
     found = discovered(effects)
     assert found is not None
-    assert found.leaves_noise
-    assert found.earns_its_place(THRESHOLD)
+    assert found.residuals_are_white
+    assert found.is_accepted(THRESHOLD)
     numbers = re.fullmatch(pattern.replace("#", r"(-?[0-9.e-]+)"), formula_text(found.robot, found.formulas))
     assert numbers is not None, formula_text(found.robot, found.formulas)
     return [float(number) for number in numbers.groups()]
@@ -70,15 +70,15 @@ def test_a_formula_of_the_robot_file_stays() -> None:
     half = replace(ROBOT, formulas=(Formula("force_x", "-30*vy"),))
     found = discovered({"unlisted_sideways": {"constant": 30.0}}, robot=half)
     assert found is not None
-    assert found.leaves_noise
-    assert [formula.place for formula in found.formulas] == ["force_y"]
+    assert found.residuals_are_white
+    assert [formula.target for formula in found.formulas] == ["force_y"]
     assert found.robot.formulas == (*half.formulas, *found.formulas)
 
 
 @pytest.mark.slow
 def test_nothing_is_found_where_nothing_is_hidden() -> None:
     found = [discovered({}, seed) for seed in (5, 6)]
-    assert not any(each is not None and each.earns_its_place(THRESHOLD) for each in found)
+    assert not any(each is not None and each.is_accepted(THRESHOLD) for each in found)
 
 
 @pytest.mark.slow
@@ -93,11 +93,11 @@ def test_nothing_is_found_where_nothing_is_hidden() -> None:
 def test_a_known_effect_by_another_name_earns_no_place(effects: dict[str, Any]) -> None:
     found = discovered(effects)
     assert found is not None
-    assert found.evidence > THRESHOLD
-    assert not found.earns_its_place(THRESHOLD)
+    assert found.log_likelihood_gain > THRESHOLD
+    assert not found.is_accepted(THRESHOLD)
 
 
 @pytest.mark.slow
 def test_what_swings_has_no_formula() -> None:
     found = discovered({"unlisted_swing": {"mass": 20.0, "length": 2.0}})
-    assert found is None or not found.leaves_noise
+    assert found is None or not found.residuals_are_white

@@ -15,15 +15,15 @@ import pytest
 from tautwire.campaign import reading as plans
 from tautwire.linear import linearise
 from tautwire.linear.document import model_document
-from tautwire.materials.table import RULES
+from tautwire.materials.table import COLUMN_RULES
 from tautwire.recordings.header import known_columns
 from tautwire.report import trace_document
 from tautwire.robots import reading as robots
 from tautwire.robots.template import new_robot_text
 from tautwire.runs.wiring import result_columns
-from tautwire.tracer.verdict import Correlation, Fitted, Resonance
+from tautwire.tracer.verdict import Correlation, FittedParameter, Resonance
 from tautwire_fmu.laws.effects import BY_NAME
-from tautwire_fmu.laws.formula import PLACES
+from tautwire_fmu.laws.formula import VARIABLES_BY_TARGET
 from tests.robots import example
 from tests.traces import made_trace
 
@@ -133,7 +133,14 @@ def of_cable(names: Iterator[str]) -> set[str]:
 
 
 def test_page_of_files_tells_every_key_of_a_robot_file() -> None:
-    keys = {*robots.KEYS, *robots.NOISES, *robots.OFFSETS, *robots.LIMITS, *PLACES, "cables"}
+    keys = {
+        *robots.TOP_LEVEL_KEYS,
+        *robots.NOISE_RULES,
+        *robots.OFFSET_RULES,
+        *robots.WINCH_LIMIT_RULES,
+        *VARIABLES_BY_TARGET,
+        "cables",
+    }
     written = set(re.findall(r"^(?:# )?(\w+) = ", new_robot_text("hall"), re.MULTILINE))
     assert len(written) > 25
     assert (keys | written) - named_in("formats.md") == set()
@@ -157,7 +164,7 @@ def test_page_of_files_tells_every_column_of_recordings_and_results() -> None:
     columns = {*known_columns(1), *(column.name for column in result_columns(1, winches=(1,)))}
     assert of_cable(iter(columns)) - named_in("formats.md") == set()
     # One for phase_degrees, one for each uncertainty.
-    assert {name.removesuffix("_uncertainty") for name in RULES} - named_in("formats.md") == set()
+    assert {name.removesuffix("_uncertainty") for name in COLUMN_RULES} - named_in("formats.md") == set()
 
 
 def test_page_of_files_tells_every_key_of_a_model() -> None:
@@ -167,7 +174,7 @@ def test_page_of_files_tells_every_key_of_a_model() -> None:
 def test_page_of_files_tells_every_key_of_a_report() -> None:
     trace = made_trace(samples=200)
     swinging = Resonance(0.45, ("x",), ("fit",))
-    together = Correlation((Fitted("damping", (1,), "damping"), Fitted("drum", (1,), "slip")), 0.3)
+    together = Correlation((FittedParameter("damping", (1,), "damping"), FittedParameter("drum", (1,), "slip")), 0.3)
     document = trace_document(replace(trace, resonances=(swinging,), correlations=(together,)))
     parameters = {p.name for effect in BY_NAME.values() for p in effect.parameters}
     assert {"between", "moves_with", "other_cables", "frequency_hz"} <= set(keys_in(document))
@@ -175,7 +182,7 @@ def test_page_of_files_tells_every_key_of_a_report() -> None:
 
 
 def test_page_of_campaigns_tells_every_key_of_a_plan() -> None:
-    assert set(plans.KEYS) - named_in("campaign.md") == set()
+    assert set(plans.PLAN_KEYS) - named_in("campaign.md") == set()
 
 
 def test_pages_name_only_what_is_there() -> None:

@@ -10,16 +10,16 @@ from tautwire_fmu.laws.cable import (
     LAWS,
     CableConstants,
     CableInputs,
-    CableReading,
+    CableOutputs,
     CableState,
-    motion,
-    reading,
+    cable_motion,
+    cable_outputs,
     span,
     start_state,
     state_rates,
 )
 from tautwire_fmu.laws.effects import ALL, ActiveEffect, Effect, Parameter
-from tautwire_fmu.laws.mathematics import COMPLEX_STEP, REAL, Mathematics, along, rate_of
+from tautwire_fmu.laws.mathematics import COMPLEX_STEP, REAL, Mathematics, rate_of, with_rate
 from tautwire_fmu.laws.point_mass import PointMassConstants, acceleration
 from tautwire_fmu.units import UNITS
 from tests.effect_cases import CASES, Case
@@ -43,7 +43,7 @@ def begun(effect: Effect) -> ActiveEffect:
 
 def of(case: Case) -> ActiveEffect:
     effect = next(e for e in ALL if e.name == case.name)
-    return ActiveEffect(effect, effect.values(**effect.completed(case.law)))
+    return ActiveEffect(effect, effect.values(**effect.completed_values(case.law)))
 
 
 def state_of(effects: tuple[ActiveEffect, ...], inner: float = 0.0) -> CableState:
@@ -53,14 +53,14 @@ def state_of(effects: tuple[ActiveEffect, ...], inner: float = 0.0) -> CableStat
 def shown(effects: tuple[ActiveEffect, ...], inner: float = 0.0) -> tuple[Any, ...]:
     """All that a robot shows of its effects at one instant."""
     state = state_of(effects, inner)
-    moving = motion(REAL, CABLE, effects, state, span(REAL, CABLE, INPUTS, effects), INPUTS.winch_speed)
+    moving = cable_motion(REAL, CABLE, effects, state, span(REAL, CABLE, INPUTS, effects), INPUTS.winch_speed)
     none = tuple(() for _ in effects)
     return (
-        reading(REAL, CABLE, effects, state, moving),
+        cable_outputs(REAL, CABLE, effects, state, moving),
         state_rates(REAL, CABLE, effects, state, moving)[:2],
         acceleration(REAL, PLATFORM, effects, none, INPUTS.position, INPUTS.velocity, (5.0, 6.0, 7.0)),
-        stages.gains(REAL, effects),
-        stages.delays(REAL, effects),
+        stages.sensor_gains(REAL, effects),
+        stages.sensor_delays(REAL, effects),
     )
 
 
@@ -97,7 +97,7 @@ def test_each_form_frees_parameters_that_bring_the_effect_about(effect: Effect) 
         freed = {p.name: p.start for p in effect.parameters if p.name in form}
         assert set(freed) == set(form)
         given = {p.name: neutral(p) * p.start_ratio for p in effect.parameters if p.neutral is None}
-        values = effect.values(**effect.completed({**freed, **given}))
+        values = effect.values(**effect.completed_values({**freed, **given}))
         assert shown((ActiveEffect(effect, values),), 0.1) != shown(())
 
 
@@ -131,26 +131,26 @@ def test_creep_follows_the_tension_that_the_rope_carries_whatever_makes_it() -> 
     effects = tuple(of(Case(name, {}, values)) for name, values in given.items())
     cable = CABLE._replace(damping=0.0)
     state = state_of(effects, 1e-4)
-    moving = motion(REAL, cable, effects, state, span(REAL, cable, INPUTS, effects), INPUTS.winch_speed)
-    carried = reading(REAL, cable, effects, state, moving).span_tension
+    moving = cable_motion(REAL, cable, effects, state, span(REAL, cable, INPUTS, effects), INPUTS.winch_speed)
+    carried = cable_outputs(REAL, cable, effects, state, moving).span_tension
     creeping = state_rates(REAL, cable, effects, state, moving).effects[0][0]
     assert carried > 100.0
     assert creeping == pytest.approx(2e-12 / (4.0 + 1e-4) * carried / cable.area, rel=1e-12)
 
 
-def read(m: Mathematics, effects: tuple[ActiveEffect, ...], state: CableState, inputs: CableInputs) -> CableReading:
-    moving = motion(m, CABLE, effects, state, span(m, CABLE, inputs, effects), inputs.winch_speed)
-    return reading(m, CABLE, effects, state, moving)
+def read(m: Mathematics, effects: tuple[ActiveEffect, ...], state: CableState, inputs: CableInputs) -> CableOutputs:
+    moving = cable_motion(m, CABLE, effects, state, span(m, CABLE, inputs, effects), inputs.winch_speed)
+    return cable_outputs(m, CABLE, effects, state, moving)
 
 
 @pytest.mark.parametrize("case", CASES, ids=str)
 def test_rates_by_a_complex_step_are_the_slopes(case: Case) -> None:
     effects = (of(case),)
     state = state_of(effects, 2e-4)
-    moving = motion(REAL, CABLE, effects, state, span(REAL, CABLE, INPUTS, effects), INPUTS.winch_speed)
+    moving = cable_motion(REAL, CABLE, effects, state, span(REAL, CABLE, INPUTS, effects), INPUTS.winch_speed)
     rates = state_rates(REAL, CABLE, effects, state, moving)
 
-    def at(time: float) -> CableReading:
+    def at(time: float) -> CableOutputs:
         later = CableState(
             state.unstrained_length + time * rates.unstrained_length,
             state.wound_length + time * rates.wound_length,
@@ -167,13 +167,15 @@ def test_rates_by_a_complex_step_are_the_slopes(case: Case) -> None:
         return read(REAL, effects, later, CableInputs(position, velocity, INPUTS.winch_speed + time * MOVING[2]))
 
     carried = CableInputs(
-        tuple(map(along, INPUTS.position, MOVING[0])),
-        tuple(map(along, INPUTS.velocity, MOVING[1])),
-        along(INPUTS.winch_speed, MOVING[2]),
+        tuple(map(with_rate, INPUTS.position, MOVING[0])),
+        tuple(map(with_rate, INPUTS.velocity, MOVING[1])),
+        with_rate(INPUTS.winch_speed, MOVING[2]),
     )
-    inner = tuple(tuple(map(along, own, slopes)) for own, slopes in zip(state.effects, rates.effects, strict=True))
+    inner = tuple(tuple(map(with_rate, own, slopes)) for own, slopes in zip(state.effects, rates.effects, strict=True))
     stepped = CableState(
-        along(state.unstrained_length, rates.unstrained_length), along(state.wound_length, rates.wound_length), inner
+        with_rate(state.unstrained_length, rates.unstrained_length),
+        with_rate(state.wound_length, rates.wound_length),
+        inner,
     )
     exact = read(COMPLEX_STEP, effects, stepped, carried)
     before, after = at(-1e-6), at(1e-6)
@@ -192,7 +194,7 @@ def test_rates_are_finite_at_rest_at_the_start(effect: Effect, present: bool) ->
     state = start_state(CABLE, effects)
     still = CableInputs((0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 0.0)
     for axis in range(3):
-        push = tuple(along(0.0, float(axis == k)) for k in range(3))
+        push = tuple(with_rate(0.0, float(axis == k)) for k in range(3))
         for inputs in (still._replace(position=push), still._replace(velocity=push)):
             assert np.isfinite([rate_of(force) for force in read(COMPLEX_STEP, effects, state, inputs).force]).all()
     pushed = acceleration(COMPLEX_STEP, PLATFORM, effects, ((),), push, push, (0.0, 0.0, 0.0))

@@ -13,10 +13,10 @@ from scipy.integrate import trapezoid
 from tautwire.control import path_tensions
 from tautwire.errors import RobotFileError, UnreachableError
 from tautwire.linear import linearise
-from tautwire.model.symbolic import FreeParameter, Model, symbolic_model
+from tautwire.model.symbolic import FreeParameter, SymbolicModel, symbolic_model
 from tautwire.robots.reading import read_robot, robot_text, write_robot
-from tautwire.robots.robot import PER_CABLE, EffectSetting, Platform, Robot
-from tautwire.statics.equilibrium import directions, routes, static_forces, static_tensions
+from tautwire.robots.robot import PER_CABLE_COMPONENTS, EffectSetting, Platform, Robot
+from tautwire.statics.equilibrium import cable_routes, static_forces, static_tensions, unit_directions
 from tautwire.trajectory import Line, ideal_winch_speeds
 from tautwire_fmu.laws.effects import ALL, BY_NAME, Effect
 from tautwire_fmu.laws.mathematics import REAL
@@ -33,7 +33,7 @@ def everything(*without: str) -> list[Case]:
     return list({case.name: case for case in CASES if case.name not in without}.values())
 
 
-def rates_at_start(model: Model) -> np.ndarray:
+def rates_at_start(model: SymbolicModel) -> np.ndarray:
     rates = casadi.Function("rates", [model.states, model.inputs], [model.rates])
     start = casadi.Function("start", [], [model.start])()["o0"]
     return np.array(rates(start, 0.0)).ravel()
@@ -45,7 +45,7 @@ def test_start_tensions_are_those_of_the_rig(case: Case, name: str) -> None:
     robot = with_effects(example(name), case)
     rig = Rig(rig_of(example(name)), {case.name: case.for_rig()}, StillProgram(robot.cable_count))
     assert static_tensions(robot) == pytest.approx(rig.start_tension, rel=1e-9)
-    assert directions(robot) == pytest.approx(rig.start_direction.T, abs=1e-12)
+    assert unit_directions(robot) == pytest.approx(rig.start_direction.T, abs=1e-12)
 
 
 @pytest.mark.parametrize("name", ["three", "caroca", "eight"])
@@ -64,9 +64,9 @@ def test_time_moves_a_resting_robot_only_by_what_it_adds_in_the_rope() -> None:
 
 
 def neutral_setting(robot: Robot, effect: Effect, begun: bool) -> EffectSetting:
-    cables = robot.cable_numbers if effect.component in PER_CABLE else ()
+    cables = robot.cable_numbers if effect.component in PER_CABLE_COMPONENTS else ()
     declared = {p.name: getattr(robot.cables[0], p.name) for p in effect.parameters if p.neutral is None}
-    values = {p.name: p.start for p in effect.parameters} if begun else effect.completed(declared)
+    values = {p.name: p.start for p in effect.parameters} if begun else effect.completed_values(declared)
     return EffectSetting(effect.name, values, cables)
 
 
@@ -76,7 +76,7 @@ def test_every_slope_is_finite_at_rest_and_slack(effect: Effect, begun: bool) ->
     robot = example("three").with_effect(neutral_setting(example("three"), effect, begun))
     model = symbolic_model(robot, [FreeParameter(0, p.name) for p in effect.parameters])
     symbols = [model.states, model.inputs, model.parameters]
-    shown = casadi.vertcat(model.rates, model.outputs, model.span_tensions, model.lags)
+    shown = casadi.vertcat(model.rates, model.outputs, model.span_tensions, model.sensor_delays)
     slopes = casadi.Function("slopes", symbols, [shown, *(casadi.jacobian(shown, symbol) for symbol in symbols)])
     values = [robot.effects[0].values[p.name] for p in effect.parameters]
     start = casadi.Function("start", [model.parameters], [model.start, casadi.jacobian(model.start, model.parameters)])
@@ -114,7 +114,7 @@ def test_lags_and_drifts_are_told_apart() -> None:
     late = {"tension_delay": 0.02, "position_delay": 0.05}
     robot = with_effects(example("three"), Case("sensor_delay", {}, late, (2,)), same("creep", 1, compliance=1e-12))
     model = symbolic_model(robot)
-    assert np.array(casadi.DM(model.lags)).ravel() == pytest.approx([0.05] * 3 + [0.0, 0.02, 0.0])
+    assert np.array(casadi.DM(model.sensor_delays)).ravel() == pytest.approx([0.05] * 3 + [0.0, 0.02, 0.0])
     assert [model.state_names[place] for place in model.drifting] == ["creep.strain_1", "creep.elapsed_1"]
 
 
@@ -142,7 +142,7 @@ def test_what_a_file_leaves_out_is_neutral(case: Case, tmp_path: Path) -> None:
     path = tmp_path / "robot.toml"
     write_robot(robot, path)
     back = read_robot(path)
-    assert back.effects[0].values == BY_NAME[case.name].completed(case.law)
+    assert back.effects[0].values == BY_NAME[case.name].completed_values(case.law)
     assert back.effects[0].cables == robot.effects[0].cables
     write_robot(back, path)
     assert read_robot(path) == back
@@ -176,7 +176,7 @@ def test_winches_that_follow_a_path_know_where_the_ropes_run() -> None:
     path = Line((28.86, 0.0, 5.0), (29.5, 0.5, 8.0), 4.0)
     times = np.linspace(0.0, 4.0, 2001)
     wound = trapezoid(ideal_winch_speeds(robot, path, times), times, axis=0)
-    lengths = [[line.length for line in routes(REAL, robot, place)] for place in (path.start, path.end)]
+    lengths = [[line.length for line in cable_routes(REAL, robot, place)] for place in (path.start, path.end)]
     assert wound == pytest.approx(np.array(lengths[0]) - lengths[1], abs=1e-6)
 
 

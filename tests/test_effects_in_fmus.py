@@ -11,7 +11,7 @@ from fmpy.validation import validate_fmu
 
 from tautwire.fmus.packaging import build_fmus
 from tautwire.robots.robot import Robot
-from tautwire.runs.cosimulation import Motion, cosimulate
+from tautwire.runs.cosimulation import CosimulationResult, cosimulate
 from tests.effect_cases import CASES, PAIRS, Case, same
 from tests.fmus import in_hand
 from tests.rig import Rig, SampledProgram, wander
@@ -24,7 +24,7 @@ from tests.test_effects_in_memory import EXACT, by_the_rig, with_effects
 BENT = {"hysteresis", "drum", "friction"}
 
 
-def errors(motion: Motion, tension: np.ndarray, position: np.ndarray) -> tuple[float, float]:
+def errors(motion: CosimulationResult, tension: np.ndarray, position: np.ndarray) -> tuple[float, float]:
     return float(np.max(np.abs(motion.position - position))), float(np.max(np.abs(motion.tension - tension)))
 
 
@@ -69,7 +69,7 @@ def test_fast_states_need_no_short_macro_steps(case: Case, tmp_path: Path) -> No
     assert tension < 1e-2
 
 
-def at_rest(robot: Robot, folder: Path) -> Motion:
+def at_rest(robot: Robot, folder: Path) -> CosimulationResult:
     time = np.linspace(0.0, 0.5, 11)
     return cosimulate(build_fmus(robot, folder), time, np.zeros((11, robot.cable_count)))
 

@@ -10,8 +10,8 @@ from tautwire.errors import (
     RobotFileError,
     TautwireError,
     UnreachableError,
+    format_value,
     one_line,
-    shown,
 )
 
 
@@ -20,7 +20,7 @@ def test_input_error_says_where_what_and_how_to_mend(kind: type[InputError]) -> 
     error = kind("hall.toml: cable[2].modulus", "is -1.0, must be above 0 Pa", "give the modulus")
     assert str(error) == "hall.toml: cable[2].modulus: is -1.0, must be above 0 Pa; give the modulus"
     assert (error.where, error.problem) == ("hall.toml: cable[2].modulus", "is -1.0, must be above 0 Pa")
-    assert error.mend == "give the modulus"
+    assert error.hint == "give the modulus"
     assert isinstance(error, TautwireError)
 
 
@@ -71,9 +71,9 @@ def test_errors_survive_the_way_between_processes(error: InputError) -> None:
     ],
 )
 def test_values_are_shown_as_a_user_knows_them(value: object, text: str) -> None:
-    assert shown(value) == text
+    assert format_value(value) == text
 
 
 def test_long_values_are_cut() -> None:
-    assert len(shown("x" * 100_000)) < 70
-    assert shown(2**20000) == "a whole number of 20001 bits"
+    assert len(format_value("x" * 100_000)) < 70
+    assert format_value(2**20000) == "a whole number of 20001 bits"

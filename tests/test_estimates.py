@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tautwire.model.symbolic import OF_FORMULAS, FreeParameter
+from tautwire.model.symbolic import FORMULA_INDEX, FreeParameter
 from tautwire.robots.robot import EffectSetting, Robot
-from tautwire.tracer.data import Sample, split
-from tautwire.tracer.estimates import correlations_of
+from tautwire.tracer.data import DataSet, split_data
+from tautwire.tracer.estimates import parameter_correlations
 from tautwire.tracer.fit import Fit, Fitter
 from tautwire.tracer.hypotheses import Hypothesis, with_values
-from tautwire.tracer.preparation.noise import noise_of
-from tautwire.tracer.verdict import Estimate, Fitted, FoundEffect
+from tautwire.tracer.preparation.noise import estimate_noise
+from tautwire.tracer.verdict import Estimate, FittedParameter, FoundEffect
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.recordings import recorded
 from tests.robots import example
@@ -26,15 +26,15 @@ VALUES = np.array([1.5, 1.01])
 SEEDS = 12
 
 
-def fitted(seed: int) -> tuple[Fitter, list[Hypothesis], Sample, Fit]:
+def fitted(seed: int) -> tuple[Fitter, list[Hypothesis], DataSet, Fit]:
     """The fit of both effects to a recording of their truth."""
     robot = example("three")
     chosen = [Hypothesis(BY_NAME["payload"], ()), Hypothesis(BY_NAME["sensor_gain"], robot.cable_numbers)]
     for hypothesis in chosen:
         robot = robot.with_effect(hypothesis.setting(robot))
     recording = recorded("three", seed, TRUTH)
-    noise = noise_of(robot, recording)
-    sample, fitter = split(robot, noise, recording, None).fit, Fitter(noise)
+    noise = estimate_noise(robot, recording)
+    sample, fitter = split_data(robot, noise, recording, None).estimation, Fitter(noise)
     return fitter, chosen, sample, fitter.fit(robot, chosen, sample)
 
 
@@ -49,13 +49,13 @@ def effects_of(robot: Robot) -> list[FoundEffect]:
 
 def correlation_of(fit: Fit) -> float:
     """The one between mass and gain."""
-    gain = Fitted("sensor_gain", (1, 2, 3), "tension_gain")
+    gain = FittedParameter("sensor_gain", (1, 2, 3), "tension_gain")
     effects = [
         FoundEffect("payload", "platform", (), {"mass": Estimate(0.0, "kg", 0.0, 0.0, None)}, 1.0),
         FoundEffect("sensor_gain", "sensor", gain.cables, {gain.parameter: Estimate(0.0, "1", 0.0, 0.0, None)}, 1.0),
     ]
-    (found,) = correlations_of(fit, effects)
-    assert found.between == (Fitted("payload", (), "mass"), gain)
+    (found,) = parameter_correlations(fit, effects)
+    assert found.between == (FittedParameter("payload", (), "mass"), gain)
     return found.value
 
 
@@ -65,14 +65,16 @@ def test_correlations_are_those_of_each_two_parameters_beside_what_else_was_fitt
     robot = robot.with_effect(EffectSetting("damping", {"damping": 2e9}, (1, 3)))
     free = (
         FreeParameter(1, "damping"),
-        FreeParameter(OF_FORMULAS, "k1"),
+        FreeParameter(FORMULA_INDEX, "k1"),
         FreeParameter(0, "mass"),
         FreeParameter(2, "damping"),
     )
     covariance = np.array([[4e16, 1e8, -1e7, 0.0], [1e8, 1.0, 0.0, 0.0], [-1e7, 0.0, 0.01, 0.0], [0.0, 0.0, 0.0, 0.0]])
-    found = correlations_of(Fit(robot, free, np.zeros(4), covariance), effects_of(robot))
+    found = parameter_correlations(Fit(robot, free, np.zeros(4), covariance), effects_of(robot))
     # The last one has no deviation, and so no correlation.
-    assert [each.between for each in found] == [(Fitted("payload", (), "mass"), Fitted("damping", (2,), "damping"))]
+    assert [each.between for each in found] == [
+        (FittedParameter("payload", (), "mass"), FittedParameter("damping", (2,), "damping"))
+    ]
     assert found[0].value == pytest.approx(-1e7 / (2e8 * 0.1))
 
 
@@ -81,7 +83,7 @@ def test_a_correlation_is_that_of_the_curvature_of_the_likelihood() -> None:
     fitter, chosen, sample, fit = fitted(3)
 
     def log_likelihood(moves: Array) -> float:
-        values = fit.values + moves * fit.deviations
+        values = fit.values + moves * fit.standard_deviations
         robot = with_values(fit.robot, fit.free, dict(zip(fit.free, values.tolist(), strict=True)))
         return fitter.judged(robot, chosen, sample).log_likelihood(sample.rows)
 
@@ -98,7 +100,7 @@ def test_a_correlation_is_that_of_the_curvature_of_the_likelihood() -> None:
 @pytest.mark.slow
 def test_a_correlation_is_that_of_fits_to_many_recordings() -> None:
     fits = [fitted(seed)[3] for seed in range(SEEDS)]
-    errors = np.array([(fit.values - VALUES) / fit.deviations for fit in fits])
+    errors = np.array([(fit.values - VALUES) / fit.standard_deviations for fit in fits])
     spread = float(np.corrcoef(errors.T)[0, 1])
     reported = float(np.mean([correlation_of(fit) for fit in fits]))
     # Fisher's transformation makes the spread of a correlation that of a normal variable.

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from tautwire.cli import run
-from tautwire.excitation import ExcitationError, Limits, MultisinePath, default_limits, excite
-from tautwire.excitation.limits import named_effects
+from tautwire.excitation import ExcitationError, ExcitationLimits, MultisinePath, default_limits, design_excitation
+from tautwire.excitation.limits import effects_by_name
 from tautwire.model.reference import integrate
 from tests.robots import EXAMPLES, example
 
 THREE = example("three")
-LIMITS = Limits(speed=0.8, reach=3.0, least_tension=300.0, largest_tension=5000.0)
+LIMITS = ExcitationLimits(speed=0.8, reach=3.0, min_tension=300.0, max_tension=5000.0)
 
 
 def quiet(what: str, done: float) -> None:
@@ -33,34 +33,34 @@ def test_a_path_of_sines_begins_and_ends_at_rest_and_has_its_own_derivatives() -
 
 @pytest.mark.slow
 def test_the_best_program_is_within_the_limits_and_better_than_most() -> None:
-    effects = named_effects(THREE, "damping,relaxation")
-    found = excite(THREE, effects, LIMITS, 3.0, 0.05, 10, 1, quiet)
+    effects = effects_by_name(THREE, "damping,relaxation")
+    found = design_excitation(THREE, effects, LIMITS, 3.0, 0.05, 10, 1, quiet)
     assert np.max(np.abs(found.winch_speed)) <= 0.8
     assert found.winch_speed[0] == pytest.approx(0.0, abs=1e-12)
     run = integrate(THREE, found.time, found.winch_speed)
     assert np.min(run.tension) > 299.0
     assert np.max(run.tension) < 5001.0
     assert [pair.nats for pair in found.pairs] == sorted(pair.nats for pair in found.pairs)
-    assert found.pairs[0].nats > 1.2 * found.typical
+    assert found.pairs[0].nats > 1.2 * found.median_separation
     assert all(pair.effect.effect is not pair.other.effect for pair in found.pairs)
-    again = excite(THREE, effects, LIMITS, 3.0, 0.05, 10, 1, quiet)
+    again = design_excitation(THREE, effects, LIMITS, 3.0, 0.05, 10, 1, quiet)
     assert np.array_equal(again.winch_speed, found.winch_speed)
 
 
 def test_limits_that_no_program_keeps_are_an_error() -> None:
-    narrow = Limits(speed=0.5, reach=1.0, least_tension=1e4, largest_tension=1.1e4)
+    narrow = ExcitationLimits(speed=0.5, reach=1.0, min_tension=1e4, max_tension=1.1e4)
     with pytest.raises(ExcitationError, match=r"none of \d+ programs"):
-        excite(THREE, named_effects(THREE, "damping,payload"), narrow, 2.0, 0.1, 1, 1, quiet)
+        design_excitation(THREE, effects_by_name(THREE, "damping,payload"), narrow, 2.0, 0.1, 1, 1, quiet)
 
 
 def test_limits_not_given_come_from_the_robot() -> None:
     limits = default_limits(THREE)
     assert limits.speed == 0.5
-    assert 0.0 < limits.least_tension < limits.largest_tension
+    assert 0.0 < limits.min_tension < limits.max_tension
     assert default_limits(THREE, 0.2, 0.1).reach == 0.1
     eight = example("eight")
     assert eight.tension is not None
-    assert default_limits(eight).least_tension == eight.tension.minimum
+    assert default_limits(eight).min_tension == eight.tension.minimum
 
 
 @pytest.mark.parametrize(

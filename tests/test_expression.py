@@ -9,17 +9,17 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tautwire.model.symbolic import CASADI
+from tautwire.model.symbolic import CASADI_MATHEMATICS
 from tautwire_fmu.laws.expression import (
-    DEEPEST,
-    LONGEST,
+    MAX_CHARACTERS,
+    MAX_NESTING,
     ExpressionError,
     evaluate,
-    expression_faults,
-    names_in,
-    read_expression,
+    expression_errors,
+    parse_expression,
+    variable_names,
 )
-from tautwire_fmu.laws.mathematics import COMPLEX_STEP, REAL, along, rate_of
+from tautwire_fmu.laws.mathematics import COMPLEX_STEP, REAL, rate_of, with_rate
 
 NAMES = ("x", "vx", "time")
 AT = {"x": 0.7, "vx": -1.3, "time": 2.0}
@@ -37,15 +37,15 @@ AT = {"x": 0.7, "vx": -1.3, "time": 2.0}
     ],
 )
 def test_arithmetic_has_its_value(text: str, value: float) -> None:
-    assert evaluate(REAL, read_expression(text, NAMES), AT) == pytest.approx(value, rel=1e-14)
+    assert evaluate(REAL, parse_expression(text, NAMES), AT) == pytest.approx(value, rel=1e-14)
 
 
 def test_one_tree_serves_every_mathematics() -> None:
-    tree = read_expression("sin(x)**3*vx", NAMES)
-    carried = evaluate(COMPLEX_STEP, tree, {**AT, "x": along(0.7, 1.0)})
+    tree = parse_expression("sin(x)**3*vx", NAMES)
+    carried = evaluate(COMPLEX_STEP, tree, {**AT, "x": with_rate(0.7, 1.0)})
     assert rate_of(carried) == pytest.approx(3.0 * math.sin(0.7) ** 2 * math.cos(0.7) * -1.3, rel=1e-14)
     x = casadi.SX.sym("x")
-    function = casadi.Function("f", [x], [evaluate(CASADI, tree, {**AT, "x": x})])
+    function = casadi.Function("f", [x], [evaluate(CASADI_MATHEMATICS, tree, {**AT, "x": x})])
     assert float(function(0.7)) == pytest.approx(evaluate(REAL, tree, AT), rel=1e-14)
 
 
@@ -57,20 +57,20 @@ def test_one_tree_serves_every_mathematics() -> None:
         ("q**2.5 + foo(p, x) - 'a'", [1, 4, 10, 14, 22]),
         ("sin(q, p) + sin(x)", [1, 5, 8]),
         ("x +", [1]),
-        ("x" * (LONGEST + 1), [LONGEST]),
+        ("x" * (MAX_CHARACTERS + 1), [MAX_CHARACTERS]),
     ],
 )
 def test_all_that_is_wrong_is_told_from_left_to_right(text: str, places: list[int]) -> None:
-    faults = expression_faults(text, NAMES)
-    assert [fault.place for fault in faults] == places
+    faults = expression_errors(text, NAMES)
+    assert [fault.position for fault in faults] == places
     if places:
         with pytest.raises(ExpressionError) as caught:
-            read_expression(text, NAMES)
+            parse_expression(text, NAMES)
         assert str(caught.value) == str(faults[0])
 
 
 def test_it_says_which_names_it_uses() -> None:
-    assert names_in(read_expression("x*time + sin(x)", NAMES)) == ("x", "time")
+    assert variable_names(parse_expression("x*time + sin(x)", NAMES)) == ("x", "time")
 
 
 @pytest.mark.parametrize(
@@ -115,9 +115,9 @@ def test_it_says_which_names_it_uses() -> None:
 )
 def test_all_else_is_refused_with_its_place(text: str, place: int) -> None:
     with pytest.raises(ExpressionError) as caught:
-        read_expression(text, NAMES)
-    assert caught.value.place == place
-    assert caught.value.mend
+        parse_expression(text, NAMES)
+    assert caught.value.position == place
+    assert caught.value.hint
 
 
 @pytest.mark.parametrize(
@@ -125,9 +125,9 @@ def test_all_else_is_refused_with_its_place(text: str, place: int) -> None:
     [
         "(" * 300 + "x" + ")" * 300,
         "-" * 1500 + "x",
-        "+".join(["x"] * (DEEPEST + 2)),
-        "sin(" * (DEEPEST + 1) + "x" + ")" * (DEEPEST + 1),
-        "x" + " " * LONGEST,
+        "+".join(["x"] * (MAX_NESTING + 2)),
+        "sin(" * (MAX_NESTING + 1) + "x" + ")" * (MAX_NESTING + 1),
+        "x" + " " * MAX_CHARACTERS,
         "\uff58",
         "x\u200b",
         "x\nvx",
@@ -136,14 +136,14 @@ def test_all_else_is_refused_with_its_place(text: str, place: int) -> None:
 )
 def test_what_is_too_long_too_deep_or_looks_like_something_else_is_refused(text: str) -> None:
     with pytest.raises(ExpressionError):
-        read_expression(text, NAMES)
+        parse_expression(text, NAMES)
 
 
 @given(st.text(max_size=60))
 @settings(max_examples=200, deadline=None)
 def test_any_text_is_read_or_refused(text: str) -> None:
     try:
-        tree = read_expression(text, NAMES)
+        tree = parse_expression(text, NAMES)
     except ExpressionError:
         return
-    assert set(names_in(tree)) <= set(NAMES)
+    assert set(variable_names(tree)) <= set(NAMES)

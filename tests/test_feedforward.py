@@ -20,7 +20,7 @@ from tautwire.control import (
 from tautwire.errors import UnreachableError
 from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.robots.robot import EffectSetting, Robot
-from tautwire.runs.cosimulation import Motion
+from tautwire.runs.cosimulation import CosimulationResult
 from tautwire.trajectory import Line, Trajectory
 from tests.robots import example, paper_robot
 from tests.winch_ramp import WinchRamp
@@ -34,11 +34,11 @@ PATHS: dict[str, Trajectory] = {
 }
 
 
-def rms_error(motion: Motion, path: Trajectory) -> float:
+def rms_error(motion: CosimulationResult, path: Trajectory) -> float:
     return float(np.sqrt(np.mean(np.sum((motion.position - path.position(motion.time)) ** 2, axis=1))))
 
 
-def both(fmus: RobotFmus, robot: Robot, path: Trajectory) -> tuple[Motion, Motion]:
+def both(fmus: RobotFmus, robot: Robot, path: Trajectory) -> tuple[CosimulationResult, CosimulationResult]:
     """Runs without and with the stretch cancelled."""
     count = robot.cable_count
     times = sample_times(0.01, path.duration + 1.0)

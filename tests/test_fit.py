@@ -1,10 +1,10 @@
 import pytest
 
 from tautwire.robots.robot import EffectSetting
-from tautwire.tracer.data import split
+from tautwire.tracer.data import split_data
 from tautwire.tracer.fit import Fitter
 from tautwire.tracer.hypotheses import Hypothesis
-from tautwire.tracer.preparation.noise import noise_of
+from tautwire.tracer.preparation.noise import estimate_noise
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.recordings import recorded
 from tests.robots import example
@@ -15,19 +15,19 @@ from tests.robots import example
 def test_a_fit_arrives_wherever_it_begins(begin: float) -> None:
     robot = example("caroca").with_effect(EffectSetting("payload", {"mass": begin}))
     recording = recorded("caroca", 3, {"payload": {"mass": 1.5}})
-    noise = noise_of(robot, recording)
-    sample = split(robot, noise, recording, None).fit
+    noise = estimate_noise(robot, recording)
+    sample = split_data(robot, noise, recording, None).estimation
     fit = Fitter(noise).fit(robot, [Hypothesis(BY_NAME["payload"], ())], sample)
-    assert abs(fit.values[0] - 1.5) < 4.5 * fit.deviations[0]
-    assert fit.deviations[0] < 0.05
+    assert abs(fit.values[0] - 1.5) < 4.5 * fit.standard_deviations[0]
+    assert fit.standard_deviations[0] < 0.05
 
 
 @pytest.mark.slow
 def test_a_relaxation_is_found_that_is_quicker_than_where_the_fit_begins() -> None:
     truth = {"modulus": 3e10, "time": 0.003}
     robot, recording = example("three"), recorded("three", 3, {"relaxation": truth})
-    noise = noise_of(robot, recording)
-    sample = split(robot, noise, recording, None).fit
+    noise = estimate_noise(robot, recording)
+    sample = split_data(robot, noise, recording, None).estimation
     true, begin = (EffectSetting("relaxation", {**truth, "time": time}, (1, 2, 3)) for time in (0.003, 0.03))
     fit = Fitter(noise).fit(robot.with_effect(begin), [Hypothesis(BY_NAME["relaxation"], (1, 2, 3))], sample)
     found, at_truth = (

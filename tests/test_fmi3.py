@@ -12,11 +12,11 @@ import pytest
 from fmpy.validation import validate_fmu
 
 from tautwire.fmus.packaging import build_fmus
-from tautwire.master import Component, ComponentError, Journal, LostError, WatchedComponent
-from tautwire.master.journal import Entry
-from tautwire.master.wiring import direct_inputs
-from tautwire.robots.robot import OwnFmu
-from tautwire.runs.cosimulation import Motion, RunError, cosimulate
+from tautwire.master import CallAbortedError, CallJournal, Component, ComponentError, JournalledComponent
+from tautwire.master.journal import CallEntry
+from tautwire.master.wiring import direct_feedthrough
+from tautwire.robots.robot import UserFmu
+from tautwire.runs.cosimulation import CosimulationResult, RunError, cosimulate
 from tautwire.runs.ssp import write_ssp
 from tests.own_fmus import LAG, compiler, lag_winch, lag_winch_3, packed_3
 from tests.robots import paper_robot
@@ -31,9 +31,9 @@ def winch(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return lag_winch_3(tmp_path_factory.mktemp("winch"))
 
 
-def moved(winches: dict[int, Path], folder: Path, patience: float | None = None, **chosen: float) -> Motion:
+def moved(winches: dict[int, Path], folder: Path, patience: float | None = None, **chosen: float) -> CosimulationResult:
     """The paper's robot with these winches, by number."""
-    robot = replace(paper_robot(), fmus=tuple(OwnFmu(f"winch_{number}", path) for number, path in winches.items()))
+    robot = replace(paper_robot(), fmus=tuple(UserFmu(f"winch_{number}", path) for number, path in winches.items()))
     return cosimulate(build_fmus(robot, folder), TIMES, SPEEDS, patience=patience, **chosen)
 
 
@@ -55,7 +55,7 @@ def test_the_same_winch_by_either_version_gives_the_same_figures(
     assert np.max(np.abs(runs[0].winch_speed[1])) > 0.1
     for name in ("position", "velocity", "tension"):
         assert np.array_equal(*(getattr(motion, name) for motion in runs)), name
-    assert runs[0].account == runs[1].account
+    assert runs[0].statistics == runs[1].statistics
 
 
 @needs_compiler
@@ -64,8 +64,8 @@ def test_both_versions_run_side_by_side_and_watched(winch: Path, tmp_path: Path)
     here = moved(winches, tmp_path / "here")
     apart = moved(winches, tmp_path / "apart", patience=60.0)
     assert np.array_equal(here.position, apart.position)
-    assert here.account.redos == apart.account.redos > 0
-    assert len([line for line in here.account.fallbacks() if line.endswith("FMU winch_1, winch_2")]) == 2
+    assert here.statistics.iterations == apart.statistics.iterations > 0
+    assert len([line for line in here.statistics.fallback_notes() if line.endswith("FMU winch_1, winch_2")]) == 2
 
 
 @needs_compiler
@@ -88,14 +88,14 @@ def test_a_step_that_does_not_reach_its_end_is_named_with_time_and_inputs(
     assert cause.inputs == {"speed_command": pytest.approx(np.interp(0.105, TIMES, SPEEDS[:, 1]))}
     given = f"speed_command={cause.inputs['speed_command']:.6g}"
     assert str(cause) == f"FMU winch_2: fmi3DoStep {outcome} at 0.1 s with {given}{logged}"
-    assert caught.value.motion.time.tolist() == [0.0, 0.1]
+    assert caught.value.result.time.tolist() == [0.0, 0.1]
 
 
 @needs_compiler
 def test_one_that_ends_its_process_is_named(tmp_path: Path) -> None:
     with pytest.raises(RunError, match=r"FMU winch_3: fmi3DoStep ended its process by SIGABRT at 0\.1 s") as caught:
         moved({3: lag_winch_3(tmp_path, "CRASH")}, tmp_path / "fmus", patience=60.0)
-    assert isinstance(caught.value.cause, LostError)
+    assert isinstance(caught.value.cause, CallAbortedError)
 
 
 @needs_compiler
@@ -141,15 +141,15 @@ def test_variables_that_it_does_not_have_are_refused_by_it(winch: Path) -> None:
     ],
 )
 def test_every_call_is_noted_by_its_name(winch: Path, tmp_path: Path, method: str, call: str) -> None:
-    journal, reader = Journal(tmp_path), Journal(tmp_path)
-    with WatchedComponent(journal, "winch", winch) as component:
-        assert reader.last().call == "fmi3InstantiateCoSimulation"
+    journal, reader = CallJournal(tmp_path), CallJournal(tmp_path)
+    with JournalledComponent(journal, "winch", winch) as component:
+        assert reader.last_entry().call == "fmi3InstantiateCoSimulation"
         component.initialize(0.5, {})
-        assert reader.last() == Entry("winch", "fmi3EnterInitializationMode", 0.5, {}, ())
+        assert reader.last_entry() == CallEntry("winch", "fmi3EnterInitializationMode", 0.5, {}, ())
         block, saved = component.block(["speed_command"]), component.save()
         arguments = {"read": [block], "write": [block], "step": [0.75, 0.01], "restore": [saved], "release": [saved]}
         getattr(component, method)(*arguments.get(method, []))
-        assert reader.last() == Entry("winch", call, 0.75 if method == "step" else 0.5, {}, ())
+        assert reader.last_entry() == CallEntry("winch", call, 0.75 if method == "step" else 0.5, {}, ())
 
 
 @needs_compiler
@@ -163,14 +163,14 @@ def test_other_names_of_a_variable_are_as_good(tmp_path: Path, winch: Path) -> N
     }
     renamed = packed_3(tmp_path / "renamed.fmu", library_of(winch), changes)
     with Component("winch", renamed) as component:
-        assert direct_inputs(component) == {name: {"u", "speed_command"} for name in ("y", "winch_speed")}
+        assert direct_feedthrough(component) == {name: {"u", "speed_command"} for name in ("y", "winch_speed")}
     motion = moved({1: renamed}, tmp_path / "renamed")
     assert np.allclose(motion.position, moved({1: winch}, tmp_path / "own").position, rtol=0.0, atol=1e-8)
 
 
 @needs_compiler
 def test_it_goes_into_the_archive_of_the_wired_robot(winch: Path, tmp_path: Path) -> None:
-    robot = replace(paper_robot(), fmus=(OwnFmu("winch_1", winch),))
+    robot = replace(paper_robot(), fmus=(UserFmu("winch_1", winch),))
     archive = write_ssp(robot, build_fmus(robot, tmp_path), tmp_path / "robot.ssp")
     with zipfile.ZipFile(archive) as content:
         structure = content.read("SystemStructure.ssd").decode()

@@ -6,7 +6,7 @@ import pytest
 
 from tautwire.cli import run
 from tautwire.fmus.packaging import RobotFmus
-from tautwire.fmus.ports import fmu_ports, vectors_together
+from tautwire.fmus.ports import fmu_ports, group_vectors
 from tautwire_fmu.units import UNITS
 from tests.robots import EXAMPLES
 
@@ -23,7 +23,7 @@ def test_ports_have_units_and_descriptions(three_fmus: RobotFmus) -> None:
 
 def test_vectors_stand_as_one(three_fmus: RobotFmus) -> None:
     ports = fmu_ports(three_fmus.cables[0])
-    rows = {port.name: port for port in vectors_together(ports)}
+    rows = {port.name: port for port in group_vectors(ports)}
     assert "position.x" not in rows and "tension" in rows
     position = rows["position.x .y .z"]
     assert (position.start, position.unit, position.description) == ("28.86, 0, 5", "m", "position of the platform")

@@ -12,7 +12,7 @@ import pytest
 from tautwire.fmus.packaging import build_fmus
 from tautwire.linear import linearise
 from tautwire.model.reference import integrate
-from tautwire.model.symbolic import OF_FORMULAS, FreeParameter, symbolic_model
+from tautwire.model.symbolic import FORMULA_INDEX, FreeParameter, symbolic_model
 from tautwire.robots.robot import Formula, Robot
 from tautwire.runs.cosimulation import cosimulate
 from tautwire.statics.equilibrium import static_tensions
@@ -106,7 +106,7 @@ def test_the_time_of_all_formulas_is_one_state() -> None:
 
 def test_numbers_of_a_formula_may_stay_symbols() -> None:
     robot = with_formulas(ROBOT, Formula("force_x", "c1*vx + c1*c2", (), {"c1": 2.0, "c2": 0.5}))
-    model = symbolic_model(robot, [FreeParameter(OF_FORMULAS, "c2")])
+    model = symbolic_model(robot, [FreeParameter(FORMULA_INDEX, "c2")])
     assert model.parameters.numel() == 1
     assert np.array_equal(static_tensions(robot), static_tensions(with_formulas(ROBOT, Formula("force_x", "1"))))
 

@@ -9,7 +9,7 @@ from tautwire.model.reference import integrate
 from tautwire.robots.reading import read_robot
 from tautwire.robots.robot import EffectSetting
 from tautwire.robots.writing import robot_text
-from tautwire_fmu.laws.cable import LINEAR, CableConstants, CableInputs, CableState, motion, reading, span
+from tautwire_fmu.laws.cable import LINEAR, CableConstants, CableInputs, CableState, cable_motion, cable_outputs, span
 from tautwire_fmu.laws.effects import ALL, BY_NAME, UNLISTED, ActiveEffect
 from tautwire_fmu.laws.mathematics import REAL
 from tests.rig import load_robot, make_recording
@@ -25,7 +25,7 @@ def test_rope_and_frame_share_a_stretch_as_springs_in_series() -> None:
     effects = (ActiveEffect(FRAME, FRAME.values(compliance=COMPLIANCE)),)
     state = CableState(10.0, 0.0, ((),))
     line = span(REAL, cable, CableInputs((0.0, 0.0, -0.01), (0.0, 0.0, 0.0), 0.0), effects)
-    shown = reading(REAL, cable, effects, state, motion(REAL, cable, effects, state, line, 0.0))
+    shown = cable_outputs(REAL, cable, effects, state, cable_motion(REAL, cable, effects, state, line, 0.0))
     rope = 1e11 * 1e-5 / 10.01
     assert shown.tension - 500.0 == pytest.approx(0.01 / (1.0 / rope + COMPLIANCE), rel=1e-12)
 

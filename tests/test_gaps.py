@@ -4,12 +4,12 @@ import numpy as np
 
 from tautwire.recordings.recording import Recording
 from tautwire.tracer.preparation.gaps import without_gaps
-from tautwire.tracer.preparation.noise import noise_of
+from tautwire.tracer.preparation.noise import estimate_noise
 from tests.recordings import recorded
 from tests.robots import example
 
 ROBOT, WHOLE = example("three"), recorded("three", 1)
-NOISE = noise_of(ROBOT, WHOLE)
+NOISE = estimate_noise(ROBOT, WHOLE)
 
 
 def without(recording: Recording, lost: slice) -> Recording:

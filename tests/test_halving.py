@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from tautwire.fmus.packaging import RobotFmus, build_fmus
-from tautwire.master import ComponentError, Coupling, FixedStep, Kept, Sampled, simulate
+from tautwire.master import ComponentError, Coupling, FixedStep, MemoryRecorder, PiecewiseLinearInput, simulate
 from tautwire.master.checkpoint import Checkpoint
-from tautwire.master.halving import MOST_HALVINGS, step_held
+from tautwire.master.halving import MAX_HALVINGS, step_with_rejection
 from tautwire.robots.reading import read_robot
-from tautwire.runs.cosimulation import instantiated
-from tautwire.runs.wiring import shown_ports
+from tautwire.runs.cosimulation import instantiate_robot
+from tautwire.runs.wiring import recorded_ports
 from tests.planar import VERTICAL, program_of, robot_text
 from tests.rig import Robot as RigRobot
 from tests.rig import SampledProgram, load_robot
@@ -40,9 +40,9 @@ def errors(planar: tuple[RobotFmus, RigRobot], step: float) -> tuple[float, Coup
     """How far the platform is from the rig's at most, m."""
     fmus, rig = planar
     time, speed = shaken(rig, step)
-    with instantiated(fmus) as coupling:
-        kept = Kept(len(time), len(shown_ports(4)))
-        simulate(coupling, Sampled(time, speed), time, shown_ports(4), FixedStep(step), kept)
+    with instantiate_robot(fmus) as coupling:
+        kept = MemoryRecorder(len(time), len(recorded_ports(4)))
+        simulate(coupling, PiecewiseLinearInput(time, speed), time, recorded_ports(4), FixedStep(step), kept)
     exact = rig_simulate(rig, PULLEY, SampledProgram(time, speed), time).position
     return float(np.max(np.abs(kept.rows[:, :3] - exact))), coupling
 
@@ -51,13 +51,13 @@ def errors(planar: tuple[RobotFmus, RigRobot], step: float) -> tuple[float, Coup
 def test_steps_in_which_no_redo_leads_anywhere_are_halved(planar: tuple[RobotFmus, RigRobot], step: float) -> None:
     error, coupling = errors(planar, step)
     assert error < 2e-3
-    assert coupling.account.steps > 1.2 * (12.0 / step)
+    assert coupling.statistics.steps > 1.2 * (12.0 / step)
 
 
 def test_steps_that_lead_somewhere_stay_whole(planar: tuple[RobotFmus, RigRobot]) -> None:
     error, coupling = errors(planar, 0.01)
     assert error < 1e-7
-    assert coupling.account.steps < 1.1 * 1200
+    assert coupling.statistics.steps < 1.1 * 1200
 
 
 class Given:
@@ -84,7 +84,7 @@ class Given:
 
 
 def held(given: Given) -> float:
-    return step_held(given, 0.0, 0.16, lambda time, step: (np.zeros(0), np.zeros(0)))[0]  # type: ignore[arg-type]
+    return step_with_rejection(given, 0.0, 0.16, lambda time, step: (np.zeros(0), np.zeros(0)))[0]  # type: ignore[arg-type]
 
 
 @pytest.mark.parametrize("status", [None, "discard", "error"])
@@ -97,11 +97,11 @@ def test_a_step_is_halved_until_it_holds(status: str | None) -> None:
 
 def test_the_shortest_is_kept_even_if_it_is_lost() -> None:
     given = Given(0.0)
-    assert held(given) == pytest.approx(0.16 / 2**MOST_HALVINGS)
+    assert held(given) == pytest.approx(0.16 / 2**MAX_HALVINGS)
     assert given.lost
 
 
-@pytest.mark.parametrize(("status", "tries"), [("discard", MOST_HALVINGS + 1), ("fatal", 1)])
+@pytest.mark.parametrize(("status", "tries"), [("discard", MAX_HALVINGS + 1), ("fatal", 1)])
 def test_an_fmu_that_fails_however_short_the_step_is_told(status: str, tries: int) -> None:
     given = Given(0.0, status)
     with pytest.raises(ComponentError, match=status):

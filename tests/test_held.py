@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tautwire.master import Connection, Port
-from tautwire.master.held import Held
+from tautwire.master.held import ZeroOrderHold
 
 
 class Fake:
@@ -25,44 +25,44 @@ class Fake:
         block.values[:] = [self.now[name] for name in block.names]
 
 
-def system() -> tuple[dict[str, Any], list[Port], Held]:
+def system() -> tuple[dict[str, Any], list[Port], ZeroOrderHold]:
     parts: dict[str, Any] = {
         "a": Fake(speed="continuous", rate="discrete"),
         "b": Fake(mode="discrete", place="continuous"),
     }
     shown = [Port("a", "rate"), Port("a", "speed"), Port("b", "mode"), Port("b", "place")]
-    return parts, shown, Held(parts, shown)
+    return parts, shown, ZeroOrderHold(parts, shown)
 
 
 def test_only_discrete_outputs_are_held() -> None:
     _, _, held = system()
     assert held.ports == (Port("a", "rate"), Port("b", "mode"))
     shown = np.array([1.0, 2.0, 3.0, 4.0])
-    assert held.begin(shown)
+    assert held.begin_step(shown)
     shown[:] = [10.0, 20.0, 30.0, 40.0]
-    held.hold(shown)
+    held.apply(shown)
     assert shown.tolist() == [1.0, 20.0, 3.0, 40.0]
 
 
 def test_at_the_end_what_the_components_show_counts_and_tells_of_a_jump() -> None:
     parts, _, held = system()
     shown = np.array([1.0, 2.0, 3.0, 4.0])
-    held.begin(shown)
+    held.begin_step(shown)
     parts["a"].now["rate"], parts["b"].now["mode"] = 1.0, 3.0
-    held.end(shown)
-    assert not held.begin(shown)
+    held.end_step(shown)
+    assert not held.begin_step(shown)
     parts["a"].now["rate"] = 5.0
-    held.end(shown)
+    held.end_step(shown)
     assert shown.tolist() == [5.0, 2.0, 3.0, 4.0]
-    assert held.begin(shown) and not held.begin(shown)
+    assert held.begin_step(shown) and not held.begin_step(shown)
 
 
 def test_after_going_back_every_value_counts_as_new() -> None:
     _, _, held = system()
     shown = np.array([1.0, 2.0, 3.0, 4.0])
-    held.begin(shown)
-    held.forget()
-    assert held.begin(shown)
+    held.begin_step(shown)
+    held.reset()
+    assert held.begin_step(shown)
 
 
 def test_inputs_that_jump_are_those_wired_to_discrete_outputs() -> None:
@@ -73,9 +73,9 @@ def test_inputs_that_jump_are_those_wired_to_discrete_outputs() -> None:
 
 def test_system_without_discrete_outputs_is_left_alone() -> None:
     parts: dict[str, Any] = {"a": Fake(speed="continuous")}
-    held = Held(parts, [Port("a", "speed")])
+    held = ZeroOrderHold(parts, [Port("a", "speed")])
     shown = np.array([1.0])
-    assert not held.begin(shown)
-    held.hold(shown)
-    held.end(shown)
+    assert not held.begin_step(shown)
+    held.apply(shown)
+    held.end_step(shown)
     assert shown.tolist() == [1.0]

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from tautwire.errors import RobotFileError
-from tautwire.recordings.header import header_of
-from tautwire.robots.checked_table import nearest
+from tautwire.recordings.header import parse_header
+from tautwire.robots.checked_table import suggest_name
 from tautwire.robots.reading import read_robot
-from tautwire.robots.robot import slots
+from tautwire.robots.robot import fmu_slots
 from tests.robots import EXAMPLES
 
 
@@ -20,15 +20,15 @@ from tests.robots import EXAMPLES
         ("gravty", ("name", "gravity"), "'gravity'"),
         ("MASS", ("mass", "start"), "'mass'"),
         ("colour", ("mass", "start"), "one of mass, start"),
-        ("cable_9", slots(4), "one of platform, cable_1 ... cable_4, winch_1 ... winch_4"),
-        ("cabel_2", slots(4), "'cable_2'"),
-        ("cable_02", slots(4), "'cable_2'"),
+        ("cable_9", fmu_slots(4), "one of platform, cable_1 ... cable_4, winch_1 ... winch_4"),
+        ("cabel_2", fmu_slots(4), "'cable_2'"),
+        ("cable_02", fmu_slots(4), "'cable_2'"),
         ("lqr", ("bob",), "'bob'"),
         ("a", (), "one that is known"),
     ],
 )
 def test_a_hint_names_what_is_likely_meant_or_all_that_is_known(name: str, known: tuple[str, ...], hint: str) -> None:
-    assert nearest(name, known) == hint
+    assert suggest_name(name, known) == hint
 
 
 @pytest.mark.parametrize(
@@ -65,5 +65,5 @@ def test_a_robot_file_with_an_odd_key_is_told_what_is_known(tmp_path: Path, adde
 )
 def test_a_missing_column_is_not_taken_for_one_of_another_cable(cells: list[str], mend: str) -> None:
     faults: list[str] = []
-    header_of(cells, "here", 1, lambda error: faults.append(error.mend))
+    parse_header(cells, "here", 1, lambda error: faults.append(error.hint))
     assert faults == [mend]

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from tautwire.interrupt import interrupts_held
+from tautwire.interrupt import defer_interrupts
 
 
 @pytest.fixture(autouse=True)
@@ -17,7 +17,7 @@ def handlers() -> Iterator[None]:
 
 def test_an_interrupt_waits_until_it_is_asked_for() -> None:
     reached = False
-    with pytest.raises(KeyboardInterrupt), interrupts_held() as raise_interrupt:
+    with pytest.raises(KeyboardInterrupt), defer_interrupts() as raise_interrupt:
         signal.raise_signal(signal.SIGINT)
         reached = True
         raise_interrupt()
@@ -25,7 +25,7 @@ def test_an_interrupt_waits_until_it_is_asked_for() -> None:
 
 
 def test_the_outer_of_two_blocks_hears_what_the_inner_raised() -> None:
-    with interrupts_held(), pytest.raises(KeyboardInterrupt), interrupts_held() as raise_interrupt:
+    with defer_interrupts(), pytest.raises(KeyboardInterrupt), defer_interrupts() as raise_interrupt:
         signal.raise_signal(signal.SIGINT)
         raise_interrupt()
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
@@ -33,7 +33,7 @@ def test_the_outer_of_two_blocks_hears_what_the_inner_raised() -> None:
 
 def test_a_process_that_ignores_interrupts_goes_on_doing_so() -> None:
     signal.signal(signal.SIGINT, signal.SIG_IGN)
-    with interrupts_held() as raise_interrupt:
+    with defer_interrupts() as raise_interrupt:
         signal.raise_signal(signal.SIGINT)
         raise_interrupt()
     assert signal.getsignal(signal.SIGINT) is signal.SIG_IGN

@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 
 from tautwire.fmus.packaging import RobotFmus, build_fmus
-from tautwire.master import Account, FixedStep, Kept, Sampled, simulate
-from tautwire.master.kinks import _landing
+from tautwire.master import FixedStep, MemoryRecorder, PiecewiseLinearInput, RunStatistics, simulate
+from tautwire.master.kinks import _land_before_event
 from tautwire.robots.robot import Platform
-from tautwire.runs.cosimulation import instantiated
-from tautwire.runs.wiring import shown_ports
+from tautwire.runs.cosimulation import instantiate_robot
+from tautwire.runs.wiring import recorded_ports
 from tests.rig import SampledProgram
 from tests.rig import simulate as rig_simulate
 from tests.robots import paper_robot
@@ -32,12 +32,12 @@ def fmus(tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
     return build_fmus(ROBOT, tmp_path_factory.mktemp("slack"))
 
 
-def run(fmus: RobotFmus, step: float, cut: bool = True) -> tuple[np.ndarray, Account]:
-    with instantiated(fmus) as coupling:
-        coupling.can_cut = cut
-        kept = Kept(len(TIME), len(shown_ports(3)))
-        simulate(coupling, Sampled(TIME, SPEED), TIME, shown_ports(3), FixedStep(step), kept)
-        return kept.rows[:, :3].copy(), coupling.account
+def run(fmus: RobotFmus, step: float, cut: bool = True) -> tuple[np.ndarray, RunStatistics]:
+    with instantiate_robot(fmus) as coupling:
+        coupling.supports_variable_step = cut
+        kept = MemoryRecorder(len(TIME), len(recorded_ports(3)))
+        simulate(coupling, PiecewiseLinearInput(TIME, SPEED), TIME, recorded_ports(3), FixedStep(step), kept)
+        return kept.rows[:, :3].copy(), coupling.statistics
 
 
 def test_steps_keep_their_order_over_a_cable_that_goes_slack(fmus: RobotFmus, exact: np.ndarray) -> None:
@@ -66,14 +66,14 @@ def test_the_way_back_from_a_root_ends_where_every_step_tried_there_is_bent() ->
         assert len(tried) < 100
         return np.array([-1.0 if any(abs(span - place) < 1e-5 for place in bent) else 0.5 - span])
 
-    landed = _landing(at, 1.0, np.ones(1), -0.5 * np.ones(1), np.array([0]))
+    landed = _land_before_event(at, 1.0, np.ones(1), -0.5 * np.ones(1), np.array([0]))
     assert tried[-1] == landed
     assert 0.0 < landed < 0.5
     assert at(landed)[0] > 0.0
 
 
 def test_the_cable_pulls_less_than_nothing_only_while_its_tension_is_zero(fmus: RobotFmus) -> None:
-    with instantiated(fmus) as coupling:
+    with instantiate_robot(fmus) as coupling:
         cable = coupling.components["cable_3"]
         block = cable.block(["pull", "tension"])
         pulls = []

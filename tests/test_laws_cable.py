@@ -9,24 +9,24 @@ import numpy as np
 import pint
 import pytest
 
-from tautwire.model.arrays import NUMPY
-from tautwire.model.symbolic import CASADI
+from tautwire.model.arrays import NUMPY_MATHEMATICS
+from tautwire.model.symbolic import CASADI_MATHEMATICS
 from tautwire_fmu.laws.cable import (
     LAWS,
     CableConstants,
     CableInputs,
     CableMotion,
-    CableReading,
+    CableOutputs,
     CableState,
-    motion,
-    reading,
-    simplified,
+    cable_motion,
+    cable_outputs,
+    fold_constant_effects,
     span,
     start_state,
     state_rates,
 )
 from tautwire_fmu.laws.effects import BY_NAME, ActiveEffect
-from tautwire_fmu.laws.mathematics import COMPLEX_STEP, REAL, Mathematics, along, rate_of
+from tautwire_fmu.laws.mathematics import COMPLEX_STEP, REAL, Mathematics, rate_of, with_rate
 
 MODULUS, AREA, DAMPING, LENGTH, TENSION = 1.0e11, 1.2e-5, 5.0e8, 5.0, 900.0
 DAMPED = (ActiveEffect(BY_NAME["damping"], BY_NAME["damping"].values(2e9)),)
@@ -38,14 +38,14 @@ def constants(law: str = "logarithmic", damping: float = DAMPING) -> CableConsta
 
 def show(
     m: Mathematics, cable: CableConstants, state: CableState, inputs: CableInputs, effects: tuple[Any, ...] = ()
-) -> CableReading:
-    return reading(m, cable, effects, state, moved(m, cable, state, inputs, effects))
+) -> CableOutputs:
+    return cable_outputs(m, cable, effects, state, moved(m, cable, state, inputs, effects))
 
 
 def moved(
     m: Mathematics, cable: CableConstants, state: CableState, inputs: CableInputs, effects: tuple[Any, ...] = ()
 ) -> CableMotion:
-    return motion(m, cable, effects, state, span(m, cable, inputs), inputs.winch_speed)
+    return cable_motion(m, cable, effects, state, span(m, cable, inputs), inputs.winch_speed)
 
 
 def at(position: tuple[Any, ...], velocity: tuple[Any, ...] = (0.0, 0.0, 0.0), speed: Any = 0.0) -> CableInputs:
@@ -103,7 +103,7 @@ class Cycle:
         path = self.amplitude * np.array([np.sin(angle), np.zeros_like(angle), 1.0 - np.cos(angle)])
         pace = self.amplitude * np.array([np.cos(angle), np.zeros_like(angle), np.sin(angle)])
         cable = constants(damping=damping)
-        shown = show(NUMPY, cable, start_state(cable, ()), at(tuple(path), tuple(pace)))
+        shown = show(NUMPY_MATHEMATICS, cable, start_state(cable, ()), at(tuple(path), tuple(pace)))
         power = sum(force * speed for force, speed in zip(shown.force, pace, strict=True))
         stored = 0.5 * MODULUS * AREA * LENGTH * np.max(shown.strain) ** 2
         return float(np.mean(power[:-1]) * 2.0 * np.pi), float(stored)
@@ -128,14 +128,16 @@ def test_one_source_runs_on_floats_complex_steps_arrays_and_symbols() -> None:
     state = CableState(4.999, 0.0, ((),))
     plain = show(REAL, cable, state, at(position, velocity, speed), DAMPED)
     columns = tuple(np.array([value, value]) for value in position)
-    arrays = show(NUMPY, cable, state, at(columns, velocity, speed), DAMPED)
+    arrays = show(NUMPY_MATHEMATICS, cable, state, at(columns, velocity, speed), DAMPED)
     assert np.array_equal(arrays.tension, [plain.tension, plain.tension])
     symbol = casadi.SX.sym("x")
-    symbolic = show(CASADI, cable, state, at((symbol, *position[1:]), velocity, speed), DAMPED).tension
+    symbolic = show(CASADI_MATHEMATICS, cable, state, at((symbol, *position[1:]), velocity, speed), DAMPED).tension
     slope = casadi.Function("slope", [symbol], [symbolic, casadi.gradient(symbolic, symbol)])
     value, exact = (float(number) for number in slope(position[0]))
     assert value == pytest.approx(plain.tension, rel=1e-14)
-    stepped = show(COMPLEX_STEP, cable, state, at((along(position[0], 1.0), *position[1:]), velocity, speed), DAMPED)
+    stepped = show(
+        COMPLEX_STEP, cable, state, at((with_rate(position[0], 1.0), *position[1:]), velocity, speed), DAMPED
+    )
     assert rate_of(stepped.tension) == pytest.approx(exact, rel=1e-12)
 
 
@@ -171,7 +173,7 @@ def test_units_come_out_right() -> None:
     velocity = tuple(speed * metre / second for speed in (0.01, -0.02, 0.03))
     inputs = at((0.0 * metre, 0.0 * metre, 0.0 * metre), velocity, 0.05 * metre / second)
     moving = moved(m, cable, state, inputs, effects)
-    shown = reading(m, cable, effects, state, moving)
+    shown = cable_outputs(m, cable, effects, state, moving)
     rates = state_rates(m, cable, effects, state, moving)
     assert shown.tension.check("[force]")
     assert all(force.check("[force]") for force in shown.force)
@@ -184,7 +186,7 @@ MODULI = (*DAMPED, ActiveEffect(BY_NAME["modulus"], BY_NAME["modulus"].values(0.
 @pytest.mark.parametrize("law", LAWS)
 def test_other_constants_do_what_the_effects_do_that_set_them(law: str) -> None:
     cable = constants(law)
-    plain, none = simplified(REAL, cable, MODULI)
+    plain, none = fold_constant_effects(REAL, cable, MODULI)
     assert none == ()
     state, inputs = CableState(4.98, 0.1, ((), ())), at((0.1, 0.2, -0.1), (0.03, -0.2, 0.1), 0.4)
     found, expected = show(REAL, plain, state, inputs), show(REAL, cable, state, inputs, MODULI)
@@ -195,8 +197,8 @@ def test_other_constants_do_what_the_effects_do_that_set_them(law: str) -> None:
 def test_a_cable_with_an_effect_that_does_more_is_left_as_it_is() -> None:
     creep = ActiveEffect(BY_NAME["creep"], BY_NAME["creep"].values(1e-12, 5.0, 0.0))
     for effects in ((), (creep,), (*DAMPED, creep)):
-        assert simplified(REAL, constants(), effects) == (constants(), effects)
+        assert fold_constant_effects(REAL, constants(), effects) == (constants(), effects)
 
 
 def test_only_modulus_and_damping_set_constants() -> None:
-    assert {name for name, effect in BY_NAME.items() if effect.sets_constants} == {"damping", "modulus"}
+    assert {name for name, effect in BY_NAME.items() if effect.only_sets_constants} == {"damping", "modulus"}

@@ -11,14 +11,14 @@ import pytest
 from numpy.typing import NDArray
 
 from tautwire_fmu.laws.sampled_control import (
+    ControllerState,
+    ControlPlan,
     Gains,
     Limits,
-    Memory,
-    Plan,
     acceleration,
-    first_sample,
     gains_at,
-    next_sample,
+    initial_controller_state,
+    next_controller_state,
 )
 
 Array = NDArray[np.float64]
@@ -28,7 +28,7 @@ FREE = Limits(1e15, 1e15, -1e15, 1e15)
 CABLES, STATES = 3, 5
 
 
-def some_plan(samples: int = 60, knots: int = 1) -> Plan:
+def some_plan(samples: int = 60, knots: int = 1) -> ControlPlan:
     """A stable regulator at each knot on a wandering path."""
     random = np.random.default_rng(7)
     gains = []
@@ -42,7 +42,7 @@ def some_plan(samples: int = 60, knots: int = 1) -> Plan:
             "M": 0.1 * random.standard_normal((STATES, CABLES)),
         }
         gains.append(Gains(**{name: part.tolist() for name, part in parts.items()}))
-    return Plan(
+    return ControlPlan(
         period=PERIOD,
         speeds=np.cumsum(random.uniform(-0.01, 0.01, (samples, CABLES)), axis=0).tolist(),
         stretches=np.zeros((samples, CABLES)).tolist(),
@@ -56,13 +56,15 @@ def some_plan(samples: int = 60, knots: int = 1) -> Plan:
     )
 
 
-def walked(plan: Plan, limits: Limits, seen: Array) -> list[Memory]:
+def walked(plan: ControlPlan, limits: Limits, seen: Array) -> list[ControllerState]:
     """The memory at each sample, under deviations seen from what is expected."""
-    memory = first_sample(plan, limits)
+    memory = initial_controller_state(plan, limits)
     found = [memory]
     for k, away in enumerate(seen):
         expected = plan.expected[min(k, len(plan.expected) - 1)]
-        memory = next_sample(plan, limits, memory, [e + float(a) for e, a in zip(expected, away, strict=True)])
+        memory = next_controller_state(
+            plan, limits, memory, [e + float(a) for e, a in zip(expected, away, strict=True)]
+        )
         found.append(memory)
     return found
 
@@ -176,7 +178,7 @@ def test_first_tensions_scale_those_to_come_and_what_cancels_stretch() -> None:
 
 def test_tare_is_bounded_and_leaves_slack_cables_alone() -> None:
     plan = some_plan()._replace(at_rest=[100.0, 100.0, 0.0], tares=True)
-    memory = next_sample(plan, FREE, first_sample(plan, FREE), [0.0] * 3 + [1.0, 900.0, 5.0])
+    memory = next_controller_state(plan, FREE, initial_controller_state(plan, FREE), [0.0] * 3 + [1.0, 900.0, 5.0])
     assert memory.scales == [0.5, 2.0, 1.0]
 
 

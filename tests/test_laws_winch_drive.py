@@ -6,8 +6,8 @@ import control
 import numpy as np
 import pytest
 
-from tautwire_fmu.laws.mathematics import COMPLEX_STEP, REAL, along, rate_of
-from tautwire_fmu.laws.winch_drive import NO_LIMIT, DriveConstants, DriveState, acceleration, margins, state_rates
+from tautwire_fmu.laws.mathematics import COMPLEX_STEP, REAL, rate_of, with_rate
+from tautwire_fmu.laws.winch_drive import NO_LIMIT, DriveConstants, DriveState, acceleration, limit_margins, state_rates
 
 FREE = DriveConstants(frequency=40.0, damping_ratio=0.6, speed_limit=NO_LIMIT, acceleration_limit=NO_LIMIT)
 LIMITED = FREE._replace(speed_limit=0.8, acceleration_limit=2.0)
@@ -20,8 +20,8 @@ def slopes(state: DriveState, command: complex) -> list[float]:
 
 
 def test_without_limits_it_is_the_transfer_function_of_a_proportional_integral_loop() -> None:
-    A = np.array([slopes(DriveState(along(0.0, v), along(0.0, z)), 0.0) for v, z in ((1.0, 0.0), (0.0, 1.0))]).T
-    B = np.array([slopes(DriveState(0.0, 0.0), along(0.0, 1.0))]).T
+    A = np.array([slopes(DriveState(with_rate(0.0, v), with_rate(0.0, z)), 0.0) for v, z in ((1.0, 0.0), (0.0, 1.0))]).T
+    B = np.array([slopes(DriveState(0.0, 0.0), with_rate(0.0, 1.0))]).T
     found = control.ss(A, B, [[1.0, 0.0]], 0.0)
     expected = control.tf([2.0 * 0.6 * 40.0, 40.0**2], [1.0, 2.0 * 0.6 * 40.0, 40.0**2])
     frequencies = np.array([0.3, 5.0, 40.0, 300.0])
@@ -60,11 +60,11 @@ def test_margins_change_their_sign_where_the_law_has_a_kink() -> None:
     state = DriveState(0.79, 0.0)
     assert slope(state, 0.8, 1e-6) == 0.0
     assert slope(state, 0.8, -1e-6) == pytest.approx(48.0)
-    assert [margins(REAL, LIMITED, state, 0.8 + change)[0] > 0.0 for change in (1e-6, -1e-6)] == [False, True]
+    assert [limit_margins(REAL, LIMITED, state, 0.8 + change)[0] > 0.0 for change in (1e-6, -1e-6)] == [False, True]
     corner = 2.0 / 48.0
     assert slope(REST, corner, 1e-6) == 0.0
     assert slope(REST, corner, -1e-6) == pytest.approx(48.0)
-    assert [margins(REAL, LIMITED, REST, corner + change)[1] > 0.0 for change in (1e-6, -1e-6)] == [False, True]
+    assert [limit_margins(REAL, LIMITED, REST, corner + change)[1] > 0.0 for change in (1e-6, -1e-6)] == [False, True]
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
@@ -73,10 +73,12 @@ def test_the_last_margin_tells_which_limit_bounds_the_acceleration(sign: float) 
     before, after = (DriveState(sign * (corner + change), 5.0 * sign) for change in (-1e-6, 1e-6))
     assert acceleration(REAL, LIMITED, before, 1.0 * sign) == 2.0 * sign
     assert abs(acceleration(REAL, LIMITED, after, 1.0 * sign)) < 2.0
-    assert margins(REAL, LIMITED, before, 1.0)[2] > 0.0 > margins(REAL, LIMITED, after, 1.0)[2]
+    assert limit_margins(REAL, LIMITED, before, 1.0)[2] > 0.0 > limit_margins(REAL, LIMITED, after, 1.0)[2]
 
 
 def test_rates_pass_through_it() -> None:
-    carried = acceleration(COMPLEX_STEP, LIMITED, DriveState(along(0.1, 0.0), along(0.0, 0.0)), along(0.11, 3.0))
+    carried = acceleration(
+        COMPLEX_STEP, LIMITED, DriveState(with_rate(0.1, 0.0), with_rate(0.0, 0.0)), with_rate(0.11, 3.0)
+    )
     assert rate_of(carried) == pytest.approx(3.0 * 48.0)
     assert math.isclose(carried.real, 0.48)

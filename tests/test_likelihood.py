@@ -8,14 +8,14 @@ import pytest
 from tautwire.model.symbolic import FreeParameter
 from tautwire.robots.robot import EffectSetting
 from tautwire.tracer.likelihood import Likelihood
-from tautwire.tracer.preparation.noise import noise_of
+from tautwire.tracer.preparation.noise import estimate_noise
 from tests.effect_cases import Case, same
 from tests.recordings import recorded
 from tests.robots import example
 
 ROBOT = example("three")
 RECORDING = recorded("three", 1)
-NOISE = noise_of(ROBOT, RECORDING)
+NOISE = estimate_noise(ROBOT, RECORDING)
 ALL = np.ones(len(RECORDING.time), dtype=bool)
 
 
@@ -23,7 +23,7 @@ ALL = np.ones(len(RECORDING.time), dtype=bool)
 def test_innovations_of_a_true_model_are_white_with_unit_variance(name: str) -> None:
     robot, recording = example(name), recorded(name, 1)
     interval = recording.time[1] - recording.time[0]
-    innovations = Likelihood(robot, (), noise_of(robot, recording), interval).innovations(recording, [])
+    innovations = Likelihood(robot, (), estimate_noise(robot, recording), interval).innovations(recording, [])
     square = innovations.mean_square(np.ones(len(recording.time), dtype=bool))
     assert np.all(np.abs(square - 1.0) < 5.0 * np.sqrt(2.0 / len(recording.time)))
     values = innovations.values
@@ -45,7 +45,7 @@ def test_slopes_are_the_derivatives_of_the_innovations() -> None:
         position=RECORDING.position[:60],
     )
     at = np.array([6e8, 1.0])
-    slopes = likelihood.innovations(short, at).slopes
+    slopes = likelihood.innovations(short, at).sensitivities
     for index, width in enumerate((1e5, 1e-4)):
         step = np.zeros(2)
         step[index] = width
@@ -59,7 +59,7 @@ def test_missing_cells_are_passed_over() -> None:
     tension[100:300, 1] = np.nan
     blind = replace(RECORDING, tension=tension, position=np.full_like(RECORDING.position, np.nan))
     innovations = Likelihood(ROBOT, (), NOISE, 0.02).innovations(blind, [])
-    assert np.array_equal(innovations.seen, np.isfinite(blind.measured()))
+    assert np.array_equal(innovations.observed, np.isfinite(blind.measured()))
     square = innovations.mean_square(ALL)
     assert np.all(np.isnan(square[:3]))
     assert np.all(np.abs(square[3:] - 1.0) < 0.3)
@@ -100,18 +100,18 @@ def test_the_transition_of_a_sample_is_the_derivative_of_the_next_state(effect: 
     """Of eight cables, whose vibrations turn by half a radian and more in a sample."""
     robot, recording = example("eight"), recorded("eight", 1)
     robot = robot.with_effect(effect.setting(robot))
-    likelihood = Likelihood(robot, (), noise_of(robot, recording), 0.01)
+    likelihood = Likelihood(robot, (), estimate_noise(robot, recording), 0.01)
     state, speeds = likelihood.start([])[0][:, None], np.full((8, 1), 0.02)
     unseen, moment = np.zeros((11, 1)), (speeds, 1.1 * speeds, np.full((1, 1), 0.01))
 
     def moved(begun: np.ndarray) -> np.ndarray:
         size = len(begun)
         carried = (begun, np.eye(size), np.zeros((size, 0)), np.zeros((0, 1)))
-        return likelihood._run(1, *carried, unseen, unseen, unseen, *moment, np.zeros((1, 1)), np.zeros((1, 1)))[0][
-            :, 1
-        ]
+        return likelihood._filter_function(
+            1, *carried, unseen, unseen, unseen, *moment, np.zeros((1, 1)), np.zeros((1, 1))
+        )[0][:, 1]
 
-    _, transition, _ = likelihood.slopes(1, state, state, np.zeros((0, 1)), unseen, *moment)
+    _, transition, _ = likelihood.jacobians(1, state, state, np.zeros((0, 1)), unseen, *moment)
     for place, width in ((0, 1e-7), (4, 1e-5), (6, 1e-7), (len(state) - 1, 1e-7)):
         step = np.zeros_like(state)
         step[place] = width

@@ -21,14 +21,14 @@ def test_modes_keep_their_shapes_where_frequencies_cross() -> None:
     assert not np.array_equal(np.argsort(along.frequencies[-1]), np.argsort(along.frequencies[0]))
     axes = np.argmax(np.abs(along.shapes), axis=1)
     assert np.all(axes == axes[1])
-    assert along.likeness[1:].min() > 0.999
+    assert along.modal_assurance[1:].min() > 0.999
 
 
 def test_frequencies_at_each_place_are_those_of_the_plant_there() -> None:
     robot = example("caroca")
     path = Line((1.0, 0.0, 1.0), (0.0, -0.5, 2.0), 4.0)
     along = modes_along(robot, path, times=np.array([0.0, 1.0, 4.0]))
-    assert along.abscissa.tolist() == [0.0, 1.0, 4.0] and along.timed
+    assert along.abscissa.tolist() == [0.0, 1.0, 4.0] and along.is_timed
     for place, frequencies, ratios in zip(along.positions, along.frequencies, along.damping_ratios, strict=True):
         modes = linearise(robot, place).modes
         order = np.argsort(frequencies)
@@ -40,7 +40,7 @@ def test_a_coarse_path_finds_the_same_modes_as_a_fine_one() -> None:
     # The helix turns twice: between coarse places modes cross, and shapes turn by more than half a right angle.
     fine, coarse = (modes_along(paper_robot(damping=4e8), PAPER_HELIX, points=points) for points in (81, 17))
     assert coarse.frequencies == pytest.approx(fine.frequencies[::5], rel=1e-12)
-    assert coarse.likeness.min() < 0.6
+    assert coarse.modal_assurance.min() < 0.6
 
 
 def test_modes_that_come_near_cross_however_finely_the_path_is_cut() -> None:
@@ -61,7 +61,7 @@ def test_modes_of_one_frequency_are_turned_towards_the_next() -> None:
     robot = Robot("even", 9.8, Platform(50.0, (0.0, 0.0, 0.0)), None, Sensors(), cables)
     along = modes_along(robot, np.array([[0.0, 0.0, 0.0], [0.0, 0.2, 0.0], [0.0, 0.4, 0.0]]))
     assert along.frequencies[0, 1] == pytest.approx(along.frequencies[0, 0], rel=1e-9)
-    assert along.likeness.min() > 0.99
+    assert along.modal_assurance.min() > 0.99
     assert along.cable_shares.sum(axis=1) == pytest.approx(np.ones((3, 3)))
     # The shares follow the turned shapes: symmetric about the path, as the second cable mirrors the third.
     across = int(np.argmax(np.abs(along.shapes[0][0])))
@@ -70,7 +70,7 @@ def test_modes_of_one_frequency_are_turned_towards_the_next() -> None:
 
 def test_positions_without_times_count_the_way() -> None:
     along = modes_along(paper_robot(), np.array([[28.86, 0.0, 5.0], [28.86, 3.0, 9.0], [28.86, 3.0, 10.0]]))
-    assert along.abscissa == pytest.approx([0.0, 5.0, 6.0]) and not along.timed
+    assert along.abscissa == pytest.approx([0.0, 5.0, 6.0]) and not along.is_timed
     assert along.shapes.shape == (3, 3, 3) and along.cable_shares.shape == (3, 3, 3)
 
 

@@ -23,7 +23,7 @@ from tautwire.linear import (
     linearise_robot_fmus,
 )
 from tautwire.master import Component, Connection, Coupling, Port
-from tautwire.robots.robot import EffectSetting, OwnFmu, Robot, Winch
+from tautwire.robots.robot import EffectSetting, Robot, UserFmu, Winch
 from tests.effect_cases import CASES, Case
 from tests.own_fmus import LAG, compiler, falling_mass, lag_winch
 from tests.robots import NAMES, example, paper_robot, with_winch
@@ -37,7 +37,7 @@ needs_compiler = pytest.mark.skipif(compiler() is None, reason="no C compiler")
 
 def distances(found: BlackBoxPlant, exact: Any) -> dict[str, float]:
     """Relative distance of each matrix in the norm of ``linearise_fmus``: largest deviations are the units."""
-    states, inputs = found.state_sizes, found.pushes
+    states, inputs = found.state_amplitudes, found.input_amplitudes
     outputs = np.abs(exact.C) @ states
     scales = {"A": (states, states), "B": (states, inputs), "C": (outputs, states), "D": (outputs, inputs)}
     return {
@@ -132,7 +132,7 @@ def test_winches_add_their_speed_loops(tmp_path: Path) -> None:
 
 
 def own_robot(robot: Robot, slot: str, path: Path, folder: Path) -> RobotFmus:
-    return build_fmus(replace(robot, fmus=(OwnFmu(slot, path),)), folder)
+    return build_fmus(replace(robot, fmus=(UserFmu(slot, path),)), folder)
 
 
 @pytest.mark.slow
@@ -206,7 +206,7 @@ def test_a_start_that_is_not_at_rest_is_refused(tmp_path: Path) -> None:
     make, command = one_winch(tmp_path)
     speed = Port("winch", "winch_speed")
     with pytest.raises(IdentificationError, match=r"not at rest, winch\.winch_speed moves by"):
-        linearise_fmus(make, {"c": command}, {"v": speed}, rest={command: 1.0})
+        linearise_fmus(make, {"c": command}, {"v": speed}, rest_inputs={command: 1.0})
 
 
 @needs_compiler

@@ -12,7 +12,7 @@ from scipy.optimize import curve_fit
 from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.linear import LinearPlant, linearise
 from tautwire.robots.robot import Robot
-from tautwire.runs.cosimulation import Motion, cosimulate
+from tautwire.runs.cosimulation import CosimulationResult, cosimulate
 from tests.robots import NAMES, example
 
 Array = NDArray[np.float64]
@@ -92,7 +92,7 @@ def swept(plant: LinearPlant, low: float, high: float) -> tuple[Array, Array]:
     return time, np.gradient(1e-4 * np.sin(0.5 * pi * edge) ** 2 * swing, time)
 
 
-def outputs(motion: Motion) -> Array:
+def outputs(motion: CosimulationResult) -> Array:
     return np.hstack([motion.position, motion.velocity, motion.tension, motion.length])
 
 

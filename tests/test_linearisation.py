@@ -6,18 +6,18 @@ import numpy as np
 import pytest
 
 from tautwire.model.symbolic import FreeParameter
-from tautwire.robots.robot import PER_CABLE, EffectSetting
-from tautwire.tracer.directions import EffectDirections
+from tautwire.robots.robot import PER_CABLE_COMPONENTS, EffectSetting
+from tautwire.tracer.directions import EffectSensitivities
 from tautwire.tracer.likelihood import Likelihood
-from tautwire.tracer.linearisation import linearise_run
-from tautwire.tracer.preparation.noise import noise_of
+from tautwire.tracer.linearisation import linearise_filter
+from tautwire.tracer.preparation.noise import estimate_noise
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.recordings import recorded
 from tests.robots import example
 
 ROBOT = example("three")
 RECORDING = recorded("three", 1).first(600)
-NOISE = noise_of(ROBOT, RECORDING)
+NOISE = estimate_noise(ROBOT, RECORDING)
 INTERVAL = float(RECORDING.time[1] - RECORDING.time[0])
 EVERYWHERE = (1, 2, 3)
 
@@ -25,11 +25,11 @@ EVERYWHERE = (1, 2, 3)
 def along(name: str, form: tuple[str, ...], trial: dict[str, float]) -> np.ndarray:
     """Slopes of the innovations by an effect's parameters, cable by cable: (N, m, p)."""
     likelihood = Likelihood(ROBOT, (), NOISE, INTERVAL)
-    directions = EffectDirections(ROBOT, BY_NAME[name], EVERYWHERE, [form], [trial], likelihood.model.state_names)
-    slopes, parts = directions.start, []
-    for run in linearise_run(likelihood, [], RECORDING):
-        slopes, moved = run.carry(slopes, *directions.through(run))
-        parts.append(moved[run.own])
+    directions = EffectSensitivities(ROBOT, BY_NAME[name], EVERYWHERE, [form], [trial], likelihood.model.state_names)
+    slopes, parts = directions.start_sensitivities, []
+    for run in linearise_filter(likelihood, [], RECORDING):
+        slopes, moved = run.propagate_sensitivities(slopes, *directions.forcing_terms(run))
+        parts.append(moved[run.is_recorded])
     return np.concatenate(parts)
 
 
@@ -37,12 +37,14 @@ def exact(name: str, parameter: str, trial: dict[str, float]) -> np.ndarray:
     """The same for one parameter on all cables, by the filter's own sensitivities."""
     effect = BY_NAME[name]
     declared = {p.name: 0.0 for p in effect.parameters if p.neutral is None}
-    cables = EVERYWHERE if effect.component in PER_CABLE else ()
-    robot = ROBOT.with_effect(EffectSetting(name, effect.completed({**declared, **trial}), cables))
+    cables = EVERYWHERE if effect.component in PER_CABLE_COMPONENTS else ()
+    robot = ROBOT.with_effect(EffectSetting(name, effect.completed_values({**declared, **trial}), cables))
     values = [robot.effects[0].values[parameter]]
     if effect.parameters[0].neutral is None:
         values = [float(getattr(ROBOT.cables[0], parameter))]
-    return Likelihood(robot, [FreeParameter(0, parameter)], NOISE, INTERVAL).innovations(RECORDING, values).slopes
+    return (
+        Likelihood(robot, [FreeParameter(0, parameter)], NOISE, INTERVAL).innovations(RECORDING, values).sensitivities
+    )
 
 
 @pytest.mark.parametrize(
@@ -75,14 +77,14 @@ def test_what_was_not_seen_moves_nothing() -> None:
     blind = replace(RECORDING, tension=RECORDING.tension.copy())
     blind.tension[100:300, 1] = np.nan
     likelihood = Likelihood(ROBOT, (), NOISE, INTERVAL)
-    runs = list(linearise_run(likelihood, [], blind))
-    seen = np.concatenate([run.seen[run.own] for run in runs])
+    runs = list(linearise_filter(likelihood, [], blind))
+    seen = np.concatenate([run.observed[run.is_recorded] for run in runs])
     assert np.array_equal(seen, np.isfinite(blind.measured()))
-    whitening = np.concatenate([run.whitening[run.own] for run in runs])
+    whitening = np.concatenate([run.whitening[run.is_recorded] for run in runs])
     assert not np.any(whitening[~seen])
 
 
 def test_the_run_has_the_innovations_of_the_filter() -> None:
     likelihood = Likelihood(ROBOT, (), NOISE, INTERVAL)
-    values = np.concatenate([run.values[run.own] for run in linearise_run(likelihood, [], RECORDING)])
+    values = np.concatenate([run.values[run.is_recorded] for run in linearise_filter(likelihood, [], RECORDING)])
     assert np.allclose(values, likelihood.innovations(RECORDING, []).values, atol=1e-12)

@@ -5,7 +5,12 @@ from pathlib import Path
 
 import pytest
 
-from tautwire.materials.consistency import Check, checks, disagreements, understated
+from tautwire.materials.consistency import (
+    ConsistencyCheck,
+    consistency_checks,
+    disagreements,
+    understated_uncertainties,
+)
 from tautwire.materials.table import PAPER_TABLE, read_material_table
 
 HEADER = (
@@ -16,10 +21,10 @@ HEADER = (
 GOOD = "1,100.000e9,1e9,86.603e9,1e9,30.000,1,0.57735,7.958e9"
 
 
-def of_row(path: Path, row: str, column: str) -> dict[str, Check]:
+def of_row(path: Path, row: str, column: str) -> dict[str, ConsistencyCheck]:
     rows = [row, *(GOOD.replace("1,", f"{f},", 1) for f in (2, 3, 4))]
     path.write_text("\n".join([HEADER, *rows]) + "\n", encoding="utf-8")
-    found = checks(read_material_table(path))
+    found = consistency_checks(read_material_table(path))
     return {check.formula: check for check in found if check.frequency == 1.0 and check.column == column}
 
 
@@ -27,7 +32,7 @@ def test_rounded_columns_agree(tmp_path: Path) -> None:
     for column in ("storage_modulus", "dynamic_modulus", "loss_factor", "damping"):
         found = of_row(tmp_path / "t.csv", GOOD, column)
         assert found
-        assert all(check.agreement == "agrees" and check.off == 0.0 for check in found.values())
+        assert all(check.agreement == "agrees" and check.range_gap == 0.0 for check in found.values())
 
 
 def test_digits_that_were_cut_off_are_told_from_wrong_ones(tmp_path: Path) -> None:
@@ -36,22 +41,22 @@ def test_digits_that_were_cut_off_are_told_from_wrong_ones(tmp_path: Path) -> No
     sharp = GOOD.replace("100.000e9", "100.0000000e9").replace("30.000", "30.0000000")
     cut = of_row(tmp_path / "t.csv", sharp.replace("86.603e9", "86.602e9"), "storage_modulus")["|E*| cos phi"]
     assert cut.agreement == "agrees if cut off"
-    assert cut.off == pytest.approx(4e4, rel=0.1)
+    assert cut.range_gap == pytest.approx(4e4, rel=0.1)
     wrong = of_row(tmp_path / "t.csv", GOOD.replace("86.603e9", "86.303e9"), "storage_modulus")["|E*| cos phi"]
     assert wrong.agreement == "disagrees"
     assert wrong.recomputed == pytest.approx(86.60254e9)
-    assert 0.2e9 < wrong.off < 0.3e9
+    assert 0.2e9 < wrong.range_gap < 0.3e9
 
 
 def test_uncertainty_is_propagated_from_both_inputs(tmp_path: Path) -> None:
     check = of_row(tmp_path / "t.csv", GOOD, "storage_modulus")["|E*| cos phi"]
     expected = math.hypot(1e9 * math.cos(math.radians(30.0)), 100e9 * math.sin(math.radians(30.0)) * math.radians(1.0))
     assert check.uncertainty == pytest.approx(expected, rel=1e-6)
-    assert check in understated([check])
+    assert check in understated_uncertainties([check])
 
 
 def test_the_papers_table_disagrees_with_itself_in_three_rows() -> None:
-    found = disagreements(checks(read_material_table(PAPER_TABLE)))
+    found = disagreements(consistency_checks(read_material_table(PAPER_TABLE)))
     named = {(check.frequency, check.column, check.formula): check.agreement for check in found}
     assert named == {
         (2.0, "storage_modulus", "|E*| cos phi"): "disagrees",
@@ -63,5 +68,5 @@ def test_the_papers_table_disagrees_with_itself_in_three_rows() -> None:
 
 
 def test_the_papers_uncertainty_of_the_storage_modulus_leaves_the_phase_out() -> None:
-    short = understated(checks(read_material_table(PAPER_TABLE)))
+    short = understated_uncertainties(consistency_checks(read_material_table(PAPER_TABLE)))
     assert [check.frequency for check in short if check.column == "storage_modulus"] == [2.0, 5.0, 10.0, 20.0]

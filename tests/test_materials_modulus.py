@@ -5,25 +5,25 @@ import pytest
 from scipy.integrate import solve_ivp
 
 from tautwire.materials.modulus import (
-    Branch,
     Material,
+    MaxwellBranch,
     complex_modulus,
-    damping,
     loss_factor,
     loss_modulus,
     storage_modulus,
+    viscous_damping,
 )
 from tautwire_fmu.laws.effects.relaxation import Values, state_rates, stiffness
 from tautwire_fmu.laws.mathematics import REAL
 
 AMPLITUDE = 3e-4
-ROPE = Material(modulus=105e9, damping=0.46e9, branches=(Branch(12e9, 0.02), Branch(29e9, 1.56)))
+ROPE = Material(modulus=105e9, damping=0.46e9, branches=(MaxwellBranch(12e9, 0.02), MaxwellBranch(29e9, 1.56)))
 
 
 def driven(material: Material, frequency: float) -> complex:
     """First harmonic of stress over strain once transients have died, dashpots integrated in time."""
     omega = 2.0 * np.pi * frequency
-    times = np.array([branch.time for branch in material.branches])
+    times = np.array([branch.relaxation_time for branch in material.branches])
     moduli = np.array([branch.modulus for branch in material.branches])
 
     def rates(time: float, dashpots: np.ndarray) -> np.ndarray:
@@ -49,9 +49,9 @@ def test_branches_and_damping_answer_as_they_do_in_time(frequency: float) -> Non
 @pytest.mark.parametrize("frequency", [0.1, 2.0, 20.0])
 def test_branches_answer_as_the_relaxation_effect_of_robot_files(frequency: float) -> None:
     turn = 2j * np.pi * frequency
-    (first, second), third = ROPE.branches, Branch(0.0, 1.0)
+    (first, second), third = ROPE.branches, MaxwellBranch(0.0, 1.0)
     values = Values(*first, *second, *third)
-    dashpots = tuple(1.0 / (1.0 + turn * branch.time) for branch in (first, second, third))
+    dashpots = tuple(1.0 / (1.0 + turn * branch.relaxation_time) for branch in (first, second, third))
 
     class Moving:
         strain = 1.0
@@ -67,7 +67,7 @@ def test_dry_friction_has_the_first_harmonic_of_its_loop() -> None:
     angle = 2.0 * np.pi * (np.arange(4096) + 0.5) / 4096.0
     stress = 7e6 * np.sign(np.cos(angle))
     ahead = 2.0 * np.mean(stress * np.cos(angle)) / AMPLITUDE
-    material = Material(100e9, friction=7e6)
+    material = Material(100e9, friction_stress=7e6)
     assert loss_modulus(material, 3.0, AMPLITUDE) == pytest.approx(ahead, rel=1e-6)
     assert storage_modulus(material, 3.0, AMPLITUDE) == 100e9
     assert loss_modulus(material, 3.0) == 0.0
@@ -82,10 +82,10 @@ def test_a_delay_turns_the_modulus_and_keeps_its_size() -> None:
 
 
 def test_a_quick_branch_is_a_damper_and_a_slow_one_a_spring() -> None:
-    quick = Material(100e9, branches=(Branch(20e9, 1e-6),))
-    assert damping(quick, 1.0) == pytest.approx(20e9 * 1e-6, rel=1e-9)
+    quick = Material(100e9, branches=(MaxwellBranch(20e9, 1e-6),))
+    assert viscous_damping(quick, 1.0) == pytest.approx(20e9 * 1e-6, rel=1e-9)
     assert storage_modulus(quick, 1.0) == pytest.approx(100e9, rel=1e-9)
-    slow = Material(100e9, branches=(Branch(20e9, 1e6),))
+    slow = Material(100e9, branches=(MaxwellBranch(20e9, 1e6),))
     assert storage_modulus(slow, 1.0) == pytest.approx(120e9, rel=1e-9)
     assert loss_modulus(slow, 1.0) < 1e5
 
@@ -94,7 +94,7 @@ def test_damping_is_equation_nine() -> None:
     frequency = np.array([0.1, 1.0, 10.0])
     eta = loss_factor(ROPE, frequency)
     expected = storage_modulus(ROPE, frequency) * eta / (2.0 * np.pi * frequency)
-    assert damping(ROPE, frequency) == pytest.approx(expected)
+    assert viscous_damping(ROPE, frequency) == pytest.approx(expected)
 
 
 def test_storage_and_loss_of_branches_obey_kramers_and_kronig() -> None:

@@ -5,17 +5,17 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tautwire.materials.observations import observations
+from tautwire.materials.observations import observations_from_table
 from tautwire.materials.table import PAPER_TABLE, read_material_table
 from tests.materials import CONSTANT, observed, written
 
 TABLE = read_material_table(PAPER_TABLE)
-POLAR, FACTOR = TABLE.pairs()
+POLAR, FACTOR = TABLE.modulus_pairs()
 
 
 @pytest.mark.parametrize("pair", [POLAR, FACTOR])
 def test_the_covariance_is_what_sampling_gives(pair: tuple[str, str]) -> None:
-    seen = observations(TABLE, pair, shared=0.3)
+    seen = observations_from_table(TABLE, pair, shared_variance=0.3)
     random = np.random.default_rng(1)
     draws = []
     for name in pair:
@@ -44,20 +44,20 @@ def test_damping_pairs_are_loss_moduli_over_omega(tmp_path: Path) -> None:
     both = []
     for name in ("loss.csv", "damping.csv"):
         table = read_material_table(tmp_path / name)
-        both.append(observations(table, table.pairs()[0]))
+        both.append(observations_from_table(table, table.modulus_pairs()[0]))
     assert both[1].loss == pytest.approx(both[0].loss)
     assert both[1].covariance == pytest.approx(both[0].covariance)
 
 
 def test_whitened_errors_have_unit_covariance() -> None:
-    seen = observations(TABLE, POLAR, shared=0.5)
+    seen = observations_from_table(TABLE, POLAR, shared_variance=0.5)
     white = seen.whitener @ seen.covariance @ seen.whitener.T
     assert white == pytest.approx(np.eye(12), abs=1e-9)
 
 
 def test_rows_that_are_taken_keep_their_numbers() -> None:
-    seen = observations(TABLE, POLAR, shared=0.5)
-    part = seen.taken([4, 1])
+    seen = observations_from_table(TABLE, POLAR, shared_variance=0.5)
+    part = seen.select_rows([4, 1])
     assert list(part.frequency) == [10.0, 1.0]
     assert part.covariance[0, 1] == seen.covariance[4, 1]
     assert part.covariance[2, 1] == seen.covariance[10, 1]
@@ -65,13 +65,13 @@ def test_rows_that_are_taken_keep_their_numbers() -> None:
 
 
 def test_two_standard_deviations_are_halved() -> None:
-    one, two = (observations(TABLE, POLAR, coverage=coverage) for coverage in (1.0, 2.0))
+    one, two = (observations_from_table(TABLE, POLAR, coverage_factor=coverage) for coverage in (1.0, 2.0))
     assert two.covariance == pytest.approx(one.covariance / 4.0)
 
 
 def test_static_rows_are_added_on_request() -> None:
-    seen = observations(TABLE, POLAR)
-    assert seen.number_count == 12
-    with_static = seen.with_static(TABLE)
-    assert with_static.number_count == 13
-    assert (with_static.static[0], with_static.static_uncertainty[0]) == (102.2e9, 2.2e9)
+    seen = observations_from_table(TABLE, POLAR)
+    assert seen.measurement_count == 12
+    with_static = seen.with_static_rows(TABLE)
+    assert with_static.measurement_count == 13
+    assert (with_static.static_modulus[0], with_static.static_modulus_uncertainty[0]) == (102.2e9, 2.2e9)

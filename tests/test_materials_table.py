@@ -23,18 +23,18 @@ def test_the_papers_table_is_read_with_its_digits() -> None:
     first = read.rows[0].quantities
     assert first["dynamic_modulus"].value == 121.4e9
     assert first["dynamic_modulus"].uncertainty == 2.8e9
-    assert first["dynamic_modulus"].digit == pytest.approx(0.1e9)
+    assert first["dynamic_modulus"].resolution == pytest.approx(0.1e9)
     assert first["phase"].value == pytest.approx(math.radians(6.8))
     assert first["phase"].uncertainty == pytest.approx(math.radians(2.3))
-    assert first["phase"].digit == pytest.approx(math.radians(0.1))
+    assert first["phase"].resolution == pytest.approx(math.radians(0.1))
     assert read.rows[-1].quantities["damping"].value == 0.44e9
     assert read.rows[-1].quantities["damping"].uncertainty is None
-    assert [row.quantities["storage_modulus"].value for row in read.static] == [102.2e9]
+    assert [row.quantities["storage_modulus"].value for row in read.static_rows] == [102.2e9]
 
 
 def test_pairs_need_uncertainties_in_every_row() -> None:
     read = read_material_table(PAPER_TABLE)
-    assert read.pairs() == (("dynamic_modulus", "phase"), ("storage_modulus", "loss_factor"))
+    assert read.modulus_pairs() == (("dynamic_modulus", "phase"), ("storage_modulus", "loss_factor"))
 
 
 def test_remarks_blank_lines_and_columns_without_uncertainty_are_read(tmp_path: Path) -> None:

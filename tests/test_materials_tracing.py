@@ -10,7 +10,7 @@ from scipy.stats import chi2
 
 from tautwire.errors import InputError
 from tautwire.materials import (
-    PAPER_PAIR_AT,
+    PAPER_PAIR_FREQUENCY,
     PAPER_TABLE,
     MaterialVerdict,
     pair_of_row,
@@ -21,9 +21,9 @@ from tautwire.materials import (
 )
 from tautwire.materials.document import material_document
 from tautwire.materials.figure import material_figure
-from tautwire.materials.modulus import Branch, Material
+from tautwire.materials.modulus import Material, MaxwellBranch
 from tautwire.materials.robot_material import declared_material
-from tautwire.materials.wording import notes, sentence
+from tautwire.materials.wording import verdict_notes, verdict_sentence
 from tests.materials import CONSTANT, observed, written
 from tests.robots import example
 
@@ -44,7 +44,7 @@ FREQUENCY = np.geomspace(0.1, 20.0, 8)
 @pytest.fixture(scope="module")
 def measured() -> MaterialVerdict:
     table = read_material_table(PAPER_TABLE)
-    return trace_material(table, pair_of_row(table, PAPER_PAIR_AT))
+    return trace_material(table, pair_of_row(table, PAPER_PAIR_FREQUENCY))
 
 
 def chi_squared(storage: float, viscous: float) -> float:
@@ -58,12 +58,12 @@ def chi_squared(storage: float, viscous: float) -> float:
 
 
 def test_the_papers_pair_is_refuted_by_the_papers_table(measured: MaterialVerdict) -> None:
-    declared = measured.before
+    declared = measured.reference_model
     assert (declared.material.modulus, declared.material.damping) == (134.8e9, 2.08e9)
     assert declared.chi_squared == pytest.approx(chi_squared(134.8, 2.08), rel=1e-9)
     assert declared.chi_squared == pytest.approx(1828.5, abs=0.1)
-    assert declared.freedom == 12
-    assert not measured.noise_before
+    assert declared.degrees_of_freedom == 12
+    assert not measured.adequate_before
 
 
 def test_every_constant_pair_is_refuted(measured: MaterialVerdict) -> None:
@@ -75,36 +75,36 @@ def test_every_constant_pair_is_refuted(measured: MaterialVerdict) -> None:
         assert chi_squared(modulus, step * viscous) > best.chi_squared
     assert best.p_value == pytest.approx(float(chi2.sf(best.chi_squared, 10)))
     assert best.p_value < 1e-8
-    assert best.leave_out is not None
-    assert max(fit.p_value for fit in best.leave_out.rest) < 1e-4
-    assert all(reading.outcomes["constant"][2] < 1e-6 for reading in measured.assumptions)
+    assert best.cross_validation is not None
+    assert max(fit.p_value for fit in best.cross_validation.fits) < 1e-4
+    assert all(reading.outcomes["constant"][2] < 1e-6 for reading in measured.error_assumptions)
 
 
 def test_relaxation_is_found_and_is_not_all(measured: MaterialVerdict) -> None:
     alone = measured.model("relaxation")
     assert alone.chi_squared == pytest.approx(32.66, abs=0.01)
     assert alone.chi_squared < measured.model("constant").chi_squared - 25.0
-    assert measured.floor == pytest.approx(30.04, abs=0.01)
-    assert chi2.sf(measured.floor, 10) < 0.01
+    assert measured.relaxation_floor == pytest.approx(30.04, abs=0.01)
+    assert chi2.sf(measured.relaxation_floor, 10) < 0.01
     assert measured.verdict == "effects"
     names = [effect.name for effect in measured.effects]
     assert {"relaxation", "hysteresis"} < set(names)
-    assert measured.after.p_value > 0.1
-    assert measured.noise_after
-    assert ("hysteresis", "relaxation", "sensor_delay") in measured.also_possible
+    assert measured.chosen_model.p_value > 0.1
+    assert measured.adequate_after
+    assert ("hysteresis", "relaxation", "sensor_delay") in measured.confusable_effects
 
 
 def test_residuals_are_in_standard_deviations_of_the_table(measured: MaterialVerdict) -> None:
-    declared = measured.before
+    declared = measured.reference_model
     frequency, size, size_sigma, phase, phase_sigma = ROWS[5]
     angle, blur = np.radians(phase), np.radians(phase_sigma)
     storage_sigma = np.hypot(np.cos(angle) * size_sigma, size * np.sin(angle) * blur)
     loss_sigma = np.hypot(np.sin(angle) * size_sigma, size * np.cos(angle) * blur)
-    assert declared.storage_sigmas[5] == pytest.approx((134.8 - size * np.cos(angle)) / storage_sigma)
+    assert declared.storage_residuals[5] == pytest.approx((134.8 - size * np.cos(angle)) / storage_sigma)
     off = 2.0 * np.pi * frequency * 2.08 - size * np.sin(angle)
-    assert declared.damping_sigmas[5] == pytest.approx(off / loss_sigma)
-    assert declared.damping_sigmas[5] > 30.0
-    assert np.max(np.abs([measured.after.storage_sigmas, measured.after.damping_sigmas])) < 2.0
+    assert declared.damping_residuals[5] == pytest.approx(off / loss_sigma)
+    assert declared.damping_residuals[5] > 30.0
+    assert np.max(np.abs([measured.chosen_model.storage_residuals, measured.chosen_model.damping_residuals])) < 2.0
 
 
 def test_errors_shrink_from_before_to_after(measured: MaterialVerdict) -> None:
@@ -139,11 +139,11 @@ def test_the_document_reads_like_a_trace(measured: MaterialVerdict) -> None:
 
 
 def test_the_words_hold_the_figures(measured: MaterialVerdict) -> None:
-    said = sentence(measured)
+    said = verdict_sentence(measured)
     assert "refuted" in said
     assert "1828" in said
     assert "relaxation and hysteresis" in said
-    text = " ".join(notes(measured))
+    text = " ".join(verdict_notes(measured))
     assert "5 Hz: storage_modulus is written 1.31e+11, |E*| cos phi gives 1.318e+11 (disagrees)" in text
     assert "whichever row is left out" in text
     assert "the strain amplitude falls with frequency" in text
@@ -153,7 +153,7 @@ def test_the_words_hold_the_figures(measured: MaterialVerdict) -> None:
 def test_the_figure_shows_every_row_and_both_models(measured: MaterialVerdict) -> None:
     figure = material_figure(measured)
     storage, viscous = figure.axes[0], figure.axes[1]
-    for axes, values in ((storage, measured.seen.storage), (viscous, measured.seen.damping)):
+    for axes, values in ((storage, measured.observations.storage), (viscous, measured.observations.damping)):
         points = axes.containers[0].lines[0]
         assert points.get_ydata() == pytest.approx(values / 1e9)
     assert "GPa" in storage.get_ylabel()
@@ -177,10 +177,10 @@ def test_the_pair_of_a_row_is_as_written_or_worked_out(tmp_path: Path) -> None:
 def test_a_constant_pair_that_is_right_is_left_alone(tmp_path: Path) -> None:
     table = read_material_table(written(tmp_path / "t.csv", observed(CONSTANT, FREQUENCY, 0.02, seed=1)))
     verdict = trace_material(table, CONSTANT)
-    assert (verdict.verdict, verdict.effects, verdict.also_possible) == ("none", (), ())
-    assert verdict.noise_before
+    assert (verdict.verdict, verdict.effects, verdict.confusable_effects) == ("none", (), ())
+    assert verdict.adequate_before
     assert verdict.error_after == verdict.error_before
-    assert "enough" in sentence(verdict)
+    assert "enough" in verdict_sentence(verdict)
 
 
 def test_a_wrong_pair_is_told_from_a_wrong_law(tmp_path: Path) -> None:
@@ -191,7 +191,7 @@ def test_a_wrong_pair_is_told_from_a_wrong_law(tmp_path: Path) -> None:
     estimate = verdict.effects[0].parameters["damping"]
     assert estimate.declared == 0.8e9
     assert estimate.low < 0.49e9 < estimate.high
-    assert verdict.noise_after
+    assert verdict.adequate_after
 
 
 def test_rows_that_no_model_follows_are_unexplained(tmp_path: Path) -> None:
@@ -199,12 +199,19 @@ def test_rows_that_no_model_follows_are_unexplained(tmp_path: Path) -> None:
     zigzag = replace(seen, storage=seen.storage * (1.0 + 0.1 * (-1.0) ** np.arange(8)))
     verdict = trace_material(read_material_table(written(tmp_path / "t.csv", zigzag)), CONSTANT)
     assert (verdict.verdict, verdict.effects) == ("unexplained", ())
-    assert not verdict.noise_after
-    assert "No model here" in sentence(verdict)
+    assert not verdict.adequate_after
+    assert "No model here" in verdict_sentence(verdict)
 
 
 def test_a_robot_takes_the_rope() -> None:
-    rope = robot_material(Material(100e9, 0.3e9, (Branch(5e9, 2e-4), Branch(20e9, 0.1), Branch(30e9, 2.0)), loss=4e9))
+    rope = robot_material(
+        Material(
+            100e9,
+            0.3e9,
+            (MaxwellBranch(5e9, 2e-4), MaxwellBranch(20e9, 0.1), MaxwellBranch(30e9, 2.0)),
+            loss_modulus=4e9,
+        )
+    )
     assert rope.damping == pytest.approx(0.3e9 + 5e9 * 2e-4)
     assert rope.relaxation == {"modulus": 20e9, "time": 0.1, "modulus_2": 30e9, "time_2": 2.0}
     robot = with_material(example("three"), rope)

@@ -2,7 +2,15 @@ import math
 
 import pytest
 
-from tautwire_fmu.laws.mathematics import COMPLEX_STEP, REAL, all_along, along, rate_of, rates_of, vector_along
+from tautwire_fmu.laws.mathematics import (
+    COMPLEX_STEP,
+    REAL,
+    all_with_rates,
+    rate_of,
+    rates_of,
+    vector_with_rates,
+    with_rate,
+)
 
 
 @pytest.mark.parametrize(
@@ -18,22 +26,24 @@ from tautwire_fmu.laws.mathematics import COMPLEX_STEP, REAL, all_along, along, 
     ],
 )
 def test_complex_step_is_exact(name: str, at: float, slope: float) -> None:
-    value = getattr(COMPLEX_STEP, name)(along(at, 3.0))
+    value = getattr(COMPLEX_STEP, name)(with_rate(at, 3.0))
     assert rate_of(value) == pytest.approx(3.0 * slope, rel=1e-15)
     assert value.real == pytest.approx(getattr(REAL, name)(at), rel=1e-15)
 
 
 def test_kinks_choose_by_the_real_part() -> None:
-    assert rate_of(COMPLEX_STEP.maximum(along(1.0, 2.0), along(0.5, 7.0))) == 2.0
-    assert rate_of(COMPLEX_STEP.where(along(-1.0, 1.0), along(0.0, 2.0), along(0.0, 5.0))) == 5.0
+    assert rate_of(COMPLEX_STEP.maximum(with_rate(1.0, 2.0), with_rate(0.5, 7.0))) == 2.0
+    assert rate_of(COMPLEX_STEP.where(with_rate(-1.0, 1.0), with_rate(0.0, 2.0), with_rate(0.0, 5.0))) == 5.0
     assert REAL.where(1.0, 2.0, 3.0) == 2.0
     assert REAL.where(0.0, 2.0, 3.0) == 3.0
 
 
 def test_vectors_carry_their_rates_as_numbers_do() -> None:
     values, rates = (1.5, -2.0, 0.25), (3.0, 0.1, -7.0)
-    carried = vector_along(values, rates)
-    assert list(carried) == all_along(values, rates) == [along(v, r) for v, r in zip(values, rates, strict=True)]
+    carried = vector_with_rates(values, rates)
+    assert (
+        list(carried) == all_with_rates(values, rates) == [with_rate(v, r) for v, r in zip(values, rates, strict=True)]
+    )
     assert rates_of(carried) == tuple(map(rate_of, carried)) == pytest.approx(rates, rel=1e-15)
 
 
@@ -43,6 +53,6 @@ def test_a_constant_has_no_rate() -> None:
 
 @pytest.mark.parametrize("function", ["log", "sqrt"])
 def test_a_number_with_its_rate_is_refused_where_the_real_one_is(function: str) -> None:
-    for mathematics, number in ((REAL, -2.0), (COMPLEX_STEP, along(-2.0, 1.0))):
+    for mathematics, number in ((REAL, -2.0), (COMPLEX_STEP, with_rate(-2.0, 1.0))):
         with pytest.raises(ValueError):
             getattr(mathematics, function)(number)

@@ -7,14 +7,14 @@ import pytest
 
 from tautwire.errors import RecordingError
 from tautwire.recordings.recording import Recording
-from tautwire.tracer.adequacy import is_noise
-from tautwire.tracer.cosimulated import cosimulated, errors, floor_of
-from tautwire.tracer.data import split
+from tautwire.tracer.adequacy import residuals_are_white
+from tautwire.tracer.cosimulated import cosimulate_data_set, cosimulation_errors, noise_floor
+from tautwire.tracer.data import split_data
 from tautwire.tracer.fit import Fitter
-from tautwire.tracer.preparation.motion_at_start import beginning_of, with_motion_at_start
-from tautwire.tracer.preparation.noise import noise_of
-from tautwire.tracer.preparation.preparation import prepare
-from tautwire.tracer.preparation.release import release_note, released
+from tautwire.tracer.preparation.motion_at_start import initial_motion, with_motion_at_start
+from tautwire.tracer.preparation.noise import estimate_noise
+from tautwire.tracer.preparation.preparation import prepare_recordings
+from tautwire.tracer.preparation.release import initial_state_note, with_initial_state
 from tests.recordings import recorded
 from tests.rig import SampledProgram, load_robot, make_recording, wander
 from tests.robots import EXAMPLES, NAMES, example
@@ -50,15 +50,18 @@ def swinging() -> Recording:
 def runs(name: str, *recordings: Recording) -> list[tuple[bool, float, float]]:
     """Of each recording: whether innovations are noise, and the co-simulation's errors over what noise leaves."""
     robot = example(name)
-    prepared = prepare(robot, *recordings)
-    evidence = split(robot, prepared.noise, prepared.fit, prepared.check)
+    prepared = prepare_recordings(robot, *recordings)
+    evidence = split_data(robot, prepared.noise, prepared.fit, prepared.check)
     fitter = Fitter(prepared.noise)
     found = []
-    for sample in (evidence.fit, evidence.judge):
-        begun = released(fitter, robot, sample)
-        assert "the run starts with tensions of" in release_note(begun, sample.recording.path)[0]
-        error, floor = errors(sample.recording, cosimulated(begun, sample)), floor_of(fitter, robot, sample)
-        quiet = is_noise(fitter.innovations(robot, sample), sample.rows)
+    for sample in (evidence.estimation, evidence.validation):
+        begun = with_initial_state(fitter, robot, sample)
+        assert "the run starts with tensions of" in initial_state_note(begun, sample.recording.path)[0]
+        error, floor = (
+            cosimulation_errors(sample.recording, cosimulate_data_set(begun, sample)),
+            noise_floor(fitter, robot, sample),
+        )
+        quiet = residuals_are_white(fitter.innovations(robot, sample), sample.rows)
         found.append((quiet, error.position_rms / floor.position_rms, error.tension_rms / floor.tension_rms))
     return found
 
@@ -67,7 +70,7 @@ def runs(name: str, *recordings: Recording) -> list[tuple[bool, float, float]]:
 def test_a_recording_that_starts_at_rest_does_not_start_in_motion(name: str) -> None:
     robot = example(name)
     pair = recorded(name, 1), recorded(name, 2)
-    noise = noise_of(robot, pair[0])
+    noise = estimate_noise(robot, pair[0])
     assert with_motion_at_start(robot, noise, pair) == (noise, ())
 
 
@@ -75,7 +78,7 @@ def test_a_recording_that_starts_at_rest_does_not_start_in_motion(name: str) -> 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_start_in_motion_leaves_noise_in_filter_and_co_simulation(name: str) -> None:
     pair = [cut(recorded(name, seed), BEGIN[name]) for seed in (1, 2)]
-    notes = prepare(example(name), *pair).notes
+    notes = prepare_recordings(example(name), *pair).notes
     assert sum("starts in motion" in note for note in notes) == 2
     for quiet, position, tension in runs(name, *pair):
         assert quiet
@@ -86,8 +89,8 @@ def test_a_start_in_motion_leaves_noise_in_filter_and_co_simulation(name: str) -
 def test_a_swing_under_resting_winches_is_a_start_in_motion() -> None:
     recording = swinging()
     assert np.max(np.abs(recording.winch_speed[:90])) < 2e-3
-    found = beginning_of(example("three"), noise_of(example("three"), recording), recording)
-    assert found is not None and found.swing > 0.002
+    found = initial_motion(example("three"), estimate_noise(example("three"), recording), recording)
+    assert found is not None and found.amplitude > 0.002
     for quiet, position, tension in runs("three", recording, recorded("three", 2)):
         assert quiet
         assert position < 1.2 and tension < 1.2
@@ -96,8 +99,8 @@ def test_a_swing_under_resting_winches_is_a_start_in_motion() -> None:
 def test_winch_speeds_alone_tell_where_no_position_is_measured() -> None:
     recording = cut(recorded("three", 1), 4.0)
     blind = replace(recording, position=np.full_like(recording.position, np.nan))
-    found = beginning_of(example("three"), noise_of(example("three"), recording), blind)
-    assert found is not None and found.velocity == pytest.approx(2.0, rel=0.2)
+    found = initial_motion(example("three"), estimate_noise(example("three"), recording), blind)
+    assert found is not None and found.speed == pytest.approx(2.0, rel=0.2)
 
 
 def test_a_start_too_far_from_rest_is_refused() -> None:
@@ -107,4 +110,4 @@ def test_a_start_too_far_from_rest_is_refused() -> None:
     with pytest.raises(
         RecordingError, match=r"three-1\.csv: starts in motion, .* m/s, and swings by .*; start the rec"
     ):
-        with_motion_at_start(robot, noise_of(robot, recording), (wild,))
+        with_motion_at_start(robot, estimate_noise(robot, recording), (wild,))

@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 from typer.main import get_command
 
-from tautwire.cli import application, run
+from tautwire.cli import app, run
 from tests.robots import EXAMPLES
 
 THREE = EXAMPLES / "three"
@@ -47,7 +47,7 @@ def test_the_last_line_names_a_command_that_is_one(
     assert named == expected
     name, *given = named.split()
     # What is asked of the command is there, and it knows all that it is given.
-    get_command(application).commands[name].make_context(name, given)  # type: ignore[attr-defined]
+    get_command(app).commands[name].make_context(name, given)  # type: ignore[attr-defined]
 
 
 @pytest.mark.parametrize("how", ["--json", "--quiet"])

@@ -6,8 +6,8 @@ from scipy.signal import lfilter
 
 from tautwire.recordings.recording import Recording
 from tautwire.robots.robot import Robot, Sensors
-from tautwire.tracer.preparation.noise import noise_of
-from tautwire.tracer.preparation.noise_check import CheckedNoise, checked_noise
+from tautwire.tracer.preparation.noise import estimate_noise
+from tautwire.tracer.preparation.noise_check import CheckedNoise, check_noise
 from tests.recordings import recorded
 from tests.robots import NAMES, example
 
@@ -16,7 +16,7 @@ PAIR = (recorded("three", 1), recorded("three", 2))
 
 
 def checked(robot: Robot, recordings: tuple[Recording, ...]) -> CheckedNoise:
-    return checked_noise(robot, noise_of(robot, recordings[0]), recordings)
+    return check_noise(robot, estimate_noise(robot, recordings[0]), recordings)
 
 
 def declared(**sensors: float) -> Robot:
@@ -37,7 +37,7 @@ def test_noise_that_is_declared_right_is_kept(name: str, effects: dict[str, dict
     robot = example(name)
     found = checked(robot, (recording,))
     assert found.notes == ()
-    assert found.noise == noise_of(robot, recording)
+    assert found.noise == estimate_noise(robot, recording)
     assert found.recordings == (recording,)
 
 

@@ -5,7 +5,7 @@ import pytest
 
 from tautwire.errors import RecordingError
 from tautwire.recordings.recording import Recording
-from tautwire.tracer.preparation.outliers import outliers, without_outliers
+from tautwire.tracer.preparation.outliers import outlier_indices, without_outliers
 from tests.recordings import recorded
 from tests.robots import NAMES
 
@@ -44,20 +44,20 @@ def test_a_recording_as_it_should_be_loses_nothing(name: str) -> None:
 def test_the_first_and_last_samples_are_looked_at_too() -> None:
     signal = np.random.default_rng(1).normal(size=400)
     signal[[1, 398]] += 60.0
-    assert outliers(signal).tolist() == [1, 398]
+    assert outlier_indices(signal).tolist() == [1, 398]
 
 
 def test_a_step_and_a_kink_are_no_outliers() -> None:
     time = np.arange(600) * 0.01
     noise = np.random.default_rng(2).normal(scale=0.01, size=600)
-    assert not len(outliers(np.where(time > 3.0, 5.0, 0.0) + noise))
-    assert not len(outliers(np.abs(time - 3.0) * 20.0 + noise))
+    assert not len(outlier_indices(np.where(time > 3.0, 5.0, 0.0) + noise))
+    assert not len(outlier_indices(np.abs(time - 3.0) * 20.0 + noise))
 
 
 def test_neighbours_of_an_outlier_stay() -> None:
     signal = np.sin(np.arange(500) * 0.2) + np.random.default_rng(3).normal(scale=0.01, size=500)
     signal[250] += 1.0
-    assert outliers(signal).tolist() == [250]
+    assert outlier_indices(signal).tolist() == [250]
 
 
 def test_a_channel_that_jumps_all_the_time_is_refused() -> None:
@@ -81,4 +81,4 @@ def test_a_winch_that_stops_speeding_up_is_no_outlier() -> None:
     time = np.arange(600) * 0.01
     noise = np.random.default_rng(5).normal(scale=1e-4, size=600)
     for acceleration in (0.5, 2.0, 20.0):
-        assert not len(outliers(np.minimum(acceleration * time, 3.0 * acceleration) + noise))
+        assert not len(outlier_indices(np.minimum(acceleration * time, 3.0 * acceleration) + noise))

@@ -3,7 +3,7 @@ from pathlib import Path
 import pytest
 
 from tautwire.errors import InputError
-from tautwire.output import file_in_place, folder_in_place
+from tautwire.output import atomic_file, atomic_folder
 
 
 def names(folder: Path) -> list[str]:
@@ -12,7 +12,7 @@ def names(folder: Path) -> list[str]:
 
 def test_files_appear_when_the_block_ends_well(tmp_path: Path) -> None:
     target = tmp_path / "new" / "deep"
-    with folder_in_place(target) as scratch:
+    with atomic_folder(target) as scratch:
         (scratch / "a").write_text("1")
         assert not target.exists()
     assert names(target) == ["a"]
@@ -20,7 +20,7 @@ def test_files_appear_when_the_block_ends_well(tmp_path: Path) -> None:
 
 
 def test_nothing_is_left_when_it_fails(tmp_path: Path) -> None:
-    with pytest.raises(KeyboardInterrupt), folder_in_place(tmp_path / "new") as scratch:
+    with pytest.raises(KeyboardInterrupt), atomic_folder(tmp_path / "new") as scratch:
         (scratch / "a").write_text("1")
         raise KeyboardInterrupt
     assert names(tmp_path) == []
@@ -29,7 +29,7 @@ def test_nothing_is_left_when_it_fails(tmp_path: Path) -> None:
 def test_other_files_in_the_folder_stay(tmp_path: Path) -> None:
     (tmp_path / "mine").write_text("mine")
     (tmp_path / "a").write_text("old")
-    with folder_in_place(tmp_path) as scratch:
+    with atomic_folder(tmp_path) as scratch:
         (scratch / "a").write_text("new")
     assert names(tmp_path) == ["a", "mine"]
     assert (tmp_path / "a").read_text() == "new"
@@ -38,19 +38,19 @@ def test_other_files_in_the_folder_stay(tmp_path: Path) -> None:
 
 def test_a_file_in_the_way_of_a_folder_is_said(tmp_path: Path) -> None:
     (tmp_path / "a").write_text("")
-    with pytest.raises(InputError, match="is a file"), folder_in_place(tmp_path / "a" / "b"):
+    with pytest.raises(InputError, match="is a file"), atomic_folder(tmp_path / "a" / "b"):
         pass
 
 
 def test_a_folder_in_the_way_of_a_file_is_said(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match="is a folder"), file_in_place(tmp_path):
+    with pytest.raises(InputError, match="is a folder"), atomic_file(tmp_path):
         pass
 
 
 def test_a_file_is_replaced_whole(tmp_path: Path) -> None:
     target = tmp_path / "result.csv"
     target.write_text("old")
-    with file_in_place(target) as scratch:
+    with atomic_file(target) as scratch:
         scratch.write_text("half")
         assert target.read_text() == "old"
     assert target.read_text() == "half"

@@ -14,11 +14,11 @@ import pytest
 
 from tautwire.cli import run
 from tautwire.fmus.packaging import RobotFmus, build_fmus
-from tautwire.fmus.slots import SlotError, lacking_ports
+from tautwire.fmus.slots import SlotError, missing_user_fmu_ports
 from tautwire.robots.reading import write_robot
-from tautwire.robots.robot import OwnFmu
+from tautwire.robots.robot import UserFmu
 from tautwire.runs.cosimulation import RunError, cosimulate
-from tautwire.runs.wiring import wiring_of
+from tautwire.runs.wiring import wire_robot
 from tests.own_fmus import LAG, compiler, falling_mass, lag_winch, packed, spring_cable
 from tests.rig import RampProgram, simulate
 from tests.robots import paper_robot
@@ -58,11 +58,11 @@ def winch(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return lag_winch(tmp_path_factory.mktemp("winch"))
 
 
-def all_winches(path: Path) -> tuple[OwnFmu, ...]:
-    return tuple(OwnFmu(f"winch_{index}", path) for index in (1, 2, 3))
+def all_winches(path: Path) -> tuple[UserFmu, ...]:
+    return tuple(UserFmu(f"winch_{index}", path) for index in (1, 2, 3))
 
 
-def end_errors(own: tuple[OwnFmu, ...], exact: np.ndarray, folder: Path) -> list[float]:
+def end_errors(own: tuple[UserFmu, ...], exact: np.ndarray, folder: Path) -> list[float]:
     """Distance in m from where the rig ends, at steps of 10 ms and 1 ms."""
     fmus = build_fmus(replace(paper_robot(), fmus=own), folder)
     return [
@@ -73,7 +73,7 @@ def end_errors(own: tuple[OwnFmu, ...], exact: np.ndarray, folder: Path) -> list
 @pytest.mark.slow
 def test_a_plain_platform_without_rates_and_states_is_of_second_order(platform: Path, tmp_path: Path) -> None:
     exact = simulate(rig_of(paper_robot()), None, RampProgram(RAMP, 1.0), CORNERS, rtol=1e-12, atol=1e-13)
-    coarse, fine = end_errors((OwnFmu("platform", platform),), exact.position[-1], tmp_path)
+    coarse, fine = end_errors((UserFmu("platform", platform),), exact.position[-1], tmp_path)
     assert coarse < 4e-4
     assert fine < 4e-6
     assert coarse / fine == pytest.approx(100.0, rel=0.1)
@@ -90,19 +90,19 @@ def test_winches_from_a_c_compiler_are_of_second_order(winch: Path, tmp_path: Pa
 
 
 def test_what_it_goes_on_without_is_said(platform: Path, tmp_path: Path) -> None:
-    fmus = build_fmus(replace(paper_robot(), fmus=(OwnFmu("platform", platform),)), tmp_path)
+    fmus = build_fmus(replace(paper_robot(), fmus=(UserFmu("platform", platform),)), tmp_path)
     motion = cosimulate(fmus, CORNERS[:2], SPEEDS[:2])
-    held, fixed, rate = motion.account.fallbacks()
+    held, fixed, rate = motion.statistics.fallback_notes()
     assert held == "no input_time, so inputs are held over each step at their mean: FMU platform"
     assert fixed == "no saved states, so no step is redone or cut at a kink: FMU platform"
     assert rate.startswith("no rate of velocity, so it is worked out from the past, off by about ")
     assert rate.endswith(" m/s2: FMU platform")
-    assert motion.account.redos == 0
+    assert motion.statistics.iterations == 0
 
 
 @pytest.mark.slow
 def test_a_plain_cable_is_told_where_the_run_starts_and_its_lacking_columns_are_left_out(tmp_path: Path) -> None:
-    robot, own = paper_robot(), (OwnFmu("cable_2", spring_cable(tmp_path)),)
+    robot, own = paper_robot(), (UserFmu("cable_2", spring_cable(tmp_path)),)
     linear = [replace(cable, law="linear") if place == 1 else cable for place, cable in enumerate(robot.cables)]
     rig = rig_of(replace(robot, cables=tuple(linear)))
     exact = simulate(rig, None, RampProgram(RAMP, 1.0), CORNERS, rtol=1e-12, atol=1e-13)
@@ -110,8 +110,8 @@ def test_a_plain_cable_is_told_where_the_run_starts_and_its_lacking_columns_are_
     assert coarse < 1e-5
     assert fine < 1e-8
     motion = cosimulate(build_fmus(replace(robot, fmus=own), tmp_path / "fmus"), CORNERS[:2], SPEEDS[:2])
-    assert motion.lacking == ("tension_2", "length_2", "elongation_2", "strain_2")
-    assert not set(motion.lacking) & set(motion.frame().columns)
+    assert motion.missing_columns == ("tension_2", "length_2", "elongation_2", "strain_2")
+    assert not set(motion.missing_columns) & set(motion.frame().columns)
     assert {"tension_1", "tension_3", "z"} < set(motion.frame().columns)
     assert np.isfinite(motion.frame().to_numpy()).all()
 
@@ -119,8 +119,8 @@ def test_a_plain_cable_is_told_where_the_run_starts_and_its_lacking_columns_are_
 @needs_compiler
 def test_a_rate_worked_out_is_as_good_as_it_says(winch: Path, tmp_path: Path) -> None:
     fmus = build_fmus(replace(paper_robot(), fmus=all_winches(winch)), tmp_path)
-    account = cosimulate(fmus, np.array([0.0, 1.0]), 0.5 * np.ones((2, 3)), 0.01).account
-    doubt = float(account.fallbacks()[1].partition("off by about ")[2].split()[0])
+    account = cosimulate(fmus, np.array([0.0, 1.0]), 0.5 * np.ones((2, 3)), 0.01).statistics
+    doubt = float(account.fallback_notes()[1].partition("off by about ")[2].split()[0])
     # The winch jumps to 0.5 m/s with its lag: the rate is exp(-t / lag) 0.5 / lag.
     times = np.arange(0.01, 1.0, 0.01)
     shown = 0.5 * (1.0 - np.exp(-times / LAG))
@@ -152,7 +152,7 @@ def test_the_command_line_says_it_with_the_error(
 
 
 def test_a_platform_that_starts_elsewhere_is_refused(platform: Path, tmp_path: Path) -> None:
-    robot = replace(paper_robot(), fmus=(OwnFmu("platform", platform),))
+    robot = replace(paper_robot(), fmus=(UserFmu("platform", platform),))
     robot = replace(robot, platform=replace(robot.platform, start=(28.86, 0.0, 5.01)))
     with pytest.raises(SlotError, match=r"starts at 28\.86, 0, 5 m, the run at 28\.86, 0, 5\.01 m"):
         cosimulate(build_fmus(robot, tmp_path), CORNERS[:2], SPEEDS[:2])
@@ -160,7 +160,7 @@ def test_a_platform_that_starts_elsewhere_is_refused(platform: Path, tmp_path: P
 
 def test_a_platform_with_a_parameter_for_it_is_started_where_the_run_starts(tmp_path: Path) -> None:
     ours = build_fmus(paper_robot(), tmp_path / "ours").platform
-    robot = replace(paper_robot(), fmus=(OwnFmu("platform", ours),))
+    robot = replace(paper_robot(), fmus=(UserFmu("platform", ours),))
     robot = replace(robot, platform=replace(robot.platform, start=(28.86, 0.0, 6.0)))
     motion = cosimulate(build_fmus(robot, tmp_path / "moved"), np.array([0.0, 0.5]), np.zeros((2, 3)))
     assert motion.position[:, 2] == pytest.approx([6.0, 6.0], abs=1e-9)
@@ -180,7 +180,7 @@ def test_an_fmu_for_steps_of_one_length_gets_no_others(winch: Path, tmp_path: Pa
 
 
 def test_a_library_that_does_not_load_is_named(tmp_path: Path) -> None:
-    own = (OwnFmu("winch_1", packed(tmp_path / "text.fmu", b"no library")),)
+    own = (UserFmu("winch_1", packed(tmp_path / "text.fmu", b"no library")),)
     here = Path.cwd()
     with pytest.raises(RunError, match="FMU winch_1: loading its library gave"):
         cosimulate(build_fmus(replace(paper_robot(), fmus=own), tmp_path), CORNERS[:2], SPEEDS[:2])
@@ -188,28 +188,28 @@ def test_a_library_that_does_not_load_is_named(tmp_path: Path) -> None:
 
 
 def test_a_tolerance_needs_saved_states(platform: Path, tmp_path: Path) -> None:
-    fmus = build_fmus(replace(paper_robot(), fmus=(OwnFmu("platform", platform),)), tmp_path)
+    fmus = build_fmus(replace(paper_robot(), fmus=(UserFmu("platform", platform),)), tmp_path)
     with pytest.raises(SlotError, match="cannot save its state"):
         cosimulate(fmus, CORNERS[:2], SPEEDS[:2], tolerance=1e-6)
 
 
 def test_rates_of_inputs_count_only_together_with_a_stamp(three_fmus: RobotFmus, tmp_path: Path) -> None:
-    assert lacking_ports({"platform": three_fmus.platform, "cable_1": three_fmus.cables[0]}, 3) == frozenset()
+    assert missing_user_fmu_ports({"platform": three_fmus.platform, "cable_1": three_fmus.cables[0]}, 3) == frozenset()
     unstamped = tmp_path / "unstamped.fmu"
     with zipfile.ZipFile(three_fmus.cables[0]) as whole, zipfile.ZipFile(unstamped, "w") as changed:
         for entry in whole.namelist():
             changed.writestr(entry, whole.read(entry).replace(b'name="input_time"', b'name="another_time"'))
-    lacking = {str(port) for port in lacking_ports({"cable_1": unstamped}, 3)}
+    lacking = {str(port) for port in missing_user_fmu_ports({"cable_1": unstamped}, 3)}
     assert {"cable_1.acceleration.x", "cable_1.winch_acceleration", "cable_1.middle_velocity.z"} < lacking
     assert not lacking & {"cable_1.force_rate.x", "cable_1.velocity.x", "cable_1.winch_speed", "cable_1.pull"}
 
 
 def test_rates_that_a_platform_does_not_show_are_worked_out_and_its_middle_is_left_out(platform: Path) -> None:
-    lacking = lacking_ports({"platform": platform}, 3)
+    lacking = missing_user_fmu_ports({"platform": platform}, 3)
     assert {port.variable.partition(".")[0] for port in lacking if port.variable.endswith(".x")} >= {"acceleration"}
-    wiring = wiring_of(3, (), lacking)
-    assert wiring.unrecorded == ()
+    wiring = wire_robot(3, (), lacking)
+    assert wiring.missing_columns == ()
     assert not [wire for wire in wiring.connections if wire.target.variable.startswith("middle_")]
-    assert {str(pair) for pair in wiring.rates if pair.target.component == "cable_2"} == {
+    assert {str(pair) for pair in wiring.derivative_connections if pair.target.component == "cable_2"} == {
         f"platform.velocity.{axis} -> cable_2.acceleration.{axis}" for axis in "xyz"
     }

@@ -28,19 +28,22 @@ def test_there_is_one_fmu_a_cable_and_one_for_the_platform(three_fmus: RobotFmus
 
 
 def test_there_is_one_more_a_winch_where_the_robot_has_them(winch_fmus: RobotFmus) -> None:
-    assert list(winch_fmus.parts) == ["platform", *(f"{kind}_{i}" for kind in ("winch", "cable") for i in (1, 2, 3))]
-    assert all(path.name == f"{name}.fmu" and path.is_file() for name, path in winch_fmus.parts.items())
+    assert list(winch_fmus.by_component) == [
+        "platform",
+        *(f"{kind}_{i}" for kind in ("winch", "cable") for i in (1, 2, 3)),
+    ]
+    assert all(path.name == f"{name}.fmu" and path.is_file() for name, path in winch_fmus.by_component.items())
 
 
 def test_fmpy_finds_nothing_to_complain_about(
     three_fmus: RobotFmus, eight_fmus: RobotFmus, winch_fmus: RobotFmus
 ) -> None:
-    for path in (*all_of(three_fmus), *all_of(eight_fmus), *winch_fmus.parts.values()):
+    for path in (*all_of(three_fmus), *all_of(eight_fmus), *winch_fmus.by_component.values()):
         assert validate_fmu(str(path)) == []
 
 
 def test_every_variable_says_what_it_is(winch_fmus: RobotFmus) -> None:
-    for path in winch_fmus.parts.values():
+    for path in winch_fmus.by_component.values():
         description = fmpy.read_model_description(str(path))
         units = {unit.name for unit in description.unitDefinitions}
         for variable in description.modelVariables:
@@ -62,7 +65,7 @@ def test_outputs_name_the_inputs_that_act_without_delay(three_fmus: RobotFmus, w
     assert "position.x" in outputs["force.x"]
     assert "acceleration.x" not in outputs["force.x"]
     assert "acceleration.x" in outputs["force_rate.x"]
-    winch = fmpy.read_model_description(str(winch_fmus.parts["winch_2"])).outputs
+    winch = fmpy.read_model_description(str(winch_fmus.by_component["winch_2"])).outputs
     assert {u.variable.name: [known.name for known in u.dependencies] for u in winch} == {
         "winch_speed": [],
         "motor_speed": [],

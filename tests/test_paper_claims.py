@@ -6,9 +6,18 @@ from dataclasses import replace
 
 import pytest
 
-from tautwire.paper.claims import Claim, Entry, text_claims
+from tautwire.paper.claims import Claim, LedgerEntry, text_claims
 
-CLAIM = Claim("it", "4.1", "a length", "mm", paper=2.4, tolerance=0.1, below=0.05, corrections=("another area",))
+CLAIM = Claim(
+    "it",
+    "4.1",
+    "a length",
+    "mm",
+    paper_value=2.4,
+    upper_tolerance=0.1,
+    lower_tolerance=0.05,
+    corrections=("another area",),
+)
 
 
 @pytest.mark.parametrize(("ours", "agrees"), [(2.36, True), (2.49, True), (2.5, True), (2.51, False), (2.34, False)])
@@ -35,35 +44,35 @@ def test_curve_agrees_that_lies_on_the_printed_axis_and_fills_it(ours: tuple[flo
 
 
 def test_verdict_says_which_parameters_it_took() -> None:
-    assert Entry(CLAIM, printed=2.4, corrected=3.0).verdict == "reproduced"
-    after = Entry(CLAIM, printed=3.0, corrected=2.4)
-    assert after.verdict == "reproduced after correction" and after.why == "another area"
-    assert Entry(CLAIM, printed=3.0, corrected=3.1).verdict == "not reproducible"
+    assert LedgerEntry(CLAIM, printed=2.4, corrected=3.0).verdict == "reproduced"
+    after = LedgerEntry(CLAIM, printed=3.0, corrected=2.4)
+    assert after.verdict == "reproduced after correction" and after.explanation == "another area"
+    assert LedgerEntry(CLAIM, printed=3.0, corrected=3.1).verdict == "not reproducible"
 
 
 def test_printed_parameters_count_only_where_their_motion_is_the_papers() -> None:
-    assert Entry(CLAIM, printed=2.4, corrected=3.0, same_motion=False).verdict == "not reproducible"
+    assert LedgerEntry(CLAIM, printed=2.4, corrected=3.0, same_motion=False).verdict == "not reproducible"
 
 
 def test_claims_are_told_apart_and_need_claims_that_there_are() -> None:
     claims = text_claims()
     ids = [claim.id for claim in claims]
     assert len(set(ids)) == len(ids) > 80
-    assert {claim.needs for claim in claims} - {""} <= set(ids)
+    assert {claim.required_claim for claim in claims} - {""} <= set(ids)
 
 
 def test_claims_on_a_fitted_rope_share_one_allowance_where_digits_are_finer() -> None:
     by_id = {claim.id: claim for claim in text_claims()}
     fine, coarse = by_id["fast.tension_gap"], by_id["caroca.error_gap"]
-    assert (fine.tolerance, fine.below) == pytest.approx((0.03 * 71.35, 0.03 * 71.35))
-    assert "3 % allowed" in fine.why
-    assert (coarse.tolerance, coarse.below) == pytest.approx((0.01, 0.005))
-    assert "allowed" not in coarse.why
+    assert (fine.upper_tolerance, fine.lower_tolerance) == pytest.approx((0.03 * 71.35, 0.03 * 71.35))
+    assert "3 % allowed" in fine.explanation
+    assert (coarse.upper_tolerance, coarse.lower_tolerance) == pytest.approx((0.01, 0.005))
+    assert "allowed" not in coarse.explanation
 
 
 def test_digits_of_the_paper_make_the_tolerance() -> None:
     by_id = {claim.id: claim for claim in text_claims()}
     claim = by_id["caroca.elongation_gap"]
-    assert (claim.paper, claim.tolerance, claim.below) == pytest.approx((0.034, 0.001, 0.0005))
+    assert (claim.paper_value, claim.upper_tolerance, claim.lower_tolerance) == pytest.approx((0.034, 0.001, 0.0005))
     about = by_id["ramp.three.stiffening"]
-    assert about.tolerance == 3.0 and about.why == '"about 30 %"; 3 % allowed', "a tolerance is named"
+    assert about.upper_tolerance == 3.0 and about.explanation == '"about 30 %"; 3 % allowed', "a tolerance is named"

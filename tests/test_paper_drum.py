@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tautwire.paper.drum import Drum, ExactReel, LinearReel, LogarithmicReel, follow
+from tautwire.paper.drum import DrumWinding, ExactReel, LinearReel, LogarithmicReel, follow_path
 from tautwire.paper.parameters import read_parameters
 from tautwire.trajectory import Line
 from tests.robots import paper_robot
@@ -15,7 +15,7 @@ STEPS = np.linspace(0.0, 20.0, 400)[1:]
 
 
 def test_rope_reeled_in_takes_its_strain_with_it_and_comes_off_with_it() -> None:
-    drum = Drum()
+    drum = DrumWinding()
     for wound in STEPS:
         drum.wind(float(wound), STRAIN)
     assert drum.material[-1] == pytest.approx(20.0 / (1.0 + STRAIN), rel=1e-14)
@@ -25,13 +25,13 @@ def test_rope_reeled_in_takes_its_strain_with_it_and_comes_off_with_it() -> None
 
 
 def test_rope_from_before_the_start_comes_off_as_tight_as_at_the_start() -> None:
-    drum = Drum()
+    drum = DrumWinding()
     drum.wind(-7.0, STRAIN)
     assert drum.material[-1] == -7.0
 
 
 def test_rope_wound_in_turns_of_two_strains_comes_off_last_on_first() -> None:
-    drum = Drum()
+    drum = DrumWinding()
     drum.wind(5.0, 0.0)
     drum.wind(8.0, 0.5)
     assert drum.material[-1] == pytest.approx(5.0 + 2.0)
@@ -46,7 +46,7 @@ def test_logarithmic_law_is_right_reeling_in_and_the_linear_one_paying_out() -> 
         for wound in sign * STEPS:
             for reel in reels:
                 reel.wind(float(wound), STRAIN)
-        held[sign] = [reel.held(sign * 20.0, STRAIN) for reel in reels]
+        held[sign] = [reel.unstrained_length(sign * 20.0, STRAIN) for reel in reels]
     exact, logarithmic, linear = held[1.0]
     # 1 / (1 + e) and exp(-e) differ by half of e squared.
     assert logarithmic == pytest.approx(exact, abs=20.0 * STRAIN**2)
@@ -60,7 +60,7 @@ def test_logarithmic_law_is_right_reeling_in_and_the_linear_one_paying_out() -> 
 def test_platform_hangs_where_its_ropes_carry_it(law: str) -> None:
     robot = paper_robot(modulus=102.2e9)
     path = Line(robot.platform.start, (28.0, 2.0, 8.0), 5.0)
-    run = follow(robot, path, np.linspace(0.0, 5.0, 51), law)
+    run = follow_path(robot, path, np.linspace(0.0, 5.0, 51), law)
     spans = np.array(robot.anchors) - run.position[-1]
     pulled = run.tension[-1] @ (spans / np.linalg.norm(spans, axis=1)[:, None])
     assert pulled == pytest.approx([0.0, 0.0, 300.0 * 9.8], abs=1e-6)
@@ -71,7 +71,7 @@ def test_slow_helix_has_the_elongations_of_the_independent_simulator() -> None:
     corrected = read_parameters("corrected")
     robot, path = corrected.robots["three"], corrected.helices["three"]
     time = np.linspace(0.0, 50.0, 401)
-    runs = {law: follow(robot, path, time, law) for law in ("logarithmic", "linear")}
+    runs = {law: follow_path(robot, path, time, law) for law in ("logarithmic", "linear")}
     gap = np.abs(runs["linear"].elongation - runs["logarithmic"].elongation)
     # tests/test_rig_paper.py: 2.86 mm at 39 s and 12.0 % at 27.5 s, with all dynamics.
     assert np.interp(39.0, time, gap[:, 1]) == pytest.approx(2.86e-3, rel=0.02)

@@ -10,21 +10,21 @@ import numpy as np
 import pytest
 
 from tautwire.paper import write_paper
-from tautwire.paper.beyond import LIMITS, OWN_SIZE, compare_sizes
-from tautwire.paper.claims import Entry
-from tautwire.paper.page import FIGURES
+from tautwire.paper.beyond import PAPER_FRAME_WIDTH, TENSION_LIMITS, compare_sizes
+from tautwire.paper.claims import LedgerEntry
+from tautwire.paper.page import SECTION_FIGURES
 from tautwire.paper.panels import draw_time_figures
-from tautwire.paper.ramps import amplitude_kept
+from tautwire.paper.ramps import remaining_amplitude
 from tautwire.paper.records import Records
-from tautwire.paper.style import style
+from tautwire.paper.style import figure_style
 from tautwire.paper.tried import elongations_by_reading
-from tautwire.paper.values import largest
-from tautwire.paper.writing import Paper
+from tautwire.paper.values import max_abs
+from tautwire.paper.writing import PaperReproduction
 from tests.rig import RampProgram, paper_robot, simulate
 
 pytestmark = pytest.mark.slow
 
-FIGURE_NAMES = {name for names in FIGURES.values() for name in names} | {
+FIGURE_NAMES = {name for names in SECTION_FIGURES.values() for name in names} | {
     "beyond_drum",
     "beyond_relaxation",
     "beyond_redundant",
@@ -121,24 +121,24 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def paper(folder: Path) -> Paper:
+def paper(folder: Path) -> PaperReproduction:
     """All that the command computes and writes."""
     return write_paper(folder, lambda what, done: None)
 
 
 @pytest.fixture(scope="module")
-def entries(paper: Paper) -> dict[str, Entry]:
+def entries(paper: PaperReproduction) -> dict[str, LedgerEntry]:
     """The rows by id."""
     return {entry.claim.id: entry for entry in paper.entries}
 
 
 @pytest.fixture(scope="module")
-def records(paper: Paper) -> Records:
+def records(paper: PaperReproduction) -> Records:
     """The runs with the corrected parameters."""
     return paper.runs["corrected"].records
 
 
-def test_every_claim_has_a_number_and_every_number_a_claim(paper: Paper) -> None:
+def test_every_claim_has_a_number_and_every_number_a_claim(paper: PaperReproduction) -> None:
     claims = {entry.claim.id for entry in paper.entries if not entry.claim.id.startswith("table_1")}
     assert set(paper.runs["corrected"].values) == claims
     assert set(paper.runs["printed"].values) <= claims
@@ -146,7 +146,7 @@ def test_every_claim_has_a_number_and_every_number_a_claim(paper: Paper) -> None
     assert all(name.startswith(("fast.", "axis.10", "axis.11")) for name in lacking), "no exit points are printed"
 
 
-def test_every_row_is_whole_and_what_is_not_reproduced_says_why(paper: Paper) -> None:
+def test_every_row_is_whole_and_what_is_not_reproduced_says_why(paper: PaperReproduction) -> None:
     for entry in paper.entries:
         row = entry.document()
         assert list(row) == KEYS
@@ -155,12 +155,12 @@ def test_every_row_is_whole_and_what_is_not_reproduced_says_why(paper: Paper) ->
 
 
 @pytest.mark.parametrize("name", CORRECTED)
-def test_corrected_parameters_give(entries: dict[str, Entry], name: str) -> None:
+def test_corrected_parameters_give(entries: dict[str, LedgerEntry], name: str) -> None:
     expected, off = CORRECTED[name]
     assert entries[name].corrected == pytest.approx(expected, abs=off)
 
 
-def test_every_claim_comes_out_but_those_named(entries: dict[str, Entry]) -> None:
+def test_every_claim_comes_out_but_those_named(entries: dict[str, LedgerEntry]) -> None:
     by_verdict: dict[str, set[str]] = {}
     for name, entry in entries.items():
         by_verdict.setdefault(entry.verdict, set()).add(name)
@@ -171,7 +171,7 @@ def test_every_claim_comes_out_but_those_named(entries: dict[str, Entry]) -> Non
     assert all(entry.claim.corrections for entry in corrected), "each names its correction"
 
 
-def test_frequency_at_p1_is_that_of_three_equal_cables_about_their_middle(entries: dict[str, Entry]) -> None:
+def test_frequency_at_p1_is_that_of_three_equal_cables_about_their_middle(entries: dict[str, LedgerEntry]) -> None:
     ours = entries["ramp.three.frequency_static"].corrected
     # Horizontal stiffness of three equal cables about their middle, with their tension across.
     length, out, pull, stiffness = 73.1977, 57.737 / 73.1977, 1594.27, 102.2e9 * np.pi * 0.002**2
@@ -197,7 +197,7 @@ def test_both_laws_part_by_the_integral_of_strain_over_length(records: Records) 
         assert gap == pytest.approx(by["now"] - by["integral"], abs=3e-5)
 
 
-def test_folder_holds_ledger_page_and_every_figure_twice(paper: Paper, folder: Path) -> None:
+def test_folder_holds_ledger_page_and_every_figure_twice(paper: PaperReproduction, folder: Path) -> None:
     assert json.loads((folder / "claims.json").read_text()) == [entry.document() for entry in paper.entries]
     page = (folder / "claims.html").read_text(encoding="utf-8")
     assert page.count("</tr>") > len(paper.entries) and page.count("<figure") == len(FIGURE_NAMES)
@@ -209,7 +209,7 @@ def test_folder_holds_ledger_page_and_every_figure_twice(paper: Paper, folder: P
 
 
 def test_time_figures_have_the_printed_panels_and_axes(records: Records) -> None:
-    with style():
+    with figure_style():
         drawn = {each.name: each for each in draw_time_figures(records)}
     axes = drawn["fig_07"].figure.axes
     assert [round(limit, -2) for limit in axes[0].get_ylim()] == [1500.0, 2200.0]
@@ -217,31 +217,31 @@ def test_time_figures_have_the_printed_panels_and_axes(records: Records) -> None
     assert drawn["fig_14"].figure.axes[0].get_xlim() == (4.0, 7.0)
 
 
-def test_size_and_direction_decide_which_law_is_nearer_to_a_rope_on_a_drum(paper: Paper) -> None:
+def test_size_and_direction_decide_which_law_is_nearer_to_a_rope_on_a_drum(paper: PaperReproduction) -> None:
     runs = paper.runs["corrected"]
     sizes = compare_sizes(runs.parameters, runs.records)
     for (direction, law), errors in sizes.errors.items():
-        assert errors / sizes.sizes == pytest.approx(errors[0] / sizes.sizes[0], rel=1e-3), (direction, law)
-    place = sizes.sizes.index(OWN_SIZE)
+        assert errors / sizes.widths == pytest.approx(errors[0] / sizes.widths[0], rel=1e-3), (direction, law)
+    place = sizes.widths.index(PAPER_FRAME_WIDTH)
     own = {key: 1e3 * errors[place] for key, errors in sizes.errors.items()}
     assert own == pytest.approx(OFF_THE_DRUM, abs=0.06), "as docs/paper.md says"
     assert np.all(sizes.errors["up", "logarithmic"] < 0.5 * sizes.errors["up", "linear"])
     assert np.all(sizes.errors["down", "linear"] < sizes.errors["down", "logarithmic"])
     for law, found in sizes.cosimulated.items():
-        slow = dict(zip(sizes.sizes, sizes.errors["up", law], strict=True))
+        slow = dict(zip(sizes.widths, sizes.errors["up", law], strict=True))
         assert [found[size] / slow[size] for size in found] == pytest.approx([1.0] * len(found), abs=0.1)
 
 
 def test_relaxing_rope_keeps_more_of_its_swing_and_is_the_static_one_on_the_helix(records: Records) -> None:
-    kept = [amplitude_kept(records[f"three/{key}"]) for key in ("damped", "relaxing")]
+    kept = [remaining_amplitude(records[f"three/{key}"]) for key in ("damped", "relaxing")]
     assert kept == pytest.approx([40.0, 59.0], abs=1.0), "as docs/paper.md says"
-    errors = [largest(records[f"three/{key}"]["error_norm"]) for key in ("constant helix", "relaxing helix")]
+    errors = [max_abs(records[f"three/{key}"]["error_norm"]) for key in ("constant helix", "relaxing helix")]
     assert errors == pytest.approx([0.0462, 0.0604], abs=1e-4)
-    assert errors[1] == pytest.approx(largest(records["three/logarithmic"]["error_norm"]), rel=0.02)
+    assert errors[1] == pytest.approx(max_abs(records["three/logarithmic"]["error_norm"]), rel=0.02)
 
 
 def test_eight_cables_follow_the_helix_within_their_limits(records: Records) -> None:
     rigid, distributed = records["eight/rigid"], records["eight/distributed"]
     tensions = np.array([distributed[f"tension_{cable}"] for cable in range(1, 9)])
-    assert LIMITS.minimum < tensions.min() and tensions.max() < LIMITS.maximum
-    assert largest(distributed["error_norm"]) < 0.002 < 0.1 < largest(rigid["error_norm"])
+    assert TENSION_LIMITS.minimum < tensions.min() and tensions.max() < TENSION_LIMITS.maximum
+    assert max_abs(distributed["error_norm"]) < 0.002 < 0.1 < max_abs(rigid["error_norm"])

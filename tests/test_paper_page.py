@@ -7,29 +7,31 @@ from dataclasses import replace
 
 from matplotlib.figure import Figure
 
-from tautwire.paper.beyond_figures import Beyond
-from tautwire.paper.claims import Claim, Entry
-from tautwire.paper.page import FIGURES, Content, inline_svg, paper_page, prose, written
-from tautwire.paper.style import Drawn, style, write_figures
-from tautwire.paper.tried import Trials
+from tautwire.paper.beyond_figures import ExtensionFigure
+from tautwire.paper.claims import Claim, LedgerEntry
+from tautwire.paper.page import SECTION_FIGURES, PageContent, inline_svg, number_text, paper_page, prose_html
+from tautwire.paper.style import PaperFigure, figure_style, write_figures
+from tautwire.paper.tried import OpenClaim
 
-CLAIM = Claim("it", "4.1.1", "difference of r1 <27.5 s>", "mm", 2.4, 0.1, 0.05, why="at 9.8 m/s^2", digits="2.40")
+CLAIM = Claim(
+    "it", "4.1.1", "difference of r1 <27.5 s>", "mm", 2.4, 0.1, 0.05, explanation="at 9.8 m/s^2", printed_digits="2.40"
+)
 AXIS = replace(CLAIM, id="axis.07a", paper=(-0.5, 3.0), rule="axis", digits="")
 
 
-def _drawn(name: str) -> Drawn:
+def _drawn(name: str) -> PaperFigure:
     figure = Figure(figsize=(3.0, 2.0))
     figure.add_subplot().plot([0.0, 1.0], [0.0, -1.0], label="a line")
-    return Drawn(name, f"Title of {name}", f'What "{name}" shows', figure)
+    return PaperFigure(name, f"Title of {name}", f'What "{name}" shows', figure)
 
 
 def _page(tmp_path) -> str:  # type: ignore[no-untyped-def]
-    with style():
-        drawn = [_drawn(name) for names in FIGURES.values() for name in names] + [_drawn("more")]
+    with figure_style():
+        drawn = [_drawn(name) for names in SECTION_FIGURES.values() for name in names] + [_drawn("more")]
         svgs = write_figures(drawn, tmp_path)
-    entries = [Entry(CLAIM, 0.4, 2.41), Entry(AXIS, (0.0, 1.0), (-0.5, 2.9))]
-    trials = [Trials("Open", "What came of it.", ("Try", "x, mm"), (("Paper", ("-10 to 25",)),))]
-    content = Content(entries, drawn, svgs, trials, [Beyond(drawn[-1], "A paragraph of 2.81e6 N.")])
+    entries = [LedgerEntry(CLAIM, 0.4, 2.41), LedgerEntry(AXIS, (0.0, 1.0), (-0.5, 2.9))]
+    trials = [OpenClaim("Open", "What came of it.", ("Try", "x, mm"), (("Paper", ("-10 to 25",)),))]
+    content = PageContent(entries, drawn, svgs, trials, [ExtensionFigure(drawn[-1], "A paragraph of 2.81e6 N.")])
     return paper_page(content, {"claims.json": "claims.json"})
 
 
@@ -38,7 +40,7 @@ def test_page_has_every_claim_figure_and_trial_and_asks_for_nothing(tmp_path) ->
     assert "2 claims: 0 reproduced, 2 reproduced after correction, 0 not reproducible" in page
     assert "Difference of r1 &lt;27.5 s&gt;" in page and ">2.40 <" in page.replace("2.40<span", "2.40 <span")
     assert "Axes of the figures: 2 " not in page and "Axes of the figures: 1 reproduced after correction" in page
-    assert page.count('role="img"') == sum(map(len, FIGURES.values())) + 1
+    assert page.count('role="img"') == sum(map(len, SECTION_FIGURES.values())) + 1
     assert 'aria-label="What &quot;fig_07&quot; shows"' in page
     assert "What came of it." in page and "2.81&nbsp;&times;&nbsp;10<sup>6</sup> N" in page
     links = re.findall(r'(?:src|href)="([^"]*)"', page)
@@ -51,7 +53,7 @@ def test_names_inside_the_figures_are_used_once(tmp_path) -> None:  # type: igno
 
 
 def test_figures_take_the_pages_ink_and_ground(tmp_path) -> None:  # type: ignore[no-untyped-def]
-    with style():
+    with figure_style():
         (svg,) = write_figures([_drawn("one")], tmp_path).values()
     shown, width = inline_svg(svg, "one")
     assert shown.startswith("<svg") and "<metadata" not in shown and "<style" not in shown
@@ -60,7 +62,7 @@ def test_figures_take_the_pages_ink_and_ground(tmp_path) -> None:  # type: ignor
 
 
 def test_numbers_are_written_short() -> None:
-    assert [written(value) for value in (None, 1e-15, 1594.2667, 0.00144210, (-0.5, 2.9))] == [
+    assert [number_text(value) for value in (None, 1e-15, 1594.2667, 0.00144210, (-0.5, 2.9))] == [
         "-", "0", "1594.3", "0.001442", "-0.5 to 2.9"
     ]  # fmt: skip
-    assert prose("12 mm^2 & N m^-1") == "12 mm<sup>2</sup> &amp; N m<sup>-1</sup>"
+    assert prose_html("12 mm^2 & N m^-1") == "12 mm<sup>2</sup> &amp; N m<sup>-1</sup>"

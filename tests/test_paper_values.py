@@ -5,8 +5,15 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tautwire.paper.records import Record
-from tautwire.paper.values import amplitude, dominant_frequency, largest, mean_reduction, relative_difference, turns
+from tautwire.paper.records import SimulationRecord
+from tautwire.paper.values import (
+    amplitude,
+    dominant_frequency,
+    max_abs,
+    mean_reduction,
+    relative_difference,
+    turning_points,
+)
 
 TIME = np.linspace(0.0, 7.0, 2101)
 DRIFT = 0.02 * TIME**3 - 0.1 * TIME
@@ -22,19 +29,19 @@ def test_amplitude_of_a_swing_on_a_drift_is_found() -> None:
 
 
 def test_differences_are_shares_of_the_base() -> None:
-    base, other = (Record(TIME, {"r": factor * TIME}) for factor in (2.0, 1.5))
+    base, other = (SimulationRecord(TIME, {"r": factor * TIME}) for factor in (2.0, 1.5))
     assert relative_difference(base, other, "r", 3.21) == pytest.approx(25.0)
     assert mean_reduction(base, other, "r") == pytest.approx(25.0)
     assert base.at("r", 1.0 / 3.0) == pytest.approx(2.0 / 3.0)
-    assert largest(np.array([1.0, -3.0])) == 3.0
+    assert max_abs(np.array([1.0, -3.0])) == 3.0
 
 
 def test_curves_that_turn_together_are_compared_where_each_turns() -> None:
-    first = Record(TIME, {"r": np.sin(2.0 * TIME), "line": TIME})
-    second = Record(TIME, {"r": 0.9 * np.sin(2.0 * (TIME - 0.1)), "line": 1.1 * TIME})
-    found = turns(first, second, "r", prominence=0.5)
+    first = SimulationRecord(TIME, {"r": np.sin(2.0 * TIME), "line": TIME})
+    second = SimulationRecord(TIME, {"r": 0.9 * np.sin(2.0 * (TIME - 0.1)), "line": 1.1 * TIME})
+    found = turning_points(first, second, "r", prominence=0.5)
     tops = (np.arange(4) + 0.5) * np.pi / 2.0
-    assert [turn.moment for turn in found] == pytest.approx(tops + 0.05, abs=0.005)
+    assert [turn.time for turn in found] == pytest.approx(tops + 0.05, abs=0.005)
     assert [turn.gap for turn in found] == pytest.approx([0.1] * 4, abs=1e-4)
-    (end,) = turns(first, second, "line", prominence=0.5)
-    assert (end.moment, end.gap) == pytest.approx((7.0, 0.7)), "a curve without turns at its end"
+    (end,) = turning_points(first, second, "line", prominence=0.5)
+    assert (end.time, end.gap) == pytest.approx((7.0, 0.7)), "a curve without turns at its end"

@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tautwire.recordings.recording import Recording
-from tautwire.tracer.where.path import Path, likeliest_intensity, smooth, smoothed_path
+from tautwire.tracer.where.path import SmoothedPath, maximum_likelihood_intensity, smooth_axis, smooth_path
 
 Array = NDArray[np.float64]
 
@@ -31,7 +31,7 @@ def recording(time: Array, hidden: NDArray[np.bool_] | None = None) -> Recording
     return Recording("made", time, np.zeros((len(time), 3)), np.full((len(time), 3), np.nan), position)
 
 
-def deviations(path: Path, axis: int) -> Array:
+def deviations(path: SmoothedPath, axis: int) -> Array:
     """Mean squares of errors over their standard deviations: position, velocity, acceleration."""
     found = np.column_stack([path.position[:, axis], path.velocity[:, axis], path.acceleration[:, axis]])
     spread = np.sqrt(np.diagonal(path.covariance[:, axis], axis1=1, axis2=2))
@@ -40,7 +40,7 @@ def deviations(path: Path, axis: int) -> Array:
 
 
 def test_errors_are_as_large_as_the_covariance_says() -> None:
-    path = smoothed_path(recording(np.arange(0.0, 20.0, 0.01)), START, [SIGMA] * 3)
+    path = smooth_path(recording(np.arange(0.0, 20.0, 0.01)), START, [SIGMA] * 3)
     for axis in range(3):
         assert np.all(deviations(path, axis) < 1.5)
         assert np.sqrt(path.covariance[1000, axis, 0, 0]) < 0.5 * SIGMA
@@ -50,7 +50,7 @@ def test_a_gap_uneven_samples_and_another_rate_are_bridged() -> None:
     time = np.arange(0.0, 20.0, 0.01)
     time = (time + np.random.default_rng(4).uniform(-1e-3, 1e-3, len(time)))[(time < 7.0) | (time > 7.4)]
     every = np.arange(len(time)) % 4 != 0
-    path = smoothed_path(recording(time, every), START, [SIGMA] * 3)
+    path = smooth_path(recording(time, every), START, [SIGMA] * 3)
     assert np.all(np.isfinite(path.position))
     assert np.all(deviations(path, 0) < 1.6)
     gap = (time > 6.95) & (time < 7.45)
@@ -60,7 +60,7 @@ def test_a_gap_uneven_samples_and_another_rate_are_bridged() -> None:
 def test_an_axis_that_was_not_measured_stays_where_it_starts() -> None:
     made = recording(np.arange(0.0, 3.0, 0.01))
     made.position[:, 1] = np.nan
-    path = smoothed_path(made, START, [SIGMA] * 3)
+    path = smooth_path(made, START, [SIGMA] * 3)
     assert path.measured.tolist() == [True, False, True]
     assert np.all(path.position[:, 1] == START[1])
     assert not np.any(path.velocity[:, 1]) and not np.any(path.covariance[:, 1])
@@ -73,8 +73,8 @@ def test_the_intensity_of_a_random_jerk_is_found() -> None:
     position = np.cumsum(np.cumsum(acceleration)) * step**2
     values = position + np.random.default_rng(6).normal(0.0, 1e-3, count)
     time = step * np.arange(count)
-    found = likeliest_intensity(time, values, 1e-3)
+    found = maximum_likelihood_intensity(time, values, 1e-3)
     assert found == pytest.approx(intensity, rel=0.5)
-    smoothed = smooth(time, values, 1e-3, found)
+    smoothed = smooth_axis(time, values, 1e-3, found)
     error = (smoothed.state[:, 2] - acceleration)[50:-50]
     assert np.mean(error**2 / smoothed.covariance[50:-50, 2, 2]) == pytest.approx(1.0, abs=0.25)

@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 
 from tautwire.fmus.packaging import build_fmus
 from tautwire.robots.robot import EffectSetting, Robot
-from tautwire.tracer.where.cable_cut import CableRun
-from tautwire.tracer.where.path import Path
-from tautwire.tracer.where.platform_cut import balance, measured_forces, run_platform
+from tautwire.tracer.where.cable_cut import CableSimulation
+from tautwire.tracer.where.path import SmoothedPath
+from tautwire.tracer.where.platform_cut import force_balance, measured_forces, simulate_platform
 from tests.robots import example
 
 Array = NDArray[np.float64]
@@ -24,11 +24,11 @@ MASS = 300.0
 
 
 @cache
-def path() -> Path:
+def path() -> SmoothedPath:
     """A turn about the start of the three-cable robot."""
     start, omega = np.array(example("three").platform.start), np.array([0.5, 0.7, 0.9])
     angle = omega * TIME[:, None]
-    return Path(
+    return SmoothedPath(
         TIME,
         start + np.sin(angle),
         omega * np.cos(angle),
@@ -51,7 +51,7 @@ def needed(extra: Array | float = 0.0) -> Array:
 
 def shown(robot: Robot, forces: Array) -> Array:
     with TemporaryDirectory() as folder:
-        return run_platform(build_fmus(robot, FilePath(folder)).platform, path(), forces, MASS)
+        return simulate_platform(build_fmus(robot, FilePath(folder)).platform, path(), forces, MASS)
 
 
 def noisy(seed: int) -> Array:
@@ -78,7 +78,7 @@ def test_a_missing_tension_leaves_a_gap_and_no_more() -> None:
     assert np.all(np.isnan(found[400:410]))
     rest = np.delete(np.arange(len(TIME)), range(400, 410))
     assert found[rest] == pytest.approx(path().acceleration[rest], abs=1e-9)
-    force = balance(path(), noisy(1), found, forces, MASS, SIGMAS).force
+    force = force_balance(path(), noisy(1), found, forces, MASS, SIGMAS).force
     assert np.all(np.isnan(force[405]))
     assert np.mean(np.isfinite(force)) == pytest.approx(1.0 - 10 / len(TIME))
     assert np.nanmax(np.abs(force)) < 5.0
@@ -91,29 +91,29 @@ def test_noise_of_positions_and_load_cells_leaves_what_is_expected() -> None:
     for seed in range(12):
         cells = random.normal(0.0, SIGMAS[3], (len(TIME), 3, 1)) * directions
         accelerations = path().acceleration + np.sum(cells, axis=1) / MASS
-        found = balance(path(), noisy(seed), accelerations, needed(), MASS, SIGMAS)
+        found = force_balance(path(), noisy(seed), accelerations, needed(), MASS, SIGMAS)
         squares += np.mean(found.force**2, axis=0)
-        expected += np.mean(found.expected**2, axis=0)
+        expected += np.mean(found.expected_deviation**2, axis=0)
     assert squares / expected == pytest.approx(np.ones(3), abs=0.3)
 
 
 def test_a_missing_force_is_found_where_it_acts() -> None:
     extra = np.column_stack([5.0 * np.sin(1.7 * TIME), np.zeros_like(TIME), np.full_like(TIME, 20.0)])
     accelerations = path().acceleration - extra / MASS
-    force = balance(path(), noisy(3), accelerations, needed(), MASS, SIGMAS).force
+    force = force_balance(path(), noisy(3), accelerations, needed(), MASS, SIGMAS).force
     assert np.max(np.abs(force - extra)[150:-150]) < 2.0
     assert np.std((force - extra)[150:-150]) < 0.5
 
 
 def test_forces_follow_measured_tensions_along_the_fmus_direction() -> None:
     force = np.array([[3.0, 0.0, 4.0], [0.0, 0.0, 0.0]])
-    run = CableRun(np.array([5.0, 0.0]), np.ones(2), force, np.zeros((2, 7)))
+    run = CableSimulation(np.array([5.0, 0.0]), np.ones(2), force, np.zeros((2, 7)))
     found = measured_forces([run], np.array([[10.0], [2.0]]), np.array([[0.0, 0.0, 9.0]]), np.zeros((2, 3)))
     assert found[:, 0] == pytest.approx(np.array([[6.0, 0.0, 8.0], [0.0, 0.0, 2.0]]))
 
 
 def test_an_axis_that_was_not_measured_is_left_out() -> None:
     flat = replace(path(), measured=np.array([True, False, True]))
-    found = balance(flat, noisy(4), path().acceleration, needed(), MASS, SIGMAS)
+    found = force_balance(flat, noisy(4), path().acceleration, needed(), MASS, SIGMAS)
     assert np.isfinite(found.cutoff).tolist() == [True, False, True]
     assert np.all(np.isnan(found.force[:, 1]))

@@ -7,19 +7,19 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tautwire.model.symbolic import OF_FORMULAS, FreeParameter
+from tautwire.model.symbolic import FORMULA_INDEX, FreeParameter
 from tautwire.robots.robot import Formula, Robot
 from tautwire.tracer.discovery.library import Term
-from tautwire.tracer.discovery.ports import Ports, moves
+from tautwire.tracer.discovery.ports import FormulaPorts, series_sensitivities
 from tautwire.tracer.likelihood import Likelihood
-from tautwire.tracer.linearisation import linearise_run
-from tautwire.tracer.preparation.noise import noise_of
+from tautwire.tracer.linearisation import linearise_filter
+from tautwire.tracer.preparation.noise import estimate_noise
 from tests.recordings import recorded
 from tests.robots import example
 
 ROBOT = example("three")
 RECORDING = recorded("three", 1).first(600)
-NOISE = noise_of(ROBOT, RECORDING)
+NOISE = estimate_noise(ROBOT, RECORDING)
 INTERVAL = float(RECORDING.time[1] - RECORDING.time[0])
 EVERYWHERE = (1, 2, 3)
 
@@ -27,25 +27,25 @@ EVERYWHERE = (1, 2, 3)
 def along(robot: Robot, term: Term) -> np.ndarray:
     """Slopes of the innovations by a term's coefficient, (N, m)."""
     likelihood = Likelihood(robot, (), NOISE, INTERVAL)
-    ports = Ports(robot, likelihood.model.state_names)
+    ports = FormulaPorts(robot, likelihood.model.state_names)
     slopes, parts, begun = np.zeros((len(likelihood.model.state_names), 1)), [], None
-    for run in linearise_run(likelihood, [], RECORDING):
-        names = ports.along(run)
+    for run in linearise_filter(likelihood, [], RECORDING):
+        names = ports.signals(run)
         ropes = [names.ropes[cable - 1] for cable in term.cables] or [names.platform]
         series = np.array([term.series(rope) for rope in ropes])
         begun = series[:, 0] if begun is None else begun
-        moved = moves([term.site], [series], [begun], ports, run, names.platform["time"])
-        slopes, found = run.carry(slopes, *moved)
-        parts.append(found[run.own, :, 0])
+        moved = series_sensitivities([term.site], [series], [begun], ports, run, names.platform["time"])
+        slopes, found = run.propagate_sensitivities(slopes, *moved)
+        parts.append(found[run.is_recorded, :, 0])
     return np.concatenate(parts)
 
 
 def exact(robot: Robot, term: Term) -> np.ndarray:
     """The same by the filter itself."""
-    formula = Formula(term.place, f"c1*{term.text}", term.cables, {"c1": 0.0})
+    formula = Formula(term.target, f"c1*{term.text}", term.cables, {"c1": 0.0})
     opened = replace(robot, formulas=(*robot.formulas, formula))
-    likelihood = Likelihood(opened, [FreeParameter(OF_FORMULAS, "c1")], NOISE, INTERVAL)
-    return likelihood.innovations(RECORDING, [0.0]).slopes[:, :, 0]
+    likelihood = Likelihood(opened, [FreeParameter(FORMULA_INDEX, "c1")], NOISE, INTERVAL)
+    return likelihood.innovations(RECORDING, [0.0]).sensitivities[:, :, 0]
 
 
 TERMS = (

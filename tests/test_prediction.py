@@ -5,14 +5,14 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from tautwire.master.bends import Bends
-from tautwire.master.hermite import Chain
-from tautwire.master.prediction import Prediction
+from tautwire.master.bends import InterpolationErrorEstimate
+from tautwire.master.hermite import DerivativeChain
+from tautwire.master.prediction import Extrapolator
 
 STEP = 0.1
 # Value, rate and its rate, each at the end and in the middle of a step.
-CHAIN = Chain((0, 1, 2), (3, 4, 5))
-VALUE_ONLY = Chain((0,), None)
+CHAIN = DerivativeChain((0, 1, 2), (3, 4, 5))
+VALUE_ONLY = DerivativeChain((0,), None)
 
 
 def swing(time: float, frequency: float = 10.0) -> list[float]:
@@ -24,19 +24,19 @@ def shown(motion: Callable[[float], list[float]], time: float) -> np.ndarray:
     return np.array([*motion(time), *motion(time - 0.5 * STEP)])
 
 
-def misses(motion: Callable[[float], list[float]], steps: int, chain: Chain = CHAIN) -> list[float]:
+def misses(motion: Callable[[float], list[float]], steps: int, chain: DerivativeChain = CHAIN) -> list[float]:
     """Of each step in turn, the largest relative to the size of a swing's value and rates."""
-    count = len(chain.ends) * (1 if chain.middles is None else 2)
-    places = np.array([*chain.ends, *(chain.middles or ())])
-    prediction = Prediction([chain], places, np.array([1.0, 10.0, 100.0] * 2)[:count])
-    prediction.forget(0.0, shown(motion, 0.0))
+    count = len(chain.ends) * (1 if chain.midpoints is None else 2)
+    places = np.array([*chain.ends, *(chain.midpoints or ())])
+    prediction = Extrapolator([chain], places, np.array([1.0, 10.0, 100.0] * 2)[:count])
+    prediction.reset(0.0, shown(motion, 0.0))
     found = []
     for number in range(1, steps + 1):
         time = number * STEP
         expected, true = shown(motion, time - STEP), shown(motion, time)
-        prediction.begin(time, expected)
+        prediction.begin_step(time, expected)
         found.append(float(np.max(np.abs(expected - true)[places] / np.array([1.0, 10.0, 100.0] * 2)[:count])))
-        prediction.end(time, true)
+        prediction.end_step(time, true)
     return found
 
 
@@ -77,42 +77,42 @@ def test_after_a_corner_only_what_follows_it_counts() -> None:
 
 def test_a_corner_in_a_short_step_tells_nothing_about_a_time_far_ahead() -> None:
     jump, corner = np.array([0.0, 0.0, 1.0] * 2), 10 * STEP
-    prediction = Prediction([CHAIN], np.arange(6), np.array([1.0, 10.0, 100.0] * 2))
-    prediction.forget(0.0, shown(swing, 0.0))
+    prediction = Extrapolator([CHAIN], np.arange(6), np.array([1.0, 10.0, 100.0] * 2))
+    prediction.reset(0.0, shown(swing, 0.0))
     for time in np.arange(1, 11) * STEP:
-        prediction.begin(time, np.zeros(6))
-        prediction.end(time, shown(swing, time))
-    prediction.begin(corner + 3e-6, np.zeros(6))
-    prediction.end(corner + 3e-6, shown(swing, corner + 3e-6) + jump)
+        prediction.begin_step(time, np.zeros(6))
+        prediction.end_step(time, shown(swing, time))
+    prediction.begin_step(corner + 3e-6, np.zeros(6))
+    prediction.end_step(corner + 3e-6, shown(swing, corner + 3e-6) + jump)
     expected = np.zeros(6)
-    prediction.begin(corner + STEP, expected)
+    prediction.begin_step(corner + STEP, expected)
     assert np.max(np.abs(expected[:3] - swing(corner + STEP)) / [1.0, 10.0, 100.0]) < 0.5
 
 
 def test_a_memory_taken_back_predicts_the_same() -> None:
-    prediction = Prediction([CHAIN], np.arange(6), np.ones(6))
-    prediction.forget(0.0, shown(swing, 0.0))
+    prediction = Extrapolator([CHAIN], np.arange(6), np.ones(6))
+    prediction.reset(0.0, shown(swing, 0.0))
     for number in range(1, 10):
-        prediction.begin(number * STEP, np.zeros(6))
-        prediction.end(number * STEP, shown(swing, number * STEP))
-    memory, found = prediction.memory, []
+        prediction.begin_step(number * STEP, np.zeros(6))
+        prediction.end_step(number * STEP, shown(swing, number * STEP))
+    memory, found = prediction.history, []
     for _ in range(2):
         expected = np.zeros(6)
-        prediction.begin(10 * STEP, expected)
-        prediction.end(10 * STEP, shown(swing, 10 * STEP) + 1.0)
+        prediction.begin_step(10 * STEP, expected)
+        prediction.end_step(10 * STEP, shown(swing, 10 * STEP) + 1.0)
         found.append(expected)
-        prediction.memory = memory
+        prediction.history = memory
     assert np.array_equal(found[0], found[1])
 
 
 def test_the_middle_of_a_quintic_bends_nowhere() -> None:
     quintic = np.polynomial.Polynomial([1.0, -2.0, 3.0, 4.0, -5.0, 6.0])
-    bends = Bends([CHAIN, VALUE_ONLY], np.ones(6))
+    bends = InterpolationErrorEstimate([CHAIN, VALUE_ONLY], np.ones(6))
     begun, end = (shown(lambda at: [quintic.deriv(k)(at) for k in range(3)], time) for time in (0.2, 0.2 + STEP))
-    assert bends.largest(begun, end, STEP) < 1e-11
+    assert bends.max_error(begun, end, STEP) < 1e-11
 
 
 def test_the_middle_bends_by_the_sixth_rate() -> None:
-    bends = Bends([CHAIN], np.array([1.0, 1e9, 1e9, 1.0, 1e9, 1e9]))
+    bends = InterpolationErrorEstimate([CHAIN], np.array([1.0, 1e9, 1e9, 1.0, 1e9, 1e9]))
     begun, end = (shown(lambda at: [at**6, 6.0 * at**5, 30.0 * at**4], time) for time in (0.0, STEP))
-    assert bends.largest(begun, end, STEP) == pytest.approx(720.0 * STEP**6 / 46080.0)
+    assert bends.max_error(begun, end, STEP) == pytest.approx(720.0 * STEP**6 / 46080.0)

@@ -11,10 +11,10 @@ import pytest
 from tautwire.cli import run
 from tautwire.errors import RecordingError
 from tautwire.recordings.recording import Recording
-from tautwire.tracer.adequacy import is_noise
-from tautwire.tracer.data import split
+from tautwire.tracer.adequacy import residuals_are_white
+from tautwire.tracer.data import split_data
 from tautwire.tracer.fit import Fitter
-from tautwire.tracer.preparation.preparation import Prepared, prepare
+from tautwire.tracer.preparation.preparation import PreparedRecordings, prepare_recordings
 from tautwire.tracer.tracing import trace
 from tests.recordings import recorded
 from tests.robots import EXAMPLES, example
@@ -38,21 +38,23 @@ def spoilt(recording: Recording, every: int = 5) -> Recording:
     )
 
 
-def noise_is_left(prepared: Prepared) -> bool:
+def noise_is_left(prepared: PreparedRecordings) -> bool:
     fitter = Fitter(prepared.noise)
-    evidence = split(ROBOT, prepared.noise, prepared.fit, prepared.check)
-    return all(is_noise(fitter.innovations(ROBOT, s), s.rows) for s in (evidence.fit, evidence.judge))
+    evidence = split_data(ROBOT, prepared.noise, prepared.fit, prepared.check)
+    return all(
+        residuals_are_white(fitter.innovations(ROBOT, s), s.rows) for s in (evidence.estimation, evidence.validation)
+    )
 
 
 def test_recordings_as_they_should_be_are_not_touched() -> None:
     pair = recorded("three", 1), recorded("three", 2)
-    prepared = prepare(ROBOT, *pair)
+    prepared = prepare_recordings(ROBOT, *pair)
     assert (prepared.fit, prepared.check) == pair
     assert prepared.notes == ()
 
 
 def test_all_that_is_done_is_said_and_leaves_noise() -> None:
-    prepared = prepare(ROBOT, spoilt(recorded("three", 1)), spoilt(recorded("three", 2)))
+    prepared = prepare_recordings(ROBOT, spoilt(recorded("three", 1)), spoilt(recorded("three", 2)))
     for path in ("three-1.csv", "three-2.csv"):
         assert f"{path}: tension_2 shows one value all along: not used" in prepared.notes
         assert any(path in note and "3 of tension_1, 2 of tension_3" in note for note in prepared.notes)
@@ -75,21 +77,21 @@ def test_outputs_may_be_missing(name: str, axes: list[int], tensions: bool) -> N
         pair.append(replace(recording, position=position, tension=tension))
     if not axes and not tensions:
         with pytest.raises(RecordingError, match=r"three-1\.csv: no number in any of the outputs"):
-            prepare(ROBOT, *pair)
+            prepare_recordings(ROBOT, *pair)
         return
-    assert noise_is_left(prepare(ROBOT, *pair))
+    assert noise_is_left(prepare_recordings(ROBOT, *pair))
 
 
 def test_a_recording_of_which_nothing_is_alive_is_refused() -> None:
     recording = recorded("three", 1)
     dead = replace(recording, position=np.ones_like(recording.position), tension=np.ones_like(recording.tension))
     with pytest.raises(RecordingError, match="no number in any of the outputs"):
-        prepare(ROBOT, dead, None)
+        prepare_recordings(ROBOT, dead, None)
 
 
 def test_a_noise_that_was_declared_too_small_leaves_noise() -> None:
     timid = replace(ROBOT, sensors=replace(ROBOT.sensors, tension_noise=0.5))
-    prepared = prepare(timid, recorded("three", 1), recorded("three", 2))
+    prepared = prepare_recordings(timid, recorded("three", 1), recorded("three", 2))
     assert sum("that is used" in note for note in prepared.notes) == 3
     assert noise_is_left(prepared)
 

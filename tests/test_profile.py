@@ -8,18 +8,18 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
-from tautwire.tracer.data import Sample, split
-from tautwire.tracer.fit import Fit, Fitter, bounds_of
+from tautwire.tracer.data import DataSet, split_data
+from tautwire.tracer.fit import Fit, Fitter, parameter_bounds
 from tautwire.tracer.hypotheses import Hypothesis
-from tautwire.tracer.preparation.noise import noise_of
-from tautwire.tracer.profile import WITHIN, intervals
-from tautwire.tracer.workers import Workers
+from tautwire.tracer.preparation.noise import estimate_noise
+from tautwire.tracer.profile import CHI_SQUARED_95, profile_intervals
+from tautwire.tracer.workers import WorkerPool
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.recordings import recorded
 from tests.robots import example
 
-HERE = Workers(1)
-Made = tuple[Fitter, list[Hypothesis], Sample, Fit]
+HERE = WorkerPool(1)
+Made = tuple[Fitter, list[Hypothesis], DataSet, Fit]
 
 
 def fitted(effect: str, truth: dict[str, dict[str, float]], form: tuple[str, ...] = ()) -> Made:
@@ -27,8 +27,8 @@ def fitted(effect: str, truth: dict[str, dict[str, float]], form: tuple[str, ...
     robot, recording = example("three"), recorded("three", 3, truth)
     known = BY_NAME[effect]
     chosen = [Hypothesis(known, robot.cable_numbers if known.component == "cable" else (), form or known.forms[0])]
-    noise = noise_of(robot, recording)
-    sample, fitter = split(robot, noise, recording, None).fit, Fitter(noise)
+    noise = estimate_noise(robot, recording)
+    sample, fitter = split_data(robot, noise, recording, None).estimation, Fitter(noise)
     return fitter, chosen, sample, fitter.fit(robot.with_effect(chosen[0].setting(robot)), chosen, sample)
 
 
@@ -42,14 +42,14 @@ def left_at(made: Made, values: list[float]) -> float:
 
 def test_a_round_surface_keeps_the_curvatures_interval() -> None:
     fitter, chosen, sample, fit = fitted("damping", {"damping": {"damping": 8e8}})
-    assert intervals(fitter, fit, chosen, sample, HERE) == [fit.interval(0)]
+    assert profile_intervals(fitter, fit, chosen, sample, HERE) == [fit.interval(0)]
 
 
 def test_ends_leave_as_much_as_the_level_says_with_the_other_parameter_at_its_best() -> None:
     made = fitted("relaxation", {"relaxation": {"modulus": 2e9, "time": 5.0}})
     fitter, chosen, sample, fit = made
     least = left_at(made, list(fit.values))
-    found = intervals(fitter, fit, chosen, sample, HERE)
+    found = profile_intervals(fitter, fit, chosen, sample, HERE)
     bent = 0
     for index, ends in enumerate(found):
         for end, by_curvature in zip(ends, fit.interval(index), strict=True):
@@ -63,17 +63,17 @@ def test_ends_leave_as_much_as_the_level_says_with_the_other_parameter_at_its_be
                 method="bounded",
                 options={"xatol": 1e-4 * other},
             )
-            assert best.fun - least == pytest.approx(WITHIN, rel=0.02)
+            assert best.fun - least == pytest.approx(CHI_SQUARED_95, rel=0.02)
     assert bent > 0
 
 
 def test_an_interval_ends_where_the_parameter_does() -> None:
     fitter, chosen, sample, fit = fitted("payload", {})
-    ((low, high),) = intervals(fitter, fit, chosen, sample, HERE)
+    ((low, high),) = profile_intervals(fitter, fit, chosen, sample, HERE)
     assert low == fit.interval(0)[0] or low == chosen[0].parameters[0].minimum
     assert low < fit.values[0] < high
     fitter, chosen, sample, fit = fitted("hysteresis", {})
-    (low, high), _ = intervals(fitter, fit, chosen, sample, HERE)
+    (low, high), _ = profile_intervals(fitter, fit, chosen, sample, HERE)
     assert low == 0.0
     assert high > fit.values[0]
 
@@ -81,11 +81,11 @@ def test_an_interval_ends_where_the_parameter_does() -> None:
 def several(names: tuple[str, ...], truth: dict[str, dict[str, float]]) -> Made:
     """The fit of several effects, with all numbers of their smallest forms."""
     robot, recording = example("three"), recorded("three", 3, truth)
-    noise = noise_of(robot, recording)
+    noise = estimate_noise(robot, recording)
     chosen = [Hypothesis(BY_NAME[name], robot.cable_numbers) for name in names]
     for hypothesis in chosen:
         robot = robot.with_effect(hypothesis.setting(robot))
-    sample, fitter = split(robot, noise, recording, None).fit, Fitter(noise)
+    sample, fitter = split_data(robot, noise, recording, None).estimation, Fitter(noise)
     return fitter, chosen, sample, fitter.fit(robot, chosen, sample)
 
 
@@ -95,9 +95,9 @@ def several(names: tuple[str, ...], truth: dict[str, dict[str, float]]) -> Made:
 )
 def test_intervals_hold_their_values_whatever_the_samples_tell(names: tuple[str, ...]) -> None:
     fitter, chosen, sample, fit = several(names, {"relaxation": {"modulus": 2e9, "time": 5.0}})
-    lower, upper = bounds_of(fit.robot, fit.free)
+    lower, upper = parameter_bounds(fit.robot, fit.free)
     for (low, high), value, least, most in zip(
-        intervals(fitter, fit, chosen, sample, HERE), fit.values, lower, upper, strict=True
+        profile_intervals(fitter, fit, chosen, sample, HERE), fit.values, lower, upper, strict=True
     ):
         assert least <= low <= value <= high <= most
         assert low < high
@@ -105,14 +105,14 @@ def test_intervals_hold_their_values_whatever_the_samples_tell(names: tuple[str,
 
 def test_a_fit_that_is_not_the_best_gets_the_interval_about_the_best() -> None:
     fitter, chosen, sample, fit = fitted("damping", {"damping": {"damping": 8e8}})
-    ((low, high),) = intervals(fitter, fit, chosen, sample, HERE)
-    beside = replace(fit, values=fit.values + 1.5 * fit.deviations)
-    ((found, reached),) = intervals(fitter, beside, chosen, sample, HERE)
+    ((low, high),) = profile_intervals(fitter, fit, chosen, sample, HERE)
+    beside = replace(fit, values=fit.values + 1.5 * fit.standard_deviations)
+    ((found, reached),) = profile_intervals(fitter, beside, chosen, sample, HERE)
     assert (found, reached) == pytest.approx((low, high), abs=0.05 * (high - low))
 
 
 def test_workers_find_the_same_ends() -> None:
     fitter, chosen, sample, fit = fitted("relaxation", {"relaxation": {"modulus": 2e9, "time": 5.0}})
-    with Workers(2) as workers:
-        apart = intervals(fitter, fit, chosen, sample, workers)
-    assert np.array(apart) == pytest.approx(np.array(intervals(fitter, fit, chosen, sample, HERE)), rel=1e-9)
+    with WorkerPool(2) as workers:
+        apart = profile_intervals(fitter, fit, chosen, sample, workers)
+    assert np.array(apart) == pytest.approx(np.array(profile_intervals(fitter, fit, chosen, sample, HERE)), rel=1e-9)

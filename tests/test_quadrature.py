@@ -8,10 +8,10 @@ from tautwire_fmu.quadrature import (
     CUBIC_MIDDLE,
     QUINTIC_END,
     QUINTIC_MIDDLE,
-    Node,
-    Place,
-    Weights,
-    integrate,
+    AccelerationNode,
+    MotionState,
+    QuadratureWeights,
+    integrate_hermite,
 )
 
 STEP = 0.7
@@ -26,12 +26,12 @@ STEP = 0.7
         (5, (0.0, 0.5, 1.0), QUINTIC_END),
     ],
 )
-def test_the_integral_is_exact(degree: int, nodes: tuple[float, ...], weights: Weights) -> None:
+def test_the_integral_is_exact(degree: int, nodes: tuple[float, ...], weights: QuadratureWeights) -> None:
     acceleration = np.polynomial.Polynomial([1.0, -2.0, 0.5, 3.0, -1.0, 2.0][: degree + 1])
     velocity = acceleration.integ(1, [0.3])
     position = velocity.integ(1, [-4.0])
-    given = [Node([acceleration(f * STEP)], [acceleration.deriv()(f * STEP)]) for f in nodes]
-    there = integrate(Place([-4.0], [0.3], ()), given, STEP, weights)
+    given = [AccelerationNode([acceleration(f * STEP)], [acceleration.deriv()(f * STEP)]) for f in nodes]
+    there = integrate_hermite(MotionState([-4.0], [0.3], ()), given, STEP, weights)
     time = weights.fraction * STEP
     assert there.position == pytest.approx([position(time)], rel=1e-13)
     assert there.velocity == pytest.approx([velocity(time)], rel=1e-13)

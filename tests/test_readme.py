@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tautwire.cli import application
+from tautwire.cli import app
 from tautwire.cli import run as command
 from tests.robots import EXAMPLES
 
@@ -30,7 +30,7 @@ def test_every_python_example_runs(
 
 def test_every_command_is_named() -> None:
     shown = README.read_text(encoding="utf-8")
-    for each in application.registered_commands:
+    for each in app.registered_commands:
         assert each.callback and f"\ntautwire {each.callback.__name__} " in shown
 
 

@@ -8,11 +8,11 @@ import pytest
 from tautwire.recordings.recording import Recording
 from tautwire.robots.robot import Robot
 from tautwire.tracer import ready, trace
-from tautwire.tracer.data import Evidence
+from tautwire.tracer.data import DataSplit
 from tautwire.tracer.fit import Fitter
-from tautwire.tracer.preparation.clock import CHANNELS, shifted
-from tautwire.tracer.ready import Ready, readings
-from tautwire.tracer.workers import Workers
+from tautwire.tracer.preparation.clock import CHANNEL_GROUPS, shifted
+from tautwire.tracer.ready import PreparedData, prepare_data
+from tautwire.tracer.workers import WorkerPool
 from tests.recordings import recorded
 from tests.robots import example
 
@@ -21,11 +21,11 @@ LATE: dict[str, Any] = {"sensor_delay": {"seconds": 0.015, "outputs": "position"
 PAYLOAD: dict[str, Any] = {"payload": {"mass": 1.5}}
 
 
-def read(fit: dict[str, Any], check: dict[str, Any]) -> tuple[Ready, ...]:
-    return readings(THREE, recorded("three", 1, fit), recorded("three", 2, check), Workers(1))
+def read(fit: dict[str, Any], check: dict[str, Any]) -> tuple[PreparedData, ...]:
+    return prepare_data(THREE, recorded("three", 1, fit), recorded("three", 2, check), WorkerPool(1))
 
 
-def told(found: Ready) -> bool:
+def told(found: PreparedData) -> bool:
     return any("a clock, no effect" in note for note in found.notes)
 
 
@@ -42,15 +42,15 @@ def test_a_clock_that_explains_all_is_set_at_once() -> None:
 def test_a_clock_that_leaves_more_than_noise_waits_behind_the_recordings_as_they_are() -> None:
     first, second = read({**PAYLOAD, **LATE}, PAYLOAD)
     assert not told(first) and told(second)
-    assert first.evidence.fit.recording is recorded("three", 1, {**PAYLOAD, **LATE})
-    assert second.evidence.fit.recording is not first.evidence.fit.recording
+    assert first.split.estimation.recording is recorded("three", 1, {**PAYLOAD, **LATE})
+    assert second.split.estimation.recording is not first.split.estimation.recording
 
 
 @pytest.mark.slow
 def test_an_effect_that_explains_all_goes_before_a_clock(monkeypatch: pytest.MonkeyPatch) -> None:
-    def always(fitter: Fitter, robot: Robot, evidence: Evidence) -> tuple[Evidence, tuple[str, ...]]:
-        late = shifted(evidence.fit.recording, 0.01, CHANNELS[1])
-        return Evidence(replace(evidence.fit, recording=late), evidence.judge, ()), ("a clock, no effect",)
+    def always(fitter: Fitter, robot: Robot, evidence: DataSplit) -> tuple[DataSplit, tuple[str, ...]]:
+        late = shifted(evidence.estimation.recording, 0.01, CHANNEL_GROUPS[1])
+        return DataSplit(replace(evidence.estimation, recording=late), evidence.validation, ()), ("a clock, no effect",)
 
     monkeypatch.setattr(ready, "with_clocks_set", always)
     found = trace(THREE, *pair({"damping": {"damping": 9e8}}))

@@ -34,7 +34,7 @@ def refused(folder: Path, text: str | bytes, cable_count: int = 3) -> RecordingE
         read(folder, text, cable_count)
     error = caught.value
     assert error.where.startswith(str(folder / "fit.csv"))
-    assert error.problem and error.mend
+    assert error.problem and error.hint
     assert len(str(error).splitlines()) == 1
     assert "pandas" not in str(error)
     return error

@@ -43,7 +43,7 @@ def refused(path: Path) -> RecordingError:
         read_recording(path, 3)
     error = caught.value
     assert error.where.startswith(str(path))
-    assert error.problem and error.mend
+    assert error.problem and error.hint
     assert len(str(error).splitlines()) == 1
     return error
 
@@ -155,7 +155,7 @@ def test_refuses_what_is_no_parquet(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "fit.parquet").write_bytes(content)
     error = refused(tmp_path / "fit.parquet")
     assert "cannot be read as Parquet" in error.problem
-    assert "write it anew" in error.mend
+    assert "write it anew" in error.hint
 
 
 @pytest.mark.parametrize(("name", "words"), [("absent.parquet", "no such file"), ("folder.parquet", "folder")])

@@ -8,10 +8,10 @@ import pytest
 from casadi import SX, Function
 
 from tautwire.model.symbolic import FreeParameter, symbolic_model
-from tautwire.native.repeated import Repeated, stacked
-from tautwire.tracer.filter_step import Substeps, filter_sample
-from tautwire.tracer.preparation.noise import noise_of
-from tautwire.tracer.preparation.start_state import start_covariance
+from tautwire.native.repeated import CompiledFunction, by_sample
+from tautwire.tracer.filter_step import Substeps, filter_step
+from tautwire.tracer.preparation.noise import estimate_noise
+from tautwire.tracer.preparation.start_state import initial_covariance
 from tests.effect_cases import CASES, Case
 from tests.memory import TOLD, resident_memory
 from tests.recordings import recorded
@@ -32,14 +32,14 @@ def test_a_function_is_taken_over_columns() -> None:
     a, b = SX.sym("a", 2, 3), SX.sym("b", 3)
     function = Function("product", [a, b], [casadi.mtimes(a, b), casadi.sin(b)])
     many, vectors = GENERATOR.normal(size=(2, 3 * 7)), GENERATOR.normal(size=(3, 7))
-    for ours, theirs in zip(Repeated(function)(7, many, vectors), function.map(7)(many, vectors), strict=True):
+    for ours, theirs in zip(CompiledFunction(function)(7, many, vectors), function.map(7)(many, vectors), strict=True):
         np.testing.assert_array_equal(ours, np.array(theirs))
 
 
 def test_results_are_carried_to_the_next_sample() -> None:
     state, matrix = GENERATOR.normal(size=(2, 1)), GENERATOR.normal(size=(2, 2))
     steps, pull = GENERATOR.normal(size=(1, 5)), GENERATOR.normal(size=(2, 1))
-    ours = Repeated(falling(), carried=2)(5, state, matrix, steps, pull)
+    ours = CompiledFunction(falling(), carried=2)(5, state, matrix, steps, pull)
     theirs = falling().mapaccum("run", 5, 2)(state, matrix, steps, np.repeat(pull, 5, axis=1))
     np.testing.assert_array_equal(ours[0], np.hstack([state, np.array(theirs[0])]))
     np.testing.assert_array_equal(ours[1], np.hstack([matrix, np.array(theirs[1])]))
@@ -48,23 +48,23 @@ def test_results_are_carried_to_the_next_sample() -> None:
 
 def test_no_samples_give_what_was_carried() -> None:
     state, matrix = np.ones((2, 1)), np.eye(2)
-    found = Repeated(falling(), carried=2)(0, state, matrix, np.zeros((1, 0)), np.zeros((2, 0)))
+    found = CompiledFunction(falling(), carried=2)(0, state, matrix, np.zeros((1, 0)), np.zeros((2, 0)))
     assert [result.shape for result in found] == [(2, 1), (2, 2), (2, 0)]
     np.testing.assert_array_equal(found[1], matrix)
 
 
 def test_arguments_of_other_sizes_are_refused() -> None:
-    repeated = Repeated(falling(), carried=2)
+    repeated = CompiledFunction(falling(), carried=2)
     with pytest.raises(ValueError, match=r"shape \(1, 4\), where \(1, 1\) is one of 5 samples"):
         repeated(5, np.ones((2, 1)), np.eye(2), np.ones((1, 4)), np.ones((2, 1)))
 
 
 def test_what_is_carried_has_to_fit() -> None:
-    repeated = Repeated(falling(), carried=2)
+    repeated = CompiledFunction(falling(), carried=2)
     with pytest.raises(ValueError, match=r"shape \(2, 1\), where \(2, 2\) is one of 1 samples"):
         repeated(5, np.ones((2, 1)), np.ones((2, 1)), np.ones((1, 5)), np.ones((2, 1)))
     with pytest.raises(ValueError, match="3 results of falling are to be carried"):
-        Repeated(falling(), carried=3)
+        CompiledFunction(falling(), carried=3)
 
 
 @pytest.mark.parametrize("count", [0, 1, 6])
@@ -72,25 +72,25 @@ def test_what_is_interpreted_is_the_same(count: int) -> None:
     state, matrix = GENERATOR.normal(size=(2, 1)), GENERATOR.normal(size=(2, 2))
     steps, pull = GENERATOR.normal(size=(1, count)), GENERATOR.normal(size=(2, 1))
     for carried, first in ((2, (state, matrix)), (0, (np.tile(state, count), matrix))):
-        ways = [Repeated(falling(), carried, most)(count, *first, steps, pull) for most in (0, 10_000)]
+        ways = [CompiledFunction(falling(), carried, most)(count, *first, steps, pull) for most in (0, 10_000)]
         for one, other in zip(*ways, strict=True):
             np.testing.assert_array_equal(one, other)
 
 
 def test_results_are_stacked_by_sample() -> None:
     wide = np.arange(12.0).reshape(2, 6)
-    np.testing.assert_array_equal(stacked(wide, 3)[1], wide[:, 2:4])
-    assert stacked(np.zeros((2, 0)), 3).shape == (3, 2, 0)
-    assert stacked(np.zeros((0, 6)), 3).shape == (3, 0, 2)
+    np.testing.assert_array_equal(by_sample(wide, 3)[1], wide[:, 2:4])
+    assert by_sample(np.zeros((2, 0)), 3).shape == (3, 2, 0)
+    assert by_sample(np.zeros((0, 6)), 3).shape == (3, 0, 2)
 
 
 @pytest.mark.skipif(not TOLD, reason="only Linux tells the memory of a process")
 def test_functions_that_are_kept_take_little_memory() -> None:
     a = SX.sym("a", 16, 16)
     function = Function("cube", [a], [casadi.mtimes(a, casadi.mtimes(a, a))])
-    kept = [Repeated(function)]
+    kept = [CompiledFunction(function)]
     before, _ = resident_memory()
-    kept += [Repeated(function) for _ in range(10)]
+    kept += [CompiledFunction(function) for _ in range(10)]
     after, _ = resident_memory()
     # 17,000 instructions, of some twenty bytes each.
     assert after - before < 10 * 3.0
@@ -100,15 +100,15 @@ def test_functions_that_are_kept_take_little_memory() -> None:
 @pytest.mark.parametrize("case", CASES, ids=str)
 def test_the_filter_of_every_effect_is_casadis_to_the_last_bit(case: Case) -> None:
     robot, recording = example("three"), recorded("three", 1)
-    noise, count = noise_of(robot, recording), 50
+    noise, count = estimate_noise(robot, recording), 50
     model = symbolic_model(
         replace(robot, effects=(case.setting(robot),)), [FreeParameter(0, name) for name in case.law]
     )
-    function = filter_sample(model, robot.cable_count, noise, Substeps(5, 1))
+    function = filter_step(model, robot.cable_count, noise, Substeps(5, 1))
     theta = np.array(list(case.law.values()))[:, None]
     start = Function("start", [model.parameters], [model.start, casadi.jacobian(model.start, model.parameters)])
     size = model.states.numel()
-    carried = (*map(np.array, start(theta)), start_covariance(robot, noise, size, 0))
+    carried = (*map(np.array, start(theta)), initial_covariance(robot, noise, size, 0))
     carried = (carried[0], carried[2], carried[1])
     columns = (
         recording.measured()[:count].T,
@@ -120,7 +120,7 @@ def test_the_filter_of_every_effect_is_casadis_to_the_last_bit(case: Case) -> No
         np.full((1, count), 1e-4),
         np.zeros((1, count)),
     )
-    ours = Repeated(function, carried=3)(count, *carried, theta, *columns)
+    ours = CompiledFunction(function, carried=3)(count, *carried, theta, *columns)
     theirs = function.mapaccum("run", count, 3)(*carried, np.repeat(theta, count, axis=1), *columns)
     for index, (a, b) in enumerate(zip(ours, theirs, strict=True)):
         first = carried[index].shape[1] if index < 3 else 0

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 from tautwire.report import trace_document
-from tautwire.tracer.verdict import Correlation, Fitted
+from tautwire.tracer.verdict import Correlation, FittedParameter
 from tests.traces import HOSTILE, made_trace, nothing_found, without_positions
 
 # The example of the agreed format, with one entry of each kind.
@@ -90,7 +90,7 @@ def test_sizes_that_would_have_shown_and_what_looks_alike_are_there() -> None:
 
 
 def test_correlations_name_the_parameters_as_the_effects_do() -> None:
-    between = (Fitted("damping", (1, 2, 3), "damping"), Fitted("payload", (), "mass"))
+    between = (FittedParameter("damping", (1, 2, 3), "damping"), FittedParameter("payload", (), "mass"))
     document = trace_document(replace(made_trace(), correlations=(Correlation(between, np.float64(-0.42)),)))
     assert document["correlations"] == [
         {

@@ -12,9 +12,9 @@ import pytest
 
 from tautwire.cli import run as command
 from tautwire.linear import LinearPlant, linearise
-from tautwire.report.modes_figures import SWING_SHARE, modes_data
+from tautwire.report.modes_figures import DRAWN_SWING_SHARE, modes_data
 from tautwire.report.modes_page import modes_page
-from tautwire.report.series import unpacked
+from tautwire.report.series import unpack_float32
 from tautwire.robots.robot import Robot
 from tests.pages import FETCHING, Page
 from tests.robots import EXAMPLES, example
@@ -33,18 +33,18 @@ def test_platform_swings_along_each_mode_about_rest(name: str) -> None:
     robot, plant = plant_of(name)
     data = modes_data(robot, plant)
     for mode, choice in enumerate(data["choices"]):
-        swing = np.column_stack([unpacked(column) for column in choice["scene"]["platform"]]) - plant.position
+        swing = np.column_stack([unpack_float32(column) for column in choice["scene"]["platform"]]) - plant.position
         assert swing[0] == pytest.approx(swing[-1], abs=1e-4)
         assert swing.max(axis=0) == pytest.approx(-swing.min(axis=0), abs=1e-4)
         size = np.ptp(np.vstack((robot.anchors, plant.position)), axis=0).max()
-        assert swing[0] == pytest.approx(SWING_SHARE * size * plant.modes.shapes[:, mode], abs=1e-4)
+        assert swing[0] == pytest.approx(DRAWN_SWING_SHARE * size * plant.modes.shapes[:, mode], abs=1e-4)
         assert choice["scene"]["cycle"]
 
 
 def test_tensions_change_as_the_plant_says_for_a_millimetre() -> None:
     robot, plant = plant_of("eight")
     scene = modes_data(robot, plant)["choices"][0]["scene"]
-    change = np.array([unpacked(column)[0] for column in scene["tension"]])
+    change = np.array([unpack_float32(column)[0] for column in scene["tension"]])
     moved = plant.position + 1e-3 * plant.modes.shapes[:, 0]
     lengths = [np.linalg.norm(np.array(robot.anchors) - place, axis=1) for place in (plant.position, moved)]
     stretch = (lengths[1] - lengths[0]) / lengths[0]
@@ -55,14 +55,14 @@ def test_tensions_change_as_the_plant_says_for_a_millimetre() -> None:
 def test_gains_are_those_of_the_plant_in_the_units_told() -> None:
     robot, plant = plant_of("three")
     data = modes_data(robot, plant)
-    frequency = unpacked(data["frequency"])
+    frequency = unpack_float32(data["frequency"])
     for row, output, scale in (("position x", "position_x", 1e3), ("tension 2", "tension_2", 1.0)):
         shown = next(each for each in data["gains"] if each["label"] == row)["from"]
         for source, per in (("winch_speed_3", 1e-3), ("external_force_z", 1.0)):
             place = list(plant.system.input_labels).index(source)
             channel = plant.system[output, source]
             expected = np.abs(channel(2j * np.pi * frequency)) * scale * per
-            assert unpacked(shown[place]["gain"]) == pytest.approx(expected, rel=1e-5)
+            assert unpack_float32(shown[place]["gain"]) == pytest.approx(expected, rel=1e-5)
     assert shown[0]["unit"] == "N per mm/s"
 
 
@@ -70,8 +70,8 @@ def test_gain_peaks_where_the_modes_are_marked() -> None:
     robot, plant = plant_of("eight")
     data = modes_data(robot, plant)
     place = list(plant.system.input_labels).index("external_force_z")
-    gain = unpacked(next(each for each in data["gains"] if each["label"] == "position z")["from"][place]["gain"])
-    peak = unpacked(data["frequency"])[np.argmax(gain)]
+    gain = unpack_float32(next(each for each in data["gains"] if each["label"] == "position z")["from"][place]["gain"])
+    peak = unpack_float32(data["frequency"])[np.argmax(gain)]
     assert any(band["low"] * 0.97 < peak < band["high"] * 1.03 for band in data["bands"])
 
 

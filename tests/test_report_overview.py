@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tautwire.master import Kept
-from tautwire.report.overview import Both, Overview
+from tautwire.master import MemoryRecorder
+from tautwire.report.overview import RecorderPair, RunOverview
 
 
-def filled(values: np.ndarray, groups: int) -> Overview:
+def filled(values: np.ndarray, groups: int) -> RunOverview:
     """An overview of rows at every 10 ms."""
-    overview = Overview(groups)
+    overview = RunOverview(groups)
     for place, row in enumerate(values):
         overview.add(0.01 * place, row)
     return overview
@@ -20,9 +20,9 @@ def filled(values: np.ndarray, groups: int) -> Overview:
 def test_short_run_is_kept_as_it_is() -> None:
     values = np.random.default_rng(1).normal(size=(150, 3))
     overview = filled(values, 100)
-    assert (overview.size, overview.count) == (1, 150)
+    assert (overview.group_size, overview.row_count) == (1, 150)
     assert np.array_equal(overview.rows, values)
-    time, line = overview.line(2)
+    time, line = overview.curve(2)
     assert np.array_equal(line, values[:, 2]) and time[-1] == pytest.approx(1.49)
 
 
@@ -34,10 +34,10 @@ def test_long_run_stays_small_with_its_extremes_and_ends(count: int) -> None:
     assert len(overview.rows) <= 200
     low, high = overview.extremes()
     assert np.array_equal(low, values.min(axis=0)) and np.array_equal(high, values.max(axis=0))
-    assert np.array_equal(overview.rows, values[:: overview.size])
+    assert np.array_equal(overview.rows, values[:: overview.group_size])
     assert np.array_equal(overview.last_row, values[-1])
     for output in (0, 1):
-        time, line = overview.line(output)
+        time, line = overview.curve(output)
         assert (np.diff(time) >= 0.0).all()
         assert np.array_equal(line, values[np.round(100.0 * time).astype(int), output])
 
@@ -51,8 +51,8 @@ def test_what_is_not_finite_is_no_extreme() -> None:
 
 
 def test_rows_go_to_both_recorders() -> None:
-    kept, overview = Kept(5, 1), Overview()
-    both = Both(kept, overview)
+    kept, overview = MemoryRecorder(5, 1), RunOverview()
+    both = RecorderPair(kept, overview)
     row = np.zeros(1)
     for place in range(5):
         row[0] = place

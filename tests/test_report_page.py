@@ -13,10 +13,17 @@ import numpy as np
 import pytest
 
 from tautwire.report import trace_document, trace_page, write_report
-from tautwire.report.figures import MOST_POINTS, magnification, page_data
-from tautwire.report.series import envelope, envelope_times, noise_density, packed, spectrum, unpacked
+from tautwire.report.figures import MAX_CURVE_POINTS, deviation_magnification, trace_page_data
+from tautwire.report.series import (
+    envelope_times,
+    min_max_envelope,
+    pack_float32,
+    residual_spectra,
+    unpack_float32,
+    white_noise_density,
+)
 from tautwire.robots.reading import read_robot
-from tautwire.tracer.verdict import Correlation, Fitted, Separation, Trace
+from tautwire.tracer.verdict import Correlation, FittedParameter, Identifiability, Trace
 from tests.pages import FETCHING, Page
 from tests.traces import HOSTILE, TENSION_NOISE, made_trace, nothing_found, without_positions
 
@@ -105,16 +112,16 @@ def test_deviations_are_drawn_so_large_that_they_are_seen_and_the_path_too() -> 
     path = np.linspace((50.0, 0.0, 5.0), (58.0, 0.0, 5.0), 50)
     apart = np.zeros((50, 3))
     apart[7, 2] = 2e-3
-    assert magnification(anchors, path, [apart]) == 100  # 1000 times would be 2 m beside a path of 8 m
-    assert magnification(anchors, path[:1].repeat(50, axis=0), [apart]) == 1000
-    assert magnification(anchors, path, [np.zeros((50, 3))]) == 1
+    assert deviation_magnification(anchors, path, [apart]) == 100  # 1000 times would be 2 m beside a path of 8 m
+    assert deviation_magnification(anchors, path[:1].repeat(50, axis=0), [apart]) == 1000
+    assert deviation_magnification(anchors, path, [np.zeros((50, 3))]) == 1
 
 
 def test_page_says_what_would_have_shown_and_what_never() -> None:
     content = trace_page(made_trace(samples=200), {})
     assert "0.0195" in content
     assert "never" in content[content.index("Smallest sizes") :]
-    nothing = replace(made_trace(samples=200), separation=Separation((), ()))
+    nothing = replace(made_trace(samples=200), separation=Identifiability((), ()))
     assert "no size can be given" in trace_page(nothing, {})
 
 
@@ -195,19 +202,19 @@ def test_every_figure_has_data_for_both_recordings(kind: str, cables: int) -> No
     assert len(panels) == 2 * (3 + cables)
     assert [each["role"] for each in data["choices"]] == ["fit", "check"]
     for recording in data["choices"]:
-        time = unpacked(recording["time"])
+        time = unpack_float32(recording["time"])
         for panel in panels:
             channel = recording["channels"][int(panel["data-channel"])]
             drawn = channel if panel["data-kind"] == "residual" else channel["spectrum"]
-            across = time if panel["data-kind"] == "residual" else unpacked(drawn["frequency"])
+            across = time if panel["data-kind"] == "residual" else unpack_float32(drawn["frequency"])
             for name in ("before", "after"):
-                values = unpacked(drawn[name])
+                values = unpack_float32(drawn[name])
                 assert values.size == across.size > 50
                 assert np.isfinite(values).mean() > 0.9
         scene = recording["scene"]
         assert [path["name"] for path in scene["paths"]] == ["measured", "before", "after"]
         for columns in (*(path["columns"] for path in scene["paths"]), scene["platform"], scene["tension"]):
-            assert all(unpacked(column).size == unpacked(scene["time"]).size for column in columns)
+            assert all(unpack_float32(column).size == unpack_float32(scene["time"]).size for column in columns)
     assert len(data["anchors"]) == cables
 
 
@@ -237,7 +244,7 @@ def test_page_follows_light_and_dark() -> None:
 
 def test_short_recordings_and_still_robots_make_a_page() -> None:
     short = made_trace(samples=8)
-    assert page_data(short)["choices"][0]["channels"][0]["spectrum"] is None
+    assert trace_page_data(short)["choices"][0]["channels"][0]["spectrum"] is None
     assert Page(trace_page(short, {})).open == []
 
 
@@ -252,30 +259,32 @@ def test_diverged_model_makes_a_page() -> None:
 def test_envelope_keeps_peaks_order_and_gaps() -> None:
     values = np.sin(np.linspace(0.0, 50.0, 100_001))
     values[12_345], values[77_777], values[40_000:42_000] = 9.0, -7.0, np.nan
-    drawn = envelope(values, MOST_POINTS)
-    time = envelope_times(np.arange(values.size, dtype=float), MOST_POINTS)
-    assert drawn.size == time.size <= MOST_POINTS
+    drawn = min_max_envelope(values, MAX_CURVE_POINTS)
+    time = envelope_times(np.arange(values.size, dtype=float), MAX_CURVE_POINTS)
+    assert drawn.size == time.size <= MAX_CURVE_POINTS
     assert (np.diff(time) >= 0.0).all()
     assert (np.nanmax(drawn), np.nanmin(drawn)) == (9.0, -7.0)
     assert abs(time[np.nanargmax(drawn)] - 12_345) < 100
     assert np.isnan(drawn[(time > 40_100) & (time < 41_900)]).all()
     short = np.array([1.0, np.nan, 3.0])
-    assert np.array_equal(envelope(short, MOST_POINTS), short, equal_nan=True)
+    assert np.array_equal(min_max_envelope(short, MAX_CURVE_POINTS), short, equal_nan=True)
 
 
 def test_spectrum_of_noise_lies_on_the_noise_line_and_a_tone_above() -> None:
     random, time = np.random.default_rng(3), np.linspace(0.0, 399.99, 40_000)
     noise = random.normal(0.0, 2.0, time.size)
-    found = spectrum(time, noise + np.sin(2 * np.pi * 5.0 * time), noise)
+    found = residual_spectra(time, noise + np.sin(2 * np.pi * 5.0 * time), noise)
     assert found is not None
-    level = noise_density(2.0, time)
+    level = white_noise_density(2.0, time)
     assert np.median(found.after) == pytest.approx(level, rel=0.05)
     assert found.frequency[np.argmax(found.before)] == pytest.approx(5.0, rel=0.03)
     assert found.before.max() > 3.0 * level
 
 
 def test_packing_keeps_numbers_and_turns_the_infinite_into_gaps() -> None:
-    assert np.array_equal(unpacked(packed(np.array([1.5, np.nan, np.inf]))), [1.5, np.nan, np.nan], equal_nan=True)
+    assert np.array_equal(
+        unpack_float32(pack_float32(np.array([1.5, np.nan, np.inf]))), [1.5, np.nan, np.nan], equal_nan=True
+    )
 
 
 def test_folder_holds_robot_fmus_report_and_page_that_links_them(tmp_path: Path) -> None:
@@ -289,8 +298,8 @@ def test_folder_holds_robot_fmus_report_and_page_that_links_them(tmp_path: Path)
 
 
 def test_estimates_that_err_together_are_told() -> None:
-    strong = (Fitted("damping", (1, 2, 3), "damping"), Fitted("payload", (), "mass"))
-    weak = (Fitted("damping", (1, 2, 3), "damping"), Fitted("sag", (2,), "linear_density"))
+    strong = (FittedParameter("damping", (1, 2, 3), "damping"), FittedParameter("payload", (), "mass"))
+    weak = (FittedParameter("damping", (1, 2, 3), "damping"), FittedParameter("sag", (2,), "linear_density"))
     correlations = (Correlation(strong, -0.954), Correlation(weak, 0.2))
     html = trace_page(replace(made_trace(), correlations=correlations), LINKS)
     assert "damping of damping (all cables) and mass of payload: where one is too large the other is too small" in html

@@ -11,9 +11,9 @@ import pandas as pd
 import pytest
 
 from tautwire.cli import run as command
-from tautwire.report.overview import Overview
+from tautwire.report.overview import RunOverview
 from tautwire.report.run_page import run_page
-from tautwire.report.series import unpacked
+from tautwire.report.series import unpack_float32
 from tautwire.runs.wiring import result_columns
 from tests.pages import FETCHING, Page
 from tests.robots import EXAMPLES
@@ -47,7 +47,7 @@ def test_every_output_has_its_panel_with_what_was_recorded() -> None:
         "Elongation"
     ] * 3
     tension = channels[3]
-    assert unpacked(tension["values"]) == pytest.approx(run.overview.rows[:, 6], rel=1e-6)
+    assert unpack_float32(tension["values"]) == pytest.approx(run.overview.rows[:, 6], rel=1e-6)
     assert float(tension["difference"]["apart"]) == pytest.approx(2.0, rel=0.1)
     assert channels[6]["recorded"] is None and channels[6]["difference"] is None
 
@@ -62,8 +62,8 @@ def test_difference_is_recorded_minus_co_simulated_in_a_handy_unit() -> None:
         simulated = run.overview.rows[:, run.columns.index(column)]
         assert channel["difference"]["unit"] == unit
         expected = (recorded - simulated) / one
-        assert unpacked(channel["difference"]["values"]) == pytest.approx(expected, rel=1e-5, abs=1e-3)
-        assert unpacked(channel["difference"]["time"]) == pytest.approx(run.overview.time)
+        assert unpack_float32(channel["difference"]["values"]) == pytest.approx(expected, rel=1e-5, abs=1e-3)
+        assert unpack_float32(channel["difference"]["time"]) == pytest.approx(run.overview.time)
 
 
 def test_page_stays_small_for_long_runs() -> None:
@@ -84,13 +84,13 @@ def test_slack_cables_and_failures_are_named_at_the_top() -> None:
 def test_output_that_no_fmu_shows_has_no_panel() -> None:
     run = made_run(samples=200)
     kept = [place for place, name in enumerate(run.columns) if name != "tension_2"]
-    overview = Overview()
+    overview = RunOverview()
     for time, row in zip(run.overview.time, run.overview.rows, strict=True):
         overview.add(float(time), row[kept])
     page = Page(run_page(replace(run, columns=tuple(run.columns[k] for k in kept), overview=overview), {}))
     labels = [each["label"] for each in page.data()["choices"][0]["channels"] if each["title"] == "Tension"]
     assert labels == ["cable 1", "cable 3"]
-    assert np.isnan(unpacked(page.data()["choices"][0]["scene"]["tension"][1])).all()
+    assert np.isnan(unpack_float32(page.data()["choices"][0]["scene"]["tension"][1])).all()
 
 
 def test_page_asks_nothing_of_the_network() -> None:
@@ -136,7 +136,7 @@ def test_a_run_that_fails_leaves_a_page_that_says_where(tmp_path: Path) -> None:
     assert command([*arguments, "--out", str(tmp_path / "result.csv"), "--report", str(page)]) == 1
     found = Page(page.read_text(encoding="utf-8"))
     assert "Stopped: an FMU failed" in found.text and "the run until then is in" in found.text
-    assert unpacked(found.data()["choices"][0]["scene"]["time"]) == pytest.approx([0.0, 0.1, 0.2])
+    assert unpack_float32(found.data()["choices"][0]["scene"]["time"]) == pytest.approx([0.0, 0.1, 0.2])
 
 
 def test_a_run_that_cannot_begin_leaves_no_page(tmp_path: Path) -> None:

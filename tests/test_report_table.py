@@ -10,8 +10,14 @@ import pytest
 from rich.console import Console
 
 from tautwire.report import trace_table
-from tautwire.report.summary import ROLES, comparison_of, evidence_text, share_explained
-from tautwire.report.units import engineering, handy_unit, percent, significant, together
+from tautwire.report.summary import ROLES, comparison_by_role, explained_share, format_evidence
+from tautwire.report.units import (
+    choose_unit,
+    format_engineering,
+    format_in_common_unit,
+    format_percent,
+    format_significant,
+)
 from tautwire.tracer.verdict import Estimate, Trace
 from tests.traces import HOSTILE, made_trace, nothing_found, without_positions
 
@@ -43,15 +49,15 @@ def test_every_error_is_there(eight: bool) -> None:
     trace = made_trace(eight=eight)
     rows = {line.strip().split("  ")[0]: line.split() for line in rendered(trace).splitlines()}
     for role in ROLES:
-        comparison = comparison_of(trace, role)
+        comparison = comparison_by_role(trace, role)
         assert comparison
         for errors in (comparison.errors_before, comparison.errors_after):
-            assert significant(1e3 * errors.position_rms) in rows["position"]
-            assert significant(errors.tension_rms) in rows["tension"]
+            assert format_significant(1e3 * errors.position_rms) in rows["position"]
+            assert format_significant(errors.tension_rms) in rows["tension"]
             for axis, value in zip("xyz", errors.axes, strict=True):
-                assert significant(1e3 * value) in rows[axis]
+                assert format_significant(1e3 * value) in rows[axis]
             for cable, value in enumerate(errors.cables, start=1):
-                assert significant(value) in rows[f"cable {cable}"]
+                assert format_significant(value) in rows[f"cable {cable}"]
 
 
 def test_large_numbers_are_not_cut() -> None:
@@ -119,11 +125,11 @@ def test_markup_and_control_characters_in_texts_do_nothing() -> None:
     ],
 )
 def test_units_are_those_of_an_engineer(value: float | None, unit: str, text: str) -> None:
-    assert engineering(value, unit) == text
+    assert format_engineering(value, unit) == text
 
 
 def test_unknown_units_are_left_alone() -> None:
-    assert handy_unit(1.2e7, "1/K") == ("1/K", 1.0)
+    assert choose_unit(1.2e7, "1/K") == ("1/K", 1.0)
 
 
 @pytest.mark.parametrize(
@@ -139,22 +145,25 @@ def test_unknown_units_are_left_alone() -> None:
     ],
 )
 def test_numbers_have_three_significant_digits_and_four_where_whole(value: float, text: str) -> None:
-    assert significant(value) == text
+    assert format_significant(value) == text
 
 
 @pytest.mark.parametrize(("evidence", "text"), [(812.43, "812.4"), (163595.4, "163600"), (math.nan, "-")])
 def test_evidence_has_four_digits_at_most(evidence: float, text: str) -> None:
-    assert evidence_text(evidence) == text
+    assert format_evidence(evidence) == text
 
 
 def test_decimals_follow_the_interval() -> None:
-    assert together((2.1034e9, 2.1e9, 2.2e9, None), "Pa s", 5e6) == (["2.1034", "2.1000", "2.2000", "-"], "GPa s")
-    assert together((0.0, -0.1, 0.1, 0.0), "kg", 0.1)[0] == ["0.00", "-0.10", "0.10", "0.00"]
+    assert format_in_common_unit((2.1034e9, 2.1e9, 2.2e9, None), "Pa s", 5e6) == (
+        ["2.1034", "2.1000", "2.2000", "-"],
+        "GPa s",
+    )
+    assert format_in_common_unit((0.0, -0.1, 0.1, 0.0), "kg", 0.1)[0] == ["0.00", "-0.10", "0.10", "0.00"]
 
 
 def test_share_explained_counts_from_the_noise_floor() -> None:
-    assert share_explained(5.0, 3.0, 3.0) == 1.0
-    assert share_explained(5.0, 5.0, 3.0) == 0.0
-    assert share_explained(3.0, 3.0, 3.0) is None
-    assert share_explained(math.nan, 1.0, 1.0) is None
-    assert (percent(0.99991), percent(1.0), percent(None)) == ("> 99.9 %", "100 %", "-")
+    assert explained_share(5.0, 3.0, 3.0) == 1.0
+    assert explained_share(5.0, 5.0, 3.0) == 0.0
+    assert explained_share(3.0, 3.0, 3.0) is None
+    assert explained_share(math.nan, 1.0, 1.0) is None
+    assert (format_percent(0.99991), format_percent(1.0), format_percent(None)) == ("> 99.9 %", "100 %", "-")

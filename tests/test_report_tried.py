@@ -7,7 +7,7 @@ from dataclasses import replace
 from rich.console import Console
 
 from tautwire.report import trace_table
-from tautwire.report.tried import tried
+from tautwire.report.tried import candidates_section
 from tautwire.tracer.verdict import Candidate, Trace
 from tests.pages import Page
 from tests.traces import made_trace
@@ -21,7 +21,7 @@ def with_hopeless_round() -> Trace:
 
 
 def test_page_folds_away_what_was_not_fitted() -> None:
-    page = Page(tried(with_hopeless_round()))
+    page = Page(candidates_section(with_hopeless_round()))
     assert "3 not fitted, they promised too little" in page.text
     assert "Nothing promised enough to be fitted." in page.text
     assert "1 not fitted" in page.text  # drag, in the first round
@@ -29,7 +29,7 @@ def test_page_folds_away_what_was_not_fitted() -> None:
 
 
 def test_effects_on_no_cable_are_said_to_be_on_the_platform() -> None:
-    page = Page(tried(made_trace(samples=200)))
+    page = Page(candidates_section(made_trace(samples=200)))
     assert "payloadplatform" in page.text
 
 

@@ -6,44 +6,44 @@ import numpy as np
 
 from tautwire.report import trace_document
 from tautwire.report.charts import log_bar
-from tautwire.report.where import where
-from tautwire.tracer.where.port_residuals import Components
+from tautwire.report.where import localisation_section
+from tautwire.tracer.where.port_residuals import FaultLocalisation
 from tests.pages import Page
 from tests.traces import HOSTILE, made_trace
 
 
 def test_each_component_has_its_figures_and_a_bar() -> None:
     trace = made_trace(samples=200)
-    page = Page(where(trace))
-    assert len(page.all("tr")) == 1 + len(trace.components.parts)
-    assert len(page.all("svg")) == len(trace.components.parts)
+    page = Page(localisation_section(trace))
+    assert len(page.all("tr")) == 1 + len(trace.components.residuals)
+    assert len(page.all("svg")) == len(trace.components.residuals)
     for words in (trace.components.sentence, "cable 3", "force z", "5.00", "strain rate (98\u00a0%)"):
         assert words in page.text
 
 
 def test_the_worst_comes_first() -> None:
-    text = Page(where(made_trace(samples=200))).text
+    text = Page(localisation_section(made_trace(samples=200))).text
     assert text.index("cable 1") < text.index("force x")
 
 
 def test_what_could_not_be_told_is_said() -> None:
-    blind = Components(np.zeros(0), (), "cannot tell", "Cannot tell which component is off.", ("no positions",))
-    page = Page(where(replace(made_trace(samples=200), components=blind)))
+    blind = FaultLocalisation(np.zeros(0), (), "cannot tell", "Cannot tell which component is off.", ("no positions",))
+    page = Page(localisation_section(replace(made_trace(samples=200), components=blind)))
     assert page.all("table") == []
     assert "Cannot tell" in page.text and "no positions" in page.text
 
 
 def test_a_ringing_force_shows_its_frequency() -> None:
     trace = made_trace(samples=200)
-    loud = replace(trace.components.parts[-1], rms=9.0, rings_at=0.4512)
-    shown = replace(trace.components, parts=(*trace.components.parts[:-1], loud))
-    assert "rings at 0.45 Hz" in Page(where(replace(trace, components=shown))).text
+    loud = replace(trace.components.residuals[-1], rms=9.0, resonance_frequency=0.4512)
+    shown = replace(trace.components, residuals=(*trace.components.residuals[:-1], loud))
+    assert "rings at 0.45 Hz" in Page(localisation_section(replace(trace, components=shown))).text
 
 
 def test_hostile_words_are_escaped() -> None:
     trace = made_trace(samples=200)
     hostile = replace(trace.components, sentence=HOSTILE, untold=(HOSTILE,))
-    assert "img" not in [tag for tag, _ in Page(where(replace(trace, components=hostile))).elements]
+    assert "img" not in [tag for tag, _ in Page(localisation_section(replace(trace, components=hostile))).elements]
 
 
 def test_a_bar_begins_at_the_mark_to_either_side() -> None:

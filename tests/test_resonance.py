@@ -9,10 +9,10 @@ import numpy as np
 import pytest
 
 from tautwire.recordings.recording import Recording
-from tautwire.tracer.data import split
-from tautwire.tracer.discovery.resonance import resonances
+from tautwire.tracer.data import split_data
+from tautwire.tracer.discovery.resonance import find_resonances
 from tautwire.tracer.fit import Fitter
-from tautwire.tracer.preparation.noise import noise_of
+from tautwire.tracer.preparation.noise import estimate_noise
 from tautwire.tracer.verdict import Resonance
 from tests.recordings import recorded
 from tests.robots import example
@@ -29,8 +29,8 @@ def without_outputs_after(recording: Recording, row: int) -> Recording:
 
 def seen(effects: dict[str, Any]) -> tuple[Resonance, ...]:
     fit, check = recorded("three", 3, effects), recorded("three", 53, effects)
-    noise = noise_of(ROBOT, fit)
-    return resonances(ROBOT, Fitter(noise), split(ROBOT, noise, fit, check))
+    noise = estimate_noise(ROBOT, fit)
+    return find_resonances(ROBOT, Fitter(noise), split_data(ROBOT, noise, fit, check))
 
 
 @pytest.mark.slow
@@ -61,9 +61,9 @@ def test_nothing_swings_where_nothing_does(effects: dict[str, Any]) -> None:
 
 def test_sensors_that_fall_silent_for_good_are_no_matter() -> None:
     effects = {"unlisted_swing": {"mass": 20.0, "length": 2.0}}
-    noise = noise_of(ROBOT, recorded("three", 3, effects))
+    noise = estimate_noise(ROBOT, recorded("three", 3, effects))
     pair = [without_outputs_after(recorded("three", seed, effects), 400) for seed in (3, 53)]
-    (found,) = resonances(ROBOT, Fitter(noise), split(ROBOT, noise, *pair))
+    (found,) = find_resonances(ROBOT, Fitter(noise), split_data(ROBOT, noise, *pair))
     # Over the half that is left it swings less than three times.
     assert found.frequency == pytest.approx(np.sqrt(ROBOT.gravity / 2.0) / (2.0 * np.pi), rel=0.1)
     assert set(found.outputs) == {"x", "y"}

@@ -13,7 +13,7 @@ import pytest
 
 from tautwire.errors import TautwireError
 from tautwire.runs import result_file
-from tautwire.runs.result_file import BLOCK_BYTES, Column, result_in_place
+from tautwire.runs.result_file import BLOCK_BYTES, Column, open_result_file
 
 COLUMNS = [Column("time", "s"), Column("x", "m"), Column("tension_1", "N")]
 ROWS = np.column_stack([np.arange(7) * 0.1, np.geomspace(1e-9, 1e9, 7), np.linspace(-1.0, 1.0, 7) / 3.0])
@@ -21,7 +21,7 @@ NAMES = ["result.csv", "result.parquet"]
 
 
 def write(target: Path, rows: np.ndarray, fault: BaseException | None = None) -> None:
-    with result_in_place(target, COLUMNS) as result:
+    with open_result_file(target, COLUMNS) as result:
         for time, *row in rows:
             result.add(float(time), np.array(row))
         if fault is not None:
@@ -81,7 +81,7 @@ def test_without_rows_or_after_anything_else_nothing_is_left(
 
 @pytest.mark.parametrize("name", NAMES)
 def test_rows_go_to_disk_as_they_come(tmp_path: Path, name: str) -> None:
-    with result_in_place(tmp_path / name, COLUMNS) as result:
+    with open_result_file(tmp_path / name, COLUMNS) as result:
         (folder,) = tmp_path.glob("*/new")
         row, sizes = np.array([1.0, 2.0]), []
         for block in range(4):
@@ -105,7 +105,7 @@ def test_memory_does_not_grow_with_the_rows(tmp_path: Path, monkeypatch: pytest.
         """Bytes that Python held at most, and Arrow between blocks."""
         before, arrow = pa.total_allocated_bytes(), 0
         tracemalloc.start()
-        with result_in_place(tmp_path / name, columns) as result:
+        with open_result_file(tmp_path / name, columns) as result:
             for index in range(blocks * block):
                 result.add(float(index), row)
                 if index % block == block - 1:

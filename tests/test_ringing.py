@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from tautwire.tracer.where.ringing import ringing
+from tautwire.tracer.where.ringing import resonance_frequency
 
 Array = NDArray[np.float64]
 
@@ -38,19 +38,19 @@ def test_a_body_that_swings_is_found_with_its_frequency(frequency: float) -> Non
     acceleration = shaken(1)
     force = swinging(acceleration, frequency)
     force[700:760] = np.nan
-    assert ringing(TIME, force, acceleration, CUTOFF) == pytest.approx(frequency, rel=0.05)
+    assert resonance_frequency(TIME, force, acceleration, CUTOFF) == pytest.approx(frequency, rel=0.05)
 
 
 def test_a_weight_and_a_brake_do_not_ring() -> None:
     for seed in range(8):
         acceleration = shaken(seed)
         noise = np.random.default_rng(100 + seed).normal(0.0, 0.01, len(TIME))
-        assert ringing(TIME, 3.0 * acceleration + noise, acceleration, CUTOFF) is None
-        assert ringing(TIME, STEP * np.cumsum(acceleration) + noise, acceleration, CUTOFF) is None
+        assert resonance_frequency(TIME, 3.0 * acceleration + noise, acceleration, CUTOFF) is None
+        assert resonance_frequency(TIME, STEP * np.cumsum(acceleration) + noise, acceleration, CUTOFF) is None
 
 
 def test_too_little_says_nothing() -> None:
     acceleration = shaken(2)
-    assert ringing(TIME[:40], acceleration[:40], acceleration[:40], CUTOFF) is None
-    assert ringing(TIME, np.full(len(TIME), np.nan), acceleration, CUTOFF) is None
-    assert ringing(TIME, acceleration, np.zeros(len(TIME)), CUTOFF) is None
+    assert resonance_frequency(TIME[:40], acceleration[:40], acceleration[:40], CUTOFF) is None
+    assert resonance_frequency(TIME, np.full(len(TIME), np.nan), acceleration, CUTOFF) is None
+    assert resonance_frequency(TIME, acceleration, np.zeros(len(TIME)), CUTOFF) is None

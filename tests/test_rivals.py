@@ -11,13 +11,13 @@ import pytest
 from tautwire.errors import UnreachableError
 from tautwire.robots.robot import Robot
 from tautwire.tracer import trace
-from tautwire.tracer.data import Sample, split
+from tautwire.tracer.data import DataSet, split_data
 from tautwire.tracer.fit import Fitter
 from tautwire.tracer.hypotheses import Hypothesis
 from tautwire.tracer.likelihood import Innovations
-from tautwire.tracer.preparation.noise import noise_of
-from tautwire.tracer.rivals import with_rivals
-from tautwire.tracer.search import Found
+from tautwire.tracer.preparation.noise import estimate_noise
+from tautwire.tracer.rivals import replace_by_confusable_models
+from tautwire.tracer.search import SelectionResult
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.recordings import recorded
 from tests.robots import example
@@ -28,18 +28,18 @@ FRAME = {"unlisted_frame": {"stiffness_constant": 3e6, "viscosity": 2e3, "mass":
 SOFTER = {"modulus": {"modulus": 0.97e11, "cables": [1, 2]}}
 
 
-def judged(hidden: dict[str, Any], chosen: list[Hypothesis]) -> Found:
+def judged(hidden: dict[str, Any], chosen: list[Hypothesis]) -> SelectionResult:
     """What rivals leave of these hypotheses, fitted to recordings that hide something."""
     robot = example("three")
-    noise = noise_of(robot, recorded("three", 9, hidden))
-    evidence = split(robot, noise, recorded("three", 9, hidden), recorded("three", 59, hidden))
+    noise = estimate_noise(robot, recorded("three", 9, hidden))
+    evidence = split_data(robot, noise, recorded("three", 9, hidden), recorded("three", 59, hidden))
     fitter, start = Fitter(noise), robot
     for hypothesis in chosen:
         start = start.with_effect(hypothesis.setting(robot))
-    fit = fitter.fit_from([start], chosen, evidence.fit, -inf)
+    fit = fitter.fit_from([start], chosen, evidence.estimation, -inf)
     alike = tuple((hypothesis.effect.name, "creep") for hypothesis in chosen)
-    found = Found(tuple(chosen), (100.0,) * len(chosen), fit, (), alike)
-    return with_rivals(robot, found, fitter, evidence, 0.01, lambda what, done: None)
+    found = SelectionResult(tuple(chosen), (100.0,) * len(chosen), fit, (), alike)
+    return replace_by_confusable_models(robot, found, fitter, evidence, 0.01, lambda what, done: None)
 
 
 def test_a_softer_rope_keeps_its_name() -> None:
@@ -53,13 +53,13 @@ def test_softer_ropes_with_damping_make_room_for_the_frame_that_they_stood_for()
     assert [hypothesis.effect.name for hypothesis in found.accepted] == ["frame"]
     assert found.fit.values[0] == pytest.approx(1.0 / 3e6, rel=0.03)
     assert found.evidence[0] > 1000.0
-    assert found.alike == ()
+    assert found.confusable == ()
 
 
 def test_a_frame_without_which_nothing_can_be_run_has_evidence_beyond_measure(monkeypatch: pytest.MonkeyPatch) -> None:
     as_it_is = Fitter.judged
 
-    def unheld(fitter: Fitter, robot: Robot, chosen: Collection[Hypothesis], sample: Sample) -> Innovations:
+    def unheld(fitter: Fitter, robot: Robot, chosen: Collection[Hypothesis], sample: DataSet) -> Innovations:
         if not chosen:
             raise UnreachableError("here", robot.platform.start, None, None)
         return as_it_is(fitter, robot, chosen, sample)

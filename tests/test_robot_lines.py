@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tautwire.robots.lines import line_of
+from tautwire.robots.lines import line_of_key
 
 TEXT = '''\
 # a comment
@@ -49,7 +49,7 @@ list = [{a = 1}, {a = 2}]
     ],
 )
 def test_a_place_has_the_line_of_its_statement(place: tuple[str | int, ...], line: int | None) -> None:
-    assert line_of(TEXT, place) == line
+    assert line_of_key(TEXT, place) == line
 
 
 @given(blank=st.lists(st.integers(0, 3), min_size=5, max_size=5))
@@ -59,4 +59,4 @@ def test_blank_lines_and_comments_are_counted(blank: list[int]) -> None:
     for number, count in enumerate(blank):
         lines += ["# comment"] * count + [""] * count + [f"key_{number} = {number}"]
         places.append(len(lines))
-    assert [line_of("\n".join(lines), (f"key_{number}",)) for number in range(5)] == places
+    assert [line_of_key("\n".join(lines), (f"key_{number}",)) for number in range(5)] == places

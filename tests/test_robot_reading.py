@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from tautwire.errors import InputError, RobotFileError
 from tautwire.robots.reading import read_robot
-from tautwire.robots.robot import Cable, EffectSetting, OwnFmu, Platform, Robot, Sensors, TensionLimits, Winch
+from tautwire.robots.robot import Cable, EffectSetting, Platform, Robot, Sensors, TensionLimits, UserFmu, Winch
 
 HALL = """\
 name = "hall"
@@ -58,7 +58,7 @@ def refused(folder: Path, text: str | bytes) -> RobotFileError:
         read_robot(path)
     error = caught.value
     assert error.where.startswith(str(path))
-    assert error.problem and error.mend
+    assert error.problem and error.hint
     assert len(str(error).splitlines()) == 1
     return error
 
@@ -256,9 +256,9 @@ def test_fmus_of_the_users_are_found_from_the_robot_file(tmp_path: Path, monkeyp
     monkeypatch.chdir(tmp_path)
     for place in (path, Path("robot.toml")):
         assert read_robot(place).fmus == (
-            OwnFmu("platform", tmp_path / "models" / "mine.fmu"),
-            OwnFmu("cable_2", tmp_path.parent / "a.fmu"),
-            OwnFmu("winch_3", absolute),
+            UserFmu("platform", tmp_path / "models" / "mine.fmu"),
+            UserFmu("cable_2", tmp_path.parent / "a.fmu"),
+            UserFmu("winch_3", absolute),
         )
 
 

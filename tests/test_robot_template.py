@@ -10,12 +10,12 @@ from tautwire.cli import run
 from tautwire.fmus.packaging import build_fmus
 from tautwire.robots import reading
 from tautwire.robots.reading import read_robot
-from tautwire.robots.template import FEWEST, MOST, new_robot_text
+from tautwire.robots.template import MAX_TEMPLATE_CABLES, MIN_TEMPLATE_CABLES, new_robot_text
 from tautwire.runs.cosimulation import cosimulate
 from tautwire.statics.equilibrium import static_tensions
 
 
-@pytest.mark.parametrize("count", range(FEWEST, MOST + 1))
+@pytest.mark.parametrize("count", range(MIN_TEMPLATE_CABLES, MAX_TEMPLATE_CABLES + 1))
 def test_it_reads_back_and_rests(tmp_path: Path, count: int) -> None:
     place = tmp_path / "robot.toml"
     place.write_text(new_robot_text('the "hall"', count), encoding="utf-8")
@@ -47,9 +47,9 @@ def test_what_is_commented_out_can_be_put_in(tmp_path: Path) -> None:
 
 def test_every_table_is_in_it() -> None:
     text = new_robot_text("hall")
-    for key in reading.KEYS:
+    for key in reading.TOP_LEVEL_KEYS:
         assert re.search(rf"^(# )?(\[*{key}[\].]|{key} = )", text, re.MULTILINE), key
-    for key in (*reading.NOISES, *reading.OFFSETS, *reading.LIMITS):
+    for key in (*reading.NOISE_RULES, *reading.OFFSET_RULES, *reading.WINCH_LIMIT_RULES):
         assert re.search(rf"^(# )?{key} = ", text, re.MULTILINE), key
 
 

@@ -13,16 +13,16 @@ from hypothesis import strategies as st
 from tautwire.errors import RobotFileError
 from tautwire.robots.reading import read_robot, robot_text, write_robot
 from tautwire.robots.robot import (
-    PER_CABLE,
+    PER_CABLE_COMPONENTS,
     Cable,
     EffectSetting,
-    OwnFmu,
     Platform,
     Robot,
     Sensors,
     TensionLimits,
+    UserFmu,
     Winch,
-    slots,
+    fmu_slots,
 )
 from tautwire_fmu.laws.cable import LAWS
 from tautwire_fmu.laws.effects import ALL
@@ -80,13 +80,13 @@ def test_with_effect_replaces_the_same_effect_on_the_same_cables() -> None:
 
 
 def test_winches_and_users_fmus_are_no_part_of_the_model() -> None:
-    own = OwnFmu("winch_2", Path("/models/a.fmu"))
-    robot = replace(HALL, winch=Winch(0.1)).with_fmus([own, OwnFmu("platform", Path("/models/b.fmu"))])
+    own = UserFmu("winch_2", Path("/models/a.fmu"))
+    robot = replace(HALL, winch=Winch(0.1)).with_fmus([own, UserFmu("platform", Path("/models/b.fmu"))])
     assert robot.as_modelled() == HALL
     assert robot.winch_numbers == (1, 2, 3)
     assert HALL.with_fmus([own]).winch_numbers == (2,)
-    again = HALL.with_fmus([own]).with_fmus([OwnFmu("winch_2", Path("/models/c.fmu"))])
-    assert again.fmus == (OwnFmu("winch_2", Path("/models/c.fmu")),)
+    again = HALL.with_fmus([own]).with_fmus([UserFmu("winch_2", Path("/models/c.fmu"))])
+    assert again.fmus == (UserFmu("winch_2", Path("/models/c.fmu")),)
 
 
 def test_with_effect_wins_on_the_cables_that_it_names() -> None:
@@ -125,7 +125,7 @@ def effect_settings(draw: st.DrawFn, cable_count: int) -> list[EffectSetting]:
     drawn = []
     for effect in draw(st.lists(st.sampled_from(ALL), unique=True, max_size=3)):
         numbers = st.fixed_dictionaries({p.name: st.floats(p.minimum, p.maximum) for p in effect.parameters})
-        if effect.component not in PER_CABLE:
+        if effect.component not in PER_CABLE_COMPONENTS:
             drawn.append(EffectSetting(effect.name, draw(numbers)))
             continue
         shares = draw(st.lists(st.integers(0, 2), min_size=cable_count, max_size=cable_count))
@@ -155,7 +155,9 @@ def robots(draw: st.DrawFn) -> Robot:
         cables=tuple(cables),
         effects=tuple(draw(effect_settings(count))),
         winch=draw(st.none() | st.builds(Winch, POSITIVE, POSITIVE, BANDWIDTH, RATIO, LIMIT, LIMIT)),
-        fmus=tuple(OwnFmu(slot, draw(FILES)) for slot in draw(st.lists(st.sampled_from(slots(count)), unique=True))),
+        fmus=tuple(
+            UserFmu(slot, draw(FILES)) for slot in draw(st.lists(st.sampled_from(fmu_slots(count)), unique=True))
+        ),
     )
 
 

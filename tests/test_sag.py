@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.optimize import brentq
 
-from tautwire_fmu.laws.cable import LAWS, CableConstants, CableInputs, CableState, motion, reading, span
+from tautwire_fmu.laws.cable import LAWS, CableConstants, CableInputs, CableState, cable_motion, cable_outputs, span
 from tautwire_fmu.laws.effects import BY_NAME, ActiveEffect
 from tautwire_fmu.laws.mathematics import REAL
 from tautwire_fmu.laws.stages import Route
@@ -90,8 +90,8 @@ def tension_of(effects: tuple[ActiveEffect, ...], unstrained: float, held: float
     own = tuple((held,) + (0.0,) * (len(a.effect.states) - 1) if a.effect.states else () for a in effects)
     state = CableState(unstrained, 0.0, own)
     constants = cable(400.0)
-    moving = motion(REAL, constants, effects, state, span(REAL, constants, STILL, effects), 0.0)
-    return reading(REAL, constants, effects, state, moving).span_tension, moving.arc
+    moving = cable_motion(REAL, constants, effects, state, span(REAL, constants, STILL, effects), 0.0)
+    return cable_outputs(REAL, constants, effects, state, moving).span_tension, moving.arc
 
 
 @pytest.mark.parametrize("shape", [0.0, 1.0])
@@ -99,7 +99,7 @@ def tension_of(effects: tuple[ActiveEffect, ...], unstrained: float, held: float
 def test_tension_is_that_of_the_arc_which_it_makes(shape: float, wound: float) -> None:
     """Against a root sought without any guess of ours; with relaxation, which carries its share of the tension."""
     effects = tuple(
-        ActiveEffect(BY_NAME[name], BY_NAME[name].values(**BY_NAME[name].completed(values)))
+        ActiveEffect(BY_NAME[name], BY_NAME[name].values(**BY_NAME[name].completed_values(values)))
         for name, values in (
             ("sag", {"linear_density": 0.3, "catenary": shape}),
             ("relaxation", {"modulus": 3e10, "time": 1.0}),

@@ -57,7 +57,7 @@ def test_one_design_at_all_places_is_that_design(three: Robot) -> None:
 
 def test_designs_are_made_for_the_places_of_the_path(three: Robot) -> None:
     aim = ControlAim(position=2e-3)
-    scheduled = schedule_controller(three, RISE, aim, places=3)
+    scheduled = schedule_controller(three, RISE, aim, points=3)
     assert scheduled.times == (0.0, 5.0, 10.0) and scheduled.aim == aim and scheduled.cable_count == 3
     assert [plant.position.tolist() for plant in scheduled.plants] == RISE.position(np.array([0.0, 5.0, 10.0])).tolist()
     there = design_controller(three, aim, (28.86, 0.0, 15.0)).regulator

@@ -7,14 +7,14 @@ import pytest
 
 from tautwire.recordings.recording import read_recording
 from tautwire.robots.reading import read_robot
-from tautwire.tracer.data import split
-from tautwire.tracer.directions import Column
+from tautwire.tracer.data import split_data
+from tautwire.tracer.directions import SensitivityColumn
 from tautwire.tracer.fit import Fitter
 from tautwire.tracer.hypotheses import Hypothesis, hypotheses
-from tautwire.tracer.preparation.noise import noise_of
-from tautwire.tracer.ready import readings
-from tautwire.tracer.screen import Signatures, _prospect, screen, screened_apart
-from tautwire.tracer.workers import Workers
+from tautwire.tracer.preparation.noise import estimate_noise
+from tautwire.tracer.ready import prepare_data
+from tautwire.tracer.screen import ScoreStatistics, _predicted_gain, score_test, score_test_in_workers
+from tautwire.tracer.workers import WorkerPool
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.planar import VERTICAL, planar_case
 from tests.recordings import recorded
@@ -22,12 +22,12 @@ from tests.robots import example
 
 ROBOT = example("three")
 RECORDING = recorded("three", 1, {"payload": {"mass": 0.5}})
-NOISE = noise_of(ROBOT, RECORDING)
-SAMPLE = split(ROBOT, NOISE, RECORDING, None).fit
+NOISE = estimate_noise(ROBOT, RECORDING)
+SAMPLE = split_data(ROBOT, NOISE, RECORDING, None).estimation
 
 
 def test_what_is_there_promises_most_and_its_values() -> None:
-    found = screen(ROBOT, (), hypotheses(ROBOT), Fitter(NOISE), SAMPLE)
+    found = score_test(ROBOT, (), hypotheses(ROBOT), Fitter(NOISE), SAMPLE)
     best = max(found, key=lambda hypothesis: found[hypothesis].gain)
     assert best.effect.name == "payload"
     assert found[best].values["mass"] == pytest.approx(0.5, rel=0.05)
@@ -37,9 +37,9 @@ def test_workers_promise_the_same() -> None:
     damped = Hypothesis(BY_NAME["damping"], ROBOT.cable_numbers)
     robot, accepted = ROBOT.with_effect(damped.setting(ROBOT)), (damped,)
     others = [h for h in hypotheses(ROBOT) if not h.overlaps(damped)]
-    here = screen(robot, accepted, others, Fitter(NOISE), SAMPLE)
-    with Workers(2) as workers:
-        apart = screened_apart(robot, accepted, others, Fitter(NOISE), SAMPLE, workers)
+    here = score_test(robot, accepted, others, Fitter(NOISE), SAMPLE)
+    with WorkerPool(2) as workers:
+        apart = score_test_in_workers(robot, accepted, others, Fitter(NOISE), SAMPLE, workers)
     assert list(apart) == list(here)
     for hypothesis, prospect in here.items():
         assert apart[hypothesis].gain == pytest.approx(prospect.gain, rel=1e-6, abs=1e-6)
@@ -50,10 +50,10 @@ def test_far_from_noise_a_rough_look_tells_what_slopes_do_not(tmp_path: Path) ->
     """After a second the oscillations of a platform a fifth lighter are out of phase with the model's."""
     robot_file, fit, check = planar_case(tmp_path, VERTICAL, {"payload": {"mass": -1.0}}, 1, preferred=30.0)
     robot = read_robot(robot_file)
-    with Workers(1) as workers:
-        ready, *_ = readings(robot, read_recording(fit, 4), read_recording(check, 4), workers)
-    sample = ready.evidence.fit.head
-    found = [screen(robot, (), hypotheses(robot), ready.fitter, sample, roughness) for roughness in (0.0, 0.1)]
+    with WorkerPool(1) as workers:
+        ready, *_ = prepare_data(robot, read_recording(fit, 4), read_recording(check, 4), workers)
+    sample = ready.split.estimation.head
+    found = [score_test(robot, (), hypotheses(robot), ready.fitter, sample, roughness) for roughness in (0.0, 0.1)]
     ranks = [sorted(prospects, key=lambda h: -prospects[h].gain) for prospects in found]
     payload = Hypothesis(BY_NAME["payload"], ())
     assert ranks[0].index(payload) > 10
@@ -67,8 +67,8 @@ def test_a_bound_before_the_best_value_leaves_what_the_way_there_gains(best: flo
     least, most = pulley.parameters[0].minimum, pulley.parameters[0].maximum
     assert least == 0.0
     unit = most / 10.0
-    column = Column("pulley", (1,), "radius", 0)
-    signatures = Signatures((column,), np.zeros(1), np.ones((1, 1)), np.array([-best * unit]))
-    found = _prospect(signatures, (), pulley, 0, {})
+    column = SensitivityColumn("pulley", (1,), "radius", 0)
+    signatures = ScoreStatistics((column,), np.zeros(1), np.ones((1, 1)), np.array([-best * unit]))
+    found = _predicted_gain(signatures, (), pulley, 0, {})
     assert found.gain == pytest.approx(kept * 0.5 * (best * unit) ** 2)
     assert found.values["radius"] == pytest.approx(value * unit)

@@ -8,11 +8,11 @@ import pytest
 
 from tautwire.recordings.recording import Recording
 from tautwire.robots.robot import EffectSetting, Robot
-from tautwire.tracer.adequacy import is_noise
-from tautwire.tracer.data import split
+from tautwire.tracer.adequacy import residuals_are_white
+from tautwire.tracer.data import split_data
 from tautwire.tracer.fit import Fitter
-from tautwire.tracer.preparation.noise import noise_of
-from tautwire.tracer.search import Found, search
+from tautwire.tracer.preparation.noise import estimate_noise
+from tautwire.tracer.search import SelectionResult, select_effects
 from tests.recordings import recorded
 from tests.robots import example
 
@@ -25,20 +25,20 @@ def pair(name: str, seed: int, effects: dict[str, Any]) -> tuple[Recording, Reco
     return recorded(name, seed, effects), recorded(name, seed + 50, effects)
 
 
-def found_in(robot: Robot, fit: Recording, check: Recording) -> Found:
-    noise = noise_of(robot, fit)
-    return search(robot, Fitter(noise), split(robot, noise, fit, check), 0.01, quiet)
+def found_in(robot: Robot, fit: Recording, check: Recording) -> SelectionResult:
+    noise = estimate_noise(robot, fit)
+    return select_effects(robot, Fitter(noise), split_data(robot, noise, fit, check), 0.01, quiet)
 
 
-def searched(name: str, seed: int, effects: dict[str, Any]) -> tuple[Found, bool]:
+def searched(name: str, seed: int, effects: dict[str, Any]) -> tuple[SelectionResult, bool]:
     robot = example(name)
     fit, check = pair(name, seed, effects)
-    noise = noise_of(robot, fit)
-    evidence = split(robot, noise, fit, check)
+    noise = estimate_noise(robot, fit)
+    evidence = split_data(robot, noise, fit, check)
     fitter = Fitter(noise)
-    found = search(robot, fitter, evidence, 0.01, quiet)
-    samples = (evidence.fit, evidence.judge)
-    return found, all(is_noise(fitter.innovations(found.fit.robot, s), s.rows) for s in samples)
+    found = select_effects(robot, fitter, evidence, 0.01, quiet)
+    samples = (evidence.estimation, evidence.validation)
+    return found, all(residuals_are_white(fitter.innovations(found.fit.robot, s), s.rows) for s in samples)
 
 
 HIDDEN: list[tuple[str, dict[str, Any]]] = [
@@ -62,7 +62,7 @@ def test_a_hidden_effect_is_named_and_measured(name: str, effects: dict[str, Any
     assert found.accepted[0].cables == cables
     assert noise_is_left
     truth = next(value for key, value in values.items() if key != "cables")
-    assert abs(found.fit.values[0] - truth) < 4.5 * found.fit.deviations[0]
+    assert abs(found.fit.values[0] - truth) < 4.5 * found.fit.standard_deviations[0]
 
 
 @pytest.mark.slow
@@ -94,7 +94,7 @@ def test_tensions_alone_are_enough() -> None:
     fit, check = (replace(r, position=np.full_like(r.position, np.nan)) for r in pair("three", 3, effects))
     found = found_in(robot, fit, check)
     assert [h.effect.name for h in found.accepted] == ["damping"]
-    assert abs(found.fit.values[0] - 9e8) < 4.5 * found.fit.deviations[0]
+    assert abs(found.fit.values[0] - 9e8) < 4.5 * found.fit.standard_deviations[0]
 
 
 @pytest.mark.slow

@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from tautwire.model.symbolic import FreeParameter, Model, symbolic_model
+from tautwire.model.symbolic import FreeParameter, SymbolicModel, symbolic_model
 from tautwire.robots.robot import EffectSetting
-from tautwire.tracer.sensing import sensing, shown_late
+from tautwire.tracer.sensing import delayed_outputs, measurement_model
 from tests.robots import example
 
 DELAYS = {"tension_delay": 0.004, "position_delay": 0.003}
@@ -18,13 +18,13 @@ THETA = np.array([DELAYS["tension_delay"], 2.0, 6e9])
 STEP, SPEEDS, LATER = 0.01, np.array([0.02, -0.01, 0.03]), np.array([0.03, -0.02, 0.02])
 
 
-def model_of(*cables: int) -> Model:
+def model_of(*cables: int) -> SymbolicModel:
     robot = example("three").with_effect(EffectSetting("sensor_delay", DELAYS, cables or (1, 2, 3)))
     robot = robot.with_effect(EffectSetting("payload", {"mass": 2.0}))
     return symbolic_model(robot.with_effect(EffectSetting("damping", {"damping": 6e9}, (1, 2, 3))), FREE)
 
 
-def moving_state(model: Model) -> np.ndarray:
+def moving_state(model: SymbolicModel) -> np.ndarray:
     """Away from rest in every direction, the cables stretched by some newtons."""
     start = np.array(casadi.Function("start", [model.parameters], [model.start])(THETA)).ravel()
     start[3:6] = 0.05, -0.03, 0.04
@@ -32,17 +32,17 @@ def moving_state(model: Model) -> np.ndarray:
     return start
 
 
-def rates_of(model: Model) -> Callable[[float, np.ndarray], np.ndarray]:
+def rates_of(model: SymbolicModel) -> Callable[[float, np.ndarray], np.ndarray]:
     rates = casadi.Function("rates", [model.states, model.inputs, model.parameters], [model.rates])
     slope = (LATER - SPEEDS) / STEP
     return lambda time, state: np.array(rates(state, [*(SPEEDS + time * slope), 0, 0, 0], THETA)).ravel()
 
 
-def past_of(model: Model, state: np.ndarray, ago: float) -> np.ndarray:
+def past_of(model: SymbolicModel, state: np.ndarray, ago: float) -> np.ndarray:
     return solve_ivp(rates_of(model), (0.0, -ago), state, rtol=1e-11, atol=1e-13).y[:, -1]
 
 
-def shown(model: Model, state: np.ndarray) -> np.ndarray:
+def shown(model: SymbolicModel, state: np.ndarray) -> np.ndarray:
     outputs = casadi.vertcat(model.outputs[:3], model.outputs[6:9])
     slope = (LATER - SPEEDS) / STEP
     function = casadi.Function("outputs", [model.states, model.inputs, model.parameters], [outputs])
@@ -55,9 +55,11 @@ def shown(model: Model, state: np.ndarray) -> np.ndarray:
     return np.append(positions[:3], tensions[3:])
 
 
-def sensed(model: Model, state: np.ndarray, theta: np.ndarray = THETA, shift: float = 0.0) -> list[np.ndarray]:
+def sensed(model: SymbolicModel, state: np.ndarray, theta: np.ndarray = THETA, shift: float = 0.0) -> list[np.ndarray]:
     inputs = [*SPEEDS, 0.0, 0.0, 0.0]
-    return [np.array(found) for found in sensing(model, 3)(state, inputs, theta, LATER, STEP, np.full(6, shift))]
+    return [
+        np.array(found) for found in measurement_model(model, 3)(state, inputs, theta, LATER, STEP, np.full(6, shift))
+    ]
 
 
 def test_a_sensor_that_lags_shows_the_past() -> None:
@@ -109,7 +111,7 @@ def test_slopes_are_those_of_what_is_shown() -> None:
 def test_the_expression_is_that_of_the_function() -> None:
     model = model_of()
     later, step, shift = casadi.SX.sym("later", 3), casadi.SX.sym("step"), casadi.SX.sym("shift", 6)
-    expression = shown_late(model, 3, later, step, shift)
+    expression = delayed_outputs(model, 3, later, step, shift)
     function = casadi.Function("late", [model.states, model.inputs, model.parameters, later, step, shift], [expression])
     state = moving_state(model)
     found = np.array(function(state, [*SPEEDS, 0, 0, 0], THETA, LATER, STEP, np.zeros(6)))

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 
 from tautwire.robots.robot import Robot
-from tautwire.tracer.data import Evidence, split
+from tautwire.tracer.data import DataSplit, split_data
 from tautwire.tracer.fit import Fitter
 from tautwire.tracer.hypotheses import Hypothesis, hypotheses
-from tautwire.tracer.preparation.noise import noise_of
-from tautwire.tracer.separation import separation
-from tautwire.tracer.verdict import Detectable, Separation
+from tautwire.tracer.preparation.noise import estimate_noise
+from tautwire.tracer.separation import analyse_identifiability
+from tautwire.tracer.verdict import Detectable, Identifiability
 from tautwire_fmu.laws.effects import DAMPING, MODULUS, PAYLOAD, RELAXATION, SLACK
 from tests.recordings import recorded
 from tests.robots import example
@@ -20,14 +20,16 @@ THREE = example("three")
 ALL = (1, 2, 3)
 
 
-def shown_by(robot: Robot, effects: dict[str, dict[str, float]], seed: int) -> tuple[Separation, Fitter, Evidence]:
+def shown_by(
+    robot: Robot, effects: dict[str, dict[str, float]], seed: int
+) -> tuple[Identifiability, Fitter, DataSplit]:
     fit, check = recorded("three", seed, effects), recorded("three", seed + 50, effects)
-    noise = noise_of(robot, fit)
-    evidence, fitter = split(robot, noise, fit, check), Fitter(noise)
-    return separation(robot, robot, (), fitter, evidence.judge, 0.01), fitter, evidence
+    noise = estimate_noise(robot, fit)
+    evidence, fitter = split_data(robot, noise, fit, check), Fitter(noise)
+    return analyse_identifiability(robot, robot, (), fitter, evidence.validation, 0.01), fitter, evidence
 
 
-def size_of(found: Separation, name: str, parameter: str) -> Detectable:
+def size_of(found: Identifiability, name: str, parameter: str) -> Detectable:
     return next(d for d in found.detectable if (d.name, d.parameter) == (name, parameter) and d.cables in ((), ALL))
 
 
@@ -40,9 +42,9 @@ def test_an_effect_of_that_size_gains_what_the_threshold_asks_for() -> None:
     for seed in (12, 13, 14, 15):
         _, fitter, evidence = shown_by(THREE, {"payload": {"mass": size.size}}, seed)
         start = THREE.with_effect(hypothesis.setting(THREE))
-        fit = fitter.fit(start, [hypothesis], evidence.fit)
-        whole = fitter.judged(fit.robot, [hypothesis], evidence.judge).log_likelihood(evidence.judge.rows)
-        without = fitter.innovations(THREE, evidence.judge).log_likelihood(evidence.judge.rows)
+        fit = fitter.fit(start, [hypothesis], evidence.estimation)
+        whole = fitter.judged(fit.robot, [hypothesis], evidence.validation).log_likelihood(evidence.validation.rows)
+        without = fitter.innovations(THREE, evidence.validation).log_likelihood(evidence.validation.rows)
         gains.append(whole - without)
     # 1.28 standard deviations of sqrt(2 gain) above the threshold on average, which is the power asked for.
     expected = sqrt(2.0 * threshold) + 1.28
@@ -56,28 +58,30 @@ def test_sizes_are_given_for_every_effect_and_never_beyond_its_bounds() -> None:
     assert size_of(found, "payload", "mass").size < 1.0
 
 
-def separation_beside(hypothesis: Hypothesis, value: float) -> Separation:
+def separation_beside(hypothesis: Hypothesis, value: float) -> Identifiability:
     """Of recordings that hide an effect of one parameter, by the model that has it."""
     (name,) = hypothesis.form
     fit, check = (recorded("three", seed, {hypothesis.effect.name: {name: value}}) for seed in (3, 53))
-    noise = noise_of(THREE, fit)
+    noise = estimate_noise(THREE, fit)
     robot = THREE.with_effect(hypothesis.setting(THREE, {name: value}))
-    return separation(robot, THREE, [hypothesis], Fitter(noise), split(THREE, noise, fit, check).judge, 0.01)
+    return analyse_identifiability(
+        robot, THREE, [hypothesis], Fitter(noise), split_data(THREE, noise, fit, check).validation, 0.01
+    )
 
 
 def test_relaxation_that_is_fast_looks_like_damping_and_payload_does_not() -> None:
     found = separation_beside(Hypothesis(DAMPING, ALL), 9e8)
-    alike = {(each.other, each.other_cables): each for each in found.alike}
+    alike = {(each.other, each.other_cables): each for each in found.confusable}
     assert alike[RELAXATION.name, ALL].cosine > 0.95
     assert (PAYLOAD.name, ()) not in alike
     assert (DAMPING.name, ALL) not in alike
-    assert all(0.9 <= each.cosine <= 1.0 and each.nats >= 0.0 for each in found.alike)
+    assert all(0.9 <= each.cosine <= 1.0 and each.nats >= 0.0 for each in found.confusable)
 
 
 def test_slow_relaxation_can_hardly_be_told_from_modulus() -> None:
     found = separation_beside(Hypothesis(MODULUS, ALL), 1.12e11)
-    assert found.alike[0].other == RELAXATION.name
-    assert found.alike[0].cosine > 0.999
+    assert found.confusable[0].other == RELAXATION.name
+    assert found.confusable[0].cosine > 0.999
 
 
 def test_a_size_that_slopes_cannot_see_is_found_by_runs() -> None:
@@ -88,7 +92,9 @@ def test_a_size_that_slopes_cannot_see_is_found_by_runs() -> None:
     gains = []
     for share in (1.0, 0.5):
         _, fitter, evidence = shown_by(THREE, {"slack": {"softness": share * size}}, 12)
-        without = fitter.innovations(THREE, evidence.judge).log_likelihood(evidence.judge.rows)
+        without = fitter.innovations(THREE, evidence.validation).log_likelihood(evidence.validation.rows)
         true = THREE.with_effect(hypothesis.setting(THREE, {"softness": share * size}))
-        gains.append(fitter.judged(true, [hypothesis], evidence.judge).log_likelihood(evidence.judge.rows) - without)
+        gains.append(
+            fitter.judged(true, [hypothesis], evidence.validation).log_likelihood(evidence.validation.rows) - without
+        )
     assert gains[0] > threshold > 5.0 * gains[1]

@@ -21,7 +21,7 @@ from tautwire.control import (
     shaper,
     shaper_for_modes,
 )
-from tautwire.control.shaping import Kind
+from tautwire.control.shaping import ShaperKind
 from tautwire.errors import InputError
 from tautwire.fmus.packaging import RobotFmus
 from tautwire.trajectory import Line, Trajectory
@@ -50,37 +50,37 @@ def energy_after(impulses: Shaper, frequency: float, damping_ratio: float) -> fl
 
 @pytest.mark.parametrize("damping_ratio", [0.0, 0.014, 0.2])
 @pytest.mark.parametrize("kind", ["ZV", "ZVD"])
-def test_no_swing_is_left_at_the_frequency_that_was_meant(kind: Kind, damping_ratio: float) -> None:
+def test_no_swing_is_left_at_the_frequency_that_was_meant(kind: ShaperKind, damping_ratio: float) -> None:
     impulses = shaper(1.2, damping_ratio, kind)
     assert np.sum(impulses.amplitudes) == pytest.approx(1.0)
-    assert impulses.residual(1.2, damping_ratio) == pytest.approx(0.0, abs=1e-12)
+    assert impulses.residual_vibration(1.2, damping_ratio) == pytest.approx(0.0, abs=1e-12)
     assert energy_after(impulses, 1.2, damping_ratio) == pytest.approx(0.0, abs=1e-20)
 
 
 @pytest.mark.parametrize("damping_ratio", [0.0, 0.05])
 @pytest.mark.parametrize("kind", ["ZV", "ZVD", "EI"])
-def test_residual_is_the_swing_of_a_mode_after_the_last_impulse(kind: Kind, damping_ratio: float) -> None:
+def test_residual_is_the_swing_of_a_mode_after_the_last_impulse(kind: ShaperKind, damping_ratio: float) -> None:
     impulses = shaper(1.2, damping_ratio, kind)
     for frequency in (0.9, 1.2, 1.5):
         expected = np.sqrt(energy_after(impulses, frequency, damping_ratio))
-        assert impulses.residual(frequency, damping_ratio) == pytest.approx(expected, abs=1e-9)
+        assert impulses.residual_vibration(frequency, damping_ratio) == pytest.approx(expected, abs=1e-9)
 
 
 def test_shapers_are_as_robust_as_the_textbook_says() -> None:
     near = np.array([1.0 - 1e-3, 1.0 + 1e-3])
     slope = np.pi / 2.0 * 1e-3
-    assert shaper(1.0, kind="ZV").residual(near) == pytest.approx(slope, rel=1e-3)
-    assert shaper(1.0, kind="ZVD").residual(near) == pytest.approx(slope**2, rel=1e-2)
-    assert shaper(1.0, kind="EI").residual(1.0) == pytest.approx(0.05)
+    assert shaper(1.0, kind="ZV").residual_vibration(near) == pytest.approx(slope, rel=1e-3)
+    assert shaper(1.0, kind="ZVD").residual_vibration(near) == pytest.approx(slope**2, rel=1e-2)
+    assert shaper(1.0, kind="EI").residual_vibration(1.0) == pytest.approx(0.05)
     # Bands with less than 5 per cent left: 6, 29 and 40 per cent of the frequency.
     around = np.linspace(0.6, 1.4, 8001)
-    bands = [np.ptp(around[shaper(1.0, kind=kind).residual(around) < 0.0501]) for kind in ("ZV", "ZVD", "EI")]
+    bands = [np.ptp(around[shaper(1.0, kind=kind).residual_vibration(around) < 0.0501]) for kind in ("ZV", "ZVD", "EI")]
     assert bands == pytest.approx([0.064, 0.287, 0.399], abs=2e-3)
 
 
 def test_an_unknown_kind_is_refused() -> None:
     with pytest.raises(InputError, match="'ZVDD' is no shaper; choose among ZV, ZVD, EI"):
-        shaper(1.0, 0.0, cast(Kind, "ZVDD"))
+        shaper(1.0, 0.0, cast(ShaperKind, "ZVDD"))
 
 
 def test_shaper_for_three_modes_has_no_swing_in_any() -> None:
@@ -89,11 +89,11 @@ def test_shaper_for_three_modes_has_no_swing_in_any() -> None:
     assert len(impulses.amplitudes) == 8
     assert np.max(impulses.delays) == pytest.approx(np.sum(0.5 / (frequencies * np.sqrt(1.0 - ratios**2))))
     for frequency, ratio in zip(frequencies, ratios, strict=True):
-        assert impulses.residual(frequency, ratio) == pytest.approx(0.0, abs=1e-12)
+        assert impulses.residual_vibration(frequency, ratio) == pytest.approx(0.0, abs=1e-12)
 
 
 def test_motion_of_a_shaped_path_is_consistent_and_a_line_stays_one() -> None:
-    path = shape_along(paper_robot(damping=4e8), PATH, "ZVD", places=4)
+    path = shape_along(paper_robot(damping=4e8), PATH, "ZVD", points=4)
     assert np.ptp(path.delays[:, -1]) > 1e-3
     times = np.linspace(-0.5, path.duration + 1.0, 60001)
     position, velocity, acceleration = path.position(times), path.velocity(times), path.acceleration(times)

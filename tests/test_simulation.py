@@ -9,9 +9,9 @@ import pyarrow.parquet as pq
 import pytest
 
 from tautwire.errors import RecordingError
-from tautwire.master.watch import PATIENCE
+from tautwire.master.watch import CALL_TIMEOUT
 from tautwire.runs import result_file
-from tautwire.runs.result_file import result_in_place
+from tautwire.runs.result_file import open_result_file
 from tautwire.runs.simulation import simulate_recording
 from tautwire.runs.wiring import result_columns
 from tests.bench.long import STEP, write_recording
@@ -58,7 +58,7 @@ def test_memory_stays_flat_over_a_long_run(tmp_path: Path, monkeypatch: pytest.M
         if int(100.0 * done) not in seen:
             seen[int(100.0 * done)] = sum(resident_memory())
 
-    with result_in_place(tmp_path / "result.parquet", result_columns(3)) as rows:
-        simulate_recording(example("three"), tmp_path / "recording.parquet", rows, STEP, None, None, look, PATIENCE)
+    with open_result_file(tmp_path / "result.parquet", result_columns(3)) as rows:
+        simulate_recording(example("three"), tmp_path / "recording.parquet", rows, STEP, None, None, look, CALL_TIMEOUT)
     assert pq.read_metadata(tmp_path / "result.parquet").num_rows == 8_001
     assert seen[100] < seen[20] + 1.0

@@ -11,9 +11,16 @@ import fmpy
 import pytest
 
 from tautwire.errors import InputError
-from tautwire.fmus.packaging import RobotFmus, build_fmus, gathered
-from tautwire.fmus.slots import SlotError, check_own_fmus, own_fmus, require_steps, slot_ports, unstated_units
-from tautwire.robots.robot import OwnFmu, slots
+from tautwire.fmus.packaging import RobotFmus, build_fmus, with_user_fmus_copied
+from tautwire.fmus.slots import (
+    SlotError,
+    check_user_fmus,
+    notes_on_unstated_units,
+    parse_user_fmus,
+    require_step_support,
+    slot_ports,
+)
+from tautwire.robots.robot import UserFmu, fmu_slots
 from tests.own_fmus import falling_mass, packed, packed_3
 from tests.robots import paper_robot
 
@@ -30,7 +37,7 @@ SINGLE = COMMAND_3.replace("Float64", "Float32").replace('declaredType="Speed" '
 def refused(path: Path, slot: str = "winch_2") -> SlotError:
     """The error about an FMU in a slot, after checking what every such error has."""
     with pytest.raises(SlotError) as caught:
-        check_own_fmus(replace(paper_robot(), fmus=(OwnFmu(slot, path),)))
+        check_user_fmus(replace(paper_robot(), fmus=(UserFmu(slot, path),)))
     error = caught.value
     assert str(error).startswith(f"{path}: ")
     assert f"the FMU {slot}" in str(error)
@@ -39,19 +46,19 @@ def refused(path: Path, slot: str = "winch_2") -> SlotError:
 
 
 def test_our_own_fmus_fit_their_slots(three_fmus: RobotFmus, winch_fmus: RobotFmus) -> None:
-    for slot, path in winch_fmus.parts.items():
-        check_own_fmus(replace(paper_robot(), fmus=(OwnFmu(slot, path),)))
+    for slot, path in winch_fmus.by_component.items():
+        check_user_fmus(replace(paper_robot(), fmus=(UserFmu(slot, path),)))
         variables = {v.name: v for v in fmpy.read_model_description(str(path)).modelVariables}
         for port in slot_ports(slot, 3):
             assert (variables[port.name].causality, variables[port.name].unit) == (port.causality, port.unit)
 
 
 def test_a_plain_platform_without_units_fits(tmp_path: Path) -> None:
-    check_own_fmus(replace(paper_robot(), fmus=(OwnFmu("platform", falling_mass(tmp_path)),)))
+    check_user_fmus(replace(paper_robot(), fmus=(UserFmu("platform", falling_mass(tmp_path)),)))
 
 
 def test_a_unit_by_another_name_is_the_same_unit(tmp_path: Path) -> None:
-    check_own_fmus(replace(paper_robot(), fmus=(OwnFmu("winch_2", packed(tmp_path / "a.fmu", b"")),)))
+    check_user_fmus(replace(paper_robot(), fmus=(UserFmu("winch_2", packed(tmp_path / "a.fmu", b"")),)))
 
 
 @pytest.mark.parametrize(
@@ -91,13 +98,13 @@ def test_so_is_one_of_an_fmi_3_fmu(tmp_path: Path, change: Mapping[str, str], po
 
 
 def test_an_fmi_3_fmu_fits(tmp_path: Path) -> None:
-    own = OwnFmu("winch_2", packed_3(tmp_path / "a.fmu", b""))
-    check_own_fmus(replace(paper_robot(), fmus=(own,)))
-    assert unstated_units((own,), 3) == ()
-    require_steps({"winch_2": own.path}, chosen=True, even=False)
+    own = UserFmu("winch_2", packed_3(tmp_path / "a.fmu", b""))
+    check_user_fmus(replace(paper_robot(), fmus=(own,)))
+    assert notes_on_unstated_units((own,), 3) == ()
+    require_step_support({"winch_2": own.path}, adaptive=True, equidistant=False)
     fixed = packed_3(tmp_path / "b.fmu", b"", {'canGetAndSetFMUState="true"': ""})
     with pytest.raises(SlotError, match="cannot save its state"):
-        require_steps({"winch_2": fixed}, chosen=True, even=False)
+        require_step_support({"winch_2": fixed}, adaptive=True, equidistant=False)
 
 
 def test_what_is_no_fmu_for_this_machine_is_refused(tmp_path: Path) -> None:
@@ -119,7 +126,7 @@ def test_other_kinds_and_machines_are_named(tmp_path: Path) -> None:
     assert "model exchange only" in str(refused(exchange))
     later = packed_3(tmp_path / "b.fmu", b"", {'fmiVersion="3.0"': 'fmiVersion="3.1"'})
     assert refused(later).problem == "cannot be the FMU winch_2: it is FMI 3.1"
-    assert refused(later).mend == "export it as FMI 2.0 or 3.0 co-simulation"
+    assert refused(later).hint == "export it as FMI 2.0 or 3.0 co-simulation"
     step_3 = 'canHandleVariableCommunicationStepSize="true" canGetAndSetFMUState="true"'
     scheduled = packed_3(tmp_path / "d.fmu", b"", {"CoSimulation": "ScheduledExecution", step_3: ""})
     assert "scheduled execution only" in str(refused(scheduled))
@@ -130,25 +137,25 @@ def test_other_kinds_and_machines_are_named(tmp_path: Path) -> None:
 def test_an_fmu_for_one_instance_takes_one_slot(tmp_path: Path) -> None:
     single = {'canGetAndSetFMUstate="true"': 'canBeInstantiatedOnlyOncePerProcess="true"'}
     path = packed(tmp_path / "a.fmu", b"", single)
-    check_own_fmus(replace(paper_robot(), fmus=(OwnFmu("winch_1", path),)))
+    check_user_fmus(replace(paper_robot(), fmus=(UserFmu("winch_1", path),)))
     with pytest.raises(SlotError, match="slot winch_1 and can be instantiated only once"):
-        check_own_fmus(replace(paper_robot(), fmus=(OwnFmu("winch_1", path), OwnFmu("winch_3", path))))
+        check_user_fmus(replace(paper_robot(), fmus=(UserFmu("winch_1", path), UserFmu("winch_3", path))))
 
 
 def test_users_fmus_are_copied_beside_ours_as_they_are(tmp_path: Path) -> None:
     own = packed(tmp_path / "mine.fmu", b"library")
-    fmus = build_fmus(replace(paper_robot(), fmus=(OwnFmu("winch_2", own),)), tmp_path / "out")
-    assert fmus.parts["winch_2"] == own
-    fmus = gathered(fmus, tmp_path / "out")
+    fmus = build_fmus(replace(paper_robot(), fmus=(UserFmu("winch_2", own),)), tmp_path / "out")
+    assert fmus.by_component["winch_2"] == own
+    fmus = with_user_fmus_copied(fmus, tmp_path / "out")
     assert fmus.winches == (None, tmp_path / "out" / "winch_2.fmu", None)
-    assert set(fmus.own) == {"winch_2"}
-    assert fmus.parts["winch_2"].read_bytes() == own.read_bytes()
-    assert list(fmus.parts) == ["platform", "winch_2", "cable_1", "cable_2", "cable_3"]
+    assert set(fmus.user_start_values) == {"winch_2"}
+    assert fmus.by_component["winch_2"].read_bytes() == own.read_bytes()
+    assert list(fmus.by_component) == ["platform", "winch_2", "cable_1", "cable_2", "cable_3"]
 
 
 def test_the_command_lines_fmus_are_slots_and_files() -> None:
-    given = own_fmus(["platform=a=b.fmu", "cable_2=c.fmu"], 3)
-    assert given == (OwnFmu("platform", Path("a=b.fmu")), OwnFmu("cable_2", Path("c.fmu")))
+    given = parse_user_fmus(["platform=a=b.fmu", "cable_2=c.fmu"], 3)
+    assert given == (UserFmu("platform", Path("a=b.fmu")), UserFmu("cable_2", Path("c.fmu")))
 
 
 @pytest.mark.parametrize(
@@ -162,8 +169,8 @@ def test_the_command_lines_fmus_are_slots_and_files() -> None:
 )
 def test_what_is_no_slot_is_refused(given: list[str], words: str) -> None:
     with pytest.raises(InputError, match=words):
-        own_fmus(given, 3)
+        parse_user_fmus(given, 3)
 
 
 def test_slots_are_platform_cables_and_winches() -> None:
-    assert slots(2) == ("platform", "cable_1", "cable_2", "winch_1", "winch_2")
+    assert fmu_slots(2) == ("platform", "cable_1", "cable_2", "winch_1", "winch_2")

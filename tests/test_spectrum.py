@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tautwire.tracer.discovery.spectrum import rhythms
+from tautwire.tracer.discovery.spectrum import spectral_lines
 from tautwire.tracer.likelihood import Innovations
 
 TIME = np.arange(1500) / 50.0
@@ -19,17 +19,17 @@ def innovations(seed: int, *lines: tuple[float, float]) -> Innovations:
 
 
 def test_lines_are_found_strongest_first() -> None:
-    found = rhythms(TIME, innovations(1, (1.713, 1.0), (4.2, 2.0)), EVERY)
+    found = spectral_lines(TIME, innovations(1, (1.713, 1.0), (4.2, 2.0)), EVERY)
     assert [pace / (2.0 * np.pi) for pace in found] == pytest.approx([4.2, 1.713], abs=0.01)
 
 
 @pytest.mark.parametrize("seed", range(10))
 def test_noise_has_none(seed: int) -> None:
-    assert rhythms(TIME, innovations(seed), EVERY) == []
+    assert spectral_lines(TIME, innovations(seed), EVERY) == []
 
 
 def test_samples_that_do_not_count_are_not_looked_at() -> None:
     mixed = innovations(2)
     mixed.values[750:, 0] += 3.0 * np.sin(2.0 * np.pi * 3.0 * TIME[750:])
-    assert rhythms(TIME, mixed, TIME < 15.0) == []
-    assert len(rhythms(TIME, mixed, TIME >= 15.0)) == 1
+    assert spectral_lines(TIME, mixed, TIME < 15.0) == []
+    assert len(spectral_lines(TIME, mixed, TIME >= 15.0)) == 1

@@ -15,15 +15,15 @@ from lxml import etree
 from tautwire.errors import InputError
 from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.robots.robot import EffectSetting
-from tautwire.runs.ssp import COMPONENTS_ONLY, OPEN, ssp_name, write_ssp
-from tautwire.runs.wiring import connections, shown_ports, winch_ports
+from tautwire.runs.ssp import COMPONENTS_ONLY, SYSTEM_STRUCTURE, ssp_name, write_ssp
+from tautwire.runs.wiring import recorded_ports, robot_connections, winch_input_ports
 from tautwire_fmu.units import UNITS
 from tests.robots import paper_robot
 
 SSD = "{http://ssp-standard.org/SSP1/SystemStructureDescription}"
 SSC = "{http://ssp-standard.org/SSP1/SystemStructureCommon}"
 SSV = "{http://ssp-standard.org/SSP1/SystemStructureParameterValues}"
-STRUCTURES = (OPEN, COMPONENTS_ONLY)
+STRUCTURES = (SYSTEM_STRUCTURE, COMPONENTS_ONLY)
 
 
 @pytest.fixture(scope="module")
@@ -56,24 +56,26 @@ def test_fmpy_reads_it(archive: Path) -> None:
 
 
 def test_components_are_wired_as_the_master_wires_them(archive: Path) -> None:
-    expected = {(w.source.component, w.source.variable, w.target.component, w.target.variable) for w in connections(3)}
+    expected = {
+        (w.source.component, w.source.variable, w.target.component, w.target.variable) for w in robot_connections(3)
+    }
     assert wires(structure(archive, COMPONENTS_ONLY)) == expected
-    assert expected < wires(structure(archive, OPEN))
+    assert expected < wires(structure(archive, SYSTEM_STRUCTURE))
 
 
 def test_winches_come_in_and_what_a_run_shows_goes_out(archive: Path) -> None:
-    outer = wires(structure(archive, OPEN)) - wires(structure(archive, COMPONENTS_ONLY))
+    outer = wires(structure(archive, SYSTEM_STRUCTURE)) - wires(structure(archive, COMPONENTS_ONLY))
     inward = {(end, variable) for start, _, end, variable in outer if start is None}
     outward = {(start, variable) for start, variable, end, _ in outer if end is None}
-    assert inward == {(port.component, port.variable) for port in winch_ports(3)}
-    assert outward == {(port.component, port.variable) for port in shown_ports(3)}
+    assert inward == {(port.component, port.variable) for port in winch_input_ports(3)}
+    assert outward == {(port.component, port.variable) for port in recorded_ports(3)}
     assert {("cable_2", "tension", None, "tension_2"), ("platform", "position.z", None, "position.z")} < outer
 
 
 def test_connectors_are_those_of_the_fmus_inside(archive: Path, tmp_path: Path) -> None:
     with zipfile.ZipFile(archive) as packed:
         packed.extractall(tmp_path)
-    for component in structure(archive, OPEN).iter(f"{SSD}Component"):
+    for component in structure(archive, SYSTEM_STRUCTURE).iter(f"{SSD}Component"):
         description = fmpy.read_model_description(str(tmp_path / component.get("source")))
         variables = {v.name: (v.causality, v.unit) for v in description.modelVariables}
         connectors = component.findall(f"{SSD}Connectors/{SSD}Connector")

@@ -15,7 +15,7 @@ ANCHOR = (1.0, -2.0, 6.0)
 
 def active(name: str, **values: float) -> ActiveEffect:
     effect = BY_NAME[name]
-    return ActiveEffect(effect, effect.values(**effect.completed(values)))
+    return ActiveEffect(effect, effect.values(**effect.completed_values(values)))
 
 
 def stretched(position: np.ndarray, radius: float) -> tuple[np.ndarray, float]:
@@ -92,17 +92,17 @@ def test_straight_under_the_exit_point_the_pulley_hangs_no_way_at_all() -> None:
 
 def test_gains_multiply_and_delays_add() -> None:
     twice = (active("sensor_gain", tension_gain=1.5), active("sensor_gain", tension_gain=2.0, position_gain=0.5))
-    assert stages.gains(REAL, twice) == (3.0, 0.5)
+    assert stages.sensor_gains(REAL, twice) == (3.0, 0.5)
     late = (active("sensor_delay", tension_delay=0.1), active("sensor_delay", tension_delay=0.2, position_delay=0.4))
-    assert stages.delays(REAL, late) == pytest.approx((0.3, 0.4))
+    assert stages.sensor_delays(REAL, late) == pytest.approx((0.3, 0.4))
 
 
 def test_a_soft_rope_keeps_its_start_tension_and_never_pushes() -> None:
     cable = type("Cable", (), {"start_tension": 250.0})
     soft = (active("slack", softness=100.0),)
-    assert stages.carried(REAL, soft, cable, 250.0) == pytest.approx(250.0, rel=1e-14)
+    assert stages.carried_tension(REAL, soft, cable, 250.0) == pytest.approx(250.0, rel=1e-14)
     pulls = np.linspace(-3000.0, 3000.0, 101)
-    tensions = np.array([stages.carried(REAL, soft, cable, float(pull)) for pull in pulls])
+    tensions = np.array([stages.carried_tension(REAL, soft, cable, float(pull)) for pull in pulls])
     assert np.all(tensions > 0.0)
     assert np.all(np.diff(tensions) > 0.0)
     expected = 100.0 * np.logaddexp(0.0, (pulls + 100.0 * np.log1p(-np.exp(-2.5))) / 100.0)

@@ -8,11 +8,11 @@ import pytest
 from tautwire.model.symbolic import symbolic_model
 from tautwire.recordings.recording import Recording
 from tautwire.robots.reading import read_robot, robot_text, write_robot
-from tautwire.robots.robot import Release
+from tautwire.robots.robot import InitialState
 from tautwire.statics.equilibrium import static_tensions
 from tautwire.tracer.filter_step import Noise
-from tautwire.tracer.preparation.noise import noise_of
-from tautwire.tracer.preparation.start_state import self_stress_of, self_stresses, start_covariance
+from tautwire.tracer.preparation.noise import estimate_noise
+from tautwire.tracer.preparation.start_state import initial_covariance, self_stress_deviation, self_stress_projection
 from tests.recordings import recorded
 from tests.robots import example
 
@@ -25,18 +25,20 @@ def blind(name: str) -> Recording:
 
 
 def test_a_start_at_rest_is_known_to_the_sensors_noise() -> None:
-    noise = noise_of(THREE, recorded("three", 1))
-    covariance = start_covariance(THREE, noise, 9)
-    assert covariance == pytest.approx(np.diag([*[noise.start**2] * 3, *[0.0] * 3, *[noise.start**2] * 3]))
+    noise = estimate_noise(THREE, recorded("three", 1))
+    covariance = initial_covariance(THREE, noise, 9)
+    assert covariance == pytest.approx(
+        np.diag([*[noise.start_position**2] * 3, *[0.0] * 3, *[noise.start_position**2] * 3])
+    )
 
 
 def test_three_cables_have_no_tension_that_holds_nothing() -> None:
-    assert self_stresses(THREE) == pytest.approx(np.zeros((3, 3)), abs=1e-9)
-    assert self_stress_of(THREE, (blind("three"),)) == (0.0, ())
+    assert self_stress_projection(THREE) == pytest.approx(np.zeros((3, 3)), abs=1e-9)
+    assert self_stress_deviation(THREE, (blind("three"),)) == (0.0, ())
 
 
 def test_tensions_that_hold_nothing_pull_nowhere() -> None:
-    stresses = self_stresses(EIGHT)
+    stresses = self_stress_projection(EIGHT)
     assert np.linalg.matrix_rank(stresses, tol=1e-6) == 5
     unit = np.array(EIGHT.anchors) - EIGHT.platform.start
     unit /= np.linalg.norm(unit, axis=1, keepdims=True)
@@ -44,21 +46,21 @@ def test_tensions_that_hold_nothing_pull_nowhere() -> None:
 
 
 def test_lengths_are_uncertain_by_what_such_tensions_stretch() -> None:
-    covariance = start_covariance(EIGHT, Noise(1e-4, 1.0, 1e-5, 0.0, self_stress=30.0), 14)[6:, 6:]
+    covariance = initial_covariance(EIGHT, Noise(1e-4, 1.0, 1e-5, 0.0, self_stress=30.0), 14)[6:, 6:]
     stiffness = [c.modulus * c.area / np.linalg.norm(np.subtract(c.anchor, EIGHT.platform.start)) for c in EIGHT.cables]
     tensions = np.diag(stiffness) @ covariance @ np.diag(stiffness)
-    assert tensions == pytest.approx(900.0 * self_stresses(EIGHT), abs=1e-6)
+    assert tensions == pytest.approx(900.0 * self_stress_projection(EIGHT), abs=1e-6)
 
 
 def test_pretension_is_uncertain_where_no_tension_is_measured_or_the_file_says_so() -> None:
-    assert self_stress_of(EIGHT, (recorded("eight", 1),)) == (0.0, ())
-    unseen, notes = self_stress_of(EIGHT, (blind("eight"),))
+    assert self_stress_deviation(EIGHT, (recorded("eight", 1),)) == (0.0, ())
+    unseen, notes = self_stress_deviation(EIGHT, (blind("eight"),))
     assert unseen == pytest.approx(0.25 * np.mean(static_tensions(EIGHT)))
     assert "no tensions are measured" in notes[0]
     assert EIGHT.tension is not None
     told = replace(EIGHT, tension=replace(EIGHT.tension, preferred_uncertainty=12.0))
-    assert self_stress_of(told, (recorded("eight", 1),))[0] == 12.0
-    assert self_stress_of(replace(told, tension=replace(EIGHT.tension, preferred_uncertainty=0.0)), ())[0] == 0.0
+    assert self_stress_deviation(told, (recorded("eight", 1),))[0] == 12.0
+    assert self_stress_deviation(replace(told, tension=replace(EIGHT.tension, preferred_uncertainty=0.0)), ())[0] == 0.0
 
 
 def test_a_robot_file_may_tell_how_uncertain_its_pretension_is(tmp_path: Path) -> None:
@@ -70,8 +72,8 @@ def test_a_robot_file_may_tell_how_uncertain_its_pretension_is(tmp_path: Path) -
 
 
 def test_a_release_begins_with_its_velocity_and_tensions() -> None:
-    release = Release((0.1, -0.2, 0.3), (10.0, -5.0, 2.0))
-    model = symbolic_model(replace(THREE, release=release))
+    release = InitialState((0.1, -0.2, 0.3), (10.0, -5.0, 2.0))
+    model = symbolic_model(replace(THREE, initial_state=release))
     start = np.array(casadi.Function("start", [], [model.start])()["o0"]).ravel()
     assert start[3:6] == pytest.approx(release.velocity)
     still = start.copy()

@@ -6,14 +6,14 @@ from scipy.optimize import minimize
 
 from tautwire.errors import UnreachableError
 from tautwire.robots.robot import EffectSetting, TensionLimits
-from tautwire.statics.equilibrium import directions, static_tensions
+from tautwire.statics.equilibrium import static_tensions, unit_directions
 from tests.robots import NAMES, example, paper_robot
 
 
 @pytest.mark.parametrize("name", NAMES)
 def test_tensions_hold_the_weight(name: str) -> None:
     robot = example(name)
-    held = directions(robot) @ static_tensions(robot)
+    held = unit_directions(robot) @ static_tensions(robot)
     assert held == pytest.approx([0.0, 0.0, robot.platform.mass * robot.gravity], abs=1e-8)
 
 
@@ -34,7 +34,7 @@ def test_more_cables_stay_as_near_to_the_preferred_tension_as_limits_allow(
     tensions = static_tensions(robot)
     assert np.all(tensions >= minimum - 1e-9)
     assert np.all(tensions <= maximum + 1e-9)
-    unit, load = directions(robot), np.array([0.0, 0.0, robot.platform.mass * robot.gravity])
+    unit, load = unit_directions(robot), np.array([0.0, 0.0, robot.platform.mass * robot.gravity])
     other = minimize(
         lambda t: float(np.sum((t - preferred) ** 2)),
         np.full(8, preferred),

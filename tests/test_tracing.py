@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tautwire.runs.cosimulation import Motion, cosimulate
+from tautwire.runs.cosimulation import CosimulationResult, cosimulate
 from tautwire.tracer import Trace, trace
-from tautwire.tracer.cosimulated import errors
+from tautwire.tracer.cosimulated import cosimulation_errors
 from tests.recordings import recorded
 from tests.robots import example
 
@@ -25,7 +25,7 @@ def test_the_rebuilt_fmus_give_the_error_after() -> None:
     found = traced()
     assert found.verdict == "effects"
     for comparison in found.comparisons:
-        again = errors(comparison.recording, comparison.after)
+        again = cosimulation_errors(comparison.recording, comparison.after)
         assert again.tension_rms == comparison.errors_after.tension_rms
         assert again.tension_rms < 1.2 * found.noise_floor.tension_rms < comparison.errors_before.tension_rms
     assert found.robot_after.effects[0].name == "damping"
@@ -47,7 +47,7 @@ def test_what_was_found_comes_with_its_correlations() -> None:
 def test_no_name_is_given_where_the_rebuilt_fmus_miss_the_recording(monkeypatch: pytest.MonkeyPatch) -> None:
     runs = []
 
-    def astray(*arguments: Any, **options: Any) -> Motion:
+    def astray(*arguments: Any, **options: Any) -> CosimulationResult:
         motion = cosimulate(*arguments, **options)
         runs.append(motion)
         return replace(motion, position=motion.position + 0.01) if len(runs) > 2 else motion

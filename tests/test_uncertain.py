@@ -11,7 +11,7 @@ import pytest
 from casadi import DM
 
 from tautwire.model.symbolic import symbolic_model
-from tautwire.model.uncertain import offsets, uncertain_numbers, with_moves
+from tautwire.model.uncertain import perturbed_robot, sensor_offsets, uncertain_parameters
 from tautwire.recordings.recording import Recording
 from tautwire.robots.reading import read_robot
 from tautwire.robots.robot import Robot
@@ -46,28 +46,30 @@ def test_a_robot_file_states_them_and_reads_back(tmp_path: Path) -> None:
     robot = replace(robot, sensors=replace(robot.sensors, position_offset_uncertainty=1e-3))
     (tmp_path / "robot.toml").write_text(robot_text(robot), encoding="utf-8")
     assert read_robot(tmp_path / "robot.toml") == robot
-    assert len(uncertain_numbers(robot)) == 1 + 3 * 3 + 3
+    assert len(uncertain_parameters(robot)) == 1 + 3 * 3 + 3
 
 
 def test_nothing_is_uncertain_that_is_not_stated() -> None:
-    assert uncertain_numbers(example("three")) == ()
+    assert uncertain_parameters(example("three")) == ()
 
 
 def test_numbers_move_by_their_own_standard_deviations() -> None:
     robot = unsure(modulus=2e9, mass=3.0, tension=5.0)
-    numbers = uncertain_numbers(robot)
+    numbers = uncertain_parameters(robot)
     moves = [float(place) for place in range(len(numbers))]
     by_label = {number.label: move for number, move in zip(numbers, moves, strict=True)}
-    moved = with_moves(robot, numbers, moves)
+    moved = perturbed_robot(robot, numbers, moves)
     assert moved.platform.mass == robot.platform.mass + 3.0 * by_label["mass"]
     assert moved.cables[1].modulus == robot.cables[1].modulus + 2e9 * by_label["modulus of cable 2"]
     assert moved.cables[1].damping == robot.cables[1].damping
-    assert offsets(numbers, moves, 3)[3:] == [5.0 * by_label[f"offset of tension {cable}"] for cable in (1, 2, 3)]
+    assert sensor_offsets(numbers, moves, 3)[3:] == [
+        5.0 * by_label[f"offset of tension {cable}"] for cable in (1, 2, 3)
+    ]
 
 
 def test_they_are_states_that_never_move_and_start_as_declared() -> None:
     robot = unsure(modulus=2e9, mass=3.0, tension=5.0)
-    numbers = uncertain_numbers(robot)
+    numbers = uncertain_parameters(robot)
     plain, model = symbolic_model(robot), symbolic_model(robot, (), numbers)
     assert model.states.numel() == plain.states.numel() + len(numbers)
     assert model.rates[-len(numbers) :].is_zero()
@@ -96,7 +98,7 @@ def test_a_mass_within_what_is_stated_is_no_payload() -> None:
         302.0, abs=4.0 * found.robot_after.platform.mass_uncertainty
     )
     assert found.robot_after.platform.mass_uncertainty < 0.3
-    assert found.components.blamed == "nothing"
+    assert found.components.faulty_component == "nothing"
 
 
 @pytest.mark.slow
@@ -108,7 +110,7 @@ def test_a_tracker_off_its_frame_is_no_anchor_elsewhere() -> None:
     shifted = [replace(each, position=each.position + off) for each in (fit, check)]
     found = trace(robot, *shifted, lambda what, done: None)
     assert found.verdict == "none"
-    assert found.components.blamed == "nothing"
+    assert found.components.faulty_component == "nothing"
 
 
 @pytest.mark.slow
@@ -134,7 +136,7 @@ def test_load_cells_off_zero_are_none_where_that_is_stated_and_no_listed_effect_
     off = (8.0, -5.0, 12.0)
     found = traced(unsure(tension=10.0), {}, off)
     assert found.verdict == "none"
-    assert found.components.blamed == "nothing"
+    assert found.components.faulty_component == "nothing"
     without = traced(example("three"), {}, off)
     assert without.effects == ()
-    assert without.components.blamed != "nothing"
+    assert without.components.faulty_component != "nothing"

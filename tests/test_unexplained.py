@@ -30,7 +30,7 @@ def test_a_formula_that_is_discovered_runs_in_the_fmus(tmp_path: Path) -> None:
     assert found.effects == ()
     assert found.formula is not None
     assert found.formula in found.sentence
-    assert [formula.place for formula in found.robot_after.formulas] == ["force_x", "force_y"]
+    assert [formula.target for formula in found.robot_after.formulas] == ["force_x", "force_y"]
     assert all(c.errors_after.tension_rms < 1.2 * found.noise_floor.tension_rms for c in found.comparisons)
     assert all(c.errors_before.tension_rms > 5.0 * found.noise_floor.tension_rms for c in found.comparisons)
     assert json.loads(json.dumps(trace_document(found)))["formula"] == found.formula

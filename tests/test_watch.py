@@ -19,18 +19,18 @@ import pytest
 from tautwire.control import cosimulate_closed_loop, design_controller
 from tautwire.fmus.packaging import RobotFmus
 from tautwire.master import (
-    Account,
+    CallAbortedError,
     ComponentError,
     FixedStep,
-    Kept,
-    LostError,
+    MemoryRecorder,
+    PiecewiseLinearInput,
     Port,
-    RunLostError,
-    Sampled,
-    simulate_watched,
+    RunAbortedError,
+    RunStatistics,
+    simulate_isolated,
     watch,
 )
-from tautwire.runs.cosimulation import Motion, RunError, cosimulate
+from tautwire.runs.cosimulation import CosimulationResult, RunError, cosimulate
 from tautwire.trajectory import PAPER_HELIX
 from tests.faults import FAULT, NUMBERS, build_faulty, coupled
 from tests.robots import paper_robot
@@ -75,12 +75,14 @@ def is_alive(number: int) -> bool:
     return "\nState:\tZ" not in Path(f"/proc/{number}/status").read_text()
 
 
-def run(fmu: Path, source: Any = None, patience: float = 60.0, recorder: Kept | None = None) -> tuple[Account, Kept]:
+def run(
+    fmu: Path, source: Any = None, patience: float = 60.0, recorder: MemoryRecorder | None = None
+) -> tuple[RunStatistics, MemoryRecorder]:
     """A run of two coupled winches, asked for 2 m/s^2."""
-    kept = Kept(len(TIMES), 2) if recorder is None else recorder
-    ramp = Sampled(TIMES, 2.0 * TIMES[:, None])
-    account = simulate_watched(
-        partial(coupled, fmu), source or ramp, TIMES, SHOWN, FixedStep(0.01), kept, patience=patience
+    kept = MemoryRecorder(len(TIMES), 2) if recorder is None else recorder
+    ramp = PiecewiseLinearInput(TIMES, 2.0 * TIMES[:, None])
+    account = simulate_isolated(
+        partial(coupled, fmu), source or ramp, TIMES, SHOWN, FixedStep(0.01), kept, call_timeout=patience
     )
     return account, kept
 
@@ -100,8 +102,8 @@ def test_an_fmu_lost_in_a_step_is_named_and_what_came_before_is_kept(
     faulty: Path, numbers: Path, monkeypatch: pytest.MonkeyPatch, how: str, fate: str
 ) -> None:
     monkeypatch.setenv(FAULT, f"right:step:{how}:0.09")
-    kept = Kept(len(TIMES), 2)
-    with pytest.raises(LostError) as caught:
+    kept = MemoryRecorder(len(TIMES), 2)
+    with pytest.raises(CallAbortedError) as caught:
         run(faulty, recorder=kept, patience=SHORT if fate == HUNG else 60.0)
     error = caught.value
     assert (error.component, error.call, error.status) == ("right", "fmi2DoStep", fate)
@@ -128,7 +130,7 @@ def test_an_fmu_lost_before_the_first_step_is_named(
     faulty: Path, numbers: Path, monkeypatch: pytest.MonkeyPatch, where: str, call: str, how: str, fate: str
 ) -> None:
     monkeypatch.setenv(FAULT, f"left:{where}:{how}:0")
-    with pytest.raises(LostError) as caught:
+    with pytest.raises(CallAbortedError) as caught:
         run(faulty, patience=SHORT if fate == HUNG else 60.0)
     assert (caught.value.component, caught.value.call, caught.value.status) == ("left", call, fate)
     assert caught.value.inputs == ({"speed_command": 0.0, "speed_command_rate": 2.0} if where == "exit" else {})
@@ -139,7 +141,7 @@ def test_what_a_hanging_fmu_has_started_ends_with_it(
     faulty: Path, numbers: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv(FAULT, "left:step:hang_beside_a_tool:0.05")
-    with pytest.raises(LostError):
+    with pytest.raises(CallAbortedError):
         run(faulty, patience=SHORT)
     assert len(set(numbers.read_text().split())) == 2
     time.sleep(0.2)
@@ -163,7 +165,7 @@ class Failing:
 
 
 def test_a_source_that_hangs_is_not_taken_for_an_fmu(faulty: Path, numbers: Path) -> None:
-    with pytest.raises(RunLostError, match=r"outside any FMU the run did not return for 1 s at 0\.1 s"):
+    with pytest.raises(RunAbortedError, match=r"outside any FMU the run did not return for 1 s at 0\.1 s"):
         run(faulty, Failing(0.1, None), SHORT)
     assert nothing_is_left(numbers)
 
@@ -180,7 +182,7 @@ def test_errors_of_the_run_arrive_as_they_were_raised(faulty: Path, numbers: Pat
 
 
 def test_what_fails_in_the_watching_process_ends_the_other(faulty: Path, numbers: Path) -> None:
-    class Full(Kept):
+    class Full(MemoryRecorder):
         def add(self, time: float, row: np.ndarray) -> None:
             raise OSError("no space left")
 
@@ -189,7 +191,7 @@ def test_what_fails_in_the_watching_process_ends_the_other(faulty: Path, numbers
     assert nothing_is_left(numbers)
 
 
-def same(motion: Motion, other: Motion) -> bool:
+def same(motion: CosimulationResult, other: CosimulationResult) -> bool:
     """Whether two runs are the same, to the last bit."""
     return all(
         np.array_equal(getattr(motion, name), getattr(other, name))
@@ -205,7 +207,7 @@ def test_a_watched_run_is_the_same_to_the_last_bit(three_fmus: RobotFmus, tolera
     here = cosimulate(three_fmus, times, speeds, tolerance=tolerance)
     apart = cosimulate(three_fmus, times, speeds, tolerance=tolerance, progress=told.append, patience=60.0)
     assert same(here, apart)
-    assert here.account == apart.account
+    assert here.statistics == apart.statistics
     assert told == pytest.approx(np.arange(1, 41) / 40)
 
 
@@ -213,7 +215,7 @@ def test_so_is_a_run_with_a_controller(damped_fmus: RobotFmus) -> None:
     robot = paper_robot(damping=2.08e9)
     controller = design_controller(robot)
     here, apart = (
-        cosimulate_closed_loop(damped_fmus, robot, controller, PAPER_HELIX, 0.2, seed=3, patience=patience)
+        cosimulate_closed_loop(damped_fmus, robot, controller, PAPER_HELIX, 0.2, seed=3, call_timeout=patience)
         for patience in (None, 60.0)
     )
     assert len(here.time) > 5
@@ -240,7 +242,7 @@ def test_a_fresh_process_does_as_well_as_a_fork(faulty: Path, numbers: Path, mon
     account, kept = run(faulty)
     assert (account.steps, kept.count) == (20, len(TIMES))
     monkeypatch.setenv(FAULT, "right:step:crash:0.09")
-    with pytest.raises(LostError, match="FMU right: fmi2DoStep ended its process by SIGSEGV"):
+    with pytest.raises(CallAbortedError, match="FMU right: fmi2DoStep ended its process by SIGSEGV"):
         run(faulty)
     assert nothing_is_left(numbers)
 

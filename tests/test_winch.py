@@ -22,7 +22,7 @@ SPEEDS = [0.0, 0.6, 0.6, -1.2, -1.2, 0.0]
 @pytest.fixture
 def limited(winch_fmus: RobotFmus) -> Path:
     """A winch as :data:`LIMITED` declares it."""
-    return winch_fmus.parts["winch_2"]
+    return winch_fmus.by_component["winch_2"]
 
 
 def command(time: float) -> float:
@@ -87,7 +87,7 @@ WINCHES = {
 @pytest.mark.parametrize("name", WINCHES)
 def test_it_is_the_rigs_drive_whatever_the_steps(name: str, tmp_path: Path) -> None:
     winch = WINCHES[name]
-    path = build_fmus(with_winch(paper_robot(), winch), tmp_path).parts["winch_1"]
+    path = build_fmus(with_winch(paper_robot(), winch), tmp_path).by_component["winch_1"]
     for step, advance in ((0.1, stamped), (0.01, stamped), (0.01, extrapolated)):
         times = step * np.arange(1, round(3.0 / step) + 1)
         exact = drive_of(winch).run(command, times, CORNERS)

@@ -12,7 +12,7 @@ from scipy.interpolate import CubicHermiteSpline
 from tautwire.control import cosimulate_closed_loop, design_controller
 from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.robots.robot import Robot, Winch
-from tautwire.runs.cosimulation import cosimulate, instantiated, wired
+from tautwire.runs.cosimulation import cosimulate, instantiate_robot, wire_fmus
 from tautwire.runs.ssp import ssp_name, write_ssp
 from tests.rig import simulate
 from tests.robots import LIMITED, example, paper_robot, with_winch
@@ -60,8 +60,8 @@ def test_the_chain_ends_where_the_rig_ends_with_limits_on_the_way(
 ) -> None:
     motion = cosimulate(winch_fmus, CORNERS, SPEEDS, step)
     assert np.linalg.norm(motion.position[-1] - limited_end) < bound
-    assert motion.account.share < 1e-9
-    assert motion.account.fallbacks() == ()
+    assert motion.statistics.energy_residual_share < 1e-9
+    assert motion.statistics.fallback_notes() == ()
 
 
 @pytest.mark.slow
@@ -71,7 +71,7 @@ def test_a_tolerance_holds_with_limits_on_the_way(
 ) -> None:
     motion = cosimulate(winch_fmus, CORNERS, SPEEDS, tolerance=tolerance)
     assert np.linalg.norm(motion.position[-1] - limited_end) < tolerance
-    assert motion.account.steps < 300
+    assert motion.statistics.steps < 300
 
 
 @pytest.mark.slow
@@ -90,10 +90,14 @@ def test_a_result_tells_what_the_winches_did(winch_fmus: RobotFmus) -> None:
 
 
 def test_winches_go_first(winch_fmus: RobotFmus) -> None:
-    with instantiated(winch_fmus) as coupling:
-        assert [seat.component.name[:5] for seat in coupling._order] == [*["winch"] * 3, *["cable"] * 3, "platf"]
+    with instantiate_robot(winch_fmus) as coupling:
+        assert [seat.component.name[:5] for seat in coupling._execution_order] == [
+            *["winch"] * 3,
+            *["cable"] * 3,
+            "platf",
+        ]
         # What winches do in the middle of a step nobody is told.
-        assert coupling.order == 4
+        assert coupling.convergence_order == 4
 
 
 @pytest.mark.slow
@@ -127,7 +131,7 @@ def test_the_controller_holds_its_path_through_winches_of_ten_hertz(name: str, t
 def test_the_archive_has_them_and_asks_them_for_their_speeds(winch_fmus: RobotFmus, tmp_path: Path) -> None:
     robot = with_winch(paper_robot(), LIMITED)
     description = read_ssd(str(write_ssp(robot, winch_fmus, tmp_path / ssp_name(robot))))
-    assert [part.name for part in description.system.elements] == list(winch_fmus.parts)
+    assert [part.name for part in description.system.elements] == list(winch_fmus.by_component)
     ends = {
         (wire.startElement, wire.startConnector, wire.endElement, wire.endConnector)
         for wire in description.system.connections
@@ -141,6 +145,6 @@ def test_the_archive_has_them_and_asks_them_for_their_speeds(winch_fmus: RobotFm
 
 def test_the_wiring_asks_winches_where_there_are_some(tmp_path: Path) -> None:
     fmus = RobotFmus((Path("a"), Path("b"), Path("c")), Path("p"), (None, Path("w"), None))
-    drives = [str(port) for port in wired(fmus).drives]
+    drives = [str(port) for port in wire_fmus(fmus).external_inputs]
     assert drives[::2] == ["cable_1.winch_speed", "winch_2.speed_command", "cable_3.winch_speed"]
     assert drives[1::2] == ["cable_1.winch_acceleration", "winch_2.speed_command_rate", "cable_3.winch_acceleration"]

@@ -4,8 +4,8 @@ import pytest
 
 from tautwire.fmus.packaging import RobotFmus
 from tautwire.master import Component, Connection, Port, WiringError
-from tautwire.master.wiring import check, levels
-from tautwire.runs.wiring import connections
+from tautwire.master.wiring import check_connections, dependency_groups
+from tautwire.runs.wiring import robot_connections
 
 
 @pytest.fixture
@@ -22,11 +22,14 @@ def wire(source: str, target: str) -> Connection:
 
 
 def test_the_robots_wiring_passes(components: dict[str, Component]) -> None:
-    check(components, connections(3))
+    check_connections(components, robot_connections(3))
 
 
 def test_motion_comes_first_and_force_rates_last(components: dict[str, Component]) -> None:
-    order = [{c.source.variable.split(".")[0] for c in group} for group in levels(components, connections(3))]
+    order = [
+        {c.source.variable.split(".")[0] for c in group}
+        for group in dependency_groups(components, robot_connections(3))
+    ]
     assert order == [{"position", "velocity"}, {"force"}, {"acceleration"}, {"force_rate"}]
 
 
@@ -42,13 +45,13 @@ def test_motion_comes_first_and_force_rates_last(components: dict[str, Component
 )
 def test_a_wrong_connection_is_refused(components: dict[str, Component], source: str, target: str, said: str) -> None:
     with pytest.raises(WiringError, match=said):
-        check(components, [wire(source, target)])
+        check_connections(components, [wire(source, target)])
 
 
 def test_an_input_has_one_source(components: dict[str, Component]) -> None:
     twice = [wire(f"platform:position.{axis}", "cable_1:position.x") for axis in "xy"]
     with pytest.raises(WiringError, match="driven by platform"):
-        check(components, twice)
+        check_connections(components, twice)
 
 
 def test_a_loop_without_delay_is_named(components: dict[str, Component]) -> None:
@@ -58,6 +61,6 @@ def test_a_loop_without_delay_is_named(components: dict[str, Component]) -> None
         wire("cable_1:force_rate.x", "cable_2:acceleration.y"),
         wire("cable_2:tension_rate", "cable_1:acceleration.y"),
     ]
-    levels(components, loop[:3])
+    dependency_groups(components, loop[:3])
     with pytest.raises(WiringError, match="depend on each other without delay"):
-        levels(components, [*loop, wire("cable_2:force_rate.x", "cable_1:acceleration.z")])
+        dependency_groups(components, [*loop, wire("cable_2:force_rate.x", "cable_1:acceleration.z")])

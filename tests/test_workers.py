@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tautwire.tracer.workers import WorkerLostError, Workers, processors
+from tautwire.tracer.workers import WorkerLostError, WorkerPool, processors
 
 
 def square(number: int) -> int:
@@ -36,37 +36,37 @@ def sleep_for_long(folder: Path) -> None:
 
 
 def test_processes_may_be_begun_before_there_is_work() -> None:
-    with Workers(1) as here, Workers(2) as apart:
-        here.begin()
-        apart.begin()
-        assert here.start(square, 3).result() == apart.start(square, 3).result() == 9
+    with WorkerPool(1) as here, WorkerPool(2) as apart:
+        here.warm_up()
+        apart.warm_up()
+        assert here.submit(square, 3).result() == apart.submit(square, 3).result() == 9
 
 
 @pytest.mark.parametrize("count", [1, 2])
 def test_each_call_is_answered_by_its_number(count: int) -> None:
-    with Workers(count) as workers:
-        assert dict(workers.each(square, [(3,), (4,), (5,)])) == {0: 9, 1: 16, 2: 25}
-        assert workers.start(square, 6).result() == 36
+    with WorkerPool(count) as workers:
+        assert dict(workers.map_unordered(square, [(3,), (4,), (5,)])) == {0: 9, 1: 16, 2: 25}
+        assert workers.submit(square, 6).result() == 36
 
 
 def test_one_worker_is_this_process_and_two_are_others(tmp_path: Path) -> None:
     here, there = tmp_path / "here", tmp_path / "there"
     here.mkdir()
     there.mkdir()
-    with Workers(1) as alone, Workers(2) as apart:
-        assert {result for _, result in alone.each(process, [(here, 1), (here, 1)])} == {os.getpid()}
-        others = {result for _, result in apart.each(process, [(there, 2), (there, 2)])}
+    with WorkerPool(1) as alone, WorkerPool(2) as apart:
+        assert {result for _, result in alone.map_unordered(process, [(here, 1), (here, 1)])} == {os.getpid()}
+        others = {result for _, result in apart.map_unordered(process, [(there, 2), (there, 2)])}
     assert len(others) == 2
     assert os.getpid() not in others
 
 
 @pytest.mark.parametrize("count", [1, 2])
 def test_what_a_call_raises_is_raised_here(count: int) -> None:
-    with Workers(count) as workers:
+    with WorkerPool(count) as workers:
         with pytest.raises(ValueError, match="no 7"):
-            workers.start(fail, 7).result()
+            workers.submit(fail, 7).result()
         with pytest.raises(ValueError, match="no 8"):
-            list(workers.each(fail, [(8,)]))
+            list(workers.map_unordered(fail, [(8,)]))
 
 
 def test_an_interrupt_ends_work_that_has_begun(tmp_path: Path) -> None:
@@ -75,16 +75,16 @@ def test_an_interrupt_ends_work_that_has_begun(tmp_path: Path) -> None:
             raise KeyboardInterrupt
 
     began = time.perf_counter()
-    with pytest.raises(KeyboardInterrupt), Workers(2, stop_when_begun) as workers:
-        workers.start(sleep_for_long, tmp_path).result()
+    with pytest.raises(KeyboardInterrupt), WorkerPool(2, stop_when_begun) as workers:
+        workers.submit(sleep_for_long, tmp_path).result()
     assert time.perf_counter() - began < 60.0
 
 
 def test_a_worker_that_ends_by_itself_is_told() -> None:
-    with Workers(2) as workers, pytest.raises(WorkerLostError, match="one of 2 worker processes"):
-        workers.start(end_at_once).result()
-    with Workers(2) as workers, pytest.raises(WorkerLostError, match="memory"):
-        list(workers.each(end_at_once, [(), ()]))
+    with WorkerPool(2) as workers, pytest.raises(WorkerLostError, match="one of 2 worker processes"):
+        workers.submit(end_at_once).result()
+    with WorkerPool(2) as workers, pytest.raises(WorkerLostError, match="memory"):
+        list(workers.map_unordered(end_at_once, [(), ()]))
 
 
 def test_there_is_at_least_one_processor() -> None:

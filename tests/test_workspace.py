@@ -6,8 +6,8 @@ import pytest
 
 from tautwire.errors import InputError, UnreachableError
 from tautwire.robots.robot import Cable, EffectSetting, Platform, Robot, Sensors, TensionLimits
-from tautwire.statics.distribution import nearest_tensions
-from tautwire.statics.equilibrium import directions, static_tensions
+from tautwire.statics.distribution import distribute_tensions
+from tautwire.statics.equilibrium import static_tensions, unit_directions
 from tautwire.statics.workspace import wrench_feasible_workspace, wrench_margin
 from tests.robots import NAMES, example, paper_robot
 
@@ -24,8 +24,8 @@ def test_it_is_where_statics_finds_tensions(name: str) -> None:
     robot = example(name)
     workspace = wrench_feasible_workspace(robot, spacing=1.0 if name == "eight" else None)
     assert 0.2 < workspace.feasible.mean() < 0.9
-    assert np.array_equal(workspace.feasible, np.isfinite(workspace.lowest))
-    assert np.array_equal(workspace.feasible, np.isfinite(workspace.highest))
+    assert np.array_equal(workspace.feasible, np.isfinite(workspace.min_tension))
+    assert np.array_equal(workspace.feasible, np.isfinite(workspace.max_tension))
 
 
 def test_the_margin_by_hand() -> None:
@@ -36,7 +36,7 @@ def test_the_margin_by_hand() -> None:
 def test_the_margin_of_three_cables_is_the_distance_to_the_nearest_plane() -> None:
     robot = paper_robot()
     position = np.array([30.0, 5.0, 10.0])
-    unit, load = directions(robot, position), np.array([0.0, 0.0, 300.0 * 9.8])
+    unit, load = unit_directions(robot, position), np.array([0.0, 0.0, 300.0 * 9.8])
     distances = []
     for i, j, k in ((0, 1, 2), (1, 2, 0), (2, 0, 1)):
         normal = np.cross(unit[:, i], unit[:, j])
@@ -49,11 +49,11 @@ def test_a_force_as_large_as_the_margin_is_just_held() -> None:
     robot, position = example("eight"), np.array([7.0, 5.0, 4.5])
     limits, margin = robot.tension, wrench_margin(robot, position)
     assert limits is not None
-    unit, weight = directions(robot, position), np.array([0.0, 0.0, 60.0 * 9.81])
+    unit, weight = unit_directions(robot, position), np.array([0.0, 0.0, 60.0 * 9.81])
     normals = [np.cross(unit[:, i], unit[:, j]) for i, j in permutations(range(8), 2)]
     pushes = [margin * normal / np.linalg.norm(normal) for normal in normals]
-    assert all(nearest_tensions(unit, weight + 0.999 * push, limits) is not None for push in pushes)
-    assert any(nearest_tensions(unit, weight + 1.001 * push, limits) is None for push in pushes)
+    assert all(distribute_tensions(unit, weight + 0.999 * push, limits) is not None for push in pushes)
+    assert any(distribute_tensions(unit, weight + 1.001 * push, limits) is None for push in pushes)
 
 
 def test_accelerations_take_from_the_margin() -> None:

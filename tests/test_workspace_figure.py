@@ -6,7 +6,7 @@ import pytest
 
 from tautwire.errors import InputError
 from tautwire.statics.workspace import wrench_feasible_workspace
-from tautwire.statics.workspace_figure import checked_format, workspace_figure
+from tautwire.statics.workspace_figure import require_figure_format, workspace_figure
 from tests.robots import example
 
 
@@ -33,6 +33,6 @@ def test_a_workspace_without_a_feasible_position_is_drawn_too() -> None:
 
 
 def test_a_file_without_a_figures_suffix_is_refused() -> None:
-    checked_format(Path("a.PDF"))
+    require_figure_format(Path("a.PDF"))
     with pytest.raises(InputError, match=r"b\.csv: has no suffix of a figure"):
-        checked_format(Path("b.csv"))
+        require_figure_format(Path("b.csv"))

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 
 from tautwire.fmus.packaging import RobotFmus
-from tautwire.fmus.wrapper import RETURN, mend_exit, returning_at_once
+from tautwire.fmus.wrapper import RETURN_INSTRUCTION, patch_wrapper_exit, with_immediate_return
 
 LIBRARY = files("pythonfmu") / "resources/binaries/linux64/libpythonfmu-export.so"
 MANY = """
@@ -24,26 +24,26 @@ for component in made:
 
 def test_one_byte_differs_from_pythonfmus_wrapper() -> None:
     original = LIBRARY.read_bytes()
-    mended = returning_at_once(original)
+    mended = with_immediate_return(original)
     places = [k for k, (a, b) in enumerate(zip(original, mended, strict=True)) if a != b]
     assert len(places) == 1
-    assert mended[places[0] : places[0] + 1] == RETURN
-    assert returning_at_once(mended) == mended
+    assert mended[places[0] : places[0] + 1] == RETURN_INSTRUCTION
+    assert with_immediate_return(mended) == mended
 
 
 @pytest.mark.parametrize("content", [b"", b"MZ not an ELF file"])
 def test_other_libraries_stay_as_they_are(content: bytes) -> None:
-    assert returning_at_once(content) == content
+    assert with_immediate_return(content) == content
 
 
 def test_built_fmus_have_the_mended_wrapper(three_fmus: RobotFmus) -> None:
     with zipfile.ZipFile(three_fmus.platform) as packed:
         library = packed.read("binaries/linux64/platform.so")
-    assert returning_at_once(library) == library
+    assert with_immediate_return(library) == library
 
 
 def test_all_else_in_an_fmu_stays(three_fmus: RobotFmus, tmp_path: Path) -> None:
-    mend_exit(three_fmus.platform, tmp_path / "again.fmu")
+    patch_wrapper_exit(three_fmus.platform, tmp_path / "again.fmu")
     with zipfile.ZipFile(three_fmus.platform) as before, zipfile.ZipFile(tmp_path / "again.fmu") as after:
         assert before.namelist() == after.namelist()
         assert all(before.read(name) == after.read(name) for name in before.namelist())

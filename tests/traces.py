@@ -7,25 +7,25 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tautwire.master import Account
+from tautwire.master import RunStatistics
 from tautwire.recordings.recording import Recording
-from tautwire.report.overview import Overview
-from tautwire.report.run import Run
+from tautwire.report.overview import RunOverview
+from tautwire.report.run import ReportedRun
 from tautwire.robots.robot import Cable, EffectSetting, Platform, Robot, Sensors
-from tautwire.runs.cosimulation import Motion
+from tautwire.runs.cosimulation import CosimulationResult
 from tautwire.tracer.verdict import (
     Candidate,
     Comparison,
+    ConfusableEffect,
     Detectable,
     Errors,
     Estimate,
     FoundEffect,
-    Likeness,
-    Separation,
+    Identifiability,
     Trace,
 )
-from tautwire.tracer.where.associations import Association
-from tautwire.tracer.where.port_residuals import ComponentResidual, Components
+from tautwire.tracer.where.associations import SignalCorrelation
+from tautwire.tracer.where.port_residuals import ComponentResidual, FaultLocalisation
 
 Array = NDArray[np.float64]
 
@@ -43,7 +43,7 @@ def made_robot(eight: bool = False, name: str = "three") -> Robot:
     return Robot(name, 9.81, Platform(300.0, start), None, sensors, cables)
 
 
-def made_motion(robot: Robot, time: Array, damping: float, seed: int) -> Motion:
+def made_motion(robot: Robot, time: Array, damping: float, seed: int) -> CosimulationResult:
     """A slow turn with a vibration that dies out at ``damping`` (1/s) each time that the winches stop."""
     anchors, start = np.array(robot.anchors), np.array(robot.platform.start)
     size = 0.12 * np.ptp(anchors, axis=0).max()
@@ -57,10 +57,12 @@ def made_motion(robot: Robot, time: Array, damping: float, seed: int) -> Motion:
     length = np.linalg.norm(away, axis=2)
     tension = 1500.0 * length / length[0] + 150.0 * ring[:, None] * np.linspace(1.0, 0.4, len(anchors))
     strain = tension / (robot.cables[0].modulus * robot.cables[0].area)
-    return Motion(time, position, np.gradient(position, time, axis=0), tension, length, strain * length, strain)
+    return CosimulationResult(
+        time, position, np.gradient(position, time, axis=0), tension, length, strain * length, strain
+    )
 
 
-def made_recording(path: str, truth: Motion, random: np.random.Generator) -> Recording:
+def made_recording(path: str, truth: CosimulationResult, random: np.random.Generator) -> Recording:
     """What sensors with noise would have written, with a gap of a second in the last tension."""
     position = truth.position + random.normal(0.0, POSITION_NOISE, truth.position.shape)
     tension = truth.tension + random.normal(0.0, TENSION_NOISE, truth.tension.shape)
@@ -68,7 +70,7 @@ def made_recording(path: str, truth: Motion, random: np.random.Generator) -> Rec
     return Recording(path, truth.time, np.zeros_like(tension), tension, position, ("temperature",))
 
 
-def made_errors(recording: Recording, motion: Motion) -> Errors:
+def made_errors(recording: Recording, motion: CosimulationResult) -> Errors:
     """Root mean squares of what a motion leaves of a recording."""
     square = (recording.measured() - motion.measured()) ** 2
     with np.errstate(invalid="ignore"):
@@ -102,21 +104,21 @@ def made_candidates(cables: tuple[int, ...]) -> tuple[Candidate, ...]:
     )
 
 
-def made_separation(cables: tuple[int, ...]) -> Separation:
+def made_separation(cables: tuple[int, ...]) -> Identifiability:
     """Sizes that would have shown, one of them never, and what looks like damping."""
     sizes = (
         Detectable("payload", (), "mass", 0.0195, "kg", {}),
         Detectable("relaxation", cables, "modulus", 3.9e7, "Pa", {"time": 30.0}),
         Detectable("slack", cables, "softness", float("inf"), "N", {}),
     )
-    alike = (Likeness("damping", cables, "relaxation", cables, 0.973, 9142.7),)
-    return Separation(sizes, alike)
+    alike = (ConfusableEffect("damping", cables, "relaxation", cables, 0.973, 9142.7),)
+    return Identifiability(sizes, alike)
 
 
-def made_components(cables: tuple[int, ...]) -> Components:
+def made_components(cables: tuple[int, ...]) -> FaultLocalisation:
     """Cables whose tensions move with the strain rate, over a platform in balance."""
     noise = np.random.default_rng(5).normal(0.0, 1.0, 400)
-    moved = Association("strain rate", 0.98)
+    moved = SignalCorrelation("strain rate", 0.98)
     tensions = [
         ComponentResidual(f"cable {i}", "tension", "N", 14.0 * noise, 0.3, 14.0, 2.8, 1.3, moved) for i in cables
     ]
@@ -124,7 +126,7 @@ def made_components(cables: tuple[int, ...]) -> Components:
         ComponentResidual("platform", f"force {a}", "N", 0.25 * noise, 0.0, 0.25, 0.25, 1.4, None) for a in "xyz"
     ]
     sentence = "The tensions of all cables are off; the platform's force balance is within its noise."
-    return Components(np.linspace(0.0, 40.0, 400), (*tensions, *balance), "cables (rope or winch)", sentence, ())
+    return FaultLocalisation(np.linspace(0.0, 40.0, 400), (*tensions, *balance), "cables (rope or winch)", sentence, ())
 
 
 def made_trace(
@@ -156,9 +158,9 @@ def made_trace(
         noise_floor=floor,
         noise_before=False,
         noise_after=True,
-        left=np.concatenate(([1.01, 0.98, 1.03], np.linspace(0.97, 1.06, len(cables)))),
+        normalised_innovation_variance=np.concatenate(([1.01, 0.98, 1.03], np.linspace(0.97, 1.06, len(cables)))),
         autocorrelations=(np.linspace(0.01, 0.05, 3 + len(cables)), np.full(3 + len(cables), 0.047)),
-        separation=made_separation(cables),
+        identifiability=made_separation(cables),
         components=made_components(cables),
         resonances=(),
         alpha=0.01,
@@ -167,17 +169,17 @@ def made_trace(
     )
 
 
-def made_run(name: str = "three", samples: int = 801, eight: bool = False) -> Run:
+def made_run(name: str = "three", samples: int = 801, eight: bool = False) -> ReportedRun:
     """A run of a robot that swings, beside a recording of it; nothing is simulated."""
     robot = made_robot(eight, name)
     motion = made_motion(robot, np.linspace(0.0, 20.0, samples), 0.4, 1)
-    overview = Overview(1500)
+    overview = RunOverview(1500)
     frame = motion.frame()
     for row in frame.to_numpy():
         overview.add(float(row[0]), row[1:])
     recording = made_recording("run.csv", motion, np.random.default_rng(4))
-    account = Account(steps=2000, redos=17, made=1e-7, exchanged=250.0)
-    return Run(robot, tuple(frame.columns[1:]), overview, recording, account, ("The winches were slow.",))
+    account = RunStatistics(steps=2000, iterations=17, energy_residual=1e-7, energy_exchanged=250.0)
+    return ReportedRun(robot, tuple(frame.columns[1:]), overview, recording, account, ("The winches were slow.",))
 
 
 def nothing_found(trace: Trace) -> Trace:
@@ -204,6 +206,9 @@ def without_positions(trace: Trace) -> Trace:
         comparisons.append(Comparison(each.role, recording, each.before, each.after, *errors))
     robot = replace(trace.robot_before, sensors=Sensors())
     floor = replace(trace.noise_floor, position_rms=float("nan"), axes=np.full(3, np.nan))
-    left, one, other = (np.append([np.nan] * 3, values[3:]) for values in (trace.left, *trace.autocorrelations))
+    left, one, other = (
+        np.append([np.nan] * 3, values[3:])
+        for values in (trace.normalised_innovation_variance, *trace.autocorrelations)
+    )
     shown = replace(trace, left=left, autocorrelations=(one, other))
     return replace(shown, robot_before=robot, comparisons=tuple(comparisons), noise_floor=floor)

@@ -1,1 +1,1 @@
-"""What travels inside an FMU: the laws and the slaves that wrap them; the standard library only."""
+"""Code inside an FMU: the physical laws and the FMI slaves that wrap them; the standard library only."""

@@ -1,4 +1,4 @@
-"""The effects that act on a component, by its resource: their variables, and their values."""
+"""FMI variables and parameter values of the effects that act on a component, by its resource."""
 
 from typing import Any, Dict, Sequence, Tuple
 
@@ -8,7 +8,7 @@ from .laws.formula import formula_effect
 
 
 def effect_variables(settings: Sequence[Dict[str, Any]]) -> Tuple[Variable, ...]:
-    """A tunable parameter for every number of every effect that is switched on."""
+    """Tunable FMI parameters, one for every parameter of every effect that is switched on."""
     return tuple(
         Variable(
             f"effect.{setting['name']}.{parameter.name}",
@@ -25,27 +25,27 @@ def effect_variables(settings: Sequence[Dict[str, Any]]) -> Tuple[Variable, ...]
     )
 
 
-def effects_of(data: Dict[str, Any]) -> Tuple[Effect, ...]:
-    """The effects that act on a component, by its resource: those switched on, then its formulas if it has any."""
-    listed = [BY_NAME[setting["name"]] for setting in data["effects"]]
-    return (*listed, formula_effect(data["formulas"])) if data.get("formulas") else tuple(listed)
+def effects_from_resource(data: Dict[str, Any]) -> Tuple[Effect, ...]:
+    """Effects that act on a component, by its resource: those switched on, then its formulas if it has any."""
+    listed_effects = [BY_NAME[setting["name"]] for setting in data["effects"]]
+    return (*listed_effects, formula_effect(data["formulas"])) if data.get("formulas") else tuple(listed_effects)
 
 
-def effect_states(data: Dict[str, Any]) -> Tuple[Variable, ...]:
-    """A local variable for every state of every effect."""
+def effect_state_variables(data: Dict[str, Any]) -> Tuple[Variable, ...]:
+    """Local FMI variables, one for every state of every effect."""
     return tuple(
         Variable(f"effect.{effect.name}.{state.name}", "local", state.unit, f"state: {state.description}")
-        for effect in effects_of(data)
+        for effect in effects_from_resource(data)
         for state in effect.states
     )
 
 
-def active_effects(effects: Sequence[Effect], numbers: Sequence[float]) -> Tuple[ActiveEffect, ...]:
-    """The effects with the present values of their parameters."""
+def active_effects(effects: Sequence[Effect], parameter_values: Sequence[float]) -> Tuple[ActiveEffect, ...]:
+    """Effects with the present values of their parameters."""
     active = []
-    rest = list(numbers)
+    remaining = list(parameter_values)
     for effect in effects:
         count = len(effect.parameters)
-        active.append(ActiveEffect(effect, effect.values(*rest[:count])))
-        rest = rest[count:]
+        active.append(ActiveEffect(effect, effect.values(*remaining[:count])))
+        remaining = remaining[count:]
     return tuple(active)

@@ -1,13 +1,13 @@
-"""The FMI variables of a cable, in the order in which the slave keeps their values."""
+"""FMI variables of a cable, in the order in which the slave keeps their values."""
 
 from typing import Any, Dict, Tuple
 
-from .acting import effect_states, effect_variables
-from .description import Variable, axes, vector
+from .acting import effect_state_variables, effect_variables
+from .description import Variable, axis_names, vector_variables
 from .slave import INPUT_TIME, MIDDLE_TIME
 
-MOTION = (*axes("position", "velocity"), "winch_speed")
-RATED = (*MOTION, *axes("acceleration"), "winch_acceleration")
+MOTION_INPUTS = (*axis_names("position", "velocity"), "winch_speed")
+MOTION_AND_RATE_INPUTS = (*MOTION_INPUTS, *axis_names("acceleration"), "winch_acceleration")
 
 
 def cable_variables(data: Dict[str, Any]) -> Tuple[Variable, ...]:
@@ -20,44 +20,54 @@ def _inputs(data: Dict[str, Any]) -> Tuple[Variable, ...]:
     return (
         INPUT_TIME,
         MIDDLE_TIME,
-        *vector("position", "input", "m", "position of the platform", start, nominal=length),
-        *vector("velocity", "input", "m/s", "velocity of the platform, the rate of position"),
-        *vector("acceleration", "input", "m/s2", "acceleration of the platform, the rate of velocity"),
+        *vector_variables("position", "input", "m", "position of the platform", start, nominal=length),
+        *vector_variables("velocity", "input", "m/s", "velocity of the platform, the rate of position"),
+        *vector_variables("acceleration", "input", "m/s2", "acceleration of the platform, the rate of velocity"),
         Variable("winch_speed", "input", "m/s", "rope speed by the winch encoder, positive reels in"),
         Variable("winch_acceleration", "input", "m/s2", "rate of winch_speed"),
-        *vector("middle_position", "input", "m", "position in the middle of a step", start, nominal=length),
-        *vector("middle_velocity", "input", "m/s", "velocity in the middle of a step"),
-        *vector("middle_acceleration", "input", "m/s2", "acceleration in the middle of a step"),
+        *vector_variables("middle_position", "input", "m", "position in the middle of a step", start, nominal=length),
+        *vector_variables("middle_velocity", "input", "m/s", "velocity in the middle of a step"),
+        *vector_variables("middle_acceleration", "input", "m/s2", "acceleration in the middle of a step"),
     )
 
 
 def _outputs(data: Dict[str, Any]) -> Tuple[Variable, ...]:
     # A nominal value is never zero.
     tension, length = float(data["start_tension"]) or None, float(data["start_length"])
-    cell = "tension at the load cell, between winch and exit point"
-    chord = "rope from exit point to platform, as if it did not sag"
-    stretch = "length less start length and rope let out"
-    pull = "tension that the law asks for, negative where the cable hangs slack"
-    place = axes("position")
+    load_cell_text = "tension at the load cell, between winch and exit point"
+    length_text = "rope from exit point to platform, as if it did not sag"
+    elongation_text = "length less start length and rope let out"
+    pull_text = "tension that the law asks for, negative where the cable hangs slack"
+    position_inputs = axis_names("position")
     return (
-        *vector("force", "output", "N", "force on the platform", nominal=tension, depends_on=MOTION),
-        Variable("tension", "output", "N", cell, minimum=0.0, nominal=tension, depends_on=MOTION),
-        Variable("length", "output", "m", chord, nominal=length, depends_on=place),
-        Variable("elongation", "output", "m", stretch, depends_on=place),
-        Variable("strain", "output", "1", "strain by the tension law", nominal=1e-3, depends_on=place),
-        Variable("pull", "output", "N", pull, nominal=tension, depends_on=MOTION),
-        *vector("force_rate", "output", "N/s", "rate of force", nominal=tension, depends_on=RATED, rate_of="force"),
+        *vector_variables("force", "output", "N", "force on the platform", nominal=tension, depends_on=MOTION_INPUTS),
+        Variable("tension", "output", "N", load_cell_text, minimum=0.0, nominal=tension, depends_on=MOTION_INPUTS),
+        Variable("length", "output", "m", length_text, nominal=length, depends_on=position_inputs),
+        Variable("elongation", "output", "m", elongation_text, depends_on=position_inputs),
+        Variable("strain", "output", "1", "strain by the tension law", nominal=1e-3, depends_on=position_inputs),
+        Variable("pull", "output", "N", pull_text, nominal=tension, depends_on=MOTION_INPUTS),
+        *vector_variables(
+            "force_rate",
+            "output",
+            "N/s",
+            "rate of force",
+            nominal=tension,
+            depends_on=MOTION_AND_RATE_INPUTS,
+            rate_of="force",
+        ),
         Variable(
             "tension_rate",
             "output",
             "N/s",
             "rate of tension",
             nominal=tension,
-            depends_on=RATED,
+            depends_on=MOTION_AND_RATE_INPUTS,
             rate_of="tension",
         ),
-        *vector("middle_force", "output", "N", "force in the middle of the last step", nominal=tension),
-        *vector("middle_force_rate", "output", "N/s", "rate of force there", nominal=tension, rate_of="middle_force"),
+        *vector_variables("middle_force", "output", "N", "force in the middle of the last step", nominal=tension),
+        *vector_variables(
+            "middle_force_rate", "output", "N/s", "rate of force there", nominal=tension, rate_of="middle_force"
+        ),
     )
 
 
@@ -66,18 +76,20 @@ def _states(data: Dict[str, Any]) -> Tuple[Variable, ...]:
     return (
         Variable("unstrained_length", "local", "m", "state: rope in the span if it were unloaded", nominal=length),
         Variable("wound_length", "local", "m", "state: rope reeled in since the start", nominal=length),
-        *effect_states(data),
+        *effect_state_variables(data),
     )
 
 
 def _parameters(data: Dict[str, Any]) -> Tuple[Variable, ...]:
     anchor, start = tuple(data["anchor"]), tuple(data["start"])
-    area = "area that the modulus refers to"
+    area_text = "area that the modulus refers to"
     return (
-        *vector("anchor", "parameter", "m", "exit point on the frame", anchor),
-        *vector("start", "parameter", "m", "position of the platform at the start, in static equilibrium", start),
+        *vector_variables("anchor", "parameter", "m", "exit point on the frame", anchor),
+        *vector_variables(
+            "start", "parameter", "m", "position of the platform at the start, in static equilibrium", start
+        ),
         Variable("modulus", "parameter", "Pa", "modulus of elasticity", data["modulus"], True, 0.0, nominal=1e11),
-        Variable("area", "parameter", "m2", area, data["area"], True, 0.0, nominal=1e-5),
+        Variable("area", "parameter", "m2", area_text, data["area"], True, 0.0, nominal=1e-5),
         Variable("damping", "parameter", "Pa s", "viscosity of the rope", data["damping"], True, 0.0, nominal=1e9),
         Variable(
             "start_tension",

@@ -1,4 +1,4 @@
-"""Completes the model description: units, bounds, exact start values, dependencies, initial unknowns."""
+"""Completes modelDescription.xml: units, bounds, exact start values, dependencies, initial unknowns."""
 
 from typing import Dict, NamedTuple, Optional, Sequence, Tuple
 from xml.etree.ElementTree import Element, SubElement
@@ -27,7 +27,7 @@ class Variable(NamedTuple):
     rate_of: Optional[str] = None
 
 
-def vector(
+def vector_variables(
     name: str,
     causality: str,
     unit: str,
@@ -37,7 +37,7 @@ def vector(
     depends_on: Tuple[str, ...] = (),
     rate_of: Optional[str] = None,
 ) -> Tuple[Variable, ...]:
-    """Three variables ``name.x``, ``name.y``, ``name.z``."""
+    """Three variables ``name.x``, ``name.y``, ``name.z`` of one vector."""
     return tuple(
         Variable(
             f"{name}.{axis}",
@@ -53,15 +53,15 @@ def vector(
     )
 
 
-def axes(*names: str) -> Tuple[str, ...]:
-    """The names of the components of vectors."""
+def axis_names(*names: str) -> Tuple[str, ...]:
+    """Names of the components of vectors."""
     return tuple(f"{name}.{axis}" for name in names for axis in "xyz")
 
 
-def complete(root: Element, variables: Sequence[Variable]) -> Element:
-    """Add to the tree that pythonfmu writes what FMI 2.0 has a place for and pythonfmu leaves out.
+def complete_model_description(root: Element, variables: Sequence[Variable]) -> Element:
+    """Complete pythonfmu's model description with the FMI 2.0 attributes that pythonfmu leaves out.
 
-    Raises KeyError where a variable bears a unit that :data:`UNITS` does not list.
+    Raises KeyError where a variable has a unit that :data:`UNITS` does not list.
     """
     by_name = {variable.name: variable for variable in variables}
     index = {}
@@ -106,7 +106,7 @@ def _complete_structure(root: Element, variables: Sequence[Variable], index: Dic
     for variable in variables:
         if variable.causality != "output":
             continue
-        known = sorted(index[name] for name in variable.depends_on)
-        attributes = {"index": str(index[variable.name]), "dependencies": " ".join(map(str, known))}
+        dependencies = sorted(index[name] for name in variable.depends_on)
+        attributes = {"index": str(index[variable.name]), "dependencies": " ".join(map(str, dependencies))}
         SubElement(outputs, "Unknown", attributes)
         SubElement(unknowns, "Unknown", {"index": attributes["index"]})

@@ -1,32 +1,32 @@
-"""What a sensor has seen, as far back as it lags: pieces of polynomials between communication points."""
+"""Delay line of a sensor signal: Hermite segments between communication points, as far back as the sensor lags."""
 
 from typing import NamedTuple, Sequence, Tuple
 
-from .interpolation import cubic, quintic
+from .interpolation import cubic_hermite, quintic_hermite
 
-Pieces = Tuple[Tuple[float, ...], ...]
+DelayLine = Tuple[Tuple[float, ...], ...]
 
 
-class Seen(NamedTuple):
-    """Of one signal at an instant: value and rate, or value, rate and curvature."""
+class SignalSample(NamedTuple):
+    """One sample of a signal: value and rate, or value, rate and curvature, at an instant."""
 
     time: float
-    numbers: Sequence[float]
+    derivatives: Sequence[float]
 
 
-def remember(past: Pieces, begin: Seen, end: Seen, lag: float) -> Pieces:
-    """The past with one more piece, without those that have lagged out."""
-    piece = (begin.time, end.time, *begin.numbers, *end.numbers)
-    return (*(old for old in past if old[1] >= end.time - lag), piece)
+def append_segment(delay_line: DelayLine, start: SignalSample, end: SignalSample, lag: float) -> DelayLine:
+    """Delay line with one more segment, without those older than the lag."""
+    segment = (start.time, end.time, *start.derivatives, *end.derivatives)
+    return (*(old for old in delay_line if old[1] >= end.time - lag), segment)
 
 
-def seen(past: Pieces, lag: float) -> Tuple[float, float]:
-    """Value and rate of the signal a lag (s) before the end of its past; before its begin it rests."""
-    time = past[-1][1] - lag
-    begin, end, *numbers = next((piece for piece in past if time <= piece[1]), past[-1])
-    count = len(numbers) // 2
-    if time < begin:
-        return numbers[0], 0.0
-    polynomial = cubic if count == 2 else quintic
-    value, rate, *_ = polynomial(numbers[:count], numbers[count:], end - begin, (time - begin) / (end - begin))
+def delayed_value(delay_line: DelayLine, lag: float) -> Tuple[float, float]:
+    """Value and rate of the signal a lag (s) before the end of its delay line; constant before its start."""
+    time = delay_line[-1][1] - lag
+    start, end, *derivatives = next((piece for piece in delay_line if time <= piece[1]), delay_line[-1])
+    count = len(derivatives) // 2
+    if time < start:
+        return derivatives[0], 0.0
+    polynomial = cubic_hermite if count == 2 else quintic_hermite
+    value, rate, *_ = polynomial(derivatives[:count], derivatives[count:], end - start, (time - start) / (end - start))
     return value, rate

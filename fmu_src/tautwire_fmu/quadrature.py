@@ -1,4 +1,4 @@
-"""Motion under an acceleration that runs on a Hermite polynomial over a step.
+"""Hermite quadrature: motion under an acceleration that is a Hermite polynomial over a step.
 
 The weights are the exact integrals of the polynomial through value and rate at its nodes: at both ends (a cubic), or
 at both ends and the middle (a quintic).
@@ -6,75 +6,77 @@ at both ends and the middle (a quintic).
 
 from typing import NamedTuple, Sequence, Tuple
 
-Pairs = Tuple[Tuple[float, float], ...]
+WeightPairs = Tuple[Tuple[float, float], ...]
 
 
-class Weights(NamedTuple):
-    """Where in the step (0 to 1), and what each node's (acceleration, its rate) adds there.
+class QuadratureWeights(NamedTuple):
+    """Quadrature weights of each node's (acceleration, its rate), at a fraction of the step (0 to 1).
 
-    Times (h^2, h^3) to the position, (h, h^2) to the velocity, (1, h) to the acceleration; the last are left out where
-    a node stands there.
+    They are times (h^2, h^3) for the position, (h, h^2) for the velocity, (1, h) for the acceleration; the last are
+    empty where a node stands there.
     """
 
     fraction: float
-    position: Pairs
-    velocity: Pairs
-    acceleration: Pairs = ()
+    position: WeightPairs
+    velocity: WeightPairs
+    acceleration: WeightPairs = ()
 
 
-CUBIC_MIDDLE = Weights(
+CUBIC_MIDDLE = QuadratureWeights(
     0.5,
     ((9 / 80, 23 / 1920), (1 / 80, -7 / 1920)),
     ((13 / 32, 11 / 192), (3 / 32, -5 / 192)),
     ((1 / 2, 1 / 8), (1 / 2, -1 / 8)),
 )
-CUBIC_END = Weights(
+CUBIC_END = QuadratureWeights(
     1.0,
     ((7 / 20, 1 / 20), (3 / 20, -1 / 30)),
     ((1 / 2, 1 / 12), (1 / 2, -1 / 12)),
 )
-QUINTIC_MIDDLE = Weights(
+QUINTIC_MIDDLE = QuadratureWeights(
     0.5,
     ((13 / 168, 59 / 13440), (1 / 24, -1 / 105), (1 / 168, -11 / 13440)),
     ((101 / 480, 13 / 960), (4 / 15, -1 / 24), (11 / 480, -1 / 320)),
 )
-QUINTIC_END = Weights(
+QUINTIC_END = QuadratureWeights(
     1.0,
     ((79 / 420, 1 / 84), (4 / 15, -2 / 105), (19 / 420, -1 / 210)),
     ((7 / 30, 1 / 60), (8 / 15, 0.0), (7 / 30, -1 / 60)),
 )
 
 
-class Node(NamedTuple):
-    """Acceleration and its rate, one number an axis."""
+class AccelerationNode(NamedTuple):
+    """Quadrature node: acceleration and its rate, one number an axis."""
 
     acceleration: Sequence[float]
     jerk: Sequence[float]
 
 
-class Place(NamedTuple):
-    """Position, velocity and acceleration, one number an axis."""
+class MotionState(NamedTuple):
+    """Motion state: position, velocity and acceleration, one number an axis."""
 
     position: Sequence[float]
     velocity: Sequence[float]
     acceleration: Sequence[float]
 
 
-def integrate(start: Place, nodes: Sequence[Node], step: float, weights: Weights) -> Place:
-    """Where the polynomial leads from ``start``, at the weights' fraction of the step."""
-    reach, square = weights.fraction * step, step * step
-    straight = [x + reach * v for x, v in zip(start.position, start.velocity)]
-    position = _moved(straight, nodes, square, step * square, weights.position)
-    velocity = _moved(start.velocity, nodes, step, square, weights.velocity)
+def integrate_hermite(
+    start: MotionState, nodes: Sequence[AccelerationNode], step: float, weights: QuadratureWeights
+) -> MotionState:
+    """Integrate the Hermite polynomial through ``nodes`` from ``start`` to the weights' fraction of the step."""
+    elapsed, step_squared = weights.fraction * step, step * step
+    unaccelerated = [x + elapsed * v for x, v in zip(start.position, start.velocity)]
+    position = _apply_weights(unaccelerated, nodes, step_squared, step * step_squared, weights.position)
+    velocity = _apply_weights(start.velocity, nodes, step, step_squared, weights.velocity)
     if weights.acceleration:
-        acceleration = _moved([0.0] * len(straight), nodes, 1.0, step, weights.acceleration)
+        acceleration = _apply_weights([0.0] * len(unaccelerated), nodes, 1.0, step, weights.acceleration)
     else:
         acceleration = nodes[int(weights.fraction * (len(nodes) - 1))].acceleration
-    return Place(position, velocity, acceleration)
+    return MotionState(position, velocity, acceleration)
 
 
-def _moved(
-    start: Sequence[float], nodes: Sequence[Node], scale: float, rate_scale: float, weights: Pairs
+def _apply_weights(
+    start: Sequence[float], nodes: Sequence[AccelerationNode], scale: float, rate_scale: float, weights: WeightPairs
 ) -> Sequence[float]:
     if len(nodes) == 2:
         first, last = nodes

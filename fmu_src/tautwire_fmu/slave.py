@@ -1,9 +1,9 @@
-"""The base of all slaves: time-stamped inputs, complete saved states, one list of numbers.
+"""Base class of all FMI slaves: time-stamped inputs, complete saved states, one list of variable values.
 
-Inputs carry their own rates. A master that knows nothing of this sets inputs at the start of a step, and the slave
-extrapolates them over it. A master that also sets ``input_time`` says when they hold: stamped with the end of the
-step, the inputs run on a polynomial from those set before to those set now; with ``middle_time``, through those of
-the middle.
+Inputs come with their rates. A master that knows nothing of this sets inputs at the start of a step, and the slave
+extrapolates them over it. A master that also sets ``input_time`` states when they hold: with the time of the end of the
+step, the inputs are interpolated by a polynomial from those set before to those set now; with ``middle_time``, through
+those of the middle.
 """
 
 import json
@@ -16,10 +16,10 @@ from xml.etree.ElementTree import Element
 from pythonfmu import Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability, Real
 from pythonfmu.enums import Fmi2Status
 
-from .description import Variable, complete
-from .past import Pieces
+from .description import Variable, complete_model_description
+from .past import DelayLine
 
-Snapshot = Tuple[Tuple[float, ...], Optional[Tuple[float, ...]], float, bool, Tuple[Pieces, ...]]
+Snapshot = Tuple[Tuple[float, ...], Optional[Tuple[float, ...]], float, bool, Tuple[DelayLine, ...]]
 
 INPUT_TIME = Variable(
     "input_time",
@@ -36,17 +36,17 @@ MIDDLE_TIME = Variable(
 )
 
 
-class AllInputs(NamedTuple):
-    """References that were last set; ``in_order`` sorts their values where they are all inputs, else None."""
+class CachedReferences(NamedTuple):
+    """Value references that were last set; ``sort_values`` sorts their values where they are all inputs, else None."""
 
     references: Sequence[int]
-    in_order: Optional[Callable[[Sequence[float]], Tuple[float, ...]]]
+    sort_values: Optional[Callable[[Sequence[float]], Tuple[float, ...]]]
 
 
 class Slave(Fmi2Slave):
-    """A slave whose variables are the entries of one list, in the order of their value references.
+    """Co-simulation slave whose variables are the entries of one list, in the order of their value references.
 
-    Subclasses give ``variables`` and where the ``states`` are, and implement :meth:`advance` and :meth:`refresh`.
+    Subclasses pass ``variables`` and the slice of the ``states``, and implement :meth:`advance` and :meth:`refresh`.
     Inputs come first in the list, ``input_time`` at their head.
     """
 
@@ -63,64 +63,64 @@ class Slave(Fmi2Slave):
         self.real: List[float] = [variable.start for variable in self.variables]
         self.input_count = sum(variable.causality == "input" for variable in self.variables)
         self.first_parameter = next(i for i, variable in enumerate(self.variables) if variable.causality == "parameter")
-        self.middle_place = next((i for i, v in enumerate(self.variables) if v.name == MIDDLE_TIME.name), None)
-        self.middle_given = False
-        self.earlier: Optional[Tuple[float, ...]] = None
-        self.all_inputs = AllInputs((), None)
+        self.middle_time_index = next((i for i, v in enumerate(self.variables) if v.name == MIDDLE_TIME.name), None)
+        self.has_middle_inputs = False
+        self.previous_inputs: Optional[Tuple[float, ...]] = None
+        self.cached_references = CachedReferences((), None)
         self.elapsed = 0.0
         self.time = 0.0
-        self.pasts: Tuple[Pieces, ...] = ()
+        self.delay_lines: Tuple[DelayLine, ...] = ()
         self.started = False
-        self.stale = True
-        # Whether nothing was set since the last step.
-        self.untouched = False
+        self.outputs_stale = True
+        # Whether no variable was set since the last step.
+        self.inputs_unchanged = False
         self.fault = ""
         for variable in self.variables:
             self.register_variable(_fmi_variable(variable, self), nested=False)
 
     def parameters_changed(self) -> None:
-        """Take over parameters from ``self.real``; before the first step the start state follows them."""
+        """Read the parameters from ``self.real``; before the first step the start state follows them."""
 
-    def advance(self, step: float, ends: bool) -> None:
-        """Integrate over one step; ``ends`` tells that the inputs hold at its end, else at its start."""
+    def advance(self, step: float, inputs_at_end: bool) -> None:
+        """Integrate over one step; the inputs hold at its end if ``inputs_at_end``, else at its start."""
         raise NotImplementedError
 
     def refresh(self) -> None:
-        """Bring the outputs in ``self.real`` up to date with state and inputs."""
+        """Compute the outputs in ``self.real`` from state and inputs."""
         raise NotImplementedError
 
     def get_real(self, vrs: Sequence[int]) -> List[float]:
-        if self.stale:
+        if self.outputs_stale:
             self._refresh_or_nan()
-            self.stale = False
+            self.outputs_stale = False
         try:
             return [self.real[reference] for reference in vrs]
         except IndexError:
-            return [self.real[r] if r < len(self.real) else self._unknown(r) for r in vrs]
+            return [self.real[r] if r < len(self.real) else self._report_unknown_reference(r) for r in vrs]
 
     def set_real(self, vrs: Sequence[int], values: Sequence[float]) -> None:
         if not vrs:
             return
         real = self.real
-        if vrs != self.all_inputs.references:
-            self.all_inputs = _all_inputs(vrs, self.input_count)
-        if self.all_inputs.in_order is not None:
-            given = self.all_inputs.in_order(values)
-            if given[0] != real[0]:
-                self.earlier = tuple(real[: self.input_count])
-            real[: self.input_count] = given
+        if vrs != self.cached_references.references:
+            self.cached_references = _cache_references(vrs, self.input_count)
+        if self.cached_references.sort_values is not None:
+            input_values = self.cached_references.sort_values(values)
+            if input_values[0] != real[0]:
+                self.previous_inputs = tuple(real[: self.input_count])
+            real[: self.input_count] = input_values
         else:
-            self._set_some(vrs, values)
-        self.stale = True
-        self.untouched = False
+            self._set_selected(vrs, values)
+        self.outputs_stale = True
+        self.inputs_unchanged = False
         self.elapsed = 0.0
 
-    def _set_some(self, vrs: Sequence[int], values: Sequence[float]) -> None:
+    def _set_selected(self, vrs: Sequence[int], values: Sequence[float]) -> None:
         real, highest = self.real, max(vrs)
         if 0 in vrs and values[vrs.index(0)] != real[0]:
-            self.earlier = tuple(real[: self.input_count])
+            self.previous_inputs = tuple(real[: self.input_count])
         if highest >= len(real):
-            vrs, values = self._known(vrs, values)
+            vrs, values = self._select_known(vrs, values)
         for reference, value in zip(vrs, values):
             real[reference] = value
         if highest >= self.first_parameter:
@@ -128,34 +128,37 @@ class Slave(Fmi2Slave):
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         if not (step_size > 0.0 and math.isfinite(current_time) and math.isfinite(step_size)):
-            self.tell(f"step of {step_size!r} s at {current_time!r} s: must be positive", Fmi2Status.error)
+            self.log_message(f"step of {step_size!r} s at {current_time!r} s: must be positive", Fmi2Status.error)
             return False
         if self.fault:
-            self.tell(self.fault, Fmi2Status.error)
+            self.log_message(self.fault, Fmi2Status.error)
             return False
-        before = self.snapshot()
-        ends = self.earlier is not None and self.real[0] > current_time + 0.5 * step_size
-        self.middle_given = ends and self._holds_in_middle(current_time, step_size)
+        state_before = self.snapshot()
+        inputs_at_end = self.previous_inputs is not None and self.real[0] > current_time + 0.5 * step_size
+        self.has_middle_inputs = inputs_at_end and self._middle_inputs_hold(current_time, step_size)
         self.time = current_time
         try:
-            self.advance(step_size, ends)
+            self.advance(step_size, inputs_at_end)
             if not all(map(math.isfinite, self.real[self.states])):
                 raise ValueError("the state is not finite any more")
         except (ArithmeticError, ValueError) as error:
-            self.restore(before)
-            told = f"step of {step_size!r} s at {current_time!r} s: {error}; inputs {self.inputs_by_name()}"
-            self.tell(told, Fmi2Status.error)
+            self.restore(state_before)
+            message = f"step of {step_size!r} s at {current_time!r} s: {error}; inputs {self.inputs_by_name()}"
+            self.log_message(message, Fmi2Status.error)
             return False
         self.started = True
-        self.elapsed = 0.0 if ends else step_size
-        self.stale = self.untouched = True
+        self.elapsed = 0.0 if inputs_at_end else step_size
+        self.outputs_stale = self.inputs_unchanged = True
         return True
 
-    def _holds_in_middle(self, time: float, step: float) -> bool:
-        return self.middle_place is not None and abs(self.real[self.middle_place] - time - 0.5 * step) < 1e-3 * step
+    def _middle_inputs_hold(self, time: float, step: float) -> bool:
+        return (
+            self.middle_time_index is not None
+            and abs(self.real[self.middle_time_index] - time - 0.5 * step) < 1e-3 * step
+        )
 
     def _refresh_or_nan(self) -> None:
-        """Refresh outputs; where the law has no value for the inputs, all outputs become NaN.
+        """Compute the outputs; where the law has no value for the inputs, all become NaN.
 
         An exception must not leave a slave: pythonfmu 0.7.0 ends the process at the third.
         """
@@ -165,42 +168,42 @@ class Slave(Fmi2Slave):
             for reference, variable in enumerate(self.variables):
                 if variable.causality == "output" and not self._is_state(reference):
                     self.real[reference] = math.nan
-            self.tell(f"no outputs: {error}; inputs {self.inputs_by_name()}", Fmi2Status.warning)
+            self.log_message(f"no outputs: {error}; inputs {self.inputs_by_name()}", Fmi2Status.warning)
 
     def _is_state(self, reference: int) -> bool:
         return self.states.start <= reference < self.states.stop
 
-    def _known(self, vrs: Sequence[int], values: Sequence[float]) -> Tuple[Sequence[int], Sequence[float]]:
+    def _select_known(self, vrs: Sequence[int], values: Sequence[float]) -> Tuple[Sequence[int], Sequence[float]]:
         for reference in vrs:
             if reference >= len(self.real):
-                self._unknown(reference)
-        known = [place for place, reference in enumerate(vrs) if reference < len(self.real)]
-        return [vrs[place] for place in known], [values[place] for place in known]
+                self._report_unknown_reference(reference)
+        known_indices = [place for place, reference in enumerate(vrs) if reference < len(self.real)]
+        return [vrs[place] for place in known_indices], [values[place] for place in known_indices]
 
-    def _unknown(self, reference: int) -> float:
+    def _report_unknown_reference(self, reference: int) -> float:
         self.fault = f"no real variable has the value reference {reference}"
-        self.tell(self.fault, Fmi2Status.error)
+        self.log_message(self.fault, Fmi2Status.error)
         return math.nan
 
-    def tell(self, message: str, status: Fmi2Status) -> None:
-        """Log; the wrapper hands the text to the host as a format, where a percent sign would be an order."""
+    def log_message(self, message: str, status: Fmi2Status) -> None:
+        """Log a message without percent signs: the wrapper passes the text to the host as a printf format."""
         self.log(message.replace("%", " per cent"), status)
 
     def inputs_by_name(self) -> Dict[str, float]:
-        """The inputs as they were set."""
+        """Inputs by variable name, as they were set."""
         return {v.name: value for v, value in zip(self.variables, self.real[: self.input_count])}
 
     def snapshot(self) -> Snapshot:
-        """All that the slave remembers."""
-        return (tuple(self.real), self.earlier, self.elapsed, self.started, self.pasts)
+        """Complete state of the slave: variables, earlier inputs, time since them, and delay lines."""
+        return (tuple(self.real), self.previous_inputs, self.elapsed, self.started, self.delay_lines)
 
     def restore(self, snapshot: Snapshot) -> None:
-        """Go back to a snapshot; a redo from it gives the same bits."""
-        real, self.earlier, self.elapsed, self.started, self.pasts = snapshot
+        """Roll back to a snapshot; a step repeated from it gives the same bits."""
+        real, self.previous_inputs, self.elapsed, self.started, self.delay_lines = snapshot
         parameters = self.real[self.first_parameter :]
         self.real = list(real)
-        self.stale = True
-        self.untouched = False
+        self.outputs_stale = True
+        self.inputs_unchanged = False
         if parameters != self.real[self.first_parameter :]:
             self.parameters_changed()
 
@@ -210,7 +213,7 @@ class Slave(Fmi2Slave):
     def _set_fmu_state(self, state: Optional[Snapshot]) -> None:
         if state is None or len(state[0]) != len(self.real):
             self.fault = "a saved state that was no state of this FMU"
-            self.tell(self.fault, Fmi2Status.error)
+            self.log_message(self.fault, Fmi2Status.error)
             return
         self.fault = ""
         self.restore(state)
@@ -222,26 +225,26 @@ class Slave(Fmi2Slave):
     @staticmethod
     def _fmu_state_from_bytes(state: bytes) -> Optional[Snapshot]:
         try:
-            real, earlier, elapsed, started, pasts = json.loads(state.decode("utf-8"))
-            before = None if earlier is None else tuple(map(float, earlier))
-            pieces = tuple(tuple(tuple(map(float, piece)) for piece in past) for past in pasts)
-            return (tuple(map(float, real)), before, float(elapsed), bool(started), pieces)
+            real, previous, elapsed, started, delay_line_lists = json.loads(state.decode("utf-8"))
+            previous_inputs = None if previous is None else tuple(map(float, previous))
+            delay_lines = tuple(tuple(tuple(map(float, piece)) for piece in past) for past in delay_line_lists)
+            return (tuple(map(float, real)), previous_inputs, float(elapsed), bool(started), delay_lines)
         except (ValueError, TypeError):
             return None
 
     def to_xml(self, model_options: Dict[str, str] = {}) -> Element:  # noqa: B006 (pythonfmu's signature)
-        return complete(super().to_xml(model_options), self.variables)
+        return complete_model_description(super().to_xml(model_options), self.variables)
 
 
-def _all_inputs(references: Sequence[int], count: int) -> AllInputs:
-    """Inputs come first, with the lowest references."""
+def _cache_references(references: Sequence[int], count: int) -> CachedReferences:
+    """Whether and how a list of references covers all inputs, which have the lowest references."""
     order = sorted(range(len(references)), key=references.__getitem__)
-    whole = count > 1 and [references[place] for place in order] == list(range(count))
-    return AllInputs(list(references), itemgetter(*order) if whole else None)
+    covers_all_inputs = count > 1 and [references[place] for place in order] == list(range(count))
+    return CachedReferences(list(references), itemgetter(*order) if covers_all_inputs else None)
 
 
 def read_resource(resources: str, name: str) -> Dict[str, Any]:
-    """The data that make this FMU this component."""
+    """Read the JSON resource that parametrises this FMU."""
     data: Dict[str, Any] = json.loads((Path(resources) / name).read_text(encoding="utf-8"))
     return data
 
@@ -249,7 +252,7 @@ def read_resource(resources: str, name: str) -> Dict[str, Any]:
 def _fmi_variable(variable: Variable, owner: Slave) -> Real:
     reference = len(owner.vars)
     parameter = variable.causality == "parameter"
-    given = parameter or variable.causality == "input"
+    is_set_from_outside = parameter or variable.causality == "input"
     return Real(
         variable.name,
         causality=Fmi2Causality[variable.causality],
@@ -260,7 +263,7 @@ def _fmi_variable(variable: Variable, owner: Slave) -> Real:
             if variable.discrete
             else Fmi2Variability.continuous
         ),
-        initial=Fmi2Initial.exact if parameter else None if given else Fmi2Initial.calculated,
+        initial=Fmi2Initial.exact if parameter else None if is_set_from_outside else Fmi2Initial.calculated,
         description=variable.description,
         getter=lambda: owner.real[reference],
     )

@@ -1,7 +1,7 @@
-"""Every slave, imported together.
+"""Imports every slave together.
 
-FMUs of one build share this package within a process; one that came later could not import its module from the
-folder of the first, which may be gone by then.
+FMUs of one build share this package within a process. A later FMU could not import a further module from the folder of
+the first, which may be deleted by then.
 """
 
 from .cable import Cable

@@ -1,4 +1,4 @@
-"""The units that FMU variables carry, as exponents of the SI base units for FMI's UnitDefinitions."""
+"""Units of FMU variables, as exponents of the SI base units for FMI's UnitDefinitions."""
 
 from typing import Dict
 

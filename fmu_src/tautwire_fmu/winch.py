@@ -1,124 +1,124 @@
-"""The winch as an FMI slave: a commanded rope speed in, the speed of rope and motor out."""
+"""FMI slave of the winch: a commanded rope speed in, the speed of rope and motor out."""
 
 import math
 from typing import Any, Callable, Dict, Sequence, Tuple
 
 from .description import Variable
-from .interpolation import cubic
+from .interpolation import cubic_hermite
 from .laws import winch_drive as law
 from .laws.mathematics import REAL
 from .slave import INPUT_TIME, Slave, read_resource
 
-COMMAND, FIRST_OUTPUT, FIRST_STATE, END_OF_STATE = 1, 3, 8, 10
-# Inner steps are at most this long in time constants of the loop.
-INNER_STEP = 0.2
-MOST_CORNERS = 12
-BISECTIONS = 44
-MOST_INNER_STEPS = 1_000_000
-Command = Callable[[float], float]
+COMMAND, FIRST_OUTPUT, FIRST_STATE, STATE_END = 1, 3, 8, 10
+# Longest inner step in time constants of the speed loop.
+MAX_INNER_STEP = 0.2
+MAX_EVENTS_PER_INNER_STEP = 12
+BISECTION_COUNT = 44
+MAX_INNER_STEPS = 1_000_000
+SpeedCommand = Callable[[float], float]
 Margins = Tuple[Any, ...]
 
 
 class Winch(Slave):
-    """A motor, its speed loop with limits, gear and drum."""
+    """Winch: motor, its speed loop with limits, gear and drum."""
 
     def __init__(self, **kwargs: Any) -> None:
         data = read_resource(kwargs["resources"], "winch.json")
-        super().__init__(data, _variables(data), slice(FIRST_STATE, END_OF_STATE), **kwargs)
+        super().__init__(data, _variables(data), slice(FIRST_STATE, STATE_END), **kwargs)
         self.parameters_changed()
 
     def parameters_changed(self) -> None:
         radius, turns, bandwidth, ratio, speed_limit, acceleration_limit = self.real[self.first_parameter :]
         frequency = 2.0 * math.pi * bandwidth
         self.constants = law.DriveConstants(frequency, ratio, speed_limit, acceleration_limit)
-        self.motor_turn = turns / radius if radius else math.nan
-        self.fastest = frequency * max(1.0, 2.0 * ratio, 0.5 / ratio if ratio else math.inf)
+        self.motor_radians_per_metre = turns / radius if radius else math.nan
+        self.fastest_rate = frequency * max(1.0, 2.0 * ratio, 0.5 / ratio if ratio else math.inf)
 
-    def advance(self, step: float, ends: bool) -> None:
-        """The classical Runge-Kutta method in inner steps, cut at the kinks of the law."""
-        command = self._commanded(step, ends)
-        state = law.DriveState(*self.real[FIRST_STATE:END_OF_STATE])
-        count = max(1, math.ceil(step * self.fastest / INNER_STEP))
-        if count > MOST_INNER_STEPS:
+    def advance(self, step: float, inputs_at_end: bool) -> None:
+        """Integrate by the classical Runge-Kutta method in inner steps, which end at the state events of the law."""
+        command = self._speed_command(step, inputs_at_end)
+        state = law.DriveState(*self.real[FIRST_STATE:STATE_END])
+        count = max(1, math.ceil(step * self.fastest_rate / MAX_INNER_STEP))
+        if count > MAX_INNER_STEPS:
             raise ValueError(f"the speed loop is too fast for this step, it takes {count} inner steps")
         margins = self._margins(command, 0.0, state)
         for k in range(count):
-            state, margins = self._across(command, step * k / count, step * (k + 1) / count, state, margins)
-        self.real[FIRST_STATE:END_OF_STATE] = state
+            state, margins = self._step_across_events(command, step * k / count, step * (k + 1) / count, state, margins)
+        self.real[FIRST_STATE:STATE_END] = state
 
     def refresh(self) -> None:
         value, rate = self.real[COMMAND:FIRST_OUTPUT]
         command = value + self.elapsed * rate
-        state = law.DriveState(*self.real[FIRST_STATE:END_OF_STATE])
+        state = law.DriveState(*self.real[FIRST_STATE:STATE_END])
         self.real[FIRST_OUTPUT:FIRST_STATE] = [
-            self.motor_turn * state.speed,
+            self.motor_radians_per_metre * state.speed,
             law.acceleration(REAL, self.constants, state, command),
-            *law.margins(REAL, self.constants, state, command),
+            *law.limit_margins(REAL, self.constants, state, command),
         ]
 
-    def _commanded(self, step: float, ends: bool) -> Command:
-        """The command over the step, by the time since its begin."""
-        now = self.real[COMMAND:FIRST_OUTPUT]
-        if not ends:
-            return lambda elapsed: now[0] + elapsed * now[1]
-        assert self.earlier is not None
-        then = self.earlier[COMMAND:FIRST_OUTPUT]
-        return lambda elapsed: cubic(then, now, step, elapsed / step)[0]
+    def _speed_command(self, step: float, inputs_at_end: bool) -> SpeedCommand:
+        """Commanded speed as a function of the time since the start of the step."""
+        end_command = self.real[COMMAND:FIRST_OUTPUT]
+        if not inputs_at_end:
+            return lambda elapsed: end_command[0] + elapsed * end_command[1]
+        assert self.previous_inputs is not None
+        start_command = self.previous_inputs[COMMAND:FIRST_OUTPUT]
+        return lambda elapsed: cubic_hermite(start_command, end_command, step, elapsed / step)[0]
 
-    def _across(
-        self, command: Command, begin: float, end: float, state: law.DriveState, here: Margins
+    def _step_across_events(
+        self, command: SpeedCommand, start: float, end: float, state: law.DriveState, start_margins: Margins
     ) -> Tuple[law.DriveState, Margins]:
-        """From ``begin`` to ``end``, one step from kink to kink; ``here`` are the margins at the begin."""
-        for _ in range(MOST_CORNERS):
-            ahead = self._inner_step(command, begin, end, state)
-            there = self._margins(command, end, ahead)
-            if not _changed(here, there):
+        """Integrate from ``start`` to ``end``, one step from event to event; ``start_margins`` hold at the start."""
+        for _ in range(MAX_EVENTS_PER_INNER_STEP):
+            end_state = self._inner_step(command, start, end, state)
+            end_margins = self._margins(command, end, end_state)
+            if not _sign_changed(start_margins, end_margins):
                 break
-            begin, state, here = self._to_kink(command, begin, end, state, here)
+            start, state, start_margins = self._locate_event(command, start, end, state, start_margins)
         else:
-            ahead = self._inner_step(command, begin, end, state)
-            there = self._margins(command, end, ahead)
-        return ahead, there
+            end_state = self._inner_step(command, start, end, state)
+            end_margins = self._margins(command, end, end_state)
+        return end_state, end_margins
 
-    def _to_kink(
-        self, command: Command, begin: float, end: float, state: law.DriveState, here: Margins
+    def _locate_event(
+        self, command: SpeedCommand, start: float, end: float, state: law.DriveState, start_margins: Margins
     ) -> Tuple[float, law.DriveState, Margins]:
-        """Just beyond the first kink: when, state and margins."""
-        low, high = begin, end
-        for _ in range(BISECTIONS):
+        """Locate the first state event by bisection; returns time, state and margins just after it."""
+        low, high = start, end
+        for _ in range(BISECTION_COUNT):
             middle = 0.5 * (low + high)
-            there = self._inner_step(command, begin, middle, state)
-            if _changed(here, self._margins(command, middle, there)):
+            event_state = self._inner_step(command, start, middle, state)
+            if _sign_changed(start_margins, self._margins(command, middle, event_state)):
                 high = middle
             else:
                 low = middle
-        there = self._inner_step(command, begin, high, state)
-        return high, there, self._margins(command, high, there)
+        event_state = self._inner_step(command, start, high, state)
+        return high, event_state, self._margins(command, high, event_state)
 
-    def _inner_step(self, command: Command, begin: float, end: float, state: law.DriveState) -> law.DriveState:
-        step = end - begin
-        middle = command(begin + 0.5 * step)
-        k1 = self._rates(state, command(begin))
-        k2 = self._rates(_moved(state, 0.5 * step, k1), middle)
-        k3 = self._rates(_moved(state, 0.5 * step, k2), middle)
-        k4 = self._rates(_moved(state, step, k3), command(end))
+    def _inner_step(self, command: SpeedCommand, start: float, end: float, state: law.DriveState) -> law.DriveState:
+        step = end - start
+        middle = command(start + 0.5 * step)
+        k1 = self._rates(state, command(start))
+        k2 = self._rates(_euler_step(state, 0.5 * step, k1), middle)
+        k3 = self._rates(_euler_step(state, 0.5 * step, k2), middle)
+        k4 = self._rates(_euler_step(state, step, k3), command(end))
         sixth = step / 6.0
-        moved = [s + sixth * (a + 2.0 * (b + c) + d) for s, a, b, c, d in zip(state, k1, k2, k3, k4)]
-        return law.DriveState(*moved)
+        end_state = [s + sixth * (a + 2.0 * (b + c) + d) for s, a, b, c, d in zip(state, k1, k2, k3, k4)]
+        return law.DriveState(*end_state)
 
     def _rates(self, state: law.DriveState, command: float) -> law.DriveState:
         return law.state_rates(REAL, self.constants, state, command)
 
-    def _margins(self, command: Command, elapsed: float, state: law.DriveState) -> Margins:
-        return law.margins(REAL, self.constants, state, command(elapsed))
+    def _margins(self, command: SpeedCommand, elapsed: float, state: law.DriveState) -> Margins:
+        return law.limit_margins(REAL, self.constants, state, command(elapsed))
 
 
-def _moved(state: law.DriveState, step: float, rates: law.DriveState) -> law.DriveState:
+def _euler_step(state: law.DriveState, step: float, rates: law.DriveState) -> law.DriveState:
     return law.DriveState(state.speed + step * rates.speed, state.integral + step * rates.integral)
 
 
-def _changed(before: Margins, after: Margins) -> bool:
-    """Whether some margin has another sign."""
+def _sign_changed(before: Margins, after: Margins) -> bool:
+    """Whether some margin changed its sign: a zero crossing."""
     return any((a > 0.0) != (b > 0.0) for a, b in zip(before, after))
 
 
@@ -136,20 +136,22 @@ def _inputs() -> Sequence[Variable]:
 
 def _outputs(data: Dict[str, Any]) -> Sequence[Variable]:
     command = ("speed_command",)
-    turns = float(data["gear"]) / float(data["drum_radius"])
-    kink = "; at a change of sign winch_acceleration has a kink"
+    motor_radians_per_metre = float(data["gear"]) / float(data["drum_radius"])
+    event_text = "; at a change of sign winch_acceleration has a kink"
     return (
-        Variable("motor_speed", "output", "rad/s", "angular speed of the motor", nominal=turns),
+        Variable("motor_speed", "output", "rad/s", "angular speed of the motor", nominal=motor_radians_per_metre),
         Variable("winch_acceleration", "output", "m/s2", "rate of winch_speed", depends_on=command),
-        Variable("command_margin", "output", "m/s", f"limit of speed less speed asked for{kink}", depends_on=command),
+        Variable(
+            "command_margin", "output", "m/s", f"limit of speed less speed asked for{event_text}", depends_on=command
+        ),
         Variable(
             "acceleration_margin",
             "output",
             "m/s2",
-            f"limit of acceleration less acceleration asked for{kink}",
+            f"limit of acceleration less acceleration asked for{event_text}",
             depends_on=command,
         ),
-        Variable("speed_margin", "output", "m/s", f"speed to where another limit bounds the acceleration{kink}"),
+        Variable("speed_margin", "output", "m/s", f"speed to where another limit bounds the acceleration{event_text}"),
         Variable("winch_speed", "output", "m/s", "rope speed by the winch encoder, positive reels in"),
         Variable("integral", "local", "m/s2", "state: integral part of the speed loop, as acceleration of the rope"),
     )
@@ -160,12 +162,12 @@ def _parameters(data: Dict[str, Any]) -> Sequence[Variable]:
         value = float(data[name])
         return Variable(name, "parameter", unit, description, value, minimum=minimum, nominal=value)
 
-    none = f"; {law.NO_LIMIT:g} where there is none"
+    no_limit_text = f"; {law.NO_LIMIT:g} where there is none"
     return (
         parameter("drum_radius", "m", "radius at which rope lies on the drum"),
         parameter("gear", "1", "turns of the motor for one turn of the drum"),
         parameter("bandwidth", "Hz", "natural frequency of the speed loop"),
         parameter("damping_ratio", "1", "damping ratio of the speed loop"),
-        parameter("speed_limit", "m/s", f"largest speed of the rope{none}"),
-        parameter("acceleration_limit", "m/s2", f"largest acceleration of the rope{none}"),
+        parameter("speed_limit", "m/s", f"largest speed of the rope{no_limit_text}"),
+        parameter("acceleration_limit", "m/s2", f"largest acceleration of the rope{no_limit_text}"),
     )

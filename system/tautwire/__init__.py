@@ -1,23 +1,23 @@
-"""Cable-driven parallel robots as FMI components, and a tracer that finds what their model lacks.
+"""Cable-driven parallel robots as FMI components, and a tracer that identifies what their model lacks.
 
-The names here are all that most programs need; each comes with its module when it is first asked for. Arguments are
-checked: wrong ones raise ``tautwire.errors.ArgumentError``; whatever is raised on purpose is a ``TautwireError``.
+These names are all that most programs need; each module is imported on first use. Arguments are validated: wrong ones
+raise ``tautwire.errors.ArgumentError``; every exception raised on purpose is a ``TautwireError``.
 
 ========================== ========================================================================================
-``read_robot``             the robot that a TOML file declares
-``build_fmus``             its FMUs, for other tools and for our master
-``cosimulate``             a run of the FMUs over winch speeds, as arrays or a pandas frame
-``Line``                   a straight path from rest to rest
-``ideal_winch_speeds``     the winch speeds of a path, for inelastic cables
-``linearise``              the linear plant as a python-control state space, with its modes
-``bode_figure``            a channel of it as a matplotlib figure
-``modes_along_figure``     the modes along a path as one; ``modes_along`` gives the numbers
-``design_controller``      LQG with integral action on it
-``cosimulate_closed_loop`` a run of the FMUs with a controller
-``read_recording``         winch speeds and what sensors saw, from CSV, Parquet or MDF
+``read_robot``             reads the robot that a TOML file declares
+``build_fmus``             builds its FMUs, for other tools and for our co-simulation master
+``cosimulate``             co-simulates the FMUs over winch speeds; results as arrays or a pandas frame
+``Line``                   a straight rest-to-rest trajectory
+``ideal_winch_speeds``     inverse kinematics: the winch speeds of a trajectory for inelastic cables
+``linearise``              linearises the robot to a python-control state space, with its modes
+``bode_figure``            Bode diagram of one channel, as a matplotlib figure
+``modes_along_figure``     the modes along a path as a figure; ``modes_along`` gives the numbers
+``design_controller``      designs an LQG controller with integral action on the linear plant
+``cosimulate_closed_loop`` co-simulates the FMUs in closed loop with a controller
+``read_recording``         reads winch speeds and sensor measurements from CSV, Parquet or MDF
 ``recording_from_frame``   the same from a pandas frame
-``trace``                  what the model lacks, from recordings
-``write_report``           the report, the better robot file and its FMUs, into a folder
+``trace``                  identifies what the model lacks, from recordings
+``write_report``           writes the report, the extended robot file and its FMUs into a folder
 ========================== ========================================================================================
 """
 
@@ -63,7 +63,7 @@ __all__ = [
     "write_report",
 ]
 
-# CasADi, python-control and plotly take a second to import; who reads a robot file needs none of them.
+# CasADi, python-control and plotly take a second to import; reading a robot file needs none of them.
 _MODULES = {
     "Line": ".trajectory",
     "bode_figure": ".linear",

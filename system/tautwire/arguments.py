@@ -1,4 +1,4 @@
-"""What the library's own functions take: single values, checked where a program hands them in."""
+"""Validation of arguments that a program passes to the library's functions: single values."""
 
 from __future__ import annotations
 
@@ -8,68 +8,72 @@ from pathlib import Path
 from stat import S_ISDIR, S_ISREG
 from typing import TypeVar
 
-from .errors import ArgumentError, described, shown, with_article
-from .input_file import path_of
+from .errors import ArgumentError, describe_value, format_value, with_article
+from .input_file import validate_path
 from .robots.checked_table import NumberRule
 from .robots.robot import Robot
 
 Kind = TypeVar("Kind")
 
 
-def of_kind(where: str, value: object, kind: type[Kind], mend: str) -> Kind:
-    """The value if it is of a class; raises ArgumentError."""
-    if isinstance(value, kind):
+def validate_instance(where: str, value: object, expected_class: type[Kind], hint: str) -> Kind:
+    """Returns the value if it is an instance of ``expected_class``; raises ArgumentError otherwise."""
+    if isinstance(value, expected_class):
         return value
-    raise ArgumentError(where, value, f"is {described(value)}, must be {with_article(kind.__name__)}", mend)
+    raise ArgumentError(
+        where, value, f"is {describe_value(value)}, must be {with_article(expected_class.__name__)}", hint
+    )
 
 
-def robot_of(where: str, value: object) -> Robot:
-    """The value if it is a robot; raises ArgumentError."""
-    return of_kind(where, value, Robot, "give what read_robot returns")
+def validate_robot(where: str, value: object) -> Robot:
+    """Returns the value if it is a Robot; raises ArgumentError otherwise."""
+    return validate_instance(where, value, Robot, "give what read_robot returns")
 
 
-def having(where: str, value: Kind, names: tuple[str, ...], wanted: str, mend: str) -> Kind:
-    """The value if it has all these attributes, as a protocol asks; ``wanted`` is what it should be.
+def validate_attributes(where: str, value: Kind, attribute_names: tuple[str, ...], expected: str, hint: str) -> Kind:
+    """Returns the value if it has all attributes of a protocol; ``expected`` names the protocol in messages.
 
     Raises ArgumentError.
     """
-    # A class has the names of its instances, and is none.
-    lacking = [name for name in names if isinstance(value, type) or not hasattr(value, name)]
-    if lacking:
-        problem = f"is {described(value)}, which is no {wanted}: it has no {', '.join(lacking)}"
-        raise ArgumentError(where, value, problem, mend)
+    # A class has its instances' attributes, but is not an instance.
+    missing = [name for name in attribute_names if isinstance(value, type) or not hasattr(value, name)]
+    if missing:
+        problem = f"is {describe_value(value)}, which is no {expected}: it has no {', '.join(missing)}"
+        raise ArgumentError(where, value, problem, hint)
     return value
 
 
-def callable_or_none(where: str, value: Kind) -> Kind:
-    """The value if it can be called, or None; raises ArgumentError."""
+def validate_callable(where: str, value: Kind) -> Kind:
+    """Returns the value if it is callable or None; raises ArgumentError otherwise."""
     if value is None or callable(value):
         return value
-    raise ArgumentError(where, value, f"is {described(value)}, cannot be called", "give a function, or leave it out")
+    raise ArgumentError(
+        where, value, f"is {describe_value(value)}, cannot be called", "give a function, or leave it out"
+    )
 
 
-def folder_of(where: str, value: object) -> Path:
-    """The path of a folder, which need not be there; raises ArgumentError where something else is, or none can be."""
-    folder = path_of(where, value)
-    mode = _mode_of(where, value, folder, "name a folder")
-    if mode is not None and not S_ISDIR(mode):
-        raise ArgumentError(where, value, f"is {shown(str(folder))}, which is no folder", "name a folder")
+def validate_folder(where: str, value: object) -> Path:
+    """The path of a folder, which need not exist; raises ArgumentError where it is no folder or cannot be one."""
+    folder = validate_path(where, value)
+    file_mode = _file_mode_of(where, value, folder, "name a folder")
+    if file_mode is not None and not S_ISDIR(file_mode):
+        raise ArgumentError(where, value, f"is {format_value(str(folder))}, which is no folder", "name a folder")
     return folder
 
 
-def file_of(where: str, value: object) -> Path:
-    """The path of a file that is there; raises ArgumentError."""
-    file = path_of(where, value)
-    mode = _mode_of(where, value, file, "check the path")
-    if mode is None or not S_ISREG(mode):
-        raise ArgumentError(where, value, f"is {shown(str(file))}, where no file is", "check the path")
+def validate_file(where: str, value: object) -> Path:
+    """The path of an existing regular file; raises ArgumentError otherwise."""
+    file = validate_path(where, value)
+    file_mode = _file_mode_of(where, value, file, "check the path")
+    if file_mode is None or not S_ISREG(file_mode):
+        raise ArgumentError(where, value, f"is {format_value(str(file))}, where no file is", "check the path")
     return file
 
 
-def _mode_of(where: str, value: object, path: Path, mend: str) -> int | None:
-    """What kind of thing a path leads to, as ``os.stat`` tells; None where nothing is there.
+def _file_mode_of(where: str, value: object, path: Path, hint: str) -> int | None:
+    """The file mode (``st_mode``) of what a path leads to; None where nothing exists there.
 
-    Raises ArgumentError where the system takes no such path: a name in it is too long, or cannot be encoded.
+    Raises ArgumentError where the system rejects the path: a name in it is too long, or cannot be encoded.
     """
     try:
         return path.stat().st_mode
@@ -78,35 +82,38 @@ def _mode_of(where: str, value: object, path: Path, mend: str) -> int | None:
     except (OSError, ValueError) as error:
         reason = getattr(error, "strerror", None) or getattr(error, "reason", None) or str(error)
         raise ArgumentError(
-            where, value, f"is {shown(str(path))}, which cannot be looked up ({reason})", mend
+            where, value, f"is {format_value(str(path))}, which cannot be looked up ({reason})", hint
         ) from error
 
 
-def number_of(where: str, value: object, rule: NumberRule, or_infinite: bool = False) -> float:
-    """The number that keeps a rule; raises ArgumentError. Infinity may pass where it means that there is no bound."""
+def validate_number(where: str, value: object, rule: NumberRule, allow_infinite: bool = False) -> float:
+    """Returns the number as a float if it satisfies a rule; raises ArgumentError otherwise.
+
+    ``allow_infinite`` accepts positive infinity, where it means that there is no bound.
+    """
     if isinstance(value, bool) or not isinstance(value, Real):
-        raise ArgumentError(where, value, f"is {described(value)}, not a number", rule.mend())
+        raise ArgumentError(where, value, f"is {describe_value(value)}, not a number", rule.hint())
     try:
         number = float(value)
     except OverflowError:
         number = math.inf
-    if or_infinite and number == math.inf:
+    if allow_infinite and number == math.inf:
         return number
     if not math.isfinite(number):
-        raise ArgumentError(where, value, f"is {shown(number)}, must be finite", rule.mend())
-    bound = rule.broken_bound(number)
+        raise ArgumentError(where, value, f"is {format_value(number)}, must be finite", rule.hint())
+    bound = rule.violated_bound(number)
     if bound is not None:
-        raise ArgumentError(where, value, f"is {number!r}, must be {bound}", rule.mend())
+        raise ArgumentError(where, value, f"is {number!r}, must be {bound}", rule.hint())
     return number
 
 
-def whole_number_of(where: str, value: object, least: int, mend: str, most: int | None = None) -> int:
-    """The whole number from ``least`` to ``most``, where there is such a bound; raises ArgumentError."""
+def validate_integer(where: str, value: object, minimum: int, hint: str, maximum: int | None = None) -> int:
+    """Returns an integer of ``minimum`` to ``maximum`` (None: unbounded); raises ArgumentError otherwise."""
     if isinstance(value, bool) or not isinstance(value, Integral):
-        raise ArgumentError(where, value, f"is {described(value)}, not a whole number", mend)
+        raise ArgumentError(where, value, f"is {describe_value(value)}, not a whole number", hint)
     number = int(value)
-    if number < least:
-        raise ArgumentError(where, value, f"is {shown(number)}, must be at least {least}", mend)
-    if most is not None and number > most:
-        raise ArgumentError(where, value, f"is {shown(number)}, must be at most {most}", mend)
+    if number < minimum:
+        raise ArgumentError(where, value, f"is {format_value(number)}, must be at least {minimum}", hint)
+    if maximum is not None and number > maximum:
+        raise ArgumentError(where, value, f"is {format_value(number)}, must be at most {maximum}", hint)
     return number

@@ -1,66 +1,72 @@
-"""Arrays and frames that a program hands to the library's own functions, checked."""
+"""Validation of arrays and frames that a program passes to the library's functions."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .errors import ArgumentError, described
+from .errors import ArgumentError, describe_value
 
 Array = NDArray[np.float64]
 Shape = tuple[int | None, ...]
 
 
-def array_of(where: str, value: object, shape: Shape, meaning: str) -> Array:
-    """The finite numbers in an array, a list or a frame; an entry of ``shape`` is None where any length will do.
+def validate_array(where: str, value: object, shape: Shape, meaning: str) -> Array:
+    """Converts an array, a list or a frame to finite floats; an entry of ``shape`` is None where any length is valid.
 
-    ``meaning`` is what to give, for messages. Raises ArgumentError, which names the first entry that is not finite.
+    ``meaning`` says what to pass, for messages. Raises ArgumentError, which names the first entry that is not finite.
     """
-    mend = f"give {meaning}"
+    hint = f"give {meaning}"
     try:
         array = np.asarray(value)
         if np.iscomplexobj(array) or array.dtype.kind in "mM":
             raise TypeError
         array = array.astype(np.float64)
     except (TypeError, ValueError, OverflowError) as error:
-        raise ArgumentError(where, value, f"is {described(value)}, not an array of numbers", mend) from error
-    if array.ndim != len(shape) or any(want not in (None, got) for want, got in zip(shape, array.shape, strict=True)):
-        raise ArgumentError(where, value, f"has the shape {_shape(array.shape)}, must have {_shape(shape)}", mend)
-    wrong = np.argwhere(~np.isfinite(array))
-    if len(wrong):
-        entry = tuple(wrong[0])
-        raise ArgumentError(where, value, f"{_place(entry)} is {array[entry]}, must be finite", mend)
+        raise ArgumentError(where, value, f"is {describe_value(value)}, not an array of numbers", hint) from error
+    if array.ndim != len(shape) or any(
+        expected not in (None, actual) for expected, actual in zip(shape, array.shape, strict=True)
+    ):
+        raise ArgumentError(
+            where, value, f"has the shape {_format_shape(array.shape)}, must have {_format_shape(shape)}", hint
+        )
+    non_finite = np.argwhere(~np.isfinite(array))
+    if len(non_finite):
+        index = tuple(non_finite[0])
+        raise ArgumentError(where, value, f"{_format_index(index)} is {array[index]}, must be finite", hint)
     return array
 
 
-def rising_of(where: str, value: object, meaning: str, least: int = 2, above: float = -np.inf) -> Array:
-    """Numbers (N,) above a bound that rise from one to the next, ``least`` or more of them; raises ArgumentError."""
-    array = array_of(where, value, (None,), meaning)
-    mend = f"give {meaning}"
-    if len(array) < least:
-        raise ArgumentError(where, value, f"has {len(array)} entries, must have {least} or more", mend)
-    if array[0] <= above:
-        raise ArgumentError(where, value, f"entry 1 is {float(array[0])!r}, must be above {above:g}", mend)
-    falls = np.flatnonzero(np.diff(array) <= 0.0)
-    if len(falls):
-        place = int(falls[0])
-        before, after = float(array[place]), float(array[place + 1])
-        problem = f"entry {place + 2} is {after!r} after {before!r}, must rise from entry to entry"
-        raise ArgumentError(where, value, problem, mend)
+def validate_increasing(
+    where: str, value: object, meaning: str, min_length: int = 2, lower_bound: float = -np.inf
+) -> Array:
+    """Strictly increasing numbers (N,) above ``lower_bound``, at least ``min_length`` of them; raises ArgumentError."""
+    array = validate_array(where, value, (None,), meaning)
+    hint = f"give {meaning}"
+    if len(array) < min_length:
+        raise ArgumentError(where, value, f"has {len(array)} entries, must have {min_length} or more", hint)
+    if array[0] <= lower_bound:
+        raise ArgumentError(where, value, f"entry 1 is {float(array[0])!r}, must be above {lower_bound:g}", hint)
+    decreases = np.flatnonzero(np.diff(array) <= 0.0)
+    if len(decreases):
+        index = int(decreases[0])
+        before, after = float(array[index]), float(array[index + 1])
+        problem = f"entry {index + 2} is {after!r} after {before!r}, must rise from entry to entry"
+        raise ArgumentError(where, value, problem, hint)
     return array
 
 
-def point_of(where: str, value: object) -> tuple[float, float, float]:
-    """Three coordinates in m; raises ArgumentError."""
-    x, y, z = array_of(where, value, (3,), "three finite coordinates x, y, z in m").tolist()
+def validate_point(where: str, value: object) -> tuple[float, float, float]:
+    """A point as three finite coordinates in m; raises ArgumentError otherwise."""
+    x, y, z = validate_array(where, value, (3,), "three finite coordinates x, y, z in m").tolist()
     return (x, y, z)
 
 
-def _shape(shape: Shape) -> str:
+def _format_shape(shape: Shape) -> str:
     lengths = ["N" if length is None else str(length) for length in shape]
     return f"({', '.join(lengths)}{',' if len(lengths) == 1 else ''})"
 
 
-def _place(entry: tuple[int, ...]) -> str:
-    names = ("entry",) if len(entry) == 1 else ("row", "column")
-    return ", ".join(f"{name} {place + 1}" for name, place in zip(names, entry, strict=False))
+def _format_index(index: tuple[int, ...]) -> str:
+    names = ("entry",) if len(index) == 1 else ("row", "column")
+    return ", ".join(f"{name} {position + 1}" for name, position in zip(names, index, strict=False))

@@ -1,4 +1,4 @@
-"""All that is wrong with a robot file and a recording of its, at once, and what a trace would do to the recording."""
+"""Checks of a robot file and a recording that collect all problems at once, and of what a trace would do to them."""
 
 from __future__ import annotations
 
@@ -9,29 +9,29 @@ from itertools import islice
 from pathlib import Path
 
 from .errors import InputError, RobotFileError, one_line
-from .fmus.slots import check_own_fmus
-from .recordings.recording import Recording, read_recording, recording_faults
-from .recordings.roughness import roughness
-from .robots.lines import line_of
-from .robots.reading import read_robot_telling, robot_file_text
-from .robots.robot import Robot, slots
-from .runs.start import start_of
+from .fmus.slots import check_user_fmus
+from .recordings.recording import Recording, read_recording, recording_errors
+from .recordings.roughness import white_noise_deviation
+from .robots.lines import line_of_key
+from .robots.reading import read_robot_with_sink, robot_file_text
+from .robots.robot import Robot, fmu_slots
+from .runs.start import start_position
 from .statics.equilibrium import static_tensions
-from .tracer.preparation.preparation import prepare
+from .tracer.preparation.preparation import prepare_recordings
 
-# Of one file; a recording with a wrong separator breaks rules in each of its cells.
-MOST = 1000
-# Of a robot file; to find the line of each takes its time, and is left out where the file is long.
-MOST_OF_ROBOT = 50
-LONGEST_TEXT = 50_000  # characters
-FEWEST_CABLES = 3
-# What has no part in whether the cables hold the platform at the start.
-APART = frozenset((("name",), ("sensors",), ("winch",), ("fmu",)))
+# Per file; a recording with a wrong separator breaks rules in each of its cells.
+MAX_PROBLEMS_PER_FILE = 1000
+# Finding the line of each problem takes time, so line numbers are left out where the file is long.
+MAX_ROBOT_FILE_PROBLEMS = 50
+MAX_CHARACTERS_FOR_LINE_NUMBERS = 50_000  # characters
+MIN_CABLE_COUNT = 3
+# Keys that do not affect whether the cables hold the platform at the start.
+KEYS_WITHOUT_INFLUENCE_ON_STATICS = frozenset((("name",), ("sensors",), ("winch",), ("fmu",)))
 
 
 @dataclass(frozen=True)
 class Problem:
-    """One thing that is wrong: ``file``, its ``line`` or row from 1 if it is one's, and the words of an InputError."""
+    """One problem: ``file``, its ``line`` or row from 1 if it concerns a single one, and the texts of an InputError."""
 
     file: str
     line: int | None
@@ -44,85 +44,87 @@ class Problem:
 
 
 @dataclass(frozen=True)
-class Checked:
-    """``problems`` in the order of the files' lines; ``notes`` is what a user should know though nothing is wrong."""
+class CheckResult:
+    """The result of a check: ``problems`` in the order of lines; ``notes`` are remarks that are no problems."""
 
     problems: tuple[Problem, ...]
     notes: tuple[str, ...]
 
 
-class _EnoughError(Exception):
-    """There are as many problems as are told of one file."""
+class _TooManyProblemsError(Exception):
+    """The maximum number of problems per file is reached."""
 
 
 def check_files(
     robot_file: Path,
     recording_file: Path | None = None,
-    tell: Callable[[str, float], None] = lambda what, done: None,
-) -> Checked:
-    """All that is wrong with a robot file and, if there is one, with a recording of that robot; raises nothing.
+    progress: Callable[[str, float], None] = lambda what, done: None,
+) -> CheckResult:
+    """Collects all problems of a robot file and, if there is one, of a recording of that robot; raises nothing.
 
-    ``tell`` gets what is being looked at, and the share of it that is done.
+    ``progress`` is called with the present activity and the fraction of it that is done.
     """
     problems: list[Problem] = []
     notes: list[str] = []
-    tell("reading the robot file", 0.0)
-    robot = _checked_robot(robot_file, problems, notes)
+    progress("reading the robot file", 0.0)
+    robot = _check_robot_file(robot_file, problems, notes)
     if recording_file is None:
-        return Checked(tuple(problems), tuple(notes))
-    if robot is None or robot.cable_count < FEWEST_CABLES:
+        return CheckResult(tuple(problems), tuple(notes))
+    if robot is None or robot.cable_count < MIN_CABLE_COUNT:
         notes.append(f"{recording_file} was not looked at: how many cables there are is not known")
-        return Checked(tuple(problems), tuple(notes))
-    of_recording: list[Problem] = []
-    tell("reading the recording", 0.0)
-    recording = _checked_recording(recording_file, robot.cable_count, of_recording, notes)
+        return CheckResult(tuple(problems), tuple(notes))
+    recording_problems: list[Problem] = []
+    progress("reading the recording", 0.0)
+    recording = _check_recording(recording_file, robot.cable_count, recording_problems, notes)
     if recording is not None and not problems:
-        tell("looking at both together", 0.0)
-        _check_together(robot, recording, of_recording, notes)
-    return Checked((*problems, *of_recording), tuple(notes))
+        progress("looking at both together", 0.0)
+        _check_together(robot, recording, recording_problems, notes)
+    return CheckResult((*problems, *recording_problems), tuple(notes))
 
 
-def _checked_robot(path: Path, problems: list[Problem], notes: list[str]) -> Robot | None:
-    """The robot; not to be used where there are problems. None where the file is no TOML."""
-    faults: list[RobotFileError] = []
+def _check_robot_file(path: Path, problems: list[Problem], notes: list[str]) -> Robot | None:
+    """The robot, invalid where there are problems; None where the file is not TOML."""
+    errors: list[RobotFileError] = []
     try:
         text = robot_file_text(path)
-        robot = read_robot_telling(path, _at_most(faults, MOST_OF_ROBOT))
+        robot = read_robot_with_sink(path, _collect_up_to(errors, MAX_ROBOT_FILE_PROBLEMS))
     except RobotFileError as error:
-        problems.append(Problem(str(path), error.line, error.where, error.problem, error.mend))
+        problems.append(Problem(str(path), error.line, error.where, error.problem, error.hint))
         return None
-    except _EnoughError:
-        notes.append(f"{path}: no more than {MOST_OF_ROBOT} problems are told")
+    except _TooManyProblemsError:
+        notes.append(f"{path}: no more than {MAX_ROBOT_FILE_PROBLEMS} problems are told")
         robot = None
-    problems += sorted((_in_robot_file(path, text, error) for error in faults), key=_by_line)
+    problems += sorted((_robot_file_problem(path, text, error) for error in errors), key=_line_order)
     if robot is not None:
-        if not {error.place[:1] for error in faults} - APART:
-            with _gathered(problems, path, _line(text, ("platform", "start"))):
+        if not {error.key_path[:1] for error in errors} - KEYS_WITHOUT_INFLUENCE_ON_STATICS:
+            with _collecting_problems(problems, path, _line_in_robot_file(text, ("platform", "start"))):
                 static_tensions(robot)
-        problems += _of_fmus(path, text, robot)
-    problems.sort(key=_by_line)
+        problems += _check_robot_fmus(path, text, robot)
+    problems.sort(key=_line_order)
     return robot
 
 
-def _of_fmus(path: Path, text: str, robot: Robot) -> list[Problem]:
-    """What is wrong with FMUs of the user's in slots that there are, whatever else is wrong."""
+def _check_robot_fmus(path: Path, text: str, robot: Robot) -> list[Problem]:
+    """Problems of the user's FMUs in existing slots, independent of other problems."""
     problems: list[Problem] = []
-    there = tuple(fmu for fmu in robot.fmus if fmu.slot in slots(robot.cable_count))
-    for fmu in there:
-        with _gathered(problems, path, _line(text, ("fmu", fmu.slot))):
-            check_own_fmus(replace(robot, fmus=(fmu,)))
+    fmus_in_slots = tuple(fmu for fmu in robot.fmus if fmu.slot in fmu_slots(robot.cable_count))
+    for fmu in fmus_in_slots:
+        with _collecting_problems(problems, path, _line_in_robot_file(text, ("fmu", fmu.slot))):
+            check_user_fmus(replace(robot, fmus=(fmu,)))
     if not problems:
-        with _gathered(problems, path, _line(text, ("fmu",))):
-            check_own_fmus(replace(robot, fmus=there))
+        with _collecting_problems(problems, path, _line_in_robot_file(text, ("fmu",))):
+            check_user_fmus(replace(robot, fmus=fmus_in_slots))
     return problems
 
 
-def _checked_recording(path: Path, cable_count: int, problems: list[Problem], notes: list[str]) -> Recording | None:
-    with _gathered(problems, path):
-        found = recording_faults(path, cable_count)
-        problems.extend(Problem(str(path), e.line, e.where, e.problem, e.mend) for e in islice(found, MOST))
-        if next(found, None) is not None:
-            notes.append(f"{path}: no more than {MOST} problems are told")
+def _check_recording(path: Path, cable_count: int, problems: list[Problem], notes: list[str]) -> Recording | None:
+    with _collecting_problems(problems, path):
+        faults = recording_errors(path, cable_count)
+        problems.extend(
+            Problem(str(path), e.line, e.where, e.problem, e.hint) for e in islice(faults, MAX_PROBLEMS_PER_FILE)
+        )
+        if next(faults, None) is not None:
+            notes.append(f"{path}: no more than {MAX_PROBLEMS_PER_FILE} problems are told")
         if not problems:
             return read_recording(path, cable_count)
     return None
@@ -135,45 +137,45 @@ def _check_together(robot: Robot, recording: Recording, problems: list[Problem],
     if not (recording.has_position or recording.has_tension):
         notes.append(f"{path}: no tension and no position was measured; simulate takes it, trace does not")
         return
-    with _gathered(problems, path):
-        noise = robot.sensors.position_noise or roughness(recording.position)
-        notes.extend(start_of(robot, noise, recording)[1])
-        notes.extend(prepare(robot.as_modelled(), recording, None).notes)
+    with _collecting_problems(problems, path):
+        noise = robot.sensors.position_noise or white_noise_deviation(recording.position)
+        notes.extend(start_position(robot, noise, recording)[1])
+        notes.extend(prepare_recordings(robot.as_modelled(), recording, None).notes)
 
 
-def _at_most(faults: list[RobotFileError], most: int) -> Callable[[RobotFileError], None]:
-    def note(error: RobotFileError) -> None:
-        faults.append(error)
-        if len(faults) == most:
-            raise _EnoughError
+def _collect_up_to(errors: list[RobotFileError], max_count: int) -> Callable[[RobotFileError], None]:
+    def collect(error: RobotFileError) -> None:
+        errors.append(error)
+        if len(errors) == max_count:
+            raise _TooManyProblemsError
 
-    return note
-
-
-def _in_robot_file(path: Path, text: str, error: RobotFileError) -> Problem:
-    return _problem(path, _line(text, error.place), error)
+    return collect
 
 
-def _line(text: str, place: tuple[str | int, ...]) -> int | None:
-    return line_of(text, place) if len(text) <= LONGEST_TEXT else None
+def _robot_file_problem(path: Path, text: str, error: RobotFileError) -> Problem:
+    return _problem_at_line(path, _line_in_robot_file(text, error.key_path), error)
 
 
-def _problem(path: Path, line: int | None, error: InputError) -> Problem:
-    """With the line in the place that the error names."""
+def _line_in_robot_file(text: str, key_path: tuple[str | int, ...]) -> int | None:
+    return line_of_key(text, key_path) if len(text) <= MAX_CHARACTERS_FOR_LINE_NUMBERS else None
+
+
+def _problem_at_line(path: Path, line: int | None, error: InputError) -> Problem:
+    """The error as a problem, with the line number inserted after the file name."""
     file, key = str(path), error.where.removeprefix(f"{path}: ")
     if line is not None:
         where = f"{file}: line {line}" + (f", {key}" if key != file else "")
-        return Problem(file, line, where, error.problem, error.mend)
-    return Problem(file, None, error.where, error.problem, error.mend)
+        return Problem(file, line, where, error.problem, error.hint)
+    return Problem(file, None, error.where, error.problem, error.hint)
 
 
 @contextmanager
-def _gathered(problems: list[Problem], path: Path, line: int | None = None) -> Iterator[None]:
+def _collecting_problems(problems: list[Problem], path: Path, line: int | None = None) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        problems.append(_problem(path, line, error))
+        problems.append(_problem_at_line(path, line, error))
 
 
-def _by_line(problem: Problem) -> int:
+def _line_order(problem: Problem) -> int:
     return problem.line or 0

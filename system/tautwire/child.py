@@ -1,4 +1,4 @@
-"""What processes do that others started for a part of the work."""
+"""Worker processes that exit with the process that started them."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from multiprocessing.connection import wait
 from pathlib import Path
 
 
-def end_with_parent(folder: Path) -> None:
-    """End this process as soon as the one that started it is gone, and remove the folder of its temporary files."""
-    threading.Thread(target=_end_with_parent, args=(folder,), daemon=True).start()
+def exit_with_parent(temporary_folder: Path) -> None:
+    """Exits this process as soon as its parent is gone, and removes the folder of its temporary files."""
+    threading.Thread(target=_exit_after_parent, args=(temporary_folder,), daemon=True).start()
 
 
-def _end_with_parent(folder: Path) -> None:
+def _exit_after_parent(temporary_folder: Path) -> None:
     parent = parent_process()
     if parent is not None:
         wait([parent.sentinel])
-        shutil.rmtree(folder, ignore_errors=True)
+        shutil.rmtree(temporary_folder, ignore_errors=True)
         os._exit(1)

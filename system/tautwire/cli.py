@@ -19,108 +19,112 @@ from .commands.plant import linearise, workspace
 from .commands.robot_file import check, new
 from .commands.tracing import excite, trace
 from .errors import InputError, TautwireError
-from .interrupt import end_like_interrupts
-from .streams import flush_or_drop, open_missing, say
+from .interrupt import raise_interrupt_on_termination
+from .streams import flush_or_discard, open_closed_streams, print_error
 
-# The base of all errors of usage; newer typer hides it in a private module.
+# The base class of usage errors; newer typer hides it in a private module.
 UsageError: type[Exception] = typer.BadParameter.__bases__[0]
 
-DONE, FAILED, WRONG_INPUT = 0, 1, 2
+EXIT_SUCCESS, EXIT_FAILURE, EXIT_WRONG_INPUT = 0, 1, 2
 
 
 COMMANDS = (new, check, build, fmus, simulate, linearise, workspace, trace, excite, material, campaign, paper)
 
 
-def _text_and_example(command: Callable[..., None]) -> tuple[str, str]:
+def _split_docstring(command: Callable[..., None]) -> tuple[str, str]:
     text, _, example = inspect.cleandoc(command.__doc__ or "").partition("Example: ")
     return text, example
 
 
-def help_of(command: Callable[..., None]) -> str:
-    """What a command's docstring says, with its last paragraph, the example, on a line of its own."""
-    text, example = _text_and_example(command)
-    # A line with a backspace alone keeps click from breaking the lines of a paragraph anew.
+def help_text(command: Callable[..., None]) -> str:
+    """The help text of a command: its docstring, with the example on a line of its own."""
+    text, example = _split_docstring(command)
+    # A line with a lone backspace keeps click from rewrapping a paragraph.
     return f"{text}\b\nExample: {example}" if example else text
 
 
-application = typer.Typer(
+app = typer.Typer(
     name="tautwire",
     help="Cable-driven parallel robots as FMI components, and a tracer that finds what their model lacks.",
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
 for command in COMMANDS:
-    application.command(help=help_of(command))(command)
+    app.command(help=help_text(command))(command)
 
 
-def _say_version(wanted: bool) -> None:
-    if wanted:
+def _print_version(requested: bool) -> None:
+    if requested:
         print(f"tautwire {__version__}")
         raise typer.Exit()
 
 
-@application.callback()
+@app.callback()
 def _options(
     version: Annotated[
-        bool, typer.Option("--version", callback=_say_version, is_eager=True, help="Show the version and exit.")
+        bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version and exit.")
     ] = False,
 ) -> None:
     """Cable-driven parallel robots as FMI components, and a tracer that finds what their model lacks."""
 
 
 def main() -> None:
-    """Run the command line; the exit status is 0 done, 2 the input is wrong, 1 anything else."""
-    open_missing()
-    end_like_interrupts()
+    """Runs the command line; the exit status is 0 for success, 2 for invalid input, 1 for any other failure."""
+    open_closed_streams()
+    raise_interrupt_on_termination()
     sys.exit(run(sys.argv[1:]))
 
 
 def run(arguments: list[str]) -> int:
-    """Run one command and return its exit status; errors go to standard error, one line each."""
+    """Runs one command and returns its exit status; errors go to standard error, one line each."""
     try:
-        status = application(arguments or ["--help"], prog_name="tautwire", standalone_mode=False)
+        status = app(arguments or ["--help"], prog_name="tautwire", standalone_mode=False)
         sys.stdout.flush()
     except InputError as error:
-        return _say(f"{error}{_example(arguments) if _is_of_usage(error) else ''}", WRONG_INPUT)
+        return _report_error(f"{error}{_example_suffix(arguments) if _is_usage_error(error) else ''}", EXIT_WRONG_INPUT)
     except UsageError as error:
         message = error.format_message().rstrip(".")  # type: ignore[attr-defined]
-        return _say(f"{message}{_example(arguments)}", WRONG_INPUT)
+        return _report_error(f"{message}{_example_suffix(arguments)}", EXIT_WRONG_INPUT)
     except TautwireError as error:
-        return _say(str(error), FAILED)
+        return _report_error(str(error), EXIT_FAILURE)
     except OSError as error:
-        flush_or_drop(sys.stdout)
-        # Nobody reads on, as in "| head": there is nothing to be told.
-        return FAILED if isinstance(error, BrokenPipeError) else _say(_system_error(error), FAILED)
+        flush_or_discard(sys.stdout)
+        # The reader closed the pipe, as in "| head": no message is needed.
+        return (
+            EXIT_FAILURE if isinstance(error, BrokenPipeError) else _report_error(_format_os_error(error), EXIT_FAILURE)
+        )
     except MemoryError:
-        return _say("this takes more memory than there is: give a shorter recording, or free some", FAILED)
+        return _report_error(
+            "this takes more memory than there is: give a shorter recording, or free some", EXIT_FAILURE
+        )
     except (KeyboardInterrupt, typer.Abort):
-        status = FAILED
-    if status == WRONG_INPUT:
-        return WRONG_INPUT
-    # Newer typer turns Ctrl-C into a status that it returns.
-    return _say("interrupted; nothing was written", FAILED) if status else DONE
+        status = EXIT_FAILURE
+    if status == EXIT_WRONG_INPUT:
+        return EXIT_WRONG_INPUT
+    # Newer typer returns a status for Ctrl-C.
+    return _report_error("interrupted; nothing was written", EXIT_FAILURE) if status else EXIT_SUCCESS
 
 
-def _is_of_usage(error: InputError) -> bool:
-    """Whether an option or argument is wrong, not a file: files and their keys have no dashes in front."""
+def _is_usage_error(error: InputError) -> bool:
+    """Whether an option or argument is invalid, rather than a file: only options begin with dashes."""
     return error.where.startswith("--") or error.where == "NAME"
 
 
-def _example(arguments: list[str]) -> str:
-    """The example of the command that was asked for, to end a line with; that of help where there is none such."""
-    examples = {command.__name__: _text_and_example(command)[1] for command in COMMANDS}
-    asked = next((examples[word] for word in arguments if word in examples), "tautwire --help")
-    return f"; example: {asked}"
+def _example_suffix(arguments: list[str]) -> str:
+    """The example of the requested command, to end an error message with; that of help for an unknown command."""
+    examples = {command.__name__: _split_docstring(command)[1] for command in COMMANDS}
+    example = next((examples[word] for word in arguments if word in examples), "tautwire --help")
+    return f"; example: {example}"
 
 
-def _system_error(error: OSError) -> str:
-    """What the system refused, and where; for what has no name."""
-    place = error.filename or f"standard output, or a temporary file in {tempfile.gettempdir()}"
-    return f"{place}: {error.strerror or error}"
+def _format_os_error(error: OSError) -> str:
+    """A system error as text, with the file it concerns; standard output where the error names none."""
+    target = error.filename or f"standard output, or a temporary file in {tempfile.gettempdir()}"
+    return f"{target}: {error.strerror or error}"
 
 
-def _say(message: str, status: int) -> int:
-    say("tautwire: " + " ".join(message.split()))
+def _report_error(message: str, status: int) -> int:
+    print_error("tautwire: " + " ".join(message.split()))
     return status
 
 

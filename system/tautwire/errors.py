@@ -1,82 +1,84 @@
-"""What Tautwire raises on purpose; each error carries its values, and its text is one line."""
+"""Exceptions that Tautwire raises on purpose; each carries its values, and its text is one line."""
 
 from collections.abc import Sequence
 from typing import NoReturn
 
 
 class TautwireError(Exception):
-    """Any error that Tautwire raises on purpose; it may be pickled, whatever its constructor takes."""
+    """Base class of all exceptions that Tautwire raises on purpose; picklable whatever its constructor takes."""
 
     def __reduce__(self) -> tuple[object, ...]:
-        return _revived, (type(self), self.args, vars(self))
+        return _rebuild_error, (type(self), self.args, vars(self))
 
 
-def _revived(kind: type[TautwireError], arguments: tuple[object, ...], values: dict[str, object]) -> TautwireError:
-    error = kind.__new__(kind, *arguments)
-    vars(error).update(values)
+def _rebuild_error(
+    error_class: type[TautwireError], arguments: tuple[object, ...], attributes: dict[str, object]
+) -> TautwireError:
+    error = error_class.__new__(error_class, *arguments)
+    vars(error).update(attributes)
     return error
 
 
 class InputError(TautwireError):
-    """The input is wrong, and whoever wrote it can mend it.
+    """The user's input is invalid, and the user can correct it.
 
     ``where`` names the file and the line or key (``hall.toml: cable[2].modulus``), ``problem`` the offending
-    value and its bound, ``mend`` what to write instead. The text is the one line ``where: problem; mend``.
+    value and its bound, ``hint`` what to write instead. The text is the one line ``where: problem; hint``.
     """
 
-    def __init__(self, where: str, problem: str, mend: str) -> None:
-        super().__init__(where, problem, mend)
+    def __init__(self, where: str, problem: str, hint: str) -> None:
+        super().__init__(where, problem, hint)
         self.where = where
         self.problem = problem
-        self.mend = mend
+        self.hint = hint
 
     def __str__(self) -> str:
-        return one_line(f"{self.where}: {self.problem}; {self.mend}")
+        return one_line(f"{self.where}: {self.problem}; {self.hint}")
 
 
 class ArgumentError(InputError):
-    """A function of the library was given what it cannot work with.
+    """An argument of a library function is invalid.
 
-    ``where`` names the function and its argument (``cosimulate: step``); ``value`` is what it was given.
+    ``where`` names the function and its argument (``cosimulate: step``); ``value`` is the value passed.
     """
 
-    def __init__(self, where: str, value: object, problem: str, mend: str) -> None:
-        super().__init__(where, problem, mend)
+    def __init__(self, where: str, value: object, problem: str, hint: str) -> None:
+        super().__init__(where, problem, hint)
         self.value = value
 
 
 class RobotFileError(InputError):
-    """A robot file that cannot be read or declares something impossible.
+    """A robot file cannot be read or declares something impossible.
 
-    ``place`` leads to what is wrong: keys and, from 0, places in lists; empty where it is the whole file. ``line``,
-    from 1, is known of what is not even TOML.
+    ``key_path`` leads to the invalid entry: keys and, from 0, indices of lists; empty where the whole file is invalid.
+    ``line``, from 1, is set where the file is not valid TOML.
     """
 
     def __init__(
-        self, where: str, problem: str, mend: str, place: tuple[str | int, ...] = (), line: int | None = None
+        self, where: str, problem: str, hint: str, key_path: tuple[str | int, ...] = (), line: int | None = None
     ) -> None:
-        super().__init__(where, problem, mend)
-        self.place = place
+        super().__init__(where, problem, hint)
+        self.key_path = key_path
         self.line = line
 
 
 class RecordingError(InputError):
-    """A recording that cannot be read or does not fit the robot; ``line``, from 1, or the row of a binary file."""
+    """A recording cannot be read or does not fit the robot; ``line``, from 1, or the row of a binary file."""
 
-    def __init__(self, where: str, problem: str, mend: str, line: int | None = None) -> None:
-        super().__init__(where, problem, mend)
+    def __init__(self, where: str, problem: str, hint: str, line: int | None = None) -> None:
+        super().__init__(where, problem, hint)
         self.line = line
 
 
 class MaterialTableError(InputError):
-    """A table of a dynamic test that cannot be read or declares something impossible."""
+    """A table of a dynamic test cannot be read or declares something impossible."""
 
 
 class UnreachableError(InputError):
-    """A position where cables that only pull cannot hold the platform.
+    """The platform cannot be held at a position by cables that only pull.
 
-    ``position`` in m; ``cable``, from 1, is the one that fails first, and ``tension``, in N, what it would
-    need there; both None where no single cable is to blame. ``reason`` says why in a few words.
+    ``position`` in m; ``cable``, from 1, is the one that fails first, and ``tension``, in N, the tension it would
+    need there; both None where no single cable is the cause. ``reason`` says why in a few words.
     """
 
     def __init__(
@@ -86,11 +88,11 @@ class UnreachableError(InputError):
         cable: int | None,
         tension: float | None,
         reason: str = "a cable cannot push",
-        mend: str = "choose a position that the cables can hold, below and between the anchors",
+        hint: str = "choose a position that the cables can hold, below and between the anchors",
     ) -> None:
-        place = ", ".join(f"{coordinate:g}" for coordinate in position)
-        need = "" if cable is None or tension is None else f", cable {cable} would need {tension:.6g} N"
-        super().__init__(where, f"the platform cannot be held at [{place}] m: {reason}{need}", mend)
+        coordinates = ", ".join(f"{coordinate:g}" for coordinate in position)
+        required_tension = "" if cable is None or tension is None else f", cable {cable} would need {tension:.6g} N"
+        super().__init__(where, f"the platform cannot be held at [{coordinates}] m: {reason}{required_tension}", hint)
         self.position = tuple(position)
         self.cable = cable
         self.tension = tension
@@ -98,32 +100,32 @@ class UnreachableError(InputError):
 
 
 class DiskFullError(TautwireError):
-    """There was no room to write ``target``; ``reason`` is the system's, ``temporary`` the temporary folder."""
+    """No disk space was left to write ``target``; ``reason`` is the system's, ``temporary`` the temporary folder."""
 
     def __init__(self, target: str, reason: str, temporary: str) -> None:
-        mend = f"make room there or in {temporary}, or choose another --out"
-        super().__init__(one_line(f"{target}: was not written, the disk refuses more ({reason}); {mend}"))
+        hint = f"make room there or in {temporary}, or choose another --out"
+        super().__init__(one_line(f"{target}: was not written, the disk refuses more ({reason}); {hint}"))
         self.target = target
         self.reason = reason
         self.temporary = temporary
 
 
-def at_once(error: InputError) -> NoReturn:
-    """What readers do with an error unless they are told otherwise: raise it."""
+def raise_error(error: InputError) -> NoReturn:
+    """The default error handler of readers: raises the error."""
     raise error
 
 
 def one_line(text: str) -> str:
-    """The text with line breaks and other unprintable characters written as escapes."""
+    """Escapes line breaks and other unprintable characters, so that the text is one line."""
     return "".join(character if character.isprintable() else ascii(character)[1:-1] for character in text)
 
 
-def shown(value: object, longest: int = 60) -> str:
-    """A value from a file as an error message shows it: one line of at most about ``longest`` characters."""
+def format_value(value: object, max_length: int = 60) -> str:
+    """Formats a value from a file for an error message: one line of at most about ``max_length`` characters."""
     if isinstance(value, int) and value.bit_length() > 1000:
         return f"a whole number of {value.bit_length()} bits"
     if isinstance(value, str):
-        text = repr(value[: longest + 1])
+        text = repr(value[: max_length + 1])
     elif isinstance(value, bool):
         text = str(value).lower()
     elif isinstance(value, dict):
@@ -132,16 +134,16 @@ def shown(value: object, longest: int = 60) -> str:
         text = f"a list of {len(value)}"
     else:
         text = str(value)
-    return text if len(text) <= longest else f"{text[:longest]}..."
+    return text if len(text) <= max_length else f"{text[:max_length]}..."
 
 
-def described(value: object) -> str:
-    """A value that a program handed over as an error message shows it: a text or number itself, others by class."""
+def describe_value(value: object) -> str:
+    """Formats an argument for an error message: a text or number by its value, anything else by its class."""
     if value is None or isinstance(value, str | int | float):
-        return shown(value)
+        return format_value(value)
     return f"the class {value.__name__}" if isinstance(value, type) else with_article(type(value).__name__)
 
 
 def with_article(name: str) -> str:
-    """A name as in ``a Robot``, ``an array``."""
+    """The name with its indefinite article, as in ``a Robot``, ``an array``."""
     return f"{'an' if name[:1].lower() in 'aeio' else 'a'} {name}"

@@ -1,92 +1,99 @@
-"""Reading files that others wrote."""
+"""Reading files that users supply, with size limits and checks that they are text."""
 
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
-from .errors import ArgumentError, InputError, described
+from .errors import ArgumentError, InputError, describe_value
 
-HEAD = 2**16  # bytes that are looked at before all are read
+HEAD_SIZE = 2**16  # bytes, checked before the rest is read
 
 _UTF_16_MARKS = (b"\xff\xfe", b"\xfe\xff")
 
 
-def path_of(where: str, value: object) -> Path:
-    """The path that a text or a path names; raises ArgumentError."""
+def validate_path(where: str, value: object) -> Path:
+    """Converts a text or path-like object to a Path; raises ArgumentError otherwise."""
     if isinstance(value, str | os.PathLike):
         return Path(value)
-    raise ArgumentError(where, value, f"is {described(value)}, not a path", "give a text or a pathlib.Path")
+    raise ArgumentError(where, value, f"is {describe_value(value)}, not a path", "give a text or a pathlib.Path")
 
 
-def read_bytes(path: str | Path, error: type[InputError], largest: int | None = None) -> bytes:
-    """All bytes of a regular file; raises ``error`` where there is none or it is larger than ``largest``."""
-    with readable_file(path, error) as file:
+def read_bytes(path: str | Path, error_class: type[InputError], max_size: int | None = None) -> bytes:
+    """Reads all bytes of a regular file; raises ``error_class`` where there is none or it exceeds ``max_size``."""
+    with readable_file(path, error_class) as file:
         size = file.stat().st_size
-        if largest is not None and size > largest:
-            raise error(str(path), f"has {size} bytes, at most {largest} are read", "check the path")
+        if max_size is not None and size > max_size:
+            raise error_class(str(path), f"has {size} bytes, at most {max_size} are read", "check the path")
         return file.read_bytes()
 
 
-def read_text(path: str | Path, error: type[InputError], kind: str, largest: int | None = None) -> bytes:
-    """All bytes of a regular file of UTF-8 text; ``kind`` is what it should be.
+def read_text_bytes(
+    path: str | Path, error_class: type[InputError], expected_format: str, max_size: int | None = None
+) -> bytes:
+    """Reads all bytes of a regular file of UTF-8 text; ``expected_format`` names its format in messages.
 
-    Raises ``error`` where there is none, it is larger than ``largest``, or is no text: if its beginning tells, before
-    the rest of it is read.
+    Raises ``error_class`` where there is none, it exceeds ``max_size`` bytes, or is not text: if its first bytes show
+    that, before the rest is read.
     """
-    with readable_file(path, error) as file, file.open("rb") as beginning:
-        _require_no_binary(beginning.read(HEAD), str(path), error, kind)
-    content = read_bytes(path, error, largest)
-    require_text(content, str(path), error, kind)
+    with readable_file(path, error_class) as file, file.open("rb") as head:
+        _refuse_binary(head.read(HEAD_SIZE), str(path), error_class, expected_format)
+    content = read_bytes(path, error_class, max_size)
+    require_utf8_text(content, str(path), error_class, expected_format)
     return content
 
 
 @contextmanager
-def readable_file(path: str | Path, error: type[InputError]) -> Iterator[Path]:
-    """The path of a regular file; raises ``error`` where there is none, or where the block cannot read it."""
+def readable_file(path: str | Path, error_class: type[InputError]) -> Iterator[Path]:
+    """Context manager for the path of a regular file.
+
+    Raises ``error_class`` where there is none, or where the block cannot read it.
+    """
     where = str(path)
     try:
         file = Path(path)
         if file.is_dir():
-            raise error(where, "is a folder, not a file", "name a file inside it")
+            raise error_class(where, "is a folder, not a file", "name a file inside it")
         if not file.exists():
-            raise error(where, "there is no such file", "check the path")
+            raise error_class(where, "there is no such file", "check the path")
         if not file.is_file():
-            raise error(where, "is not a regular file", "copy it to a file first")
+            raise error_class(where, "is not a regular file", "copy it to a file first")
         yield file
-    except (OSError, ValueError) as problem:
-        reason = getattr(problem, "strerror", None) or str(problem)
-        raise error(where, f"cannot be read ({reason})", "check the path and its permissions") from problem
+    except (OSError, ValueError) as os_error:
+        reason = getattr(os_error, "strerror", None) or str(os_error)
+        raise error_class(where, f"cannot be read ({reason})", "check the path and its permissions") from os_error
 
 
-def require_text(content: bytes, where: str, error: type[InputError], kind: str) -> None:
-    """Raises ``error`` unless the bytes are UTF-8 text; ``kind`` is what the file should be."""
-    _require_no_binary(content, where, error, kind)
+def require_utf8_text(content: bytes, where: str, error_class: type[InputError], expected_format: str) -> None:
+    """Raises ``error_class`` unless the bytes are UTF-8 text; ``expected_format`` names the format in messages."""
+    _refuse_binary(content, where, error_class, expected_format)
     if content.isascii():
         return
     try:
         content.decode("utf-8")
-    except UnicodeDecodeError as problem:
-        line = _line(content, where, problem.start)
-        byte = content[problem.start]
-        raise error(line, f"byte 0x{byte:02x} is not UTF-8", f"save it as {kind} in UTF-8") from problem
+    except UnicodeDecodeError as decode_error:
+        location = _line_location(content, where, decode_error.start)
+        byte = content[decode_error.start]
+        raise error_class(
+            location, f"byte 0x{byte:02x} is not UTF-8", f"save it as {expected_format} in UTF-8"
+        ) from decode_error
 
 
-def _require_no_binary(content: bytes, where: str, error: type[InputError], kind: str) -> None:
-    """Raises ``error`` where the bytes, or the first of them, show that a file is something else than text."""
-    mend = f"save it as {kind} in UTF-8"
+def _refuse_binary(content: bytes, where: str, error_class: type[InputError], expected_format: str) -> None:
+    """Raises ``error_class`` where the bytes, or the first of them, show that a file is not text."""
+    hint = f"save it as {expected_format} in UTF-8"
     if content.startswith(b"PK\x03\x04"):
-        raise error(where, "is a zip archive or a spreadsheet, not text", mend)
+        raise error_class(where, "is a zip archive or a spreadsheet, not text", hint)
     if content.startswith(b"\x1f\x8b"):
-        raise error(where, "is packed by gzip, not text", "unpack it first")
+        raise error_class(where, "is packed by gzip, not text", "unpack it first")
     if content.startswith(_UTF_16_MARKS):
-        raise error(where, "is UTF-16, not UTF-8", mend)
-    zero = content.find(b"\0")
-    if zero >= 0:
-        raise error(_line(content, where, zero), "is binary (it has a zero byte), not text", mend)
+        raise error_class(where, "is UTF-16, not UTF-8", hint)
+    null_index = content.find(b"\0")
+    if null_index >= 0:
+        raise error_class(_line_location(content, where, null_index), "is binary (it has a zero byte), not text", hint)
 
 
-def _line(content: bytes, where: str, position: int) -> str:
-    before = content[:position].replace(b"\r\n", b"\n").replace(b"\r", b"\n")
-    breaks = before.count(b"\n")
-    return f"{where}: line {breaks + 1}"
+def _line_location(content: bytes, where: str, position: int) -> str:
+    preceding = content[:position].replace(b"\r\n", b"\n").replace(b"\r", b"\n")
+    line_breaks = preceding.count(b"\n")
+    return f"{where}: line {line_breaks + 1}"

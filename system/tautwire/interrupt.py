@@ -1,6 +1,6 @@
-"""Holds Ctrl-C back while foreign code runs, and lets other requests to end be like it.
+"""Process signals: Ctrl-C is deferred while foreign code runs, and termination signals are handled like it.
 
-Inside an FMU it would end the process, inside CasADi it would become another error.
+Inside an FMU an interrupt would end the process, inside CasADi it would become another error.
 """
 
 from __future__ import annotations
@@ -11,49 +11,49 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from types import FrameType
 
-# Ways to ask a process to end; some systems lack the last.
-ENDING = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
+# Windows lacks SIGHUP.
+TERMINATION_SIGNALS = tuple(getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGHUP") if hasattr(signal, name))
 
 
-def end_like_interrupts() -> None:
-    """Let what else asks this process to end raise KeyboardInterrupt, as Ctrl-C does; not what it is to ignore."""
-    for number in ENDING:
+def raise_interrupt_on_termination() -> None:
+    """Makes termination signals raise KeyboardInterrupt, as Ctrl-C does; ignored signals stay ignored."""
+    for number in TERMINATION_SIGNALS:
         if signal.getsignal(number) is signal.SIG_DFL:
             signal.signal(number, signal.default_int_handler)
 
 
-def as_by_default() -> None:
-    """Let this process be ended as any other; Ctrl-C is for the one that started it."""
-    for number in ENDING:
+def restore_default_signals() -> None:
+    """Restores default signal handling in a worker process; Ctrl-C is ignored, it is meant for the parent."""
+    for number in TERMINATION_SIGNALS:
         signal.signal(number, signal.SIG_IGN if number == signal.SIGINT else signal.SIG_DFL)
 
 
 @contextmanager
-def interrupts_held() -> Iterator[Callable[[], None]]:
-    """Within the block Ctrl-C, and what is like it, is only noted.
+def defer_interrupts() -> Iterator[Callable[[], None]]:
+    """Context manager that defers Ctrl-C and termination signals: within the block they are only recorded.
 
-    Call what the block gets, where nothing foreign is running, to have KeyboardInterrupt raised there. Only the main
-    thread receives signals; elsewhere nothing is changed. What the process ignores stays ignored.
+    It yields a function that raises KeyboardInterrupt if one was received; call it where no foreign code runs. Only
+    the main thread receives signals; elsewhere nothing changes. Ignored signals stay ignored.
     """
     if threading.current_thread() is not threading.main_thread():
         yield lambda: None
         return
-    noted = []
+    received = []
 
-    def note(number: int, frame: FrameType | None) -> None:
-        noted.append(number)
+    def record_signal(number: int, frame: FrameType | None) -> None:
+        received.append(number)
 
-    def raise_noted() -> None:
-        if noted:
+    def raise_pending() -> None:
+        if received:
             raise KeyboardInterrupt
 
-    before = {number: signal.getsignal(number) for number in ENDING}
-    heard = [n for n in ENDING if before[n] is not signal.SIG_IGN]
-    held = [n for n in heard if n == signal.SIGINT or before[n] is signal.default_int_handler]
-    for number in held:
-        signal.signal(number, note)
+    previous_handlers = {number: signal.getsignal(number) for number in TERMINATION_SIGNALS}
+    not_ignored = [n for n in TERMINATION_SIGNALS if previous_handlers[n] is not signal.SIG_IGN]
+    deferred = [n for n in not_ignored if n == signal.SIGINT or previous_handlers[n] is signal.default_int_handler]
+    for number in deferred:
+        signal.signal(number, record_signal)
     try:
-        yield raise_noted
+        yield raise_pending
     finally:
-        for number in held:
-            signal.signal(number, before[number])
+        for number in deferred:
+            signal.signal(number, previous_handlers[number])

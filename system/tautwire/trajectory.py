@@ -9,46 +9,46 @@ from typing import Protocol, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from .arguments import having, number_of, robot_of
-from .array_arguments import array_of, point_of
+from .arguments import validate_attributes, validate_number, validate_robot
+from .array_arguments import validate_array, validate_point
 from .errors import ArgumentError
 from .robots.checked_table import NumberRule
 from .robots.robot import Point, Robot
-from .statics.equilibrium import directions as rope_directions
-from .statics.equilibrium import has_routes
+from .statics.equilibrium import has_routing_effects
+from .statics.equilibrium import unit_directions as rope_directions
 
 Array = NDArray[np.float64]
 
-DURATION = NumberRule("how long the path takes", "s", positive=True)
-RADIUS = NumberRule("the radius", "m", minimum=0.0)
-RISE = NumberRule("the rise over the whole helix", "m")
-ANGLE = NumberRule("the angle turned", "rad")
+DURATION_RULE = NumberRule("how long the path takes", "s", positive=True)
+RADIUS_RULE = NumberRule("the radius", "m", minimum=0.0)
+RISE_RULE = NumberRule("the rise over the whole helix", "m")
+ANGLE_RULE = NumberRule("the angle turned", "rad")
 
 
 class Trajectory(Protocol):
-    """A path over time; each method takes times (N,) in s and gives (N, 3), in m, m/s and m/s^2."""
+    """Interface of a trajectory: each method takes times (N,) in s and returns (N, 3), in m, m/s and m/s^2."""
 
     @property
     def duration(self) -> float:
-        """When the end is reached, in s; the path rests there afterwards, and at its start before 0."""
+        """Time of arrival in s; the trajectory rests at its end afterwards, and at its start before 0."""
         ...
 
     def position(self, times: Array) -> Array:
-        """Where the platform shall be."""
+        """Reference position."""
         ...
 
     def velocity(self, times: Array) -> Array:
-        """The rate of position."""
+        """Reference velocity."""
         ...
 
     def acceleration(self, times: Array) -> Array:
-        """The rate of velocity."""
+        """Reference acceleration."""
         ...
 
 
 @dataclass(frozen=True)
 class Line:
-    """A straight line from rest at ``start`` to rest at ``end``, in m, within ``duration``, in s.
+    """A straight rest-to-rest trajectory from ``start`` to ``end``, in m, within ``duration``, in s.
 
     ``p = start + s(t) (end - start)`` with the fifth-order law s of :func:`quintic_law`.
 
@@ -60,20 +60,20 @@ class Line:
     duration: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "start", point_of("Line: start", self.start))
-        object.__setattr__(self, "end", point_of("Line: end", self.end))
-        object.__setattr__(self, "duration", number_of("Line: duration", self.duration, DURATION))
+        object.__setattr__(self, "start", validate_point("Line: start", self.start))
+        object.__setattr__(self, "end", validate_point("Line: end", self.end))
+        object.__setattr__(self, "duration", validate_number("Line: duration", self.duration, DURATION_RULE))
 
     def position(self, times: Array) -> Array:
-        """Where the platform shall be, (N, 3) in m."""
+        """Reference position, (N, 3) in m."""
         return np.array(self.start) + np.outer(quintic_law(times, self.duration)[0], self._span)
 
     def velocity(self, times: Array) -> Array:
-        """The rate of position, (N, 3) in m/s."""
+        """Reference velocity, (N, 3) in m/s."""
         return np.outer(quintic_law(times, self.duration)[1], self._span)
 
     def acceleration(self, times: Array) -> Array:
-        """The rate of velocity, (N, 3) in m/s^2."""
+        """Reference acceleration, (N, 3) in m/s^2."""
         return np.outer(quintic_law(times, self.duration)[2], self._span)
 
     @property
@@ -83,7 +83,7 @@ class Line:
 
 @dataclass(frozen=True)
 class Helix:
-    """A helix about a vertical axis from rest to rest within ``duration``, in s.
+    """A rest-to-rest trajectory along a helix about a vertical axis, within ``duration``, in s.
 
     ``p = centre + (R cos q, R sin q, rise q / angle)``, ``q = angle s(t)`` with the fifth-order law s of
     :func:`quintic_law`; ``radius`` R and ``rise`` in m, ``angle`` in rad. Baklouti et al. 2017, Eqs. 13, 14.
@@ -98,33 +98,38 @@ class Helix:
     duration: float
 
     def __post_init__(self) -> None:
-        object.__setattr__(self, "centre", point_of("Helix: centre", self.centre))
-        for name, rule in (("radius", RADIUS), ("rise", RISE), ("angle", ANGLE), ("duration", DURATION)):
-            object.__setattr__(self, name, number_of(f"Helix: {name}", getattr(self, name), rule))
+        object.__setattr__(self, "centre", validate_point("Helix: centre", self.centre))
+        for name, rule in (
+            ("radius", RADIUS_RULE),
+            ("rise", RISE_RULE),
+            ("angle", ANGLE_RULE),
+            ("duration", DURATION_RULE),
+        ):
+            object.__setattr__(self, name, validate_number(f"Helix: {name}", getattr(self, name), rule))
         if self.angle == 0.0:
             raise ArgumentError("Helix: angle", 0.0, "is 0, which is no turn", "give another angle, or take a Line")
 
     def position(self, times: Array) -> Array:
-        """Where the platform shall be, (N, 3) in m."""
-        turned = self.angle * quintic_law(times, self.duration)[0]
-        return np.array(self.centre) + self._columns(np.cos(turned), np.sin(turned), turned)
+        """Reference position, (N, 3) in m."""
+        angles = self.angle * quintic_law(times, self.duration)[0]
+        return np.array(self.centre) + self._columns(np.cos(angles), np.sin(angles), angles)
 
     def velocity(self, times: Array) -> Array:
-        """The rate of position, (N, 3) in m/s."""
-        turned, rate, _ = (self.angle * part for part in quintic_law(times, self.duration))
-        return self._columns(-rate * np.sin(turned), rate * np.cos(turned), rate)
+        """Reference velocity, (N, 3) in m/s."""
+        angles, angular_rate, _ = (self.angle * part for part in quintic_law(times, self.duration))
+        return self._columns(-angular_rate * np.sin(angles), angular_rate * np.cos(angles), angular_rate)
 
     def acceleration(self, times: Array) -> Array:
-        """The rate of velocity, (N, 3) in m/s^2."""
-        turned, rate, change = (self.angle * part for part in quintic_law(times, self.duration))
+        """Reference acceleration, (N, 3) in m/s^2."""
+        angles, angular_rate, angular_acceleration = (self.angle * part for part in quintic_law(times, self.duration))
         return self._columns(
-            -change * np.sin(turned) - rate**2 * np.cos(turned),
-            change * np.cos(turned) - rate**2 * np.sin(turned),
-            change,
+            -angular_acceleration * np.sin(angles) - angular_rate**2 * np.cos(angles),
+            angular_acceleration * np.cos(angles) - angular_rate**2 * np.sin(angles),
+            angular_acceleration,
         )
 
-    def _columns(self, x: Array, y: Array, turned: Array) -> Array:
-        return np.column_stack([self.radius * x, self.radius * y, self.rise / self.angle * turned])
+    def _columns(self, x: Array, y: Array, angles: Array) -> Array:
+        return np.column_stack([self.radius * x, self.radius * y, self.rise / self.angle * angles])
 
 
 # The printed coefficients turn three times and rise 9.4 m; the printed end point and figures need these.
@@ -134,23 +139,23 @@ CAROCA_HELIX = Helix(centre=(0.0, 0.0, 1.0), radius=1.0, rise=0.12 * pi, angle=0
 
 
 def quintic_law(times: Array, duration: float) -> tuple[Array, Array, Array]:
-    """A rest-to-rest time law from 0 to 1 with its two derivatives in time.
+    """Quintic rest-to-rest time law from 0 to 1, with its first two time derivatives.
 
-    ``s = 6 f^5 - 15 f^4 + 10 f^3``, ``f = t / duration`` held within 0 and 1; speed and acceleration are zero
+    ``s = 6 f^5 - 15 f^4 + 10 f^3``, ``f = t / duration`` clipped to 0 and 1; speed and acceleration are zero
     at both ends.
     """
-    f = np.clip(np.asarray(times, dtype=float) / duration, 0.0, 1.0)
-    rest = 1.0 - f
+    fraction = np.clip(np.asarray(times, dtype=float) / duration, 0.0, 1.0)
+    remainder = 1.0 - fraction
     return (
-        f**3 * (10.0 + f * (6.0 * f - 15.0)),
-        30.0 * f**2 * rest**2 / duration,
-        60.0 * f * rest * (rest - f) / duration**2,
+        fraction**3 * (10.0 + fraction * (6.0 * fraction - 15.0)),
+        30.0 * fraction**2 * remainder**2 / duration,
+        60.0 * fraction * remainder * (remainder - fraction) / duration**2,
     )
 
 
 def cable_directions(robot: Robot, positions: Array) -> Array:
-    """Unit vectors of the ropes at the platform; positions (N, 3) in m give (N, 3, n)."""
-    if has_routes(robot):
+    """Unit vectors of the cables at the platform; positions (N, 3) in m give (N, 3, n)."""
+    if has_routing_effects(robot):
         return np.array([rope_directions(robot, position) for position in np.asarray(positions, dtype=float)])
     spans = np.array(robot.anchors).T - np.asarray(positions, dtype=float)[:, :, None]
     directions: Array = spans / np.linalg.norm(spans, axis=1, keepdims=True)
@@ -158,35 +163,41 @@ def cable_directions(robot: Robot, positions: Array) -> Array:
 
 
 def ideal_winch_speeds(robot: Robot, trajectory: Trajectory, times: ArrayLike) -> Array:
-    """Speeds that reel inelastic cables along a path, at ``times`` (N,) in s; positive reels in.
+    """Winch speeds of inelastic cables along a trajectory, at ``times`` (N,) in s; positive reels in.
 
-    ``V_i = -dl_i/dt = u_i . v``, shape (N, n), in m/s; ``u_i`` from the platform along the rope, ``v`` the velocity.
+    ``V_i = -dl_i/dt = u_i . v``, shape (N, n), in m/s; ``u_i`` from the platform along the cable, ``v`` the velocity.
 
-    Raises ArgumentError where an argument is none of these, a path of the user's gives anything but finite (N, 3), or
-    the path leads through an exit point.
+    Raises ArgumentError for an invalid argument, a user's trajectory whose values are not finite (N, 3), or a
+    trajectory through an exit point.
     """
-    robot_of("ideal_winch_speeds: robot", robot)
-    trajectory_of("ideal_winch_speeds: trajectory", trajectory)
-    moments = array_of("ideal_winch_speeds: times", times, (None,), "finite times (N,) in s")
-    place, velocity = (_along("ideal_winch_speeds", trajectory, name, moments) for name in ("position", "velocity"))
+    validate_robot("ideal_winch_speeds: robot", robot)
+    require_trajectory("ideal_winch_speeds: trajectory", trajectory)
+    instants = validate_array("ideal_winch_speeds: times", times, (None,), "finite times (N,) in s")
+    positions, velocities = (
+        _evaluate_path("ideal_winch_speeds", trajectory, name, instants) for name in ("position", "velocity")
+    )
     with np.errstate(invalid="ignore", divide="ignore"):
-        unit = cable_directions(robot, place)
-    speeds: Array = np.einsum("kai,ka->ki", unit, velocity)
-    lost = np.argwhere(~np.isfinite(speeds))
-    if len(lost):
-        row, cable = lost[0]
-        problem = f"has no winch speed of cable {cable + 1} at {moments[row]:g} s: it leads through the exit point"
+        directions = cable_directions(robot, positions)
+    speeds: Array = np.einsum("kai,ka->ki", directions, velocities)
+    undefined = np.argwhere(~np.isfinite(speeds))
+    if len(undefined):
+        row, cable = undefined[0]
+        problem = f"has no winch speed of cable {cable + 1} at {instants[row]:g} s: it leads through the exit point"
         raise ArgumentError("ideal_winch_speeds: trajectory", trajectory, problem, "lead the path past all exit points")
     return speeds
 
 
-def _along(where: str, trajectory: Trajectory, name: str, times: Array) -> Array:
-    """What a path, maybe of the user's, is or does at times (N,): finite numbers (N, 3); raises ArgumentError."""
-    meaning = f"a path whose {name}(times) has a finite row x, y, z for each of the {len(times)} times"
-    return array_of(f"{where}: trajectory.{name}", getattr(trajectory, name)(times), (len(times), 3), meaning)
+def _evaluate_path(where: str, trajectory: Trajectory, quantity: str, times: Array) -> Array:
+    """A quantity of a trajectory, possibly the user's, at times (N,): finite numbers (N, 3); raises ArgumentError."""
+    meaning = f"a path whose {quantity}(times) has a finite row x, y, z for each of the {len(times)} times"
+    return validate_array(
+        f"{where}: trajectory.{quantity}", getattr(trajectory, quantity)(times), (len(times), 3), meaning
+    )
 
 
-def trajectory_of(where: str, value: object) -> Trajectory:
-    """The value if it is a path over time; raises ArgumentError."""
+def require_trajectory(where: str, value: object) -> Trajectory:
+    """Returns the value if it is a trajectory; raises ArgumentError."""
     names = ("duration", "position", "velocity", "acceleration")
-    return cast(Trajectory, having(where, value, names, "path", "give a path, such as Line(start, end, duration)"))
+    return cast(
+        Trajectory, validate_attributes(where, value, names, "path", "give a path, such as Line(start, end, duration)")
+    )

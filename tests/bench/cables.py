@@ -8,10 +8,10 @@ from time import perf_counter
 import numpy as np
 
 from tautwire.fmus.packaging import build_fmus
-from tautwire.master import FixedStep, Kept, Sampled, simulate
+from tautwire.master import FixedStep, MemoryRecorder, PiecewiseLinearInput, simulate
 from tautwire.robots.robot import Cable, Platform, Robot, Sensors
-from tautwire.runs.cosimulation import instantiated
-from tautwire.runs.wiring import shown_ports
+from tautwire.runs.cosimulation import instantiate_robot
+from tautwire.runs.wiring import recorded_ports
 
 
 def wheel_of_cables(count: int) -> Robot:
@@ -27,8 +27,8 @@ def time_per_step(count: int, folder: Path) -> float:
     fmus = build_fmus(wheel_of_cables(count), folder)
     time = np.array([0.0, 1.0])
     speeds = np.vstack([np.zeros(count), np.linspace(-0.1, 0.1, count)])
-    with instantiated(fmus) as coupling:
-        kept = Kept(2, len(shown_ports(count)))
+    with instantiate_robot(fmus) as coupling:
+        kept = MemoryRecorder(2, len(recorded_ports(count)))
         begun = perf_counter()
-        simulate(coupling, Sampled(time, speeds), time, shown_ports(count), FixedStep(0.01), kept)
-        return (perf_counter() - begun) / coupling.account.steps
+        simulate(coupling, PiecewiseLinearInput(time, speeds), time, recorded_ports(count), FixedStep(0.01), kept)
+        return (perf_counter() - begun) / coupling.statistics.steps

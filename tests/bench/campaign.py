@@ -20,11 +20,11 @@ import numpy as np
 from psutil import Process
 from threadpoolctl import threadpool_limits
 
-from tautwire.campaign.cluster import Task, connected, results, shared_future
-from tautwire.campaign.dataset import done_rows, opened
+from tautwire.campaign.cluster import Task, context_future, dask_client, task_results
+from tautwire.campaign.dataset import completed_runs, open_dataset
 from tautwire.campaign.plan import Plan
-from tautwire.campaign.run import run_job, shared_of
-from tautwire.campaign.running import jobs_of, make_rows
+from tautwire.campaign.run import build_context, run_job
+from tautwire.campaign.running import planned_jobs, run_campaign
 from tests.campaigns import read
 from tests.memory import resident_memory
 
@@ -55,8 +55,8 @@ modes = false
 
 def bare(plan: Plan, folder: Path) -> float:
     """Seconds for all runs one after the other in this process."""
-    shared = shared_of(plan, {})
-    jobs = list(jobs_of(plan, np.ones(plan.count, dtype=bool)))
+    shared = build_context(plan, {})
+    jobs = list(planned_jobs(plan, np.ones(plan.count, dtype=bool)))
     run_job(shared, jobs[0], folder)
     with threadpool_limits(1):
         begun = perf_counter()
@@ -74,13 +74,13 @@ def over_workers(plan: Plan, folder: Path, workers: int) -> float:
         if what == "running" and done == 0.0:
             begun = perf_counter()
 
-    with connected(None, workers) as client:
+    with dask_client(None, workers) as client:
         # Each worker imports what it needs, and unpacks its FMUs, in a campaign before.
         before = replace(plan, count=2 * workers)
-        with opened(folder / "warm", before):
-            make_rows(before, folder / "warm", client, tell)
-        with opened(folder / "rows", plan):
-            make_rows(plan, folder / "rows", client, tell)
+        with open_dataset(folder / "warm", before):
+            run_campaign(before, folder / "warm", client, tell)
+        with open_dataset(folder / "rows", plan):
+            run_campaign(plan, folder / "rows", client, tell)
             return perf_counter() - begun
 
 
@@ -122,16 +122,16 @@ def cost(folder: Path, tasks: int = 300, seconds: float = 10.0) -> None:
     """
     (folder / "little").mkdir()
     plan = read(folder / "little", CHEAPLY.format(count=tasks))
-    with connected(None, 1) as client:
+    with dask_client(None, 1) as client:
         workers = Process().children(recursive=True)
 
         def processor_time() -> tuple[float, float]:
             return process_time(), sum(sum(each.cpu_times()[:2]) for each in workers)
 
-        shared = shared_future(client, plan, {})
-        jobs = jobs_of(plan, np.ones(tasks, dtype=bool))
+        shared = context_future(client, plan, {})
+        jobs = planned_jobs(plan, np.ones(tasks, dtype=bool))
         begun, before = perf_counter(), processor_time()
-        made = sum(len(some) for some in results(client, shared, plan, (Task((job,)) for job in jobs)))
+        made = sum(len(some) for some in task_results(client, shared, plan, (Task((job,)) for job in jobs)))
         wall, after = perf_counter() - begun, processor_time()
         own, others = (1e3 * (b - a) / made for a, b in zip(before, after, strict=True))
         shown = f"processor time {own:.1f} ms here, {others:.1f} ms there"
@@ -158,9 +158,9 @@ def memory(folder: Path, runs: int) -> None:
             print(f"| {10 * tenths.pop(0)} % | {own:.0f} MB | {workers:.0f} MB | {seconds:.0f} s |", flush=True)
 
     out = folder / "many"
-    with connected(None, 2) as client, opened(out, plan):
-        make_rows(plan, out, client, tell)
-        assert done_rows(out, runs).all()
+    with dask_client(None, 2) as client, open_dataset(out, plan):
+        run_campaign(plan, out, client, tell)
+        assert completed_runs(out, runs).all()
     size = sum(part.stat().st_size for part in out.rglob("*.parquet"))
     print(f"\n{len(list(out.rglob('*.parquet')))} parts, {size / 1e6:.1f} MB on disk")
 

@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from tautwire.control import Design
-from tautwire.runs.cosimulation import Motion
+from tautwire.runs.cosimulation import CosimulationResult
 from tests.bench.control_figure import Curves, draw
 from tests.bench.control_runs import (
     Controlled,
@@ -31,7 +31,7 @@ from tests.bench.control_tables import margin_table, run_table
 # When the shaped ramps have ended, in s.
 SHAPED_BY = 6.5
 BEGIN, END = "<!-- bench -->\n", "<!-- end of bench -->\n"
-Runs = dict[str, tuple[Controlled, Motion]]
+Runs = dict[str, tuple[Controlled, CosimulationResult]]
 Pairs = dict[str, tuple[Measured, Measured]]
 
 

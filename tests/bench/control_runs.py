@@ -26,7 +26,7 @@ from tautwire.control import (
 )
 from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.robots.robot import Robot
-from tautwire.runs.cosimulation import Motion
+from tautwire.runs.cosimulation import CosimulationResult
 from tautwire.trajectory import CAROCA_HELIX, PAPER_HELIX, Line, Trajectory
 from tests.robots import example
 from tests.winch_ramp import WinchRamp
@@ -135,7 +135,7 @@ def robots(move: Move, folder: Path) -> Iterator[tuple[bool, RobotFmus]]:
         yield False, build_fmus(robot, folder / f"{modulus:g}-{payload:g}")
 
 
-def run(move: Move, controller: Controlled, fmus: RobotFmus) -> Motion:
+def run(move: Move, controller: Controlled, fmus: RobotFmus) -> CosimulationResult:
     """One run, sensors with noise."""
     return cosimulate_closed_loop(
         fmus,
@@ -145,11 +145,11 @@ def run(move: Move, controller: Controlled, fmus: RobotFmus) -> Motion:
         move.duration,
         seed=SEED,
         reference=controller.reference,
-        push=move.push,
+        external_force=move.push,
     )
 
 
-def measured(move: Move, controller: Controlled, motion: Motion) -> Measured:
+def measured(move: Move, controller: Controlled, motion: CosimulationResult) -> Measured:
     """The numbers of a run; settling counts from the end of the move, as the controller has shaped it."""
     away = motion.position - controller.path.position(motion.time)
     distance = np.linalg.norm(away, axis=1)

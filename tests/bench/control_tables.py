@@ -86,12 +86,12 @@ def cases(robot: Robot, path: Trajectory, design: Design) -> list[tuple[str, Pla
 
 
 def _margin_cells(found: Margins) -> list[str]:
-    if found.radius >= 1.0:
+    if found.spectral_radius >= 1.0:
         return ["unstable"] * 3
     return [
         f"{_decibel(found.disk_gain)} dB, {found.disk_phase:.0f}°",
-        f"{_decibel(found.gain)} dB, {found.phase:.0f}°",
-        f"disk {found.sensors:.2f}",
+        f"{_decibel(found.gain_margin)} dB, {found.phase_margin:.0f}°",
+        f"disk {found.sensor_disk:.2f}",
     ]
 
 

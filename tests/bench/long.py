@@ -11,8 +11,8 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from tautwire.master.watch import PATIENCE
-from tautwire.runs.result_file import result_in_place
+from tautwire.master.watch import CALL_TIMEOUT
+from tautwire.runs.result_file import open_result_file
 from tautwire.runs.simulation import simulate_recording
 from tautwire.runs.wiring import result_columns
 from tests.memory import resident_memory
@@ -44,11 +44,11 @@ def run(folder: Path, steps: int) -> None:
             print(f"| {percents.pop(0)} % | {own:.1f} MB | {fmus:.1f} MB | {seconds:.0f} s |", flush=True)
 
     print("| done | resident memory | of the FMUs' process | wall time |\n| --- | --- | --- | --- |")
-    with result_in_place(result, result_columns(robot.cable_count)) as rows:
-        account, _ = simulate_recording(robot, recording, rows, STEP, None, None, tell, PATIENCE)
+    with open_result_file(result, result_columns(robot.cable_count)) as rows:
+        account, _ = simulate_recording(robot, recording, rows, STEP, None, None, tell, CALL_TIMEOUT)
     content = pq.ParquetFile(result).metadata
     print(
-        f"\n{account.steps} steps, {account.redos} redos; {content.num_rows} rows of {content.num_columns} numbers in "
+        f"\n{account.steps} steps, {account.iterations} redos; {content.num_rows} rows of {content.num_columns} numbers in "
         f"{content.num_row_groups} row groups, {result.stat().st_size / 1e6:.0f} MB on disk"
     )
 

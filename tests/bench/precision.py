@@ -12,7 +12,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from tautwire.fmus.packaging import build_fmus
-from tautwire.master import AdaptiveStep, FixedStep, Stepping
+from tautwire.master import AdaptiveStep, FixedStep, StepSizeControl
 from tests.importers.harness import IMPORTERS, NotInstallableError, exact_end, prepare, run_client
 from tests.robots import paper_robot
 
@@ -52,7 +52,7 @@ def by_tautwire(folder: Path) -> list[Curve]:
     fmus = build_fmus(paper_robot(), folder)
     exact = exact_end(paper_robot())
 
-    def run(stepping: Callable[[], Stepping], setting: str) -> Point:
+    def run(stepping: Callable[[], StepSizeControl], setting: str) -> Point:
         runs = [by_fmus(fmus, stepping()) for _ in range(RUNS)]
         return Point(setting, distance(runs[0][0], exact), min(seconds for _, seconds, _ in runs))
 

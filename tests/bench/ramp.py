@@ -10,11 +10,11 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 from tautwire.fmus.packaging import RobotFmus
-from tautwire.master import Kept, Sampled, Stepping, simulate
-from tautwire.model.assembly import assemble
+from tautwire.master import MemoryRecorder, PiecewiseLinearInput, StepSizeControl, simulate
+from tautwire.model.assembly import assemble_robot
 from tautwire.robots.robot import Robot
-from tautwire.runs.cosimulation import instantiated
-from tautwire.runs.wiring import shown_ports
+from tautwire.runs.cosimulation import instantiate_robot
+from tautwire.runs.wiring import recorded_ports
 from tautwire_fmu.laws import cable as cable_law
 from tautwire_fmu.laws import point_mass as platform_law
 from tautwire_fmu.laws.mathematics import REAL
@@ -29,7 +29,7 @@ def ramp(time: float) -> np.ndarray:
 
 def laws_in_memory(robot: Robot) -> Callable[[float, np.ndarray], list[float]]:
     """The laws as one right-hand side in floats, as a user of solve_ivp would write it."""
-    assembly = assemble(robot)
+    assembly = assemble_robot(robot)
 
     def rates(time: float, state: np.ndarray) -> list[float]:
         numbers = state.tolist()
@@ -39,8 +39,8 @@ def laws_in_memory(robot: Robot) -> Callable[[float, np.ndarray], list[float]]:
             constants = component.constants
             own = cable_law.CableState(length, 0.0, ())
             line = cable_law.span(REAL, constants, cable_law.CableInputs(position, velocity, speed))
-            moving = cable_law.motion(REAL, constants, (), own, line, speed)
-            pull = cable_law.reading(REAL, constants, (), own, moving).force
+            moving = cable_law.cable_motion(REAL, constants, (), own, line, speed)
+            pull = cable_law.cable_outputs(REAL, constants, (), own, moving).force
             force = [a + b for a, b in zip(force, pull, strict=True)]
             slopes.append(cable_law.state_rates(REAL, constants, (), own, moving).unstrained_length)
         pushed = platform_law.acceleration(REAL, assembly.platform, (), (), position, velocity, force)
@@ -63,12 +63,12 @@ def by_solve_ivp(
 
 
 def by_fmus(
-    fmus: RobotFmus, stepping: Stepping, clock: Callable[[], float] = perf_counter
+    fmus: RobotFmus, stepping: StepSizeControl, clock: Callable[[], float] = perf_counter
 ) -> tuple[np.ndarray, float, int]:
     """End position, wall time of the run, or that of another clock, and macro steps."""
     speeds = np.array([ramp(time) for time in CORNERS])
-    with instantiated(fmus) as coupling:
-        kept = Kept(len(CORNERS), len(shown_ports(3)))
+    with instantiate_robot(fmus) as coupling:
+        kept = MemoryRecorder(len(CORNERS), len(recorded_ports(3)))
         begun = clock()
-        simulate(coupling, Sampled(CORNERS, speeds), CORNERS, shown_ports(3), stepping, kept)
-        return kept.rows[-1, :3], clock() - begun, coupling.account.steps
+        simulate(coupling, PiecewiseLinearInput(CORNERS, speeds), CORNERS, recorded_ports(3), stepping, kept)
+        return kept.rows[-1, :3], clock() - begun, coupling.statistics.steps

@@ -24,8 +24,8 @@ import numpy as np
 from tautwire.fmus.packaging import build_fmus
 from tautwire.model.reference import integrate
 from tautwire.robots.robot import Robot
-from tautwire.runs.ssp import COMPONENTS_ONLY, OPEN, ssp_name, write_ssp
-from tautwire.runs.wiring import AXES, PLATFORM, cable_name, connections
+from tautwire.runs.ssp import COMPONENTS_ONLY, SYSTEM_STRUCTURE, ssp_name, write_ssp
+from tautwire.runs.wiring import AXES, PLATFORM, cable_name, robot_connections
 
 from .ramps import LIMIT, RAMP, STOP
 
@@ -81,7 +81,7 @@ def prepare(robot: Robot, folder: Path) -> None:
     files |= {cable_name(number): path.name for number, path in enumerate(fmus.cables, start=1)}
     wires = [
         [wire.source.component, wire.source.variable, wire.target.component, wire.target.variable]
-        for wire in connections(robot.cable_count)
+        for wire in robot_connections(robot.cable_count)
     ]
     for number in robot.cable_numbers:
         wires += [
@@ -111,7 +111,7 @@ def _unpack(archive: Path, folder: Path) -> Path:
     """The archive's files with the structure that has no system connectors in the default's place."""
     with zipfile.ZipFile(archive) as packed:
         packed.extractall(folder)
-    (folder / COMPONENTS_ONLY).replace(folder / OPEN)
+    (folder / COMPONENTS_ONLY).replace(folder / SYSTEM_STRUCTURE)
     return folder
 
 

@@ -1,1 +1,1 @@
-"""The physics, written once: plain functions of scalars and small tuples, with the mathematics handed in."""
+"""Physical laws, written once: plain functions of scalars and small tuples, with the mathematics passed in."""

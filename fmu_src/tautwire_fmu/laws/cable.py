@@ -1,13 +1,13 @@
-"""A cable from its exit point to the platform: length, strain, tension, and the force on the platform.
+"""Cable law from the exit point to the platform: length, strain, tension, and the force on the platform.
 
-State: the unstrained length ``l_u`` and the wound length, the integral of the rope speed ``V``; and what the effects
-remember. How the effects act on the way from motion to load cell: :class:`tautwire_fmu.laws.effects.Effect`.
+State: the unstrained length ``l_u``, the wound length (the integral of the rope speed ``V``), and the states of the
+effects. How the effects act on the way from motion to load cell: :class:`tautwire_fmu.laws.effects.Effect`.
 
     logarithmic law   T = E S ln(l / l_u) + c S (dl/dt + V) / l + T0,   dl_u/dt = -V l_u / l
     linear law        T = E S r / l       + c S (dl/dt + V) / l + T0,   r = l - l_u,  dl_u/dt = -V
 
 ``V`` is positive when the winch reels in; it takes up strained rope, hence ``l_u / l``. At the start ``l_u`` is the
-length and ``T`` is ``T0``, so ``T0`` is what statics asks for there. A cable that would push carries nothing.
+length and ``T`` is ``T0``, so ``T0`` is the static tension there. A cable that would push carries no tension.
 
 Source: Baklouti et al. 2017, Eqs. 1 to 4 and 12, with the reference length moving with the winch.
 """
@@ -21,7 +21,7 @@ from .vectors import Vector, add, dot, norm, scale, subtract
 
 
 class TensionLaw(NamedTuple):
-    """The two functions in which the tension laws differ."""
+    """Tension law: the two functions in which the laws differ."""
 
     strain: Callable[[Mathematics, Any, Any], Any]
     unstrained_length_rate: Callable[[Mathematics, Any, Any, Any], Any]
@@ -49,9 +49,9 @@ LAWS = {"logarithmic": LOGARITHMIC, "linear": LINEAR}
 
 
 class CableConstants(NamedTuple):
-    """What the robot file declares of a cable, and its static start; SI units.
+    """Constants of a cable by the robot file, and its static start; SI units.
 
-    ``start_direction`` and ``start_length`` are those of :func:`tautwire_fmu.laws.stages.route` at the start.
+    ``start_direction`` and ``start_length`` are those of :func:`tautwire_fmu.laws.effect_stages.route` at the start.
     """
 
     law: TensionLaw
@@ -66,7 +66,7 @@ class CableConstants(NamedTuple):
 
 
 class CableState(NamedTuple):
-    """What a cable remembers; ``effects`` holds one tuple an effect."""
+    """State of a cable; ``effects`` holds one tuple an effect."""
 
     unstrained_length: Any
     wound_length: Any
@@ -74,7 +74,7 @@ class CableState(NamedTuple):
 
 
 class CableInputs(NamedTuple):
-    """What acts on a cable from outside: the platform's motion and the winch speed."""
+    """Inputs of a cable: the platform's motion and the winch speed."""
 
     position: Vector
     velocity: Vector
@@ -82,7 +82,7 @@ class CableInputs(NamedTuple):
 
 
 class Span(NamedTuple):
-    """The rope between platform and exit point as if it did not sag; see :class:`tautwire_fmu.laws.stages.Route`."""
+    """Free span between platform and exit point, without sag; see :class:`tautwire_fmu.laws.effect_stages.Route`."""
 
     direction: Vector
     length: Any
@@ -91,9 +91,9 @@ class Span(NamedTuple):
 
 
 class CableMotion(NamedTuple):
-    """The kinematics of a cable, as effects in the rope see them.
+    """Kinematics of a cable, as passed to the effects in the rope.
 
-    ``strain`` is what the law acts on, ``elastic_tension`` what it gives without viscosity, in N; ``arc`` is the
+    ``strain`` is the argument of the law, ``elastic_tension`` its value without viscosity, in N; ``arc`` is the
     length of the rope with its sag, in m; ``winch_speed`` is the encoder's, ``rope_speed`` the rope's, in m/s.
     """
 
@@ -106,11 +106,11 @@ class CableMotion(NamedTuple):
     elastic_tension: Any
 
 
-class CableReading(NamedTuple):
-    """What a cable shows: tension in N, force on the platform in N, lengths in m.
+class CableOutputs(NamedTuple):
+    """Outputs of a cable: tension in N, force on the platform in N, lengths in m.
 
-    ``tension`` is what the load cell shows, but for its lag; ``span_tension`` that of the free span; ``pull`` what
-    the law asks for, negative where the cable hangs slack.
+    ``tension`` is that at the load cell, without its lag; ``span_tension`` that of the free span; ``pull`` the value of
+    the tension law, negative where the cable hangs slack.
     """
 
     tension: Any
@@ -122,18 +122,20 @@ class CableReading(NamedTuple):
     strain: Any
 
 
-def simplified(
+def fold_constant_effects(
     m: Mathematics, cable: CableConstants, effects: Tuple[ActiveEffect, ...]
 ) -> Tuple[CableConstants, Tuple[ActiveEffect, ...]]:
-    """A cable whose effects do nothing but set constants: with these, and no effects. Any other as it is."""
-    if not effects or not all(active.effect.sets_constants for active in effects):
+    """Fold effects that only set constants into the constants of a cable, which then has no effects.
+
+    Any other cable is returned as it is."""
+    if not effects or not all(active.effect.only_sets_constants for active in effects):
         return cable, effects
     modulus, _ = stages.stiffness(m, effects, [()] * len(effects), cable)
     return cable._replace(modulus=modulus, damping=stages.viscosity(m, effects, cable)), ()
 
 
 def start_state(cable: CableConstants, effects: Sequence[ActiveEffect]) -> CableState:
-    """The state at the static start: nothing wound, the unstrained length equal to the length."""
+    """State at the static start: nothing wound, the unstrained length equal to the length."""
     return CableState(
         unstrained_length=cable.start_length,
         wound_length=0.0,
@@ -142,7 +144,7 @@ def start_state(cable: CableConstants, effects: Sequence[ActiveEffect]) -> Cable
 
 
 def span(m: Mathematics, cable: CableConstants, inputs: CableInputs, effects: Sequence[ActiveEffect] = ()) -> Span:
-    """Length, its rate and direction; they depend on the platform's motion alone."""
+    """Length, length rate and direction of the span; they depend on the platform's motion alone."""
     if effects:
         direction, length, chord = stages.route(m, effects, cable.anchor, inputs.position)
     else:
@@ -152,7 +154,7 @@ def span(m: Mathematics, cable: CableConstants, inputs: CableInputs, effects: Se
     return Span(direction, length, chord, -dot(direction, inputs.velocity))
 
 
-def motion(
+def cable_motion(
     m: Mathematics,
     cable: CableConstants,
     effects: Sequence[ActiveEffect],
@@ -160,7 +162,7 @@ def motion(
     line: Span,
     winch_speed: Any,
 ) -> CableMotion:
-    """Strain and its rate on a span."""
+    """Strain, its rate and the elastic tension on a span."""
     strain = cable.law.strain(m, line.length, state.unstrained_length)
     if not effects:
         return CableMotion(
@@ -172,16 +174,18 @@ def motion(
             (line.length_rate + winch_speed) / line.length,
             cable.area * (cable.modulus * strain) + cable.start_tension,
         )
-    own = state.effects
-    modulus, stress = stages.stiffness(m, effects, own, cable)
-    strain = strain - stages.free_strain(m, effects, own)
-    sag, sag_before = stages.sag(m, effects, cable, line, strain, modulus, stress)
-    strain = strain + (sag - sag_before)
+    effect_states = state.effects
+    modulus, stress = stages.stiffness(m, effects, effect_states, cable)
+    strain = strain - stages.free_strain(m, effects, effect_states)
+    sag, start_sag = stages.sag(m, effects, cable, line, strain, modulus, stress)
+    strain = strain + (sag - start_sag)
     arc = line.length * m.exp(sag)
-    elastic = cable.area * (modulus * strain + stress) + cable.start_tension
-    speed = stages.rope_speed(m, effects, own, winch_speed, elastic)
-    free_rate = stages.free_strain_rate(m, effects, own, cable, elastic)
-    return CableMotion(line, winch_speed, speed, arc, strain, (line.length_rate + speed) / arc - free_rate, elastic)
+    elastic_tension = cable.area * (modulus * strain + stress) + cable.start_tension
+    rope_speed = stages.rope_speed(m, effects, effect_states, winch_speed, elastic_tension)
+    free_rate = stages.free_strain_rate(m, effects, effect_states, cable, elastic_tension)
+    return CableMotion(
+        line, winch_speed, rope_speed, arc, strain, (line.length_rate + rope_speed) / arc - free_rate, elastic_tension
+    )
 
 
 def state_rates(
@@ -189,51 +193,51 @@ def state_rates(
     cable: CableConstants,
     effects: Sequence[ActiveEffect],
     state: CableState,
-    moving: CableMotion,
+    motion: CableMotion,
 ) -> CableState:
     """Time derivative of the state, in the shape of the state."""
     return CableState(
-        unstrained_length=cable.law.unstrained_length_rate(m, moving.rope_speed, moving.arc, state.unstrained_length),
-        wound_length=moving.rope_speed,
+        unstrained_length=cable.law.unstrained_length_rate(m, motion.rope_speed, motion.arc, state.unstrained_length),
+        wound_length=motion.rope_speed,
         effects=tuple(
-            () if active.effect.state_rates is None else active.effect.state_rates(m, active.values, own, cable, moving)
+            () if active.effect.state_rates is None else active.effect.state_rates(m, active.values, own, cable, motion)
             for active, own in zip(effects, state.effects)
         ),
     )
 
 
-def reading(
+def cable_outputs(
     m: Mathematics,
     cable: CableConstants,
     effects: Sequence[ActiveEffect],
     state: CableState,
-    moving: CableMotion,
-) -> CableReading:
-    """Tensions, force on the platform, length, elongation and strain.
+    motion: CableMotion,
+) -> CableOutputs:
+    """Outputs of a cable: tensions, force on the platform, length, elongation and strain.
 
     ``elongation`` is the paper's ``r = l - (l_0 - integral V dt)`` (Eq. 4). Not ``l - l_u``: under the logarithmic
-    law the winch has taken up strained rope, and the two part by that stretch.
+    law the winch has taken up strained rope, and the two differ by that stretch.
     """
-    line = moving.line
+    line = motion.line
     if effects:
         damping = stages.viscosity(m, effects, cable)
-        pull = moving.elastic_tension + cable.area * (damping * moving.strain_rate)
-        pull = pull + stages.added_tension(m, effects, state.effects, cable, moving)
-        tension = stages.carried(m, effects, cable, pull)
-        at_platform, at_cell = stages.transmission(m, effects, moving)
-        on_platform, more = stages.ends(m, effects, cable.gravity, line, tension)
-        force = add(scale(tension * m.exp(at_platform), line.direction), on_platform)
-        shown = (tension + more) * m.exp(at_cell) * stages.gains(m, effects)[0]
+        law_tension = motion.elastic_tension + cable.area * (damping * motion.strain_rate)
+        law_tension = law_tension + stages.added_tension(m, effects, state.effects, cable, motion)
+        tension = stages.carried_tension(m, effects, cable, law_tension)
+        log_platform_ratio, log_cell_ratio = stages.transmission(m, effects, motion)
+        end_force, end_tension = stages.end_forces(m, effects, cable.gravity, line, tension)
+        force = add(scale(tension * m.exp(log_platform_ratio), line.direction), end_force)
+        measured_tension = (tension + end_tension) * m.exp(log_cell_ratio) * stages.sensor_gains(m, effects)[0]
     else:
-        pull = moving.elastic_tension + cable.area * (cable.damping * moving.strain_rate)
-        shown = tension = m.maximum(pull, 0.0)
+        law_tension = motion.elastic_tension + cable.area * (cable.damping * motion.strain_rate)
+        measured_tension = tension = m.maximum(law_tension, 0.0)
         force = scale(tension, line.direction)
-    return CableReading(
-        tension=shown,
+    return CableOutputs(
+        tension=measured_tension,
         span_tension=tension,
-        pull=pull,
+        pull=law_tension,
         force=force,
         length=line.length,
         elongation=line.length - (cable.start_length - state.wound_length),
-        strain=moving.strain,
+        strain=motion.strain,
     )

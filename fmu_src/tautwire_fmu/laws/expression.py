@@ -1,8 +1,8 @@
-"""Reads a formula as data: arithmetic of numbers, names out of a list and a few functions; nothing is ever executed.
+"""Parser and evaluator of arithmetic expressions in numbers, listed names and a few functions; nothing is executed.
 
     numbers, names, + - * / and unary -, x ** n with a whole n from -8 to 8, sin cos exp log sqrt tanh abs
 
-Everything else is refused with its place. The tree is evaluated with the mathematics handed in, as laws are.
+Everything else is refused with its position. The syntax tree is evaluated with the mathematics passed in, as laws are.
 """
 
 import ast
@@ -11,9 +11,9 @@ from typing import Any, Callable, Collection, Dict, List, Mapping, NamedTuple, T
 
 from .mathematics import Mathematics
 
-LONGEST = 2000
-DEEPEST = 40
-LARGEST_POWER = 8
+MAX_CHARACTERS = 2000
+MAX_NESTING = 40
+MAX_EXPONENT = 8
 OPERATORS = {ast.Add: "+", ast.Sub: "-", ast.Mult: "*", ast.Div: "/"}
 FUNCTIONS: Dict[str, Callable[[Mathematics], Callable[[Any], Any]]] = {
     "sin": lambda m: m.sin,
@@ -27,97 +27,99 @@ FUNCTIONS: Dict[str, Callable[[Mathematics], Callable[[Any], Any]]] = {
 
 
 class ExpressionError(ValueError):
-    """A text that is no formula; carries where (a character, from 1), what is wrong, and how to mend it."""
+    """A text is no valid formula; carries the position (character, from 1), the problem, and a hint."""
 
-    def __init__(self, place: int, problem: str, mend: str) -> None:
-        self.place, self.problem, self.mend = place, problem, mend
-        super().__init__(f"character {place}: {problem}; {mend}")
+    def __init__(self, position: int, problem: str, hint: str) -> None:
+        self.position, self.problem, self.hint = position, problem, hint
+        super().__init__(f"character {position}: {problem}; {hint}")
 
 
-class Node(NamedTuple):
-    """One operation on ``parts``: of ``number`` a float, of ``name`` a text, of ``power`` node and int, else nodes.
+class ExpressionNode(NamedTuple):
+    """Syntax-tree node; ``operands`` of number: a float, of name: a text, of power: node and int, else nodes.
 
     Operations are ``number``, ``name``, ``power``, ``negative``, ``+ - * /`` and the functions by their names.
     """
 
     operation: str
-    parts: Tuple[Any, ...]
+    operands: Tuple[Any, ...]
 
 
-NOTHING = Node("number", (math.nan,))
+INVALID_NODE = ExpressionNode("number", (math.nan,))
 
 
-def read_expression(text: str, names: Collection[str]) -> Node:
-    """The tree of a formula in some names.
+def parse_expression(text: str, names: Collection[str]) -> ExpressionNode:
+    """Parse a formula in some names into its syntax tree.
 
-    Raises ExpressionError, the first, where the text is anything else.
+    Raises the first ExpressionError where the text is anything else.
     """
-    faults: List[ExpressionError] = []
-    tree = _read(text, names, faults)
-    if faults:
-        raise min(faults, key=_place)
+    errors: List[ExpressionError] = []
+    tree = _parse(text, names, errors)
+    if errors:
+        raise min(errors, key=_error_position)
     return tree
 
 
-def expression_faults(text: str, names: Collection[str]) -> Tuple[ExpressionError, ...]:
-    """All for which a text is no formula in some names, from left to right; none where it is one."""
-    faults: List[ExpressionError] = []
+def expression_errors(text: str, names: Collection[str]) -> Tuple[ExpressionError, ...]:
+    """All syntax errors of a formula in some names, from left to right; empty where it is valid."""
+    errors: List[ExpressionError] = []
     try:
-        _read(text, names, faults)
+        _parse(text, names, errors)
     except ExpressionError as error:
         return (error,)
-    return tuple(sorted(faults, key=_place))
+    return tuple(sorted(errors, key=_error_position))
 
 
-def _place(error: ExpressionError) -> int:
-    return error.place
+def _error_position(error: ExpressionError) -> int:
+    return error.position
 
 
-def _read(text: str, names: Collection[str], faults: List[ExpressionError]) -> Node:
-    """The tree, of use where it adds nothing to the faults; raises ExpressionError where there is no tree at all."""
-    if len(text) > LONGEST:
-        raise ExpressionError(LONGEST, f"has {len(text)} characters, at most {LONGEST} are read", "write it shorter")
-    strange = next((place for place, letter in enumerate(text) if not " " <= letter <= "~"), None)
-    if strange is not None:
-        # The parser takes letters that look alike for one another.
-        mend = "use the letters and signs of plain ASCII, in one line"
-        raise ExpressionError(strange + 1, f"has {text[strange]!r}", mend)
+def _parse(text: str, names: Collection[str], errors: List[ExpressionError]) -> ExpressionNode:
+    """Syntax tree, valid if it adds no errors; raises ExpressionError where there is no tree at all."""
+    if len(text) > MAX_CHARACTERS:
+        raise ExpressionError(
+            MAX_CHARACTERS, f"has {len(text)} characters, at most {MAX_CHARACTERS} are read", "write it shorter"
+        )
+    index = next((place for place, letter in enumerate(text) if not " " <= letter <= "~"), None)
+    if index is not None:
+        # Python's parser normalises letters that look alike into one another.
+        hint = "use the letters and signs of plain ASCII, in one line"
+        raise ExpressionError(index + 1, f"has {text[index]!r}", hint)
     try:
         body = ast.parse(text.strip(), mode="eval").body
     except SyntaxError as error:
         raise ExpressionError(error.offset or 1, f"is no formula ({error.msg})", "correct it there") from error
     except (ValueError, RecursionError, MemoryError) as error:
         raise ExpressionError(1, "cannot be read", "write it shorter and with fewer brackets") from error
-    return _node(body, frozenset(names), DEEPEST, faults)
+    return _read_node(body, frozenset(names), MAX_NESTING, errors)
 
 
-def evaluate(m: Mathematics, node: Node, values: Mapping[str, Any]) -> Any:
-    """The value of a formula where its names have these values; what ``m`` raises, or ZeroDivisionError."""
-    operation, parts = node
+def evaluate(m: Mathematics, node: ExpressionNode, values: Mapping[str, Any]) -> Any:
+    """Value of a formula at given values of its names; raises what ``m`` raises, or ZeroDivisionError."""
+    operation, operands = node
     if operation == "number":
-        return parts[0]
+        return operands[0]
     if operation == "name":
-        return values[parts[0]]
-    first = evaluate(m, parts[0], values)
+        return values[operands[0]]
+    first_value = evaluate(m, operands[0], values)
     if operation == "power":
-        return _power(first, parts[1])
+        return _power(first_value, operands[1])
     if operation == "negative":
-        return -first
+        return -first_value
     if operation in FUNCTIONS:
-        return FUNCTIONS[operation](m)(first)
-    second = evaluate(m, parts[1], values)
+        return FUNCTIONS[operation](m)(first_value)
+    second_value = evaluate(m, operands[1], values)
     if operation == "+":
-        return first + second
+        return first_value + second_value
     if operation == "-":
-        return first - second
-    return first * second if operation == "*" else first / second
+        return first_value - second_value
+    return first_value * second_value if operation == "*" else first_value / second_value
 
 
-def names_in(node: Node) -> Tuple[str, ...]:
-    """The names that a formula uses, each once, in its order."""
+def variable_names(node: ExpressionNode) -> Tuple[str, ...]:
+    """Names that a formula uses, each once, in its order."""
     if node.operation == "name":
-        return (node.parts[0],)
-    inner = (name for part in node.parts if isinstance(part, Node) for name in names_in(part))
+        return (node.operands[0],)
+    inner = (name for part in node.operands if isinstance(part, ExpressionNode) for name in variable_names(part))
     return tuple(dict.fromkeys(inner))
 
 
@@ -128,62 +130,72 @@ def _power(base: Any, exponent: int) -> Any:
     return result if exponent >= 0 else 1.0 / result
 
 
-def _node(found: ast.AST, names: Collection[str], depth: int, faults: List[ExpressionError]) -> Node:
+def _read_node(
+    syntax_node: ast.AST, names: Collection[str], levels_left: int, errors: List[ExpressionError]
+) -> ExpressionNode:
     try:
-        return _operation(found, names, depth, faults)
+        return _read_operation(syntax_node, names, levels_left, errors)
     except ExpressionError as error:
-        faults.append(error)
-        return NOTHING
+        errors.append(error)
+        return INVALID_NODE
 
 
-def _operation(found: ast.AST, names: Collection[str], depth: int, faults: List[ExpressionError]) -> Node:
-    if depth == 0:
-        raise _refusal(found, f"is nested more than {DEEPEST} deep", "use fewer brackets, or multiply out")
-    if isinstance(found, ast.Constant):
-        return Node("number", (_number(found),))
-    if isinstance(found, ast.Name):
-        if found.id not in names:
-            raise _refusal(found, f"{found.id[:40]!r} is no name here", f"use {', '.join(sorted(names))}")
-        return Node("name", (found.id,))
-    if isinstance(found, ast.UnaryOp) and isinstance(found.op, (ast.USub, ast.UAdd)):
-        inner = _node(found.operand, names, depth - 1, faults)
-        return Node("negative", (inner,)) if isinstance(found.op, ast.USub) else inner
-    if isinstance(found, ast.BinOp) and isinstance(found.op, ast.Pow):
-        base = _node(found.left, names, depth - 1, faults)
-        return Node("power", (base, _exponent(found.right)))
-    if isinstance(found, ast.BinOp) and type(found.op) in OPERATORS:
-        parts = tuple(_node(side, names, depth - 1, faults) for side in (found.left, found.right))
-        return Node(OPERATORS[type(found.op)], parts)
-    if isinstance(found, ast.Call) and isinstance(found.func, ast.Name):
-        parts = tuple(_node(argument, names, depth - 1, faults) for argument in found.args)
-        if found.func.id in FUNCTIONS:
-            if len(found.args) != 1 or found.keywords:
-                raise _refusal(found, f"{found.func.id} takes one number", f"write {found.func.id}(...)")
-            return Node(found.func.id, parts)
-    raise _refusal(found, "is neither arithmetic nor a known function", f"use + - * / ** and {', '.join(FUNCTIONS)}")
+def _read_operation(
+    syntax_node: ast.AST, names: Collection[str], levels_left: int, errors: List[ExpressionError]
+) -> ExpressionNode:
+    if levels_left == 0:
+        raise _error_at(syntax_node, f"is nested more than {MAX_NESTING} deep", "use fewer brackets, or multiply out")
+    if isinstance(syntax_node, ast.Constant):
+        return ExpressionNode("number", (_read_number(syntax_node),))
+    if isinstance(syntax_node, ast.Name):
+        if syntax_node.id not in names:
+            raise _error_at(syntax_node, f"{syntax_node.id[:40]!r} is no name here", f"use {', '.join(sorted(names))}")
+        return ExpressionNode("name", (syntax_node.id,))
+    if isinstance(syntax_node, ast.UnaryOp) and isinstance(syntax_node.op, (ast.USub, ast.UAdd)):
+        inner = _read_node(syntax_node.operand, names, levels_left - 1, errors)
+        return ExpressionNode("negative", (inner,)) if isinstance(syntax_node.op, ast.USub) else inner
+    if isinstance(syntax_node, ast.BinOp) and isinstance(syntax_node.op, ast.Pow):
+        base = _read_node(syntax_node.left, names, levels_left - 1, errors)
+        return ExpressionNode("power", (base, _read_exponent(syntax_node.right)))
+    if isinstance(syntax_node, ast.BinOp) and type(syntax_node.op) in OPERATORS:
+        operands = tuple(
+            _read_node(side, names, levels_left - 1, errors) for side in (syntax_node.left, syntax_node.right)
+        )
+        return ExpressionNode(OPERATORS[type(syntax_node.op)], operands)
+    if isinstance(syntax_node, ast.Call) and isinstance(syntax_node.func, ast.Name):
+        operands = tuple(_read_node(argument, names, levels_left - 1, errors) for argument in syntax_node.args)
+        if syntax_node.func.id in FUNCTIONS:
+            if len(syntax_node.args) != 1 or syntax_node.keywords:
+                raise _error_at(
+                    syntax_node, f"{syntax_node.func.id} takes one number", f"write {syntax_node.func.id}(...)"
+                )
+            return ExpressionNode(syntax_node.func.id, operands)
+    raise _error_at(
+        syntax_node, "is neither arithmetic nor a known function", f"use + - * / ** and {', '.join(FUNCTIONS)}"
+    )
 
 
-def _number(found: ast.Constant) -> float:
-    if isinstance(found.value, bool) or not isinstance(found.value, (int, float)):
-        raise _refusal(found, "is no number", "write a number such as 2.5 or 1e-3")
+def _read_number(syntax_node: ast.Constant) -> float:
+    if isinstance(syntax_node.value, bool) or not isinstance(syntax_node.value, (int, float)):
+        raise _error_at(syntax_node, "is no number", "write a number such as 2.5 or 1e-3")
     try:
-        number = float(found.value)
+        number = float(syntax_node.value)
     except OverflowError:
         number = math.inf
     if not math.isfinite(number):
-        raise _refusal(found, "is too large a number", "write one below 1e308")
+        raise _error_at(syntax_node, "is too large a number", "write one below 1e308")
     return number
 
 
-def _exponent(found: ast.AST) -> int:
-    negative = isinstance(found, ast.UnaryOp) and isinstance(found.op, ast.USub)
-    inner = found.operand if isinstance(found, ast.UnaryOp) and negative else found
-    whole = inner.value if isinstance(inner, ast.Constant) else None
-    if isinstance(whole, bool) or not isinstance(whole, int) or whole > LARGEST_POWER:
-        mend = f"write a whole number from -{LARGEST_POWER} to {LARGEST_POWER}, or use sqrt, exp and log"
-        raise _refusal(found, "is no small whole power", mend)
+def _read_exponent(syntax_node: ast.AST) -> int:
+    negative = isinstance(syntax_node, ast.UnaryOp) and isinstance(syntax_node.op, ast.USub)
+    unsigned_node = syntax_node.operand if isinstance(syntax_node, ast.UnaryOp) and negative else syntax_node
+    whole = unsigned_node.value if isinstance(unsigned_node, ast.Constant) else None
+    if isinstance(whole, bool) or not isinstance(whole, int) or whole > MAX_EXPONENT:
+        hint = f"write a whole number from -{MAX_EXPONENT} to {MAX_EXPONENT}, or use sqrt, exp and log"
+        raise _error_at(syntax_node, "is no small whole power", hint)
     return -whole if negative else whole
 
 
-def _refusal(found: ast.AST, problem: str, mend: str) -> ExpressionError:
-    return ExpressionError(getattr(found, "col_offset", 0) + 1, problem, mend)
+def _error_at(syntax_node: ast.AST, problem: str, hint: str) -> ExpressionError:
+    return ExpressionError(getattr(syntax_node, "col_offset", 0) + 1, problem, hint)

@@ -1,8 +1,8 @@
-"""The mathematics that the laws are handed: the functions of one kind of number.
+"""Mathematical functions passed to the laws, for one kind of number: floats or complex steps.
 
 A law calls ``m.log(x)``, never ``math.log(x)``, so the same source runs on floats inside an FMU, on complex
-numbers for exact rates, and on arrays or symbols outside. Kinks are written with ``m.maximum``, ``m.absolute`` and
-``m.where`` for the same reason.
+numbers for exact rates, and on arrays or symbols outside. Nonsmooth functions are written with ``m.maximum``,
+``m.absolute`` and ``m.where`` for the same reason.
 """
 
 import cmath
@@ -11,7 +11,7 @@ from typing import Any, Callable, List, NamedTuple, Sequence, Tuple
 
 
 class Mathematics(NamedTuple):
-    """The functions that a law may use, for one kind of number.
+    """Functions that a law may use, for one kind of number.
 
     ``where(condition, a, b)`` takes ``condition`` as a number: positive chooses ``a``.
     """
@@ -33,7 +33,7 @@ def _real_where(condition: float, a: float, b: float) -> float:
 
 
 def _complex_log(a: complex) -> complex:
-    """Refuses what the real one refuses: a rope reeled in past its end has no strain."""
+    """Complex logarithm with the domain of the real one: a rope reeled in past its end has no strain."""
     if not a.real > 0.0:
         raise ValueError(f"the logarithm of {a.real} is not a real number")
     return cmath.log(a)
@@ -46,7 +46,7 @@ def _complex_sqrt(a: complex) -> complex:
 
 
 def _complex_atan2(y: complex, x: complex) -> complex:
-    """To first order in the imaginary parts, which is all that a complex step has."""
+    """Complex atan2 to first order in the imaginary parts, all that a complex step needs."""
     a, b = complex(y), complex(x)
     slope = (b.real * a.imag - a.real * b.imag) / (a.real * a.real + b.real * b.real)
     return complex(math.atan2(a.real, b.real), slope)
@@ -90,39 +90,40 @@ COMPLEX_STEP = Mathematics(
     where=_complex_where,
 )
 
-STEP = 1e-30
-UNIT = complex(0.0, STEP)
+COMPLEX_STEP_SIZE = 1e-30
+IMAGINARY_STEP = complex(0.0, COMPLEX_STEP_SIZE)
 
 
-def along(value: float, rate: float) -> complex:
-    """A number that carries its rate of change through a law.
+def with_rate(value: float, rate: float) -> complex:
+    """Complex-step number: a value that carries its rate of change through a law.
 
-    ``f(along(x, dx)).imag / STEP`` is ``f'(x) dx`` without truncation or cancellation (complex-step derivative).
-    Not a Taylor step: ``f(along(x, dx)).real`` is ``f(x)`` itself.
+    ``f(with_rate(x, dx)).imag / COMPLEX_STEP_SIZE`` is ``f'(x) dx`` without truncation or cancellation
+    (complex-step derivative).
+    Not a Taylor step: ``f(with_rate(x, dx)).real`` is ``f(x)`` itself.
 
     Source: Martins, Sturdza and Alonso (2003), ACM Transactions on Mathematical Software 29(3), 245-262.
     """
-    return complex(value, STEP * rate)
+    return complex(value, COMPLEX_STEP_SIZE * rate)
 
 
-def all_along(values: Sequence[float], rates: Sequence[float]) -> List[complex]:
-    """As :func:`along`, number by number."""
-    return [value + rate * UNIT for value, rate in zip(values, rates)]
+def all_with_rates(values: Sequence[float], rates: Sequence[float]) -> List[complex]:
+    """As :func:`with_rate`, number by number."""
+    return [value + rate * IMAGINARY_STEP for value, rate in zip(values, rates)]
 
 
-def vector_along(values: Sequence[float], rates: Sequence[float]) -> Tuple[complex, complex, complex]:
-    """As :func:`along`, for the three numbers of a vector."""
+def vector_with_rates(values: Sequence[float], rates: Sequence[float]) -> Tuple[complex, complex, complex]:
+    """As :func:`with_rate`, for the three numbers of a vector."""
     x, y, z = values
     dx, dy, dz = rates
-    return (x + dx * UNIT, y + dy * UNIT, z + dz * UNIT)
+    return (x + dx * IMAGINARY_STEP, y + dy * IMAGINARY_STEP, z + dz * IMAGINARY_STEP)
 
 
 def rates_of(vector: Sequence[complex]) -> Tuple[float, float, float]:
     """As :func:`rate_of`, for the three numbers of a vector."""
     x, y, z = vector
-    return (x.imag / STEP, y.imag / STEP, z.imag / STEP)
+    return (x.imag / COMPLEX_STEP_SIZE, y.imag / COMPLEX_STEP_SIZE, z.imag / COMPLEX_STEP_SIZE)
 
 
 def rate_of(value: complex) -> float:
-    """The rate that a law passed on, see :func:`along`."""
-    return value.imag / STEP
+    """Rate of change carried by a complex-step number, see :func:`with_rate`."""
+    return value.imag / COMPLEX_STEP_SIZE

@@ -1,4 +1,4 @@
-"""The platform as a point mass under the forces of its cables and its weight.
+"""Equation of motion of the platform as a point mass under cable forces and weight.
 
     (m + sum of added masses) a = sum of cable forces + sum of wrenches - (m + sum of added masses) g e_z
 
@@ -13,14 +13,14 @@ from .vectors import Vector, add, scale
 
 
 class PointMassConstants(NamedTuple):
-    """What the robot file declares of the platform: kg and m/s^2."""
+    """Constants of the platform by the robot file: mass in kg and gravity in m/s^2."""
 
     mass: Any
     gravity: Any
 
 
 def start_states(effects: Sequence[ActiveEffect]) -> Tuple[Tuple[Any, ...], ...]:
-    """What the effects remember at the start: nothing."""
+    """States of the effects at the start: all zero."""
     return tuple((0.0,) * len(active.effect.states) for active in effects)
 
 
@@ -30,11 +30,11 @@ def total_mass(
     effects: Sequence[ActiveEffect],
     states: Optional[Sequence[Tuple[Any, ...]]] = None,
 ) -> Any:
-    """Declared mass and what the effects add to it, in kg; at the start where no states are given."""
+    """Declared mass plus the added masses of the effects, in kg; at the start where no states are given."""
     mass = platform.mass
-    for active, own in zip(effects, start_states(effects) if states is None else states):
+    for active, effect_states in zip(effects, start_states(effects) if states is None else states):
         if active.effect.inertia is not None:
-            mass = mass + active.effect.inertia(m, active.values, own)
+            mass = mass + active.effect.inertia(m, active.values, effect_states)
     return mass
 
 
@@ -45,11 +45,11 @@ def wrench(
     position: Vector,
     velocity: Vector,
 ) -> Vector:
-    """Force on the platform that comes neither from cables nor from weight, in N."""
+    """Force on the platform by effects, beside cables and weight, in N."""
     total: Vector = (0.0, 0.0, 0.0)
-    for active, own in zip(effects, states):
+    for active, effect_states in zip(effects, states):
         if active.effect.wrench is not None:
-            total = add(total, active.effect.wrench(m, active.values, own, position, velocity))
+            total = add(total, active.effect.wrench(m, active.values, effect_states, position, velocity))
     return total
 
 
@@ -62,7 +62,7 @@ def acceleration(
     velocity: Vector,
     cable_force: Vector,
 ) -> Vector:
-    """Acceleration in m/s^2 under the summed force of the cables."""
+    """Acceleration in m/s^2 under the total force of the cables."""
     force = add(cable_force, wrench(m, effects, states, position, velocity))
-    pulled = scale(1.0 / total_mass(m, platform, effects, states), force)
-    return (pulled[0], pulled[1], pulled[2] - platform.gravity)
+    specific_force = scale(1.0 / total_mass(m, platform, effects, states), force)
+    return (specific_force[0], specific_force[1], specific_force[2] - platform.gravity)

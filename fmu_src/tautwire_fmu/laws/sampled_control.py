@@ -1,21 +1,21 @@
-"""A sampled controller on a path: from what the sensors show to where the winch speeds run next.
+"""Sampled-data controller on a path: from measurements to the next winch speeds.
 
-Within sample k, of length h, the winches run on a ramp from ``V_k`` to ``V_k+1``. F are the feedforward speeds, r is
-what the sensors shall show and y what they show, ``w_k = V_k - F_k``:
+Within sample k, of length h, the winch speeds are ramps from ``V_k`` to ``V_k+1``. F are the feedforward speeds, r the
+reference measurements and y the measurements, ``w_k = V_k - F_k``:
 
-    a_k   = C x_k + D w_k                                        what is asked for
-    V_k+1 = F_k+1 + w_k + h a_k, within the limits               what is given
-    x_k+1 = A x_k + B (y_k - r_k, w_k) + M (given a_k - a_k)
+    a_k   = C x_k + D w_k                                        demanded acceleration
+    V_k+1 = F_k+1 + w_k + h a_k, within the limits               next speed
+    x_k+1 = A x_k + B (y_k - r_k, w_k) + M (limited a_k - a_k)
 
-``x_k`` knows samples before k only: one sample is there for computing. M tells the state what was given, so nothing
-winds up at a limit. Between the knots of a schedule all matrices are interpolated linearly.
+``x_k`` depends on samples before k only: one sample of computation delay. M is the anti-windup gain: it feeds the
+limited acceleration back to the state. Between the knots of a gain schedule all matrices are interpolated linearly.
 
-A cable's tension T is kept below a limit L by a bound on what is asked for beyond the feedforward, the one that would
+A cable's tension T is kept below a limit L by a bound on the demand beyond the feedforward, the one that would
 take T to L as a mode of angular frequency 1 / tau and damping ratio 0.7, ``a <= (l / E S) ((L - T) / tau - 1.4 dT/dt)
-/ tau``, from T as seen a sample before; and so from below. Where statics asks for more than L the cable gives way.
+/ tau``, from T as measured a sample before; likewise from below. Where the static tension exceeds L the cable yields.
 
-A plan that ``tares`` takes the platform to rest at the start: the first tensions seen, over those expected, scale all
-that follow and the speeds that cancel stretch. So a payload that nobody declared does no harm.
+A plan that ``tares`` assumes the platform at rest at the start: the first tensions measured, over those expected, scale
+all expected tensions and the speeds that cancel stretch. This compensates an undeclared payload.
 
 Source: Astrom and Rundqwist (1989), Integrator windup and how to avoid it, American Control Conference, for M.
 """
@@ -26,13 +26,13 @@ from typing import Any, Dict, List, NamedTuple, Sequence
 Vector = Sequence[float]
 Matrix = Sequence[Vector]
 
-# Twice the damping ratio with which a tension goes to its limit.
-DAMPED = 1.4
-SMALLEST_SCALE, LARGEST_SCALE = 0.5, 2.0
+# Twice the damping ratio with which a tension approaches its limit.
+TWICE_TENSION_DAMPING_RATIO = 1.4
+MIN_TENSION_SCALE, MAX_TENSION_SCALE = 0.5, 2.0
 
 
 class Gains(NamedTuple):
-    """The matrices A, B, C, D and M as rows; p states, n cables, 3 + n sensors: B has 3 + 2 n columns."""
+    """Controller matrices A, B, C, D and M as rows; p states, n cables, 3 + n sensors: B has 3 + 2 n columns."""
 
     A: Matrix
     B: Matrix
@@ -41,8 +41,8 @@ class Gains(NamedTuple):
     M: Matrix
 
 
-class Plan(NamedTuple):
-    """A controller made for a path.
+class ControlPlan(NamedTuple):
+    """Controller designed for a path.
 
     ``period`` h in s; at each of N samples ``speeds`` (n) for inelastic cables and ``stretches`` (n), which cancel
     stretch and make F of these, in m/s, and ``expected`` r (3 + n), position in m and tensions in N; ``at_rest`` (n)
@@ -71,11 +71,11 @@ class Limits(NamedTuple):
     highest_tension: float
 
 
-class Memory(NamedTuple):
-    """Where a controller is: in which sample, its state, winch speeds at both ends of it, the last tensions seen.
+class ControllerState(NamedTuple):
+    """State of the controller: sample, state vector, winch speeds at both ends of the sample, last measured tensions.
 
-    ``tensions`` are of the sample before this one, ``earlier`` of the one before that; ``scales`` (n) are what the
-    tare has found.
+    ``tensions`` are of the sample before this one, ``earlier`` of the one before that; ``scales`` (n) are the
+    ratios by the tare.
     """
 
     sample: int
@@ -87,9 +87,9 @@ class Memory(NamedTuple):
     scales: Vector
 
 
-def plan_of(data: Dict[str, Any]) -> Plan:
-    """The plan that a resource holds."""
-    return Plan(
+def plan_from_resource(data: Dict[str, Any]) -> ControlPlan:
+    """Controller plan from the JSON resource."""
+    return ControlPlan(
         data["period"],
         data["speeds"],
         data["stretches"],
@@ -103,104 +103,129 @@ def plan_of(data: Dict[str, Any]) -> Plan:
     )
 
 
-def first_sample(plan: Plan, limits: Limits) -> Memory:
-    """At the start of the path: nothing seen, the state zero."""
+def initial_controller_state(plan: ControlPlan, limits: Limits) -> ControllerState:
+    """Controller state at the start of the path: nothing measured, the state vector zero."""
     scales = [1.0] * len(plan.compliances)
-    begin = [_cut(speed, -limits.speed, limits.speed) for speed in _forward(plan, scales, 0)]
+    start_speeds = [_clamp(speed, -limits.speed, limits.speed) for speed in _feedforward_speeds(plan, scales, 0)]
     state = [0.0] * len(plan.gains[0].A)
     tensions = plan.expected[0][3:]
-    start = Memory(0, state, begin, begin, tensions, tensions, scales)
-    return start._replace(end=_ahead(plan, limits, start))
+    initial_state = ControllerState(0, state, start_speeds, start_speeds, tensions, tensions, scales)
+    return initial_state._replace(end=_limited_end_speeds(plan, limits, initial_state))
 
 
-def next_sample(plan: Plan, limits: Limits, memory: Memory, measured: Vector) -> Memory:
-    """The next sample, by what the sensors showed at the begin of this one: position in m, then tensions in N."""
-    k, scales = memory.sample, memory.scales
+def next_controller_state(
+    plan: ControlPlan, limits: Limits, controller_state: ControllerState, measured: Vector
+) -> ControllerState:
+    """Controller state of the next sample, from the measurements at the start of this one.
+
+    ``measured`` is the position in m, then the tensions in N.
+    """
+    k, scales = controller_state.sample, controller_state.scales
     if plan.tares and k == 0:
-        scales = [_scale(seen, expected) for seen, expected in zip(measured[3:], plan.at_rest)]
+        scales = [_tension_scale(deviations, expected) for deviations, expected in zip(measured[3:], plan.at_rest)]
     gains = gains_at(plan, k)
-    away = _less(memory.begin, _forward(plan, scales, k))
-    asked = _asked(gains, memory.state, away)
-    ahead = _less(memory.end, _forward(plan, scales, k + 1))
-    missed = [(b - a) / plan.period - wanted for a, b, wanted in zip(away, ahead, asked)]
-    seen = _less(measured, _expected(plan, scales, k)) + away
+    speed_deviations = _difference(controller_state.begin, _feedforward_speeds(plan, scales, k))
+    demanded_accelerations = _demanded_accelerations(gains, controller_state.state, speed_deviations)
+    next_speed_deviations = _difference(controller_state.end, _feedforward_speeds(plan, scales, k + 1))
+    saturation_errors = [
+        (b - a) / plan.period - wanted
+        for a, b, wanted in zip(speed_deviations, next_speed_deviations, demanded_accelerations)
+    ]
+    seen = _difference(measured, _expected_measurements(plan, scales, k)) + speed_deviations
     state = [
-        _dot(row, memory.state) + _dot(driven, seen) + _dot(told, missed)
-        for row, driven, told in zip(gains.A, gains.B, gains.M)
+        _dot(row, controller_state.state) + _dot(input_row, seen) + _dot(anti_windup_row, saturation_errors)
+        for row, input_row, anti_windup_row in zip(gains.A, gains.B, gains.M)
     ]
     tensions = measured[3:]
-    # At the first sample there is no rate: those remembered were only expected.
-    earlier = memory.tensions if k > 0 else tensions
-    following = Memory(k + 1, state, memory.end, memory.end, tensions, earlier, scales)
-    return following._replace(end=_ahead(plan, limits, following))
+    # At the first sample there is no rate: the stored tensions were only expected.
+    earlier_tensions = controller_state.tensions if k > 0 else tensions
+    next_state = ControllerState(
+        k + 1, state, controller_state.end, controller_state.end, tensions, earlier_tensions, scales
+    )
+    return next_state._replace(end=_limited_end_speeds(plan, limits, next_state))
 
 
-def gains_at(plan: Plan, sample: int) -> Gains:
-    """The gains at a sample, before the first and after the last knot those of that knot."""
+def gains_at(plan: ControlPlan, sample: int) -> Gains:
+    """Scheduled gains at a sample; before the first and after the last knot those of that knot."""
     knots = plan.knots
-    after = next((place for place, knot in enumerate(knots) if knot > sample), len(knots))
-    if after == 0 or after == len(knots):
-        return plan.gains[max(after - 1, 0)]
-    share = (sample - knots[after - 1]) / (knots[after] - knots[after - 1])
-    return Gains(*(_between(a, b, share) for a, b in zip(plan.gains[after - 1], plan.gains[after])))
+    next_knot = next((place for place, knot in enumerate(knots) if knot > sample), len(knots))
+    if next_knot == 0 or next_knot == len(knots):
+        return plan.gains[max(next_knot - 1, 0)]
+    weight = (sample - knots[next_knot - 1]) / (knots[next_knot] - knots[next_knot - 1])
+    return Gains(*(_interpolated(a, b, weight) for a, b in zip(plan.gains[next_knot - 1], plan.gains[next_knot])))
 
 
-def acceleration(plan: Plan, memory: Memory) -> List[float]:
-    """Of the ropes within the sample, in m/s^2."""
-    return [(after - before) / plan.period for before, after in zip(memory.begin, memory.end)]
+def acceleration(plan: ControlPlan, controller_state: ControllerState) -> List[float]:
+    """Accelerations of the ropes within the sample, in m/s^2."""
+    return [(after - before) / plan.period for before, after in zip(controller_state.begin, controller_state.end)]
 
 
-def _ahead(plan: Plan, limits: Limits, memory: Memory) -> List[float]:
-    """The winch speeds at the end of the sample, within the limits; those of the winch have the last word."""
-    k = memory.sample
-    there = _forward(plan, memory.scales, k + 1)
-    away = _less(memory.begin, _forward(plan, memory.scales, k))
-    asked = _asked(gains_at(plan, k), memory.state, away)
-    reach = plan.period * limits.acceleration
-    found = []
-    for speed, then, off, wanted, compliance, tension, before in zip(
-        memory.begin, there, away, asked, plan.compliances, memory.tensions, memory.earlier
+def _limited_end_speeds(plan: ControlPlan, limits: Limits, controller_state: ControllerState) -> List[float]:
+    """Winch speeds at the end of the sample, within the limits; the limits of the winch take precedence."""
+    k = controller_state.sample
+    feedforward_speeds = _feedforward_speeds(plan, controller_state.scales, k + 1)
+    speed_deviations = _difference(controller_state.begin, _feedforward_speeds(plan, controller_state.scales, k))
+    demanded_accelerations = _demanded_accelerations(gains_at(plan, k), controller_state.state, speed_deviations)
+    max_speed_change = plan.period * limits.acceleration
+    end_speeds = []
+    for speed, feedforward_speed, speed_deviation, demanded_acceleration, compliance, tension, earlier_tension in zip(
+        controller_state.begin,
+        feedforward_speeds,
+        speed_deviations,
+        demanded_accelerations,
+        plan.compliances,
+        controller_state.tensions,
+        controller_state.earlier,
     ):
-        give, rising = compliance / plan.yield_time, DAMPED * (tension - before) / plan.period
-        lower = give * ((limits.lowest_tension - tension) / plan.yield_time - rising)
-        upper = give * ((limits.highest_tension - tension) / plan.yield_time - rising)
-        free = then + off + plan.period * _cut(wanted, lower, upper)
-        held = _cut(free, speed - reach, speed + reach)
-        found.append(_cut(held, -limits.speed, limits.speed))
-    return found
+        compliance_rate, damped_tension_rate = (
+            compliance / plan.yield_time,
+            TWICE_TENSION_DAMPING_RATIO * (tension - earlier_tension) / plan.period,
+        )
+        lower = compliance_rate * ((limits.lowest_tension - tension) / plan.yield_time - damped_tension_rate)
+        upper = compliance_rate * ((limits.highest_tension - tension) / plan.yield_time - damped_tension_rate)
+        unlimited_speed = (
+            feedforward_speed + speed_deviation + plan.period * _clamp(demanded_acceleration, lower, upper)
+        )
+        acceleration_limited_speed = _clamp(unlimited_speed, speed - max_speed_change, speed + max_speed_change)
+        end_speeds.append(_clamp(acceleration_limited_speed, -limits.speed, limits.speed))
+    return end_speeds
 
 
-def _asked(gains: Gains, state: Vector, away: Vector) -> List[float]:
-    return [_dot(row, state) + _dot(own, away) for row, own in zip(gains.C, gains.D)]
+def _demanded_accelerations(gains: Gains, state: Vector, speed_deviations: Vector) -> List[float]:
+    return [
+        _dot(row, state) + _dot(feedthrough_row, speed_deviations) for row, feedthrough_row in zip(gains.C, gains.D)
+    ]
 
 
-def _forward(plan: Plan, scales: Vector, k: int) -> List[float]:
-    """The speeds F of a sample."""
-    rows = zip(_row(plan.speeds, k), scales, _row(plan.stretches, k))
+def _feedforward_speeds(plan: ControlPlan, scales: Vector, k: int) -> List[float]:
+    """Feedforward speeds F of a sample."""
+    rows = zip(_row_or_last(plan.speeds, k), scales, _row_or_last(plan.stretches, k))
     return [speed + scale * stretch for speed, scale, stretch in rows]
 
 
-def _expected(plan: Plan, scales: Vector, k: int) -> List[float]:
-    """What the sensors shall show at a sample."""
-    row = _row(plan.expected, k)
+def _expected_measurements(plan: ControlPlan, scales: Vector, k: int) -> List[float]:
+    """Reference measurements at a sample, tensions scaled by the tare."""
+    row = _row_or_last(plan.expected, k)
     return [*row[:3], *map(mul, scales, row[3:])]
 
 
-def _scale(seen: float, expected: float) -> float:
-    """By what a tension differs from the one expected; nothing where that tells nothing."""
-    return _cut(seen / expected, SMALLEST_SCALE, LARGEST_SCALE) if expected > 0.0 else 1.0
+def _tension_scale(measured: float, expected: float) -> float:
+    """Ratio of a measured to the expected tension, bounded; 1 where none is expected."""
+    return _clamp(measured / expected, MIN_TENSION_SCALE, MAX_TENSION_SCALE) if expected > 0.0 else 1.0
 
 
-def _row(rows: Matrix, k: int) -> Vector:
-    """The path rests at its last sample."""
+def _row_or_last(rows: Matrix, k: int) -> Vector:
+    """Row of a sample; the path rests at its last one."""
     return rows[min(k, len(rows) - 1)]
 
 
-def _between(first: Matrix, second: Matrix, share: float) -> Matrix:
-    return [[a + share * (b - a) for a, b in zip(one, other)] for one, other in zip(first, second)]
+def _interpolated(first: Matrix, second: Matrix, weight: float) -> Matrix:
+    return [
+        [a + weight * (b - a) for a, b in zip(first_row, second_row)] for first_row, second_row in zip(first, second)
+    ]
 
 
-def _less(values: Vector, others: Vector) -> List[float]:
+def _difference(values: Vector, others: Vector) -> List[float]:
     return [a - b for a, b in zip(values, others)]
 
 
@@ -208,5 +233,5 @@ def _dot(row: Vector, values: Vector) -> float:
     return sum(map(mul, row, values))
 
 
-def _cut(value: float, lower: float, upper: float) -> float:
+def _clamp(value: float, lower: float, upper: float) -> float:
     return min(max(value, lower), upper)

@@ -1,4 +1,4 @@
-"""What the effects of a cable add up to, stage by stage; see :class:`tautwire_fmu.laws.effects.Effect`."""
+"""Combined contributions of the effects of a cable, stage by stage; see :class:`tautwire_fmu.laws.effects.Effect`."""
 
 from typing import Any, NamedTuple, Sequence, Tuple
 
@@ -11,7 +11,7 @@ States = Sequence[Tuple[Any, ...]]
 
 
 class Route(NamedTuple):
-    """The rope's way to the exit point: ``direction`` is its unit vector at the platform, ``length`` in m.
+    """Route of the rope to the exit point: ``direction`` is its unit vector at the platform, ``length`` in m.
 
     ``chord`` is the straight distance in m.
     """
@@ -22,7 +22,7 @@ class Route(NamedTuple):
 
 
 def route(m: Mathematics, effects: Effects, anchor: Vector, position: Vector) -> Route:
-    """Straight to the declared exit point, or as the effects have it."""
+    """Route straight to the declared exit point, or as the effects change it."""
     for active in effects:
         if active.effect.exit_point is not None:
             anchor = add(anchor, active.effect.exit_point(m, active.values))
@@ -36,19 +36,19 @@ def route(m: Mathematics, effects: Effects, anchor: Vector, position: Vector) ->
 
 
 def stiffness(m: Mathematics, effects: Effects, states: States, cable: Any) -> Tuple[Any, Any]:
-    """The modulus, and the stress at no strain beside that of the start tension; both in Pa."""
+    """Modulus, and the stress at no strain beside that of the start tension; both in Pa."""
     modulus: Any = cable.modulus
     stress: Any = 0.0
-    for active, own in zip(effects, states):
+    for active, effect_states in zip(effects, states):
         if active.effect.stiffness is not None:
-            more, held = active.effect.stiffness(m, active.values, own, cable)
-            modulus = modulus + more
-            stress = stress + held
+            modulus_change, stress_change = active.effect.stiffness(m, active.values, effect_states, cable)
+            modulus = modulus + modulus_change
+            stress = stress + stress_change
     return modulus, stress
 
 
 def viscosity(m: Mathematics, effects: Effects, cable: Any) -> Any:
-    """The damping, in Pa s."""
+    """Total damping, in Pa s."""
     total: Any = cable.damping
     for active in effects:
         if active.effect.viscosity is not None:
@@ -59,18 +59,18 @@ def viscosity(m: Mathematics, effects: Effects, cable: Any) -> Any:
 def free_strain(m: Mathematics, effects: Effects, states: States) -> Any:
     """Strain that carries no tension."""
     total: Any = 0.0
-    for active, own in zip(effects, states):
+    for active, effect_states in zip(effects, states):
         if active.effect.free_strain is not None:
-            total = total + active.effect.free_strain(m, active.values, own)
+            total = total + active.effect.free_strain(m, active.values, effect_states)
     return total
 
 
 def free_strain_rate(m: Mathematics, effects: Effects, states: States, cable: Any, tension: Any) -> Any:
-    """Its rate under an elastic tension, in 1/s."""
+    """Rate of the free strain under an elastic tension, in 1/s."""
     total: Any = 0.0
-    for active, own in zip(effects, states):
+    for active, effect_states in zip(effects, states):
         if active.effect.free_strain_rate is not None:
-            total = total + active.effect.free_strain_rate(m, active.values, own, cable, tension)
+            total = total + active.effect.free_strain_rate(m, active.values, effect_states, cable, tension)
     return total
 
 
@@ -80,31 +80,31 @@ def sag(
     """``ln(arc / chord)`` of the rope, now and at the start."""
     for active in effects:
         if active.effect.sag is not None:
-            now, before = active.effect.sag(m, active.values, cable, line, strain, modulus, stress)
-            return now, before
+            now, at_start = active.effect.sag(m, active.values, cable, line, strain, modulus, stress)
+            return now, at_start
     return 0.0, 0.0
 
 
 def rope_speed(m: Mathematics, effects: Effects, states: States, winch_speed: Any, tension: Any) -> Any:
-    """Speed at which rope is reeled in, in m/s: the reported speed and what the effects add to it."""
+    """Speed at which rope is reeled in, in m/s: the encoder speed and what the effects add to it."""
     speed = winch_speed
-    for active, own in zip(effects, states):
+    for active, effect_states in zip(effects, states):
         if active.effect.rope_speed is not None:
-            speed = speed + active.effect.rope_speed(m, active.values, own, winch_speed, tension)
+            speed = speed + active.effect.rope_speed(m, active.values, effect_states, winch_speed, tension)
     return speed
 
 
 def added_tension(m: Mathematics, effects: Effects, states: States, cable: Any, motion: Any) -> Any:
     """Tension beside that of the law, in N."""
     total: Any = 0.0
-    for active, own in zip(effects, states):
+    for active, effect_states in zip(effects, states):
         if active.effect.tension is not None:
-            total = total + active.effect.tension(m, active.values, own, cable, motion)
+            total = total + active.effect.tension(m, active.values, effect_states, cable, motion)
     return total
 
 
-def carried(m: Mathematics, effects: Effects, cable: Any, pull: Any) -> Any:
-    """The tension that a rope carries where the law asks for ``pull``; never negative, in N."""
+def carried_tension(m: Mathematics, effects: Effects, cable: Any, pull: Any) -> Any:
+    """Tension that a rope carries where the law gives ``pull``; never negative, in N."""
     tension = m.maximum(pull, 0.0)
     for active in effects:
         if active.effect.softening is not None:
@@ -112,16 +112,16 @@ def carried(m: Mathematics, effects: Effects, cable: Any, pull: Any) -> Any:
     return tension
 
 
-def ends(m: Mathematics, effects: Effects, gravity: Any, line: Any, tension: Any) -> Tuple[Vector, Any]:
-    """What the ends carry beside the tension: a vector on the platform, and at the load cell; in N."""
-    on_platform: Vector = (0.0, 0.0, 0.0)
-    at_cell: Any = 0.0
+def end_forces(m: Mathematics, effects: Effects, gravity: Any, line: Any, tension: Any) -> Tuple[Vector, Any]:
+    """Forces at the ends beside the tension: a vector on the platform, and at the load cell; in N."""
+    platform_force: Vector = (0.0, 0.0, 0.0)
+    cell_tension: Any = 0.0
     for active in effects:
         if active.effect.ends is not None:
-            force, more = active.effect.ends(m, active.values, gravity, line, tension)
-            on_platform = add(on_platform, force)
-            at_cell = at_cell + more
-    return on_platform, at_cell
+            force, tension_change = active.effect.ends(m, active.values, gravity, line, tension)
+            platform_force = add(platform_force, force)
+            cell_tension = cell_tension + tension_change
+    return platform_force, cell_tension
 
 
 def transmission(m: Mathematics, effects: Effects, motion: Any) -> Tuple[Any, Any]:
@@ -136,8 +136,8 @@ def transmission(m: Mathematics, effects: Effects, motion: Any) -> Tuple[Any, An
     return at_platform, at_cell
 
 
-def gains(m: Mathematics, effects: Effects) -> Tuple[Any, Any]:
-    """Factors of measured tension and measured position."""
+def sensor_gains(m: Mathematics, effects: Effects) -> Tuple[Any, Any]:
+    """Sensor gains of measured tension and measured position."""
     tension: Any = 1.0
     position: Any = 1.0
     for active in effects:
@@ -148,8 +148,8 @@ def gains(m: Mathematics, effects: Effects) -> Tuple[Any, Any]:
     return tension, position
 
 
-def delays(m: Mathematics, effects: Effects) -> Tuple[Any, Any]:
-    """Lags of measured tension and measured position, in s."""
+def sensor_delays(m: Mathematics, effects: Effects) -> Tuple[Any, Any]:
+    """Sensor delays of measured tension and measured position, in s."""
     tension: Any = 0.0
     position: Any = 0.0
     for active in effects:

@@ -1,1 +1,1 @@
-"""Many runs of one robot: samples and sweeps of its numbers, over paths and controllers, and folders of recordings."""
+"""Simulation campaigns: many runs of one robot over a parameter space, paths and controllers, or many traces."""

@@ -1,4 +1,4 @@
-"""Dask, by its documented ways: a cluster of this machine's processors, or the user's by its address."""
+"""Distributed execution by Dask: a local cluster of processes, or the user's cluster by its scheduler's address."""
 
 from __future__ import annotations
 
@@ -14,23 +14,23 @@ from typing import Any
 from ..errors import InputError, TautwireError
 from .errors import MissingExtraError
 from .plan import Plan
-from .rows import FAILURE
-from .run import Job, Result, Shared, run_job, shared_of
+from .rows import FAILURE_COLUMN
+from .run import CampaignContext, Job, RunResult, build_context, run_job
 
 CONNECT = 15.0  # s
-# Tasks in flight for each thread: enough that none waits, few enough that memory stays flat.
-AHEAD = 4
-LOOK_AGAIN = 2.0  # s
-# A profiler and checks up to a hundred times a second would take some per cent of what runs take; the scheduler's
-# memory of tasks grows with what these hold.
-FRUGAL = {
+# Tasks in flight per thread: enough to keep all busy, few enough that memory stays flat.
+TASKS_PER_THREAD = 4
+WORKER_COUNT_INTERVAL = 2.0  # s
+# Dask's profiler and its checks, up to a hundred times a second, would cost some per cent of the run time;
+# the scheduler's memory grows with its log of tasks.
+LOW_OVERHEAD_CONFIG = {
     "distributed.worker.profile.enabled": False,
     "distributed.worker.memory.monitor-interval": "1s",
     "distributed.admin.tick.interval": "1s",
     "distributed.admin.system-monitor.interval": "2s",
     "distributed.admin.low-level-log-length": 20,
 }
-LOST = "its worker was lost again and again: out of memory, or an FMU ended its process"
+WORKER_LOST = "its worker was lost again and again: out of memory, or an FMU ended its process"
 
 
 class SchedulerLostError(TautwireError):
@@ -39,9 +39,9 @@ class SchedulerLostError(TautwireError):
 
 @dataclass(frozen=True)
 class Task:
-    """What goes to a worker at once: some runs, or a recording to be traced, or the ``problem`` that it is unreadable.
+    """A task for one worker: some runs, or a recording to trace, or the ``problem`` that makes it unreadable.
 
-    ``name`` is that of the recording.
+    ``name`` is the file name of the recording.
     """
 
     jobs: tuple[Job, ...]
@@ -51,7 +51,7 @@ class Task:
 
 
 @contextmanager
-def connected(scheduler: str | None, workers: int) -> Iterator[Any]:
+def dask_client(scheduler: str | None, workers: int) -> Iterator[Any]:
     """A Dask client: of the scheduler at an address, or of a local cluster of processes with one thread each.
 
     Raises MissingExtraError without Dask, InputError where no scheduler answers.
@@ -65,12 +65,12 @@ def connected(scheduler: str | None, workers: int) -> Iterator[Any]:
         try:
             client = Client(scheduler, timeout=CONNECT, set_as_default=False)
         except (OSError, ValueError, TimeoutError) as error:
-            mend = "give the address that the scheduler printed, such as tcp://127.0.0.1:8786"
-            raise InputError("--scheduler", f"no Dask scheduler answers at {scheduler}", mend) from error
+            hint = "give the address that the scheduler printed, such as tcp://127.0.0.1:8786"
+            raise InputError("--scheduler", f"no Dask scheduler answers at {scheduler}", hint) from error
         with client:
             yield client
         return
-    with config.set(FRUGAL):
+    with config.set(LOW_OVERHEAD_CONFIG):
         cluster = LocalCluster(
             n_workers=workers,
             threads_per_worker=1,
@@ -83,78 +83,78 @@ def connected(scheduler: str | None, workers: int) -> Iterator[Any]:
             yield client
 
 
-def dashboard(client: Any) -> str:
-    """What to say of the dashboard: its address, or that there is none."""
+def dashboard_message(client: Any) -> str:
+    """Message with the address of Dask's dashboard, or the reason why there is none."""
     if client.cluster is not None and find_spec("bokeh") is None:
         return "Dask's dashboard is off: it needs bokeh"
     return f"Dask's dashboard: {client.dashboard_link}"
 
 
-def work(shared: Shared, task: Task) -> list[Result]:
-    """What a worker does with a task."""
+def run_task_on_worker(context: CampaignContext, task: Task) -> list[RunResult]:
+    """Run a task on a Dask worker, with the FMU cache in its local directory."""
     from distributed import get_worker
 
-    folder = Path(get_worker().local_directory) / "tautwire-fmus"
-    return done_here(shared, task, folder)
+    fmu_folder = Path(get_worker().local_directory) / "tautwire-fmus"
+    return run_task(context, task, fmu_folder)
 
 
-def done_here(shared: Shared, task: Task, folder: Path) -> list[Result]:
-    """A task in this process; ``folder`` keeps FMUs from run to run."""
-    if shared.plan.trace is None:
-        return [run_job(shared, job, folder) for job in task.jobs]
+def run_task(context: CampaignContext, task: Task, fmu_folder: Path) -> list[RunResult]:
+    """Run a task in this process; ``fmu_folder`` caches FMUs between runs."""
+    if context.plan.trace is None:
+        return [run_job(context, job, fmu_folder) for job in task.jobs]
     if task.problem:
-        return [failed(shared.plan, task, job, task.problem) for job in task.jobs]
-    from .traced import traced_row
+        return [failed_result(context.plan, task, job, task.problem) for job in task.jobs]
+    from .traced import trace_row
 
-    return [Result(traced_row(shared.plan, job.index, task.recording)) for job in task.jobs]
+    return [RunResult(trace_row(context.plan, job.index, task.recording)) for job in task.jobs]
 
 
-def failed(plan: Plan, task: Task, job: Job, reason: str) -> Result:
-    """The row of a run that came to nothing."""
+def failed_result(plan: Plan, task: Task, job: Job, reason: str) -> RunResult:
+    """The row of a failed run, with the ``reason``."""
     if plan.trace is not None:
-        return Result({"index": job.index, "recording": task.name, FAILURE: reason})
-    place, controller = plan.variants[job.variant]
-    path = {"path": plan.paths[place].name, "controller": controller} if place >= 0 else {}
+        return RunResult({"index": job.index, "recording": task.name, FAILURE_COLUMN: reason})
+    path_index, controller = plan.variants[job.variant]
+    path_columns = {"path": plan.paths[path_index].name, "controller": controller} if path_index >= 0 else {}
     inputs = dict(zip(plan.keys, job.values, strict=True))
-    return Result({"index": job.index, "sample": job.sample, **path, **inputs, FAILURE: reason})
+    return RunResult({"index": job.index, "sample": job.sample, **path_columns, **inputs, FAILURE_COLUMN: reason})
 
 
-def results(client: Any, shared: Any, plan: Plan, tasks: Iterable[Task]) -> Iterator[list[Result]]:
-    """The results of tasks as they come; no more tasks are in flight than keep all workers busy.
+def task_results(client: Any, context: Any, plan: Plan, tasks: Iterable[Task]) -> Iterator[list[RunResult]]:
+    """Yield the results of tasks as they complete; tasks in flight are limited to what keeps all workers busy.
 
-    ``shared`` is a future. A task whose worker is lost goes to another one, as often as Dask's ``allowed-failures``
-    says; then its runs go alone, and the one at which workers are lost is a row that says so.
+    ``context`` is a future. A task whose worker is lost is rescheduled, as often as Dask's ``allowed-failures`` says;
+    then its runs are submitted one by one, and the one at which workers are lost becomes a row with that reason.
 
     Raises OSError where a worker's machine fails, SchedulerLostError where the scheduler is gone.
     """
     from distributed import KilledWorker
 
-    flight = _Flight(client, shared, tasks)
-    with _scheduler_lost(client):
-        flight.fill()
-    while flight.running:
-        with _scheduler_lost(client):
-            task, future = flight.landed()
-            found = future.result() if future.status == "finished" else None
-            error = future.exception() if found is None else None
-        if found is not None:
-            yield found
+    in_flight = _TasksInFlight(client, context, tasks)
+    with _translate_scheduler_loss(client):
+        in_flight.fill()
+    while in_flight.running:
+        with _translate_scheduler_loss(client):
+            task, future = in_flight.next_completed()
+            task_result = future.result() if future.status == "finished" else None
+            error = future.exception() if task_result is None else None
+        if task_result is not None:
+            yield task_result
         elif isinstance(error, OSError):
             raise error
         elif isinstance(error, KilledWorker) and len(task.jobs) > 1:
             for job in task.jobs:
-                flight.submit(Task((job,)))
+                in_flight.submit(Task((job,)))
         else:
-            reason = LOST if isinstance(error, KilledWorker) else f"{type(error).__name__}: {error}"
-            yield [failed(plan, task, job, reason) for job in task.jobs]
-        with _scheduler_lost(client):
+            reason = WORKER_LOST if isinstance(error, KilledWorker) else f"{type(error).__name__}: {error}"
+            yield [failed_result(plan, task, job, reason) for job in task.jobs]
+        with _translate_scheduler_loss(client):
             future.release()
-            flight.fill()
+            in_flight.fill()
 
 
 @contextmanager
-def _scheduler_lost(client: Any) -> Iterator[None]:
-    """Tell in the campaign's own words that the scheduler is gone, whatever Dask calls it where it is found out."""
+def _translate_scheduler_loss(client: Any) -> Iterator[None]:
+    """Translate whatever Dask raises when the scheduler is gone into SchedulerLostError."""
     from distributed.client import FutureCancelledError
     from distributed.comm import CommClosedError
 
@@ -166,64 +166,64 @@ def _scheduler_lost(client: Any) -> Iterator[None]:
         raise
 
 
-class _Flight:
-    """Tasks that workers have: no more than there is room for, each until it :meth:`landed`."""
+class _TasksInFlight:
+    """Tasks submitted to workers and not yet completed, limited by the capacity of the workers."""
 
-    def __init__(self, client: Any, shared: Any, tasks: Iterable[Task]) -> None:
+    def __init__(self, client: Any, context: Any, tasks: Iterable[Task]) -> None:
         from distributed import as_completed
 
         self.running: dict[str, Task] = {}
         self._client = client
-        self._shared = shared
-        self._waiting = iter(tasks)
+        self._context = context
+        self._pending = iter(tasks)
         self._completed = as_completed(loop=client.loop)
-        self._room = _Room(client)
+        self._capacity = _WorkerCapacity(client)
 
     def submit(self, task: Task) -> None:
-        """Send a task to a worker."""
-        future = self._client.submit(work, self._shared, task, pure=False)
+        """Submit a task to the cluster."""
+        future = self._client.submit(run_task_on_worker, self._context, task, pure=False)
         self.running[future.key] = task
         self._completed.add(future)
 
     def fill(self) -> None:
-        """Send tasks that wait for as long as there is room."""
-        while len(self.running) < self._room.size():
-            task = next(self._waiting, None)
+        """Submit pending tasks while there is capacity."""
+        while len(self.running) < self._capacity.task_limit():
+            task = next(self._pending, None)
             if task is None:
                 return
             self.submit(task)
 
-    def landed(self) -> tuple[Task, Any]:
-        """Wait for the next task that comes back, with its future."""
+    def next_completed(self) -> tuple[Task, Any]:
+        """Wait for the next completed task, and return it with its future."""
         future = next(self._completed)
         return self.running.pop(future.key), future
 
 
-class _Room:
-    """How many tasks may be in flight; asks anew now and then, for workers come and go."""
+class _WorkerCapacity:
+    """Limit of tasks in flight; counts threads anew now and then, since workers come and go."""
 
     def __init__(self, client: Any) -> None:
         self._client = client
-        self._asked = -LOOK_AGAIN
-        self._size = AHEAD
+        self._counted_at = -WORKER_COUNT_INTERVAL
+        self._task_limit = TASKS_PER_THREAD
 
-    def size(self) -> int:
-        if time.monotonic() - self._asked > LOOK_AGAIN:
-            self._size = AHEAD * max(1, sum(self._client.nthreads().values()))
-            self._asked = time.monotonic()
-        return self._size
+    def task_limit(self) -> int:
+        if time.monotonic() - self._counted_at > WORKER_COUNT_INTERVAL:
+            self._task_limit = TASKS_PER_THREAD * max(1, sum(self._client.nthreads().values()))
+            self._counted_at = time.monotonic()
+        return self._task_limit
 
 
-def shared_future(client: Any, plan: Plan, recordings: Any) -> Any:
-    """What all runs share, made in a worker, from which Dask takes it to each other one once.
+def context_future(client: Any, plan: Plan, recordings: Any) -> Any:
+    """Future of the context that all runs share, built in a worker and copied by Dask once to each other worker.
 
-    Where its holders are lost Dask makes it again. Raises what making it raises.
+    Where all workers that hold it are lost, Dask builds it again. Raises what :func:`build_context` raises.
     """
-    future = client.submit(shared_of, plan, recordings, pure=False)
+    future = client.submit(build_context, plan, recordings, pure=False)
     error = future.exception()
     if isinstance(error, ImportError):
-        mend = "install the same version of tautwire with its extra campaign where the workers run"
-        raise InputError("--scheduler", f"its workers cannot import what they need ({error})", mend) from error
+        hint = "install the same version of tautwire with its extra campaign where the workers run"
+        raise InputError("--scheduler", f"its workers cannot import what they need ({error})", hint) from error
     if error is not None:
         raise error
     return future

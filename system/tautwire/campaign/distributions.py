@@ -1,4 +1,4 @@
-"""How a number of a plan is distributed, and what it is at a share of its probability."""
+"""Probability distributions of the inputs of a plan, and their quantile functions."""
 
 from __future__ import annotations
 
@@ -19,23 +19,23 @@ NORMAL, UNIFORM, TRIANGULAR, LOGNORMAL, LIST, LINSPACE = (
     "list",
     "linspace",
 )
-STEPPED = (LIST, LINSPACE)
-# What a distribution's numbers are; a list has as many as it likes.
-SHAPES: Mapping[str, tuple[str, ...]] = {
+DISCRETE_KINDS = (LIST, LINSPACE)
+# Names of each distribution's parameters; a list has any number of values.
+PARAMETER_NAMES: Mapping[str, tuple[str, ...]] = {
     NORMAL: ("mean", "standard deviation"),
     UNIFORM: ("least", "largest"),
     TRIANGULAR: ("least", "most probable", "largest"),
     LOGNORMAL: ("median", "standard deviation of the logarithm"),
     LINSPACE: ("first", "last", "count"),
 }
-KINDS = (*SHAPES, LIST)
+DISTRIBUTION_KINDS = (*PARAMETER_NAMES, LIST)
 
 
 @dataclass(frozen=True)
 class Distribution:
-    """A value's distribution: its ``kind``, one of :data:`KINDS`, and its ``numbers`` in the order of `SHAPES`.
+    """A probability distribution: its ``kind``, one of :data:`DISTRIBUTION_KINDS`, and its parameters ``numbers``.
 
-    The numbers of a list of ``texts`` are their places, from zero.
+    They are in the order of :data:`PARAMETER_NAMES`; those of a list of ``texts`` are indices, from zero.
     """
 
     kind: str
@@ -43,42 +43,42 @@ class Distribution:
     texts: tuple[str, ...] = ()
 
     @property
-    def steps(self) -> tuple[float, ...]:
-        """The values of a list or of a linspace, none of others."""
+    def discrete_values(self) -> tuple[float, ...]:
+        """The values of a discrete distribution, a list or a linspace; empty for others."""
         if self.kind == LINSPACE:
             first, last, count = self.numbers
             return tuple(np.linspace(first, last, int(count)).tolist())
         return self.numbers if self.kind == LIST else ()
 
     def value(self, number: float) -> float | str:
-        """What one of the numbers stands for."""
+        """The value that a number encodes: the text of that index in a list of texts, else the number."""
         return self.texts[int(number)] if self.texts else number
 
-    def quantile(self, share: Array) -> Array:
-        """The values below which these shares (N,) of the probability lie; steps are equally probable."""
-        steps = self.steps
-        if steps:
-            return np.array(steps)[np.minimum((share * len(steps)).astype(int), len(steps) - 1)]
-        return np.asarray(_QUANTILES[self.kind](share, *self.numbers), dtype=float)
+    def quantile(self, probability: Array) -> Array:
+        """Quantile function at probabilities (N,); discrete values are equally probable."""
+        values = self.discrete_values
+        if values:
+            return np.array(values)[np.minimum((probability * len(values)).astype(int), len(values) - 1)]
+        return np.asarray(_QUANTILE_FUNCTIONS[self.kind](probability, *self.numbers), dtype=float)
 
 
-def _triangular(share: Array, least: float, mode: float, largest: float) -> Array:
-    return np.asarray(stats.triang.ppf(share, (mode - least) / (largest - least), least, largest - least))
+def _triangular_quantile(probability: Array, minimum: float, mode: float, maximum: float) -> Array:
+    return np.asarray(stats.triang.ppf(probability, (mode - minimum) / (maximum - minimum), minimum, maximum - minimum))
 
 
-_QUANTILES: Mapping[str, Callable[..., Array]] = {
+_QUANTILE_FUNCTIONS: Mapping[str, Callable[..., Array]] = {
     NORMAL: lambda share, mean, deviation: np.asarray(stats.norm.ppf(share, mean, deviation)),
     UNIFORM: lambda share, least, largest: least + share * (largest - least),
-    TRIANGULAR: _triangular,
+    TRIANGULAR: _triangular_quantile,
     LOGNORMAL: lambda share, median, deviation: median * np.exp(stats.norm.ppf(share, 0.0, deviation)),
 }
 
 
-def problem_of(kind: str, numbers: Sequence[float]) -> str | None:
-    """Why these numbers make no distribution of this kind; None where they do."""
-    shape = SHAPES.get(kind)
-    if shape is not None and len(numbers) != len(shape):
-        return f"has {len(numbers)} numbers, {kind} takes {len(shape)}: {', '.join(shape)}"
+def parameter_problem(kind: str, numbers: Sequence[float]) -> str | None:
+    """Problem that makes these parameters invalid for a distribution of this kind; None where they are valid."""
+    names = PARAMETER_NAMES.get(kind)
+    if names is not None and len(numbers) != len(names):
+        return f"has {len(numbers)} numbers, {kind} takes {len(names)}: {', '.join(names)}"
     if kind == LIST:
         return None if numbers else "is empty, a list has one value or more"
     if kind == LINSPACE:

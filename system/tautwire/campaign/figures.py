@@ -1,4 +1,4 @@
-"""The numbers that the figures of a campaign's page draw."""
+"""Data of the figures on a campaign's page."""
 
 from __future__ import annotations
 
@@ -10,108 +10,120 @@ import numpy as np
 import pyarrow as pa
 from numpy.typing import NDArray
 
-from ..report.series import packed, thinned
-from ..report.units import significant
-from .bands import Bands, bands_of
+from ..report.series import evenly_spaced_indices, pack_float32
+from ..report.units import format_significant
+from .bands import QuantileBands, quantile_bands
 from .plan import Input, Plan
 from .rows import RowColumn, series_columns
-from .summary import Summary, numbers_of, parts_by_variant
+from .summary import Summary, column_values, rows_by_variant
 
 Array = NDArray[np.float64]
 
-BINS = 40
-MOST_POINTS = 2000
+MAX_HISTOGRAM_BINS = 40
+MAX_GRID_POINTS = 2000
 
 
-def figures_of(
+def figure_data(
     plan: Plan, columns: Sequence[RowColumn], cable_count: int, summary: Summary, rows: pa.Table, folder: Path
 ) -> dict[str, Any]:
-    """Bands and spreads of each path with each controller, ready to draw."""
-    shown = numbers_shown(columns)
+    """Quantile bands and histograms of each path with each controller, packed for the page."""
+    outputs = numeric_outputs(columns)
     variants = []
-    for place, (path, controller, part) in enumerate(parts_by_variant(plan, rows)):
-        kept = part.take(pa.array(thinned(part.num_rows, MOST_POINTS))) if part.num_rows else part
+    for variant, (path, controller, variant_rows) in enumerate(rows_by_variant(plan, rows)):
+        thinned_rows = (
+            variant_rows.take(pa.array(evenly_spaced_indices(variant_rows.num_rows, MAX_GRID_POINTS)))
+            if variant_rows.num_rows
+            else variant_rows
+        )
         quantiles = {
             each.name: each.quantiles for each in summary.spreads if (each.path, each.controller) == (path, controller)
         }
         bands: dict[str, Any] = {"time": "", "bands": []}
         if plan.paths and plan.compute.series > 1:
             names = series_columns(cable_count)
-            bands = _bands(bands_of(plan, folder, place, names), names)
+            bands = _band_data(quantile_bands(plan, folder, variant, names), names)
         variants.append(
             {
                 "label": variant_label(path, controller),
                 **bands,
-                "spreads": [_spread(part, kept, each, quantiles, plan.method == "grid") for each in shown],
-                "inputs": [packed(_steps_of(kept, each)) for each in plan.inputs] if plan.method == "grid" else [],
+                "spreads": [
+                    _spread_data(variant_rows, thinned_rows, each, quantiles, plan.method == "grid") for each in outputs
+                ],
+                "inputs": [pack_float32(_numeric_values(thinned_rows, each)) for each in plan.inputs]
+                if plan.method == "grid"
+                else [],
             }
         )
-    inputs = [{"label": _axis(each), "place": place} for place, each in enumerate(plan.inputs)]
-    # The scripts shared by all pages begin with choices where there are any; these begin by themselves.
+    inputs = [{"label": _axis_label(each), "place": place} for place, each in enumerate(plan.inputs)]
+    # The scripts shared by all pages start from choices where there are any; those of campaigns start by themselves.
     return {"choices": [], "variants": variants, "inputs": inputs}
 
 
-def _axis(one: Input) -> str:
-    """An input's key, and where its texts stand on an axis."""
-    places = ", ".join(f"{place} {words}" for place, words in enumerate(one.distribution.texts))
-    return f"{one.key} ({places})" if places else one.key
+def _axis_label(varied: Input) -> str:
+    """Axis label of an input: its key, and the numbers that stand for its texts."""
+    codes = ", ".join(f"{place} {words}" for place, words in enumerate(varied.distribution.texts))
+    return f"{varied.key} ({codes})" if codes else varied.key
 
 
-def _steps_of(rows: pa.Table, one: Input) -> Array:
-    """What an input is in each run; of texts their places."""
-    if not one.distribution.texts:
-        return numbers_of(rows, one.key)
-    return np.array([float(one.distribution.texts.index(each)) for each in rows[one.key].to_pylist()])
+def _numeric_values(rows: pa.Table, varied: Input) -> Array:
+    """Values of an input in each run; texts as their indices."""
+    if not varied.distribution.texts:
+        return column_values(rows, varied.key)
+    return np.array([float(varied.distribution.texts.index(each)) for each in rows[varied.key].to_pylist()])
 
 
-def numbers_shown(columns: Sequence[RowColumn]) -> list[RowColumn]:
-    """The outputs that are numbers."""
+def numeric_outputs(columns: Sequence[RowColumn]) -> list[RowColumn]:
+    """The numeric outputs."""
     return [each for each in columns if each.role == "output" and each.kind == "number"]
 
 
 def variant_label(path: str, controller: str) -> str:
-    """What to call a path with a controller."""
+    """Label of a path with a controller."""
     return f"{path}, {controller}" if path else "at rest"
 
 
-def label_of(name: str) -> str:
-    """A column's name as words."""
+def column_label(name: str) -> str:
+    """A column's name in words."""
     return name.replace("_", " ")
 
 
-def channel_kind(name: str) -> tuple[str, str, str]:
-    """The title, the label and the unit of a series."""
+def channel_description(name: str) -> tuple[str, str, str]:
+    """Title, label and unit of a time series."""
     prefix, _, cable = name.rpartition("_")
     return ("Tension", f"cable {cable}", "N") if prefix else ("Position", name, "m")
 
 
-def _bands(bands: Bands, names: Sequence[str]) -> dict[str, Any]:
-    shown = []
+def _band_data(bands: QuantileBands, names: Sequence[str]) -> dict[str, Any]:
+    channels = []
     for name in names:
-        title, label, unit = channel_kind(name)
-        found = bands.quantiles.get(name)
-        low, middle, high = (None, None, None) if found is None else map(packed, found)
-        width = "" if found is None else significant(float(np.nanmax(found[2] - found[0])))
-        shown.append(
+        title, label, unit = channel_description(name)
+        quantiles = bands.quantiles.get(name)
+        low, middle, high = (None, None, None) if quantiles is None else map(pack_float32, quantiles)
+        width = "" if quantiles is None else format_significant(float(np.nanmax(quantiles[2] - quantiles[0])))
+        channels.append(
             {"title": title, "label": label, "unit": unit, "low": low, "middle": middle, "high": high, "width": width}
         )
-    return {"time": packed(bands.time), "bands": shown}
+    return {"time": pack_float32(bands.time), "bands": channels}
 
 
-def _spread(
-    rows: pa.Table, kept: pa.Table, column: RowColumn, quantiles: Mapping[str, Sequence[float]], is_grid: bool
+def _spread_data(
+    rows: pa.Table, thinned_rows: pa.Table, column: RowColumn, quantiles: Mapping[str, Sequence[float]], is_grid: bool
 ) -> dict[str, Any]:
     """A histogram of an output, or its values over a grid."""
-    told: dict[str, Any] = {"label": label_of(column.name), "unit": column.unit or "1", "words": ""}
-    values = numbers_of(rows, column.name)
-    known = values[np.isfinite(values)]
-    if not known.size:
-        return {**told, "edges": None, "counts": None, "quantiles": [], "values": None}
+    common: dict[str, Any] = {"label": column_label(column.name), "unit": column.unit or "1", "words": ""}
+    values = column_values(rows, column.name)
+    finite = values[np.isfinite(values)]
+    if not finite.size:
+        return {**common, "edges": None, "counts": None, "quantiles": [], "values": None}
     if is_grid:
-        ends = f"{significant(float(known.min()), 4)} to {significant(float(known.max()), 4)} {column.unit}".rstrip()
-        return {**told, "words": ends, "values": packed(numbers_of(kept, column.name))}
-    counts, edges = np.histogram(known, min(BINS, max(5, int(np.sqrt(known.size)))))
+        range_text = f"{format_significant(float(finite.min()), 4)} to {format_significant(float(finite.max()), 4)} {column.unit}".rstrip()
+        return {**common, "words": range_text, "values": pack_float32(column_values(thinned_rows, column.name))}
+    counts, edges = np.histogram(finite, min(MAX_HISTOGRAM_BINS, max(5, int(np.sqrt(finite.size)))))
     low, _, middle, _, high = quantiles[column.name]
-    words = f"{significant(low, 4)} to {significant(high, 4)} {column.unit}".rstrip()
-    drawn = {"edges": packed(edges), "counts": packed(counts.astype(float)), "quantiles": [low, middle, high]}
-    return {**told, "words": words, **drawn}
+    words = f"{format_significant(low, 4)} to {format_significant(high, 4)} {column.unit}".rstrip()
+    histogram = {
+        "edges": pack_float32(edges),
+        "counts": pack_float32(counts.astype(float)),
+        "quantiles": [low, middle, high],
+    }
+    return {**common, "words": words, **histogram}

@@ -1,4 +1,4 @@
-"""What a trace found as inputs of a campaign: normal variables by its numbers, their intervals and correlations."""
+"""Identified parameters of a trace as inputs of a campaign: normal variables with its intervals and correlations."""
 
 from __future__ import annotations
 
@@ -11,21 +11,21 @@ from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..input_file import read_bytes
-from ..robots.reading import robot_from
+from ..robots.reading import robot_from_content
 from ..robots.robot import EffectSetting, Robot
 from .distributions import NORMAL, Distribution
 from .errors import PlanError
 from .plan import Correlation, Input
 
-# Half a 95 % interval of a normal variable, in standard deviations.
-HALF_INTERVAL = 1.959963984540054
-LARGEST_REPORT = 100_000_000  # bytes
-MEND = "name the report.json that tautwire trace wrote"
+# Half-width of the 95 % interval of a normal variable, in standard deviations.
+NORMAL_QUANTILE_975 = 1.959963984540054
+MAX_REPORT_SIZE = 100_000_000  # bytes
+REPORT_HINT = "name the report.json that tautwire trace wrote"
 
 
 @dataclass(frozen=True)
-class FoundInputs:
-    """The robot file's ``content`` with the effects of a report on, inputs for their numbers, and notes."""
+class IdentifiedInputs:
+    """The robot file's ``content`` with the identified effects, inputs for their parameters, and notes."""
 
     content: dict[str, Any]
     inputs: tuple[Input, ...] = ()
@@ -33,8 +33,8 @@ class FoundInputs:
     notes: tuple[str, ...] = ()
 
 
-class Name(NamedTuple):
-    """What a report calls a number: an effect, the cables that it acts on, and a parameter."""
+class ParameterName(NamedTuple):
+    """Name of a parameter in a report: an effect, the cables that it acts on, and the parameter."""
 
     effect: str
     cables: tuple[int, ...]
@@ -42,115 +42,125 @@ class Name(NamedTuple):
 
 
 @dataclass(frozen=True)
-class _Report:
-    """A report's numbers: value and standard deviation, None where there is no interval; correlations of pairs."""
+class _TraceReport:
+    """Estimates of a report: value and standard deviation, None without an interval; correlations of pairs."""
 
-    numbers: Mapping[Name, tuple[float, float | None]]
-    correlations: Mapping[frozenset[Name], float]
+    estimates: Mapping[ParameterName, tuple[float, float | None]]
+    correlations: Mapping[frozenset[ParameterName], float]
 
 
-def found_inputs(report: Path, content: Mapping[str, Any], file: Path, correlated: bool = True) -> FoundInputs:
-    """What a trace's report makes of the content of the robot ``file``.
+def identified_inputs(
+    report_file: Path, content: Mapping[str, Any], robot_file: Path, correlated: bool = True
+) -> IdentifiedInputs:
+    """Inputs from a trace's report, with the content of the robot file that has its effects.
 
-    Each number is normal about its value, with its 95 % interval as 1.96 standard deviations to both sides, and where
-    ``correlated`` goes together with the others as the report says. One without an interval is set and stays.
+    Each parameter is normal about its estimate, its 95 % interval being 1.96 standard deviations to both sides; where
+    ``correlated``, with the correlations of the report. A parameter without an interval is set to its estimate.
 
     Raises PlanError where the file is no report of a trace, or found no effect.
     """
-    found = _read(report)
-    tables, places = _effect_tables(_with_effects(robot_from(dict(content), file), found))
-    if any((name.effect, name.cables) not in places for name in found.numbers):
-        raise PlanError(str(report), "has an effect on a cable twice", MEND)
-    inputs: dict[Name, Input] = {}
+    report = _read_report(report_file)
+    tables, effect_paths = _effect_tables(_robot_with_effects(robot_from_content(dict(content), robot_file), report))
+    if any((name.effect, name.cables) not in effect_paths for name in report.estimates):
+        raise PlanError(str(report_file), "has an effect on a cable twice", REPORT_HINT)
+    inputs: dict[ParameterName, Input] = {}
     notes: list[str] = []
-    for name, (value, deviation) in found.numbers.items():
-        path = f"{places[name.effect, name.cables]}.{name.parameter}"
+    for name, (value, deviation) in report.estimates.items():
+        path = f"{effect_paths[name.effect, name.cables]}.{name.parameter}"
         if deviation is None:
-            notes.append(f"{path} stays at {value:g}: {report.name} gives it no interval")
+            notes.append(f"{path} stays at {value:g}: {report_file.name} gives it no interval")
         else:
             inputs[name] = Input(path, Distribution(NORMAL, (value, deviation)))
     pairs = list(combinations(range(len(inputs)), 2)) if correlated else []
-    known = tuple(_correlations(found, list(inputs), pairs))
-    if len(known) < len(pairs):
-        lacks = f"{len(pairs) - len(known)} of {len(pairs)} pairs of its numbers"
-        notes.append(f"{report.name} gives no correlation of {lacks}: taken as independent")
-    return FoundInputs({**content, "effect": tables}, tuple(inputs.values()), known, tuple(notes))
+    correlations = tuple(_known_correlations(report, list(inputs), pairs))
+    if len(correlations) < len(pairs):
+        missing_pairs = f"{len(pairs) - len(correlations)} of {len(pairs)} pairs of its numbers"
+        notes.append(f"{report_file.name} gives no correlation of {missing_pairs}: taken as independent")
+    return IdentifiedInputs({**content, "effect": tables}, tuple(inputs.values()), correlations, tuple(notes))
 
 
-def _read(report: Path) -> _Report:
+def _read_report(report_file: Path) -> _TraceReport:
     try:
-        document = json.loads(read_bytes(report, PlanError, LARGEST_REPORT).decode("utf-8"))
-        numbers = {
-            Name(str(effect["name"]), _cables(effect), str(key)): (_finite(each["value"]), _deviation(each))
+        document = json.loads(read_bytes(report_file, PlanError, MAX_REPORT_SIZE).decode("utf-8"))
+        estimates = {
+            ParameterName(str(effect["name"]), _cable_numbers(effect), str(key)): (
+                _require_finite(each["value"]),
+                _standard_deviation(each),
+            )
             for effect in document["effects"]
             for key, each in effect["parameters"].items()
         }
-        correlations = dict(_pairs(document))
+        correlations = dict(_correlation_pairs(document))
     except (ArithmeticError, AttributeError, KeyError, RecursionError, TypeError, ValueError) as problem:
-        raise PlanError(str(report), "is no report of a trace", MEND) from problem
-    if not numbers:
-        raise PlanError(str(report), "found no effect whose numbers could vary", "leave [found] out")
-    return _Report(numbers, correlations)
+        raise PlanError(str(report_file), "is no report of a trace", REPORT_HINT) from problem
+    if not estimates:
+        raise PlanError(str(report_file), "found no effect whose numbers could vary", "leave [found] out")
+    return _TraceReport(estimates, correlations)
 
 
-def _cables(named: Mapping[str, Any]) -> tuple[int, ...]:
-    return tuple(sorted(int(cable) for cable in named["cables"]))
+def _cable_numbers(entry: Mapping[str, Any]) -> tuple[int, ...]:
+    return tuple(sorted(int(cable) for cable in entry["cables"]))
 
 
-def _deviation(estimate: Mapping[str, Any]) -> float | None:
+def _standard_deviation(estimate: Mapping[str, Any]) -> float | None:
     low, high = estimate.get("low"), estimate.get("high")
     if low is None or high is None or not high > low:
         return None
-    return _finite(float(high) - float(low)) / (2.0 * HALF_INTERVAL)
+    return _require_finite(float(high) - float(low)) / (2.0 * NORMAL_QUANTILE_975)
 
 
-def _finite(number: Any) -> float:
+def _require_finite(number: Any) -> float:
     if not isfinite(number):
         raise ValueError(number)
     return float(number)
 
 
-def _pairs(document: Mapping[str, Any]) -> Iterator[tuple[frozenset[Name], float]]:
-    for one in document.get("correlations", ()):
-        between = [Name(str(each["name"]), _cables(each), str(each["parameter"])) for each in one["between"]]
-        if one["value"] is not None:
-            value = float(one["value"])
-            if len(set(between)) != 2 or not abs(value) <= 1.0:
-                raise ValueError(one)
-            yield frozenset(between), value
+def _correlation_pairs(document: Mapping[str, Any]) -> Iterator[tuple[frozenset[ParameterName], float]]:
+    for correlation in document.get("correlations", ()):
+        names = [
+            ParameterName(str(each["name"]), _cable_numbers(each), str(each["parameter"]))
+            for each in correlation["between"]
+        ]
+        if correlation["value"] is not None:
+            value = float(correlation["value"])
+            if len(set(names)) != 2 or not abs(value) <= 1.0:
+                raise ValueError(correlation)
+            yield frozenset(names), value
 
 
-def _with_effects(robot: Robot, found: _Report) -> Robot:
-    """The robot with what was found in place of what it declares where both act."""
+def _robot_with_effects(robot: Robot, report: _TraceReport) -> Robot:
+    """The robot with the identified effects, which replace declared ones where both act."""
     values: dict[tuple[str, tuple[int, ...]], dict[str, float]] = {}
-    for name, (value, _) in found.numbers.items():
+    for name, (value, _) in report.estimates.items():
         values.setdefault((name.effect, name.cables), {})[name.parameter] = value
-    for (effect, cables), each in values.items():
-        robot = robot.with_effect(EffectSetting(effect, each, cables))
+    for (effect, cables), effect_values in values.items():
+        robot = robot.with_effect(EffectSetting(effect, effect_values, cables))
     return robot
 
 
 def _effect_tables(robot: Robot) -> tuple[dict[str, Any], dict[tuple[str, tuple[int, ...]], str]]:
-    """The robot's effects as its file has them, and the path of the table of each by its name and cables."""
+    """The robot's effects as tables of its file, and the key path of each table by effect name and cables."""
     tables: dict[str, Any] = {}
-    places: dict[tuple[str, tuple[int, ...]], str] = {}
+    effect_paths: dict[tuple[str, tuple[int, ...]], str] = {}
     for name in dict.fromkeys(setting.name for setting in robot.effects):
         settings = [setting for setting in robot.effects if setting.name == name]
-        found = [{**each.values, **_limited(each, robot.cable_numbers)} for each in settings]
-        tables[name] = found[0] if len(found) == 1 else found
+        entries = [{**each.values, **_cable_restriction(each, robot.cable_numbers)} for each in settings]
+        tables[name] = entries[0] if len(entries) == 1 else entries
         for number, setting in enumerate(settings, start=1):
-            entry = "" if len(found) == 1 else f"[{number}]"
-            places[name, setting.cables] = f"effect.{name}{entry}"
-    return tables, places
+            suffix = "" if len(entries) == 1 else f"[{number}]"
+            effect_paths[name, setting.cables] = f"effect.{name}{suffix}"
+    return tables, effect_paths
 
 
-def _limited(setting: EffectSetting, all_cables: Sequence[int]) -> dict[str, list[int]]:
+def _cable_restriction(setting: EffectSetting, all_cables: Sequence[int]) -> dict[str, list[int]]:
     return {"cables": list(setting.cables)} if setting.cables not in ((), tuple(all_cables)) else {}
 
 
-def _correlations(found: _Report, varied: Sequence[Name], pairs: Sequence[tuple[int, int]]) -> Iterator[Correlation]:
-    """Those known, of pairs of what varies, by its places."""
+def _known_correlations(
+    report: _TraceReport, names: Sequence[ParameterName], pairs: Sequence[tuple[int, int]]
+) -> Iterator[Correlation]:
+    """Correlations in the report of pairs of inputs, by their indices."""
     for first, second in pairs:
-        value = found.correlations.get(frozenset((varied[first], varied[second])))
+        value = report.correlations.get(frozenset((names[first], names[second])))
         if value is not None:
             yield Correlation(first, second, value)

@@ -1,4 +1,4 @@
-"""What a plan asks for: which numbers vary and how, which paths and controllers, what is computed of each run."""
+"""The plan of a campaign: inputs and their distributions, paths, controllers, and what is computed of each run."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ BELIEFS = ("declared", "varied")
 
 @dataclass(frozen=True)
 class Input:
-    """A number of the robot file, by the path of its key, that differs from run to run."""
+    """An input of the campaign: a number of the robot file, by its key path, and its distribution over the runs."""
 
     key: str
     distribution: Distribution
@@ -30,7 +30,7 @@ class Input:
 
 @dataclass(frozen=True)
 class Correlation:
-    """Two inputs, by their places, and the correlation of the normal variables that they are made of."""
+    """Correlation of two inputs, by index, as that of the normal variables of a Gaussian copula."""
 
     first: int
     second: int
@@ -42,7 +42,7 @@ class PathPlan:
     """A path: ``kind`` is "line", "helix" or "recording"; ``numbers`` are those of its kind in SI units.
 
     ``start`` is where a line starts, None for the robot's start; ``recording`` is a file of winch speeds, and
-    ``digest`` tells what is in it.
+    ``digest`` is that of its content.
     """
 
     name: str
@@ -56,10 +56,10 @@ class PathPlan:
 
 @dataclass(frozen=True)
 class Compute:
-    """What is computed of each run beside its motion.
+    """Outputs that are computed of each run, and settings of its co-simulation.
 
-    ``step`` is the longest macro step (s), ``settle`` how long runs go on after a path (s), ``series`` how many points
-    of each motion are kept; ``noise`` lets controllers see through noisy sensors.
+    ``step`` is the longest macro step (s), ``settle`` how long runs continue after a path (s), ``series`` how many
+    points of each motion are stored; ``noise`` adds sensor noise to what controllers measure.
     """
 
     statics: bool = True
@@ -72,7 +72,7 @@ class Compute:
 
 @dataclass(frozen=True)
 class TracePlan:
-    """Recordings to be traced, in the order of their names; ``digests`` tell what is in them."""
+    """Recordings to trace, in the order of their names, with the ``digests`` of their contents."""
 
     recordings: tuple[str, ...]
     digests: tuple[str, ...]
@@ -81,7 +81,7 @@ class TracePlan:
 
 @dataclass(frozen=True)
 class Plan:
-    """A campaign: ``content`` is the robot file's, ``file`` where it stands; each of ``count`` samples has all inputs.
+    """A campaign plan: ``content`` of the robot file ``file``; each of ``count`` samples has values of all inputs.
 
     With a ``trace`` each recording is a run, and nothing varies.
     """
@@ -102,7 +102,7 @@ class Plan:
 
     @property
     def variants(self) -> tuple[tuple[int, str], ...]:
-        """Each path, by its place, with each controller; one without a path where there are none."""
+        """Each path, by index, with each controller; a single one with index -1 where there are no paths."""
         if not self.paths:
             return ((-1, ""),)
         return tuple((place, name) for place in range(len(self.paths)) for name in self.controllers)
@@ -113,12 +113,12 @@ class Plan:
         return tuple(each.key for each in self.inputs)
 
     def digest(self) -> str:
-        """What tells plans apart that make other rows; where files stand does not count, what is in them does."""
-        told = asdict(self)
+        """Digest that differs between plans with different rows; contents of files count, their locations do not."""
+        fields = asdict(self)
         for name in ("file", "notes"):
-            del told[name]
-        for path in told["paths"]:
+            del fields[name]
+        for path in fields["paths"]:
             del path["recording"]
         if self.trace is not None:
-            told["trace"]["recordings"] = [Path(each).name for each in self.trace.recordings]
-        return hashlib.sha256(json.dumps([told, __version__], sort_keys=True, default=str).encode()).hexdigest()[:12]
+            fields["trace"]["recordings"] = [Path(each).name for each in self.trace.recordings]
+        return hashlib.sha256(json.dumps([fields, __version__], sort_keys=True, default=str).encode()).hexdigest()[:12]

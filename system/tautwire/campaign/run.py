@@ -1,4 +1,4 @@
-"""One run of a campaign as a pure function: what all runs share and the numbers of this one in, a row out."""
+"""One run of a campaign as a pure function of the shared context and its inputs, which returns a row."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ from ..linear import linearise
 from ..linear.modes import POSITION, VELOCITY
 from ..linear.plant import LinearPlant
 from ..recordings.recording import Recording
-from ..robots.reading import robot_from
+from ..robots.reading import robot_from_content
 from ..robots.robot import Robot
-from ..runs.cosimulation import Motion, cosimulate
-from ..runs.start import placed
+from ..runs.cosimulation import CosimulationResult, cosimulate
+from ..runs.start import with_start
 from ..runs.wiring import AXES
 from ..statics.equilibrium import static_tensions
-from .built import Bundle, bundled, fmus_of
-from .drive import Drive, drive_of, start_of_path
+from .built import FmuBundle, build_bundle, cached_fmus
+from .drive import ReferenceInput, build_reference_input, path_start
 from .keys import with_values
 from .plan import Plan
-from .rows import FAILURE, MODES, Row, series_columns
+from .rows import FAILURE_COLUMN, MODE_NUMBERS, Row, series_columns
 
 Array = NDArray[np.float64]
 Series = dict[str, Array]
 
-LONGEST_REASON = 2000
+MAX_REASON_LENGTH = 2000
 
 
 @dataclass(frozen=True)
@@ -49,76 +49,76 @@ class Job:
 
 
 @dataclass(frozen=True)
-class Shared:
-    """What all runs of a plan share; ``drives`` by variant where they do not depend on the run."""
+class CampaignContext:
+    """Context that all runs of a plan share; ``reference_inputs`` by variant where they do not depend on the run."""
 
     plan: Plan
     recordings: Mapping[str, Recording]
-    bundle: Bundle | None = None
-    drives: Mapping[int, Drive] = field(default_factory=dict)
+    bundle: FmuBundle | None = None
+    reference_inputs: Mapping[int, ReferenceInput] = field(default_factory=dict)
 
 
 @dataclass(frozen=True)
-class Result:
-    """What a run came to: a ``row`` by columns, and its ``series`` by columns, empty where nothing is kept."""
+class RunResult:
+    """Result of a run: a ``row`` by column, and its time ``series`` by column, empty where none is stored."""
 
     row: Row
     series: Series = field(default_factory=dict)
 
 
-def shared_of(plan: Plan, recordings: Mapping[str, Recording]) -> Shared:
+def build_context(plan: Plan, recordings: Mapping[str, Recording]) -> CampaignContext:
     """Build the FMUs and design the controllers that all runs share.
 
-    Raises what building and designing raise where the robot file as it stands cannot follow a path.
+    Raises what building and design raise where the declared robot cannot follow a path.
     """
     if not plan.paths:
-        return Shared(plan, recordings)
-    robot = robot_from(dict(plan.content), plan.file)
-    bundle = bundled(placed(robot, start_of_path(robot, plan.paths[0])))
-    drives = {
-        place: drive_of(robot, plan.paths[path], controller, plan.compute, recordings)
-        for place, (path, controller) in enumerate(plan.variants)
+        return CampaignContext(plan, recordings)
+    robot = robot_from_content(dict(plan.content), plan.file)
+    bundle = build_bundle(with_start(robot, path_start(robot, plan.paths[0])))
+    reference_inputs = {
+        variant: build_reference_input(robot, plan.paths[path], controller, plan.compute, recordings)
+        for variant, (path, controller) in enumerate(plan.variants)
     }
-    varies = plan.belief == "varied" or any(key.startswith("platform.start") for key in plan.keys)
-    return Shared(plan, recordings, bundle, {} if varies else drives)
+    differs_by_run = plan.belief == "varied" or any(key.startswith("platform.start") for key in plan.keys)
+    return CampaignContext(plan, recordings, bundle, {} if differs_by_run else reference_inputs)
 
 
-def run_job(shared: Shared, job: Job, folder: Path) -> Result:
-    """Make one run; what it fails with is its row's reason, beside what came before that.
+def run_job(context: CampaignContext, job: Job, fmu_folder: Path) -> RunResult:
+    """Simulate one run; its row has the outputs computed before a failure, and the reason of the failure.
 
-    The row depends on the plan and the job alone. ``folder`` keeps FMUs from run to run.
+    The row depends on the plan and the job alone. ``fmu_folder`` caches FMUs between runs.
 
     Raises OSError where the machine fails, not the run.
     """
-    path, controller = shared.plan.variants[job.variant]
+    path, controller = context.plan.variants[job.variant]
     row: Row = {"index": job.index, "sample": job.sample}
     if path >= 0:
-        row |= {"path": shared.plan.paths[path].name, "controller": controller}
-    row |= dict(zip(shared.plan.keys, job.values, strict=True))
+        row |= {"path": context.plan.paths[path].name, "controller": controller}
+    row |= dict(zip(context.plan.keys, job.values, strict=True))
     series: Series = {}
     try:
-        for numbers, kept in _stages(shared, job, folder):
-            row |= numbers
-            series = kept
+        for outputs, stage_series in _run_stages(context, job, fmu_folder):
+            row |= outputs
+            series = stage_series
     except OSError:
         raise
     except Exception as error:
-        row[FAILURE] = reason_of(error)
-    return Result(row, series)
+        row[FAILURE_COLUMN] = failure_reason(error)
+    return RunResult(row, series)
 
 
-def reason_of(error: BaseException) -> str:
-    """An error as one line of a row."""
-    said = one_line(" ".join(str(error).split())) or "no message"
-    return f"{type(error).__name__}: {said}"[:LONGEST_REASON]
+def failure_reason(error: BaseException) -> str:
+    """The text of an error on one line, for a row."""
+    message = one_line(" ".join(str(error).split())) or "no message"
+    return f"{type(error).__name__}: {message}"[:MAX_REASON_LENGTH]
 
 
-def _stages(shared: Shared, job: Job, folder: Path) -> Iterable[tuple[Row, Series]]:
-    plan = shared.plan
-    robot = robot_from(with_values(plan.content, dict(zip(plan.keys, job.values, strict=True))), plan.file)
-    place, controller = plan.variants[job.variant]
-    if place >= 0:
-        robot = placed(robot, start_of_path(robot, plan.paths[place]))
+def _run_stages(context: CampaignContext, job: Job, fmu_folder: Path) -> Iterable[tuple[Row, Series]]:
+    plan = context.plan
+    robot = robot_from_content(with_values(plan.content, dict(zip(plan.keys, job.values, strict=True))), plan.file)
+    path_index, controller = plan.variants[job.variant]
+    if path_index >= 0:
+        robot = with_start(robot, path_start(robot, plan.paths[path_index]))
     if plan.compute.statics:
         yield {"held": False}, {}
         tensions = static_tensions(robot)
@@ -127,83 +127,85 @@ def _stages(shared: Shared, job: Job, folder: Path) -> Iterable[tuple[Row, Serie
             {},
         )
     if plan.compute.modes:
-        yield _modes(robot, linearise(robot)), {}
-    if place >= 0 and shared.bundle is not None:
-        drive = shared.drives.get(job.variant) or drive_of(
-            _believed(robot, plan), plan.paths[place], controller, plan.compute, shared.recordings
+        yield _modal_outputs(robot, linearise(robot)), {}
+    if path_index >= 0 and context.bundle is not None:
+        reference_input = context.reference_inputs.get(job.variant) or build_reference_input(
+            _nominal_robot(robot, plan), plan.paths[path_index], controller, plan.compute, context.recordings
         )
-        motion = _moved(fmus_of(robot, shared.bundle, folder), drive, plan, job)
-        yield _numbers(robot, drive, motion), _series(motion, plan.compute.series)
+        motion = _simulate(cached_fmus(robot, context.bundle, fmu_folder), reference_input, plan, job)
+        yield _motion_outputs(robot, reference_input, motion), _resampled_series(motion, plan.compute.series)
 
 
-def _believed(robot: Robot, plan: Plan) -> Robot:
-    """What controllers and winch speeds are made for."""
+def _nominal_robot(robot: Robot, plan: Plan) -> Robot:
+    """The nominal robot, for which controllers and winch speeds are designed."""
     if plan.belief == "varied":
         return robot
-    return placed(robot_from(dict(plan.content), plan.file), robot.platform.start)
+    return with_start(robot_from_content(dict(plan.content), plan.file), robot.platform.start)
 
 
-def _modes(robot: Robot, plant: LinearPlant) -> Row:
-    """Frequencies, damping ratios, and the least eigenvalue of the stiffness that the platform feels."""
+def _modal_outputs(robot: Robot, plant: LinearPlant) -> Row:
+    """Natural frequencies, damping ratios, and the smallest eigenvalue of the stiffness at the platform."""
     modes, A, B = plant.modes, plant.system.A, plant.system.B
     stiffness = -np.linalg.solve(B[VELOCITY, robot.cable_count :], A[VELOCITY, POSITION])
-    least = float(np.linalg.eigvalsh(0.5 * (stiffness + stiffness.T))[0])
-    frequencies = {f"frequency_{mode}": float(modes.frequencies[mode - 1]) for mode in MODES}
-    ratios = {f"damping_ratio_{mode}": float(modes.damping_ratios[mode - 1]) for mode in MODES}
-    return {**frequencies, **ratios, "stiffness_least": least}
+    min_stiffness = float(np.linalg.eigvalsh(0.5 * (stiffness + stiffness.T))[0])
+    frequencies = {f"frequency_{mode}": float(modes.frequencies[mode - 1]) for mode in MODE_NUMBERS}
+    damping_ratios = {f"damping_ratio_{mode}": float(modes.damping_ratios[mode - 1]) for mode in MODE_NUMBERS}
+    return {**frequencies, **damping_ratios, "stiffness_least": min_stiffness}
 
 
-def _moved(fmus: RobotFmus, drive: Drive, plan: Plan, job: Job) -> Motion:
-    if drive.speeds is not None:
-        return cosimulate(fmus, drive.time, drive.speeds, plan.compute.step)
-    if drive.design is None or drive.trajectory is None:
+def _simulate(fmus: RobotFmus, reference_input: ReferenceInput, plan: Plan, job: Job) -> CosimulationResult:
+    if reference_input.winch_speeds is not None:
+        return cosimulate(fmus, reference_input.time, reference_input.winch_speeds, plan.compute.step)
+    if reference_input.design is None or reference_input.trajectory is None:
         raise ValueError("a drive without speeds needs a controller and its path")
     seed = int(np.random.SeedSequence((plan.seed, job.index)).generate_state(1)[0]) if plan.compute.noise else None
     return cosimulate_closed_loop(
         fmus,
-        drive.believed,
-        drive.design,
-        drive.trajectory,
-        float(drive.time[-1]),
+        reference_input.nominal_robot,
+        reference_input.design,
+        reference_input.trajectory,
+        float(reference_input.time[-1]),
         plan.compute.step,
         seed,
-        reference=drive.reference,
+        reference=reference_input.reference,
     )
 
 
-def _numbers(robot: Robot, drive: Drive, motion: Motion) -> Row:
-    """Where a motion ended, how far it was from its path, and what its tensions were."""
+def _motion_outputs(robot: Robot, reference_input: ReferenceInput, motion: CosimulationResult) -> Row:
+    """Outputs of a motion: end position, path error, and the range of tensions."""
     row: dict[str, Any] = {f"end_{axis}": float(each) for axis, each in zip(AXES, motion.position[-1], strict=True)}
-    if drive.wanted is not None:
-        apart = np.linalg.norm(motion.position - drive.wanted, axis=1)
-        errors = {"end": apart[-1], "largest": apart.max(), "rms": np.sqrt(np.mean(apart**2))}
+    if reference_input.desired_position is not None:
+        path_error = np.linalg.norm(motion.position - reference_input.desired_position, axis=1)
+        errors = {"end": path_error[-1], "largest": path_error.max(), "rms": np.sqrt(np.mean(path_error**2))}
         row |= {f"path_error_{name}": float(value) for name, value in errors.items()}
-    least, largest = motion.tension.min(axis=0), motion.tension.max(axis=0)
+    min_tension, max_tension = motion.tension.min(axis=0), motion.tension.max(axis=0)
     for cable in robot.cable_numbers:
-        row |= {f"tension_{cable}_least": float(least[cable - 1])}
-        row |= {f"tension_{cable}_largest": float(largest[cable - 1])}
-    row["slack"] = bool(np.any(least <= _without_pull(robot)))
+        row |= {f"tension_{cable}_least": float(min_tension[cable - 1])}
+        row |= {f"tension_{cable}_largest": float(max_tension[cable - 1])}
+    row["slack"] = bool(np.any(min_tension <= _slack_tension(robot)))
     if robot.tension is not None:
-        row["limit_broken"] = bool(least.min() < robot.tension.minimum or largest.max() > robot.tension.maximum)
+        row["limit_broken"] = bool(
+            min_tension.min() < robot.tension.minimum or max_tension.max() > robot.tension.maximum
+        )
     return row
 
 
-def _without_pull(robot: Robot) -> Array:
-    """The tension (n,) in N of a cable that nothing pulls at: zero, or ``s ln 2`` of the effect slack's softness s."""
-    left = np.zeros(robot.cable_count)
+def _slack_tension(robot: Robot) -> Array:
+    """Tension (n,) in N of a cable that nothing pulls at: zero, or ``s ln 2`` of the effect slack's softness s."""
+    tension = np.zeros(robot.cable_count)
     for setting in robot.effects:
         if setting.name == SLACK.name:
-            left[[cable - 1 for cable in setting.cables]] = setting.values["softness"] * log(2.0)
-    return left
+            tension[[cable - 1 for cable in setting.cables]] = setting.values["softness"] * log(2.0)
+    return tension
 
 
-def _series(motion: Motion, points: int) -> Series:
-    """Positions and tensions at evenly spread times, from a motion's start to its end."""
-    if points < 2:
+def _resampled_series(motion: CosimulationResult, point_count: int) -> Series:
+    """Positions and tensions at evenly spaced times, from the start of a motion to its end."""
+    if point_count < 2:
         return {}
-    time = np.linspace(motion.time[0], motion.time[-1], points)
-    shown = motion.measured()
+    time = np.linspace(motion.time[0], motion.time[-1], point_count)
+    outputs = motion.measured()
     names = series_columns(motion.tension.shape[1])
     return {"time": time} | {
-        name: np.interp(time, motion.time, column) for name, column in zip(names, shown.T, strict=True)
+        name: np.interp(time, motion.time, column) for name, column in zip(names, outputs.T, strict=True)
     }

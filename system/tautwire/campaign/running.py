@@ -1,4 +1,4 @@
-"""A campaign from its plan to its rows: what is done stays done, and what is missing is made."""
+"""Runs a campaign from its plan to its rows; a stopped campaign resumes with the missing rows."""
 
 from __future__ import annotations
 
@@ -14,110 +14,118 @@ from numpy.typing import NDArray
 
 from ..errors import InputError
 from ..recordings.recording import Recording, read_recording
-from ..robots.reading import robot_from
-from .cluster import SchedulerLostError, Task, results, shared_future
-from .dataset import Parts, done_rows
+from ..robots.reading import robot_from_content
+from .cluster import SchedulerLostError, Task, context_future, task_results
+from .dataset import PartWriter, completed_runs
 from .errors import UnfinishedError
 from .plan import Plan
-from .rows import columns_of
-from .run import Job, Result, reason_of
-from .sampling import samples
+from .rows import row_columns
+from .run import Job, RunResult, failure_reason
+from .sampling import draw_samples
 
 Array = NDArray[np.float64]
-Progress = Callable[[str, float], None]
+ProgressCallback = Callable[[str, float], None]
 
-# Runs that a task holds: those without motion take a few ms, and a task costs one.
-TOGETHER_STATICS, TOGETHER_MODES = 200, 20
-# Rows wait for at most so long (s), or for this share of the time gone: a long campaign has few parts.
-LONGEST_WAIT, WAIT_SHARE = 1.0, 0.02
-MOST_WAITING = 5000
-# Errors of the disk that no other worker would be spared.
-FULL = (errno.ENOSPC, errno.EDQUOT)
+# Runs without motion take a few ms each, and a task has an overhead of one.
+STATIC_RUNS_PER_TASK, MODAL_RUNS_PER_TASK = 200, 20
+# Rows are flushed at the longer of this interval (s) and this fraction of the elapsed time: few parts in all.
+MIN_FLUSH_INTERVAL, FLUSH_TIME_FRACTION = 1.0, 0.02
+MAX_BUFFERED_ROWS = 5000
+# Errors of the disk that would meet every other worker too.
+DISK_FULL_ERRNOS = (errno.ENOSPC, errno.EDQUOT)
 
 
 def run_count(plan: Plan) -> int:
-    """How many runs, and so rows, a plan makes."""
+    """Number of runs, and so of rows, of a plan."""
     return len(plan.trace.recordings) if plan.trace else plan.count * len(plan.variants)
 
 
-def jobs_of(plan: Plan, wanted: NDArray[np.bool_]) -> Iterator[Job]:
-    """The runs that are wanted (N,), by ascending index: all variants of a sample, then those of the next."""
+def planned_jobs(plan: Plan, selected: NDArray[np.bool_]) -> Iterator[Job]:
+    """The selected runs, by a mask (N,), in ascending index: all variants of a sample, then those of the next."""
     if plan.trace is not None:
-        yield from (Job(int(index), int(index), 0) for index in np.flatnonzero(wanted))
+        yield from (Job(int(index), int(index), 0) for index in np.flatnonzero(selected))
         return
-    values, variants = samples(plan), len(plan.variants)
-    for index in np.flatnonzero(wanted):
+    values, variants = draw_samples(plan), len(plan.variants)
+    for index in np.flatnonzero(selected):
         sample, variant = divmod(int(index), variants)
-        given = zip(plan.inputs, values[sample].tolist(), strict=True)
-        yield Job(int(index), sample, variant, tuple(each.distribution.value(number) for each, number in given))
+        numbers = zip(plan.inputs, values[sample].tolist(), strict=True)
+        yield Job(int(index), sample, variant, tuple(each.distribution.value(number) for each, number in numbers))
 
 
-def tasks_of(plan: Plan, wanted: NDArray[np.bool_], cable_count: int) -> Iterator[Task]:
-    """The wanted runs as tasks; a recording is read when its turn comes, and goes with its task."""
-    jobs = jobs_of(plan, wanted)
+def planned_tasks(plan: Plan, selected: NDArray[np.bool_], cable_count: int) -> Iterator[Task]:
+    """The selected runs as tasks; a recording is read when its task is submitted, and sent with it."""
+    jobs = planned_jobs(plan, selected)
     if plan.trace is not None:
-        yield from (_traced(plan.trace.recordings[job.index], job, cable_count) for job in jobs)
+        yield from (_trace_task(plan.trace.recordings[job.index], job, cable_count) for job in jobs)
         return
-    together = 1 if plan.paths else TOGETHER_MODES if plan.compute.modes else TOGETHER_STATICS
-    while some := tuple(islice(jobs, together)):
-        yield Task(some)
+    runs_per_task = 1 if plan.paths else MODAL_RUNS_PER_TASK if plan.compute.modes else STATIC_RUNS_PER_TASK
+    while batch := tuple(islice(jobs, runs_per_task)):
+        yield Task(batch)
 
 
-def _traced(file: str, job: Job, cable_count: int) -> Task:
+def _trace_task(file: str, job: Job, cable_count: int) -> Task:
     name = Path(file).name
     try:
         return Task((job,), read_recording(file, cable_count), name)
     except InputError as error:
-        return Task((job,), None, name, reason_of(error))
+        return Task((job,), None, name, failure_reason(error))
 
 
-def recordings_of(plan: Plan, cable_count: int) -> dict[str, Recording]:
-    """The recordings of winch speeds that paths name, by their paths' names."""
+def path_recordings(plan: Plan, cable_count: int) -> dict[str, Recording]:
+    """The recordings of winch speeds that paths name, by path name."""
     return {path.name: read_recording(path.recording, cable_count) for path in plan.paths if path.recording}
 
 
-def make_rows(plan: Plan, folder: Path, client: Any, tell: Progress) -> int:
-    """Make the rows that are missing in a folder with a Dask client, and return how many these were.
+def run_campaign(plan: Plan, folder: Path, client: Any, report_progress: ProgressCallback) -> int:
+    """Run the missing runs of a campaign with a Dask client, and return their number.
 
-    The folder is one that :func:`tautwire.campaign.dataset.opened` holds.
+    The folder must be locked by :func:`tautwire.campaigns.campaign_dataset.open_dataset`.
 
-    Raises UnfinishedError where it is interrupted, the scheduler is lost or a disk is full: what came until then is
-    written. Raises what :func:`tautwire.campaign.run.shared_of` raises.
+    Raises UnfinishedError where it is interrupted, the scheduler is lost or a disk is full; rows completed before are
+    written. Raises what :func:`tautwire.campaigns.campaign_run.build_context` raises.
     """
     count = run_count(plan)
-    cable_count = robot_from(dict(plan.content), plan.file).cable_count
-    done = done_rows(folder, count)
-    if done.all():
+    cable_count = robot_from_content(dict(plan.content), plan.file).cable_count
+    completed = completed_runs(folder, count)
+    if completed.all():
         return 0
     try:
-        with Parts(folder, columns_of(plan, cable_count)) as parts:
-            tell("preparing", 0.0)
-            shared = shared_future(client, plan, recordings_of(plan, cable_count))
-            tasks = tasks_of(plan, ~done, cable_count)
-            _keep(results(client, shared, plan, tasks), parts, int(done.sum()), count, tell)
+        with PartWriter(folder, row_columns(plan, cable_count)) as writer:
+            report_progress("preparing", 0.0)
+            shared = context_future(client, plan, path_recordings(plan, cable_count))
+            tasks = planned_tasks(plan, ~completed, cable_count)
+            _write_results(
+                task_results(client, shared, plan, tasks), writer, int(completed.sum()), count, report_progress
+            )
     except KeyboardInterrupt as error:
-        raise UnfinishedError("interrupted", _written(folder, count), count) from error
+        raise UnfinishedError("interrupted", _written_count(folder, count), count) from error
     except SchedulerLostError as error:
-        raise UnfinishedError(str(error), _written(folder, count), count) from error
+        raise UnfinishedError(str(error), _written_count(folder, count), count) from error
     except OSError as error:
-        reason = "the disk is full" if error.errno in FULL else f"stopped ({error})"
-        raise UnfinishedError(reason, _written(folder, count), count) from error
-    return count - int(done.sum())
+        reason = "the disk is full" if error.errno in DISK_FULL_ERRNOS else f"stopped ({error})"
+        raise UnfinishedError(reason, _written_count(folder, count), count) from error
+    return count - int(completed.sum())
 
 
-def _keep(found: Iterator[list[Result]], parts: Parts, made: int, count: int, tell: Progress) -> None:
-    """Let rows go to disk as they come, some at a time."""
-    begun = written = monotonic()
-    tell("running", made / count)
-    for some in found:
-        parts.add(some)
-        made += len(some)
-        wait = max(LONGEST_WAIT, WAIT_SHARE * (monotonic() - begun))
-        if parts.waiting >= MOST_WAITING or monotonic() - written > wait:
-            parts.flush()
-            written = monotonic()
-        tell("running", made / count)
+def _write_results(
+    batches: Iterator[list[RunResult]],
+    writer: PartWriter,
+    completed_count: int,
+    count: int,
+    report_progress: ProgressCallback,
+) -> None:
+    """Write rows to disk as they are completed, in batches."""
+    start_time = flush_time = monotonic()
+    report_progress("running", completed_count / count)
+    for batch in batches:
+        writer.add(batch)
+        completed_count += len(batch)
+        flush_interval = max(MIN_FLUSH_INTERVAL, FLUSH_TIME_FRACTION * (monotonic() - start_time))
+        if writer.buffered_count >= MAX_BUFFERED_ROWS or monotonic() - flush_time > flush_interval:
+            writer.flush()
+            flush_time = monotonic()
+        report_progress("running", completed_count / count)
 
 
-def _written(folder: Path, count: int) -> int:
-    return int(done_rows(folder, count).sum())
+def _written_count(folder: Path, count: int) -> int:
+    return int(completed_runs(folder, count).sum())

@@ -1,4 +1,4 @@
-"""The values that inputs have in each sample; the same seed gives the same ones, however they are run."""
+"""Sampling of the inputs; the same seed gives the same samples, whatever the number of workers."""
 
 from __future__ import annotations
 
@@ -14,36 +14,38 @@ from .plan import Input, Plan
 
 Array = NDArray[np.float64]
 
-# A share of 0 or 1 would be infinitely far out.
-FARTHEST = 1e-12
-# By rounding the least eigenvalue of correlations may lie this far below zero.
-SINGULAR = 1e-9
+# The normal quantiles of probabilities 0 and 1 are infinite.
+MIN_TAIL_PROBABILITY = 1e-12
+# Rounding may put the smallest eigenvalue of a correlation matrix this far below zero.
+EIGENVALUE_TOLERANCE = 1e-9
 
 
-def samples(plan: Plan) -> Array:
-    """The inputs of all samples, shape (count, inputs).
+def draw_samples(plan: Plan) -> Array:
+    """Draw the inputs of all samples, shape (count, inputs).
 
-    Samples are drawn in a unit cube. Correlations are those of normal variables there (a Gaussian copula): shares of
-    probability go to normal variables, through a factor of their correlations, and back; each input is then
-    its quantile. A grid is the product of its steps, the last input fastest.
+    Samples are drawn in the unit cube and correlated by a Gaussian copula: probabilities are mapped to normal
+    variables, multiplied by a factor of the correlation matrix, and mapped back; each input is then its quantile.
+    A grid is the Cartesian product of the discrete values, the last input fastest.
 
     Raises PlanError where correlations contradict each other.
     """
     if not plan.inputs:
         return np.zeros((plan.count, 0))
     if plan.method == "grid":
-        return np.array(list(product(*(each.distribution.steps for each in plan.inputs))))
-    shares = _correlated(plan, np.clip(_shares(plan), FARTHEST, 1.0 - FARTHEST))
-    return np.column_stack([each.distribution.quantile(shares[:, i]) for i, each in enumerate(plan.inputs)])
+        return np.array(list(product(*(each.distribution.discrete_values for each in plan.inputs))))
+    probabilities = _apply_copula(
+        plan, np.clip(_unit_cube_samples(plan), MIN_TAIL_PROBABILITY, 1.0 - MIN_TAIL_PROBABILITY)
+    )
+    return np.column_stack([each.distribution.quantile(probabilities[:, i]) for i, each in enumerate(plan.inputs)])
 
 
-def middle(one: Input) -> float | str:
+def median_value(varied: Input) -> float | str:
     """The median of an input."""
-    return one.distribution.value(float(one.distribution.quantile(np.array([0.5]))[0]))
+    return varied.distribution.value(float(varied.distribution.quantile(np.array([0.5]))[0]))
 
 
 def correlation_matrix(plan: Plan) -> Array:
-    """The correlations of the normal variables behind the inputs, shape (inputs, inputs)."""
+    """Correlation matrix of the normal variables of the copula, shape (inputs, inputs)."""
     matrix = np.eye(len(plan.inputs))
     for each in plan.correlations:
         matrix[each.first, each.second] = matrix[each.second, each.first] = each.value
@@ -51,7 +53,7 @@ def correlation_matrix(plan: Plan) -> Array:
 
 
 def correlated_groups(plan: Plan) -> tuple[int, ...]:
-    """A number for each input, the same for those that are correlated with each other, whatever lies between."""
+    """Group number of each input: connected components of the graph of correlations."""
     groups = list(range(len(plan.inputs)))
     for each in plan.correlations:
         old, new = groups[each.second], groups[each.first]
@@ -60,8 +62,8 @@ def correlated_groups(plan: Plan) -> tuple[int, ...]:
     return tuple(order.index(group) for group in groups)
 
 
-def sobol_problem(plan: Plan) -> dict[str, Any]:
-    """What SALib calls a problem: the unit cube, correlated inputs in one group."""
+def salib_problem(plan: Plan) -> dict[str, Any]:
+    """The problem definition of SALib: the unit cube, with correlated inputs in one group."""
     names = list(plan.keys)
     problem: dict[str, Any] = {"num_vars": len(names), "names": names, "bounds": [[0.0, 1.0]] * len(names)}
     if plan.correlations:
@@ -71,26 +73,26 @@ def sobol_problem(plan: Plan) -> dict[str, Any]:
     return problem
 
 
-def sobol_block(plan: Plan) -> int:
-    """How many samples of a Saltelli design stand together: one, one for each group exchanged, one with all."""
+def saltelli_block_size(plan: Plan) -> int:
+    """Block size of a Saltelli design: one sample, one for each group exchanged, one with all exchanged."""
     return len(set(correlated_groups(plan))) + 2
 
 
-def _shares(plan: Plan) -> Array:
-    count, width = plan.count, len(plan.inputs)
+def _unit_cube_samples(plan: Plan) -> Array:
+    count, dimension = plan.count, len(plan.inputs)
     generator = np.random.default_rng(plan.seed)
     if plan.method == "random":
-        return generator.random((count, width))
+        return generator.random((count, dimension))
     if plan.method == "latin hypercube":
-        return np.asarray(qmc.LatinHypercube(width, seed=generator).random(count))
+        return np.asarray(qmc.LatinHypercube(dimension, seed=generator).random(count))
     if plan.method == "sobol":
-        return np.asarray(qmc.Sobol(width, scramble=True, seed=generator).random(count))
-    sample = _saltelli()
-    base = plan.count // sobol_block(plan)
-    return np.asarray(sample(sobol_problem(plan), base, calc_second_order=False, scramble=True, seed=plan.seed))
+        return np.asarray(qmc.Sobol(dimension, scramble=True, seed=generator).random(count))
+    sample = _saltelli_sampler()
+    base = plan.count // saltelli_block_size(plan)
+    return np.asarray(sample(salib_problem(plan), base, calc_second_order=False, scramble=True, seed=plan.seed))
 
 
-def _saltelli() -> Any:
+def _saltelli_sampler() -> Any:
     try:
         from SALib.sample import sobol
     except ImportError as error:
@@ -98,19 +100,23 @@ def _saltelli() -> Any:
     return sobol.sample
 
 
-def _correlated(plan: Plan, shares: Array) -> Array:
+def _apply_copula(plan: Plan, probabilities: Array) -> Array:
     if not plan.correlations:
-        return shares
-    return np.clip(norm.cdf(norm.ppf(shares) @ _factor(correlation_matrix(plan)).T), FARTHEST, 1.0 - FARTHEST)
+        return probabilities
+    return np.clip(
+        norm.cdf(norm.ppf(probabilities) @ _correlation_factor(correlation_matrix(plan)).T),
+        MIN_TAIL_PROBABILITY,
+        1.0 - MIN_TAIL_PROBABILITY,
+    )
 
 
-def _factor(matrix: Array) -> Array:
-    """A matrix F with ``F F' = matrix``: Cholesky's, or by eigenvectors where the matrix is barely singular."""
+def _correlation_factor(matrix: Array) -> Array:
+    """Factor F of a correlation matrix, ``F F' = matrix``: Cholesky's, or by eigenvectors where barely singular."""
     try:
         return np.asarray(np.linalg.cholesky(matrix))
     except np.linalg.LinAlgError as error:
-        sizes, vectors = np.linalg.eigh(matrix)
-        if sizes[0] < -SINGULAR:
+        eigenvalues, eigenvectors = np.linalg.eigh(matrix)
+        if eigenvalues[0] < -EIGENVALUE_TOLERANCE:
             problem = "contradict each other: no inputs are correlated like that"
             raise PlanError("correlation", problem, "make them smaller") from error
-    return np.asarray(vectors * np.sqrt(np.maximum(sizes, 0.0)))
+    return np.asarray(eigenvectors * np.sqrt(np.maximum(eigenvalues, 0.0)))

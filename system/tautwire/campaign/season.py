@@ -1,4 +1,4 @@
-"""What the traces of many recordings say together."""
+"""Summary of the traces of many recordings."""
 
 from __future__ import annotations
 
@@ -9,12 +9,12 @@ from typing import Any
 
 import pyarrow as pa
 
-from .rows import FAILURE
+from .rows import FAILURE_COLUMN
 
 
 @dataclass(frozen=True)
-class Finding:
-    """A parameter that one recording's trace found, with its 95 % interval; None where there is no end."""
+class IdentifiedParameter:
+    """A parameter identified from one recording, with its 95 % interval; None where a bound does not exist."""
 
     recording: str
     effect: str
@@ -27,25 +27,25 @@ class Finding:
 
 
 @dataclass(frozen=True)
-class Season:
-    """All recordings: how many had each verdict, and each parameter of each effect over the recordings."""
+class TraceSummary:
+    """Summary of all traces: counts of each verdict, and each parameter of each effect over the recordings."""
 
     count: int
     failed: int
     verdicts: tuple[tuple[str, int], ...]
-    findings: tuple[Finding, ...]
+    findings: tuple[IdentifiedParameter, ...]
 
     def document(self) -> dict[str, Any]:
-        """It as what JSON knows."""
-        told = asdict(self)
-        told["verdicts"] = dict(self.verdicts)
-        return told
+        """The summary as JSON-serialisable data."""
+        fields = asdict(self)
+        fields["verdicts"] = dict(self.verdicts)
+        return fields
 
 
-def season_of(rows: pa.Table) -> Season:
-    """What the rows of a campaign of traces say, by ascending index."""
+def summarise_traces(rows: pa.Table) -> TraceSummary:
+    """Summary of the rows of a campaign of traces, sorted by index."""
     findings = [
-        Finding(
+        IdentifiedParameter(
             recording=recording,
             effect=effect["name"],
             cables=tuple(effect["cables"]),
@@ -61,5 +61,5 @@ def season_of(rows: pa.Table) -> Season:
     ]
     findings.sort(key=lambda each: (each.effect, each.cables, each.parameter))
     verdicts = Counter(each for each in rows["verdict"].to_pylist() if each is not None)
-    failed = sum(each is not None for each in rows[FAILURE].to_pylist())
-    return Season(rows.num_rows, failed, tuple(verdicts.most_common()), tuple(findings))
+    failed = sum(each is not None for each in rows[FAILURE_COLUMN].to_pylist())
+    return TraceSummary(rows.num_rows, failed, tuple(verdicts.most_common()), tuple(findings))

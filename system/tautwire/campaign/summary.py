@@ -1,4 +1,4 @@
-"""What the rows of a campaign say together: spreads, probabilities, and what the outputs depend on."""
+"""Statistics over the rows of a campaign: quantiles, probabilities, and Sobol indices."""
 
 from __future__ import annotations
 
@@ -16,21 +16,21 @@ from scipy.stats import binomtest
 
 from .errors import MissingExtraError
 from .plan import Plan
-from .rows import FAILURE, RowColumn
-from .sampling import sobol_block, sobol_problem
+from .rows import FAILURE_COLUMN, RowColumn
+from .sampling import salib_problem, saltelli_block_size
 
 Array = NDArray[np.float64]
 
-SHARES = (0.025, 0.25, 0.5, 0.75, 0.975)
-CONFIDENCE = 0.95
-MOST_REASONS = 20
-# Below these SALib's estimates say nothing: of given samples (RBD-FAST), and of base samples (Saltelli).
-FEWEST_GIVEN, FEWEST_BASE = 64, 8
+SPREAD_QUANTILE_LEVELS = (0.025, 0.25, 0.5, 0.75, 0.975)
+CONFIDENCE_LEVEL = 0.95
+MAX_REASONS = 20
+# Fewer samples (RBD-FAST) or blocks (Saltelli) give meaningless estimates by SALib.
+MIN_RBD_FAST_SAMPLES, MIN_SALTELLI_BLOCKS = 64, 8
 
 
 @dataclass(frozen=True)
 class Spread:
-    """An output over all runs of a path and a controller that have it; ``quantiles`` at :data:`SHARES`."""
+    """Statistics of an output over the runs of a path and a controller; quantiles at :data:`SPREAD_QUANTILE_LEVELS`."""
 
     path: str
     controller: str
@@ -45,8 +45,8 @@ class Spread:
 
 
 @dataclass(frozen=True)
-class Probability:
-    """How often a flag holds: ``times`` of ``count`` runs, and the 95 % interval of its probability (Wilson)."""
+class FlagProbability:
+    """Probability of a flag: true in ``times`` of ``count`` runs, with its 95 % interval (Wilson)."""
 
     path: str
     controller: str
@@ -57,16 +57,16 @@ class Probability:
     high: float
 
     @property
-    def share(self) -> float:
-        """The part of runs in which it holds."""
+    def relative_frequency(self) -> float:
+        """Relative frequency of the flag over the runs."""
         return self.times / self.count
 
 
 @dataclass(frozen=True)
-class Dependence:
-    """How much of an output's variance an input, or a group of correlated ones, makes, with 95 % half-widths.
+class SobolIndices:
+    """Sobol indices of an output with respect to an input or a group of correlated ones, with 95 % half-widths.
 
-    ``first`` is the Sobol index of first order; ``total`` that of all orders, None where the samples do not tell it.
+    ``first`` is the first-order index; ``total`` the total-order one, None where the design does not give it.
     """
 
     path: str
@@ -81,65 +81,66 @@ class Dependence:
 
 @dataclass(frozen=True)
 class Summary:
-    """All of it; ``reasons`` are those of failed runs with how many had them; ``notes`` what could not be said."""
+    """Summary of a campaign; ``reasons`` are those of failed runs with counts; ``notes`` what could not be computed."""
 
     count: int
     failed: int
     reasons: tuple[tuple[str, int], ...]
     spreads: tuple[Spread, ...]
-    probabilities: tuple[Probability, ...]
-    dependences: tuple[Dependence, ...]
+    probabilities: tuple[FlagProbability, ...]
+    dependences: tuple[SobolIndices, ...]
     notes: tuple[str, ...] = ()
 
     def document(self) -> dict[str, Any]:
-        """It as what JSON knows; null where a number is not finite."""
-        told = asdict(self)
-        told["reasons"] = [{"reason": reason, "runs": count} for reason, count in self.reasons]
-        for place, each in enumerate(self.probabilities):
-            told["probabilities"][place]["probability"] = each.share
-        for each in told["spreads"]:
+        """The summary as JSON-serialisable data; null where a number is not finite."""
+        fields = asdict(self)
+        fields["reasons"] = [{"reason": reason, "runs": count} for reason, count in self.reasons]
+        for index, each in enumerate(self.probabilities):
+            fields["probabilities"][index]["probability"] = each.relative_frequency
+        for each in fields["spreads"]:
             each["quantiles"] = {
-                f"{100 * share:g} %": value for share, value in zip(SHARES, each["quantiles"], strict=True)
+                f"{100 * share:g} %": value
+                for share, value in zip(SPREAD_QUANTILE_LEVELS, each["quantiles"], strict=True)
             }
-        return dict(_plain(told))
+        return dict(_json_value(fields))
 
 
-def summary_of(plan: Plan, columns: tuple[RowColumn, ...], rows: pa.Table) -> Summary:
-    """What all rows say, by ascending index, by path and controller."""
+def summarise_runs(plan: Plan, columns: tuple[RowColumn, ...], rows: pa.Table) -> Summary:
+    """Summarise all rows, sorted by index, by path and controller."""
     spreads: list[Spread] = []
-    probabilities: list[Probability] = []
-    dependences: list[Dependence] = []
-    why = _why_no_dependence(plan)
-    for path, controller, part in parts_by_variant(plan, rows):
+    probabilities: list[FlagProbability] = []
+    dependences: list[SobolIndices] = []
+    unavailable_reason = _sobol_unavailable_reason(plan)
+    for path, controller, variant_rows in rows_by_variant(plan, rows):
         for column in columns:
             if column.role != "output":
                 continue
             if column.kind == "number":
-                values = numbers_of(part, column.name)
-                spreads += _spread(path, controller, column, values)
-                if not why:
-                    dependences += _dependences(plan, path, controller, column.name, values, part)
+                values = column_values(variant_rows, column.name)
+                spreads += _output_spread(path, controller, column, values)
+                if not unavailable_reason:
+                    dependences += _sobol_indices(plan, path, controller, column.name, values, variant_rows)
             elif column.kind == "flag":
-                probabilities += _probability(path, controller, column.name, part)
-    failures = Counter(each for each in rows[FAILURE].to_pylist() if each is not None)
+                probabilities += _flag_probability(path, controller, column.name, variant_rows)
+    failures = Counter(each for each in rows[FAILURE_COLUMN].to_pylist() if each is not None)
     return Summary(
         count=rows.num_rows,
         failed=sum(failures.values()),
-        reasons=tuple(failures.most_common(MOST_REASONS)),
+        reasons=tuple(failures.most_common(MAX_REASONS)),
         spreads=tuple(spreads),
         probabilities=tuple(probabilities),
         dependences=tuple(dependences),
-        notes=(*plan.notes, *([why] if why else [])),
+        notes=(*plan.notes, *([unavailable_reason] if unavailable_reason else [])),
     )
 
 
-def parts_by_variant(plan: Plan, rows: pa.Table) -> Iterator[tuple[str, str, pa.Table]]:
-    """The rows of each path with each controller, by ascending sample."""
+def rows_by_variant(plan: Plan, rows: pa.Table) -> Iterator[tuple[str, str, pa.Table]]:
+    """The rows of each path with each controller, in ascending order of samples."""
     if not plan.paths:
         yield "", "", rows
         return
-    for place, controller in plan.variants:
-        name = plan.paths[place].name
+    for path_index, controller in plan.variants:
+        name = plan.paths[path_index].name
         yield (
             name,
             controller,
@@ -147,41 +148,41 @@ def parts_by_variant(plan: Plan, rows: pa.Table) -> Iterator[tuple[str, str, pa.
         )
 
 
-def numbers_of(rows: pa.Table, name: str) -> Array:
-    """A column of numbers, NaN where a run has none."""
+def column_values(rows: pa.Table, name: str) -> Array:
+    """A numeric column, NaN where a run has no value."""
     return np.asarray(rows[name].cast(pa.float64()).to_numpy(), dtype=float)
 
 
-def _spread(path: str, controller: str, column: RowColumn, values: Array) -> list[Spread]:
-    known = values[np.isfinite(values)]
-    if not known.size:
+def _output_spread(path: str, controller: str, column: RowColumn, values: Array) -> list[Spread]:
+    finite = values[np.isfinite(values)]
+    if not finite.size:
         return []
-    found = Spread(
+    spread = Spread(
         path=path,
         controller=controller,
         name=column.name,
         unit=column.unit,
-        count=int(known.size),
-        mean=float(known.mean()),
-        standard_deviation=float(known.std(ddof=1)) if known.size > 1 else 0.0,
-        quantiles=tuple(np.quantile(known, SHARES).tolist()),
-        least=float(known.min()),
-        largest=float(known.max()),
+        count=int(finite.size),
+        mean=float(finite.mean()),
+        standard_deviation=float(finite.std(ddof=1)) if finite.size > 1 else 0.0,
+        quantiles=tuple(np.quantile(finite, SPREAD_QUANTILE_LEVELS).tolist()),
+        least=float(finite.min()),
+        largest=float(finite.max()),
     )
-    return [found]
+    return [spread]
 
 
-def _probability(path: str, controller: str, name: str, rows: pa.Table) -> list[Probability]:
-    known = rows[name].drop_null()
-    if not len(known):
+def _flag_probability(path: str, controller: str, name: str, rows: pa.Table) -> list[FlagProbability]:
+    flags = rows[name].drop_null()
+    if not len(flags):
         return []
-    times = int(pc.sum(known).as_py())
-    interval = binomtest(times, len(known)).proportion_ci(CONFIDENCE, method="wilson")
-    return [Probability(path, controller, name, times, len(known), float(interval.low), float(interval.high))]
+    true_count = int(pc.sum(flags).as_py())
+    interval = binomtest(true_count, len(flags)).proportion_ci(CONFIDENCE_LEVEL, method="wilson")
+    return [FlagProbability(path, controller, name, true_count, len(flags), float(interval.low), float(interval.high))]
 
 
-def _why_no_dependence(plan: Plan) -> str:
-    """Why nothing can be said of what outputs depend on; empty where it can."""
+def _sobol_unavailable_reason(plan: Plan) -> str:
+    """Reason why Sobol indices cannot be computed; empty where they can."""
     if plan.trace is not None or not plan.inputs:
         return ""
     if plan.method == "grid":
@@ -190,60 +191,60 @@ def _why_no_dependence(plan: Plan) -> str:
         return ""
     if plan.correlations:
         return 'no Sobol indices: inputs are correlated, which takes method = "saltelli"'
-    if any(each.distribution.steps for each in plan.inputs):
+    if any(each.distribution.discrete_values for each in plan.inputs):
         return 'no Sobol indices: inputs have steps, which takes method = "saltelli"'
-    few = plan.count < FEWEST_GIVEN
-    return f"no Sobol indices: {plan.count} samples, they take {FEWEST_GIVEN} or more" if few else ""
+    too_few = plan.count < MIN_RBD_FAST_SAMPLES
+    return f"no Sobol indices: {plan.count} samples, they take {MIN_RBD_FAST_SAMPLES} or more" if too_few else ""
 
 
-def _dependences(
+def _sobol_indices(
     plan: Plan, path: str, controller: str, output: str, values: Array, rows: pa.Table
-) -> list[Dependence]:
-    """Sobol indices by SALib, of whole blocks of a Saltelli design or of whatever samples there are.
+) -> list[SobolIndices]:
+    """Sobol indices by SALib, from complete blocks of a Saltelli design, or by RBD-FAST from any other samples.
 
-    A block in which a run failed is left out; none are given where what is left is too little, or does not vary.
+    Blocks with a failed run are omitted; the list is empty where too few remain, or the output is constant.
     """
     if plan.method == "saltelli":
-        block = sobol_block(plan)
-        whole = np.isfinite(values).reshape(-1, block).all(axis=1)
-        known = values.reshape(-1, block)[whole].ravel()
-        if whole.sum() < FEWEST_BASE or _is_constant(known):
+        block_size = saltelli_block_size(plan)
+        is_complete = np.isfinite(values).reshape(-1, block_size).all(axis=1)
+        usable = values.reshape(-1, block_size)[is_complete].ravel()
+        if is_complete.sum() < MIN_SALTELLI_BLOCKS or _is_constant(usable):
             return []
-        found = _analysed("sobol", sobol_problem(plan), known, calc_second_order=False, seed=plan.seed)
+        analysis = _salib_analysis("sobol", salib_problem(plan), usable, calc_second_order=False, seed=plan.seed)
         return [
-            Dependence(path, controller, output, *each)
+            SobolIndices(path, controller, output, *each)
             for each in zip(
-                found["names"], *(map(float, found[k]) for k in ("S1", "S1_conf", "ST", "ST_conf")), strict=True
+                analysis["names"], *(map(float, analysis[k]) for k in ("S1", "S1_conf", "ST", "ST_conf")), strict=True
             )
         ]
-    known = np.isfinite(values)
-    if known.sum() < FEWEST_GIVEN or _is_constant(values[known]):
+    usable = np.isfinite(values)
+    if usable.sum() < MIN_RBD_FAST_SAMPLES or _is_constant(values[usable]):
         return []
-    inputs = np.column_stack([numbers_of(rows, key) for key in plan.keys])[known]
-    found = _analysed("rbd_fast", sobol_problem(plan), inputs, values[known], seed=plan.seed)
-    pairs = zip(plan.keys, map(float, found["S1"]), map(float, found["S1_conf"]), strict=True)
-    return [Dependence(path, controller, output, *each) for each in pairs]
+    inputs = np.column_stack([column_values(rows, key) for key in plan.keys])[usable]
+    analysis = _salib_analysis("rbd_fast", salib_problem(plan), inputs, values[usable], seed=plan.seed)
+    pairs = zip(plan.keys, map(float, analysis["S1"]), map(float, analysis["S1_conf"]), strict=True)
+    return [SobolIndices(path, controller, output, *each) for each in pairs]
 
 
 def _is_constant(values: Array) -> bool:
     return bool(np.ptp(values) <= 1e-12 * np.max(np.abs(values), initial=0.0))
 
 
-def _analysed(method: str, problem: dict[str, Any], *arguments: Array, **options: Any) -> Any:
+def _salib_analysis(method: str, problem: dict[str, Any], *arguments: Array, **options: Any) -> Any:
     try:
         from SALib.analyze import rbd_fast, sobol
     except ImportError as error:
         raise MissingExtraError("SALib") from error
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        found = (sobol if method == "sobol" else rbd_fast).analyze(problem, *arguments, **options)
-    found["names"] = list(dict.fromkeys(problem.get("groups", problem["names"])))
-    return found
+        analysis = (sobol if method == "sobol" else rbd_fast).analyze(problem, *arguments, **options)
+    analysis["names"] = list(dict.fromkeys(problem.get("groups", problem["names"])))
+    return analysis
 
 
-def _plain(value: Any) -> Any:
+def _json_value(value: Any) -> Any:
     if isinstance(value, dict):
-        return {name: _plain(each) for name, each in value.items()}
+        return {name: _json_value(each) for name, each in value.items()}
     if isinstance(value, list | tuple):
-        return [_plain(each) for each in value]
+        return [_json_value(each) for each in value]
     return None if isinstance(value, float) and not np.isfinite(value) else value

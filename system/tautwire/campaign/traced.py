@@ -1,4 +1,4 @@
-"""One recording of a campaign traced: a row with the verdict, and the whole report as JSON."""
+"""Trace of one recording of a campaign: a row with the verdict, and the whole report as JSON."""
 
 from __future__ import annotations
 
@@ -7,27 +7,27 @@ from pathlib import Path
 
 from ..recordings.recording import Recording, read_recording
 from ..report.document import trace_document
-from ..robots.reading import robot_from
+from ..robots.reading import robot_from_content
 from ..tracer import trace
 from .plan import Plan
-from .rows import FAILURE, Row
-from .run import reason_of
+from .rows import FAILURE_COLUMN, Row
+from .run import failure_reason
 
 
-def traced_row(plan: Plan, index: int, recording: Recording) -> Row:
-    """Trace a recording against the plan's robot; what that fails with is the row's reason.
+def trace_row(plan: Plan, index: int, recording: Recording) -> Row:
+    """Trace a recording with the plan's robot as the model; an error becomes the failure reason of the row.
 
     Raises OSError where the machine fails, not the trace.
     """
     alpha = plan.trace.alpha if plan.trace else 0.01
-    row = row_of_recording(index, recording.path)
+    row = recording_row(index, recording.path)
     try:
-        document = trace_document(trace(robot_from(dict(plan.content), plan.file), recording, alpha=alpha))
+        document = trace_document(trace(robot_from_content(dict(plan.content), plan.file), recording, alpha=alpha))
     except OSError:
         raise
     except Exception as error:
-        return {**row, FAILURE: reason_of(error)}
-    # How long it took is no part of what it found, and the same plan is to give the same rows.
+        return {**row, FAILURE_COLUMN: failure_reason(error)}
+    # The computing time is dropped: the same plan has to give the same rows.
     del document["seconds"]
     errors = {
         f"{quantity}_rms_{when}": document[f"error_{when}"]["fit"][f"{quantity}_rms"]
@@ -45,11 +45,11 @@ def traced_row(plan: Plan, index: int, recording: Recording) -> Row:
     }
 
 
-def row_of_recording(index: int, path: str) -> Row:
-    """A row that says which recording it is of."""
+def recording_row(index: int, path: str) -> Row:
+    """A row with the index and the name of its recording."""
     return {"index": index, "recording": Path(path).name}
 
 
-def recording_of(plan: Plan, index: int, cable_count: int) -> Recording:
+def read_traced_recording(plan: Plan, index: int, cable_count: int) -> Recording:
     """The recording of a run; raises RecordingError where the file is none."""
     return read_recording(plan.trace.recordings[index] if plan.trace else "", cable_count)

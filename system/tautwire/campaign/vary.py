@@ -1,4 +1,4 @@
-"""The table ``[vary]`` of a plan: distributions by the keys of the robot file."""
+"""The table ``[vary]`` of a plan: distributions by key path of the robot file."""
 
 from __future__ import annotations
 
@@ -6,57 +6,57 @@ import math
 from collections.abc import Iterator, Mapping
 from typing import Any
 
-from ..errors import shown
+from ..errors import format_value
 from ..robots.checked_table import CheckedTable
-from .distributions import KINDS, LINSPACE, LIST, SHAPES, Distribution, problem_of
-from .keys import KeyPathError, paths_of
+from .distributions import DISTRIBUTION_KINDS, LINSPACE, LIST, PARAMETER_NAMES, Distribution, parameter_problem
+from .keys import KeyPathError, expand_key_path
 from .plan import Input
 
 
-def inputs_of(table: CheckedTable, content: Mapping[str, Any]) -> tuple[Input, ...]:
-    """What varies by ``[vary]``; a key with ``[*]`` gives each entry of a list a draw of its own."""
-    found: list[Input] = []
-    for key, given in _flat(table.content, ""):
-        distribution = _distribution(table, key, given)
+def read_parameter_space(table: CheckedTable, content: Mapping[str, Any]) -> tuple[Input, ...]:
+    """The parameter space of ``[vary]``; a key with ``[*]`` makes each entry of a list an independent input."""
+    inputs: list[Input] = []
+    for key, entry in _flatten_keys(table.content, ""):
+        distribution = _read_distribution(table, key, entry)
         try:
-            paths = paths_of(content, key)
+            paths = expand_key_path(content, key)
         except KeyPathError as problem:
-            table.refuse(key, problem.problem, problem.mend)
+            table.refuse(key, problem.problem, problem.hint)
             continue
-        found += [Input(path, distribution) for path in paths]
-    if not found:
+        inputs += [Input(path, distribution) for path in paths]
+    if not inputs:
         table.refuse("", "is empty", 'add a key of the robot file, as in "cable.modulus" = {normal = [1e11, 2e9]}')
-    return tuple(found)
+    return tuple(inputs)
 
 
-def _flat(content: Mapping[str, Any], before: str) -> Iterator[tuple[str, Any]]:
-    """Keys with what stands there; TOML nests a table where dots are not quoted."""
+def _flatten_keys(content: Mapping[str, Any], prefix: str) -> Iterator[tuple[str, Any]]:
+    """Flat key paths with their entries; TOML nests a table where dots are not quoted."""
     for name, value in content.items():
-        key = f"{before}.{name}" if before else name
-        is_nested = isinstance(value, dict) and value and not set(value) & set(KINDS)
-        # A list is what a distribution has, if of a kind that is not known.
+        key = f"{prefix}.{name}" if prefix else name
+        is_nested = isinstance(value, dict) and value and not set(value) & set(DISTRIBUTION_KINDS)
+        # A table with a list is a distribution, possibly of an unknown kind.
         if is_nested and not any(isinstance(each, list) for each in value.values()):
-            yield from _flat(value, key)
+            yield from _flatten_keys(value, key)
         else:
             yield key, value
 
 
-def _distribution(table: CheckedTable, key: str, given: Any) -> Distribution:
-    mend = f"write one of {', '.join(KINDS)}, as in {{normal = [1e11, 2e9]}}"
-    if not isinstance(given, dict) or len(given) != 1 or next(iter(given)) not in KINDS:
-        told = "several" if isinstance(given, dict) and len(given) > 1 else shown(given)
-        table.refuse(key, f"is {told}, not one distribution", mend)
-    ((kind, numbers),) = given.items()
+def _read_distribution(table: CheckedTable, key: str, entry: Any) -> Distribution:
+    hint = f"write one of {', '.join(DISTRIBUTION_KINDS)}, as in {{normal = [1e11, 2e9]}}"
+    if not isinstance(entry, dict) or len(entry) != 1 or next(iter(entry)) not in DISTRIBUTION_KINDS:
+        actual = "several" if isinstance(entry, dict) and len(entry) > 1 else format_value(entry)
+        table.refuse(key, f"is {actual}, not one distribution", hint)
+    ((kind, numbers),) = entry.items()
     if kind == LIST and isinstance(numbers, list) and numbers and all(isinstance(each, str) for each in numbers):
         return Distribution(kind, tuple(map(float, range(len(numbers)))), tuple(numbers))
-    shape = f"{kind} = [{', '.join(SHAPES.get(kind, ('value', '...')))}]"
+    expected = f"{kind} = [{', '.join(PARAMETER_NAMES.get(kind, ('value', '...')))}]"
     if not isinstance(numbers, list) or not all(map(_is_number, numbers)):
-        table.refuse(key, f"has {shown(numbers)}, not finite numbers", f"write {shape}")
+        table.refuse(key, f"has {format_value(numbers)}, not finite numbers", f"write {expected}")
     if kind in (LIST, LINSPACE) and len(numbers) > 1_000_000:
         table.refuse(key, f"has {len(numbers)} values", "give fewer")
-    problem = problem_of(kind, numbers)
+    problem = parameter_problem(kind, numbers)
     if problem is not None:
-        table.refuse(key, problem, f"write {shape}")
+        table.refuse(key, problem, f"write {expected}")
     return Distribution(kind, tuple(map(float, numbers)))
 
 

@@ -1,4 +1,4 @@
-"""What Dask has each worker process of a local cluster do first (a preload)."""
+"""Dask preload of the worker processes of a local cluster."""
 
 from __future__ import annotations
 
@@ -7,5 +7,5 @@ from typing import Any
 
 
 def dask_setup(worker: Any) -> None:
-    """Leave Ctrl-C, which a terminal sends to all processes, to the one that has the campaign: it ends the workers."""
+    """Ignore Ctrl-C, which a terminal sends to all processes: the main process handles it and ends the workers."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)

@@ -1,1 +1,1 @@
-"""The commands of the command line, each in the file of its subject."""
+"""The command line: one module for each group of commands."""

@@ -1,4 +1,4 @@
-"""Many runs by a plan, on this machine or on a Dask cluster."""
+"""The command ``campaign``: many runs by a plan, on this machine or on a Dask cluster."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import InputError
-from .shared import AsJson, Quiet, Voice, progress_bar
+from .shared import AsJson, CommandOutput, Quiet, progress_bar
 
 if TYPE_CHECKING:
     from ..campaign.plan import Plan
 
-SCHEDULER = "Address of a Dask scheduler; a cluster of this machine's processors without."
-WORKERS = "Worker processes on this machine; one a processor by default."
+SCHEDULER_HELP = "Address of a Dask scheduler; a cluster of this machine's processors without."
+WORKERS_HELP = "Worker processes on this machine; one a processor by default."
 
 
 def campaign(
     plan_file: Annotated[Path, typer.Argument(metavar="PLAN.toml", help="What varies, and what is computed.")],
     out: Annotated[Path | None, typer.Option(metavar="FOLDER", help="Where rows, summary and page go.")] = None,
-    scheduler: Annotated[str | None, typer.Option(metavar="ADDRESS", help=SCHEDULER)] = None,
-    workers: Annotated[int | None, typer.Option(help=WORKERS, min=1, max=4096)] = None,
+    scheduler: Annotated[str | None, typer.Option(metavar="ADDRESS", help=SCHEDULER_HELP)] = None,
+    workers: Annotated[int | None, typer.Option(help=WORKERS_HELP, min=1, max=4096)] = None,
     dry_run: Annotated[bool, typer.Option("--dry-run", help="Print the rows that would be run, and run none.")] = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
@@ -34,62 +34,65 @@ def campaign(
 
     Example: tautwire campaign plan.toml --out campaign/
     """
-    from ..campaign.cluster import connected, dashboard
-    from ..campaign.dataset import done_rows, opened
+    from ..campaign.cluster import dashboard_message, dask_client
+    from ..campaign.dataset import completed_runs, open_dataset
     from ..campaign.reading import read_plan
-    from ..campaign.running import make_rows, run_count
+    from ..campaign.running import run_campaign, run_count
     from ..campaign.writing import require_libraries, write_summary
-    from ..output import refuse_inputs
+    from ..output import refuse_overwriting_inputs
     from ..tracer import processors
 
-    voice = Voice(as_json, quiet)
+    output = CommandOutput(as_json, quiet)
     plan = read_plan(plan_file)
     for note in plan.notes:
-        voice.note(note)
+        output.note(note)
     if dry_run:
-        _print_rows(plan, voice)
+        _print_rows(plan, output)
         return
     if out is None:
         raise InputError("--out", "is missing", "name a folder, as in --out campaign/, or add --dry-run")
     require_libraries(plan)
-    refuse_inputs([plan_file, Path(plan.file)], [out / name for name in ("campaign.json", "summary.json")])
-    made = 0
-    with opened(out, plan):
-        if not done_rows(out, run_count(plan)).all():
-            with connected(scheduler, workers or processors()) as client, progress_bar(voice) as tell:
-                voice.note(dashboard(client))
+    refuse_overwriting_inputs([plan_file, Path(plan.file)], [out / name for name in ("campaign.json", "summary.json")])
+    new_runs = 0
+    with open_dataset(out, plan):
+        if not completed_runs(out, run_count(plan)).all():
+            with dask_client(scheduler, workers or processors()) as client, progress_bar(output) as progress:
+                output.note(dashboard_message(client))
                 if not client.nthreads():
-                    voice.note("no worker is there yet; runs begin when one comes")
-                made = make_rows(plan, out, client, tell)
-        with progress_bar(voice) as tell:
-            tell("summing up", 0.0)
+                    output.note("no worker is there yet; runs begin when one comes")
+                new_runs = run_campaign(plan, out, client, progress)
+        with progress_bar(output) as progress:
+            progress("summing up", 0.0)
             summary = write_summary(plan, out)
-    said = f"{run_count(plan)} runs, {made} of them now, {summary['failed']} failed"
+    run_counts = f"{run_count(plan)} runs, {new_runs} of them now, {summary['failed']} failed"
     written = {"rows": out / "runs", "summary": out / "summary.json", "page": out / "index.html"}
-    voice.result([said, *written.values()], {**written, "made": made, **summary})
-    voice.next(f"open {written['page']}; pandas.read_parquet('{written['rows']}') has a row a run")
+    output.result([run_counts, *written.values()], {**written, "made": new_runs, **summary})
+    output.suggest_next(f"open {written['page']}; pandas.read_parquet('{written['rows']}') has a row a run")
 
 
-def _print_rows(plan: Plan, voice: Voice) -> None:
-    """All runs with their inputs, as CSV or JSON."""
+def _print_rows(plan: Plan, output: CommandOutput) -> None:
+    """Prints all runs with their inputs, as CSV or JSON."""
     import numpy as np
 
-    from ..campaign.running import jobs_of, run_count
+    from ..campaign.running import planned_jobs, run_count
 
-    jobs = jobs_of(plan, np.ones(run_count(plan), dtype=bool))
+    jobs = planned_jobs(plan, np.ones(run_count(plan), dtype=bool))
     if plan.trace is not None:
         recordings = plan.trace.recordings
         rows: Any = ({"index": job.index, "recording": recordings[job.index]} for job in jobs)
     else:
-        names = [("" if place < 0 else plan.paths[place].name, controller) for place, controller in plan.variants]
+        variant_names = [
+            ("" if path_index < 0 else plan.paths[path_index].name, controller)
+            for path_index, controller in plan.variants
+        ]
         rows = (
             {"index": job.index, "sample": job.sample}
-            | (dict(zip(("path", "controller"), names[job.variant], strict=True)) if plan.paths else {})
+            | (dict(zip(("path", "controller"), variant_names[job.variant], strict=True)) if plan.paths else {})
             | dict(zip(plan.keys, job.values, strict=True))
             for job in jobs
         )
-    if voice.as_json or voice.quiet:
-        voice.result((), {"rows": list(rows)})
+    if output.as_json or output.quiet:
+        output.result((), {"rows": list(rows)})
         return
     writer = csv.writer(sys.stdout, lineterminator="\n")
     for place, row in enumerate(rows):

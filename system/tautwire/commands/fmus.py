@@ -1,4 +1,4 @@
-"""FMUs built, and co-simulated."""
+"""The commands ``build``, ``simulate`` and ``fmus``: FMUs built, co-simulated and listed with their ports."""
 
 from __future__ import annotations
 
@@ -15,25 +15,27 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from ..robots.robot import slots
-from .shared import AsJson, Quiet, RobotFile, Voice, links_beside, progress_bar, robot_of
+from ..robots.robot import fmu_slots
+from .shared import AsJson, CommandOutput, Quiet, RobotFile, progress_bar, read_holdable_robot, relative_links
 
 if TYPE_CHECKING:
     from ..fmus.ports import FmuPort
 
-WIDE = 160
+NON_TERMINAL_WIDTH = 160
 PORT_COLUMNS = ("name", "causality", "unit", "start", "description")
-C_HOSTS = (
+C_HOSTS_HELP = (
     "Make FMUs that also run in importers that are not Python processes; needs a C compiler, and Python's headers "
     "and shared library (Debian: gcc, python3-dev)."
 )
-OWN_FMU = "An FMU of yours in place of ours, such as platform=mine.fmu, cable_2=... or winch_1=...; may be repeated."
+OWN_FMU_HELP = (
+    "An FMU of yours in place of ours, such as platform=mine.fmu, cable_2=... or winch_1=...; may be repeated."
+)
 
 
 def build(
     robot_file: RobotFile,
     out: Annotated[Path, typer.Option(help="Folder for the FMUs.")] = Path("build"),
-    for_c_hosts: Annotated[bool, typer.Option("--for-c-hosts", help=C_HOSTS)] = False,
+    for_c_hosts: Annotated[bool, typer.Option("--for-c-hosts", help=C_HOSTS_HELP)] = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -44,27 +46,31 @@ def build(
     Example: tautwire build robot.toml --out build/
     """
     from ..fmus.c_hosts import embeddable_python, find_compiler, make_for_c_hosts
-    from ..fmus.packaging import build_fmus, gathered
-    from ..output import folder_in_place, refuse_inputs
+    from ..fmus.packaging import build_fmus, with_user_fmus_copied
+    from ..output import atomic_folder, refuse_overwriting_inputs
     from ..runs.ssp import ssp_name, write_ssp
 
-    voice = Voice(as_json, quiet)
-    robot = robot_of(robot_file)
-    refuse_inputs([fmu.path for fmu in robot.fmus], [out / f"{slot}.fmu" for slot in slots(robot.cable_count)])
+    output = CommandOutput(as_json, quiet)
+    robot = read_holdable_robot(robot_file)
+    refuse_overwriting_inputs(
+        [fmu.path for fmu in robot.fmus], [out / f"{slot}.fmu" for slot in fmu_slots(robot.cable_count)]
+    )
     if for_c_hosts:
         embeddable_python()
         find_compiler()
-    with folder_in_place(out) as scratch, progress_bar(voice) as tell:
-        fmus = gathered(build_fmus(robot, scratch, partial(tell, "building")), scratch)
+    with atomic_folder(out) as scratch, progress_bar(output) as progress:
+        fmus = with_user_fmus_copied(build_fmus(robot, scratch, partial(progress, "building")), scratch)
         if for_c_hosts:
-            ours = sorted(fmus.parts.keys() - fmus.own.keys())
-            for place, slot in enumerate(ours):
-                tell("making them for C hosts", place / len(ours))
-                make_for_c_hosts(fmus.parts[slot])
-        system = write_ssp(robot, fmus, scratch / ssp_name(robot))
-    paths = [out / path.name for path in (*fmus.paths, system)]
-    voice.result(paths, {"fmus": {slot: out / path.name for slot, path in fmus.parts.items()}, "ssp": paths[-1]})
-    voice.next(f"tautwire fmus {robot_file}, for their ports; or load {paths[-1]} in your tool")
+            project_slots = sorted(fmus.by_component.keys() - fmus.user_start_values.keys())
+            for index, slot in enumerate(project_slots):
+                progress("making them for C hosts", index / len(project_slots))
+                make_for_c_hosts(fmus.by_component[slot])
+        archive = write_ssp(robot, fmus, scratch / ssp_name(robot))
+    paths = [out / path.name for path in (*fmus.paths, archive)]
+    output.result(
+        paths, {"fmus": {slot: out / path.name for slot, path in fmus.by_component.items()}, "ssp": paths[-1]}
+    )
+    output.suggest_next(f"tautwire fmus {robot_file}, for their ports; or load {paths[-1]} in your tool")
 
 
 def simulate(
@@ -77,7 +83,7 @@ def simulate(
     ] = None,
     until: Annotated[float | None, typer.Option(help="Stop at this time, s.")] = None,
     patience: Annotated[float, typer.Option(help="An FMU in the same call for so long hangs, s.")] = 60.0,
-    fmu: Annotated[list[str] | None, typer.Option(metavar="SLOT=FILE", help=OWN_FMU)] = None,
+    fmu: Annotated[list[str] | None, typer.Option(metavar="SLOT=FILE", help=OWN_FMU_HELP)] = None,
     report: Annotated[Path | None, typer.Option(metavar="PAGE.html", help="The run as a page, in 3D.")] = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
@@ -88,41 +94,52 @@ def simulate(
 
     Example: tautwire simulate robot.toml --speeds recording.csv --out result.csv --report run.html
     """
-    from ..fmus.slots import check_own_fmus, lacking_ports, own_fmus
-    from ..output import refuse_inputs, refuse_same
-    from ..report.overview import Both, Overview
-    from ..report.run_in_place import page_in_place
-    from ..runs.asked import require_numbers
-    from ..runs.result_file import result_in_place
+    from ..fmus.slots import check_user_fmus, missing_user_fmu_ports, parse_user_fmus
+    from ..output import refuse_overwriting_inputs, refuse_same_output
+    from ..report.overview import RecorderPair, RunOverview
+    from ..report.run_in_place import atomic_run_page
+    from ..runs.asked import validate_numbers
+    from ..runs.result_file import open_result_file
     from ..runs.simulation import simulate_recording
     from ..runs.wiring import result_columns
 
-    require_numbers("--", step, tolerance, patience, until)
-    voice = Voice(as_json, quiet)
-    robot = robot_of(robot_file)
-    robot = robot.with_fmus(own_fmus(fmu or [], robot.cable_count))
-    refuse_inputs([robot_file, speeds, *(own.path for own in robot.fmus)], [out, *([report] if report else [])])
-    refuse_same(out, report)
-    check_own_fmus(robot)
-    lacking = lacking_ports({own.slot: own.path for own in robot.fmus}, robot.cable_count)
-    columns = result_columns(robot.cable_count, robot.winch_numbers, lacking)
-    overview, links = Overview(), {} if report is None else links_beside(report, robot_file, out)
+    validate_numbers("--", step, tolerance, patience, until)
+    output = CommandOutput(as_json, quiet)
+    robot = read_holdable_robot(robot_file)
+    robot = robot.with_fmus(parse_user_fmus(fmu or [], robot.cable_count))
+    refuse_overwriting_inputs(
+        [robot_file, speeds, *(own.path for own in robot.fmus)], [out, *([report] if report else [])]
+    )
+    refuse_same_output(out, report)
+    check_user_fmus(robot)
+    missing_ports = missing_user_fmu_ports({own.slot: own.path for own in robot.fmus}, robot.cable_count)
+    columns = result_columns(robot.cable_count, robot.winch_numbers, missing_ports)
+    overview, links = RunOverview(), {} if report is None else relative_links(report, robot_file, out)
     with (
-        page_in_place(report, robot, columns, overview, speeds, links) as finish,
-        result_in_place(out, columns) as result,
-        progress_bar(voice) as tell,
+        atomic_run_page(report, robot, columns, overview, speeds, links) as write_page,
+        open_result_file(out, columns) as result,
+        progress_bar(output) as progress,
     ):
-        recorder = result if report is None else Both(result, overview)
-        account, notes = simulate_recording(robot, speeds, recorder, step, tolerance, until, tell, patience)
-        finish(account, notes)
+        recorder = result if report is None else RecorderPair(result, overview)
+        statistics, notes = simulate_recording(robot, speeds, recorder, step, tolerance, until, progress, patience)
+        write_page(statistics, notes)
     for note in notes:
-        voice.note(note)
-    estimated = "" if account.error is None else f", estimated error {account.error:.2g} m"
-    said = [f"{out}: {account.steps} steps, {account.redos} redos, coupling made {account.made:.2g} J{estimated}"]
+        output.note(note)
+    error_text = "" if statistics.estimated_error is None else f", estimated error {statistics.estimated_error:.2g} m"
+    summary_lines = [
+        f"{out}: {statistics.steps} steps, {statistics.iterations} redos, coupling made {statistics.energy_residual:.2g} J{error_text}"
+    ]
     written = {"result": out} | ({"report": report} if report else {})
-    books = {"steps": account.steps, "redos": account.redos, "energy_made": account.made, "error": account.error}
-    voice.result([*said, *([report] if report else [])], {**written, **books, "notes": notes})
-    voice.next(f"tautwire trace {robot_file} {speeds} --out report/, if positions or tensions were measured too")
+    statistics_record = {
+        "steps": statistics.steps,
+        "redos": statistics.iterations,
+        "energy_made": statistics.energy_residual,
+        "error": statistics.estimated_error,
+    }
+    output.result([*summary_lines, *([report] if report else [])], {**written, **statistics_record, "notes": notes})
+    output.suggest_next(
+        f"tautwire trace {robot_file} {speeds} --out report/, if positions or tensions were measured too"
+    )
 
 
 def fmus(robot_file: RobotFile, as_json: AsJson = False, quiet: Quiet = False) -> None:
@@ -133,34 +150,34 @@ def fmus(robot_file: RobotFile, as_json: AsJson = False, quiet: Quiet = False) -
     from ..fmus.packaging import build_fmus
     from ..fmus.ports import fmu_ports
 
-    voice = Voice(as_json, quiet)
-    robot = robot_of(robot_file)
-    with TemporaryDirectory(prefix="tautwire-fmus-") as folder, progress_bar(voice) as tell:
-        paths = build_fmus(robot, Path(folder), partial(tell, "building")).parts
+    output = CommandOutput(as_json, quiet)
+    robot = read_holdable_robot(robot_file)
+    with TemporaryDirectory(prefix="tautwire-fmus-") as folder, progress_bar(output) as progress:
+        paths = build_fmus(robot, Path(folder), partial(progress, "building")).by_component
         ports = {slot: fmu_ports(path) for slot, path in paths.items()}
-    listed = [{"fmu": slot, "ports": [asdict(port) for port in shown]} for slot, shown in ports.items()]
-    voice.result((), {"robot": robot.name, "fmus": listed})
+    listing = [{"fmu": slot, "ports": [asdict(port) for port in slot_ports]} for slot, slot_ports in ports.items()]
+    output.result((), {"robot": robot.name, "fmus": listing})
     if as_json or quiet:
         return
-    # A table that is cut to the width of no terminal helps nobody.
-    console = Console(width=None if sys.stdout.isatty() else WIDE)
+    # Without a terminal rich would cut tables to a default width.
+    console = Console(width=None if sys.stdout.isatty() else NON_TERMINAL_WIDTH)
     for table in port_tables(ports):
         console.print(table)
-    voice.next(f"tautwire build {robot_file} --out build/")
+    output.suggest_next(f"tautwire build {robot_file} --out build/")
 
 
 def port_tables(ports: Mapping[str, Sequence[FmuPort]]) -> list[Table]:
-    """A table for the ports of each FMU; one for all FMUs that show the same ones, then with the first one's starts."""
-    from ..fmus.ports import vectors_together
+    """Tables of the ports of each FMU; FMUs with the same ports share one, with the start values of the first."""
+    from ..fmus.ports import group_vectors
 
-    alike: dict[tuple[str, ...], list[str]] = {}
-    for slot, shown in ports.items():
-        alike.setdefault(tuple(port.name for port in shown), []).append(slot)
+    slots_by_port_names: dict[tuple[str, ...], list[str]] = {}
+    for slot, slot_ports in ports.items():
+        slots_by_port_names.setdefault(tuple(port.name for port in slot_ports), []).append(slot)
     tables = []
-    for names in alike.values():
+    for names in slots_by_port_names.values():
         title = ", ".join(f"{slot}.fmu" for slot in names) + (", starts of the first" if len(names) > 1 else "")
         table = Table(*PORT_COLUMNS, title=title, title_justify="left", title_style="bold", box=None)
-        for port in vectors_together(ports[names[0]]):
+        for port in group_vectors(ports[names[0]]):
             start = "" if port.start is None else port.start
             table.add_row(port.name, port.causality, port.unit or "", start, Text(port.description))
         tables.append(table)

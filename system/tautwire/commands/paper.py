@@ -1,4 +1,4 @@
-"""The paper that the project implements, claim by claim."""
+"""The command ``paper``: reproduction of the paper that the project implements, claim by claim."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from .shared import AsJson, Quiet, Voice, progress_bar
+from .shared import AsJson, CommandOutput, Quiet, progress_bar
 
 
 def paper(
@@ -21,14 +21,14 @@ def paper(
 
     Example: tautwire paper --out paper/
     """
-    from ..output import folder_in_place
+    from ..output import atomic_folder
     from ..paper import write_paper
 
-    voice = Voice(as_json, quiet)
-    with folder_in_place(out) as scratch, progress_bar(voice) as tell:
-        found = write_paper(scratch, tell)
-    counts = dict(found.counts)
-    voice.note(", ".join(f"{count} {verdict}" for verdict, count in counts.items()))
+    output = CommandOutput(as_json, quiet)
+    with atomic_folder(out) as scratch, progress_bar(output) as progress:
+        result = write_paper(scratch, progress)
+    counts = dict(result.counts)
+    output.note(", ".join(f"{count} {verdict}" for verdict, count in counts.items()))
     paths = [out / "claims.html", out / "claims.json"]
-    voice.result(paths, {"claims": len(found.entries), "verdicts": counts, "page": paths[0], "ledger": paths[1]})
-    voice.next(f"open {paths[0]} in a browser")
+    output.result(paths, {"claims": len(result.entries), "verdicts": counts, "page": paths[0], "ledger": paths[1]})
+    output.suggest_next(f"open {paths[0]} in a browser")

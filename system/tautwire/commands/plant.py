@@ -1,4 +1,4 @@
-"""The linear plant, and where the cables hold the platform."""
+"""The commands ``linearise`` and ``workspace``: the linear plant, and the wrench-feasible workspace."""
 
 from __future__ import annotations
 
@@ -17,14 +17,14 @@ from ..robots.reading import read_robot
 from ..robots.robot import Robot
 from .shared import (
     AsJson,
+    CommandOutput,
     Quiet,
     RobotFile,
-    Voice,
-    links_beside,
-    position_of,
+    note_unused_tables,
+    parse_position,
     progress_bar,
-    robot_of,
-    say_what_is_left_out,
+    read_holdable_robot,
+    relative_links,
 )
 
 if TYPE_CHECKING:
@@ -52,30 +52,30 @@ def linearise(
     """
     from ..linear import linearise as linearised
     from ..linear import model_document
-    from ..output import refuse_inputs, refuse_same
+    from ..output import refuse_overwriting_inputs, refuse_same_output
 
-    require_out(out, as_json, "model.json")
-    refuse_inputs([robot_file], [path for path in (out, report) if path])
-    refuse_same(out, report)
-    voice = Voice(as_json, quiet)
-    robot = robot_of(robot_file)
+    require_output(out, as_json, "model.json")
+    refuse_overwriting_inputs([robot_file], [path for path in (out, report) if path])
+    refuse_same_output(out, report)
+    output = CommandOutput(as_json, quiet)
+    robot = read_holdable_robot(robot_file)
     try:
-        with progress_bar(voice) as tell:
-            tell("linearising", 0.0)
-            plant = linearised(robot, None if at is None else position_of(at))
+        with progress_bar(output) as progress:
+            progress("linearising", 0.0)
+            plant = linearised(robot, None if at is None else parse_position(at))
     except UnreachableError as error:
         raise UnreachableError("--at", error.position, error.cable, error.tension, error.reason) from error
     document = model_document(plant)
     written = _write_model(document, out, robot, plant, report, robot_file)
-    say_what_is_left_out(robot, voice)
+    note_unused_tables(robot, output)
     for note in plant.notes:
-        voice.note(note)
-    voice.result([*_modes_told(plant), *written.values()], {**written, **document, "notes": plant.notes})
+        output.note(note)
+    output.result([*_mode_lines(plant), *written.values()], {**written, **document, "notes": plant.notes})
 
 
-def _modes_told(plant: LinearPlant) -> list[str]:
+def _mode_lines(plant: LinearPlant) -> list[str]:
     pairs = zip(plant.modes.frequencies, plant.modes.damping_ratios, strict=True)
-    return [f"mode {i}: {hertz:.4f} Hz, damping ratio {ratio:.5f}" for i, (hertz, ratio) in enumerate(pairs, 1)]
+    return [f"mode {i}: {frequency:.4f} Hz, damping ratio {ratio:.5f}" for i, (frequency, ratio) in enumerate(pairs, 1)]
 
 
 def _write_model(
@@ -86,18 +86,18 @@ def _write_model(
     report: Path | None,
     robot_file: Path,
 ) -> dict[str, Path]:
-    """Write the model and its page where they are asked for, both or none; returns what was written, by name."""
-    from ..output import file_in_place
+    """Writes the model and its page as requested, both or neither; returns the written files by name."""
+    from ..output import atomic_file
 
-    with ExitStack() as both:
+    with ExitStack() as stack:
         if out is not None:
-            scratch = both.enter_context(file_in_place(out))
+            scratch = stack.enter_context(atomic_file(out))
             scratch.write_text(json.dumps(document, indent=1), encoding="utf-8")
         if report is not None:
             from ..report.modes_page import modes_page
 
-            links = links_beside(report, robot_file, *([out] if out else []))
-            page = both.enter_context(file_in_place(report))
+            links = relative_links(report, robot_file, *([out] if out else []))
+            page = stack.enter_context(atomic_file(report))
             page.write_text(modes_page(robot, plant, links), encoding="utf-8")
     return ({"model": out} if out else {}) | ({"report": report} if report else {})
 
@@ -123,49 +123,52 @@ def workspace(
 
     Example: tautwire workspace robot.toml --out workspace.csv --plot workspace.png
     """
-    from ..output import refuse_inputs, refuse_same
+    from ..output import refuse_overwriting_inputs, refuse_same_output
     from ..statics.workspace import wrench_feasible_workspace
-    from ..statics.workspace_figure import checked_format
+    from ..statics.workspace_figure import require_figure_format
 
-    require_out(out, as_json, "workspace.csv")
-    refuse_inputs([robot_file], [path for path in (out, plot) if path])
-    refuse_same(out, plot, "--plot")
+    require_output(out, as_json, "workspace.csv")
+    refuse_overwriting_inputs([robot_file], [path for path in (out, plot) if path])
+    refuse_same_output(out, plot, "--plot")
     if plot is not None:
-        checked_format(plot)
-    voice = Voice(as_json, quiet)
+        require_figure_format(plot)
+    output = CommandOutput(as_json, quiet)
     robot = read_robot(robot_file)
-    least = None if lower is None else position_of(lower, "--lower")
-    most = None if upper is None else position_of(upper, "--upper")
-    with progress_bar(voice) as tell:
-        ahead = partial(tell, "looking where the cables hold it")
-        found = wrench_feasible_workspace(robot, least, most, spacing, acceleration, ahead)
-    written = _write_workspace(found, out, robot, plot)
-    counts = {"feasible": int(found.feasible.sum()), "positions": int(found.feasible.size)}
-    said = "{feasible} of {positions} positions are wrench-feasible".format_map(counts)
-    # What no file holds, a machine gets here.
-    voice.result([said, *written.values()], {**written, **counts, **({} if out else {"rows": _rows(found)})})
+    lower_corner = None if lower is None else parse_position(lower, "--lower")
+    upper_corner = None if upper is None else parse_position(upper, "--upper")
+    with progress_bar(output) as progress:
+        grid_progress = partial(progress, "looking where the cables hold it")
+        feasibility = wrench_feasible_workspace(robot, lower_corner, upper_corner, spacing, acceleration, grid_progress)
+    written = _write_workspace(feasibility, out, robot, plot)
+    counts = {"feasible": int(feasibility.feasible.sum()), "positions": int(feasibility.feasible.size)}
+    summary_line = "{feasible} of {positions} positions are wrench-feasible".format_map(counts)
+    # Without a table file, JSON output holds the rows.
+    output.result(
+        [summary_line, *written.values()],
+        {**written, **counts, **({} if out else {"rows": _workspace_records(feasibility)})},
+    )
 
 
-def _write_workspace(found: Workspace, out: Path | None, robot: Robot, plot: Path | None) -> dict[str, Path]:
-    """Write the table and the figure where they are asked for, both or none; returns what was written, by name."""
-    from ..output import file_in_place
+def _write_workspace(feasibility: Workspace, out: Path | None, robot: Robot, plot: Path | None) -> dict[str, Path]:
+    """Writes the table and the figure as requested, both or neither; returns the written files by name."""
+    from ..output import atomic_file
     from ..statics.workspace_figure import workspace_figure
 
-    with ExitStack() as both:
+    with ExitStack() as stack:
         if out is not None:
-            found.frame().to_csv(both.enter_context(file_in_place(out)), index=False, float_format="%.10g")
+            feasibility.frame().to_csv(stack.enter_context(atomic_file(out)), index=False, float_format="%.10g")
         if plot is not None:
-            workspace_figure(robot, found).savefig(both.enter_context(file_in_place(plot)))
+            workspace_figure(robot, feasibility).savefig(stack.enter_context(atomic_file(plot)))
     return ({"workspace": out} if out else {}) | ({"plot": plot} if plot else {})
 
 
-def require_out(out: Path | None, as_json: bool, name: str) -> None:
-    """Raises InputError where the result would go nowhere."""
+def require_output(out: Path | None, as_json: bool, name: str) -> None:
+    """Raises InputError where neither an output file nor JSON output is requested."""
     if out is None and not as_json:
         raise InputError("--out", "is missing", f"name a file, as in --out {name}, or add --json")
 
 
-def _rows(found: Workspace) -> list[dict[str, float | None]]:
-    """A record a position, None where there is no number."""
-    records = found.frame().to_dict("records")
+def _workspace_records(feasibility: Workspace) -> list[dict[str, float | None]]:
+    """One record for each position; None for a number that is not finite."""
+    records = feasibility.frame().to_dict("records")
     return [{str(key): value if math.isfinite(value) else None for key, value in record.items()} for record in records]

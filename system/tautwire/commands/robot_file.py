@@ -1,4 +1,4 @@
-"""Robot files: a new one, and all that is wrong with one."""
+"""The commands ``new`` and ``check``: a robot file to begin with, and a check of robot file and recording."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import Annotated
 import typer
 
 from ..errors import InputError
-from .shared import AsJson, Quiet, RobotFile, Voice, progress_bar
+from .shared import AsJson, CommandOutput, Quiet, RobotFile, progress_bar
 
-SUFFIX = ".toml"
-WRONG_INPUT = 2
+ROBOT_FILE_SUFFIX = ".toml"
+EXIT_WRONG_INPUT = 2
 
 
 def new(
@@ -28,20 +28,20 @@ def new(
 
     Example: tautwire new hall --cables 4
     """
-    from ..output import file_in_place
+    from ..output import atomic_file
     from ..robots.template import new_robot_text
 
-    voice = Voice(as_json, quiet)
-    target = Path(name if name.endswith(SUFFIX) else f"{name}{SUFFIX}")
-    robot = target.name.removesuffix(SUFFIX)
-    if not robot.strip() or not robot.isprintable():
-        raise InputError("NAME", f"{robot!r} is no name", "give one line of printable text, such as hall")
+    output = CommandOutput(as_json, quiet)
+    target = Path(name if name.endswith(ROBOT_FILE_SUFFIX) else f"{name}{ROBOT_FILE_SUFFIX}")
+    robot_name = target.name.removesuffix(ROBOT_FILE_SUFFIX)
+    if not robot_name.strip() or not robot_name.isprintable():
+        raise InputError("NAME", f"{robot_name!r} is no name", "give one line of printable text, such as hall")
     if target.exists() and not overwrite:
         raise InputError(str(target), "is there already", "choose another name, or add --overwrite")
-    with file_in_place(target) as scratch:
-        scratch.write_text(new_robot_text(robot, cables), encoding="utf-8")
-    voice.result([target], {"robot": target})
-    voice.next(f"put your robot's numbers into {target}, then tautwire check {target}")
+    with atomic_file(target) as scratch:
+        scratch.write_text(new_robot_text(robot_name, cables), encoding="utf-8")
+    output.result([target], {"robot": target})
+    output.suggest_next(f"put your robot's numbers into {target}, then tautwire check {target}")
 
 
 def check(
@@ -61,23 +61,25 @@ def check(
     """
     from ..checking import check_files
 
-    voice = Voice(as_json, quiet)
-    with progress_bar(voice) as tell:
-        checked = check_files(robot_file, recording, tell)
-    problems = [asdict(problem) for problem in checked.problems]
-    for note in () if as_json else checked.notes:
-        voice.note(note)
-    # What is wrong is said however quiet it is to be.
-    Voice(as_json).result(checked.problems, {"problems": problems, "notes": checked.notes})
-    if checked.problems:
-        files = len({problem.file for problem in checked.problems})
-        voice.next(f"mend {_count(len(problems), 'problem')} in {_count(files, 'file')}, then run this again")
-        raise typer.Exit(WRONG_INPUT)
+    output = CommandOutput(as_json, quiet)
+    with progress_bar(output) as progress:
+        result = check_files(robot_file, recording, progress)
+    problems = [asdict(problem) for problem in result.problems]
+    for note in () if as_json else result.notes:
+        output.note(note)
+    # Problems are printed even with --quiet.
+    CommandOutput(as_json).result(result.problems, {"problems": problems, "notes": result.notes})
+    if result.problems:
+        file_count = len({problem.file for problem in result.problems})
+        output.suggest_next(
+            f"mend {_count_text(len(problems), 'problem')} in {_count_text(file_count, 'file')}, then run this again"
+        )
+        raise typer.Exit(EXIT_WRONG_INPUT)
     if not as_json:
-        voice.result([f"{file}: nothing is wrong" for file in (robot_file, recording) if file], {})
-    commands = f"trace {robot_file} {recording} --out report/" if recording else f"build {robot_file} --out build/"
-    voice.next(f"tautwire {commands}")
+        output.result([f"{file}: nothing is wrong" for file in (robot_file, recording) if file], {})
+    next_command = f"trace {robot_file} {recording} --out report/" if recording else f"build {robot_file} --out build/"
+    output.suggest_next(f"tautwire {next_command}")
 
 
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}" + ("" if number == 1 else "s")
+def _count_text(count: int, noun: str) -> str:
+    return f"{count} {noun}" + ("" if count == 1 else "s")

@@ -1,4 +1,4 @@
-"""What commands share: the robot file, a position, how they speak, a bar that names what is being done."""
+"""Console of the commands: common arguments and options, output as lines or JSON, and a progress bar."""
 
 from __future__ import annotations
 
@@ -33,14 +33,14 @@ Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but wh
 
 
 @dataclass(frozen=True)
-class Voice:
-    """How a command speaks: results on standard output, all else on standard error; ``quiet`` leaves out both."""
+class CommandOutput:
+    """Output of a command: results on standard output, notes on standard error; ``quiet`` suppresses both."""
 
     as_json: bool = False
     quiet: bool = False
 
     def result(self, lines: Iterable[object], document: Mapping[str, object]) -> None:
-        """What came out, as lines or as one JSON object."""
+        """Prints the result, as lines or as one JSON object."""
         if self.as_json:
             print(json.dumps(document, default=str))
         elif not self.quiet:
@@ -48,21 +48,21 @@ class Voice:
                 print(line)
 
     def note(self, text: str) -> None:
-        """What the user should know."""
+        """Prints a remark for the user."""
         if not self.quiet:
             print(text, file=sys.stderr)
 
-    def next(self, text: str) -> None:
-        """What to do next; not for machines."""
+    def suggest_next(self, text: str) -> None:
+        """Prints what to do next; not with JSON output."""
         if not self.as_json:
             self.note(f"next: {text}")
 
 
-ALOUD = Voice()
+DEFAULT_OUTPUT = CommandOutput()
 
 
-def robot_of(path: Path) -> Robot:
-    """Read a robot file and refuse a start that its cables cannot hold."""
+def read_holdable_robot(path: Path) -> Robot:
+    """Reads a robot file; raises UnreachableError where its cables cannot hold the platform at the start."""
     from ..statics.equilibrium import static_tensions
 
     robot = read_robot(path)
@@ -74,37 +74,39 @@ def robot_of(path: Path) -> Robot:
     return robot
 
 
-def say_what_is_left_out(robot: Robot, voice: Voice = ALOUD) -> None:
-    """Which tables of the robot file a command had no use for."""
+def note_unused_tables(robot: Robot, output: CommandOutput = DEFAULT_OUTPUT) -> None:
+    """Notes which tables of the robot file a command does not use."""
     tables = [name for name, content in (("[winch]", robot.winch), ("[fmu]", robot.fmus)) if content]
     if tables:
-        said = "no part in this: winch speeds are those of the drums' encoders, and all components the project's own"
-        voice.note(f"{' and '.join(tables)}: {said}")
+        explanation = (
+            "no part in this: winch speeds are those of the drums' encoders, and all components the project's own"
+        )
+        output.note(f"{' and '.join(tables)}: {explanation}")
 
 
-def links_beside(page: Path, *files: Path) -> dict[str, str]:
-    """Relative paths from a page to files, by their names."""
+def relative_links(page: Path, *files: Path) -> dict[str, str]:
+    """Relative paths from a page to files, by file name."""
     folder = page.absolute().parent
     return {file.name: Path(os.path.relpath(file.absolute(), folder)).as_posix() for file in files}
 
 
-def position_of(text: str, option: str = "--at") -> tuple[float, float, float]:
-    """Three finite numbers with commas; raises InputError that names the option."""
-    mend = f"give three numbers in m, such as {option} 10,5.5,4"
+def parse_position(text: str, option: str = "--at") -> tuple[float, float, float]:
+    """Parses three finite numbers separated by commas; raises InputError that names the option."""
+    hint = f"give three numbers in m, such as {option} 10,5.5,4"
     try:
         x, y, z = (float(part) for part in text.split(","))
     except ValueError:
-        raise InputError(option, f"{text!r} is not a position", mend) from None
+        raise InputError(option, f"{text!r} is not a position", hint) from None
     if not all(map(math.isfinite, (x, y, z))):
-        raise InputError(option, f"{text!r} is not a position", mend)
+        raise InputError(option, f"{text!r} is not a position", hint)
     return x, y, z
 
 
 @contextmanager
-def progress_bar(voice: Voice = ALOUD) -> Iterator[Callable[[str, float], None]]:
-    """A bar on standard error that names what is being done; none where that is no terminal, or all is to be quiet."""
+def progress_bar(output: CommandOutput = DEFAULT_OUTPUT) -> Iterator[Callable[[str, float], None]]:
+    """Context manager for a progress bar on standard error; none where that is no terminal, or with ``quiet``."""
     console = Console(stderr=True)
-    if voice.quiet or not console.is_terminal:
+    if output.quiet or not console.is_terminal:
         yield lambda what, done: None
         return
     columns = (
@@ -114,16 +116,16 @@ def progress_bar(voice: Voice = ALOUD) -> Iterator[Callable[[str, float], None]]
         TimeElapsedColumn(),
         TimeRemainingColumn(),
     )
-    # A campaign's runs may come minutes apart; what is left of time is told from the last hour.
+    # A campaign's runs may come minutes apart; the remaining time is estimated from the last hour.
     with Progress(*columns, console=console, transient=True, speed_estimate_period=3600.0) as bar:
         task = bar.add_task("", total=1.0)
-        current = ""
+        current_activity = ""
 
-        def tell(what: str, done: float) -> None:
-            nonlocal current
-            if what != current:
-                bar.reset(task, description=what)
-                current = what
-            bar.update(task, completed=done)
+        def report_progress(activity: str, fraction: float) -> None:
+            nonlocal current_activity
+            if activity != current_activity:
+                bar.reset(task, description=activity)
+                current_activity = activity
+            bar.update(task, completed=fraction)
 
-        yield tell
+        yield report_progress

@@ -1,4 +1,4 @@
-"""What a model lacks, and the motion that would tell."""
+"""The commands ``trace`` and ``excite``: identification of missing effects, and the design of excitation for it."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ import typer
 from rich.console import Console
 
 from ..errors import InputError
-from .material import judge_rope
-from .shared import AsJson, Quiet, RobotFile, Voice, progress_bar, robot_of, say_what_is_left_out
+from .material import judge_rope_material
+from .shared import AsJson, CommandOutput, Quiet, RobotFile, note_unused_tables, progress_bar, read_holdable_robot
 
 
 def trace(
@@ -33,34 +33,36 @@ def trace(
     Example: tautwire trace robot.toml fit.csv --check check.csv --out report/
     """
     from ..materials.table import is_material_table
-    from ..output import folder_in_place, refuse_inputs
+    from ..output import atomic_folder, refuse_overwriting_inputs
     from ..recordings.recording import read_recording
     from ..report import trace_document, trace_table, write_report
     from ..tracer import processors
     from ..tracer import trace as traced
-    from ..tracer.asked import rate_of
+    from ..tracer.asked import validated_false_alarm_rate
 
-    rate_of("--alpha", alpha)
-    voice = Voice(as_json, quiet)
+    validated_false_alarm_rate("--alpha", alpha)
+    output = CommandOutput(as_json, quiet)
     if is_material_table(fit):
         if check is not None:
             raise InputError("--check", f"{fit} is a dynamic test of a rope", "leave it out: its rows judge each other")
-        judge_rope(fit, robot_file, out, alpha, voice)
+        judge_rope_material(fit, robot_file, out, alpha, output)
         return
-    robot = robot_of(robot_file)
+    robot = read_holdable_robot(robot_file)
     recording = read_recording(fit, robot.cable_count)
-    judging = None if check is None else read_recording(check, robot.cable_count)
-    made = ["robot.toml", "report.json", "index.html"]
-    refuse_inputs([robot_file, fit, *([check] if check else [])], [out / name for name in made])
-    with folder_in_place(out) as scratch, progress_bar(voice) as tell:
-        result = traced(robot, recording, judging, tell, alpha, processors())
-        tell("writing the report", 0.0)
-        write_report(result, scratch)
-    say_what_is_left_out(robot, voice)
+    check_recording = None if check is None else read_recording(check, robot.cable_count)
+    file_names = ["robot.toml", "report.json", "index.html"]
+    refuse_overwriting_inputs([robot_file, fit, *([check] if check else [])], [out / name for name in file_names])
+    with atomic_folder(out) as scratch, progress_bar(output) as progress:
+        trace_result = traced(robot, recording, check_recording, progress, alpha, processors())
+        progress("writing the report", 0.0)
+        write_report(trace_result, scratch)
+    note_unused_tables(robot, output)
     if not (quiet or as_json):
-        Console().print(trace_table(result))
-    voice.result([out / "index.html"], {"folder": out, **trace_document(result)})
-    voice.next(f"open {out / 'index.html'}; {out / 'robot.toml'} is the robot as found, its FMUs are beside it")
+        Console().print(trace_table(trace_result))
+    output.result([out / "index.html"], {"folder": out, **trace_document(trace_result)})
+    output.suggest_next(
+        f"open {out / 'index.html'}; {out / 'robot.toml'} is the robot as found, its FMUs are beside it"
+    )
 
 
 def excite(
@@ -83,22 +85,26 @@ def excite(
     Example: tautwire excite robot.toml --effects damping,relaxation,hysteresis --out program.csv
     """
     from ..excitation import default_limits
-    from ..excitation import excite as excited
-    from ..excitation.limits import named_effects
-    from ..output import file_in_place, refuse_inputs
+    from ..excitation import design_excitation as excited
+    from ..excitation.limits import effects_by_name
+    from ..output import atomic_file, refuse_overwriting_inputs
 
-    voice = Voice(as_json, quiet)
-    refuse_inputs([robot_file], [out])
-    robot = robot_of(robot_file)
-    chosen = named_effects(robot, effects)
-    with progress_bar(voice) as tell:
-        found = excited(robot, chosen, default_limits(robot, speed, reach), duration, 1.0 / rate, programs, seed, tell)
-    with file_in_place(out) as scratch:
-        found.frame().to_csv(scratch, index=False, float_format="%.10g")
-    pairs = [(pair.effect.label(robot), pair.other.label(robot), pair.nats) for pair in found.pairs]
+    output = CommandOutput(as_json, quiet)
+    refuse_overwriting_inputs([robot_file], [out])
+    robot = read_holdable_robot(robot_file)
+    selected_effects = effects_by_name(robot, effects)
+    with progress_bar(output) as progress:
+        excitation = excited(
+            robot, selected_effects, default_limits(robot, speed, reach), duration, 1.0 / rate, programs, seed, progress
+        )
+    with atomic_file(out) as scratch:
+        excitation.frame().to_csv(scratch, index=False, float_format="%.10g")
+    pairs = [(pair.effect.label(robot), pair.other.label(robot), pair.nats) for pair in excitation.pairs]
     lines = [f"{effect}, and {other} in its place: {nats:.3g} nats apart" for effect, other, nats in pairs[:5]]
-    median = f"closest pair of the median program: {found.typical:.3g} nats"
-    named = [{"effect": effect, "other": other, "nats": nats} for effect, other, nats in pairs]
-    voice.result([*lines, median, out], {"program": out, "pairs": named, "median": found.typical})
-    tracing = f"tautwire trace {robot_file} RECORDING.csv --out report/"
-    voice.next(f"run it on the robot, record positions and tensions, then {tracing}")
+    median_line = f"closest pair of the median program: {excitation.median_separation:.3g} nats"
+    pair_records = [{"effect": effect, "other": other, "nats": nats} for effect, other, nats in pairs]
+    output.result(
+        [*lines, median_line, out], {"program": out, "pairs": pair_records, "median": excitation.median_separation}
+    )
+    trace_command = f"tautwire trace {robot_file} RECORDING.csv --out report/"
+    output.suggest_next(f"run it on the robot, record positions and tensions, then {trace_command}")

@@ -1,4 +1,4 @@
-"""Sampled controllers that hold the platform on a path, with limits, no wind-up and one sample for computing."""
+"""Sampled controllers for path tracking, with limits, anti-windup and one sample of computing delay."""
 
 from .aim import POSITION_NOISE, TENSION_NOISE, ControlAim, measurement_noise
 from .closed_loop import (

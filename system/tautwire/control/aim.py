@@ -1,4 +1,4 @@
-"""What a controller weighs, what bounds it, and what it is told of its sensors."""
+"""Design aims of a controller: weights, limits and sensor noise."""
 
 from __future__ import annotations
 
@@ -7,18 +7,18 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arguments import number_of
+from ..arguments import validate_number
 from ..errors import ArgumentError
 from ..robots.checked_table import NumberRule
 from ..robots.robot import Robot
 
 Array = NDArray[np.float64]
 
-# What a robot file that declares no sensors is taken to have.
+# Assumed if the robot file declares no sensors.
 POSITION_NOISE = 1e-4
 TENSION_NOISE = 1.0
 
-RULES = {
+AIM_RULES = {
     "period": NumberRule("the sample period", "s", positive=True),
     "position": NumberRule("a deviation of position", "m", positive=True),
     "tension": NumberRule("a share of the mean static tension", "", positive=True),
@@ -33,28 +33,28 @@ RULES = {
     "highest_tension": NumberRule("the largest tension", "N", positive=True),
     "yield_time": NumberRule("a time", "s", positive=True),
 }
-ENDLESS = ("speed_limit", "acceleration_limit", "highest_tension")
-OPTIONAL = ("lowest_tension", "highest_tension")
+UNBOUNDED_KEYS = ("speed_limit", "acceleration_limit", "highest_tension")
+OPTIONAL_KEYS = ("lowest_tension", "highest_tension")
 
 
 @dataclass(frozen=True)
 class ControlAim:
-    """What the controller weighs; each number is the size of a deviation that costs as much as the others.
+    """Weights and limits of a controller; weights are deviations of equal cost (Bryson's rule).
 
     ``period`` in s; ``position`` in m; ``tension`` as a share of the mean static tension; ``winch_speed`` in
-    m/s and ``winch_acceleration`` in m/s^2, beyond the ideal ones; ``integral_time`` in s, over which a
-    lasting error of position grows that important.
+    m/s and ``winch_acceleration`` in m/s^2, beyond the ideal ones; ``integral_time`` in s, after which a
+    lasting error of position costs as much.
 
     The observer expects velocity to wander by ``acceleration_disturbance`` (m/s^2) and rope by
     ``speed_disturbance`` (m/s) within a second. A larger ``speed_disturbance`` makes the loop more robust
     against a wrong modulus or payload, a smaller one calmer under noise (loop transfer recovery).
 
-    Limits, whatever the design: ``speed_limit`` in m/s and ``acceleration_limit`` in m/s^2 bound what is asked of any
-    winch, beside what the robot file says of it. No cable is let out below ``lowest_tension`` or reeled in above
-    ``highest_tension``, in N; where None, the bounds of the robot file's tension distribution, else 0 and none. A
-    cable beyond its limit gives way so that its tension is back in about ``yield_time``, in s.
+    Limits of every design: ``speed_limit`` in m/s and ``acceleration_limit`` in m/s^2 bound the commands of each winch,
+    in addition to those of the robot file. No cable is let out below ``lowest_tension`` or reeled in above
+    ``highest_tension``, in N; by default the bounds of the robot file's tension distribution, otherwise 0 and none. A
+    cable beyond its limit yields such that its tension is back in about ``yield_time``, in s.
 
-    With ``tare`` the run starts at rest, and the tensions seen there tell of a payload that nobody declared.
+    With ``tare`` the run starts at rest, and the tensions measured there reveal an undeclared payload.
 
     Raises ArgumentError where a number is not finite or not above 0; limits may be infinite, the lowest tension 0.
     """
@@ -75,10 +75,10 @@ class ControlAim:
     tare: bool = True
 
     def __post_init__(self) -> None:
-        for name, rule in RULES.items():
+        for name, rule in AIM_RULES.items():
             value = getattr(self, name)
-            if not (value is None and name in OPTIONAL):
-                number_of(f"ControlAim: {name}", value, rule, or_infinite=name in ENDLESS)
+            if not (value is None and name in OPTIONAL_KEYS):
+                validate_number(f"ControlAim: {name}", value, rule, allow_infinite=name in UNBOUNDED_KEYS)
         lowest, highest = self.lowest_tension, self.highest_tension
         if lowest is not None and highest is not None and lowest > highest:
             problem = f"is {lowest:g} N, above highest_tension, {highest:g} N"

@@ -1,4 +1,4 @@
-"""The FMUs under a controller: one at work in our master, or one that is an FMU itself."""
+"""Closed-loop co-simulation: the FMUs under a controller that runs in the master, or is an FMU itself."""
 
 from __future__ import annotations
 
@@ -8,68 +8,86 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arguments import file_of, folder_of, having, number_of, of_kind, robot_of, whole_number_of
-from ..array_arguments import array_of, rising_of
+from ..arguments import (
+    validate_attributes,
+    validate_file,
+    validate_folder,
+    validate_instance,
+    validate_integer,
+    validate_number,
+    validate_robot,
+)
+from ..array_arguments import validate_array, validate_increasing
 from ..errors import InputError
-from ..fmus.packaging import RobotFmus, build_controller
-from ..master import Connection, FixedStep, Port, Progress, Source
+from ..fmus.packaging import RobotFmus, package_controller_fmu
+from ..master import Connection, FixedStep, InputSource, Port, Progress
 from ..robots.robot import Robot
-from ..runs.asked import require_fmus, require_options
-from ..runs.cosimulation import ALONE, STEP, TIMES, Beside, Motion, run, wired
-from ..runs.wiring import AXES, PLATFORM, winch_ports
-from ..trajectory import DURATION as OF_PATH
-from ..trajectory import Trajectory, trajectory_of
+from ..runs.asked import validate_fmus, validate_options
+from ..runs.cosimulation import (
+    DEFAULT_STEP,
+    NO_ADDITIONAL_COMPONENTS,
+    TIME_MEANING,
+    AdditionalComponents,
+    CosimulationResult,
+    run_cosimulation,
+    wire_fmus,
+)
+from ..runs.wiring import AXES, PLATFORM, winch_input_ports
+from ..trajectory import DURATION_RULE as OF_PATH
+from ..trajectory import Trajectory, require_trajectory
 from .design import Design
 from .feedforward import elastic_reference
 from .path import Reference
-from .plan import plan_data
+from .plan import controller_data
 from .source import PathController
 
 Array = NDArray[np.float64]
 
-CONTROLLER = "controller"
-DURATION = OF_PATH._replace(meaning="how long the run takes")
-DESIGN = ("aim", "cable_count", "feels", "knots")
-PUSHED = tuple(Port(PLATFORM, f"{name}.{axis}") for axis in AXES for name in ("external_force", "external_force_rate"))
+CONTROLLER_NAME = "controller"
+RUN_DURATION_RULE = OF_PATH._replace(meaning="how long the run takes")
+DESIGN_ATTRIBUTES = ("aim", "cable_count", "feels", "knots")
+FORCE_PORTS = tuple(
+    Port(PLATFORM, f"{name}.{axis}") for axis in AXES for name in ("external_force", "external_force_rate")
+)
 
 
 @dataclass(frozen=True)
-class Push:
-    """An external force on the platform: ``forces`` (N, 3) in N, each held from its sample to the next."""
+class SampledForce:
+    """An external force on the platform as a zero-order hold: ``forces`` (N, 3) in N, each held to the next sample."""
 
     forces: Array
 
-    def interval(self, index: int, time: float, step: float, shown: Array) -> tuple[Array, Array]:
-        """See :class:`tautwire.master.Source`."""
-        held = np.column_stack([self.forces[index], np.zeros(3)]).ravel()
-        return held, held
+    def interval(self, index: int, time: float, step: float, outputs: Array) -> tuple[Array, Array]:
+        """See :class:`tautwire.cosimulation.Source`."""
+        input_values = np.column_stack([self.forces[index], np.zeros(3)]).ravel()
+        return input_values, input_values
 
 
 @dataclass(frozen=True)
-class Still:
-    """Inputs that stay zero, ``count`` of them."""
+class ZeroInput:
+    """``count`` inputs that stay zero."""
 
     count: int
 
-    def interval(self, index: int, time: float, step: float, shown: Array) -> tuple[Array, Array]:
-        """See :class:`tautwire.master.Source`."""
+    def interval(self, index: int, time: float, step: float, outputs: Array) -> tuple[Array, Array]:
+        """See :class:`tautwire.cosimulation.Source`."""
         return np.zeros(self.count), np.zeros(self.count)
 
 
 @dataclass(frozen=True)
-class Joined:
-    """The inputs that each of some sources drives, one after the other."""
+class JoinedSources:
+    """Concatenates the inputs of several sources."""
 
-    sources: tuple[Source, ...]
+    sources: tuple[InputSource, ...]
 
-    def interval(self, index: int, time: float, step: float, shown: Array) -> tuple[Array, Array]:
-        """See :class:`tautwire.master.Source`."""
-        pairs = [source.interval(index, time, step, shown) for source in self.sources]
+    def interval(self, index: int, time: float, step: float, outputs: Array) -> tuple[Array, Array]:
+        """See :class:`tautwire.cosimulation.Source`."""
+        pairs = [source.interval(index, time, step, outputs) for source in self.sources]
         return np.concatenate([start for start, _ in pairs]), np.concatenate([end for _, end in pairs])
 
 
 def sample_times(period: float, duration: float) -> Array:
-    """Whole samples of ``period`` (s) until ``duration`` (s) is reached."""
+    """Sample times with ``period`` (s) until ``duration`` (s) is reached."""
     count = int(np.ceil(duration / period * (1.0 - 1e-9))) + 1
     return np.linspace(0.0, (count - 1) * period, count)
 
@@ -80,38 +98,38 @@ def cosimulate_closed_loop(
     controller: Design,
     trajectory: Trajectory,
     duration: float,
-    step: float = STEP,
+    step: float = DEFAULT_STEP,
     seed: int | None = None,
     progress: Progress | None = None,
-    patience: float | None = None,
+    call_timeout: float | None = None,
     reference: Reference | None = None,
-    push: ArrayLike | None = None,
-) -> Motion:
-    """Co-simulate the FMUs with the controller over whole samples until ``duration`` (s) is reached, N of them.
+    external_force: ArrayLike | None = None,
+) -> CosimulationResult:
+    """Co-simulates the FMUs in closed loop over N whole samples until ``duration`` (s) is reached.
 
-    ``robot`` is what the controller believes; it follows ``reference`` at its samples, by default that of the elastic
-    model. ``step`` bounds the macro step in s; ``seed`` switches the noise of the robot's sensors on; ``push`` (N, 3)
-    is an external force in N, held from sample to sample. ``progress`` and ``patience`` are as for
+    ``robot`` is the controller's model; the controller follows ``reference`` at its samples, by default that of the
+    elastic model. ``step`` bounds the macro step in s; ``seed`` enables the noise of the robot's sensors;
+    ``external_force`` (N, 3) in N is held from sample to sample. ``progress`` and ``call_timeout`` are as for
     :func:`tautwire.cosimulate`. Returns the run at the controller's samples.
 
-    With winches the speeds that the controller wants are what these are asked for.
+    With winches the controller's speeds are their commands.
 
-    Raises UnreachableError where the path asks a cable to push, StretchError where no speeds follow it, RunError where
-    an FMU fails, InputError where an FMU does not show a tension or robot, controller and FMUs do not go together,
-    ArgumentError where an argument is none of these.
+    Raises UnreachableError where the path requires a cable to push, StretchError where no speeds follow it, RunError
+    where an FMU fails, InputError where an FMU lacks a tension output or robot, controller and FMUs do not match,
+    ArgumentError for an invalid argument.
     """
-    name = "cosimulate_closed_loop"
-    _require_loop(name, fmus, robot, controller, trajectory, duration, seed)
-    require_options(name, step, None, progress, patience)
+    caller = "cosimulate_closed_loop"
+    _require_loop(caller, fmus, robot, controller, trajectory, duration, seed)
+    validate_options(caller, step, None, progress, call_timeout)
     times = sample_times(controller.aim.period, duration)
     if reference is not None:
-        _require_reference(name, reference, len(times), robot.cable_count)
-    source: Source = PathController(robot, controller, trajectory, times, seed, reference)
-    beside = ALONE
-    if push is not None:
-        forces = _require_push(name, push, len(times))
-        source, beside = Joined((source, Push(forces))), Beside(also=PUSHED)
-    return run(fmus, source, times, FixedStep(step), progress, patience, beside)
+        _require_reference(caller, reference, len(times), robot.cable_count)
+    source: InputSource = PathController(robot, controller, trajectory, times, seed, reference)
+    extra = NO_ADDITIONAL_COMPONENTS
+    if external_force is not None:
+        forces = _require_force(caller, external_force, len(times))
+        source, extra = JoinedSources((source, SampledForce(forces))), AdditionalComponents(external_inputs=FORCE_PORTS)
+    return run_cosimulation(fmus, source, times, FixedStep(step), progress, call_timeout, extra)
 
 
 def build_controller_fmu(
@@ -122,21 +140,21 @@ def build_controller_fmu(
     folder: str | Path,
     reference: Reference | None = None,
 ) -> Path:
-    """Write ``controller.fmu`` into ``folder``: the controller with its path until ``duration`` (s), where it rests.
+    """Writes ``controller.fmu`` into ``folder``: the controller with its path until ``duration`` (s), where it rests.
 
     ``reference`` is at the controller's samples, by default that of the elastic model. Its inputs are the measured
     position and tensions, its outputs winch speeds and their rates.
 
-    Raises UnreachableError where the path asks a cable to push, ArgumentError where an argument is none of these.
+    Raises UnreachableError where the path requires a cable to push, ArgumentError for an invalid argument.
     """
     _require_design("build_controller_fmu", robot, controller, trajectory)
-    number_of("build_controller_fmu: duration", duration, DURATION)
-    place = folder_of("build_controller_fmu: folder", folder)
+    validate_number("build_controller_fmu: duration", duration, RUN_DURATION_RULE)
+    target_folder = validate_folder("build_controller_fmu: folder", folder)
     times = sample_times(controller.aim.period, duration)
     if reference is not None:
         _require_reference("build_controller_fmu", reference, len(times), robot.cable_count)
-    return build_controller(
-        plan_data(robot, controller, reference or elastic_reference(robot, trajectory, times)), place
+    return package_controller_fmu(
+        controller_data(robot, controller, reference or elastic_reference(robot, trajectory, times)), target_folder
     )
 
 
@@ -144,48 +162,57 @@ def cosimulate_with_controller(
     fmus: RobotFmus,
     controller: str | Path,
     time: ArrayLike,
-    step: float = STEP,
-    push: ArrayLike | None = None,
+    step: float = DEFAULT_STEP,
+    external_force: ArrayLike | None = None,
     progress: Progress | None = None,
-    patience: float | None = None,
-) -> Motion:
-    """Co-simulate a robot's FMUs wired to a controller that is an FMU too, as :func:`build_controller_fmu` writes it.
+    call_timeout: float | None = None,
+) -> CosimulationResult:
+    """Co-simulates a robot's FMUs with a controller FMU, such as :func:`build_controller_fmu` writes.
 
-    ``time`` (N,) in s, rising, from 0; macro steps are no longer than ``step`` (s) and end at each of these times: let
-    them hold the controller's samples. ``push`` (N, 3) is an external force in N, held from time to time.
+    ``time`` (N,) in s, rising, from 0; macro steps are no longer than ``step`` (s) and end at each of these times,
+    which should contain the controller's samples. ``external_force`` (N, 3) in N is held from time to time.
 
-    Raises RunError where an FMU fails, ArgumentError where an argument is none of these.
+    Raises RunError where an FMU fails, ArgumentError for an invalid argument.
     """
-    name = "cosimulate_with_controller"
-    require_fmus(f"{name}: fmus", fmus)
-    parts = {CONTROLLER: file_of(f"{name}: controller", controller)}
-    moments = rising_of(f"{name}: time", time, TIMES)
-    require_options(name, step, None, progress, patience)
-    wires = controller_wires(fmus)
-    still = Still(len(winch_ports(len(fmus.cables))))
-    if push is None:
-        beside, source = Beside(parts, wires), Joined((still,))
+    caller = "cosimulate_with_controller"
+    validate_fmus(f"{caller}: fmus", fmus)
+    parts = {CONTROLLER_NAME: validate_file(f"{caller}: controller", controller)}
+    instants = validate_increasing(f"{caller}: time", time, TIME_MEANING)
+    validate_options(caller, step, None, progress, call_timeout)
+    connections = controller_wires(fmus)
+    zero_input = ZeroInput(len(winch_input_ports(len(fmus.cables))))
+    if external_force is None:
+        extra, source = AdditionalComponents(parts, connections), JoinedSources((zero_input,))
     else:
-        forces = _require_push(name, push, len(moments))
-        beside, source = Beside(parts, wires, PUSHED), Joined((still, Push(forces)))
-    return run(fmus, source, moments, FixedStep(step), progress, patience, beside)
+        forces = _require_force(caller, external_force, len(instants))
+        extra, source = (
+            AdditionalComponents(parts, connections, FORCE_PORTS),
+            JoinedSources((zero_input, SampledForce(forces))),
+        )
+    return run_cosimulation(fmus, source, instants, FixedStep(step), progress, call_timeout, extra)
 
 
 def controller_wires(fmus: RobotFmus) -> tuple[Connection, ...]:
-    """What a controller is shown, and what it drives in place of the master."""
-    count, wiring = len(fmus.cables), wired(fmus)
-    seen = [*(f"position.{axis}" for axis in AXES), *(f"tension_{i}" for i in range(1, count + 1))]
-    shown = [*wiring.shown[:3], *wiring.shown[6 : 6 + count]]
-    asked = [f"{name}_{i}" for i in range(1, count + 1) for name in ("winch_speed", "winch_acceleration")]
-    ports = winch_ports(count, fmus.winch_numbers)
+    """Connections from the measured outputs to the controller, and from it to the winch inputs."""
+    count, wiring = len(fmus.cables), wire_fmus(fmus)
+    input_names = [*(f"position.{axis}" for axis in AXES), *(f"tension_{i}" for i in range(1, count + 1))]
+    measured_ports = [*wiring.outputs[:3], *wiring.outputs[6 : 6 + count]]
+    output_names = [f"{name}_{i}" for i in range(1, count + 1) for name in ("winch_speed", "winch_acceleration")]
+    target_ports = winch_input_ports(count, fmus.winch_numbers)
     return (
-        *(Connection(port, Port(CONTROLLER, name)) for port, name in zip(shown, seen, strict=True)),
-        *(Connection(Port(CONTROLLER, asked[place]), ports[place]) for place in wiring.driven),
+        *(
+            Connection(port, Port(CONTROLLER_NAME, name))
+            for port, name in zip(measured_ports, input_names, strict=True)
+        ),
+        *(
+            Connection(Port(CONTROLLER_NAME, output_names[place]), target_ports[place])
+            for place in wiring.external_indices
+        ),
     )
 
 
 def _require_loop(
-    name: str,
+    caller: str,
     fmus: RobotFmus,
     robot: Robot,
     controller: Design,
@@ -193,43 +220,47 @@ def _require_loop(
     duration: float,
     seed: int | None,
 ) -> None:
-    """Refuse what no controller can be run with."""
-    require_fmus(f"{name}: fmus", fmus)
-    _require_design(name, robot, controller, trajectory)
-    number_of(f"{name}: duration", duration, DURATION)
+    """Validates the arguments of a closed-loop run."""
+    validate_fmus(f"{caller}: fmus", fmus)
+    _require_design(caller, robot, controller, trajectory)
+    validate_number(f"{caller}: duration", duration, RUN_DURATION_RULE)
     if seed is not None:
-        whole_number_of(f"{name}: seed", seed, 0, "give a whole number, or None for no noise")
+        validate_integer(f"{caller}: seed", seed, 0, "give a whole number, or None for no noise")
     _require_cables(fmus, robot, controller)
     _require_tensions(fmus, robot)
 
 
-def _require_design(name: str, robot: Robot, controller: Design, trajectory: Trajectory) -> None:
-    robot_of(f"{name}: robot", robot)
-    having(f"{name}: controller", controller, DESIGN, "controller", "give what design_controller returns")
-    trajectory_of(f"{name}: trajectory", trajectory)
+def _require_design(caller: str, robot: Robot, controller: Design, trajectory: Trajectory) -> None:
+    validate_robot(f"{caller}: robot", robot)
+    validate_attributes(
+        f"{caller}: controller", controller, DESIGN_ATTRIBUTES, "controller", "give what design_controller returns"
+    )
+    require_trajectory(f"{caller}: trajectory", trajectory)
 
 
-def _require_push(name: str, push: ArrayLike, count: int) -> Array:
+def _require_force(caller: str, external_force: ArrayLike, count: int) -> Array:
     meaning = "finite forces in N, a row for each sample and columns x, y, z"
-    return array_of(f"{name}: push", push, (count, 3), meaning)
+    return validate_array(f"{caller}: push", external_force, (count, 3), meaning)
 
 
-def _require_reference(name: str, reference: Reference, count: int, cables: int) -> None:
-    where = f"{name}: reference"
-    of_kind(where, reference, Reference, "give what elastic_reference returns")
+def _require_reference(caller: str, reference: Reference, count: int, cables: int) -> None:
+    where = f"{caller}: reference"
+    validate_instance(where, reference, Reference, "give what elastic_reference returns")
     meaning = f"that of the controller's {count} samples, sample_times(period, duration)"
     for part, width in {"speeds": cables, "rigid": cables, "expected": 3 + cables}.items():
-        array_of(f"{where}.{part}", getattr(reference, part), (count, width), meaning)
+        validate_array(f"{where}.{part}", getattr(reference, part), (count, width), meaning)
 
 
 def _require_cables(fmus: RobotFmus, robot: Robot, controller: Design) -> None:
     counts = {len(fmus.cables), robot.cable_count, controller.cable_count}
     if len(counts) > 1:
-        told = f"has {robot.cable_count} cables, the controller {controller.cable_count}, the FMUs {len(fmus.cables)}"
-        raise InputError(robot.name, told, "give those of one robot")
+        problem = (
+            f"has {robot.cable_count} cables, the controller {controller.cable_count}, the FMUs {len(fmus.cables)}"
+        )
+        raise InputError(robot.name, problem, "give those of one robot")
 
 
 def _require_tensions(fmus: RobotFmus, robot: Robot) -> None:
-    unseen = [name for name in wired(fmus).unrecorded if name.startswith("tension")]
-    if unseen:
-        raise InputError(robot.name, f"the controller needs {', '.join(unseen)}, no FMU shows it", "let one show it")
+    missing = [name for name in wire_fmus(fmus).missing_columns if name.startswith("tension")]
+    if missing:
+        raise InputError(robot.name, f"the controller needs {', '.join(missing)}, no FMU shows it", "let one show it")

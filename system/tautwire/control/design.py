@@ -1,4 +1,4 @@
-"""What every controller has: limits, and gains at places of a path."""
+"""What every controller design has: limits, and gains at points of a path."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Knot:
-    """A controller as it is at a ``time`` (s) of the path; n cables, q states.
+    """A point of a gain schedule at ``time`` (s) of the path; n cables, q states.
 
-    ``regulator`` is a sampled ``control.StateSpace``, deviations of position, tensions and winch speeds from the path
-    in, winch accelerations out; only winch speeds act at once. ``tracking`` (q, n) tells its state by how much the
-    acceleration given is not the one asked for.
+    ``regulator`` is a sampled ``control.StateSpace`` from deviations of position, tensions and winch speeds from the
+    path to winch accelerations; only winch speeds feed through. ``tracking`` (q, n) is the anti-windup gain: from the
+    difference of actual and commanded acceleration to the state.
     """
 
     time: float
@@ -30,7 +30,7 @@ class Knot:
 
 
 class Design(Protocol):
-    """A designed controller."""
+    """Interface of a designed controller."""
 
     @property
     def aim(self) -> ControlAim:
@@ -44,17 +44,17 @@ class Design(Protocol):
 
     @property
     def feels(self) -> bool:
-        """Whether it looks at sensors at all."""
+        """Whether it uses feedback from sensors."""
         ...
 
     def knots(self) -> tuple[Knot, ...]:
-        """Where along the path it is designed; between knots gains are interpolated."""
+        """The points of the path at which it is designed; gains are interpolated in between."""
         ...
 
 
 @dataclass(frozen=True)
 class Feedforward:
-    """No feedback: the winches get the speeds that the reference has, within the limits of speed."""
+    """Pure feedforward: the winches get the reference speeds, within the speed limits."""
 
     cable_count: int
     aim: ControlAim = field(default_factory=ControlAim)
@@ -65,15 +65,15 @@ class Feedforward:
         return False
 
     def knots(self) -> tuple[Knot, ...]:
-        """See :class:`Design`; a speed that a limit has cut is made up for in the next sample."""
+        """See :class:`Design`; speed lost to a limit is made up for in the next sample."""
         count = self.cable_count
-        through = np.hstack([np.zeros((count, 3 + count)), -np.eye(count) / self.aim.period])
-        regulator = control.ss([], [], [], through, self.aim.period, **regulator_signals(count))
+        feedthrough = np.hstack([np.zeros((count, 3 + count)), -np.eye(count) / self.aim.period])
+        regulator = control.ss([], [], [], feedthrough, self.aim.period, **regulator_signals(count))
         return (Knot(0.0, regulator, np.zeros((0, count))),)
 
 
 def regulator_signals(count: int) -> dict[str, Any]:
-    """Names of a regulator's inputs and outputs, and its own."""
+    """Names of a regulator's inputs and outputs, and of the regulator."""
     numbers = range(1, count + 1)
     return {
         "inputs": [

@@ -1,4 +1,4 @@
-"""What the design of a controller raises; each error carries its values."""
+"""Errors of controller design; each carries its values."""
 
 from __future__ import annotations
 
@@ -6,19 +6,19 @@ from ..errors import InputError
 
 
 class MarginError(InputError):
-    """No controller of a design keeps its margin; ``asked`` and the best ``reached`` are disk margins."""
+    """No controller of a design has the ``required`` disk margin; ``achieved`` is the best one."""
 
-    def __init__(self, where: str, asked: float, reached: float, mend: str) -> None:
-        super().__init__(where, f"a disk margin of {asked:g} cannot be kept, {reached:.3g} is the best", mend)
-        self.asked = asked
-        self.reached = reached
-        self.args = (where, asked, reached, mend)
+    def __init__(self, where: str, required: float, achieved: float, hint: str) -> None:
+        super().__init__(where, f"a disk margin of {required:g} cannot be kept, {achieved:.3g} is the best", hint)
+        self.required = required
+        self.achieved = achieved
+        self.args = (where, required, achieved, hint)
 
 
 class StretchError(InputError):
-    """No winch speeds make the elastic model follow a path; ``time`` in s is where the search for them ended."""
+    """No winch speeds make the elastic model follow a path; ``time`` in s is where the inverse simulation failed."""
 
-    def __init__(self, where: str, time: float, mend: str) -> None:
-        super().__init__(where, f"no winch speeds were found that follow the path at {time:g} s", mend)
+    def __init__(self, where: str, time: float, hint: str) -> None:
+        super().__init__(where, f"no winch speeds were found that follow the path at {time:g} s", hint)
         self.time = time
-        self.args = (where, time, mend)
+        self.args = (where, time, hint)

@@ -1,8 +1,8 @@
-"""H-infinity loop shaping of a sampled plant: the controller that keeps the largest margin at a chosen loop shape.
+"""H-infinity loop shaping of a sampled plant: the controller with the largest margin for a chosen loop shape.
 
 Four-block mixed sensitivity, ``min || [S_o, S_o G; K S_o, K S_o G] ||``, G the plant with its weights: disturbances
-also enter where the winches act, so lightly damped modes are damped, not cancelled. A bilinear map carries the
-sampled plant to a continuous one and the controller back; it leaves the norm as it is.
+also enter where the winches act, so lightly damped modes are damped, not cancelled. A bilinear map (Tustin)
+transforms the sampled plant to a continuous one and the controller back; it preserves the norm.
 
 Sources: McFarlane and Glover (1992), IEEE Transactions on Automatic Control 37(6), 759-769; Glover and Doyle (1988),
 Systems and Control Letters 11, 167-172, for the controller, by SLICOT's SB10AD.
@@ -20,46 +20,59 @@ from threadpoolctl import threadpool_limits
 
 Array = NDArray[np.float64]
 
-# The controller with the very smallest norm has poles at infinity; one a little larger has not.
-SLACK = 1.1
-GIVEN_NORM = 4
-# Integrators of the plant, moved off the axis by this in 1/s.
-LEAK = 1e-5
+# The optimal controller has poles at infinity; a slightly suboptimal one has not.
+NORM_FACTOR = 1.1
+SB10AD_GIVEN_NORM_JOB = 4
+# Shift of the plant's integrators off the imaginary axis, in 1/s.
+INTEGRATOR_LEAK = 1e-5
 
 
-def shaped_controller(plant: Any, weights: Any) -> Any:
-    """The robust controller of a sampled ``plant``, to be closed with positive feedback; states of both and no more.
+def synthesise_controller(plant: Any, weights: Any) -> Any:
+    """Synthesises the H-infinity controller of a sampled ``plant``, to be closed with positive feedback.
 
-    ``weights`` is a continuous ``control.StateSpace`` of the w-plane on the plant's outputs.
+    ``weights`` is a continuous ``control.StateSpace`` in the w-plane on the plant's outputs. The
+    controller has the states of both.
     """
     period = plant.dt
     shaped = weights * to_continuous(plant)
-    states, seen, driven = shaped.nstates, shaped.noutputs, shaped.ninputs
-    A = shaped.A - LEAK * np.eye(states)
-    B = np.hstack([shaped.B, np.zeros((states, seen)), shaped.B])
-    C = np.vstack([shaped.C, np.zeros((driven, states)), shaped.C])
-    each = np.eye(seen)
+    state_count, output_count, input_count = shaped.nstates, shaped.noutputs, shaped.ninputs
+    A = shaped.A - INTEGRATOR_LEAK * np.eye(state_count)
+    B = np.hstack([shaped.B, np.zeros((state_count, output_count)), shaped.B])
+    C = np.vstack([shaped.C, np.zeros((input_count, state_count)), shaped.C])
+    identity = np.eye(output_count)
     D = np.block(
         [
-            [shaped.D, each, shaped.D],
-            [np.zeros((driven, driven + seen)), np.eye(driven)],
-            [shaped.D, each, shaped.D],
+            [shaped.D, identity, shaped.D],
+            [np.zeros((input_count, input_count + output_count)), np.eye(input_count)],
+            [shaped.D, identity, shaped.D],
         ]
     )
-    # Small matrices: threads that wait for each other would cost most of the time.
+    # Small matrices: thread synchronisation would dominate the time.
     with threadpool_limits(limits=1, user_api="blas"):
-        _, _, norm, _ = control.hinfsyn(control.ss(A, B, C, D), seen, driven)
-        found = sb10ad(states, B.shape[1], C.shape[0], driven, seen, SLACK * norm, A, B, C, D, job=GIVEN_NORM)
-    return to_sampled(control.ss(*found[1:5]) * weights, period)
+        _, _, norm, _ = control.hinfsyn(control.ss(A, B, C, D), output_count, input_count)
+        synthesis = sb10ad(
+            state_count,
+            B.shape[1],
+            C.shape[0],
+            input_count,
+            output_count,
+            NORM_FACTOR * norm,
+            A,
+            B,
+            C,
+            D,
+            job=SB10AD_GIVEN_NORM_JOB,
+        )
+    return to_sampled(control.ss(*synthesis[1:5]) * weights, period)
 
 
 def to_continuous(system: Any) -> Any:
-    """The w-plane system of a sampled one, ``z = (1 + s h / 2) / (1 - s h / 2)``; no pole may be at -1."""
+    """Bilinear transform to the w-plane, ``z = (1 + s h / 2) / (1 - s h / 2)``; no pole may be at -1."""
     h = system.dt
-    each = np.eye(system.nstates)
-    inverse = np.linalg.inv(system.A + each)
+    identity = np.eye(system.nstates)
+    inverse = np.linalg.inv(system.A + identity)
     return control.ss(
-        2.0 / h * (system.A - each) @ inverse,
+        2.0 / h * (system.A - identity) @ inverse,
         2.0 / np.sqrt(h) * inverse @ system.B,
         2.0 / np.sqrt(h) * system.C @ inverse,
         system.D - system.C @ inverse @ system.B,
@@ -68,10 +81,10 @@ def to_continuous(system: Any) -> Any:
 
 def to_sampled(system: Any, period: float) -> Any:
     """The inverse of :func:`to_continuous`."""
-    each = np.eye(system.nstates)
-    inverse = np.linalg.inv(each - 0.5 * period * system.A)
+    identity = np.eye(system.nstates)
+    inverse = np.linalg.inv(identity - 0.5 * period * system.A)
     return control.ss(
-        inverse @ (each + 0.5 * period * system.A),
+        inverse @ (identity + 0.5 * period * system.A),
         np.sqrt(period) * inverse @ system.B,
         np.sqrt(period) * system.C @ inverse,
         system.D + 0.5 * period * system.C @ inverse @ system.B,

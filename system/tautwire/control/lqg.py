@@ -1,10 +1,10 @@
-"""LQG with integral action: an observer of the plant, and feedback of its state.
+"""LQG with integral action: a Kalman filter of the plant, and feedback of its state estimate.
 
-    a_k = -K (x_k, w_k, z_k),                 x the estimate from samples before t_k: one sample for computing
+    a_k = -K (x_k, w_k, z_k),                 x the estimate from samples before t_k: one sample of delay
     x_k+1 = F x_k + G (w_k, a_k) + L (y_k - C x_k - D w_k),           z_k+1 = z_k + (position error)_k
 
-All in deviations from the path: ``y`` from its positions and tensions, ``w`` from its winch speeds; ``a`` are the
-accelerations of the winches over the next sample.
+All signals are deviations from the path: ``y`` of positions and tensions, ``w`` of winch speeds; ``a`` are the winch
+accelerations over the next sample.
 """
 
 from __future__ import annotations
@@ -17,7 +17,7 @@ import control
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arguments import of_kind, robot_of
+from ..arguments import validate_instance, validate_robot
 from ..linear import LinearPlant, linearise
 from ..robots.robot import Robot
 from ..runs.wiring import AXES
@@ -27,8 +27,8 @@ from .plant import sampled_plant
 
 Array = NDArray[np.float64]
 
-# python-control would take slycot's where it is installed, and the last digits would differ.
-RICCATI = "scipy"
+# python-control would use slycot if installed, and the last digits would differ.
+RICCATI_METHOD = "scipy"
 
 
 @dataclass(frozen=True)
@@ -57,14 +57,14 @@ class Controller:
 
     @property
     def regulator(self) -> Any:
-        """The unlimited controller as a ``control.StateSpace``: outputs of ``plant`` in, its inputs out.
+        """The controller without limits as a ``control.StateSpace`` from outputs of ``plant`` to its inputs.
 
-        Signals are deviations from the path; the sign of the feedback is inside, so close the loop with
+        Signals are deviations from the path; the sign of the feedback is included, so close the loop with
         ``control.feedback(plant, regulator, 1)``. States are the estimate and the summed position errors.
         """
         count, size = self.cable_count, len(self.observer)
-        measured = self.observer @ self.plant.C[:-count]
-        A, B = self.plant.A[:size] - measured, self.plant.B[:size]
+        correction = self.observer @ self.plant.C[:-count]
+        A, B = self.plant.A[:size] - correction, self.plant.B[:size]
         K_state, K_speed, K_sum = np.hsplit(self.feedback, [size, size + count])
         sums = np.eye(3, 3 + 2 * count)
         return control.ss(
@@ -79,14 +79,14 @@ class Controller:
 
     @property
     def tracking(self) -> Array:
-        """What the state makes of a limit, (p + 3, n): the observer sees what was given, the sums give way to it.
+        """Anti-windup gain, (p + 3, n): the observer uses the limited acceleration, the integrals are corrected by it.
 
-        The sums go back towards those that would have asked for what was given, over ``integral_time``; so they do
-        not wind up. Source: Astrom and Hagglund (2006), Advanced PID Control, section 3.5, back-calculation.
+        Back-calculation: the integrals approach those that would have commanded the limited acceleration, over
+        ``integral_time``. Source: Astrom and Hagglund (2006), Advanced PID Control, section 3.5, back-calculation.
         """
         size = len(self.observer)
-        back = self.aim.period / self.aim.integral_time * np.linalg.pinv(self.feedback[:, -3:])
-        return np.vstack([self.plant.B[:size], -back])
+        sum_correction = self.aim.period / self.aim.integral_time * np.linalg.pinv(self.feedback[:, -3:])
+        return np.vstack([self.plant.B[:size], -sum_correction])
 
     def knots(self) -> tuple[Knot, ...]:
         """See :class:`tautwire.control.Design`; one for the whole path."""
@@ -94,52 +94,56 @@ class Controller:
 
 
 def design_controller(robot: Robot, aim: ControlAim | None = None, at: Sequence[float] | None = None) -> Controller:
-    """LQG with integral action on the plant linearised at ``at``, three coordinates in m, by default the start.
+    """Designs LQG with integral action on the plant linearised at ``at``, three coordinates in m, by default the start.
 
     ``a_k = -K (x_k, w_k, z_k)``: winch accelerations (n,) in m/s^2 from the estimate of a Kalman filter, winch speeds
-    and summed position errors, sampled at ``aim.period``. ``aim`` holds what is weighed, and the limits.
+    and summed position errors, sampled at ``aim.period``. ``aim`` holds weights and limits.
 
     Raises UnreachableError where the cables cannot hold the platform there, OperatingPointError where they do not hold
-    it stably, ArgumentError where an argument is none of these. Source: Franklin, Powell and Workman (1998), Digital
+    it stably, ArgumentError for an invalid argument. Source: Franklin, Powell and Workman (1998), Digital
     Control of Dynamic Systems, chapter 9.
     """
-    robot_of("design_controller: robot", robot)
-    aim = ControlAim() if aim is None else of_kind("design_controller: aim", aim, ControlAim, "give a ControlAim")
+    validate_robot("design_controller: robot", robot)
+    aim = (
+        ControlAim()
+        if aim is None
+        else validate_instance("design_controller: aim", aim, ControlAim, "give a ControlAim")
+    )
     linear = linearise(robot, at)
     plant = sampled_plant(linear, aim.period)
-    return Controller(aim, linear, plant, _feedback(aim, linear, plant), _observer(robot, aim, linear, plant))
+    return Controller(aim, linear, plant, _feedback_gain(aim, linear, plant), _kalman_gain(robot, aim, linear, plant))
 
 
-def _feedback(aim: ControlAim, linear: LinearPlant, plant: Any) -> Array:
-    """LQI: positions, tensions, winch speeds and summed position errors against winch accelerations."""
+def _feedback_gain(aim: ControlAim, linear: LinearPlant, plant: Any) -> Array:
+    """LQI gain: weighs positions, tensions, winch speeds and summed position errors against winch accelerations."""
     count = len(linear.tensions)
     tension = aim.tension * float(np.mean(linear.tensions))
-    sizes = np.repeat([aim.position, tension, aim.winch_speed], [3, count, count])
-    scaled = plant.C / sizes[:, None]
+    scales = np.repeat([aim.position, tension, aim.winch_speed], [3, count, count])
+    scaled = plant.C / scales[:, None]
     weights = scaled.T @ scaled
     weights = 0.5 * (weights + weights.T)  # python-control wants it symmetric to the last bit
     sums = np.eye(3) * (aim.period / (aim.integral_time * aim.position)) ** 2
-    nothing = np.zeros((len(weights), 3))
+    zeros = np.zeros((len(weights), 3))
     gain, _, _ = control.dlqr(
         plant,
-        np.block([[weights, nothing], [nothing.T, sums]]),
+        np.block([[weights, zeros], [zeros.T, sums]]),
         np.eye(count) / aim.winch_acceleration**2,
         integral_action=plant.C[:3],
-        method=RICCATI,
+        method=RICCATI_METHOD,
     )
     return np.asarray(gain)
 
 
-def _observer(robot: Robot, aim: ControlAim, linear: LinearPlant, plant: Any) -> Array:
-    """The stationary Kalman gain: random walks of velocity, rope and effects against the sensors' noise."""
+def _kalman_gain(robot: Robot, aim: ControlAim, linear: LinearPlant, plant: Any) -> Array:
+    """Stationary Kalman gain: random walks of velocity, rope and effects as process noise, and sensor noise."""
     count, size = len(linear.tensions), linear.system.nstates
-    walk = np.repeat([aim.acceleration_disturbance, aim.speed_disturbance], [3, size - 6])
+    process_noise = np.repeat([aim.acceleration_disturbance, aim.speed_disturbance], [3, size - 6])
     gain, _, _ = control.dlqe(
         plant.A[:size, :size],
         np.eye(size)[:, 3:],
         plant.C[:-count, :size],
-        np.diag(walk**2 * aim.period),
+        np.diag(process_noise**2 * aim.period),
         np.diag(measurement_noise(robot) ** 2),
-        method=RICCATI,
+        method=RICCATI_METHOD,
     )
     return np.asarray(gain)

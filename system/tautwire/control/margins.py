@@ -1,7 +1,7 @@
-"""How much a loop can be changed before it rings or breaks: gain, phase and disk margins, by python-control.
+"""Stability margins of a loop: gain, phase and disk margins, by python-control.
 
-A disk margin alpha holds for gain and phase together, in every loop that it is of at once: each may be multiplied by
-any complex number in a disk around 1 that reaches from ``(2 - alpha) / (2 + alpha)`` to its inverse.
+A disk margin alpha holds for gain and phase together, in all its loops at once: each may be multiplied by any complex
+number in a disk around 1 that reaches from ``(2 - alpha) / (2 + alpha)`` to its inverse.
 
 Source: Seiler, Packard and Gahinet (2020), An introduction to disk margins, IEEE Control Systems 40(5), 78-95.
 """
@@ -23,60 +23,60 @@ from .plant import ramp_plant
 
 Array = NDArray[np.float64]
 
-FREQUENCIES = 200
-SLOWEST = 1e-3
+FREQUENCY_COUNT = 200
+MIN_RELATIVE_FREQUENCY = 1e-3
 
 
 @dataclass(frozen=True)
 class Margins:
-    """Margins of a closed loop; ``radius``, of its slowest pole, is below 1 if it is stable, else all margins are 0.
+    """Stability margins of a closed loop; ``spectral_radius`` is below 1 if it is stable, otherwise all margins are 0.
 
-    Disk margins: ``winches`` of all winch speeds at once, ``sensors`` of one sensor, the worst. ``gain``, a factor,
-    and ``phase`` in degrees are the smallest of one winch, the classical ones.
+    Disk margins: ``winch_disk`` of all winch speeds at once, ``sensor_disk`` the smallest of a single sensor.
+    ``gain_margin``, a factor, and ``phase_margin`` in degrees are the smallest classical ones of a single winch.
     """
 
-    radius: float
-    winches: float
-    sensors: float
-    gain: float
-    phase: float
+    spectral_radius: float
+    winch_disk: float
+    sensor_disk: float
+    gain_margin: float
+    phase_margin: float
 
     @property
-    def least(self) -> float:
+    def min_disk(self) -> float:
         """The smaller of the disk margins."""
-        return min(self.winches, self.sensors)
+        return min(self.winch_disk, self.sensor_disk)
 
     @property
     def disk_gain(self) -> float:
-        """The factor by which all winches' gains may grow or shrink at once."""
-        return float("inf") if self.winches >= 2.0 else (2.0 + self.winches) / (2.0 - self.winches)
+        """Factor by which all winch gains may grow or shrink at once."""
+        return float("inf") if self.winch_disk >= 2.0 else (2.0 + self.winch_disk) / (2.0 - self.winch_disk)
 
     @property
     def disk_phase(self) -> float:
-        """The phase, in degrees, that all winches may lose at once."""
-        return float(2.0 * np.rad2deg(np.arctan(0.5 * self.winches)))
+        """Phase, in degrees, that all winches may lose at once."""
+        return float(2.0 * np.rad2deg(np.arctan(0.5 * self.winch_disk)))
 
-    def worst(self, other: Margins) -> Margins:
-        """Of two loops, margin by margin."""
+    def worst_of(self, other: Margins) -> Margins:
+        """The worse of two loops, margin by margin."""
         return Margins(
-            max(self.radius, other.radius),
-            min(self.winches, other.winches),
-            min(self.sensors, other.sensors),
-            min(self.gain, other.gain),
-            min(self.phase, other.phase),
+            max(self.spectral_radius, other.spectral_radius),
+            min(self.winch_disk, other.winch_disk),
+            min(self.sensor_disk, other.sensor_disk),
+            min(self.gain_margin, other.gain_margin),
+            min(self.phase_margin, other.phase_margin),
         )
 
 
 @dataclass(frozen=True)
 class Range:
-    """What is not known of a robot: ``moduli`` in Pa and payloads, as shares of the declared mass, from ... to."""
+    """Parametric uncertainty of a robot: ranges of ``moduli`` in Pa, and of ``payloads`` as mass ratios."""
 
     moduli: tuple[float, float] = (102e9, 135e9)
     payloads: tuple[float, float] = (0.8, 1.2)
 
     @classmethod
     def of(cls, robot: Robot) -> Range:
-        """Around a robot: the paper's rope from its static to its dynamic modulus, another rope by the same shares."""
+        """The range of a robot: the paper's rope from static to dynamic modulus, other ropes in proportion."""
         moduli = [cable.modulus for cable in robot.cables]
         lowest, highest = cls.moduli
         if lowest <= min(moduli) and max(moduli) <= highest:
@@ -96,18 +96,20 @@ class Range:
 
 
 def robot_with(robot: Robot, modulus: float, payload: float) -> Robot:
-    """The robot with another modulus (Pa) of all cables, and its mass multiplied."""
+    """The robot with another modulus (Pa) of all cables, and its mass times ``payload``."""
     cables = tuple(replace(cable, modulus=modulus) for cable in robot.cables)
     return replace(robot, cables=cables, platform=replace(robot.platform, mass=payload * robot.platform.mass))
 
 
 def speed_controller(regulator: Any) -> Any:
-    """A regulator with its winches: from position and tensions to the winch speeds, a ``control.StateSpace``."""
+    """A regulator with integrated winch speeds: ``control.StateSpace`` from position and tensions to winch speeds."""
     count, sensors = regulator.noutputs, regulator.ninputs - regulator.noutputs
     period, states = regulator.dt, regulator.nstates
-    through = regulator.D[:, sensors:]
+    feedthrough = regulator.D[:, sensors:]
     return control.ss(
-        np.block([[regulator.A, regulator.B[:, sensors:]], [period * regulator.C, np.eye(count) + period * through]]),
+        np.block(
+            [[regulator.A, regulator.B[:, sensors:]], [period * regulator.C, np.eye(count) + period * feedthrough]]
+        ),
         np.vstack([regulator.B[:, :sensors], period * regulator.D[:, :sensors]]),
         np.eye(count, states + count, states),
         np.zeros((count, sensors)),
@@ -119,7 +121,7 @@ def speed_controller(regulator: Any) -> Any:
 
 
 def margins_of(linear: LinearPlant, knot: Knot) -> Margins:
-    """Margins of a controller on a plant; of one that feels nothing they are infinite, it closes no loop."""
+    """Margins of a controller on a plant; infinite without feedback, which closes no loop."""
     regulator = knot.regulator
     if not np.any(regulator.B[:, : regulator.ninputs - regulator.noutputs]):
         return Margins(0.0, *[float("inf")] * 4)
@@ -127,37 +129,37 @@ def margins_of(linear: LinearPlant, knot: Knot) -> Margins:
     radius = float(np.max(np.abs(control.feedback(plant, feedback, 1).poles())))
     if radius >= 1.0:
         return Margins(radius, 0.0, 0.0, 0.0, 0.0)
-    fastest = np.pi / regulator.dt
-    omega = np.geomspace(SLOWEST * fastest, 0.999 * fastest, FREQUENCIES)
+    nyquist_frequency = np.pi / regulator.dt
+    omega = np.geomspace(MIN_RELATIVE_FREQUENCY * nyquist_frequency, 0.999 * nyquist_frequency, FREQUENCY_COUNT)
     at_winches, at_sensors = -feedback * plant, -plant * feedback
-    together = _disk(at_winches, omega)
-    alone = [_disk(loop, omega) for loop in _loops(at_sensors)]
-    classical = [_classical(loop, omega) for loop in _loops(at_winches)]
+    winch_disk = _disk_margin(at_winches, omega)
+    sensor_disks = [_disk_margin(loop, omega) for loop in _single_loops(at_sensors)]
+    classical = [_classical_margins(loop, omega) for loop in _single_loops(at_winches)]
     gain, phase = (min(values) for values in zip(*classical, strict=True))
-    return Margins(radius, together, min(alone), gain, phase)
+    return Margins(radius, winch_disk, min(sensor_disks), gain, phase)
 
 
 def margins_over(
-    robot: Robot, knots: Sequence[Knot], positions: Array, uncertain: Range | None = None, points: int = 3
+    robot: Robot, knots: Sequence[Knot], positions: Array, parameter_range: Range | None = None, points: int = 3
 ) -> Margins:
     """The worst margins over a range of robots, of each knot at its position (K, 3) in m.
 
     Raises what :func:`tautwire.linear.linearise` raises.
     """
-    robots = [each for _, _, each in uncertain.robots(robot, points)] if uncertain else [robot]
-    found = [
+    robots = [each for _, _, each in parameter_range.robots(robot, points)] if parameter_range else [robot]
+    all_margins = [
         margins_of(linearise(each, position), knot)
         for each in robots
         for knot, position in zip(knots, positions, strict=True)
     ]
-    worst = found[0]
-    for other in found[1:]:
-        worst = worst.worst(other)
+    worst = all_margins[0]
+    for other in all_margins[1:]:
+        worst = worst.worst_of(other)
     return worst
 
 
-def _loops(loop: Any) -> Iterator[Any]:
-    """Each loop by itself, the others closed."""
+def _single_loops(loop: Any) -> Iterator[Any]:
+    """Each loop opened by itself, with the others closed."""
     count = loop.ninputs
     for index in range(count):
         others = np.eye(count)
@@ -165,11 +167,11 @@ def _loops(loop: Any) -> Iterator[Any]:
         yield control.feedback(loop, control.ss([], [], [], others, loop.dt))[index, index]
 
 
-def _disk(loop: Any, omega: Array) -> float:
+def _disk_margin(loop: Any, omega: Array) -> float:
     return float(control.disk_margins(loop, omega)[0])
 
 
-def _classical(loop: Any, omega: Array) -> tuple[float, float]:
+def _classical_margins(loop: Any, omega: Array) -> tuple[float, float]:
     """Smallest gain margin, as a factor above 1 in either direction, and phase margin in degrees."""
     response = control.frequency_response(loop, omega)
     gains, phases, *_ = control.stability_margins(response, returnall=True)

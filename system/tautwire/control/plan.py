@@ -1,4 +1,4 @@
-"""A design put on a path: all that a controller at work needs, as plain numbers."""
+"""Data of a controller on a path, as plain numbers."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from .path import Reference
 Array = NDArray[np.float64]
 
 
-def plan_data(robot: Robot, design: Design, reference: Reference) -> dict[str, Any]:
+def controller_data(robot: Robot, design: Design, reference: Reference) -> dict[str, Any]:
     """The content of a controller's resource: lists and numbers, as the law of the FMU takes them.
 
     Raises InputError where a regulator acts on position or tension without a sample of delay.
@@ -32,15 +32,15 @@ def plan_data(robot: Robot, design: Design, reference: Reference) -> dict[str, A
         "expected": reference.expected.tolist(),
         "at_rest": reference.at_rest.tolist(),
         "knots": [_knot_data(knot, period) for knot in design.knots()],
-        "compliances": compliances(robot).tolist(),
+        "compliances": cable_compliances(robot).tolist(),
         "yield_time": design.aim.yield_time,
         "tares": design.feels and design.aim.tare,
-        "limits": limits_of(robot, design)._asdict(),
+        "limits": control_limits(robot, design)._asdict(),
     }
 
 
-def limits_of(robot: Robot, design: Design) -> Limits:
-    """The tighter of what the aim and the robot file say; none of tension where no sensor is looked at."""
+def control_limits(robot: Robot, design: Design) -> Limits:
+    """The tighter limits of aim and robot file; no tension limits without feedback."""
     aim, winch, bounds = design.aim, robot.winch, robot.tension
     speed = [aim.speed_limit, winch.speed_limit if winch else None]
     acceleration = [aim.acceleration_limit, winch.acceleration_limit if winch else None]
@@ -54,20 +54,20 @@ def limits_of(robot: Robot, design: Design) -> Limits:
     )
 
 
-def compliances(robot: Robot) -> Array:
-    """Of each cable at the start, ``l / (E S)``, shape (n,), in m/N."""
+def cable_compliances(robot: Robot) -> Array:
+    """Compliance of each cable at the start, ``l / (E S)``, shape (n,), in m/N."""
     lengths = np.linalg.norm(np.array(robot.anchors) - robot.platform.start, axis=1)
     stiffness = np.array([cable.modulus * cable.area for cable in robot.cables])
-    found: Array = lengths / stiffness
-    return found
+    result: Array = lengths / stiffness
+    return result
 
 
 def _knot_data(knot: Knot, period: float) -> dict[str, Any]:
     regulator = knot.regulator
     sensors = regulator.ninputs - regulator.noutputs
     if np.any(regulator.D[:, :sensors]):
-        mend = "give it one sample for computing: no direct gain from position or tension"
-        raise InputError(regulator.name, "acts on the sample just measured", mend)
+        hint = "give it one sample for computing: no direct gain from position or tension"
+        raise InputError(regulator.name, "acts on the sample just measured", hint)
     return {
         "sample": knot.time / period,
         "A": regulator.A.tolist(),

@@ -1,4 +1,4 @@
-"""The linearised plant as a sampled controller meets it: winch speeds that run on ramps from sample to sample."""
+"""The linearised plant in discrete time, with winch speeds that are ramps between samples."""
 
 from __future__ import annotations
 
@@ -13,42 +13,42 @@ from ..linear import LinearPlant
 Array = NDArray[np.float64]
 
 
-def measured(linear: LinearPlant) -> list[int]:
-    """Places of position and tensions among the plant's outputs."""
+def sensor_output_indices(linear: LinearPlant) -> list[int]:
+    """Indices of position and tensions among the plant's outputs."""
     return [*range(3), *range(6, 6 + len(linear.tensions))]
 
 
 def sampled_plant(linear: LinearPlant, period: float) -> Any:
-    """From winch accelerations, held over samples of ``period`` (s), to position, tensions and winch speeds.
+    """Discrete plant from winch accelerations, held for ``period`` (s), to position, tensions and winch speeds.
 
     A ``control.StateSpace`` with states (plant, winch speeds): inputs held over a sample are then ramps of speed.
     """
     system, count = linear.system, len(linear.tensions)
-    seen = measured(linear)
+    sensor_rows = sensor_output_indices(linear)
     winches = list(system.input_labels[:count])
-    still, each = np.zeros((count, system.nstates)), np.eye(count)
+    zeros, identity = np.zeros((count, system.nstates)), np.eye(count)
     driven = control.ss(
-        np.block([[system.A, system.B[:, :count]], [still, np.zeros_like(each)]]),
-        np.vstack([still.T, each]),
-        np.block([[system.C[seen], system.D[seen, :count]], [still, each]]),
+        np.block([[system.A, system.B[:, :count]], [zeros, np.zeros_like(identity)]]),
+        np.vstack([zeros.T, identity]),
+        np.block([[system.C[sensor_rows], system.D[sensor_rows, :count]], [zeros, identity]]),
         0.0,
         states=[*system.state_labels, *winches],
         inputs=[f"winch_acceleration_{index}" for index in range(1, count + 1)],
-        outputs=[*(system.output_labels[place] for place in seen), *winches],
+        outputs=[*(system.output_labels[place] for place in sensor_rows), *winches],
     )
     return control.sample_system(driven, period, method="zoh", name="sampled_plant")
 
 
 def ramp_plant(linear: LinearPlant, period: float) -> Any:
-    """From winch speeds at the samples to position and tensions there: a ``control.StateSpace``, shape (3 + n, n)."""
+    """Discrete plant from winch speeds to position and tensions at the samples: ``control.StateSpace``, (3 + n, n)."""
     system, count = linear.system, len(linear.tensions)
-    seen = measured(linear)
+    sensor_rows = sensor_output_indices(linear)
     driven = control.ss(
         system.A,
         system.B[:, :count],
-        system.C[seen],
-        system.D[seen, :count],
+        system.C[sensor_rows],
+        system.D[sensor_rows, :count],
         inputs=system.input_labels[:count],
-        outputs=[system.output_labels[place] for place in seen],
+        outputs=[system.output_labels[place] for place in sensor_rows],
     )
     return control.sample_system(driven, period, method="foh", name="ramp_plant")

@@ -1,8 +1,8 @@
-"""A controller that keeps its margins over a range of moduli and payloads: H-infinity loop shaping.
+"""Robust control: H-infinity loop shaping that keeps disk margins over a range of moduli and payloads.
 
-The loop is as fast as the margins allow: of several bandwidths the largest is kept at which the worst disk margin
-over the whole range, of all winches at once and of each sensor alone, is what was asked for. Along a path designs at
-its places follow each other: their states are estimates of the same quantities, so gains can be interpolated.
+The loop is as fast as the margins allow: of several bandwidths the largest is taken at which the worst disk margin
+over the whole range, of all winches at once and of each sensor alone, is the required one. The designs at points of a
+path have states that estimate the same quantities, so gains can be interpolated.
 """
 
 from __future__ import annotations
@@ -21,27 +21,27 @@ from ..trajectory import Trajectory
 from .aim import ControlAim
 from .design import Knot, regulator_signals
 from .errors import MarginError
-from .loop_shaping import shaped_controller
+from .loop_shaping import synthesise_controller
 from .margins import Margins, Range, margins_of
 from .plant import ramp_plant
-from .schedule import PLACES, ScheduledController
+from .schedule import DESIGN_POINTS, ScheduledController
 
 Array = NDArray[np.float64]
 
-# Of the lowest mode, from fast to slow.
-BANDWIDTHS = (1.6, 1.2, 0.9, 0.65, 0.48, 0.35, 0.26, 0.19, 0.14, 0.1)
-# Between sensing and the end of the ramp that answers: one sample for computing, one for the ramp.
-DELAY = 2
-# How much faster than they act the integrals give way where a limit acts.
-YIELDING = 3.0
+# Multiples of the lowest mode, from fast to slow.
+RELATIVE_BANDWIDTHS = (1.6, 1.2, 0.9, 0.65, 0.48, 0.35, 0.26, 0.19, 0.14, 0.1)
+# From measurement to the end of the resulting ramp: one sample for computing, one for the ramp.
+LOOP_DELAY_SAMPLES = 2
+# Rate of back-calculation relative to the integral action.
+BACK_CALCULATION_FACTOR = 3.0
 
 
 @dataclass(frozen=True)
 class RobustAim:
-    """``margin`` is the disk margin to keep; 2/3 allows a factor of 2 in gain and 37 degrees of phase, at once.
+    """Design aims of a robust controller: ``margin`` is the disk margin; 2/3 allows gain by 2 and 37 degrees of phase.
 
-    As multiples of the lowest mode's angular frequency: ``damping``, the rate at which a cable gives way to its own
-    tension, and ``integral``, where the integral action of position sets in.
+    As multiples of the lowest mode's angular frequency: ``damping``, the rate at which a cable yields to its own
+    tension, and ``integral``, the corner frequency of the integral action of position.
     """
 
     margin: float = 2.0 / 3.0
@@ -82,19 +82,19 @@ class RobustController:
 def design_robust(
     robot: Robot,
     aim: ControlAim | None = None,
-    uncertain: Range | None = None,
+    parameter_range: Range | None = None,
     robust: RobustAim | None = None,
     at: Sequence[float] | None = None,
 ) -> RobustController:
-    """The fastest loop whose margins hold over a range, at a position (m), by default the start.
+    """Designs the fastest loop whose disk margins hold over a range, at a position (m), by default the start.
 
-    The range is :meth:`Range.of` the robot where none is given.
+    The default range is :meth:`Range.of` the robot.
 
-    Raises MarginError where none does, and what :func:`tautwire.linear.linearise` raises.
+    Raises MarginError where no design does, and what :func:`tautwire.linear.linearise` raises.
     """
     start = robot.platform.start if at is None else at
-    (design,) = _fastest(
-        robot, np.array([start]), aim or ControlAim(), uncertain or Range.of(robot), robust or RobustAim()
+    (design,) = _fastest_designs(
+        robot, np.array([start]), aim or ControlAim(), parameter_range or Range.of(robot), robust or RobustAim()
     )
     return design
 
@@ -103,41 +103,45 @@ def schedule_robust(
     robot: Robot,
     trajectory: Trajectory,
     aim: ControlAim | None = None,
-    uncertain: Range | None = None,
+    parameter_range: Range | None = None,
     robust: RobustAim | None = None,
-    places: int = PLACES,
+    points: int = DESIGN_POINTS,
 ) -> ScheduledController:
-    """As :func:`design_robust`, at equally many times of a path, from its start to its end.
+    """Gain-scheduled :func:`design_robust` at equidistant times of a path, from its start to its end.
 
-    Raises MarginError where none does, and what :func:`tautwire.linear.linearise` raises.
+    Raises MarginError where no design does, and what :func:`tautwire.linear.linearise` raises.
     """
-    times = np.linspace(0.0, trajectory.duration, places)
+    times = np.linspace(0.0, trajectory.duration, points)
     positions = trajectory.position(times)
-    designs = _fastest(robot, positions, aim or ControlAim(), uncertain or Range.of(robot), robust or RobustAim())
+    designs = _fastest_designs(
+        robot, positions, aim or ControlAim(), parameter_range or Range.of(robot), robust or RobustAim()
+    )
     return ScheduledController(tuple(times.tolist()), tuple(designs))
 
 
-def _fastest(
-    robot: Robot, positions: Array, aim: ControlAim, uncertain: Range, robust: RobustAim
+def _fastest_designs(
+    robot: Robot, positions: Array, aim: ControlAim, parameter_range: Range, robust: RobustAim
 ) -> list[RobustController]:
-    """Designs of one bandwidth at all positions, the largest at which all keep their margin."""
-    middles = [linearise(uncertain.middle(robot), position) for position in positions]
-    plants = [[linearise(each, position) for _, _, each in uncertain.robots(robot)] for position in positions]
-    reached = 0.0
-    for bandwidth in BANDWIDTHS:
-        found: list[RobustController] = []
-        for middle, around in zip(middles, plants, strict=True):
-            design = _design(robot, middle, around, aim, robust, bandwidth)
-            if design.margins.least < robust.margin:
-                reached = max(reached, design.margins.least)
+    """Designs of one bandwidth at all positions, the largest at which all have the required margin."""
+    nominal_plants = [linearise(parameter_range.middle(robot), position) for position in positions]
+    range_plants = [
+        [linearise(each, position) for _, _, each in parameter_range.robots(robot)] for position in positions
+    ]
+    best_margin = 0.0
+    for bandwidth in RELATIVE_BANDWIDTHS:
+        designs: list[RobustController] = []
+        for nominal_plant, varied_plants in zip(nominal_plants, range_plants, strict=True):
+            design = _design_at(robot, nominal_plant, varied_plants, aim, robust, bandwidth)
+            if design.margins.min_disk < robust.margin:
+                best_margin = max(best_margin, design.margins.min_disk)
                 break
-            found.append(design)
+            designs.append(design)
         else:
-            return found
-    raise MarginError(robot.name, robust.margin, reached, "ask for less, narrow the range, or sample faster")
+            return designs
+    raise MarginError(robot.name, robust.margin, best_margin, "ask for less, narrow the range, or sample faster")
 
 
-def _design(
+def _design_at(
     robot: Robot,
     linear: LinearPlant,
     plants: Sequence[LinearPlant],
@@ -145,77 +149,86 @@ def _design(
     robust: RobustAim,
     bandwidth: float,
 ) -> RobustController:
-    """A design with its worst margins on some plants, or on the first of them that fall short."""
-    regulator = _regulator(robot, linear, aim.period, bandwidth, robust)
-    tracking = back_calculation(regulator, YIELDING * robust.integral * _lowest(linear) * aim.period)
+    """A design with its worst margins over some plants, up to the first that falls short."""
+    regulator = _shape_regulator(robot, linear, aim.period, bandwidth, robust)
+    tracking = back_calculation(
+        regulator, BACK_CALCULATION_FACTOR * robust.integral * _lowest_frequency(linear) * aim.period
+    )
     knot = Knot(0.0, regulator, tracking)
     worst = margins_of(plants[0], knot)
     for plant in plants[1:]:
-        if worst.least < robust.margin:
+        if worst.min_disk < robust.margin:
             break
-        worst = worst.worst(margins_of(plant, knot))
+        worst = worst.worst_of(margins_of(plant, knot))
     return RobustController(aim, linear, regulator, tracking, bandwidth, worst)
 
 
 def back_calculation(regulator: Any, share: float) -> Array:
-    """What the integrals make of a limit, (q, n): a ``share`` of what lets the speed asked for be the one given.
+    """Anti-windup gain of the integrals, (q, n): a ``share`` of what makes the commanded speed the limited one.
 
-    The other states of the regulator forget by themselves.
+    The other states of the regulator are stable by themselves.
     """
     count = regulator.noutputs
     others = slice(3, regulator.nstates - count)
-    asks = regulator.A[-count:]
-    settled = np.linalg.solve(np.eye(others.stop - 3) - regulator.A[others, others], regulator.A[others, :3])
-    lasting = asks[:, :3] + asks[:, others] @ settled
+    speed_rows = regulator.A[-count:]
+    steady_state = np.linalg.solve(np.eye(others.stop - 3) - regulator.A[others, others], regulator.A[others, :3])
+    steady_gain = speed_rows[:, :3] + speed_rows[:, others] @ steady_state
     gain = np.zeros((regulator.nstates, count))
-    gain[:3] = share * regulator.dt * np.linalg.pinv(lasting)
+    gain[:3] = share * regulator.dt * np.linalg.pinv(steady_gain)
     return gain
 
 
-def _lowest(linear: LinearPlant) -> float:
+def _lowest_frequency(linear: LinearPlant) -> float:
     """Angular frequency of the lowest mode, in rad/s."""
     return 2.0 * np.pi * float(linear.modes.frequencies[0])
 
 
-def _regulator(robot: Robot, linear: LinearPlant, period: float, bandwidth: float, robust: RobustAim) -> Any:
-    """One loop shape: scale position and tensions, close, and let the winches run as asked two samples later."""
+def _shape_regulator(robot: Robot, linear: LinearPlant, period: float, bandwidth: float, robust: RobustAim) -> Any:
+    """Regulator of one loop shape: scaled position and tensions, and winches that respond two samples later."""
     count = len(linear.tensions)
-    lowest = _lowest(linear)
+    lowest_frequency = _lowest_frequency(linear)
     lengths = np.linalg.norm(np.array(robot.anchors) - linear.position, axis=1)
     stiffness = float(np.mean([cable.modulus * cable.area for cable in robot.cables] / lengths))
-    rates = np.repeat([bandwidth * lowest, robust.damping * lowest / stiffness], [3, count])
+    signal_weights = np.repeat(
+        [bandwidth * lowest_frequency, robust.damping * lowest_frequency / stiffness], [3, count]
+    )
     plant = ramp_plant(linear, period)
-    scaled = control.ss(plant.A, plant.B, rates[:, None] * plant.C, rates[:, None] * plant.D, period)
+    scaled = control.ss(plant.A, plant.B, signal_weights[:, None] * plant.C, signal_weights[:, None] * plant.D, period)
     # Position also by its integral: (s + w) / s.
-    corner = robust.integral * lowest
-    places = np.eye(3 + count, 3)
-    weights = control.ss(np.zeros((3, 3)), corner * places.T, places, np.eye(3 + count))
-    found = shaped_controller(scaled * _delay(count, period), weights)
-    return _as_regulator(control.ss(found.A, found.B * rates, found.C, found.D * rates, period), count)
+    corner = robust.integral * lowest_frequency
+    position_selector = np.eye(3 + count, 3)
+    weights = control.ss(np.zeros((3, 3)), corner * position_selector.T, position_selector, np.eye(3 + count))
+    synthesised = synthesise_controller(scaled * _delay_system(count, period), weights)
+    return _as_regulator(
+        control.ss(
+            synthesised.A, synthesised.B * signal_weights, synthesised.C, synthesised.D * signal_weights, period
+        ),
+        count,
+    )
 
 
-def _delay(count: int, period: float) -> Any:
-    """Each of some signals, DELAY samples late."""
-    nothing = np.zeros((count, count))
-    once = control.ss(nothing, np.eye(count), np.eye(count), nothing, period)
-    late = once
-    for _ in range(DELAY - 1):
-        late = late * once
-    return late
+def _delay_system(count: int, period: float) -> Any:
+    """Delay of LOOP_DELAY_SAMPLES samples for each of ``count`` signals."""
+    zeros = np.zeros((count, count))
+    unit_delay = control.ss(zeros, np.eye(count), np.eye(count), zeros, period)
+    delayed = unit_delay
+    for _ in range(LOOP_DELAY_SAMPLES - 1):
+        delayed = delayed * unit_delay
+    return delayed
 
 
-def _as_regulator(found: Any, count: int) -> Any:
-    """A controller whose output is the speed of two samples later, as accelerations of the next sample.
+def _as_regulator(speed_controller: Any, count: int) -> Any:
+    """Converts a controller of the speed two samples later to accelerations of the next sample.
 
-    The speed for the sample's end was found one sample ago and is part of the state.
+    The speed at the sample's end was computed one sample ago and is part of the state.
     """
-    size, sensors, period = found.nstates, found.ninputs, found.dt
-    each, none = np.eye(count) / period, np.zeros
+    size, sensors, period = speed_controller.nstates, speed_controller.ninputs, speed_controller.dt
+    identity_rate, none = np.eye(count) / period, np.zeros
     return control.ss(
-        np.block([[found.A, none((size, count))], [found.C, none((count, count))]]),
-        np.block([[found.B, none((size, count))], [found.D, none((count, count))]]),
-        np.hstack([none((count, size)), each]),
-        np.hstack([none((count, sensors)), -each]),
+        np.block([[speed_controller.A, none((size, count))], [speed_controller.C, none((count, count))]]),
+        np.block([[speed_controller.B, none((size, count))], [speed_controller.D, none((count, count))]]),
+        np.hstack([none((count, size)), identity_rate]),
+        np.hstack([none((count, sensors)), -identity_rate]),
         period,
         **regulator_signals(count),
     )

@@ -1,7 +1,7 @@
-"""A controller that is designed at several places of a path, with its gains interpolated in between.
+"""Gain scheduling: a controller designed at several points of a path, with interpolated gains.
 
-All designs must estimate the same quantities. Then nothing jumps where one takes over from another: the state goes
-on, and gains that change continuously ask for accelerations that do.
+All designs must estimate the same quantities. Then the transfer is bumpless: the state is continuous, and continuous
+gains give continuous accelerations.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from .aim import ControlAim
 from .design import Design, Knot
 from .lqg import design_controller
 
-PLACES = 9
+DESIGN_POINTS = 9
 
 
 class DesignOfOnePlant(Design, Protocol):
-    """A design for one place."""
+    """Interface of a design at one operating point."""
 
     @property
     def linear(self) -> LinearPlant:
@@ -66,12 +66,12 @@ class ScheduledController:
 
 
 def schedule_controller(
-    robot: Robot, trajectory: Trajectory, aim: ControlAim | None = None, places: int = PLACES
+    robot: Robot, trajectory: Trajectory, aim: ControlAim | None = None, points: int = DESIGN_POINTS
 ) -> ScheduledController:
-    """LQG designs at equally many times of a path, from its start to its end.
+    """Gain-scheduled LQG designs at ``points`` equidistant times of a path, from its start to its end.
 
     Raises what :func:`tautwire.linear.linearise` raises.
     """
-    times = np.linspace(0.0, trajectory.duration, places)
+    times = np.linspace(0.0, trajectory.duration, points)
     controllers = [design_controller(robot, aim, at) for at in trajectory.position(times).tolist()]
     return ScheduledController(tuple(times.tolist()), tuple(controllers))

@@ -1,7 +1,15 @@
-"""Winch programs that tell effects apart."""
+"""Optimal input design: winch programs that tell effects apart."""
 
 from .limits import default_limits
 from .program import MultisinePath
-from .search import Excitation, ExcitationError, Limits, Pair, excite
+from .search import EffectSeparation, Excitation, ExcitationError, ExcitationLimits, design_excitation
 
-__all__ = ["Excitation", "ExcitationError", "Limits", "MultisinePath", "Pair", "default_limits", "excite"]
+__all__ = [
+    "EffectSeparation",
+    "Excitation",
+    "ExcitationError",
+    "ExcitationLimits",
+    "MultisinePath",
+    "default_limits",
+    "design_excitation",
+]

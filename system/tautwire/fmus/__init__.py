@@ -1,1 +1,1 @@
-"""A robot's FMUs: built, mended for C hosts, and the slots that FMUs of others can take."""
+"""A robot's FMUs: built, patched for C hosts, and the slots that user FMUs can take."""

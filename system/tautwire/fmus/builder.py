@@ -1,7 +1,7 @@
-"""pythonfmu's builder as it is installed, whatever FMUs this process has loaded.
+"""pythonfmu's FmuBuilder as it is installed, whatever FMUs this process has loaded.
 
-An FMU carries a copy of pythonfmu without binaries and puts it first on the path of the process that loads it, and so
-of those that this process spawns. FMUs that such a copy builds have no library.
+An FMU contains a copy of pythonfmu without binaries and puts it first on the path of the process that loads it, and so
+of those that this process spawns. FMUs built by such a copy have no library.
 """
 
 from __future__ import annotations
@@ -16,36 +16,37 @@ from typing import Any
 
 from ..errors import TautwireError
 
-LIBRARY = "pythonfmu"
-# What pythonfmu lays beside the modules inside every FMU.
-MARK = "slavemodule.txt"
+PYTHONFMU = "pythonfmu"
+# File that pythonfmu puts beside the modules inside every FMU.
+FMU_RESOURCE_MARKER = "slavemodule.txt"
 
 
 class FmuLibraryError(TautwireError):
-    """The pythonfmu at hand has no library for FMUs of this machine; carries the folder in which it lies."""
+    """The installed pythonfmu has no wrapper library for this machine; carries its folder."""
 
-    def __init__(self, place: Path) -> None:
-        self.place = place
+    def __init__(self, folder: Path) -> None:
+        self.folder = folder
         super().__init__(
-            f"pythonfmu in {place} has no binaries for this machine, so it cannot build FMUs: install it again "
+            f"pythonfmu in {folder} has no binaries for this machine, so it cannot build FMUs: install it again "
             "(pip install --force-reinstall pythonfmu)"
         )
 
 
 @contextmanager
-def builder(scratch: Path, names: Collection[str]) -> Iterator[Any]:
-    """The installed library's ``FmuBuilder``, while modules and packages of these names are imported from ``scratch``.
+def installed_builder(scratch: Path, names: Collection[str]) -> Iterator[Any]:
+    """Context with the installed library's ``FmuBuilder``.
 
-    Path and modules are afterwards as they were. Raises FmuLibraryError where the library cannot build FMUs.
+    Modules and packages of these names are imported from ``scratch`` within it. Path and modules are restored
+    afterwards. Raises FmuLibraryError where the library cannot build FMUs.
     """
     path, modules = list(sys.path), dict(sys.modules)
-    foreign = {*names} if _is_installed(modules.get(LIBRARY)) else {*names, LIBRARY}
+    reimported_packages = {*names} if _is_installed(modules.get(PYTHONFMU)) else {*names, PYTHONFMU}
     for name in modules:
-        if name.partition(".")[0] in foreign:
+        if name.partition(".")[0] in reimported_packages:
             del sys.modules[name]
-    sys.path[:] = [str(scratch), *(entry for entry in path if not (Path(entry) / MARK).is_file())]
+    sys.path[:] = [str(scratch), *(entry for entry in path if not (Path(entry) / FMU_RESOURCE_MARKER).is_file())]
     try:
-        yield _checked(importlib.import_module(f"{LIBRARY}.builder"))
+        yield _checked_builder(importlib.import_module(f"{PYTHONFMU}.builder"))
     finally:
         sys.path[:] = path
         for name in set(sys.modules) - set(modules):
@@ -56,11 +57,11 @@ def builder(scratch: Path, names: Collection[str]) -> Iterator[Any]:
 
 
 def _is_installed(library: ModuleType | None) -> bool:
-    place = Path((library and library.__file__) or ".").parent
-    return place.is_dir() and not (place.parent / MARK).exists()
+    folder = Path((library and library.__file__) or ".").parent
+    return folder.is_dir() and not (folder.parent / FMU_RESOURCE_MARKER).exists()
 
 
-def _checked(module: ModuleType) -> Any:
+def _checked_builder(module: ModuleType) -> Any:
     if not module.FmuBuilder.has_binary():
         raise FmuLibraryError(Path(module.__file__ or ".").parent)
     return module.FmuBuilder

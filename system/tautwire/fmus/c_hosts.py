@@ -1,8 +1,8 @@
-"""Makes FMUs that run in importers that are not Python processes.
+"""FMUs for C hosts: they run in importers that are not Python processes.
 
-pythonfmu's wrapper has undefined symbols of libpython, which only a Python process resolves. Here a library of our own
-takes the wrapper's name inside the FMU and the wrapper lies beside it. On loading, ours opens and starts libpython
-where the process has no Python, and then loads the wrapper; ``c_hosts.c`` tells how.
+pythonfmu's wrapper has undefined symbols of libpython, which only a Python process resolves. Here a launcher library
+takes the wrapper's name inside the FMU and the wrapper lies beside it. On loading, the launcher opens and starts
+libpython where the process has no Python, and then loads the wrapper; see ``c_hosts.c``.
 
 A wrapper with libpython among its needed libraries does not do: extension modules of the standard library such as
 ``_ctypes`` find no symbols where the importer loads with RTLD_LOCAL; the FMU fails to load where that libpython is
@@ -28,39 +28,39 @@ from importlib.resources import files
 from pathlib import Path
 
 from ..errors import TautwireError, one_line
-from ..master.archive import require_sound
-from ..output import file_in_place
+from ..master.archive import require_valid_archive
+from ..output import atomic_file
 
 BINARIES = "binaries/linux64/"
-LIBRARY = ".so"
-WRAPPER = ".pythonfmu.so"
+LIBRARY_SUFFIX = ".so"
+WRAPPER_SUFFIX = ".pythonfmu.so"
 COMPILERS = ("cc", "gcc", "clang")
-FLAGS = ("-std=gnu11", "-O2", "-fPIC", "-shared", "-s", "-fvisibility=hidden")
-GET_A_COMPILER = "install a C compiler (Debian: sudo apt install gcc), or name one in the environment variable CC"
-GET_A_LIBPYTHON = (
+COMPILER_FLAGS = ("-std=gnu11", "-O2", "-fPIC", "-shared", "-s", "-fvisibility=hidden")
+COMPILER_HINT = "install a C compiler (Debian: sudo apt install gcc), or name one in the environment variable CC"
+LIBPYTHON_HINT = (
     "build the FMUs with a Python that has one: from uv, conda or python.org, from pyenv with "
     "PYTHON_CONFIGURE_OPTS=--enable-shared, or the system's (Debian: sudo apt install python3-dev)"
 )
 
 
 class CHostError(TautwireError):
-    """FMUs for C hosts cannot be made here or from this file: ``problem`` says why, ``mend`` what to do."""
+    """FMUs for C hosts cannot be built here or from this file: ``problem`` says why, ``hint`` what to do."""
 
-    def __init__(self, problem: str, mend: str) -> None:
-        super().__init__(problem, mend)
+    def __init__(self, problem: str, hint: str) -> None:
+        super().__init__(problem, hint)
         self.problem = problem
-        self.mend = mend
+        self.hint = hint
 
     def __str__(self) -> str:
-        return one_line(f"{self.problem}; {self.mend}")
+        return one_line(f"{self.problem}; {self.hint}")
 
 
 @dataclass(frozen=True)
 class EmbeddablePython:
-    """What a process needs to run the Python at hand inside itself.
+    """Files and folders that a process needs to embed the running Python.
 
-    ``library`` is libpython, ``home`` what PYTHONHOME would be, ``standard_library`` the folder that tells that the
-    home is still there, ``headers`` the folder of ``Python.h``.
+    ``library`` is libpython, ``home`` the value of PYTHONHOME, ``standard_library`` the folder whose presence proves
+    that home still exists, ``headers`` the folder of ``Python.h``.
     """
 
     library: Path
@@ -72,29 +72,29 @@ class EmbeddablePython:
 def make_for_c_hosts(fmu: Path) -> None:
     """Rewrite an FMU that pythonfmu built so that it also runs where there is no Python process.
 
-    All other members keep their bytes. An FMU that is for C hosts already is made anew for the Python at hand, with
+    All other members keep their bytes. An FMU that is for C hosts already is rebuilt for the running Python, with
     the same bytes where that is the same Python.
 
-    Raises CHostError where the FMU is none of pythonfmu's, or Python or the machine lacks something, ArchiveError where
-    it is no sound archive.
+    Raises CHostError where the FMU was not built by pythonfmu, or Python or the machine lacks something, ArchiveError
+    where it is no sound archive.
     """
-    library = _compiled(embeddable_python(), find_compiler())
-    own, kept = _members(fmu)
-    require_sound(fmu)
-    with zipfile.ZipFile(fmu) as archive, file_in_place(fmu) as scratch:
-        wrapper = archive.read(kept if kept in archive.namelist() else own)
+    library_bytes = _compiled_library(embeddable_python(), find_compiler())
+    loaded_member, wrapper_member = _library_members(fmu)
+    require_valid_archive(fmu)
+    with zipfile.ZipFile(fmu) as archive, atomic_file(fmu) as scratch:
+        wrapper_bytes = archive.read(wrapper_member if wrapper_member in archive.namelist() else loaded_member)
         with zipfile.ZipFile(scratch, "w") as rewritten:
             for member in archive.infolist():
-                if member.filename == own:
-                    rewritten.writestr(copy(member), library)
-                    rewritten.writestr(_renamed(member, kept), wrapper)
-                elif member.filename != kept:
+                if member.filename == loaded_member:
+                    rewritten.writestr(copy(member), library_bytes)
+                    rewritten.writestr(_renamed(member, wrapper_member), wrapper_bytes)
+                elif member.filename != wrapper_member:
                     rewritten.writestr(copy(member), archive.read(member))
         shutil.copymode(fmu, scratch)
 
 
 def embeddable_python() -> EmbeddablePython:
-    """The Python that runs this, as a C host can embed it.
+    """Locate the running Python as a C host can embed it.
 
     Raises CHostError where the system is not Linux on x86-64, or Python comes without libpython or headers.
     """
@@ -111,23 +111,27 @@ def embeddable_python() -> EmbeddablePython:
             "install Python's headers (Debian: sudo apt install python3-dev)",
         )
     prefixes = dict.fromkeys((sys.base_prefix, sys.base_exec_prefix))
-    return EmbeddablePython(_libpython(), ":".join(prefixes), Path(sysconfig.get_path("stdlib")), headers)
+    return EmbeddablePython(_find_libpython(), ":".join(prefixes), Path(sysconfig.get_path("stdlib")), headers)
 
 
 def find_compiler() -> tuple[str, ...]:
-    """The command of the C compiler: that of the environment variable CC, else the first on the path.
+    """Command of the C compiler: that of the environment variable CC, else the first on the path.
 
     Raises CHostError where there is none.
     """
-    named = shlex.split(os.environ.get("CC", ""))
-    for command in [named] if named else [[name] for name in COMPILERS]:
+    compiler_from_environment = shlex.split(os.environ.get("CC", ""))
+    for command in [compiler_from_environment] if compiler_from_environment else [[name] for name in COMPILERS]:
         if shutil.which(command[0]) is not None:
             return tuple(command)
-    tried = f"{shlex.join(named)} (from CC)" if named else ", ".join(COMPILERS)
-    raise CHostError(f"FMUs for C hosts need a C compiler on the machine that builds them: no {tried}", GET_A_COMPILER)
+    candidates = (
+        f"{shlex.join(compiler_from_environment)} (from CC)" if compiler_from_environment else ", ".join(COMPILERS)
+    )
+    raise CHostError(
+        f"FMUs for C hosts need a C compiler on the machine that builds them: no {candidates}", COMPILER_HINT
+    )
 
 
-def _libpython() -> Path:
+def _find_libpython() -> Path:
     version = sysconfig.get_config_var("LDVERSION") or sysconfig.get_python_version()
     names = (sysconfig.get_config_var("INSTSONAME"), f"libpython{version}.so.1.0", f"libpython{version}.so")
     base = Path(sys.base_exec_prefix)
@@ -136,20 +140,20 @@ def _libpython() -> Path:
             if folder and name and ".so" in name and (Path(folder) / name).is_file():
                 return Path(folder) / name
     how = "was built without" if not sysconfig.get_config_var("Py_ENABLE_SHARED") else "lacks"
-    raise CHostError(f"the Python in {sys.base_prefix} {how} a shared libpython, which a C host loads", GET_A_LIBPYTHON)
+    raise CHostError(f"the Python in {sys.base_prefix} {how} a shared libpython, which a C host loads", LIBPYTHON_HINT)
 
 
-def _members(fmu: Path) -> tuple[str, str]:
-    """The member that importers load, and the one that the wrapper lies in."""
+def _library_members(fmu: Path) -> tuple[str, str]:
+    """Archive members: the library that importers load, and that of the wrapper."""
     members: list[str] = []
     if zipfile.is_zipfile(fmu):
         with zipfile.ZipFile(fmu) as archive:
             members = archive.namelist()
-    libraries = [name for name in members if name.startswith(BINARIES) and name.endswith(LIBRARY)]
-    own = [name for name in libraries if not name.endswith(WRAPPER)]
-    if len(own) != 1 or "resources/slavemodule.txt" not in members:
+    libraries = [name for name in members if name.startswith(BINARIES) and name.endswith(LIBRARY_SUFFIX)]
+    loaded_members = [name for name in libraries if not name.endswith(WRAPPER_SUFFIX)]
+    if len(loaded_members) != 1 or "resources/slavemodule.txt" not in members:
         raise CHostError(f"{fmu} is not an FMU that pythonfmu built", "give one that tautwire build wrote")
-    return own[0], own[0][: -len(LIBRARY)] + WRAPPER
+    return loaded_members[0], loaded_members[0][: -len(LIBRARY_SUFFIX)] + WRAPPER_SUFFIX
 
 
 def _renamed(member: zipfile.ZipInfo, name: str) -> zipfile.ZipInfo:
@@ -159,29 +163,40 @@ def _renamed(member: zipfile.ZipInfo, name: str) -> zipfile.ZipInfo:
 
 
 @lru_cache
-def _compiled(python: EmbeddablePython, compiler: tuple[str, ...]) -> bytes:
-    defined = {
+def _compiled_library(python: EmbeddablePython, compiler: tuple[str, ...]) -> bytes:
+    macros = {
         "PYTHON_LIBRARY": str(python.library),
-        "PYTHON_SONAME": _shared_name(python.library),
+        "PYTHON_SONAME": _soname(python.library),
         "PYTHON_HOME": python.home,
         "PYTHON_PROGRAM": f"{python.home.split(':')[0]}/bin/python3",
         "STANDARD_LIBRARY": str(python.standard_library),
     }
     with tempfile.TemporaryDirectory(prefix="tautwire-build-") as scratch:
-        result = Path(scratch) / "library.so"
-        given = [f"-D{name}={_c_string(text)}" for name, text in defined.items()]
-        command = [*compiler, *FLAGS, *given, f"-I{python.headers}", "-x", "c", "-", "-o", str(result), "-ldl"]
+        library_file = Path(scratch) / "library.so"
+        macro_flags = [f"-D{name}={_c_string(text)}" for name, text in macros.items()]
+        command = [
+            *compiler,
+            *COMPILER_FLAGS,
+            *macro_flags,
+            f"-I{python.headers}",
+            "-x",
+            "c",
+            "-",
+            "-o",
+            str(library_file),
+            "-ldl",
+        ]
         source = files(__package__).joinpath("c_hosts.c").read_bytes()
-        done = subprocess.run(command, input=source, capture_output=True, check=False)
-        if done.returncode != 0 or not result.is_file():
-            said = [line for line in done.stderr.decode(errors="replace").splitlines() if "error" in line]
-            why = said[0] if said else f"exit status {done.returncode}"
-            raise CHostError(f"{shlex.join(compiler)} cannot compile the C part of the FMUs: {why}", GET_A_COMPILER)
-        return result.read_bytes()
+        completed = subprocess.run(command, input=source, capture_output=True, check=False)
+        if completed.returncode != 0 or not library_file.is_file():
+            error_lines = [line for line in completed.stderr.decode(errors="replace").splitlines() if "error" in line]
+            reason = error_lines[0] if error_lines else f"exit status {completed.returncode}"
+            raise CHostError(f"{shlex.join(compiler)} cannot compile the C part of the FMUs: {reason}", COMPILER_HINT)
+        return library_file.read_bytes()
 
 
-def _shared_name(library: Path) -> str:
-    """The name by which the loader finds the library on a machine that has it elsewhere."""
+def _soname(library: Path) -> str:
+    """Shared-object name (soname) by which the loader finds the library on another machine."""
     return library.name if library.name.endswith(".1.0") else f"{library.name}.1.0"
 
 

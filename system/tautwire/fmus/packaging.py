@@ -17,24 +17,24 @@ import tautwire_fmu
 from tautwire_fmu.laws.effects import BY_NAME
 from tautwire_fmu.laws.winch_drive import NO_LIMIT
 
-from ..arguments import callable_or_none, folder_of, robot_of
-from ..interrupt import interrupts_held
-from ..model.assembly import assemble
+from ..arguments import validate_callable, validate_folder, validate_robot
+from ..interrupt import defer_interrupts
+from ..model.assembly import assemble_robot
 from ..robots.robot import EffectSetting, Robot
 from ..statics.equilibrium import formula_texts, has_sensor_effects, platform_settings, static_forces, static_tensions
-from .builder import builder
-from .slots import check_own_fmus
-from .wrapper import mend_exit
+from .builder import installed_builder
+from .slots import check_user_fmus
+from .wrapper import patch_wrapper_exit
 
-# pythonfmu 0.7.0 runs the script at every instantiation and then gives up a reference to its globals that it does
-# not own; without the one taken here the second instance finds an empty module.
+# pythonfmu 0.7.0 runs the script at every instantiation and then releases a reference to its globals that it does
+# not own; without the one taken here the second instance gets an empty module.
 LAUNCHER = """import ctypes
 
 from {package}.slaves import {base}
 
 ctypes.pythonapi.Py_IncRef(ctypes.py_object(globals()))
 """
-OPTIONS = {
+FMU_OPTIONS = {
     "needsExecutionTool": False,
     "canGetAndSetFMUstate": True,
     "canSerializeFMUstate": True,
@@ -44,84 +44,88 @@ OPTIONS = {
 
 @dataclass(frozen=True)
 class RobotFmus:
-    """Where the FMUs of a robot lie: one path a cable in the robot file's order, the platform's, and the winches'.
+    """Paths of a robot's FMUs: one a cable in the robot file's order, the platform's, and the winches'.
 
-    A winch is None where rope runs at the speed asked for. ``own`` are the slots with FMUs of the user's; each is to
-    start with these values, by the names of our parameters. ``measured`` tells that the platform also shows its
-    position as its sensor does. ``settings`` are parameters that our own are to start with in place of what they hold,
-    by component; names that are no parameter of it are passed over.
+    A winch is None where rope runs at the commanded speed. ``user_start_values`` are the slots with user FMUs; each
+    is to start with these values, by the names of our parameters. ``has_position_sensor`` tells that the platform also
+    outputs its measured position. ``start_settings`` are parameters that our own FMUs start with in place of their
+    stored values, by component; names that are no parameter of it are ignored.
     """
 
     cables: tuple[Path, ...]
     platform: Path
     winches: tuple[Path | None, ...] = ()
-    own: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
-    measured: bool = False
-    settings: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    user_start_values: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    has_position_sensor: bool = False
+    start_settings: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     @property
-    def parts(self) -> dict[str, Path]:
-        """All FMUs by the names of their components: platform, winches, and the cables, which wait for both."""
+    def by_component(self) -> dict[str, Path]:
+        """All FMUs by the names of their components: platform, winches, and the cables, which depend on both."""
         cables = {f"cable_{index}": path for index, path in enumerate(self.cables, start=1)}
         winches = {f"winch_{index}": path for index, path in enumerate(self.winches, start=1) if path is not None}
         return {"platform": self.platform} | winches | cables
 
     @property
     def paths(self) -> tuple[Path, ...]:
-        """All FMUs, those of the cables first."""
+        """Paths of all FMUs, those of the cables first."""
         return (*self.cables, self.platform, *(path for path in self.winches if path is not None))
 
     @property
     def winch_numbers(self) -> tuple[int, ...]:
-        """The cables, counted from 1, that have a winch."""
+        """Cables, counted from 1, that have a winch."""
         return tuple(index for index, path in enumerate(self.winches, start=1) if path is not None)
 
 
 def build_fmus(robot: Robot, folder: str | Path, progress: Callable[[float], None] | None = None) -> RobotFmus:
     """Write ``platform.fmu``, ``cable_1.fmu`` ... and, where there are winches, ``winch_1.fmu`` ... into ``folder``.
 
-    FMI 2.0 co-simulation; what a component is lies inside as a JSON resource. FMUs of the user's stay where they are.
-    The folder is made if absent, and has to stay while the FMUs are run. ``progress`` gets the share that is done, from
-    0 to 1. Returns where the FMUs lie.
+    FMI 2.0 co-simulation; the data of a component lie inside as a JSON resource. User FMUs stay where they are.
+    The folder is created if absent, and has to stay while the FMUs are run. ``progress`` gets the fraction completed,
+    from 0 to 1. Returns the paths of the FMUs.
 
-    Raises SlotError where an FMU of the user's does not fit, UnreachableError where the cables cannot hold the
+    Raises SlotError where a user FMU does not fit, UnreachableError where the cables cannot hold the
     platform at the start, ArgumentError where an argument is none of these, OSError where the disk refuses.
     """
-    robot_of("build_fmus: robot", robot)
-    folder = folder_of("build_fmus: folder", folder)
-    callable_or_none("build_fmus: progress", progress)
-    check_own_fmus(robot)
+    validate_robot("build_fmus: robot", robot)
+    folder = validate_folder("build_fmus: folder", folder)
+    validate_callable("build_fmus: progress", progress)
+    check_user_fmus(robot)
     folder.mkdir(parents=True, exist_ok=True)
-    own = {fmu.slot: fmu.path for fmu in robot.fmus}
-    count, done = 1 + robot.cable_count + len(robot.winch_numbers), itertools.count(1)
+    user_fmus = {fmu.slot: fmu.path for fmu in robot.fmus}
+    fmu_count, built_counter = 1 + robot.cable_count + len(robot.winch_numbers), itertools.count(1)
 
-    def made(module: str, base: str, name: str, data: dict[str, Any]) -> Path:
-        path = own[name] if name in own else _build(module, base, name, data, folder)
+    def build_or_use(module: str, base: str, name: str, data: dict[str, Any]) -> Path:
+        path = user_fmus[name] if name in user_fmus else _build_fmu(module, base, name, data, folder)
         if progress is not None:
-            progress(next(done) / count)
+            progress(next(built_counter) / fmu_count)
         return path
 
     return RobotFmus(
-        cables=tuple(made("cable", "Cable", f"cable_{i}", data) for i, data in enumerate(cable_data(robot), start=1)),
-        platform=made("point_mass", "PointMass", "platform", platform_data(robot)),
+        cables=tuple(
+            build_or_use("cable", "Cable", f"cable_{i}", data) for i, data in enumerate(cable_resources(robot), start=1)
+        ),
+        platform=build_or_use("point_mass", "PointMass", "platform", platform_resource(robot)),
         winches=tuple(
-            made("winch", "Winch", f"winch_{i}", winch_data(robot, i)) if i in robot.winch_numbers else None
+            build_or_use("winch", "Winch", f"winch_{i}", winch_resource(robot, i)) if i in robot.winch_numbers else None
             for i in robot.cable_numbers
         ),
-        own={slot: start_values(robot, slot) for slot in own},
-        measured="platform" not in own and has_sensor_effects(robot),
+        user_start_values={slot: start_values(robot, slot) for slot in user_fmus},
+        has_position_sensor="platform" not in user_fmus and has_sensor_effects(robot),
     )
 
 
-def build_controller(data: dict[str, Any], folder: Path) -> Path:
-    """Write ``controller.fmu`` into ``folder``; ``data`` is what it carries as ``controller.json``."""
+def package_controller_fmu(data: dict[str, Any], folder: Path) -> Path:
+    """Write ``controller.fmu`` into ``folder``; ``data`` is its resource ``controller.json``."""
     folder.mkdir(parents=True, exist_ok=True)
-    return _build("controller", "Controller", "controller", data, folder)
+    return _build_fmu("controller", "Controller", "controller", data, folder)
 
 
-def gathered(fmus: RobotFmus, folder: Path) -> RobotFmus:
-    """The same FMUs with copies in ``folder`` of those of the user's, named as their slots."""
-    copies = {slot: _copy(fmus.parts[slot], folder / f"{slot}.fmu") for slot in fmus.own}
+def with_user_fmus_copied(fmus: RobotFmus, folder: Path) -> RobotFmus:
+    """The same FMUs with copies of the user FMUs in ``folder``, named as their slots."""
+    copies = {
+        slot: _copy_atomically(fmus.by_component[slot], folder / f"{slot}.fmu") for slot in fmus.user_start_values
+    }
     return replace(
         fmus,
         cables=tuple(copies.get(f"cable_{i}", path) for i, path in enumerate(fmus.cables, start=1)),
@@ -131,7 +135,7 @@ def gathered(fmus: RobotFmus, folder: Path) -> RobotFmus:
 
 
 def start_values(robot: Robot, slot: str) -> dict[str, float]:
-    """Where the run starts, by our parameters: ``start.x`` ... in m, and of a cable ``start_tension`` in N."""
+    """Start values of a run, by our parameters: ``start.x`` ... in m, and of a cable ``start_tension`` in N."""
     kind, _, number = slot.partition("_")
     if kind == "winch":
         return {}
@@ -139,8 +143,8 @@ def start_values(robot: Robot, slot: str) -> dict[str, float]:
     return start if kind == "platform" else start | {"start_tension": float(static_tensions(robot)[int(number) - 1])}
 
 
-def cable_data(robot: Robot) -> list[dict[str, Any]]:
-    """What each cable FMU carries as ``cable.json``."""
+def cable_resources(robot: Robot) -> list[dict[str, Any]]:
+    """Resources ``cable.json`` of the cable FMUs."""
     start = robot.platform.start
     return [
         {
@@ -154,59 +158,63 @@ def cable_data(robot: Robot) -> list[dict[str, Any]]:
             "area": cable.area,
             "damping": cable.damping,
             "gravity": robot.gravity,
-            "effects": [_effect_data(s) for s in robot.effects_on_cable(index)],
+            "effects": [_effect_resource(s) for s in robot.effects_on_cable(index)],
             "formulas": formula_texts(robot.formulas_on(index)),
         }
-        for index, (cable, component) in enumerate(zip(robot.cables, assemble(robot).cables, strict=True), start=1)
+        for index, (cable, component) in enumerate(
+            zip(robot.cables, assemble_robot(robot).cables, strict=True), start=1
+        )
     ]
 
 
-def platform_data(robot: Robot) -> dict[str, Any]:
-    """What the platform FMU carries as ``point_mass.json``."""
+def platform_resource(robot: Robot) -> dict[str, Any]:
+    """Resource ``point_mass.json`` of the platform FMU."""
     forces = static_forces(robot)
     return {
         "description": f"platform of {robot.name}",
         "mass": robot.platform.mass,
         "gravity": robot.gravity,
         "start": list(robot.platform.start),
-        "start_velocity": list(assemble(robot).velocity),
+        "start_velocity": list(assemble_robot(robot).velocity),
         "start_forces": forces.tolist(),
-        "effects": [_effect_data(s) for s in platform_settings(robot)],
+        "effects": [_effect_resource(s) for s in platform_settings(robot)],
         "formulas": formula_texts(robot.formulas_on()),
     }
 
 
-def winch_data(robot: Robot, cable: int) -> dict[str, Any]:
-    """What the winch FMU of a cable, counted from 1, carries as ``winch.json``."""
+def winch_resource(robot: Robot, cable: int) -> dict[str, Any]:
+    """Resource ``winch.json`` of the winch FMU of a cable, counted from 1."""
     declared = {} if robot.winch is None else vars(robot.winch)
-    numbers = {name: NO_LIMIT if value is None else value for name, value in declared.items()}
-    return {"description": f"winch {cable} of {robot.name}", **numbers}
+    limited_values = {name: NO_LIMIT if value is None else value for name, value in declared.items()}
+    return {"description": f"winch {cable} of {robot.name}", **limited_values}
 
 
-def _effect_data(setting: EffectSetting) -> dict[str, Any]:
-    return {"name": setting.name, "values": BY_NAME[setting.name].completed(setting.values)}
+def _effect_resource(setting: EffectSetting) -> dict[str, Any]:
+    return {"name": setting.name, "values": BY_NAME[setting.name].completed_values(setting.values)}
 
 
-def _build(module: str, base: str, name: str, data: dict[str, Any], folder: Path) -> Path:
+def _build_fmu(module: str, base: str, name: str, data: dict[str, Any], folder: Path) -> Path:
     sources = Path(tautwire_fmu.__file__).parent
     package = f"tautwire_fmu_{_digest(sources)}"
     text = json.dumps(data | {"model_name": name}, sort_keys=True)
     guid = str(uuid5(NAMESPACE_URL, package + module + text))
-    # An interrupt within one of the many imports may end in a callback that nobody hears of.
-    with interrupts_held() as raise_interrupt, tempfile.TemporaryDirectory(prefix="tautwire-build-") as scratch_name:
+    # An interrupt within one of the many imports may be raised in a callback, where it is lost.
+    with defer_interrupts() as raise_interrupt, tempfile.TemporaryDirectory(prefix="tautwire-build-") as scratch_name:
         scratch = Path(scratch_name)
         shutil.copytree(sources, scratch / package, ignore=shutil.ignore_patterns("__pycache__", "*.pyc"))
         resource = scratch / f"{module}.json"
         resource.write_text(json.dumps(data | {"model_name": name, "guid": guid}), encoding="utf-8")
         script = scratch / f"{name}_{guid.replace('-', '')[:12]}.py"
         script.write_text(LAUNCHER.format(package=package, base=base), encoding="utf-8")
-        unfinished = scratch / "built" / f"{name}.fmu"
-        with builder(scratch, (package, script.stem)) as fmu_builder:
-            fmu_builder.build_FMU(script, dest=unfinished, project_files=[scratch / package, resource], **OPTIONS)
-        finished = scratch / f"{name}.fmu"
-        mend_exit(unfinished, finished)
+        unpatched_fmu = scratch / "built" / f"{name}.fmu"
+        with installed_builder(scratch, (package, script.stem)) as fmu_builder:
+            fmu_builder.build_FMU(
+                script, dest=unpatched_fmu, project_files=[scratch / package, resource], **FMU_OPTIONS
+            )
+        patched_fmu = scratch / f"{name}.fmu"
+        patch_wrapper_exit(unpatched_fmu, patched_fmu)
         raise_interrupt()
-        return _move(finished, folder / f"{name}.fmu")
+        return _move_atomically(patched_fmu, folder / f"{name}.fmu")
 
 
 def _digest(sources: Path) -> str:
@@ -217,15 +225,15 @@ def _digest(sources: Path) -> str:
     return digest.hexdigest()[:12]
 
 
-def _copy(source: Path, target: Path) -> Path:
-    beside = target.with_name(f".{target.name}.partial")
-    shutil.copyfile(source, beside)
-    beside.replace(target)
+def _copy_atomically(source: Path, target: Path) -> Path:
+    partial_file = target.with_name(f".{target.name}.partial")
+    shutil.copyfile(source, partial_file)
+    partial_file.replace(target)
     return target
 
 
-def _move(built: Path, target: Path) -> Path:
-    beside = target.with_name(f".{target.name}.partial")
-    shutil.move(built, beside)
-    beside.replace(target)
+def _move_atomically(built: Path, target: Path) -> Path:
+    partial_file = target.with_name(f".{target.name}.partial")
+    shutil.move(built, partial_file)
+    partial_file.replace(target)
     return target

@@ -1,4 +1,4 @@
-"""What an FMU shows: its variables with causality, unit and description."""
+"""Ports of an FMU: its variables with causality, unit and description."""
 
 from __future__ import annotations
 
@@ -6,17 +6,17 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from ..master.archive import description_of
-from ..master.standard import kind_of
+from ..master.archive import read_model_description
+from ..master.standard import type_name
 from ..master.units import unit_of
 
-AXES = ("x", "y", "z")
-SHOWN = ("input", "output", "parameter")
+VECTOR_AXES = ("x", "y", "z")
+LISTED_CAUSALITIES = ("input", "output", "parameter")
 
 
 @dataclass(frozen=True)
 class FmuPort:
-    """A variable of an FMU in the words of FMI; ``unit`` and ``start`` are None where none is stated."""
+    """Variable of an FMU in the terms of FMI; ``unit`` and ``start`` are None where none is stated."""
 
     name: str
     causality: str
@@ -28,33 +28,35 @@ class FmuPort:
 
 
 def fmu_ports(path: Path) -> tuple[FmuPort, ...]:
-    """The inputs, outputs and parameters of an FMU that can be read, in its own order."""
-    variables = description_of(path).modelVariables
+    """Inputs, outputs and parameters of a readable FMU, in its own order."""
+    variables = read_model_description(path).modelVariables
     return tuple(
         FmuPort(
             name=variable.name,
             causality=variable.causality,
             variability=variable.variability or "",
-            type=kind_of(variable),
+            type=type_name(variable),
             unit=unit_of(variable),
             start=None if variable.start is None else str(variable.start),
             description=variable.description or "",
         )
         for variable in variables
-        if variable.causality in SHOWN
+        if variable.causality in LISTED_CAUSALITIES
     )
 
 
-def vectors_together(ports: Sequence[FmuPort]) -> tuple[FmuPort, ...]:
-    """The ports with those that are the axes of one vector as one, for people to read."""
+def group_vectors(ports: Sequence[FmuPort]) -> tuple[FmuPort, ...]:
+    """Ports with the three axes of each vector merged into one, for display."""
     vectors: dict[str, list[FmuPort]] = {}
     for port in ports:
         stem, _, axis = port.name.rpartition(".")
-        vectors.setdefault(stem if axis in AXES else port.name, []).append(port)
-    return tuple(_vector(stem, parts) if len(parts) == len(AXES) else parts[0] for stem, parts in vectors.items())
+        vectors.setdefault(stem if axis in VECTOR_AXES else port.name, []).append(port)
+    return tuple(
+        _vector_port(stem, parts) if len(parts) == len(VECTOR_AXES) else parts[0] for stem, parts in vectors.items()
+    )
 
 
-def _vector(stem: str, parts: Sequence[FmuPort]) -> FmuPort:
+def _vector_port(stem: str, parts: Sequence[FmuPort]) -> FmuPort:
     starts = [f"{float(part.start):g}" for part in parts if part.start is not None]
     return replace(
         parts[0],

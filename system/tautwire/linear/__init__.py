@@ -1,4 +1,4 @@
-"""The linearised plant: python-control's state space with named signals, its modes, and what is made of them."""
+"""The linearised plant: a python-control state space with named signals, its modes and figures."""
 
 from .along import ModesAlong, modes_along
 from .black_box import BlackBoxPlant, linearise_fmus

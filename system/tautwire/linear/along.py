@@ -1,4 +1,4 @@
-"""The modes along a path, each followed by its shape through crossings with others."""
+"""Modes along a path, tracked by their shapes through frequency crossings."""
 
 from __future__ import annotations
 
@@ -11,102 +11,105 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
-from ..arguments import robot_of, whole_number_of
-from ..array_arguments import array_of, rising_of
+from ..arguments import validate_integer, validate_robot
+from ..array_arguments import validate_array, validate_increasing
 from ..errors import ArgumentError
 from ..robots.robot import Robot
-from ..trajectory import Trajectory, trajectory_of
+from ..trajectory import Trajectory, require_trajectory
 from .modes import Modes, cable_shares
 from .plant import linearise
 
 Array = NDArray[np.float64]
 
-POINTS = 101
-SURE = 0.9
-HALVINGS = 6
-EQUAL = 1e-3
+DEFAULT_POINTS = 101
+MIN_MODAL_ASSURANCE = 0.9
+MAX_BISECTIONS = 6
+FREQUENCY_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True)
-class _Here:
-    """Modes at a place, and what the cables have in motions there."""
+class _LocalModes:
+    """Modes at one position, and the function that gives the cables' energy shares there."""
 
     modes: Modes
-    shares: Callable[[Array], Array]
+    energy_shares: Callable[[Array], Array]
 
 
 @dataclass(frozen=True)
 class ModesAlong:
-    """Modes at N places of a path; column k of every array is one mode all along, by frequency at the first place.
+    """Modes at N points of a path; column k of every array is one tracked mode, by frequency at the first point.
 
-    ``abscissa`` (N,) is time in s, or distance travelled in m where ``timed`` is False; ``positions`` (N, 3) in m;
+    ``abscissa`` (N,) is time in s, or distance travelled in m where ``is_timed`` is False; ``positions`` (N, 3) in m;
     ``frequencies`` and ``damped_frequencies`` (N, 3) in Hz; ``damping_ratios`` (N, 3); ``shapes`` (N, 3, 3), unit
-    columns; ``cable_shares`` (N, n, 3). ``likeness`` (N - 1,) is the least modal assurance criterion, ``(phi_a .
-    phi_b)^2`` for unit shapes of a point mass, between neighbours: near 1 each mode is surely itself, below 0.5 the
-    path is too coarse there, or modes of one frequency mix.
+    columns; ``cable_shares`` (N, n, 3). ``modal_assurance`` (N - 1,) is the smallest modal assurance criterion,
+    ``(phi_a . phi_b)^2`` for unit shapes of a point mass, between neighbours: near 1 the tracking is certain, below
+    0.5 the path is too coarse there, or modes of equal frequency mix.
     """
 
     abscissa: Array
-    timed: bool
+    is_timed: bool
     positions: Array
     frequencies: Array
     damping_ratios: Array
     damped_frequencies: Array
     shapes: Array
     cable_shares: Array
-    likeness: Array
+    modal_assurance: Array
 
 
 def modes_along(
-    robot: Robot, path: Trajectory | ArrayLike, times: ArrayLike | None = None, points: int = POINTS
+    robot: Robot, path: Trajectory | ArrayLike, times: ArrayLike | None = None, points: int = DEFAULT_POINTS
 ) -> ModesAlong:
-    """The modes of a robot at rest at places along a path; the paper's Fig. 15 in one call.
+    """Computes the modes of a robot at rest at points of a path, tracked by shape; the paper's Fig. 15 in one call.
 
-    ``path`` is a trajectory, taken at ``times`` (N,) in s or at equally many ``points`` of its duration, or positions
-    (N, 3) in m, which may have ``times`` too. A mode is followed by its shape; between neighbours whose shapes differ
-    much the path is halved, up to six times, to tell which is which. Modes whose frequencies differ by less than 0.1 %
-    turn into each other at the least change: their shapes are turned back to look like those before, so that modes
-    that come so near cross.
+    ``path`` is a trajectory, taken at ``times`` (N,) in s or at ``points`` equidistant times of its duration, or
+    positions (N, 3) in m, optionally with ``times``. Modes are matched by shape; between neighbours whose shapes differ
+    much the path is bisected, up to six times. Shapes of modes whose frequencies differ by less than 0.1 % are not
+    unique: they are rotated to match the previous ones, so that modes that come so near cross.
 
-    Raises ArgumentError where an argument is none of these, or the path has fewer than two places, and what
+    Raises ArgumentError for an invalid argument or a path of fewer than two points, and what
     :func:`tautwire.linear.linearise` raises.
     """
-    robot_of("modes_along: robot", robot)
-    whole_number_of("modes_along: points", points, 2, "give two or more")
-    place, abscissa, timed = _path(path, times, points)
+    validate_robot("modes_along: robot", robot)
+    validate_integer("modes_along: points", points, 2, "give two or more")
+    position_at, abscissa, is_timed = _path_positions(path, times, points)
     count = len(abscissa)
 
-    def here(where: float) -> _Here:
-        plant = linearise(robot, place(where), swing=0.0)
+    def modes_at(coordinate: float) -> _LocalModes:
+        plant = linearise(robot, position_at(coordinate), swing=0.0)
         energies = partial(cable_shares, robot, plant.position, plant.tensions, plant.tension_slopes)
-        return _Here(plant.modes, energies)
+        return _LocalModes(plant.modes, energies)
 
-    found = _followed(here, count)
-    stacked = {field.name: np.array([getattr(modes, field.name) for modes in found]) for field in fields(Modes)}
-    likeness = [np.min(_likeness(a, b).diagonal()) for a, b in pairwise(found)]
-    positions = np.array([place(float(index)) for index in range(count)])
-    return ModesAlong(abscissa=abscissa, timed=timed, positions=positions, likeness=np.array(likeness), **stacked)
+    tracked_modes = _track_modes(modes_at, count)
+    stacked = {field.name: np.array([getattr(modes, field.name) for modes in tracked_modes]) for field in fields(Modes)}
+    assurance = [np.min(_modal_assurance(a, b).diagonal()) for a, b in pairwise(tracked_modes)]
+    positions = np.array([position_at(float(index)) for index in range(count)])
+    return ModesAlong(
+        abscissa=abscissa, is_timed=is_timed, positions=positions, modal_assurance=np.array(assurance), **stacked
+    )
 
 
-def _path(
+def _path_positions(
     path: Trajectory | ArrayLike, times: ArrayLike | None, points: int
 ) -> tuple[Callable[[float], Array], Array, bool]:
-    """The place at a number of points, fractions between neighbours, with the abscissa and whether that is time."""
+    """The position as a function of the (fractional) point number, the abscissa, and whether that is time."""
     if not hasattr(path, "__len__"):
-        trajectory = trajectory_of("modes_along: path", path)
-        asked = np.linspace(0.0, trajectory.duration, points) if times is None else times
-        instants = rising_of("modes_along: times", asked, "finite times (N,) in s that rise, two or more")
+        trajectory = require_trajectory("modes_along: path", path)
+        requested_times = np.linspace(0.0, trajectory.duration, points) if times is None else times
+        instants = validate_increasing(
+            "modes_along: times", requested_times, "finite times (N,) in s that rise, two or more"
+        )
         numbers = np.arange(len(instants))
         return (lambda where: trajectory.position(np.array([np.interp(where, numbers, instants)]))[0]), instants, True
-    positions = array_of("modes_along: path", path, (None, 3), "a path, or finite positions (N, 3) in m")
+    positions = validate_array("modes_along: path", path, (None, 3), "a path, or finite positions (N, 3) in m")
     if len(positions) < 2:
         raise ArgumentError("modes_along: path", path, f"has {len(positions)} places", "give two or more")
     numbers = np.arange(len(positions))
-    travelled = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(positions, axis=0), axis=1))])
-    abscissa = travelled
+    distances = np.concatenate([[0.0], np.cumsum(np.linalg.norm(np.diff(positions, axis=0), axis=1))])
+    abscissa = distances
     if times is not None:
         meaning = f"one time for each of {len(positions)} positions, in s"
-        abscissa = array_of("modes_along: times", times, (len(positions),), meaning)
+        abscissa = validate_array("modes_along: times", times, (len(positions),), meaning)
     return (
         (lambda where: np.array([np.interp(where, numbers, axis) for axis in positions.T])),
         abscissa,
@@ -114,76 +117,83 @@ def _path(
     )
 
 
-def _followed(here: Callable[[float], _Here], count: int) -> list[Modes]:
-    """The modes at 0 ... count - 1, followed both ways from where they differ most in frequency."""
-    places = [here(float(index)) for index in range(count)]
-    first = int(np.argmax([_least_gap(place.modes.frequencies) for place in places]))
-    found = {first: places[first].modes}
+def _track_modes(modes_at: Callable[[float], _LocalModes], count: int) -> list[Modes]:
+    """Modes at 0 ... count - 1, tracked in both directions from where the frequencies differ most."""
+    local_modes = [modes_at(float(index)) for index in range(count)]
+    first = int(np.argmax([_min_relative_gap(place.modes.frequencies) for place in local_modes]))
+    tracked = {first: local_modes[first].modes}
     for sign, indices in ((1, range(first + 1, count)), (-1, range(first - 1, -1, -1))):
         for index in indices:
-            before = index - sign
-            found[index] = _follow(here, found[before], before, places[index], index, HALVINGS)
-    order = np.argsort(found[0].frequencies)
-    return [_in_order(found[index], order) for index in range(count)]
+            previous = index - sign
+            tracked[index] = _track_interval(
+                modes_at, tracked[previous], previous, local_modes[index], index, MAX_BISECTIONS
+            )
+    order = np.argsort(tracked[0].frequencies)
+    return [_reorder(tracked[index], order) for index in range(count)]
 
 
-def _follow(
-    here: Callable[[float], _Here], before: Modes, begin: float, after: _Here, end: float, halvings: int
+def _track_interval(
+    modes_at: Callable[[float], _LocalModes],
+    previous: Modes,
+    begin: float,
+    following: _LocalModes,
+    end: float,
+    bisections: int,
 ) -> Modes:
-    """The modes at ``end`` in the order and with the signs of those ``before``, at ``begin``."""
-    carried = _turned(after, before)
-    likeness = _likeness(before, carried)
-    rows, columns = linear_sum_assignment(-likeness)
-    if halvings == 0 or np.min(likeness[rows, columns]) > SURE:
-        return _along(_in_order(carried, columns), before)
+    """The modes at ``end`` in the order and with the signs of the ``previous`` ones at ``begin``."""
+    rotated = _rotate_degenerate(following, previous)
+    assurance = _modal_assurance(previous, rotated)
+    rows, columns = linear_sum_assignment(-assurance)
+    if bisections == 0 or np.min(assurance[rows, columns]) > MIN_MODAL_ASSURANCE:
+        return _align_signs(_reorder(rotated, columns), previous)
     middle = 0.5 * (begin + end)
-    between = _follow(here, before, begin, here(middle), middle, halvings - 1)
-    return _follow(here, between, middle, after, end, halvings - 1)
+    middle_modes = _track_interval(modes_at, previous, begin, modes_at(middle), middle, bisections - 1)
+    return _track_interval(modes_at, middle_modes, middle, following, end, bisections - 1)
 
 
-def _likeness(a: Modes, b: Modes) -> Array:
-    """Modal assurance criterion of each mode of one set with each of another; the mass is the same along all axes."""
-    likeness: Array = (a.shapes.T @ b.shapes) ** 2
-    return likeness
+def _modal_assurance(a: Modes, b: Modes) -> Array:
+    """Modal assurance criterion (MAC) of each mode of one set with each of another; the mass is isotropic."""
+    assurance: Array = (a.shapes.T @ b.shapes) ** 2
+    return assurance
 
 
-def _in_order(modes: Modes, order: NDArray[np.intp]) -> Modes:
+def _reorder(modes: Modes, order: NDArray[np.intp]) -> Modes:
     return Modes(**{field.name: getattr(modes, field.name)[..., order] for field in fields(Modes)})
 
 
-def _along(modes: Modes, before: Modes) -> Modes:
-    """Shapes that point the way those before do."""
-    against = np.sum(before.shapes * modes.shapes, axis=0) < 0.0
-    return replace(modes, shapes=np.where(against, -modes.shapes, modes.shapes))
+def _align_signs(modes: Modes, previous: Modes) -> Modes:
+    """Modes with shapes of the same sign as the previous ones."""
+    is_opposite = np.sum(previous.shapes * modes.shapes, axis=0) < 0.0
+    return replace(modes, shapes=np.where(is_opposite, -modes.shapes, modes.shapes))
 
 
-def _turned(here: _Here, towards: Modes) -> Modes:
-    """Shapes of nearly one frequency turned among each other to look most like those of ``towards`` (Procrustes).
+def _rotate_degenerate(local: _LocalModes, reference: Modes) -> Modes:
+    """Rotates shapes of nearly equal frequency to match those of ``reference`` (orthogonal Procrustes problem).
 
-    Each gets that frequency whose rank its Rayleigh quotient has.
+    Each gets the frequency whose rank its Rayleigh quotient has.
     """
-    modes, shapes = here.modes, here.modes.shapes.copy()
+    modes, shapes = local.modes, local.modes.shapes.copy()
     order = np.arange(len(modes.frequencies))
-    for group in _groups(modes.frequencies):
-        _, columns = linear_sum_assignment(-((shapes[:, group].T @ towards.shapes) ** 2))
-        left, _, right = np.linalg.svd(shapes[:, group].T @ towards.shapes[:, columns])
-        turn = left @ right
-        shapes[:, group] = shapes[:, group] @ turn
-        quotients = (turn**2).T @ modes.frequencies[group] ** 2
+    for group in _degenerate_groups(modes.frequencies):
+        _, columns = linear_sum_assignment(-((shapes[:, group].T @ reference.shapes) ** 2))
+        left_vectors, _, right_vectors = np.linalg.svd(shapes[:, group].T @ reference.shapes[:, columns])
+        rotation = left_vectors @ right_vectors
+        shapes[:, group] = shapes[:, group] @ rotation
+        quotients = (rotation**2).T @ modes.frequencies[group] ** 2
         order[group] = np.array(group)[np.argsort(np.argsort(quotients))]
-    return replace(_in_order(modes, order), shapes=shapes, cable_shares=here.shares(shapes))
+    return replace(_reorder(modes, order), shapes=shapes, cable_shares=local.energy_shares(shapes))
 
 
-def _groups(frequencies: Array) -> list[list[int]]:
-    """Modes, by ascending frequency, that differ by less than :data:`EQUAL` from the next."""
+def _degenerate_groups(frequencies: Array) -> list[list[int]]:
+    """Groups of modes, by ascending frequency, that differ by less than :data:`FREQUENCY_TOLERANCE` from the next."""
     groups: list[list[int]] = [[0]]
     for mode, (lower, upper) in enumerate(pairwise(frequencies), start=1):
-        if upper - lower <= EQUAL * upper:
+        if upper - lower <= FREQUENCY_TOLERANCE * upper:
             groups[-1].append(mode)
         else:
             groups.append([mode])
     return [group for group in groups if len(group) > 1]
 
 
-def _least_gap(frequencies: Array) -> float:
+def _min_relative_gap(frequencies: Array) -> float:
     return float(np.min(np.diff(frequencies) / frequencies[1:]))

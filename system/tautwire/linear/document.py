@@ -1,4 +1,4 @@
-"""A linearised plant as the content of a model file."""
+"""The content of a model file of a linearised plant."""
 
 from __future__ import annotations
 

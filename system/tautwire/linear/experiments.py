@@ -1,7 +1,7 @@
-"""Small pulses on a wired system of FMUs at rest, and what comes of them; the FMUs are black boxes.
+"""Pulse-response experiments on a system of black-box FMUs at rest.
 
-Each pulse holds one input a little above its value at rest for one step and lets the system run free for some more;
-then the same below. Half the difference is the linear response: what is even in the pulse cancels.
+Each pulse holds one input slightly above its value at rest for one step, followed by a free response; then the same
+below. Half the difference is the linear response: terms that are even in the amplitude cancel.
 """
 
 from __future__ import annotations
@@ -14,210 +14,229 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import TautwireError
-from ..interrupt import interrupts_held
+from ..interrupt import defer_interrupts
 from ..master import Coupling, Port
 
 Array = NDArray[np.float64]
-Make = Callable[[], AbstractContextManager[Coupling]]
+CouplingFactory = Callable[[], AbstractContextManager[Coupling]]
 
-SAMPLES = 16
-# The coupling agrees to rounding: what it leaves is noise on small responses.
-TOLERANCE, REDOS = 1e-13, 20
-FIRST_PUSH, LARGEST_PUSH, SMALLEST_PUSH = 1e-2, 1e-1, 1e-7
-# The even part of a response, relative to the odd one: between them rounding and bending both stay small.
-STRAIGHT, FINE, ROUNDS = 3e-4, 1e-8, 4
-KINK, MOST_KINK = 1e-2, 1e-1
-MOST_ORDER, PARTS = 4, 8
-DRIFT, MOST_DRIFT = 1e-2, 10.0
-# Of a variable's nominal value, or its value at rest: deviations that are none.
-UNFELT = 1e-10
-LEAST = 1e-6
+FREE_STEPS = 16
+# The coupling converges to rounding: its residual is noise on small responses.
+COUPLING_TOLERANCE, MAX_COUPLING_ITERATIONS = 1e-13, 20
+INITIAL_AMPLITUDE, MAX_AMPLITUDE, MIN_AMPLITUDE = 1e-2, 1e-1, 1e-7
+# Even part of a response relative to the odd one: between these both rounding and nonlinearity are small.
+MAX_NONLINEARITY, MIN_NONLINEARITY, MAX_AMPLITUDE_ROUNDS = 3e-4, 1e-8, 4
+NONSMOOTH_NOTE_LEVEL, NONSMOOTH_ERROR_LEVEL = 1e-2, 1e-1
+MAX_ERROR_ORDER, SUBSTEPS = 4, 8
+DRIFT_NOTE_LEVEL, DRIFT_ERROR_LEVEL = 1e-2, 10.0
+# Relative to a variable's nominal value or value at rest: smaller deviations count as none.
+NEGLIGIBLE_DEVIATION = 1e-10
+MIN_RELATIVE_RESPONSE = 1e-6
 
 
 class IdentificationError(TautwireError):
-    """A wired system of FMUs cannot be linearised from outside; carries the ``reason`` and what to do, ``mend``."""
+    """A wired system of FMUs cannot be linearised from outside; carries the ``reason`` and a ``hint``."""
 
-    def __init__(self, reason: str, mend: str) -> None:
+    def __init__(self, reason: str, hint: str) -> None:
         self.reason = reason
-        self.mend = mend
-        super().__init__(f"the FMUs cannot be linearised: {reason}; {mend}")
+        self.hint = hint
+        super().__init__(f"the FMUs cannot be linearised: {reason}; {hint}")
 
 
 @dataclass(frozen=True)
 class Responses:
-    """Responses to m pulses of one step (s), seen at p ports.
+    """Responses to m pulses of one step (s), observed at p ports.
 
-    ``held`` (m, p) at the end of the pulse, ``free`` (N, m, p) after 1 ... N steps without it, both for ``pushes``
-    (m,) of the inputs. ``sizes`` (p,) are the largest deviations, or what counts as none; in these units ``evenness``
-    (m,) is the even part of each response relative to the odd one, and ``drifts`` (p,) is what moves without a push.
+    ``pulse_response`` (m, p) at the end of the pulse, ``free_response`` (N, m, p) after 1 ... N further steps, both
+    for ``amplitudes`` (m,) of the inputs. ``scales`` (p,) are the largest deviations, or the negligible ones; in these
+    units ``nonlinearity`` (m,) is the even part of each response relative to the odd one, and ``drifts`` (p,) is the
+    motion without a pulse.
     """
 
     step: float
-    held: Array
-    free: Array
-    sizes: Array
-    pushes: Array
-    evenness: Array
+    pulse_response: Array
+    free_response: Array
+    scales: Array
+    amplitudes: Array
+    nonlinearity: Array
     drifts: Array
 
 
-class Bench:
-    """A system of FMUs at rest, ready for pulses; each begins from the same saved state, or from a new start.
+class PulseExperiment:
+    """Pulse experiments on a system of FMUs at rest; each starts from the same saved state, or from a restart.
 
-    Made with :func:`on_bench`. ``rest`` (k,) are the values of the coupling's drives at rest, ``inputs`` those of
-    them that are pushed, ``seen`` the ports that are read, with what counts as no deviation of each, ``unfelt``.
-    ``order`` is that of the error in the step, or the least that it may be.
+    Created by :func:`pulse_experiment`. ``rest_inputs`` (k,) are the coupling's external inputs at rest, ``inputs``
+    those of them that get pulses, ``observed_ports`` the ports that are read, each with its ``negligible`` deviation.
+    ``order`` is the order of the discretisation error in the step, or a lower bound of it.
     """
 
     def __init__(
-        self, stack: ExitStack, make: Make, rest: Mapping[Port, float], inputs: Sequence[Port], seen: Sequence[Port]
+        self,
+        stack: ExitStack,
+        make_coupling: CouplingFactory,
+        rest_inputs: Mapping[Port, float],
+        inputs: Sequence[Port],
+        observed_ports: Sequence[Port],
     ) -> None:
-        self._raise_interrupt = stack.enter_context(interrupts_held())
-        self._make = make
-        self._given = dict(rest)
-        self.inputs, self.seen = tuple(inputs), tuple(seen)
-        self._coupling = self._start(stack)
-        self._base = self._coupling.save() if self._coupling.can_redo else None
-        if self._base is not None:
-            stack.callback(self._coupling.release, self._base)
-        self._whole = self._coupling.can_redo and not self._coupling.account.without.estimated
-        self.order = min(self._coupling.order, MOST_ORDER) if self._whole else 1
-        resting = self._resting(self._coupling)[self._places(self._coupling)]
-        self.nominal = np.maximum(self._nominal(inputs), np.abs(resting))
-        self.unfelt = UNFELT * np.maximum(self._nominal(seen), np.abs(self._read(self._coupling)))
+        self._raise_interrupt = stack.enter_context(defer_interrupts())
+        self._make_coupling = make_coupling
+        self._rest_inputs = dict(rest_inputs)
+        self.inputs, self.observed_ports = tuple(inputs), tuple(observed_ports)
+        self._coupling = self._start_coupling(stack)
+        self._rest_snapshot = self._coupling.save() if self._coupling.supports_rollback else None
+        if self._rest_snapshot is not None:
+            stack.callback(self._coupling.release, self._rest_snapshot)
+        self._takes_whole_steps = (
+            self._coupling.supports_rollback and not self._coupling.statistics.fallbacks.estimated_derivatives
+        )
+        self.order = min(self._coupling.convergence_order, MAX_ERROR_ORDER) if self._takes_whole_steps else 1
+        rest_values = self._rest_values(self._coupling)[self._input_indices(self._coupling)]
+        self.nominal = np.maximum(self._nominal_values(inputs), np.abs(rest_values))
+        self.negligible = NEGLIGIBLE_DEVIATION * np.maximum(
+            self._nominal_values(observed_ports), np.abs(self._read_outputs(self._coupling))
+        )
 
-    def _start(self, stack: ExitStack) -> Coupling:
-        coupling = stack.enter_context(self._make())
-        missing = [str(port) for port in self.inputs if port not in coupling.drives]
+    def _start_coupling(self, stack: ExitStack) -> Coupling:
+        coupling = stack.enter_context(self._make_coupling())
+        missing = [str(port) for port in self.inputs if port not in coupling.external_inputs]
         if missing:
             raise IdentificationError(f"{', '.join(missing)} is no driven input", "choose among the coupling's drives")
-        coupling.tolerance, coupling.redos = TOLERANCE, REDOS
-        coupling.settle(0.0, self._resting(coupling))
+        coupling.tolerance, coupling.max_iterations = COUPLING_TOLERANCE, MAX_COUPLING_ITERATIONS
+        coupling.solve_initial_values(0.0, self._rest_values(coupling))
         for component in coupling.components.values():
             component.run()
         return coupling
 
-    def _nominal(self, ports: Sequence[Port]) -> Array:
+    def _nominal_values(self, ports: Sequence[Port]) -> Array:
         variables = [self._coupling.components[port.component].variables[port.variable] for port in ports]
         return np.array([abs(float(variable.nominal or 1.0)) for variable in variables])
 
-    def _resting(self, coupling: Coupling) -> Array:
-        return np.array([self._given.get(port, 0.0) for port in coupling.drives])
+    def _rest_values(self, coupling: Coupling) -> Array:
+        return np.array([self._rest_inputs.get(port, 0.0) for port in coupling.external_inputs])
 
-    def _places(self, coupling: Coupling) -> list[int]:
-        return [coupling.drives.index(port) for port in self.inputs]
+    def _input_indices(self, coupling: Coupling) -> list[int]:
+        return [coupling.external_inputs.index(port) for port in self.inputs]
 
     @contextmanager
     def _at_rest(self) -> Iterator[Coupling]:
-        if self._base is not None:
-            self._coupling.restore(self._base)
+        if self._rest_snapshot is not None:
+            self._coupling.restore(self._rest_snapshot)
             yield self._coupling
             return
         with ExitStack() as stack:
-            yield self._start(stack)
+            yield self._start_coupling(stack)
 
-    def run(self, index: int | None, push: float, step: float, samples: int) -> Array:
-        """What is seen at the end of the pulse and after each free step, (1 + samples, p); None pushes nothing.
+    def run_pulse(self, index: int | None, amplitude: float, step: float, free_steps: int) -> Array:
+        """Observations at the end of the pulse and after each free step, (1 + free_steps, p); None: no pulse.
 
-        A coupling that works something out from the past makes several steps of one, and begins each without a past:
-        so what comes of a step follows from the FMUs alone.
+        A coupling that extrapolates from its history takes several substeps, and clears its history before each step:
+        so the result of a step depends on the FMUs alone.
         """
         self._raise_interrupt()
-        parts = 1 if self._whole else PARTS
+        substeps = 1 if self._takes_whole_steps else SUBSTEPS
         with self._at_rest() as coupling:
-            rest = self._resting(coupling)
-            pushed = rest.copy()
+            rest_values = self._rest_values(coupling)
+            pulse_values = rest_values.copy()
             if index is not None:
-                pushed[self._places(coupling)[index]] += push
-            rows = np.empty((1 + samples, len(self.seen)))
-            for k in range(1 + samples):
-                drives = rest if k else pushed
-                if not self._whole:
-                    coupling.forget(k * step)
-                for part in range(parts):
-                    coupling.step((k + part / parts) * step, step / parts, drives, drives)
-                rows[k] = self._read(coupling)
+                pulse_values[self._input_indices(coupling)[index]] += amplitude
+            rows = np.empty((1 + free_steps, len(self.observed_ports)))
+            for k in range(1 + free_steps):
+                external_inputs = rest_values if k else pulse_values
+                if not self._takes_whole_steps:
+                    coupling.reset_history(k * step)
+                for substep in range(substeps):
+                    coupling.step((k + substep / substeps) * step, step / substeps, external_inputs, external_inputs)
+                rows[k] = self._read_outputs(coupling)
             return rows
 
-    def _read(self, coupling: Coupling) -> Array:
-        row = np.empty(len(self.seen))
-        for name in dict.fromkeys(port.component for port in self.seen):
-            places = [place for place, port in enumerate(self.seen) if port.component == name]
+    def _read_outputs(self, coupling: Coupling) -> Array:
+        row = np.empty(len(self.observed_ports))
+        for name in dict.fromkeys(port.component for port in self.observed_ports):
+            indices = [place for place, port in enumerate(self.observed_ports) if port.component == name]
             component = coupling.components[name]
-            block = component.block([self.seen[place].variable for place in places])
+            block = component.block([self.observed_ports[place].variable for place in indices])
             component.read(block)
             if not np.all(np.isfinite(block.values)):
-                component.refuse(block)
-            row[places] = block.values
+                component.raise_not_finite(block)
+            row[indices] = block.values
         return row
 
 
 @contextmanager
-def on_bench(make: Make, rest: Mapping[Port, float], inputs: Sequence[Port], seen: Sequence[Port]) -> Iterator[Bench]:
-    """A bench that is cleared when the block ends."""
+def pulse_experiment(
+    make_coupling: CouplingFactory,
+    rest_inputs: Mapping[Port, float],
+    inputs: Sequence[Port],
+    observed_ports: Sequence[Port],
+) -> Iterator[PulseExperiment]:
+    """Context of a pulse experiment, which is released when the block ends."""
     with ExitStack() as stack:
-        yield Bench(stack, make, rest, inputs, seen)
+        yield PulseExperiment(stack, make_coupling, rest_inputs, inputs, observed_ports)
 
 
-def respond(bench: Bench, step: float, pushes: Array | None = None, samples: int = SAMPLES) -> Responses:
-    """Responses to a pulse on each input, pushed so far that neither rounding nor the bend of the laws is felt.
+def measure_responses(
+    experiment: PulseExperiment, step: float, amplitudes: Array | None = None, free_steps: int = FREE_STEPS
+) -> Responses:
+    """Responses to a pulse on each input, with amplitudes at which neither rounding nor nonlinearity matters.
 
-    ``pushes`` (m,) are a first guess. Raises IdentificationError where the system is not at rest, or at a kink.
+    ``amplitudes`` (m,) are a first guess. Raises IdentificationError where the system is not at rest, or not smooth.
     """
-    pushes = FIRST_PUSH * bench.nominal if pushes is None else pushes.copy()
-    still = bench.run(None, 0.0, step, samples)
-    odd = np.zeros((len(pushes), *still.shape))
-    even = np.zeros((len(pushes), still.shape[1]))
-    wanted = np.ones(len(pushes), dtype=bool)
-    for _ in range(ROUNDS):
-        for index in np.flatnonzero(wanted):
-            above = bench.run(int(index), pushes[index], step, samples)
-            below = bench.run(int(index), -pushes[index], step, samples)
+    amplitudes = INITIAL_AMPLITUDE * experiment.nominal if amplitudes is None else amplitudes.copy()
+    unforced = experiment.run_pulse(None, 0.0, step, free_steps)
+    odd = np.zeros((len(amplitudes), *unforced.shape))
+    even = np.zeros((len(amplitudes), unforced.shape[1]))
+    pending = np.ones(len(amplitudes), dtype=bool)
+    for _ in range(MAX_AMPLITUDE_ROUNDS):
+        for index in np.flatnonzero(pending):
+            above = experiment.run_pulse(int(index), amplitudes[index], step, free_steps)
+            below = experiment.run_pulse(int(index), -amplitudes[index], step, free_steps)
             odd[index] = 0.5 * (above - below)
-            even[index] = np.max(np.abs(0.5 * (above + below) - still), axis=0)
-        sizes = np.maximum(np.max(np.abs(odd), axis=(0, 1)), bench.unfelt)
-        own = np.max(np.abs(odd) / sizes, axis=(1, 2), initial=0.0)
-        evenness = np.max(even / sizes, axis=1, initial=0.0) / np.maximum(own, LEAST)
-        better = _better_pushes(bench, pushes, evenness)
-        wanted = better != pushes
-        if not np.any(wanted):
+            even[index] = np.max(np.abs(0.5 * (above + below) - unforced), axis=0)
+        scales = np.maximum(np.max(np.abs(odd), axis=(0, 1)), experiment.negligible)
+        relative_responses = np.max(np.abs(odd) / scales, axis=(1, 2), initial=0.0)
+        nonlinearity = np.max(even / scales, axis=1, initial=0.0) / np.maximum(
+            relative_responses, MIN_RELATIVE_RESPONSE
+        )
+        improved = _improved_amplitudes(experiment, amplitudes, nonlinearity)
+        pending = improved != amplitudes
+        if not np.any(pending):
             break
-        last, pushes = pushes, better
+        previous, amplitudes = amplitudes, improved
     else:
-        pushes = last
-    _refuse_kinks(bench, evenness)
-    drifts = _drifts(bench, still, sizes)
-    return Responses(step, odd[:, 0], odd[:, 1:].transpose(1, 0, 2), sizes, pushes, evenness, drifts)
+        amplitudes = previous
+    _require_smooth(experiment, nonlinearity)
+    drifts = _relative_drifts(experiment, unforced, scales)
+    return Responses(step, odd[:, 0], odd[:, 1:].transpose(1, 0, 2), scales, amplitudes, nonlinearity, drifts)
 
 
-def _better_pushes(bench: Bench, pushes: Array, evenness: Array) -> Array:
-    """Pushes whose responses should be even to about the geometric mean of the bounds; as they are where they fit."""
-    aim = np.sqrt(STRAIGHT * FINE)
-    factor = np.clip(aim / np.maximum(evenness, 1e-300), 1e-2, 1e2)
-    factor[(evenness <= STRAIGHT) & (evenness >= FINE)] = 1.0
-    better = np.clip(pushes * factor, SMALLEST_PUSH * bench.nominal, LARGEST_PUSH * bench.nominal)
-    # Beyond the bound already, or so nearly there that it is not worth another run.
-    return np.where(np.abs(better / pushes - 1.0) < 0.5, pushes, better)
+def _improved_amplitudes(experiment: PulseExperiment, amplitudes: Array, nonlinearity: Array) -> Array:
+    """Amplitudes that aim at a nonlinearity of the geometric mean of its bounds; unchanged where within the bounds."""
+    target = np.sqrt(MAX_NONLINEARITY * MIN_NONLINEARITY)
+    factor = np.clip(target / np.maximum(nonlinearity, 1e-300), 1e-2, 1e2)
+    factor[(nonlinearity <= MAX_NONLINEARITY) & (nonlinearity >= MIN_NONLINEARITY)] = 1.0
+    improved = np.clip(amplitudes * factor, MIN_AMPLITUDE * experiment.nominal, MAX_AMPLITUDE * experiment.nominal)
+    # At the bound already, or so near that another run does not pay.
+    return np.where(np.abs(improved / amplitudes - 1.0) < 0.5, amplitudes, improved)
 
 
-def _refuse_kinks(bench: Bench, evenness: Array) -> None:
-    worst = int(np.argmax(evenness))
-    if evenness[worst] > MOST_KINK:
+def _require_smooth(experiment: PulseExperiment, nonlinearity: Array) -> None:
+    worst = int(np.argmax(nonlinearity))
+    if nonlinearity[worst] > NONSMOOTH_ERROR_LEVEL:
         raise IdentificationError(
-            f"at a kink, what {bench.inputs[worst]} does upward and downward differs by {evenness[worst]:.0%}, however "
+            f"at a kink, what {experiment.inputs[worst]} does upward and downward differs by {nonlinearity[worst]:.0%}, however "
             "small the push",
             "start them where no cable is about to slacken and nothing is about to slip",
         )
 
 
-def _drifts(bench: Bench, still: Array, sizes: Array) -> Array:
-    """How far each port moves without a push, relative to ``sizes``."""
-    moved = np.max(np.abs(still - still[0]), axis=0)
-    drifts: Array = moved / sizes
+def _relative_drifts(experiment: PulseExperiment, unforced: Array, scales: Array) -> Array:
+    """Motion of each port without a pulse, relative to ``scales``."""
+    drift_sizes = np.max(np.abs(unforced - unforced[0]), axis=0)
+    drifts: Array = drift_sizes / scales
     worst = int(np.argmax(drifts))
-    if drifts[worst] > MOST_DRIFT:
+    if drifts[worst] > DRIFT_ERROR_LEVEL:
         raise IdentificationError(
-            f"they are not at rest, {bench.seen[worst]} moves by {moved[worst]:.3g} without a push",
+            f"they are not at rest, {experiment.observed_ports[worst]} moves by {drift_sizes[worst]:.3g} without a push",
             "start them in equilibrium, and give the drives' values there",
         )
     return drifts

@@ -1,6 +1,6 @@
-"""Figures of a linearised plant: Bode diagram, poles and zeros, modes along a path; by python-control where it can.
+"""Figures of a linearised plant: Bode diagram, poles and zeros, modes along a path; by python-control where possible.
 
-All are returned, none is shown: ``figure.savefig("bode.png")``.
+Figures are returned, not shown: ``figure.savefig("bode.png")``.
 """
 
 from __future__ import annotations
@@ -13,18 +13,18 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
-from ..arguments import of_kind
-from ..array_arguments import rising_of
-from ..errors import ArgumentError, described
+from ..arguments import validate_instance
+from ..array_arguments import validate_increasing
+from ..errors import ArgumentError, describe_value
 from .along import ModesAlong
 from .channels import minimal
 
 Array = NDArray[np.float64]
 
-BEYOND = 10.0
-POINTS = 4000
-MARGIN = 1.15
-STYLES = ("-", "--", ":", "-.")
+FREQUENCY_MARGIN = 10.0
+FREQUENCY_COUNT = 4000
+FRAME_MARGIN = 1.15
+LINE_STYLES = ("-", "--", ":", "-.")
 
 
 def bode_figure(system: Any, source: str, targets: Sequence[str] | str, frequencies: ArrayLike | None = None) -> Figure:
@@ -33,70 +33,80 @@ def bode_figure(system: Any, source: str, targets: Sequence[str] | str, frequenc
     ``frequencies`` (N,) in Hz, rising, above 0; by default from a tenth of the slowest oscillation to ten times the
     fastest. The figure is returned, not shown.
 
-    Raises InputError where a signal is unknown or no output is named, ArgumentError where an argument is none of these.
+    Raises InputError where a signal is unknown or no output is named, ArgumentError for an invalid argument.
     """
-    of_kind("bode_figure: system", system, control.StateSpace, "give a state space, such as linearise(robot).system")
-    of_kind("bode_figure: source", source, str, f"name one of {', '.join(system.input_labels)}")
-    names = _names("bode_figure: targets", targets, system.output_labels)
-    omega = _around(system)
+    validate_instance(
+        "bode_figure: system", system, control.StateSpace, "give a state space, such as linearise(robot).system"
+    )
+    validate_instance("bode_figure: source", source, str, f"name one of {', '.join(system.input_labels)}")
+    names = _output_names("bode_figure: targets", targets, system.output_labels)
+    omega = _frequency_grid(system)
     if frequencies is not None:
         meaning = "finite frequencies (N,) in Hz that rise, two or more"
-        omega = 2.0 * np.pi * rising_of("bode_figure: frequencies", frequencies, meaning, above=0.0)
+        omega = 2.0 * np.pi * validate_increasing("bode_figure: frequencies", frequencies, meaning, lower_bound=0.0)
     figure = Figure(figsize=(8.0, 6.0), layout="constrained")
     axes = figure.subplots(2, 1, sharex=True)
     for name in names:
         channel = minimal(system, source, name)
-        begins = float(np.degrees(np.angle(channel(1j * omega[0]))))
+        initial_phase = float(np.degrees(np.angle(channel(1j * omega[0]))))
         stacked = np.array([[axes[0]], [axes[1]]])
-        control.bode_plot(channel, omega, Hz=True, initial_phase=begins, ax=stacked, label=name, title="", grid=True)
+        control.bode_plot(
+            channel, omega, Hz=True, initial_phase=initial_phase, ax=stacked, label=name, title="", grid=True
+        )
     axes[0].legend(loc="best")
     figure.suptitle(f"From {source}")
     return figure
 
 
 def pole_figure(system: Any, source: str | None = None, target: str | None = None) -> Figure:
-    """Poles of a ``control.StateSpace``; with a named input and output, poles and zeros of that channel alone.
+    """Pole map of a ``control.StateSpace``; with a named input and output, poles and zeros of that channel alone.
 
-    The frame fits the poles; the text tells of zeros beyond. Raises InputError where a signal is unknown.
+    The axes fit the poles; the title lists zeros outside. Raises InputError where a signal is unknown.
     """
-    single = source is not None and target is not None
-    shown = minimal(system, source, target) if source is not None and target is not None else system
+    is_channel = source is not None and target is not None
+    drawn_system = minimal(system, source, target) if source is not None and target is not None else system
     figure = Figure(figsize=(6.0, 6.0), layout="constrained")
     axes = figure.subplots()
-    poles, zeros = shown.poles(), shown.zeros() if single else np.zeros(0)
+    poles, zeros = drawn_system.poles(), drawn_system.zeros() if is_channel else np.zeros(0)
     control.pole_zero_plot(control.PoleZeroData(poles, zeros), ax=np.array([[axes]]), title="")
-    reach = MARGIN * max(float(np.max(np.abs(poles.imag), initial=0.0)), 1e-6)
-    left = min(MARGIN * float(np.min(poles.real, initial=0.0)), -0.1 * reach)
-    axes.set_xlim(left, max(MARGIN * float(np.max(poles.real, initial=0.0)), 0.1 * reach))
+    reach = FRAME_MARGIN * max(float(np.max(np.abs(poles.imag), initial=0.0)), 1e-6)
+    left = min(FRAME_MARGIN * float(np.min(poles.real, initial=0.0)), -0.1 * reach)
+    axes.set_xlim(left, max(FRAME_MARGIN * float(np.max(poles.real, initial=0.0)), 0.1 * reach))
     axes.set_ylim(-reach, reach)
     axes.set_xlabel("real part, rad/s")
     axes.set_ylabel("imaginary part, rad/s")
-    beyond = [zero for zero in zeros if not (left <= zero.real <= axes.get_xlim()[1] and abs(zero.imag) <= reach)]
-    told = f"; zeros beyond: {', '.join(f'{zero:.4g}' for zero in np.real_if_close(beyond))}" if beyond else ""
-    figure.suptitle((f"{target} by {source}{told}") if single else "Poles")
+    outside_zeros = [
+        zero for zero in zeros if not (left <= zero.real <= axes.get_xlim()[1] and abs(zero.imag) <= reach)
+    ]
+    outside_text = (
+        f"; zeros beyond: {', '.join(f'{zero:.4g}' for zero in np.real_if_close(outside_zeros))}"
+        if outside_zeros
+        else ""
+    )
+    figure.suptitle((f"{target} by {source}{outside_text}") if is_channel else "Poles")
     return figure
 
 
 def modes_along_figure(runs: ModesAlong | Mapping[str, ModesAlong]) -> Figure:
-    """Frequencies and damping ratios of the modes along a path, a colour for each mode.
+    """Frequencies and damping ratios of the modes along a path, one colour per mode.
 
     Several runs by name, as with the quasi-static and the dynamic modulus, get a line style each; the paper's Fig. 15.
     Over time in s, or distance travelled in m; frequencies in Hz. The figure is returned, not shown.
 
     Raises ArgumentError where ``runs`` is neither what ``modes_along`` returns nor a mapping of names to such.
     """
-    named = _runs(runs)
+    named = _named_runs(runs)
     figure = Figure(figsize=(8.0, 6.0), layout="constrained")
     upper, lower = figure.subplots(2, 1, sharex=True)
-    for (name, run), style in zip(named.items(), STYLES * len(named), strict=False):
+    for (name, run), style in zip(named.items(), LINE_STYLES * len(named), strict=False):
         for mode in range(run.frequencies.shape[1]):
             label = f"mode {mode + 1}" + (f", {name}" if name else "")
-            look: dict[str, Any] = {"color": f"C{mode}", "linestyle": style, "label": label}
-            upper.plot(run.abscissa, run.frequencies[:, mode], **look)
-            lower.plot(run.abscissa, run.damping_ratios[:, mode], **look)
+            style_options: dict[str, Any] = {"color": f"C{mode}", "linestyle": style, "label": label}
+            upper.plot(run.abscissa, run.frequencies[:, mode], **style_options)
+            lower.plot(run.abscissa, run.damping_ratios[:, mode], **style_options)
     upper.set_ylabel("frequency, Hz")
     lower.set_ylabel("damping ratio")
-    timed = next(iter(named.values())).timed
+    timed = next(iter(named.values())).is_timed
     lower.set_xlabel("time, s" if timed else "distance travelled, m")
     for axes in (upper, lower):
         axes.grid(True, alpha=0.4)
@@ -105,32 +115,36 @@ def modes_along_figure(runs: ModesAlong | Mapping[str, ModesAlong]) -> Figure:
     return figure
 
 
-def _names(where: str, names: Sequence[str] | str, labels: Sequence[str]) -> list[str]:
-    """One name or several as a list; raises ArgumentError for none."""
-    mend = f"name some of {', '.join(labels)}"
-    listed = [names] if isinstance(names, str) else names if isinstance(names, Iterable) else []
-    found = [of_kind(where, name, str, mend) for name in listed]
-    if not found:
-        raise ArgumentError(where, names, f"is {described(names)} that names no output", mend)
-    return found
+def _output_names(where: str, names: Sequence[str] | str, labels: Sequence[str]) -> list[str]:
+    """One or several output names as a list; raises ArgumentError if there is none."""
+    hint = f"name some of {', '.join(labels)}"
+    candidates = [names] if isinstance(names, str) else names if isinstance(names, Iterable) else []
+    output_names = [validate_instance(where, name, str, hint) for name in candidates]
+    if not output_names:
+        raise ArgumentError(where, names, f"is {describe_value(names)} that names no output", hint)
+    return output_names
 
 
-def _runs(runs: ModesAlong | Mapping[str, ModesAlong]) -> Mapping[str, ModesAlong]:
-    """The runs by name; raises ArgumentError."""
+def _named_runs(runs: ModesAlong | Mapping[str, ModesAlong]) -> Mapping[str, ModesAlong]:
+    """The runs as a mapping by name; raises ArgumentError."""
     if isinstance(runs, ModesAlong):
         return {"": runs}
-    where, mend = "modes_along_figure: runs", "give what modes_along returns, or several by name"
+    where, hint = "modes_along_figure: runs", "give what modes_along returns, or several by name"
     if not isinstance(runs, Mapping) or not runs:
-        raise ArgumentError(where, runs, f"is {described(runs)} that holds no run", mend)
+        raise ArgumentError(where, runs, f"is {describe_value(runs)} that holds no run", hint)
     for name, run in runs.items():
-        of_kind(f"{where}[{name!r}]", run, ModesAlong, mend)
+        validate_instance(f"{where}[{name!r}]", run, ModesAlong, hint)
     return runs
 
 
-def _around(system: Any) -> Array:
-    """Angular frequencies about the oscillations of a system, in rad/s."""
+def _frequency_grid(system: Any) -> Array:
+    """Angular frequencies around the oscillatory poles of a system, in rad/s."""
     poles = system.poles()
-    turning = np.abs(poles[np.abs(poles.imag) > 1e-9 * np.max(np.abs(poles), initial=1e-300)])
-    if not len(turning):
-        turning = np.ones(1)
-    return np.geomspace(np.min(turning) / BEYOND, np.max(turning) * BEYOND, POINTS)
+    oscillation_frequencies = np.abs(poles[np.abs(poles.imag) > 1e-9 * np.max(np.abs(poles), initial=1e-300)])
+    if not len(oscillation_frequencies):
+        oscillation_frequencies = np.ones(1)
+    return np.geomspace(
+        np.min(oscillation_frequencies) / FREQUENCY_MARGIN,
+        np.max(oscillation_frequencies) * FREQUENCY_MARGIN,
+        FREQUENCY_COUNT,
+    )

@@ -1,4 +1,4 @@
-"""What a linear plant leaves out near rest: slack cables, effects with a kink or a bend there, lags of sensors."""
+"""Nonsmooth and nonlinear behaviour near the operating point that a linear plant leaves out, and sensor delays."""
 
 from __future__ import annotations
 
@@ -11,144 +11,161 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 from scipy.linalg import expm
 
-from ..model.symbolic import Model
+from ..model.symbolic import SymbolicModel
 from ..robots.robot import Robot
 from .modes import POSITION, Modes
 from .rest import slack_cables
 
 Array = NDArray[np.float64]
 
-SWING = 5e-3
-BENT = 0.05
-# Swings of a tension that are less than this share of the largest say nothing; nor does a share of the tension.
-QUIET, UNFELT = 0.01, 1e-4
-SAMPLES = 64
+DEFAULT_SWING = 5e-3
+MAX_RELATIVE_DEVIATION = 0.05
+# Tension swings below this share of the largest are not judged; nor are changes below a share of the tension.
+MIN_SWING_SHARE, MIN_CHANGE_SHARE = 0.01, 1e-4
+SAMPLES_PER_PERIOD = 64
 
 
 @dataclass(frozen=True)
-class Rest:
-    """A robot's equations at rest: ``state``, ``tensions`` (n,) of the ropes in N, their ``slopes`` (n, 3) in N/m."""
+class OperatingPoint:
+    """An operating point: ``state``, cable ``tensions`` (n,) in N, and their ``tension_slopes`` (n, 3) in N/m."""
 
     robot: Robot
-    model: Model
+    model: SymbolicModel
     state: Array
     tensions: Array
-    slopes: Array
+    tension_slopes: Array
 
 
-def kink_notes(rest: Rest, matrices: Sequence[Array], modes: Modes, swing: float = SWING) -> tuple[str, ...]:
-    """What a user of the linear plant must know, a line each; none where it holds for a swing of ``swing`` (m).
+def validity_notes(
+    operating_point: OperatingPoint, matrices: Sequence[Array], modes: Modes, swing: float = DEFAULT_SWING
+) -> tuple[str, ...]:
+    """Limits of validity of the linear plant for a swing of ``swing`` (m), one line each; empty if it holds.
 
-    Slack: a cable carries nothing at rest, or goes slack within the swing in some mode. Effects: in a period of free
-    swing by the laws, or with one winch at the speed of the slowest swing, tensions or ropes differ from the linear
-    ones by more than 5 % of their change; a kink, as in friction, does that however small the swing. Sensors: what they
-    show late.
+    Slack: a cable carries nothing at rest, or goes slack within the swing in some mode. Effects: in a period of the
+    nonlinear free oscillation, or with one winch at the speed of the slowest one, tensions or rope speeds differ from
+    the linear ones by more than 5 % of their change; Coulomb friction at rest does that at any amplitude. Sensors:
+    their delays.
     """
-    slack = slack_cables(rest.tensions)
+    slack = slack_cables(operating_point.tensions)
     notes = [f"cable {cable + 1} hangs slack: it carries nothing, and holds only while it stays so" for cable in slack]
-    reach = _slack_swings(rest.tensions, rest.slopes @ modes.shapes)
+    slack_swings = _slack_swings(operating_point.tensions, operating_point.tension_slopes @ modes.shapes)
     notes += [
-        f"cable {cable + 1} goes slack at a swing of {reach[cable]:.2g} m"
-        for cable in np.setdiff1d(np.flatnonzero(reach <= swing), slack)
+        f"cable {cable + 1} goes slack at a swing of {slack_swings[cable]:.2g} m"
+        for cable in np.setdiff1d(np.flatnonzero(slack_swings <= swing), slack)
     ]
-    if rest.robot.effects and swing > 0.0:
-        size = min(swing, 0.5 * float(np.min(reach)))
-        notes += _swing_notes(rest, matrices, modes, size)
-        notes += _winch_notes(rest, matrices, 2.0 * np.pi * float(modes.frequencies[0]) * size)
-    return (*notes, *_lag_notes(rest.model, rest.robot.cable_count))
+    if operating_point.robot.effects and swing > 0.0:
+        amplitude = min(swing, 0.5 * float(np.min(slack_swings)))
+        notes += _swing_notes(operating_point, matrices, modes, amplitude)
+        notes += _winch_notes(operating_point, matrices, 2.0 * np.pi * float(modes.frequencies[0]) * amplitude)
+    return (*notes, *_delay_notes(operating_point.model, operating_point.robot.cable_count))
 
 
-def _slack_swings(tensions: Array, slopes: Array) -> Array:
-    """The swing in m, in the mode in which it is least, at which each cable goes slack; slopes (n, 3) in N/m."""
-    steepest = np.max(np.abs(slopes), axis=1)
+def _slack_swings(tensions: Array, tension_slopes: Array) -> Array:
+    """Smallest amplitude over all modes, in m, at which each cable goes slack; slopes (n, 3) in N/m."""
+    steepest = np.max(np.abs(tension_slopes), axis=1)
     return np.divide(tensions, steepest, out=np.full(len(tensions), np.inf), where=(steepest > 0.0) & (tensions > 0.0))
 
 
-def _named(robot: Robot) -> str:
+def _effect_description(robot: Robot) -> str:
     names = dict.fromkeys(setting.name for setting in robot.effects)
     return f"an effect ({', '.join(names)}) has a kink or bends near rest"
 
 
-def _swing_notes(rest: Rest, matrices: Sequence[Array], modes: Modes, size: float) -> list[str]:
+def _swing_notes(
+    operating_point: OperatingPoint, matrices: Sequence[Array], modes: Modes, amplitude: float
+) -> list[str]:
     notes = []
     for mode, frequency in enumerate(modes.frequencies):
-        offset = np.zeros(len(rest.state))
-        offset[POSITION] = size * modes.shapes[:, mode]
-        bends = _bends(rest, matrices, offset, np.linspace(0.0, 1.0 / frequency, SAMPLES))
-        cable = int(np.argmax(bends))
-        if not bends[cable] <= BENT:
+        offset = np.zeros(len(operating_point.state))
+        offset[POSITION] = amplitude * modes.shapes[:, mode]
+        deviations = _swing_deviations(
+            operating_point, matrices, offset, np.linspace(0.0, 1.0 / frequency, SAMPLES_PER_PERIOD)
+        )
+        cable = int(np.argmax(deviations))
+        if not deviations[cable] <= MAX_RELATIVE_DEVIATION:
             notes.append(
-                f"mode {mode + 1}: in a swing of {size:.2g} m the tension of cable {cable + 1} is off the linear plant "
-                f"by {bends[cable]:.0%} of its swing; {_named(rest.robot)}"
+                f"mode {mode + 1}: in a swing of {amplitude:.2g} m the tension of cable {cable + 1} is off the linear plant "
+                f"by {deviations[cable]:.0%} of its swing; {_effect_description(operating_point.robot)}"
             )
     return notes
 
 
-def _bends(rest: Rest, matrices: Sequence[Array], offset: Array, times: Array) -> Array:
-    """By how much the tensions of a free swing differ from the linear ones, as shares of those, shape (n,)."""
+def _swing_deviations(operating_point: OperatingPoint, matrices: Sequence[Array], offset: Array, times: Array) -> Array:
+    """Relative deviation of the nonlinear from the linear tensions in a free oscillation, shape (n,)."""
     A, _, C, _ = matrices
-    model, shown = rest.model, slice(6, 6 + rest.robot.cable_count)
-    still = np.zeros(model.inputs.numel())
+    model, tension_rows = operating_point.model, slice(6, 6 + operating_point.robot.cable_count)
+    zero_inputs = np.zeros(model.inputs.numel())
     laws = casadi.Function("laws", [model.states, model.inputs], [model.rates, model.outputs])
     step = expm(A * (times[1] - times[0]))
     linear = [offset]
     for _ in times[1:]:
         linear.append(step @ linear[-1])
-    expected = np.array(linear) @ C[shown].T
+    expected = np.array(linear) @ C[tension_rows].T
     run = solve_ivp(
-        lambda _, x: np.asarray(laws(x, still)[0]).ravel(),
+        lambda _, x: np.asarray(laws(x, zero_inputs)[0]).ravel(),
         (times[0], times[-1]),
-        rest.state + offset,
+        operating_point.state + offset,
         method="LSODA",
         t_eval=times,
         rtol=1e-8,
         atol=1e-12,
     )
     if not run.success:
-        return np.full(rest.robot.cable_count, np.inf)
-    at_rest, *found = [np.asarray(laws(x, still)[1]).ravel()[shown] for x in (rest.state, *run.y.T)]
-    swings = np.max(np.abs(expected), axis=0)
-    bends: Array = np.max(np.abs(found - at_rest - expected), axis=0) / np.maximum(swings, QUIET * np.max(swings))
-    return bends
+        return np.full(operating_point.robot.cable_count, np.inf)
+    rest_tensions, *swing_tensions = [
+        np.asarray(laws(x, zero_inputs)[1]).ravel()[tension_rows] for x in (operating_point.state, *run.y.T)
+    ]
+    amplitudes = np.max(np.abs(expected), axis=0)
+    deviations: Array = np.max(np.abs(swing_tensions - rest_tensions - expected), axis=0) / np.maximum(
+        amplitudes, MIN_SWING_SHARE * np.max(amplitudes)
+    )
+    return deviations
 
 
-def _winch_notes(rest: Rest, matrices: Sequence[Array], speed: float) -> list[str]:
-    """Of winches that turn with ``speed`` (m/s) to either side: tensions at once, and how fast the rope grows."""
+def _winch_notes(operating_point: OperatingPoint, matrices: Sequence[Array], speed: float) -> list[str]:
+    """Notes on winches at ``speed`` (m/s) in either direction: immediate tension change and rate of rope length."""
     _, B, _, D = matrices
-    model, count = rest.model, rest.robot.cable_count
-    told = casadi.Function(
+    model, count = operating_point.model, operating_point.robot.cable_count
+    evaluate = casadi.Function(
         "told", [model.states, model.inputs], [model.outputs[6 : 6 + count], model.rates[6 : 6 + count]]
     )
-    tension, rate = (np.asarray(value).ravel() for value in told(rest.state, np.zeros(model.inputs.numel())))
-    bends: dict[int, float] = {}
+    tension, rate = (
+        np.asarray(value).ravel() for value in evaluate(operating_point.state, np.zeros(model.inputs.numel()))
+    )
+    deviations: dict[int, float] = {}
     for winch in range(count):
         worst = 0.0
-        for turn in (speed, -speed):
+        for winch_speed in (speed, -speed):
             inputs = np.zeros(model.inputs.numel())
-            inputs[winch] = turn
-            now, moved = (np.asarray(value).ravel() for value in told(rest.state, inputs))
-            floor = UNFELT * np.max(rest.tensions)
+            inputs[winch] = winch_speed
+            moved_tension, moved_rate = (np.asarray(value).ravel() for value in evaluate(operating_point.state, inputs))
+            floor = MIN_CHANGE_SHARE * np.max(operating_point.tensions)
             worst = max(
                 worst,
-                _share(now[winch] - tension[winch], D[6 + winch, winch] * turn, floor),
-                _share(moved[winch] - rate[winch], B[6 + winch, winch] * turn, UNFELT * speed),
+                _relative_deviation(moved_tension[winch] - tension[winch], D[6 + winch, winch] * winch_speed, floor),
+                _relative_deviation(
+                    moved_rate[winch] - rate[winch], B[6 + winch, winch] * winch_speed, MIN_CHANGE_SHARE * speed
+                ),
             )
-        if not worst <= BENT:
-            bends[winch + 1] = worst
-    if not bends:
+        if not worst <= MAX_RELATIVE_DEVIATION:
+            deviations[winch + 1] = worst
+    if not deviations:
         return []
     return [
-        f"winches {', '.join(map(str, bends))}: at {speed:.2g} m/s tension or rope of their cables is off the linear "
-        f"plant by up to {max(bends.values()):.0%} of the change; {_named(rest.robot)}"
+        f"winches {', '.join(map(str, deviations))}: at {speed:.2g} m/s tension or rope of their cables is off the linear "
+        f"plant by up to {max(deviations.values()):.0%} of the change; {_effect_description(operating_point.robot)}"
     ]
 
 
-def _share(change: float, linear: float, floor: float) -> float:
+def _relative_deviation(change: float, linear: float, floor: float) -> float:
     return abs(change - linear) / max(abs(change), abs(linear), floor)
 
 
-def _lag_notes(model: Model, count: int) -> list[str]:
-    """Of sensors that show late."""
-    lags = np.asarray(casadi.evalf(model.lags), dtype=float).ravel()
-    late = [("positions", float(lags[0])), *((f"tension {i + 1}", float(lags[3 + i])) for i in range(count))]
-    return [f"{what}: sensors show {lag:g} s late, the plant at once" for what, lag in late if lag > 0.0]
+def _delay_notes(model: SymbolicModel, count: int) -> list[str]:
+    """Notes on sensor delays."""
+    delays = np.asarray(casadi.evalf(model.sensor_delays), dtype=float).ravel()
+    sensor_delays = [
+        ("positions", float(delays[0])),
+        *((f"tension {i + 1}", float(delays[3 + i])) for i in range(count)),
+    ]
+    return [f"{what}: sensors show {lag:g} s late, the plant at once" for what, lag in sensor_delays if lag > 0.0]

@@ -1,4 +1,4 @@
-"""A robot's FMUs as one black box, with the signals of the plant that is made from the laws."""
+"""Linearisation of a robot's FMUs as one black box, with the signals of the plant from the laws."""
 
 from __future__ import annotations
 
@@ -13,22 +13,22 @@ from tautwire_fmu.laws.effects import BY_NAME
 from ..errors import InputError
 from ..fmus.packaging import RobotFmus
 from ..master import Port
-from ..master.archive import description_of
-from ..runs.cosimulation import instantiated, wired
+from ..master.archive import read_model_description
+from ..runs.cosimulation import instantiate_robot, wire_fmus
 from ..runs.wiring import AXES, PLATFORM, cable_name, winch_name
-from .black_box import ERROR, STEP, BlackBoxPlant, linearise_fmus
+from .black_box import DEFAULT_STEP, DEFAULT_TOLERANCE, BlackBoxPlant, linearise_fmus
 
-DRIVEN = ("winch_speed", "speed_command")
-SHOWN = ("position", "measured_position", "velocity", "tension", "length", "winch_speed")
-EFFECT = "effect."
-MEASURED = "measured_"
+INPUT_VARIABLES = ("winch_speed", "speed_command")
+OUTPUT_VARIABLES = ("position", "measured_position", "velocity", "tension", "length", "winch_speed")
+EFFECT_PREFIX = "effect."
+MEASURED_PREFIX = "measured_"
 
 
 @dataclass(frozen=True)
 class RobotSignals:
-    """Ports of a robot's FMUs by the names of the plant's signals; ``states`` are None where a cable is the user's.
+    """Ports of a robot's FMUs by the plant's signal names; ``states`` is None if a cable is a user's FMU.
 
-    States are those of :func:`tautwire.linear.linearise`, and those of winches; of a user's platform its motion, of a
+    States are those of :func:`tautwire.linear.linearise` and of the winches; of a user's platform its motion, of a
     user's winch its speed.
     """
 
@@ -40,73 +40,82 @@ class RobotSignals:
 def robot_signals(fmus: RobotFmus) -> RobotSignals:
     """The signals of :func:`tautwire.linear.linearise` in a robot's FMUs.
 
-    Winches that are FMUs are driven by ``speed_command_i`` and show ``winch_speed_i``; an external force is there if
-    the platform takes one. Outputs that an FMU does not show are left out.
+    Winch FMUs have the input ``speed_command_i`` and the output ``winch_speed_i``; an external force is an input if
+    the platform has one. Outputs that an FMU lacks are left out.
     """
-    wiring = wired(fmus)
-    platform = description_of(fmus.platform)
-    there = {variable.name for variable in platform.modelVariables}
-    pushed = [Port(PLATFORM, f"external_force.{axis}") for axis in AXES]
-    inputs = [port for port in wiring.drives if port.variable in DRIVEN] + [p for p in pushed if p.variable in there]
-    outputs = [port for port in wiring.shown if port.variable.partition(".")[0] in SHOWN]
+    wiring = wire_fmus(fmus)
+    platform = read_model_description(fmus.platform)
+    variable_names = {variable.name for variable in platform.modelVariables}
+    force_ports = [Port(PLATFORM, f"external_force.{axis}") for axis in AXES]
+    inputs = [port for port in wiring.external_inputs if port.variable in INPUT_VARIABLES] + [
+        p for p in force_ports if p.variable in variable_names
+    ]
+    outputs = [port for port in wiring.outputs if port.variable.partition(".")[0] in OUTPUT_VARIABLES]
     return RobotSignals(
-        inputs={_signal(port): port for port in inputs},
-        outputs={_signal(port): port for port in outputs},
-        states=None if any(cable in fmus.own for cable in _cables(fmus)) else _states(fmus),
+        inputs={_signal_name(port): port for port in inputs},
+        outputs={_signal_name(port): port for port in outputs},
+        states=None if any(cable in fmus.user_start_values for cable in _cable_names(fmus)) else _state_ports(fmus),
     )
 
 
 def linearise_robot_fmus(
-    fmus: RobotFmus, states: Sequence[str] | None = None, step: float = STEP, error: float = ERROR
+    fmus: RobotFmus,
+    states: Sequence[str] | None = None,
+    step: float = DEFAULT_STEP,
+    tolerance: float = DEFAULT_TOLERANCE,
 ) -> BlackBoxPlant:
-    """Linearise a robot's FMUs about their start, where they rest; see :func:`linearise_fmus`.
+    """Linearises a robot's FMUs about their start, where they rest; see :func:`linearise_fmus`.
 
-    ``states`` choose by name among those of :func:`robot_signals`, such as the ``state_labels`` of the plant from the
-    laws; by default all. None at all, ``()``, gives the states coordinates of their own, which a user's FMU with
-    states that it does not show needs.
+    ``states`` selects by name among those of :func:`robot_signals`, such as the ``state_labels`` of the plant from the
+    laws; by default all. With ``()`` the states are coordinates of their own, as needed for a user's FMU with hidden
+    states.
 
     Raises InputError where a state is unknown, and what :func:`linearise_fmus` raises.
     """
     signals = robot_signals(fmus)
-    also = [port for port in signals.inputs.values() if port.component == PLATFORM]
-    chosen = signals.states if states is None else _chosen(states, signals.states or {})
-    make = partial(instantiated, fmus, also=also)
-    return linearise_fmus(make, signals.inputs, signals.outputs, chosen or None, step=step, error=error)
+    force_ports = [port for port in signals.inputs.values() if port.component == PLATFORM]
+    selected_states = signals.states if states is None else _select_states(states, signals.states or {})
+    make_coupling = partial(instantiate_robot, fmus, external_inputs=force_ports)
+    return linearise_fmus(
+        make_coupling, signals.inputs, signals.outputs, selected_states or None, step=step, tolerance=tolerance
+    )
 
 
-def _chosen(names: Sequence[str], known: dict[str, Port]) -> dict[str, Port]:
+def _select_states(names: Sequence[str], known: dict[str, Port]) -> dict[str, Port]:
     for name in names:
         if name not in known:
             raise InputError("states", f"no FMU shows a state {name!r}", f"choose among {', '.join(known)}")
     return {name: known[name] for name in names}
 
 
-def _cables(fmus: RobotFmus) -> list[str]:
+def _cable_names(fmus: RobotFmus) -> list[str]:
     return [cable_name(index) for index in range(1, len(fmus.cables) + 1)]
 
 
-def _states(fmus: RobotFmus) -> dict[str, Port]:
+def _state_ports(fmus: RobotFmus) -> dict[str, Port]:
     motion = [Port(PLATFORM, f"{name}.{axis}") for name in ("position", "velocity") for axis in AXES]
-    ropes = [Port(cable, "unstrained_length") for cable in _cables(fmus)]
-    parts = {name: path for name, path in fmus.parts.items() if name in (*_cables(fmus), PLATFORM)}
+    ropes = [Port(cable, "unstrained_length") for cable in _cable_names(fmus)]
+    parts = {name: path for name, path in fmus.by_component.items() if name in (*_cable_names(fmus), PLATFORM)}
     effects = [Port(name, local) for name, path in parts.items() for local in _effect_states(path)]
     speeds = [Port(winch_name(i), "winch_speed") for i in fmus.winch_numbers]
-    loops = [Port(winch_name(i), "integral") for i in fmus.winch_numbers if winch_name(i) not in fmus.own]
-    return {_signal(port): port for port in (*motion, *ropes, *effects, *speeds, *loops)}
+    integrators = [
+        Port(winch_name(i), "integral") for i in fmus.winch_numbers if winch_name(i) not in fmus.user_start_values
+    ]
+    return {_signal_name(port): port for port in (*motion, *ropes, *effects, *speeds, *integrators)}
 
 
 def _effect_states(path: Path) -> list[str]:
-    """The states of effects in an FMU that settle where the robot rests."""
-    variables = description_of(path).modelVariables
+    """The effect states of an FMU that have an equilibrium."""
+    variables = read_model_description(path).modelVariables
     states = [(effect.name, state) for effect in BY_NAME.values() for state in effect.states]
-    states += [(formula.NAME, state) for state in (formula.TRAVEL, formula.TIME)]
-    drifting = {f"{EFFECT}{name}.{state.name}" for name, state in states if state.drifts}
-    locals_ = [v.name for v in variables if v.causality == "local" and v.name.startswith(EFFECT)]
+    states += [(formula.FORMULA_EFFECT_NAME, state) for state in (formula.ENCODER_TRAVEL, formula.ELAPSED_TIME)]
+    drifting = {f"{EFFECT_PREFIX}{name}.{state.name}" for name, state in states if state.drifts}
+    locals_ = [v.name for v in variables if v.causality == "local" and v.name.startswith(EFFECT_PREFIX)]
     return [name for name in locals_ if name not in drifting]
 
 
-def _signal(port: Port) -> str:
+def _signal_name(port: Port) -> str:
     """The name of a port's signal in the plant: ``cable_2.effect.relaxation.strain`` is ``relaxation_strain_2``."""
     _, _, number = port.component.partition("_")
-    name = port.variable.removeprefix(EFFECT).removeprefix(MEASURED).replace(".", "_")
+    name = port.variable.removeprefix(EFFECT_PREFIX).removeprefix(MEASURED_PREFIX).replace(".", "_")
     return f"{name}_{number}" if number else name

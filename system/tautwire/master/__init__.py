@@ -1,38 +1,38 @@
-"""The master: co-simulates any wired system of FMI 2.0 and 3.0 FMUs and keeps their coupling exact."""
+"""Co-simulation master: implicit coupling of FMI 2.0 and 3.0 FMUs, and of a robot's FMUs in particular."""
 
-from .audit import Account, Bond
+from .audit import PowerBond, RunStatistics
 from .component import Component, ComponentError
 from .coupling import Coupling
-from .journal import Journal
-from .simulation import Kept, Progress, Recorder, Sampled, Source, simulate
-from .stepping import AdaptiveStep, FixedStep, StepError, Stepping
-from .watch import PATIENCE, LostError, RunLostError, simulate_watched
-from .watched import WatchedComponent
+from .journal import CallJournal
+from .simulation import InputSource, MemoryRecorder, PiecewiseLinearInput, Progress, Recorder, simulate
+from .stepping import AdaptiveStep, FixedStep, StepSizeControl, StepSizeError
+from .watch import CALL_TIMEOUT, CallAbortedError, RunAbortedError, simulate_isolated
+from .watched import JournalledComponent
 from .wiring import Connection, Port, WiringError
 
 __all__ = [
-    "PATIENCE",
-    "Account",
+    "CALL_TIMEOUT",
     "AdaptiveStep",
-    "Bond",
+    "CallAbortedError",
+    "CallJournal",
     "Component",
     "ComponentError",
     "Connection",
     "Coupling",
     "FixedStep",
-    "Journal",
-    "Kept",
-    "LostError",
+    "InputSource",
+    "JournalledComponent",
+    "MemoryRecorder",
+    "PiecewiseLinearInput",
     "Port",
+    "PowerBond",
     "Progress",
     "Recorder",
-    "RunLostError",
-    "Sampled",
-    "Source",
-    "StepError",
-    "Stepping",
-    "WatchedComponent",
+    "RunAbortedError",
+    "RunStatistics",
+    "StepSizeControl",
+    "StepSizeError",
     "WiringError",
     "simulate",
-    "simulate_watched",
+    "simulate_isolated",
 ]

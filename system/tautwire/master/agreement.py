@@ -1,46 +1,59 @@
-"""When the inputs and outputs of a step agree well enough for redos to end."""
+"""Convergence criterion of the iterations within a macro step."""
 
 from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .bends import Bends
+from .bends import InterpolationErrorEstimate
 
 Array = NDArray[np.float64]
 
-# From one step to the next of the same length, what is allowed hardly ever grows more than so many times.
-FAR = 100.0
-# Relative; steps that are equal differ by what their times are rounded by.
-SAME = 1e-6
+# From one step to the next of the same size, the allowed error hardly ever grows more than this many times.
+MAX_TOLERANCE_GROWTH = 100.0
+# Equal steps differ by the rounding of their times.
+STEP_SIZE_RTOL = 1e-6
 
 
-class Agreement:
-    """What outputs may still err by: the tolerance, or a share of what the polynomials of a step miss.
+class ConvergenceCriterion:
+    """Convergence criterion: the iteration error against a tolerance or a share of the interpolation error.
 
-    The latter is not worked out where the error is far above what the step before was allowed, unless no redo is left.
-    This is how far redos are worth while; the step itself errs by what its polynomials miss.
+    The interpolation error is not evaluated where the iteration error is far above what the step before was allowed,
+    unless no iteration is left. Iterating further is not worth while: the step itself has the interpolation error.
     """
 
-    def __init__(self, bends: Bends) -> None:
-        self._bends = bends
-        self.forget()
+    def __init__(self, interpolation_error: InterpolationErrorEstimate) -> None:
+        self._interpolation_error = interpolation_error
+        self.reset()
 
-    def forget(self) -> None:
-        """Drop what the step before was allowed."""
-        self._length, self._allowed = 0.0, np.inf
+    def reset(self) -> None:
+        """Drop the allowed error of the step before."""
+        self._step_size, self._allowed_error = 0.0, np.inf
 
-    def lacking(
-        self, error: float, tolerance: float, share: float, begun: Array, shown: Array, step: float, last: bool = False
+    def is_unconverged(
+        self,
+        error: float,
+        tolerance: float,
+        interpolation_error_share: float,
+        outputs_at_start: Array,
+        outputs: Array,
+        step: float,
+        is_last_iteration: bool = False,
     ) -> bool:
-        """Whether ``error`` is more than a ``step`` (s) may have that has ``begun`` so and now shows that.
+        """Whether ``error`` exceeds what a ``step`` (s) from ``outputs_at_start`` to ``outputs`` may have.
 
-        ``error`` and ``tolerance`` are relative to nominal values; ``last`` tells that no redo is left.
+        ``error`` and ``tolerance`` are relative to nominal values; with ``is_last_iteration`` none is left.
         """
-        if not share or error <= tolerance:
+        if not interpolation_error_share or error <= tolerance:
             return error > tolerance
-        if not last and abs(step - self._length) <= SAME * step and error > FAR * self._allowed:
+        if (
+            not is_last_iteration
+            and abs(step - self._step_size) <= STEP_SIZE_RTOL * step
+            and error > MAX_TOLERANCE_GROWTH * self._allowed_error
+        ):
             return True
-        self._length = step
-        self._allowed = max(tolerance, share * self._bends.largest(begun, shown, step))
-        return error > self._allowed
+        self._step_size = step
+        self._allowed_error = max(
+            tolerance, interpolation_error_share * self._interpolation_error.max_error(outputs_at_start, outputs, step)
+        )
+        return error > self._allowed_error

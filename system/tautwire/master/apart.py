@@ -1,4 +1,4 @@
-"""What the process does that calls FMUs while another one watches it."""
+"""The worker process, which calls FMUs under the watchdog of another process."""
 
 from __future__ import annotations
 
@@ -17,69 +17,82 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from ..child import end_with_parent
-from ..interrupt import as_by_default
+from ..child import exit_with_parent
+from ..interrupt import restore_default_signals
 from .coupling import Coupling
-from .journal import Journal
-from .simulation import Source, simulate
-from .stepping import Stepping
+from .journal import CallJournal
+from .simulation import InputSource, simulate
+from .stepping import StepSizeControl
 from .wiring import Port
 
 Array = NDArray[np.float64]
-System = Callable[[Journal], AbstractContextManager[Coupling]]
+SystemBuilder = Callable[[CallJournal], AbstractContextManager[Coupling]]
 
-ROW, ACCOUNT, ERROR = b"r", b"a", b"e"
-TEMPORARY = ("TMPDIR", "TEMP", "TMP")
+ROW_MESSAGE, STATISTICS_MESSAGE, ERROR_MESSAGE = b"r", b"a", b"e"
+TEMPORARY_FOLDER_VARIABLES = ("TMPDIR", "TEMP", "TMP")
 
 
 @dataclass(frozen=True)
 class Job:
-    """A co-simulation for another process; ``system`` builds it there, the rest is as for :func:`simulate`."""
+    """A co-simulation for a worker process; ``build_system`` is called there, the rest is as for :func:`simulate`."""
 
-    system: System
-    source: Source
+    build_system: SystemBuilder
+    input_source: InputSource
     times: Array
-    observed: tuple[Port, ...]
-    stepping: Stepping
+    observed_outputs: tuple[Port, ...]
+    step_size_control: StepSizeControl
 
 
-class StoppedError(Exception):
-    """The watching process wants no more."""
+class StopRequestedError(Exception):
+    """The watchdog has asked the worker to stop."""
 
 
-def work(job: Job, folder: Path, sender: Connection) -> None:
-    """Do a job: rows go to the pipe as they come, then the account or the error.
+def run_worker(job: Job, folder: Path, sender: Connection) -> None:
+    """Run a job: rows go to the pipe as they come, then the run statistics or the error.
 
     Each message ends with its kind. All temporary files go into ``folder``.
     """
-    _settle_in(folder)
-    journal = Journal(folder)
-    with sender, suppress(Exception), _told(sender), job.system(journal) as coupling, _told(sender):
-        simulate(coupling, _Noted(job.source, journal), job.times, job.observed, job.stepping, _Sent(sender))
-        sender.send_bytes(pickle.dumps(coupling.account) + ACCOUNT)
+    _prepare_process(folder)
+    journal = CallJournal(folder)
+    with (
+        sender,
+        suppress(Exception),
+        _sending_errors(sender),
+        job.build_system(journal) as coupling,
+        _sending_errors(sender),
+    ):
+        simulate(
+            coupling,
+            _JournalledSource(job.input_source, journal),
+            job.times,
+            job.observed_outputs,
+            job.step_size_control,
+            _PipeRecorder(sender),
+        )
+        sender.send_bytes(pickle.dumps(coupling.statistics) + STATISTICS_MESSAGE)
 
 
-def _settle_in(folder: Path) -> None:
-    """Make this process one that leaves no trace and does not outlive the one that watches it."""
-    as_by_default()
+def _prepare_process(folder: Path) -> None:
+    """Prepare this process to leave no temporary files and not to outlive the process that watches it."""
+    restore_default_signals()
     if sys.platform != "win32":
-        # With what FMUs may start, so that all of it can be ended together.
+        # A process group, so that whatever FMUs start can be ended together with this process.
         os.setpgid(0, 0)
-    for name in TEMPORARY:
+    for name in TEMPORARY_FOLDER_VARIABLES:
         os.environ[name] = str(folder)
     tempfile.tempdir = str(folder)
-    # What a fork inherits is the other process's to free.
+    # Objects inherited by a fork are the parent's to free.
     gc.freeze()
     # A fork's streams may be locked by a thread that it does not have.
     for number, name in ((1, "stdout"), (2, "stderr")):
         with suppress(OSError):
             setattr(sys, name, open(number, "w", buffering=1, encoding="utf-8", closefd=False))  # noqa: SIM115
-    end_with_parent(folder)
+    exit_with_parent(folder)
 
 
 @contextmanager
-def _told(sender: Connection) -> Iterator[None]:
-    """Errors of the block are sent before anything else is done about them."""
+def _sending_errors(sender: Connection) -> Iterator[None]:
+    """Send errors of the block before they are handled any further."""
     try:
         yield
     except Exception as error:
@@ -89,29 +102,29 @@ def _told(sender: Connection) -> Iterator[None]:
             pickle.loads(content)
         except Exception:
             content = pickle.dumps((RuntimeError(f"{type(error).__name__}: {error}"), text))
-        sender.send_bytes(content + ERROR)
+        sender.send_bytes(content + ERROR_MESSAGE)
         raise
 
 
-class _Sent:
-    """See :class:`tautwire.master.Recorder`; the rows go into a pipe."""
+class _PipeRecorder:
+    """A :class:`tautwire.cosimulation.Recorder` that writes rows into a pipe."""
 
     def __init__(self, sender: Connection) -> None:
         self._sender = sender
 
     def add(self, time: float, row: Array) -> None:
-        self._sender.send_bytes(row.tobytes() + ROW)
+        self._sender.send_bytes(row.tobytes() + ROW_MESSAGE)
 
 
-class _Noted:
-    """See :class:`tautwire.master.Source`; time that a source takes is not an FMU's."""
+class _JournalledSource:
+    """A :class:`tautwire.cosimulation.InputSource` that marks the journal idle: its own time is not an FMU's."""
 
-    def __init__(self, source: Source, journal: Journal) -> None:
+    def __init__(self, source: InputSource, journal: CallJournal) -> None:
         self._source = source
         self._journal = journal
 
-    def interval(self, index: int, time: float, step: float, shown: Array) -> tuple[Array, Array]:
-        if self._journal.stopped:
-            raise StoppedError
-        self._journal.rest(time)
-        return self._source.interval(index, time, step, shown)
+    def interval(self, index: int, time: float, step: float, outputs: Array) -> tuple[Array, Array]:
+        if self._journal.stop_requested:
+            raise StopRequestedError
+        self._journal.mark_idle(time)
+        return self._source.interval(index, time, step, outputs)

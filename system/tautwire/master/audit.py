@@ -1,4 +1,4 @@
-"""The books of a run: steps, redos, and the energy that the coupling itself made or ate."""
+"""Run statistics: steps, iterations, and the energy residual of the coupling."""
 
 from __future__ import annotations
 
@@ -7,83 +7,83 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from .fallback import Fallback
+from .fallback import Fallbacks
 from .wiring import Connection
 
 Array = NDArray[np.float64]
 
-# Of the energy exchanged, and of all steps.
-WARNED_SHARE, WARNED_UNSETTLED = 0.01, 0.1
+# Relative to the energy exchanged, and to all steps.
+MAX_ENERGY_RESIDUAL_SHARE, MAX_UNCONVERGED_SHARE = 0.01, 0.1
 
 
 @dataclass(frozen=True)
-class Bond:
-    """Two connections whose product is a power: an effort one way (N), a flow the other way (m/s)."""
+class PowerBond:
+    """Power bond: two connections whose product is a power, an effort one way (N) and a flow the other way (m/s)."""
 
     effort: Connection
     flow: Connection
 
 
 @dataclass
-class Account:
-    """What a run cost, and what its coupling did to energy.
+class RunStatistics:
+    """Statistics of a run: its cost in steps, iterations and sweeps, and the energy residual of its coupling.
 
     Over a step h, a bond sends ``effort sent x flow received`` and gets ``effort received x flow sent``; half of h
-    times their difference at its end is energy (J) that no component made. Zero where inputs equal outputs at both
-    ends; what the polynomials between them err by does not show. ``error`` is the sum of the steps' estimated errors
-    (m), where steps were chosen by a tolerance. In ``unsettled`` steps inputs and outputs did not agree after all
-    redos. ``doubted`` sums the squares of what estimated rates may err by.
+    times their difference at its end is the energy residual (J), which no component has produced. It is zero where
+    inputs equal outputs at both ends; interpolation errors between them do not show. ``estimated_error`` is the sum of
+    the steps' estimated errors (m), where steps were chosen by a tolerance. ``unconverged_steps`` did not converge
+    within all iterations. ``squared_derivative_errors`` sums the squared error estimates of estimated derivatives.
 
     Source: Sadjina, Kyllingstad, Skjong and Pedersen (2017), Energy conservation and power bonds in co-simulations,
     Engineering with Computers 33(3), 607-620.
     """
 
     steps: int = 0
-    redos: int = 0
-    passes: int = 0
-    unsettled: int = 0
-    made: float = 0.0
-    exchanged: float = 0.0
-    error: float | None = None
-    without: Fallback = field(default_factory=Fallback, repr=False)
-    doubted: Array = field(default_factory=lambda: np.zeros(0), repr=False, compare=False)
+    iterations: int = 0
+    sweeps: int = 0
+    unconverged_steps: int = 0
+    energy_residual: float = 0.0
+    energy_exchanged: float = 0.0
+    estimated_error: float | None = None
+    fallbacks: Fallbacks = field(default_factory=Fallbacks, repr=False)
+    squared_derivative_errors: Array = field(default_factory=lambda: np.zeros(0), repr=False, compare=False)
 
-    def enter(
-        self, step: float, redos: int, agreed: bool, sent: tuple[Array, Array], received: tuple[Array, Array]
+    def add_step(
+        self, step: float, iterations: int, converged: bool, sent: tuple[Array, Array], received: tuple[Array, Array]
     ) -> None:
-        """One step; ``sent`` and ``received`` are (efforts, flows) of all bonds at its end."""
+        """Add one step; ``sent`` and ``received`` are (efforts, flows) of all power bonds at its end."""
         self.steps += 1
-        self.redos += redos
-        self.unsettled += not agreed and redos > 0
+        self.iterations += iterations
+        self.unconverged_steps += not converged and iterations > 0
         effort_sent, flow_sent = sent
         effort_received, flow_received = received
-        self.made += 0.5 * step * float(effort_received @ flow_sent - effort_sent @ flow_received)
-        self.exchanged += step * float(np.sum(np.abs(effort_sent * flow_sent)))
+        self.energy_residual += 0.5 * step * float(effort_received @ flow_sent - effort_sent @ flow_received)
+        self.energy_exchanged += step * float(np.sum(np.abs(effort_sent * flow_sent)))
 
-    def doubt(self, doubts: Array) -> None:
-        """By how much the estimated rates of a step may err, shape (number of rates,)."""
-        self.doubted = self.doubted + doubts**2
+    def add_derivative_errors(self, errors: Array) -> None:
+        """Add the error estimates of a step's estimated derivatives, shape (number of derivatives,)."""
+        self.squared_derivative_errors = self.squared_derivative_errors + errors**2
 
-    def fallbacks(self) -> tuple[str, ...]:
-        """What the master did without, for want of FMUs that can do it; the errors of rates are root mean squares."""
-        return self.without.notes(np.sqrt(self.doubted / max(self.steps, 1)))
+    def fallback_notes(self) -> tuple[str, ...]:
+        """One line for each capability that FMUs lack; errors of estimated derivatives are root mean squares."""
+        return self.fallbacks.notes(np.sqrt(self.squared_derivative_errors / max(self.steps, 1)))
 
     @property
-    def share(self) -> float:
-        """Energy made by the coupling, as a share of all that was exchanged; zero where nothing was."""
-        return abs(self.made) / self.exchanged if self.exchanged else 0.0
+    def energy_residual_share(self) -> float:
+        """Energy residual of the coupling, as a share of the energy exchanged; zero where none was."""
+        return abs(self.energy_residual) / self.energy_exchanged if self.energy_exchanged else 0.0
 
     def warnings(self) -> tuple[str, ...]:
-        """What a user should know: where the coupling made energy, or steps ended before inputs and outputs agreed."""
-        told = []
-        if self.share > WARNED_SHARE:
-            told.append(
-                f"the coupling made {self.made:.3g} J, {100.0 * self.share:.2g} % of the energy exchanged: "
+        """Warnings for the user: a large energy residual, or steps that did not converge."""
+        messages = []
+        if self.energy_residual_share > MAX_ENERGY_RESIDUAL_SHARE:
+            messages.append(
+                f"the coupling made {self.energy_residual:.3g} J, {100.0 * self.energy_residual_share:.2g} % of the energy exchanged: "
                 "take a smaller --step, or FMUs that save their states"
             )
-        if self.unsettled > WARNED_UNSETTLED * self.steps:
-            told.append(
-                f"in {self.unsettled} of {self.steps} steps inputs and outputs did not agree after all redos: "
+        if self.unconverged_steps > MAX_UNCONVERGED_SHARE * self.steps:
+            messages.append(
+                f"in {self.unconverged_steps} of {self.steps} steps inputs and outputs did not agree after all redos: "
                 "take a smaller --step; where that does not help, some FMU rounds its outputs"
             )
-        return tuple(told)
+        return tuple(messages)

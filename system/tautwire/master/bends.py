@@ -1,4 +1,4 @@
-"""How much of the motion within a step its polynomials miss, from what the middle of the step shows."""
+"""Interpolation error within a macro step, estimated from outputs at its midpoint."""
 
 from __future__ import annotations
 
@@ -7,48 +7,51 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-from .hermite import Chain, scaled, shares
+from .hermite import DerivativeChain, hermite_weights, scale_weights
 
 Array = NDArray[np.float64]
 
-# Values with two rates at both ends make a polynomial of the fifth degree, near enough to that of a step.
-LEAST_LENGTH = 3
-KEPT_WEIGHTS = 64
+# Values with two derivatives at both ends make a polynomial of degree five, close to that of a step.
+MIN_CHAIN_LENGTH = 3
+MAX_CACHED_STEP_SIZES = 64
 
 
-class Bends:
-    """What outputs in the middle of a step differ by from the polynomials through their values and rates at its ends.
+class InterpolationErrorEstimate:
+    """Difference at mid-step between outputs and the Hermite interpolant of their values and derivatives at the ends.
 
-    For a chain of three that is ``h^6 / 46080`` times the sixth rate, for the second rate 24 of it over ``h^2``.
-    ``nominal`` are the units of all outputs shown.
+    For a chain of three that is ``h^6 / 46080`` times the sixth derivative, for the second derivative 24 of it over
+    ``h^2``. ``nominal`` are the nominal values of all outputs.
     """
 
-    def __init__(self, chains: Sequence[Chain], nominal: Array) -> None:
-        known = [c for c in chains if c.middles is not None and len(c.ends) >= LEAST_LENGTH]
-        lengths = sorted({len(chain.ends) for chain in known})
-        groups = [[chain for chain in known if len(chain.ends) == length] for length in lengths]
+    def __init__(self, chains: Sequence[DerivativeChain], nominal: Array) -> None:
+        midpoint_chains = [c for c in chains if c.midpoints is not None and len(c.ends) >= MIN_CHAIN_LENGTH]
+        lengths = sorted({len(chain.ends) for chain in midpoint_chains})
+        groups = [[chain for chain in midpoint_chains if len(chain.ends) == length] for length in lengths]
         self._groups = [
-            (np.array([chain.ends for chain in group]).T, np.array([chain.middles for chain in group]).T)
+            (np.array([chain.ends for chain in group]).T, np.array([chain.midpoints for chain in group]).T)
             for group in groups
         ]
-        self._units = [nominal[middles] for _, middles in self._groups]
+        self._nominals = [nominal[middles] for _, middles in self._groups]
         self._weights: dict[float, list[Array]] = {}
 
-    def largest(self, begun: Array, shown: Array, step: float) -> float:
-        """The largest of a ``step`` (s) that has ``begun`` with these outputs and now shows those; in nominal units."""
-        found = 0.0
-        for (ends, middles), units, weight in zip(self._groups, self._units, self._weights_for(step), strict=True):
-            missed = weight @ np.concatenate([begun[ends], shown[ends]]) - shown[middles]
-            found = max(found, float(np.abs(missed / units).max()))
-        return found
+    def max_error(self, outputs_at_start: Array, outputs: Array, step: float) -> float:
+        """The largest error of a ``step`` (s) from ``outputs_at_start`` to ``outputs``, relative to nominal values."""
+        max_relative_error = 0.0
+        for (ends, midpoints), nominals, weight in zip(
+            self._groups, self._nominals, self._weights_for(step), strict=True
+        ):
+            errors = weight @ np.concatenate([outputs_at_start[ends], outputs[ends]]) - outputs[midpoints]
+            max_relative_error = max(max_relative_error, float(np.abs(errors / nominals).max()))
+        return max_relative_error
 
     def _weights_for(self, step: float) -> list[Array]:
         key = round(step, 12)
         if key not in self._weights:
-            if len(self._weights) >= KEPT_WEIGHTS:
+            if len(self._weights) >= MAX_CACHED_STEP_SIZES:
                 self._weights.clear()
             counts = [ends.shape[0] for ends, _ in self._groups]
             self._weights[key] = [
-                scaled(shares((0.0, 1.0), count, (0.5,)), step).reshape(count, 2 * count) for count in counts
+                scale_weights(hermite_weights((0.0, 1.0), count, (0.5,)), step).reshape(count, 2 * count)
+                for count in counts
             ]
         return self._weights[key]

@@ -1,4 +1,4 @@
-"""What a coupling keeps to go back to a time."""
+"""Checkpoint of a coupling, for a rollback."""
 
 from __future__ import annotations
 
@@ -8,19 +8,19 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .audit import Account
-from .prediction import Memory
+from .audit import RunStatistics
+from .prediction import ExtrapolationHistory
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class Checkpoint:
-    """All that a coupling needs to go back to a time."""
+    """The state of a coupling at a communication point, for a rollback to it."""
 
-    states: tuple[ctypes.c_void_p, ...]
-    shown: Array
-    given: Array
-    driven: Array
-    account: Account
-    memory: Memory
+    fmu_states: tuple[ctypes.c_void_p, ...]
+    outputs: Array
+    inputs: Array
+    external_values: Array
+    statistics: RunStatistics
+    extrapolation_history: ExtrapolationHistory

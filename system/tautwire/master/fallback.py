@@ -1,4 +1,4 @@
-"""What a master does without where an FMU cannot do it, in words."""
+"""Fallbacks of the master for capabilities that FMUs lack, in words."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .component import Component
-from .seat import STAMP
+from .seat import INPUT_TIME
 from .units import unit_of
 from .wiring import Connection, Port
 
@@ -17,42 +17,55 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Fallback:
-    """``lacks`` are sentences; ``estimated`` are outputs whose rates are estimated, with the units of these rates."""
+class Fallbacks:
+    """Capabilities that FMUs lack, in sentences, and outputs whose derivatives are estimated, with their units."""
 
-    lacks: tuple[str, ...] = ()
-    estimated: tuple[tuple[Port, str], ...] = ()
+    missing_capabilities: tuple[str, ...] = ()
+    estimated_derivatives: tuple[tuple[Port, str], ...] = ()
 
-    def notes(self, doubts: Array) -> tuple[str, ...]:
-        """One line for each shortcoming; ``doubts`` (number of rates,) is what the estimated rates may err by."""
-        worst: dict[tuple[str, str], float] = {}
-        names: dict[tuple[str, str], dict[str, None]] = {}
-        for (port, unit), doubt in zip(self.estimated, doubts, strict=True):
-            whole = port.variable.partition(".")[0], unit
-            worst[whole] = max(worst.get(whole, 0.0), float(doubt))
-            names.setdefault(whole, {})[port.component] = None
-        rates = (
+    def notes(self, errors: Array) -> tuple[str, ...]:
+        """One line for each fallback; ``errors`` (number of derivatives,) are those of the estimated derivatives."""
+        max_errors: dict[tuple[str, str], float] = {}
+        component_names: dict[tuple[str, str], dict[str, None]] = {}
+        for (port, unit), error in zip(self.estimated_derivatives, errors, strict=True):
+            quantity = port.variable.partition(".")[0], unit
+            max_errors[quantity] = max(max_errors.get(quantity, 0.0), float(error))
+            component_names.setdefault(quantity, {})[port.component] = None
+        derivative_notes = (
             f"no rate of {name}, so it is worked out from the past, off by about {doubt:.2g} {unit}: "
-            f"FMU {', '.join(names[name, unit])}"
-            for (name, unit), doubt in worst.items()
+            f"FMU {', '.join(component_names[name, unit])}"
+            for (name, unit), doubt in max_errors.items()
         )
-        return (*self.lacks, *rates)
+        return (*self.missing_capabilities, *derivative_notes)
 
 
-def fallback(
+def find_fallbacks(
     components: Mapping[str, Component],
     connections: Sequence[Connection],
-    drives: Sequence[Port],
-    rates: Sequence[Connection],
-) -> Fallback:
-    """What these FMUs lack of what a step of full order takes."""
-    fed = {wire.target.component for wire in (*connections, *rates)} | {port.component for port in drives}
-    holding = [name for name in components if name in fed and STAMP not in components[name].variables]
-    fixed = [name for name, component in components.items() if not component.can_restore]
-    lacks = []
+    external_inputs: Sequence[Port],
+    derivative_connections: Sequence[Connection],
+) -> Fallbacks:
+    """Find the capabilities that these FMUs lack for a step of full order."""
+    components_with_inputs = {wire.target.component for wire in (*connections, *derivative_connections)} | {
+        port.component for port in external_inputs
+    }
+    holding = [
+        name for name in components if name in components_with_inputs and INPUT_TIME not in components[name].variables
+    ]
+    without_rollback = [name for name, component in components.items() if not component.supports_rollback]
+    missing_capabilities = []
     if holding:
-        lacks.append(f"no {STAMP}, so inputs are held over each step at their mean: FMU {', '.join(holding)}")
-    if fixed:
-        lacks.append(f"no saved states, so no step is redone or cut at a kink: FMU {', '.join(fixed)}")
-    targets = {wire.source: components[wire.target.component].variables[wire.target.variable] for wire in rates}
-    return Fallback(tuple(lacks), tuple((port, unit_of(target) or "") for port, target in targets.items()))
+        missing_capabilities.append(
+            f"no {INPUT_TIME}, so inputs are held over each step at their mean: FMU {', '.join(holding)}"
+        )
+    if without_rollback:
+        missing_capabilities.append(
+            f"no saved states, so no step is redone or cut at a kink: FMU {', '.join(without_rollback)}"
+        )
+    targets = {
+        wire.source: components[wire.target.component].variables[wire.target.variable]
+        for wire in derivative_connections
+    }
+    return Fallbacks(
+        tuple(missing_capabilities), tuple((port, unit_of(target) or "") for port, target in targets.items())
+    )

@@ -14,26 +14,26 @@ from fmpy.fmi2 import (
     fmi2CallbackLoggerTYPE,
 )
 
-from .standard import FMI_2, Fail, Functions, Log
+from .standard import FMI_2, Fail, Log, StepFunctions
 
 
 class Fmi2Instance:
-    """See :class:`tautwire.master.standard.Instance`."""
+    """See :class:`FmuInstance`."""
 
-    calls = FMI_2
-    real = "Real"
+    call_names = FMI_2
+    real_type = "Real"
 
     def __init__(self, **arguments: Any) -> None:
         self._slave = FMU2Slave(**arguments)
 
-    def instantiate(self, log: Log, fail: Fail) -> Functions:
-        """See :meth:`tautwire.master.standard.Instance.instantiate`."""
+    def instantiate(self, log: Log, fail: Fail) -> StepFunctions:
+        """See :meth:`FmuInstance.instantiate`."""
 
-        def tell(environment: Any, instance: bytes, status: int, category: bytes, message: bytes) -> None:
+        def log_message(environment: Any, instance: bytes, status: int, category: bytes, message: bytes) -> None:
             log(status, message)
 
         self._callbacks = fmi2CallbackFunctions()
-        self._callbacks.logger = fmi2CallbackLoggerTYPE(tell)
+        self._callbacks.logger = fmi2CallbackLoggerTYPE(log_message)
         self._callbacks.allocateMemory = fmi2CallbackAllocateMemoryTYPE(fmpy.calloc)
         self._callbacks.freeMemory = fmi2CallbackFreeMemoryTYPE(fmpy.free)
         self._slave.instantiate(callbacks=self._callbacks, loggingOn=True)
@@ -41,7 +41,7 @@ class Fmi2Instance:
         library.fmi2DoStep.argtypes = [ctypes.c_void_p, ctypes.c_double, ctypes.c_double, ctypes.c_int]
         for function in (library.fmi2GetReal, library.fmi2SetReal):
             function.argtypes = [ctypes.c_void_p, ctypes.c_void_p, ctypes.c_size_t, ctypes.c_void_p]
-        return Functions(
+        return StepFunctions(
             ctypes.c_void_p(self._slave.component),
             library.fmi2GetReal,
             library.fmi2SetReal,
@@ -51,18 +51,18 @@ class Fmi2Instance:
             library.fmi2FreeFMUstate,
         )
 
-    def set_up(self, start: float) -> None:
-        """See :meth:`tautwire.master.standard.Instance.set_up`."""
+    def setup_experiment(self, start: float) -> None:
+        """See :meth:`FmuInstance.setup_experiment`."""
         self._slave.setupExperiment(startTime=start)
 
-    def enter(self, start: float) -> None:
-        """See :meth:`tautwire.master.standard.Instance.enter`."""
+    def enter_initialization(self, start: float) -> None:
+        """See :meth:`FmuInstance.enter_initialization`."""
         self._slave.enterInitializationMode()
 
-    def leave(self) -> None:
-        """See :meth:`tautwire.master.standard.Instance.leave`."""
+    def exit_initialization(self) -> None:
+        """See :meth:`FmuInstance.exit_initialization`."""
         self._slave.exitInitializationMode()
 
     def free(self) -> None:
-        """See :meth:`tautwire.master.standard.Instance.free`."""
+        """See :meth:`FmuInstance.free`."""
         self._slave.freeInstance()

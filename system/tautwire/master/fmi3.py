@@ -1,4 +1,4 @@
-"""An instance of an FMI 3.0 co-simulation FMU, without event mode: it handles its events within its steps."""
+"""An FMI 3.0 co-simulation FMU instance without event mode: it handles its events within its steps."""
 
 from __future__ import annotations
 
@@ -8,54 +8,54 @@ from typing import Any
 
 from fmpy.fmi3 import FMU3Slave
 
-from .standard import FMI_3, FMI_WARNING, Fail, Functions, Log
+from .standard import FMI_3, FMI_WARNING, Fail, Log, StepFunctions
 
 
 class Fmi3Instance:
-    """See :class:`tautwire.master.standard.Instance`."""
+    """See :class:`FmuInstance`."""
 
-    calls = FMI_3
-    real = "Float64"
+    call_names = FMI_3
+    real_type = "Float64"
 
     def __init__(self, **arguments: Any) -> None:
         self._slave = FMU3Slave(**arguments)
 
-    def instantiate(self, log: Log, fail: Fail) -> Functions:
-        """See :meth:`tautwire.master.standard.Instance.instantiate`."""
+    def instantiate(self, log: Log, fail: Fail) -> StepFunctions:
+        """See :meth:`FmuInstance.instantiate`."""
 
-        def tell(environment: Any, status: int, category: bytes, message: bytes) -> None:
+        def log_message(environment: Any, status: int, category: bytes, message: bytes) -> None:
             log(status, message)
 
-        self._slave.instantiate(loggingOn=True, logMessage=tell)
+        self._slave.instantiate(loggingOn=True, logMessage=log_message)
         library = self._slave.dll
-        return Functions(
+        return StepFunctions(
             ctypes.c_void_p(self._slave.component),
-            _scalars(library.fmi3GetFloat64),
-            _scalars(library.fmi3SetFloat64),
-            _whole_step(library.fmi3DoStep, fail),
+            _with_value_count(library.fmi3GetFloat64),
+            _with_value_count(library.fmi3SetFloat64),
+            _complete_step(library.fmi3DoStep, fail),
             library.fmi3GetFMUState,
             library.fmi3SetFMUState,
             library.fmi3FreeFMUState,
         )
 
-    def set_up(self, start: float) -> None:
+    def setup_experiment(self, start: float) -> None:
         """Nothing: FMI 3.0 takes the start time with initialization mode."""
 
-    def enter(self, start: float) -> None:
-        """See :meth:`tautwire.master.standard.Instance.enter`."""
+    def enter_initialization(self, start: float) -> None:
+        """See :meth:`FmuInstance.enter_initialization`."""
         self._slave.enterInitializationMode(startTime=start)
 
-    def leave(self) -> None:
-        """See :meth:`tautwire.master.standard.Instance.leave`."""
+    def exit_initialization(self) -> None:
+        """See :meth:`FmuInstance.exit_initialization`."""
         self._slave.exitInitializationMode()
 
     def free(self) -> None:
-        """See :meth:`tautwire.master.standard.Instance.free`."""
+        """See :meth:`FmuInstance.free`."""
         self._slave.freeInstance()
 
 
-def _scalars(function: Callable[..., int]) -> Callable[..., int]:
-    """Reads or writes variables of one value each."""
+def _with_value_count(function: Callable[..., int]) -> Callable[..., int]:
+    """A get or set function for scalars: as many values as value references."""
     function.argtypes = [  # type: ignore[attr-defined]
         ctypes.c_void_p,
         ctypes.c_void_p,
@@ -70,18 +70,23 @@ def _scalars(function: Callable[..., int]) -> Callable[..., int]:
     return call
 
 
-def _whole_step(do_step: Callable[..., int], fail: Fail) -> Callable[..., int]:
-    """Steps that end where they are to end, or fail in words."""
-    event, end, early, reached = ctypes.c_bool(), ctypes.c_bool(), ctypes.c_bool(), ctypes.c_double()
-    told = [ctypes.byref(value) for value in (event, end, early, reached)]
+def _complete_step(do_step: Callable[..., int], fail: Fail) -> Callable[..., int]:
+    """fmi3DoStep that either reaches the end of the step or fails with a reason."""
+    event_needed, terminate, early_return, last_time = (
+        ctypes.c_bool(),
+        ctypes.c_bool(),
+        ctypes.c_bool(),
+        ctypes.c_double(),
+    )
+    flags = [ctypes.byref(value) for value in (event_needed, terminate, early_return, last_time)]
 
     def step(handle: Any, time: float, length: float, keep: int) -> int:
-        status = do_step(handle, time, length, keep, *told)
-        if status <= FMI_WARNING and (event.value or end.value or early.value):
-            if end.value:
-                fail(FMI_3.step, f"a request to end the run at {reached.value:.6g} s")
-            if early.value:
-                fail(FMI_3.step, f"an early return at {reached.value:.6g} s, which it was not allowed")
+        status = do_step(handle, time, length, keep, *flags)
+        if status <= FMI_WARNING and (event_needed.value or terminate.value or early_return.value):
+            if terminate.value:
+                fail(FMI_3.step, f"a request to end the run at {last_time.value:.6g} s")
+            if early_return.value:
+                fail(FMI_3.step, f"an early return at {last_time.value:.6g} s, which it was not allowed")
             fail(FMI_3.step, "an event for the master to handle, though it was told to handle its own")
         return status
 

@@ -1,7 +1,7 @@
-"""Halves a macro step in which redos lead nowhere, or at which an FMU gives up, until they lead somewhere.
+"""Step rejection: a macro step whose iterations diverge, or that an FMU discards, is halved and tried again.
 
-Too long for what couples its components, a step has no solution that redos could find, and what they end with is
-arbitrary. The standard lets an FMU that discards a step go back to a saved state and try a shorter one.
+If a step is too long for its coupling, the iterations have no solution to converge to, and their last result is
+arbitrary. The standard lets an FMU that discards a step roll back to a saved state and try a shorter one.
 """
 
 from __future__ import annotations
@@ -16,40 +16,42 @@ from .component import ComponentError
 from .coupling import Coupling
 
 Array = NDArray[np.float64]
-Drives = Callable[[float, float], tuple[Array, Array]]
+ExternalInputs = Callable[[float, float], tuple[Array, Array]]
 
-MOST_HALVINGS = 4
+MAX_HALVINGS = 4
 
 
-def step_held(coupling: Coupling, time: float, step: float, drives: Drives) -> tuple[float, Checkpoint]:
-    """A step from ``time``, or its first half, quarter and so on, that is not lost; returns how far, and from where.
+def step_with_rejection(
+    coupling: Coupling, time: float, step: float, external_inputs: ExternalInputs
+) -> tuple[float, Checkpoint]:
+    """A step from ``time``, halved until it does not diverge; returns its length and the checkpoint of its beginning.
 
-    ``drives(time, step)`` gives the driven inputs at both ends. States have to be restorable; the one returned is to
-    be let go. The shortest step is kept even if it is lost.
+    ``external_inputs(time, step)`` returns the external inputs at both ends. All FMUs have to support rollback; the
+    checkpoint has to be released. The shortest step is accepted even if it diverges.
 
-    Raises ComponentError where an FMU fails even in the shortest: the first, of the whole step.
+    Raises ComponentError where an FMU fails even in the shortest step: the first error, that of the whole step.
     """
-    failed: ComponentError | None = None
-    for _ in range(MOST_HALVINGS):
+    first_error: ComponentError | None = None
+    for _ in range(MAX_HALVINGS):
         try:
-            before = _attempt(coupling, time, step, drives)
+            checkpoint = _attempt_step(coupling, time, step, external_inputs)
         except ComponentError as error:
-            if not error.can_restore:
+            if not error.is_recoverable:
                 raise
-            failed = failed or error
+            first_error = first_error or error
         else:
-            if not coupling.lost:
-                return step, before
-            coupling.restore(before)
-            coupling.release(before)
+            if not coupling.diverged:
+                return step, checkpoint
+            coupling.restore(checkpoint)
+            coupling.release(checkpoint)
         step *= 0.5
     try:
-        return step, _attempt(coupling, time, step, drives)
+        return step, _attempt_step(coupling, time, step, external_inputs)
     except ComponentError as error:
-        raise failed or error from error
+        raise first_error or error from error
 
 
-def _attempt(coupling: Coupling, time: float, step: float, drives: Drives) -> Checkpoint:
-    before = coupling.attempt(time, step, *drives(time, step))
-    assert before is not None
-    return before
+def _attempt_step(coupling: Coupling, time: float, step: float, external_inputs: ExternalInputs) -> Checkpoint:
+    checkpoint = coupling.attempt_step(time, step, *external_inputs(time, step))
+    assert checkpoint is not None
+    return checkpoint

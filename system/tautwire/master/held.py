@@ -1,4 +1,4 @@
-"""Outputs that hold over a step and jump between steps: those of discrete variability, as sampled controllers have."""
+"""Zero-order hold of outputs of discrete variability, such as those of sampled controllers."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from .wiring import Connection, Port
 Array = NDArray[np.float64]
 
 
-class Held:
-    """The discrete outputs among those ``shown``.
+class ZeroOrderHold:
+    """Zero-order hold of the discrete outputs among ``output_ports``.
 
-    What such an output shows at the end of a step is for the next one; within the step its value at the begin holds.
+    Their value at the end of a step is for the next one; within the step their value at its beginning holds.
     """
 
-    def __init__(self, components: Mapping[str, Component], shown: Sequence[Port]) -> None:
-        self.ports = tuple(port for port in shown if _is_discrete(components, port))
-        self._places = np.array([shown.index(port) for port in self.ports], dtype=np.intp)
+    def __init__(self, components: Mapping[str, Component], output_ports: Sequence[Port]) -> None:
+        self.ports = tuple(port for port in output_ports if _is_discrete(components, port))
+        self._indices = np.array([output_ports.index(port) for port in self.ports], dtype=np.intp)
         names = dict.fromkeys(port.component for port in self.ports)
         self._blocks = [
             (components[name], components[name].block([p.variable for p in self.ports if p.component == name]))
@@ -29,30 +29,30 @@ class Held:
         ]
         self._values: Array = np.full(len(self.ports), np.nan)
 
-    def begin(self, shown: Array) -> bool:
-        """Take the values that hold from now on; returns whether some have jumped."""
-        now = shown[self._places]
-        jumped = not np.array_equal(now, self._values)
-        self._values = now
+    def begin_step(self, outputs: Array) -> bool:
+        """Sample the values to hold from now on; returns whether some have jumped."""
+        values = outputs[self._indices]
+        jumped = not np.array_equal(values, self._values)
+        self._values = values
         return jumped
 
-    def forget(self) -> None:
-        """Take the next values for new ones."""
+    def reset(self) -> None:
+        """Treat the next values as jumps."""
         self._values.fill(np.nan)
 
-    def hold(self, shown: Array) -> None:
-        """Show the values that hold, whatever is guessed or already known of the next step."""
-        shown[self._places] = self._values
+    def apply(self, outputs: Array) -> None:
+        """Set the outputs to the held values, in place of extrapolated or newer ones."""
+        outputs[self._indices] = self._values
 
-    def end(self, shown: Array) -> None:
-        """Show what the components do at the end of the step."""
+    def end_step(self, outputs: Array) -> None:
+        """Read the values at the end of the step."""
         if self._blocks:
             for component, block in self._blocks:
                 component.read(block)
-            shown[self._places] = np.concatenate([block.values for _, block in self._blocks])
+            outputs[self._indices] = np.concatenate([block.values for _, block in self._blocks])
 
     def targets(self, connections: Sequence[Connection]) -> list[Port]:
-        """The inputs that take discrete outputs."""
+        """The inputs that are connected to discrete outputs."""
         return [wire.target for wire in connections if wire.source in self.ports]
 
 

@@ -1,4 +1,4 @@
-"""Polynomials through the values of outputs and of their rates at some times."""
+"""Hermite interpolation: polynomials through the values and derivatives of outputs at some times."""
 
 from __future__ import annotations
 
@@ -10,75 +10,83 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .component import Component
-from .seat import MIDDLE
+from .seat import MIDDLE_PREFIX
 from .wiring import Port
 
 Array = NDArray[np.float64]
-Places = NDArray[np.intp]
+Indices = NDArray[np.intp]
 
 
 @dataclass(frozen=True)
-class Chain:
-    """An output, its rate, the rate of that and so on: their places among the outputs shown.
+class DerivativeChain:
+    """An output and its successive time derivatives, as indices into the outputs.
 
-    ``ends`` are those at a communication point, ``middles`` those in the middle of the last step, None where it is
-    not shown.
+    ``ends`` are those at a communication point, ``midpoints`` those at the midpoint of the last step, None where the
+    FMU has no such outputs.
     """
 
     ends: tuple[int, ...]
-    middles: tuple[int, ...] | None
+    midpoints: tuple[int, ...] | None
 
 
-def chains_of(components: Mapping[str, Component], shown: Sequence[Port], wanted: Collection[int]) -> list[Chain]:
-    """The chains of all outputs at the ``wanted`` places; FMUs declare which output is the rate of which."""
-    places = {port: place for place, port in enumerate(shown)}
-    rates = {}
-    for port in shown:
+def derivative_chains(
+    components: Mapping[str, Component], output_ports: Sequence[Port], selected: Collection[int]
+) -> list[DerivativeChain]:
+    """The derivative chains of the ``selected`` outputs; FMUs declare which output is the derivative of which."""
+    indices = {port: place for place, port in enumerate(output_ports)}
+    derivative_ports = {}
+    for port in output_ports:
         variable = components[port.component].variables[port.variable] if port.component else None
         if variable is not None and variable.derivative is not None:
             value = Port(port.component, variable.derivative.name)
-            if value in places:
-                rates[value] = port
-    behind = {*rates.values(), *(_middle_of(port) for port in shown if _middle_of(port) in places)}
-    found = []
-    for port in (port for port in shown if port not in behind):
+            if value in indices:
+                derivative_ports[value] = port
+    derived_ports = {
+        *derivative_ports.values(),
+        *(_midpoint_port(port) for port in output_ports if _midpoint_port(port) in indices),
+    }
+    chains = []
+    for port in (port for port in output_ports if port not in derived_ports):
         ports = [port]
-        while ports[-1] in rates:
-            ports.append(rates[ports[-1]])
-        ends = tuple(places[port] for port in ports)
-        middles = tuple(places.get(_middle_of(port), -1) for port in ports)
-        if not {*ends, *middles}.isdisjoint(wanted):
-            found.append(Chain(ends, None if -1 in middles else middles))
-    return found
+        while ports[-1] in derivative_ports:
+            ports.append(derivative_ports[ports[-1]])
+        ends = tuple(indices[port] for port in ports)
+        midpoints = tuple(indices.get(_midpoint_port(port), -1) for port in ports)
+        if not {*ends, *midpoints}.isdisjoint(selected):
+            chains.append(DerivativeChain(ends, None if -1 in midpoints else midpoints))
+    return chains
 
 
-def _middle_of(port: Port) -> Port:
-    return Port(port.component, f"{MIDDLE}{port.variable}")
+def _midpoint_port(port: Port) -> Port:
+    return Port(port.component, f"{MIDDLE_PREFIX}{port.variable}")
 
 
 @lru_cache(maxsize=256)
-def shares(times: tuple[float, ...], count: int, at: tuple[float, ...]) -> Array:
-    """Of values and rates at ``times`` in those of the polynomial through them at the times ``at``.
+def hermite_weights(times: tuple[float, ...], derivative_count: int, at: tuple[float, ...]) -> Array:
+    """Weights that evaluate the Hermite interpolant at ``at`` from values and derivatives at ``times``.
 
-    ``count`` are the value and the rates that are known at each time, and asked for; rates are by the unit of the
-    times. Shape (number of ``at``, count, number of ``times``, count), not to be written to.
+    ``derivative_count`` counts the value and its derivatives, known at each of ``times`` and evaluated at each of
+    ``at``; derivatives are with respect to the unit of the times. Shape (number of ``at``, derivative_count, number of
+    ``times``, derivative_count), not to be written to.
     """
-    powers = _powers(np.array([*times, *at]), count, count * len(times))
-    known, asked = powers[: count * len(times)], powers[count * len(times) :]
-    found: Array = np.linalg.solve(known.T, asked.T).T.reshape(len(at), count, len(times), count)
-    found.flags.writeable = False
-    return found
-
-
-def scaled(found: Array, unit: float) -> Array:
-    """What :func:`shares` has found in a ``unit`` of time (s), for rates by the second."""
-    scales = unit ** np.arange(found.shape[-1])
-    weights: Array = found * scales / scales[:, None, None]
+    powers = _power_rows(np.array([*times, *at]), derivative_count, derivative_count * len(times))
+    at_nodes, at_targets = powers[: derivative_count * len(times)], powers[derivative_count * len(times) :]
+    weights: Array = np.linalg.solve(at_nodes.T, at_targets.T).T.reshape(
+        len(at), derivative_count, len(times), derivative_count
+    )
+    weights.flags.writeable = False
     return weights
 
 
-def _powers(times: Array, count: int, terms: int) -> Array:
-    """The powers of each time and their rates, shape (number of times x count, terms)."""
+def scale_weights(weights: Array, time_unit: float) -> Array:
+    """Weights of :func:`hermite_weights` with times in a ``time_unit`` (s), scaled for derivatives by the second."""
+    scales = time_unit ** np.arange(weights.shape[-1])
+    scaled_weights: Array = weights * scales / scales[:, None, None]
+    return scaled_weights
+
+
+def _power_rows(times: Array, count: int, terms: int) -> Array:
+    """The powers of each time and their derivatives, shape (number of times x count, terms)."""
     factors = np.ones((count, terms))
     for k in range(1, count):
         factors[k] = factors[k - 1] * np.maximum(np.arange(terms) - k + 1, 0)

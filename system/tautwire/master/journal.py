@@ -1,4 +1,4 @@
-"""Notes each call of an FMU before it is made, where another process reads it when the call takes this one down."""
+"""Journal of FMU calls: each is noted before it is made, where another process reads it if the call never returns."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ from .wiring import Port
 Array = NDArray[np.float64]
 
 UNPACKING = "unpacking"
-CALLS = (UNPACKING, *FMI_2.named(), *FMI_3.named())
-# What stands where in the mapped memory. A place counts all calls of all components from one; zero is before them.
-PLACE, TIME, STEPS, STOPPED = range(4)
-NO_CALL = -1.0
+CALL_NAMES = (UNPACKING, *FMI_2.all_names(), *FMI_3.all_names())
+# Layout of the mapped memory. A call index counts all calls of all components from one; zero is before them.
+CALL_INDEX, CALL_TIME, STEP_COUNT, STOP_REQUESTED = range(4)
+IDLE = -1.0
 
 
 @dataclass(frozen=True)
-class Entry:
-    """The call noted last: of which component, at which time (s), with its inputs and what it had logged by then.
+class CallEntry:
+    """The last call noted: its component, time (s), inputs, and what the component had logged by then.
 
     ``component`` is None where no FMU was being called.
     """
@@ -38,8 +38,8 @@ class Entry:
     messages: tuple[str, ...]
 
 
-class Journal:
-    """What a process does with its FMUs, in the files of a ``folder`` that another one may read at any time.
+class CallJournal:
+    """A call journal in files of a ``folder``, which another process may read at any time.
 
     A note is a write or two into mapped memory, and the inputs of all components live there, so that nothing has to
     be copied: the operating system keeps such memory when the process dies.
@@ -47,78 +47,80 @@ class Journal:
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
-        self._mapped = _mapped(folder / "now", 4)
-        self.now = memoryview(self._mapped).cast("d")
-        self._components: list[str] = []
+        self._memory_map = _map_numbers(folder / "now", 4)
+        self.state = memoryview(self._memory_map).cast("d")
+        self._component_names: list[str] = []
 
     def close(self) -> None:
-        """Let the mapped memory go."""
-        self.now.release()
-        self._mapped.close()
+        """Unmap the memory."""
+        self.state.release()
+        self._memory_map.close()
 
-    def enter(self, name: str) -> dict[str, float]:
-        """A component that is about to be instantiated; returns the place of each of its calls."""
-        first = 1 + len(self._components) * len(CALLS)
-        self._components.append(name)
-        self._write("components", self._components)
-        return {call: float(first + number) for number, call in enumerate(CALLS)}
+    def register(self, name: str) -> dict[str, float]:
+        """Register a component before it is instantiated; returns the index of each of its calls."""
+        first_index = 1 + len(self._component_names) * len(CALL_NAMES)
+        self._component_names.append(name)
+        self._write("components", self._component_names)
+        return {call: float(first_index + number) for number, call in enumerate(CALL_NAMES)}
 
-    def inputs(self, ports: Sequence[Port]) -> Array:
-        """Memory for the values of all inputs, shape (number of ports,)."""
-        memory = np.frombuffer(_mapped(self._folder / "inputs", max(len(ports), 1)), count=len(ports))
+    def allocate_inputs(self, ports: Sequence[Port]) -> Array:
+        """Mapped memory for the values of all inputs, shape (number of ports,)."""
+        memory = np.frombuffer(_map_numbers(self._folder / "inputs", max(len(ports), 1)), count=len(ports))
         self._write("ports", [[port.component, port.variable] for port in ports])
         return memory
 
-    def say(self, name: str, messages: Sequence[str]) -> None:
-        """What a component has logged lately."""
-        self._write(f"messages_{self._components.index(name)}", [one_line(message) for message in messages])
+    def write_messages(self, name: str, messages: Sequence[str]) -> None:
+        """Write the latest log messages of a component."""
+        self._write(f"messages_{self._component_names.index(name)}", [one_line(message) for message in messages])
 
-    def rest(self, time: float) -> None:
-        """From ``time`` (s) on no FMU is being called."""
-        self.now[PLACE], self.now[TIME] = NO_CALL, time
+    def mark_idle(self, time: float) -> None:
+        """Note that from ``time`` (s) on no FMU is being called."""
+        self.state[CALL_INDEX], self.state[CALL_TIME] = IDLE, time
 
-    def stop(self) -> None:
-        """Ask the process that calls FMUs to end."""
-        self.now[STOPPED] = 1.0
-
-    @property
-    def stopped(self) -> bool:
-        """Whether the process that calls FMUs is asked to end."""
-        return self.now[STOPPED] != 0.0
+    def request_stop(self) -> None:
+        """Ask the worker process to end."""
+        self.state[STOP_REQUESTED] = 1.0
 
     @property
-    def begun(self) -> bool:
+    def stop_requested(self) -> bool:
+        """Whether the worker process is asked to end."""
+        return self.state[STOP_REQUESTED] != 0.0
+
+    @property
+    def has_entries(self) -> bool:
         """Whether any call was noted."""
-        return self.now[PLACE] != 0.0
+        return self.state[CALL_INDEX] != 0.0
 
-    def mark(self) -> bytes:
-        """What is another one after every step, and mostly after every call."""
-        return bytes(self.now)
+    def snapshot(self) -> bytes:
+        """A snapshot of the state, which differs after every step, and mostly after every call."""
+        return bytes(self.state)
 
-    def last(self) -> Entry:
-        """The call noted last."""
-        time, place = self.now[TIME], self.now[PLACE]
-        if place <= 0.0:
-            return Entry(None, "", time, {}, ())
-        number, call = divmod(int(place) - 1, len(CALLS))
+    def last_entry(self) -> CallEntry:
+        """The last call noted."""
+        time, call_index = self.state[CALL_TIME], self.state[CALL_INDEX]
+        if call_index <= 0.0:
+            return CallEntry(None, "", time, {}, ())
+        number, call = divmod(int(call_index) - 1, len(CALL_NAMES))
         name = self._read("components")[number]
         ports = self._read("ports")
         values = np.fromfile(self._folder / "inputs", count=len(ports)).tolist() if ports else []
-        given = {variable: value for (who, variable), value in zip(ports, values, strict=True) if who == name}
-        return Entry(name, CALLS[call], time, given, tuple(self._read(f"messages_{number}")))
+        inputs = {
+            variable: value for (component, variable), value in zip(ports, values, strict=True) if component == name
+        }
+        return CallEntry(name, CALL_NAMES[call], time, inputs, tuple(self._read(f"messages_{number}")))
 
-    def _write(self, what: str, content: list[str] | list[list[str]]) -> None:
-        beside = self._folder / "beside"
-        beside.write_text(json.dumps(content), encoding="utf-8")
-        beside.replace(self._folder / what)
+    def _write(self, name: str, content: list[str] | list[list[str]]) -> None:
+        temporary_path = self._folder / "beside"
+        temporary_path.write_text(json.dumps(content), encoding="utf-8")
+        temporary_path.replace(self._folder / name)
 
-    def _read(self, what: str) -> list:
-        place = self._folder / what
-        return json.loads(place.read_text(encoding="utf-8")) if place.exists() else []
+    def _read(self, name: str) -> list:
+        path = self._folder / name
+        return json.loads(path.read_text(encoding="utf-8")) if path.exists() else []
 
 
-def _mapped(place: Path, count: int) -> mmap.mmap:
-    """A file as memory for numbers that processes share, zeros at first."""
-    with place.open("a+b") as file:
+def _map_numbers(path: Path, count: int) -> mmap.mmap:
+    """A file mapped as shared memory for numbers, zeros at first."""
+    with path.open("a+b") as file:
         file.truncate(8 * count)
         return mmap.mmap(file.fileno(), 8 * count)

@@ -1,7 +1,7 @@
-"""Cuts a macro step where an output changes its sign at which others have a kink, such as a cable going slack.
+"""Splits a macro step at state events, zero crossings of event indicators, such as a cable going slack.
 
-Between kinks outputs are smooth and a step has its full order. A step over a kink has only the second, whatever is
-iterated: the polynomial through value and rate at both ends cannot bend.
+Between events outputs are smooth and a step has its full order. A step over an event has only order two, however it is
+iterated: the polynomial through value and derivative at both ends has no kink.
 """
 
 from __future__ import annotations
@@ -13,97 +13,105 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from .coupling import Coupling
-from .halving import Drives, step_held
+from .halving import ExternalInputs, step_with_rejection
 
 Array = NDArray[np.float64]
 
-# A kink nearer than this is stepped over; the error is of second order in it.
-WIDTH = 1e-6
-NEAREST = 0.2 * WIDTH
-MOST_PIECES = 40
-# Of what is left of a step: no piece leaves less.
-LEAST_REST = 1e-6
-LANDING = 1e-3
+# An event nearer than this (s) is stepped over; the error is of second order in it.
+EVENT_WIDTH = 1e-6
+EVENT_TOLERANCE = 0.2 * EVENT_WIDTH
+MAX_SUBSTEPS = 40
+# Relative to the remaining step: no substep leaves less.
+MIN_REMAINING_SHARE = 1e-6
+LANDING_RTOL = 1e-3
 
 
-def step_over(coupling: Coupling, time: float, step: float, drives: Drives) -> float:
-    """One macro step from ``time``, where states can be restored in pieces: cut at kinks, and where redos are lost.
+def step_with_events(coupling: Coupling, time: float, step: float, external_inputs: ExternalInputs) -> float:
+    """One macro step from ``time``, split at events and where it is rejected, if FMUs support rollback.
 
-    ``drives(time, step)`` gives the driven inputs at both ends. A sign that changes twice within a step is not seen.
-    Returns the length of the first piece: ``step`` where it was made whole.
+    ``external_inputs(time, step)`` returns the external inputs at both ends. Two zero crossings of one indicator within
+    a step are not seen. Returns the length of the first substep: ``step`` where it was not split.
     """
-    if not (coupling.can_redo and coupling.can_cut):
-        coupling.step(time, step, *drives(time, step))
+    if not (coupling.supports_rollback and coupling.supports_variable_step):
+        coupling.step(time, step, *external_inputs(time, step))
         return step
-    done, first, reach = 0.0, step, step
-    for _ in range(MOST_PIECES):
-        rest = step - done
-        piece = rest if reach > (1.0 - LEAST_REST) * rest else reach
-        made, lost = _step_to_kink(coupling, time + done, piece, drives)
-        first = first if done else made
-        if made == rest:
-            return first
-        done += made
-        reach = made if lost else 2.0 * reach
-    coupling.step(time + done, step - done, *drives(time + done, step - done))
-    return first
+    elapsed, first_length, max_substep = 0.0, step, step
+    for _ in range(MAX_SUBSTEPS):
+        remaining = step - elapsed
+        substep = remaining if max_substep > (1.0 - MIN_REMAINING_SHARE) * remaining else max_substep
+        advanced, rejected = _step_to_event(coupling, time + elapsed, substep, external_inputs)
+        first_length = first_length if elapsed else advanced
+        if advanced == remaining:
+            return first_length
+        elapsed += advanced
+        max_substep = advanced if rejected else 2.0 * max_substep
+    coupling.step(time + elapsed, step - elapsed, *external_inputs(time + elapsed, step - elapsed))
+    return first_length
 
 
-def _step_to_kink(coupling: Coupling, time: float, step: float, drives: Drives) -> tuple[float, bool]:
-    """Step up to the first kink, or over it where it is near; returns how far, and whether a longer step was lost."""
-    signs = np.sign(coupling.kinks())
-    reached, before = step_held(coupling, time, step, drives)
-    lost, step = reached < step, reached
+def _step_to_event(coupling: Coupling, time: float, step: float, external_inputs: ExternalInputs) -> tuple[float, bool]:
+    """Step to just before the first event, or over a near one; returns the length, and whether a step was rejected."""
+    signs = np.sign(coupling.event_indicators())
+    accepted_step, checkpoint = step_with_rejection(coupling, time, step, external_inputs)
+    rejected, step = accepted_step < step, accepted_step
     try:
-        end = coupling.kinks()
-        changed = np.flatnonzero(np.sign(end) != signs)
-        if not len(changed) or step <= 2.0 * WIDTH:
-            return step, lost
+        end_indicators = coupling.event_indicators()
+        changed = np.flatnonzero(np.sign(end_indicators) != signs)
+        if not len(changed) or step <= 2.0 * EVENT_WIDTH:
+            return step, rejected
 
-        def at(span: float) -> Array:
-            coupling.restore(before)
-            coupling.step(time, span, *drives(time, span))
-            return coupling.kinks()
+        def indicators_after(span: float) -> Array:
+            coupling.restore(checkpoint)
+            coupling.step(time, span, *external_inputs(time, span))
+            return coupling.event_indicators()
 
-        before_kink = _landing(at, step, signs, end, changed)
-        if before_kink > WIDTH:
-            return before_kink, lost
-        at(2.0 * WIDTH)
-        coupling.forget(time + 2.0 * WIDTH)
-        return 2.0 * WIDTH, lost
+        step_before_event = _land_before_event(indicators_after, step, signs, end_indicators, changed)
+        if step_before_event > EVENT_WIDTH:
+            return step_before_event, rejected
+        indicators_after(2.0 * EVENT_WIDTH)
+        coupling.reset_history(time + 2.0 * EVENT_WIDTH)
+        return 2.0 * EVENT_WIDTH, rejected
     finally:
-        coupling.release(before)
+        coupling.release(checkpoint)
 
 
-def _landing(at: Callable[[float], Array], step: float, signs: Array, end: Array, changed: NDArray[np.intp]) -> float:
-    """The end of a step that comes just before the first kink, and makes it; zero where that is less than ``WIDTH``.
+def _land_before_event(
+    indicators_after: Callable[[float], Array],
+    step: float,
+    signs: Array,
+    end_indicators: Array,
+    changed: NDArray[np.intp],
+) -> float:
+    """Step to just before the first event; returns the length, zero where that is less than ``EVENT_WIDTH``.
 
-    Near a kink two solutions of a step can agree with themselves, one bent, one not; hence the way back from the root.
+    Near an event a step can have two solutions, one on either side; hence the retreat from the zero crossing.
     """
-    begin = at(WIDTH)
-    if np.any(np.sign(begin) != signs):
+    begin_indicators = indicators_after(EVENT_WIDTH)
+    if np.any(np.sign(begin_indicators) != signs):
         return 0.0
-    reached, back = step, 0.0
+    step_end, retreat = step, 0.0
     while True:
-        near = max(LANDING * reached, NEAREST)
-        if reached - WIDTH <= near:
-            at(WIDTH)
+        tolerance = max(LANDING_RTOL * step_end, EVENT_TOLERANCE)
+        if step_end - EVENT_WIDTH <= tolerance:
+            indicators_after(EVENT_WIDTH)
             return 0.0
-        known = {WIDTH: begin, reached: end}
-        root = min(_root(at, known, int(place), near) for place in changed)
-        # Never less far back than half of what is left, so that this comes to an end.
-        back = max(near, 4.0 * back)
-        reached = max(root - back, 0.5 * (WIDTH + root))
-        end = at(reached)
-        changed = np.flatnonzero(np.sign(end) != signs)
+        known_indicators = {EVENT_WIDTH: begin_indicators, step_end: end_indicators}
+        crossing = min(_zero_crossing(indicators_after, known_indicators, int(place), tolerance) for place in changed)
+        # Never further back than half of the remaining span, so that the loop terminates.
+        retreat = max(tolerance, 4.0 * retreat)
+        step_end = max(crossing - retreat, 0.5 * (EVENT_WIDTH + crossing))
+        end_indicators = indicators_after(step_end)
+        changed = np.flatnonzero(np.sign(end_indicators) != signs)
         if not len(changed):
-            return reached
+            return step_end
 
 
-def _root(at: Callable[[float], Array], known: Mapping[float, Array], place: int, near: float) -> float:
-    """Where the output at ``place`` changes its sign between two spans at which it is known already."""
+def _zero_crossing(
+    indicators_after: Callable[[float], Array], known_indicators: Mapping[float, Array], index: int, tolerance: float
+) -> float:
+    """The zero crossing of the indicator at ``index``, between two spans at which it is known already."""
 
-    def shown(span: float) -> float:
-        return float((known[span] if span in known else at(span))[place])
+    def indicator(span: float) -> float:
+        return float((known_indicators[span] if span in known_indicators else indicators_after(span))[index])
 
-    return float(brentq(shown, min(known), max(known), xtol=near))
+    return float(brentq(indicator, min(known_indicators), max(known_indicators), xtol=tolerance))

@@ -1,8 +1,8 @@
-"""Predicts what outputs will be at the end of a step and in its middle, from their past.
+"""Extrapolation of outputs to the end of a step and its midpoint, from past communication points.
 
-An output runs on the polynomial through its values, and those of its rates, at the last communication points. From how
-many of these it is best predicted shows at the end of the step. What the longest polynomial missed by swings as the
-system does, so its next miss is expected to go on like the last ones:
+An output is extrapolated by the Hermite polynomial through its values and derivatives at the last communication points.
+How many of these do best shows at the end of the step. The error of the longest polynomial oscillates as the system
+does, so it is extrapolated too, by linear prediction:
 
     e_n = c_1 e_(n-1) + c_2 e_(n-2),   c by least squares over the last steps, the same for all outputs
 
@@ -17,146 +17,156 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from .hermite import Chain, Places, scaled, shares
+from .hermite import DerivativeChain, Indices, hermite_weights, scale_weights
 
 Array = NDArray[np.float64]
 Past = tuple[tuple[float, Array], ...]
 
-POINTS, PAST = 3, 4
-LEAST_MISSES, MOST_MISSES = 3, 8
-DAMPED, LEAST_SQUARE = 1e-10, 1e-100
-# So many times worse than a step before, and even the best prediction has met a corner.
-CORNER, NEGLIGIBLE = 10.0, 1e-9
-# So many times farther than points lie apart, a polynomial through them tells no more than their errors.
-FARTHEST = 5.0
-KEPT_WEIGHTS = 64
+MAX_POINTS, MAX_PAST_POINTS = 3, 4
+MIN_ERRORS, MAX_ERRORS = 3, 8
+RELATIVE_DAMPING, ABSOLUTE_DAMPING = 1e-10, 1e-100
+# Where even the best candidate is this many times worse than a step before, outputs have a corner.
+CORNER_ERROR_RATIO, NEGLIGIBLE_ERROR = 10.0, 1e-9
+# Farther than this many point distances, a polynomial extrapolates mostly the errors of its points.
+MAX_EXTRAPOLATION_RATIO = 5.0
+MAX_CACHED_STEP_SIZES = 64
 
 
-class Memory(NamedTuple):
-    """What predictions are made from: the ``past``, oldest first, and the ``misses`` of the longest polynomial.
+class ExtrapolationHistory(NamedTuple):
+    """Extrapolation history: the ``past`` points, oldest first, and the ``errors`` of the longest polynomial.
 
-    Misses have a row for each of the last steps, the newest first; None right behind a corner. Of the past, ``smooth``
-    points lie behind no corner. ``choice`` did best in the last step, and missed by ``miss``.
+    Errors have a row for each of the last steps, the newest first; None right after a corner. Of the past points,
+    ``smooth_points`` lie after the last corner. ``best_candidate`` did best in the last step, with ``best_error``.
     """
 
     past: Past
-    smooth: int = 1
-    choice: int = 0
-    miss: float = np.inf
-    misses: Array | None = None
+    smooth_points: int = 1
+    best_candidate: int = 0
+    best_error: float = np.inf
+    errors: Array | None = None
 
 
-class Prediction:
-    """Predicts those of the outputs shown that are at ``places``; ``nominal`` (number of places,) are their units.
+class Extrapolator:
+    """Extrapolates the outputs at ``indices``; ``nominals`` (number of indices,) are their nominal values.
 
-    ``chains`` tell which outputs are rates of which. ``memory`` may be put back to what it was at an earlier time.
+    ``chains`` tell which outputs are derivatives of which. ``history`` may be set back to that of an earlier time.
     """
 
-    def __init__(self, chains: Sequence[Chain], places: Places, nominal: Array) -> None:
+    def __init__(self, chains: Sequence[DerivativeChain], indices: Indices, nominals: Array) -> None:
         lengths = sorted({len(chain.ends) for chain in chains})
         self._groups = [[chain for chain in chains if len(chain.ends) == length] for length in lengths]
         self._ends = [np.array([chain.ends for chain in group]).T for group in self._groups]
-        found = [place for group in self._groups for place in _targets(group)]
-        self._order = np.array([found.index(place) for place in places], dtype=np.intp)
-        self._places = places
-        self._nominal = nominal
+        target_indices = [place for group in self._groups for place in _target_indices(group)]
+        self._target_order = np.array([target_indices.index(place) for place in indices], dtype=np.intp)
+        self._indices = indices
+        self._nominals = nominals
         self._weights: dict[tuple[float, ...], list[Array]] = {}
-        self._found: Array = np.zeros((1, len(places)))
-        self.memory = Memory(())
+        self._candidates: Array = np.zeros((1, len(indices)))
+        self.history = ExtrapolationHistory(())
 
-    def forget(self, time: float, shown: Array) -> None:
-        """Begin anew at ``time``."""
-        self.memory = Memory(((time, shown.copy()),))
+    def reset(self, time: float, outputs: Array) -> None:
+        """Restart the history at ``time``."""
+        self.history = ExtrapolationHistory(((time, outputs.copy()),))
 
-    def begin(self, time: float, shown: Array) -> None:
-        """A step that ends at ``time``: set ``shown`` to what is expected of it."""
-        if not len(self._places):
+    def begin_step(self, time: float, outputs: Array) -> None:
+        """Begin a step that ends at ``time``: set ``outputs`` to their extrapolation."""
+        if not len(self._indices):
             return
-        memory = self.memory = _within_reach(self.memory, time)
-        points = memory.past[-min(memory.smooth, POINTS) :]
+        history = self.history = _drop_close_points(self.history, time)
+        points = history.past[-min(history.smooth_points, MAX_POINTS) :]
         values = np.array([value for _, value in points])
-        weights = self._weights_for([at for at, _ in points], time)
+        weights = self._weights_for([point_time for point_time, _ in points], time)
         parts = [
             (weight @ values.take(ends, axis=1).reshape(-1, ends.shape[1])).reshape(len(points), -1)
             for ends, weight in zip(self._ends, weights, strict=True)
         ]
-        self._found = np.concatenate(parts, axis=1).take(self._order, axis=1)
-        if memory.misses is not None and len(memory.misses) >= LEAST_MISSES:
-            swung = self._found[-1] + _next_miss(memory.misses) * self._nominal
-            self._found = np.concatenate([self._found, swung[None, :]])
-        shown[self._places] = self._found[min(memory.choice, len(self._found) - 1)]
+        self._candidates = np.concatenate(parts, axis=1).take(self._target_order, axis=1)
+        if history.errors is not None and len(history.errors) >= MIN_ERRORS:
+            corrected = self._candidates[-1] + _predict_error(history.errors) * self._nominals
+            self._candidates = np.concatenate([self._candidates, corrected[None, :]])
+        outputs[self._indices] = self._candidates[min(history.best_candidate, len(self._candidates) - 1)]
 
-    def end(self, time: float, shown: Array) -> None:
-        """Learn from what is shown at ``time``, the end of the step."""
-        memory = self.memory
-        past = (*memory.past[1 - PAST :], (time, shown.copy()))
-        if not len(self._places):
-            self.memory = memory._replace(past=past)
+    def end_step(self, time: float, outputs: Array) -> None:
+        """Add the outputs at ``time``, the end of the step, to the history, and rate the candidates by them."""
+        history = self.history
+        past = (*history.past[1 - MAX_PAST_POINTS :], (time, outputs.copy()))
+        if not len(self._indices):
+            self.history = history._replace(past=past)
             return
-        misses = (shown[self._places] - self._found) / self._nominal
-        sizes = np.abs(misses).max(axis=1)
-        choice, miss = int(sizes.argmin()), float(sizes.min())
-        points = min(memory.smooth, POINTS)
-        if miss > CORNER * max(memory.miss, NEGLIGIBLE):
-            # Begin and end of this step lie on the same side of the corner.
-            self.memory = Memory(past, smooth=2, choice=1, miss=miss)
-        elif points < POINTS:
-            # There is one point more from now on, which is tried where all points were of use.
-            self.memory = Memory(past, points + 1, choice + (choice == points - 1), miss)
+        errors = (outputs[self._indices] - self._candidates) / self._nominals
+        max_errors = np.abs(errors).max(axis=1)
+        best_candidate, best_error = int(max_errors.argmin()), float(max_errors.min())
+        points = min(history.smooth_points, MAX_POINTS)
+        if best_error > CORNER_ERROR_RATIO * max(history.best_error, NEGLIGIBLE_ERROR):
+            # Beginning and end of this step are taken to lie on the same side of the corner.
+            self.history = ExtrapolationHistory(past, smooth_points=2, best_candidate=1, best_error=best_error)
+        elif points < MAX_POINTS:
+            # From now on there is one point more, which is tried where all points were of use.
+            self.history = ExtrapolationHistory(
+                past, points + 1, best_candidate + (best_candidate == points - 1), best_error
+            )
         else:
-            newest = misses[POINTS - 1 : POINTS]
-            before = memory.misses
-            kept = newest if before is None else np.concatenate([newest, before[: MOST_MISSES - 1]])
-            self.memory = Memory(past, points, choice, miss, kept)
+            newest_errors = errors[MAX_POINTS - 1 : MAX_POINTS]
+            previous_errors = history.errors
+            kept_errors = (
+                newest_errors
+                if previous_errors is None
+                else np.concatenate([newest_errors, previous_errors[: MAX_ERRORS - 1]])
+            )
+            self.history = ExtrapolationHistory(past, points, best_candidate, best_error, kept_errors)
 
     def _weights_for(self, times: Sequence[float], end: float) -> list[Array]:
-        """Of the past in what all polynomials say of a step's middle and end; for chains of each length."""
+        """Weights of the past points in all candidates at a step's midpoint and end, for chains of each length."""
         step = end - times[-1]
-        # Equal steps differ by what their times are rounded by.
+        # Equal steps differ by the rounding of their times.
         key = (round(step, 12), *(round((time - times[-1]) / step, 9) for time in times))
         if key not in self._weights:
-            if len(self._weights) >= KEPT_WEIGHTS:
+            if len(self._weights) >= MAX_CACHED_STEP_SIZES:
                 self._weights.clear()
-            self._weights[key] = [_all_weights(key[1:], ends.shape[0], step) for ends in self._ends]
+            self._weights[key] = [_candidate_weights(key[1:], ends.shape[0], step) for ends in self._ends]
         return self._weights[key]
 
 
-def _within_reach(memory: Memory, time: float) -> Memory:
-    """Without the points that lie too close together for ``time`` to be foretold from them."""
-    times = [at for at, _ in memory.past[-min(memory.smooth, POINTS) :]]
-    least = (time - times[-1]) / FARTHEST
-    far = 1
-    while far < len(times) and times[-far] - times[-far - 1] >= least:
-        far += 1
-    if far == len(times):
-        return memory
-    return memory._replace(smooth=far, choice=min(memory.choice, far - 1), misses=None)
+def _drop_close_points(history: ExtrapolationHistory, time: float) -> ExtrapolationHistory:
+    """The history without points that are too close together to extrapolate to ``time``."""
+    times = [at for at, _ in history.past[-min(history.smooth_points, MAX_POINTS) :]]
+    min_distance = (time - times[-1]) / MAX_EXTRAPOLATION_RATIO
+    usable_points = 1
+    while usable_points < len(times) and times[-usable_points] - times[-usable_points - 1] >= min_distance:
+        usable_points += 1
+    if usable_points == len(times):
+        return history
+    return history._replace(
+        smooth_points=usable_points, best_candidate=min(history.best_candidate, usable_points - 1), errors=None
+    )
 
 
-def _targets(group: Sequence[Chain]) -> list[int]:
-    """The places of what is found for a group of chains: first in the middle, then at the end, rate after rate."""
+def _target_indices(group: Sequence[DerivativeChain]) -> list[int]:
+    """Output indices of a group of chains: first at the midpoint, then at the end, derivative after derivative."""
     length = len(group[0].ends)
-    middles = [-1 if chain.middles is None else chain.middles[k] for k in range(length) for chain in group]
-    return [*middles, *(chain.ends[k] for k in range(length) for chain in group)]
+    midpoints = [-1 if chain.midpoints is None else chain.midpoints[k] for k in range(length) for chain in group]
+    return [*midpoints, *(chain.ends[k] for k in range(length) for chain in group)]
 
 
-def _all_weights(times: tuple[float, ...], count: int, step: float) -> Array:
-    """Of the polynomials through the last point, through the last two ... one below the other; times in steps."""
+def _candidate_weights(times: tuple[float, ...], count: int, step: float) -> Array:
+    """Weights of the polynomials through the last point, the last two ..., stacked; ``times`` in steps."""
     points = len(times)
-    found = np.zeros((points, 2, count, points, count))
+    weights = np.zeros((points, 2, count, points, count))
     for used in range(1, points + 1):
-        found[used - 1, :, :, points - used :] = scaled(shares(times[points - used :], count, (0.5, 1.0)), step)
-    return found.reshape(points * 2 * count, points * count)
+        weights[used - 1, :, :, points - used :] = scale_weights(
+            hermite_weights(times[points - used :], count, (0.5, 1.0)), step
+        )
+    return weights.reshape(points * 2 * count, points * count)
 
 
-def _next_miss(misses: Array) -> Array:
-    """What is to come after ``misses`` (N, n), the newest first."""
-    told, last, before = misses[:-2].ravel(), misses[1:-1].ravel(), misses[2:].ravel()
-    square, product, other = last @ last, last @ before, before @ before
-    damped = DAMPED * (square + other) + LEAST_SQUARE
+def _predict_error(errors: Array) -> Array:
+    """Linear prediction of the error that follows ``errors`` (N, n), the newest first."""
+    targets, last, before_last = errors[:-2].ravel(), errors[1:-1].ravel(), errors[2:].ravel()
+    square, product, other = last @ last, last @ before_last, before_last @ before_last
+    damped = RELATIVE_DAMPING * (square + other) + ABSOLUTE_DAMPING
     square, other = square + damped, other + damped
-    first, second = last @ told, before @ told
-    found: Array = (
-        (first * other - second * product) * misses[0] + (second * square - first * product) * misses[1]
+    first, second = last @ targets, before_last @ targets
+    predicted: Array = (
+        (first * other - second * product) * errors[0] + (second * square - first * product) * errors[1]
     ) / (square * other - product * product)
-    return found
+    return predicted

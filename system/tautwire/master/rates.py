@@ -1,11 +1,11 @@
-"""Rates of outputs whose FMU does not show them, worked out from what it has shown.
+"""Estimation of output derivatives that an FMU does not provide, from its past outputs.
 
-The rate now is that of the polynomial through the value now and those at the last communication points:
+The derivative now is that of the polynomial through the value now and those at the last communication points:
 
-    y'(t) = sum over j of w_j y(t_j),   w_j the rate, at t, of the Lagrange polynomial that is one at t_j
+    y'(t) = sum over j of w_j y(t_j),   w_j the derivative, at t, of the Lagrange polynomial that is one at t_j
 
-With k points before the present one, h apart, it errs by h^k y^(k+1) / (k + 1). What one point fewer gives differs by
-about the error of that lesser estimate.
+With k points before the present one, h apart, its error is h^k y^(k+1) / (k + 1). The difference to the estimate
+with one point fewer is about the error of the latter.
 """
 
 from __future__ import annotations
@@ -16,56 +16,62 @@ import numpy as np
 from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
-Places = NDArray[np.intp]
-Past = Sequence[tuple[float, Array]]
+IndexArray = NDArray[np.intp]
+PastOutputs = Sequence[tuple[float, Array]]
 
 
-def rate_weights(times: Sequence[float]) -> Array:
-    """The weights of values at ``times`` (s, all different) in the rate at the last one, in 1/s; shape (N,)."""
+def derivative_weights(times: Sequence[float]) -> Array:
+    """The weights of values at ``times`` (s, all different) in the derivative at the last one, in 1/s; shape (N,)."""
     *earlier, now = times
     weights = np.zeros(len(times))
-    for place, time in enumerate(earlier):
+    for index, time in enumerate(earlier):
         weight = 1.0 / (time - now)
-        for other in earlier[:place] + earlier[place + 1 :]:
+        for other in earlier[:index] + earlier[index + 1 :]:
             weight *= (now - other) / (time - other)
-        weights[place] = weight
+        weights[index] = weight
     weights[-1] = -np.sum(weights[:-1])
     return weights
 
 
-class Rates:
-    """Fills the ``rates`` of an array of outputs from the past of its ``values``, both places in it of equal number."""
+class DerivativeEstimator:
+    """Estimates the outputs at ``derivative_indices`` as derivatives of those at ``value_indices``, one for each."""
 
-    def __init__(self, values: Places, rates: Places) -> None:
-        self._values = values
-        self._rates = rates
-        self._known = self._coarse = np.zeros(len(values))
-        self._now = self._coarse_now = 0.0
+    def __init__(self, value_indices: IndexArray, derivative_indices: IndexArray) -> None:
+        self._value_indices = value_indices
+        self._derivative_indices = derivative_indices
+        self._past_sum = self._coarse_past_sum = np.zeros(len(value_indices))
+        self._present_weight = self._coarse_present_weight = 0.0
 
     @property
     def count(self) -> int:
-        """Number of rates."""
-        return len(self._rates)
+        """Number of estimated derivatives."""
+        return len(self._derivative_indices)
 
-    def begin(self, past: Past, time: float) -> None:
-        """A step that ends at ``time``; ``past`` holds what was shown at the communication points before."""
+    def begin_step(self, past: PastOutputs, time: float) -> None:
+        """Begin a step that ends at ``time``; ``past`` holds the outputs at earlier communication points."""
         if not self.count:
             return
-        self._known, self._now = self._weighed(past, time)
-        # One point before the present one leaves nothing to compare with.
-        self._coarse, self._coarse_now = self._weighed(past[1:] or past, time)
+        self._past_sum, self._present_weight = self._weighted_past(past, time)
+        # With a single earlier point there is no coarser estimate to compare with.
+        self._coarse_past_sum, self._coarse_present_weight = self._weighted_past(past[1:] or past, time)
 
-    def fill(self, shown: Array) -> None:
-        """Set the rates that go with the values shown."""
+    def fill(self, outputs: Array) -> None:
+        """Set the derivatives that belong to the present values."""
         if self.count:
-            shown[self._rates] = self._known + self._now * shown[self._values]
+            outputs[self._derivative_indices] = self._past_sum + self._present_weight * outputs[self._value_indices]
 
-    def doubts(self, shown: Array) -> Array:
-        """By how much each rate would be another with one point fewer."""
-        doubts: Array = np.abs(shown[self._rates] - self._coarse - self._coarse_now * shown[self._values])
-        return doubts
+    def error_estimates(self, outputs: Array) -> Array:
+        """Error estimate of each derivative: its difference to the estimate with one point fewer."""
+        errors: Array = np.abs(
+            outputs[self._derivative_indices]
+            - self._coarse_past_sum
+            - self._coarse_present_weight * outputs[self._value_indices]
+        )
+        return errors
 
-    def _weighed(self, past: Past, time: float) -> tuple[Array, float]:
-        weights = rate_weights([at for at, _ in past] + [time])
-        known = sum((weight * values[self._values] for weight, (_, values) in zip(weights, past, strict=False)), 0.0)
-        return np.broadcast_to(known, self._values.shape), float(weights[-1])
+    def _weighted_past(self, past: PastOutputs, time: float) -> tuple[Array, float]:
+        weights = derivative_weights([at for at, _ in past] + [time])
+        past_sum = sum(
+            (weight * values[self._value_indices] for weight, (_, values) in zip(weights, past, strict=False)), 0.0
+        )
+        return np.broadcast_to(past_sum, self._value_indices.shape), float(weights[-1])

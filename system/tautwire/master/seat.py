@@ -1,4 +1,4 @@
-"""The slots of a coupling: where a component finds its inputs and leaves its outputs."""
+"""FMU instances with their input and output buffers in a coupling, and their dependency levels."""
 
 from __future__ import annotations
 
@@ -8,105 +8,110 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .component import Block, Component
+from .component import Component, VariableBlock
 from .wiring import Connection, Port
 
 Array = NDArray[np.float64]
-Places = NDArray[np.intp]
+Indices = NDArray[np.intp]
 
-STAMP = "input_time"
-MIDDLE_STAMP = "middle_time"
-MIDDLE = "middle_"
+INPUT_TIME = "input_time"
+MIDDLE_TIME = "middle_time"
+MIDDLE_PREFIX = "middle_"
 
 
 @dataclass(frozen=True)
-class Seat:
-    """A component in its slot.
+class ConnectedInstance:
+    """An FMU instance with its input and output buffers.
 
-    ``outputs`` and ``inputs`` are parts of the coupling's arrays of all outputs and inputs, the latter at ``taken``.
-    The last inputs, which are ``fed``, take the outputs at ``sources``, those before them are driven, and the first is
-    the stamp where the component has one; the second is that of the middle where ``middle`` inputs are connected.
+    ``outputs`` and ``inputs`` are parts of the coupling's arrays of all outputs and inputs, the latter at
+    ``input_slice``. The last inputs, ``connected_inputs``, take the outputs at ``source_indices``, those before them
+    are external. The first is the input time where the component has one; the second is the time of the midpoint where
+    midpoint inputs are connected.
     """
 
     component: Component
-    outputs: Block
-    inputs: Block
-    taken: slice
-    sources: Places
-    fed: Array
-    stamped: bool
-    middle: bool
+    outputs: VariableBlock
+    inputs: VariableBlock
+    input_slice: slice
+    source_indices: Indices
+    connected_inputs: Array
+    has_input_time: bool
+    has_middle_time: bool
 
-    def gather(self, time: float, shown: Array) -> None:
-        """Take all inputs at ``time`` from the outputs shown."""
-        if self.stamped:
+    def gather_inputs(self, time: float, all_outputs: Array) -> None:
+        """Gather all inputs at ``time`` from the outputs of all instances."""
+        if self.has_input_time:
             self.inputs.values[0] = time
-        if len(self.sources):
-            shown.take(self.sources, out=self.fed, mode="clip")
+        if len(self.source_indices):
+            all_outputs.take(self.source_indices, out=self.connected_inputs, mode="clip")
 
-    def write(self, time: float, shown: Array) -> None:
-        """Set all inputs as they hold at ``time``."""
-        self.gather(time, shown)
+    def write_inputs(self, time: float, all_outputs: Array) -> None:
+        """Gather all inputs at ``time`` and set them."""
+        self.gather_inputs(time, all_outputs)
         if self.inputs.count:
             self.component.write(self.inputs)
 
-    def advance(self, time: float, step: float, begun: Array, shown: Array) -> None:
-        """One macro step, then show the outputs at its end.
+    def do_step(self, time: float, step: float, inputs_at_start: Array, all_outputs: Array) -> None:
+        """One macro step, then read the outputs at its end.
 
-        A component that knows no stamp holds its inputs over the step: it gets the mean of those with which the step
-        has ``begun`` and those at its end, which is of second order and symmetric in time, and the end values before
-        its outputs are read.
+        A component without an input time holds its inputs over the step: it gets the mean of ``inputs_at_start`` and
+        those at the end of the step, which is of second order and symmetric in time, and the end values before its
+        outputs are read.
         """
-        if self.stamped:
-            if self.middle:
+        if self.has_input_time:
+            if self.has_middle_time:
                 self.inputs.values[1] = time + 0.5 * step
-            self.write(time + step, shown)
+            self.write_inputs(time + step, all_outputs)
             self.component.step(time, step)
         else:
-            self.gather(time, shown)
-            end = self.inputs.values.copy()
-            self.inputs.values[:] = 0.5 * (begun[self.taken] + end)
+            self.gather_inputs(time, all_outputs)
+            inputs_at_end = self.inputs.values.copy()
+            self.inputs.values[:] = 0.5 * (inputs_at_start[self.input_slice] + inputs_at_end)
             if self.inputs.count:
                 self.component.write(self.inputs)
             self.component.step(time, step)
-            self.inputs.values[:] = end
+            self.inputs.values[:] = inputs_at_end
             if self.inputs.count:
                 self.component.write(self.inputs)
-        self.show()
+        self.read_outputs()
 
-    def show(self) -> None:
+    def read_outputs(self) -> None:
         """Read the outputs."""
         if self.outputs.count:
             self.component.read(self.outputs)
 
 
 @dataclass(frozen=True)
-class Level:
-    """Outputs that become known together, where they belong, and the seats that they drive."""
+class DependencyLevel:
+    """A dependency level: outputs that can be read together, their indices, and the instances that they drive."""
 
-    reads: tuple[tuple[Component, Block, Places], ...]
-    writes: tuple[Seat, ...]
+    output_reads: tuple[tuple[Component, VariableBlock, Indices], ...]
+    driven_instances: tuple[ConnectedInstance, ...]
 
-    def pass_on(self, time: float, shown: Array) -> None:
-        """Read the outputs and set the inputs that take them."""
-        for component, block, places in self.reads:
+    def propagate(self, time: float, all_outputs: Array) -> None:
+        """Propagate: read the outputs and set the inputs that are connected to them."""
+        for component, block, indices in self.output_reads:
             component.read(block)
-            shown[places] = block.values
-        for seat in self.writes:
-            seat.write(time, shown)
+            all_outputs[indices] = block.values
+        for instance in self.driven_instances:
+            instance.write_inputs(time, all_outputs)
 
 
-def takes_middle(component: Component, connections: Sequence[Connection]) -> bool:
-    """Whether a component is given what holds in the middle of a step."""
-    return MIDDLE_STAMP in component.variables and any(
-        c.target.component == component.name and c.target.variable.startswith(MIDDLE) for c in connections
+def takes_middle_inputs(component: Component, connections: Sequence[Connection]) -> bool:
+    """Whether a component has connected midpoint inputs."""
+    return MIDDLE_TIME in component.variables and any(
+        c.target.component == component.name and c.target.variable.startswith(MIDDLE_PREFIX) for c in connections
     )
 
 
-def order_of(seats: Sequence[Seat], connections: Sequence[Connection]) -> int:
-    """Of the error in the step: six where all that is connected is known in its middle, four if all is stamped."""
-    taken = {c.target for c in connections}
-    wanted = (Port(t.component, f"{MIDDLE}{t.variable}") for t in taken if not t.variable.startswith(MIDDLE))
-    if taken.issuperset(wanted):
+def convergence_order_of(instances: Sequence[ConnectedInstance], connections: Sequence[Connection]) -> int:
+    """Convergence order: six where all connected inputs have midpoint inputs, four with input times, else two."""
+    connected_inputs = {c.target for c in connections}
+    middle_inputs = (
+        Port(t.component, f"{MIDDLE_PREFIX}{t.variable}")
+        for t in connected_inputs
+        if not t.variable.startswith(MIDDLE_PREFIX)
+    )
+    if connected_inputs.issuperset(middle_inputs):
         return 6
-    return 4 if all(seat.stamped for seat in seats if len(seat.sources)) else 2
+    return 4 if all(seat.has_input_time for seat in instances if len(seat.source_indices)) else 2

@@ -1,4 +1,4 @@
-"""What the versions of FMI have in common for the master, and what each calls it."""
+"""The common interface to FMI 2.0 and FMI 3.0 instances, and the function names of each version."""
 
 from __future__ import annotations
 
@@ -9,21 +9,21 @@ from typing import Any, Protocol
 from fmpy.model_description import ScalarVariable
 
 FMI_WARNING = 1
-STATUS = ("ok", "warning", "discard", "error", "fatal", "pending")
-REALS = ("Real", "Float64")
+STATUS_NAMES = ("ok", "warning", "discard", "error", "fatal", "pending")
+REAL_TYPES = ("Real", "Float64")
 
 Log = Callable[[int, bytes], None]
 Fail = Callable[[str, str], None]
 
 
 @dataclass(frozen=True)
-class Calls:
-    """The names of the functions that the master calls; ``set_up`` is None where a version has no such function."""
+class CallNames:
+    """The FMI functions that the master calls; ``setup_experiment`` is None where a version has no such function."""
 
     instantiate: str
-    set_up: str | None
-    enter: str
-    leave: str
+    setup_experiment: str | None
+    enter_initialization: str
+    exit_initialization: str
     read: str
     write: str
     step: str
@@ -32,12 +32,12 @@ class Calls:
     release: str
     free: str
 
-    def named(self) -> tuple[str, ...]:
-        """All names there are."""
+    def all_names(self) -> tuple[str, ...]:
+        """The names of all functions that the version has."""
         return tuple(name for name in astuple(self) if name is not None)
 
 
-FMI_2 = Calls(
+FMI_2 = CallNames(
     "fmi2Instantiate",
     "fmi2SetupExperiment",
     "fmi2EnterInitializationMode",
@@ -50,7 +50,7 @@ FMI_2 = Calls(
     "fmi2FreeFMUstate",
     "fmi2FreeInstance",
 )
-FMI_3 = Calls(
+FMI_3 = CallNames(
     "fmi3InstantiateCoSimulation",
     None,
     "fmi3EnterInitializationMode",
@@ -66,8 +66,8 @@ FMI_3 = Calls(
 
 
 @dataclass(frozen=True)
-class Functions:
-    """What is called in a step, whatever the version: ``handle`` first, then as FMI 2.0 has it; returns a status."""
+class StepFunctions:
+    """The functions called in a step, with FMI 2.0 signatures for either version; each returns a status."""
 
     handle: Any
     read: Callable[..., int]
@@ -78,28 +78,28 @@ class Functions:
     release: Callable[..., int]
 
 
-class Instance(Protocol):
+class FmuInstance(Protocol):
     """A loaded FMU, to be instantiated and initialised once; each method raises what fmpy raises.
 
     ``real`` is the type of its numbers.
     """
 
-    calls: Calls
-    real: str
+    call_names: CallNames
+    real_type: str
 
-    def instantiate(self, log: Log, fail: Fail) -> Functions:
-        """Make the instance: it tells ``log`` status and message, the functions ``fail`` a call and its outcome."""
+    def instantiate(self, log: Log, fail: Fail) -> StepFunctions:
+        """Instantiate the FMU; ``log`` gets status and message, ``fail`` a call and its outcome."""
         ...
 
-    def set_up(self, start: float) -> None:
-        """What comes before parameters are set, from the start time (s)."""
+    def setup_experiment(self, start: float) -> None:
+        """Set up the experiment from the start time (s), before parameters are set."""
         ...
 
-    def enter(self, start: float) -> None:
+    def enter_initialization(self, start: float) -> None:
         """Enter initialization mode."""
         ...
 
-    def leave(self) -> None:
+    def exit_initialization(self) -> None:
         """Leave initialization mode."""
         ...
 
@@ -108,11 +108,11 @@ class Instance(Protocol):
         ...
 
 
-def is_real(variable: ScalarVariable) -> bool:
-    """Whether a variable is one number of double precision that may be read and written between any steps."""
-    return variable.type in REALS and not variable.dimensions and not variable.clocks
+def is_real_scalar(variable: ScalarVariable) -> bool:
+    """Whether a variable is a scalar of double precision without clocks."""
+    return variable.type in REAL_TYPES and not variable.dimensions and not variable.clocks
 
 
-def kind_of(variable: ScalarVariable) -> str:
-    """The type of a variable in words, such as ``Float64 array``."""
+def type_name(variable: ScalarVariable) -> str:
+    """The type name of a variable, such as ``Float64 array``."""
     return f"{'clocked ' * bool(variable.clocks)}{variable.type}{' array' * bool(variable.dimensions)}"

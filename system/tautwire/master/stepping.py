@@ -1,4 +1,4 @@
-"""How an interval between two grid times is cut into macro steps: by a bound, or by a tolerance."""
+"""Step-size control: divides an interval between two grid times into macro steps, by a bound or a tolerance."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from numpy.typing import NDArray
 
 from ..errors import TautwireError
 from .coupling import Coupling
-from .halving import Drives
-from .kinks import WIDTH, step_over
+from .halving import ExternalInputs
+from .kinks import EVENT_WIDTH, step_with_events
 
 Array = NDArray[np.float64]
-Watch = Callable[[], Array]
+ReadLengths = Callable[[], Array]
 
-SAFETY = 0.9
-# Errors of steps may grow as they travel on; a third of the tolerance is theirs.
-SHARE = 0.3
-SMALLEST_SHARE = 1e-6
-LEAST_GROWTH, LARGEST_GROWTH, LARGEST_CUT = 1.3, 4.0, 0.1
-FINEST_AGREEMENT, COARSEST_AGREEMENT = 1e-12, 1e-7
+SAFETY_FACTOR = 0.9
+# Local errors may grow as they propagate; they get a third of the tolerance.
+LOCAL_ERROR_SHARE = 0.3
+MIN_STEP_SHARE = 1e-6
+MIN_STEP_GROWTH, MAX_STEP_FACTOR, MIN_STEP_FACTOR = 1.3, 4.0, 0.1
+MIN_COUPLING_TOLERANCE, MAX_COUPLING_TOLERANCE = 1e-12, 1e-7
 
 
-class StepError(TautwireError):
-    """The tolerance asks for steps too small to go on; carries time (s), step (s) and the error estimated (m)."""
+class StepSizeError(TautwireError):
+    """The tolerance requires a step below the smallest one; carries time (s), step (s) and the error estimated (m)."""
 
     def __init__(self, time: float, step: float, error: float) -> None:
         self.time = time
@@ -38,94 +38,104 @@ class StepError(TautwireError):
         )
 
 
-class Stepping(Protocol):
-    """Goes from ``begin`` over ``span`` seconds; ``drives(time, step)`` gives the driven inputs at both ends.
+class StepSizeControl(Protocol):
+    """Step-size control over an interval; ``external_inputs(time, step)`` returns the inputs at both ends.
 
-    ``agreement`` is the tolerance of the coupling that the steps deserve; None leaves it as it is.
+    ``coupling_tolerance`` is the tolerance of the coupling that fits the steps; None leaves it as it is.
     """
 
     @property
-    def agreement(self) -> float | None:
+    def coupling_tolerance(self) -> float | None:
         """See :class:`Coupling`, ``tolerance``."""
         ...
 
-    def cover(self, coupling: Coupling, begin: float, span: float, drives: Drives, watch: Watch) -> None:
-        """Advance the coupling; ``watch()`` reads the outputs whose error counts."""
+    def advance(
+        self, coupling: Coupling, begin: float, span: float, external_inputs: ExternalInputs, read_lengths: ReadLengths
+    ) -> None:
+        """Advance the coupling by ``span`` (s); ``read_lengths()`` reads the outputs whose error counts."""
         ...
 
 
 @dataclass(frozen=True)
 class FixedStep:
-    """Equal macro steps no longer than ``longest`` (s)."""
+    """Equal macro steps no longer than ``max_step`` (s)."""
 
-    longest: float
+    max_step: float
 
     @property
-    def agreement(self) -> None:
-        """See :class:`Stepping`."""
+    def coupling_tolerance(self) -> None:
+        """See :class:`StepSizeControl`."""
 
-    def cover(self, coupling: Coupling, begin: float, span: float, drives: Drives, watch: Watch) -> None:
-        """See :class:`Stepping`."""
-        count = max(1, math.ceil(span / self.longest * (1.0 - 1e-9)))
+    def advance(
+        self, coupling: Coupling, begin: float, span: float, external_inputs: ExternalInputs, read_lengths: ReadLengths
+    ) -> None:
+        """See :class:`StepSizeControl`."""
+        count = max(1, math.ceil(span / self.max_step * (1.0 - 1e-9)))
         for k in range(count):
             time = begin + k * span / count
-            step_over(coupling, time, span / count, drives)
+            step_with_events(coupling, time, span / count, external_inputs)
 
 
 @dataclass
 class AdaptiveStep:
-    """Macro steps such that the errors of all steps of a run of ``duration`` (s) sum to at most ``tolerance`` (m).
+    """Adaptive macro steps: local errors over a run of ``duration`` (s) sum to at most ``tolerance`` (m).
 
-    Each step is made whole and, from the saved states, in two halves, which are kept; for order p their error is the
-    difference over ``2^p - 1``.
+    Step doubling: each step is made whole and, after a rollback, in two halves, which are accepted; for order p their
+    error is the difference over ``2^p - 1``.
     """
 
     tolerance: float
     duration: float
-    next: float = 0.02
+    next_step: float = 0.02
 
     @property
-    def agreement(self) -> float:
+    def coupling_tolerance(self) -> float:
         """A tenth of the tolerance, of outputs whose nominal values are taken for metres."""
-        return min(max(0.1 * self.tolerance, FINEST_AGREEMENT), COARSEST_AGREEMENT)
+        return min(max(0.1 * self.tolerance, MIN_COUPLING_TOLERANCE), MAX_COUPLING_TOLERANCE)
 
-    def cover(self, coupling: Coupling, begin: float, span: float, drives: Drives, watch: Watch) -> None:
-        """See :class:`Stepping`; raises StepError where no step is small enough."""
-        done = 0.0
-        while done < span * (1.0 - 1e-12):
-            rest = span - done
-            step = rest / math.ceil(rest / self.next * (1.0 - 1e-3))
-            done += self._try(coupling, begin + done, step, drives, watch)
+    def advance(
+        self, coupling: Coupling, begin: float, span: float, external_inputs: ExternalInputs, read_lengths: ReadLengths
+    ) -> None:
+        """See :class:`StepSizeControl`; raises StepError where no step is small enough."""
+        elapsed = 0.0
+        while elapsed < span * (1.0 - 1e-12):
+            remaining = span - elapsed
+            step = remaining / math.ceil(remaining / self.next_step * (1.0 - 1e-3))
+            elapsed += self._try_step(coupling, begin + elapsed, step, external_inputs, read_lengths)
 
-    def _try(self, coupling: Coupling, time: float, step: float, drives: Drives, watch: Watch) -> float:
-        """Make one step, or the part of it before a kink; returns how far, zero if the error was too large."""
-        before = coupling.save()
+    def _try_step(
+        self, coupling: Coupling, time: float, step: float, external_inputs: ExternalInputs, read_lengths: ReadLengths
+    ) -> float:
+        """Try one step, or its part before an event; returns its length, zero if the error was too large."""
+        checkpoint = coupling.save()
         try:
-            first = step_over(coupling, time, step, drives)
-            if first < step:
-                # After a kink the whole step would go on as its halves do, and show no error.
-                coupling.restore(before)
-                step_over(coupling, time, first, drives)
-                if first <= 2.0 * WIDTH:
-                    return first
-            cut, step = first < step, first
-            whole = watch()
-            coupling.restore(before)
+            first_substep = step_with_events(coupling, time, step, external_inputs)
+            if first_substep < step:
+                # After an event the whole step would take the same substeps as its halves, and show no error.
+                coupling.restore(checkpoint)
+                step_with_events(coupling, time, first_substep, external_inputs)
+                if first_substep <= 2.0 * EVENT_WIDTH:
+                    return first_substep
+            shortened, step = first_substep < step, first_substep
+            whole_step_lengths = read_lengths()
+            coupling.restore(checkpoint)
             half = 0.5 * step
-            step_over(coupling, time, half, drives)
-            step_over(coupling, time + half, half, drives)
-            error = float(np.max(np.abs(watch() - whole), initial=0.0)) / (2**coupling.order - 1)
-            allowed = SHARE * self.tolerance * step / self.duration
-            factor = SAFETY * (allowed / max(error, 1e-300)) ** (1.0 / coupling.order)
-            # What redos have learnt serves steps of the same length only.
-            if not (1.0 <= factor < LEAST_GROWTH or (cut and factor > 1.0)):
-                self.next = step * min(max(factor, LARGEST_CUT), LARGEST_GROWTH)
-            if error <= allowed:
-                coupling.account.error = (coupling.account.error or 0.0) + error
+            step_with_events(coupling, time, half, external_inputs)
+            step_with_events(coupling, time + half, half, external_inputs)
+            error = float(np.max(np.abs(read_lengths() - whole_step_lengths), initial=0.0)) / (
+                2**coupling.convergence_order - 1
+            )
+            allowed_error = LOCAL_ERROR_SHARE * self.tolerance * step / self.duration
+            factor = SAFETY_FACTOR * (allowed_error / max(error, 1e-300)) ** (1.0 / coupling.convergence_order)
+            # The quasi-Newton history serves steps of the same size only, so small changes do not pay.
+            if not (1.0 <= factor < MIN_STEP_GROWTH or (shortened and factor > 1.0)):
+                self.next_step = step * min(max(factor, MIN_STEP_FACTOR), MAX_STEP_FACTOR)
+            if error <= allowed_error:
+                coupling.statistics.estimated_error = (coupling.statistics.estimated_error or 0.0) + error
                 return step
-            if self.next < SMALLEST_SHARE * self.duration:
-                raise StepError(time, step, error)
-            coupling.restore(before)
+            if self.next_step < MIN_STEP_SHARE * self.duration:
+                raise StepSizeError(time, step, error)
+            coupling.restore(checkpoint)
             return 0.0
         finally:
-            coupling.release(before)
+            coupling.release(checkpoint)

@@ -1,4 +1,4 @@
-"""In which order the components take their turns in a pass, and what that makes of their outputs."""
+"""Execution order of the components in a Gauss-Seidel sweep, and the tear variables that follow from it."""
 
 from __future__ import annotations
 
@@ -7,53 +7,58 @@ from collections.abc import Mapping, Sequence
 import numpy as np
 
 from .component import Component
-from .seat import Places
-from .wiring import Connection, Port, direct_inputs
+from .seat import Indices
+from .wiring import Connection, Port, direct_feedthrough
 
 
 def gauss_seidel_order(
-    components: Mapping[str, Component], connections: Sequence[Connection], shown: Sequence[Port]
+    components: Mapping[str, Component], connections: Sequence[Connection], outputs: Sequence[Port]
 ) -> list[str]:
-    """Components that show some output without waiting for an input go first, unless fewer outputs are then guessed.
+    """Gauss-Seidel order: components with an output free of direct feedthrough first, adapted for fewer tear variables.
 
-    One after the other goes last where that leaves fewer outputs that are used before they are found.
+    Each component in turn is moved to the end where that leaves fewer tear variables.
     """
-    fed = {(c.target.component, c.target.variable) for c in connections}
+    connected_inputs = {(c.target.component, c.target.variable) for c in connections}
 
-    def waits(name: str) -> bool:
-        direct = direct_inputs(components[name])
-        own = [port.variable for port in shown if port.component == name]
-        return all(any((name, known) in fed for known in direct[variable]) for variable in own)
+    def has_full_feedthrough(name: str) -> bool:
+        feedthrough = direct_feedthrough(components[name])
+        own_outputs = [port.variable for port in outputs if port.component == name]
+        return all(
+            any((name, known) in connected_inputs for known in feedthrough[variable]) for variable in own_outputs
+        )
 
-    order = sorted(components, key=waits)
+    order = sorted(components, key=has_full_feedthrough)
     for name in tuple(order):
-        other = [*(kept for kept in order if kept != name), name]
-        if len(fed_back(other, connections, shown)) < len(fed_back(order, connections, shown)):
-            order = other
+        candidate = [*(kept for kept in order if kept != name), name]
+        if len(tear_variables(candidate, connections, outputs)) < len(tear_variables(order, connections, outputs)):
+            order = candidate
     return order
 
 
-def fed_back(order: Sequence[str], connections: Sequence[Connection], shown: Sequence[Port]) -> Places:
-    """Places of the outputs that a pass in this order uses before it has found them."""
-    turn = {name: number for number, name in enumerate(order)}
-    back = {c.source for c in connections if turn[c.source.component] >= turn[c.target.component]}
-    return np.array([place for place, port in enumerate(shown) if port in back], dtype=np.intp)
+def tear_variables(order: Sequence[str], connections: Sequence[Connection], outputs: Sequence[Port]) -> Indices:
+    """Indices of the tear variables: outputs that a sweep in this order uses before it computes them."""
+    position = {name: number for number, name in enumerate(order)}
+    torn_outputs = {c.source for c in connections if position[c.source.component] >= position[c.target.component]}
+    return np.array([place for place, port in enumerate(outputs) if port in torn_outputs], dtype=np.intp)
 
 
-def downstream(
-    components: Mapping[str, Component], groups: Sequence[Sequence[Connection]], drives: Sequence[Port]
+def affected_connections(
+    components: Mapping[str, Component], groups: Sequence[Sequence[Connection]], changed_inputs: Sequence[Port]
 ) -> list[list[Connection]]:
-    """The connections whose values change at once when a driven input changes, group by group."""
-    direct = {name: direct_inputs(component) for name, component in components.items()}
-    touched = set(drives)
-    found = []
+    """The connections whose values jump, by direct feedthrough, when the changed inputs do, group by group."""
+    feedthrough = {name: direct_feedthrough(component) for name, component in components.items()}
+    affected_ports = set(changed_inputs)
+    affected_groups = []
     for group in groups:
-        moved = [
+        affected = [
             c
             for c in group
-            if any(Port(c.source.component, n) in touched for n in direct[c.source.component][c.source.variable])
+            if any(
+                Port(c.source.component, n) in affected_ports
+                for n in feedthrough[c.source.component][c.source.variable]
+            )
         ]
-        touched |= {c.target for c in moved}
-        if moved:
-            found.append(moved)
-    return found
+        affected_ports |= {c.target for c in affected}
+        if affected:
+            affected_groups.append(affected)
+    return affected_groups

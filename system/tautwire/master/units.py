@@ -1,4 +1,4 @@
-"""Whether two variables of FMUs bear the same unit, whatever each tool calls it."""
+"""Units and nominal values of FMU variables, compared across tools by their SI definitions."""
 
 from __future__ import annotations
 
@@ -6,40 +6,44 @@ from collections.abc import Mapping
 
 from fmpy.model_description import ModelDescription, ScalarVariable
 
-BASES = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
-Measure = tuple[float, ...]
+SI_BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+UnitDefinition = tuple[float, ...]
 
 
 def unit_of(variable: ScalarVariable) -> str | None:
     """The unit that a variable or its type states; None where neither does."""
-    stated = variable.unit or getattr(variable.declaredType, "unit", None)
-    return str(stated) if stated else None
+    unit = variable.unit or getattr(variable.declaredType, "unit", None)
+    return str(unit) if unit else None
 
 
 def nominal_of(variable: ScalarVariable) -> float:
-    """The size that a variable or its type states; one where neither does, or where it is zero, which FMI forbids."""
-    stated = variable.nominal or getattr(variable.declaredType, "nominal", None)
-    return abs(float(stated or 1.0)) or 1.0
+    """The nominal value that a variable or its type states; one where neither does, or where zero, against FMI."""
+    nominal = variable.nominal or getattr(variable.declaredType, "nominal", None)
+    return abs(float(nominal or 1.0)) or 1.0
 
 
-def measure(description: ModelDescription, unit: str) -> Measure | None:
+def unit_definition(description: ModelDescription, unit: str) -> UnitDefinition | None:
     """Exponents of the SI base units, then factor and offset; None where the FMU does not define the unit."""
-    for known in description.unitDefinitions:
-        if known.name == unit and known.baseUnit is not None:
-            base = known.baseUnit
-            exponents = (float(getattr(base, name) or 0.0) for name in BASES)
-            return (*exponents, float(1.0 if base.factor is None else base.factor), float(base.offset or 0.0))
+    for definition in description.unitDefinitions:
+        if definition.name == unit and definition.baseUnit is not None:
+            base_unit = definition.baseUnit
+            exponents = (float(getattr(base_unit, name) or 0.0) for name in SI_BASE_UNITS)
+            return (
+                *exponents,
+                float(1.0 if base_unit.factor is None else base_unit.factor),
+                float(base_unit.offset or 0.0),
+            )
     return None
 
 
-def measure_of(exponents: Mapping[str, int]) -> Measure:
-    """What :func:`measure` gives for a product of powers of base units."""
-    return (*(float(exponents.get(name, 0)) for name in BASES), 1.0, 0.0)
+def definition_from_exponents(exponents: Mapping[str, int]) -> UnitDefinition:
+    """The definition, as of :func:`unit_definition`, of a product of powers of base units."""
+    return (*(float(exponents.get(name, 0)) for name in SI_BASE_UNITS), 1.0, 0.0)
 
 
-def same_unit(a: tuple[str | None, Measure | None], b: tuple[str | None, Measure | None]) -> bool:
-    """Whether two units, each a name and what it measures, are the same; one that is not stated fits any."""
-    (name, size), (other_name, other_size) = a, b
+def same_unit(a: tuple[str | None, UnitDefinition | None], b: tuple[str | None, UnitDefinition | None]) -> bool:
+    """Whether two units, each a name and its definition, are the same; one that is not stated fits any."""
+    (name, definition), (other_name, other_definition) = a, b
     if name is None or other_name is None:
         return True
-    return name == other_name if size is None or other_size is None else size == other_size
+    return name == other_name if definition is None or other_definition is None else definition == other_definition

@@ -1,9 +1,9 @@
-"""Runs FMUs in a process of their own, so that one that hangs or dies is named and nothing is lost.
+"""Isolation: FMUs run in a worker process under a watchdog, so that one that hangs or crashes is named.
 
 On Linux that process is a fork of this one: it starts in milliseconds, and source and system may be anything. A fork
 lacks the other threads, whose locks may be held for ever; so it takes none of them: it calls FMUs, writes to a pipe
-and a folder of its own, and ends. Elsewhere the process is a fresh Python: it takes half a second to start, and all
-that it is given must be picklable.
+and a folder of its own, and ends. Elsewhere the process is a fresh Python: it takes half a second to start, and its
+arguments must be picklable.
 """
 
 from __future__ import annotations
@@ -27,25 +27,25 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import TautwireError
-from ..interrupt import interrupts_held
-from .apart import ERROR, ROW, Job, System, work
-from .audit import Account
+from ..interrupt import defer_interrupts
+from .apart import ERROR_MESSAGE, ROW_MESSAGE, Job, SystemBuilder, run_worker
+from .audit import RunStatistics
 from .component import ComponentError
-from .journal import Entry, Journal
-from .simulation import Progress, Recorder, Source
-from .stepping import Stepping
+from .journal import CallEntry, CallJournal
+from .simulation import InputSource, Progress, Recorder
+from .stepping import StepSizeControl
 from .wiring import Port
 
 Array = NDArray[np.float64]
 
-PATIENCE = 60.0
-POLL = 0.05
-GRACE = 2.0
-NAP = 0.005
+CALL_TIMEOUT = 60.0
+POLL_INTERVAL = 0.05
+SHUTDOWN_TIMEOUT = 2.0
+BATCH_DELAY = 0.005
 
 
-class LostError(ComponentError):
-    """An FMU did not come back from a call: it hung, or its process ended there; ``status`` says which."""
+class CallAbortedError(ComponentError):
+    """An FMU call did not return: it hung, or its process ended there; ``status`` says which."""
 
     @property
     def outcome(self) -> str:
@@ -53,7 +53,7 @@ class LostError(ComponentError):
         return self.status
 
 
-class RunLostError(TautwireError):
+class RunAbortedError(TautwireError):
     """A run hung, or its process ended, while no FMU was being called; carries how, and the time (s)."""
 
     def __init__(self, status: str, time: float) -> None:
@@ -62,130 +62,135 @@ class RunLostError(TautwireError):
         super().__init__(f"outside any FMU the run {status} at {time:.6g} s: look at what drives it")
 
 
-class ElsewhereError(Exception):
-    """Where in the other process an error was raised: the text of its traceback."""
+class RemoteTracebackError(Exception):
+    """The traceback of an error in the worker process, as text."""
 
 
-def simulate_watched(
-    system: System,
-    source: Source,
+def simulate_isolated(
+    build_system: SystemBuilder,
+    input_source: InputSource,
     times: Array,
-    observed: Sequence[Port],
-    stepping: Stepping,
+    observed_outputs: Sequence[Port],
+    step_size_control: StepSizeControl,
     recorder: Recorder,
     progress: Progress | None = None,
-    patience: float = PATIENCE,
-) -> Account:
-    """Co-simulate as :func:`simulate` does, in another process that is watched from this one.
+    call_timeout: float = CALL_TIMEOUT,
+) -> RunStatistics:
+    """Co-simulate as :func:`simulate` does, in a worker process under a watchdog.
 
-    ``system`` builds the coupling there, with components and input memory from the journal that it is given. The
-    recorder and ``progress`` are called here; ``source`` and ``stepping`` work on copies. An FMU that is in the same
-    call for ``patience`` seconds hangs. Ctrl-C ends the run within seconds. Returns the books.
+    ``build_system`` builds the coupling there, with components and input memory from its argument, the call journal.
+    The recorder and ``progress`` are called here; ``input_source`` and ``step_size_control`` are copies there. An FMU
+    call that takes ``call_timeout`` seconds is taken to hang. Ctrl-C ends the run within seconds. Returns the run
+    statistics.
 
-    Raises LostError where an FMU hangs or ends its process, RunLostError where the source does, and whatever the run
-    raises; the recorder has what came before. No process and no temporary file is left.
+    Raises CallAbortedError where an FMU hangs or ends its process, RunAbortedError where the source does, and whatever
+    the run raises; the recorder has the rows until then. No process and no temporary file remains.
     """
-    job = Job(system, source, times, tuple(observed), stepping)
+    job = Job(build_system, input_source, times, tuple(observed_outputs), step_size_control)
     with (
-        interrupts_held() as raise_interrupt,
+        defer_interrupts() as raise_interrupt,
         TemporaryDirectory(prefix="tautwire-run-", ignore_cleanup_errors=True) as folder,
-        closing(Journal(Path(folder))) as journal,
-        _started(job, Path(folder), journal) as (process, receiver),
+        closing(CallJournal(Path(folder))) as journal,
+        _worker_process(job, Path(folder), journal) as (process, receiver),
     ):
-        account, count = None, 0
-        for message in _received(process, receiver, journal, patience, raise_interrupt):
+        statistics, row_count = None, 0
+        for message in _receive_messages(process, receiver, journal, call_timeout, raise_interrupt):
             content, kind = message[:-1], message[-1:]
-            if kind == ROW:
-                recorder.add(float(times[count]), np.frombuffer(content))
-                count += 1
-                if progress is not None and count > 1:
-                    progress((count - 1) / (len(times) - 1))
-            elif kind == ERROR:
+            if kind == ROW_MESSAGE:
+                recorder.add(float(times[row_count]), np.frombuffer(content))
+                row_count += 1
+                if progress is not None and row_count > 1:
+                    progress((row_count - 1) / (len(times) - 1))
+            elif kind == ERROR_MESSAGE:
                 error, text = pickle.loads(content)
-                raise error from ElsewhereError(text)
+                raise error from RemoteTracebackError(text)
             else:
-                account = pickle.loads(content)
-        lost = journal.last()
-        process.join(GRACE)
-        if account is None or (process.exitcode != 0 and lost.component is not None):
-            raise _loss(lost, _fate(process.exitcode))
-        return account
+                statistics = pickle.loads(content)
+        last_entry = journal.last_entry()
+        process.join(SHUTDOWN_TIMEOUT)
+        if statistics is None or (process.exitcode != 0 and last_entry.component is not None):
+            raise _aborted_error(last_entry, _exit_reason(process.exitcode))
+        return statistics
 
 
 def start_method() -> Literal["fork", "spawn"]:
-    """How the process starts on this system, as :mod:`multiprocessing` names it."""
+    """The start method of the worker process on this system, as :mod:`multiprocessing` names it."""
     return "fork" if sys.platform == "linux" else "spawn"
 
 
 @contextmanager
-def _started(job: Job, folder: Path, journal: Journal) -> Iterator[tuple[BaseProcess, Connection]]:
-    """The process at work, and the pipe's end at which its messages arrive; it is gone when the block ends."""
+def _worker_process(job: Job, folder: Path, journal: CallJournal) -> Iterator[tuple[BaseProcess, Connection]]:
+    """The worker process and the receiving end of its pipe; the process is ended when the block ends."""
     context = multiprocessing.get_context(start_method())
     receiver, sender = context.Pipe(duplex=False)
-    process: BaseProcess = context.Process(target=work, args=(job, folder, sender))  # type: ignore[attr-defined]
+    process: BaseProcess = context.Process(target=run_worker, args=(job, folder, sender))  # type: ignore[attr-defined]
     with warnings.catch_warnings():
-        # Python 3.12 warns of any fork beside threads; why this one is safe stands at the top.
+        # Python 3.12 warns of any fork beside threads; the module docstring says why this one is safe.
         warnings.simplefilter("ignore", DeprecationWarning)
         process.start()
     sender.close()
     try:
         yield process, receiver
     finally:
-        journal.stop()
-        _end(process, receiver)
+        journal.request_stop()
+        _shut_down(process, receiver)
 
 
-def _received(
-    process: BaseProcess, receiver: Connection, journal: Journal, patience: float, raise_interrupt: Callable[[], None]
+def _receive_messages(
+    process: BaseProcess,
+    receiver: Connection,
+    journal: CallJournal,
+    call_timeout: float,
+    raise_interrupt: Callable[[], None],
 ) -> Iterator[bytes]:
-    """The process's messages until it is gone; raises where it hangs."""
-    idle, mark, more = 0.0, journal.mark(), False
+    """Yield the worker's messages until it ends; raises where it hangs."""
+    idle, snapshot, has_more = 0.0, journal.snapshot(), False
     while True:
         raise_interrupt()
-        if more or receiver.poll(POLL):
+        if has_more or receiver.poll(POLL_INTERVAL):
             try:
                 message = receiver.recv_bytes()
             except (EOFError, OSError):
                 return
             yield message
-            idle, more = 0.0, receiver.poll()
-            if not more:
-                # Rows in batches: to be woken for each would cost the other process more than to write it.
-                sleep(NAP)
+            idle, has_more = 0.0, receiver.poll()
+            if not has_more:
+                # Rows in batches: waking for each would cost the worker more than writing it.
+                sleep(BATCH_DELAY)
         elif not process.is_alive():
             return
-        elif journal.mark() != mark:
-            idle, mark = 0.0, journal.mark()
-        elif idle < (patience if journal.begun else max(patience, PATIENCE)):
-            # Not by a clock: that runs on while this process is stopped.
-            idle += POLL
+        elif journal.snapshot() != snapshot:
+            idle, snapshot = 0.0, journal.snapshot()
+        elif idle < (call_timeout if journal.has_entries else max(call_timeout, CALL_TIMEOUT)):
+            # Counted, not by a clock, which runs on while this process is suspended.
+            idle += POLL_INTERVAL
         else:
             _kill(process)
-            raise _loss(journal.last(), f"did not return for {patience:g} s")
+            raise _aborted_error(journal.last_entry(), f"did not return for {call_timeout:g} s")
 
 
-def _loss(entry: Entry, status: str) -> TautwireError:
+def _aborted_error(entry: CallEntry, status: str) -> TautwireError:
     if entry.component is None:
-        return RunLostError(status, entry.time)
-    return LostError(entry.component, entry.call, status, entry.time, entry.inputs, entry.messages)
+        return RunAbortedError(status, entry.time)
+    return CallAbortedError(entry.component, entry.call, status, entry.time, entry.inputs, entry.messages)
 
 
-def _fate(code: int | None) -> str:
+def _exit_reason(code: int | None) -> str:
     """How a process has ended, in words."""
     if code is None:
         return "closed the pipe of its process"
     if code >= 0:
         return f"ended its process with exit status {code}"
-    name = {known.value: known.name for known in signal.Signals}.get(-code, f"signal {-code}")
+    name = {known_signal.value: known_signal.name for known_signal in signal.Signals}.get(-code, f"signal {-code}")
     return f"ended its process by {name}" + (" (out of memory, or killed by hand)" if name == "SIGKILL" else "")
 
 
-def _end(process: BaseProcess, receiver: Connection) -> None:
-    """Let the process free its FMUs and go; end it, and all that it has started, where it does not."""
-    deadline = monotonic() + GRACE
+def _shut_down(process: BaseProcess, receiver: Connection) -> None:
+    """Let the worker free its FMUs and exit; kill it, and all that it has started, where it does not."""
+    deadline = monotonic() + SHUTDOWN_TIMEOUT
     with receiver:
         while process.is_alive() and monotonic() < deadline:
-            # It may be waiting for room in the pipe.
+            # The worker may be blocked on a full pipe.
             with suppress(EOFError, OSError):
                 if receiver.poll():
                     receiver.recv_bytes()
@@ -197,7 +202,7 @@ def _end(process: BaseProcess, receiver: Connection) -> None:
 
 
 def _kill(process: BaseProcess) -> None:
-    """End a process and all that it has started."""
+    """Kill a process and all that it has started."""
     if sys.platform != "win32" and process.pid is not None:
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(process.pid, signal.SIGKILL)

@@ -1,4 +1,4 @@
-"""A component whose calls are noted before they are made."""
+"""A component whose calls are noted in the call journal before they are made."""
 
 from __future__ import annotations
 
@@ -7,80 +7,84 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
-from .component import Block, Component
-from .journal import PLACE, STEPS, TIME, UNPACKING, Journal
+from .component import Component, VariableBlock
+from .journal import CALL_INDEX, CALL_TIME, STEP_COUNT, UNPACKING, CallJournal
 from .standard import FMI_WARNING
 
 
-class WatchedComponent(Component):
-    """See :class:`Component`; whoever reads the journal knows which call did not come back."""
+class JournalledComponent(Component):
+    """A :class:`Component` that notes each call in a journal, which then names a call that did not return."""
 
     # The calls of a step name their base class: ``super()`` would cost twice what the note does.
 
-    def __init__(self, journal: Journal, name: str, path: Path) -> None:
+    def __init__(self, journal: CallJournal, name: str, path: Path) -> None:
         self._journal = journal
-        self._now = journal.now
-        self._places = journal.enter(name)
-        self._now[PLACE] = self._places[UNPACKING]
+        self._journal_state = journal.state
+        self._call_indices = journal.register(name)
+        self._journal_state[CALL_INDEX] = self._call_indices[UNPACKING]
         super().__init__(name, path)
 
     def _load(self) -> None:
-        places, calls = self._places, self._calls
-        self._reading, self._writing, self._stepping = places[calls.read], places[calls.write], places[calls.step]
-        self._saving, self._restoring, self._releasing = (
-            places[call] for call in (calls.save, calls.restore, calls.release)
+        call_indices, call_names = self._call_indices, self._call_names
+        self._read_index, self._write_index, self._step_index = (
+            call_indices[call_names.read],
+            call_indices[call_names.write],
+            call_indices[call_names.step],
         )
-        self._now[PLACE] = places[calls.instantiate]
+        self._save_index, self._restore_index, self._release_index = (
+            call_indices[call] for call in (call_names.save, call_names.restore, call_names.release)
+        )
+        self._journal_state[CALL_INDEX] = call_indices[call_names.instantiate]
         super()._load()
 
     def _call(self, call: str, function: Callable[..., Any], **arguments: Any) -> None:
-        self._now[PLACE] = self._places[call]
+        self._journal_state[CALL_INDEX] = self._call_indices[call]
         super()._call(call, function, **arguments)
 
     def _log(self, status: int, message: bytes) -> None:
         super()._log(status, message)
         if status >= FMI_WARNING:
-            self._journal.say(self.name, self.messages)
+            self._journal.write_messages(self.name, self.messages)
 
     def initialize(self, start: float, parameters: dict[str, float]) -> None:
         """See :meth:`Component.initialize`."""
-        self._now[TIME] = start
+        self._journal_state[CALL_TIME] = start
         super().initialize(start, parameters)
 
-    def read(self, block: Block) -> None:
+    def read(self, block: VariableBlock) -> None:
         """See :meth:`Component.read`."""
-        self._now[PLACE] = self._reading
+        self._journal_state[CALL_INDEX] = self._read_index
         Component.read(self, block)
 
-    def write(self, block: Block) -> None:
+    def write(self, block: VariableBlock) -> None:
         """See :meth:`Component.write`."""
-        self._now[PLACE] = self._writing
+        self._journal_state[CALL_INDEX] = self._write_index
         Component.write(self, block)
 
     def step(self, time: float, step: float) -> None:
         """See :meth:`Component.step`."""
-        now = self._now
-        now[PLACE], now[TIME] = self._stepping, time
-        now[STEPS] += 1.0
+        journal_state = self._journal_state
+        journal_state[CALL_INDEX], journal_state[CALL_TIME] = self._step_index, time
+        journal_state[STEP_COUNT] += 1.0
         Component.step(self, time, step)
 
     def save(self) -> ctypes.c_void_p:
         """See :meth:`Component.save`."""
-        self._now[PLACE] = self._saving
+        self._journal_state[CALL_INDEX] = self._save_index
         return Component.save(self)
 
     def restore(self, saved: ctypes.c_void_p) -> None:
         """See :meth:`Component.restore`."""
-        self._now[PLACE] = self._restoring
+        self._journal_state[CALL_INDEX] = self._restore_index
         Component.restore(self, saved)
 
     def release(self, saved: ctypes.c_void_p) -> None:
         """See :meth:`Component.release`."""
-        self._now[PLACE] = self._releasing
+        self._journal_state[CALL_INDEX] = self._release_index
         Component.release(self, saved)
 
     def close(self) -> None:
         """See :meth:`Component.close`."""
-        self._now[PLACE] = self._places[self._calls.free]
+        self._journal_state[CALL_INDEX] = self._call_indices[self._call_names.free]
         super().close()
-        self._journal.rest(self.time)
+        self._journal.mark_idle(self.time)

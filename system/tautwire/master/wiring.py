@@ -1,4 +1,4 @@
-"""Which output drives which input, checked, and in which order outputs become known."""
+"""Connections between FMU variables: checked, and grouped into dependency levels."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ from fmpy.model_description import ScalarVariable
 
 from ..errors import TautwireError
 from .component import Component
-from .standard import is_real, kind_of
-from .units import Measure, measure, same_unit, unit_of
+from .standard import is_real_scalar, type_name
+from .units import UnitDefinition, same_unit, unit_definition, unit_of
 
 
 class WiringError(TautwireError):
-    """A connection does not fit; tells which and why."""
+    """A connection is invalid; the message says which and why."""
 
 
 @dataclass(frozen=True, order=True)
@@ -40,25 +40,27 @@ class Connection:
         return f"{self.source} -> {self.target}"
 
 
-def check(components: Mapping[str, Component], connections: Sequence[Connection]) -> None:
-    """Refuse unknown names, wrong causality, unlike types or units, and inputs driven twice."""
-    driven: dict[Port, Connection] = {}
+def check_connections(components: Mapping[str, Component], connections: Sequence[Connection]) -> None:
+    """Refuse unknown names, wrong causality, different types or units, and inputs connected twice."""
+    connections_by_target: dict[Port, Connection] = {}
     for connection in connections:
         source = _variable(components, connection, connection.source, "output")
         target = _variable(components, connection, connection.target, "input")
-        _require_reals(connection, source, target)
-        given, taken = (_unit(components, end) for end in (connection.source, connection.target))
-        if not same_unit(given, taken):
-            raise WiringError(f"{connection}: units differ, {given[0]!r} and {taken[0]!r}")
-        if connection.target in driven:
-            raise WiringError(f"{connection}: {connection.target} is driven by {driven[connection.target].source} too")
-        driven[connection.target] = connection
+        _require_real_scalars(connection, source, target)
+        source_unit, target_unit = (_unit(components, end) for end in (connection.source, connection.target))
+        if not same_unit(source_unit, target_unit):
+            raise WiringError(f"{connection}: units differ, {source_unit[0]!r} and {target_unit[0]!r}")
+        if connection.target in connections_by_target:
+            raise WiringError(
+                f"{connection}: {connection.target} is driven by {connections_by_target[connection.target].source} too"
+            )
+        connections_by_target[connection.target] = connection
 
 
-def _unit(components: Mapping[str, Component], port: Port) -> tuple[str | None, Measure | None]:
+def _unit(components: Mapping[str, Component], port: Port) -> tuple[str | None, UnitDefinition | None]:
     component = components[port.component]
     unit = unit_of(component.variables[port.variable])
-    return unit, None if unit is None else measure(component.description, unit)
+    return unit, None if unit is None else unit_definition(component.description, unit)
 
 
 def _variable(
@@ -74,77 +76,82 @@ def _variable(
     return variable
 
 
-def check_rates(components: Mapping[str, Component], rates: Sequence[Connection]) -> None:
-    """Refuse unknown names, wrong causality and types in pairs whose target takes the rate of the source."""
-    for pair in rates:
+def check_derivative_connections(
+    components: Mapping[str, Component], derivative_connections: Sequence[Connection]
+) -> None:
+    """Refuse unknown names, wrong causality and types in pairs whose target takes the derivative of the source."""
+    for pair in derivative_connections:
         source = _variable(components, pair, pair.source, "output")
-        _require_reals(pair, source, _variable(components, pair, pair.target, "input"))
+        _require_real_scalars(pair, source, _variable(components, pair, pair.target, "input"))
 
 
-def _require_reals(connection: Connection, source: ScalarVariable, target: ScalarVariable) -> None:
-    if not (is_real(source) and is_real(target)):
-        kinds = f"{kind_of(source)} and {kind_of(target)}"
-        raise WiringError(f"{connection}: both must be Real or Float64, they are {kinds}")
+def _require_real_scalars(connection: Connection, source: ScalarVariable, target: ScalarVariable) -> None:
+    if not (is_real_scalar(source) and is_real_scalar(target)):
+        type_names = f"{type_name(source)} and {type_name(target)}"
+        raise WiringError(f"{connection}: both must be Real or Float64, they are {type_names}")
 
 
-def direct_inputs(component: Component, unsaid: bool = True) -> dict[str, frozenset[str]]:
-    """For each output, the inputs that act on it without delay.
+def direct_feedthrough(component: Component, assume_feedthrough: bool = True) -> dict[str, frozenset[str]]:
+    """Direct feedthrough: for each output, the inputs that act on it without delay.
 
-    Where the FMU does not say, all of them, or none where ``unsaid`` is False.
+    Where the FMU does not declare it, all inputs, or none where ``assume_feedthrough`` is False.
     """
     inputs = [v for v in component.variables.values() if v.causality == "input"]
-    everything = {_identity(v) for v in inputs}
-    said = {
-        _identity(unknown.variable): {_identity(known) for known in unknown.dependencies}
+    all_inputs = {_variable_key(v) for v in inputs}
+    declared = {
+        _variable_key(unknown.variable): {_variable_key(known) for known in unknown.dependencies}
         for unknown in component.description.outputs
         if unknown.dependencies is not None
     }
-    undeclared = everything if unsaid else set()
+    undeclared = all_inputs if assume_feedthrough else set()
     outputs = [v for v in component.variables.values() if v.causality == "output"]
     return {
-        v.name: frozenset(known.name for known in inputs if _identity(known) in said.get(_identity(v), undeclared))
+        v.name: frozenset(
+            known.name for known in inputs if _variable_key(known) in declared.get(_variable_key(v), undeclared)
+        )
         for v in outputs
     }
 
 
-def _identity(variable: ScalarVariable) -> tuple[str, int]:
-    """The same for all names of a variable, of which FMI 3.0 lists dependencies under one only."""
+def _variable_key(variable: ScalarVariable) -> tuple[str, int]:
+    """A key shared by all aliases of a variable, of which FMI 3.0 lists dependencies under one only."""
     return variable.type, variable.valueReference
 
 
-def levels(components: Mapping[str, Component], connections: Sequence[Connection]) -> list[list[Connection]]:
-    """Connections in groups: those of a group carry outputs that only depend on groups before it.
+def dependency_groups(components: Mapping[str, Component], connections: Sequence[Connection]) -> list[list[Connection]]:
+    """Connections grouped topologically: outputs of a group depend on groups before it only.
 
-    An FMU that does not say what its outputs depend on is taken to delay all of its inputs, if else there was a loop.
+    An FMU that does not declare its dependencies is taken to have no direct feedthrough where there were an algebraic
+    loop otherwise.
 
-    Raises WiringError where outputs depend on each other in a loop without delay.
+    Raises WiringError where declared dependencies make an algebraic loop.
     """
     try:
-        return _grouped(components, connections, unsaid=True)
+        return _topological_groups(components, connections, assume_feedthrough=True)
     except CycleError:
         pass
     try:
-        return _grouped(components, connections, unsaid=False)
+        return _topological_groups(components, connections, assume_feedthrough=False)
     except CycleError as error:
         loop = " -> ".join(str(port) for port in error.args[1])
         raise WiringError(f"outputs depend on each other without delay: {loop}") from error
 
 
-def _grouped(
-    components: Mapping[str, Component], connections: Sequence[Connection], unsaid: bool
+def _topological_groups(
+    components: Mapping[str, Component], connections: Sequence[Connection], assume_feedthrough: bool
 ) -> list[list[Connection]]:
-    feeding = {connection.target: connection.source for connection in connections}
+    source_of_target = {connection.target: connection.source for connection in connections}
     sources = {connection.source for connection in connections}
-    direct = {name: direct_inputs(component, unsaid) for name, component in components.items()}
-    depends: dict[Port, set[Port]] = {
+    feedthrough = {name: direct_feedthrough(component, assume_feedthrough) for name, component in components.items()}
+    dependencies: dict[Port, set[Port]] = {
         source: {
-            feeding[target]
-            for target in (Port(source.component, known) for known in direct[source.component][source.variable])
-            if target in feeding
+            source_of_target[target]
+            for target in (Port(source.component, known) for known in feedthrough[source.component][source.variable])
+            if target in source_of_target
         }
         for source in sources
     }
-    sorter = TopologicalSorter(depends)
+    sorter = TopologicalSorter(dependencies)
     sorter.prepare()
     groups = []
     while sorter.is_active():

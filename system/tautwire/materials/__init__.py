@@ -1,16 +1,16 @@
-"""What a dynamic test says of a rope: from a table of moduli over frequency to the rope of a robot file."""
+"""Identification of a rope's viscoelastic constants from a dynamic test, for use in a robot file."""
 
 from .robot_material import RobotMaterial, robot_material, with_material
-from .table import PAPER_PAIR_AT, PAPER_TABLE, MaterialTable, read_material_table
+from .table import PAPER_PAIR_FREQUENCY, PAPER_TABLE, MaterialTable, read_material_table
 from .tracing import pair_of_row, trace_material
-from .verdict import MaterialVerdict, Options
+from .verdict import MaterialOptions, MaterialVerdict
 
 __all__ = [
-    "PAPER_PAIR_AT",
+    "PAPER_PAIR_FREQUENCY",
     "PAPER_TABLE",
+    "MaterialOptions",
     "MaterialTable",
     "MaterialVerdict",
-    "Options",
     "RobotMaterial",
     "pair_of_row",
     "read_material_table",

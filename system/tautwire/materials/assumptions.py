@@ -1,45 +1,58 @@
-"""The same models where the table's errors are read in another way: does the verdict hang on it?"""
+"""Sensitivity of the verdict to how the table's errors are read."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 
-from .fit import fit_terms
-from .observations import Observations, observations
+from .fit import fit_structure
+from .observations import ModulusObservations, observations_from_table
 from .table import MaterialTable
-from .terms import Terms
-from .verdict import Assumption, Role
+from .terms import ModelStructure
+from .verdict import ErrorAssumption, Role
 
-SHARED, TWO_SIGMA = 0.5, 2.0
+ASSUMED_SHARED_VARIANCE, TWO_SIGMA_COVERAGE = 0.5, 2.0
 
 
-def assumptions(
-    table: MaterialTable, pair: tuple[str, str], shared: float, coverage: float, terms: Mapping[Role, Terms]
-) -> tuple[Assumption, ...]:
-    """Chi-squared, degrees of freedom and p value of each model under each reading, the one in use first."""
+def error_assumptions(
+    table: MaterialTable,
+    pair: tuple[str, str],
+    shared_variance: float,
+    coverage_factor: float,
+    structures: Mapping[Role, ModelStructure],
+) -> tuple[ErrorAssumption, ...]:
+    """Chi-squared, degrees of freedom and p value of each model under each reading of the errors, that in use first."""
     return tuple(
-        Assumption(label, {role: _outcome(seen, each) for role, each in terms.items()})
-        for label, seen in _readings(table, pair, shared, coverage)
+        ErrorAssumption(label, {role: _fit_outcome(observations, each) for role, each in structures.items()})
+        for label, observations in _error_readings(table, pair, shared_variance, coverage_factor)
     )
 
 
-def _outcome(seen: Observations, terms: Terms) -> tuple[float, int, float]:
-    fit = fit_terms(seen, terms)
-    return fit.chi_squared, fit.freedom, fit.p_value
+def _fit_outcome(observations: ModulusObservations, structure: ModelStructure) -> tuple[float, int, float]:
+    fit = fit_structure(observations, structure)
+    return fit.chi_squared, fit.degrees_of_freedom, fit.p_value
 
 
-def _readings(
-    table: MaterialTable, pair: tuple[str, str], shared: float, coverage: float
-) -> Iterator[tuple[str, Observations]]:
-    yield "as fitted", observations(table, pair, shared, coverage)
-    for other in table.pairs():
+def _error_readings(
+    table: MaterialTable, pair: tuple[str, str], shared_variance: float, coverage_factor: float
+) -> Iterator[tuple[str, ModulusObservations]]:
+    yield "as fitted", observations_from_table(table, pair, shared_variance, coverage_factor)
+    for other in table.modulus_pairs():
         if other != pair:
-            yield f"from {other[0]} and {other[1]}", observations(table, other, shared, coverage)
-    for share in (0.0, SHARED):
-        if share != shared:
-            label = f"{share:.0%} of each variance common to all rows"
-            yield label, observations(table, pair, share, coverage)
-    if coverage != TWO_SIGMA:
-        yield "uncertainties are two standard deviations", observations(table, pair, shared, TWO_SIGMA)
-    if table.static:
-        yield "static rows fitted too", observations(table, pair, shared, coverage).with_static(table)
+            yield (
+                f"from {other[0]} and {other[1]}",
+                observations_from_table(table, other, shared_variance, coverage_factor),
+            )
+    for assumed_share in (0.0, ASSUMED_SHARED_VARIANCE):
+        if assumed_share != shared_variance:
+            label = f"{assumed_share:.0%} of each variance common to all rows"
+            yield label, observations_from_table(table, pair, assumed_share, coverage_factor)
+    if coverage_factor != TWO_SIGMA_COVERAGE:
+        yield (
+            "uncertainties are two standard deviations",
+            observations_from_table(table, pair, shared_variance, TWO_SIGMA_COVERAGE),
+        )
+    if table.static_rows:
+        yield (
+            "static rows fitted too",
+            observations_from_table(table, pair, shared_variance, coverage_factor).with_static_rows(table),
+        )

@@ -1,4 +1,4 @@
-"""Whether the columns of a table agree with each other, within the digits that were written.
+"""Checks that the columns of a table agree with each other within the digits that were written.
 
     |E*| = sigma / eps,  E' = |E*| cos(phi),  E'' = |E*| sin(phi),  eta = tan(phi) = E'' / E',
     |E*| = sqrt(E'^2 + E''^2),  c = E' eta / (2 pi f) = E'' / (2 pi f)
@@ -23,21 +23,21 @@ from .table import MaterialRow, MaterialTable, Quantity
 
 Agreement = Literal["agrees", "agrees if cut off", "disagrees"]
 
-_SLOPE_STEP = 1e-6
+_RELATIVE_STEP = 1e-6
 
 
 @dataclass(frozen=True)
 class Relation:
-    """How ``column`` follows from the columns ``given``; ``formula`` in words, ``value(f, *given)`` in numbers.
+    """How ``column`` follows from the columns ``inputs``; ``formula`` in words, ``value(f, *inputs)`` in numbers.
 
-    ``measured`` where the given columns are what a test measures, so that their errors are independent.
+    ``has_independent_inputs`` where the inputs are what a test measures, so that their errors are independent.
     """
 
     column: str
     formula: str
-    given: tuple[str, ...]
+    inputs: tuple[str, ...]
     value: Callable[..., float]
-    measured: bool = True
+    has_independent_inputs: bool = True
 
 
 _STRESS = ("stress_amplitude", "strain_amplitude")
@@ -66,11 +66,11 @@ RELATIONS: tuple[Relation, ...] = (
 
 
 @dataclass(frozen=True)
-class Check:
-    """One relation in one row: the ``written`` value beside the ``recomputed`` one, in SI units.
+class ConsistencyCheck:
+    """Consistency check of one relation in one row: the ``written`` and the ``recomputed`` value, in SI units.
 
     ``low`` and ``high`` bound the recomputed value for the digits of its inputs; ``uncertainty`` is propagated from
-    theirs, None where one has none or they are not independent; ``off`` is by how much the ranges miss each other.
+    theirs, None where one has none or they are not independent; ``range_gap`` is the gap between the two ranges.
     """
 
     frequency: float
@@ -82,81 +82,86 @@ class Check:
     high: float
     uncertainty: float | None
     written_uncertainty: float | None
-    off: float
+    range_gap: float
     agreement: Agreement
 
 
-def checks(table: MaterialTable) -> tuple[Check, ...]:
-    """Every relation whose columns a row has, row by row."""
-    return tuple(check for row in table.rows for check in _row_checks(row))
+def consistency_checks(table: MaterialTable) -> tuple[ConsistencyCheck, ...]:
+    """Check every relation whose columns a row has, row by row."""
+    return tuple(check for row in table.rows for check in _checks_of_row(row))
 
 
-def disagreements(found: Sequence[Check]) -> tuple[Check, ...]:
-    """The checks that fail, those that only fit digits cut off rather than rounded included."""
-    return tuple(check for check in found if check.agreement != "agrees")
+def disagreements(checks: Sequence[ConsistencyCheck]) -> tuple[ConsistencyCheck, ...]:
+    """Checks that fail, including those that agree only if digits were cut off rather than rounded."""
+    return tuple(check for check in checks if check.agreement != "agrees")
 
 
-def understated(found: Sequence[Check]) -> tuple[Check, ...]:
-    """The checks whose written uncertainty is below the propagated one by more than a tenth of it."""
+def understated_uncertainties(checks: Sequence[ConsistencyCheck]) -> tuple[ConsistencyCheck, ...]:
+    """Checks whose written uncertainty is below the propagated one by more than a tenth of it."""
     return tuple(
         check
-        for check in found
+        for check in checks
         if check.uncertainty is not None
         and check.written_uncertainty is not None
         and check.written_uncertainty < 0.9 * check.uncertainty
     )
 
 
-def _row_checks(row: MaterialRow) -> Iterator[Check]:
+def _checks_of_row(row: MaterialRow) -> Iterator[ConsistencyCheck]:
     for relation in RELATIONS:
         written = row.quantities.get(relation.column)
-        given = [row.quantities[name] for name in relation.given if name in row.quantities]
-        if written is not None and len(given) == len(relation.given):
-            yield _check(row.frequency, relation, written, given)
+        inputs = [row.quantities[name] for name in relation.inputs if name in row.quantities]
+        if written is not None and len(inputs) == len(relation.inputs):
+            yield _check_relation(row.frequency, relation, written, inputs)
 
 
-def _check(frequency: float, relation: Relation, written: Quantity, given: Sequence[Quantity]) -> Check:
+def _check_relation(
+    frequency: float, relation: Relation, written: Quantity, inputs: Sequence[Quantity]
+) -> ConsistencyCheck:
     def value(*numbers: float) -> float:
         return relation.value(frequency, *numbers)
 
-    middle = [quantity.value for quantity in given]
+    nominal = [quantity.value for quantity in inputs]
     # Every relation is monotonic in each of its inputs, so the corners bound it.
     corners = [
-        value(*corner) for corner in product(*((q.value - 0.5 * q.digit, q.value + 0.5 * q.digit) for q in given))
+        value(*corner)
+        for corner in product(*((q.value - 0.5 * q.resolution, q.value + 0.5 * q.resolution) for q in inputs))
     ]
     low, high = min(corners), max(corners)
-    off = _gap(written.value - 0.5 * written.digit, written.value + 0.5 * written.digit, low, high)
-    cut = _gap(written.value, written.value + written.digit, low, high)
-    return Check(
+    rounded_gap = _range_gap(
+        written.value - 0.5 * written.resolution, written.value + 0.5 * written.resolution, low, high
+    )
+    truncated_gap = _range_gap(written.value, written.value + written.resolution, low, high)
+    return ConsistencyCheck(
         frequency=frequency,
         column=relation.column,
         formula=relation.formula,
         written=written.value,
-        recomputed=value(*middle),
+        recomputed=value(*nominal),
         low=low,
         high=high,
-        uncertainty=_propagated(value, given) if relation.measured else None,
+        uncertainty=_propagated_uncertainty(value, inputs) if relation.has_independent_inputs else None,
         written_uncertainty=written.uncertainty,
-        off=off,
-        agreement="agrees" if off == 0.0 else "agrees if cut off" if cut == 0.0 else "disagrees",
+        range_gap=rounded_gap,
+        agreement="agrees" if rounded_gap == 0.0 else "agrees if cut off" if truncated_gap == 0.0 else "disagrees",
     )
 
 
-def _gap(low: float, high: float, other_low: float, other_high: float) -> float:
-    """By how much two ranges miss each other; rounding of the arithmetic itself is no gap."""
+def _range_gap(low: float, high: float, other_low: float, other_high: float) -> float:
+    """Gap between two ranges; rounding of the arithmetic itself is no gap."""
     gap = max(other_low - high, low - other_high, 0.0)
     return gap if gap > 1e-12 * max(abs(high), abs(other_high)) else 0.0
 
 
-def _propagated(value: Callable[..., float], given: Sequence[Quantity]) -> float | None:
+def _propagated_uncertainty(value: Callable[..., float], inputs: Sequence[Quantity]) -> float | None:
     """One standard deviation of the value, to first order, for independent inputs."""
-    if any(quantity.uncertainty is None for quantity in given):
+    if any(quantity.uncertainty is None for quantity in inputs):
         return None
-    middle = np.array([quantity.value for quantity in given])
-    total = 0.0
-    for place, quantity in enumerate(given):
-        step = np.zeros(len(given))
-        step[place] = _SLOPE_STEP * max(abs(quantity.value), 1e-3)
-        slope = (value(*(middle + step)) - value(*(middle - step))) / (2.0 * step[place])
-        total += (slope * float(quantity.uncertainty or 0.0)) ** 2
-    return math.sqrt(total)
+    nominal = np.array([quantity.value for quantity in inputs])
+    variance = 0.0
+    for index, quantity in enumerate(inputs):
+        step = np.zeros(len(inputs))
+        step[index] = _RELATIVE_STEP * max(abs(quantity.value), 1e-3)
+        slope = (value(*(nominal + step)) - value(*(nominal - step))) / (2.0 * step[index])
+        variance += (slope * float(quantity.uncertainty or 0.0)) ** 2
+    return math.sqrt(variance)

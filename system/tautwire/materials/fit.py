@@ -1,7 +1,7 @@
-"""Fits a model of the modulus to observations: weighted least squares with no modulus below zero.
+"""Fits a model of the complex modulus by weighted least squares with no modulus below zero.
 
 The modulus is linear in moduli and damping. Non-negative least squares over a grid of relaxation times and delays
-therefore finds where to begin, without local minima; a trust-region method then frees all parameters.
+therefore finds starting values, without local minima; a trust-region method then frees all parameters.
 """
 
 from __future__ import annotations
@@ -17,260 +17,279 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares, nnls
 from scipy.stats import chi2
 
-from .modulus import Complex, Material, angular, branch_share, complex_modulus, friction_share
-from .observations import Observations
-from .terms import Terms
+from .modulus import (
+    Complex,
+    Material,
+    angular_frequency,
+    complex_modulus,
+    normalised_branch_modulus,
+    normalised_friction_loss,
+)
+from .observations import ModulusObservations
+from .terms import ModelStructure
 
 Array = NDArray[np.float64]
 
-# Beyond these, in tenths and tens of the measured periods, a branch looks like a damper or like a spring.
-TIME_MARGIN = 10.0
-TIMES_A_DECADE = 4
-DELAYS = 9
-STARTS = 3
-EVALUATIONS = 200
-# A rope that let go entirely could not carry a robot: some modulus is left, as a share of the mean measured one.
-LEAST_MODULUS = 0.01
-DENSE_TIMES_A_DECADE = 80
+# Relaxation times up to this factor beyond the measured periods; a branch beyond looks like a damper or a spring.
+RELAXATION_TIME_MARGIN = 10.0
+GRID_TIMES_PER_DECADE = 4
+GRID_DELAYS = 9
+MAX_STARTS = 3
+MAX_EVALUATIONS = 200
+# Lower bound of the long-term modulus over the mean measured one: a rope that relaxes entirely carries no robot.
+MIN_RELATIVE_MODULUS = 0.01
+DENSE_GRID_TIMES_PER_DECADE = 80
 
 
 @dataclass(frozen=True)
 class MaterialFit:
-    """The best values of a model's parameters, in SI units, with what they leave of the observations."""
+    """Least-squares estimate of a model's parameters, in SI units, with the chi-squared of its residuals."""
 
-    seen: Observations = field(repr=False)
-    terms: Terms
+    observations: ModulusObservations = field(repr=False)
+    structure: ModelStructure
     values: tuple[float, ...]
     chi_squared: float
 
     @property
     def material(self) -> Material:
         """The fitted constants."""
-        return self.terms.material(self.values)
+        return self.structure.material(self.values)
 
     @property
-    def freedom(self) -> int:
+    def degrees_of_freedom(self) -> int:
         """Degrees of freedom: measured numbers less free parameters."""
-        return self.seen.number_count - len(self.values)
+        return self.observations.measurement_count - len(self.values)
 
     @property
     def p_value(self) -> float:
-        """How often noise alone would leave as much."""
-        return float(chi2.sf(self.chi_squared, self.freedom))
+        """Probability that noise alone gives as large a chi-squared."""
+        return float(chi2.sf(self.chi_squared, self.degrees_of_freedom))
 
     @property
     def bic(self) -> float:
         """Bayesian information criterion, up to a constant of the observations: chi-squared + p ln(numbers)."""
-        return self.chi_squared + len(self.values) * float(np.log(self.seen.number_count))
+        return self.chi_squared + len(self.values) * float(np.log(self.observations.measurement_count))
 
 
 @dataclass(frozen=True)
-class Problem:
-    """Residuals of a model by scaled parameters, which are all of order one; times enter by their logarithm."""
+class LeastSquaresProblem:
+    """Least-squares problem in scaled parameters, which are all of order one; times enter by their logarithm."""
 
-    seen: Observations
-    terms: Terms
+    observations: ModulusObservations
+    structure: ModelStructure
 
     @cached_property
     def _omega(self) -> Array:
-        return angular(self.seen.frequency)
+        return angular_frequency(self.observations.frequency)
 
     @cached_property
-    def _target(self) -> Array:
-        return self.seen.whitened(self.seen.storage, self.seen.loss, self.seen.static)
+    def _whitened_measurements(self) -> Array:
+        return self.observations.whiten(
+            self.observations.storage, self.observations.loss, self.observations.static_modulus
+        )
 
     @cached_property
-    def _hysteresis(self) -> Array:
-        """Loss modulus of each parameter of hysteresis of one, shape (N, 0 or 1)."""
-        kinds = {"none": [], "modulus": [np.ones_like(self._omega)], "stress": [friction_share(self.seen.amplitude)]}
-        return np.array(kinds[self.terms.hysteresis]).reshape(-1, len(self._omega)).T
+    def _hysteresis_columns(self) -> Array:
+        """Loss modulus for a hysteresis parameter of one, shape (N, 0 or 1)."""
+        kinds = {
+            "none": [],
+            "modulus": [np.ones_like(self._omega)],
+            "stress": [normalised_friction_loss(self.observations.amplitude)],
+        }
+        return np.array(kinds[self.structure.hysteresis]).reshape(-1, len(self._omega)).T
 
     @cached_property
     def scale(self) -> Array:
-        """SI units of one scaled parameter; of a time, its middle."""
-        modulus = float(np.mean(np.hypot(self.seen.storage, self.seen.loss)))
+        """Scale of each parameter in SI units; of a relaxation time, the middle of its range."""
+        modulus = float(np.mean(np.hypot(self.observations.storage, self.observations.loss)))
         middle = float(np.sqrt(self._omega.min() * self._omega.max()))
-        branches = [modulus] * self.terms.branches + [1.0 / middle] * self.terms.branches
-        viscous = [modulus / middle] * self.terms.damping
-        friction = [modulus / size for size in self._hysteresis.max(axis=0)]
-        return np.array([modulus, *viscous, *friction, *branches, *([1.0 / self._omega.max()] * self.terms.delay)])
+        branches = [modulus] * self.structure.branches + [1.0 / middle] * self.structure.branches
+        viscous = [modulus / middle] * self.structure.damping
+        friction = [modulus / size for size in self._hysteresis_columns.max(axis=0)]
+        return np.array([modulus, *viscous, *friction, *branches, *([1.0 / self._omega.max()] * self.structure.delay)])
 
     @cached_property
     def bounds(self) -> tuple[Array, Array]:
-        """Least and greatest scaled parameters."""
-        linear, branches = self.terms.linear_count, self.terms.branches
-        reach = 0.5 * np.log(self._omega.max() / self._omega.min()) + np.log(TIME_MARGIN)
-        quarter = [np.pi / 2.0] * self.terms.delay
-        lower = [LEAST_MODULUS] + [0.0] * (linear - 1) + [-reach] * branches + [-each for each in quarter]
-        upper = [np.inf] * linear + [reach] * branches + quarter
+        """Lower and upper bounds of the scaled parameters."""
+        linear, branches = self.structure.linear_count, self.structure.branches
+        reach = 0.5 * np.log(self._omega.max() / self._omega.min()) + np.log(RELAXATION_TIME_MARGIN)
+        max_delay = [np.pi / 2.0] * self.structure.delay
+        lower = [MIN_RELATIVE_MODULUS] + [0.0] * (linear - 1) + [-reach] * branches + [-each for each in max_delay]
+        upper = [np.inf] * linear + [reach] * branches + max_delay
         return np.array(lower), np.array(upper)
 
-    def in_units(self, scaled: Array) -> Array:
-        """Parameters in SI units."""
-        first, last = self._times()
+    def to_si(self, scaled: Array) -> Array:
+        """Convert scaled parameters to SI units."""
+        first, last = self._time_indices()
         values = np.array(scaled, dtype=float)
         values[first:last] = np.exp(values[first:last])
         product: Array = values * self.scale
         return product
 
-    def in_scale(self, values: Array) -> Array:
-        """Scaled parameters of values in SI units."""
-        first, last = self._times()
+    def to_scaled(self, values: Array) -> Array:
+        """Convert parameters in SI units to scaled ones."""
+        first, last = self._time_indices()
         scaled = np.asarray(values, dtype=float) / self.scale
         scaled[first:last] = np.log(scaled[first:last])
         return scaled
 
     def residual(self, scaled: Array) -> Array:
-        """Model less measured, whitened, shape (2N + M,)."""
-        linear = scaled[: self.terms.linear_count]
-        return np.asarray(self._whitened(self._columns(scaled)) @ linear - self._target)
+        """Residual: model less measured, whitened, shape (2N + M,)."""
+        linear = scaled[: self.structure.linear_count]
+        return np.asarray(self._whiten(self._modulus_columns(scaled)) @ linear - self._whitened_measurements)
 
     def jacobian(self, scaled: Array) -> Array:
-        """Derivatives of the residual, shape (2N + M, p)."""
-        columns = self._columns(scaled)
-        first, last = self._times()
-        linear = scaled[: self.terms.linear_count]
-        slopes: list[Complex] = [columns]
-        if self.terms.branches:
-            times = self.in_units(scaled)[first:last]
-            shares = columns[:, self.terms.linear_count - self.terms.branches :]
+        """Jacobian of the residual, shape (2N + M, p)."""
+        columns = self._modulus_columns(scaled)
+        first, last = self._time_indices()
+        linear = scaled[: self.structure.linear_count]
+        derivatives: list[Complex] = [columns]
+        if self.structure.branches:
+            times = self.to_si(scaled)[first:last]
+            branch_columns = columns[:, self.structure.linear_count - self.structure.branches :]
             # d/d ln(tau) of x / (1 + x) is x / (1 + x)^2.
-            moduli: Array = linear[-self.terms.branches :]
-            slopes.append(np.asarray(shares * moduli / (1.0 + 1j * np.outer(self._omega, times))))
-        if self.terms.delay:
-            turn = 1j * self._omega * self.scale[-1]
-            slopes.append((turn * (columns @ linear))[:, None])
-        return self._whitened(np.hstack(slopes))
+            moduli: Array = linear[-self.structure.branches :]
+            derivatives.append(np.asarray(branch_columns * moduli / (1.0 + 1j * np.outer(self._omega, times))))
+        if self.structure.delay:
+            delay_factor = 1j * self._omega * self.scale[-1]
+            derivatives.append((delay_factor * (columns @ linear))[:, None])
+        return self._whiten(np.hstack(derivatives))
 
-    def linear_solution(self, nonlinear: Array) -> tuple[Array, float]:
-        """All scaled parameters with the best linear ones for given times and delay, and the chi-squared."""
-        lower = self.bounds[0][: self.terms.linear_count]
+    def solve_linear(self, nonlinear: Array) -> tuple[Array, float]:
+        """Variable projection: scaled parameters, the linear ones best for fixed times and delay, and chi-squared."""
+        lower = self.bounds[0][: self.structure.linear_count]
         scaled = np.concatenate([lower, nonlinear])
-        matrix = self._whitened(self._columns(scaled))
-        linear, left = nnls(matrix, self._target - matrix @ lower)
-        return np.concatenate([lower + linear, nonlinear]), left**2
+        matrix = self._whiten(self._modulus_columns(scaled))
+        linear, residual_norm = nnls(matrix, self._whitened_measurements - matrix @ lower)
+        return np.concatenate([lower + linear, nonlinear]), residual_norm**2
 
-    def starts(self) -> list[Array]:
-        """Where to begin: the best points of a grid of times and delays, each with its best linear parameters."""
-        lower, upper = (bound[self.terms.linear_count :] for bound in self.bounds)
+    def starting_points(self) -> list[Array]:
+        """Starting points: the best of a grid search over times and delays, each with its best linear parameters."""
+        lower, upper = (bound[self.structure.linear_count :] for bound in self.bounds)
         times: Array = np.zeros(0)
-        if self.terms.branches:
+        if self.structure.branches:
             decades = (upper[0] - lower[0]) / np.log(10.0)
-            times = np.linspace(lower[0], upper[0], 1 + int(np.ceil(TIMES_A_DECADE * decades)))
-        delays = np.linspace(lower[-1], upper[-1], DELAYS)[1:-1, None] if self.terms.delay else np.zeros((1, 0))
-        found = [start for delay in delays for start in self._starts_on(times, delay)]
-        return [scaled for _, scaled in sorted(found, key=lambda each: each[0])[:STARTS]]
+            times = np.linspace(lower[0], upper[0], 1 + int(np.ceil(GRID_TIMES_PER_DECADE * decades)))
+        delays = (
+            np.linspace(lower[-1], upper[-1], GRID_DELAYS)[1:-1, None] if self.structure.delay else np.zeros((1, 0))
+        )
+        candidates = [start for delay in delays for start in self._grid_starts(times, delay)]
+        return [scaled for _, scaled in sorted(candidates, key=lambda each: each[0])[:MAX_STARTS]]
 
-    def _starts_on(self, times: Array, delay: Array) -> Iterator[tuple[float, Array]]:
-        """Chi-squared and scaled parameters of every choice of branches from these times."""
-        branches, head = self.terms.branches, self.terms.linear_count - self.terms.branches
-        dense = Problem(self.seen, replace(self.terms, branches=len(times)))
-        scaled = np.concatenate([np.zeros(head + len(times)), times, delay])
-        matrix = dense._whitened(dense._columns(scaled))
-        # The triangle of the QR decomposition has the same least squares in far fewer rows.
-        short: Array = np.asarray(np.linalg.qr(np.column_stack([matrix, self._target]), mode="r"))
-        rest = short[:, -1] - LEAST_MODULUS * short[:, 0]
-        for chosen in combinations(range(len(times)), branches):
-            columns = [*range(head), *(head + place for place in chosen)]
-            linear, left = nnls(short[:, columns], rest)
-            linear[0] += LEAST_MODULUS
-            yield left**2, np.concatenate([linear, times[list(chosen)], delay])
+    def _grid_starts(self, times: Array, delay: Array) -> Iterator[tuple[float, Array]]:
+        """Chi-squared and scaled parameters for every choice of branches from the grid of times."""
+        branches, leading_count = self.structure.branches, self.structure.linear_count - self.structure.branches
+        dense = LeastSquaresProblem(self.observations, replace(self.structure, branches=len(times)))
+        scaled = np.concatenate([np.zeros(leading_count + len(times)), times, delay])
+        matrix = dense._whiten(dense._modulus_columns(scaled))
+        # The triangular factor of QR has the same least-squares solution in far fewer rows.
+        triangle: Array = np.asarray(np.linalg.qr(np.column_stack([matrix, self._whitened_measurements]), mode="r"))
+        target = triangle[:, -1] - MIN_RELATIVE_MODULUS * triangle[:, 0]
+        for time_indices in combinations(range(len(times)), branches):
+            columns = [*range(leading_count), *(leading_count + index for index in time_indices)]
+            linear, residual_norm = nnls(triangle[:, columns], target)
+            linear[0] += MIN_RELATIVE_MODULUS
+            yield residual_norm**2, np.concatenate([linear, times[list(time_indices)], delay])
 
-    def _times(self) -> tuple[int, int]:
-        return self.terms.linear_count, self.terms.linear_count + self.terms.branches
+    def _time_indices(self) -> tuple[int, int]:
+        return self.structure.linear_count, self.structure.linear_count + self.structure.branches
 
-    def _columns(self, scaled: Array) -> Complex:
-        """The complex modulus of each linear parameter of one, shape (N, linear_count)."""
-        first, last = self._times()
-        values = self.in_units(scaled)
+    def _modulus_columns(self, scaled: Array) -> Complex:
+        """Complex modulus for each linear parameter of one, shape (N, linear_count)."""
+        first, last = self._time_indices()
+        values = self.to_si(scaled)
         ones = np.ones_like(self._omega)
-        columns: list[Any] = [ones, *([1j * self._omega] * self.terms.damping), *(1j * self._hysteresis.T)]
-        columns += [branch_share(self._omega, time) for time in values[first:last]]
-        lead = np.exp(1j * self._omega * (values[-1] if self.terms.delay else 0.0))
-        modulus: Complex = np.column_stack(columns) * self.scale[: self.terms.linear_count] * lead[:, None]
+        columns: list[Any] = [ones, *([1j * self._omega] * self.structure.damping), *(1j * self._hysteresis_columns.T)]
+        columns += [normalised_branch_modulus(self._omega, time) for time in values[first:last]]
+        phase_lead = np.exp(1j * self._omega * (values[-1] if self.structure.delay else 0.0))
+        modulus: Complex = np.column_stack(columns) * self.scale[: self.structure.linear_count] * phase_lead[:, None]
         return modulus
 
-    def _whitened(self, columns: Complex) -> Array:
-        long_term = np.zeros((len(self.seen.static), columns.shape[1]))
+    def _whiten(self, columns: Complex) -> Array:
+        long_term = np.zeros((len(self.observations.static_modulus), columns.shape[1]))
         long_term[:, 0] = self.scale[0]
-        return self.seen.whitened(columns.real, columns.imag, long_term)
+        return self.observations.whiten(columns.real, columns.imag, long_term)
 
 
-def fit_terms(seen: Observations, terms: Terms) -> MaterialFit:
-    """The most probable values of a model's parameters."""
-    problem = Problem(seen, terms)
-    starts = problem.starts()
-    if len(starts[0]) == terms.linear_count:
-        scaled, left = problem.linear_solution(np.zeros(0))
+def fit_structure(observations: ModulusObservations, structure: ModelStructure) -> MaterialFit:
+    """Fit a model structure: the maximum-likelihood estimate of its parameters."""
+    problem = LeastSquaresProblem(observations, structure)
+    starts = problem.starting_points()
+    if len(starts[0]) == structure.linear_count:
+        scaled, chi_squared = problem.solve_linear(np.zeros(0))
     else:
-        scaled, left = solve(problem, starts)
-        # The trust region only comes near a bound; the linear solution sits on it.
-        scaled, left = min(problem.linear_solution(scaled[terms.linear_count :]), (scaled, left), key=lambda s: s[1])
-    values = _sorted_branches(terms, problem.in_units(scaled))
-    return MaterialFit(seen, terms, tuple(values.tolist()), float(left))
+        scaled, chi_squared = minimise(problem, starts)
+        # The trust region only approaches a bound; the linear solution lies on it.
+        scaled, chi_squared = min(
+            problem.solve_linear(scaled[structure.linear_count :]), (scaled, chi_squared), key=lambda s: s[1]
+        )
+    values = _sorted_branches(structure, problem.to_si(scaled))
+    return MaterialFit(observations, structure, tuple(values.tolist()), float(chi_squared))
 
 
-def solve(problem: Problem, starts: list[Array], fixed: Mapping[int, float] | None = None) -> tuple[Array, float]:
-    """Scaled parameters of least chi-squared, from the best of some starts, and the chi-squared.
+def minimise(
+    problem: LeastSquaresProblem, starts: list[Array], fixed_values: Mapping[int, float] | None = None
+) -> tuple[Array, float]:
+    """Scaled parameters that minimise chi-squared, from the best of several starting points, and that chi-squared.
 
-    ``fixed`` holds scaled values of parameters, by index, that stay as they are.
+    ``fixed_values`` holds scaled values of parameters, by index, that are not varied.
     """
-    held = dict(fixed or {})
-    free = np.array([index for index in range(len(problem.scale)) if index not in held], dtype=int)
+    fixed_by_index = dict(fixed_values or {})
+    free = np.array([index for index in range(len(problem.scale)) if index not in fixed_by_index], dtype=int)
     lower, upper = problem.bounds
 
-    def whole(part: Array) -> Array:
+    def with_fixed(free_values: Array) -> Array:
         scaled = np.zeros(len(problem.scale))
-        scaled[free] = part
-        for index, value in held.items():
+        scaled[free] = free_values
+        for index, value in fixed_by_index.items():
             scaled[index] = value
         return scaled
 
-    def residual(part: Array) -> Array:
-        return problem.residual(whole(part))
+    def residual(free_values: Array) -> Array:
+        return problem.residual(with_fixed(free_values))
 
-    def slopes(part: Array) -> Array:
-        return np.asarray(problem.jacobian(whole(part))[:, free])
+    def jacobian(free_values: Array) -> Array:
+        return np.asarray(problem.jacobian(with_fixed(free_values))[:, free])
 
     if not len(free):
-        return whole(np.zeros(0)), float(np.sum(residual(np.zeros(0)) ** 2))
+        return with_fixed(np.zeros(0)), float(np.sum(residual(np.zeros(0)) ** 2))
     solutions = [
         least_squares(
             residual,
             np.clip(start[free], lower[free], upper[free]),
-            jac=slopes,
+            jac=jacobian,
             bounds=(lower[free], upper[free]),
             ftol=1e-9,
-            max_nfev=EVALUATIONS,
+            max_nfev=MAX_EVALUATIONS,
         )
         for start in starts
     ]
     best = min(solutions, key=lambda solution: float(solution.cost))
-    return whole(best.x), 2.0 * float(best.cost)
+    return with_fixed(best.x), 2.0 * float(best.cost)
 
 
-def residuals(seen: Observations, material: Material) -> Array:
-    """Model less measured of any material, whitened, shape (2N + M,); its squares sum to chi-squared."""
-    modulus = complex_modulus(material, seen.frequency, seen.amplitude)
-    long_term = material.modulus - seen.static
-    return seen.whitened(modulus.real - seen.storage, modulus.imag - seen.loss, long_term)
+def whitened_residuals(observations: ModulusObservations, material: Material) -> Array:
+    """Whitened residuals, model less measured, of any material, shape (2N + M,); their squares sum to chi-squared."""
+    modulus = complex_modulus(material, observations.frequency, observations.amplitude)
+    long_term = material.modulus - observations.static_modulus
+    return observations.whiten(modulus.real - observations.storage, modulus.imag - observations.loss, long_term)
 
 
-def relaxation_floor(seen: Observations) -> float:
-    """The least chi-squared that damping and any number of branches can leave: a convex problem, solved globally.
+def relaxation_floor(observations: ModulusObservations) -> float:
+    """Minimum of chi-squared over damping and any number of branches: a convex problem, solved globally.
 
-    No passive linear solid does better; what is above noise here, relaxation cannot be the reason of.
+    No passive linear solid does better; relaxation cannot explain what is above noise here.
     """
-    problem = Problem(seen, Terms(damping=True, branches=1))
+    problem = LeastSquaresProblem(observations, ModelStructure(damping=True, branches=1))
     lower, upper = problem.bounds
-    count = 1 + int(np.ceil(DENSE_TIMES_A_DECADE * (upper[-1] - lower[-1]) / np.log(10.0)))
-    dense = Problem(seen, Terms(damping=True, branches=count))
-    return dense.linear_solution(np.linspace(lower[-1], upper[-1], count))[1]
+    count = 1 + int(np.ceil(DENSE_GRID_TIMES_PER_DECADE * (upper[-1] - lower[-1]) / np.log(10.0)))
+    dense = LeastSquaresProblem(observations, ModelStructure(damping=True, branches=count))
+    return dense.solve_linear(np.linspace(lower[-1], upper[-1], count))[1]
 
 
-def _sorted_branches(terms: Terms, values: Array) -> Array:
-    """The same parameters with the branches from the shortest time on."""
-    count, first = terms.branches, terms.linear_count
+def _sorted_branches(structure: ModelStructure, values: Array) -> Array:
+    """The parameters with the branches sorted from the shortest time on."""
+    count, first = structure.branches, structure.linear_count
     order = np.argsort(values[first : first + count])
     ordered = values.copy()
     ordered[first - count : first] = values[first - count : first][order]

@@ -1,4 +1,4 @@
-"""How well a model, fitted to the other rows, predicts a row that it has not seen."""
+"""Cross-validation: how well a model predicts rows that it was not fitted to."""
 
 from __future__ import annotations
 
@@ -7,59 +7,63 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .fit import MaterialFit, fit_terms, residuals
+from .fit import MaterialFit, fit_structure, whitened_residuals
 from .modulus import complex_modulus
-from .observations import Observations
-from .terms import Terms
+from .observations import ModulusObservations
+from .terms import ModelStructure
 
 Array = NDArray[np.float64]
 
-# Longer tables are left out in so many interleaved parts.
-MOST_PARTS = 12
+# Leave-one-out up to this number of rows; longer tables are held out in as many interleaved folds.
+MAX_FOLDS = 12
 
 
 @dataclass(frozen=True)
-class LeaveOut:
-    """What N rows look like to fits that have not seen them.
+class CrossValidation:
+    """Cross-validated predictions of N rows by fits that have not seen them.
 
     ``storage`` in Pa and ``damping`` in Pa s are predicted; ``chi_squared`` is of each row's two numbers against the
-    table's uncertainty alone; all (N,). ``inside`` marks rows between frequencies that the fit had seen: the others
-    are extrapolated. ``rest`` are the fits to the other rows, and ``rows`` what each had not seen.
+    table's uncertainty alone; all (N,). ``is_interpolated`` marks rows between frequencies that the fit had seen: the
+    others are extrapolated. ``fits`` are the fits to the other rows, and ``held_out_rows`` what each had not seen.
     """
 
     storage: Array
     damping: Array
     chi_squared: Array
-    inside: NDArray[np.bool_]
-    rest: tuple[MaterialFit, ...]
-    rows: tuple[tuple[int, ...], ...]
+    is_interpolated: NDArray[np.bool_]
+    fits: tuple[MaterialFit, ...]
+    held_out_rows: tuple[tuple[int, ...], ...]
 
     @property
-    def total(self) -> float:
+    def total_chi_squared(self) -> float:
         """Chi-squared of all predictions."""
         return float(np.sum(self.chi_squared))
 
     @property
-    def total_inside(self) -> float:
+    def interpolated_chi_squared(self) -> float:
         """Chi-squared of the predictions that are no extrapolation."""
-        return float(np.sum(self.chi_squared[self.inside]))
+        return float(np.sum(self.chi_squared[self.is_interpolated]))
 
 
-def leave_out(seen: Observations, terms: Terms) -> LeaveOut:
-    """Fits a model without each row (each of twelve parts of a longer table) and predicts what was left out."""
-    count = seen.row_count
-    parts = [tuple(range(first, count, MOST_PARTS)) for first in range(min(count, MOST_PARTS))]
+def cross_validate(observations: ModulusObservations, structure: ModelStructure) -> CrossValidation:
+    """Cross-validate a model: fit it without each row (each of twelve folds of a longer table) and predict that."""
+    count = observations.row_count
+    folds = [tuple(range(first, count, MAX_FOLDS)) for first in range(min(count, MAX_FOLDS))]
     predicted = np.zeros(count, dtype=complex)
-    chi_squared, inside = np.zeros(count), np.zeros(count, dtype=bool)
-    rest = []
-    for rows in parts:
-        kept = [row for row in range(count) if row not in rows]
-        fit = fit_terms(seen.taken(kept), terms)
-        rest.append(fit)
+    chi_squared, is_interpolated = np.zeros(count), np.zeros(count, dtype=bool)
+    fits = []
+    for rows in folds:
+        training_rows = [row for row in range(count) if row not in rows]
+        fit = fit_structure(observations.select_rows(training_rows), structure)
+        fits.append(fit)
         for row in rows:
-            alone = seen.taken([row])
-            predicted[row] = complex_modulus(fit.material, seen.frequency[row], seen.amplitude[row])
-            chi_squared[row] = float(np.sum(residuals(alone, fit.material)[:2] ** 2))
-            inside[row] = seen.frequency[kept].min() <= seen.frequency[row] <= seen.frequency[kept].max()
-    damping = predicted.imag / (2.0 * np.pi * seen.frequency)
-    return LeaveOut(predicted.real, damping, chi_squared, inside, tuple(rest), tuple(parts))
+            held_out = observations.select_rows([row])
+            predicted[row] = complex_modulus(fit.material, observations.frequency[row], observations.amplitude[row])
+            chi_squared[row] = float(np.sum(whitened_residuals(held_out, fit.material)[:2] ** 2))
+            is_interpolated[row] = (
+                observations.frequency[training_rows].min()
+                <= observations.frequency[row]
+                <= observations.frequency[training_rows].max()
+            )
+    damping = predicted.imag / (2.0 * np.pi * observations.frequency)
+    return CrossValidation(predicted.real, damping, chi_squared, is_interpolated, tuple(fits), tuple(folds))

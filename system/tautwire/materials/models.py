@@ -1,4 +1,4 @@
-"""Models beside a table: how far each is off, row by row."""
+"""Goodness of fit of models against a table, row by row."""
 
 from __future__ import annotations
 
@@ -7,39 +7,51 @@ from collections.abc import Mapping
 import numpy as np
 from scipy.stats import chi2
 
-from .fit import MaterialFit, residuals
-from .leave_out import LeaveOut
-from .modulus import Material, damping, storage_modulus
-from .observations import Observations
-from .profile import intervals
-from .verdict import Errors, Estimate, Model, Role
+from .fit import MaterialFit, whitened_residuals
+from .leave_out import CrossValidation
+from .modulus import Material, storage_modulus, viscous_damping
+from .observations import ModulusObservations
+from .profile import confidence_intervals
+from .verdict import Estimate, EvaluatedModel, RmsErrors, Role
 
 
-def declared_model(seen: Observations, material: Material) -> Model:
-    """A material whose constants were not fitted."""
-    chi_squared = float(np.sum(residuals(seen, material) ** 2))
-    count = seen.number_count
-    return _model(seen, "declared", "damping", material, (), chi_squared, count, chi_squared)
+def declared_model(observations: ModulusObservations, material: Material) -> EvaluatedModel:
+    """Evaluate a material whose constants were not fitted."""
+    chi_squared = float(np.sum(whitened_residuals(observations, material) ** 2))
+    count = observations.measurement_count
+    return _evaluate_model(observations, "declared", "damping", material, (), chi_squared, count, chi_squared)
 
 
 def fitted_model(
-    seen: Observations,
+    observations: ModulusObservations,
     role: Role,
     fit: MaterialFit,
     declared: Material | None = None,
-    left_out: LeaveOut | None = None,
-) -> Model:
-    """A fit with the intervals of its parameters, judged on ``seen``; ``declared`` gives the constants so far."""
-    found = estimates(fit, declared)
-    chi_squared = float(np.sum(residuals(seen, fit.material) ** 2))
-    freedom = seen.number_count - len(fit.values)
-    bic = chi_squared + len(fit.values) * float(np.log(seen.number_count))
-    return _model(seen, role, fit.terms.label, fit.material, found, chi_squared, freedom, bic, left_out)
+    cross_validation: CrossValidation | None = None,
+) -> EvaluatedModel:
+    """Evaluate a fit, with its confidence intervals, on ``observations``; ``declared`` gives the present constants."""
+    estimates = parameter_estimates(fit, declared)
+    chi_squared = float(np.sum(whitened_residuals(observations, fit.material) ** 2))
+    degrees_of_freedom = observations.measurement_count - len(fit.values)
+    bic = chi_squared + len(fit.values) * float(np.log(observations.measurement_count))
+    return _evaluate_model(
+        observations,
+        role,
+        fit.structure.label,
+        fit.material,
+        estimates,
+        chi_squared,
+        degrees_of_freedom,
+        bic,
+        cross_validation,
+    )
 
 
-def estimates(fit: MaterialFit, declared: Material | None) -> tuple[Estimate, ...]:
-    """Every parameter of a fit with its 95 % interval."""
-    known: Mapping[str, float] = {"modulus": declared.modulus, "damping": declared.damping} if declared else {}
+def parameter_estimates(fit: MaterialFit, declared: Material | None) -> tuple[Estimate, ...]:
+    """Estimates of all parameters of a fit with their 95 % intervals."""
+    declared_values: Mapping[str, float] = (
+        {"modulus": declared.modulus, "damping": declared.damping} if declared else {}
+    )
     return tuple(
         Estimate(
             effect=parameter.effect,
@@ -50,59 +62,63 @@ def estimates(fit: MaterialFit, declared: Material | None) -> tuple[Estimate, ..
             high=interval.high,
             low_is_open=interval.low_is_open,
             high_is_open=interval.high_is_open,
-            declared=known.get(parameter.effect),
+            declared=declared_values.get(parameter.effect),
         )
-        for parameter, value, interval in zip(fit.terms.parameters, fit.values, intervals(fit), strict=True)
+        for parameter, value, interval in zip(
+            fit.structure.parameters, fit.values, confidence_intervals(fit), strict=True
+        )
     )
 
 
-def errors(seen: Observations, model: Model) -> Errors:
-    """Root mean squares of model less measured, over the rows that it was fitted to."""
-    return _rms(
-        storage_modulus(model.material, seen.frequency, seen.amplitude) - seen.storage,
-        damping(model.material, seen.frequency, seen.amplitude) - seen.damping,
+def fit_errors(observations: ModulusObservations, model: EvaluatedModel) -> RmsErrors:
+    """Root mean square errors, model less measured, over the rows that the model was fitted to."""
+    return _rms_errors(
+        storage_modulus(model.material, observations.frequency, observations.amplitude) - observations.storage,
+        viscous_damping(model.material, observations.frequency, observations.amplitude) - observations.damping,
     )
 
 
-def predicted_errors(seen: Observations, model: Model) -> Errors:
-    """The same over rows predicted from the others; of a declared pair, which saw none, over all."""
-    if model.leave_out is None:
-        return errors(seen, model)
-    return _rms(model.leave_out.storage - seen.storage, model.leave_out.damping - seen.damping)
+def prediction_errors(observations: ModulusObservations, model: EvaluatedModel) -> RmsErrors:
+    """Root mean square errors of cross-validated predictions; of a declared pair, never fitted, over all rows."""
+    if model.cross_validation is None:
+        return fit_errors(observations, model)
+    return _rms_errors(
+        model.cross_validation.storage - observations.storage, model.cross_validation.damping - observations.damping
+    )
 
 
-def noise_floor(seen: Observations) -> Errors:
-    """What the table's uncertainties alone would leave."""
-    return _rms(seen.storage_uncertainty, seen.damping_uncertainty)
+def noise_floor(observations: ModulusObservations) -> RmsErrors:
+    """Root mean square errors that the table's uncertainties alone would give."""
+    return _rms_errors(observations.storage_uncertainty, observations.damping_uncertainty)
 
 
-def _rms(storage: np.ndarray, viscous: np.ndarray) -> Errors:
-    return Errors(float(np.sqrt(np.mean(storage**2))), float(np.sqrt(np.mean(viscous**2))))
+def _rms_errors(storage: np.ndarray, viscous: np.ndarray) -> RmsErrors:
+    return RmsErrors(float(np.sqrt(np.mean(storage**2))), float(np.sqrt(np.mean(viscous**2))))
 
 
-def _model(
-    seen: Observations,
+def _evaluate_model(
+    observations: ModulusObservations,
     role: Role,
     label: str,
     material: Material,
-    found: tuple[Estimate, ...],
+    estimates: tuple[Estimate, ...],
     chi_squared: float,
-    freedom: int,
+    degrees_of_freedom: int,
     bic: float,
-    left_out: LeaveOut | None = None,
-) -> Model:
-    storage = storage_modulus(material, seen.frequency, seen.amplitude) - seen.storage
-    viscous = damping(material, seen.frequency, seen.amplitude) - seen.damping
-    return Model(
+    cross_validation: CrossValidation | None = None,
+) -> EvaluatedModel:
+    storage = storage_modulus(material, observations.frequency, observations.amplitude) - observations.storage
+    viscous = viscous_damping(material, observations.frequency, observations.amplitude) - observations.damping
+    return EvaluatedModel(
         role=role,
         label=label,
         material=material,
-        estimates=found,
+        estimates=estimates,
         chi_squared=chi_squared,
-        freedom=freedom,
-        p_value=float(chi2.sf(chi_squared, freedom)),
+        degrees_of_freedom=degrees_of_freedom,
+        p_value=float(chi2.sf(chi_squared, degrees_of_freedom)),
         bic=bic,
-        storage_sigmas=storage / seen.storage_uncertainty,
-        damping_sigmas=viscous / seen.damping_uncertainty,
-        leave_out=left_out,
+        storage_residuals=storage / observations.storage_uncertainty,
+        damping_residuals=viscous / observations.damping_uncertainty,
+        cross_validation=cross_validation,
     )

@@ -1,4 +1,4 @@
-"""The files of a verdict on a rope."""
+"""Writes the files of a verdict on a rope."""
 
 from __future__ import annotations
 
@@ -12,12 +12,12 @@ from .figure import material_figure
 from .robot_material import robot_material, with_material
 from .verdict import MaterialVerdict
 
-FILES = ("fit.json", "material.png", "material.svg", "relaxation.toml", "robot.toml")
+MATERIAL_FILES = ("fit.json", "material.png", "material.svg", "relaxation.toml", "robot.toml")
 DOTS_PER_INCH = 150
 
 
 def write_material(verdict: MaterialVerdict, folder: Path, robot: Robot | None = None) -> None:
-    """Writes ``fit.json``, the figure as PNG and SVG, and the lines for a robot file into a folder.
+    """Write ``fit.json``, the figure as PNG and SVG, and the lines for a robot file into a folder.
 
     ``robot`` is written too, as ``robot.toml``, with the rope on all its cables.
     """

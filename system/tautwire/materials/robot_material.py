@@ -1,4 +1,4 @@
-"""A fitted rope in a robot file: declared modulus and damping, and the ``relaxation`` effect beside them.
+"""Puts a fitted rope into a robot file: declared modulus and damping, and the ``relaxation`` effect beside them.
 
 T = S (E eps + c deps/dt + sum_k E_k (eps - e_k)) + T0,   de_k/dt = (eps - e_k) / tau_k
 """
@@ -12,19 +12,19 @@ from tautwire_fmu.laws.effects import BY_NAME
 
 from ..errors import InputError
 from ..robots.robot import EffectSetting, Robot
-from .modulus import Branch, Material
+from .modulus import Material, MaxwellBranch
 
-# What the declared constants and the branches replace in a robot.
-REPLACED = ("modulus", "damping", "relaxation")
+# Effects of a robot that the fitted constants and branches replace.
+REPLACED_EFFECTS = ("modulus", "damping", "relaxation")
 
 
 @dataclass(frozen=True)
 class RobotMaterial:
-    """What a robot file says of the rope: ``modulus`` in Pa, long-term; ``damping`` in Pa s; Maxwell ``branches``."""
+    """A rope as a robot file declares it: long-term ``modulus`` in Pa; ``damping`` in Pa s; Maxwell ``branches``."""
 
     modulus: float
     damping: float
-    branches: tuple[Branch, ...]
+    branches: tuple[MaxwellBranch, ...]
 
     @property
     def relaxation(self) -> Mapping[str, float]:
@@ -32,7 +32,7 @@ class RobotMaterial:
         values: dict[str, float] = {}
         for number, branch in enumerate(self.branches, 1):
             suffix = "" if number == 1 else f"_{number}"
-            values |= {f"modulus{suffix}": branch.modulus, f"time{suffix}": branch.time}
+            values |= {f"modulus{suffix}": branch.modulus, f"time{suffix}": branch.relaxation_time}
         return values
 
     def text(self) -> str:
@@ -50,25 +50,29 @@ class RobotMaterial:
 
 
 def robot_material(material: Material) -> RobotMaterial:
-    """The part of a material that a robot file can hold: modulus, damping and branches.
+    """Restrict a material to what a robot file can hold: modulus, damping and branches.
 
-    A branch too quick for the effect acts as a damper of ``E_k tau_k`` there, and becomes one.
+    A branch faster than the effect allows acts as a damper of ``E_k tau_k``, and becomes one.
     """
-    shortest = next(each.minimum for each in BY_NAME["relaxation"].parameters if each.name == "time")
-    slow = tuple(branch for branch in material.branches if branch.time >= shortest)
-    quick = sum(branch.modulus * branch.time for branch in material.branches if branch.time < shortest)
-    return RobotMaterial(material.modulus, material.damping + quick, slow)
+    min_relaxation_time = next(each.minimum for each in BY_NAME["relaxation"].parameters if each.name == "time")
+    resolved_branches = tuple(branch for branch in material.branches if branch.relaxation_time >= min_relaxation_time)
+    equivalent_damping = sum(
+        branch.modulus * branch.relaxation_time
+        for branch in material.branches
+        if branch.relaxation_time < min_relaxation_time
+    )
+    return RobotMaterial(material.modulus, material.damping + equivalent_damping, resolved_branches)
 
 
 def with_material(robot: Robot, rope: RobotMaterial) -> Robot:
-    """The robot with this rope on every cable, in place of what it said of modulus, damping and relaxation."""
+    """The robot with this rope on every cable, replacing its modulus, damping and relaxation."""
     cables = tuple(replace(cable, modulus=rope.modulus, damping=rope.damping) for cable in robot.cables)
-    kept = tuple(setting for setting in robot.effects if setting.name not in REPLACED)
-    plain = replace(robot, cables=cables, effects=kept)
+    other_effects = tuple(setting for setting in robot.effects if setting.name not in REPLACED_EFFECTS)
+    plain = replace(robot, cables=cables, effects=other_effects)
     if not rope.branches:
         return plain
-    absent = {each.name: each.neutral for each in BY_NAME["relaxation"].parameters if each.neutral is not None}
-    return plain.with_effect(EffectSetting("relaxation", {**absent, **rope.relaxation}, robot.cable_numbers))
+    neutral_values = {each.name: each.neutral for each in BY_NAME["relaxation"].parameters if each.neutral is not None}
+    return plain.with_effect(EffectSetting("relaxation", {**neutral_values, **rope.relaxation}, robot.cable_numbers))
 
 
 def declared_material(robot: Robot, where: str) -> Material:

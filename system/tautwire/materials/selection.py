@@ -1,10 +1,10 @@
-"""Which model of the modulus a table asks for.
+"""Selects a model of the modulus by the Bayesian information criterion and likelihood-ratio tests.
 
 Modulus and damping, the constant pair of the paper's law, are in every model that describes the rope; only a delay
-between the test's channels may stand in the place of damping. Within a family, branches are added as long as the
-Bayesian information criterion falls. Of the families without a delay the one with the lowest criterion is taken, and
-then loses every term that does not earn its place: chance would improve the fit as much in more than ``alpha`` of
-tables that lack it.
+between the test's channels may replace damping. Within a family, branches are added as long as the
+Bayesian information criterion falls. Of the families without a delay the one with the lowest criterion is selected, and
+then loses, by backward elimination, every term that is not significant: chance would improve the fit as much in more
+than ``significance_level`` of tables that lack it.
 """
 
 from __future__ import annotations
@@ -15,101 +15,117 @@ from itertools import product
 
 from scipy.stats import chi2
 
-from .fit import MaterialFit, fit_terms
-from .observations import Observations
-from .terms import Hysteresis, Terms, grown
+from .fit import MaterialFit, fit_structure
+from .observations import ModulusObservations
+from .terms import Hysteresis, ModelStructure, branch_variants
 
-CONSTANT = Terms(damping=True)
-LINEAR = Terms(damping=True, branches=1)
+CONSTANT_PAIR = ModelStructure(damping=True)
+LINEAR_VISCOELASTIC = ModelStructure(damping=True, branches=1)
 # Differences of the criterion from here on are strong evidence (Kass and Raftery 1995).
-STRONG = 6.0
-# Measured numbers that a model must leave over: one is still left where a row is left out.
-SPARE_NUMBERS = 3
+STRONG_BIC_DIFFERENCE = 6.0
+# Measured numbers beyond the free parameters: one remains where cross-validation holds out a row of two.
+MIN_DEGREES_OF_FREEDOM = 3
 
 
 @dataclass(frozen=True)
-class Selection:
-    """The best fit of every family of terms, and the family that is taken."""
+class ModelSelection:
+    """Selected model family, among the best fits of every family."""
 
-    best: Mapping[Terms, MaterialFit]
-    chosen: Terms
+    best_fits: Mapping[ModelStructure, MaterialFit]
+    chosen: ModelStructure
 
     @property
     def fit(self) -> MaterialFit:
-        """The fit that is taken."""
-        return self.best[self.chosen]
+        """The fit of the selected family."""
+        return self.best_fits[self.chosen]
 
     def evidence(self, effect: str) -> float:
-        """Natural log of the likelihood ratio to the best model without one effect, other than damping."""
-        return 0.5 * (self.best[self.chosen.without(effect)].chi_squared - self.fit.chi_squared)
+        """Log likelihood ratio (natural) to the best model without one effect, other than damping."""
+        return 0.5 * (self.best_fits[self.chosen.without(effect)].chi_squared - self.fit.chi_squared)
 
-    def rivals(self, alpha: float) -> tuple[Terms, ...]:
-        """Other families that leave no more than noise and that the criterion does not strongly speak against.
+    def confusable_models(self, significance_level: float) -> tuple[ModelStructure, ...]:
+        """Confusable families: their residuals are noise, and the criterion gives no strong evidence against them.
 
-        A family that holds all of the chosen one, or of another rival, says nothing new and is not among them.
+        A family that includes the chosen one, or another confusable one, adds nothing and is left out.
         """
-        able = [
+        adequate = [
             family
-            for family, fit in self.best.items()
-            if not family.holds(self.chosen) and fit.p_value >= alpha and fit.bic < self.fit.bic + STRONG
+            for family, fit in self.best_fits.items()
+            if not family.includes(self.chosen)
+            and fit.p_value >= significance_level
+            and fit.bic < self.fit.bic + STRONG_BIC_DIFFERENCE
         ]
-        least = [family for family in able if not any(family.holds(other) for other in able if other != family)]
-        return tuple(sorted(least, key=lambda family: self.best[family].bic))
+        minimal = [
+            family for family in adequate if not any(family.includes(other) for other in adequate if other != family)
+        ]
+        return tuple(sorted(minimal, key=lambda family: self.best_fits[family].bic))
 
 
-def select(seen: Observations, alpha: float, tell: Callable[[str, float], None] = lambda what, done: None) -> Selection:
-    """Fits every family of terms and chooses one; ``tell`` hears what is being tried and how far it has come."""
-    best: dict[Terms, MaterialFit] = {}
-    families = _families(seen)
-    for place, family in enumerate(families):
-        tell(f"fitting {family.label}", place / len(families))
-        plain, *branched = _fits(seen, family)
-        best[family] = plain
+def select_model(
+    observations: ModulusObservations,
+    significance_level: float,
+    progress: Callable[[str, float], None] = lambda what, done: None,
+) -> ModelSelection:
+    """Fit every model family and select one; ``progress`` receives the present task and the share that is done."""
+    best_fits: dict[ModelStructure, MaterialFit] = {}
+    families = _model_families(observations)
+    for index, family in enumerate(families):
+        progress(f"fitting {family.label}", index / len(families))
+        plain, *branched = _fits_of_family(observations, family)
+        best_fits[family] = plain
         if branched:
-            best[branched[0].terms.family] = min(branched, key=lambda fit: fit.bic)
-    ours = [family for family in best if not family.delay]
-    chosen = min(ours, key=lambda family: best[family].bic)
-    return Selection(best, _earned(seen, best, chosen, alpha))
+            best_fits[branched[0].structure.family] = min(branched, key=lambda fit: fit.bic)
+    candidates = [family for family in best_fits if not family.delay]
+    chosen = min(candidates, key=lambda family: best_fits[family].bic)
+    return ModelSelection(best_fits, _eliminate_backward(observations, best_fits, chosen, significance_level))
 
 
-def best_linear(seen: Observations) -> MaterialFit:
+def best_linear_fit(observations: ModulusObservations) -> MaterialFit:
     """The best fit of damping and relaxation alone, which is what robot files can hold."""
-    return min(_fits(seen, CONSTANT)[1:], key=lambda fit: fit.bic)
+    return min(_fits_of_family(observations, CONSTANT_PAIR)[1:], key=lambda fit: fit.bic)
 
 
-def chance(fit: MaterialFit, without: MaterialFit) -> float:
-    """How often chance improves a fit as much as the terms do that ``without`` lacks (likelihood ratio test)."""
-    gain, added = without.chi_squared - fit.chi_squared, len(fit.values) - len(without.values)
-    return float(chi2.sf(max(gain, 0.0), added))
+def likelihood_ratio_p_value(fit: MaterialFit, reduced: MaterialFit) -> float:
+    """P value of the likelihood-ratio test of ``fit`` against the ``reduced`` fit, which lacks some of its terms."""
+    gain, added_parameters = reduced.chi_squared - fit.chi_squared, len(fit.values) - len(reduced.values)
+    return float(chi2.sf(max(gain, 0.0), added_parameters))
 
 
-def _families(seen: Observations) -> tuple[Terms, ...]:
-    """All terms without branches that are tried."""
-    kinds: tuple[Hysteresis, ...] = ("none", "modulus", "stress") if seen.has_amplitude else ("none", "modulus")
+def _model_families(observations: ModulusObservations) -> tuple[ModelStructure, ...]:
+    """All model families, without branches."""
+    kinds: tuple[Hysteresis, ...] = ("none", "modulus", "stress") if observations.has_amplitude else ("none", "modulus")
     choices = product((False, True), kinds, (False, True))
     return tuple(
-        Terms(damping=damping, hysteresis=kind, delay=delay) for delay, kind, damping in choices if delay or damping
+        ModelStructure(damping=damping, hysteresis=kind, delay=delay)
+        for delay, kind, damping in choices
+        if delay or damping
     )
 
 
-def _fits(seen: Observations, family: Terms) -> list[MaterialFit]:
-    """A family without branches, then with one, two ... until the criterion rises; the last may be the worse one."""
+def _fits_of_family(observations: ModulusObservations, family: ModelStructure) -> list[MaterialFit]:
+    """Fits of a family with no branch, one, two ... until the criterion rises; the last may be the worse one."""
     fits: list[MaterialFit] = []
-    for terms in grown(family, seen.number_count - SPARE_NUMBERS):
-        fits.append(fit_terms(seen, terms))
-        if terms.branches > 1 and fits[-1].bic > fits[-2].bic:
+    for structure in branch_variants(family, observations.measurement_count - MIN_DEGREES_OF_FREEDOM):
+        fits.append(fit_structure(observations, structure))
+        if structure.branches > 1 and fits[-1].bic > fits[-2].bic:
             break
     return fits
 
 
-def _earned(seen: Observations, best: Mapping[Terms, MaterialFit], chosen: Terms, alpha: float) -> Terms:
+def _eliminate_backward(
+    observations: ModulusObservations,
+    best_fits: Mapping[ModelStructure, MaterialFit],
+    chosen: ModelStructure,
+    significance_level: float,
+) -> ModelStructure:
     while True:
-        fit = best[chosen]
-        # With as many branches the smaller model lies inside the larger, as the test needs it.
-        chances = {
-            effect: chance(fit, fit_terms(seen, fit.terms.without(effect))) for effect in chosen.effects - {"damping"}
+        fit = best_fits[chosen]
+        # With as many branches the smaller model is nested in the larger, as the test requires.
+        p_values = {
+            effect: likelihood_ratio_p_value(fit, fit_structure(observations, fit.structure.without(effect)))
+            for effect in chosen.effects - {"damping"}
         }
-        weakest = max(chances, key=lambda effect: chances[effect], default=None)
-        if weakest is None or chances[weakest] < alpha:
+        least_significant = max(p_values, key=lambda effect: p_values[effect], default=None)
+        if least_significant is None or p_values[least_significant] < significance_level:
             return chosen
-        chosen = chosen.without(weakest)
+        chosen = chosen.without(least_significant)

@@ -1,4 +1,4 @@
-"""A table of a dynamic test on a rope: what was measured at which frequency, and how surely."""
+"""Reads the table of a dynamic test on a rope: quantities at each frequency, with their uncertainties."""
 
 from __future__ import annotations
 
@@ -12,21 +12,21 @@ from io import StringIO
 from itertools import islice
 from pathlib import Path
 
-from ..errors import MaterialTableError, shown
-from ..input_file import read_text, readable_file
-from ..recordings.rules import MISSING
-from ..robots.checked_table import NumberRule, nearest
+from ..errors import MaterialTableError, format_value
+from ..input_file import read_text_bytes, readable_file
+from ..recordings.rules import MISSING_CELLS
+from ..robots.checked_table import NumberRule, suggest_name
 
 PAPER_TABLE = Path(__file__).parent / "steel_wire_rope_baklouti_2017.csv"
 # The row, in Hz, whose pair the paper takes as constant (sec. 4.3).
-PAPER_PAIR_AT = 2.0
-LEAST_ROWS, MOST_ROWS = 4, 500
-LARGEST_FILE = 10_000_000
-LARGEST_EXPONENT = 300
-# Lines of remarks, and characters of a header, that are looked at to tell a table from a recording.
-LONGEST_REMARK, LONGEST_HEADER = 100, 10_000
+PAPER_PAIR_FREQUENCY = 2.0
+MIN_ROWS, MAX_ROWS = 4, 500
+MAX_FILE_BYTES = 10_000_000
+MAX_DECIMAL_EXPONENT = 300
+# Comment lines, and characters of a header, that are read to tell a table from a recording.
+MAX_COMMENT_LINES, MAX_HEADER_LENGTH = 100, 10_000
 
-RULES: Mapping[str, NumberRule] = {
+COLUMN_RULES: Mapping[str, NumberRule] = {
     "frequency": NumberRule("the loading frequency, 0 for a static test,", "Hz", 0.0, 1e6),
     "stress_amplitude": NumberRule("the amplitude of the stress", "Pa", 0.0, 1e12, positive=True),
     "strain_amplitude": NumberRule("the amplitude of the strain", "1", 0.0, 1.0, positive=True),
@@ -38,10 +38,10 @@ RULES: Mapping[str, NumberRule] = {
     "loss_factor": NumberRule("the loss factor E''/E'", "1", 0.0, 1e3),
     "damping": NumberRule("the damping c = E''/(2 pi f)", "Pa s"),
 }
-UNCERTAINTY = "_uncertainty"
-WITHOUT_UNCERTAINTY = ("frequency",)
-# Two quantities that make a complex modulus, in the order of preference: what the test measures comes first.
-PAIRS: tuple[tuple[str, str], ...] = (
+UNCERTAINTY_SUFFIX = "_uncertainty"
+COLUMNS_WITHOUT_UNCERTAINTY = ("frequency",)
+# Two quantities that determine the complex modulus, in order of preference: what the test measures comes first.
+MODULUS_PAIRS: tuple[tuple[str, str], ...] = (
     ("dynamic_modulus", "phase"),
     ("storage_modulus", "loss_factor"),
     ("storage_modulus", "loss_modulus"),
@@ -51,17 +51,17 @@ PAIRS: tuple[tuple[str, str], ...] = (
 
 @dataclass(frozen=True)
 class Quantity:
-    """A measured number in SI units; ``digit`` is one unit of the last digit written, ``uncertainty`` one sigma."""
+    """A measured number in SI units; ``resolution`` is one unit of its last digit, ``uncertainty`` one sigma."""
 
     value: float
-    digit: float
+    resolution: float
     uncertainty: float | None = None
-    uncertainty_digit: float = 0.0
+    uncertainty_resolution: float = 0.0
 
     def scaled(self, factor: float) -> Quantity:
-        """The same in another unit."""
+        """The quantity in another unit, multiplied by ``factor``."""
         sigma = None if self.uncertainty is None else self.uncertainty * factor
-        return Quantity(self.value * factor, self.digit * factor, sigma, self.uncertainty_digit * factor)
+        return Quantity(self.value * factor, self.resolution * factor, sigma, self.uncertainty_resolution * factor)
 
 
 @dataclass(frozen=True)
@@ -75,47 +75,50 @@ class MaterialRow:
 
 @dataclass(frozen=True)
 class MaterialTable:
-    """A dynamic test: ``rows`` at frequencies above zero, ``static`` ones at zero, both in the file's order."""
+    """A dynamic test: ``rows`` at frequencies above zero, ``static_rows`` at zero, both in the file's order."""
 
     path: str
     rows: tuple[MaterialRow, ...]
-    static: tuple[MaterialRow, ...]
+    static_rows: tuple[MaterialRow, ...]
 
-    def pairs(self) -> tuple[tuple[str, str], ...]:
+    def modulus_pairs(self) -> tuple[tuple[str, str], ...]:
         """The pairs of columns that give a complex modulus with uncertainty in every row, the preferred first."""
-        return tuple(pair for pair in PAIRS if all(_is_measured(row, name) for row in self.rows for name in pair))
+        return tuple(
+            pair for pair in MODULUS_PAIRS if all(_has_uncertainty(row, name) for row in self.rows for name in pair)
+        )
 
 
 def read_material_table(path: str | Path) -> MaterialTable:
-    """The table in a CSV file; raises MaterialTableError.
+    """Read the table of a dynamic test from a CSV file; raises MaterialTableError.
 
-    Lines that begin with ``#`` are remarks. Columns are those of ``RULES``, each with ``_uncertainty`` (one standard
-    deviation) beside it where there is one; ``frequency`` and one of ``PAIRS`` with uncertainties are needed. Values
-    in Hz, Pa, Pa s and rad, or degrees in ``phase_degrees``. A row of frequency 0 gives the storage modulus alone.
+    Lines that begin with ``#`` are comments. Columns are those of ``COLUMN_RULES``, each with ``_uncertainty`` (one
+    standard deviation) beside it where there is one; ``frequency`` and one of ``MODULUS_PAIRS`` with uncertainties are
+    needed. Values in Hz, Pa, Pa s and rad, or degrees in ``phase_degrees``. A row of frequency 0 gives the storage
+    modulus alone.
     """
     file = str(path)
-    content = read_text(path, MaterialTableError, "CSV", LARGEST_FILE)
-    lines = list(_cells(content.decode("utf-8-sig"), file))
+    content = read_text_bytes(path, MaterialTableError, "CSV", MAX_FILE_BYTES)
+    lines = list(_csv_rows(content.decode("utf-8-sig"), file))
     if not lines:
         raise MaterialTableError(file, "is empty", "write a header line and four or more rows")
     (where, names), body = lines[0], lines[1:]
     _require_header(names, where)
-    rows = tuple(_row(place, cells, names) for place, cells in body)
+    rows = tuple(_parse_row(row_location, cells, names) for row_location, cells in body)
     table = MaterialTable(
         path=file,
         rows=tuple(row for row in rows if row.frequency > 0.0),
-        static=tuple(row for row in rows if row.frequency == 0.0),
+        static_rows=tuple(row for row in rows if row.frequency == 0.0),
     )
     _require_rows(table)
     return table
 
 
 def is_material_table(path: str | Path) -> bool:
-    """Whether the first line of a file that is no remark names a column "frequency" and none "time"."""
+    """Whether the first line of a file that is no comment names a column "frequency" and none "time"."""
     try:
-        with readable_file(path, MaterialTableError) as place, place.open("rb") as file:
-            read = islice(iter(partial(file.readline, LONGEST_HEADER), b""), LONGEST_REMARK)
-            lines = (line.decode("utf-8-sig", "replace").strip() for line in read)
+        with readable_file(path, MaterialTableError) as file_path, file_path.open("rb") as file:
+            head = islice(iter(partial(file.readline, MAX_HEADER_LENGTH), b""), MAX_COMMENT_LINES)
+            lines = (line.decode("utf-8-sig", "replace").strip() for line in head)
             header = next((line for line in lines if line and not line.startswith("#")), "")
     except MaterialTableError:
         return False
@@ -123,13 +126,13 @@ def is_material_table(path: str | Path) -> bool:
     return "frequency" in names and "time" not in names
 
 
-def _is_measured(row: MaterialRow, name: str) -> bool:
+def _has_uncertainty(row: MaterialRow, name: str) -> bool:
     quantity = row.quantities.get(name)
     return quantity is not None and quantity.uncertainty is not None
 
 
-def _cells(text: str, file: str) -> Iterator[tuple[str, list[str]]]:
-    """Lines that hold something, as cells, each with its place."""
+def _csv_rows(text: str, file: str) -> Iterator[tuple[str, list[str]]]:
+    """Lines that are neither empty nor comments, as cells, each with its location."""
     for number, line in enumerate(text.splitlines(), 1):
         if line.strip() and not line.lstrip().startswith("#"):
             where = f"{file}: line {number}"
@@ -140,38 +143,41 @@ def _cells(text: str, file: str) -> Iterator[tuple[str, list[str]]]:
 
 
 def _require_header(names: Sequence[str], where: str) -> None:
-    known = [*RULES, *(name + UNCERTAINTY for name in RULES if name not in WITHOUT_UNCERTAINTY)]
-    for place, name in enumerate(names):
-        if name in names[:place]:
-            raise MaterialTableError(where, f"the column {shown(name)} is there twice", "keep one of the two")
+    known = [
+        *COLUMN_RULES,
+        *(name + UNCERTAINTY_SUFFIX for name in COLUMN_RULES if name not in COLUMNS_WITHOUT_UNCERTAINTY),
+    ]
+    for index, name in enumerate(names):
+        if name in names[:index]:
+            raise MaterialTableError(where, f"the column {format_value(name)} is there twice", "keep one of the two")
         if ";" in name or "\t" in name:
             problem = "the columns are separated with semicolons or tabs"
             raise MaterialTableError(
                 where, problem, "separate them with commas, and write numbers with a decimal point"
             )
         if name not in known:
-            mend = f"write {nearest(name, known)}, or remove it"
-            raise MaterialTableError(where, f"the column {shown(name)} is not known", mend)
-        owner = name.removesuffix(UNCERTAINTY)
-        if owner not in names:
-            raise MaterialTableError(where, f"{name} stands without {owner}", f"add the column {owner}")
+            hint = f"write {suggest_name(name, known)}, or remove it"
+            raise MaterialTableError(where, f"the column {format_value(name)} is not known", hint)
+        column = name.removesuffix(UNCERTAINTY_SUFFIX)
+        if column not in names:
+            raise MaterialTableError(where, f"{name} stands without {column}", f"add the column {column}")
     if "phase" in names and "phase_degrees" in names:
         raise MaterialTableError(where, "the phase is there in rad and in degrees", "keep one of the two")
     if "frequency" not in names:
         raise MaterialTableError(where, "the column frequency is missing", "add it, in Hz")
 
 
-def _row(where: str, cells: Sequence[str], names: Sequence[str]) -> MaterialRow:
+def _parse_row(where: str, cells: Sequence[str], names: Sequence[str]) -> MaterialRow:
     if len(cells) != len(names):
-        mend = "complete the line, leave a cell empty where nothing was measured"
-        raise MaterialTableError(where, f"has {len(cells)} cells, the header has {len(names)}", mend)
-    numbers = {name: _number(where, name, cell) for name, cell in zip(names, cells, strict=True)}
+        hint = "complete the line, leave a cell empty where nothing was measured"
+        raise MaterialTableError(where, f"has {len(cells)} cells, the header has {len(names)}", hint)
+    numbers = {name: _parse_number(where, name, cell) for name, cell in zip(names, cells, strict=True)}
     if numbers["frequency"] is None:
-        raise MaterialTableError(f"{where}: frequency", "is missing", RULES["frequency"].mend())
+        raise MaterialTableError(f"{where}: frequency", "is missing", COLUMN_RULES["frequency"].hint())
     quantities = {}
     for name in names:
-        number, sigma = numbers[name], numbers.get(name + UNCERTAINTY)
-        if name in RULES and number is not None:
+        number, sigma = numbers[name], numbers.get(name + UNCERTAINTY_SUFFIX)
+        if name in COLUMN_RULES and number is not None:
             quantities[name] = Quantity(number[0], number[1], *(sigma or ()))
     if "phase_degrees" in quantities:
         quantities["phase"] = quantities.pop("phase_degrees").scaled(math.pi / 180.0)
@@ -179,11 +185,11 @@ def _row(where: str, cells: Sequence[str], names: Sequence[str]) -> MaterialRow:
     return MaterialRow(where, frequency, quantities)
 
 
-def _number(where: str, name: str, cell: str) -> tuple[float, float] | None:
+def _parse_number(where: str, name: str, cell: str) -> tuple[float, float] | None:
     """A number and one unit of its last digit; None where the cell is empty."""
-    if cell in MISSING:
+    if cell in MISSING_CELLS:
         return None
-    place, rule = f"{where}: {name}", RULES[name.removesuffix(UNCERTAINTY)]
+    cell_location, rule = f"{where}: {name}", COLUMN_RULES[name.removesuffix(UNCERTAINTY_SUFFIX)]
     try:
         number = Decimal(cell) if cell.isascii() and "_" not in cell else Decimal("nan")
     except InvalidOperation:
@@ -191,27 +197,27 @@ def _number(where: str, name: str, cell: str) -> tuple[float, float] | None:
     exponent = number.as_tuple().exponent
     value = float(number)
     if not isinstance(exponent, int) or not math.isfinite(value):
-        raise MaterialTableError(place, f"is {shown(cell)}, not a number", rule.mend())
-    if name.endswith(UNCERTAINTY):
+        raise MaterialTableError(cell_location, f"is {format_value(cell)}, not a number", rule.hint())
+    if name.endswith(UNCERTAINTY_SUFFIX):
         rule = NumberRule(f"one standard deviation of {rule.meaning}", rule.unit, positive=True)
-    bound = rule.broken_bound(value)
+    bound = rule.violated_bound(value)
     if bound:
-        raise MaterialTableError(place, f"is {value!r}, must be {bound}", rule.mend())
-    return value, 10.0 ** min(exponent, LARGEST_EXPONENT)
+        raise MaterialTableError(cell_location, f"is {value!r}, must be {bound}", rule.hint())
+    return value, 10.0 ** min(exponent, MAX_DECIMAL_EXPONENT)
 
 
 def _require_rows(table: MaterialTable) -> None:
-    if len(table.rows) < LEAST_ROWS:
-        problem = f"has {len(table.rows)} rows of a frequency above zero, must have at least {LEAST_ROWS}"
+    if len(table.rows) < MIN_ROWS:
+        problem = f"has {len(table.rows)} rows of a frequency above zero, must have at least {MIN_ROWS}"
         raise MaterialTableError(table.path, problem, "measure at more frequencies")
-    if len(table.rows) > MOST_ROWS:
-        problem = f"has {len(table.rows)} rows, at most {MOST_ROWS} are fitted"
+    if len(table.rows) > MAX_ROWS:
+        problem = f"has {len(table.rows)} rows, at most {MAX_ROWS} are fitted"
         raise MaterialTableError(table.path, problem, "average the repeats at one frequency")
-    for row in table.static:
-        if not _is_measured(row, "storage_modulus"):
+    for row in table.static_rows:
+        if not _has_uncertainty(row, "storage_modulus"):
             problem = "a static row gives no storage_modulus with its uncertainty"
             raise MaterialTableError(row.where, problem, "add both, or remove the row")
-    if not table.pairs():
+    if not table.modulus_pairs():
         problem = "no pair of columns gives a complex modulus with uncertainties in every row"
-        pairs = "; ".join(f"{first} and {second}" for first, second in PAIRS)
-        raise MaterialTableError(table.path, problem, f"give, with {UNCERTAINTY} columns, one of: {pairs}")
+        pairs = "; ".join(f"{first} and {second}" for first, second in MODULUS_PAIRS)
+        raise MaterialTableError(table.path, problem, f"give, with {UNCERTAINTY_SUFFIX} columns, one of: {pairs}")

@@ -1,4 +1,4 @@
-"""Judges the constant pair of modulus and damping by a dynamic test, and finds what the rope has besides."""
+"""Tests a constant pair of modulus and damping against a dynamic test, and identifies what the rope has besides."""
 
 from __future__ import annotations
 
@@ -9,168 +9,190 @@ from collections.abc import Callable, Iterator
 from scipy.stats import chi2
 
 from ..errors import InputError
-from .assumptions import assumptions
-from .consistency import checks
+from .assumptions import error_assumptions
+from .consistency import consistency_checks
 from .fit import MaterialFit, relaxation_floor
-from .leave_out import leave_out
-from .models import declared_model, errors, fitted_model, noise_floor, predicted_errors
+from .leave_out import cross_validate
+from .models import declared_model, fit_errors, fitted_model, noise_floor, prediction_errors
 from .modulus import Material
-from .observations import Observations, observations
-from .profile import chi_squared_at
-from .selection import CONSTANT, LINEAR, Selection, best_linear, select
+from .observations import ModulusObservations, observations_from_table
+from .profile import profile_chi_squared
+from .selection import CONSTANT_PAIR, LINEAR_VISCOELASTIC, ModelSelection, best_linear_fit, select_model
 from .table import MaterialRow, MaterialTable
-from .terms import Terms
-from .verdict import Errors, Estimate, FoundEffect, MaterialVerdict, Model, Options, Role, StaticCheck, VerdictName
+from .terms import ModelStructure
+from .verdict import (
+    Estimate,
+    EvaluatedModel,
+    IdentifiedEffect,
+    MaterialOptions,
+    MaterialVerdict,
+    RmsErrors,
+    Role,
+    StaticCheck,
+    VerdictName,
+)
 
-# Real residuals are never quite white: up to so many standard deviations, root mean square, are let pass.
-MATERIAL_RMS = 1.5
-# A row is meant by a frequency that is so near.
-SAME_FREQUENCY = 1e-3
+# Real residuals are never quite white: a root mean square up to this many standard deviations is adequate.
+MAX_ADEQUATE_RMS = 1.5
+# Relative difference up to which a frequency denotes a row.
+FREQUENCY_TOLERANCE = 1e-3
 
-Tell = Callable[[str, float], None]
+Progress = Callable[[str, float], None]
 
 
 def pair_of_row(table: MaterialTable, frequency: float) -> Material:
-    """The constant pair that one row gives, as written there or worked out; raises InputError where there is none."""
-    near = [row for row in table.rows if math.isclose(row.frequency, frequency, rel_tol=SAME_FREQUENCY)]
-    if not near:
+    """The constant pair of one row, as written there or computed; raises InputError where there is none."""
+    matching_rows = [row for row in table.rows if math.isclose(row.frequency, frequency, rel_tol=FREQUENCY_TOLERANCE)]
+    if not matching_rows:
         listed = ", ".join(f"{row.frequency:g}" for row in table.rows)
         raise InputError("--at", f"{frequency:g} Hz is no row of {table.path}", f"give one of {listed}")
-    row = near[0]
-    seen = observations(MaterialTable(table.path, (row,), ()), table.pairs()[0])
+    row = matching_rows[0]
+    observations = observations_from_table(MaterialTable(table.path, (row,), ()), table.modulus_pairs()[0])
     return Material(
-        modulus=_written(row, "storage_modulus", float(seen.storage[0])),
-        damping=_written(row, "damping", float(seen.damping[0])),
+        modulus=_value_or_default(row, "storage_modulus", float(observations.storage[0])),
+        damping=_value_or_default(row, "damping", float(observations.damping[0])),
     )
 
 
 def trace_material(
     table: MaterialTable,
     declared: Material | None = None,
-    options: Options | None = None,
-    tell: Tell = lambda what, done: None,
+    options: MaterialOptions | None = None,
+    progress: Progress = lambda what, done: None,
 ) -> MaterialVerdict:
-    """The verdict on a table; ``declared`` is the constant pair in use, ``tell`` hears of the progress."""
-    began = time.perf_counter()
-    options = options or Options()
-    pair = options.pair or table.pairs()[0]
-    seen = observations(table, pair, options.shared, options.coverage)
-    found = select(seen, options.alpha, tell)
-    models = _models(table, seen, found, declared, options.alpha, tell)
+    """Identify a rope from a table; ``declared`` is the constant pair in use, ``progress`` a progress callback."""
+    start_time = time.perf_counter()
+    options = options or MaterialOptions()
+    pair = options.pair or table.modulus_pairs()[0]
+    observations = observations_from_table(table, pair, options.shared_variance, options.coverage_factor)
+    selection = select_model(observations, options.significance_level, progress)
+    models = _evaluated_models(table, observations, selection, declared, options.significance_level, progress)
     by_role = {model.role: model for model in reversed(models)}
-    before, after = models[0], by_role["chosen"]
-    effects = _effects(found, after, declared, options.alpha)
-    name = _verdict(before, after, effects, options.alpha)
-    named = name == "effects"
-    tell("reading the errors in other ways", 0.0)
+    reference, chosen = models[0], by_role["chosen"]
+    effects = _identified_effects(selection, chosen, declared, options.significance_level)
+    verdict_name = _decide(reference, chosen, effects, options.significance_level)
+    effects_identified = verdict_name == "effects"
+    progress("reading the errors in other ways", 0.0)
     return MaterialVerdict(
-        verdict=name,
+        verdict=verdict_name,
         table=table,
         pair=pair,
         options=options,
-        seen=seen,
+        observations=observations,
         models=tuple(models),
-        effects=effects if named else (),
-        also_possible=_also_possible(found, options.alpha) if named else (),
-        error_before=_errors(seen, before),
-        error_after=_errors(seen, after if named else before),
-        noise_floor=noise_floor(seen),
-        noise_before=before.p_value >= options.alpha,
-        noise_after=(after if named else before).p_value >= options.alpha,
-        checks=checks(table),
-        assumptions=assumptions(table, pair, options.shared, options.coverage, _compared(found)),
+        effects=effects if effects_identified else (),
+        confusable_effects=_confusable_effects(selection, options.significance_level) if effects_identified else (),
+        error_before=_errors_by_use(observations, reference),
+        error_after=_errors_by_use(observations, chosen if effects_identified else reference),
+        noise_floor=noise_floor(observations),
+        adequate_before=reference.p_value >= options.significance_level,
+        adequate_after=(chosen if effects_identified else reference).p_value >= options.significance_level,
+        consistency_checks=consistency_checks(table),
+        error_assumptions=error_assumptions(
+            table, pair, options.shared_variance, options.coverage_factor, _compared_structures(selection)
+        ),
         static_checks=tuple(_static_checks(table, by_role)),
-        floor=relaxation_floor(seen),
-        seconds=time.perf_counter() - began,
+        relaxation_floor=relaxation_floor(observations),
+        seconds=time.perf_counter() - start_time,
     )
 
 
-def _written(row: MaterialRow, column: str, otherwise: float) -> float:
+def _value_or_default(row: MaterialRow, column: str, default: float) -> float:
     quantity = row.quantities.get(column)
-    return otherwise if quantity is None else quantity.value
+    return default if quantity is None else quantity.value
 
 
-def _compared(found: Selection) -> dict[Role, Terms]:
+def _compared_structures(selection: ModelSelection) -> dict[Role, ModelStructure]:
     return {
-        "constant": found.best[CONSTANT].terms,
-        "relaxation": found.best[LINEAR].terms,
-        "chosen": found.fit.terms,
+        "constant": selection.best_fits[CONSTANT_PAIR].structure,
+        "relaxation": selection.best_fits[LINEAR_VISCOELASTIC].structure,
+        "chosen": selection.fit.structure,
     }
 
 
-def _models(
+def _evaluated_models(
     table: MaterialTable,
-    seen: Observations,
-    found: Selection,
+    observations: ModulusObservations,
+    selection: ModelSelection,
     declared: Material | None,
-    alpha: float,
-    tell: Tell,
-) -> list[Model]:
-    """All models that a report compares, the declared pair first."""
+    significance_level: float,
+    progress: Progress,
+) -> list[EvaluatedModel]:
+    """Evaluate all models that a report compares, the declared pair first."""
     fits: list[tuple[Role, MaterialFit]] = [
-        ("constant", found.best[CONSTANT]),
-        ("relaxation", found.best[LINEAR]),
-        ("chosen", found.fit),
-        *(("rival", found.best[rival]) for rival in found.rivals(alpha)),
+        ("constant", selection.best_fits[CONSTANT_PAIR]),
+        ("relaxation", selection.best_fits[LINEAR_VISCOELASTIC]),
+        ("chosen", selection.fit),
+        *(("rival", selection.best_fits[rival]) for rival in selection.confusable_models(significance_level)),
     ]
-    models = [declared_model(seen, declared)] if declared else []
-    for place, (role, fit) in enumerate(fits):
-        tell(f"leaving out rows: {fit.terms.label}", place / len(fits))
-        models.append(fitted_model(seen, role, fit, declared, leave_out(seen, fit.terms)))
-    tell("fitting what a robot file can hold", 0.0)
-    robot = best_linear(seen.with_static(table)) if table.static else found.best[LINEAR]
-    return [*models, fitted_model(seen, "robot", robot, declared)]
+    models = [declared_model(observations, declared)] if declared else []
+    for index, (role, fit) in enumerate(fits):
+        progress(f"leaving out rows: {fit.structure.label}", index / len(fits))
+        models.append(fitted_model(observations, role, fit, declared, cross_validate(observations, fit.structure)))
+    progress("fitting what a robot file can hold", 0.0)
+    robot_fit = (
+        best_linear_fit(observations.with_static_rows(table))
+        if table.static_rows
+        else selection.best_fits[LINEAR_VISCOELASTIC]
+    )
+    return [*models, fitted_model(observations, "robot", robot_fit, declared)]
 
 
-def _effects(found: Selection, chosen: Model, declared: Material | None, alpha: float) -> tuple[FoundEffect, ...]:
-    """The terms that the declared pair lacks or has wrong, the most evident first."""
+def _identified_effects(
+    selection: ModelSelection, chosen: EvaluatedModel, declared: Material | None, significance_level: float
+) -> tuple[IdentifiedEffect, ...]:
+    """Terms that the declared pair lacks or has wrong, by falling likelihood ratio."""
     effects = [
-        FoundEffect(effect, _parameters(chosen, effect), found.evidence(effect))
-        for effect in found.chosen.effects - CONSTANT.effects
+        IdentifiedEffect(effect, _parameters_of(chosen, effect), selection.evidence(effect))
+        for effect in selection.chosen.effects - CONSTANT_PAIR.effects
     ]
     constants = [("modulus", declared.modulus), ("damping", declared.damping)] if declared else []
-    for index, (name, value) in enumerate(constants):
-        left = chi_squared_at(found.fit, index, value)
-        evidence = 0.5 * (left - found.fit.chi_squared)
-        if chi2.sf(2.0 * evidence, 1) < alpha:
-            effects.append(FoundEffect(name, _parameters(chosen, name), evidence))
-    return tuple(sorted(effects, key=lambda effect: -effect.evidence))
+    for parameter_index, (name, value) in enumerate(constants):
+        chi_squared = profile_chi_squared(selection.fit, parameter_index, value)
+        evidence = 0.5 * (chi_squared - selection.fit.chi_squared)
+        if chi2.sf(2.0 * evidence, 1) < significance_level:
+            effects.append(IdentifiedEffect(name, _parameters_of(chosen, name), evidence))
+    return tuple(sorted(effects, key=lambda effect: -effect.log_likelihood_ratio))
 
 
-def _also_possible(found: Selection, alpha: float) -> tuple[tuple[str, ...], ...]:
-    """The rivals by the names of their effects, each set once, those of the chosen one left out."""
-    sets = dict.fromkeys(rival.effects for rival in found.rivals(alpha))
-    return tuple(tuple(sorted(effects)) for effects in sets if effects != found.chosen.effects)
+def _confusable_effects(selection: ModelSelection, significance_level: float) -> tuple[tuple[str, ...], ...]:
+    """Confusable models by the names of their effects, each set once, without that of the chosen one."""
+    effect_sets = dict.fromkeys(rival.effects for rival in selection.confusable_models(significance_level))
+    return tuple(tuple(sorted(effects)) for effects in effect_sets if effects != selection.chosen.effects)
 
 
-def _parameters(model: Model, effect: str) -> dict[str, Estimate]:
+def _parameters_of(model: EvaluatedModel, effect: str) -> dict[str, Estimate]:
     return {estimate.name: estimate for estimate in model.estimates if estimate.effect == effect}
 
 
-def _verdict(before: Model, after: Model, effects: tuple[FoundEffect, ...], alpha: float) -> VerdictName:
-    if not effects or (before.role == "declared" and before.p_value >= alpha and not _adds(effects)):
-        return "none" if before.p_value >= alpha else "unexplained"
-    adequate = after.p_value >= alpha or _rms_sigma(after) <= MATERIAL_RMS
+def _decide(
+    reference: EvaluatedModel, chosen: EvaluatedModel, effects: tuple[IdentifiedEffect, ...], significance_level: float
+) -> VerdictName:
+    if not effects or (
+        reference.role == "declared" and reference.p_value >= significance_level and not _exceeds_constant_pair(effects)
+    ):
+        return "none" if reference.p_value >= significance_level else "unexplained"
+    adequate = chosen.p_value >= significance_level or _rms_residual(chosen) <= MAX_ADEQUATE_RMS
     return "effects" if adequate else "unexplained"
 
 
-def _adds(effects: tuple[FoundEffect, ...]) -> bool:
-    """Whether there is more than other values of the constant pair."""
+def _exceeds_constant_pair(effects: tuple[IdentifiedEffect, ...]) -> bool:
+    """Whether the effects are more than other values of the constant pair."""
     return any(effect.name not in ("modulus", "damping") for effect in effects)
 
 
-def _rms_sigma(model: Model) -> float:
-    numbers = len(model.storage_sigmas) + len(model.damping_sigmas)
-    return math.sqrt(model.chi_squared / numbers)
+def _rms_residual(model: EvaluatedModel) -> float:
+    measurement_count = len(model.storage_residuals) + len(model.damping_residuals)
+    return math.sqrt(model.chi_squared / measurement_count)
 
 
-def _errors(seen: Observations, model: Model) -> dict[str, Errors]:
-    return {"fit": errors(seen, model), "check": predicted_errors(seen, model)}
+def _errors_by_use(observations: ModulusObservations, model: EvaluatedModel) -> dict[str, RmsErrors]:
+    return {"fit": fit_errors(observations, model), "check": prediction_errors(observations, model)}
 
 
-def _static_checks(table: MaterialTable, models: dict[Role, Model]) -> Iterator[StaticCheck]:
-    """The table's static rows beside the long-term moduli of the models that did not see them."""
-    for row in table.static:
+def _static_checks(table: MaterialTable, models: dict[Role, EvaluatedModel]) -> Iterator[StaticCheck]:
+    """Check the table's static rows against the long-term moduli of models that were not fitted to them."""
+    for row in table.static_rows:
         measured = row.quantities["storage_modulus"]
         for role in ("constant", "relaxation", "chosen"):
             predicted = models[role].estimates[0]

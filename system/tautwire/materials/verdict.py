@@ -1,4 +1,4 @@
-"""What a dynamic test says about a rope: values only, for reports to show."""
+"""The verdict of a dynamic test on a rope: values only, for reports to show."""
 
 from __future__ import annotations
 
@@ -9,10 +9,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import NDArray
 
-from .consistency import Check
-from .leave_out import LeaveOut
+from .consistency import ConsistencyCheck
+from .leave_out import CrossValidation
 from .modulus import Material
-from .observations import Observations
+from .observations import ModulusObservations
 from .table import MaterialTable
 
 Array = NDArray[np.float64]
@@ -21,24 +21,25 @@ Role = Literal["declared", "constant", "relaxation", "chosen", "rival", "robot"]
 
 
 @dataclass(frozen=True)
-class Options:
-    """How a table is read and judged.
+class MaterialOptions:
+    """Options of how a table is read and tested.
 
-    ``pair`` are the two columns that are fitted, None for the preferred ones; ``shared`` the share of variance that all
-    rows have in common; uncertainties are ``coverage`` standard deviations; ``alpha`` the rate of false alarms.
+    ``pair`` are the two columns that are fitted, None for the preferred ones; ``shared_variance`` the share of variance
+    that all rows have in common; uncertainties are ``coverage_factor`` standard deviations; ``significance_level`` is
+    the rate of false alarms.
     """
 
     pair: tuple[str, str] | None = None
-    shared: float = 0.0
-    coverage: float = 1.0
-    alpha: float = 0.01
+    shared_variance: float = 0.0
+    coverage_factor: float = 1.0
+    significance_level: float = 0.01
 
 
 @dataclass(frozen=True)
 class Estimate:
     """A parameter with its 95 % interval, in SI units; a side is open where only a bound of the model ends it.
 
-    ``declared`` is the constant in use so far, None where there is none.
+    ``declared`` is the constant in present use, None where there is none.
     """
 
     effect: str
@@ -53,21 +54,21 @@ class Estimate:
 
 
 @dataclass(frozen=True)
-class FoundEffect:
-    """A term that earned its place; ``evidence`` is the natural log of its likelihood ratio."""
+class IdentifiedEffect:
+    """A term accepted into the model; ``log_likelihood_ratio`` is the natural log of its likelihood ratio."""
 
     name: str
     parameters: Mapping[str, Estimate]
-    evidence: float
+    log_likelihood_ratio: float
 
 
 @dataclass(frozen=True)
-class Model:
-    """One model beside the table.
+class EvaluatedModel:
+    """Goodness of fit of one model against the table.
 
-    ``storage_sigmas`` and ``damping_sigmas``, each (N,), are model less measured in standard deviations of the table;
-    ``freedom`` the numbers less free parameters. ``estimates`` is empty for a declared pair; ``leave_out`` is None for
-    one, and where it was not asked for.
+    ``storage_residuals`` and ``damping_residuals``, each (N,), are model less measured in standard deviations of the
+    table; ``degrees_of_freedom`` the numbers less free parameters. ``estimates`` is empty for a declared pair;
+    ``cross_validation`` is None for one, and where it was not computed.
     """
 
     role: Role
@@ -75,17 +76,17 @@ class Model:
     material: Material
     estimates: tuple[Estimate, ...]
     chi_squared: float
-    freedom: int
+    degrees_of_freedom: int
     p_value: float
     bic: float
-    storage_sigmas: Array
-    damping_sigmas: Array
-    leave_out: LeaveOut | None = None
+    storage_residuals: Array
+    damping_residuals: Array
+    cross_validation: CrossValidation | None = None
 
 
 @dataclass(frozen=True)
-class Assumption:
-    """Chi-squared and p value of some models, by role, where the table's errors are read in another way."""
+class ErrorAssumption:
+    """Chi-squared, degrees of freedom and p value of models, by role, under another reading of the table's errors."""
 
     label: str
     outcomes: Mapping[Role, tuple[float, int, float]]
@@ -93,7 +94,7 @@ class Assumption:
 
 @dataclass(frozen=True)
 class StaticCheck:
-    """A static test, which no model was fitted to, beside the long-term modulus that a model predicts; all in Pa."""
+    """A static test, held out from the fit, against the long-term modulus that a model predicts; all in Pa."""
 
     role: Role
     measured: float
@@ -102,8 +103,8 @@ class StaticCheck:
 
 
 @dataclass(frozen=True)
-class Errors:
-    """Root mean squares over the rows: storage modulus in Pa, damping in Pa s."""
+class RmsErrors:
+    """Root mean square errors over the rows: storage modulus in Pa, damping in Pa s."""
 
     storage_modulus_rms: float
     damping_rms: float
@@ -111,33 +112,34 @@ class Errors:
 
 @dataclass(frozen=True)
 class MaterialVerdict:
-    """The answer to: does one pair of modulus and damping describe this rope, and if not, what does.
+    """Verdict on whether one pair of modulus and damping describes a rope, and if not, what does.
 
-    ``models`` has the declared pair, where there is one, first. ``floor`` is the least chi-squared that damping and any
-    number of branches leave. ``error_before`` and ``error_after`` are of the declared pair (else the best constant one)
-    and of the chosen model: ``fit`` for rows that were fitted, ``check`` for each row predicted from the others.
+    ``models`` has the declared pair, where there is one, first. ``relaxation_floor`` is the minimum of chi-squared over
+    damping and any number of branches. ``error_before`` and ``error_after`` are of the declared pair (else the best
+    constant one) and of the chosen model: ``fit`` for rows that were fitted, ``check`` for each row predicted from the
+    others.
     """
 
     verdict: VerdictName
     table: MaterialTable
     pair: tuple[str, str]
-    options: Options
-    seen: Observations
-    models: tuple[Model, ...]
-    effects: tuple[FoundEffect, ...]
-    also_possible: tuple[tuple[str, ...], ...]
-    error_before: Mapping[str, Errors]
-    error_after: Mapping[str, Errors]
-    noise_floor: Errors
-    noise_before: bool
-    noise_after: bool
-    checks: tuple[Check, ...]
-    assumptions: tuple[Assumption, ...]
+    options: MaterialOptions
+    observations: ModulusObservations
+    models: tuple[EvaluatedModel, ...]
+    effects: tuple[IdentifiedEffect, ...]
+    confusable_effects: tuple[tuple[str, ...], ...]
+    error_before: Mapping[str, RmsErrors]
+    error_after: Mapping[str, RmsErrors]
+    noise_floor: RmsErrors
+    adequate_before: bool
+    adequate_after: bool
+    consistency_checks: tuple[ConsistencyCheck, ...]
+    error_assumptions: tuple[ErrorAssumption, ...]
     static_checks: tuple[StaticCheck, ...]
-    floor: float
+    relaxation_floor: float
     seconds: float
 
-    def model(self, role: Role) -> Model:
+    def model(self, role: Role) -> EvaluatedModel:
         """The first model of a role; raises KeyError where there is none."""
         for model in self.models:
             if model.role == role:
@@ -145,11 +147,11 @@ class MaterialVerdict:
         raise KeyError(role)
 
     @property
-    def before(self) -> Model:
-        """The declared pair, or where none is declared the best constant one."""
+    def reference_model(self) -> EvaluatedModel:
+        """The reference: the declared pair, or where none is declared the best constant one."""
         return self.model("declared" if self.models[0].role == "declared" else "constant")
 
     @property
-    def after(self) -> Model:
-        """The model that the table asks for."""
+    def chosen_model(self) -> EvaluatedModel:
+        """The model that was selected for the table."""
         return self.model("chosen")

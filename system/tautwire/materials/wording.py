@@ -1,4 +1,4 @@
-"""A verdict on a rope in words: one sentence, and what a reader must know beside it."""
+"""The verdict on a rope in words: one sentence, and notes on what limits it."""
 
 from __future__ import annotations
 
@@ -7,15 +7,15 @@ from collections.abc import Iterable, Iterator, Sequence
 import numpy as np
 from scipy.stats import chi2, spearmanr
 
-from .consistency import disagreements, understated
+from .consistency import disagreements, understated_uncertainties
 from .table import MaterialTable
-from .verdict import MaterialVerdict, Model, Role
+from .verdict import EvaluatedModel, MaterialVerdict, Role
 
-SMALLEST_P = 1e-300
-# From this rank correlation on, two columns of a table rise or fall together.
-TOGETHER = 0.9
-NEW_TERMS = ("relaxation", "hysteresis")
-TITLES: dict[Role, str] = {
+MIN_PRINTED_P_VALUE = 1e-300
+# Rank correlation from which on two columns of a table count as collinear.
+COLLINEAR_RANK_CORRELATION = 0.9
+ADDED_EFFECTS = ("relaxation", "hysteresis")
+MODEL_TITLES: dict[Role, str] = {
     "declared": "declared pair",
     "constant": "best constant pair",
     "relaxation": "relaxation alone",
@@ -25,110 +25,122 @@ TITLES: dict[Role, str] = {
 }
 
 
-def sentence(verdict: MaterialVerdict) -> str:
+def verdict_sentence(verdict: MaterialVerdict) -> str:
     """The verdict in one or two sentences."""
     constant = verdict.model("constant")
-    refuted = constant.p_value < verdict.options.alpha
-    judged = f"A constant pair of modulus and damping is {'refuted' if refuted else 'enough'}: the best one leaves"
-    text = f"{judged} {left_text(constant)}"
-    if verdict.before.role == "declared":
-        text += f", the declared one {left_text(verdict.before)}"
+    refuted = constant.p_value < verdict.options.significance_level
+    opening = f"A constant pair of modulus and damping is {'refuted' if refuted else 'enough'}: the best one leaves"
+    text = f"{opening} {chi_squared_text(constant)}"
+    if verdict.reference_model.role == "declared":
+        text += f", the declared one {chi_squared_text(verdict.reference_model)}"
     if verdict.verdict == "unexplained":
-        return f"{text}. No model here leaves only noise: {verdict.after.label} leaves {left_text(verdict.after)}."
-    new = sorted((effect.name for effect in verdict.effects if effect.name in NEW_TERMS), reverse=True)
-    if new:
-        return f"{text}. Found: {' and '.join(new)}, with which {left_text(verdict.after)} is left."
+        return f"{text}. No model here leaves only noise: {verdict.chosen_model.label} leaves {chi_squared_text(verdict.chosen_model)}."
+    added_effects = sorted((effect.name for effect in verdict.effects if effect.name in ADDED_EFFECTS), reverse=True)
+    if added_effects:
+        return f"{text}. Found: {' and '.join(added_effects)}, with which {chi_squared_text(verdict.chosen_model)} is left."
     if verdict.effects:
         changed = " and ".join(effect.name for effect in verdict.effects)
         return f"{text}. Found: another {changed}."
     return f"{text}."
 
 
-def notes(verdict: MaterialVerdict) -> tuple[str, ...]:
-    """What limits the verdict: how errors were read, what the table cannot tell, which rows it hangs on."""
+def verdict_notes(verdict: MaterialVerdict) -> tuple[str, ...]:
+    """Notes on what limits the verdict: how errors were read, what the table cannot tell, which rows it depends on."""
     return (
-        *_reading(verdict),
-        *_consistency(verdict),
-        *_amplitude(verdict.table),
-        *_floor(verdict),
-        *_left_out(verdict),
-        *_rivals(verdict),
-        *_robot(verdict),
+        *_uncertainty_notes(verdict),
+        *_consistency_notes(verdict),
+        *_amplitude_notes(verdict.table),
+        *_relaxation_floor_notes(verdict),
+        *_cross_validation_notes(verdict),
+        *_confusable_model_notes(verdict),
+        *_robot_model_notes(verdict),
     )
 
 
-def left_text(model: Model) -> str:
-    """``chi-squared 59.9 of 10 (p = 3.9e-09)``: of so many degrees of freedom."""
-    return f"chi-squared {model.chi_squared:.4g} of {model.freedom} ({p_text(model.p_value)})"
+def chi_squared_text(model: EvaluatedModel) -> str:
+    """Chi-squared of a model with its degrees of freedom: ``chi-squared 59.9 of 10 (p = 3.9e-09)``."""
+    return f"chi-squared {model.chi_squared:.4g} of {model.degrees_of_freedom} ({p_value_text(model.p_value)})"
 
 
-def p_text(p_value: float) -> str:
-    """A p value; one below what a float holds as a bound."""
-    return f"p < {SMALLEST_P:g}" if p_value < SMALLEST_P else f"p = {p_value:.2g}"
+def p_value_text(p_value: float) -> str:
+    """A p value as text; one below what a float holds as a bound."""
+    return f"p < {MIN_PRINTED_P_VALUE:g}" if p_value < MIN_PRINTED_P_VALUE else f"p = {p_value:.2g}"
 
 
-def _reading(verdict: MaterialVerdict) -> Iterator[str]:
+def _uncertainty_notes(verdict: MaterialVerdict) -> Iterator[str]:
     options = verdict.options
-    many = "one standard deviation" if options.coverage == 1.0 else f"{options.coverage:g} standard deviations"
-    common = f", {options.shared:.0%} of each variance common to all rows" if options.shared else ", rows independent"
-    yield f"fitted: {verdict.pair[0]} and {verdict.pair[1]}, uncertainties read as {many}{common}"
+    coverage_text = (
+        "one standard deviation"
+        if options.coverage_factor == 1.0
+        else f"{options.coverage_factor:g} standard deviations"
+    )
+    shared_text = (
+        f", {options.shared_variance:.0%} of each variance common to all rows"
+        if options.shared_variance
+        else ", rows independent"
+    )
+    yield f"fitted: {verdict.pair[0]} and {verdict.pair[1]}, uncertainties read as {coverage_text}{shared_text}"
 
 
-def _consistency(verdict: MaterialVerdict) -> Iterator[str]:
-    for check in disagreements(verdict.checks):
+def _consistency_notes(verdict: MaterialVerdict) -> Iterator[str]:
+    for check in disagreements(verdict.consistency_checks):
         yield (
             f"{check.frequency:g} Hz: {check.column} is written {check.written:.4g}, "
             f"{check.formula} gives {check.recomputed:.4g} ({check.agreement})"
         )
-    columns = dict.fromkeys(check.column for check in understated(verdict.checks))
+    columns = dict.fromkeys(check.column for check in understated_uncertainties(verdict.consistency_checks))
     for column in columns:
-        of_column = [check for check in understated(verdict.checks) if check.column == column]
+        of_column = [check for check in understated_uncertainties(verdict.consistency_checks) if check.column == column]
         rows = ", ".join(dict.fromkeys(f"{check.frequency:g}" for check in of_column))
         yield f"the uncertainty of {column} is written smaller than its inputs' give, at {rows} Hz"
 
 
-def _amplitude(table: MaterialTable) -> Iterator[str]:
+def _amplitude_notes(table: MaterialTable) -> Iterator[str]:
     if not all("strain_amplitude" in row.quantities for row in table.rows):
         return
     amplitude = np.array([row.quantities["strain_amplitude"].value for row in table.rows])
     frequency = [row.frequency for row in table.rows]
     if np.ptp(amplitude) > 0.0 and np.ptp(frequency) > 0.0:
-        rank = float(spearmanr(frequency, amplitude).statistic)
-        if abs(rank) >= TOGETHER:
-            way = "rises" if rank > 0.0 else "falls"
+        rank_correlation = float(spearmanr(frequency, amplitude).statistic)
+        if abs(rank_correlation) >= COLLINEAR_RANK_CORRELATION:
+            direction = "rises" if rank_correlation > 0.0 else "falls"
             yield (
-                f"the strain amplitude {way} with frequency, {amplitude.min():.2g} to {amplitude.max():.2g}: "
+                f"the strain amplitude {direction} with frequency, {amplitude.min():.2g} to {amplitude.max():.2g}: "
                 "what amplitude does looks here like what frequency does"
             )
 
 
-def _floor(verdict: MaterialVerdict) -> Iterator[str]:
-    """Even with no branch counted as a free parameter."""
-    freedom = verdict.seen.number_count - 2
-    p_value = float(chi2.sf(verdict.floor, freedom))
-    if p_value < verdict.options.alpha:
+def _relaxation_floor_notes(verdict: MaterialVerdict) -> Iterator[str]:
+    """Note that relaxation is rejected, even with no branch counted as a free parameter."""
+    degrees_of_freedom = verdict.observations.measurement_count - 2
+    p_value = float(chi2.sf(verdict.relaxation_floor, degrees_of_freedom))
+    if p_value < verdict.options.significance_level:
         yield (
-            f"damping with any number of branches leaves at least chi-squared {verdict.floor:.4g} of {freedom} "
-            f"({p_text(p_value)}): no passive linear solid gives these rows within their uncertainties"
+            f"damping with any number of branches leaves at least chi-squared {verdict.relaxation_floor:.4g} of {degrees_of_freedom} "
+            f"({p_value_text(p_value)}): no passive linear solid gives these rows within their uncertainties"
         )
 
 
-def _left_out(verdict: MaterialVerdict) -> Iterator[str]:
-    constant, chosen = verdict.model("constant").leave_out, verdict.after.leave_out
+def _cross_validation_notes(verdict: MaterialVerdict) -> Iterator[str]:
+    constant, chosen = verdict.model("constant").cross_validation, verdict.chosen_model.cross_validation
     if constant is None or chosen is None:
         return
-    most = max(fit.p_value for fit in constant.rest)
-    if verdict.model("constant").p_value < verdict.options.alpha:
-        which = "whichever row is left out" if most < verdict.options.alpha else "only with all rows"
-        yield f"a constant pair is refuted {which}: at most {p_text(most)} without one"
-    outside = [row for row in range(len(chosen.inside)) if not chosen.inside[row]]
-    worst = [row for row in outside if chosen.chi_squared[row] > float(chi2.isf(verdict.options.alpha, 2))]
-    if worst:
-        rows = _listed(f"{verdict.seen.frequency[row]:g}" for row in worst)
+    max_p_value = max(fit.p_value for fit in constant.fits)
+    if verdict.model("constant").p_value < verdict.options.significance_level:
+        condition = (
+            "whichever row is left out" if max_p_value < verdict.options.significance_level else "only with all rows"
+        )
+        yield f"a constant pair is refuted {condition}: at most {p_value_text(max_p_value)} without one"
+    extrapolated = [row for row in range(len(chosen.is_interpolated)) if not chosen.is_interpolated[row]]
+    unpredicted = [
+        row for row in extrapolated if chosen.chi_squared[row] > float(chi2.isf(verdict.options.significance_level, 2))
+    ]
+    if unpredicted:
+        rows = _joined(f"{verdict.observations.frequency[row]:g}" for row in unpredicted)
         yield f"the rows at {rows} Hz are not predicted by the others: do not extrapolate beyond the table"
 
 
-def _rivals(verdict: MaterialVerdict) -> Iterator[str]:
+def _confusable_model_notes(verdict: MaterialVerdict) -> Iterator[str]:
     for model in verdict.models:
         if model.role != "rival":
             continue
@@ -136,15 +148,15 @@ def _rivals(verdict: MaterialVerdict) -> Iterator[str]:
         reason = ""
         if delay:
             reason = f": a delay of {1e3 * delay[0].value:.3g} ms between the test's channels would pass for damping"
-        elif model.material.friction:
-            reason = f": dry friction of {model.material.friction / 1e6:.3g} MPa at all amplitudes does as well"
-        yield f"as good: {model.label}, {left_text(model)}{reason}"
+        elif model.material.friction_stress:
+            reason = f": dry friction of {model.material.friction_stress / 1e6:.3g} MPa at all amplitudes does as well"
+        yield f"as good: {model.label}, {chi_squared_text(model)}{reason}"
 
 
-def _robot(verdict: MaterialVerdict) -> Iterator[str]:
+def _robot_model_notes(verdict: MaterialVerdict) -> Iterator[str]:
     robot = verdict.model("robot")
-    static = ", static rows included" if verdict.table.static else ""
-    yield f"robot files hold {robot.label}{static}: {left_text(robot)}"
+    static = ", static rows included" if verdict.table.static_rows else ""
+    yield f"robot files hold {robot.label}{static}: {chi_squared_text(robot)}"
     for check in verdict.static_checks:
         if check.role == "relaxation":
             low, high = check.predicted.low / 1e9, check.predicted.high / 1e9
@@ -154,6 +166,6 @@ def _robot(verdict: MaterialVerdict) -> Iterator[str]:
             )
 
 
-def _listed(words: Iterable[str]) -> str:
-    known: Sequence[str] = tuple(words)
-    return known[0] if len(known) == 1 else f"{', '.join(known[:-1])} and {known[-1]}"
+def _joined(words: Iterable[str]) -> str:
+    items: Sequence[str] = tuple(words)
+    return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"

@@ -1,10 +1,10 @@
-"""The laws' mathematics on arrays: many instants at once."""
+"""The mathematics of the physical laws on NumPy arrays: many instants at once."""
 
 import numpy as np
 
 from tautwire_fmu.laws.mathematics import Mathematics
 
-NUMPY = Mathematics(
+NUMPY_MATHEMATICS = Mathematics(
     log=np.log,
     exp=np.exp,
     sqrt=np.sqrt,

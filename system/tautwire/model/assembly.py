@@ -1,4 +1,4 @@
-"""From a robot to what the laws take: constants and active effects of each component."""
+"""Assembles a robot for the physical laws: constants and active effects of each component."""
 
 from __future__ import annotations
 
@@ -12,20 +12,20 @@ from tautwire_fmu.laws.mathematics import REAL, Mathematics
 from tautwire_fmu.laws.point_mass import PointMassConstants
 
 from ..robots.robot import Robot
-from ..statics.equilibrium import cable_effects, platform_effects, routes, static_tensions
+from ..statics.equilibrium import cable_effects, cable_routes, platform_effects, static_tensions
 
 
 @dataclass(frozen=True)
 class CableComponent:
-    """One cable: what is declared of it, and the effects that act in it."""
+    """One cable: its declared constants, and the effects that act in it."""
 
     constants: CableConstants
     effects: tuple[ActiveEffect, ...]
 
 
 @dataclass(frozen=True)
-class Assembly:
-    """A robot as the laws see it; positions in m, the start's velocity in m/s."""
+class RobotAssembly:
+    """A robot as the laws take it; positions in m, the initial velocity in m/s."""
 
     cables: tuple[CableComponent, ...]
     platform: PointMassConstants
@@ -34,17 +34,19 @@ class Assembly:
     velocity: tuple[float, float, float]
 
 
-def assemble(robot: Robot, start_tensions: Sequence[Any] | None = None, m: Mathematics = REAL) -> Assembly:
-    """Gather constants and effects; the static start gives the tensions where none are handed in.
+def assemble_robot(
+    robot: Robot, start_tensions: Sequence[Any] | None = None, mathematics: Mathematics = REAL
+) -> RobotAssembly:
+    """Assembles constants and effects; start tensions are by default those of static equilibrium.
 
-    ``m`` is the mathematics of the effects' parameters.
+    ``mathematics`` are the functions for the effects' parameters.
 
     Raises UnreachableError where the cables cannot hold the platform at its start.
     """
     tensions = static_tensions(robot) if start_tensions is None else start_tensions
-    if robot.release:
-        tensions = [tension + beside for tension, beside in zip(tensions, robot.release.tensions, strict=True)]
-    lines = routes(m, robot, robot.platform.start)
+    if robot.initial_state:
+        tensions = [tension + beside for tension, beside in zip(tensions, robot.initial_state.tensions, strict=True)]
+    cable_paths = cable_routes(mathematics, robot, robot.platform.start)
     cables = tuple(
         CableComponent(
             constants=CableConstants(
@@ -60,12 +62,12 @@ def assemble(robot: Robot, start_tensions: Sequence[Any] | None = None, m: Mathe
             ),
             effects=cable_effects(robot, index),
         )
-        for index, (cable, line, tension) in enumerate(zip(robot.cables, lines, tensions, strict=True), start=1)
+        for index, (cable, line, tension) in enumerate(zip(robot.cables, cable_paths, tensions, strict=True), start=1)
     )
-    return Assembly(
+    return RobotAssembly(
         cables=cables,
         platform=PointMassConstants(robot.platform.mass, robot.gravity),
         platform_effects=platform_effects(robot),
         start=robot.platform.start,
-        velocity=robot.release.velocity if robot.release else (0.0, 0.0, 0.0),
+        velocity=robot.initial_state.velocity if robot.initial_state else (0.0, 0.0, 0.0),
     )

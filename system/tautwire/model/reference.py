@@ -1,4 +1,4 @@
-"""The robot as one model in memory, made from the laws that the FMUs carry: what a co-simulation is held against."""
+"""Monolithic reference simulation of the robot, from the laws in the FMUs, to verify a co-simulation against."""
 
 from __future__ import annotations
 
@@ -10,14 +10,14 @@ from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
 from ..robots.robot import Robot
-from .symbolic import Model, symbolic_model
+from .symbolic import SymbolicModel, symbolic_model
 
 Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
 class ReferenceRun:
-    """``time`` (N,) in s, ``position`` and ``velocity`` (N, 3), ``tension`` and ``length`` (N, n); SI units."""
+    """Solution in SI units: ``time`` (N,), ``position`` and ``velocity`` (N, 3), ``tension`` and ``length`` (N, n)."""
 
     time: Array
     position: Array
@@ -27,30 +27,43 @@ class ReferenceRun:
 
 
 def integrate(
-    robot: Robot, time: Array, winch_speed: Array, relative: float = 1e-11, absolute: float = 1e-12
+    robot: Robot, time: Array, winch_speed: Array, relative_tolerance: float = 1e-11, absolute_tolerance: float = 1e-12
 ) -> ReferenceRun:
-    """Integrate the whole robot over winch speeds that are linear between samples.
+    """Integrates the whole robot in one model, with winch speeds that are linear between samples.
 
-    ``time`` (N,), ``winch_speed`` (N, n). Dormand and Prince's method of order 8 (DOP853), begun anew at every
-    sample, where the slope of the winch speed jumps. A sensor that lags shows the start until its lag has passed.
+    ``time`` (N,), ``winch_speed`` (N, n). Dormand and Prince's method of order 8 (DOP853), restarted at every
+    sample, where the slope of the winch speed jumps. A delayed sensor shows the start value until its delay has passed.
     """
     model = symbolic_model(robot)
     outputs = casadi.Function("outputs", [model.states, model.inputs], [model.outputs])
-    lags = np.array(casadi.Function("lags", [], [model.lags])()["o0"]).ravel()
-    late = {float(lag): np.maximum(time - lag, time[0]) for lag in np.unique(np.append(lags, 0.0))}
-    instants = np.unique(np.concatenate(list(late.values())))
-    states = _states(model, time, winch_speed, instants, relative, absolute)
-    speeds = np.array([np.interp(instants, time, column) for column in winch_speed.T])
-    shown = np.array(outputs(states.T, np.vstack([speeds, np.zeros((3, len(instants)))]))).T
+    delays = np.array(casadi.Function("lags", [], [model.sensor_delays])()["o0"]).ravel()
+    delayed_times = {float(lag): np.maximum(time - lag, time[0]) for lag in np.unique(np.append(delays, 0.0))}
+    evaluation_times = np.unique(np.concatenate(list(delayed_times.values())))
+    states = _integrate_states(model, time, winch_speed, evaluation_times, relative_tolerance, absolute_tolerance)
+    speeds = np.array([np.interp(evaluation_times, time, column) for column in winch_speed.T])
+    output_values = np.array(outputs(states.T, np.vstack([speeds, np.zeros((3, len(evaluation_times)))]))).T
     count = robot.cable_count
-    columns = np.repeat(0.0, shown.shape[1])
-    columns[np.r_[0:3, 6 : 6 + count]] = lags
-    rows = np.array([np.searchsorted(instants, late[float(lag)]) for lag in columns]).T
-    shown = np.take_along_axis(shown, rows, axis=0)
-    return ReferenceRun(time, shown[:, :3], shown[:, 3:6], shown[:, 6 : 6 + count], shown[:, 6 + count :])
+    output_delays = np.repeat(0.0, output_values.shape[1])
+    output_delays[np.r_[0:3, 6 : 6 + count]] = delays
+    rows = np.array([np.searchsorted(evaluation_times, delayed_times[float(lag)]) for lag in output_delays]).T
+    output_values = np.take_along_axis(output_values, rows, axis=0)
+    return ReferenceRun(
+        time,
+        output_values[:, :3],
+        output_values[:, 3:6],
+        output_values[:, 6 : 6 + count],
+        output_values[:, 6 + count :],
+    )
 
 
-def _states(model: Model, time: Array, winch_speed: Array, instants: Array, relative: float, absolute: float) -> Array:
+def _integrate_states(
+    model: SymbolicModel,
+    time: Array,
+    winch_speed: Array,
+    evaluation_times: Array,
+    relative_tolerance: float,
+    absolute_tolerance: float,
+) -> Array:
     """States at rising instants, the first of which is the start, shape (instants, states)."""
     rates = casadi.Function("rates", [model.states, model.inputs], [model.rates])
     state = np.array(casadi.Function("start", [], [model.start])()["o0"]).ravel()
@@ -63,9 +76,17 @@ def _states(model: Model, time: Array, winch_speed: Array, instants: Array, rela
             speed = winch_speed[index] + (at - begin) * slope
             return np.array(rates(y, np.append(speed, np.zeros(3)))).ravel()
 
-        inside = instants[(instants > begin) & (instants <= end)]
-        asked = np.unique(np.append(inside, end))
-        solution = solve_ivp(rate, (begin, end), state, method="DOP853", t_eval=asked, rtol=relative, atol=absolute)
+        interval_times = evaluation_times[(evaluation_times > begin) & (evaluation_times <= end)]
+        solver_times = np.unique(np.append(interval_times, end))
+        solution = solve_ivp(
+            rate,
+            (begin, end),
+            state,
+            method="DOP853",
+            t_eval=solver_times,
+            rtol=relative_tolerance,
+            atol=absolute_tolerance,
+        )
         state = solution.y[:, -1]
-        states.append(solution.y.T[: len(inside)])
+        states.append(solution.y.T[: len(interval_times)])
     return np.vstack(states)

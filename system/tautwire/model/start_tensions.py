@@ -1,4 +1,4 @@
-"""The static start's tensions as expressions of a robot's free numbers."""
+"""The static start tensions as CasADi expressions of a robot's free parameters."""
 
 from __future__ import annotations
 
@@ -10,63 +10,80 @@ from numpy.typing import NDArray
 from tautwire_fmu.laws.mathematics import Mathematics
 
 from ..robots.robot import Robot
-from ..statics.equilibrium import DEFAULT_LIMITS, PARALLEL, directions, has_weight, hung, load, routes, static_tensions
+from ..statics.equilibrium import (
+    DEFAULT_LIMITS,
+    SINGULARITY_TOLERANCE,
+    cable_routes,
+    cable_weight_force,
+    cables_have_weight,
+    static_load,
+    static_tensions,
+    unit_directions,
+)
 
 Array = NDArray[np.float64]
 
-AT_BOUND = 1e-6
-# Where ropes have weight: each gains some three digits.
-SWEEPS = 6
+LIMIT_TOLERANCE = 1e-6
+# Where cables have weight: each iteration gains some three digits.
+WEIGHT_ITERATIONS = 6
 
 
-def start_tensions(nominal: Robot, opened: Robot, m: Mathematics) -> list[SX]:
-    """Static tensions, N, of a robot some of whose numbers are expressions; ``nominal`` has numbers in their place.
+def symbolic_start_tensions(nominal: Robot, symbolic_robot: Robot, mathematics: Mathematics) -> list[SX]:
+    """Static tensions, in N, of a robot with symbolic parameters; ``nominal`` has numbers instead.
 
-    Cables at a limit stay there, the others share the rest.
+    Cables at a tension limit stay there, the others share the remaining load.
     """
     tensions = static_tensions(nominal)
     limits = nominal.tension or DEFAULT_LIMITS
-    span = max(float(np.max(tensions)), 1.0) * AT_BOUND
-    held = np.zeros(len(tensions), dtype=bool)
+    limit_distance = max(float(np.max(tensions)), 1.0) * LIMIT_TOLERANCE
+    at_limit = np.zeros(len(tensions), dtype=bool)
     if len(tensions) > 3:
-        held = (tensions - limits.minimum < span) | (limits.maximum - tensions < span)
+        at_limit = (tensions - limits.minimum < limit_distance) | (limits.maximum - tensions < limit_distance)
     start = nominal.platform.start
-    lines = routes(m, opened, start)
-    across = SX(_spanned(directions(nominal))).T
-    unit = casadi.mtimes(across, casadi.horzcat(*(casadi.vertcat(*line.direction) for line in lines)))
-    weight = SX(casadi.vertcat(*load(m, opened, start)))
+    cable_paths = cable_routes(mathematics, symbolic_robot, start)
+    basis = SX(_wrench_basis(unit_directions(nominal))).T
+    directions_in_basis = casadi.mtimes(
+        basis, casadi.horzcat(*(casadi.vertcat(*line.direction) for line in cable_paths))
+    )
+    load_vector = SX(casadi.vertcat(*static_load(mathematics, symbolic_robot, start)))
     result = [SX(float(tension)) for tension in tensions]
-    for _ in range(SWEEPS if has_weight(opened) else 1):
-        rest = casadi.mtimes(across, weight - casadi.vertcat(*hung(m, opened, lines, result)))
-        result = _shared(unit, rest, result, held, limits.preferred)
+    for _ in range(WEIGHT_ITERATIONS if cables_have_weight(symbolic_robot) else 1):
+        remaining_load = casadi.mtimes(
+            basis, load_vector - casadi.vertcat(*cable_weight_force(mathematics, symbolic_robot, cable_paths, result))
+        )
+        result = _distribute_symbolically(directions_in_basis, remaining_load, result, at_limit, limits.preferred)
     return result
 
 
-def _spanned(unit: Array) -> Array:
-    """A basis of what the cables can push in; the axes themselves where that is everything."""
-    basis, size, _ = np.linalg.svd(unit)
-    return np.eye(3) if size[-1] > PARALLEL else basis[:, size > PARALLEL]
+def _wrench_basis(unit_directions: Array) -> Array:
+    """Orthonormal basis of the forces that the cables can exert; the coordinate axes if these span the space."""
+    basis, singular_values, _ = np.linalg.svd(unit_directions)
+    return (
+        np.eye(3) if singular_values[-1] > SINGULARITY_TOLERANCE else basis[:, singular_values > SINGULARITY_TOLERANCE]
+    )
 
 
-def _shared(unit: SX, rest: SX, tensions: list[SX], held: NDArray[np.bool_], preferred: float) -> list[SX]:
-    """The tensions with those that are not held chosen anew, to hold ``rest``."""
-    sharing = np.flatnonzero(~held).tolist()
-    for index in np.flatnonzero(held).tolist():
-        rest = rest - unit[:, index] * tensions[index]
-    own = unit[:, sharing]
+def _distribute_symbolically(
+    unit_directions: SX, remaining_load: SX, tensions: list[SX], at_limit: NDArray[np.bool_], preferred: float
+) -> list[SX]:
+    """Tensions with those not at a limit recomputed to balance ``remaining_load``."""
+    free_cables = np.flatnonzero(~at_limit).tolist()
+    for index in np.flatnonzero(at_limit).tolist():
+        remaining_load = remaining_load - unit_directions[:, index] * tensions[index]
+    free_directions = unit_directions[:, free_cables]
     if len(tensions) == 3:
-        shares = casadi.solve(own, rest)
+        free_tensions = casadi.solve(free_directions, remaining_load)
     else:
-        missing = rest - preferred * casadi.sum2(own)
-        shares = preferred + casadi.mtimes(_pseudo_inverse(own), missing)
+        load_residual = remaining_load - preferred * casadi.sum2(free_directions)
+        free_tensions = preferred + casadi.mtimes(_pseudo_inverse(free_directions), load_residual)
     result = list(tensions)
-    for place, index in enumerate(sharing):
-        result[index] = shares[place]
+    for position, index in enumerate(free_cables):
+        result[index] = free_tensions[position]
     return result
 
 
 def _pseudo_inverse(matrix: SX) -> SX:
-    """Of a matrix of full rank."""
+    """Moore-Penrose inverse of a matrix of full rank."""
     if matrix.shape[1] < matrix.shape[0]:
         return casadi.solve(casadi.mtimes(matrix.T, matrix), matrix.T)
     return casadi.solve(casadi.mtimes(matrix, matrix.T), matrix).T

@@ -15,22 +15,22 @@ from tautwire_fmu.laws import cable as cable_law
 from tautwire_fmu.laws import point_mass as platform_law
 from tautwire_fmu.laws import stages
 from tautwire_fmu.laws.effects import State
-from tautwire_fmu.laws.formula import NAME as FORMULA_NAME
-from tautwire_fmu.laws.formula import TIME
+from tautwire_fmu.laws.formula import ELAPSED_TIME
+from tautwire_fmu.laws.formula import FORMULA_EFFECT_NAME as FORMULA_NAME
 from tautwire_fmu.laws.mathematics import Mathematics
 from tautwire_fmu.laws.vectors import add, scale
 
 from ..robots.robot import EffectSetting, Robot
-from .assembly import Assembly, assemble
-from .start_tensions import start_tensions
-from .uncertain import AXES, UncertainNumber, offsets, with_moves
+from .assembly import RobotAssembly, assemble_robot
+from .start_tensions import symbolic_start_tensions
+from .uncertain import AXES, UncertainParameter, perturbed_robot, sensor_offsets
 
 Array = NDArray[np.float64]
 
-# In the place of an effect's setting: a number of the formulas.
-OF_FORMULAS = -1
+# Instead of an effect's index: a parameter of the formulas.
+FORMULA_INDEX = -1
 
-CASADI = Mathematics(
+CASADI_MATHEMATICS = Mathematics(
     log=casadi.log,
     exp=casadi.exp,
     sqrt=casadi.sqrt,
@@ -46,24 +46,24 @@ CASADI = Mathematics(
 
 @dataclass(frozen=True)
 class FreeParameter:
-    """A parameter of an effect of the robot that stays a symbol; ``setting`` counts the robot's effects from 0.
+    """A free parameter: a number of an effect that stays a symbol; ``effect_index`` counts the robot's effects from 0.
 
-    It is OF_FORMULAS for a number of the formulas.
+    It is FORMULA_INDEX for a number of the formulas.
     """
 
-    setting: int
+    effect_index: int
     name: str
 
 
 @dataclass(frozen=True)
-class Model:
-    """The equations of a robot; SX columns.
+class SymbolicModel:
+    """The equations of a robot as a state-space model of SX columns.
 
     States: position, velocity, unstrained lengths, and those states of effects that something depends on. Inputs:
-    winch speeds, external force. Outputs: position and tensions as sensors show them but for their lag, velocity,
-    lengths. ``lags`` (3 + n) of positions and tensions in s; ``span_tensions`` (n) those of the free ropes in N.
-    ``start`` is the state at the static start; ``drifting`` are the places of states that never settle;
-    ``parameters`` are the free ones.
+    winch speeds, external force. Outputs: measured position and tensions without sensor delay, velocity, lengths.
+    ``sensor_delays`` (3 + n) of positions and tensions in s; ``span_tensions`` (n) of the free spans in N. ``start``
+    is the state in static equilibrium; ``drifting`` are the indices of states without equilibrium; ``parameters``
+    are the free ones.
     """
 
     states: SX
@@ -72,7 +72,7 @@ class Model:
     rates: SX
     outputs: SX
     span_tensions: SX
-    lags: SX
+    sensor_delays: SX
     start: SX
     drifting: tuple[int, ...]
     state_names: tuple[str, ...]
@@ -89,7 +89,7 @@ class _Equations:
 
 @dataclass(frozen=True)
 class _EffectState:
-    """A state of an effect with its symbol; ``cable`` counts from 1 and is 0 on the platform."""
+    """A state of an effect with its symbol; ``cable`` counts from 1, 0 for the platform."""
 
     effect: str
     cable: int
@@ -102,187 +102,225 @@ class _EffectState:
 
 
 def symbolic_model(
-    robot: Robot, free: Sequence[FreeParameter] = (), uncertain: Sequence[UncertainNumber] = ()
-) -> Model:
-    """Assemble the equations of a robot with some parameters of its effects left free.
+    robot: Robot, free_parameters: Sequence[FreeParameter] = (), uncertain_parameters: Sequence[UncertainParameter] = ()
+) -> SymbolicModel:
+    """Assembles the equations of a robot with some parameters of its effects as symbols.
 
-    Each ``uncertain`` number is one more state, after all others: in standard deviations, zero at the start.
+    Each of ``uncertain_parameters`` is one more state, after all others: in standard deviations, zero at the start.
     The static start follows the free parameters; with more than three cables, cables at a tension limit stay there.
     Not valid across a change of which cables are at a limit.
     """
-    symbols = [SX.sym(f"{_owner(robot, f)}.{f.name}") for f in free]
-    moves = [SX.sym(number.label) for number in uncertain]
-    opened = _with_symbols(with_moves(robot, uncertain, moves), free, symbols)
-    assembly = assemble(opened, start_tensions(robot, opened, CASADI), CASADI)
+    symbols = [SX.sym(f"{_owner_name(robot, f)}.{f.name}") for f in free_parameters]
+    perturbations = [SX.sym(number.label) for number in uncertain_parameters]
+    symbolic_robot = _with_symbols(
+        perturbed_robot(robot, uncertain_parameters, perturbations), free_parameters, symbols
+    )
+    assembly = assemble_robot(
+        symbolic_robot, symbolic_start_tensions(robot, symbolic_robot, CASADI_MATHEMATICS), CASADI_MATHEMATICS
+    )
     count = len(assembly.cables)
     position, velocity = SX.sym("position", 3), SX.sym("velocity", 3)
     unstrained = SX.sym("unstrained_length", count)
-    speeds, external = SX.sym("winch_speed", count), SX.sym("external_force", 3)
-    own = _effect_states(assembly)
-    equations = _equations(assembly, position, velocity, unstrained, speeds, external, [e.symbol for e in own])
-    always = casadi.vertcat(position, velocity, unstrained)
-    once = [place for place, state in enumerate(own) if state not in own[:place]]
-    own = [own[place] for place in once]
-    rows = [*range(always.numel()), *(always.numel() + place for place in once)]
+    winch_speeds, external_force = SX.sym("winch_speed", count), SX.sym("external_force", 3)
+    effect_states = _effect_states(assembly)
+    equations = _equations(
+        assembly, position, velocity, unstrained, winch_speeds, external_force, [e.symbol for e in effect_states]
+    )
+    mechanical_states = casadi.vertcat(position, velocity, unstrained)
+    unique_indices = [place for place, state in enumerate(effect_states) if state not in effect_states[:place]]
+    effect_states = [effect_states[place] for place in unique_indices]
+    rows = [*range(mechanical_states.numel()), *(mechanical_states.numel() + place for place in unique_indices)]
     equations = replace(equations, rates=equations.rates[rows])
-    kept = _felt(casadi.vertcat(always, *(e.symbol for e in own)), always.numel(), equations)
+    relevant_indices = _relevant_effect_states(
+        casadi.vertcat(mechanical_states, *(e.symbol for e in effect_states)), mechanical_states.numel(), equations
+    )
     lengths = [SX(c.constants.start_length) for c in assembly.cables]
-    begun = casadi.vertcat(SX(list(assembly.start)), SX(list(assembly.velocity)), *lengths, SX(len(kept), 1))
-    shown_off = casadi.vertcat(*map(SX, offsets(uncertain, moves, count)))
-    return Model(
-        states=casadi.vertcat(always, *(own[place].symbol for place in kept), *moves),
-        inputs=casadi.vertcat(speeds, external),
+    initial_state = casadi.vertcat(
+        SX(list(assembly.start)), SX(list(assembly.velocity)), *lengths, SX(len(relevant_indices), 1)
+    )
+    sensor_offset = casadi.vertcat(*map(SX, sensor_offsets(uncertain_parameters, perturbations, count)))
+    return SymbolicModel(
+        states=casadi.vertcat(
+            mechanical_states, *(effect_states[place].symbol for place in relevant_indices), *perturbations
+        ),
+        inputs=casadi.vertcat(winch_speeds, external_force),
         parameters=casadi.vertcat(*symbols) if symbols else SX(0, 1),
         rates=casadi.vertcat(
-            equations.rates[[*range(always.numel()), *(always.numel() + place for place in kept)]], SX(len(moves), 1)
+            equations.rates[
+                [*range(mechanical_states.numel()), *(mechanical_states.numel() + place for place in relevant_indices)]
+            ],
+            SX(len(perturbations), 1),
         ),
-        outputs=equations.outputs + casadi.vertcat(shown_off[:3], SX(3, 1), shown_off[3:], SX(count, 1)),
+        outputs=equations.outputs + casadi.vertcat(sensor_offset[:3], SX(3, 1), sensor_offset[3:], SX(count, 1)),
         span_tensions=equations.span_tensions,
-        lags=_lags(assembly),
-        start=casadi.vertcat(_at_rest(begun, moves), SX(len(moves), 1)),
-        drifting=tuple(always.numel() + i for i, place in enumerate(kept) if own[place].state.drifts),
-        state_names=(
-            *_vector("position"),
-            *_vector("velocity"),
-            *_numbered("unstrained_length", count),
-            *(own[place].name for place in kept),
-            *(f"uncertain {number.label}" for number in uncertain),
+        sensor_delays=_sensor_delays(assembly),
+        start=casadi.vertcat(_nominal_start(initial_state, perturbations), SX(len(perturbations), 1)),
+        drifting=tuple(
+            mechanical_states.numel() + i
+            for i, place in enumerate(relevant_indices)
+            if effect_states[place].state.drifts
         ),
-        input_names=(*_numbered("winch_speed", count), *_vector("external_force")),
+        state_names=(
+            *_axis_names("position"),
+            *_axis_names("velocity"),
+            *_numbered_names("unstrained_length", count),
+            *(effect_states[place].name for place in relevant_indices),
+            *(f"uncertain {number.label}" for number in uncertain_parameters),
+        ),
+        input_names=(*_numbered_names("winch_speed", count), *_axis_names("external_force")),
         output_names=(
-            *_vector("position"),
-            *_vector("velocity"),
-            *_numbered("tension", count),
-            *_numbered("length", count),
+            *_axis_names("position"),
+            *_axis_names("velocity"),
+            *_numbered_names("tension", count),
+            *_numbered_names("length", count),
         ),
     )
 
 
-def _at_rest(start: SX, moves: Sequence[SX]) -> SX:
-    """The start's states by what is declared, whatever the uncertain numbers are."""
-    return casadi.substitute(start, casadi.vertcat(*moves), SX.zeros(len(moves), 1)) if moves else start
+def _nominal_start(start: SX, perturbations: Sequence[SX]) -> SX:
+    """The initial state at the declared values, independent of the uncertain parameters."""
+    return (
+        casadi.substitute(start, casadi.vertcat(*perturbations), SX.zeros(len(perturbations), 1))
+        if perturbations
+        else start
+    )
 
 
-def with_drifts_held(model: Model) -> Model:
-    """The model without the states that never settle, which stay as they are at the start."""
+def freeze_drifting_states(model: SymbolicModel) -> SymbolicModel:
+    """The model with states that have no equilibrium frozen at their initial values and removed."""
     if not model.drifting:
         return model
-    settling = [place for place in range(model.states.numel()) if place not in model.drifting]
-    held = model.states[list(model.drifting)]
-    expressions = [model.rates[settling], model.outputs, model.span_tensions]
-    rates, outputs, tensions = casadi.substitute(expressions, [held], [SX.zeros(*held.shape)])
+    settling_indices = [place for place in range(model.states.numel()) if place not in model.drifting]
+    frozen_states = model.states[list(model.drifting)]
+    expressions = [model.rates[settling_indices], model.outputs, model.span_tensions]
+    rates, outputs, tensions = casadi.substitute(expressions, [frozen_states], [SX.zeros(*frozen_states.shape)])
     return replace(
         model,
-        states=model.states[settling],
+        states=model.states[settling_indices],
         rates=rates,
         outputs=outputs,
         span_tensions=tensions,
-        start=model.start[settling],
+        start=model.start[settling_indices],
         drifting=(),
-        state_names=tuple(model.state_names[place] for place in settling),
+        state_names=tuple(model.state_names[place] for place in settling_indices),
     )
 
 
-def _effect_states(assembly: Assembly) -> list[_EffectState]:
-    """Those of the cables, then those of the platform; the time of all formulas is one state."""
-    parts = [*enumerate((component.effects for component in assembly.cables), start=1), (0, assembly.platform_effects)]
-    found = [
+def _effect_states(assembly: RobotAssembly) -> list[_EffectState]:
+    """States of effects of the cables, then of the platform; all formulas share one time state."""
+    components = [
+        *enumerate((component.effects for component in assembly.cables), start=1),
+        (0, assembly.platform_effects),
+    ]
+    effect_states = [
         _EffectState(active.effect.name, index, state, SX.sym(state.name))
-        for index, effects in parts
+        for index, effects in components
         for active in effects
         for state in active.effect.states
     ]
-    time = _EffectState(FORMULA_NAME, 0, TIME, SX.sym(TIME.name))
-    return [time if (each.effect, each.state) == (FORMULA_NAME, TIME) else each for each in found]
+    time = _EffectState(FORMULA_NAME, 0, ELAPSED_TIME, SX.sym(ELAPSED_TIME.name))
+    return [time if (each.effect, each.state) == (FORMULA_NAME, ELAPSED_TIME) else each for each in effect_states]
 
 
-def _felt(states: SX, always: int, equations: _Equations) -> list[int]:
-    """Which states of effects reach an output or the other states, counted among the states of effects."""
-    shown = casadi.vertcat(equations.outputs, equations.span_tensions)
-    by_rates, by_shown = (_present(casadi.jacobian(f, states)) for f in (equations.rates, shown))
-    felt: NDArray[np.bool_] = np.any(by_shown, axis=0) | (np.arange(states.numel()) < always)
-    for _ in range(len(felt)):
-        felt = felt | np.any(by_rates[felt], axis=0)
-    return np.flatnonzero(felt[always:]).tolist()
+def _relevant_effect_states(states: SX, mechanical_count: int, equations: _Equations) -> list[int]:
+    """Indices of the effect states that influence an output, directly or through other states."""
+    outputs = casadi.vertcat(equations.outputs, equations.span_tensions)
+    rate_pattern, output_pattern = (_nonzero_pattern(casadi.jacobian(f, states)) for f in (equations.rates, outputs))
+    relevant: NDArray[np.bool_] = np.any(output_pattern, axis=0) | (np.arange(states.numel()) < mechanical_count)
+    for _ in range(len(relevant)):
+        relevant = relevant | np.any(rate_pattern[relevant], axis=0)
+    return np.flatnonzero(relevant[mechanical_count:]).tolist()
 
 
-def _present(matrix: SX) -> NDArray[np.bool_]:
-    """Where a matrix has entries at all."""
-    found: NDArray[np.bool_] = np.array(casadi.DM(matrix.sparsity(), 1.0), dtype=bool)
-    return found
+def _nonzero_pattern(matrix: SX) -> NDArray[np.bool_]:
+    """Sparsity pattern of a matrix."""
+    pattern: NDArray[np.bool_] = np.array(casadi.DM(matrix.sparsity(), 1.0), dtype=bool)
+    return pattern
 
 
-def _with_symbols(robot: Robot, free: Sequence[FreeParameter], symbols: Sequence[SX]) -> Robot:
+def _with_symbols(robot: Robot, free_parameters: Sequence[FreeParameter], symbols: Sequence[SX]) -> Robot:
     effects = list(robot.effects)
     numbers: dict[str, Any] = {
-        p.name: symbol for p, symbol in zip(free, symbols, strict=True) if p.setting == OF_FORMULAS
+        p.name: symbol for p, symbol in zip(free_parameters, symbols, strict=True) if p.effect_index == FORMULA_INDEX
     }
     formulas = [
         replace(f, numbers={name: numbers.get(name, value) for name, value in f.numbers.items()})
         for f in robot.formulas
     ]
-    for parameter, symbol in zip(free, symbols, strict=True):
-        if parameter.setting == OF_FORMULAS:
+    for parameter, symbol in zip(free_parameters, symbols, strict=True):
+        if parameter.effect_index == FORMULA_INDEX:
             continue
-        old = effects[parameter.setting]
-        values: dict[str, Any] = {**old.values, parameter.name: symbol}
-        effects[parameter.setting] = EffectSetting(old.name, values, old.cables)
+        setting = effects[parameter.effect_index]
+        values: dict[str, Any] = {**setting.values, parameter.name: symbol}
+        effects[parameter.effect_index] = EffectSetting(setting.name, values, setting.cables)
     return replace(robot, effects=tuple(effects), formulas=tuple(formulas))
 
 
-def _owner(robot: Robot, free: FreeParameter) -> str:
-    return FORMULA_NAME if free.setting == OF_FORMULAS else robot.effects[free.setting].name
+def _owner_name(robot: Robot, parameter: FreeParameter) -> str:
+    return FORMULA_NAME if parameter.effect_index == FORMULA_INDEX else robot.effects[parameter.effect_index].name
 
 
 def _equations(
-    assembly: Assembly, position: SX, velocity: SX, unstrained: SX, speeds: SX, external: SX, own: list[SX]
+    assembly: RobotAssembly,
+    position: SX,
+    velocity: SX,
+    unstrained: SX,
+    winch_speeds: SX,
+    external_force: SX,
+    effect_states: list[SX],
 ) -> _Equations:
-    force: Sequence[SX] = _three(external)
-    shown = []
+    force: Sequence[SX] = _components(external_force)
+    readings = []
     cable_rates = []
     effect_rates: list[SX] = []
-    symbols = iter(own)
+    symbols = iter(effect_states)
     for index, component in enumerate(assembly.cables):
         states = tuple(tuple(next(symbols) for _ in a.effect.states) for a in component.effects)
         state = cable_law.CableState(unstrained[index], 0.0, states)
-        inputs = cable_law.CableInputs(_three(position), _three(velocity), speeds[index])
-        arguments = (CASADI, component.constants, component.effects, state)
-        line = cable_law.span(CASADI, component.constants, inputs, component.effects)
-        moving = cable_law.motion(*arguments, line, inputs.winch_speed)
-        reading = cable_law.reading(*arguments, moving)
-        rate = cable_law.state_rates(*arguments, moving)
+        inputs = cable_law.CableInputs(_components(position), _components(velocity), winch_speeds[index])
+        arguments = (CASADI_MATHEMATICS, component.constants, component.effects, state)
+        span = cable_law.span(CASADI_MATHEMATICS, component.constants, inputs, component.effects)
+        motion = cable_law.cable_motion(*arguments, span, inputs.winch_speed)
+        reading = cable_law.cable_outputs(*arguments, motion)
+        rate = cable_law.state_rates(*arguments, motion)
         force = add(force, reading.force)
-        shown.append(reading)
+        readings.append(reading)
         cable_rates.append(rate.unstrained_length)
         effect_rates += [r for rates in rate.effects for r in rates]
-    on_platform = tuple(tuple(next(symbols) for _ in a.effect.states) for a in assembly.platform_effects)
-    # Of the effects, formulas alone have states on the platform: the time since the start.
-    effect_rates += [SX(1.0) for states in on_platform for _ in states]
+    platform_states = tuple(tuple(next(symbols) for _ in a.effect.states) for a in assembly.platform_effects)
+    # On the platform only formulas have states: the time since the start.
+    effect_rates += [SX(1.0) for states in platform_states for _ in states]
     acceleration = platform_law.acceleration(
-        CASADI, assembly.platform, assembly.platform_effects, on_platform, _three(position), _three(velocity), force
+        CASADI_MATHEMATICS,
+        assembly.platform,
+        assembly.platform_effects,
+        platform_states,
+        _components(position),
+        _components(velocity),
+        force,
     )
-    measured = scale(stages.gains(CASADI, assembly.platform_effects)[1], _three(position))
+    measured = scale(stages.sensor_gains(CASADI_MATHEMATICS, assembly.platform_effects)[1], _components(position))
     return _Equations(
         rates=casadi.vertcat(velocity, *acceleration, *cable_rates, *effect_rates),
-        outputs=casadi.vertcat(*measured, velocity, *(r.tension for r in shown), *(r.length for r in shown)),
-        span_tensions=casadi.vertcat(*(r.span_tension for r in shown)),
+        outputs=casadi.vertcat(*measured, velocity, *(r.tension for r in readings), *(r.length for r in readings)),
+        span_tensions=casadi.vertcat(*(r.span_tension for r in readings)),
     )
 
 
-def _lags(assembly: Assembly) -> SX:
-    """By how many seconds the measured x, y, z and tensions are late."""
-    of_position = stages.delays(CASADI, assembly.platform_effects)[1]
-    of_tensions = [stages.delays(CASADI, component.effects)[0] for component in assembly.cables]
-    return casadi.vertcat(*[SX(of_position)] * 3, *map(SX, of_tensions))
+def _sensor_delays(assembly: RobotAssembly) -> SX:
+    """Delays of the measured x, y, z and tensions, in s."""
+    position_delay = stages.sensor_delays(CASADI_MATHEMATICS, assembly.platform_effects)[1]
+    tension_delays = [stages.sensor_delays(CASADI_MATHEMATICS, component.effects)[0] for component in assembly.cables]
+    return casadi.vertcat(*[SX(position_delay)] * 3, *map(SX, tension_delays))
 
 
-def _three(column: SX) -> tuple[SX, SX, SX]:
+def _components(column: SX) -> tuple[SX, SX, SX]:
     return (column[0], column[1], column[2])
 
 
-def _vector(name: str) -> tuple[str, ...]:
+def _axis_names(name: str) -> tuple[str, ...]:
     return tuple(f"{name}.{axis}" for axis in AXES)
 
 
-def _numbered(name: str, count: int) -> tuple[str, ...]:
+def _numbered_names(name: str, count: int) -> tuple[str, ...]:
     return tuple(f"{name}_{index}" for index in range(1, count + 1))

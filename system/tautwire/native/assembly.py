@@ -1,6 +1,6 @@
 """A CasADi function's instructions as LLVM assembly, one for one: rounding is the same to the last bit.
 
-Within a part each value is named where it is worked out and never changes; only what other parts need goes through
+Within a part each value is named where it is computed and never changes; only what other parts need goes through
 CasADi's work vector. In one part, large functions would take LLVM long and need more stack than a thread has.
 
 Source: LLVM Language Reference Manual; Andersson et al. (2019), CasADi, Mathematical Programming Computation 11, 1-36.
@@ -16,10 +16,10 @@ from casadi import Function
 
 from ..errors import TautwireError
 
-# Instructions.
-PART = 4_000
-# What is called by name, mostly of C's mathematics library, and how many arguments it takes.
-CALLED = {
+# Instructions of one part.
+MAX_PART_INSTRUCTIONS = 4_000
+# Operations that call a function, mostly of C's mathematics library: its name and number of arguments.
+LIBRARY_CALLS = {
     casadi.OP_EXP: ("exp", 1),
     casadi.OP_LOG: ("log", 1),
     casadi.OP_POW: ("pow", 2),
@@ -39,8 +39,8 @@ CALLED = {
     casadi.OP_FMIN: ("fmin", 2),
     casadi.OP_FMAX: ("fmax", 2),
 }
-# {v} is the value's name, {0} and {1} those of what it is made from.
-WRITTEN = {
+# {v} is the name of the result, {0} and {1} are those of the operands.
+INSTRUCTIONS = {
     casadi.OP_ASSIGN: "{v} = fadd double {0}, -0.0",
     casadi.OP_ADD: "{v} = fadd double {0}, {1}",
     casadi.OP_SUB: "{v} = fsub double {0}, {1}",
@@ -61,7 +61,7 @@ WRITTEN = {
         "{v}c = select i1 {v}b, double 1.0, double {0}\n{v} = select i1 {v}a, double -1.0, double {v}c"
     ),
 }
-RUN = """define void @run(i64 %count, ptr %places, ptr %strides) {{
+RUN_TEMPLATE = """define void @run(i64 %count, ptr %places, ptr %strides) {{
 begin:
 %any = icmp ugt i64 %count, 0
 br i1 %any, label %each, label %end
@@ -75,7 +75,7 @@ br i1 %more, label %each, label %end
 end:
 ret void
 }}"""
-PLACE = """%place{0} = getelementptr ptr, ptr %places, i64 {0}
+POINTER_TEMPLATE = """%place{0} = getelementptr ptr, ptr %places, i64 {0}
 %first{0} = load ptr, ptr %place{0}
 %stride{0} = getelementptr i64, ptr %strides, i64 {0}
 %size{0} = load i64, ptr %stride{0}
@@ -91,8 +91,8 @@ class UntranslatableError(TautwireError):
         super().__init__(f"function {function}: CasADi's operation {operation} has no assembly; write it in this table")
 
 
-def assembly(function: Function) -> str:
-    """Defines ``run(count, places, strides)``: the function, so many times.
+def llvm_assembly(function: Function) -> str:
+    """LLVM assembly that defines ``run(count, places, strides)``: the function, ``count`` times.
 
     ``places`` has a pointer to the first number of each argument, then of each result, and to room for
     ``function.sz_w()`` numbers; ``strides`` by how many numbers each moves from one time to the next. Arguments and
@@ -101,64 +101,68 @@ def assembly(function: Function) -> str:
     Raises UntranslatableError.
     """
     pointers = range(function.n_in() + function.n_out() + 1)
-    declared = [f"declare double @{name}({', '.join(['double'] * n)})" for name, n in sorted(set(CALLED.values()))]
-    parts = range(0, function.n_instructions(), PART)
-    given = ", ".join(f"ptr %at{j}" for j in pointers)
-    run = RUN.format(
-        places="\n".join(PLACE.format(j) for j in pointers),
-        calls="\n".join(f"call void @part{first}({given})" for first in parts),
+    declarations = [
+        f"declare double @{name}({', '.join(['double'] * n)})" for name, n in sorted(set(LIBRARY_CALLS.values()))
+    ]
+    parts = range(0, function.n_instructions(), MAX_PART_INSTRUCTIONS)
+    arguments = ", ".join(f"ptr %at{j}" for j in pointers)
+    run_definition = RUN_TEMPLATE.format(
+        places="\n".join(POINTER_TEMPLATE.format(j) for j in pointers),
+        calls="\n".join(f"call void @part{first}({arguments})" for first in parts),
     )
-    return "\n".join([*declared, *(line for first in parts for line in _part(function, first)), run])
+    return "\n".join(
+        [*declarations, *(line for first in parts for line in _part_assembly(function, first)), run_definition]
+    )
 
 
-def _part(function: Function, first: int) -> Iterator[str]:
-    """Some instructions. They find in the room, and leave there, what is needed before and after them."""
+def _part_assembly(function: Function, first: int) -> Iterator[str]:
+    """Assembly of one part; it exchanges values with the other parts through the workspace."""
     pointers = [f"%p{j}" for j in range(function.n_in() + function.n_out() + 1)]
-    *_, room = pointers
+    *_, workspace = pointers
     values: dict[int, str] = {}
     written: list[int] = []
     yield f"define void @part{first}({', '.join(f'ptr {name}' for name in pointers)}) {{"
-    for k in range(first, min(first + PART, function.n_instructions())):
+    for k in range(first, min(first + MAX_PART_INSTRUCTIONS, function.n_instructions())):
         operation, name = function.instruction_id(k), f"%v{k}"
         sources, targets = function.instruction_input(k), function.instruction_output(k)
         if operation == casadi.OP_INPUT:
-            yield _loaded(name, pointers[sources[0]], sources[1])
+            yield _load(name, pointers[sources[0]], sources[1])
         elif operation == casadi.OP_CONST:
             name = _constant(function.instruction_constant(k))
         else:
-            for place in sources:
-                if place not in values:
-                    values[place] = f"%w{k}_{place}"
-                    yield _loaded(values[place], room, place)
-            known = [values[place] for place in sources]
+            for index in sources:
+                if index not in values:
+                    values[index] = f"%w{k}_{index}"
+                    yield _load(values[index], workspace, index)
+            operands = [values[place] for place in sources]
             if operation == casadi.OP_OUTPUT:
-                yield _stored(known[0], name, pointers[function.n_in() + targets[0]], targets[1])
+                yield _store(operands[0], name, pointers[function.n_in() + targets[0]], targets[1])
                 continue
-            yield _worked_out(function, operation, name, known)
+            yield _operation(function, operation, name, operands)
         values[targets[0]] = name
         written.append(targets[0])
-    for place in dict.fromkeys(written):
-        yield _stored(values[place], f"%s{place}", room, place)
+    for index in dict.fromkeys(written):
+        yield _store(values[index], f"%s{index}", workspace, index)
     yield "ret void\n}"
 
 
-def _loaded(name: str, pointer: str, place: int) -> str:
-    return f"{name}a = getelementptr double, ptr {pointer}, i64 {place}\n{name} = load double, ptr {name}a"
+def _load(name: str, pointer: str, index: int) -> str:
+    return f"{name}a = getelementptr double, ptr {pointer}, i64 {index}\n{name} = load double, ptr {name}a"
 
 
-def _stored(value: str, name: str, pointer: str, place: int) -> str:
-    return f"{name}a = getelementptr double, ptr {pointer}, i64 {place}\nstore double {value}, ptr {name}a"
+def _store(value: str, name: str, pointer: str, index: int) -> str:
+    return f"{name}a = getelementptr double, ptr {pointer}, i64 {index}\nstore double {value}, ptr {name}a"
 
 
-def _worked_out(function: Function, operation: int, name: str, sources: list[str]) -> str:
-    if operation in WRITTEN:
-        return WRITTEN[operation].format(*sources, v=name)
-    if operation in CALLED:
-        called, _ = CALLED[operation]
-        return f"{name} = call double @{called}({', '.join(f'double {source}' for source in sources)})"
+def _operation(function: Function, operation: int, name: str, sources: list[str]) -> str:
+    if operation in INSTRUCTIONS:
+        return INSTRUCTIONS[operation].format(*sources, v=name)
+    if operation in LIBRARY_CALLS:
+        function_name, _ = LIBRARY_CALLS[operation]
+        return f"{name} = call double @{function_name}({', '.join(f'double {source}' for source in sources)})"
     raise UntranslatableError(function.name(), operation)
 
 
 def _constant(value: float) -> str:
-    """All 64 bits, as LLVM reads them."""
+    """A constant with all 64 bits, as LLVM reads them."""
     return f"0x{int(np.float64(value).view(np.uint64)):016X}"

@@ -1,4 +1,4 @@
-"""The ledger: what the paper claims, what our runs give, and whether the two agree."""
+"""The ledger of claims: what the paper prints, what our runs give, and whether the two agree."""
 
 from __future__ import annotations
 
@@ -8,68 +8,72 @@ from decimal import Decimal
 from typing import Any, Literal
 
 from .panels import time_figures
-from .parameters import DATA, read_data
-from .values import Values
+from .parameters import DATA_FOLDER, read_data
+from .values import ClaimValues
 
-Rule = Literal["near", "below", "above", "within", "axis"]
-Verdict = Literal["reproduced", "reproduced after correction", "not reproducible"]
-Number = float | tuple[float, float]
+ComparisonRule = Literal["near", "below", "above", "within", "axis"]
+ClaimVerdict = Literal["reproduced", "reproduced after correction", "not reproducible"]
+ClaimNumber = float | tuple[float, float]
 
-# A curve lies on a printed axis if it leaves it by no more than this share, and fills it by at least that one.
-BEYOND, FILLED = 0.02, 0.5
-ROUNDING = 1e-9
+# A curve lies on a printed axis if it exceeds it by at most the first share of its span and fills at least the second.
+MAX_AXIS_OVERSHOOT, MIN_AXIS_COVERAGE = 0.02, 0.5
+ROUNDING_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
 class Claim:
-    """A number of the paper, by a ``rule``; two numbers are a range.
+    """A claimed number of the paper, compared by a ``rule``; two numbers are a range.
 
-    ``near``: in size no more than ``tolerance`` above it, ``below`` below it. ``corrections`` are what the corrected
-    parameters change, in words. ``needs`` is the claim without which the printed parameters give another motion.
-    ``digits`` are as printed.
+    ``near``: in size no more than ``upper_tolerance`` above it, ``lower_tolerance`` below it. ``corrections`` are what
+    the corrected parameters change, in words. ``required_claim`` is the claim without which the printed parameters give
+    another motion. ``printed_digits`` are as printed.
     """
 
     id: str
     section: str
     quantity: str
     unit: str
-    paper: Number
-    tolerance: float
-    below: float = 0.0
-    rule: Rule = "near"
+    paper_value: ClaimNumber
+    upper_tolerance: float
+    lower_tolerance: float = 0.0
+    rule: ComparisonRule = "near"
     corrections: tuple[str, ...] = ()
-    why: str = ""
-    needs: str = ""
-    digits: str = ""
+    explanation: str = ""
+    required_claim: str = ""
+    printed_digits: str = ""
 
-    def agrees(self, ours: Number | None) -> bool:
-        """Whether a number of ours is what the paper claims."""
-        if ours is None:
+    def agrees(self, value: ClaimNumber | None) -> bool:
+        """Whether a computed value agrees with the claim."""
+        if value is None:
             return False
-        if isinstance(ours, tuple):
-            return isinstance(self.paper, tuple) and _lies_on(ours, self.paper)
-        if isinstance(self.paper, tuple):
-            return self.paper[0] <= ours <= self.paper[1]
+        if isinstance(value, tuple):
+            return isinstance(self.paper_value, tuple) and _lies_on_axis(value, self.paper_value)
+        if isinstance(self.paper_value, tuple):
+            return self.paper_value[0] <= value <= self.paper_value[1]
         if self.rule == "below":
-            return ours < self.paper
+            return value < self.paper_value
         if self.rule == "above":
-            return ours > self.paper
-        beyond = (ours - self.paper) * (-1.0 if self.paper < 0.0 else 1.0)
-        return -self.below * (1.0 + ROUNDING) <= beyond <= self.tolerance * (1.0 + ROUNDING)
+            return value > self.paper_value
+        excess = (value - self.paper_value) * (-1.0 if self.paper_value < 0.0 else 1.0)
+        return (
+            -self.lower_tolerance * (1.0 + ROUNDING_TOLERANCE)
+            <= excess
+            <= self.upper_tolerance * (1.0 + ROUNDING_TOLERANCE)
+        )
 
 
 @dataclass(frozen=True)
-class Entry:
-    """A row of the ledger."""
+class LedgerEntry:
+    """A row of the ledger: a claim with the values of the printed and of the corrected parameters."""
 
     claim: Claim
-    printed: Number | None
-    corrected: Number | None
+    printed: ClaimNumber | None
+    corrected: ClaimNumber | None
     same_motion: bool = True
 
     @property
-    def verdict(self) -> Verdict:
-        """As the printed parameters are, those that give the figures, or neither.
+    def verdict(self) -> ClaimVerdict:
+        """Verdict: reproduced with the printed parameters, with the corrected ones, or with neither.
 
         With the printed ones only where their motion is the paper's, ``same_motion``.
         """
@@ -78,105 +82,112 @@ class Entry:
         return "reproduced after correction" if self.claim.agrees(self.corrected) else "not reproducible"
 
     @property
-    def why(self) -> str:
-        """Which correction it took, and what else there is to say."""
-        used = "; ".join(self.claim.corrections) if self.verdict == "reproduced after correction" else ""
-        return "; ".join(part for part in (used, self.claim.why) if part)
+    def explanation(self) -> str:
+        """Explanation: the corrections that were needed, and remarks."""
+        corrections = "; ".join(self.claim.corrections) if self.verdict == "reproduced after correction" else ""
+        return "; ".join(part for part in (corrections, self.claim.explanation) if part)
 
     def document(self) -> dict[str, Any]:
-        """The row as JSON has it."""
+        """The row as a JSON object."""
         return {
             "id": self.claim.id,
             "section": self.claim.section,
             "quantity": self.claim.quantity,
             "unit": self.claim.unit,
-            "paper": list(self.claim.paper) if isinstance(self.claim.paper, tuple) else self.claim.paper,
+            "paper": list(self.claim.paper_value)
+            if isinstance(self.claim.paper_value, tuple)
+            else self.claim.paper_value,
             "printed_parameters": _rounded(self.printed),
             "corrected_parameters": _rounded(self.corrected),
             "verdict": self.verdict,
-            "why": self.why,
+            "why": self.explanation,
         }
 
 
-def judged(claims: Sequence[Claim], printed: Values, corrected: Values) -> tuple[Entry, ...]:
-    """The rows of some claims; what needs a claim that the printed parameters break is not judged by these."""
-    met = {claim.id for claim in claims if claim.agrees(printed.get(claim.id))}
+def judge_claims(claims: Sequence[Claim], printed: ClaimValues, corrected: ClaimValues) -> tuple[LedgerEntry, ...]:
+    """Judge claims; one whose required claim the printed parameters violate is not judged by these."""
+    satisfied = {claim.id for claim in claims if claim.agrees(printed.get(claim.id))}
     return tuple(
-        Entry(claim, printed.get(claim.id), corrected.get(claim.id), not claim.needs or claim.needs in met)
+        LedgerEntry(
+            claim,
+            printed.get(claim.id),
+            corrected.get(claim.id),
+            not claim.required_claim or claim.required_claim in satisfied,
+        )
         for claim in claims
     )
 
 
 def text_claims() -> tuple[Claim, ...]:
     """The claims of the text."""
-    content = read_data(DATA / "claims.toml")
-    return tuple(_claim(table, content) for table in content["claim"])
+    content = read_data(DATA_FOLDER / "claims.toml")
+    return tuple(_read_claim(table, content) for table in content["claim"])
 
 
 def axis_claims() -> Iterator[Claim]:
-    """That the curves lie on the printed axes, and fill them."""
-    named = read_data(DATA / "claims.toml")["correction"]
-    for each in time_figures():
-        for panel in each.panels:
+    """The claims that the curves lie on the printed axes, and fill them."""
+    correction_texts = read_data(DATA_FOLDER / "claims.toml")["correction"]
+    for figure in time_figures():
+        for panel in figure.panels:
             if panel.y is None:
                 continue
             label = panel.label.replace("$", "").replace("\\Delta ", "error ").replace("_", "")
             quantity, _, unit = label.rstrip(")").rpartition(" (")
-            keys = panel.corrections or each.corrections
+            keys = panel.corrections or figure.corrections
             yield Claim(
                 id=panel.name,
-                section=each.section,
-                quantity=f"Fig. {int(each.number)}{panel.letter}: range of {quantity} on the printed axis",
+                section=figure.section,
+                quantity=f"Fig. {int(figure.number)}{panel.letter}: range of {quantity} on the printed axis",
                 unit=unit,
-                paper=panel.y,
-                tolerance=0.0,
-                needs=each.needs,
+                paper_value=panel.y,
+                upper_tolerance=0.0,
+                required_claim=figure.required_claim,
                 rule="axis",
-                corrections=tuple(named[key] for key in keys),
-                why=panel.reason,
+                corrections=tuple(correction_texts[key] for key in keys),
+                explanation=panel.reason,
             )
 
 
-def _lies_on(ours: tuple[float, float], axis: tuple[float, float]) -> bool:
+def _lies_on_axis(extent: tuple[float, float], axis: tuple[float, float]) -> bool:
     span = axis[1] - axis[0]
-    inside = ours[0] >= axis[0] - BEYOND * span and ours[1] <= axis[1] + BEYOND * span
-    return inside and ours[1] - ours[0] >= FILLED * span
+    inside = extent[0] >= axis[0] - MAX_AXIS_OVERSHOOT * span and extent[1] <= axis[1] + MAX_AXIS_OVERSHOOT * span
+    return inside and extent[1] - extent[0] >= MIN_AXIS_COVERAGE * span
 
 
-def _claim(table: Mapping[str, Any], named: Mapping[str, Mapping[str, Any]]) -> Claim:
+def _read_claim(table: Mapping[str, Any], definitions: Mapping[str, Mapping[str, Any]]) -> Claim:
     paper, rule = table["paper"], table.get("rule", "near")
-    digit = 0.0 if isinstance(paper, list) else _last_digit(paper)
-    allowed, reasons = 0.0, [table.get("why", "")]
+    digit_unit = 0.0 if isinstance(paper, list) else _last_digit_unit(paper)
+    allowance_width, reasons = 0.0, [table.get("why", "")]
     if "tolerance" in table:
         reasons.append(f"{table['tolerance']:g} {table['unit']}".removesuffix(" 1") + " allowed")
     if "allowance" in table:
-        allowance = named["allowance"][table["allowance"]]
-        allowed = allowance["share"] * abs(float(paper))
-        reasons += [allowance["why"]] if allowed > 0.5 * digit else []
+        allowance = definitions["allowance"][table["allowance"]]
+        allowance_width = allowance["share"] * abs(float(paper))
+        reasons += [allowance["why"]] if allowance_width > 0.5 * digit_unit else []
     return Claim(
         id=table["id"],
         section=table["section"],
         quantity=table["quantity"],
         unit=table["unit"],
-        paper=float(paper) if isinstance(paper, str) else (float(paper[0]), float(paper[1])),
-        # Rounded digits are half a unit off either way, cut off ones up to a whole one below.
-        tolerance=table.get("tolerance", max(digit, allowed)),
-        below=table.get("tolerance", max(0.5 * digit, allowed)),
+        paper_value=float(paper) if isinstance(paper, str) else (float(paper[0]), float(paper[1])),
+        # Rounded digits err by half a unit either way, truncated ones by up to a whole unit below.
+        upper_tolerance=table.get("tolerance", max(digit_unit, allowance_width)),
+        lower_tolerance=table.get("tolerance", max(0.5 * digit_unit, allowance_width)),
         rule=rule,
-        corrections=tuple(named["correction"][key] for key in table.get("corrections", ())),
-        why="; ".join(filter(None, reasons)),
-        needs=table.get("needs", ""),
-        digits=paper if isinstance(paper, str) else "",
+        corrections=tuple(definitions["correction"][key] for key in table.get("corrections", ())),
+        explanation="; ".join(filter(None, reasons)),
+        required_claim=table.get("needs", ""),
+        printed_digits=paper if isinstance(paper, str) else "",
     )
 
 
-def _last_digit(text: str) -> float:
+def _last_digit_unit(text: str) -> float:
     """One unit of the last digit written."""
     exponent = Decimal(text).as_tuple().exponent
     return 10.0 ** int(exponent)
 
 
-def _rounded(number: Number | None) -> float | Sequence[float] | None:
+def _rounded(number: ClaimNumber | None) -> float | Sequence[float] | None:
     if number is None:
         return None
     return [float(f"{each:.6g}") for each in number] if isinstance(number, tuple) else float(f"{number:.6g}")

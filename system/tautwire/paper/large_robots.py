@@ -7,86 +7,86 @@ from collections.abc import Iterator
 import numpy as np
 
 from ..robots.robot import Robot
-from .helix import LAWS, gap
-from .parameters import Parameters, with_law
-from .records import Case, Records, helix_case
-from .values import Values, largest, relative_difference
+from .helix import TENSION_LAWS, law_difference
+from .parameters import PaperParameters, with_law
+from .records import Records, SimulationCase, path_case
+from .values import ClaimValues, max_abs, relative_difference
 
-SAMPLES = {"caroca": 800, "fast": 800}
-# The cable that the paper plots and its numbers are about.
-SHOWN = 2
-# When the text says that FAST shows its largest difference, in s.
-FAST_MOMENT = 38.0
+SAMPLE_COUNTS = {"caroca": 800, "fast": 800}
+# The cable that the paper plots and takes its numbers from.
+PLOTTED_CABLE = 2
+# s, time at which the text says that FAST shows its largest difference.
+FAST_DIFFERENCE_TIME = 38.0
 
 
-def cases(parameters: Parameters) -> Iterator[tuple[str, Case]]:
-    """Both laws on the helix of each robot whose parameters are known."""
-    for name, samples in SAMPLES.items():
+def cases(parameters: PaperParameters) -> Iterator[tuple[str, SimulationCase]]:
+    """Runs of both laws on the helix of each robot that the parameter set has."""
+    for name, samples in SAMPLE_COUNTS.items():
         if name in parameters.robots:
-            for law in LAWS:
+            for law in TENSION_LAWS:
                 robot = with_law(parameters.robots[name], law)
-                yield f"{name}/{law}", helix_case(robot, parameters.helices[name], samples)
+                yield f"{name}/{law}", path_case(robot, parameters.helices[name], samples)
 
 
-def quantities(parameters: Parameters, records: Records) -> Values:
-    """What section 4.1.2 and its Table 2 say in numbers."""
-    values = _caroca(records)
-    for name in SAMPLES:
+def quantities(parameters: PaperParameters, records: Records) -> ClaimValues:
+    """Numbers of section 4.1.2 and its Table 2."""
+    values = _caroca_values(records)
+    for name in SAMPLE_COUNTS:
         if name in parameters.helices:
             path = parameters.helices[name]
             end = path.position(np.array([path.duration]))[0]
-            values |= {f"{name}.end_{axis}": float(end[place]) for place, axis in enumerate("xyz")}
+            values |= {f"{name}.end_{axis}": float(end[index]) for index, axis in enumerate("xyz")}
         if name in parameters.robots:
-            values |= _table_2(name, parameters.robots[name], records)
+            values |= _table_2_values(name, parameters.robots[name], records)
     if "fast" in parameters.robots:
-        values |= _fast(records)
+        values |= _fast_values(records)
     return values
 
 
-def _caroca(records: Records) -> Values:
+def _caroca_values(records: Records) -> ClaimValues:
     logarithmic, linear = records["caroca/logarithmic"], records["caroca/linear"]
-    elongation, strain = f"elongation_{SHOWN}", f"strain_{SHOWN}"
+    elongation, strain = f"elongation_{PLOTTED_CABLE}", f"strain_{PLOTTED_CABLE}"
     end = float(logarithmic.time[-1])
-    strains = np.abs(gap(records, "caroca", strain))
-    errors = np.abs(gap(records, "caroca", "error_norm"))
+    strain_difference = np.abs(law_difference(records, "caroca", strain))
+    error_difference = np.abs(law_difference(records, "caroca", "error_norm"))
     return {
-        "caroca.strain_gap": 100.0 * largest(strains),
-        "caroca.strain_relative": 100.0 * largest(strains) / largest(logarithmic[strain]),
-        "caroca.elongation_gap": 1e3 * abs(float(gap(records, "caroca", elongation)[-1])),
+        "caroca.strain_gap": 100.0 * max_abs(strain_difference),
+        "caroca.strain_relative": 100.0 * max_abs(strain_difference) / max_abs(logarithmic[strain]),
+        "caroca.elongation_gap": 1e3 * abs(float(law_difference(records, "caroca", elongation)[-1])),
         "caroca.elongation_relative": relative_difference(linear, logarithmic, elongation, end),
-        "caroca.moment": float(logarithmic.time[np.argmax(np.abs(gap(records, "caroca", elongation)))]),
-        "caroca.error_gap": 1e3 * float(errors[-1]),
-        "caroca.error_relative": 100.0 * float(errors[-1]) / linear.at("error_norm", end),
+        "caroca.moment": float(logarithmic.time[np.argmax(np.abs(law_difference(records, "caroca", elongation)))]),
+        "caroca.error_gap": 1e3 * float(error_difference[-1]),
+        "caroca.error_relative": 100.0 * float(error_difference[-1]) / linear.at("error_norm", end),
     }
 
 
-def _fast(records: Records) -> Values:
+def _fast_values(records: Records) -> ClaimValues:
     logarithmic, linear = records["fast/logarithmic"], records["fast/linear"]
-    elongation, strain = f"elongation_{SHOWN}", f"strain_{SHOWN}"
-    apart = np.abs(gap(records, "fast", elongation))
-    strains = np.abs(gap(records, "fast", strain))
-    # Early on both are next to nothing, and so is what their quotient says.
+    elongation, strain = f"elongation_{PLOTTED_CABLE}", f"strain_{PLOTTED_CABLE}"
+    difference = np.abs(law_difference(records, "fast", elongation))
+    strain_difference = np.abs(law_difference(records, "fast", strain))
+    # Early on both are near zero, where their quotient has no meaning.
     late = linear.time >= 0.5 * linear.time[-1]
-    errors = np.linalg.norm([gap(records, "fast", f"error_{axis}") for axis in "xyz"], axis=0)
+    error_difference = np.linalg.norm([law_difference(records, "fast", f"error_{axis}") for axis in "xyz"], axis=0)
     return {
-        "fast.elongation_gap": 1e3 * float(np.interp(FAST_MOMENT, logarithmic.time, apart)),
-        "fast.moment": float(logarithmic.time[np.argmax(apart)]),
-        "fast.elongation_relative": relative_difference(linear, logarithmic, elongation, FAST_MOMENT),
-        "fast.tension_gap": largest(gap(records, "fast", f"tension_{SHOWN}")),
-        "fast.strain_gap": 100.0 * largest(strains),
-        "fast.strain_relative": 100.0 * float(np.max(strains[late] / linear[strain][late])),
-        "fast.error_gap": 1e3 * float(errors[-1]),
-        "fast.error_moment": float(logarithmic.time[np.argmax(errors)]),
+        "fast.elongation_gap": 1e3 * float(np.interp(FAST_DIFFERENCE_TIME, logarithmic.time, difference)),
+        "fast.moment": float(logarithmic.time[np.argmax(difference)]),
+        "fast.elongation_relative": relative_difference(linear, logarithmic, elongation, FAST_DIFFERENCE_TIME),
+        "fast.tension_gap": max_abs(law_difference(records, "fast", f"tension_{PLOTTED_CABLE}")),
+        "fast.strain_gap": 100.0 * max_abs(strain_difference),
+        "fast.strain_relative": 100.0 * float(np.max(strain_difference[late] / linear[strain][late])),
+        "fast.error_gap": 1e3 * float(error_difference[-1]),
+        "fast.error_moment": float(logarithmic.time[np.argmax(error_difference)]),
     }
 
 
-def _table_2(name: str, robot: Robot, records: Records) -> Values:
-    """Size of the frame (m), mean cable length at P1 (m), largest tension of the run (kN)."""
+def _table_2_values(name: str, robot: Robot, records: Records) -> ClaimValues:
+    """Table 2: size of the frame (m), mean cable length at P1 (m), largest tension of the run (kN)."""
     anchors = np.array(robot.anchors)
     count, run = robot.cable_count, records[f"{name}/logarithmic"]
     return {
         f"{name}.height": float(np.max(anchors[:, 2]) if name == "caroca" else np.max(anchors[:, 2]) - run["z"][0]),
         f"{name}.width": float(np.max(np.ptp(anchors[:, :2], axis=0))),
         f"{name}.cable_length": float(np.mean([run[f"length_{i}"][0] for i in range(1, count + 1)])),
-        f"{name}.largest_tension": 1e-3 * max(largest(run[f"tension_{i}"]) for i in range(1, count + 1)),
+        f"{name}.largest_tension": 1e-3 * max(max_abs(run[f"tension_{i}"]) for i in range(1, count + 1)),
     }

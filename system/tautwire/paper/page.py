@@ -1,4 +1,4 @@
-"""The ledger with its figures as one page that needs no network."""
+"""The ledger of claims with its figures as one HTML page that needs no network."""
 
 from __future__ import annotations
 
@@ -8,15 +8,15 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 
-from ..report.markup import Column, downloads, number, section, table, text
+from ..report.markup import TableColumn, download_links, escape_text, number_html, section, table
 from ..report.shell import html_page
-from .beyond_figures import Beyond
-from .claims import Entry, Number, Verdict
-from .parameters import DATA
-from .style import INK, PAPER, Drawn
-from .tried import Trials
+from .beyond_figures import ExtensionFigure
+from .claims import ClaimNumber, ClaimVerdict, LedgerEntry
+from .parameters import DATA_FOLDER
+from .style import BACKGROUND_COLOUR, TEXT_COLOUR, PaperFigure
+from .tried import OpenClaim
 
-SECTIONS = {
+SECTION_TITLES = {
     "2.2": "2.2 The model's assumptions",
     "3.1": "3.1 Modulus of elasticity",
     "3.2": "3.2 Dynamic modulus",
@@ -25,8 +25,8 @@ SECTIONS = {
     "4.2": "4.2 Dynamic stiffening",
     "4.3": "4.3 Damping",
 }
-# Where each figure stands; the others are beyond the paper.
-FIGURES = {
+# Figures by section; the others are beyond the paper.
+SECTION_FIGURES = {
     "3.1": ("fig_03",),
     "3.2": ("fig_04",),
     "4.1.1": ("fig_05a", "fig_05", "fig_06", "fig_07", "fig_08"),
@@ -34,60 +34,68 @@ FIGURES = {
     "4.2": ("fig_12", "fig_12b", "fig_13", "fig_14", "fig_15", "fig_16"),
     "4.3": ("fig_17", "fig_18"),
 }
-NAMES: Mapping[Verdict, str] = {
+VERDICT_NAMES: Mapping[ClaimVerdict, str] = {
     "reproduced": "reproduced",
     "reproduced after correction": "corrected",
     "not reproducible": "not",
 }
-LEDGER = (
-    Column("Claim"),
-    Column("Paper", True),
-    Column("As printed", True),
-    Column("Corrected", True),
-    Column("Verdict"),
-    Column("Why", wide=True),
+LEDGER_COLUMNS = (
+    TableColumn("Claim"),
+    TableColumn("Paper", True),
+    TableColumn("As printed", True),
+    TableColumn("Corrected", True),
+    TableColumn("Verdict"),
+    TableColumn("Why", wide=True),
 )
-# Up to this width a narrow screen shows a figure whole; wider ones scroll.
-NARROW = 400.0
-# Claims that stand apart from those of the text, by the beginning of their ids.
-APART = {"axis.": "Axes of the figures", "table_1.": "Table 1"}
-RAISED, POWER_OF_TEN = re.compile(r"\^(-?\d+)"), re.compile(r"(?<=\d)e(\d+)\b")
-IDENTITY = re.compile(r'(?<=\bid=")|(?<=url\(#)|(?<=href="#)')
+# pt, width up to which a narrow screen shows a whole figure; wider ones scroll.
+MAX_NARROW_WIDTH = 400.0
+# Groups of claims listed separately from those of the text, by the prefix of their ids.
+SEPARATE_CLAIMS = {"axis.": "Axes of the figures", "table_1.": "Table 1"}
+EXPONENT, POWER_OF_TEN = re.compile(r"\^(-?\d+)"), re.compile(r"(?<=\d)e(\d+)\b")
+SVG_ID_REFERENCE = re.compile(r'(?<=\bid=")|(?<=url\(#)|(?<=href="#)')
 
 
 @dataclass(frozen=True)
-class Content:
-    """What the page is made of; ``svgs`` are the figures' texts by name."""
+class PageContent:
+    """Content of the page; ``svg_texts`` are the figures' SVG texts by name."""
 
-    entries: Sequence[Entry]
-    drawn: Sequence[Drawn]
-    svgs: Mapping[str, str]
-    trials: Sequence[Trials]
-    beyond: Sequence[Beyond]
+    entries: Sequence[LedgerEntry]
+    figures: Sequence[PaperFigure]
+    svg_texts: Mapping[str, str]
+    open_claims: Sequence[OpenClaim]
+    extensions: Sequence[ExtensionFigure]
 
 
-def paper_page(content: Content, links: Mapping[str, str]) -> str:
-    """The page; ``links`` maps labels to files beside it."""
-    css = (DATA / "page.css").read_text(encoding="utf-8")
-    figures = {each.name: _figure(each, content.svgs[each.name]) for each in content.drawn}
-    parts = [f"<style>{css}</style>", _masthead(content, links)]
-    for number_, title in SECTIONS.items():
-        shown = _figures(figures, FIGURES.get(number_, ()), content.svgs)
-        parts.append(section(f"section-{number_}", title, shown + _ledger(content.entries, number_, title)))
-    parts.append(section("tried", "What was tried", "".join(map(_trials, content.trials)), TRIED))
-    beyond = "".join(
-        f'<h3>{text(each.drawn.title)}</h3><p class="paragraph">{prose(each.paragraph)}</p>{figures[each.drawn.name]}'
-        for each in content.beyond
+def paper_page(content: PageContent, links: Mapping[str, str]) -> str:
+    """The page as HTML; ``links`` maps labels to files beside it."""
+    css = (DATA_FOLDER / "page.css").read_text(encoding="utf-8")
+    figures = {each.name: _figure_html(each, content.svg_texts[each.name]) for each in content.figures}
+    parts = [f"<style>{css}</style>", _masthead_html(content, links)]
+    for section_number, title in SECTION_TITLES.items():
+        section_figures = _figures_html(figures, SECTION_FIGURES.get(section_number, ()), content.svg_texts)
+        parts.append(
+            section(
+                f"section-{section_number}",
+                title,
+                section_figures + _ledger_html(content.entries, section_number, title),
+            )
+        )
+    parts.append(
+        section("tried", "What was tried", "".join(map(_open_claim_html, content.open_claims)), OPEN_CLAIMS_LEAD)
     )
-    parts.append(section("beyond", "Beyond the paper", beyond))
+    extensions = "".join(
+        f'<h3>{escape_text(each.figure.title)}</h3><p class="paragraph">{prose_html(each.paragraph)}</p>{figures[each.figure.name]}'
+        for each in content.extensions
+    )
+    parts.append(section("beyond", "Beyond the paper", extensions))
     return html_page("The paper, claim by claim", "\n".join(parts))
 
 
-TRIED = (
+OPEN_CLAIMS_LEAD = (
     "Claims that the parameters above leave open, each with the readings that were tried. All numbers are of this run; "
     "the first row is the paper's."
 )
-LEAD = (
+PAGE_LEAD = (
     "Baklouti, Courteille, Caro and Dkhil (2017), doi:10.1115/1.4038068. Every number that the text claims, Table 1 "
     "and the axes of its figures, beside what co-simulated FMUs give with the parameters as printed, and with those "
     "that give the printed figures. A number agrees that rounds, or is cut off, to the printed digits, or lies within "
@@ -96,110 +104,130 @@ LEAD = (
 )
 
 
-def _masthead(content: Content, links: Mapping[str, str]) -> str:
+def _masthead_html(content: PageContent, links: Mapping[str, str]) -> str:
     counts = Counter(entry.verdict for entry in content.entries)
-    said = ", ".join(f"{counts[verdict]} {verdict}" for verdict in NAMES)
+    counts_text = ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICT_NAMES)
     rows = []
-    for number_, title in SECTIONS.items():
-        here = Counter(entry.verdict for entry in content.entries if entry.claim.section == number_)
-        cells = (number(str(here[verdict])) for verdict in NAMES)
-        rows.append([f'<a href="#section-{number_}">{text(title)}</a>', *cells])
-    columns = (Column("Section"), *(Column(verdict.capitalize(), True) for verdict in NAMES))
+    for section_number, title in SECTION_TITLES.items():
+        section_counts = Counter(entry.verdict for entry in content.entries if entry.claim.section == section_number)
+        cells = (number_html(str(section_counts[verdict])) for verdict in VERDICT_NAMES)
+        rows.append([f'<a href="#section-{section_number}">{escape_text(title)}</a>', *cells])
+    columns = (TableColumn("Section"), *(TableColumn(verdict.capitalize(), True) for verdict in VERDICT_NAMES))
     return (
         '<header><p class="eyebrow"><strong>Tautwire paper</strong> <span>the paper, claim by claim</span></p>'
-        f"<h1>{text(f'{len(content.entries)} claims: {said}')}</h1>"
-        f'<p class="aside">{text(LEAD)}</p>{downloads(links)}</header>'
-        + section("overview", "By section", table("Verdicts by section", columns, rows, "counts", quiet=True))
+        f"<h1>{escape_text(f'{len(content.entries)} claims: {counts_text}')}</h1>"
+        f'<p class="aside">{escape_text(PAGE_LEAD)}</p>{download_links(links)}</header>'
+        + section("overview", "By section", table("Verdicts by section", columns, rows, "counts", caption_hidden=True))
     )
 
 
-def _ledger(entries: Sequence[Entry], number_: str, title: str) -> str:
-    """The claims of a section's text; those of its figures' axes and of Table 1 on request."""
-    here = [entry for entry in entries if entry.claim.section == number_]
-    groups: dict[str, list[Entry]] = {"": []}
-    for entry in here:
-        kind = next((name for prefix, name in APART.items() if entry.claim.id.startswith(prefix)), "")
+def _ledger_html(entries: Sequence[LedgerEntry], section_number: str, title: str) -> str:
+    """Claims of a section's text; those of its figures' axes and of Table 1 folded."""
+    section_entries = [entry for entry in entries if entry.claim.section == section_number]
+    groups: dict[str, list[LedgerEntry]] = {"": []}
+    for entry in section_entries:
+        kind = next((name for prefix, name in SEPARATE_CLAIMS.items() if entry.claim.id.startswith(prefix)), "")
         groups.setdefault(kind, []).append(entry)
-    shown = table(f"Claims of section {title}", LEDGER, [_row(each) for each in groups.pop("")], "ledger", quiet=True)
+    html = table(
+        f"Claims of section {title}",
+        LEDGER_COLUMNS,
+        [_entry_row(each) for each in groups.pop("")],
+        "ledger",
+        caption_hidden=True,
+    )
     for name, rows in groups.items():
         counts = Counter(entry.verdict for entry in rows)
-        said = ", ".join(f"{counts[verdict]} {verdict}" for verdict in NAMES if counts[verdict])
-        content = table(f"{name}, section {title}", LEDGER, [_row(each) for each in rows], "ledger", quiet=True)
-        shown += f"<details><summary>{text(name)}: {text(said)}</summary>{content}</details>"
-    return shown
+        counts_text = ", ".join(f"{counts[verdict]} {verdict}" for verdict in VERDICT_NAMES if counts[verdict])
+        content = table(
+            f"{name}, section {title}",
+            LEDGER_COLUMNS,
+            [_entry_row(each) for each in rows],
+            "ledger",
+            caption_hidden=True,
+        )
+        html += f"<details><summary>{escape_text(name)}: {escape_text(counts_text)}</summary>{content}</details>"
+    return html
 
 
-def _row(entry: Entry) -> list[str]:
+def _entry_row(entry: LedgerEntry) -> list[str]:
     claim = entry.claim
-    unit = "" if claim.unit == "1" else f' <span class="unit">{text(claim.unit)}</span>'
-    verdict = f'<span class="is is-{NAMES[entry.verdict]}">{text(entry.verdict)}</span>'
-    shown = [number(written(each)) for each in (entry.printed, entry.corrected)]
+    unit = "" if claim.unit == "1" else f' <span class="unit">{escape_text(claim.unit)}</span>'
+    verdict = f'<span class="is is-{VERDICT_NAMES[entry.verdict]}">{escape_text(entry.verdict)}</span>'
+    numbers = [number_html(number_text(each)) for each in (entry.printed, entry.corrected)]
     quantity = claim.quantity[0].upper() + claim.quantity[1:]
-    return [prose(quantity), number(_asked(entry)) + unit, *shown, verdict, prose(entry.why)]
+    return [
+        prose_html(quantity),
+        number_html(_claimed_value(entry)) + unit,
+        *numbers,
+        verdict,
+        prose_html(entry.explanation),
+    ]
 
 
-def prose(value: str) -> str:
-    """A text as HTML with its powers raised."""
-    scaled = POWER_OF_TEN.sub(r"&nbsp;&times;&nbsp;10<sup>\1</sup>", text(value))
-    return RAISED.sub(r"<sup>\1</sup>", scaled).replace(" %", "&nbsp;%")
+def prose_html(value: str) -> str:
+    """A text as HTML with superscript exponents."""
+    scaled = POWER_OF_TEN.sub(r"&nbsp;&times;&nbsp;10<sup>\1</sup>", escape_text(value))
+    return EXPONENT.sub(r"<sup>\1</sup>", scaled).replace(" %", "&nbsp;%")
 
 
-def written(value: Number | None) -> str:
+def number_text(value: ClaimNumber | None) -> str:
     """A number of the ledger to four digits, a range as such, a dash for none."""
     if value is None:
         return "-"
     if isinstance(value, tuple):
-        return f"{_digits(value[0])} to {_digits(value[1])}"
-    return _digits(value)
+        return f"{_significant_digits(value[0])} to {_significant_digits(value[1])}"
+    return _significant_digits(value)
 
 
-def _digits(value: float) -> str:
+def _significant_digits(value: float) -> str:
     if abs(value) < 1e-9:
         return "0"
     return f"{value:.4g}" if abs(value) < 1e3 else f"{value:.1f}"
 
 
-def _asked(entry: Entry) -> str:
+def _claimed_value(entry: LedgerEntry) -> str:
     signs = {"below": "< ", "above": "> "}
-    return signs.get(entry.claim.rule, "") + (entry.claim.digits or written(entry.claim.paper))
+    return signs.get(entry.claim.rule, "") + (entry.claim.printed_digits or number_text(entry.claim.paper_value))
 
 
-def _trials(trials: Trials) -> str:
-    columns = (Column(trials.columns[0]), *(Column(title, True) for title in trials.columns[1:]))
-    rows = [[prose(label), *map(number, cells)] for label, cells in trials.rows]
-    lead = f'<p class="paragraph">{prose(trials.lead)}</p>'
-    return f"<h3>{text(trials.title)}</h3>{lead}" + table(trials.title, columns, rows, "tried", quiet=True)
+def _open_claim_html(open_claim: OpenClaim) -> str:
+    columns = (TableColumn(open_claim.columns[0]), *(TableColumn(title, True) for title in open_claim.columns[1:]))
+    rows = [[prose_html(label), *map(number_html, cells)] for label, cells in open_claim.rows]
+    lead = f'<p class="paragraph">{prose_html(open_claim.lead)}</p>'
+    return f"<h3>{escape_text(open_claim.title)}</h3>{lead}" + table(
+        open_claim.title, columns, rows, "tried", caption_hidden=True
+    )
 
 
-def _figures(figures: Mapping[str, str], names: Sequence[str], svgs: Mapping[str, str]) -> str:
+def _figures_html(figures: Mapping[str, str], names: Sequence[str], svg_texts: Mapping[str, str]) -> str:
     """Figures one after the other, narrow ones side by side."""
-    shown = ""
-    for narrow, group in groupby(names, key=lambda name: inline_svg(svgs[name], name)[1] <= NARROW):
-        together = "".join(figures[name] for name in group)
-        shown += f'<div class="pair">{together}</div>' if narrow else together
-    return shown
+    html = ""
+    for is_narrow, group in groupby(names, key=lambda name: inline_svg(svg_texts[name], name)[1] <= MAX_NARROW_WIDTH):
+        group_html = "".join(figures[name] for name in group)
+        html += f'<div class="pair">{group_html}</div>' if is_narrow else group_html
+    return html
 
 
-def _figure(drawn: Drawn, svg: str) -> str:
-    shown, width = inline_svg(svg, drawn.name)
-    wide = ' class="wide" tabindex="0"' if width > NARROW else ""
+def _figure_html(paper_figure: PaperFigure, svg: str) -> str:
+    svg_html, width = inline_svg(svg, paper_figure.name)
+    scroll_attributes = ' class="wide" tabindex="0"' if width > MAX_NARROW_WIDTH else ""
     return (
-        f'<figure class="drawn" id="{drawn.name}"><figcaption><strong>{text(drawn.title)}</strong></figcaption>'
-        f'<div{wide} role="img" aria-label="{text(drawn.told)}">{shown}</div></figure>'
+        f'<figure class="drawn" id="{paper_figure.name}"><figcaption><strong>{escape_text(paper_figure.title)}</strong></figcaption>'
+        f'<div{scroll_attributes} role="img" aria-label="{escape_text(paper_figure.description)}">{svg_html}</div></figure>'
     )
 
 
 def inline_svg(svg: str, name: str) -> tuple[str, float]:
-    """An SVG as it may stand in a page: no prologue, ids of its own, ink and ground the page's; and its width in pt."""
+    """An SVG for embedding, without prologue, with unique ids and the page's colours; and its width in pt."""
     body = svg[svg.index("<svg") :]
     body = re.sub(r"\s*<metadata>.*?</metadata>", "", body, flags=re.DOTALL)
-    # A style element inside would hold for the whole page.
+    # A style element inside would apply to the whole page.
     body = re.sub(r"\s*<defs>\s*<style[^>]*>.*?</style>\s*</defs>", "", body, count=1, flags=re.DOTALL)
-    body = IDENTITY.sub(f"{name}-", body)
-    body = body.replace(INK, "currentColor").replace(f"fill: {PAPER}", "fill: none")
+    body = SVG_ID_REFERENCE.sub(f"{name}-", body)
+    body = body.replace(TEXT_COLOUR, "currentColor").replace(f"fill: {BACKGROUND_COLOUR}", "fill: none")
     size = re.search(r'width="([\d.]+)pt" height="([\d.]+)pt"', body)
     if size is None:
         raise ValueError(f"{name} is no SVG with a size")
     width = float(size.group(1))
-    joined = f'aria-hidden="true" style="max-width: {1.6 * width:.0f}px; stroke-linejoin: round"'
-    return body.replace(size.group(0), joined, 1), width
+    attributes = f'aria-hidden="true" style="max-width: {1.6 * width:.0f}px; stroke-linejoin: round"'
+    return body.replace(size.group(0), attributes, 1), width

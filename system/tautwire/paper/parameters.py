@@ -1,4 +1,4 @@
-"""The paper's robots and motions: one set as printed, one that gives the printed figures."""
+"""The paper's robots and motions as two parameter sets: one as printed, one that gives the printed figures."""
 
 from __future__ import annotations
 
@@ -22,68 +22,68 @@ else:
     import tomli as tomllib  # type: ignore[import-not-found,unused-ignore]
 
 Array = NDArray[np.float64]
-SetName = Literal["printed", "corrected"]
+ParameterSetName = Literal["printed", "corrected"]
 
-SETS: tuple[SetName, ...] = ("printed", "corrected")
-DATA = Path(__file__).parent / "data"
-QUINTIC = (6.0, -15.0, 10.0)
+PARAMETER_SETS: tuple[ParameterSetName, ...] = ("printed", "corrected")
+DATA_FOLDER = Path(__file__).parent / "data"
+QUINTIC_COEFFICIENTS = (6.0, -15.0, 10.0)
 
 
 @dataclass(frozen=True)
-class Ramp:
-    """Winch speeds that rise from rest at ``accelerations`` (n,), in m/s^2, until they reach ``peak``, in m/s.
+class WinchRamp:
+    """Winch speeds that rise from rest at ``accelerations`` (n,), in m/s^2, until they reach ``peak_speed``, in m/s.
 
-    They are then ``held`` to the end, or as a ``trapezoid`` fall to rest at the end, as steeply as they rose. ``start``
-    in m, ``duration`` in s.
+    By ``shape`` they are then ``held`` to the end, or as a ``trapezoid`` fall to rest at the end, as steeply as they
+    rose. ``start`` in m, ``duration`` in s.
     """
 
     shape: str
     start: Point
     accelerations: tuple[float, ...]
-    peak: float
+    peak_speed: float
     duration: float
 
     def speeds(self, times: Array) -> Array:
         """Winch speeds at times (N,) in s, shape (N, n), in m/s; positive reels in."""
-        rising = np.minimum(times, self.duration - times) if self.shape == "trapezoid" else times
-        speeds: Array = np.clip(np.outer(rising, self.accelerations), -self.peak, self.peak)
+        ramp_time = np.minimum(times, self.duration - times) if self.shape == "trapezoid" else times
+        speeds: Array = np.clip(np.outer(ramp_time, self.accelerations), -self.peak_speed, self.peak_speed)
         return speeds
 
     @property
-    def reached(self) -> float:
-        """When the first winch reaches its peak, in s."""
-        return self.peak / max(abs(value) for value in self.accelerations)
+    def peak_time(self) -> float:
+        """Time at which the first winch reaches its peak speed, in s."""
+        return self.peak_speed / max(abs(value) for value in self.accelerations)
 
 
 @dataclass(frozen=True)
-class Parameters:
+class PaperParameters:
     """One set of parameters; robots, helices and ramps by name, those that the set does not have left out.
 
-    ``error_share`` is how much of the printed errors of force and elongation each reading has.
+    ``error_share`` is the share of the printed errors of force and elongation that each reading has.
     """
 
-    name: SetName
+    name: ParameterSetName
     robots: Mapping[str, Robot]
     helices: Mapping[str, Helix]
-    ramps: Mapping[str, Ramp]
+    ramps: Mapping[str, WinchRamp]
     error_share: float
 
 
-def read_parameters(name: SetName) -> Parameters:
-    """A set from its files, one for each robot and one for the motions; raises RobotFileError."""
-    folder = DATA / name
+def read_parameters(name: ParameterSetName) -> PaperParameters:
+    """Read a parameter set from its files, one for each robot and one for the motions; raises RobotFileError."""
+    folder = DATA_FOLDER / name
     motions = read_data(folder / "motions.toml")
-    return Parameters(
+    return PaperParameters(
         name=name,
         robots={path.stem: read_robot(path) for path in sorted(folder.glob("*.toml")) if path.stem != "motions"},
-        helices={robot: _helix(table) for robot, table in motions["helix"].items()},
-        ramps={robot: _ramp(table) for robot, table in motions["ramp"].items()},
+        helices={robot: _read_helix(table) for robot, table in motions["helix"].items()},
+        ramps={robot: _read_ramp(table) for robot, table in motions["ramp"].items()},
         error_share=motions["error_share"],
     )
 
 
 def read_data(path: Path) -> dict[str, Any]:
-    """One of the project's own TOML files."""
+    """Read one of the project's own TOML files."""
     return tomllib.loads(path.read_text(encoding="utf-8"))
 
 
@@ -93,7 +93,7 @@ def with_law(robot: Robot, law: str) -> Robot:
 
 
 def with_rope(robot: Robot, modulus: float, damping: float = 0.0, area: float | None = None) -> Robot:
-    """The robot with ropes of another modulus (Pa), damping (Pa s) and, where given, area (m^2)."""
+    """The robot with ropes of another modulus (Pa), damping (Pa s) and, optionally, area (m^2)."""
     cables = (replace(c, modulus=modulus, damping=damping, area=area or c.area) for c in robot.cables)
     return replace(robot, cables=tuple(cables))
 
@@ -103,17 +103,17 @@ def with_start(robot: Robot, start: Point) -> Robot:
     return replace(robot, platform=replace(robot.platform, start=start))
 
 
-def _helix(table: Mapping[str, Any]) -> Helix:
+def _read_helix(table: Mapping[str, Any]) -> Helix:
     """Eq. 13: the angle is the sum of the coefficients; the rise is the pitch times the angle."""
     a5, a4, a3 = table["coefficients"]
-    turned = a5 + a4 + a3
-    if not np.allclose(np.array([a5, a4, a3]), turned * np.array(QUINTIC)):
+    half_turns = a5 + a4 + a3
+    if not np.allclose(np.array([a5, a4, a3]), half_turns * np.array(QUINTIC_COEFFICIENTS)):
         raise ValueError(f"coefficients {a5}, {a4}, {a3} do not go from rest to rest")
     x, y, z = table["centre"]
-    angle = math.pi * turned
+    angle = math.pi * half_turns
     return Helix((x, y, z), table["radius"], table["pitch"] * angle, angle, table["duration"])
 
 
-def _ramp(table: Mapping[str, Any]) -> Ramp:
+def _read_ramp(table: Mapping[str, Any]) -> WinchRamp:
     x, y, z = table["start"]
-    return Ramp(table["shape"], (x, y, z), tuple(table["accelerations"]), table["peak"], table["duration"])
+    return WinchRamp(table["shape"], (x, y, z), tuple(table["accelerations"]), table["peak"], table["duration"])

@@ -1,4 +1,4 @@
-"""Runs of the paper's robots by FMUs and master, and what is kept of each: series by name."""
+"""Co-simulates the paper's robots and records each run as named time series."""
 
 from __future__ import annotations
 
@@ -13,89 +13,89 @@ from numpy.typing import NDArray
 from ..errors import TautwireError
 from ..fmus.packaging import build_fmus
 from ..robots.robot import Robot
-from ..runs.cosimulation import Motion, cosimulate
+from ..runs.cosimulation import CosimulationResult, cosimulate
 from ..trajectory import Trajectory, ideal_winch_speeds
-from .parameters import Ramp, with_start
+from .parameters import WinchRamp, with_start
 
 Array = NDArray[np.float64]
-Tell = Callable[[str, float], None]
+Progress = Callable[[str, float], None]
 
-STEP = 0.1  # s, macro steps; micrometres off on the ramps
-SETTLED, SWEEPS = 1e-12, 30
+MACRO_STEP = 0.1  # s, macro step; its error on the ramps is micrometres
+NEWTON_TOLERANCE, MAX_NEWTON_ITERATIONS = 1e-12, 30
 
 
 @dataclass(frozen=True)
-class Case:
-    """What one run takes: winch speeds (N, n) in m/s at ``time`` (N,) in s, and where the platform should be (N, 3)."""
+class SimulationCase:
+    """Inputs of one run: winch speeds (N, n) in m/s at ``time`` (N,) in s, and the ``desired_position`` (N, 3) in m."""
 
     robot: Robot
     time: Array
     winch_speed: Array
-    desired: Array
+    desired_position: Array
 
 
 @dataclass(frozen=True)
-class Record:
-    """Series (N,) by name over ``time`` (N,) in s, SI units.
+class SimulationRecord:
+    """Recorded series (N,) by name over ``time`` (N,) in s, SI units.
 
     Of a run: ``tension_1``, ``elongation_1``, ``strain_1`` (the paper's r / l), ``length_1``, ``winch_speed_1`` ...;
-    ``x``, ``vx``, ``error_x`` ... (desired less real); ``error_norm``. ``made`` is the energy that the coupling made as
-    a share of all that was exchanged.
+    ``x``, ``vx``, ``error_x`` ... (desired less real); ``error_norm``. ``coupling_energy_share`` is
+    the energy that the coupling generated as a share of all that was exchanged.
     """
 
     time: Array
     values: Mapping[str, Array] = field(repr=False)
-    made: float = 0.0
+    coupling_energy_share: float = 0.0
 
     def __getitem__(self, name: str) -> Array:
         return self.values[name]
 
-    def at(self, name: str, moment: float) -> float:
-        """A series at a moment in s, linear between samples."""
-        return float(np.interp(moment, self.time, self.values[name]))
+    def at(self, name: str, time: float) -> float:
+        """Value of a series at a time in s, linear between samples."""
+        return float(np.interp(time, self.time, self.values[name]))
 
 
-Records = Mapping[str, Record]
+Records = Mapping[str, SimulationRecord]
 
 
 class RigidPathError(TautwireError):
-    """Ropes of given lengths meet nowhere near where they were before; ``moment`` in s."""
+    """Inelastic ropes of these lengths have no common end near the last one; ``time`` in s."""
 
-    def __init__(self, robot: str, moment: float) -> None:
+    def __init__(self, robot: str, time: float) -> None:
         self.robot = robot
-        self.moment = moment
-        super().__init__(f"{robot}: inelastic ropes meet nowhere at {moment:g} s")
+        self.time = time
+        super().__init__(f"{robot}: inelastic ropes meet nowhere at {time:g} s")
 
 
-def helix_case(robot: Robot, path: Trajectory, samples: int) -> Case:
-    """A path followed with the winch speeds of inelastic ropes, in so many intervals."""
+def path_case(robot: Robot, path: Trajectory, samples: int) -> SimulationCase:
+    """The run that follows a path with the winch speeds of inelastic ropes, in ``samples`` intervals."""
     time = np.linspace(0.0, path.duration, samples + 1)
-    return Case(robot, time, ideal_winch_speeds(robot, path, time), path.position(time))
+    return SimulationCase(robot, time, ideal_winch_speeds(robot, path, time), path.position(time))
 
 
-def ramp_case(robot: Robot, ramp: Ramp, samples: int) -> Case:
-    """A ramp of the winches; desired is where inelastic ropes would lead. Bends of the ramp have to be samples."""
+def ramp_case(robot: Robot, ramp: WinchRamp, samples: int) -> SimulationCase:
+    """The run of a winch ramp; inelastic ropes give the desired path. Corners of the ramp have to be samples."""
     placed = with_start(robot, ramp.start)
     time = np.linspace(0.0, ramp.duration, samples + 1)
     speeds = ramp.speeds(time)
-    return Case(placed, time, speeds, rigid_path(placed, time, speeds))
+    return SimulationCase(placed, time, speeds, rigid_path(placed, time, speeds))
 
 
 def rigid_path(robot: Robot, time: Array, winch_speed: Array) -> Array:
-    """Where three inelastic ropes lead the platform, (N, 3) in m: ``|p - b_i| = l_i(0) - integral V_i dt``, by Newton.
+    """Forward kinematics of three inelastic ropes, (N, 3) in m: ``|p - b_i| = l_i(0) - integral V_i dt``, by Newton.
 
     ``time`` (N,) in s; ``winch_speed`` (N, 3) in m/s, linear in between. Raises RigidPathError.
     """
     anchors, position = np.array(robot.anchors), np.array(robot.platform.start)
-    lengths = np.linalg.norm(position - anchors, axis=1) - travelled(time, winch_speed)
+    lengths = np.linalg.norm(position - anchors, axis=1) - reeled_length(time, winch_speed)
     path = np.empty((len(time), 3))
-    for row, wanted in enumerate(lengths):
-        for _ in range(SWEEPS):
+    for row, target_lengths in enumerate(lengths):
+        for _ in range(MAX_NEWTON_ITERATIONS):
             spans = position - anchors
-            found = np.linalg.norm(spans, axis=1)
-            change = np.linalg.solve(spans / found[:, None], wanted - found)
-            position = position + change
-            if np.max(np.abs(change)) < SETTLED * np.max(found):
+            current_lengths = np.linalg.norm(spans, axis=1)
+            position_change = np.linalg.solve(spans / current_lengths[:, None], target_lengths - current_lengths)
+            position = position + position_change
+            if np.max(np.abs(position_change)) < NEWTON_TOLERANCE * np.max(current_lengths):
                 break
         else:
             raise RigidPathError(robot.name, float(time[row]))
@@ -103,35 +103,35 @@ def rigid_path(robot: Robot, time: Array, winch_speed: Array) -> Array:
     return path
 
 
-def travelled(time: Array, winch_speed: Array) -> Array:
+def reeled_length(time: Array, winch_speed: Array) -> Array:
     """Rope reeled in since the start, in m, of speeds (N, n) that are linear between samples."""
-    slices = 0.5 * np.diff(time)[:, None] * (winch_speed[1:] + winch_speed[:-1])
-    return np.vstack([np.zeros(winch_speed.shape[1]), np.cumsum(slices, axis=0)])
+    increments = 0.5 * np.diff(time)[:, None] * (winch_speed[1:] + winch_speed[:-1])
+    return np.vstack([np.zeros(winch_speed.shape[1]), np.cumsum(increments, axis=0)])
 
 
-def run_case(case: Case) -> Record:
+def run_case(case: SimulationCase) -> SimulationRecord:
     """Build the FMUs of a case and co-simulate them; raises RunError where an FMU fails."""
     with TemporaryDirectory(prefix="tautwire-paper-") as folder:
         fmus = build_fmus(case.robot, Path(folder))
-        return record_of(cosimulate(fmus, case.time, case.winch_speed, step=STEP), case)
+        return record_from_motion(cosimulate(fmus, case.time, case.winch_speed, step=MACRO_STEP), case)
 
 
-def record_of(motion: Motion, case: Case) -> Record:
-    """The series of a run."""
-    return Record(motion.time, dict(_series(motion, case)), motion.account.share)
+def record_from_motion(motion: CosimulationResult, case: SimulationCase) -> SimulationRecord:
+    """Record the series of a run."""
+    return SimulationRecord(motion.time, dict(_series(motion, case)), motion.statistics.energy_residual_share)
 
 
-def _series(motion: Motion, case: Case) -> Iterator[tuple[str, Array]]:
-    error = case.desired - motion.position
-    for place, axis in enumerate("xyz"):
-        yield axis, motion.position[:, place]
-        yield f"v{axis}", motion.velocity[:, place]
-        yield f"error_{axis}", error[:, place]
+def _series(motion: CosimulationResult, case: SimulationCase) -> Iterator[tuple[str, Array]]:
+    error = case.desired_position - motion.position
+    for index, axis in enumerate("xyz"):
+        yield axis, motion.position[:, index]
+        yield f"v{axis}", motion.velocity[:, index]
+        yield f"error_{axis}", error[:, index]
     yield "error_norm", np.linalg.norm(error, axis=1)
-    for place in range(case.robot.cable_count):
-        number = place + 1
-        yield f"tension_{number}", motion.tension[:, place]
-        yield f"length_{number}", motion.length[:, place]
-        yield f"elongation_{number}", motion.elongation[:, place]
-        yield f"strain_{number}", motion.elongation[:, place] / motion.length[:, place]
-        yield f"winch_speed_{number}", case.winch_speed[:, place]
+    for index in range(case.robot.cable_count):
+        number = index + 1
+        yield f"tension_{number}", motion.tension[:, index]
+        yield f"length_{number}", motion.length[:, index]
+        yield f"elongation_{number}", motion.elongation[:, index]
+        yield f"strain_{number}", motion.elongation[:, index] / motion.length[:, index]
+        yield f"winch_speed_{number}", case.winch_speed[:, index]

@@ -1,4 +1,4 @@
-"""Plain functions from series to the numbers of the ledger."""
+"""Computes the numbers of the ledger from time series."""
 
 from __future__ import annotations
 
@@ -9,84 +9,86 @@ from numpy.typing import NDArray
 from scipy.signal import find_peaks
 from scipy.signal.windows import hann
 
-from .records import Record
+from .records import SimulationRecord
 
 Array = NDArray[np.float64]
-# By the ids of the claims; two numbers are a range. Units are the claims'.
-Values = dict[str, float | tuple[float, float] | None]
+# Computed values by the ids of the claims, in the claims' units; two numbers are a range.
+ClaimValues = dict[str, float | tuple[float, float] | None]
 
-# s, within which two curves turn together.
-NEAR = 1.5
-DRIFT_ORDER = 8
-FEWEST_PERIODS = 4.0
-PADDING = 16
+# s, within which turning points of two curves belong together.
+TURN_WINDOW = 1.5
+DRIFT_POLYNOMIAL_ORDER = 8
+MIN_PERIODS = 4.0
+ZERO_PADDING_FACTOR = 16
 
 
-def largest(series: Array) -> float:
+def max_abs(series: Array) -> float:
     """The largest absolute value."""
     return float(np.max(np.abs(series)))
 
 
-def relative_difference(base: Record, other: Record, name: str, moment: float) -> float:
-    """How far another run's series is off at a moment (s), in % of the base's there."""
-    return 100.0 * abs(other.at(name, moment) - base.at(name, moment)) / abs(base.at(name, moment))
+def relative_difference(base: SimulationRecord, other: SimulationRecord, name: str, time: float) -> float:
+    """Relative difference of another run's series at a time (s), in % of the base's there."""
+    return 100.0 * abs(other.at(name, time) - base.at(name, time)) / abs(base.at(name, time))
 
 
 @dataclass(frozen=True)
-class Turn:
-    """Where two curves of one quantity turn, each at its own moment: ``moment`` in s is between the two."""
+class TurningPoint:
+    """A turning point of two curves of one quantity, each at its own time: ``time`` in s is halfway between."""
 
-    moment: float
+    time: float
     first: float
     second: float
 
     @property
     def gap(self) -> float:
-        """How far the two turn apart."""
+        """Difference of the two extremes."""
         return abs(self.first - self.second)
 
 
-def turns(first: Record, second: Record, name: str, prominence: float) -> list[Turn]:
-    """The turns of a series that stand out by so much (in its unit), by time; the end where there are none.
+def turning_points(
+    first: SimulationRecord, second: SimulationRecord, name: str, prominence: float
+) -> list[TurningPoint]:
+    """Turning points of a series of at least this prominence (in its unit), by time; the end where there are none.
 
-    A turn of the second curve is its extreme of the same kind near that of the first.
+    A turning point of the second curve is its extreme of the same kind near that of the first.
     """
-    time, found = first.time, []
+    time, points = first.time, []
     for sign in (1.0, -1.0):
         for row in find_peaks(sign * first[name], prominence=prominence)[0]:
-            near = np.flatnonzero(np.abs(time - time[row]) <= NEAR)
-            other = near[np.argmax(sign * second[name][near])]
-            moment = 0.5 * float(time[row] + time[other])
-            found.append(Turn(moment, float(first[name][row]), float(second[name][other])))
-    if not found:
-        return [Turn(float(time[-1]), float(first[name][-1]), float(second[name][-1]))]
-    return sorted(found, key=lambda turn: turn.moment)
+            nearby = np.flatnonzero(np.abs(time - time[row]) <= TURN_WINDOW)
+            other_row = nearby[np.argmax(sign * second[name][nearby])]
+            mean_time = 0.5 * float(time[row] + time[other_row])
+            points.append(TurningPoint(mean_time, float(first[name][row]), float(second[name][other_row])))
+    if not points:
+        return [TurningPoint(float(time[-1]), float(first[name][-1]), float(second[name][-1]))]
+    return sorted(points, key=lambda point: point.time)
 
 
-def mean_reduction(before: Record, after: Record, name: str) -> float:
-    """By how much the mean absolute value of a series falls, in %."""
+def mean_reduction(before: SimulationRecord, after: SimulationRecord, name: str) -> float:
+    """Reduction of the mean absolute value of a series, in %."""
     return 100.0 * (1.0 - float(np.mean(np.abs(after[name])) / np.mean(np.abs(before[name]))))
 
 
 def dominant_frequency(time: Array, series: Array) -> float:
-    """Where the spectrum of a series (N,) at even times (s) is largest, in Hz, a slow drift taken off by a polynomial.
+    """Dominant frequency in Hz of a series (N,) at even times (s): its spectral peak after polynomial detrending.
 
     Only frequencies with four periods or more in the series count.
     """
     centred = 2.0 * (time - time[0]) / (time[-1] - time[0]) - 1.0
-    drift = np.polynomial.chebyshev.chebfit(centred, series, DRIFT_ORDER)
-    swing = series - np.polynomial.chebyshev.chebval(centred, drift)
-    count = PADDING * len(swing)
-    spectrum = np.abs(np.fft.rfft(swing * hann(len(swing)), count))
+    drift = np.polynomial.chebyshev.chebfit(centred, series, DRIFT_POLYNOMIAL_ORDER)
+    detrended = series - np.polynomial.chebyshev.chebval(centred, drift)
+    count = ZERO_PADDING_FACTOR * len(detrended)
+    spectrum = np.abs(np.fft.rfft(detrended * hann(len(detrended)), count))
     frequency = np.fft.rfftfreq(count, time[1] - time[0])
-    spectrum[frequency < FEWEST_PERIODS / (time[-1] - time[0])] = 0.0
+    spectrum[frequency < MIN_PERIODS / (time[-1] - time[0])] = 0.0
     return float(frequency[np.argmax(spectrum)])
 
 
-def amplitude(time: Array, series: Array, frequency: float, begin: float, end: float) -> float:
-    """Amplitude of a swing of a frequency (Hz) between two moments (s), on a drift of second order: least squares."""
-    inside = (time >= begin) & (time <= end)
-    turn = 2.0 * np.pi * frequency * time[inside]
-    columns = np.column_stack([np.vander(time[inside] - begin, 3), np.cos(turn), np.sin(turn)])
-    found = np.linalg.lstsq(columns, series[inside], rcond=None)[0]
-    return float(np.hypot(found[3], found[4]))
+def amplitude(time: Array, series: Array, frequency: float, start: float, end: float) -> float:
+    """Least-squares amplitude of an oscillation of known frequency (Hz) between two times (s), on a quadratic drift."""
+    inside = (time >= start) & (time <= end)
+    phase = 2.0 * np.pi * frequency * time[inside]
+    regressors = np.column_stack([np.vander(time[inside] - start, 3), np.cos(phase), np.sin(phase)])
+    coefficients = np.linalg.lstsq(regressors, series[inside], rcond=None)[0]
+    return float(np.hypot(coefficients[3], coefficients[4]))

@@ -1,4 +1,4 @@
-"""Runs all that the paper computes, and writes figures, ledger and page."""
+"""Runs all that the paper computes, and writes its figures, the ledger of claims and the page."""
 
 from __future__ import annotations
 
@@ -10,118 +10,126 @@ from functools import partial
 from pathlib import Path
 
 from ..materials import RobotMaterial
-from ..tracer.workers import Workers, processors
+from ..tracer.workers import WorkerPool, processors
 from . import beyond, helix, large_robots, ramps, tried
-from .beyond_figures import draw_beyond
-from .claims import Entry, axis_claims, judged, text_claims
-from .material import MaterialRuns, printed_rope, quantities, relaxing_rope, run_material
-from .material_figures import draw_material
-from .page import Content, paper_page
+from .beyond_figures import draw_extensions
+from .claims import LedgerEntry, axis_claims, judge_claims, text_claims
+from .material import RopeTestRuns, printed_rope, relaxing_rope, rope_test_values, run_tensile_and_dynamic_tests
+from .material_figures import draw_rope_tests
+from .page import PageContent, paper_page
 from .panels import axis_values, draw_time_figures
-from .parameters import SETS, Parameters, SetName, read_parameters
-from .records import Case, Record, Tell, run_case
-from .spaces import draw_spaces
-from .style import style, write_figures
-from .table_1 import table_entries
-from .tried import Trials, trials
-from .values import Values
+from .parameters import PARAMETER_SETS, PaperParameters, ParameterSetName, read_parameters
+from .records import Progress, SimulationCase, SimulationRecord, run_case
+from .spaces import draw_space_figures
+from .style import figure_style, write_figures
+from .table_1 import table_1_entries
+from .tried import OpenClaim, examine_open_claims
+from .values import ClaimValues
 
-PARTS = (helix, large_robots, ramps)
-MOST_PROCESSES = 2
+SECTION_MODULES = (helix, large_robots, ramps)
+MAX_PROCESSES = 2
 
 
 @dataclass(frozen=True)
 class PaperRuns:
-    """All runs of one set of parameters, with section 3 and the numbers that come of them."""
+    """All runs of one parameter set, with the rope tests of section 3 and the numbers computed from them."""
 
-    parameters: Parameters
-    records: Mapping[str, Record]
-    material: MaterialRuns
-    values: Values
+    parameters: PaperParameters
+    records: Mapping[str, SimulationRecord]
+    rope_tests: RopeTestRuns
+    values: ClaimValues
 
 
 @dataclass(frozen=True)
-class Paper:
-    """All that came out."""
+class PaperReproduction:
+    """Result of the reproduction: runs by parameter set, and the entries of the ledger."""
 
-    runs: Mapping[SetName, PaperRuns] = field(repr=False)
-    entries: tuple[Entry, ...] = field(repr=False)
+    runs: Mapping[ParameterSetName, PaperRuns] = field(repr=False)
+    entries: tuple[LedgerEntry, ...] = field(repr=False)
 
     @property
     def counts(self) -> Mapping[str, int]:
-        """How many claims have each verdict."""
+        """Number of claims with each verdict."""
         return Counter(entry.verdict for entry in self.entries)
 
 
-def write_paper(folder: Path, tell: Tell) -> Paper:
+def write_paper(folder: Path, progress: Progress) -> PaperReproduction:
     """Run everything and write ``claims.json``, ``claims.html`` and all figures into an existing folder.
 
     Raises RunError where an FMU fails.
     """
-    with Workers(min(processors(), MOST_PROCESSES)) as workers:
-        paper = run_paper(workers, tell)
-    runs = paper.runs["corrected"]
-    tell("comparing ropes on a drum", 0.0)
-    sizes = beyond.compare_sizes(runs.parameters, runs.records)
-    with style():
-        extra = tuple(draw_beyond(runs.records, sizes))
-        drawn = [
-            *draw_material({name: each.material for name, each in paper.runs.items()}),
+    with WorkerPool(min(processors(), MAX_PROCESSES)) as workers:
+        reproduction = run_paper(workers, progress)
+    runs = reproduction.runs["corrected"]
+    progress("comparing ropes on a drum", 0.0)
+    size_study = beyond.compare_sizes(runs.parameters, runs.records)
+    with figure_style():
+        extensions = tuple(draw_extensions(runs.records, size_study))
+        figures = [
+            *draw_rope_tests({name: each.rope_tests for name, each in reproduction.runs.items()}),
             *draw_time_figures(runs.records),
-            *draw_spaces(runs.parameters, runs.records),
-            *(each.drawn for each in extra),
+            *draw_space_figures(runs.parameters, runs.records),
+            *(each.figure for each in extensions),
         ]
-        svgs = write_figures(drawn, folder, partial(tell, "drawing"))
-    _write(folder, paper.entries, Content(paper.entries, drawn, svgs, _trials(runs), extra))
-    return paper
+        svgs = write_figures(figures, folder, partial(progress, "drawing"))
+    _write_ledger(
+        folder, reproduction.entries, PageContent(reproduction.entries, figures, svgs, _open_claims(runs), extensions)
+    )
+    return reproduction
 
 
-def run_paper(workers: Workers, tell: Tell) -> Paper:
-    """All runs, those with the corrected parameters also of what was tried and of what goes beyond the paper."""
-    parameters = {name: read_parameters(name) for name in SETS}
-    ropes: dict[SetName, RobotMaterial] = {"printed": printed_rope(), "corrected": relaxing_rope()}
-    cases = {(name, key): case for name in SETS for key, case in _cases(parameters[name])}
-    extra = (*tried.cases(parameters["corrected"]), *beyond.cases(parameters["corrected"], ropes["corrected"]))
-    cases |= {("corrected", key): case for key, case in extra}
-    pulled = {name: workers.start(run_material, rope) for name, rope in ropes.items()}
-    records = _run(cases, workers, tell)
+def run_paper(workers: WorkerPool, progress: Progress) -> PaperReproduction:
+    """Run everything; with the corrected parameters also the open claims and the studies beyond the paper."""
+    parameters = {name: read_parameters(name) for name in PARAMETER_SETS}
+    ropes: dict[ParameterSetName, RobotMaterial] = {"printed": printed_rope(), "corrected": relaxing_rope()}
+    cases = {(name, key): case for name in PARAMETER_SETS for key, case in _section_cases(parameters[name])}
+    extra_cases = (*tried.cases(parameters["corrected"]), *beyond.cases(parameters["corrected"], ropes["corrected"]))
+    cases |= {("corrected", key): case for key, case in extra_cases}
+    rope_test_runs = {name: workers.submit(run_tensile_and_dynamic_tests, rope) for name, rope in ropes.items()}
+    records = _run_cases(cases, workers, progress)
     runs = {}
-    for name in SETS:
-        own = {key: record for (which, key), record in records.items() if which == name}
-        runs[name] = _collected(parameters[name], own, pulled[name].result())
+    for name in PARAMETER_SETS:
+        set_records = {key: record for (set_name, key), record in records.items() if set_name == name}
+        runs[name] = _collect_runs(parameters[name], set_records, rope_test_runs[name].result())
     claims = (*text_claims(), *axis_claims())
-    rows = judged(claims, runs["printed"].values, runs["corrected"].values)
-    entries = sorted((*rows, *table_entries(runs["corrected"].material, parameters)), key=lambda row: row.claim.section)
-    return Paper(runs, tuple(entries))
+    judged_entries = judge_claims(claims, runs["printed"].values, runs["corrected"].values)
+    entries = sorted(
+        (*judged_entries, *table_1_entries(runs["corrected"].rope_tests, parameters)), key=lambda row: row.claim.section
+    )
+    return PaperReproduction(runs, tuple(entries))
 
 
-def _cases(parameters: Parameters) -> list[tuple[str, Case]]:
-    return [case for part in PARTS for case in part.cases(parameters)]
+def _section_cases(parameters: PaperParameters) -> list[tuple[str, SimulationCase]]:
+    return [case for section_module in SECTION_MODULES for case in section_module.cases(parameters)]
 
 
-def _run(cases: Mapping[tuple[SetName, str], Case], workers: Workers, tell: Tell) -> dict[tuple[SetName, str], Record]:
-    """All runs, side by side where the workers have processes."""
-    names, records = list(cases), {}
-    tell("co-simulating", 0.0)
-    for number, record in workers.each(run_case, [(cases[name],) for name in names]):
-        records[names[number]] = record
-        tell("co-simulating", len(records) / len(names))
+def _run_cases(
+    cases: Mapping[tuple[ParameterSetName, str], SimulationCase], workers: WorkerPool, progress: Progress
+) -> dict[tuple[ParameterSetName, str], SimulationRecord]:
+    """Run all cases, in parallel where the workers have processes."""
+    case_keys, records = list(cases), {}
+    progress("co-simulating", 0.0)
+    for number, record in workers.map_unordered(run_case, [(cases[name],) for name in case_keys]):
+        records[case_keys[number]] = record
+        progress("co-simulating", len(records) / len(case_keys))
     return records
 
 
-def _collected(parameters: Parameters, records: dict[str, Record], material: MaterialRuns) -> PaperRuns:
-    records |= ramps.modes(parameters, records)
-    values = quantities(material, parameters.error_share)
-    for part in PARTS:
-        values |= part.quantities(parameters, records)
-    return PaperRuns(parameters, records, material, values | axis_values(records, parameters.name))
+def _collect_runs(
+    parameters: PaperParameters, records: dict[str, SimulationRecord], rope_tests: RopeTestRuns
+) -> PaperRuns:
+    records |= ramps.mode_records(parameters, records)
+    values = rope_test_values(rope_tests, parameters.error_share)
+    for section_module in SECTION_MODULES:
+        values |= section_module.quantities(parameters, records)
+    return PaperRuns(parameters, records, rope_tests, values | axis_values(records, parameters.name))
 
 
-def _trials(runs: PaperRuns) -> tuple[Trials, ...]:
-    return trials(runs.parameters, runs.records)
+def _open_claims(runs: PaperRuns) -> tuple[OpenClaim, ...]:
+    return examine_open_claims(runs.parameters, runs.records)
 
 
-def _write(folder: Path, entries: tuple[Entry, ...], content: Content) -> None:
+def _write_ledger(folder: Path, entries: tuple[LedgerEntry, ...], content: PageContent) -> None:
     document = json.dumps([entry.document() for entry in entries], indent=1, allow_nan=False)
     (folder / "claims.json").write_text(document + "\n", encoding="utf-8")
     page = paper_page(content, {"claims.json": "claims.json"})

@@ -1,1 +1,1 @@
-"""Recordings: winch speeds and what sensors saw, from CSV, Parquet and MDF files."""
+"""Recordings: winch speeds and sensor signals, from CSV, Parquet and MDF files."""

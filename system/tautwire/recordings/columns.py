@@ -1,4 +1,4 @@
-"""Recordings as columns of numbers in memory, whatever file they come from."""
+"""Recordings as columns of numbers in memory, independent of the file format."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -14,7 +14,7 @@ from .rules import Row
 
 @dataclass(frozen=True)
 class ColumnTable:
-    """The known columns of a file that has columns, in memory."""
+    """The known columns of a columnar file or a frame, in memory."""
 
     file: str
     header: Header

@@ -1,4 +1,4 @@
-"""Recordings in CSV files: one header line, then one line a sample."""
+"""Recordings in CSV files: one header line, then one line per sample."""
 
 import csv
 import re
@@ -13,12 +13,12 @@ import numpy as np
 import pandas as pd  # type: ignore[import-untyped,unused-ignore]
 from numpy.typing import NDArray
 
-from ..errors import RecordingError, at_once, shown
-from ..input_file import read_text
-from .header import Header, Refuse, header_of
-from .rules import MISSING, Row
+from ..errors import RecordingError, format_value, raise_error
+from ..input_file import read_text_bytes
+from .header import ErrorSink, Header, parse_header
+from .rules import MISSING_CELLS, Row
 
-LARGEST_FILE = 2**31  # bytes; it is held in memory
+MAX_FILE_SIZE = 2**31  # bytes; it is held in memory
 
 _BYTE_ORDER_MARK = b"\xef\xbb\xbf"
 _NUMBER = re.compile(r"[-+]?[0-9]*[.,]?[0-9]+([eE][-+]?[0-9]+)?")
@@ -33,7 +33,7 @@ class CsvTable:
     header: Header
 
     def numbers(self) -> Mapping[str, NDArray[np.float64]] | None:
-        """The known columns, each (N,), NaN where a cell is missing; None where this is no table of numbers."""
+        """The known columns, each (N,), NaN where a cell is missing; None where this is not a table of numbers."""
         header, content = self.header, self.content
         # Where the first row has more cells than the header, pandas would take some for an index.
         if not self._is_rectangular(row_count=1):
@@ -43,61 +43,65 @@ class CsvTable:
                 BytesIO(content),
                 header=0,
                 names=list(header.names),
-                dtype={name: str if name in header.unknown else np.float64 for name in header.names},
+                dtype={name: str if name in header.unknown_names else np.float64 for name in header.names},
                 encoding="utf-8",
                 skipinitialspace=True,
                 keep_default_na=False,
-                na_values=list(MISSING),
-                **_exactly(),
+                na_values=list(MISSING_CELLS),
+                **_exact_float_options(),
             )
         except (ValueError, OverflowError):
             return None
-        return {name: frame[name].to_numpy() for name in header.known} if self._is_rectangular(len(frame)) else None
+        return (
+            {name: frame[name].to_numpy() for name in header.known_names} if self._is_rectangular(len(frame)) else None
+        )
 
     def rows(self) -> Iterator[Row]:
         """Rows below the header that are not blank, each with the file and the line on which it begins."""
         rows = csv.reader(_as_text(self.content), skipinitialspace=True, strict=True)
-        begin = 1
+        first_line = 1
         try:
             next(rows)
-            begin = rows.line_num + 1
+            first_line = rows.line_num + 1
             for row in rows:
                 if len(row) > 1 or "".join(row).strip():
-                    yield Row(f"{self.file}: line {begin}", begin, row)
-                begin = rows.line_num + 1
+                    yield Row(f"{self.file}: line {first_line}", first_line, row)
+                first_line = rows.line_num + 1
         except csv.Error as problem:
-            mend = "check the quotation marks from this line on"
-            raise RecordingError(f"{self.file}: line {begin}", f"is no CSV ({problem})", mend, begin) from problem
+            hint = "check the quotation marks from this line on"
+            raise RecordingError(
+                f"{self.file}: line {first_line}", f"is no CSV ({problem})", hint, first_line
+            ) from problem
 
     def _is_rectangular(self, row_count: int) -> bool:
-        """Whether the first rows are as wide as the header; pandas fills short ones up without a word."""
+        """Whether the first rows are as wide as the header; pandas pads short ones silently."""
         width = len(self.header.names)
         if row_count > 1 and b'"' not in self.content:
             return self.content.count(b",") == (row_count + 1) * (width - 1)
         try:
             rows = csv.reader(_as_text(self.content), skipinitialspace=True)
-            filled = (row for row in rows if len(row) > 1 or "".join(row).strip())
-            return all(len(row) == width for row in islice(filled, row_count + 1))
+            data_rows = (row for row in rows if len(row) > 1 or "".join(row).strip())
+            return all(len(row) == width for row in islice(data_rows, row_count + 1))
         except csv.Error:
             return False
 
 
-def open_csv(path: str | Path, cable_count: int, sink: Refuse = at_once) -> CsvTable:
-    """The CSV file of a recording; raises RecordingError where it is no text or its header is wrong.
+def open_csv(path: str | Path, cable_count: int, sink: ErrorSink = raise_error) -> CsvTable:
+    """Open the CSV file of a recording; raises RecordingError where it is not text or has no valid header.
 
-    What is wrong with columns of the header goes to the ``sink``.
+    Errors in the columns of the header go to the ``sink``.
     """
     file = str(path)
-    content = read_text(path, RecordingError, "CSV", LARGEST_FILE)
+    content = read_text_bytes(path, RecordingError, "CSV", MAX_FILE_SIZE)
     content = content.removeprefix(_BYTE_ORDER_MARK)
     cells = _first_row(content, file)
     where = f"{file}: line 1"
     _require_header(cells, where)
-    return CsvTable(file, content, header_of(cells, where, cable_count, sink, line=1))
+    return CsvTable(file, content, parse_header(cells, where, cable_count, sink, line=1))
 
 
-def _exactly() -> dict[str, Any]:
-    """What makes pandas read each number as Python does; from 3.1 on it does so anyway, and deprecates the argument."""
+def _exact_float_options() -> dict[str, Any]:
+    """Options by which pandas parses floats as Python does; from 3.1 on the default, the option deprecated."""
     version = tuple(int(part) for part in pd.__version__.split(".")[:2])
     return {} if version >= (3, 1) else {"float_precision": "round_trip"}
 
@@ -121,8 +125,8 @@ def _require_header(cells: list[str], where: str) -> None:
         raise RecordingError(where, "is blank, the header is missing", "begin with the names of the columns")
     for separator, name in ((";", "semicolons"), ("\t", "tabs")):
         if "time" not in cells and any(separator in cell for cell in cells):
-            mend = "separate them with commas, and write numbers with a decimal point"
-            raise RecordingError(where, f"the columns are separated with {name}", mend)
+            hint = "separate them with commas, and write numbers with a decimal point"
+            raise RecordingError(where, f"the columns are separated with {name}", hint)
     if all(_NUMBER.fullmatch(cell) for cell in cells):
-        mend = "begin with a line that names the columns, as in time,winch_speed_1"
-        raise RecordingError(where, f"has numbers ({shown(cells[0])}), so the header is missing", mend)
+        hint = "begin with a line that names the columns, as in time,winch_speed_1"
+        raise RecordingError(where, f"has numbers ({format_value(cells[0])}), so the header is missing", hint)

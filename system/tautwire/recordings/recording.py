@@ -1,4 +1,4 @@
-"""Recordings: the speeds that the winches reported and what was measured, sample by sample."""
+"""Recordings: measured winch speeds, tensions and positions, sample by sample."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -8,18 +8,18 @@ import numpy as np
 import pandas as pd  # type: ignore[import-untyped,unused-ignore]
 from numpy.typing import NDArray
 
-from ..arguments import of_kind, whole_number_of
-from ..errors import RecordingError, at_once, shown
-from ..input_file import path_of
-from ..robots.reading import MOST_CABLES
+from ..arguments import validate_instance, validate_integer
+from ..errors import RecordingError, format_value, raise_error
+from ..input_file import validate_path
+from ..robots.reading import MAX_CABLES
 from .columns import ColumnTable
 from .csv_file import CsvTable, open_csv
-from .header import AXES, Refuse, header_of
+from .header import AXES, ErrorSink, parse_header
 from .mdf_file import is_mdf, open_mdf
 from .parquet_file import is_parquet, open_parquet
-from .rules import HUGE, faults, no_table
+from .rules import MAX_MAGNITUDE, not_a_table_error, row_errors
 
-CABLES = "give the robot's cable_count"
+CABLE_COUNT_HINT = "give the robot's cable_count"
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,109 +89,109 @@ class Recording:
 
 
 def read_recording(path: str | Path, cable_count: int) -> Recording:
-    """The recording in a CSV, Parquet or MDF file of a robot with n = ``cable_count`` cables, N samples.
+    """Read a recording from a CSV, Parquet or MDF file, of a robot with n = ``cable_count`` cables, N samples.
 
     Columns are ``time`` (s), ``winch_speed_1`` ... (m/s), ``tension_1`` ... (N), ``x``, ``y``, ``z`` (m).
 
-    Raises RecordingError, which names the line or row, where the file holds none; ArgumentError where ``path`` is no
-    path or ``cable_count`` no whole number from 1 to 100.
+    Raises RecordingError, which names the line or row, where the file is not a valid recording; ArgumentError where
+    ``path`` is no path or ``cable_count`` no whole number from 1 to 100.
     """
-    path_of("read_recording: path", path)
-    whole_number_of("read_recording: cable_count", cable_count, 1, CABLES, MOST_CABLES)
-    return _checked(_opened(path, cable_count, at_once), cable_count)
+    validate_path("read_recording: path", path)
+    validate_integer("read_recording: cable_count", cable_count, 1, CABLE_COUNT_HINT, MAX_CABLES)
+    return _validated_recording(_open_table(path, cable_count, raise_error), cable_count)
 
 
-def _checked(table: CsvTable | ColumnTable, cable_count: int) -> Recording:
+def _validated_recording(table: CsvTable | ColumnTable, cable_count: int) -> Recording:
     numbers = table.numbers()
     if numbers is None:
-        raise _first_fault(table)
+        raise _first_error(table)
     cables = range(1, cable_count + 1)
     recording = Recording(
         path=table.file,
-        time=_columns(numbers, ["time"])[:, 0],
-        winch_speed=_columns(numbers, [f"winch_speed_{cable}" for cable in cables]),
-        tension=_columns(numbers, [f"tension_{cable}" for cable in cables]),
-        position=_columns(numbers, AXES),
-        unknown_columns=table.header.unknown,
+        time=_stacked_columns(numbers, ["time"])[:, 0],
+        winch_speed=_stacked_columns(numbers, [f"winch_speed_{cable}" for cable in cables]),
+        tension=_stacked_columns(numbers, [f"tension_{cable}" for cable in cables]),
+        position=_stacked_columns(numbers, AXES),
+        unknown_columns=table.header.unknown_names,
     )
-    if not _is_sound(recording):
-        raise _first_fault(table)
+    if not _is_valid(recording):
+        raise _first_error(table)
     return recording
 
 
-def recording_faults(path: str | Path, cable_count: int) -> Iterator[RecordingError]:
-    """All that is wrong with a recording, in the file's order; nothing where it can be read. Takes its time.
+def recording_errors(path: str | Path, cable_count: int) -> Iterator[RecordingError]:
+    """All errors of a recording, in the file's order; none where it is valid. Slow: every cell is parsed.
 
     Raises RecordingError where the file cannot be read as a recording at all.
     """
-    of_header: list[RecordingError] = []
-    table = _opened(path, cable_count, of_header.append)
-    yield from of_header
-    yield from faults(table.rows(), table.header, table.file)
+    header_errors: list[RecordingError] = []
+    table = _open_table(path, cable_count, header_errors.append)
+    yield from header_errors
+    yield from row_errors(table.rows(), table.header, table.file)
 
 
-def _opened(path: str | Path, cable_count: int, sink: Refuse) -> CsvTable | ColumnTable:
-    opened = open_parquet if is_parquet(path) else open_mdf if is_mdf(path) else open_csv
-    return opened(path, cable_count, sink)
+def _open_table(path: str | Path, cable_count: int, sink: ErrorSink) -> CsvTable | ColumnTable:
+    open_table = open_parquet if is_parquet(path) else open_mdf if is_mdf(path) else open_csv
+    return open_table(path, cable_count, sink)
 
 
-def _first_fault(table: CsvTable | ColumnTable) -> RecordingError:
-    return next(faults(table.rows(), table.header, table.file), no_table(table.file))
+def _first_error(table: CsvTable | ColumnTable) -> RecordingError:
+    return next(row_errors(table.rows(), table.header, table.file), not_a_table_error(table.file))
 
 
 def recording_from_frame(frame: pd.DataFrame, cable_count: int, name: str = "frame") -> Recording:
-    """The recording in a table with the columns of a recording file, of a robot with n = ``cable_count`` cables.
+    """Make a recording from a pandas frame with the columns of a recording file, of n = ``cable_count`` cables.
 
     Columns are those of :func:`read_recording`, in SI units; one row a sample, N rows; NaN where an output was not
     measured. ``name`` is what messages call it.
 
     Raises RecordingError as :func:`read_recording` does, ArgumentError where ``frame`` is no frame.
     """
-    of_kind("recording_from_frame: frame", frame, pd.DataFrame, "give a pandas frame with a column time")
-    whole_number_of("recording_from_frame: cable_count", cable_count, 1, CABLES, MOST_CABLES)
-    of_kind("recording_from_frame: name", name, str, "give what messages shall call it")
-    header = header_of([str(column) for column in frame.columns], name, cable_count)
+    validate_instance("recording_from_frame: frame", frame, pd.DataFrame, "give a pandas frame with a column time")
+    validate_integer("recording_from_frame: cable_count", cable_count, 1, CABLE_COUNT_HINT, MAX_CABLES)
+    validate_instance("recording_from_frame: name", name, str, "give what messages shall call it")
+    header = parse_header([str(column) for column in frame.columns], name, cable_count)
     numbers = frame.set_axis(list(header.names), axis="columns")
-    columns = {column: _floats(numbers[column], f"{name}: column {column}") for column in header.known}
-    return _checked(ColumnTable(name, header, columns), cable_count)
+    columns = {column: _float_column(numbers[column], f"{name}: column {column}") for column in header.known_names}
+    return _validated_recording(ColumnTable(name, header, columns), cable_count)
 
 
-def _floats(column: pd.Series, where: str) -> NDArray[np.float64]:
+def _float_column(column: pd.Series, where: str) -> NDArray[np.float64]:
     try:
         return column.to_numpy(dtype=np.float64, na_value=np.nan)
     except (TypeError, ValueError) as problem:
-        said = f"holds {shown(str(column.dtype))}, not numbers"
-        raise RecordingError(where, said, "convert it to float64, in SI units") from problem
+        message = f"holds {format_value(str(column.dtype))}, not numbers"
+        raise RecordingError(where, message, "convert it to float64, in SI units") from problem
 
 
 def require_outputs(recording: Recording) -> None:
     """Raises RecordingError where nothing at all was measured."""
     if recording.has_position or recording.has_tension:
         return
-    mend = "record at least one of them"
+    hint = "record at least one of them"
     if recording.unknown_columns:
-        mend += f" (not read: {shown(', '.join(recording.unknown_columns), 200)})"
-    last = f"tension_{recording.cable_count}"
-    problem = f"no number in any of the outputs x, y, z, tension_1 to {last}"
-    raise RecordingError(recording.path, problem, mend)
+        hint += f" (not read: {format_value(', '.join(recording.unknown_columns), 200)})"
+    last_tension = f"tension_{recording.cable_count}"
+    problem = f"no number in any of the outputs x, y, z, tension_1 to {last_tension}"
+    raise RecordingError(recording.path, problem, hint)
 
 
-def _is_sound(recording: Recording) -> bool:
-    """Whether the numbers keep the rules that ``raise_first_fault`` explains."""
+def _is_valid(recording: Recording) -> bool:
+    """Whether the arrays are valid; :func:`row_errors` names the rule and the cell where they are not."""
     inputs, outputs = (recording.time, recording.winch_speed), (recording.position, recording.tension)
     return bool(
         recording.sample_count >= 2
         and all(np.isfinite(signals).all() for signals in inputs)
-        and not any((np.abs(signals) > HUGE).any() for signals in (*inputs, *outputs))
+        and not any((np.abs(signals) > MAX_MAGNITUDE).any() for signals in (*inputs, *outputs))
         and (np.diff(recording.time) > 0.0).all()
     )
 
 
-def _columns(numbers: Mapping[str, NDArray[np.float64]], names: Sequence[str]) -> NDArray[np.float64]:
+def _stacked_columns(numbers: Mapping[str, NDArray[np.float64]], names: Sequence[str]) -> NDArray[np.float64]:
     """Columns side by side, shape (N, number of names); NaN where the file has none of that name."""
     columns = np.full((len(numbers["time"]), len(names)), np.nan)
-    for place, name in enumerate(names):
+    for index, name in enumerate(names):
         if name in numbers:
-            columns[:, place] = numbers[name]
+            columns[:, index] = numbers[name]
     columns.setflags(write=False)
     return columns

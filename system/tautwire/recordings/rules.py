@@ -1,11 +1,11 @@
-"""The rules that the cells of a recording keep, and the rows and columns where one is broken."""
+"""Validation rules for the cells of a recording, and errors that name the row and column."""
 
 import math
 import re
 from collections.abc import Iterable, Iterator
 from typing import NamedTuple
 
-from ..errors import RecordingError, shown
+from ..errors import RecordingError, format_value
 from .header import Header
 
 
@@ -17,73 +17,73 @@ class Row(NamedTuple):
     cells: list[str]
 
 
-HUGE = 1e12  # beyond any quantity of a cable robot in SI units
-MISSING = ("", "nan", "NaN", "NAN", "NA")  # what loggers write where a sensor dropped out
+MAX_MAGNITUDE = 1e12  # beyond any quantity of a cable robot in SI units
+MISSING_CELLS = ("", "nan", "NaN", "NAN", "NA")  # what loggers write where a sensor dropped out
 
 _DECIMAL_COMMA = re.compile(r"[-+]?[0-9]+,[0-9]+([eE][-+]?[0-9]+)?")
 
 
-def faults(rows: Iterable[Row], header: Header, file: str) -> Iterator[RecordingError]:
-    """Every broken rule of the samples of a recording, in the file's order; takes its time."""
-    count, before = 0, -math.inf
+def row_errors(rows: Iterable[Row], header: Header, file: str) -> Iterator[RecordingError]:
+    """Validation errors of all samples of a recording, in the file's order; parses every cell, so it is slow."""
+    count, previous_time = 0, -math.inf
     for row in rows:
         count += 1
         if len(row.cells) != len(header.names):
-            yield _of_row(row, len(header.names))
+            yield _width_error(row, len(header.names))
             continue
         time = math.nan
         for name, cell in zip(header.names, row.cells, strict=True):
-            if name not in header.unknown:
-                found = _number(row, name, cell.strip(" "))
-                if isinstance(found, RecordingError):
-                    yield found
+            if name not in header.unknown_names:
+                value = _parse_cell(row, name, cell.strip(" "))
+                if isinstance(value, RecordingError):
+                    yield value
                 elif name == "time":
-                    time = found
-        if time <= before:
-            problem = f"is {time!r} after {before!r}, must rise from sample to sample"
-            yield _fault(row, "time", problem, "sort the samples, keep each once")
-        before = time if time > before else before
+                    time = value
+        if time <= previous_time:
+            problem = f"is {time!r} after {previous_time!r}, must rise from sample to sample"
+            yield _cell_error(row, "time", problem, "sort the samples, keep each once")
+        previous_time = time if time > previous_time else previous_time
     if count < 2:
         samples = "1 sample" if count else "no samples"
         yield RecordingError(file, f"has {samples}, must have at least 2", "record for longer")
 
 
-def no_table(file: str) -> RecordingError:
-    """What is wrong where no rule is broken that has a name."""
+def not_a_table_error(file: str) -> RecordingError:
+    """The error of a file that is no table of numbers for another reason than the rules name."""
     return RecordingError(file, "is no table of numbers", "write one line per sample, one number per cell")
 
 
-def _of_row(row: Row, width: int) -> RecordingError:
-    mend = "complete the line or remove it"
+def _width_error(row: Row, width: int) -> RecordingError:
+    hint = "complete the line or remove it"
     if len(row.cells) > width:
-        mend = "write numbers with a decimal point, and one cell for each column"
-    return RecordingError(row.where, f"has {len(row.cells)} cells, the header has {width}", mend, row.number)
+        hint = "write numbers with a decimal point, and one cell for each column"
+    return RecordingError(row.where, f"has {len(row.cells)} cells, the header has {width}", hint, row.number)
 
 
-def _number(row: Row, name: str, cell: str) -> float | RecordingError:
+def _parse_cell(row: Row, name: str, cell: str) -> float | RecordingError:
     """The number in a cell, NaN where an output is missing; or what is wrong with it."""
-    if cell in MISSING:
+    if cell in MISSING_CELLS:
         if name == "time" or name.startswith("winch_speed_"):
-            problem = f"is {shown(cell) if cell else 'empty'}, must be a number"
-            return _fault(row, name, problem, "write a number, or cut the recording before this sample")
+            problem = f"is {format_value(cell) if cell else 'empty'}, must be a number"
+            return _cell_error(row, name, problem, "write a number, or cut the recording before this sample")
         return math.nan
     try:
-        # Python's own float would take underscores and the digits of all scripts.
+        # Python's float also accepts underscores and the digits of all scripts.
         number = math.nan if "_" in cell or not cell.isascii() else float(cell)
     except ValueError:
         number = math.nan
-    if abs(number) <= HUGE:
+    if abs(number) <= MAX_MAGNITUDE:
         return number
-    mend = "write a number, or leave the cell of an output empty where nothing was measured"
+    hint = "write a number, or leave the cell of an output empty where nothing was measured"
     if math.isinf(number):
-        return _fault(row, name, f"is {shown(cell)}, must be finite", mend)
+        return _cell_error(row, name, f"is {format_value(cell)}, must be finite", hint)
     if _DECIMAL_COMMA.fullmatch(cell):
-        mend = "write it with a decimal point"
+        hint = "write it with a decimal point"
     if math.isnan(number):
-        return _fault(row, name, f"is {shown(cell)}, not a number", mend)
-    problem = f"is {shown(cell)}, must be at most {HUGE:g} in magnitude"
-    return _fault(row, name, problem, "give it in SI units")
+        return _cell_error(row, name, f"is {format_value(cell)}, not a number", hint)
+    problem = f"is {format_value(cell)}, must be at most {MAX_MAGNITUDE:g} in magnitude"
+    return _cell_error(row, name, problem, "give it in SI units")
 
 
-def _fault(row: Row, name: str, problem: str, mend: str) -> RecordingError:
-    return RecordingError(f"{row.where}, column {name}", problem, mend, row.number)
+def _cell_error(row: Row, name: str, problem: str, hint: str) -> RecordingError:
+    return RecordingError(f"{row.where}, column {name}", problem, hint, row.number)

@@ -1,4 +1,4 @@
-"""What a trace found, shown: as a JSON document, on the terminal, as a page and as a folder of all."""
+"""Reports: traces, runs and linear plants as JSON documents, terminal tables, HTML pages and report folders."""
 
 from .document import trace_document
 from .folder import write_report

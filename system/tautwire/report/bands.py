@@ -1,4 +1,4 @@
-"""Where modes lie in a spectrum: the frequencies of each along a path, as bands."""
+"""Frequency bands of the modes along a path, to be marked in a spectrum."""
 
 from __future__ import annotations
 
@@ -13,23 +13,23 @@ from ..errors import TautwireError
 from ..linear import linearise
 from ..robots.robot import Robot
 from ..tracer.verdict import Resonance
-from .series import thinned
-from .units import significant
+from .series import evenly_spaced_indices
+from .units import format_significant
 
 Array = NDArray[np.float64]
 
-PLACES = 9
-# Modes whose edges are nearer than this factor share a label: two would cover each other.
-TOUCHING = 1.2
-# A mode that does not move along the path is drawn this factor wide.
-LEAST_WIDTH = 1.01
+PATH_SAMPLES = 9
+# Bands whose edges are nearer than this factor are merged: their labels would overlap.
+MERGE_RATIO = 1.2
+# A mode whose frequency is constant along the path is drawn this factor wide.
+MIN_WIDTH_RATIO = 1.01
 
 
 @dataclass(frozen=True)
 class Band:
-    """Frequencies from ``low`` to ``high`` (Hz) with a short label, and what is there in words.
+    """A frequency band from ``low`` to ``high`` (Hz) with a short label and a description in words.
 
-    ``spans`` are those of each mode in it, from low to high; ``strange`` is no mode.
+    ``spans`` are the bands of its modes, from low to high; ``strange`` marks a resonance that the model lacks.
     """
 
     low: float
@@ -45,55 +45,57 @@ class Band:
 
 
 def mode_bands(robot: Robot, path: Array) -> list[Band]:
-    """The bands of a robot's modes along a ``path`` (N, 3) in m, close ones in one; none where none rest."""
+    """Bands of a robot's modes along a ``path`` (N, 3) in m, close ones merged; none without an operating point."""
     finite = path[np.isfinite(path).all(axis=1)]
     if len(finite) < 2:
         return []
-    places = finite[thinned(len(finite), PLACES)]
+    positions = finite[evenly_spaced_indices(len(finite), PATH_SAMPLES)]
     try:
-        return joined(np.array([linearise(robot, place, swing=0.0).modes.frequencies for place in places]))
+        return merge_mode_bands(
+            np.array([linearise(robot, position, swing=0.0).modes.frequencies for position in positions])
+        )
     except TautwireError:
         return []
 
 
-def joined(frequencies: Array) -> list[Band]:
-    """Bands of modes by frequency, ``frequencies`` (N, modes) in Hz ascending in each row; close ones in one."""
+def merge_mode_bands(frequencies: Array) -> list[Band]:
+    """Bands of modes, close ones merged, from ``frequencies`` (N, modes) in Hz, ascending in each row."""
     groups: list[list[int]] = []
     for mode in range(frequencies.shape[1]):
-        if groups and frequencies[:, mode].min() <= TOUCHING * frequencies[:, groups[-1]].max():
+        if groups and frequencies[:, mode].min() <= MERGE_RATIO * frequencies[:, groups[-1]].max():
             groups[-1].append(mode)
         else:
             groups.append([mode])
-    return [_band(frequencies[:, group], group) for group in groups]
+    return [_mode_group_band(frequencies[:, group], group) for group in groups]
 
 
-def strange_bands(resonances: Sequence[Resonance]) -> list[Band]:
-    """Lines where something swings that the model does not have."""
-    return [_strange(each) for each in resonances]
+def resonance_bands(resonances: Sequence[Resonance]) -> list[Band]:
+    """Narrow bands at resonances that the model does not have."""
+    return [_resonance_band(each) for each in resonances]
 
 
-def _strange(resonance: Resonance) -> Band:
-    span = _widened(resonance.frequency, resonance.frequency)
+def _resonance_band(resonance: Resonance) -> Band:
+    span = _widen(resonance.frequency, resonance.frequency)
     return Band(*span, "?", f"{resonance.sentence[0].upper()}{resonance.sentence[1:]}", (span,), True)
 
 
-def _band(frequencies: Array, modes: Sequence[int]) -> Band:
-    ends = [(float(each.min()), float(each.max())) for each in frequencies.T]
-    spans = tuple(_widened(*each) for each in ends)
+def _mode_group_band(frequencies: Array, modes: Sequence[int]) -> Band:
+    ends = [(float(mode_texts.min()), float(mode_texts.max())) for mode_texts in frequencies.T]
+    spans = tuple(_widen(*each) for each in ends)
     low, high = min(low for low, _ in spans), max(high for _, high in spans)
     first, last = modes[0] + 1, modes[-1] + 1
     if first == last:
-        return Band(low, high, f"{first}", f"Mode {first} lies {_span(*ends[0])}", spans)
-    several = f"{first} {'and' if last == first + 1 else 'to'} {last}"
-    each = ", ".join(f"mode {mode + 1} {_span(*span)}" for mode, span in zip(modes, ends, strict=True))
-    return Band(low, high, several, f"Modes {several} lie close together: {each}", spans)
+        return Band(low, high, f"{first}", f"Mode {first} lies {_span_text(*ends[0])}", spans)
+    mode_numbers = f"{first} {'and' if last == first + 1 else 'to'} {last}"
+    each = ", ".join(f"mode {mode + 1} {_span_text(*span)}" for mode, span in zip(modes, ends, strict=True))
+    return Band(low, high, mode_numbers, f"Modes {mode_numbers} lie close together: {each}", spans)
 
 
-def _span(low: float, high: float) -> str:
-    """Where a mode lies, in words."""
-    ends = significant(low, 4), significant(high, 4)
+def _span_text(low: float, high: float) -> str:
+    """The frequency range of a mode in words."""
+    ends = format_significant(low, 4), format_significant(high, 4)
     return f"at {ends[0]} Hz" if ends[0] == ends[1] else f"between {ends[0]} and {ends[1]} Hz"
 
 
-def _widened(low: float, high: float) -> tuple[float, float]:
-    return min(low, high / LEAST_WIDTH), max(high, low * LEAST_WIDTH)
+def _widen(low: float, high: float) -> tuple[float, float]:
+    return min(low, high / MIN_WIDTH_RATIO), max(high, low * MIN_WIDTH_RATIO)

@@ -1,4 +1,4 @@
-"""A trace as the document that ``report.json`` holds."""
+"""A trace as the JSON document of ``report.json``."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from collections.abc import Iterable
 from typing import Any
 
 from ..runs.wiring import AXES
-from ..tracer.verdict import Candidate, Correlation, Detectable, Errors, Estimate, FoundEffect, Likeness, Trace
+from ..tracer.verdict import Candidate, ConfusableEffect, Correlation, Detectable, Errors, Estimate, FoundEffect, Trace
 from ..tracer.where.port_residuals import ComponentResidual
-from .summary import ROLES, comparison_of
+from .summary import ROLES, comparison_by_role
 
 
 def trace_document(trace: Trace) -> dict[str, Any]:
-    """The report in plain types that JSON knows, keys in a fixed order; null where a number is not finite."""
+    """The report in JSON types, keys in a fixed order; None where a number is not finite."""
     return {
         "verdict": trace.verdict,
         "sentence": trace.sentence,
@@ -22,73 +22,76 @@ def trace_document(trace: Trace) -> dict[str, Any]:
         "correlations": [_correlation(each) for each in trace.correlations],
         "also_possible": [list(names) for names in trace.also_possible],
         "formula": trace.formula,
-        "error_before": _errors_of_roles(trace, "errors_before"),
-        "error_after": _errors_of_roles(trace, "errors_after"),
+        "error_before": _errors_by_role(trace, "errors_before"),
+        "error_after": _errors_by_role(trace, "errors_after"),
         "noise_floor": _errors(trace.noise_floor, trace.robot_before.cable_count),
         "residual_is_noise": {"before": bool(trace.noise_before), "after": bool(trace.noise_after)},
-        "left": _by_output(trace, trace.left),
+        "left": _by_output(trace, trace.normalised_innovation_variance),
         "autocorrelation": _by_output(trace, trace.autocorrelations[0]),
         "autocorrelation_of_noise": _by_output(trace, trace.autocorrelations[1]),
-        "detectable": [_detectable(each) for each in trace.separation.detectable],
-        "alike": [_likeness(each) for each in trace.separation.alike],
+        "detectable": [_detectable(each) for each in trace.identifiability.detectable],
+        "alike": [_likeness(each) for each in trace.identifiability.confusable],
         "components": [_component(part) for part in trace.components.ranking],
         "where": {
-            "component": trace.components.blamed,
+            "component": trace.components.faulty_component,
             "sentence": trace.components.sentence,
-            "untold": list(trace.components.untold),
+            "untold": list(trace.components.limitations),
         },
         "resonance": [
-            {"frequency_hz": _number(each.frequency), "outputs": list(each.outputs), "on": list(each.on)}
+            {"frequency_hz": _finite_or_none(each.frequency), "outputs": list(each.outputs), "on": list(each.on)}
             for each in trace.resonances
         ],
-        "alpha": _number(trace.alpha),
+        "alpha": _finite_or_none(trace.alpha),
         "candidates": [_candidate(candidate) for candidate in trace.candidates],
         "unknown_columns": _unknown_columns(trace),
         "notes": list(trace.notes),
-        "seconds": _number(trace.seconds),
+        "seconds": _finite_or_none(trace.seconds),
     }
 
 
 def _effect(effect: FoundEffect) -> dict[str, Any]:
     return {
         "name": effect.name,
-        "cables": _whole(effect.cables),
+        "cables": _integers(effect.cables),
         "parameters": {name: _estimate(estimate) for name, estimate in effect.parameters.items()},
         "component": effect.component,
-        "evidence": _number(effect.evidence),
+        "evidence": _finite_or_none(effect.evidence),
     }
 
 
 def _estimate(estimate: Estimate) -> dict[str, Any]:
     return {
-        "value": _number(estimate.value),
+        "value": _finite_or_none(estimate.value),
         "unit": estimate.unit,
-        "low": _number(estimate.low),
-        "high": _number(estimate.high),
-        "declared": _number(estimate.declared),
+        "low": _finite_or_none(estimate.low),
+        "high": _finite_or_none(estimate.high),
+        "declared": _finite_or_none(estimate.declared),
     }
 
 
 def _correlation(correlation: Correlation) -> dict[str, Any]:
     between = [
-        {"name": each.name, "cables": _whole(each.cables), "parameter": each.parameter} for each in correlation.between
+        {"name": each.name, "cables": _integers(each.cables), "parameter": each.parameter}
+        for each in correlation.between
     ]
-    return {"between": between, "value": _number(correlation.value)}
+    return {"between": between, "value": _finite_or_none(correlation.value)}
 
 
 def _component(part: ComponentResidual) -> dict[str, Any]:
-    moved = part.moves_with
+    association = part.correlated_signal
     return {
         "component": part.component,
         "quantity": part.quantity,
         "unit": part.unit,
-        "rms": _number(part.rms),
-        "expected_rms": _number(part.expected_rms),
-        "ratio": _number(part.ratio),
-        "limit": _number(part.limit),
-        "mean": _number(part.mean),
-        "moves_with": {"name": moved.name, "correlation": _number(moved.correlation)} if moved else None,
-        "rings_at_hz": _number(part.rings_at),
+        "rms": _finite_or_none(part.rms),
+        "expected_rms": _finite_or_none(part.expected_rms),
+        "ratio": _finite_or_none(part.ratio),
+        "limit": _finite_or_none(part.threshold),
+        "mean": _finite_or_none(part.mean),
+        "moves_with": {"name": association.name, "correlation": _finite_or_none(association.correlation)}
+        if association
+        else None,
+        "rings_at_hz": _finite_or_none(part.resonance_frequency),
     }
 
 
@@ -96,10 +99,10 @@ def _candidate(candidate: Candidate) -> dict[str, Any]:
     return {
         "round": int(candidate.round),
         "name": candidate.name,
-        "cables": _whole(candidate.cables),
-        "values": {name: _number(value) for name, value in candidate.values.items()},
-        "evidence": _number(candidate.evidence),
-        "mean_square": _number(candidate.mean_square),
+        "cables": _integers(candidate.cables),
+        "values": {name: _finite_or_none(value) for name, value in candidate.values.items()},
+        "evidence": _finite_or_none(candidate.evidence),
+        "mean_square": _finite_or_none(candidate.mean_square),
         "accepted": bool(candidate.accepted),
     }
 
@@ -107,56 +110,56 @@ def _candidate(candidate: Candidate) -> dict[str, Any]:
 def _detectable(size: Detectable) -> dict[str, Any]:
     return {
         "name": size.name,
-        "cables": _whole(size.cables),
+        "cables": _integers(size.cables),
         "parameter": size.parameter,
-        "size": _number(size.size),
+        "size": _finite_or_none(size.size),
         "unit": size.unit,
-        "beside": {name: _number(value) for name, value in size.beside.items()},
+        "beside": {name: _finite_or_none(value) for name, value in size.other_values.items()},
     }
 
 
-def _likeness(likeness: Likeness) -> dict[str, Any]:
+def _likeness(likeness: ConfusableEffect) -> dict[str, Any]:
     return {
         "name": likeness.name,
-        "cables": _whole(likeness.cables),
+        "cables": _integers(likeness.cables),
         "other": likeness.other,
-        "other_cables": _whole(likeness.other_cables),
-        "cosine": _number(likeness.cosine),
-        "nats": _number(likeness.nats),
+        "other_cables": _integers(likeness.other_cables),
+        "cosine": _finite_or_none(likeness.cosine),
+        "nats": _finite_or_none(likeness.nats),
     }
 
 
-def _errors_of_roles(trace: Trace, field: str) -> dict[str, Any]:
-    found = {role: comparison_of(trace, role) for role in ROLES}
+def _errors_by_role(trace: Trace, field: str) -> dict[str, Any]:
+    comparisons = {role: comparison_by_role(trace, role) for role in ROLES}
     count = trace.robot_before.cable_count
-    return {role: _errors(getattr(each, field) if each else None, count) for role, each in found.items()}
+    return {role: _errors(getattr(each, field) if each else None, count) for role, each in comparisons.items()}
 
 
 def _errors(errors: Errors | None, cable_count: int) -> dict[str, Any]:
-    """Errors in m and N; all null where there are none."""
+    """Root mean square errors in m and N; all None where ``errors`` is None."""
     axes: Iterable[float] = errors.axes if errors else [math.nan] * len(AXES)
     cables: Iterable[float] = errors.cables if errors else [math.nan] * cable_count
     return {
-        "position_rms": _number(errors.position_rms if errors else None),
-        "tension_rms": _number(errors.tension_rms if errors else None),
-        "axes": {axis: _number(value) for axis, value in zip(AXES, axes, strict=True)},
-        "cables": [_number(value) for value in cables],
+        "position_rms": _finite_or_none(errors.position_rms if errors else None),
+        "tension_rms": _finite_or_none(errors.tension_rms if errors else None),
+        "axes": {axis: _finite_or_none(value) for axis, value in zip(AXES, axes, strict=True)},
+        "cables": [_finite_or_none(value) for value in cables],
     }
 
 
 def _by_output(trace: Trace, values: Iterable[float]) -> dict[str, float | None]:
     names = [*AXES, *(f"tension_{cable}" for cable in trace.robot_before.cable_numbers)]
-    return {name: _number(value) for name, value in zip(names, values, strict=True)}
+    return {name: _finite_or_none(value) for name, value in zip(names, values, strict=True)}
 
 
 def _unknown_columns(trace: Trace) -> dict[str, list[str]]:
     return {each.role: list(each.recording.unknown_columns) for each in trace.comparisons}
 
 
-def _whole(numbers: Iterable[int]) -> list[int]:
+def _integers(numbers: Iterable[int]) -> list[int]:
     return [int(number) for number in numbers]
 
 
-def _number(value: float | None) -> float | None:
-    """A plain float; None where it is none or not finite."""
+def _finite_or_none(value: float | None) -> float | None:
+    """A plain float; None where the value is None or not finite."""
     return None if value is None or not math.isfinite(value) else float(value)

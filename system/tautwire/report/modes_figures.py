@@ -1,4 +1,4 @@
-"""The numbers that the figures of a linear plant's page draw."""
+"""The data of the figures on a linear plant's page."""
 
 from __future__ import annotations
 
@@ -9,96 +9,113 @@ from numpy.typing import NDArray
 
 from ..linear import LinearPlant
 from ..robots.robot import Robot
-from .bands import joined
-from .scene import Path, Scene, columns, scene_data
-from .series import packed
-from .units import significant
+from .bands import merge_mode_bands
+from .scene import RobotScene, ScenePath, pack_columns, scene_data
+from .series import pack_float32
+from .units import format_significant
 
 Array = NDArray[np.float64]
 
-# Outputs whose gains are shown, by the first part of their names.
-GAIN_OUTPUTS = {"position": "Position", "tension": "Tension"}
-# What an input or output is counted in on the page, and how many SI units one of it is.
-UNITS = {"position": ("mm", 1e-3), "tension": ("N", 1.0), "winch_speed": ("mm/s", 1e-3), "external_force": ("N", 1.0)}
-SWING = 1e-3  # m, which the change of tension is told for
-SWING_SHARE = 0.08  # of the robot's size, as drawn
-STOPS = 73
-PERIOD = 2.0  # s, one period as played
-GAIN_POINTS = 300
-BEYOND = 5.0
+# Outputs whose gains are drawn, by the prefix of their names.
+GAIN_OUTPUT_TITLES = {"position": "Position", "tension": "Tension"}
+# Unit of an input or output on the page, and its size in SI units.
+SIGNAL_UNITS = {
+    "position": ("mm", 1e-3),
+    "tension": ("N", 1.0),
+    "winch_speed": ("mm/s", 1e-3),
+    "external_force": ("N", 1.0),
+}
+SWING_AMPLITUDE = 1e-3  # m, for which the change of tension is stated
+DRAWN_SWING_SHARE = 0.08  # of the robot's size, as drawn
+FRAME_COUNT = 73
+PLAYBACK_PERIOD = 2.0  # s, playback time of one period
+FREQUENCY_POINTS = 300
+FREQUENCY_MARGIN_FACTOR = 5.0
 
 
 def modes_data(robot: Robot, plant: LinearPlant) -> dict[str, Any]:
-    """The modes in motion, and the gains of the plant from each input, ready to draw."""
-    frequency = _frequencies(plant)
-    bands = [band.document() for band in joined(np.array([plant.modes.frequencies]))]
+    """The figure data: mode shapes in motion, and the frequency response of the plant from each input."""
+    frequency = _frequency_grid(plant)
+    bands = [band.document() for band in merge_mode_bands(np.array([plant.modes.frequencies]))]
     return {
         "anchors": [[float(value) for value in anchor] for anchor in robot.anchors],
         "magnifications": [1],
-        "choices": [_mode(robot, plant, mode) for mode in range(len(plant.modes.frequencies))],
-        "frequency": packed(frequency),
+        "choices": [_mode_data(robot, plant, mode) for mode in range(len(plant.modes.frequencies))],
+        "frequency": pack_float32(frequency),
         "bands": bands,
-        "gains": _gains(plant, frequency),
+        "gains": _gains_data(plant, frequency),
     }
 
 
 def signal_label(name: str) -> str:
-    """A signal's name as a reader says it: "tension_2" is "tension 2"."""
+    """A signal's name as text: "tension_2" is "tension 2"."""
     return name.replace("_", " ")
 
 
-def _mode(robot: Robot, plant: LinearPlant, mode: int) -> dict[str, Any]:
-    """One mode as a scene that goes round; "time" is a period's share in per cent."""
-    phase = np.linspace(0.0, 1.0, STOPS)
+def _mode_data(robot: Robot, plant: LinearPlant, mode: int) -> dict[str, Any]:
+    """One mode shape as a looping scene; "time" is the phase in per cent of a period."""
+    phase = np.linspace(0.0, 1.0, FRAME_COUNT)
     swing = np.cos(2.0 * np.pi * phase)[:, None]
     shape = plant.modes.shapes[:, mode]
     size = float(np.max(np.ptp(np.vstack((np.array(robot.anchors), plant.position)), axis=0)))
-    platform = plant.position + SWING_SHARE * size * swing * shape
-    change = SWING * swing * (plant.tension_slopes @ shape)
-    largest = float(np.max(np.abs(change), initial=0.0)) or 1.0
-    scene = scene_data(Scene(100.0 * phase, platform, change, (Path("swing", platform, "accent", 5),)))
-    label = f"{mode + 1}: {significant(float(plant.modes.frequencies[mode]))} Hz"
-    told = {
+    platform = plant.position + DRAWN_SWING_SHARE * size * swing * shape
+    tension_change = SWING_AMPLITUDE * swing * (plant.tension_slopes @ shape)
+    max_tension_change = float(np.max(np.abs(tension_change), initial=0.0)) or 1.0
+    scene = scene_data(
+        RobotScene(100.0 * phase, platform, tension_change, (ScenePath("swing", platform, "accent", 5),))
+    )
+    label = f"{mode + 1}: {format_significant(float(plant.modes.frequencies[mode]))} Hz"
+    animation = {
         "clock": "% of a period",
         "decimals": 0,
-        "pace": PERIOD / 100.0,
+        "pace": PLAYBACK_PERIOD / 100.0,
         "cycle": True,
-        "tensionRange": [-largest, largest],
+        "tensionRange": [-max_tension_change, max_tension_change],
         "tensionTitle": "Change of tension for 1 mm (N)",
     }
-    return {"label": label, "scene": scene | told}
+    return {"label": label, "scene": scene | animation}
 
 
-def _frequencies(plant: LinearPlant) -> Array:
-    """Frequencies in Hz about the modes, and just at them, where gains have their peaks."""
+def _frequency_grid(plant: LinearPlant) -> Array:
+    """Frequency grid in Hz around the modes, including the modal frequencies, where gains peak."""
     modes = plant.modes.frequencies
-    around = np.geomspace(modes.min() / BEYOND, modes.max() * BEYOND, GAIN_POINTS)
+    around = np.geomspace(
+        modes.min() / FREQUENCY_MARGIN_FACTOR, modes.max() * FREQUENCY_MARGIN_FACTOR, FREQUENCY_POINTS
+    )
     return np.union1d(around, modes)
 
 
-def _gains(plant: LinearPlant, frequency: Array) -> list[dict[str, Any]]:
-    """For each output the gain and phase from each input."""
+def _gains_data(plant: LinearPlant, frequency: Array) -> list[dict[str, Any]]:
+    """Gain and phase of each output from each input."""
     system = plant.system
     response = np.asarray(system(2j * np.pi * frequency))
     return [
         {
             "label": signal_label(name),
-            "from": [_gain(system, response, row, source) for source in range(system.ninputs)],
+            "from": [_gain_data(system, response, output_index, input_index) for input_index in range(system.ninputs)],
         }
-        for row, name in enumerate(system.output_labels)
-        if name.rpartition("_")[0] in GAIN_OUTPUTS
+        for output_index, name in enumerate(system.output_labels)
+        if name.rpartition("_")[0] in GAIN_OUTPUT_TITLES
     ]
 
 
-def _gain(system: Any, response: Array, row: int, source: int) -> dict[str, Any]:
-    """Gain in handy units and phase in degrees; null where the input does not act."""
-    output, driver = system.output_labels[row], system.input_labels[source]
-    (unit, one), (per, each) = UNITS[output.rpartition("_")[0]], UNITS[driver.rpartition("_")[0]]
-    described = {"unit": f"{unit} per {per}", "by": signal_label(driver)}
-    values = response[row, source]
-    size = np.abs(values) * each / one
-    if not np.max(size) > 0.0:
-        return {**described, "gain": None, "phase": None, "peak": None}
+def _gain_data(system: Any, response: Array, output_index: int, input_index: int) -> dict[str, Any]:
+    """Gain in the page's units and phase in degrees; None where the input does not act on the output."""
+    output_name, input_name = system.output_labels[output_index], system.input_labels[input_index]
+    (output_unit, output_unit_size), (input_unit, input_unit_size) = (
+        SIGNAL_UNITS[output_name.rpartition("_")[0]],
+        SIGNAL_UNITS[input_name.rpartition("_")[0]],
+    )
+    description = {"unit": f"{output_unit} per {input_unit}", "by": signal_label(input_name)}
+    values = response[output_index, input_index]
+    magnitude = np.abs(values) * input_unit_size / output_unit_size
+    if not np.max(magnitude) > 0.0:
+        return {**description, "gain": None, "phase": None, "peak": None}
     phase = np.degrees(np.unwrap(np.angle(values)))
-    gain, turned = columns(np.column_stack((size, phase)))
-    return {**described, "gain": gain, "phase": turned, "peak": significant(float(np.max(size)))}
+    packed_gain, packed_phase = pack_columns(np.column_stack((magnitude, phase)))
+    return {
+        **description,
+        "gain": packed_gain,
+        "phase": packed_phase,
+        "peak": format_significant(float(np.max(magnitude))),
+    }

@@ -1,4 +1,4 @@
-"""An overview of a run of any length, taken while it goes on: what a page draws, in bounded memory."""
+"""An overview of a run of any length, recorded while it goes on: what a page draws, in bounded memory."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from ..master import Recorder
 
 Array = NDArray[np.float64]
 
-GROUPS = 1500
+MIN_GROUP_COUNT = 1500
 
 
 @dataclass(frozen=True)
-class _Group:
-    """Rows one after the other: the first with its time, and of each output the extremes with their times."""
+class _RowGroup:
+    """Consecutive rows: the first with its time, and the extremes of each output with their times."""
 
     time: float
     first: Array
@@ -25,53 +25,54 @@ class _Group:
     low_time: Array
     high_time: Array
 
-    def joined(self, later: _Group) -> _Group:
-        """This group and the next as one."""
-        lower = ~(self.low <= later.low) & ~np.isnan(later.low)
-        higher = ~(self.high >= later.high) & ~np.isnan(later.high)
-        return _Group(
+    def merge(self, following: _RowGroup) -> _RowGroup:
+        """Merges this group with the following one."""
+        is_lower = ~(self.low <= following.low) & ~np.isnan(following.low)
+        is_higher = ~(self.high >= following.high) & ~np.isnan(following.high)
+        return _RowGroup(
             self.time,
             self.first,
-            np.where(lower, later.low, self.low),
-            np.where(higher, later.high, self.high),
-            np.where(lower, later.low_time, self.low_time),
-            np.where(higher, later.high_time, self.high_time),
+            np.where(is_lower, following.low, self.low),
+            np.where(is_higher, following.high, self.high),
+            np.where(is_lower, following.low_time, self.low_time),
+            np.where(is_higher, following.high_time, self.high_time),
         )
 
 
-class Overview:
-    """A recorder that keeps of every group of rows the first, and the least and largest of each output.
+class RunOverview:
+    """A recorder that keeps of every group of rows the first, and the minimum and maximum of each output.
 
-    A group begins as one row; whenever there are twice ``groups`` of them, neighbours join. ``count`` rows came,
-    ``size`` of them make a group; ``first_row`` and ``last_row`` are the run's ends. What is not finite is no extreme.
+    A group begins as one row; whenever there are twice ``min_group_count`` groups, neighbours are merged. ``row_count``
+    rows were recorded, ``group_size`` to a group; ``last_row`` is the run's end. Values that are not finite are ignored
+    in the extremes.
     """
 
-    def __init__(self, groups: int = GROUPS) -> None:
-        self._limit = 2 * groups
-        self._done: list[_Group] = []
-        self._open: _Group | None = None
-        self._opened = 0
-        self.size = 1
-        self.count = 0
+    def __init__(self, min_group_count: int = MIN_GROUP_COUNT) -> None:
+        self._max_group_count = 2 * min_group_count
+        self._closed_groups: list[_RowGroup] = []
+        self._open_group: _RowGroup | None = None
+        self._open_row_count = 0
+        self.group_size = 1
+        self.row_count = 0
         self.last_time = 0.0
         self.last_row = np.zeros(0)
 
     def add(self, time: float, row: Array) -> None:
-        """See :class:`tautwire.master.Recorder`."""
-        kept = np.where(np.isfinite(row), row, np.nan)
-        times = np.full(len(kept), time)
-        group = _Group(time, kept, kept, kept, times, times)
-        self._open = group if self._open is None else self._open.joined(group)
-        self._opened += 1
-        self.count += 1
-        self.last_time, self.last_row = time, kept
-        if self._opened == self.size:
-            self._done.append(self._open)
-            self._open, self._opened = None, 0
-        if len(self._done) == self._limit:
-            pairs = zip(self._done[0::2], self._done[1::2], strict=True)
-            self._done = [early.joined(late) for early, late in pairs]
-            self.size *= 2
+        """See :class:`tautwire.cosimulation.Recorder`."""
+        finite_row = np.where(np.isfinite(row), row, np.nan)
+        times = np.full(len(finite_row), time)
+        group = _RowGroup(time, finite_row, finite_row, finite_row, times, times)
+        self._open_group = group if self._open_group is None else self._open_group.merge(group)
+        self._open_row_count += 1
+        self.row_count += 1
+        self.last_time, self.last_row = time, finite_row
+        if self._open_row_count == self.group_size:
+            self._closed_groups.append(self._open_group)
+            self._open_group, self._open_row_count = None, 0
+        if len(self._closed_groups) == self._max_group_count:
+            pairs = zip(self._closed_groups[0::2], self._closed_groups[1::2], strict=True)
+            self._closed_groups = [early.merge(late) for early, late in pairs]
+            self.group_size *= 2
 
     @property
     def time(self) -> Array:
@@ -80,19 +81,19 @@ class Overview:
 
     @property
     def rows(self) -> Array:
-        """First rows of all groups, shape (groups, number of outputs); row k of them is row ``k * size`` of the run."""
+        """First rows of all groups, shape (groups, number of outputs); row k is row ``k * group_size`` of the run."""
         return np.array([group.first for group in self._groups()])
 
     def extremes(self) -> tuple[Array, Array]:
-        """The least and the largest of each output over the whole run; NaN where nothing was finite."""
+        """Minimum and maximum of each output over the whole run; NaN where nothing was finite."""
         groups = self._groups()
         low, high = np.array([group.low for group in groups]), np.array([group.high for group in groups])
         return np.fmin.reduce(low), np.fmax.reduce(high)
 
-    def line(self, output: int) -> tuple[Array, Array]:
-        """Times and values of one output to draw: all rows, or the extremes of each group as they came."""
+    def curve(self, output: int) -> tuple[Array, Array]:
+        """Times and values of one output to draw: all rows, or the extremes of each group in order of time."""
         groups = self._groups()
-        if self.size == 1:
+        if self.group_size == 1:
             return self.time, np.array([group.first[output] for group in groups])
         ends = np.array([
             (group.low_time[output], group.low[output], group.high_time[output], group.high[output])
@@ -103,18 +104,18 @@ class Overview:
         flat = pairs.reshape(-1, 2)
         return flat[:, 0], flat[:, 1]
 
-    def _groups(self) -> list[_Group]:
-        return self._done if self._open is None else [*self._done, self._open]
+    def _groups(self) -> list[_RowGroup]:
+        return self._closed_groups if self._open_group is None else [*self._closed_groups, self._open_group]
 
 
 @dataclass(frozen=True)
-class Both:
-    """A recorder that hands each row to two."""
+class RecorderPair:
+    """A recorder that passes each row to two recorders."""
 
-    one: Recorder
-    other: Recorder
+    first: Recorder
+    second: Recorder
 
     def add(self, time: float, row: Array) -> None:
-        """See :class:`tautwire.master.Recorder`."""
-        self.one.add(time, row)
-        self.other.add(time, row)
+        """See :class:`tautwire.cosimulation.Recorder`."""
+        self.first.add(time, row)
+        self.second.add(time, row)

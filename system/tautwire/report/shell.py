@@ -1,4 +1,4 @@
-"""The shell that all pages share: one HTML file with its style, data and scripts inside, which asks for nothing."""
+"""The self-contained HTML page that all reports share, with its style, data and scripts inside."""
 
 from __future__ import annotations
 
@@ -7,29 +7,29 @@ from importlib.resources import files
 from string import Template
 from typing import Any
 
-from .markup import inline_json, text
+from .markup import escape_text, inline_json
 
-# In this order: later scripts use what earlier ones define.
+# The order matters: later scripts use what earlier ones define.
 FIGURE_SCRIPTS = ("drawing.js", "panels.js", "flat.js", "scene.js", "controls.js")
 
 
 def html_page(title: str, body: str, figures: Any = None, scripts: Sequence[str] = ()) -> str:
-    """A whole page: ``title`` is plain text, ``body`` the HTML inside ``main``.
+    """A complete HTML page: ``title`` is plain text, ``body`` the HTML inside ``main``.
 
-    With ``figures``, what JSON can hold, plotly and the scripts that draw them come in too: the shared ones, then
+    With ``figures``, any JSON value, plotly and the scripts that draw them are included: the shared ones, then
     ``scripts`` by their names in ``assets``. The page opens from a disk, without a network.
     """
     return Template(asset("page.html")).substitute(
-        title=text(title), style=asset("style.css"), body=body, figures=_figures(figures, scripts)
+        title=escape_text(title), style=asset("style.css"), body=body, figures=_figure_scripts(figures, scripts)
     )
 
 
 def asset(name: str) -> str:
-    """The content of a file in ``assets``."""
+    """The text of a file in ``assets``."""
     return (files(__package__) / "assets" / name).read_text(encoding="utf-8")
 
 
-def _figures(figures: Any, scripts: Sequence[str]) -> str:
+def _figure_scripts(figures: Any, scripts: Sequence[str]) -> str:
     """The script elements of a page with figures; the first holds the data."""
     if figures is None:
         return ""
@@ -37,6 +37,6 @@ def _figures(figures: Any, scripts: Sequence[str]) -> str:
     from plotly.offline import get_plotlyjs
 
     names = [*FIGURE_SCRIPTS, *scripts, "start.js"]
-    drawing = "\n".join(asset(name) for name in names)
+    script_text = "\n".join(asset(name) for name in names)
     data = f'<script type="application/json" id="report-data">{inline_json(figures)}</script>'
-    return f"{data}\n<script>{get_plotlyjs()}</script>\n<script>\n{drawing}\n</script>"
+    return f"{data}\n<script>{get_plotlyjs()}</script>\n<script>\n{script_text}\n</script>"

@@ -17,25 +17,25 @@ from .summary import (
     ROLES,
     TENSION,
     VERDICTS,
-    Output,
+    MeasuredOutput,
     axis_outputs,
     cable_outputs,
     cables_text,
-    comparison_of,
-    estimate_text,
-    evidence_text,
+    candidates_by_round,
+    comparison_by_role,
+    explained_share,
+    format_estimate,
+    format_evidence,
     noise_sentence,
-    ranking,
-    share_explained,
     values_text,
 )
-from .units import percent, significant
+from .units import format_percent, format_significant
 
-SHOWN_CANDIDATES = 5
+MAX_CANDIDATES_SHOWN = 5
 
 
 def trace_table(trace: Trace) -> RenderableType:
-    """What a trace found, for a rich console."""
+    """The result of a trace, for a rich console."""
     blocks: list[RenderableType] = [
         Text(f"{VERDICTS[trace.verdict]}: {one_line(trace.sentence)}", style="bold"),
         Text(noise_sentence(trace) + "\n"),
@@ -60,8 +60,8 @@ def _new_table(title: str) -> Table:
 
 
 def _error_table(trace: Trace) -> Table:
-    """Root mean squares before and after on each recording, against the noise floor."""
-    roles = [role for role in ROLES if comparison_of(trace, role)]
+    """Root mean square errors before and after on each recording, against the noise floor."""
+    roles = [role for role in ROLES if comparison_by_role(trace, role)]
     table = _new_table("Error of the co-simulation (root mean square)")
     table.add_column("output", no_wrap=True)
     table.add_column("unit", no_wrap=True)
@@ -70,27 +70,27 @@ def _error_table(trace: Trace) -> Table:
         table.add_column("\nafter", justify="right", no_wrap=True)
     table.add_column("noise\nfloor", justify="right", no_wrap=True)
     table.add_column(f"{roles[-1]}:\nexplained" if roles else "explained", justify="right", no_wrap=True)
-    for total, parts in (
+    for total_output, part_outputs in (
         (POSITION, axis_outputs()),
         (TENSION, cable_outputs(trace.robot_before.cable_count)),
     ):
-        for output in (total, *parts):
-            label = output.label if output is total else f"  {output.label}"
+        for output in (total_output, *part_outputs):
+            label = output.label if output is total_output else f"  {output.label}"
             table.add_row(label, output.unit, *_error_cells(trace, output, roles))
     return table
 
 
-def _error_cells(trace: Trace, output: Output, roles: list[str]) -> list[str]:
+def _error_cells(trace: Trace, output: MeasuredOutput, roles: list[str]) -> list[str]:
     cells: list[str] = []
     share: float | None = None
-    floor = output.of(trace.noise_floor)
+    floor = output.error_of(trace.noise_floor)
     for role in roles:
-        comparison = comparison_of(trace, role)
+        comparison = comparison_by_role(trace, role)
         if comparison:
-            before, after = output.of(comparison.errors_before), output.of(comparison.errors_after)
-            cells += [significant(before), significant(after)]
-            share = share_explained(before, after, floor)
-    return [*cells, significant(floor), percent(share)]
+            before, after = output.error_of(comparison.errors_before), output.error_of(comparison.errors_after)
+            cells += [format_significant(before), format_significant(after)]
+            share = explained_share(before, after, floor)
+    return [*cells, format_significant(floor), format_percent(share)]
 
 
 def _effect_table(trace: Trace) -> Table:
@@ -102,12 +102,12 @@ def _effect_table(trace: Trace) -> Table:
     table.add_column("unit", no_wrap=True)
     for effect in trace.effects:
         cables = cables_text(effect.cables, trace.robot_before.cable_count).removesuffix(" cables")
-        first = [Text(one_line(effect.name)), Text(cables.removeprefix("cables ").removeprefix("cable "))]
+        leading_cells = [Text(one_line(effect.name)), Text(cables.removeprefix("cables ").removeprefix("cable "))]
         for name, estimate in effect.parameters.items():
-            text = estimate_text(estimate)
+            text = format_estimate(estimate)
             numbers = (text.value, text.low, text.high, text.declared, text.unit)
-            table.add_row(*first, Text(one_line(name)), *numbers)
-            first = [Text(""), Text("")]
+            table.add_row(*leading_cells, Text(one_line(name)), *numbers)
+            leading_cells = [Text(""), Text("")]
     return table
 
 
@@ -122,17 +122,17 @@ def _candidate_table(trace: Trace) -> Table:
     table.add_column("", no_wrap=True)
     table.add_column("values", overflow="fold", ratio=1)
     caption = "left: mean square of the whitened innovations, 1 where only noise is left"
-    hidden = 0
-    for number, candidates in ranking(trace.candidates):
-        fitted = [candidate for candidate in candidates if math.isfinite(candidate.mean_square)][:SHOWN_CANDIDATES]
-        for place, candidate in enumerate(fitted):
-            label = str(number) if place == 0 else ""
+    hidden_count = 0
+    for round_number, candidates in candidates_by_round(trace.candidates):
+        fitted = [candidate for candidate in candidates if math.isfinite(candidate.mean_square)][:MAX_CANDIDATES_SHOWN]
+        for index, candidate in enumerate(fitted):
+            label = str(round_number) if index == 0 else ""
             table.add_row(label, *_candidate_cells(candidate, trace.robot_before.cable_count))
         if not fitted:
-            table.add_row(str(number), *["-"] * 5, "nothing promised enough to be fitted")
-        hidden += len(candidates) - len(fitted)
-    if hidden:
-        caption += f"\n{hidden} more with less evidence, or not fitted: in report.json and on the page"
+            table.add_row(str(round_number), *["-"] * 5, "nothing promised enough to be fitted")
+        hidden_count += len(candidates) - len(fitted)
+    if hidden_count:
+        caption += f"\n{hidden_count} more with less evidence, or not fitted: in report.json and on the page"
     table.caption, table.caption_justify = caption, "left"
     return table
 
@@ -142,8 +142,8 @@ def _candidate_cells(candidate: Candidate, cable_count: int) -> list[Text]:
     return [
         Text(one_line(candidate.name)),
         Text(cables.removeprefix("cables ").removeprefix("cable ")),
-        Text(evidence_text(candidate.evidence)),
-        Text(significant(candidate.mean_square)),
+        Text(format_evidence(candidate.evidence)),
+        Text(format_significant(candidate.mean_square)),
         Text("taken" if candidate.accepted else ""),
         Text(one_line(values_text(candidate.name, candidate.values))),
     ]

@@ -1,4 +1,4 @@
-"""Numbers as an engineer reads them: a few significant digits, and units of a handy size."""
+"""Formatting of numbers as engineers read them: a few significant digits, and units with a fitting SI prefix."""
 
 from __future__ import annotations
 
@@ -6,85 +6,85 @@ import math
 import re
 from collections.abc import Sequence
 
-ABSENT = "-"
+ABSENT_TEXT = "-"
 PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"), (1e-9, "n"))
-# Units that engineers scale, and by which prefixes; any other unit is shown as it is.
-SCALED = {"Pa": "GMk", "N": "kMm", "m": "mµ", "s": "mµ", "Hz": "kM", "W": "kM", "J": "kM"}
-SMALL_AREA = 1e-2  # m^2, below it an area is shown in mm^2
-# As in "m^2", and in "m2" as FMI writes it.
-POWER = re.compile(r"(?<=[A-Za-z])\^?([23])(?!\d)")
-POWERS = {"2": "²", "3": "³"}
-PLAIN_FROM, PLAIN_TO = 1e-4, 1e6
-WHOLE_DIGITS = 4
+# Prefixes in use for each unit; any other unit is printed as it is.
+PREFIXES_BY_UNIT = {"Pa": "GMk", "N": "kMm", "m": "mµ", "s": "mµ", "Hz": "kM", "W": "kM", "J": "kM"}
+MAX_AREA_IN_MM2 = 1e-2  # m^2; a smaller area is printed in mm^2
+# The power in "m^2", or in "m2" as FMI writes it.
+UNIT_POWER_PATTERN = re.compile(r"(?<=[A-Za-z])\^?([23])(?!\d)")
+SUPERSCRIPTS = {"2": "²", "3": "³"}
+MIN_PLAIN_NUMBER, MAX_PLAIN_NUMBER = 1e-4, 1e6
+INTEGER_DIGITS = 4
 
 
-def significant(value: float | None, digits: int = 3) -> str:
-    """A number to so many significant digits, to four where these are whole; a dash where there is none."""
+def format_significant(value: float | None, digits: int = 3) -> str:
+    """Formats a number to so many significant digits, integers to four; a dash for None or a non-finite number."""
     if value is None or not math.isfinite(value):
-        return ABSENT
+        return ABSENT_TEXT
     if value == 0.0:
         return "0"
     size = abs(value)
-    if not PLAIN_FROM <= size < PLAIN_TO:
+    if not MIN_PLAIN_NUMBER <= size < MAX_PLAIN_NUMBER:
         return f"{value:.{digits - 1}e}"
-    rounded = float(f"{value:.{max(digits, WHOLE_DIGITS) - 1}e}")
-    return f"{rounded:.{_decimals(size, digits)}f}"
+    rounded = float(f"{value:.{max(digits, INTEGER_DIGITS) - 1}e}")
+    return f"{rounded:.{_decimal_places(size, digits)}f}"
 
 
-def handy_unit(value: float, unit: str) -> tuple[str, float]:
-    """The unit that suits a value given in an SI ``unit``, and how many SI units one of it is."""
+def choose_unit(value: float, unit: str) -> tuple[str, float]:
+    """Chooses the SI prefix for a value in an SI ``unit``; returns the prefixed unit and its size in SI units."""
     size = abs(value)
-    if unit == "m^2" and 0.0 < size < SMALL_AREA:
+    if unit == "m^2" and 0.0 < size < MAX_AREA_IN_MM2:
         return "mm²", 1e-6
     # Of a compound unit such as "Pa s" or "m/s", the first factor takes the prefix.
     first = re.split("[ /^]", unit, maxsplit=1)[0]
-    letters = "" if unit.startswith(f"{first}^") else SCALED.get(first, "")
-    fitting = [(factor, letter) for factor, letter in PREFIXES if letter == "" or letter in letters]
-    reached = [each for each in fitting if size >= each[0] * (1.0 - 1e-9)]
-    factor, letter = (reached or fitting[-1:])[0] if size > 0.0 else (1.0, "")
-    return _typeset(letter + unit), factor
+    letters = "" if unit.startswith(f"{first}^") else PREFIXES_BY_UNIT.get(first, "")
+    allowed_prefixes = [(factor, letter) for factor, letter in PREFIXES if letter == "" or letter in letters]
+    prefixes_below_value = [each for each in allowed_prefixes if size >= each[0] * (1.0 - 1e-9)]
+    factor, letter = (prefixes_below_value or allowed_prefixes[-1:])[0] if size > 0.0 else (1.0, "")
+    return _typeset_unit(letter + unit), factor
 
 
-def engineering(value: float | None, unit: str, digits: int = 3) -> str:
-    """A value in an SI unit with a unit of a handy size, as in "102 GPa"."""
+def format_engineering(value: float | None, unit: str, digits: int = 3) -> str:
+    """Formats a value in an SI unit with a fitting prefix, as in "102 GPa"."""
     if value is None or not math.isfinite(value):
-        return ABSENT
-    name, factor = handy_unit(value, unit)
-    return f"{significant(value / factor, digits)} {name}".rstrip()
+        return ABSENT_TEXT
+    name, factor = choose_unit(value, unit)
+    return f"{format_significant(value / factor, digits)} {name}".rstrip()
 
 
-def together(values: Sequence[float | None], unit: str, width: float) -> tuple[list[str], str]:
-    """Values in one handy unit with as many decimals as a ``width`` (an interval's) justifies; and that unit."""
-    known = [abs(value) for value in values if value is not None and math.isfinite(value)]
-    name, factor = handy_unit(known[0] if known else 0.0, unit)
+def format_in_common_unit(values: Sequence[float | None], unit: str, width: float) -> tuple[list[str], str]:
+    """Formats values in one prefixed unit with as many decimals as an interval's ``width`` justifies; and that unit."""
+    magnitudes = [abs(value) for value in values if value is not None and math.isfinite(value)]
+    name, factor = choose_unit(magnitudes[0] if magnitudes else 0.0, unit)
     scaled = [None if value is None else value / factor for value in values]
     spread = abs(width) / factor
-    largest = max((size / factor for size in known), default=0.0)
-    if not 0.0 < spread < math.inf or not PLAIN_FROM <= largest < PLAIN_TO:
-        return [significant(value, 4) for value in scaled], name
-    decimals = min(_decimals(spread, 2), 8)
-    return [_fixed(value, decimals) for value in scaled], name
+    max_magnitude = max((size / factor for size in magnitudes), default=0.0)
+    if not 0.0 < spread < math.inf or not MIN_PLAIN_NUMBER <= max_magnitude < MAX_PLAIN_NUMBER:
+        return [format_significant(value, 4) for value in scaled], name
+    decimals = min(_decimal_places(spread, 2), 8)
+    return [_format_fixed(value, decimals) for value in scaled], name
 
 
-def percent(share: float | None) -> str:
-    """A share as per cent; close to all of it is said so, not rounded up."""
+def format_percent(share: float | None) -> str:
+    """Formats a share as per cent; just below 1 it is "> 99.9 %", not rounded up."""
     if share is None or not math.isfinite(share):
-        return ABSENT
+        return ABSENT_TEXT
     if 0.9995 <= share < 1.0:
         return "> 99.9 %"
     return f"{100.0 * share:.{0 if abs(share) >= 10.0 or share == 1.0 else 1}f} %"
 
 
-def _fixed(value: float | None, decimals: int) -> str:
-    return ABSENT if value is None or not math.isfinite(value) else f"{value:.{decimals}f}"
+def _format_fixed(value: float | None, decimals: int) -> str:
+    return ABSENT_TEXT if value is None or not math.isfinite(value) else f"{value:.{decimals}f}"
 
 
-def _decimals(size: float, digits: int) -> int:
-    """How many decimals show so many significant digits of a number of this size."""
+def _decimal_places(size: float, digits: int) -> int:
+    """Number of decimals that show so many significant digits of a number of this size."""
     rounded = float(f"{size:.{digits - 1}e}")
     return max(0, digits - 1 - math.floor(math.log10(rounded)))
 
 
-def _typeset(unit: str) -> str:
-    """A unit as it is printed: powers raised, and nothing where a number has no unit."""
-    return "" if unit == "1" else POWER.sub(lambda found: POWERS[found[1]], unit)
+def _typeset_unit(unit: str) -> str:
+    """A unit as printed: powers as superscripts, and empty for a dimensionless number."""
+    return "" if unit == "1" else UNIT_POWER_PATTERN.sub(lambda found: SUPERSCRIPTS[found[1]], unit)

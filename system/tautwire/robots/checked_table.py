@@ -1,4 +1,4 @@
-"""A table of a robot file that checks what it hands out."""
+"""A table of a robot file that validates the values it returns."""
 
 import math
 import re
@@ -6,41 +6,41 @@ from collections.abc import Callable, Iterable, Sequence
 from difflib import get_close_matches
 from typing import Any, NamedTuple
 
-from ..errors import RobotFileError, at_once, shown
+from ..errors import RobotFileError, format_value, raise_error
 
-Refuse = Callable[[RobotFileError], None]
-Place = tuple[str | int, ...]
+ErrorSink = Callable[[RobotFileError], None]
+KeyPath = tuple[str | int, ...]
 
-# Beyond this no quantity of a cable robot lies, and squares of numbers still stay finite.
-LARGEST = 1e15
-LONGEST_KEY = 80
-# Of difflib's ratio; below it names have little but a few letters in common.
-ALIKE = 0.6
-SHORT_SERIES, MOST_LISTED = 2, 30
+# No quantity of a cable robot is larger, and squares of numbers stay finite.
+MAX_MAGNITUDE = 1e15
+MAX_KEY_LENGTH = 80
+# Ratio of difflib; below it names share little but a few letters.
+MIN_NAME_SIMILARITY = 0.6
+MAX_UNABBREVIATED_SERIES, MAX_LISTED_NAMES = 2, 30
 
-_NUMBER = re.compile("[0-9]+")
+_DIGITS = re.compile("[0-9]+")
 
 
 class NumberRule(NamedTuple):
-    """What a number must satisfy; ``positive`` excludes zero; ``meaning`` and ``unit`` are for messages."""
+    """Validity range of a number; ``positive`` excludes zero; ``meaning`` and ``unit`` are for messages."""
 
     meaning: str
     unit: str
-    minimum: float = -LARGEST
-    maximum: float = LARGEST
+    minimum: float = -MAX_MAGNITUDE
+    maximum: float = MAX_MAGNITUDE
     positive: bool = False
     default: float | None = None
 
-    def broken_bound(self, value: float) -> str | None:
-        """The bound that a finite number breaks, such as ``above 0 kg``; None where it breaks none."""
+    def violated_bound(self, value: float) -> str | None:
+        """The bound that a finite number violates, such as ``above 0 kg``; None if it violates none."""
         if self.positive and value <= 0.0:
             return f"above 0{self._unit()}"
         if value < self.minimum:
             return f"at least {self.minimum:g}{self._unit()}"
         return f"at most {self.maximum:g}{self._unit()}" if value > self.maximum else None
 
-    def mend(self) -> str:
-        """What to write."""
+    def hint(self) -> str:
+        """Hint about what to write."""
         return f"give {self.meaning}" + (f" in{self._unit()}" if self._unit() else "")
 
     def _unit(self) -> str:
@@ -48,44 +48,46 @@ class NumberRule(NamedTuple):
 
 
 class CheckedTable:
-    """One table at a ``place`` of a file.
+    """One table of a file, at ``key_path``, with validated access to its values.
 
-    What is wrong in it goes to ``sink`` as a RobotFileError, which names the file and the full key. Where that does
-    not raise, as :func:`tautwire.errors.at_once` does, reading goes on: with NaN for a number, None for a text.
+    Each error goes to ``sink`` as a RobotFileError, which names the file and the full key. If ``sink`` does not raise
+    it, as :func:`tautwire.errors.at_once` does, reading continues with NaN for a number and None for a text.
     """
 
-    def __init__(self, file: str, key: str, content: dict[str, Any], sink: Refuse = at_once, place: Place = ()) -> None:
+    def __init__(
+        self, file: str, key: str, content: dict[str, Any], sink: ErrorSink = raise_error, key_path: KeyPath = ()
+    ) -> None:
         self.file = file
         self.key = key
         self.content = content
         self.sink = sink
-        self.place = place
+        self.key_path = key_path
 
-    def refuse(self, key: str, problem: str, mend: str, entry: int | None = None) -> None:
-        """Refuse a key of this table, or an entry of its list; or the table where ``key`` is empty."""
-        named = key[:LONGEST_KEY] if entry is None else f"{key}[{entry + 1}]"
-        path = ".".join(part for part in (self.key, named) if part)
-        place = (*self.place, *([key] if key else []), *([] if entry is None else [entry]))
-        self.sink(RobotFileError(f"{self.file}: {path}" if path else self.file, problem, mend, place))
+    def refuse(self, key: str, problem: str, hint: str, entry: int | None = None) -> None:
+        """Reports an error of a key of this table, or of an entry of its list; of the table if ``key`` is empty."""
+        shortened_key = key[:MAX_KEY_LENGTH] if entry is None else f"{key}[{entry + 1}]"
+        path = ".".join(part for part in (self.key, shortened_key) if part)
+        key_path = (*self.key_path, *([key] if key else []), *([] if entry is None else [entry]))
+        self.sink(RobotFileError(f"{self.file}: {path}" if path else self.file, problem, hint, key_path))
 
     def require_known(self, known: Iterable[str]) -> None:
-        """Refuses a key that is not among the known ones; names the one that is likely meant, or all."""
+        """Reports each unknown key, with the known one that is likely meant, or all."""
         names = tuple(known)
         for key in self.content:
             if key not in names:
-                self.refuse(key, "is not a known key", f"write {nearest(key, names)}, or remove it")
+                self.refuse(key, "is not a known key", f"write {suggest_name(key, names)}, or remove it")
 
     def number(self, key: str, rule: NumberRule) -> float:
         """The number under a key, or the rule's default."""
         if key not in self.content:
             if rule.default is None:
-                self.refuse(key, "is missing", rule.mend())
+                self.refuse(key, "is missing", rule.hint())
                 return math.nan
             return rule.default
-        value = self._finite(key, self.content[key], rule.mend())
-        bound = rule.broken_bound(value)
+        value = self._finite_number(key, self.content[key], rule.hint())
+        bound = rule.violated_bound(value)
         if bound:
-            self.refuse(key, f"is {value!r}, must be {bound}", rule.mend())
+            self.refuse(key, f"is {value!r}, must be {bound}", rule.hint())
             return math.nan
         return value
 
@@ -95,26 +97,26 @@ class CheckedTable:
 
     def point(self, key: str, meaning: str) -> tuple[float, float, float]:
         """Three coordinates, in m."""
-        mend = f"give {meaning} as [x, y, z] in m"
+        hint = f"give {meaning} as [x, y, z] in m"
         value = self.content.get(key)
         if key not in self.content:
-            self.refuse(key, "is missing", mend)
+            self.refuse(key, "is missing", hint)
         elif not isinstance(value, list):
-            self.refuse(key, f"is {shown(value)}, not a list of 3 numbers", mend)
+            self.refuse(key, f"is {format_value(value)}, not a list of 3 numbers", hint)
         elif len(value) != 3:
-            self.refuse(key, f"has {len(value)} entries, must have 3", mend)
+            self.refuse(key, f"has {len(value)} entries, must have 3", hint)
         else:
-            x, y, z = (self._coordinate(key, entry, each, mend) for entry, each in enumerate(value))
+            x, y, z = (self._coordinate(key, entry, each, hint) for entry, each in enumerate(value))
             return (x, y, z)
         return (math.nan, math.nan, math.nan)
 
-    def text(self, key: str, mend: str) -> str | None:
+    def text(self, key: str, hint: str) -> str | None:
         """The text under a key."""
         value = self.content.get(key)
         if key not in self.content:
-            self.refuse(key, "is missing", mend)
+            self.refuse(key, "is missing", hint)
         elif not isinstance(value, str):
-            self.refuse(key, f"is {shown(value)}, not text", mend)
+            self.refuse(key, f"is {format_value(value)}, not text", hint)
         else:
             return value
         return None
@@ -123,93 +125,97 @@ class CheckedTable:
         """The table under a key; None where there is none."""
         if key not in self.content:
             return None
-        return self._inner(f"{self.key}.{key}" if self.key else key, self.content[key], (*self.place, key))
+        return self._nested_table(f"{self.key}.{key}" if self.key else key, self.content[key], (*self.key_path, key))
 
     def tables(self, key: str) -> "tuple[CheckedTable, ...]":
         """The array of tables under a key, their paths counted from 1."""
         path = f"{self.key}.{key}" if self.key else key
         value = self.content[key]
         if not isinstance(value, list):
-            self.refuse(key, f"is {shown(value)}, not an array of tables", f"write it as [[{path}]]")
+            self.refuse(key, f"is {format_value(value)}, not an array of tables", f"write it as [[{path}]]")
             return ()
-        inner = (self._inner(f"{path}[{at + 1}]", one, (*self.place, key, at)) for at, one in enumerate(value))
-        return tuple(table for table in inner if table is not None)
+        nested_tables = (
+            self._nested_table(f"{path}[{at + 1}]", one, (*self.key_path, key, at)) for at, one in enumerate(value)
+        )
+        return tuple(table for table in nested_tables if table is not None)
 
-    def one_or_several(self, key: str) -> "tuple[CheckedTable, ...]":
+    def table_or_tables(self, key: str) -> "tuple[CheckedTable, ...]":
         """The table under a key, or the array of tables."""
         if isinstance(self.content[key], list):
             return self.tables(key)
         table = self.table(key)
         return () if table is None else (table,)
 
-    def _inner(self, path: str, content: Any, place: Place) -> "CheckedTable | None":
+    def _nested_table(self, path: str, content: Any, key_path: KeyPath) -> "CheckedTable | None":
         if isinstance(content, dict):
-            return CheckedTable(self.file, path, content, self.sink, place)
-        problem = f"is {shown(content)}, not a table"
-        self.sink(RobotFileError(f"{self.file}: {path}", problem, "write it as a table", place))
+            return CheckedTable(self.file, path, content, self.sink, key_path)
+        problem = f"is {format_value(content)}, not a table"
+        self.sink(RobotFileError(f"{self.file}: {path}", problem, "write it as a table", key_path))
         return None
 
-    def _finite(self, key: str, value: Any, mend: str, entry: int | None = None) -> float:
+    def _finite_number(self, key: str, value: Any, hint: str, entry: int | None = None) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):
-            self.refuse(key, f"is {shown(value)}, not a number", mend, entry)
+            self.refuse(key, f"is {format_value(value)}, not a number", hint, entry)
             return math.nan
         try:
             number = float(value)
         except OverflowError:
             number = math.inf
         if not math.isfinite(number):
-            self.refuse(key, f"is {shown(value)}, must be finite", mend, entry)
+            self.refuse(key, f"is {format_value(value)}, must be finite", hint, entry)
             return math.nan
         return number
 
-    def _coordinate(self, key: str, entry: int, value: Any, mend: str) -> float:
-        number = self._finite(key, value, mend, entry)
-        if abs(number) > LARGEST:
-            self.refuse(key, f"is {number!r}, must be at most {LARGEST:g} m from the origin", mend, entry)
+    def _coordinate(self, key: str, entry: int, value: Any, hint: str) -> float:
+        number = self._finite_number(key, value, hint, entry)
+        if abs(number) > MAX_MAGNITUDE:
+            self.refuse(key, f"is {number!r}, must be at most {MAX_MAGNITUDE:g} m from the origin", hint, entry)
         return number
 
 
-def nearest(name: str, known: Iterable[str]) -> str:
-    """The known name that ``name`` is likely meant to be, quoted; else ``one of`` and all that are known."""
+def suggest_name(name: str, known: Iterable[str]) -> str:
+    """The known name that ``name`` is likely meant to be, quoted; otherwise ``one of`` and all known names."""
     names = tuple(known)
-    found = likely(name, names)
-    if found is not None or len(names) == 1:
-        return shown(found or names[0])
-    return f"one of {listed(names)}" if names else "one that is known"
+    match = closest_name(name, names)
+    if match is not None or len(names) == 1:
+        return format_value(match or names[0])
+    return f"one of {join_names(names)}" if names else "one that is known"
 
 
-def likely(name: str, known: Iterable[str]) -> str | None:
-    """The known name that looks most like ``name``, letter case aside; None where none does.
+def closest_name(name: str, known: Iterable[str]) -> str | None:
+    """The known name most similar to ``name``, ignoring case; None if none is similar.
 
-    A name with other numbers in it is of something else, however alike: ``cable_9`` is no slip for ``cable_3``.
+    A name with other numbers in it means something else, however similar: ``cable_9`` is no slip for ``cable_3``.
     """
-    given = name[:LONGEST_KEY].lower()
+    lower_case_name = name[:MAX_KEY_LENGTH].lower()
     by_lower_case = {candidate.lower(): candidate for candidate in known}
-    numbers = _numbers(given)
-    alike = [each for each in by_lower_case if not (numbers and _numbers(each)) or numbers == _numbers(each)]
-    found = get_close_matches(given, alike, n=1, cutoff=ALIKE)
-    return by_lower_case[found[0]] if found else None
+    numbers = _digit_groups(lower_case_name)
+    candidates = [
+        each for each in by_lower_case if not (numbers and _digit_groups(each)) or numbers == _digit_groups(each)
+    ]
+    matches = get_close_matches(lower_case_name, candidates, n=1, cutoff=MIN_NAME_SIMILARITY)
+    return by_lower_case[matches[0]] if matches else None
 
 
-def listed(names: Sequence[str]) -> str:
-    """Names with commas; of a long series, such as ``cable_1 ... cable_8``, the ends."""
+def join_names(names: Sequence[str]) -> str:
+    """Names separated by commas; a long series is abbreviated, such as ``cable_1 ... cable_8``."""
     parts: list[str] = []
-    for series in _series(names):
-        parts += series if len(series) <= SHORT_SERIES else [f"{series[0]} ... {series[-1]}"]
-    return ", ".join(parts[:MOST_LISTED]) + (" ..." if len(parts) > MOST_LISTED else "")
+    for series in _group_series(names):
+        parts += series if len(series) <= MAX_UNABBREVIATED_SERIES else [f"{series[0]} ... {series[-1]}"]
+    return ", ".join(parts[:MAX_LISTED_NAMES]) + (" ..." if len(parts) > MAX_LISTED_NAMES else "")
 
 
-def _series(names: Sequence[str]) -> list[list[str]]:
-    """Neighbours together that differ in their numbers only."""
-    found: list[list[str]] = []
+def _group_series(names: Sequence[str]) -> list[list[str]]:
+    """Groups neighbours that differ in their numbers only."""
+    groups: list[list[str]] = []
     for name in names:
-        if found and _NUMBER.search(name) and _NUMBER.sub("", name) == _NUMBER.sub("", found[-1][-1]):
-            found[-1].append(name)
+        if groups and _DIGITS.search(name) and _DIGITS.sub("", name) == _DIGITS.sub("", groups[-1][-1]):
+            groups[-1].append(name)
         else:
-            found.append([name])
-    return found
+            groups.append([name])
+    return groups
 
 
-def _numbers(name: str) -> list[str]:
-    # As digits: Python refuses to count beyond some thousands of them.
-    return [digits.lstrip("0") for digits in _NUMBER.findall(name)]
+def _digit_groups(name: str) -> list[str]:
+    # Kept as digits: Python refuses to convert more than some thousands of them.
+    return [digits.lstrip("0") for digits in _DIGITS.findall(name)]

@@ -1,72 +1,72 @@
-"""The effects of a robot file, each with its numbers checked."""
+"""The effects of a robot file, each with its numbers validated."""
 
 from __future__ import annotations
 
 from tautwire_fmu.laws.effects import BY_NAME, Effect, Parameter
 
-from ..errors import shown
-from .checked_table import CheckedTable, NumberRule, nearest
-from .robot import PER_CABLE, EffectSetting
+from ..errors import format_value
+from .checked_table import CheckedTable, NumberRule, suggest_name
+from .robot import PER_CABLE_COMPONENTS, EffectSetting
 
 
-def effects_in(table: CheckedTable, cable_count: int) -> tuple[EffectSetting, ...]:
-    """The settings in a robot file's ``[effect]``; what is wrong goes where the table sends it."""
+def read_effects(table: CheckedTable, cable_count: int) -> tuple[EffectSetting, ...]:
+    """Reads the effect settings of ``[effect]`` in a robot file; errors go to the table's sink."""
     settings: list[EffectSetting] = []
     for name in table.content:
         if name not in BY_NAME:
             table.refuse(
-                name, "is not an effect that the project knows", f"write {nearest(name, BY_NAME)}, or remove it"
+                name, "is not an effect that the project knows", f"write {suggest_name(name, BY_NAME)}, or remove it"
             )
             continue
-        taken: dict[int, str] = {}
-        for one in table.one_or_several(name):
-            setting = _effect(one, BY_NAME[name], cable_count)
-            # Effects that act on no cable take the place of cable 0, so that they too are set once.
+        tables_by_cable: dict[int, str] = {}
+        for effect_table in table.table_or_tables(name):
+            setting = _read_effect(effect_table, BY_NAME[name], cable_count)
+            # Effects that act on no cable count as cable 0, so that they too are set once.
             for cable in setting.cables or (0,):
-                if cable in taken:
+                if cable in tables_by_cable:
                     which = f"cable {cable}" if cable else "the robot"
-                    problem = f"is set twice for {which}, in {taken[cable]} too"
-                    one.refuse("cables" if cable else "", problem, "set it once")
-                taken[cable] = one.key
+                    problem = f"is set twice for {which}, in {tables_by_cable[cable]} too"
+                    effect_table.refuse("cables" if cable else "", problem, "set it once")
+                tables_by_cable[cable] = effect_table.key
             settings.append(setting)
     return tuple(settings)
 
 
-def _effect(table: CheckedTable, effect: Effect, cable_count: int) -> EffectSetting:
-    per_cable = effect.component in PER_CABLE
+def _read_effect(table: CheckedTable, effect: Effect, cable_count: int) -> EffectSetting:
+    per_cable = effect.component in PER_CABLE_COMPONENTS
     if "cables" in table.content and not per_cable:
         table.refuse("cables", f"{effect.name} acts on the {effect.component}", "remove cables")
     names = [parameter.name for parameter in effect.parameters]
     table.require_known([*names, "cables"])
-    values = {each.name: table.number(each.name, _rule(each)) for each in effect.parameters}
-    # A number that has to be given is told to be missing already.
+    values = {each.name: table.number(each.name, _parameter_rule(each)) for each in effect.parameters}
+    # A missing number without a neutral value is reported already.
     if not any(name in table.content for name in names) and all(each.neutral is not None for each in effect.parameters):
-        mend = f"give {effect.parameters[0].description}, as in {names[0]} = {effect.parameters[0].start:g}"
-        table.refuse("", "sets none of its numbers", mend)
-    return EffectSetting(effect.name, values, cables_of(table, cable_count) if per_cable else ())
+        hint = f"give {effect.parameters[0].description}, as in {names[0]} = {effect.parameters[0].start:g}"
+        table.refuse("", "sets none of its numbers", hint)
+    return EffectSetting(effect.name, values, read_cable_list(table, cable_count) if per_cable else ())
 
 
-def _rule(parameter: Parameter) -> NumberRule:
+def _parameter_rule(parameter: Parameter) -> NumberRule:
     bounds = (parameter.minimum, parameter.maximum)
     return NumberRule(parameter.description, parameter.unit, *bounds, default=parameter.neutral)
 
 
-def cables_of(table: CheckedTable, cable_count: int) -> tuple[int, ...]:
-    """The cables, from 1, in which what a table declares acts; all where it names none."""
+def read_cable_list(table: CheckedTable, cable_count: int) -> tuple[int, ...]:
+    """Reads the cables, from 1, on which a table acts; all if it names none."""
     if "cables" not in table.content:
         return tuple(range(1, cable_count + 1))
-    mend = "list cables as in cables = [2], or remove the key for all cables"
-    given = table.content["cables"]
-    if not isinstance(given, list) or not given:
-        problem = "is empty" if given == [] else f"is {shown(given)}, not a list of cables"
-        table.refuse("cables", problem, mend)
+    hint = "list cables as in cables = [2], or remove the key for all cables"
+    entries = table.content["cables"]
+    if not isinstance(entries, list) or not entries:
+        problem = "is empty" if entries == [] else f"is {format_value(entries)}, not a list of cables"
+        table.refuse("cables", problem, hint)
         return ()
-    named: set[int] = set()
-    for cable in given:
+    cable_numbers: set[int] = set()
+    for cable in entries:
         if isinstance(cable, bool) or not isinstance(cable, int) or not 1 <= cable <= cable_count:
-            table.refuse("cables", f"has {shown(cable)}, must be from 1 to {cable_count}", mend)
-        elif cable in named:
-            table.refuse("cables", f"names cable {cable} twice", mend)
+            table.refuse("cables", f"has {format_value(cable)}, must be from 1 to {cable_count}", hint)
+        elif cable in cable_numbers:
+            table.refuse("cables", f"names cable {cable} twice", hint)
         else:
-            named.add(cable)
-    return tuple(sorted(named))
+            cable_numbers.add(cable)
+    return tuple(sorted(cable_numbers))

@@ -1,4 +1,4 @@
-"""Where in a robot file something stands."""
+"""Finds the line of a TOML file in which a key is declared."""
 
 from __future__ import annotations
 
@@ -13,35 +13,37 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib  # type: ignore[import-not-found,unused-ignore]
 
-LONGEST_STATEMENT = 1000  # lines
+MAX_STATEMENT_LINES = 1000  # lines
 
 
-def line_of(text: str, place: Sequence[str | int]) -> int | None:
-    """The line, from 1, of the statement in a TOML text that declares a place; of what is there of it if it is missing.
+def line_of_key(text: str, key_path: Sequence[str | int]) -> int | None:
+    """The line, from 1, of the statement in a TOML text that declares a key path, or its longest existing part.
 
-    The beginnings of a text that are TOML have more and more of it: the first that has the place ends with its
-    statement. None where nothing of the place is there.
+    Bisection over the prefixes of the text that are TOML: the first that contains the key path ends with its
+    statement. None if no part of the key path exists.
     """
     lines = text.split("\n")
-    whole = _depth(_beginning(lines, len(lines)), place)
-    if not whole:
+    full_depth = _matched_depth(_parse_prefix(lines, len(lines)), key_path)
+    if not full_depth:
         return None
-    return bisect_left(range(len(lines) + 1), whole, key=lambda count: _depth(_beginning(lines, count), place))
+    return bisect_left(
+        range(len(lines) + 1), full_depth, key=lambda count: _matched_depth(_parse_prefix(lines, count), key_path)
+    )
 
 
-def _beginning(lines: Sequence[str], count: int) -> Any:
-    """What the first lines say, with as many more as end the statement that they break off in."""
-    for last in range(count, min(count + LONGEST_STATEMENT, len(lines)) + 1):
+def _parse_prefix(lines: Sequence[str], line_count: int) -> Any:
+    """Parses the first lines, with as many more as complete the last statement."""
+    for last in range(line_count, min(line_count + MAX_STATEMENT_LINES, len(lines)) + 1):
         with suppress(ValueError):
             return tomllib.loads("\n".join(lines[:last]) + "\n")
     return {}
 
 
-def _depth(content: Any, place: Sequence[str | int]) -> int:
-    """How many steps of the way to a place are there."""
-    for depth, step in enumerate(place):
-        known = content if isinstance(content, dict) else range(len(content) if isinstance(content, list) else 0)
-        if step not in known:
+def _matched_depth(content: Any, key_path: Sequence[str | int]) -> int:
+    """How many keys of the path exist."""
+    for depth, key in enumerate(key_path):
+        keys = content if isinstance(content, dict) else range(len(content) if isinstance(content, list) else 0)
+        if key not in keys:
             return depth
-        content = content[step]
-    return len(place)
+        content = content[key]
+    return len(key_path)

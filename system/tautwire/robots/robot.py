@@ -1,4 +1,4 @@
-"""What a robot file declares: the robot and the effects that act on it."""
+"""The declared robot: platform, cables, winch, sensors, effects and formulas as immutable data."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
@@ -6,12 +6,12 @@ from pathlib import Path
 
 Point = tuple[float, float, float]
 
-# Components of which there is one for each cable: an effect in them may hold for some cables only.
-PER_CABLE = ("cable", "winch", "sensor")
+# Components that exist once per cable: an effect in them may apply to some cables only.
+PER_CABLE_COMPONENTS = ("cable", "winch", "sensor")
 
 
 class Numbers(Mapping[str, float]):
-    """Named numbers that never change; two are equal where names and numbers are, whatever their order."""
+    """An immutable, hashable mapping of names to numbers; equality ignores the order."""
 
     __slots__ = ("_items",)
 
@@ -39,7 +39,7 @@ class Numbers(Mapping[str, float]):
 
 @dataclass(frozen=True)
 class Platform:
-    """The moved point mass: ``mass`` in kg; ``start``, where the run starts at rest, in m.
+    """The platform as a point mass: ``mass`` in kg; ``start``, where a run starts at rest, in m.
 
     ``mass_uncertainty``: standard deviation of the true mass, in kg.
     """
@@ -51,9 +51,9 @@ class Platform:
 
 @dataclass(frozen=True)
 class TensionLimits:
-    """Bounds and aim of the tension distribution, in N; used where there are more than three cables.
+    """Bounds and preferred value of the tension distribution, in N; used with more than three cables.
 
-    ``preferred_uncertainty``: by how much true start tensions may differ from the rule's, a standard deviation.
+    ``preferred_uncertainty``: standard deviation of the true start tensions from those of the distribution.
     """
 
     minimum: float
@@ -64,10 +64,10 @@ class TensionLimits:
 
 @dataclass(frozen=True)
 class Sensors:
-    """Standard deviation of one sample: position in m, tension in N, winch speed in m/s; None if unknown.
+    """Sensor noise, standard deviation of a sample: position in m, tension in N, winch speed in m/s; None if unknown.
 
-    ``tension_offset_uncertainty`` (N) and ``position_offset_uncertainty`` (m): standard deviations of what each load
-    cell, and the tracker on each axis, may show too much all the time.
+    ``tension_offset_uncertainty`` (N) and ``position_offset_uncertainty`` (m): standard deviations of the constant
+    offset of each load cell, and of the tracker on each axis.
     """
 
     position_noise: float | None = None
@@ -95,10 +95,10 @@ class Cable:
 
 @dataclass(frozen=True)
 class Winch:
-    """How each winch follows the speed asked of it; its speed loop is a PI controller on the motor's inertia.
+    """Speed-controlled winch: a PI speed loop on the motor's inertia.
 
-    ``drum_radius`` in m; ``gear``, motor turns a drum turn; ``bandwidth``, the loop's natural frequency, in Hz; limits
-    of the rope in m/s and m/s^2, None where there is none.
+    ``drum_radius`` in m; ``gear``, motor turns per drum turn; ``bandwidth``, the loop's natural frequency, in Hz;
+    limits of the rope in m/s and m/s^2, None where there is none.
     """
 
     drum_radius: float
@@ -110,15 +110,15 @@ class Winch:
 
 
 @dataclass(frozen=True)
-class OwnFmu:
-    """An FMU of the user's in place of the project's: ``slot`` is ``platform``, ``cable_2``, ``winch_1`` ..."""
+class UserFmu:
+    """A user's FMU that replaces one of the project's: ``slot`` is ``platform``, ``cable_2``, ``winch_1`` ..."""
 
     slot: str
     path: Path
 
 
-def slots(cable_count: int) -> tuple[str, ...]:
-    """All components that may be a user's FMU: ``platform``, ``cable_1`` ..., ``winch_1`` ..."""
+def fmu_slots(cable_count: int) -> tuple[str, ...]:
+    """All components that a user's FMU may replace: ``platform``, ``cable_1`` ..., ``winch_1`` ..."""
     numbers = range(1, cable_count + 1)
     return ("platform", *(f"cable_{i}" for i in numbers), *(f"winch_{i}" for i in numbers))
 
@@ -140,8 +140,8 @@ class EffectSetting:
 
 
 @dataclass(frozen=True)
-class Release:
-    """How a run begins that does not begin at rest: ``velocity`` (m/s), and ``tensions`` beside the static ones (N)."""
+class InitialState:
+    """Initial state of a run that is not at rest: ``velocity`` (m/s), ``tensions`` on top of the static ones (N)."""
 
     velocity: Point
     tensions: tuple[float, ...]
@@ -149,13 +149,13 @@ class Release:
 
 @dataclass(frozen=True)
 class Formula:
-    """What no known effect is, as arithmetic: ``text`` gives N (kg of ``mass``) in a ``place`` of the laws.
+    """A user-defined law as arithmetic: ``text``, in N (kg for ``mass``), adds to the ``target`` of the laws.
 
-    Places: :data:`tautwire_fmu.laws.formula.PLACES`. ``cables`` counts from 1, empty on the platform. ``numbers`` are
-    values of names that the text uses beside those of its place; a file has none.
+    Targets: the keys of :data:`tautwire_fmu.laws.formula.VARIABLES_BY_TARGET`. ``cables`` counts from 1, empty on the
+    platform. ``numbers`` are values of names that the text uses beside the variables of its target; a file has none.
     """
 
-    place: str
+    target: str
     text: str
     cables: tuple[int, ...] = ()
     numbers: Mapping[str, float] = Numbers({})
@@ -167,10 +167,10 @@ class Formula:
 
 @dataclass(frozen=True)
 class Robot:
-    """A cable-driven robot as declared; ``gravity`` in m/s^2.
+    """A cable-driven parallel robot as declared; ``gravity`` in m/s^2.
 
-    Without a ``winch`` rope runs at the speed asked for. Settings of one effect stand together in ``effects``, as they
-    do in a file; otherwise their order is kept. A ``release`` belongs to a run, no file has one.
+    Without a ``winch`` the rope runs at the commanded speed. Settings of one effect are adjacent in ``effects``, as
+    in a file; otherwise their order is kept. An ``initial_state`` belongs to a run, no file has one.
     """
 
     name: str
@@ -181,14 +181,14 @@ class Robot:
     cables: tuple[Cable, ...]
     effects: tuple[EffectSetting, ...] = ()
     winch: Winch | None = None
-    fmus: tuple[OwnFmu, ...] = ()
+    fmus: tuple[UserFmu, ...] = ()
     formulas: tuple[Formula, ...] = ()
-    release: Release | None = None
+    initial_state: InitialState | None = None
 
     def __post_init__(self) -> None:
         names = list(dict.fromkeys(setting.name for setting in self.effects))
-        together = tuple(sorted(self.effects, key=lambda setting: names.index(setting.name)))
-        object.__setattr__(self, "effects", together)
+        grouped = tuple(sorted(self.effects, key=lambda setting: names.index(setting.name)))
+        object.__setattr__(self, "effects", grouped)
 
     @property
     def cable_count(self) -> int:
@@ -202,7 +202,7 @@ class Robot:
 
     @property
     def winch_numbers(self) -> tuple[int, ...]:
-        """The cables, counted from 1, whose rope a winch drives: all with a ``winch``, else those with a user's FMU."""
+        """The cables, counted from 1, driven by a winch model: all with a ``winch``, else those with a user's FMU."""
         slots_taken = {fmu.slot for fmu in self.fmus}
         return tuple(cable for cable in self.cable_numbers if self.winch or f"winch_{cable}" in slots_taken)
 
@@ -224,30 +224,30 @@ class Robot:
         return tuple(f for f in self.formulas if (cable in f.cables if cable else not f.cables))
 
     def with_effect(self, setting: EffectSetting) -> "Robot":
-        """This robot with one more effect; the new setting wins wherever the same effect acted before."""
-        kept: list[EffectSetting] = []
-        placed = False
-        for old in self.effects:
-            if old.name == setting.name and old.cables == setting.cables:
-                kept.append(setting)
-                placed = True
-            elif old.name == setting.name and set(old.cables) & set(setting.cables):
+        """This robot with one more effect; the new setting replaces the same effect on the same cables."""
+        settings: list[EffectSetting] = []
+        is_placed = False
+        for existing in self.effects:
+            if existing.name == setting.name and existing.cables == setting.cables:
+                settings.append(setting)
+                is_placed = True
+            elif existing.name == setting.name and set(existing.cables) & set(setting.cables):
                 # An effect acts on a cable once: contributions add up, and two moduli would not.
-                left = tuple(cable for cable in old.cables if cable not in setting.cables)
-                kept.extend([replace(old, cables=left)] if left else [])
+                remaining_cables = tuple(cable for cable in existing.cables if cable not in setting.cables)
+                settings.extend([replace(existing, cables=remaining_cables)] if remaining_cables else [])
             else:
-                kept.append(old)
-        return replace(self, effects=(*kept, *(() if placed else (setting,))))
+                settings.append(existing)
+        return replace(self, effects=(*settings, *(() if is_placed else (setting,))))
 
-    def with_fmus(self, fmus: Iterable[OwnFmu]) -> "Robot":
-        """This robot with more FMUs of the user's; a new one takes the slot of an old one."""
+    def with_fmus(self, fmus: Iterable[UserFmu]) -> "Robot":
+        """This robot with more user FMUs; a new one replaces an existing one in its slot."""
         by_slot = {fmu.slot: fmu for fmu in (*self.fmus, *fmus)}
         return replace(self, fmus=tuple(by_slot.values()))
 
     def as_modelled(self) -> "Robot":
-        """This robot as the laws know it: rope at the speed that the drum's encoder gives, no FMU of the user's."""
+        """This robot as the laws model it: rope at the drum encoder's speed, no user FMU."""
         return replace(self, winch=None, fmus=())
 
     def without_effects(self) -> "Robot":
-        """This robot as its owner declares it, with no effect switched on and no formula."""
+        """This robot without any effect or formula."""
         return replace(self, effects=(), formulas=())

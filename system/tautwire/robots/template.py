@@ -1,13 +1,13 @@
-"""A robot file to begin with: every key that there is, each with what it means."""
+"""A template robot file: every key, each with its meaning."""
 
 from __future__ import annotations
 
 import json
 from math import cos, pi, sin
 
-FEWEST, MOST = 3, 12
+MIN_TEMPLATE_CABLES, MAX_TEMPLATE_CABLES = 3, 12
 
-HEAD = """\
+TEMPLATE_HEAD = """\
 # A cable-driven robot. SI units throughout; z points up; cables count from 1 in the order of this file.
 # The numbers are an example, of a frame of 8 m: put in yours, then run "tautwire check" on this file.
 
@@ -37,7 +37,7 @@ winch_speed_noise = 1e-4          # m/s
 
 # One table for each cable, three or more. The law of tension is T = E S eps + c S deps/dt + T0.
 """
-CABLE = """
+TEMPLATE_CABLE = """
 [[cable]]  # cable {number}
 anchor = [{x}, {y}, {z}]  # m, where the cable leaves the frame
 modulus = 1.0e11                  # Pa, E: steel rope about 1e11, braided polyethylene about 6e10
@@ -47,7 +47,7 @@ law = "logarithmic"               # eps is ln(l/l_u); or "linear", l/l_u - 1
 # modulus_uncertainty = 2e9       # Pa
 # damping_uncertainty = 1e8       # Pa s
 """
-TAIL = """
+TEMPLATE_TAIL = """
 # Winches that follow the speed asked of them only so fast; without this table the rope runs exactly at that speed.
 # [winch]
 # drum_radius = 0.1               # m
@@ -75,17 +75,23 @@ TAIL = """
 """
 
 
-def new_robot_text(name: str, cable_count: int = FEWEST) -> str:
-    """A robot file of a robot with so many cables, 3 to 12, that can be built and run as it stands.
+def new_robot_text(name: str, cable_count: int = MIN_TEMPLATE_CABLES) -> str:
+    """The text of a template robot file with 3 to 12 cables, which can be built and run as it is.
 
-    Exit points lie evenly on a circle above the platform; of six and more, every second one below it.
+    Exit points lie evenly on a circle above the platform; from six cables on, every second one below it.
     """
-    below = cable_count >= 6
-    head = HEAD.format(name=json.dumps(name, ensure_ascii=False), preferred="600.0" if below else "250.0")
-    return head + "".join(_cable(number, cable_count, below) for number in range(1, cable_count + 1)) + TAIL
+    has_lower_anchors = cable_count >= 6
+    head = TEMPLATE_HEAD.format(
+        name=json.dumps(name, ensure_ascii=False), preferred="600.0" if has_lower_anchors else "250.0"
+    )
+    return (
+        head
+        + "".join(_template_cable(number, cable_count, has_lower_anchors) for number in range(1, cable_count + 1))
+        + TEMPLATE_TAIL
+    )
 
 
-def _cable(number: int, cable_count: int, below: bool) -> str:
+def _template_cable(number: int, cable_count: int, has_lower_anchors: bool) -> str:
     angle = 2.0 * pi * (number - 1) / cable_count
     x, y = (round(4.0 * part, 3) + 0.0 for part in (cos(angle), sin(angle)))
-    return CABLE.format(number=number, x=x, y=y, z=0.0 if below and number % 2 == 0 else 5.0)
+    return TEMPLATE_CABLE.format(number=number, x=x, y=y, z=0.0 if has_lower_anchors and number % 2 == 0 else 5.0)

@@ -1,4 +1,4 @@
-"""Whether a recording can be one of a robot at all."""
+"""Consistency of a recording and a robot: start position and winch travel."""
 
 from __future__ import annotations
 
@@ -13,76 +13,80 @@ from ..robots.robot import Robot
 
 Array = NDArray[np.float64]
 
-# Shares of the robot's size: a start nearer than FAR, or ropes reeled by less than LEAST, tell nothing.
-FAR, LEAST = 0.1, 1e-3
-# Of what was reeled. Stretch, wrong drums and drift stay far below, another robot's ropes are wrong by all of it.
-APART = 0.5
-LOOKED_AT = 60.0  # s
-# Rows at rest at the start, and the share of all rows that counts: a tracker may jump now and then.
-FIRST, COUNTED = 5, 0.95
-MEND = "give a recording of this robot, with positions in m in the robot file's frame, or correct the robot file"
+# Shares of the robot's size: a nearer start, or a shorter winch travel, is not checked.
+MIN_CHECKED_START_SHARE, MIN_REELED_SHARE = 0.1, 1e-3
+# Share of the winch travel: stretch, wrong drums and drift stay far below, another robot mismatches by all of it.
+MAX_REELING_MISMATCH = 0.5
+CHECKED_DURATION = 60.0  # s
+# Rows at rest at the start, and the quantile of rows without outliers of the tracker.
+ROWS_AT_REST, INLIER_QUANTILE = 5, 0.95
+CONSISTENCY_HINT = (
+    "give a recording of this robot, with positions in m in the robot file's frame, or correct the robot file"
+)
 
 
-def start_told(robot: Robot, start: Array) -> str:
-    """How far a start is from the robot file's, in words."""
-    return f"{_gap(robot, start):.3g} m from where the robot file starts it, at [{_place(robot.platform.start)}] m"
+def describe_start(robot: Robot, start: Array) -> str:
+    """Describe how far a start is from the robot file's."""
+    return f"{_start_distance(robot, start):.3g} m from where the robot file starts it, at [{_position_text(robot.platform.start)}] m"
 
 
-def require_near(robot: Robot, start: Array, where: str) -> None:
+def require_start_within_robot(robot: Robot, start: Array, where: str) -> None:
     """Raises RecordingError where a start is farther from the robot file's than the robot is large."""
-    size = size_of(robot)
-    if _gap(robot, start) > size:
-        raise RecordingError(where, f"{_begin(robot, start)}, and the robot is no larger than {size:.3g} m", MEND)
+    size = robot_size(robot)
+    if _start_distance(robot, start) > size:
+        raise RecordingError(
+            where, f"{_start_text(robot, start)}, and the robot is no larger than {size:.3g} m", CONSISTENCY_HINT
+        )
 
 
-def require_ropes(robot: Robot, recording: Recording, start: Array, where: str) -> None:
-    """Refuse a recording that starts far away, with ropes that are not reeled as its winch speeds say.
+def require_matching_reeling(robot: Robot, recording: Recording, start: Array, where: str) -> None:
+    """Refuse a recording that starts far away and whose winch travel does not match its positions.
 
-    Their lengths are ``|a_i - p|``. Raises RecordingError.
+    Rope lengths are ``|a_i - p|``. Raises RecordingError.
     """
-    size = size_of(robot)
-    if _gap(robot, start) < FAR * size:
+    size = robot_size(robot)
+    if _start_distance(robot, start) < MIN_CHECKED_START_SHARE * size:
         return
-    reeled, missed = reeled_and_missed(robot, recording)
-    if reeled > LEAST * size and missed > APART * reeled:
-        told = f"ropes there would not be reeled so: {reeled:.2g} m were, {missed:.2g} m do not fit (rms)"
-        raise RecordingError(where, f"{_begin(robot, start)}, and {told}", MEND)
+    reeled, mismatch = reeling_mismatch(robot, recording)
+    if reeled > MIN_REELED_SHARE * size and mismatch > MAX_REELING_MISMATCH * reeled:
+        mismatch_text = f"ropes there would not be reeled so: {reeled:.2g} m were, {mismatch:.2g} m do not fit (rms)"
+        raise RecordingError(where, f"{_start_text(robot, start)}, and {mismatch_text}", CONSISTENCY_HINT)
 
 
-def reeled_and_missed(robot: Robot, recording: Recording) -> tuple[float, float]:
-    """Rope reeled by the winches, and what of it the lengths at the recorded positions do not show; rms in m.
+def reeling_mismatch(robot: Robot, recording: Recording) -> tuple[float, float]:
+    """Winch travel, and its mismatch with the rope lengths at the recorded positions; rms in m.
 
-    Without the rows at which most is missed, which may be outliers.
+    The rows with the largest mismatch are left out, since they may be outliers.
     """
     time, speeds = recording.time, recording.winch_speed
     reeled = np.zeros_like(speeds)
     np.cumsum(0.5 * (speeds[1:] + speeds[:-1]) * np.diff(time)[:, None], axis=0, out=reeled[1:])
-    rows = np.isfinite(recording.position).all(axis=1) & (time <= time[0] + LOOKED_AT)
+    rows = np.isfinite(recording.position).all(axis=1) & (time <= time[0] + CHECKED_DURATION)
     if not rows.any():
         return 0.0, 0.0
     lengths = np.linalg.norm(np.array(robot.anchors) - recording.position[rows][:, None], axis=2)
-    wound = reeled[rows] - reeled[rows][0]
-    errors = wound + lengths - np.median(lengths[:FIRST], axis=0)
-    missed = np.mean(errors**2, axis=1)
-    kept = missed <= np.quantile(missed, COUNTED)
-    return _rms(wound[kept]), _rms(errors[kept])
+    reeled_length = reeled[rows] - reeled[rows][0]
+    errors = reeled_length + lengths - np.median(lengths[:ROWS_AT_REST], axis=0)
+    mean_squares = np.mean(errors**2, axis=1)
+    inliers = mean_squares <= np.quantile(mean_squares, INLIER_QUANTILE)
+    return _rms(reeled_length[inliers]), _rms(errors[inliers])
 
 
-def size_of(robot: Robot) -> float:
+def robot_size(robot: Robot) -> float:
     """The largest distance between two of the exit points and the start, in m."""
-    places = np.array([*robot.anchors, robot.platform.start])
-    return float(np.max(np.linalg.norm(places[:, None] - places[None], axis=2)))
+    points = np.array([*robot.anchors, robot.platform.start])
+    return float(np.max(np.linalg.norm(points[:, None] - points[None], axis=2)))
 
 
-def _gap(robot: Robot, start: Array) -> float:
+def _start_distance(robot: Robot, start: Array) -> float:
     return float(np.linalg.norm(start - np.array(robot.platform.start)))
 
 
-def _begin(robot: Robot, start: Array) -> str:
-    return f"they begin at [{_place(start)}] m, {start_told(robot, start)}"
+def _start_text(robot: Robot, start: Array) -> str:
+    return f"they begin at [{_position_text(start)}] m, {describe_start(robot, start)}"
 
 
-def _place(position: Sequence[float] | Array) -> str:
+def _position_text(position: Sequence[float] | Array) -> str:
     return ", ".join(f"{coordinate:.5g}" for coordinate in position)
 
 

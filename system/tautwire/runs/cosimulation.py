@@ -1,4 +1,4 @@
-"""A robot's FMUs wired together: cables and platform, driven by winch speeds."""
+"""Co-simulation of a robot's FMUs: cables, winches and platform, driven by winch speeds."""
 
 from __future__ import annotations
 
@@ -12,53 +12,53 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
-from ..array_arguments import array_of, rising_of
+from ..array_arguments import validate_array, validate_increasing
 from ..errors import TautwireError
 from ..fmus.packaging import RobotFmus
-from ..fmus.slots import SlotError, lacking_ports, require_steps
-from ..interrupt import interrupts_held
+from ..fmus.slots import SlotError, missing_user_fmu_ports, require_step_support
+from ..interrupt import defer_interrupts
 from ..master import (
-    Account,
     AdaptiveStep,
+    CallJournal,
     Component,
     ComponentError,
     Connection,
     Coupling,
     FixedStep,
-    Journal,
-    Kept,
+    InputSource,
+    JournalledComponent,
+    MemoryRecorder,
+    PiecewiseLinearInput,
     Port,
     Progress,
     Recorder,
-    Sampled,
-    Source,
-    Stepping,
-    WatchedComponent,
+    RunStatistics,
+    StepSizeControl,
     simulate,
-    simulate_watched,
+    simulate_isolated,
 )
-from .asked import require_fmus, require_options
-from .wiring import AXES, PLATFORM, SHOWN_OF_CABLE, RobotWiring, result_columns, wired_beside, wiring_of
+from .asked import validate_fmus, validate_options
+from .wiring import AXES, CABLE_QUANTITIES, PLATFORM, RobotWiring, result_columns, wire_robot, with_connections
 
 Array = NDArray[np.float64]
 
-STEP = 0.01
-SAME_START = 1e-6  # m
-SAME_STEP = 1e-6
+DEFAULT_STEP = 0.01
+START_TOLERANCE = 1e-6  # m
+EQUAL_STEP_RTOL = 1e-6
 
-SPEEDS = "finite speeds in m/s, a row for each time and a column for each of the {count} cables"
-TIMES = "rising, finite times (N,) in s, two or more"
+WINCH_SPEED_MEANING = "finite speeds in m/s, a row for each time and a column for each of the {count} cables"
+TIME_MEANING = "rising, finite times (N,) in s, two or more"
 
 
 @dataclass(frozen=True)
-class Motion:
-    """A run of a robot with n cables at N times; SI units.
+class CosimulationResult:
+    """Result of a co-simulation of a robot with n cables at N times; SI units.
 
-    ``account`` tells steps, redos and the energy that the coupling made. ``time`` (N,); ``position`` and ``velocity``
-    (N, 3); ``tension``, ``length``, ``elongation`` and ``strain``
-    (N, n). ``elongation`` is the paper's r, see :func:`tautwire_fmu.laws.cable.reading`. ``winch_speed`` (N,) is what
-    the winch of a cable, counted from 1, made of its command, where it has one. Columns of a result file that some
-    FMU does not show are ``lacking``, their numbers not finite.
+    ``statistics`` has steps, iterations and the energy residual of the coupling. ``time`` (N,); ``position`` and
+    ``velocity`` (N, 3); ``tension``, ``length``, ``elongation`` and ``strain``
+    (N, n). ``elongation`` is the paper's r, see :func:`tautwire_fmu.laws.cable.reading`. ``winch_speed`` (N,) is the
+    speed of the winch of a cable, counted from 1, where it has one. Columns of a result file that no FMU provides are
+    ``missing_columns``, their numbers not finite.
     """
 
     time: Array
@@ -68,73 +68,79 @@ class Motion:
     length: Array
     elongation: Array
     strain: Array
-    account: Account = field(default_factory=Account, compare=False)
+    statistics: RunStatistics = field(default_factory=RunStatistics, compare=False)
     winch_speed: Mapping[int, Array] = field(default_factory=dict)
-    lacking: tuple[str, ...] = ()
+    missing_columns: tuple[str, ...] = ()
 
     def measured(self) -> Array:
-        """What sensors see, shape (N, 3 + n): x, y, z, then the tensions."""
+        """Measured outputs, shape (N, 3 + n): x, y, z, then the tensions."""
         return np.hstack([self.position, self.tension])
 
     def frame(self) -> pd.DataFrame:
         """The run as a table with the columns of a result file."""
-        cables = [getattr(self, name) for name in SHOWN_OF_CABLE]
+        cables = [getattr(self, name) for name in CABLE_QUANTITIES]
         rows = np.column_stack([self.time, self.position, self.velocity, *cables, *self.winch_speed.values()])
         columns = result_columns(self.tension.shape[1], tuple(self.winch_speed))
-        return pd.DataFrame(rows, columns=[column.name for column in columns]).drop(columns=list(self.lacking))
+        return pd.DataFrame(rows, columns=[column.name for column in columns]).drop(columns=list(self.missing_columns))
 
 
 class RunError(TautwireError):
-    """An FMU failed in a run; ``motion`` is the run until then."""
+    """An FMU failed in a run; ``result`` is the run until then."""
 
-    def __init__(self, cause: ComponentError, motion: Motion) -> None:
+    def __init__(self, cause: ComponentError, result: CosimulationResult) -> None:
         self.cause = cause
-        self.motion = motion
+        self.result = result
         super().__init__(str(cause))
 
 
 @dataclass(frozen=True)
-class Beside:
-    """What runs beside a robot's own FMUs: ``parts`` by name, such as a controller, and ``wires`` from and to them.
+class AdditionalComponents:
+    """Additional components: FMUs by name, such as a controller, and ``connections`` from and to them.
 
-    ``also`` are inputs to be driven beside those of the winches; what drives them comes after these.
+    ``external_inputs`` are further external inputs; their values follow those of the winches.
     """
 
-    parts: Mapping[str, Path] = field(default_factory=dict)
-    wires: tuple[Connection, ...] = ()
-    also: tuple[Port, ...] = ()
+    fmu_paths: Mapping[str, Path] = field(default_factory=dict)
+    connections: tuple[Connection, ...] = ()
+    external_inputs: tuple[Port, ...] = ()
 
 
-ALONE = Beside()
+NO_ADDITIONAL_COMPONENTS = AdditionalComponents()
 
 
 @contextmanager
-def instantiated(
-    fmus: RobotFmus, journal: Journal | None = None, also: Sequence[Port] = (), beside: Beside = ALONE
+def instantiate_robot(
+    fmus: RobotFmus,
+    journal: CallJournal | None = None,
+    external_inputs: Sequence[Port] = (),
+    additional: AdditionalComponents = NO_ADDITIONAL_COMPONENTS,
 ) -> Iterator[Coupling]:
-    """The wired robot in initialization mode; instances and folders go when the block ends.
+    """The coupled robot in initialization mode; instances and folders are removed when the block ends.
 
-    With a ``journal`` each call of an FMU is noted in it; ``also`` are inputs to be driven beside those of the winches.
+    With a ``journal`` each FMU call is noted in it; ``external_inputs`` are further ones besides those of the winches.
     """
-    wiring = wired_beside(wired(fmus), len(fmus.cables), beside.wires, (*beside.also, *also))
-    make = Component if journal is None else partial(WatchedComponent, journal)
-    memory = None if journal is None else journal.inputs
+    wiring = with_connections(
+        wire_fmus(fmus), len(fmus.cables), additional.connections, (*additional.external_inputs, *external_inputs)
+    )
+    new_component = Component if journal is None else partial(JournalledComponent, journal)
+    allocate_inputs = None if journal is None else journal.allocate_inputs
     with ExitStack() as stack:
         components = {
-            name: stack.enter_context(make(name, path)) for name, path in {**fmus.parts, **beside.parts}.items()
+            name: stack.enter_context(new_component(name, path))
+            for name, path in {**fmus.by_component, **additional.fmu_paths}.items()
         }
         for name, component in components.items():
-            start = {**fmus.own.get(name, {}), **fmus.settings.get(name, {})}
+            start = {**fmus.user_start_values.get(name, {}), **fmus.start_settings.get(name, {})}
             component.initialize(0.0, {key: value for key, value in start.items() if _is_parameter(component, key)})
-        _require_start(fmus, components[PLATFORM])
+        _require_platform_start(fmus, components[PLATFORM])
         yield Coupling(
             components,
             wiring.connections,
-            wiring.drives,
-            wiring.bonds,
-            wiring.kinks,
-            memory=memory,
-            rates=wiring.rates,
+            wiring.external_inputs,
+            wiring.power_bonds,
+            wiring.event_indicators,
+            allocate_inputs=allocate_inputs,
+            derivative_connections=wiring.derivative_connections,
         )
 
 
@@ -142,39 +148,43 @@ def _is_parameter(component: Component, name: str) -> bool:
     return name in component.variables and component.variables[name].causality == "parameter"
 
 
-def _require_start(fmus: RobotFmus, platform: Component) -> None:
-    """Refuse a user's platform that is elsewhere than where the cables take it to start."""
-    if PLATFORM not in fmus.own:
+def _require_platform_start(fmus: RobotFmus, platform: Component) -> None:
+    """Refuse a user's platform whose start position differs from that of the cables."""
+    if PLATFORM not in fmus.user_start_values:
         return
     block = platform.block([f"position.{axis}" for axis in AXES])
     platform.read(block)
-    expected = np.array([fmus.own[PLATFORM][f"start.{axis}"] for axis in AXES])
-    if not np.max(np.abs(block.values - expected)) < SAME_START:
-        there, here = (", ".join(f"{value:.9g}" for value in place) for place in (block.values, expected))
-        mend = "start it there, or give it parameters start.x, start.y and start.z, which are then set"
-        raise SlotError(fmus.platform, PLATFORM, None, f"it starts at {there} m, the run at {here} m", mend)
+    expected = np.array([fmus.user_start_values[PLATFORM][f"start.{axis}"] for axis in AXES])
+    if not np.max(np.abs(block.values - expected)) < START_TOLERANCE:
+        platform_text, expected_text = (
+            ", ".join(f"{value:.9g}" for value in position) for position in (block.values, expected)
+        )
+        hint = "start it there, or give it parameters start.x, start.y and start.z, which are then set"
+        raise SlotError(
+            fmus.platform, PLATFORM, None, f"it starts at {platform_text} m, the run at {expected_text} m", hint
+        )
 
 
-def wired(fmus: RobotFmus) -> RobotWiring:
+def wire_fmus(fmus: RobotFmus) -> RobotWiring:
     """How a robot's FMUs are wired; raises SlotError where one of the user's cannot be read."""
     count = len(fmus.cables)
-    own = {slot: fmus.parts[slot] for slot in fmus.own}
-    return wiring_of(count, fmus.winch_numbers, lacking_ports(own, count), fmus.measured)
+    user_fmus = {slot: fmus.by_component[slot] for slot in fmus.user_start_values}
+    return wire_robot(count, fmus.winch_numbers, missing_user_fmu_ports(user_fmus, count), fmus.has_position_sensor)
 
 
 def cosimulate(
     fmus: RobotFmus,
     time: ArrayLike,
     winch_speed: ArrayLike,
-    step: float = STEP,
+    step: float = DEFAULT_STEP,
     tolerance: float | None = None,
     progress: Progress | None = None,
     patience: float | None = None,
-) -> Motion:
+) -> CosimulationResult:
     """Co-simulate a robot over sampled winch speeds, linear between samples.
 
     ``time`` (N,) in s, rising, and ``winch_speed`` (N, n) in m/s, positive reels in, are arrays or columns of a frame.
-    Speeds are what the rope does, or what winches are asked for where the robot has such. Macro steps are no longer
+    Speeds are those of the rope, or the commands of the winches where the robot has such. Macro steps are no longer
     than ``step`` (s); or such that their estimated errors of all lengths sum to at most ``tolerance`` (m), where one is
     given. ``progress`` gets the share that is done. With a ``patience`` (s) an FMU that is in one call for so long, or
     takes its process down, is one that fails. Returns the run at ``time``: arrays (N, 3) and (N, n) in SI units.
@@ -182,113 +192,131 @@ def cosimulate(
     Raises RunError where an FMU fails, StepError where no step meets the tolerance, SlotError where an FMU of the
     user's starts elsewhere or cannot make such steps, ArgumentError where an argument is none of these.
     """
-    require_fmus("cosimulate: fmus", fmus)
-    moments = rising_of("cosimulate: time", time, TIMES)
+    validate_fmus("cosimulate: fmus", fmus)
+    sample_times = validate_increasing("cosimulate: time", time, TIME_MEANING)
     count = len(fmus.cables)
-    speeds = array_of("cosimulate: winch_speed", winch_speed, (len(moments), count), SPEEDS.format(count=count))
-    require_options("cosimulate", step, tolerance, progress, patience)
-    return run(fmus, Sampled(moments, speeds), moments, stepping_by(step, tolerance, moments), progress, patience)
+    speeds = validate_array(
+        "cosimulate: winch_speed", winch_speed, (len(sample_times), count), WINCH_SPEED_MEANING.format(count=count)
+    )
+    validate_options("cosimulate", step, tolerance, progress, patience)
+    return run_cosimulation(
+        fmus,
+        PiecewiseLinearInput(sample_times, speeds),
+        sample_times,
+        step_size_control_for(step, tolerance, sample_times),
+        progress,
+        patience,
+    )
 
 
-def stepping_by(step: float, tolerance: float | None, time: Array) -> Stepping:
+def step_size_control_for(step: float, tolerance: float | None, time: Array) -> StepSizeControl:
     """Steps no longer than ``step`` (s), or by a ``tolerance`` (m) for a run over ``time`` where one is given."""
     return FixedStep(step) if tolerance is None else AdaptiveStep(tolerance, float(time[-1] - time[0]))
 
 
-def run(
+def run_cosimulation(
     fmus: RobotFmus,
-    source: Source,
+    input_source: InputSource,
     time: Array,
-    stepping: Stepping,
+    step_size_control: StepSizeControl,
     progress: Progress | None = None,
-    patience: float | None = None,
-    beside: Beside = ALONE,
-) -> Motion:
+    call_timeout: float | None = None,
+    additional: AdditionalComponents = NO_ADDITIONAL_COMPONENTS,
+) -> CosimulationResult:
     """Co-simulate a robot under any source of winch speeds, recorded at ``time``.
 
-    ``patience`` and ``beside`` are as for :func:`record`.
+    ``call_timeout`` and ``additional`` are as for :func:`record_cosimulation`.
 
     Raises RunError, which has the run until then, where an FMU fails.
     """
-    wiring = wired(fmus)
-    kept = Kept(len(time), len(wiring.shown))
+    wiring = wire_fmus(fmus)
+    recorder = MemoryRecorder(len(time), len(wiring.outputs))
     try:
-        account = record(fmus, source, time, stepping, kept, progress, patience, beside)
+        statistics = record_cosimulation(
+            fmus, input_source, time, step_size_control, recorder, progress, call_timeout, additional
+        )
     except ComponentError as error:
-        raise RunError(error, motion_of(time[: kept.count], kept.rows, fmus, wiring)) from error
-    return replace(motion_of(time, kept.rows, fmus, wiring), account=account)
+        raise RunError(error, result_from_rows(time[: recorder.count], recorder.rows, fmus, wiring)) from error
+    return replace(result_from_rows(time, recorder.rows, fmus, wiring), statistics=statistics)
 
 
-def record(
+def record_cosimulation(
     fmus: RobotFmus,
-    source: Source,
+    input_source: InputSource,
     time: Array,
-    stepping: Stepping,
+    step_size_control: StepSizeControl,
     recorder: Recorder,
     progress: Progress | None = None,
-    patience: float | None = None,
-    beside: Beside = ALONE,
-) -> Account:
-    """Co-simulate a robot under any source of winch speeds; the recorder gets a row at each ``time`` and keeps it.
+    call_timeout: float | None = None,
+    additional: AdditionalComponents = NO_ADDITIONAL_COMPONENTS,
+) -> RunStatistics:
+    """Co-simulate a robot under any source of winch speeds; the recorder gets a row at each ``time``.
 
-    A row is in the order of :attr:`RobotWiring.shown`. Nothing else is kept of a run, however long. With a ``patience``
-    (s) the FMUs run in a process of their own, so that one that hangs for so long, or takes its process down, is an FMU
-    that fails; see :func:`tautwire.master.simulate_watched`. Other components may run ``beside`` the robot's own.
+    A row is in the order of :attr:`RobotWiring.outputs`. Nothing else is kept of a run, however long. With a
+    ``call_timeout`` (s) the FMUs run in a worker process, so that one that hangs for so long, or crashes its process,
+    is an FMU that fails; see :func:`tautwire.cosimulation.simulate_isolated`. ``additional`` components run with them.
 
     Raises ComponentError where an FMU fails; the recorder has what came before. Raises SlotError where an FMU of the
     user's starts elsewhere, or cannot make such steps.
     """
-    chosen, intervals = isinstance(stepping, AdaptiveStep), np.diff(time)
-    even = not chosen and bool(np.ptp(intervals) <= SAME_STEP * np.max(intervals))
-    require_steps({slot: fmus.parts[slot] for slot in fmus.own}, chosen, even)
-    wiring = wired_beside(wired(fmus), len(fmus.cables), beside.wires, beside.also)
-    ports, source = wiring.shown, Chosen(source, wiring.driven)
-    if patience is not None:
-        return simulate_watched(
-            partial(instantiated, fmus, beside=beside), source, time, ports, stepping, recorder, progress, patience
+    is_adaptive, intervals = isinstance(step_size_control, AdaptiveStep), np.diff(time)
+    equal_steps = not is_adaptive and bool(np.ptp(intervals) <= EQUAL_STEP_RTOL * np.max(intervals))
+    require_step_support({slot: fmus.by_component[slot] for slot in fmus.user_start_values}, is_adaptive, equal_steps)
+    wiring = with_connections(wire_fmus(fmus), len(fmus.cables), additional.connections, additional.external_inputs)
+    ports, input_source = wiring.outputs, SelectedInputs(input_source, wiring.external_indices)
+    if call_timeout is not None:
+        return simulate_isolated(
+            partial(instantiate_robot, fmus, additional=additional),
+            input_source,
+            time,
+            ports,
+            step_size_control,
+            recorder,
+            progress,
+            call_timeout,
         )
-    with interrupts_held() as raise_interrupt, instantiated(fmus, beside=beside) as coupling:
+    with defer_interrupts() as raise_interrupt, instantiate_robot(fmus, additional=additional) as coupling:
 
-        def tell(done: float) -> None:
+        def report_progress(done: float) -> None:
             raise_interrupt()
             if progress is not None:
                 progress(done)
 
-        simulate(coupling, source, time, ports, stepping, recorder, tell)
-        return coupling.account
+        simulate(coupling, input_source, time, ports, step_size_control, recorder, report_progress)
+        return coupling.statistics
 
 
 @dataclass(frozen=True)
-class Chosen:
-    """A source of which only the values at ``places`` drive something."""
+class SelectedInputs:
+    """A source of which only the values at ``indices`` are external inputs."""
 
-    source: Source
-    places: tuple[int, ...]
+    source: InputSource
+    indices: tuple[int, ...]
 
-    def interval(self, index: int, time: float, step: float, shown: Array) -> tuple[Array, Array]:
-        """See :class:`tautwire.master.Source`."""
-        start, end = self.source.interval(index, time, step, shown)
-        if len(start) == len(self.places):
+    def interval(self, index: int, time: float, step: float, outputs: Array) -> tuple[Array, Array]:
+        """See :class:`tautwire.cosimulation.InputSource`."""
+        start, end = self.source.interval(index, time, step, outputs)
+        if len(start) == len(self.indices):
             return start, end
-        places = list(self.places)
-        return start[places], end[places]
+        indices = list(self.indices)
+        return start[indices], end[indices]
 
 
-def motion_of(time: Array, shown: Array, fmus: RobotFmus, wiring: RobotWiring) -> Motion:
-    """Sort recorded columns, in the order of :attr:`RobotWiring.shown`, into a run."""
+def result_from_rows(time: Array, rows: Array, fmus: RobotFmus, wiring: RobotWiring) -> CosimulationResult:
+    """Sort recorded columns, in the order of :attr:`RobotWiring.outputs`, into a result."""
     count, winches = len(fmus.cables), fmus.winch_numbers
-    whole = np.full((len(shown), len(wiring.recorded) + len(wiring.unrecorded)), np.nan)
-    whole[:, wiring.recorded] = shown
-    first_winch = 6 + len(SHOWN_OF_CABLE) * count
-    tension, length, elongation, strain = np.split(whole[:, 6:first_winch], len(SHOWN_OF_CABLE), axis=1)
-    return Motion(
+    all_columns = np.full((len(rows), len(wiring.output_indices) + len(wiring.missing_columns)), np.nan)
+    all_columns[:, wiring.output_indices] = rows
+    first_winch = 6 + len(CABLE_QUANTITIES) * count
+    tension, length, elongation, strain = np.split(all_columns[:, 6:first_winch], len(CABLE_QUANTITIES), axis=1)
+    return CosimulationResult(
         time,
-        whole[:, :3],
-        whole[:, 3:6],
+        all_columns[:, :3],
+        all_columns[:, 3:6],
         tension,
         length,
         elongation,
         strain,
-        winch_speed=dict(zip(winches, whole[:, first_winch:].T, strict=True)),
-        lacking=wiring.unrecorded,
+        winch_speed=dict(zip(winches, all_columns[:, first_winch:].T, strict=True)),
+        missing_columns=wiring.missing_columns,
     )

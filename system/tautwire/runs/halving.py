@@ -1,4 +1,4 @@
-"""The error of a run whose FMUs cannot redo a step: what the same run with half the steps differs by."""
+"""Step doubling: the error of a run without rollback, from a second run with half the step."""
 
 from __future__ import annotations
 
@@ -9,27 +9,27 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..master import Account, ComponentError, Coupling, FixedStep, Recorder, Stepping
-from ..master.stepping import Drives, Watch
+from ..master import ComponentError, Coupling, FixedStep, Recorder, RunStatistics, StepSizeControl
+from ..master.stepping import ExternalInputs, ReadLengths
 
 Array = NDArray[np.float64]
-Run = Callable[[int, Stepping, Recorder], Account]
+Run = Callable[[int, StepSizeControl, Recorder], RunStatistics]
 
-COMPARED = 5000
-# What is left of an error of first order that halving takes half of.
-FIRST_ORDER = 2.0
+MAX_COMPARED_ROWS = 5000
+# Error of the first run over its difference to the second, for a method of first order.
+FIRST_ORDER_FACTOR = 2.0
 
 
-class Beginning:
-    """A recorder that keeps the positions of the first rows, shape (N, 3), and hands every row on."""
+class FirstPositionsRecorder:
+    """A recorder that keeps the positions of the first rows, shape (N, 3), and passes every row on."""
 
     def __init__(self, count: int, recorder: Recorder | None = None) -> None:
-        self._rows = np.empty((min(count, COMPARED), 3))
+        self._rows = np.empty((min(count, MAX_COMPARED_ROWS), 3))
         self._recorder = recorder
         self._count = 0
 
     def add(self, time: float, row: Array) -> None:
-        """See :class:`tautwire.master.Recorder`."""
+        """See :class:`tautwire.cosimulation.Recorder`."""
         if self._count < len(self._rows):
             self._rows[self._count] = row[:3]
             self._count += 1
@@ -38,7 +38,7 @@ class Beginning:
 
     @property
     def positions(self) -> Array:
-        """The rows that came."""
+        """The positions recorded so far."""
         return self._rows[: self._count]
 
 
@@ -46,26 +46,28 @@ class Beginning:
 class HalvedStep:
     """Half of each step that a :class:`FixedStep` of this length makes."""
 
-    longest: float
-    agreement: None = None
+    max_step: float
+    coupling_tolerance: None = None
 
-    def cover(self, coupling: Coupling, begin: float, span: float, drives: Drives, watch: Watch) -> None:
-        """See :class:`tautwire.master.Stepping`."""
-        count = max(1, math.ceil(span / self.longest * (1.0 - 1e-9)))
-        FixedStep(0.5 * span / count).cover(coupling, begin, span, drives, watch)
+    def advance(
+        self, coupling: Coupling, begin: float, span: float, external_inputs: ExternalInputs, read_lengths: ReadLengths
+    ) -> None:
+        """See :class:`tautwire.cosimulation.StepSizeControl`."""
+        count = max(1, math.ceil(span / self.max_step * (1.0 - 1e-9)))
+        FixedStep(0.5 * span / count).advance(coupling, begin, span, external_inputs, read_lengths)
 
 
-def error_by_halving(run: Run, time: Array, step: float, first: Array) -> str:
-    """What to tell of the error of positions ``first`` (N, 3), recorded at ``time`` (N or more,) in steps of ``step``.
+def step_doubling_note(run: Run, time: Array, step: float, positions: Array) -> str:
+    """A note on the error of ``positions`` (N, 3), recorded at ``time`` (N or more,) in steps of ``step``.
 
-    ``run(count, stepping, recorder)`` makes the run again, up to ``count`` of its times. The error is twice what it
-    differs by, as for a method of first order; for one of second order it is a third too large.
+    ``run(count, step_size_control, recorder)`` repeats the run, up to ``count`` of its times. The error is twice the
+    difference of the two, as for a method of first order; for second order it is half too large.
     """
-    again = Beginning(len(first))
+    recorder = FirstPositionsRecorder(len(positions))
     try:
-        run(len(first), HalvedStep(step), again)
+        run(len(positions), HalvedStep(step), recorder)
     except ComponentError as error:
         return f"the error is not known: with half the step, {error}"
-    error_of_position = FIRST_ORDER * float(np.max(np.abs(first - again.positions), initial=0.0))
-    part = "" if len(first) == len(time) else f" over the first {time[len(first) - 1]:g} s"
-    return f"estimated error of the position{part}: {error_of_position:.2g} m, by a second run with half the step"
+    position_error = FIRST_ORDER_FACTOR * float(np.max(np.abs(positions - recorder.positions), initial=0.0))
+    period = "" if len(positions) == len(time) else f" over the first {time[len(positions) - 1]:g} s"
+    return f"estimated error of the position{period}: {position_error:.2g} m, by a second run with half the step"

@@ -14,12 +14,12 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from ..errors import TautwireError
-from ..output import file_in_place
+from ..output import atomic_file
 
 Array = NDArray[np.float64]
-Write = Callable[[Array], None]
+WriteRows = Callable[[Array], None]
 
-PARQUET = ".parquet"
+PARQUET_SUFFIX = ".parquet"
 BLOCK_BYTES = 2**22
 
 
@@ -32,19 +32,19 @@ class Column:
 
 
 class ResultFile:
-    """A recorder that hands its rows on block by block; it keeps no more than one block of ``BLOCK_BYTES``.
+    """A recorder that writes its rows block by block; it holds no more than one block of ``BLOCK_BYTES``.
 
-    ``count`` rows came so far. A row of the file is the time (s), then the observed outputs.
+    ``count`` rows were recorded so far. A row of the file is the time (s), then the observed outputs.
     """
 
-    def __init__(self, width: int, write: Write) -> None:
+    def __init__(self, width: int, write: WriteRows) -> None:
         self._block = np.empty((max(1, BLOCK_BYTES // (8 * width)), width), order="F")
         self._write = write
         self._filled = 0
         self.count = 0
 
     def add(self, time: float, row: Array) -> None:
-        """See :class:`tautwire.master.Recorder`."""
+        """See :class:`tautwire.cosimulation.Recorder`."""
         self._block[self._filled, 0] = time
         self._block[self._filled, 1:] = row
         self._filled += 1
@@ -53,14 +53,14 @@ class ResultFile:
             self.flush()
 
     def flush(self) -> None:
-        """Hand on the rows that are still here."""
+        """Write the rows that are still held."""
         if self._filled:
             self._write(self._block[: self._filled])
             self._filled = 0
 
 
 @contextmanager
-def result_in_place(target: Path, columns: Sequence[Column]) -> Iterator[ResultFile]:
+def open_result_file(target: Path, columns: Sequence[Column]) -> Iterator[ResultFile]:
     """A result file that becomes ``target`` when the block ends well, or fails after some rows.
 
     It is Parquet where the name ends in ``.parquet``, with each column's unit in its field's metadata, else CSV.
@@ -69,8 +69,8 @@ def result_in_place(target: Path, columns: Sequence[Column]) -> Iterator[ResultF
     that says where these are. After anything else nothing is left.
     """
     failure: TautwireError | None = None
-    opened = _parquet if target.suffix.lower() == PARQUET else _csv
-    with file_in_place(target) as scratch, opened(scratch, columns) as write:
+    open_writer = _parquet_writer if target.suffix.lower() == PARQUET_SUFFIX else _csv_writer
+    with atomic_file(target) as scratch, open_writer(scratch, columns) as write:
         result = ResultFile(len(columns), write)
         try:
             yield result
@@ -84,7 +84,7 @@ def result_in_place(target: Path, columns: Sequence[Column]) -> Iterator[ResultF
 
 
 @contextmanager
-def _parquet(path: Path, columns: Sequence[Column]) -> Iterator[Write]:
+def _parquet_writer(path: Path, columns: Sequence[Column]) -> Iterator[WriteRows]:
     """A row group for every block."""
     schema = pa.schema(
         [pa.field(column.name, pa.float64(), nullable=False, metadata={"unit": column.unit}) for column in columns]
@@ -94,7 +94,7 @@ def _parquet(path: Path, columns: Sequence[Column]) -> Iterator[Write]:
 
 
 @contextmanager
-def _csv(path: Path, columns: Sequence[Column]) -> Iterator[Write]:
+def _csv_writer(path: Path, columns: Sequence[Column]) -> Iterator[WriteRows]:
     with path.open("w", encoding="utf-8", newline="") as file:
         file.write(",".join(column.name for column in columns) + "\n")
         # A process that is forked from this one must not inherit text that is yet to be written.

@@ -11,14 +11,14 @@ import numpy as np
 
 from ..errors import RecordingError
 from ..fmus.packaging import build_fmus
-from ..fmus.slots import unstated_units
-from ..master import Account, Recorder, Sampled, Stepping
+from ..fmus.slots import notes_on_unstated_units
+from ..master import PiecewiseLinearInput, Recorder, RunStatistics, StepSizeControl
 from ..recordings.recording import Recording, read_recording
-from ..recordings.roughness import roughness
+from ..recordings.roughness import white_noise_deviation
 from ..robots.robot import Robot
-from .cosimulation import record, stepping_by, wired
-from .halving import Beginning, error_by_halving
-from .start import placed, start_of
+from .cosimulation import record_cosimulation, step_size_control_for, wire_fmus
+from .halving import FirstPositionsRecorder, step_doubling_note
+from .start import start_position, with_start
 from .wiring import RobotWiring
 
 
@@ -30,41 +30,45 @@ def simulate_recording(
     tolerance: float | None,
     until: float | None,
     progress: Callable[[str, float], None],
-    patience: float | None = None,
-) -> tuple[Account, tuple[str, ...]]:
-    """Record a run at the recording's times, up to ``until`` (s); returns its books and what the user should know.
+    call_timeout: float | None = None,
+) -> tuple[RunStatistics, tuple[str, ...]]:
+    """Record a run at the recording's times, up to ``until`` (s); returns its statistics and notes for the user.
 
-    ``patience`` is as for :func:`tautwire.runs.cosimulation.record`.
+    ``call_timeout`` is as for :func:`record_cosimulation`.
 
     Raises RecordingError where fewer than two samples lie before ``until``, ComponentError where an FMU fails: the
     recorder has what came before.
     """
     recording = read_recording(path, robot.cable_count)
-    noise = robot.sensors.position_noise or roughness(recording.position)
-    start, notes = start_of(robot, noise, recording)
-    count = _count(recording, until)
+    noise = robot.sensors.position_noise or white_noise_deviation(recording.position)
+    start, notes = start_position(robot, noise, recording)
+    count = _sample_count(recording, until)
     time, winch_speed = recording.time[:count], recording.winch_speed[:count]
-    # Where a long run starts is known; what was measured need not stay in memory all through it.
+    # The start is known; measurements need not stay in memory through a long run.
     del recording
     if robot.winch_numbers:
         notes = (*notes, f"{path}: winch speeds are what the winches are asked for")
-    notes = (*notes, *unstated_units(robot.fmus, robot.cable_count))
+    notes = (*notes, *notes_on_unstated_units(robot.fmus, robot.cable_count))
     with TemporaryDirectory(prefix="tautwire-simulate-") as folder:
-        fmus = build_fmus(placed(robot, start), Path(folder), partial(progress, "building"))
-        source, begun = Sampled(time, winch_speed), Beginning(count, recorder)
+        fmus = build_fmus(with_start(robot, start), Path(folder), partial(progress, "building"))
+        source, first_positions = PiecewiseLinearInput(time, winch_speed), FirstPositionsRecorder(count, recorder)
 
-        def run(rows: int, stepping: Stepping, into: Recorder, what: str = "estimating the error") -> Account:
-            return record(fmus, source, time[:rows], stepping, into, partial(progress, what), patience)
+        def run(
+            rows: int, stepping: StepSizeControl, target: Recorder, activity: str = "estimating the error"
+        ) -> RunStatistics:
+            return record_cosimulation(
+                fmus, source, time[:rows], stepping, target, partial(progress, activity), call_timeout
+            )
 
-        account = run(count, stepping_by(step, tolerance, time), begun, "co-simulating")
-        notes = (*notes, *lacking_notes(wired(fmus)), *account.fallbacks())
-        if account.fallbacks() and tolerance is None:
-            notes = (*notes, error_by_halving(run, time, step, begun.positions))
-    return account, (*notes, *account.warnings())
+        statistics = run(count, step_size_control_for(step, tolerance, time), first_positions, "co-simulating")
+        notes = (*notes, *missing_column_notes(wire_fmus(fmus)), *statistics.fallback_notes())
+        if statistics.fallback_notes() and tolerance is None:
+            notes = (*notes, step_doubling_note(run, time, step, first_positions.positions))
+    return statistics, (*notes, *statistics.warnings())
 
 
-def _count(recording: Recording, until: float | None) -> int:
-    """How many samples lie before ``until``."""
+def _sample_count(recording: Recording, until: float | None) -> int:
+    """Number of samples up to ``until``."""
     count = len(recording.time) if until is None else int(np.searchsorted(recording.time, until, side="right"))
     if count < 2:
         raise RecordingError(
@@ -75,6 +79,8 @@ def _count(recording: Recording, until: float | None) -> int:
     return count
 
 
-def lacking_notes(wiring: RobotWiring) -> tuple[str, ...]:
-    """What some FMU does not show, so that the result has no column for it."""
-    return (f"not in the result, no FMU shows it: {', '.join(wiring.unrecorded)}",) if wiring.unrecorded else ()
+def missing_column_notes(wiring: RobotWiring) -> tuple[str, ...]:
+    """A note on outputs that no FMU provides, so that the result has no column for them."""
+    return (
+        (f"not in the result, no FMU shows it: {', '.join(wiring.missing_columns)}",) if wiring.missing_columns else ()
+    )

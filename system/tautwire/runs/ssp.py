@@ -1,8 +1,8 @@
 """Writes a robot's FMUs, their wiring, parameter values and units as one SSP 1.0 archive.
 
-``SystemStructure.ssd`` has connectors of its own for what drives the winches (in) and for what a run shows (out).
+``SystemStructure.ssd`` has system connectors for the external inputs of the winches and for the recorded outputs.
 Importers that know connections between components only (libcosim, ecos) refuse those, so ``ComponentsOnly.ssd``, a
-second variant in the same archive, leaves them away.
+second variant in the same archive, omits them.
 """
 
 from __future__ import annotations
@@ -23,32 +23,32 @@ from ..errors import one_line
 from ..fmus.packaging import RobotFmus
 from ..fmus.slots import slot_ports
 from ..master import Connection, Port
-from ..master.archive import description_of
-from ..master.standard import is_real
-from ..master.units import BASES, measure, measure_of, unit_of
-from ..output import file_in_place
+from ..master.archive import read_model_description
+from ..master.standard import is_real_scalar
+from ..master.units import SI_BASE_UNITS, definition_from_exponents, unit_definition, unit_of
+from ..output import atomic_file
 from ..robots.robot import Robot
-from .cosimulation import wired
-from .wiring import PLATFORM, middle_connections
+from .cosimulation import wire_fmus
+from .wiring import PLATFORM, midpoint_connections
 
-OPEN = "SystemStructure.ssd"
+SYSTEM_STRUCTURE = "SystemStructure.ssd"
 COMPONENTS_ONLY = "ComponentsOnly.ssd"
-SYSTEM = "robot"
+SYSTEM_NAME = "robot"
 NAMESPACE = "http://ssp-standard.org/SSP1/SystemStructure"
-SPACES = {
+NAMESPACES = {
     "xmlns:ssd": f"{NAMESPACE}Description",
     "xmlns:ssc": f"{NAMESPACE}Common",
     "xmlns:ssv": f"{NAMESPACE}ParameterValues",
 }
-LONGEST_STEM = 100
-RESERVED = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\.|$)", re.IGNORECASE)
-# The same FMUs give the same bytes: no time of writing goes into the archive.
-STAMP = (1980, 1, 1, 0, 0, 0)
+MAX_STEM_BYTES = 100
+RESERVED_NAMES = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\.|$)", re.IGNORECASE)
+# Reproducible archives: the same FMUs give the same bytes, without the time of writing.
+ENTRY_DATE = (1980, 1, 1, 0, 0, 0)
 
 
 @dataclass(frozen=True)
-class _Part:
-    """A component of the system: its name and FMU, the FMU's variables by name, its connectors and their units."""
+class _SspComponent:
+    """An SSP component: its name and FMU, the FMU's variables by name, its connectors and their units."""
 
     name: str
     path: Path
@@ -56,20 +56,20 @@ class _Part:
     variables: Mapping[str, ScalarVariable]
     connectors: Mapping[str, str]
 
-    def bases(self, unit: str) -> dict[str, str]:
-        """The attributes that tell what a unit measures, as the FMU defines it."""
+    def unit_attributes(self, unit: str) -> dict[str, str]:
+        """The attributes of a unit's BaseUnit element, as the FMU defines it."""
         if unit in UNITS:
             return {base: str(exponent) for base, exponent in UNITS[unit].items()}
-        *exponents, factor, offset = measure(self.description, unit) or measure_of({})
-        powers = {base: str(int(power)) for base, power in zip(BASES, exponents, strict=True) if power}
+        *exponents, factor, offset = unit_definition(self.description, unit) or definition_from_exponents({})
+        powers = {base: str(int(power)) for base, power in zip(SI_BASE_UNITS, exponents, strict=True) if power}
         return powers | ({} if (factor, offset) == (1.0, 0.0) else {"factor": repr(factor), "offset": repr(offset)})
 
 
 def ssp_name(robot: Robot) -> str:
     """A file name for a robot's archive that any file system takes, whatever the robot is called."""
     text = re.sub(r"[^\w.-]+", "_", unicodedata.normalize("NFC", robot.name))
-    stem = text.encode("utf-8", "ignore")[:LONGEST_STEM].decode("utf-8", "ignore").strip("._-")
-    return f"{SYSTEM}_{stem}.ssp" if RESERVED.match(stem) else f"{stem or SYSTEM}.ssp"
+    stem = text.encode("utf-8", "ignore")[:MAX_STEM_BYTES].decode("utf-8", "ignore").strip("._-")
+    return f"{SYSTEM_NAME}_{stem}.ssp" if RESERVED_NAMES.match(stem) else f"{stem or SYSTEM_NAME}.ssp"
 
 
 def write_ssp(robot: Robot, fmus: RobotFmus, path: Path) -> Path:
@@ -77,125 +77,129 @@ def write_ssp(robot: Robot, fmus: RobotFmus, path: Path) -> Path:
 
     Raises InputError where ``path`` cannot be written.
     """
-    wiring = wired(fmus)
-    # Importers know no middle of a step.
-    middle = middle_connections(len(fmus.cables))
-    wires = [wire for wire in wiring.connections if wire not in middle]
-    inward = {_outer_name(port): port for port in wiring.drives}
-    outward = {_outer_name(port): port for port in wiring.shown}
+    wiring = wire_fmus(fmus)
+    # Importers do not set midpoint inputs.
+    midpoint_wires = midpoint_connections(len(fmus.cables))
+    wires = [wire for wire in wiring.connections if wire not in midpoint_wires]
+    system_inputs = {_system_connector_name(port): port for port in wiring.external_inputs}
+    system_outputs = {_system_connector_name(port): port for port in wiring.outputs}
     ends = [end for wire in wires for end in (wire.source, wire.target)]
-    parts = _parts(fmus, [*ends, *inward.values(), *outward.values()])
-    with file_in_place(path) as scratch, zipfile.ZipFile(scratch, "w") as archive:
-        _add(archive, OPEN, _description(robot, parts, wires, inward, outward))
-        _add(archive, COMPONENTS_ONLY, _description(robot, parts, wires, {}, {}))
+    parts = _ssp_components(fmus, [*ends, *system_inputs.values(), *system_outputs.values()])
+    with atomic_file(path) as scratch, zipfile.ZipFile(scratch, "w") as archive:
+        _add_entry(archive, SYSTEM_STRUCTURE, _system_description(robot, parts, wires, system_inputs, system_outputs))
+        _add_entry(archive, COMPONENTS_ONLY, _system_description(robot, parts, wires, {}, {}))
         for part in parts.values():
-            _add(archive, _source(part), part.path.read_bytes(), zipfile.ZIP_STORED)
+            _add_entry(archive, _fmu_path(part), part.path.read_bytes(), zipfile.ZIP_STORED)
     return path
 
 
-def _parts(fmus: RobotFmus, ports: Iterable[Port]) -> dict[str, _Part]:
-    names: dict[str, dict[str, None]] = {name: {} for name in fmus.parts}
+def _ssp_components(fmus: RobotFmus, ports: Iterable[Port]) -> dict[str, _SspComponent]:
+    names: dict[str, dict[str, None]] = {name: {} for name in fmus.by_component}
     for port in ports:
         names[port.component][port.variable] = None
-    return {name: _part(name, path, names[name], len(fmus.cables)) for name, path in fmus.parts.items()}
+    return {name: _ssp_component(name, path, names[name], len(fmus.cables)) for name, path in fmus.by_component.items()}
 
 
-def _part(name: str, path: Path, connectors: Iterable[str], cable_count: int) -> _Part:
-    description = description_of(path)
+def _ssp_component(name: str, path: Path, connectors: Iterable[str], cable_count: int) -> _SspComponent:
+    description = read_model_description(path)
     variables = {variable.name: variable for variable in description.modelVariables}
-    ours = {port.name: port.unit for port in slot_ports(name, cable_count)}
-    units = {connector: unit_of(variables[connector]) or ours[connector] for connector in connectors}
-    return _Part(name, path, description, variables, units)
+    default_units = {port.name: port.unit for port in slot_ports(name, cable_count)}
+    units = {connector: unit_of(variables[connector]) or default_units[connector] for connector in connectors}
+    return _SspComponent(name, path, description, variables, units)
 
 
-def _outer_name(port: Port) -> str:
+def _system_connector_name(port: Port) -> str:
     """The name of a system connector: ``tension_2`` for the tension of the second cable."""
     return port.variable if port.component == PLATFORM else f"{port.variable}_{port.component.rpartition('_')[2]}"
 
 
-def _source(part: _Part) -> str:
+def _fmu_path(part: _SspComponent) -> str:
     return f"resources/{part.name}.fmu"
 
 
-def _add(archive: zipfile.ZipFile, name: str, data: bytes, method: int = zipfile.ZIP_DEFLATED) -> None:
-    entry = zipfile.ZipInfo(name, STAMP)
+def _add_entry(archive: zipfile.ZipFile, name: str, data: bytes, method: int = zipfile.ZIP_DEFLATED) -> None:
+    entry = zipfile.ZipInfo(name, ENTRY_DATE)
     entry.compress_type = method
     entry.external_attr = 0o644 << 16
     archive.writestr(entry, data)
 
 
-def _description(
+def _system_description(
     robot: Robot,
-    parts: Mapping[str, _Part],
+    parts: Mapping[str, _SspComponent],
     wires: Iterable[Connection],
-    inward: Mapping[str, Port],
-    outward: Mapping[str, Port],
+    system_inputs: Mapping[str, Port],
+    system_outputs: Mapping[str, Port],
 ) -> bytes:
     name = one_line(robot.name)
-    root = Element("ssd:SystemStructureDescription", {**SPACES, "version": "1.0", "name": name})
+    root = Element("ssd:SystemStructureDescription", {**NAMESPACES, "version": "1.0", "name": name})
     root.set("generationTool", "Tautwire")
-    system = SubElement(root, "ssd:System", {"name": SYSTEM, "description": f"cable robot {name}"})
-    if inward or outward:
+    system = SubElement(root, "ssd:System", {"name": SYSTEM_NAME, "description": f"cable robot {name}"})
+    if system_inputs or system_outputs:
         frame = SubElement(system, "ssd:Connectors")
-        for kind, ports in (("input", inward), ("output", outward)):
+        for kind, ports in (("input", system_inputs), ("output", system_outputs)):
             for outer, port in ports.items():
-                _connector(frame, outer, kind, port.variable, parts[port.component])
+                _add_connector(frame, outer, kind, port.variable, parts[port.component])
     elements = SubElement(system, "ssd:Elements")
     for component, part in parts.items():
-        _component(elements, component, part)
-    _connections(system, wires, inward, outward)
-    _units(root, parts.values())
+        _add_component(elements, component, part)
+    _add_connections(system, wires, system_inputs, system_outputs)
+    _add_units(root, parts.values())
     indent(root)
     return bytes(tostring(root, encoding="utf-8", xml_declaration=True))
 
 
-def _component(elements: Element, name: str, part: _Part) -> None:
-    attributes = {"name": name, "type": "application/x-fmu-sharedlibrary", "source": _source(part)}
+def _add_component(elements: Element, name: str, part: _SspComponent) -> None:
+    attributes = {"name": name, "type": "application/x-fmu-sharedlibrary", "source": _fmu_path(part)}
     component = SubElement(elements, "ssd:Component", attributes | {"implementation": "CoSimulation"})
     frame = SubElement(component, "ssd:Connectors")
     for connector in part.connectors:
-        _connector(frame, connector, part.variables[connector].causality, connector, part)
+        _add_connector(frame, connector, part.variables[connector].causality, connector, part)
     bindings = SubElement(component, "ssd:ParameterBindings")
     values = SubElement(SubElement(bindings, "ssd:ParameterBinding"), "ssd:ParameterValues")
     settings = SubElement(values, "ssv:ParameterSet", {"version": "1.0", "name": "values"})
     numbers = SubElement(settings, "ssv:Parameters")
-    parameters = [v for v in part.variables.values() if v.causality == "parameter" and is_real(v)]
+    parameters = [v for v in part.variables.values() if v.causality == "parameter" and is_real_scalar(v)]
     for parameter in parameters:
         number = SubElement(numbers, "ssv:Parameter", {"name": parameter.name})
         unit = unit_of(parameter)
         SubElement(number, "ssv:Real", {"value": str(parameter.start)} | ({"unit": unit} if unit else {}))
-    _unit_list(settings, "ssv:Units", {unit: part.bases(unit) for unit in filter(None, map(unit_of, parameters))})
+    _add_unit_list(
+        settings, "ssv:Units", {unit: part.unit_attributes(unit) for unit in filter(None, map(unit_of, parameters))}
+    )
 
 
-def _connector(frame: Element, name: str, kind: str, variable: str, part: _Part) -> None:
+def _add_connector(frame: Element, name: str, kind: str, variable: str, part: _SspComponent) -> None:
     connector = SubElement(frame, "ssd:Connector", {"name": name, "kind": kind})
     if part.variables[variable].description:
         connector.set("description", part.variables[variable].description)
     SubElement(connector, "ssc:Real", {"unit": part.connectors[variable]})
 
 
-def _connections(
-    system: Element, wires: Iterable[Connection], inward: Mapping[str, Port], outward: Mapping[str, Port]
+def _add_connections(
+    system: Element, wires: Iterable[Connection], system_inputs: Mapping[str, Port], system_outputs: Mapping[str, Port]
 ) -> None:
     frame = SubElement(system, "ssd:Connections")
     for wire in wires:
-        SubElement(frame, "ssd:Connection", _end("start", wire.source) | _end("end", wire.target))
-    for outer, port in inward.items():
-        SubElement(frame, "ssd:Connection", {"startConnector": outer} | _end("end", port))
-    for outer, port in outward.items():
-        SubElement(frame, "ssd:Connection", _end("start", port) | {"endConnector": outer})
+        SubElement(frame, "ssd:Connection", _connection_end("start", wire.source) | _connection_end("end", wire.target))
+    for outer, port in system_inputs.items():
+        SubElement(frame, "ssd:Connection", {"startConnector": outer} | _connection_end("end", port))
+    for outer, port in system_outputs.items():
+        SubElement(frame, "ssd:Connection", _connection_end("start", port) | {"endConnector": outer})
 
 
-def _end(side: str, port: Port) -> dict[str, str]:
+def _connection_end(side: str, port: Port) -> dict[str, str]:
     return {f"{side}Element": port.component, f"{side}Connector": port.variable}
 
 
-def _units(root: Element, parts: Iterable[_Part]) -> None:
+def _add_units(root: Element, parts: Iterable[_SspComponent]) -> None:
     """The units of all connectors; parameter sets list their own."""
-    _unit_list(root, "ssd:Units", {unit: part.bases(unit) for part in parts for unit in part.connectors.values()})
+    _add_unit_list(
+        root, "ssd:Units", {unit: part.unit_attributes(unit) for part in parts for unit in part.connectors.values()}
+    )
 
 
-def _unit_list(parent: Element, tag: str, units: Mapping[str, Mapping[str, str]]) -> None:
+def _add_unit_list(parent: Element, tag: str, units: Mapping[str, Mapping[str, str]]) -> None:
     frame = SubElement(parent, tag)
     for unit, bases in sorted(units.items()):
         node = SubElement(frame, "ssc:Unit", {"name": unit})

@@ -1,4 +1,4 @@
-"""Static tensions at a position: solved for three cables, distributed for more."""
+"""Static equilibrium at a position: tensions solved for three cables, distributed for more."""
 
 from __future__ import annotations
 
@@ -17,35 +17,37 @@ from tautwire_fmu.laws.vectors import Vector, add, scale, subtract
 
 from ..errors import UnreachableError
 from ..robots.robot import EffectSetting, Formula, Robot, TensionLimits
-from .distribution import excess_tensions, nearest_tensions
+from .distribution import distribute_tensions, least_limit_violations
 
 Array = NDArray[np.float64]
 
 DEFAULT_LIMITS = TensionLimits(minimum=0.0, maximum=float("inf"), preferred=0.0)
-PARALLEL = 1e-9
-AT_ANCHOR = 1e-6
-SWEEPS = 50
-SETTLED = 1e-14
+SINGULARITY_TOLERANCE = 1e-9
+MIN_CABLE_LENGTH = 1e-6
+MAX_ITERATIONS = 50
+CONVERGENCE_TOLERANCE = 1e-14
 
 
-def active(setting: EffectSetting) -> ActiveEffect:
-    """An effect of the robot file with its numbers, as the laws take it."""
+def active_effect(setting: EffectSetting) -> ActiveEffect:
+    """An effect setting with its parameter values, as the laws take it."""
     effect = BY_NAME[setting.name]
-    return ActiveEffect(effect, effect.values(**effect.completed(setting.values)))
+    return ActiveEffect(effect, effect.values(**effect.completed_values(setting.values)))
 
 
 def cable_effects(robot: Robot, cable: int) -> tuple[ActiveEffect, ...]:
-    """The effects of the robot file that act on a cable, its winch or its load cell; ``cable`` counts from 1."""
-    return (*map(active, robot.effects_on_cable(cable)), *_active_formulas(robot.formulas_on(cable)))
+    """The effects and formulas that act on a cable, its winch or its load cell; ``cable`` counts from 1."""
+    return (*map(active_effect, robot.effects_on_cable(cable)), *_formula_effects(robot.formulas_on(cable)))
 
 
 def formula_texts(formulas: Sequence[Formula]) -> dict[str, list[str]]:
-    """The texts of some formulas by their places."""
-    return {place: [f.text for f in formulas if f.place == place] for place in dict.fromkeys(f.place for f in formulas)}
+    """The texts of some formulas by their targets."""
+    return {
+        place: [f.text for f in formulas if f.target == place] for place in dict.fromkeys(f.target for f in formulas)
+    }
 
 
-def _active_formulas(formulas: Sequence[Formula]) -> tuple[ActiveEffect, ...]:
-    """All formulas of a component as one effect, none where there are none."""
+def _formula_effects(formulas: Sequence[Formula]) -> tuple[ActiveEffect, ...]:
+    """All formulas of a component as one effect; empty without formulas."""
     if not formulas:
         return ()
     numbers = {name: value for formula in formulas for name, value in formula.numbers.items()}
@@ -53,132 +55,141 @@ def _active_formulas(formulas: Sequence[Formula]) -> tuple[ActiveEffect, ...]:
 
 
 def platform_settings(robot: Robot) -> tuple[EffectSetting, ...]:
-    """The effects of the robot file that act on the platform or on the sensor of its position."""
+    """The effect settings that act on the platform or on its position sensor."""
     return tuple(s for s in robot.effects if not s.cables or BY_NAME[s.name].component == "sensor")
 
 
 def has_sensor_effects(robot: Robot) -> bool:
-    """Whether sensors show something else than what is."""
+    """Whether an effect distorts the measurements."""
     return any(BY_NAME[setting.name].component == "sensor" for setting in robot.effects)
 
 
 def platform_effects(robot: Robot) -> tuple[ActiveEffect, ...]:
-    """Those of :func:`platform_settings` and the formulas on the platform, as the laws take them."""
-    return (*map(active, platform_settings(robot)), *_active_formulas(robot.formulas_on()))
+    """The effects of :func:`platform_settings` and the formulas on the platform, as the laws take them."""
+    return (*map(active_effect, platform_settings(robot)), *_formula_effects(robot.formulas_on()))
 
 
-def routes(m: Mathematics, robot: Robot, position: Sequence[Any]) -> tuple[Route, ...]:
-    """How the ropes run from the platform at a position (m) to their exit points, effects included.
+def cable_routes(mathematics: Mathematics, robot: Robot, position: Sequence[Any]) -> tuple[Route, ...]:
+    """Routes of the cables from the platform at a position (m) to their exit points, effects included.
 
-    Raises UnreachableError where a rope has no length there, or the platform is inside a pulley.
+    Raises UnreachableError where a cable has no length there, or the platform is inside a pulley.
     """
-    found = []
+    route_list = []
     for index, anchor in enumerate(robot.anchors, start=1):
         try:
-            line = stages.route(m, cable_effects(robot, index), anchor, position)
+            route = stages.route(mathematics, cable_effects(robot, index), anchor, position)
         except (ArithmeticError, ValueError) as error:
-            raise _no_length(robot, position, index) from error
-        if isinstance(line.length, float) and not line.length >= AT_ANCHOR:
-            raise _no_length(robot, position, index)
-        found.append(line)
-    return tuple(found)
+            raise _no_length_error(robot, position, index) from error
+        if isinstance(route.length, float) and not route.length >= MIN_CABLE_LENGTH:
+            raise _no_length_error(robot, position, index)
+        route_list.append(route)
+    return tuple(route_list)
 
 
-def directions(robot: Robot, at: Array | None = None) -> Array:
-    """Unit vectors of the ropes at the platform, by default at its start, shape (3, n)."""
+def unit_directions(robot: Robot, at: Array | None = None) -> Array:
+    """Unit vectors of the cables at the platform, by default at its start, shape (3, n)."""
     position = np.array(robot.platform.start if at is None else at, dtype=float)
-    return np.array([line.direction for line in routes(REAL, robot, position.tolist())]).T
+    return np.array([line.direction for line in cable_routes(REAL, robot, position.tolist())]).T
 
 
-def weight(robot: Robot, m: Mathematics = REAL) -> Any:
-    """Weight of the platform with all that the robot file puts on it, in N."""
+def total_weight(robot: Robot, mathematics: Mathematics = REAL) -> Any:
+    """Weight of the platform with payload, in N."""
     constants = point_mass.PointMassConstants(robot.platform.mass, robot.gravity)
-    return point_mass.total_mass(m, constants, platform_effects(robot)) * robot.gravity
+    return point_mass.total_mass(mathematics, constants, platform_effects(robot)) * robot.gravity
 
 
-def load(m: Mathematics, robot: Robot, position: Sequence[Any]) -> Vector:
-    """What the cables have to hold of the platform at rest, in N: its weight less what effects push it with."""
+def static_load(mathematics: Mathematics, robot: Robot, position: Sequence[Any]) -> Vector:
+    """Static load on the cables, in N: the platform's weight less the forces of effects."""
     effects = platform_effects(robot)
-    pushed = point_mass.wrench(m, effects, point_mass.start_states(effects), position, (0.0, 0.0, 0.0))
-    return subtract((0.0, 0.0, weight(robot, m)), pushed)
+    effect_force = point_mass.wrench(mathematics, effects, point_mass.start_states(effects), position, (0.0, 0.0, 0.0))
+    return subtract((0.0, 0.0, total_weight(robot, mathematics)), effect_force)
 
 
-def has_routes(robot: Robot) -> bool:
-    """Whether some rope does not run straight to its declared exit point."""
+def has_routing_effects(robot: Robot) -> bool:
+    """Whether a cable does not run straight to its declared exit point."""
     effects = (BY_NAME[setting.name] for setting in robot.effects)
     return any(effect.exit_point is not None or effect.path is not None for effect in effects)
 
 
-def has_weight(robot: Robot) -> bool:
-    """Whether the ropes' ends carry more than the tension."""
+def cables_have_weight(robot: Robot) -> bool:
+    """Whether the cables have weight, so that their ends carry more than the tension."""
     return any(BY_NAME[setting.name].ends is not None for setting in robot.effects)
 
 
-def hung(m: Mathematics, robot: Robot, lines: Sequence[Route], tensions: Sequence[Any]) -> Vector:
-    """What ropes under tensions (N) put on the platform beside them, in N."""
+def cable_weight_force(
+    mathematics: Mathematics, robot: Robot, cable_paths: Sequence[Route], tensions: Sequence[Any]
+) -> Vector:
+    """Force of cables under tensions (N) on the platform on top of these tensions, in N."""
     total: Vector = (0.0, 0.0, 0.0)
-    for index, (line, tension) in enumerate(zip(lines, tensions, strict=True), start=1):
-        total = add(total, stages.ends(m, cable_effects(robot, index), robot.gravity, line, tension)[0])
+    for index, (route, tension) in enumerate(zip(cable_paths, tensions, strict=True), start=1):
+        total = add(
+            total, stages.end_forces(mathematics, cable_effects(robot, index), robot.gravity, route, tension)[0]
+        )
     return total
 
 
-def held_by(robot: Robot, position: Sequence[float], tensions: Array) -> Array:
-    """What tensions (n,) in N along the ropes have to hold of the platform at rest at a position (m), (3,) in N."""
-    lines = routes(REAL, robot, position)
-    hanging = hung(REAL, robot, lines, tensions.tolist())
-    return np.array(subtract(load(REAL, robot, position), hanging), dtype=float)
+def load_on_tensions(robot: Robot, position: Sequence[float], tensions: Array) -> Array:
+    """Load that tensions (n,) in N along the cables balance at a position (m), (3,) in N."""
+    cable_paths = cable_routes(REAL, robot, position)
+    weight_force = cable_weight_force(REAL, robot, cable_paths, tensions.tolist())
+    return np.array(subtract(static_load(REAL, robot, position), weight_force), dtype=float)
 
 
 def static_tensions(robot: Robot, at: Array | None = None) -> Array:
-    """Tensions that hold the platform at rest, shape (n,), in N.
+    """Static tensions that hold the platform in equilibrium, shape (n,), in N.
 
-    Solves ``sum T_i u_i = m g e_z``, with what effects add to the load and hang on the platform. With more than three
+    Solves ``sum T_i u_i = m g e_z``, with the loads of effects and the weight of cables. With more than three
     cables, the tensions nearest to the preferred one (least squares) within the limits of the robot file; without
     limits there, nearest to zero and not negative. ``at`` is a position in m, by default the start.
 
     Raises UnreachableError where a cable would have to push or to break a limit.
     """
     position = np.array(robot.platform.start if at is None else at, dtype=float)
-    lines = routes(REAL, robot, position.tolist())
-    unit = np.array([line.direction for line in lines]).T
-    held = np.array(load(REAL, robot, position.tolist()), dtype=float)
-    solve = _solve_three if len(robot.cables) == 3 else _distribute
-    if not has_weight(robot):
-        return solve(robot, position, unit, held)
+    cable_paths = cable_routes(REAL, robot, position.tolist())
+    direction_matrix = np.array([line.direction for line in cable_paths]).T
+    load_vector = np.array(static_load(REAL, robot, position.tolist()), dtype=float)
+    solver = _solve_three if len(robot.cables) == 3 else _distribute
+    if not cables_have_weight(robot):
+        return solver(robot, position, direction_matrix, load_vector)
 
-    def sweep(tensions: Array) -> Array:
-        return solve(robot, position, unit, held - np.array(hung(REAL, robot, lines, tensions.tolist())))
+    def iterate(tensions: Array) -> Array:
+        return solver(
+            robot,
+            position,
+            direction_matrix,
+            load_vector - np.array(cable_weight_force(REAL, robot, cable_paths, tensions.tolist())),
+        )
 
-    return _settled(sweep, np.full(len(lines), float(np.linalg.norm(held))))
+    return _fixed_point(iterate, np.full(len(cable_paths), float(np.linalg.norm(load_vector))))
 
 
 def static_forces(robot: Robot) -> Array:
     """Forces of the cables on the platform at its start, shape (n, 3), in N."""
-    lines = routes(REAL, robot, robot.platform.start)
+    cable_paths = cable_routes(REAL, robot, robot.platform.start)
     forces = []
-    for index, (line, tension) in enumerate(zip(lines, static_tensions(robot).tolist(), strict=True), start=1):
-        beside = stages.ends(REAL, cable_effects(robot, index), robot.gravity, line, tension)[0]
-        forces.append(add(scale(tension, line.direction), beside))
+    for index, (route, tension) in enumerate(zip(cable_paths, static_tensions(robot).tolist(), strict=True), start=1):
+        weight_force = stages.end_forces(REAL, cable_effects(robot, index), robot.gravity, route, tension)[0]
+        forces.append(add(scale(tension, route.direction), weight_force))
     return np.array(forces)
 
 
-def _settled(sweep: Callable[[Array], Array], guess: Array) -> Array:
-    """The fixed point of a map that hardly depends on where it starts: ropes are light against their tensions."""
+def _fixed_point(iterate: Callable[[Array], Array], guess: Array) -> Array:
+    """Fixed-point iteration of a strong contraction: cables are light against their tensions."""
     tensions = guess
-    for _ in range(SWEEPS):
-        before, tensions = tensions, sweep(tensions)
-        if np.max(np.abs(tensions - before)) <= SETTLED * np.max(tensions):
+    for _ in range(MAX_ITERATIONS):
+        previous, tensions = tensions, iterate(tensions)
+        if np.max(np.abs(tensions - previous)) <= CONVERGENCE_TOLERANCE * np.max(tensions):
             break
     return tensions
 
 
-def _no_length(robot: Robot, position: Sequence[Any], cable: int) -> UnreachableError:
+def _no_length_error(robot: Robot, position: Sequence[Any], cable: int) -> UnreachableError:
     reason = f"cable {cable} has no length there"
     return UnreachableError(robot.name, tuple(map(float, position)), cable=cable, tension=None, reason=reason)
 
 
-def _solve_three(robot: Robot, position: Array, unit: Array, load: Array) -> Array:
-    if abs(np.linalg.det(unit)) < PARALLEL:
+def _solve_three(robot: Robot, position: Array, direction_matrix: Array, load: Array) -> Array:
+    if abs(np.linalg.det(direction_matrix)) < SINGULARITY_TOLERANCE:
         raise UnreachableError(
             robot.name,
             position=tuple(position),
@@ -186,7 +197,7 @@ def _solve_three(robot: Robot, position: Array, unit: Array, load: Array) -> Arr
             tension=None,
             reason="the three cables lie in one plane there",
         )
-    tensions = np.asarray(np.linalg.solve(unit, load), dtype=np.float64)
+    tensions = np.asarray(np.linalg.solve(direction_matrix, load), dtype=np.float64)
     worst = int(np.argmin(tensions))
     if tensions[worst] < 0.0:
         raise UnreachableError(
@@ -199,12 +210,12 @@ def _solve_three(robot: Robot, position: Array, unit: Array, load: Array) -> Arr
     return tensions
 
 
-def _distribute(robot: Robot, position: Array, unit: Array, load: Array) -> Array:
+def _distribute(robot: Robot, position: Array, direction_matrix: Array, load: Array) -> Array:
     limits = robot.tension or DEFAULT_LIMITS
-    tensions = nearest_tensions(unit, load, limits)
+    tensions = distribute_tensions(direction_matrix, load, limits)
     if tensions is not None:
         return tensions
-    excess = excess_tensions(unit, load, limits)
+    excess = least_limit_violations(direction_matrix, load, limits)
     if not np.all(np.isfinite(excess)):
         raise UnreachableError(
             robot.name,

@@ -1,4 +1,4 @@
-"""Finds what a model lacks from recordings, or says that it does not know."""
+"""System identification: finds what a model lacks from recordings, or says that it does not know."""
 
 from .tracing import trace
 from .verdict import Candidate, Comparison, Errors, Estimate, FoundEffect, Trace

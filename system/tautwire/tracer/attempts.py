@@ -1,4 +1,4 @@
-"""One hypothesis fitted and judged: what a worker does."""
+"""Fit and validation of one hypothesis: what a worker process does."""
 
 from __future__ import annotations
 
@@ -9,52 +9,53 @@ import numpy as np
 
 from ..errors import UnreachableError
 from ..robots.robot import Robot
-from .data import Sample
+from .data import DataSet
 from .filter_step import Noise
 from .fit import Fit, Fitter, NoFitError
 from .hypotheses import Hypothesis
 
 
 @dataclass(frozen=True)
-class Task:
-    """Fit the chosen hypotheses to a sample, from starts that are tried in turn, and judge them on another.
+class FitTask:
+    """Fit of the chosen hypotheses to estimation data, from starts that are tried in turn; validated on other data.
 
-    ``least`` is the log-likelihood of the sample without the last of them; for ``stop`` see :meth:`Fitter.fit_from`.
+    ``min_log_likelihood`` is that of the data without the last of them; for ``cost_tolerance`` see
+    :meth:`Fitter.fit_from`.
     """
 
     chosen: tuple[Hypothesis, ...]
     starts: tuple[Robot, ...]
-    least: float
-    stop: float
+    min_log_likelihood: float
+    cost_tolerance: float
 
 
 @dataclass(frozen=True)
-class Attempt:
-    """A fit, and what it does on the judging samples: log-likelihood, and mean square of the innovations."""
+class ValidatedFit:
+    """A fit with its validation: log-likelihood and mean square of the innovations on validation data."""
 
     fit: Fit
     log_likelihood: float
     mean_square: float
 
 
-def attempt(fitter: Fitter, task: Task, sample: Sample, judge: Sample) -> Attempt | None:
-    """None where the cables cannot hold what the task asks for, or nothing finite comes out."""
+def fit_and_validate(fitter: Fitter, task: FitTask, data: DataSet, validation: DataSet) -> ValidatedFit | None:
+    """Fit and validate a task; None where the cables cannot hold the platform, or nothing finite comes out."""
     try:
-        fit = fitter.fit_from(task.starts, task.chosen, sample, task.least, task.stop)
-        innovations = fitter.judged(fit.robot, task.chosen, judge)
+        fit = fitter.fit_from(task.starts, task.chosen, data, task.min_log_likelihood, task.cost_tolerance)
+        innovations = fitter.judged(fit.robot, task.chosen, validation)
     except (UnreachableError, NoFitError):
         return None
-    likelihood = innovations.log_likelihood(judge.rows)
-    square = float(np.nanmean(innovations.mean_square(judge.rows)))
-    return Attempt(fit, likelihood, square) if np.isfinite(likelihood) else None
+    log_likelihood = innovations.log_likelihood(validation.rows)
+    mean_square = float(np.nanmean(innovations.mean_square(validation.rows)))
+    return ValidatedFit(fit, log_likelihood, mean_square) if np.isfinite(log_likelihood) else None
 
 
-def attempt_apart(noise: Noise, task: Task, sample: Sample, judge: Sample) -> Attempt | None:
-    """As :func:`attempt`, in a process that keeps a fitter of its own."""
-    return attempt(fitter_apart(noise), task, sample, judge)
+def fit_and_validate_in_worker(noise: Noise, task: FitTask, data: DataSet, validation: DataSet) -> ValidatedFit | None:
+    """As :func:`fit_and_validate`, in a worker process with its own fitter."""
+    return fit_and_validate(worker_fitter(noise), task, data, validation)
 
 
 @lru_cache(maxsize=1)
-def fitter_apart(noise: Noise) -> Fitter:
-    """A worker's own. Its compiled likelihoods serve the next task of the same process."""
+def worker_fitter(noise: Noise) -> Fitter:
+    """The fitter of this worker process. Its compiled likelihoods serve the next task of the same process."""
     return Fitter(noise)

@@ -1,4 +1,4 @@
-"""Robots co-simulated beside the recordings, through their FMUs: what a trace's errors before and after are."""
+"""Validation by co-simulation: robots run through their FMUs beside the recordings, with errors before and after."""
 
 from __future__ import annotations
 
@@ -12,79 +12,89 @@ from numpy.typing import NDArray
 from ..fmus.packaging import build_fmus
 from ..recordings.recording import Recording
 from ..robots.robot import Robot
-from ..runs.cosimulation import Motion, cosimulate
-from .data import Sample
+from ..runs.cosimulation import CosimulationResult, cosimulate
+from .data import DataSet
 from .fit import Fitter
-from .preparation.calibration import calibrated
-from .preparation.release import released
+from .preparation.calibration import calibrate
+from .preparation.release import with_initial_state
 from .verdict import Comparison, Errors
-from .workers import Pending, Workers
+from .workers import PendingResult, WorkerPool
 
 Array = NDArray[np.float64]
 
 ROLES = ("fit", "check")
-REACHED = 1.5
+MAX_ERROR_TO_NOISE_FLOOR = 1.5
 
 
-def started(workers: Workers, fitter: Fitter, robot: Robot, samples: Sequence[Sample]) -> list[Pending[Motion]]:
-    """The runs of a robot over some recordings, begun; each from where and how fast its recording starts."""
-    return [workers.start(cosimulated, released(fitter, robot, sample), sample) for sample in samples]
+def start_cosimulations(
+    workers: WorkerPool, fitter: Fitter, robot: Robot, data_sets: Sequence[DataSet]
+) -> list[PendingResult[CosimulationResult]]:
+    """Start the co-simulations of a robot over some recordings, each from its smoothed initial state."""
+    return [
+        workers.submit(cosimulate_data_set, with_initial_state(fitter, robot, sample), sample) for sample in data_sets
+    ]
 
 
-def cosimulated(robot: Robot, sample: Sample) -> Motion:
-    """The run of a robot placed where a recording starts."""
+def cosimulate_data_set(robot: Robot, data: DataSet) -> CosimulationResult:
+    """Co-simulate a robot placed where a recording starts."""
     with TemporaryDirectory(prefix="tautwire-trace-") as folder:
         fmus = build_fmus(robot.as_modelled(), Path(folder))
-        return cosimulate(fmus, sample.recording.time, sample.recording.winch_speed)
+        return cosimulate(fmus, data.recording.time, data.recording.winch_speed)
 
 
-def reaching(
-    after: Robot, fitter: Fitter, samples: Sequence[Sample], before: Sequence[Motion], workers: Workers
+def validate_by_cosimulation(
+    identified: Robot,
+    fitter: Fitter,
+    data_sets: Sequence[DataSet],
+    runs_before: Sequence[CosimulationResult],
+    workers: WorkerPool,
 ) -> tuple[tuple[Comparison, ...], list[Errors]] | None:
-    """What the co-simulation of a better robot leaves; None where that is more than noise.
+    """Errors that the co-simulation of a better robot leaves; None where they are more than noise.
 
     It has the last word: a filter follows what the model itself would not do.
     """
-    runs = [run.result() for run in started(workers, fitter, after, samples)]
-    better, lower = compared(after, fitter, samples, before, runs)
-    reached = all(_reached(c.errors_after, floor) for c, floor in zip(better, lower, strict=True))
-    return (better, lower) if reached else None
+    runs_after = [run.result() for run in start_cosimulations(workers, fitter, identified, data_sets)]
+    comparisons, noise_floors = compare_cosimulations(identified, fitter, data_sets, runs_before, runs_after)
+    all_near_floor = all(
+        _is_near_noise_floor(c.errors_after, floor) for c, floor in zip(comparisons, noise_floors, strict=True)
+    )
+    return (comparisons, noise_floors) if all_near_floor else None
 
 
-def compared(
+def compare_cosimulations(
     robot: Robot,
     fitter: Fitter,
-    samples: Sequence[Sample],
-    before: Sequence[Motion],
-    after: Sequence[Motion],
+    data_sets: Sequence[DataSet],
+    runs_before: Sequence[CosimulationResult],
+    runs_after: Sequence[CosimulationResult],
 ) -> tuple[tuple[Comparison, ...], list[Errors]]:
-    """Both runs beside each recording, and what noise alone would leave there under the later robot.
+    """Compare both runs with each recording, and with the noise floor under the later robot.
 
-    Recordings are shown without the constant errors that their sensors may have, as far as those are stated.
+    Recordings are corrected for the constant errors that their sensors may have, as far as those are stated.
     """
-    shown = [calibrated(fitter, robot, sample).recording(sample.recording) for sample in samples]
+    recordings = [calibrate(fitter, robot, sample).without_sensor_offsets(sample.recording) for sample in data_sets]
     comparisons = tuple(
-        Comparison(role, recording, b, a, errors(recording, b), errors(recording, a))
-        for role, recording, b, a in zip(ROLES, shown, before, after, strict=False)
+        Comparison(role, recording, b, a, cosimulation_errors(recording, b), cosimulation_errors(recording, a))
+        for role, recording, b, a in zip(ROLES, recordings, runs_before, runs_after, strict=False)
     )
-    return comparisons, [floor_of(fitter, robot, sample) for sample in samples]
+    return comparisons, [noise_floor(fitter, robot, sample) for sample in data_sets]
 
 
-def errors(recording: Recording, motion: Motion) -> Errors:
-    """Root mean squares of measured less co-simulated."""
+def cosimulation_errors(recording: Recording, motion: CosimulationResult) -> Errors:
+    """Root-mean-square errors: measured less co-simulated."""
     return _root_mean_squares((recording.measured() - motion.measured()) ** 2)
 
 
-def floor_of(fitter: Fitter, robot: Robot, sample: Sample) -> Errors:
-    """What sensors and the recorded winch speeds' noise alone would leave in a simulation of this recording."""
-    variances = fitter.open_loop_variances(robot, sample)
-    return _root_mean_squares(np.where(np.isfinite(sample.recording.measured()), variances, np.nan))
+def noise_floor(fitter: Fitter, robot: Robot, data: DataSet) -> Errors:
+    """Noise floor: the errors that noise of the sensors and winch speeds alone would leave in a simulation."""
+    variances = fitter.open_loop_variances(robot, data)
+    return _root_mean_squares(np.where(np.isfinite(data.recording.measured()), variances, np.nan))
 
 
-def _reached(after: Errors, floor: Errors) -> bool:
-    """Whether a co-simulation errs by no more than half over what noise alone leaves."""
-    pairs = ((after.position_rms, floor.position_rms), (after.tension_rms, floor.tension_rms))
-    return all(not error > REACHED * least for error, least in pairs)
+def _is_near_noise_floor(after: Errors, noise_floor_errors: Errors) -> bool:
+    """Whether the errors of a co-simulation are at most 1.5 times the noise floor."""
+    pairs = ((after.position_rms, noise_floor_errors.position_rms), (after.tension_rms, noise_floor_errors.tension_rms))
+    return all(not error > MAX_ERROR_TO_NOISE_FLOOR * least for error, least in pairs)
 
 
 def _root_mean_squares(squares: Array) -> Errors:

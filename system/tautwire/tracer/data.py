@@ -1,4 +1,4 @@
-"""What a trace is judged on: the recordings, where each starts, and which samples fit and which judge."""
+"""Estimation and validation data: the recordings, where each starts, and which samples fit and which judge."""
 
 from __future__ import annotations
 
@@ -9,54 +9,54 @@ from numpy.typing import NDArray
 
 from ..recordings.recording import Recording
 from ..robots.robot import Robot
-from ..runs.start import start_of
+from ..runs.start import start_position
 from .filter_step import Noise
 
-HEAD_SHARE = 3
-FEWEST_IN_HEAD, MOST_IN_HEAD = 800, 20_000
+HEAD_DIVISOR = 3
+MIN_HEAD_SAMPLES, MAX_HEAD_SAMPLES = 800, 20_000
 
 
 @dataclass(frozen=True)
-class Sample:
-    """Samples of a recording from one place: ``rows`` (N,) tells which of them count."""
+class DataSet:
+    """Data set: a recording, where it starts, and which of its samples count: ``rows`` (N,)."""
 
     recording: Recording
     start: tuple[float, float, float]
     rows: NDArray[np.bool_]
 
     @property
-    def head(self) -> Sample:
-        """The beginning of the samples that count, long enough to rank hypotheses by: a third, of 800 to 20,000."""
-        third = int(np.sum(self.rows)) // HEAD_SHARE
-        return self.beginning(min(max(third, FEWEST_IN_HEAD), MOST_IN_HEAD))
+    def head(self) -> DataSet:
+        """The first samples that count, enough to rank hypotheses by: a third, of 800 to 20,000."""
+        third = int(np.sum(self.rows)) // HEAD_DIVISOR
+        return self.first(min(max(third, MIN_HEAD_SAMPLES), MAX_HEAD_SAMPLES))
 
-    def beginning(self, count: int) -> Sample:
-        """The first so many samples that count, all where there are no more."""
-        places = np.flatnonzero(self.rows)
-        last = int(places[min(count, len(places)) - 1]) + 1
-        return Sample(self.recording.first(last), self.start, self.rows[:last])
+    def first(self, count: int) -> DataSet:
+        """The first ``count`` samples that count; all where there are no more."""
+        indices = np.flatnonzero(self.rows)
+        end = int(indices[min(count, len(indices)) - 1]) + 1
+        return DataSet(self.recording.first(end), self.start, self.rows[:end])
 
 
 @dataclass(frozen=True)
-class Evidence:
-    """What fits and what judges; never the same samples."""
+class DataSplit:
+    """Estimation data that fits and validation data that judges; never the same samples."""
 
-    fit: Sample
-    judge: Sample
+    estimation: DataSet
+    validation: DataSet
     notes: tuple[str, ...]
 
 
-def split(robot: Robot, noise: Noise, fit: Recording, check: Recording | None) -> Evidence:
-    """Judge on the check recording, or on the second half of the only one."""
-    fit_start, notes = start_of(robot, noise.position, fit)
-    everything = np.ones(len(fit.time), dtype=bool)
+def split_data(robot: Robot, noise: Noise, fit: Recording, check: Recording | None) -> DataSplit:
+    """Split into estimation and validation data: the check recording validates, or the second half of the only one."""
+    fit_start, notes = start_position(robot, noise.position, fit)
+    all_rows = np.ones(len(fit.time), dtype=bool)
     if check is not None:
-        check_start, check_notes = start_of(robot, noise.position, check)
-        return Evidence(
-            Sample(fit, fit_start, everything),
-            Sample(check, check_start, np.ones(len(check.time), dtype=bool)),
+        check_start, check_notes = start_position(robot, noise.position, check)
+        return DataSplit(
+            DataSet(fit, fit_start, all_rows),
+            DataSet(check, check_start, np.ones(len(check.time), dtype=bool)),
             notes + check_notes,
         )
-    first = np.arange(len(fit.time)) < len(fit.time) // 2
-    said = "no check recording: the second half of the recording judged what the first half fitted"
-    return Evidence(Sample(fit, fit_start, first), Sample(fit, fit_start, ~first), (*notes, said))
+    first_half = np.arange(len(fit.time)) < len(fit.time) // 2
+    note = "no check recording: the second half of the recording judged what the first half fitted"
+    return DataSplit(DataSet(fit, fit_start, first_half), DataSet(fit, fit_start, ~first_half), (*notes, note))

@@ -1,4 +1,4 @@
-"""What a fit says of the effects that were accepted: their parameters with intervals, and how these go together."""
+"""Estimates of the accepted effects: their parameters with intervals and correlations."""
 
 from __future__ import annotations
 
@@ -7,61 +7,63 @@ from itertools import combinations
 
 from tautwire_fmu.laws.effects import UNLISTED
 
-from ..model.symbolic import OF_FORMULAS
+from ..model.symbolic import FORMULA_INDEX
 from ..robots.robot import Robot
-from .data import Sample
+from .data import DataSet
 from .fit import Fit, Fitter
 from .hypotheses import declared_value
-from .profile import intervals
-from .search import Found
-from .verdict import Correlation, Estimate, Fitted, FoundEffect
-from .workers import Workers
+from .profile import profile_intervals
+from .search import SelectionResult
+from .verdict import Correlation, Estimate, FittedParameter, FoundEffect
+from .workers import WorkerPool
 
 
-def found_effects(
-    robot: Robot, found: Found, fitter: Fitter, sample: Sample, workers: Workers
+def estimated_effects(
+    robot: Robot, selection: SelectionResult, fitter: Fitter, data: DataSet, workers: WorkerPool
 ) -> tuple[FoundEffect, ...]:
-    """The accepted effects of the list, in the order found; ``robot`` is as declared, ``sample`` what was fitted."""
-    places = _places(found.fit)
-    ends = intervals(fitter, found.fit, found.accepted, sample, workers)
+    """Estimates of the accepted effects of the list, in order; ``robot`` is as declared, ``data`` was fitted."""
+    indices = _parameter_indices(selection.fit)
+    interval_ends = profile_intervals(fitter, selection.fit, selection.accepted, data, workers)
     effects = []
-    for hypothesis, evidence in zip(found.accepted, found.evidence, strict=True):
+    for hypothesis, evidence in zip(selection.accepted, selection.evidence, strict=True):
         if hypothesis.effect in UNLISTED:
             continue
         estimates = {}
         for parameter in hypothesis.parameters:
-            place = places[Fitted(hypothesis.effect.name, hypothesis.cables, parameter.name)]
-            low, high = ends[place]
+            index = indices[FittedParameter(hypothesis.effect.name, hypothesis.cables, parameter.name)]
+            low, high = interval_ends[index]
             declared = declared_value(robot, parameter, hypothesis.cables)
-            estimates[parameter.name] = Estimate(float(found.fit.values[place]), parameter.unit, low, high, declared)
+            estimates[parameter.name] = Estimate(
+                float(selection.fit.values[index]), parameter.unit, low, high, declared
+            )
         effects.append(
             FoundEffect(hypothesis.effect.name, hypothesis.effect.component, hypothesis.cables, estimates, evidence)
         )
     return tuple(effects)
 
 
-def correlations_of(fit: Fit, effects: Sequence[FoundEffect]) -> tuple[Correlation, ...]:
-    """The correlation of each two parameters of some effects, whatever else was fitted beside them.
+def parameter_correlations(fit: Fit, effects: Sequence[FoundEffect]) -> tuple[Correlation, ...]:
+    """Correlations of each two parameters of some effects, whatever else was fitted beside them.
 
     ``C_ik / (d_i d_k)`` of the fit's covariance C and its deviations d; none where one has no deviation.
     """
-    places, deviations = _places(fit), fit.deviations
-    fitted = [Fitted(each.name, each.cables, parameter) for each in effects for parameter in each.parameters]
-    found = []
-    for one, other in combinations(fitted, 2):
-        i, k = places[one], places[other]
+    indices, deviations = _parameter_indices(fit), fit.standard_deviations
+    fitted = [FittedParameter(each.name, each.cables, parameter) for each in effects for parameter in each.parameters]
+    correlations = []
+    for first, second in combinations(fitted, 2):
+        i, k = indices[first], indices[second]
         scale = deviations[i] * deviations[k]
         if scale > 0.0:
             value = min(max(float(fit.covariance[i, k] / scale), -1.0), 1.0)
-            found.append(Correlation((one, other), value))
-    return tuple(found)
+            correlations.append(Correlation((first, second), value))
+    return tuple(correlations)
 
 
-def _places(fit: Fit) -> dict[Fitted, int]:
-    """Where the fit has each parameter of its robot's effects."""
-    of_effects = [(index, free) for index, free in enumerate(fit.free) if free.setting != OF_FORMULAS]
+def _parameter_indices(fit: Fit) -> dict[FittedParameter, int]:
+    """Index in the fit of each parameter of its robot's effects."""
+    of_effects = [(index, free) for index, free in enumerate(fit.free) if free.effect_index != FORMULA_INDEX]
     settings = fit.robot.effects
     return {
-        Fitted(settings[free.setting].name, settings[free.setting].cables, free.name): index
+        FittedParameter(settings[free.effect_index].name, settings[free.effect_index].cables, free.name): index
         for index, free in of_effects
     }

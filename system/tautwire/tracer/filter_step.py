@@ -1,7 +1,7 @@
-"""One sample of the extended Kalman filter as a CasADi function: take the measurement in, go to the next sample.
+"""One sample of the extended Kalman filter as a CasADi function: measurement update, then time update.
 
-Measurements are taken in one by one (their noise is independent), which needs no matrix inverse and lets a missing
-one be passed over. Sensitivities by the free parameters are carried along with the gain held fixed.
+Scalar measurements are processed one by one (their noise is independent), which needs no matrix inverse and skips a
+missing one. Sensitivities to the free parameters are propagated with the gain held fixed.
 
 Source: Bierman (1977), Factorization Methods for Discrete Sequential Estimation, ch. 2; Ljung (1999), ch. 11.
 """
@@ -15,13 +15,13 @@ from itertools import pairwise
 import casadi
 from casadi import SX, Function
 
-from ..model.symbolic import Model
-from .sensing import sensing
+from ..model.symbolic import SymbolicModel
+from .sensing import measurement_model
 
 
 @dataclass(frozen=True)
 class Noise:
-    """Standard deviations: position (m), tension (N), winch speed (m/s), and of the start's place (m).
+    """Noise levels as standard deviations: position (m), tension (N), winch speed (m/s), and start position (m).
 
     Of a start that is not known at rest: its velocity (m/s), how far it is from equilibrium (m), and tensions that hold
     nothing (N). ``own`` are those of single outputs (3 + n) where they differ from the others of their kind.
@@ -30,7 +30,7 @@ class Noise:
     position: float
     tension: float
     winch_speed: float
-    start: float
+    start_position: float
     start_velocity: float = 0.0
     start_stretch: float = 0.0
     self_stress: float = 0.0
@@ -45,7 +45,7 @@ class Noise:
 class Substeps:
     """Integration steps between two samples: of the state itself, and of its derivatives.
 
-    The latter go by a series of some order, of a part so small that ``doublings`` make it a whole step.
+    The latter use a series of some order over a part so small that ``doublings`` make it a whole step.
     """
 
     state: int
@@ -58,20 +58,20 @@ class Substeps:
 class _Filtered:
     state: SX
     covariance: SX
-    slopes: SX
+    sensitivities: SX
     innovations: SX
     log_variances: SX
-    gradient: SX
+    innovation_sensitivities: SX
 
 
-def filter_sample(model: Model, cable_count: int, noise: Noise, substeps: Substeps) -> Function:
-    """Arguments: state, covariance, slopes, parameters, measured, seen, shift, speed, next speed, time step, drift,
-    roughness.
+def filter_step(model: SymbolicModel, cable_count: int, noise: Noise, substeps: Substeps) -> Function:
+    """One step of the filter: measurement update, time update, and the sensitivities of both.
 
-    Results: the first three at the next sample, then whitened innovations (m,), log of their variances (m,), and
-    the innovations' derivatives by the parameters (m, p), whitened. Measured is x, y, z and the tensions, each as shown
-    ``shift`` (s) later; drift (s^2) times the variance of a winch speed is what its noise adds to the variance of each
-    unstrained length.
+    Arguments: state, covariance, sensitivities, parameters, measured, observed, shift, speed, next speed, time step,
+    drift, acceleration noise density. Results: the first three at the next sample, then whitened innovations (m,), log
+    of their variances (m,), and the innovations' derivatives by the parameters (m, p), whitened. Measured is x, y, z
+    and the tensions, each as shown ``shift`` (s) later; drift (s^2) times the variance of a winch speed is what its
+    noise adds to the variance of each unstrained length.
     """
     size, count = model.states.numel(), model.parameters.numel()
     predicted = _Filtered(
@@ -82,26 +82,26 @@ def filter_sample(model: Model, cable_count: int, noise: Noise, substeps: Subste
         SX(),
         SX(),
     )
-    measured, seen, shift = (SX.sym(name, 3 + cable_count) for name in ("measured", "seen", "shift"))
+    measured, observed, shift = (SX.sym(name, 3 + cable_count) for name in ("measured", "seen", "shift"))
     speed, later = SX.sym("speed", cable_count), SX.sym("later", cable_count)
     step, drift, roughness = SX.sym("step"), SX.sym("drift"), SX.sym("roughness")
-    moment = [casadi.vertcat(speed, SX(3, 1)), model.parameters, later, step, shift]
-    shown = sensing(model, cable_count).call([predicted.state, *moment])
-    filtered = _take_in(shown, noise, predicted, measured, seen)
-    state, transition, direct = _advance(model, substeps, filtered.state, speed, later, step)
-    spread = _symmetric(casadi.mtimes([transition, filtered.covariance, transition.T]))
-    variance = SX(size, 1)
-    variance[3:6] = roughness**2 * step
-    variance[6 : 6 + cable_count] = noise.winch_speed**2 * drift
+    instant = [casadi.vertcat(speed, SX(3, 1)), model.parameters, later, step, shift]
+    outputs = measurement_model(model, cable_count).call([predicted.state, *instant])
+    filtered = _measurement_update(outputs, noise, predicted, measured, observed)
+    state, transition, direct_sensitivity = _time_update(model, substeps, filtered.state, speed, later, step)
+    propagated_covariance = _symmetric(casadi.mtimes([transition, filtered.covariance, transition.T]))
+    process_noise = SX(size, 1)
+    process_noise[3:6] = roughness**2 * step
+    process_noise[6 : 6 + cable_count] = noise.winch_speed**2 * drift
     return Function(
         "filter_sample",
         [
             predicted.state,
             predicted.covariance,
-            predicted.slopes,
+            predicted.sensitivities,
             model.parameters,
             measured,
-            seen,
+            observed,
             shift,
             speed,
             later,
@@ -111,132 +111,147 @@ def filter_sample(model: Model, cable_count: int, noise: Noise, substeps: Subste
         ],
         [
             state,
-            spread + casadi.diag(variance),
-            casadi.mtimes(transition, filtered.slopes) + direct,
+            propagated_covariance + casadi.diag(process_noise),
+            casadi.mtimes(transition, filtered.sensitivities) + direct_sensitivity,
             filtered.innovations,
             filtered.log_variances,
-            filtered.gradient,
+            filtered.innovation_sensitivities,
         ],
     )
 
 
-def filter_slopes(model: Model, cable_count: int, substeps: Substeps) -> Function:
-    """How a sample's filter moves with its state: by the state before, ``d shown``; by the state after, ``d next``.
+def filter_jacobians(model: SymbolicModel, cable_count: int, substeps: Substeps) -> Function:
+    """Jacobians of a filter step: of the outputs by the predicted state, of the next state by the updated one.
 
-    Arguments: state before and after measurements are taken in, parameters, shift, speed, next speed, time step.
-    Results: derivatives of what sensors show (m, n), of the state at the next sample (n, n), and of that state by the
+    Arguments: state before and after the measurement update, parameters, shift, speed, next speed, time step.
+    Results: derivatives of the outputs (m, n), of the state at the next sample (n, n), and of that state by the
     one half a step before it (n, n), from the cubic through both ends.
     """
-    before, after = SX.sym("before", model.states.numel()), SX.sym("after", model.states.numel())
+    predicted, updated = SX.sym("before", model.states.numel()), SX.sym("after", model.states.numel())
     shift = SX.sym("shift", 3 + cable_count)
     speed, later, step = SX.sym("speed", cable_count), SX.sym("later", cable_count), SX.sym("step")
-    moment = [casadi.vertcat(speed, SX(3, 1)), model.parameters, later, step, shift]
-    _, by_state, _ = sensing(model, cable_count).call([before, *moment])
-    _, transition, _ = _advance(model, substeps, after, speed, later, step)
-    bending = Function(
+    instant = [casadi.vertcat(speed, SX(3, 1)), model.parameters, later, step, shift]
+    _, by_state, _ = measurement_model(model, cable_count).call([predicted, *instant])
+    _, transition, _ = _time_update(model, substeps, updated, speed, later, step)
+    rate_jacobian = Function(
         "bending", [model.states, model.inputs, model.parameters], [casadi.jacobian(model.rates, model.states)]
     )
-    rates = bending(after, casadi.vertcat(speed, SX(3, 1)), model.parameters)
-    still = SX.eye(after.numel())
-    half = 0.5 * (transition + still) + step / 8.0 * casadi.mtimes(still - transition, rates)
-    arguments = [before, after, model.parameters, shift, speed, later, step]
-    return Function("filter_slopes", arguments, [casadi.densify(f) for f in (by_state, transition, half)])
+    jacobian_at_update = rate_jacobian(updated, casadi.vertcat(speed, SX(3, 1)), model.parameters)
+    identity = SX.eye(updated.numel())
+    half_transition = 0.5 * (transition + identity) + step / 8.0 * casadi.mtimes(
+        identity - transition, jacobian_at_update
+    )
+    arguments = [predicted, updated, model.parameters, shift, speed, later, step]
+    return Function("filter_slopes", arguments, [casadi.densify(f) for f in (by_state, transition, half_transition)])
 
 
-def _take_in(shown: Sequence[SX], noise: Noise, predicted: _Filtered, measured: SX, seen: SX) -> _Filtered:
-    expected, by_state, by_parameters = shown
+def _measurement_update(
+    outputs: Sequence[SX], noise: Noise, predicted: _Filtered, measured: SX, observed: SX
+) -> _Filtered:
+    expected, by_state, by_parameters = outputs
     covariance = predicted.covariance
     correction = SX(predicted.state.numel(), 1)
-    slopes = predicted.slopes
+    sensitivities = predicted.sensitivities
     rows: list[tuple[SX, SX, SX]] = []
-    for index, own in enumerate(noise.of_outputs(expected.numel() - 3)):
-        row = by_state[index, :]
-        spread = casadi.mtimes(covariance, row.T)
-        variance = casadi.mtimes(row, spread) + own**2
-        error = measured[index] - expected[index] - casadi.mtimes(row, correction)
-        slope = -(casadi.mtimes(row, slopes) + by_parameters[index, :])
-        gain = spread * (seen[index] / variance)
-        correction = correction + gain * error
-        slopes = slopes + casadi.mtimes(gain, slope)
-        covariance = _symmetric(covariance - casadi.mtimes(gain, spread.T))
-        deviation = casadi.sqrt(variance)
-        rows.append((error / deviation, casadi.log(variance), slope / deviation))
-    errors, logs, gradients = (casadi.vertcat(*column) for column in zip(*rows, strict=True))
-    return _Filtered(predicted.state + correction, covariance, slopes, errors, logs, gradients)
+    for index, sensor_deviation in enumerate(noise.of_outputs(expected.numel() - 3)):
+        output_row = by_state[index, :]
+        cross_covariance = casadi.mtimes(covariance, output_row.T)
+        innovation_variance = casadi.mtimes(output_row, cross_covariance) + sensor_deviation**2
+        innovation = measured[index] - expected[index] - casadi.mtimes(output_row, correction)
+        innovation_sensitivity = -(casadi.mtimes(output_row, sensitivities) + by_parameters[index, :])
+        gain = cross_covariance * (observed[index] / innovation_variance)
+        correction = correction + gain * innovation
+        sensitivities = sensitivities + casadi.mtimes(gain, innovation_sensitivity)
+        covariance = _symmetric(covariance - casadi.mtimes(gain, cross_covariance.T))
+        deviation = casadi.sqrt(innovation_variance)
+        rows.append((innovation / deviation, casadi.log(innovation_variance), innovation_sensitivity / deviation))
+    whitened_innovations, log_variances, whitened_sensitivities = (
+        casadi.vertcat(*column) for column in zip(*rows, strict=True)
+    )
+    return _Filtered(
+        predicted.state + correction,
+        covariance,
+        sensitivities,
+        whitened_innovations,
+        log_variances,
+        whitened_sensitivities,
+    )
 
 
-def _advance(model: Model, substeps: Substeps, state: SX, speed: SX, later: SX, step: SX) -> tuple[SX, SX, SX]:
+def _time_update(
+    model: SymbolicModel, substeps: Substeps, state: SX, speed: SX, next_speed: SX, step: SX
+) -> tuple[SX, SX, SX]:
     """State after one sample, and its derivatives by the state before and by the parameters.
 
     The derivatives weigh errors and may be coarser than the state, whose own error would pose as an effect: with the
-    slopes ``F`` and ``f_p`` of the rates in the middle of a part of the step, to the fourth order or a higher one
+    Jacobians ``F`` and ``f_p`` of the rates in the middle of a part of the step, to the fourth order or a higher one
 
         Gamma = h (I + h F / 2 (I + h F / 3 (I + h F / 4)))        A = I + F Gamma        B = Gamma f_p
 
     Over twice the time that is ``Gamma + A Gamma``: decays which are far quicker than the step then die, where the
     series would blow up.
     """
-    single = _runge_kutta_step(model, speed.numel())
-    path = [state]
-    for begin, end in _cuts(speed, later, substeps.state):
-        path.append(single(path[-1], model.parameters, begin, end, step / substeps.state))
-    slope = Function(
+    runge_kutta_step = _runge_kutta_step(model, speed.numel())
+    trajectory = [state]
+    for begin, end in _speed_intervals(speed, next_speed, substeps.state):
+        trajectory.append(runge_kutta_step(trajectory[-1], model.parameters, begin, end, step / substeps.state))
+    rate_jacobians = Function(
         "slope",
         [model.states, model.inputs, model.parameters],
         [casadi.jacobian(model.rates, symbol) for symbol in (model.states, model.parameters)],
     )
     transition = SX.eye(state.numel())
-    direct = SX(state.numel(), model.parameters.numel())
-    part = step / substeps.slope
-    for index, (begin, end) in enumerate(_cuts(speed, later, substeps.slope)):
-        middle = _on(path, (index + 0.5) / substeps.slope)
+    direct_sensitivity = SX(state.numel(), model.parameters.numel())
+    substep = step / substeps.slope
+    for index, (begin, end) in enumerate(_speed_intervals(speed, next_speed, substeps.slope)):
+        middle = _interpolated(trajectory, (index + 0.5) / substeps.slope)
         inputs = casadi.vertcat(0.5 * (begin + end), SX(3, 1))
-        by_state, by_parameters = slope(middle, inputs, model.parameters)
-        carried = _carried(by_state, part / 2**substeps.doublings, substeps.order)
+        by_state, by_parameters = rate_jacobians(middle, inputs, model.parameters)
+        gamma = _integrated_exponential(by_state, substep / 2**substeps.doublings, substeps.order)
         for _ in range(substeps.doublings):
-            carried = 2.0 * carried + casadi.mtimes(casadi.mtimes(by_state, carried), carried)
-        own = SX.eye(state.numel()) + casadi.mtimes(by_state, carried)
-        transition = casadi.mtimes(own, transition)
-        direct = casadi.mtimes(own, direct) + casadi.mtimes(carried, by_parameters)
-    return path[-1], transition, direct
+            gamma = 2.0 * gamma + casadi.mtimes(casadi.mtimes(by_state, gamma), gamma)
+        substep_transition = SX.eye(state.numel()) + casadi.mtimes(by_state, gamma)
+        transition = casadi.mtimes(substep_transition, transition)
+        direct_sensitivity = casadi.mtimes(substep_transition, direct_sensitivity) + casadi.mtimes(gamma, by_parameters)
+    return trajectory[-1], transition, direct_sensitivity
 
 
-def _on(path: list[SX], fraction: float) -> SX:
-    """A point of a path of equal steps, straight between its points."""
-    steps = len(path) - 1
-    before = min(int(fraction * steps), steps - 1)
-    return path[before] + (fraction * steps - before) * (path[before + 1] - path[before])
+def _interpolated(trajectory: list[SX], fraction: float) -> SX:
+    """Linear interpolation in a trajectory of equal steps."""
+    steps = len(trajectory) - 1
+    interval = min(int(fraction * steps), steps - 1)
+    return trajectory[interval] + (fraction * steps - interval) * (trajectory[interval + 1] - trajectory[interval])
 
 
-def _carried(slopes: SX, step: SX, order: int) -> SX:
-    """What a rate that stays makes of the state over a step."""
-    still = SX.eye(slopes.shape[0])
-    carried = still
+def _integrated_exponential(rate_jacobian: SX, step: SX, order: int) -> SX:
+    """Integral of the matrix exponential over a step, as a series: what a constant rate adds to the state."""
+    identity = SX.eye(rate_jacobian.shape[0])
+    series = identity
     for term in range(order, 1, -1):
-        carried = still + (step / term) * casadi.mtimes(slopes, carried)
-    return step * carried
+        series = identity + (step / term) * casadi.mtimes(rate_jacobian, series)
+    return step * series
 
 
 def _symmetric(matrix: SX) -> SX:
-    """By its upper half alone: the lower one is not worked out."""
+    """The matrix made symmetric from its upper half alone: the lower one is not computed."""
     return casadi.triu2symm(casadi.triu(matrix))
 
 
-def _cuts(speed: SX, later: SX, count: int) -> list[tuple[SX, SX]]:
-    """Winch speeds at both ends of equal parts of a sample interval."""
-    points = [speed + (k / count) * (later - speed) for k in range(count + 1)]
+def _speed_intervals(speed: SX, next_speed: SX, count: int) -> list[tuple[SX, SX]]:
+    """Winch speeds at both ends of each equal part of a sample interval."""
+    points = [speed + (k / count) * (next_speed - speed) for k in range(count + 1)]
     return list(pairwise(points))
 
 
-def _runge_kutta_step(model: Model, cable_count: int) -> Function:
+def _runge_kutta_step(model: SymbolicModel, cable_count: int) -> Function:
     rates = Function("rates", [model.states, model.inputs, model.parameters], [model.rates])
     begin, end, step = SX.sym("begin", cable_count), SX.sym("end", cable_count), SX.sym("step")
-    none = SX(3, 1)
-    at_begin, at_end = casadi.vertcat(begin, none), casadi.vertcat(end, none)
+    no_force = SX(3, 1)
+    at_begin, at_end = casadi.vertcat(begin, no_force), casadi.vertcat(end, no_force)
     middle = 0.5 * (at_begin + at_end)
     k1 = rates(model.states, at_begin, model.parameters)
     k2 = rates(model.states + 0.5 * step * k1, middle, model.parameters)
     k3 = rates(model.states + 0.5 * step * k2, middle, model.parameters)
     k4 = rates(model.states + step * k3, at_end, model.parameters)
-    after = model.states + step / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
-    return Function("runge_kutta_step", [model.states, model.parameters, begin, end, step], [after])
+    next_state = model.states + step / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
+    return Function("runge_kutta_step", [model.states, model.parameters, begin, end, step], [next_state])

@@ -1,4 +1,4 @@
-"""Fits the parameters of a robot's effects to recorded samples."""
+"""Maximum-likelihood fits of the parameters of a robot's effects."""
 
 from __future__ import annotations
 
@@ -12,23 +12,23 @@ from scipy.optimize import least_squares
 from tautwire_fmu.laws.effects import BY_NAME, Parameter
 
 from ..errors import TautwireError, UnreachableError
-from ..model.symbolic import OF_FORMULAS, FreeParameter
+from ..model.symbolic import FORMULA_INDEX, FreeParameter
 from ..robots.robot import Robot
-from ..runs.start import placed
-from .data import Sample
+from ..runs.start import with_start
+from .data import DataSet
 from .filter_step import Noise
 from .hypotheses import Hypothesis, free_parameters, value_of, with_values
 from .likelihood import Innovations, Likelihood
-from .preparation.compression import compressed
+from .preparation.compression import compressed_residuals
 
 Array = NDArray[np.float64]
 
-# Roughness of the model and relative change of the cost at which to stop, stage by stage; then the exact model's.
-ROUGH_STAGES = ((0.1, 1e-3), (0.01, 1e-3))
-EXACT = 1e-7
-EVALUATIONS = 15
-KEPT = 40
-NORMAL_95 = 1.959964
+# Acceleration noise density and relative change of the cost at which to stop, stage by stage; then without it.
+COARSE_FIT_STAGES = ((0.1, 1e-3), (0.01, 1e-3))
+FINE_COST_TOLERANCE = 1e-7
+MAX_FIT_EVALUATIONS = 15
+MAX_COMPILED_LIKELIHOODS = 40
+NORMAL_QUANTILE_95 = 1.959964
 
 
 class NoFitError(TautwireError):
@@ -41,7 +41,7 @@ class NoFitError(TautwireError):
 
 @dataclass(frozen=True)
 class Fit:
-    """A robot some of whose effects' parameters are fitted.
+    """Fitted parameters of a robot's effects, with their covariance.
 
     ``values`` of the ``free`` ones have shape (p,); ``covariance`` (p, p) is from the curvature of the likelihood.
     """
@@ -52,172 +52,188 @@ class Fit:
     covariance: Array
 
     @property
-    def deviations(self) -> Array:
+    def standard_deviations(self) -> Array:
         """Standard deviations (p,)."""
         return np.sqrt(np.maximum(np.diag(self.covariance), 0.0))
 
     def interval(self, index: int) -> tuple[float, float]:
         """95 % interval of one parameter."""
-        reach = NORMAL_95 * float(self.deviations[index])
-        return float(self.values[index]) - reach, float(self.values[index]) + reach
+        half_width = NORMAL_QUANTILE_95 * float(self.standard_deviations[index])
+        return float(self.values[index]) - half_width, float(self.values[index]) + half_width
 
 
 class Fitter:
-    """Fits and judges robots on samples; compiled likelihoods are kept, and ``between`` is called before each run."""
+    """Fits and validates robots on data sets; keeps compiled likelihoods, calls ``poll_interrupts`` before each run."""
 
-    def __init__(self, noise: Noise, between: Callable[[], None] = lambda: None) -> None:
+    def __init__(self, noise: Noise, poll_interrupts: Callable[[], None] = lambda: None) -> None:
         self.noise = noise
-        self.between = between
+        self.poll_interrupts = poll_interrupts
         self._compiled: dict[tuple[object, ...], Likelihood] = {}
 
-    def fit(self, robot: Robot, chosen: Collection[Hypothesis], sample: Sample) -> Fit:
-        """Least squares on whitened innovations, first under a rough model, then under the exact one.
+    def fit(self, robot: Robot, chosen: Collection[Hypothesis], data: DataSet) -> Fit:
+        """Least squares on whitened innovations, first with acceleration noise, then under the exact model.
 
-        Frees the parameters of the chosen hypotheses. The exact stage begins where the rough one ended or where that
+        Frees the parameters of the chosen hypotheses. The exact stage begins where the coarse one ended or where that
         began, whichever is more probable.
         """
-        return self._fit(robot, chosen, sample, (*ROUGH_STAGES, (0.0, EXACT)))
+        return self._fit(robot, chosen, data, (*COARSE_FIT_STAGES, (0.0, FINE_COST_TOLERANCE)))
 
     def fit_from(
-        self, starts: Sequence[Robot], chosen: Collection[Hypothesis], sample: Sample, least: float, stop: float = EXACT
+        self,
+        starts: Sequence[Robot],
+        chosen: Collection[Hypothesis],
+        data: DataSet,
+        min_log_likelihood: float,
+        cost_tolerance: float = FINE_COST_TOLERANCE,
     ) -> Fit:
-        """Fit from the first start whose log-likelihood reaches ``least``, under the exact model at once.
+        """Fit from the first start whose log-likelihood is at least ``min_log_likelihood``, under the exact model.
 
-        Where none does, the last start is fitted as :meth:`fit` does. ``stop`` is the relative change of the cost at
-        which the exact stage ends.
+        Where none does, the last start is fitted as :meth:`fit` does. ``cost_tolerance`` is the relative change of the
+        cost at which the exact stage ends.
 
         Raises NoFitError, UnreachableError.
         """
         for start in starts:
             try:
-                found = self.judged(start, chosen, sample).log_likelihood(sample.rows)
+                log_likelihood = self.judged(start, chosen, data).log_likelihood(data.rows)
             except UnreachableError:
                 continue
-            if found >= least:
-                return self._fit(start, chosen, sample, ((0.0, stop),))
-        return self._fit(starts[-1], chosen, sample, (*ROUGH_STAGES, (0.0, stop)))
+            if log_likelihood >= min_log_likelihood:
+                return self._fit(start, chosen, data, ((0.0, cost_tolerance),))
+        return self._fit(starts[-1], chosen, data, (*COARSE_FIT_STAGES, (0.0, cost_tolerance)))
 
     def _fit(
-        self, robot: Robot, chosen: Collection[Hypothesis], sample: Sample, stages: Sequence[tuple[float, float]]
+        self, robot: Robot, chosen: Collection[Hypothesis], data: DataSet, stages: Sequence[tuple[float, float]]
     ) -> Fit:
         free = free_parameters(robot, chosen)
         if not free:
             return Fit(robot, (), np.zeros(0), np.zeros((0, 0)))
         start = np.array([value_of(robot, f) for f in free])
-        scale = sizes_of(robot, free)
-        lower, upper = (bounds / scale for bounds in bounds_of(robot, free))
-        likelihood = self._likelihood(placed(robot, sample.start), free, sample)
-        begun = scaled = start / scale
-        slopes = np.zeros((0, len(free)))
-        for rough, stop in stages:
-            residual = _Residual(likelihood, sample, scale, rough, self.between)
-            if rough == 0.0:
-                scaled = max((scaled, begun), key=residual.log_likelihood)
+        scale = parameter_scales(robot, free)
+        lower, upper = (bounds / scale for bounds in parameter_bounds(robot, free))
+        likelihood = self._compiled_likelihood(with_start(robot, data.start), free, data)
+        scaled_start = scaled = start / scale
+        jacobian = np.zeros((0, len(free)))
+        for noise_density, cost_tolerance in stages:
+            residual = _Residual(likelihood, data, scale, noise_density, self.poll_interrupts)
+            if noise_density == 0.0:
+                scaled = max((scaled, scaled_start), key=residual.log_likelihood)
             # The first trust region is as large as the start: counted from one, a parameter near zero is not stuck.
             residual.origin = scaled - 1.0
-            if not np.all(np.isfinite(residual.values(np.ones(len(free))))):
+            if not np.all(np.isfinite(residual.residuals(np.ones(len(free))))):
                 raise NoFitError(scaled * scale)
             solution = least_squares(
-                residual.values,
+                residual.residuals,
                 np.ones(len(free)),
-                jac=residual.slopes,
+                jac=residual.jacobian,
                 bounds=(lower - residual.origin, upper - residual.origin),
                 x_scale="jac",
-                ftol=stop,
-                max_nfev=EVALUATIONS,
+                ftol=cost_tolerance,
+                max_nfev=MAX_FIT_EVALUATIONS,
             )
-            scaled, slopes = residual.origin + solution.x, np.asarray(solution.jac, dtype=float)
+            scaled, jacobian = residual.origin + solution.x, np.asarray(solution.jac, dtype=float)
         # What is scaled back may end beyond a bound by its last digit.
-        values = np.clip(scaled * scale, *bounds_of(robot, free))
-        covariance = np.linalg.pinv(slopes.T @ slopes) * np.outer(scale, scale)
+        values = np.clip(scaled * scale, *parameter_bounds(robot, free))
+        covariance = np.linalg.pinv(jacobian.T @ jacobian) * np.outer(scale, scale)
         fitted = with_values(robot, free, dict(zip(free, values.tolist(), strict=True)))
         return Fit(fitted, free, values, covariance)
 
-    def innovations(self, robot: Robot, sample: Sample) -> Innovations:
+    def innovations(self, robot: Robot, data: DataSet) -> Innovations:
         """Innovations of all samples of a recording under a robot as it is."""
-        return self._likelihood(placed(robot, sample.start), (), sample).innovations(sample.recording, ())
+        return self._compiled_likelihood(with_start(robot, data.start), (), data).innovations(data.recording, ())
 
-    def judged(self, robot: Robot, chosen: Collection[Hypothesis], sample: Sample) -> Innovations:
-        """As :meth:`innovations`, by what was compiled for fitting the chosen hypotheses."""
-        likelihood, values = self.likelihood(robot, chosen, sample)
-        return likelihood.innovations(sample.recording, values)
+    def judged(self, robot: Robot, chosen: Collection[Hypothesis], data: DataSet) -> Innovations:
+        """As :meth:`innovations`, with the likelihood that was compiled for fitting the chosen hypotheses."""
+        likelihood, values = self.likelihood(robot, chosen, data)
+        return likelihood.innovations(data.recording, values)
 
-    def likelihood(
-        self, robot: Robot, chosen: Collection[Hypothesis], sample: Sample
-    ) -> tuple[Likelihood, list[float]]:
-        """What was compiled for fitting the chosen hypotheses, and the values that the robot has."""
+    def likelihood(self, robot: Robot, chosen: Collection[Hypothesis], data: DataSet) -> tuple[Likelihood, list[float]]:
+        """The likelihood compiled for fitting the chosen hypotheses, and the robot's values of their parameters."""
         free = free_parameters(robot, chosen)
         values = [value_of(robot, f) for f in free]
-        return self._likelihood(placed(robot, sample.start), free, sample), values
+        return self._compiled_likelihood(with_start(robot, data.start), free, data), values
 
-    def open_loop_variances(self, robot: Robot, sample: Sample) -> Array:
-        """See :meth:`tautwire.tracer.likelihood.Likelihood.open_loop_variances`."""
-        return self._likelihood(placed(robot, sample.start), (), sample).open_loop_variances(sample.recording, ())
+    def open_loop_variances(self, robot: Robot, data: DataSet) -> Array:
+        """See :meth:`tautwire.estimation.likelihood.Likelihood.open_loop_variances`."""
+        return self._compiled_likelihood(with_start(robot, data.start), (), data).open_loop_variances(
+            data.recording, ()
+        )
 
-    def _likelihood(self, robot: Robot, free: Sequence[FreeParameter], sample: Sample) -> Likelihood:
-        self.between()
-        interval = float(np.median(np.diff(sample.recording.time)))
-        opened = with_values(robot, free, dict.fromkeys(free, 0.0))
-        key = (opened, tuple(free), round(interval, 9))
+    def _compiled_likelihood(self, robot: Robot, free: Sequence[FreeParameter], data: DataSet) -> Likelihood:
+        self.poll_interrupts()
+        interval = float(np.median(np.diff(data.recording.time)))
+        structure = with_values(robot, free, dict.fromkeys(free, 0.0))
+        key = (structure, tuple(free), round(interval, 9))
         if key not in self._compiled:
-            if len(self._compiled) >= KEPT:
+            if len(self._compiled) >= MAX_COMPILED_LIKELIHOODS:
                 self._compiled.pop(next(iter(self._compiled)))
             self._compiled[key] = Likelihood(robot, free, self.noise, interval)
         return self._compiled[key]
 
 
-def bounds_of(robot: Robot, free: Sequence[FreeParameter]) -> tuple[Array, Array]:
-    """Least and largest value of each free parameter, (p,) each."""
-    known = _parameters(robot, free)
-    return np.array([p.minimum for p in known], dtype=float), np.array([p.maximum for p in known], dtype=float)
+def parameter_bounds(robot: Robot, free: Sequence[FreeParameter]) -> tuple[Array, Array]:
+    """Lower and upper bound of each free parameter, (p,) each."""
+    declarations = _parameter_declarations(robot, free)
+    return np.array([p.minimum for p in declarations], dtype=float), np.array(
+        [p.maximum for p in declarations], dtype=float
+    )
 
 
-def sizes_of(robot: Robot, free: Sequence[FreeParameter]) -> Array:
-    """What the free parameters are measured by (p,): their values, or where fits begin if that is more."""
-    known = _parameters(robot, free)
-    return np.array([max(abs(value_of(robot, f)), abs(p.start)) for f, p in zip(free, known, strict=True)])
+def parameter_scales(robot: Robot, free: Sequence[FreeParameter]) -> Array:
+    """Scale of each free parameter (p,): its value, or where fits begin if that is more."""
+    declarations = _parameter_declarations(robot, free)
+    return np.array([max(abs(value_of(robot, f)), abs(p.start)) for f, p in zip(free, declarations, strict=True)])
 
 
-def _parameters(robot: Robot, free: Sequence[FreeParameter]) -> list[Parameter]:
-    """What the effects say of each free parameter; a number of a formula may be any."""
+def _parameter_declarations(robot: Robot, free: Sequence[FreeParameter]) -> list[Parameter]:
+    """Declaration of each free parameter; a number of a formula is unbounded."""
     return [
         Parameter(f.name, "", "", -np.inf, np.inf, 0.0, value_of(robot, f) or 1.0)
-        if f.setting == OF_FORMULAS
-        else {p.name: p for p in BY_NAME[robot.effects[f.setting].name].parameters}[f.name]
+        if f.effect_index == FORMULA_INDEX
+        else {p.name: p for p in BY_NAME[robot.effects[f.effect_index].name].parameters}[f.name]
         for f in free
     ]
 
 
 class _Residual:
-    """Innovations and their slopes, compressed, at the last point asked for, in scaled parameters."""
+    """Compressed innovations and their Jacobian in scaled parameters, cached at the last point."""
 
     def __init__(
-        self, likelihood: Likelihood, sample: Sample, scale: Array, roughness: float, between: Callable[[], None]
+        self,
+        likelihood: Likelihood,
+        data: DataSet,
+        scale: Array,
+        acceleration_noise_density: float,
+        poll_interrupts: Callable[[], None],
     ) -> None:
-        self.between = between
+        self.poll_interrupts = poll_interrupts
         self.likelihood = likelihood
-        self.sample = sample
+        self.sample = data
         self.scale = scale
-        self.roughness = roughness
+        self.acceleration_noise_density = acceleration_noise_density
         self.origin = np.zeros(len(scale))
-        self._at: Array | None = None
-        self._found: tuple[Array, Array] = (np.zeros(0), np.zeros((0, 0)))
+        self._evaluated_at: Array | None = None
+        self._cached: tuple[Array, Array] = (np.zeros(0), np.zeros((0, 0)))
 
     def log_likelihood(self, scaled: Array) -> float:
-        found = self.likelihood.innovations(self.sample.recording, scaled * self.scale, self.roughness)
-        value = found.log_likelihood(self.sample.rows)
+        innovations = self.likelihood.innovations(
+            self.sample.recording, scaled * self.scale, self.acceleration_noise_density
+        )
+        value = innovations.log_likelihood(self.sample.rows)
         return value if np.isfinite(value) else -np.inf
 
-    def values(self, moved: Array) -> Array:
-        return self._evaluate(self.origin + moved)[0]
+    def residuals(self, offset: Array) -> Array:
+        return self._evaluate(self.origin + offset)[0]
 
-    def slopes(self, moved: Array) -> Array:
-        return self._evaluate(self.origin + moved)[1]
+    def jacobian(self, offset: Array) -> Array:
+        return self._evaluate(self.origin + offset)[1]
 
     def _evaluate(self, scaled: Array) -> tuple[Array, Array]:
-        if self._at is None or not np.array_equal(self._at, scaled):
-            self.between()
-            residuals, slopes = compressed(self.likelihood, scaled * self.scale, self.sample, self.roughness)
-            self._found = (residuals, slopes * self.scale)
-            self._at = scaled.copy()
-        return self._found
+        if self._evaluated_at is None or not np.array_equal(self._evaluated_at, scaled):
+            self.poll_interrupts()
+            residuals, sensitivities = compressed_residuals(
+                self.likelihood, scaled * self.scale, self.sample, self.acceleration_noise_density
+            )
+            self._cached = (residuals, sensitivities * self.scale)
+            self._evaluated_at = scaled.copy()
+        return self._cached

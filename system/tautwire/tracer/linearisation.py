@@ -1,10 +1,10 @@
-"""The filter's run over a recording, linearised: how a small change of the robot would move every innovation.
+"""Linearised filter: how a small change of the robot would move every innovation of a recording.
 
-With the filter's gain held, slopes ``S`` of the predicted state by parameters follow
+With the filter's gain held, sensitivities ``S`` of the predicted state to parameters follow
 
     dv = C S + D          S' = A (S - K dv) + B
 
-where ``C`` and ``A`` are the derivatives of what sensors show and of the next state by the state, and ``D`` and ``B``
+where ``C`` and ``A`` are the derivatives of the outputs and of the next state by the state, and ``D`` and ``B``
 those by the parameters. All but ``D`` and ``B`` belong to the run, so that any number of parameters costs one run.
 
 Source: Ljung (1999), System Identification, sec. 11.4; Anderson and Moore (1979), Optimal Filtering, ch. 5.
@@ -18,7 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..native.repeated import stacked
+from ..native.repeated import by_sample
 from ..recordings.recording import Recording
 from .likelihood import Likelihood
 
@@ -26,14 +26,14 @@ Array = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
-class Linearised:
-    """K successive samples of a run.
+class LinearisedSegment:
+    """Linearised filter segment: Linearised filter segment: K successive samples of a run.
 
     ``states`` (n, K + 1) as predicted and winch ``speeds`` (cables, K + 1), of the next sample too; ``step`` (K) and
-    ``shift`` (m, K) in s. ``transition`` A (K, n, n), ``half`` the same from half a step before the next sample,
-    ``sensing`` C (K, m, n), ``gain`` K (K, n, m); ``whitening`` (K, m, m) makes innovations independent with unit
-    variance and is zero where nothing was ``seen`` (K, m). ``own``, ``values`` and ``slopes`` as for Stretch, values
-    and slopes zero where nothing was seen.
+    ``shift`` (m, K) in s. ``transition`` A (K, n, n), ``half_transition`` the same from half a step before the next
+    sample, ``output_matrix`` C (K, m, n), ``gain`` K (K, n, m); ``whitening`` (K, m, m) makes innovations independent
+    with unit variance and is zero where nothing was ``observed`` (K, m). ``is_recorded``, ``values`` and
+    ``sensitivities`` as for FilterSegment, values and sensitivities zero where nothing was observed.
     """
 
     states: Array
@@ -41,66 +41,71 @@ class Linearised:
     step: Array
     shift: Array
     transition: Array
-    half: Array
-    sensing: Array
+    half_transition: Array
+    output_matrix: Array
     gain: Array
     whitening: Array
-    seen: NDArray[np.bool_]
-    own: NDArray[np.bool_]
+    observed: NDArray[np.bool_]
+    is_recorded: NDArray[np.bool_]
     values: Array
-    slopes: Array
+    sensitivities: Array
 
-    def carry(self, state_slopes: Array, by_rates: Array, by_sensors: Array) -> tuple[Array, Array]:
-        """Slopes of the predicted state (n, p) after this stretch, and of the whitened innovations (K, m, p).
+    def propagate_sensitivities(
+        self, state_sensitivities: Array, state_forcing: Array, output_forcing: Array
+    ) -> tuple[Array, Array]:
+        """Sensitivities of the predicted state (n, p) after this segment, and of the whitened innovations (K, m, p).
 
-        ``by_rates`` is B (K, n, p), ``by_sensors`` D (K, m, p).
+        ``state_forcing`` is B (K, n, p), ``output_forcing`` D (K, m, p).
         """
-        moved = np.empty_like(by_sensors)
-        slopes = state_slopes
-        for k in range(len(by_sensors)):
-            moved[k] = self.sensing[k] @ slopes + by_sensors[k]
-            slopes = self.transition[k] @ (slopes - self.gain[k] @ moved[k]) + by_rates[k]
-        return slopes, -(self.whitening @ moved)
+        output_changes = np.empty_like(output_forcing)
+        sensitivities = state_sensitivities
+        for k in range(len(output_forcing)):
+            output_changes[k] = self.output_matrix[k] @ sensitivities + output_forcing[k]
+            sensitivities = self.transition[k] @ (sensitivities - self.gain[k] @ output_changes[k]) + state_forcing[k]
+        return sensitivities, -(self.whitening @ output_changes)
 
 
-def linearise_run(
-    likelihood: Likelihood, values: list[float], recording: Recording, roughness: float = 0.0
-) -> Iterator[Linearised]:
-    """Each stretch of a filter's run over a recording, at some values of its free parameters.
+def linearise_filter(
+    likelihood: Likelihood, values: list[float], recording: Recording, acceleration_noise_density: float = 0.0
+) -> Iterator[LinearisedSegment]:
+    """Linearise a filter's run over a recording, segment by segment, at some values of its free parameters.
 
-    With ``roughness`` (m/s^2 per root hertz) the run follows what was measured where the model does not.
+    With ``acceleration_noise_density`` (m/s^2 per root hertz) the run follows what was measured where the model does
+    not.
     """
     theta = np.array(values, dtype=float)[:, None]
     noise = likelihood.noise
     variances = np.square(noise.of_outputs(likelihood.cable_count))
-    for stretch in likelihood.stretches(recording, values, roughness):
-        measured, seen, shift, speed, later, step, _ = stretch.columns
+    for segment in likelihood.segments(recording, values, acceleration_noise_density):
+        measured, observed, shift, speed, later, step, _ = segment.columns
         count = measured.shape[1]
-        before = stretch.states[:, :-1]
-        looked = seen.T[:, :, None] > 0.0
-        innovations = np.where(looked[:, :, 0], stretch.values, 0.0)
-        sensing = stacked(likelihood.slopes(count, before, before, theta, shift, speed, later, step)[0], count)
-        spread = stretch.covariances @ np.where(looked, sensing, 0.0).swapaxes(1, 2)
-        covariance = np.where(looked, sensing, 0.0) @ spread + np.diag(variances)
-        root = np.linalg.cholesky(covariance)
-        whitening = np.where(looked, np.linalg.inv(root), 0.0)
-        gain = spread @ np.linalg.inv(covariance)
-        moved = np.einsum("kij,kjl,kl->ki", gain, root, innovations)
-        after = before + moved.T
-        _, *ahead = likelihood.slopes(count, before, after, theta, shift, speed, later, step)
-        transition, half = (stacked(matrix, count) for matrix in ahead)
-        yield Linearised(
-            stretch.states,
+        predicted = segment.states[:, :-1]
+        is_observed = observed.T[:, :, None] > 0.0
+        innovations = np.where(is_observed[:, :, 0], segment.values, 0.0)
+        output_matrix = by_sample(
+            likelihood.jacobians(count, predicted, predicted, theta, shift, speed, later, step)[0], count
+        )
+        cross_covariance = segment.covariances @ np.where(is_observed, output_matrix, 0.0).swapaxes(1, 2)
+        covariance = np.where(is_observed, output_matrix, 0.0) @ cross_covariance + np.diag(variances)
+        cholesky_factor = np.linalg.cholesky(covariance)
+        whitening = np.where(is_observed, np.linalg.inv(cholesky_factor), 0.0)
+        gain = cross_covariance @ np.linalg.inv(covariance)
+        corrections = np.einsum("kij,kjl,kl->ki", gain, cholesky_factor, innovations)
+        updated = predicted + corrections.T
+        _, *jacobians = likelihood.jacobians(count, predicted, updated, theta, shift, speed, later, step)
+        transition, half_transition = (by_sample(matrix, count) for matrix in jacobians)
+        yield LinearisedSegment(
+            segment.states,
             np.hstack([speed, later[:, -1:]]),
             step[0],
             shift,
             transition,
-            half,
-            sensing,
+            half_transition,
+            output_matrix,
             gain,
             whitening,
-            looked[:, :, 0],
-            stretch.own,
+            is_observed[:, :, 0],
+            segment.is_recorded,
             innovations,
-            np.where(looked, stretch.slopes, 0.0),
+            np.where(is_observed, segment.sensitivities, 0.0),
         )

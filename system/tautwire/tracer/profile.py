@@ -1,6 +1,7 @@
-"""95 % intervals by profile likelihood, where the surface about a fit is not round.
+"""Profile-likelihood 95 % intervals, also where the sum of squares about a fit is not a parabola.
 
-A value ``t`` of one parameter is inside while the others, at their best beside it, leave little more than the fit does:
+A value ``t`` of one parameter is inside while the others, at their best beside it, leave a sum of squares little above
+that of the fit:
 
     min over the others of S(t, others) - S(fit) <= 1.96^2
 
@@ -19,98 +20,116 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import brentq
 
-from .attempts import fitter_apart
-from .data import Sample
+from .attempts import worker_fitter
+from .data import DataSet
 from .filter_step import Noise
-from .fit import NORMAL_95, Fit, Fitter, bounds_of
+from .fit import NORMAL_QUANTILE_95, Fit, Fitter, parameter_bounds
 from .hypotheses import Hypothesis
-from .surface import LowerError, Surface, TooManyRunsError
-from .workers import Workers
+from .surface import LowerMinimumError, ProfileLikelihood, TooManyRunsError
+from .workers import WorkerPool
 
 Array = NDArray[np.float64]
 
-WITHIN = NORMAL_95**2
-# Relative difference of the rise at both ends from that of a parabola, up to which the surface counts as round.
-ROUND = 0.1
-# Of the distance from the fit to an end.
-PRECISION = 0.01
-# Of its size: how far from the fit an end is looked for first where curvature tells nothing.
-FIRST_REACH = 1e-3
+CHI_SQUARED_95 = NORMAL_QUANTILE_95**2
+# Largest relative difference of the rise from that of a parabola at which an end by curvature is taken.
+MAX_PARABOLA_DEVIATION = 0.1
+# Relative to the distance from the fit to an end.
+INTERVAL_END_TOLERANCE = 0.01
+# Relative to the parameter's scale: first distance of the search where the curvature is unknown.
+FIRST_RELATIVE_DISTANCE = 1e-3
 # How often the distance is doubled in search of an end, and how often the fit may turn out not to be the best.
-MOST_DOUBLINGS, MOST_LOWER = 20, 3
+MAX_DISTANCE_DOUBLINGS, MAX_RECENTRINGS = 20, 3
 
 
-def intervals(
-    fitter: Fitter, fit: Fit, chosen: Sequence[Hypothesis], sample: Sample, workers: Workers
+def profile_intervals(
+    fitter: Fitter, fit: Fit, chosen: Sequence[Hypothesis], data: DataSet, workers: WorkerPool
 ) -> list[tuple[float, float]]:
-    """Low and high end for each free parameter of the fit, which was made with ``chosen`` on the sample.
+    """Profile-likelihood interval of each free parameter of a fit, which was made with ``chosen`` on ``data``.
 
-    An end is where the parameter's range ends if nothing tells before; infinite where neither does. It is by curvature
-    where :class:`Surface` takes too many runs to find it.
+    An end is the parameter's bound if the profile does not rise before; infinite where there is none. It is by
+    curvature where :class:`ProfileLikelihood` takes too many runs to find it.
     """
     count = len(fit.free)
     if workers.processes == 1:
-        return [ends(fitter, fit, chosen, sample, index) for index in range(count)]
-    calls = [(fitter.noise, fit, chosen, sample, index) for index in range(count)]
-    return [found for _, found in sorted(workers.each(_ends_apart, calls))]
+        return [profile_interval(fitter, fit, chosen, data, index) for index in range(count)]
+    calls = [(fitter.noise, fit, chosen, data, index) for index in range(count)]
+    return [found for _, found in sorted(workers.map_unordered(_profile_interval_in_worker, calls))]
 
 
-def ends(fitter: Fitter, fit: Fit, chosen: Sequence[Hypothesis], sample: Sample, index: int) -> tuple[float, float]:
-    """Where the interval of one parameter ends; its value is inside."""
-    likelihood, _ = fitter.likelihood(fit.robot, chosen, sample)
-    lower, upper = bounds_of(fit.robot, fit.free)
-    least, most = float(lower[index]), float(upper[index])
-    value, reach = float(fit.values[index]), NORMAL_95 * float(fit.deviations[index])
-    surface = Surface(likelihood, fit, sample, lower, upper, fitter.between)
-    try:
-        low, high = _both(surface, index, (least, most), MOST_LOWER)
-    except (LowerError, TooManyRunsError):
-        return (max(value - reach, least), min(value + reach, most)) if reach > 0.0 else (least, most)
-    return max(min(low, value), least), min(max(high, value), most)
-
-
-def _ends_apart(
-    noise: Noise, fit: Fit, chosen: Sequence[Hypothesis], sample: Sample, index: int
+def profile_interval(
+    fitter: Fitter, fit: Fit, chosen: Sequence[Hypothesis], data: DataSet, index: int
 ) -> tuple[float, float]:
-    return ends(fitter_apart(noise), fit, chosen, sample, index)
-
-
-def _both(surface: Surface, index: int, bounds: tuple[float, float], left: int) -> tuple[float, float]:
-    """Both ends, about better values where some turn up."""
+    """Profile-likelihood interval of one parameter; its value is inside."""
+    likelihood, _ = fitter.likelihood(fit.robot, chosen, data)
+    lower, upper = parameter_bounds(fit.robot, fit.free)
+    minimum, maximum = float(lower[index]), float(upper[index])
+    value, half_width = float(fit.values[index]), NORMAL_QUANTILE_95 * float(fit.standard_deviations[index])
+    profile = ProfileLikelihood(likelihood, fit, data, lower, upper, fitter.poll_interrupts)
     try:
-        return _searched(surface, index, -1.0, bounds[0]), _searched(surface, index, 1.0, bounds[1])
-    except LowerError as lower:
-        if not left:
+        low, high = _both_ends(profile, index, (minimum, maximum), MAX_RECENTRINGS)
+    except (LowerMinimumError, TooManyRunsError):
+        return (
+            (max(value - half_width, minimum), min(value + half_width, maximum))
+            if half_width > 0.0
+            else (minimum, maximum)
+        )
+    return max(min(low, value), minimum), min(max(high, value), maximum)
+
+
+def _profile_interval_in_worker(
+    noise: Noise, fit: Fit, chosen: Sequence[Hypothesis], data: DataSet, index: int
+) -> tuple[float, float]:
+    return profile_interval(worker_fitter(noise), fit, chosen, data, index)
+
+
+def _both_ends(
+    profile: ProfileLikelihood, index: int, bounds: tuple[float, float], recentrings: int
+) -> tuple[float, float]:
+    """Both ends, recentred on better values where some turn up."""
+    try:
+        return _interval_end(profile, index, -1.0, bounds[0]), _interval_end(profile, index, 1.0, bounds[1])
+    except LowerMinimumError as better:
+        if not recentrings:
             raise
-        return _both(surface.about(lower.values), index, bounds, left - 1)
+        return _both_ends(profile.recentred(better.values), index, bounds, recentrings - 1)
 
 
-def _searched(surface: Surface, index: int, side: float, bound: float) -> float:
-    middle, deviation = float(surface.values[index]), float(surface.deviations[index])
-    inside = 0.0
-    for reach in _reaches(NORMAL_95 * deviation, FIRST_REACH * float(surface.sizes[index]), abs(bound - middle)):
-        rise = surface.rise(index, middle + side * reach) - WITHIN
-        if inside == 0.0 and reach == NORMAL_95 * deviation and abs(rise) < ROUND * WITHIN:
-            return middle + side * reach
-        if rise > 0.0:
+def _interval_end(profile: ProfileLikelihood, index: int, sign: float, bound: float) -> float:
+    estimate, standard_deviation = float(profile.values[index]), float(profile.standard_deviations[index])
+    inner = 0.0
+    for distance in _search_distances(
+        NORMAL_QUANTILE_95 * standard_deviation,
+        FIRST_RELATIVE_DISTANCE * float(profile.scales[index]),
+        abs(bound - estimate),
+    ):
+        excess_at_distance = profile.rise(index, estimate + sign * distance) - CHI_SQUARED_95
+        if (
+            inner == 0.0
+            and distance == NORMAL_QUANTILE_95 * standard_deviation
+            and abs(excess_at_distance) < MAX_PARABOLA_DEVIATION * CHI_SQUARED_95
+        ):
+            return estimate + sign * distance
+        if excess_at_distance > 0.0:
             break
-        inside = reach
+        inner = distance
     else:
         return bound
 
-    def excess(distance: float) -> float:
-        return surface.rise(index, middle + side * distance) - WITHIN if distance > 0.0 else -WITHIN
+    def excess(length: float) -> float:
+        return profile.rise(index, estimate + sign * length) - CHI_SQUARED_95 if length > 0.0 else -CHI_SQUARED_95
 
-    return middle + side * float(brentq(excess, inside, reach, xtol=PRECISION * reach, rtol=PRECISION))
+    return estimate + sign * float(
+        brentq(excess, inner, distance, xtol=INTERVAL_END_TOLERANCE * distance, rtol=INTERVAL_END_TOLERANCE)
+    )
 
 
-def _reaches(by_curvature: float, by_size: float, farthest: float) -> Iterator[float]:
-    """Distances at which to look, each twice the last, up to the farthest if that is not infinite."""
-    reach = by_curvature if by_curvature > 0.0 else by_size
-    for _ in range(MOST_DOUBLINGS):
-        if reach >= farthest:
+def _search_distances(by_curvature: float, by_size: float, farthest: float) -> Iterator[float]:
+    """Distances of the search, each twice the last, up to the farthest if that is not infinite."""
+    distance = by_curvature if by_curvature > 0.0 else by_size
+    for _ in range(MAX_DISTANCE_DOUBLINGS):
+        if distance >= farthest:
             break
-        yield reach
-        reach = max(2.0 * reach, by_size)
+        yield distance
+        distance = max(2.0 * distance, by_size)
     if 0.0 < farthest < np.inf:
         yield farthest

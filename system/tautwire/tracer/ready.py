@@ -1,4 +1,4 @@
-"""Recordings made ready for judging: what is done to them, the plain model's innovations, and notes of it all."""
+"""Preprocessing of recordings: what is done to them, the declared model's innovations, and notes of it all."""
 
 from __future__ import annotations
 
@@ -8,85 +8,91 @@ from dataclasses import dataclass, replace
 from ..errors import RecordingError
 from ..recordings.recording import Recording
 from ..robots.robot import Robot
-from .adequacy import FEWEST, enough_samples, is_noise
-from .data import Evidence, Sample, split
+from .adequacy import MIN_SAMPLES, has_enough_samples, residuals_are_white
+from .data import DataSet, DataSplit, split_data
 from .fit import Fitter
 from .likelihood import Innovations
-from .preparation.calibration import calibrated
+from .preparation.calibration import calibrate
 from .preparation.clock import with_clocks_set
 from .preparation.length import shortened
-from .preparation.preparation import prepare
-from .workers import Workers
+from .preparation.preparation import prepare_recordings
+from .workers import WorkerPool
 
 
 @dataclass(frozen=True)
-class Ready:
-    """Recordings made fit for judging, the plain model's innovations on them, and what was done to them."""
+class PreparedData:
+    """Preprocessed data, the declared model's innovations on them, and notes on what was done."""
 
-    evidence: Evidence
-    samples: tuple[Sample, ...]
+    split: DataSplit
+    data_sets: tuple[DataSet, ...]
     fitter: Fitter
-    plain: tuple[Innovations, Innovations]
+    innovations: tuple[Innovations, Innovations]
     notes: tuple[str, ...]
 
 
-def readings(robot: Robot, fit: Recording, check: Recording | None, workers: Workers) -> tuple[Ready, ...]:
-    """The recordings made ready; twice where clocks seem to be apart but more is wrong.
+def prepare_data(
+    robot: Robot, fit: Recording, check: Recording | None, workers: WorkerPool
+) -> tuple[PreparedData, ...]:
+    """Preprocess the recordings; in two versions where clocks seem to be apart but more is wrong.
 
-    First as they are then: an effect that explains all of it goes before a clock that explains a part.
+    The first is as recorded then: an effect that explains all of it goes before a clock that explains a part.
     """
-    fit, check, short = shortened(fit, check)
-    prepared = prepare(robot, fit, check)
-    evidence = split(robot, prepared.noise, prepared.fit, prepared.check)
-    fitter = Fitter(prepared.noise, workers.between)
-    plain = innovations_of(fitter, robot, evidence)
-    _require_samples(plain, evidence)
+    fit, check, truncation_notes = shortened(fit, check)
+    prepared = prepare_recordings(robot, fit, check)
+    data_split = split_data(robot, prepared.noise, prepared.fit, prepared.check)
+    fitter = Fitter(prepared.noise, workers.poll_interrupts)
+    innovations = innovations_of(fitter, robot, data_split)
+    _require_samples(innovations, data_split)
 
-    def ready(evidence: Evidence, plain: tuple[Innovations, Innovations], clocks: tuple[str, ...]) -> Ready:
-        samples = (evidence.fit,) if check is None else (evidence.fit, evidence.judge)
-        notes = (*short, *prepared.notes, *clocks, *_notes(evidence, samples))
-        return Ready(evidence, samples, fitter, plain, notes)
+    def assembled(
+        data_split: DataSplit, innovations: tuple[Innovations, Innovations], clock_notes: tuple[str, ...]
+    ) -> PreparedData:
+        data_sets = (data_split.estimation,) if check is None else (data_split.estimation, data_split.validation)
+        all_notes = (*truncation_notes, *prepared.notes, *clock_notes, *_notes(data_split, data_sets))
+        return PreparedData(data_split, data_sets, fitter, innovations, all_notes)
 
-    as_they_are = ready(evidence, plain, ())
-    if all_noise(plain, evidence):
-        return (as_they_are,)
-    evidence, clocks = with_clocks_set(fitter, robot, evidence)
-    if not clocks:
-        return (as_they_are,)
-    plain = innovations_of(fitter, robot, evidence)
-    with_clocks = ready(evidence, plain, clocks)
-    return (with_clocks,) if all_noise(plain, evidence) else (as_they_are, with_clocks)
-
-
-def innovations_of(fitter: Fitter, robot: Robot, evidence: Evidence) -> tuple[Innovations, Innovations]:
-    """Those of a robot as it is, where models are fitted and where they are judged."""
-    return fitter.innovations(robot, evidence.fit), fitter.innovations(robot, evidence.judge)
+    as_recorded = assembled(data_split, innovations, ())
+    if all_residuals_white(innovations, data_split):
+        return (as_recorded,)
+    data_split, clock_notes = with_clocks_set(fitter, robot, data_split)
+    if not clock_notes:
+        return (as_recorded,)
+    innovations = innovations_of(fitter, robot, data_split)
+    clock_corrected = assembled(data_split, innovations, clock_notes)
+    return (clock_corrected,) if all_residuals_white(innovations, data_split) else (as_recorded, clock_corrected)
 
 
-def all_noise(innovations: Sequence[Innovations], evidence: Evidence) -> bool:
-    """Whether nothing but noise is left, where the model was fitted as where it is judged."""
-    samples = (evidence.fit, evidence.judge)
-    return all(is_noise(found, sample.rows) for found, sample in zip(innovations, samples, strict=True))
+def innovations_of(fitter: Fitter, robot: Robot, split: DataSplit) -> tuple[Innovations, Innovations]:
+    """Innovations of a robot as it is, on estimation and on validation data."""
+    return fitter.innovations(robot, split.estimation), fitter.innovations(robot, split.validation)
 
 
-def calibrated_fit(ready: Ready, robot: Robot) -> tuple[Robot, Sample]:
+def all_residuals_white(innovations: Sequence[Innovations], split: DataSplit) -> bool:
+    """Whether the residuals are white noise on both estimation and validation data."""
+    data_sets = (split.estimation, split.validation)
+    return all(residuals_are_white(found, sample.rows) for found, sample in zip(innovations, data_sets, strict=True))
+
+
+def calibrated_estimation_data(prepared: PreparedData, robot: Robot) -> tuple[Robot, DataSet]:
     """Robot and FIT with uncertain numbers as FIT has them: what is within their bounds is no component's residual."""
-    sample = ready.evidence.fit
-    numbers = calibrated(ready.fitter, robot, sample)
-    return numbers.robot(robot), replace(sample, recording=numbers.recording(sample.recording))
+    data = prepared.split.estimation
+    calibration = calibrate(prepared.fitter, robot, data)
+    return calibration.calibrated_robot(robot), replace(
+        data, recording=calibration.without_sensor_offsets(data.recording)
+    )
 
 
-def _require_samples(innovations: tuple[Innovations, Innovations], evidence: Evidence) -> None:
-    for found, sample in zip(innovations, (evidence.fit, evidence.judge), strict=True):
-        if not enough_samples(found, sample.rows):
-            mend = f"record at least {FEWEST} samples, {2 * FEWEST} where there is no check recording"
-            raise RecordingError(sample.recording.path, "too few samples to tell noise from more", mend)
+def _require_samples(innovations: tuple[Innovations, Innovations], split: DataSplit) -> None:
+    for found, sample in zip(innovations, (split.estimation, split.validation), strict=True):
+        if not has_enough_samples(found, sample.rows):
+            hint = f"record at least {MIN_SAMPLES} samples, {2 * MIN_SAMPLES} where there is no check recording"
+            raise RecordingError(sample.recording.path, "too few samples to tell noise from more", hint)
 
 
-def _notes(evidence: Evidence, samples: tuple[Sample, ...]) -> tuple[str, ...]:
+def _notes(split: DataSplit, data_sets: tuple[DataSet, ...]) -> tuple[str, ...]:
     unknown = tuple(
         f"{s.recording.path}: columns not used: {', '.join(s.recording.unknown_columns)}"
-        for s in samples
+        for s in data_sets
         if s.recording.unknown_columns
     )
-    return (*evidence.notes, *unknown)
+    return (*split.notes, *unknown)

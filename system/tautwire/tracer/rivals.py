@@ -1,6 +1,6 @@
-"""Other models in the place of what was found, so that nothing gets the name of its likes.
+"""Tests confusable alternatives to the selected effects.
 
-They are known effects that are no kind of the list, and larger forms of fewer effects.
+They are known effects that are not on the list, and larger forms of fewer effects.
 """
 
 from __future__ import annotations
@@ -14,114 +14,137 @@ from tautwire_fmu.laws.effects import UNLISTED
 
 from ..errors import UnreachableError
 from ..robots.robot import EffectSetting, Robot
-from .adequacy import is_noise
-from .data import Evidence, Sample
-from .fit import EXACT, Fit, Fitter, NoFitError
-from .hypotheses import Hypothesis, enlarged, hypotheses, joined
-from .search import PART, ROUGHLY_ALIKE, SHARE_ALIKE, Found
-from .trials import ALIKE, setting_of
+from .adequacy import residuals_are_white
+from .data import DataSet, DataSplit
+from .fit import FINE_COST_TOLERANCE, Fit, Fitter, NoFitError
+from .hypotheses import Hypothesis, hypotheses, with_hypothesis, with_larger_forms
+from .search import COARSE_COST_TOLERANCE, COARSE_TIE_NATS, COARSE_TIE_SHARE, SelectionResult
+from .trials import TIE_NATS, setting_of
 
 Progress = Callable[[str, float], None]
 
 
-def with_rivals(
-    robot: Robot, found: Found, fitter: Fitter, evidence: Evidence, alpha: float, progress: Progress
-) -> Found:
-    """What a search found, or an unlisted effect or a larger form of one effect in the place of some of it.
+def replace_by_confusable_models(
+    robot: Robot, selection: SelectionResult, fitter: Fitter, split: DataSplit, alpha: float, progress: Progress
+) -> SelectionResult:
+    """The selection, or one with a confusable model instead: an unlisted effect or a larger form of one effect.
 
-    That is where it explains more with no more parameters, or as much with fewer. Where what was found leaves more than
-    noise, an unlisted effect is tried beside it too, and has to leave noise. Judged on samples that did not fit it.
+    The alternative has to explain more with no more parameters, or as much with fewer. Where the selection leaves more
+    than noise, an unlisted effect is tried beside it too, and has to leave noise. Judged on validation data.
     """
-    judge = evidence.judge
-    enough = is_noise(fitter.judged(found.fit.robot, found.accepted, judge), judge.rows)
-    if enough and not found.accepted:
-        return found
-    significant = log((len(hypotheses(robot)) + 1) / alpha)
-    best, worth = found, _worth(fitter, found.fit, found.accepted, judge)
-    tried = [*_unlisted(robot, found.accepted, enough), *_larger(found.accepted)]
-    for number, chosen in enumerate(tried):
-        progress(f"rivals: {chosen[-1].label(robot)}", number / len(tried))
-        fit = _fit(robot, found, chosen, fitter, evidence)
-        if fit is None or not (enough or is_noise(fitter.judged(fit.robot, chosen, judge), judge.rows)):
+    validation = split.validation
+    is_adequate = residuals_are_white(
+        fitter.judged(selection.fit.robot, selection.accepted, validation), validation.rows
+    )
+    if is_adequate and not selection.accepted:
+        return selection
+    threshold = log((len(hypotheses(robot)) + 1) / alpha)
+    best, log_likelihood = selection, _log_likelihood(fitter, selection.fit, selection.accepted, validation)
+    alternatives = [*_unlisted_alternatives(robot, selection.accepted, is_adequate), *_larger_forms(selection.accepted)]
+    for number, chosen in enumerate(alternatives):
+        progress(f"rivals: {chosen[-1].label(robot)}", number / len(alternatives))
+        fit = _fit_alternative(robot, selection, chosen, fitter, split)
+        if fit is None or not (
+            is_adequate or residuals_are_white(fitter.judged(fit.robot, chosen, validation), validation.rows)
+        ):
             continue
-        gain = _worth(fitter, fit, chosen, judge) - worth
-        more = _count(chosen) - _count(best.accepted)
-        if gain > (-ALIKE if more < 0 else ALIKE if more == 0 else significant):
-            worth += gain
-            best = _found(found, chosen, fit, worth - _without_last(robot, fit, chosen, fitter, judge))
+        gain = _log_likelihood(fitter, fit, chosen, validation) - log_likelihood
+        extra_parameters = _parameter_count(chosen) - _parameter_count(best.accepted)
+        if gain > (-TIE_NATS if extra_parameters < 0 else TIE_NATS if extra_parameters == 0 else threshold):
+            log_likelihood += gain
+            best = _with_alternative(
+                selection,
+                chosen,
+                fit,
+                log_likelihood - _log_likelihood_without_last(robot, fit, chosen, fitter, validation),
+            )
     return best
 
 
-def _larger(accepted: Sequence[Hypothesis]) -> Iterator[tuple[Hypothesis, ...]]:
+def _larger_forms(accepted: Sequence[Hypothesis]) -> Iterator[tuple[Hypothesis, ...]]:
     """One more form of each accepted effect beside parts of the others."""
     for old in accepted:
         others = [hypothesis for hypothesis in accepted if hypothesis is not old]
         for size in range(len(others)):
             for part in combinations(others, size):
-                for larger in enlarged([old]):
+                for larger in with_larger_forms([old]):
                     yield (*part, larger)
 
 
-def _unlisted(robot: Robot, accepted: Sequence[Hypothesis], enough: bool) -> Iterator[tuple[Hypothesis, ...]]:
-    """Each unlisted effect beside parts of what was accepted; all of that only where it is not enough."""
-    largest = len(accepted) - 1 if enough else len(accepted)
-    parts = list(chain.from_iterable(combinations(accepted, size) for size in range(largest + 1)))
-    places = dict.fromkeys([robot.cable_numbers, *(hypothesis.cables for hypothesis in accepted if hypothesis.cables)])
+def _unlisted_alternatives(
+    robot: Robot, accepted: Sequence[Hypothesis], is_adequate: bool
+) -> Iterator[tuple[Hypothesis, ...]]:
+    """Each unlisted effect beside parts of the accepted ones; beside all only where these leave more than noise."""
+    max_size = len(accepted) - 1 if is_adequate else len(accepted)
+    parts = list(chain.from_iterable(combinations(accepted, size) for size in range(max_size + 1)))
+    cable_groups = dict.fromkeys(
+        [robot.cable_numbers, *(hypothesis.cables for hypothesis in accepted if hypothesis.cables)]
+    )
     for effect in UNLISTED:
-        for cables in places:
+        for cables in cable_groups:
             for part in parts:
-                yield tuple(joined(part, Hypothesis(effect, cables)))
+                yield tuple(with_hypothesis(part, Hypothesis(effect, cables)))
 
 
-def _fit(robot: Robot, found: Found, chosen: Sequence[Hypothesis], fitter: Fitter, evidence: Evidence) -> Fit | None:
-    """Fitted to all samples where a fit to a part of them comes near what was found; None where it does not."""
-    head = evidence.fit.head
+def _fit_alternative(
+    robot: Robot, selection: SelectionResult, chosen: Sequence[Hypothesis], fitter: Fitter, split: DataSplit
+) -> Fit | None:
+    """Fit of an alternative to all samples; None where a fit to a part of them stays far below the selection."""
+    head = split.estimation.head
     start = robot
     for hypothesis in chosen:
-        start = start.with_effect(_begun(robot, found, hypothesis))
-    reached = _worth(fitter, found.fit, found.accepted, head)
+        start = start.with_effect(_start_setting(robot, selection, hypothesis))
+    reference = _log_likelihood(fitter, selection.fit, selection.accepted, head)
     try:
-        rough = fitter.fit_from([start], chosen, head, -inf, PART)
-        if _worth(fitter, rough, chosen, head) < reached - ROUGHLY_ALIKE - SHARE_ALIKE * abs(reached):
+        coarse_fit = fitter.fit_from([start], chosen, head, -inf, COARSE_COST_TOLERANCE)
+        if _log_likelihood(fitter, coarse_fit, chosen, head) < reference - COARSE_TIE_NATS - COARSE_TIE_SHARE * abs(
+            reference
+        ):
             return None
-        return fitter.fit_from([rough.robot], chosen, evidence.fit, -inf, EXACT)
+        return fitter.fit_from([coarse_fit.robot], chosen, split.estimation, -inf, FINE_COST_TOLERANCE)
     except (UnreachableError, NoFitError):
         return None
 
 
-def _begun(robot: Robot, found: Found, hypothesis: Hypothesis) -> EffectSetting:
-    """Where a fit begins: what was found of the same effect is kept."""
-    begun = hypothesis.setting(robot)
-    for old in found.accepted:
+def _start_setting(robot: Robot, selection: SelectionResult, hypothesis: Hypothesis) -> EffectSetting:
+    """Start of a fit: values that the selection has for the same effect are used."""
+    start = hypothesis.setting(robot)
+    for old in selection.accepted:
         if (old.effect, old.cables) == (hypothesis.effect, hypothesis.cables):
-            known = setting_of(found.fit.robot, old).values
-            return replace(begun, values={**begun.values, **{name: known[name] for name in old.form}})
-    return begun
+            fitted_values = setting_of(selection.fit.robot, old).values
+            return replace(start, values={**start.values, **{name: fitted_values[name] for name in old.form}})
+    return start
 
 
-def _worth(fitter: Fitter, fit: Fit, chosen: Sequence[Hypothesis], sample: Sample) -> float:
-    return fitter.judged(fit.robot, chosen, sample).log_likelihood(sample.rows)
+def _log_likelihood(fitter: Fitter, fit: Fit, chosen: Sequence[Hypothesis], data: DataSet) -> float:
+    return fitter.judged(fit.robot, chosen, data).log_likelihood(data.rows)
 
 
-def _count(chosen: Sequence[Hypothesis]) -> int:
+def _parameter_count(chosen: Sequence[Hypothesis]) -> int:
     return sum(len(hypothesis.form) for hypothesis in chosen)
 
 
-def _without_last(robot: Robot, fit: Fit, chosen: Sequence[Hypothesis], fitter: Fitter, judge: Sample) -> float:
-    """Log-likelihood of the judging samples under the others at their best there; -inf where they cannot be run."""
+def _log_likelihood_without_last(
+    robot: Robot, fit: Fit, chosen: Sequence[Hypothesis], fitter: Fitter, validation: DataSet
+) -> float:
+    """Log-likelihood of the validation data under the others at their best there; -inf where they cannot be run."""
     others = chosen[:-1]
     for hypothesis in others:
         robot = robot.with_effect(setting_of(fit.robot, hypothesis))
     try:
-        best = fitter.fit_from([robot], others, judge, -inf) if others else replace(fit, robot=robot)
-        return _worth(fitter, best, others, judge)
+        best = fitter.fit_from([robot], others, validation, -inf) if others else replace(fit, robot=robot)
+        return _log_likelihood(fitter, best, others, validation)
     except (UnreachableError, NoFitError):
         return -inf
 
 
-def _found(found: Found, chosen: Sequence[Hypothesis], fit: Fit, evidence: float) -> Found:
-    """The chosen in the place of what was found, with the evidence of the last of them."""
-    kept = [found.evidence[found.accepted.index(h)] if h in found.accepted else evidence for h in chosen]
+def _with_alternative(
+    selection: SelectionResult, chosen: Sequence[Hypothesis], fit: Fit, evidence: float
+) -> SelectionResult:
+    """The selection replaced by the chosen hypotheses, with the evidence of the last of them."""
+    evidences = [
+        selection.evidence[selection.accepted.index(h)] if h in selection.accepted else evidence for h in chosen
+    ]
     names = {hypothesis.effect.name for hypothesis in chosen}
-    alike = tuple(pair for pair in found.alike if pair[0] in names)
-    return replace(found, accepted=tuple(chosen), evidence=tuple(kept), fit=fit, alike=alike)
+    confusable = tuple(pair for pair in selection.confusable if pair[0] in names)
+    return replace(selection, accepted=tuple(chosen), evidence=tuple(evidences), fit=fit, confusable=confusable)

@@ -1,7 +1,7 @@
-"""What hypotheses gain at values that their effects name: where slopes about the model without them mislead.
+"""Grid search over starting values, where the score test misleads: runs at values that effects name.
 
 A rope softens near slackness by ``s ln(1 + exp(T / s))``: at ``s = 0`` all derivatives vanish, so linearisations
-promise nothing however much it would explain. A friction force far above the first slope's reach ends a fit in the
+predict no gain however much it would explain. A friction force far above the first slope's reach ends a fit in the
 wrong valley. The model itself is run at some values instead.
 """
 
@@ -20,124 +20,134 @@ from tautwire_fmu.laws.effects import Parameter
 
 from ..errors import UnreachableError
 from ..robots.robot import EffectSetting, Robot
-from .attempts import fitter_apart
-from .data import Sample
+from .attempts import worker_fitter
+from .data import DataSet
 from .filter_step import Noise
 from .fit import Fitter
-from .hypotheses import Hypothesis, joined
-from .screen import Prospect
-from .workers import Workers
+from .hypotheses import Hypothesis, with_hypothesis
+from .screen import PredictedGain
+from .workers import WorkerPool
 
-# Nats that do not count: smaller values of the parameter are not felt either.
-UNFELT = 0.01
-# Relative.
-PRECISION = 0.01
-
-
-def silent(prospects: Mapping[Hypothesis, Prospect]) -> dict[Hypothesis, Prospect]:
-    """Those of parameters that name values to look at and have no slope."""
-    return {h: p for h, p in prospects.items() if any(q.scanned and q.name not in p.values for q in h.parameters)}
+# Nats: where gains are this small, smaller values of the parameter have no effect either.
+NEGLIGIBLE_GAIN = 0.01
+# Of the natural log of the value.
+LOG_VALUE_TOLERANCE = 0.01
 
 
-def scanned(
+def zero_slope_predictions(predictions: Mapping[Hypothesis, PredictedGain]) -> dict[Hypothesis, PredictedGain]:
+    """Predictions of hypotheses with a parameter that has grid values and no slope."""
+    return {h: p for h, p in predictions.items() if any(q.grid_values and q.name not in p.values for q in h.parameters)}
+
+
+def grid_search(
     robot: Robot,
     accepted: Sequence[Hypothesis],
     fitter: Fitter,
-    sample: Sample,
-    prospects: Mapping[Hypothesis, Prospect],
-    workers: Workers,
-) -> dict[Hypothesis, Prospect]:
-    """The prospects that name values to look at, better where a run at one gains more than a run at what they promise.
+    data: DataSet,
+    predictions: Mapping[Hypothesis, PredictedGain],
+    workers: WorkerPool,
+) -> dict[Hypothesis, PredictedGain]:
+    """Grid search of the hypotheses that have grid values: the best grid point, or the prediction if it gains more.
 
     ``robot`` has the accepted hypotheses, whose parameters stay as they are.
     """
-    asked = [hypothesis for hypothesis in prospects if any(p.scanned for p in hypothesis.parameters)]
-    if not asked:
+    candidates = [hypothesis for hypothesis in predictions if any(p.grid_values for p in hypothesis.parameters)]
+    if not candidates:
         return {}
-    without = fitter.judged(robot, accepted, sample).log_likelihood(sample.rows)
-    tasks = [(robot, joined(accepted, h), sample, prospects[h], without) for h in asked]
+    baseline = fitter.judged(robot, accepted, data).log_likelihood(data.rows)
+    tasks = [(robot, with_hypothesis(accepted, h), data, predictions[h], baseline) for h in candidates]
     if workers.processes == 1:
-        made = workers.each(partial(better, fitter), tasks)
+        results = workers.map_unordered(partial(best_grid_point, fitter), tasks)
     else:
-        made = workers.each(better_apart, [(fitter.noise, *task) for task in tasks])
-    return {asked[number]: prospect for number, prospect in made}
+        results = workers.map_unordered(best_grid_point_in_worker, [(fitter.noise, *task) for task in tasks])
+    return {candidates[number]: prospect for number, prospect in results}
 
 
-def better(
-    fitter: Fitter, robot: Robot, chosen: Sequence[Hypothesis], sample: Sample, prospect: Prospect, without: float
-) -> Prospect:
-    """Of the last of the chosen hypotheses: what it promises, or what gains more by a run.
+def best_grid_point(
+    fitter: Fitter,
+    robot: Robot,
+    chosen: Sequence[Hypothesis],
+    data: DataSet,
+    prediction: PredictedGain,
+    baseline: float,
+) -> PredictedGain:
+    """Best grid point of the last of the chosen hypotheses, or its predicted values where they gain more.
 
-    ``without`` is the log-likelihood of the sample without it.
+    ``baseline`` is the log-likelihood of the data without it.
     """
     gains = []
-    if prospect.values and isfinite(promised := _run(robot, chosen, fitter, sample, prospect.values) - without):
-        gains.append((promised, prospect))
-    for shapes in looked_at(chosen[-1]):
-        tried = [{**prospect.values, **values} for values in shapes]
-        found = [_run(robot, chosen, fitter, sample, values) - without for values in tried]
-        gains += [(g, Prospect(g, values)) for g, values in zip(found, tried, strict=True) if isfinite(g)]
-        if all(abs(gain) < UNFELT for gain in found):
+    if prediction.values and isfinite(
+        simulated_gain := _log_likelihood_at(robot, chosen, fitter, data, prediction.values) - baseline
+    ):
+        gains.append((simulated_gain, prediction))
+    for shapes in grid_points(chosen[-1]):
+        points = [{**prediction.values, **values} for values in shapes]
+        point_gains = [_log_likelihood_at(robot, chosen, fitter, data, values) - baseline for values in points]
+        gains += [(g, PredictedGain(g, values)) for g, values in zip(point_gains, points, strict=True) if isfinite(g)]
+        if all(abs(gain) < NEGLIGIBLE_GAIN for gain in point_gains):
             break
-    return max(gains, key=lambda each: each[0], default=(0.0, prospect))[1]
+    return max(gains, key=lambda each: each[0], default=(0.0, prediction))[1]
 
 
-def better_apart(noise: Noise, *asked: Any) -> Prospect:
-    """As :func:`better`, in a process that keeps a fitter of its own."""
-    return better(fitter_apart(noise), *asked)
+def best_grid_point_in_worker(noise: Noise, *arguments: Any) -> PredictedGain:
+    """As :func:`best_grid_point`, in a worker process with its own fitter."""
+    return best_grid_point(worker_fitter(noise), *arguments)
 
 
-def felt_from(
+def detectable_value(
     robot: Robot,
     accepted: Sequence[Hypothesis],
     fitter: Fitter,
-    sample: Sample,
+    data: DataSet,
     hypothesis: Hypothesis,
     parameter: Parameter,
-    distance: float,
+    required_norm: float,
 ) -> float:
-    """The value of a scanned parameter that moves the whitened innovations by so much, as root of the sum of squares.
+    """Detectable value of a gridded parameter: it moves the whitened innovations by ``required_norm``.
 
-    Infinite where the largest value to look at does not. The other parameters are where fits begin.
+    That is the root of the sum of squares; infinite where the largest grid value does not reach it. The other
+    parameters are where fits begin.
     """
-    chosen = joined(accepted, hypothesis)
-    without = fitter.judged(robot, accepted, sample).values[sample.rows]
+    chosen = with_hypothesis(accepted, hypothesis)
+    baseline = fitter.judged(robot, accepted, data).values[data.rows]
 
-    def excess(scale: float) -> float:
-        begun = hypothesis.setting(robot)
-        setting = EffectSetting(begun.name, {**begun.values, parameter.name: exp(scale)}, begun.cables)
+    def excess(log_value: float) -> float:
+        start = hypothesis.setting(robot)
+        setting = EffectSetting(start.name, {**start.values, parameter.name: exp(log_value)}, start.cables)
         try:
-            moved = fitter.judged(robot.with_effect(setting), chosen, sample).values[sample.rows] - without
+            change = fitter.judged(robot.with_effect(setting), chosen, data).values[data.rows] - baseline
         except UnreachableError:
-            return distance
-        found = float(np.sqrt(np.nansum(moved**2)))
-        return min(found, 2.0 * distance) - distance if isfinite(found) else distance
+            return required_norm
+        norm = float(np.sqrt(np.nansum(change**2)))
+        return min(norm, 2.0 * required_norm) - required_norm if isfinite(norm) else required_norm
 
-    least, most = log(min(parameter.scanned)), log(max(parameter.scanned))
-    if excess(most) < 0.0:
+    log_minimum, log_maximum = log(min(parameter.grid_values)), log(max(parameter.grid_values))
+    if excess(log_maximum) < 0.0:
         return inf
-    return exp(least if excess(least) > 0.0 else brentq(excess, least, most, xtol=PRECISION))
+    return exp(
+        log_minimum if excess(log_minimum) > 0.0 else brentq(excess, log_minimum, log_maximum, xtol=LOG_VALUE_TOLERANCE)
+    )
 
 
-def looked_at(hypothesis: Hypothesis) -> Iterator[list[dict[str, float]]]:
-    """The values to look at, the largest first, each with all trials of the parameters that shape the effect."""
-    scales = [p for p in hypothesis.parameters if p.scanned]
-    shapes = [p for p in hypothesis.parameters if p.trials]
+def grid_points(hypothesis: Hypothesis) -> Iterator[list[dict[str, float]]]:
+    """Grid points, the largest values first, each with all grid values of the parameters that shape the effect."""
+    scales = [p for p in hypothesis.parameters if p.grid_values]
+    shapes = [p for p in hypothesis.parameters if p.multistart_values]
     if not scales:
         return
     names = [p.name for p in (*scales, *shapes)]
-    for sizes in product(*(sorted(p.scanned, reverse=True) for p in scales)):
-        shaped = product(*(p.trials for p in shapes))
-        yield [dict(zip(names, (*sizes, *values), strict=True)) for values in shaped]
+    for scale_values in product(*(sorted(p.grid_values, reverse=True) for p in scales)):
+        shaped = product(*(p.multistart_values for p in shapes))
+        yield [dict(zip(names, (*scale_values, *values), strict=True)) for values in shaped]
 
 
-def _run(
-    robot: Robot, chosen: Sequence[Hypothesis], fitter: Fitter, sample: Sample, values: Mapping[str, float]
+def _log_likelihood_at(
+    robot: Robot, chosen: Sequence[Hypothesis], fitter: Fitter, data: DataSet, values: Mapping[str, float]
 ) -> float:
     """Log-likelihood with the last of the chosen at some values; NaN where the cables cannot hold them."""
-    begun = chosen[-1].setting(robot)
-    setting = EffectSetting(begun.name, {**begun.values, **values}, begun.cables)
+    start = chosen[-1].setting(robot)
+    setting = EffectSetting(start.name, {**start.values, **values}, start.cables)
     try:
-        return fitter.judged(robot.with_effect(setting), chosen, sample).log_likelihood(sample.rows)
+        return fitter.judged(robot.with_effect(setting), chosen, data).log_likelihood(data.rows)
     except UnreachableError:
         return float("nan")

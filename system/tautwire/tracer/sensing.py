@@ -1,11 +1,11 @@
-"""What sensors that lag show of a robot, and how that moves with its state and the free parameters.
+"""Measurement model: outputs of sensors that lag, with their derivatives by state and free parameters.
 
 A sensor that shows the state of ``d`` seconds ago is given that state, to second order:
 
     y = h(x_d, u_d)        x_d = x - d f + d^2/2 (F f + f_u du/dt)        u_d = u - d du/dt
 
-with the rates ``f`` and their slopes ``F`` and ``f_u`` at ``x``. Its slopes are those of ``h`` there, carried back with
-``F`` and ``f_p`` as they are at ``x``:
+with the rates ``f`` and their Jacobians ``F`` and ``f_u`` at ``x``. Its derivatives are those of ``h`` there, carried
+back with ``F`` and ``f_p`` as they are at ``x``:
 
     y_x = h_x (I - d F (I - d F / 2))        y_p = h_p - d h_x (I - d F / 2) f_p - dy/dt dd/dp
 """
@@ -17,87 +17,96 @@ from dataclasses import dataclass
 import casadi
 from casadi import SX, Function
 
-from ..model.symbolic import Model
+from ..model.symbolic import SymbolicModel
 
 
 @dataclass(frozen=True)
 class _Motion:
-    """Rates of the states, of these rates and of the inputs; slopes of the rates by states and parameters."""
+    """Rates of the states, of these rates and of the inputs; Jacobians of the rates by states and parameters."""
 
     rates: SX
-    bend: SX
-    inputs: SX
+    acceleration: SX
+    input_rates: SX
     by_state: SX
     by_parameters: SX
 
 
-def shown_late(model: Model, cable_count: int, later: SX, step: SX, shift: SX) -> SX:
-    """What sensors show ``shift`` (s) after this sample: of a state ``lag - shift`` before it, where they lag.
+def delayed_outputs(model: SymbolicModel, cable_count: int, next_speed: SX, step: SX, shift: SX) -> SX:
+    """Outputs of the sensors ``shift`` (s) after this sample: of a state ``lag - shift`` before it, where they lag.
 
-    That is at most half a sample. ``later`` are the winch speeds at the next sample, in ``step`` seconds.
+    That is at most half a sample. ``next_speed`` are the winch speeds at the next sample, in ``step`` seconds.
     """
-    motion, late = _motion(model, cable_count, later, step), model.lags - shift
-    shown = casadi.vertsplit(_shown(model, cable_count))
-    for index in _lagging(model):
-        read = Function("read", [model.states, model.inputs, model.parameters], [shown[index]])
-        shown[index] = read(*_before(model, motion, late[index]), model.parameters)
-    return casadi.vertcat(*shown)
+    motion, delays = _motion(model, cable_count, next_speed, step), model.sensor_delays - shift
+    outputs = casadi.vertsplit(_sensor_outputs(model, cable_count))
+    for index in _lagging_sensors(model):
+        read = Function("read", [model.states, model.inputs, model.parameters], [outputs[index]])
+        outputs[index] = read(*_delayed_arguments(model, motion, delays[index]), model.parameters)
+    return casadi.vertcat(*outputs)
 
 
-def sensing(model: Model, cable_count: int) -> Function:
-    """What sensors show, with its derivatives.
+def measurement_model(model: SymbolicModel, cable_count: int) -> Function:
+    """Measurement model: outputs of the sensors with their derivatives.
 
-    Arguments: state, inputs, parameters, next winch speeds, time step, shift. Results: as :func:`shown_late`, and its
-    derivatives by the state (m, n) and by the parameters (m, p).
+    Arguments: state, inputs, parameters, next winch speeds, time step, shift. Results: as :func:`delayed_outputs`, and
+    its derivatives by the state (m, n) and by the parameters (m, p).
     """
     later, step, shift = SX.sym("later", cable_count), SX.sym("step"), SX.sym("shift", 3 + cable_count)
-    at = [model.states, model.inputs, model.parameters]
-    shown = _shown(model, cable_count)
-    results = [shown, casadi.jacobian(shown, model.states), casadi.jacobian(shown, model.parameters)]
-    if _lagging(model):
-        motion, late = _motion(model, cable_count, later, step), model.lags - shift
-        slopes = casadi.jacobian(model.lags, model.parameters)
+    arguments = [model.states, model.inputs, model.parameters]
+    outputs = _sensor_outputs(model, cable_count)
+    results = [outputs, casadi.jacobian(outputs, model.states), casadi.jacobian(outputs, model.parameters)]
+    if _lagging_sensors(model):
+        motion, delays = _motion(model, cable_count, later, step), model.sensor_delays - shift
+        lag_sensitivities = casadi.jacobian(model.sensor_delays, model.parameters)
         rows = list(zip(*map(casadi.vertsplit, results), strict=True))
-        for index in _lagging(model):
-            rows[index] = _row(model, shown[index], motion, late[index], slopes[index, :])
+        for index in _lagging_sensors(model):
+            rows[index] = _delayed_row(model, outputs[index], motion, delays[index], lag_sensitivities[index, :])
         results = [casadi.vertcat(*column) for column in zip(*rows, strict=True)]
-    return Function("sensing", [*at, later, step, shift], results)
+    return Function("sensing", [*arguments, later, step, shift], results)
 
 
-def _row(model: Model, shown: SX, motion: _Motion, late: SX, late_slope: SX) -> tuple[SX, SX, SX]:
-    """One sensor: what it shows, and the derivatives."""
-    at = [model.states, model.inputs, model.parameters]
-    read = Function("read", at, [shown, *(casadi.jacobian(shown, symbol) for symbol in at)])
-    value, by_state, by_inputs, by_parameters = read(*_before(model, motion, late), model.parameters)
-    turned = by_state - 0.5 * late * casadi.mtimes(by_state, motion.by_state)
-    moved = by_state - late * casadi.mtimes(turned, motion.by_state)
-    rate = casadi.mtimes(by_state, motion.rates - late * motion.bend) + casadi.mtimes(by_inputs, motion.inputs)
-    sensitive = by_parameters - late * casadi.mtimes(turned, motion.by_parameters) - rate * late_slope
-    return value, moved, sensitive
+def _delayed_row(
+    model: SymbolicModel, output: SX, motion: _Motion, delay: SX, delay_sensitivity: SX
+) -> tuple[SX, SX, SX]:
+    """One sensor's delayed output with its derivatives."""
+    arguments = [model.states, model.inputs, model.parameters]
+    read = Function("read", arguments, [output, *(casadi.jacobian(output, symbol) for symbol in arguments)])
+    value, by_state, by_inputs, by_parameters = read(*_delayed_arguments(model, motion, delay), model.parameters)
+    half_delayed = by_state - 0.5 * delay * casadi.mtimes(by_state, motion.by_state)
+    delayed_by_state = by_state - delay * casadi.mtimes(half_delayed, motion.by_state)
+    output_rate = casadi.mtimes(by_state, motion.rates - delay * motion.acceleration) + casadi.mtimes(
+        by_inputs, motion.input_rates
+    )
+    delayed_by_parameters = (
+        by_parameters - delay * casadi.mtimes(half_delayed, motion.by_parameters) - output_rate * delay_sensitivity
+    )
+    return value, delayed_by_state, delayed_by_parameters
 
 
-def _before(model: Model, motion: _Motion, late: SX) -> tuple[SX, SX]:
-    """State and inputs so many seconds ago."""
-    return model.states - late * motion.rates + 0.5 * late**2 * motion.bend, model.inputs - late * motion.inputs
+def _delayed_arguments(model: SymbolicModel, motion: _Motion, delay: SX) -> tuple[SX, SX]:
+    """State and inputs ``delay`` seconds ago."""
+    return (
+        model.states - delay * motion.rates + 0.5 * delay** 2 * motion.acceleration,
+        model.inputs - delay * motion.input_rates,
+    )
 
 
-def _motion(model: Model, cable_count: int, later: SX, step: SX) -> _Motion:
-    slope = casadi.if_else(step > 0.0, (later - model.inputs[:cable_count]) / step, 0.0)
-    inputs = casadi.vertcat(slope, SX(model.inputs.numel() - cable_count, 1))
-    moved = casadi.vertcat(model.states, model.inputs)
+def _motion(model: SymbolicModel, cable_count: int, next_speed: SX, step: SX) -> _Motion:
+    speed_rates = casadi.if_else(step > 0.0, (next_speed - model.inputs[:cable_count]) / step, 0.0)
+    input_rates = casadi.vertcat(speed_rates, SX(model.inputs.numel() - cable_count, 1))
+    variables = casadi.vertcat(model.states, model.inputs)
     return _Motion(
         rates=model.rates,
-        bend=casadi.jtimes(model.rates, moved, casadi.vertcat(model.rates, inputs)),
-        inputs=inputs,
+        acceleration=casadi.jtimes(model.rates, variables, casadi.vertcat(model.rates, input_rates)),
+        input_rates=input_rates,
         by_state=casadi.jacobian(model.rates, model.states),
         by_parameters=casadi.jacobian(model.rates, model.parameters),
     )
 
 
-def _shown(model: Model, cable_count: int) -> SX:
+def _sensor_outputs(model: SymbolicModel, cable_count: int) -> SX:
     return casadi.vertcat(model.outputs[:3], model.outputs[6 : 6 + cable_count])
 
 
-def _lagging(model: Model) -> list[int]:
-    """Places of the sensors that lag at all; a lag that is free may be zero."""
-    return [index for index, lag in enumerate(casadi.vertsplit(model.lags)) if not lag.is_zero()]
+def _lagging_sensors(model: SymbolicModel) -> list[int]:
+    """Indices of the sensors that lag at all; a lag that is free may be zero."""
+    return [index for index, lag in enumerate(casadi.vertsplit(model.sensor_delays)) if not lag.is_zero()]

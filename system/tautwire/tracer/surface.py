@@ -1,4 +1,4 @@
-"""The sum of squares about a fit, with one parameter held and the others at their best."""
+"""Profile likelihood: the sum of squares about a fit, one parameter held and the others at their best."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
 from ..errors import TautwireError
-from .data import Sample
-from .fit import Fit, sizes_of
+from .data import DataSet
+from .fit import Fit, parameter_scales
 from .likelihood import Likelihood
-from .preparation.compression import compressed
+from .preparation.compression import compressed_residuals
 
 Array = NDArray[np.float64]
 
-# What counts as much, where the model has no finite output.
-MUCH = 1e4
-# A fall below the fit that its stop does not explain.
-LOWER = 0.1
+# Rise of the sum of squares where the model has no finite output.
+NON_FINITE_RISE = 1e4
+# A fall below the fit that the fit's cost tolerance does not explain.
+SIGNIFICANT_FALL = 0.1
 # Runs over the sample, in all and in one fit of the others; and the least distance from bounds, in deviations.
-MOST_RUNS, RUNS_OF_A_FIT, INSIDE = 300, 15, 1e-6
+MAX_PROFILE_RUNS, MAX_PROFILE_EVALUATIONS, MIN_BOUND_DISTANCE = 300, 15, 1e-6
 
 
-class LowerError(TautwireError):
-    """Other values leave less than the fit does; carries them."""
+class LowerMinimumError(TautwireError):
+    """Other values have a lower sum of squares than the fit; carries them."""
 
     def __init__(self, values: Array) -> None:
         self.values = values
@@ -34,121 +34,132 @@ class LowerError(TautwireError):
 
 
 class TooManyRunsError(TautwireError):
-    """The surface has been looked at more often than it is worth; carries how often."""
+    """The profile has taken more runs than it is worth; carries how many."""
 
     def __init__(self, runs: int) -> None:
         self.runs = runs
         super().__init__(f"{runs} runs have not found where an interval ends")
 
 
-class Surface:
-    """Sums of squares of the whitened innovations about a fit of ``values``, which stay within ``lower`` and ``upper``.
+class ProfileLikelihood:
+    """Profile likelihood about a fit of ``values``, which stay within ``lower`` and ``upper``.
 
-    ``sizes`` (p,) are what the parameters are measured by; ``deviations`` (p,) are zero where the curvature tells none.
+    It is by sums of squares of the whitened innovations. ``scales`` (p,) are the parameters' scales;
+    ``standard_deviations`` (p,) are zero where the curvature gives none.
     """
 
     def __init__(
         self,
         likelihood: Likelihood,
         fit: Fit,
-        sample: Sample,
+        data: DataSet,
         lower: Array,
         upper: Array,
-        between: Callable[[], None],
+        poll_interrupts: Callable[[], None],
     ) -> None:
-        self._likelihood, self._fit, self._sample, self._between = likelihood, fit, sample, between
+        self._likelihood, self._fit, self._sample, self._poll_interrupts = likelihood, fit, data, poll_interrupts
         self._lower, self._upper = lower, upper
         self.values = fit.values
-        self.sizes = sizes_of(fit.robot, fit.free)
+        self.scales = parameter_scales(fit.robot, fit.free)
         variances = np.diag(fit.covariance)
-        self.deviations = np.sqrt(np.where(np.isfinite(variances), np.maximum(variances, 0.0), 0.0))
-        self._units = np.where(self.deviations > 0.0, self.deviations, self.sizes)
-        self._runs = 0
-        self._least = float(np.sum(self._rows(fit.values)[0] ** 2))
+        self.standard_deviations = np.sqrt(np.where(np.isfinite(variances), np.maximum(variances, 0.0), 0.0))
+        self._units = np.where(self.standard_deviations > 0.0, self.standard_deviations, self.scales)
+        self._run_count = 0
+        self._minimum = float(np.sum(self._residuals(fit.values)[0] ** 2))
 
-    def about(self, values: Array) -> Surface:
-        """The same about other values."""
-        moved = replace(self._fit, values=values)
-        return Surface(self._likelihood, moved, self._sample, self._lower, self._upper, self._between)
+    def recentred(self, values: Array) -> ProfileLikelihood:
+        """The same profile likelihood about other values."""
+        recentred_fit = replace(self._fit, values=values)
+        return ProfileLikelihood(
+            self._likelihood, recentred_fit, self._sample, self._lower, self._upper, self._poll_interrupts
+        )
 
     def rise(self, index: int, value: float) -> float:
-        """How much more is left with one parameter at a value; much, where the model has no finite output.
+        """Rise of the sum of squares with one parameter at a value; 1e4 where the model has no finite output.
 
         Raises LowerError, TooManyRunsError.
         """
         others = np.arange(len(self.values)) != index
         if not np.any(others):
-            return self._told(float(np.sum(self._rows(np.array([value]))[0] ** 2)), np.array([value]))
-        for begun in (self._on_the_line(index, value), self.values):
-            found = self._fitted(index, value, begun[others], others)
-            if found is not None:
-                return found
-        return MUCH
+            return self._checked_rise(float(np.sum(self._residuals(np.array([value]))[0] ** 2)), np.array([value]))
+        for start in (self._linear_prediction(index, value), self.values):
+            profile_rise = self._profile_point(index, value, start[others], others)
+            if profile_rise is not None:
+                return profile_rise
+        return NON_FINITE_RISE
 
-    def _fitted(self, index: int, value: float, begun: Array, others: NDArray[np.bool_]) -> float | None:
+    def _profile_point(self, index: int, value: float, origin: Array, others: NDArray[np.bool_]) -> float | None:
         units = self._units[others]
-        low, high = (self._lower[others] - begun) / units, (self._upper[others] - begun) / units
-        start = np.clip(np.zeros(len(begun)), np.minimum(low + INSIDE, 0.5 * (low + high)), high)
-        start = np.clip(start, low, np.maximum(high - INSIDE, 0.5 * (low + high)))
-        residual = _Held(self._rows, index, value, begun, units)
-        if not np.all(np.isfinite(residual.values(start))):
+        low, high = (self._lower[others] - origin) / units, (self._upper[others] - origin) / units
+        start = np.clip(np.zeros(len(origin)), np.minimum(low + MIN_BOUND_DISTANCE, 0.5 * (low + high)), high)
+        start = np.clip(start, low, np.maximum(high - MIN_BOUND_DISTANCE, 0.5 * (low + high)))
+        residual = _ConstrainedResidual(self._residuals, index, value, origin, units)
+        if not np.all(np.isfinite(residual.residuals(start))):
             return None
         solution = least_squares(
-            residual.values,
+            residual.residuals,
             start,
-            jac=residual.slopes,
+            jac=residual.jacobian,
             bounds=(low, high),
             x_scale="jac",
             ftol=1e-6,
-            max_nfev=RUNS_OF_A_FIT,
+            max_nfev=MAX_PROFILE_EVALUATIONS,
         )
-        return self._told(2.0 * float(solution.cost), np.insert(begun + solution.x * units, index, value))
+        return self._checked_rise(2.0 * float(solution.cost), np.insert(origin + solution.x * units, index, value))
 
-    def _told(self, found: float, values: Array) -> float:
-        rise = found - self._least
-        if rise < -LOWER:
-            raise LowerError(values)
-        return rise if np.isfinite(rise) else MUCH
+    def _checked_rise(self, sum_of_squares: float, values: Array) -> float:
+        rise = sum_of_squares - self._minimum
+        if rise < -SIGNIFICANT_FALL:
+            raise LowerMinimumError(values)
+        return rise if np.isfinite(rise) else NON_FINITE_RISE
 
-    def _on_the_line(self, index: int, value: float) -> Array:
-        """Where the others would be if the surface were round, within their ranges."""
+    def _linear_prediction(self, index: int, value: float) -> Array:
+        """Linear prediction of the others from the fit's covariance, within their bounds."""
         variance = self._fit.covariance[index, index]
         slopes = self._fit.covariance[:, index] / variance if variance > 0.0 else np.zeros(len(self.values))
-        moved = self.values + np.where(np.isfinite(slopes), slopes, 0.0) * (value - self.values[index])
-        return np.clip(moved, self._lower, self._upper)
+        predicted = self.values + np.where(np.isfinite(slopes), slopes, 0.0) * (value - self.values[index])
+        return np.clip(predicted, self._lower, self._upper)
 
-    def _rows(self, values: Array) -> tuple[Array, Array]:
-        self._between()
-        self._runs += 1
-        if self._runs > MOST_RUNS:
-            raise TooManyRunsError(MOST_RUNS)
-        return compressed(self._likelihood, values, self._sample, 0.0)
+    def _residuals(self, values: Array) -> tuple[Array, Array]:
+        self._poll_interrupts()
+        self._run_count += 1
+        if self._run_count > MAX_PROFILE_RUNS:
+            raise TooManyRunsError(MAX_PROFILE_RUNS)
+        return compressed_residuals(self._likelihood, values, self._sample, 0.0)
 
 
-class _Held:
-    """Rows and their slopes by the other parameters, which count units from where they begin."""
+class _ConstrainedResidual:
+    """Residuals with one parameter fixed, and their Jacobian by the others, in units from where they begin."""
 
     def __init__(
         self,
-        rows: Callable[[Array], tuple[Array, Array]],
+        residuals: Callable[[Array], tuple[Array, Array]],
         index: int,
-        held: float,
-        begun: Array,
+        fixed_value: float,
+        origin: Array,
         units: Array,
     ) -> None:
-        self._rows, self._index, self._held, self._begun, self._units = rows, index, held, begun, units
-        self._at: Array | None = None
-        self._found: tuple[Array, Array] = (np.zeros(0), np.zeros((0, 0)))
+        self._residuals, self._index, self._fixed_value, self._origin, self._units = (
+            residuals,
+            index,
+            fixed_value,
+            origin,
+            units,
+        )
+        self._evaluated_at: Array | None = None
+        self._cached: tuple[Array, Array] = (np.zeros(0), np.zeros((0, 0)))
 
-    def values(self, moved: Array) -> Array:
-        return self._evaluate(moved)[0]
+    def residuals(self, offset: Array) -> Array:
+        return self._evaluate(offset)[0]
 
-    def slopes(self, moved: Array) -> Array:
-        return self._evaluate(moved)[1]
+    def jacobian(self, offset: Array) -> Array:
+        return self._evaluate(offset)[1]
 
-    def _evaluate(self, moved: Array) -> tuple[Array, Array]:
-        if self._at is None or not np.array_equal(self._at, moved):
-            residuals, slopes = self._rows(np.insert(self._begun + moved * self._units, self._index, self._held))
-            self._found = residuals, np.delete(slopes, self._index, axis=1) * self._units
-            self._at = moved.copy()
-        return self._found
+    def _evaluate(self, offset: Array) -> tuple[Array, Array]:
+        if self._evaluated_at is None or not np.array_equal(self._evaluated_at, offset):
+            residuals, jacobian = self._residuals(
+                np.insert(self._origin + offset * self._units, self._index, self._fixed_value)
+            )
+            self._cached = residuals, np.delete(jacobian, self._index, axis=1) * self._units
+            self._evaluated_at = offset.copy()
+        return self._cached

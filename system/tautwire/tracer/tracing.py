@@ -1,4 +1,4 @@
-"""The whole loop: recording in, residual, the effect behind it, a better robot out, through FMUs both times."""
+"""Identification of what a robot's model lacks: from recordings to a better robot, through FMUs both times."""
 
 from __future__ import annotations
 
@@ -10,33 +10,33 @@ from threadpoolctl import threadpool_limits
 
 from tautwire_fmu.laws.effects import UNLISTED
 
-from ..interrupt import interrupts_held
-from ..model.uncertain import uncertain_numbers
+from ..interrupt import defer_interrupts
+from ..model.uncertain import uncertain_parameters
 from ..recordings.recording import Recording
 from ..robots.robot import Robot
-from ..runs.cosimulation import Motion
+from ..runs.cosimulation import CosimulationResult
 from .adequacy import largest_autocorrelations
-from .asked import require_asked
-from .cosimulated import compared, reaching, started
+from .asked import validate_trace_arguments
+from .cosimulated import compare_cosimulations, start_cosimulations, validate_by_cosimulation
 from .discovery.discovery import Discovery
-from .discovery.unexplained import Rest, what_is_left
+from .discovery.unexplained import UnexplainedResidual, explain_residual
 from .discovery.written import effects_text, formula_text
-from .estimates import correlations_of, found_effects
+from .estimates import estimated_effects, parameter_correlations
 from .hypotheses import Hypothesis
-from .preparation.calibration import calibrated
-from .preparation.release import release_note, released
-from .ready import Ready, all_noise, calibrated_fit, innovations_of, readings
-from .rivals import with_rivals
-from .search import Found, search
-from .separation import separation
+from .preparation.calibration import calibrate
+from .preparation.release import initial_state_note, with_initial_state
+from .ready import PreparedData, all_residuals_white, calibrated_estimation_data, innovations_of, prepare_data
+from .rivals import replace_by_confusable_models
+from .search import SelectionResult, select_effects
+from .separation import analyse_identifiability
 from .trials import setting_of
-from .verdict import Comparison, Errors, Separation, Trace, VerdictName
-from .where.components import Components, cut_at_ports
-from .workers import Pending, Workers
+from .verdict import Comparison, Errors, Identifiability, Trace, Verdict
+from .where.components import FaultLocalisation, localise_residual
+from .workers import PendingResult, WorkerPool
 
 Progress = Callable[[str, float], None]
 
-ALPHA = 0.01
+SIGNIFICANCE_LEVEL = 0.01
 
 
 def trace(
@@ -44,49 +44,49 @@ def trace(
     fit: Recording,
     check: Recording | None = None,
     progress: Progress | None = None,
-    alpha: float = ALPHA,
+    alpha: float = SIGNIFICANCE_LEVEL,
     processes: int = 1,
 ) -> Trace:
-    """Find what a robot's model lacks, and show by co-simulating its FMUs what adding it does to the error.
+    """Identify what a robot's model lacks, and show by co-simulating its FMUs what adding it does to the error.
 
     What fits ``fit`` is judged on ``check``; without one, on the second half of ``fit``. Of recordings of more than
     100,000 samples (200,000 of the only one) the beginning is traced, and a note says so. ``progress`` gets what is
     being done, and the share of it that is done. ``alpha`` bounds the probability of naming an effect where there is
     none. For more ``processes`` than one the calling program's main module has to be guarded, see
-    :class:`tautwire.tracer.workers.Workers`.
+    :class:`tautwire.estimation.worker_pool.WorkerPool`.
 
     Raises RecordingError where a recording has no measured output, is too short or cannot be this robot's,
     UnreachableError where the cables cannot hold the platform where a recording starts, ArgumentError where an
     argument is none of these.
     """
-    require_asked(robot, fit, check, progress, alpha, processes)
-    # What threads of BLAS round differently from one, the workers' processes could not repeat.
+    validate_trace_arguments(robot, fit, check, progress, alpha, processes)
+    # BLAS rounds differently with several threads, which the worker processes could not reproduce.
     with (
-        interrupts_held() as raise_interrupt,
+        defer_interrupts() as raise_interrupt,
         threadpool_limits(1, "blas"),
-        Workers(processes, raise_interrupt) as workers,
+        WorkerPool(processes, raise_interrupt) as workers,
     ):
-        return _trace(robot, fit, check, progress or _silently, alpha, workers)
+        return _trace(robot, fit, check, progress or _no_progress, alpha, workers)
 
 
-def _silently(what: str, done: float) -> None:
-    """Tells nobody."""
+def _no_progress(label: str, share: float) -> None:
+    """Discards the progress."""
 
 
 @dataclass(frozen=True)
-class _Answer:
-    """The effects or the formula that the FMUs, too, bear out; else neither, and what is left.
+class _Outcome:
+    """Outcome of an identification: the effects or the formula that the FMUs confirm; else the unexplained residual.
 
-    ``robot`` is the best model that holds, with uncertain numbers as FIT has them.
+    ``robot`` is the best validated model, with uncertain numbers as FIT has them.
     """
 
     robot: Robot
-    found: Found
+    selection: SelectionResult
     effects_hold: bool
-    discovered: Discovery | None
-    rest: Rest
+    discovery: Discovery | None
+    unexplained: UnexplainedResidual
     comparisons: tuple[Comparison, ...]
-    floors: Sequence[Errors]
+    noise_floors: Sequence[Errors]
 
 
 def _trace(
@@ -95,169 +95,179 @@ def _trace(
     check: Recording | None,
     progress: Progress,
     alpha: float,
-    workers: Workers,
+    workers: WorkerPool,
 ) -> Trace:
-    began = perf_counter()
-    workers.begin()
-    searched = _searched(robot, fit, check, progress, alpha, workers)
-    ready, found = searched.ready, searched.found
-    noise_alone = all_noise(ready.plain, ready.evidence)
-    answer = _answer(robot, ready, found, searched.before, noise_alone, alpha, progress, workers)
-    final, kept = answer.robot, answer.effects_hold
-    verdict, sentence = _verdict(robot, answer, noise_alone)
-    numbers = [] if verdict == "unexplained" else _numbers(ready, answer)
+    start_time = perf_counter()
+    workers.warm_up()
+    selected = _select(robot, fit, check, progress, alpha, workers)
+    prepared, selection = selected.prepared, selected.selection
+    white_before = all_residuals_white(prepared.innovations, prepared.split)
+    outcome = _outcome(robot, prepared, selection, selected.runs_before, white_before, alpha, progress, workers)
+    final, effects_hold = outcome.robot, outcome.effects_hold
+    verdict, sentence = _verdict(robot, outcome, white_before)
+    calibration_notes = [] if verdict == "unexplained" else _calibration_notes(prepared, outcome)
     progress("intervals", 0.0)
-    effects = found_effects(robot, found, ready.fitter, ready.evidence.fit, workers) if kept else ()
-    judge = ready.evidence.judge
-    left = ready.fitter.innovations(final, judge)
-    shown = Separation((), ())
-    if kept or verdict == "none":
+    effects = (
+        estimated_effects(robot, selection, prepared.fitter, prepared.split.estimation, workers) if effects_hold else ()
+    )
+    validation = prepared.split.validation
+    innovations = prepared.fitter.innovations(final, validation)
+    identifiability = Identifiability((), ())
+    if effects_hold or verdict == "none":
         progress("what these recordings could show", 0.0)
-        shown = separation(found.fit.robot, robot, found.accepted, ready.fitter, judge, alpha)
+        identifiability = analyse_identifiability(
+            selection.fit.robot, robot, selection.accepted, prepared.fitter, validation, alpha
+        )
     return Trace(
         verdict=verdict,
         sentence=sentence,
         robot_before=robot,
         robot_after=final,
         effects=effects,
-        correlations=correlations_of(found.fit, effects),
-        also_possible=found.alike if kept else (),
-        candidates=found.candidates,
-        formula=_formula(robot, answer),
-        comparisons=answer.comparisons,
-        noise_floor=answer.floors[-1],
-        noise_before=noise_alone,
-        noise_after=kept or answer.discovered is not None or noise_alone,
-        left=left.mean_square(judge.rows),
-        autocorrelations=largest_autocorrelations(left, judge.rows),
-        separation=shown,
-        components=searched.components.result(),
-        resonances=answer.rest.resonances,
+        correlations=parameter_correlations(selection.fit, effects),
+        also_possible=selection.confusable if effects_hold else (),
+        candidates=selection.candidates,
+        formula=_formula(robot, outcome),
+        comparisons=outcome.comparisons,
+        noise_floor=outcome.noise_floors[-1],
+        noise_before=white_before,
+        noise_after=effects_hold or outcome.discovery is not None or white_before,
+        normalised_innovation_variance=innovations.mean_square(validation.rows),
+        autocorrelations=largest_autocorrelations(innovations, validation.rows),
+        identifiability=identifiability,
+        components=selected.components.result(),
+        resonances=outcome.unexplained.resonances,
         alpha=alpha,
-        notes=(*ready.notes, *answer.rest.notes, *_begun(ready, final), *numbers),
-        seconds=perf_counter() - began,
+        notes=(*prepared.notes, *outcome.unexplained.notes, *_release_notes(prepared, final), *calibration_notes),
+        seconds=perf_counter() - start_time,
     )
 
 
 @dataclass(frozen=True)
-class _Searched:
-    """What a search found in which recordings, and what went on beside it: runs before, and the cut at the ports."""
+class _Selected:
+    """Result of the selection with its data, the co-simulations before, and the component residuals."""
 
-    ready: Ready
-    found: Found
-    before: Sequence[Motion]
-    components: Pending[Components]
+    prepared: PreparedData
+    selection: SelectionResult
+    runs_before: Sequence[CosimulationResult]
+    components: PendingResult[FaultLocalisation]
 
 
-def _searched(
-    robot: Robot, fit: Recording, check: Recording | None, progress: Progress, alpha: float, workers: Workers
-) -> _Searched:
-    """In the recordings as they are; with clocks set where no effects explain those."""
-    ready, *others = readings(robot, fit, check, workers)
-    runs, components = _aside(ready, robot, workers)
-    found = search(robot, ready.fitter, ready.evidence, alpha, progress, workers)
-    if others and not (found.accepted and _leaves_noise(ready, found)):
-        ready = others[0]
-        runs, components = _aside(ready, robot, workers)
-        found = search(robot, ready.fitter, ready.evidence, alpha, progress, workers)
-    found = with_rivals(robot, found, ready.fitter, ready.evidence, alpha, progress)
+def _select(
+    robot: Robot, fit: Recording, check: Recording | None, progress: Progress, alpha: float, workers: WorkerPool
+) -> _Selected:
+    """Select effects in the recordings as they are; with clocks corrected where no effects explain those."""
+    prepared, *others = prepare_data(robot, fit, check, workers)
+    runs, components = _start_side_runs(prepared, robot, workers)
+    selection = select_effects(robot, prepared.fitter, prepared.split, alpha, progress, workers)
+    if others and not (selection.accepted and _leaves_white_residuals(prepared, selection)):
+        prepared = others[0]
+        runs, components = _start_side_runs(prepared, robot, workers)
+        selection = select_effects(robot, prepared.fitter, prepared.split, alpha, progress, workers)
+    selection = replace_by_confusable_models(robot, selection, prepared.fitter, prepared.split, alpha, progress)
     progress("co-simulating before", 0.0)
-    return _Searched(ready, found, [run.result() for run in runs], components)
+    return _Selected(prepared, selection, [run.result() for run in runs], components)
 
 
-def _aside(ready: Ready, robot: Robot, workers: Workers) -> tuple[list[Pending[Motion]], Pending[Components]]:
-    runs = started(workers, ready.fitter, robot, ready.samples)
-    return runs, workers.start(cut_at_ports, *calibrated_fit(ready, robot), ready.fitter.noise)
+def _start_side_runs(
+    prepared: PreparedData, robot: Robot, workers: WorkerPool
+) -> tuple[list[PendingResult[CosimulationResult]], PendingResult[FaultLocalisation]]:
+    runs = start_cosimulations(workers, prepared.fitter, robot, prepared.data_sets)
+    return runs, workers.submit(localise_residual, *calibrated_estimation_data(prepared, robot), prepared.fitter.noise)
 
 
-def _leaves_noise(ready: Ready, found: Found) -> bool:
-    return all_noise(innovations_of(ready.fitter, found.fit.robot, ready.evidence), ready.evidence)
+def _leaves_white_residuals(prepared: PreparedData, selection: SelectionResult) -> bool:
+    return all_residuals_white(innovations_of(prepared.fitter, selection.fit.robot, prepared.split), prepared.split)
 
 
-def _answer(
+def _outcome(
     robot: Robot,
-    ready: Ready,
-    found: Found,
-    before: Sequence[Motion],
-    noise_alone: bool,
+    prepared: PreparedData,
+    selection: SelectionResult,
+    runs_before: Sequence[CosimulationResult],
+    white_before: bool,
     alpha: float,
     progress: Progress,
-    workers: Workers,
-) -> _Answer:
-    """Effects if they leave noise, to the filter and in the FMUs; else a formula that does."""
-    fitter, samples = ready.fitter, ready.samples
+    workers: WorkerPool,
+) -> _Outcome:
+    """The effects if they leave white noise, in the filter and in the FMUs; else a formula that does."""
+    fitter, data_sets = prepared.fitter, prepared.data_sets
 
-    def borne_out(better: Robot) -> tuple[Robot, tuple[Comparison, ...], Sequence[Errors]] | None:
-        after = calibrated(fitter, better, ready.evidence.fit).robot(better)
-        reached = reaching(after, fitter, samples, before, workers)
-        return None if reached is None else (after, *reached)
+    def validated(candidate: Robot) -> tuple[Robot, tuple[Comparison, ...], Sequence[Errors]] | None:
+        calibrated_robot = calibrate(fitter, candidate, prepared.split.estimation).calibrated_robot(candidate)
+        validation = validate_by_cosimulation(calibrated_robot, fitter, data_sets, runs_before, workers)
+        return None if validation is None else (calibrated_robot, *validation)
 
-    plain = robot, *compared(robot, fitter, samples, before, before)
+    unchanged = robot, *compare_cosimulations(robot, fitter, data_sets, runs_before, runs_before)
     progress("co-simulating after", 0.0)
-    if found.accepted and _leaves_noise(ready, found):
-        better = borne_out(found.fit.robot)
-        if better is not None:
-            return _answered(better, found, True, None, Rest())
-    if not found.accepted and noise_alone:
-        better = borne_out(robot) if uncertain_numbers(robot) else None
-        return _answered(better or plain, found, False, None, Rest())
-    rest = what_is_left(robot, found, fitter, ready.evidence, alpha, progress, workers)
-    better = borne_out(rest.discovery.robot) if rest.discovery else None
-    return _answered(better or plain, found, False, rest.discovery if better else None, rest)
+    if selection.accepted and _leaves_white_residuals(prepared, selection):
+        improved = validated(selection.fit.robot)
+        if improved is not None:
+            return _outcome_of(improved, selection, True, None, UnexplainedResidual())
+    if not selection.accepted and white_before:
+        improved = validated(robot) if uncertain_parameters(robot) else None
+        return _outcome_of(improved or unchanged, selection, False, None, UnexplainedResidual())
+    unexplained = explain_residual(robot, selection, fitter, prepared.split, alpha, progress, workers)
+    improved = validated(unexplained.discovery.robot) if unexplained.discovery else None
+    return _outcome_of(
+        improved or unchanged, selection, False, unexplained.discovery if improved else None, unexplained
+    )
 
 
-def _answered(
-    shown: tuple[Robot, tuple[Comparison, ...], Sequence[Errors]],
-    found: Found,
+def _outcome_of(
+    validated: tuple[Robot, tuple[Comparison, ...], Sequence[Errors]],
+    selection: SelectionResult,
     effects_hold: bool,
-    discovered: Discovery | None,
-    rest: Rest,
-) -> _Answer:
-    robot, comparisons, floors = shown
-    return _Answer(robot, found, effects_hold, discovered, rest, comparisons, floors)
+    discovery: Discovery | None,
+    unexplained: UnexplainedResidual,
+) -> _Outcome:
+    robot, comparisons, noise_floors = validated
+    return _Outcome(robot, selection, effects_hold, discovery, unexplained, comparisons, noise_floors)
 
 
-def _numbers(ready: Ready, answer: _Answer) -> list[str]:
-    """What the recordings say of declared numbers that the robot file calls uncertain."""
-    best = answer.found.fit.robot if answer.discovered is None else answer.discovered.robot
+def _calibration_notes(prepared: PreparedData, outcome: _Outcome) -> list[str]:
+    """Notes on declared numbers that the robot file calls uncertain, as the recordings have them."""
+    final_robot = outcome.selection.fit.robot if outcome.discovery is None else outcome.discovery.robot
     return [
         note
-        for sample in ready.samples
-        for note in calibrated(ready.fitter, best, sample).notes(best, sample.recording.path)
+        for sample in prepared.data_sets
+        for note in calibrate(prepared.fitter, final_robot, sample).notes(final_robot, sample.recording.path)
     ]
 
 
-def _begun(ready: Ready, final: Robot) -> list[str]:
-    """What the last model says of how fast each recording begins."""
-    starts = [(released(ready.fitter, final, sample), sample.recording.path) for sample in ready.samples]
-    return [note for start, path in starts for note in release_note(start, path)]
+def _release_notes(prepared: PreparedData, final: Robot) -> list[str]:
+    """Notes on the smoothed initial state of each recording under the final model."""
+    starts = [
+        (with_initial_state(prepared.fitter, final, sample), sample.recording.path) for sample in prepared.data_sets
+    ]
+    return [note for start, path in starts for note in initial_state_note(start, path)]
 
 
-def _verdict(robot: Robot, answer: _Answer, noise_alone: bool) -> tuple[VerdictName, str]:
-    found, discovered = answer.found, answer.discovered
-    names = " and ".join(h.label(robot) for h in found.accepted)
-    if answer.effects_hold and _unlisted(answer):
-        said = f"The model lacks {names}; with it, what is left is noise."
-        return "discovered", f"{said} No kind of the list does it: {_formula(robot, answer)}."
-    if answer.effects_hold:
+def _verdict(robot: Robot, outcome: _Outcome, white_before: bool) -> tuple[Verdict, str]:
+    selection, discovery = outcome.selection, outcome.discovery
+    names = " and ".join(h.label(robot) for h in selection.accepted)
+    if outcome.effects_hold and _unlisted_hypotheses(outcome):
+        sentence = f"The model lacks {names}; with it, what is left is noise."
+        return "discovered", f"{sentence} No kind of the list does it: {_formula(robot, outcome)}."
+    if outcome.effects_hold:
         return "effects", f"The model lacks {names}; with it, what is left is noise."
-    if discovered:
-        said = f"No known effect explains the residual; a formula does: {formula_text(robot, discovered.formulas)}."
-        return "discovered", f"{said} With it, what is left is noise."
-    if not found.accepted and noise_alone:
+    if discovery:
+        sentence = f"No known effect explains the residual; a formula does: {formula_text(robot, discovery.formulas)}."
+        return "discovered", f"{sentence} With it, what is left is noise."
+    if not selection.accepted and white_before:
         return "none", "The residual is noise: this recording shows nothing that the model lacks."
-    closest = f"; {names} comes closest but leaves too much" if found.accepted else ""
+    closest = f"; {names} comes closest but leaves too much" if selection.accepted else ""
     return "unexplained", f"The residual is more than noise, and no known effect explains it{closest}."
 
 
-def _unlisted(answer: _Answer) -> list[Hypothesis]:
-    """Accepted effects that are no kind of the list."""
-    return [hypothesis for hypothesis in answer.found.accepted if hypothesis.effect in UNLISTED]
+def _unlisted_hypotheses(outcome: _Outcome) -> list[Hypothesis]:
+    """Accepted effects that are not on the list."""
+    return [hypothesis for hypothesis in outcome.selection.accepted if hypothesis.effect in UNLISTED]
 
 
-def _formula(robot: Robot, answer: _Answer) -> str | None:
-    """Of what is no kind of the list; None where there is nothing such."""
-    if answer.discovered:
-        return formula_text(robot, answer.discovered.formulas)
-    unlisted = _unlisted(answer) if answer.effects_hold else []
-    return effects_text([(h.label(robot), setting_of(answer.found.fit.robot, h)) for h in unlisted]) or None
+def _formula(robot: Robot, outcome: _Outcome) -> str | None:
+    """Formula of what is not on the list; None where there is none."""
+    if outcome.discovery:
+        return formula_text(robot, outcome.discovery.formulas)
+    unlisted = _unlisted_hypotheses(outcome) if outcome.effects_hold else []
+    return effects_text([(h.label(robot), setting_of(outcome.selection.fit.robot, h)) for h in unlisted]) or None

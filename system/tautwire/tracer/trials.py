@@ -1,4 +1,4 @@
-"""What a search tries: hypotheses with their fits and evidence, and which of them are worth more work."""
+"""Scores of candidate effects: their fits and evidence, and which of them are worth more work."""
 
 from __future__ import annotations
 
@@ -10,23 +10,23 @@ import numpy as np
 from ..robots.robot import EffectSetting, Robot
 from .fit import Fit
 from .hypotheses import Hypothesis
-from .screen import Prospect
+from .screen import PredictedGain
 from .verdict import Candidate
 
-ALIKE = 5.0
-# A gain on FIT below this many nats is what chance gives some of the hypotheses.
-HOPELESS = 4.0
-# Only so many of the best prospects are fitted, and those that promise this share of the best.
-MOST_FITTED, MOST_BESIDE = 8, 3
-MOST_OF_AN_EFFECT = 3
-PROMISING = 0.02
+TIE_NATS = 5.0
+# A gain on estimation data below this many nats is what chance gives some of the hypotheses.
+MIN_PREDICTED_GAIN = 4.0
+# How many of the best predictions are fitted, and how many of the rough ones; at least this share of the best gain.
+MAX_FITS, MAX_ROUGH_FITS = 8, 3
+MAX_FITS_PER_EFFECT = 3
+MIN_GAIN_SHARE = 0.02
 
 
 @dataclass(frozen=True)
-class Trial:
-    """A hypothesis fitted beside the accepted ones.
+class CandidateScore:
+    """Score of a candidate: a hypothesis fitted beside the accepted ones.
 
-    ``evidence`` is its log-likelihood on the judging samples over that of the model without it at its best there,
+    ``evidence`` is its log-likelihood on validation data over that of the model without it at its best there,
     ``mean_square`` that of the innovations there.
     """
 
@@ -39,14 +39,14 @@ class Trial:
     def parameter_count(self) -> int:
         return len(self.hypothesis.form)
 
-    def rivalled_by(self, other: Trial) -> bool:
+    def is_confusable_with(self, other: CandidateScore) -> bool:
         """Whether the other explains as much with no more parameters."""
-        close = self.evidence - other.evidence < ALIKE
+        close = self.evidence - other.evidence < TIE_NATS
         return close and other.parameter_count <= self.parameter_count
 
-    def candidate(self, number: int, accepted: bool) -> Candidate:
+    def candidate(self, round_number: int, accepted: bool) -> Candidate:
         return Candidate(
-            round=number,
+            round=round_number,
             name=self.hypothesis.effect.name,
             cables=self.hypothesis.cables,
             values=setting_of(self.fit.robot, self.hypothesis).values,
@@ -57,43 +57,43 @@ class Trial:
 
 
 def setting_of(robot: Robot, hypothesis: Hypothesis) -> EffectSetting:
-    """The setting of a robot that a hypothesis put there."""
+    """The robot's effect setting that belongs to a hypothesis."""
     wanted = (hypothesis.effect.name, hypothesis.cables)
     return next(setting for setting in robot.effects if (setting.name, setting.cables) == wanted)
 
 
-def worth_fitting(
-    prospects: Mapping[Hypothesis, Prospect], beside: Mapping[Hypothesis, Prospect] | None = None
+def shortlist(
+    predictions: Mapping[Hypothesis, PredictedGain], rough_predictions: Mapping[Hypothesis, PredictedGain] | None = None
 ) -> list[Hypothesis]:
-    """The best prospects, best first, few of each effect; then the best ``beside`` them, in place of the last.
+    """Shortlist of the best predictions, few of each effect; the best of ``rough_predictions`` replace the last.
 
-    Those are promised by another look at the same hypotheses.
+    Those are of another score test of the same hypotheses, with process noise.
     """
-    ranked, others = _ranked(prospects), _ranked(beside or {})
-    sure = ranked[: MOST_FITTED - MOST_BESIDE]
-    new = [hypothesis for hypothesis in others[:MOST_BESIDE] if hypothesis not in sure]
-    kept = [hypothesis for hypothesis in ranked if hypothesis not in new]
-    return [*kept[: MOST_FITTED - len(new)], *new]
+    ranked, others = _ranked(predictions), _ranked(rough_predictions or {})
+    leading = ranked[: MAX_FITS - MAX_ROUGH_FITS]
+    added = [hypothesis for hypothesis in others[:MAX_ROUGH_FITS] if hypothesis not in leading]
+    remaining = [hypothesis for hypothesis in ranked if hypothesis not in added]
+    return [*remaining[: MAX_FITS - len(added)], *added]
 
 
-def _ranked(prospects: Mapping[Hypothesis, Prospect]) -> list[Hypothesis]:
+def _ranked(predictions: Mapping[Hypothesis, PredictedGain]) -> list[Hypothesis]:
     ranked: list[Hypothesis] = []
-    for hypothesis in sorted(prospects, key=lambda hypothesis: -prospects[hypothesis].gain):
-        if sum(hypothesis.effect is other.effect for other in ranked) < MOST_OF_AN_EFFECT:
+    for hypothesis in sorted(predictions, key=lambda hypothesis: -predictions[hypothesis].gain):
+        if sum(hypothesis.effect is other.effect for other in ranked) < MAX_FITS_PER_EFFECT:
             ranked.append(hypothesis)
-    least = max(HOPELESS, PROMISING * prospects[ranked[0]].gain) if ranked else HOPELESS
-    return [hypothesis for hypothesis in ranked[:MOST_FITTED] if prospects[hypothesis].gain >= least]
+    min_gain = max(MIN_PREDICTED_GAIN, MIN_GAIN_SHARE * predictions[ranked[0]].gain) if ranked else MIN_PREDICTED_GAIN
+    return [hypothesis for hypothesis in ranked[:MAX_FITS] if predictions[hypothesis].gain >= min_gain]
 
 
-def simplest(trials: Sequence[Trial]) -> Trial | None:
-    """Of the trials that the evidence does not tell from the best, the one with fewest parameters, then the best."""
-    top = max((trial.evidence for trial in trials), default=0.0)
-    near = [trial for trial in trials if top - trial.evidence < ALIKE]
-    return min(near, key=lambda trial: (trial.parameter_count, -trial.evidence), default=None)
+def most_parsimonious(scores: Sequence[CandidateScore]) -> CandidateScore | None:
+    """Most parsimonious candidate: of those whose evidence ties with the best, the one with fewest parameters."""
+    top = max((trial.evidence for trial in scores), default=0.0)
+    tied = [trial for trial in scores if top - trial.evidence < TIE_NATS]
+    return min(tied, key=lambda trial: (trial.parameter_count, -trial.evidence), default=None)
 
 
-def screened(robot: Robot, hypothesis: Hypothesis, prospect: Prospect) -> Trial:
-    """A hypothesis that is not worth a fit; only a fit may pass the threshold."""
-    values = {**hypothesis.setting(robot).values, **prospect.values}
-    promised = robot.with_effect(EffectSetting(hypothesis.effect.name, values, hypothesis.cables))
-    return Trial(hypothesis, Fit(promised, (), np.zeros(0), np.zeros((0, 0))), 0.0, float("nan"))
+def unfitted_score(robot: Robot, hypothesis: Hypothesis, prediction: PredictedGain) -> CandidateScore:
+    """Score of a hypothesis that is rejected by the score test; only a fit may pass the threshold."""
+    values = {**hypothesis.setting(robot).values, **prediction.values}
+    predicted_robot = robot.with_effect(EffectSetting(hypothesis.effect.name, values, hypothesis.cables))
+    return CandidateScore(hypothesis, Fit(predicted_robot, (), np.zeros(0), np.zeros((0, 0))), 0.0, float("nan"))

@@ -1,4 +1,4 @@
-"""What a trace found: values only, for reports to show."""
+"""Result of a trace: values only, for reports to show."""
 
 from __future__ import annotations
 
@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from ..recordings.recording import Recording
 from ..robots.robot import Robot
-from ..runs.cosimulation import Motion
-from .where.port_residuals import Components
+from ..runs.cosimulation import CosimulationResult
+from .where.port_residuals import FaultLocalisation
 
 Array = NDArray[np.float64]
-VerdictName = Literal["effects", "none", "discovered", "unexplained"]
+Verdict = Literal["effects", "none", "discovered", "unexplained"]
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ class Estimate:
 
 @dataclass(frozen=True)
 class FoundEffect:
-    """An effect that earned its place; ``evidence`` is the natural log of its likelihood ratio on unseen data."""
+    """An effect that was accepted; ``evidence`` is the natural log of its likelihood ratio on unseen data."""
 
     name: str
     component: str
@@ -41,8 +41,8 @@ class FoundEffect:
 
 
 @dataclass(frozen=True)
-class Fitted:
-    """Which parameter of a found effect is meant."""
+class FittedParameter:
+    """Identifies a fitted parameter: effect, cables and parameter name."""
 
     name: str
     cables: tuple[int, ...]
@@ -51,9 +51,9 @@ class Fitted:
 
 @dataclass(frozen=True)
 class Correlation:
-    """How the errors of two estimates go together: their correlation, of -1 to 1."""
+    """Correlation of the errors of two estimates, from -1 to 1."""
 
-    between: tuple[Fitted, Fitted]
+    between: tuple[FittedParameter, FittedParameter]
     value: float
 
 
@@ -62,7 +62,7 @@ class Candidate:
     """A hypothesis that was tried: one effect more than the model had in its round.
 
     ``evidence`` is the natural log of its likelihood ratio on unseen data, against the model without it;
-    ``mean_square`` the mean square of the whitened innovations there (one where nothing is left).
+    ``mean_square`` the mean square of the whitened innovations there (one where the residual is white noise).
     """
 
     round: int
@@ -93,18 +93,18 @@ class Comparison:
 
     role: str
     recording: Recording
-    before: Motion
-    after: Motion
+    before: CosimulationResult
+    after: CosimulationResult
     errors_before: Errors
     errors_after: Errors
 
 
 @dataclass(frozen=True)
 class Detectable:
-    """The size of a parameter, from where the effect is absent, that a recording would show nine times out of ten.
+    """Detectable size of a parameter, from where the effect is absent: a recording shows it nine times out of ten.
 
-    ``beside`` are the values of the effect's other parameters that this holds for. Infinite where no size would show,
-    or none that the parameter may have.
+    ``other_values`` are the values of the effect's other parameters that this holds for. Infinite where no size would
+    show, or none that the parameter may have.
     """
 
     name: str
@@ -112,14 +112,14 @@ class Detectable:
     parameter: str
     size: float
     unit: str
-    beside: Mapping[str, float]
+    other_values: Mapping[str, float]
 
 
 @dataclass(frozen=True)
-class Likeness:
-    """How much of an accepted effect another could mimic: ``cosine`` of the angle between them, 1 where all of it.
+class ConfusableEffect:
+    """Confusable effect: how much of an accepted effect another could mimic, by the ``cosine`` of their angle.
 
-    ``nats`` is what would be lost if the other stood in its place, as far as linearisation holds.
+    It is 1 where all of it; ``nats`` is the evidence lost if the other replaced it, as far as linearisation holds.
     """
 
     name: str
@@ -131,11 +131,11 @@ class Likeness:
 
 
 @dataclass(frozen=True)
-class Separation:
-    """What one recording could have shown beside the effects that were accepted."""
+class Identifiability:
+    """Identifiability: what one recording could have shown beside the accepted effects."""
 
     detectable: tuple[Detectable, ...]
-    alike: tuple[Likeness, ...]
+    confusable: tuple[ConfusableEffect, ...]
 
 
 @dataclass(frozen=True)
@@ -155,17 +155,18 @@ class Resonance:
 
 @dataclass(frozen=True)
 class Trace:
-    """The answer to: what does this model lack.
+    """Result of a trace: what the model lacks.
 
     ``correlations`` are those of each two parameters of the effects. ``noise_floor`` is what noise of the sensors and
-    of the recorded winch speeds would leave; ``left`` the mean square of the whitened innovations of each output (x, y,
-    z, tensions) under the final model on unseen data, shape (3 + n,), and ``autocorrelations`` the largest correlation
-    of each with itself, and what noise stays below, as :func:`adequacy.largest_autocorrelations` gives them.
-    ``separation`` is what those data could have shown beside the effects; empty where the model leaves more than noise.
-    ``components`` tells where the fit recording errs, before any effect is fitted.
+    of the recorded winch speeds would leave; ``normalised_innovation_variance`` is the mean square of the whitened
+    innovations of each output (x, y, z, tensions) under the final model on unseen data, shape (3 + n,), 1 where the
+    residual is white noise, and ``autocorrelations`` the largest correlation of each with itself, and what noise stays
+    below, as :func:`residual_analysis.largest_autocorrelations` gives them. ``identifiability`` is what those data
+    could have shown beside the effects; empty where the model leaves more than noise. ``components`` tells where the
+    fit recording errs, before any effect is fitted.
     """
 
-    verdict: VerdictName
+    verdict: Verdict
     sentence: str
     robot_before: Robot
     robot_after: Robot
@@ -178,10 +179,10 @@ class Trace:
     noise_floor: Errors
     noise_before: bool
     noise_after: bool
-    left: Array
+    normalised_innovation_variance: Array
     autocorrelations: tuple[Array, Array]
-    separation: Separation
-    components: Components
+    identifiability: Identifiability
+    components: FaultLocalisation
     resonances: tuple[Resonance, ...]
     alpha: float
     notes: tuple[str, ...]

@@ -1,4 +1,4 @@
-"""Processes of their own for what a trace can do side by side: fits, co-simulations."""
+"""Pool of worker processes for what a trace can do in parallel: fits and co-simulations."""
 
 from __future__ import annotations
 
@@ -16,18 +16,18 @@ from typing import Any, Generic, TypeVar
 
 from threadpoolctl import threadpool_limits
 
-from ..child import end_with_parent
+from ..child import exit_with_parent
 from ..errors import TautwireError
-from ..interrupt import ENDING
+from ..interrupt import TERMINATION_SIGNALS
 
 Result = TypeVar("Result")
 
-# Seconds between two looks whether the user wants to stop.
-PATIENCE = 0.1
+# Seconds between two checks whether the user wants to stop.
+POLL_INTERVAL = 0.1
 
 
 class WorkerLostError(TautwireError):
-    """A process that worked for a trace ended before its work did; carries how many there were."""
+    """A worker process ended before its work did; carries how many there were."""
 
     def __init__(self, processes: int) -> None:
         self.processes = processes
@@ -42,39 +42,48 @@ def processors() -> int:
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
 
 
-class Pending(Generic[Result]):
-    """A result that is being worked on; ``result`` waits for it."""
+class PendingResult(Generic[Result]):
+    """A pending result; ``result`` waits for it."""
 
     def __init__(
-        self, future: Future[Result] | None, now: Callable[[], Result], between: Callable[[], None], processes: int
+        self,
+        future: Future[Result] | None,
+        compute: Callable[[], Result],
+        poll_interrupts: Callable[[], None],
+        processes: int,
     ) -> None:
-        self._future, self._now, self._between, self._processes = future, now, between, processes
+        self._future, self._compute, self._poll_interrupts, self._processes = (
+            future,
+            compute,
+            poll_interrupts,
+            processes,
+        )
 
     def result(self) -> Result:
         """The result, or what the work raised. Without a process of its own it is done here."""
         if self._future is None:
-            return self._now()
-        while not wait([self._future], PATIENCE).done:
-            self._between()
-        with _loss_told(self._processes):
+            return self._compute()
+        while not wait([self._future], POLL_INTERVAL).done:
+            self._poll_interrupts()
+        with _worker_loss_raised(self._processes):
             return self._future.result()
 
 
-class Workers:
-    """Calls functions with picklable arguments, in so many processes; with one of them, here.
+class WorkerPool:
+    """Pool of worker processes that call functions with picklable arguments; with one process, they run here.
 
-    ``between`` is called while they are waited for. Leaving the context ends the processes, whatever they do, and
-    removes what they left in temporary folders. A program that asks for more than one process has to guard its main
+    ``poll_interrupts`` is called while they are waited for. Leaving the context ends the processes, whatever they do,
+    and removes what they left in temporary folders. A program that asks for more than one process has to guard its main
     module by ``if __name__ == "__main__"``, as multiprocessing wants.
     """
 
-    def __init__(self, processes: int, between: Callable[[], None] = lambda: None) -> None:
+    def __init__(self, processes: int, poll_interrupts: Callable[[], None] = lambda: None) -> None:
         self.processes = processes
-        self.between = between
+        self.poll_interrupts = poll_interrupts
         self._folder = tempfile.TemporaryDirectory(prefix="tautwire-workers-") if processes > 1 else None
         self._executor: ProcessPoolExecutor | None = None
 
-    def __enter__(self) -> Workers:
+    def __enter__(self) -> WorkerPool:
         return self
 
     def __exit__(
@@ -91,20 +100,22 @@ class Workers:
         if self._folder is not None:
             self._folder.cleanup()
 
-    def begin(self) -> None:
-        """Begin the processes, which takes them a while; else the first call does."""
-        if self._pool() is not None:
+    def warm_up(self) -> None:
+        """Start the processes, which takes a while; else the first call does."""
+        if self._started_executor() is not None:
             for _ in range(self.processes):
-                self._submit(_begun)
+                self._submit(_no_operation)
 
-    def start(self, function: Callable[..., Result], *arguments: Any) -> Pending[Result]:
-        """Begin a call; its result may be fetched once."""
-        future = None if self._pool() is None else self._submit(function, *arguments)
-        return Pending(future, lambda: function(*arguments), self.between, self.processes)
+    def submit(self, function: Callable[..., Result], *arguments: Any) -> PendingResult[Result]:
+        """Start a call; its result may be fetched once."""
+        future = None if self._started_executor() is None else self._submit(function, *arguments)
+        return PendingResult(future, lambda: function(*arguments), self.poll_interrupts, self.processes)
 
-    def each(self, function: Callable[..., Result], calls: Sequence[tuple[Any, ...]]) -> Generator[tuple[int, Result]]:
+    def map_unordered(
+        self, function: Callable[..., Result], calls: Sequence[tuple[Any, ...]]
+    ) -> Generator[tuple[int, Result]]:
         """Number and result of each call, in the order in which they end; closing it drops those not begun."""
-        if self._pool() is None:
+        if self._started_executor() is None:
             for number, arguments in enumerate(calls):
                 yield number, function(*arguments)
             return
@@ -112,10 +123,10 @@ class Workers:
         waiting = set(futures)
         try:
             while waiting:
-                self.between()
-                done, waiting = wait(waiting, PATIENCE, FIRST_COMPLETED)
+                self.poll_interrupts()
+                done, waiting = wait(waiting, POLL_INTERVAL, FIRST_COMPLETED)
                 for future in sorted(done, key=futures.__getitem__):
-                    with _loss_told(self.processes):
+                    with _worker_loss_raised(self.processes):
                         result = future.result()
                     yield futures[future], result
         finally:
@@ -123,19 +134,21 @@ class Workers:
                 future.cancel()
 
     def _submit(self, function: Callable[..., Result], *arguments: Any) -> Future[Result]:
-        with _interrupts_blocked(), _loss_told(self.processes):
-            future: Future[Result] = self._pool().submit(function, *arguments)
+        with _interrupts_blocked(), _worker_loss_raised(self.processes):
+            future: Future[Result] = self._started_executor().submit(function, *arguments)
             return future
 
-    def _pool(self) -> Any:
+    def _started_executor(self) -> Any:
         if self.processes > 1 and self._executor is None and self._folder is not None:
             # Not forked: threads of libraries would be missing. No fork server: its socket's path may be too long.
-            self._executor = ProcessPoolExecutor(self.processes, get_context("spawn"), _begin, (self._folder.name,))
+            self._executor = ProcessPoolExecutor(
+                self.processes, get_context("spawn"), _initialise_worker, (self._folder.name,)
+            )
         return self._executor
 
 
 @contextmanager
-def _loss_told(processes: int) -> Iterator[None]:
+def _worker_loss_raised(processes: int) -> Iterator[None]:
     try:
         yield
     except BrokenProcessPool as error:
@@ -144,25 +157,25 @@ def _loss_told(processes: int) -> Iterator[None]:
 
 @contextmanager
 def _interrupts_blocked() -> Iterator[None]:
-    """Processes that are started in the block do not get Ctrl-C and what is like it; here it is only late."""
+    """Processes started in the block do not receive Ctrl-C and the like; here it is only delayed."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
-    before = signal.pthread_sigmask(signal.SIG_BLOCK, set(ENDING))
+    previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, set(TERMINATION_SIGNALS))
     try:
         yield
     finally:
-        signal.pthread_sigmask(signal.SIG_SETMASK, before)
+        signal.pthread_sigmask(signal.SIG_SETMASK, previous_mask)
 
 
-def _begun() -> None:
-    """Something to do first."""
+def _no_operation() -> None:
+    """No operation: makes a process start."""
 
 
-def _begin(folder: str) -> None:
-    """To be ended is the parent's to handle; temporary folders are made where the parent removes them."""
-    for number in ENDING:
+def _initialise_worker(folder: str) -> None:
+    """Ignore signals that the parent handles; make temporary folders where the parent removes them."""
+    for number in TERMINATION_SIGNALS:
         signal.signal(number, signal.SIG_IGN)
-    end_with_parent(Path(folder))
+    exit_with_parent(Path(folder))
     tempfile.tempdir = folder
     threadpool_limits(1)

@@ -118,7 +118,7 @@ def line_of(key: str, fingerprint: str, code: str, trace: Trace, used: Used) -> 
         seconds=trace.seconds,
         processor=used.processor,
         memory=used.memory,
-        left=tuple(float(square) for square in trace.left),
+        left=tuple(float(square) for square in trace.normalised_innovation_variance),
         rivals=_best(trace),
     )
 

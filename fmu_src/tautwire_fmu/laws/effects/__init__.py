@@ -40,7 +40,7 @@ ALL: Tuple[Effect, ...] = (
     SENSOR_GAIN,
 )
 
-# What is no kind of the list: a trace that finds one has discovered it.
+# Effects outside the list: a trace that selects one has discovered it.
 UNLISTED: Tuple[Effect, ...] = (FRAME,)
 
 BY_NAME: Dict[str, Effect] = {effect.name: effect for effect in (*ALL, *UNLISTED)}

@@ -1,4 +1,4 @@
-"""An exit point that is not where the robot file has it."""
+"""Exit-point offset: an exit point that is not where the robot file has it."""
 
 from typing import Any, NamedTuple, Tuple
 
@@ -7,7 +7,7 @@ from .effect import Effect, Parameter
 
 
 class Values(NamedTuple):
-    """From the declared exit point to the true one."""
+    """Vector from the declared exit point to the true one."""
 
     x: Any
     y: Any
@@ -15,7 +15,7 @@ class Values(NamedTuple):
 
 
 def exit_point(m: Mathematics, values: Values) -> Tuple[Any, Any, Any]:
-    """The shift itself, in m."""
+    """Shift of the exit point, in m."""
     return (values.x, values.y, values.z)
 
 

@@ -1,4 +1,4 @@
-"""Creep: a rope that grows under load, for good, and carries none of that growth."""
+"""Creep of the rope: lasting growth under load, which carries no tension."""
 
 from typing import Any, NamedTuple, Tuple
 
@@ -15,7 +15,7 @@ class Values(NamedTuple):
 
 
 def free_strain(m: Mathematics, values: Values, states: Tuple[Any, ...]) -> Any:
-    """The strain that has crept."""
+    """Creep strain."""
     return states[0]
 
 
@@ -26,7 +26,7 @@ def free_strain_rate(m: Mathematics, values: Values, states: Tuple[Any, ...], ca
 
 
 def state_rates(m: Mathematics, values: Values, states: Tuple[Any, ...], cable: Any, motion: Any) -> Tuple[Any, ...]:
-    """Of the crept strain, in 1/s, and of the time, which is one."""
+    """Rates of the creep strain, in 1/s, and of the time, which is one."""
     return free_strain_rate(m, values, states, cable, motion.elastic_tension), 1.0
 
 
@@ -52,7 +52,7 @@ CREEP = Effect(
             maximum=1e8,
             neutral=10.0,
             start=10.0,
-            trials=(1.0, 10.0, 100.0),
+            multistart_values=(1.0, 10.0, 100.0),
         ),
         Parameter(
             name="fluidity",

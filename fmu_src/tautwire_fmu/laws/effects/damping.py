@@ -7,13 +7,13 @@ from .effect import Effect, Parameter
 
 
 class Values(NamedTuple):
-    """The damping that the cable really has, in place of the declared one."""
+    """True damping of the cable, in place of the declared one."""
 
     damping: Any
 
 
 def viscosity(m: Mathematics, values: Values, cable: Any) -> Any:
-    """What the damping has over the declared one, in Pa s."""
+    """Excess of the damping over the declared one, in Pa s."""
     return values.damping - cable.damping
 
 

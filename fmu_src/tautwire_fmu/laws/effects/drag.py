@@ -1,4 +1,4 @@
-"""Drag of the air on the platform, with a steady wind."""
+"""Aerodynamic drag on the platform, with a steady wind."""
 
 from typing import Any, NamedTuple, Tuple
 
@@ -7,7 +7,7 @@ from ..vectors import Vector, dot, scale, subtract
 from .effect import Effect, Parameter
 
 # (m/s)^2: keeps the slope of the speed finite at rest.
-AT_REST = 1e-24
+SPEED_SQUARED_FLOOR = 1e-24
 
 
 class Values(NamedTuple):
@@ -23,11 +23,11 @@ class Values(NamedTuple):
 def wrench(m: Mathematics, values: Values, states: Tuple[Any, ...], position: Vector, velocity: Vector) -> Vector:
     """``-rho / 2 C A |v - w| (v - w)``, in N; the start is in equilibrium with the wind."""
     relative = subtract(velocity, (values.wind_x, values.wind_y, values.wind_z))
-    speed = m.sqrt(dot(relative, relative) + AT_REST)
+    speed = m.sqrt(dot(relative, relative) + SPEED_SQUARED_FLOOR)
     return scale(-0.5 * values.density * values.drag_area * speed, relative)
 
 
-def _wind(axis: str) -> Parameter:
+def _wind_parameter(axis: str) -> Parameter:
     return Parameter(
         name=f"wind_{axis}",
         unit="m/s",
@@ -62,7 +62,7 @@ DRAG = Effect(
             neutral=1.225,
             start=1.225,
         ),
-        *map(_wind, "xyz"),
+        *map(_wind_parameter, "xyz"),
     ),
     values=Values,
     forms=(("drag_area",), ("drag_area", "wind_x", "wind_y", "wind_z")),

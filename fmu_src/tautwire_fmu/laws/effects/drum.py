@@ -1,4 +1,4 @@
-"""A drum that is not what its encoder takes it for: another radius, out of round, or slipping."""
+"""Winch drum errors: another radius than the encoder assumes, eccentricity, or slip."""
 
 import math
 from typing import Any, NamedTuple, Tuple
@@ -21,13 +21,13 @@ class Values(NamedTuple):
 
 def rope_speed(m: Mathematics, values: Values, states: Tuple[Any, ...], winch_speed: Any, tension: Any) -> Any:
     """``V_e (q (1 + e cos(s / R + f)) - 1) - k max(T, 0) |V_e|``, in m/s; ``s`` is what the encoder has counted."""
-    wave = 1.0 + values.eccentricity * m.cos(states[0] / values.radius + values.phase)
-    lost = values.slip * m.maximum(tension, 0.0) * m.absolute(winch_speed)
-    return winch_speed * (values.radius_ratio * wave - 1.0) - lost
+    radius_factor = 1.0 + values.eccentricity * m.cos(states[0] / values.radius + values.phase)
+    slip_speed = values.slip * m.maximum(tension, 0.0) * m.absolute(winch_speed)
+    return winch_speed * (values.radius_ratio * radius_factor - 1.0) - slip_speed
 
 
 def state_rates(m: Mathematics, values: Values, states: Tuple[Any, ...], cable: Any, motion: Any) -> Tuple[Any, ...]:
-    """Of what the encoder has counted, in m/s."""
+    """Rate of the travel counted by the encoder, in m/s."""
     return (motion.winch_speed,)
 
 
@@ -62,7 +62,7 @@ DRUM = Effect(
             maximum=6.4,
             neutral=0.0,
             start=1.0,
-            trials=(0.0, QUARTER_TURN),
+            multistart_values=(0.0, QUARTER_TURN),
         ),
         Parameter(
             name="radius",
@@ -72,7 +72,7 @@ DRUM = Effect(
             maximum=10.0,
             neutral=0.1,
             start=0.1,
-            trials=(0.04, 0.05, 0.06, 0.08, 0.1, 0.125, 0.15, 0.2, 0.3),
+            multistart_values=(0.04, 0.05, 0.06, 0.08, 0.1, 0.125, 0.15, 0.2, 0.3),
         ),
         Parameter(
             name="slip",

@@ -1,17 +1,18 @@
-"""What an effect is: data and a few functions, each for the stage where the effect acts."""
+"""Definition of an effect: data and a few functions, each for the stage where the effect acts."""
 
 from typing import Any, Callable, Dict, Mapping, NamedTuple, Optional, Tuple
 
 
 class Parameter(NamedTuple):
-    """One number of an effect.
+    """Parameter of an effect.
 
     ``neutral`` is the value of a parameter that is not given: with all parameters neutral the effect is exactly
     absent. None where that is the value that the robot file declares for the cable under the key of the same name;
-    such a parameter has to be given. Fits begin at ``start_ratio`` times the declared value, or at ``start`` where
-    nothing or zero is declared; neither is the neutral value. ``trials`` are values from which fits begin where one
-    start could end in the wrong valley: of parameters that count only while others are not neutral. ``scanned`` are
-    values to look at, too, of a parameter whose slope where it is neutral is none or misleads.
+    such a parameter has to be given. Fits start at ``start_ratio`` times the declared value, or at ``start`` where
+    nothing or zero is declared; neither is the neutral value. ``multistart_values`` are the starts of a multi-start fit
+    where one start could end in a local optimum: of parameters that act only while others are not neutral.
+    ``grid_values`` are further starting values for the grid search over a parameter whose score at neutral is zero or
+    misleading.
     """
 
     name: str
@@ -22,15 +23,15 @@ class Parameter(NamedTuple):
     neutral: Optional[float]
     start: float
     start_ratio: float = 1.0
-    trials: Tuple[float, ...] = ()
-    scanned: Tuple[float, ...] = ()
+    multistart_values: Tuple[float, ...] = ()
+    grid_values: Tuple[float, ...] = ()
 
 
 class State(NamedTuple):
-    """One state of an effect; it starts at zero.
+    """State of an effect; it starts at zero.
 
-    ``scale`` is a size, in ``unit``, that is felt: a ten-millionth of it is not. A state that ``drifts`` never
-    settles: where the robot rests it is taken as it was at the start.
+    ``scale`` is a typical size, in ``unit``; a ten-millionth of it is negligible. A state that ``drifts`` has no
+    equilibrium: where the robot rests it is taken as it was at the start.
     """
 
     name: str
@@ -41,7 +42,7 @@ class State(NamedTuple):
 
 
 class Effect(NamedTuple):
-    """A physical effect that the plain robot lacks.
+    """Physical effect that the plain robot model lacks.
 
     Stages, each a function or None where the effect does not act there; the first two arguments of all are ``m`` and
     ``values``. Contributions of one stage add up (or their logarithms do: transmission, gain), so the order of effects
@@ -70,7 +71,7 @@ class Effect(NamedTuple):
 
     ``values`` is the class of the parameters (a NamedTuple, one field a parameter, in order). ``state_rates`` gives a
     tuple, one rate a state, from ``m, values, states, cable, motion``. ``forms`` are the sets of parameters that a fit
-    frees together; the others stay neutral.
+    estimates together; the others stay neutral.
     """
 
     name: str
@@ -100,18 +101,21 @@ class Effect(NamedTuple):
     delay: Optional[Callable[..., Any]] = None
 
     @property
-    def sets_constants(self) -> bool:
-        """Whether it does nothing but put other constants in the place of a rope's modulus and damping."""
-        acts = {name for name in self._fields[self._fields.index("states") :] if getattr(self, name)}
-        return bool(acts) and acts <= {"stiffness", "viscosity"}
+    def only_sets_constants(self) -> bool:
+        """Whether the effect only replaces a rope's modulus and damping by other constants."""
+        used_stages = {name for name in self._fields[self._fields.index("states") :] if getattr(self, name)}
+        return bool(used_stages) and used_stages <= {"stiffness", "viscosity"}
 
-    def completed(self, given: Mapping[str, Any]) -> Dict[str, Any]:
-        """All parameters by name: those given, the others neutral; KeyError where one that has to be is not given."""
-        return {p.name: given[p.name] if p.neutral is None else given.get(p.name, p.neutral) for p in self.parameters}
+    def completed_values(self, specified_values: Mapping[str, Any]) -> Dict[str, Any]:
+        """Values of all parameters by name, neutral where not specified; KeyError where a required one is missing."""
+        return {
+            p.name: specified_values[p.name] if p.neutral is None else specified_values.get(p.name, p.neutral)
+            for p in self.parameters
+        }
 
 
 class ActiveEffect(NamedTuple):
-    """An effect with its numbers, as it acts on one component."""
+    """Effect with its parameter values, as it acts on one component."""
 
     effect: Effect
     values: Any

@@ -1,4 +1,4 @@
-"""A frame that gives way: the exit point follows the rope as on a spring, along the rope."""
+"""Frame compliance: the exit point follows the rope as on a spring, along the rope."""
 
 from typing import Any, NamedTuple, Tuple
 
@@ -7,7 +7,7 @@ from .effect import Effect, Parameter
 
 
 class Values(NamedTuple):
-    """How far the exit point moves toward the platform for each newton."""
+    """Compliance: how far the exit point moves toward the platform for each newton."""
 
     compliance: Any
 
@@ -15,12 +15,12 @@ class Values(NamedTuple):
 def tension(m: Mathematics, values: Values, states: Tuple[Any, ...], cable: Any, motion: Any) -> Any:
     """``-(T - T0) k / (1 + k)`` with ``k = C E S / l``, in N: rope and frame in series share the stretch.
 
-    Unlike a softer rope it takes the same stretch from a long rope as from a short one. The frame's mass is left out:
-    it follows at once.
+    Unlike a softer rope it takes the same stretch from a long rope as from a short one. The frame's mass is
+    neglected: it follows at once.
     """
-    share = values.compliance * cable.modulus * cable.area / motion.line.length
-    beyond = motion.elastic_tension - cable.start_tension + cable.area * (cable.damping * motion.strain_rate)
-    return -beyond * (share / (1.0 + share))
+    relative_compliance = values.compliance * cable.modulus * cable.area / motion.line.length
+    tension_change = motion.elastic_tension - cable.start_tension + cable.area * (cable.damping * motion.strain_rate)
+    return -tension_change * (relative_compliance / (1.0 + relative_compliance))
 
 
 FRAME = Effect(

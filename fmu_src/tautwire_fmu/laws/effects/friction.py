@@ -9,7 +9,7 @@ QUARTER_TURN = 1.5707963267948966
 
 
 class Values(NamedTuple):
-    """Coefficients of friction by where the tension law holds, angle of wrap, and speed below which it fades."""
+    """Coefficients of friction by where the tension law holds, angle of wrap, and speed below which friction fades."""
 
     coefficient: Any
     coefficient_at_cell: Any
@@ -18,13 +18,13 @@ class Values(NamedTuple):
 
 
 def transmission(m: Mathematics, values: Values, motion: Any) -> Tuple[Any, Any]:
-    """Logarithms of the tensions at platform and load cell over that of the law: the cell feels more, reeling in.
+    """Logarithms of the tensions at platform and load cell over that of the law: the cell has more, reeling in.
 
     ``ln(T_cell / T_platform) = (mu + mu_cell) wrap tanh(V / v_s)``. By ``mu`` the law gives the tension of the free
-    span, which pulls the platform; by ``mu_cell`` it gives that at the load cell, and the platform feels the friction.
+    span, which pulls the platform; by ``mu_cell`` it gives that at the load cell, and friction acts on the platform.
     """
-    turned = values.wrap * m.tanh(motion.rope_speed / values.smoothing)
-    return -values.coefficient_at_cell * turned, values.coefficient * turned
+    log_ratio_per_coefficient = values.wrap * m.tanh(motion.rope_speed / values.smoothing)
+    return -values.coefficient_at_cell * log_ratio_per_coefficient, values.coefficient * log_ratio_per_coefficient
 
 
 FRICTION = Effect(
@@ -67,7 +67,7 @@ FRICTION = Effect(
             maximum=1.0,
             neutral=0.005,
             start=0.005,
-            trials=(0.005, 0.05),
+            multistart_values=(0.005, 0.05),
         ),
     ),
     values=Values,

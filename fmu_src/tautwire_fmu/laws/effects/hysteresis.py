@@ -1,16 +1,16 @@
-"""Friction between the strands of a rope: tension that depends on the way, not on its speed."""
+"""Hysteresis (Bouc-Wen) of a rope: rate-independent friction between its strands."""
 
 from typing import Any, NamedTuple, Tuple
 
 from ..mathematics import Mathematics
 from .effect import Effect, Parameter, State
 
-# Far below any memory that is felt; keeps the power's slope finite at zero.
-SMALLEST = 1e-100
+# Far below any memory that matters; keeps the power's slope finite at zero.
+MEMORY_FLOOR = 1e-100
 
 
 class Values(NamedTuple):
-    """Largest friction force, strain in which it builds up, and sharpness of the passage to sliding."""
+    """Largest friction force, strain in which it builds up, and sharpness of the transition to sliding."""
 
     force: Any
     yield_strain: Any
@@ -25,7 +25,7 @@ def tension(m: Mathematics, values: Values, states: Tuple[Any, ...], cable: Any,
 def state_rates(m: Mathematics, values: Values, states: Tuple[Any, ...], cable: Any, motion: Any) -> Tuple[Any, ...]:
     """``dh/dt = (deps/dt / eps_y) (1 - |h|^n)`` while ``h`` grows in size, without ``|h|^n`` while it falls; in 1/s."""
     memory, rate = states[0], motion.strain_rate
-    power = m.exp(values.exponent * m.log(m.maximum(m.absolute(memory), SMALLEST)))
+    power = m.exp(values.exponent * m.log(m.maximum(m.absolute(memory), MEMORY_FLOOR)))
     sliding = m.where(memory * rate, power, 0.0)
     return ((rate / values.yield_strain) * (1.0 - sliding),)
 
@@ -43,7 +43,7 @@ HYSTERESIS = Effect(
             maximum=1e6,
             neutral=0.0,
             start=20.0,
-            scanned=(10.0, 100.0, 1000.0),
+            grid_values=(10.0, 100.0, 1000.0),
         ),
         Parameter(
             name="yield_strain",
@@ -53,7 +53,7 @@ HYSTERESIS = Effect(
             maximum=0.1,
             neutral=1e-4,
             start=1e-4,
-            trials=(1e-5, 1e-4, 1e-3),
+            multistart_values=(1e-5, 1e-4, 1e-3),
         ),
         Parameter(
             name="exponent",

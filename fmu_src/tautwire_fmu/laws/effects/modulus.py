@@ -1,4 +1,4 @@
-"""A modulus of elasticity other than the declared one."""
+"""Modulus of elasticity other than the declared one."""
 
 from typing import Any, NamedTuple, Tuple
 
@@ -7,13 +7,13 @@ from .effect import Effect, Parameter
 
 
 class Values(NamedTuple):
-    """The modulus that the cable really has, in place of the declared one."""
+    """True modulus of the cable, in place of the declared one."""
 
     modulus: Any
 
 
 def stiffness(m: Mathematics, values: Values, states: Tuple[Any, ...], cable: Any) -> Tuple[Any, Any]:
-    """What the modulus has over the declared one, in Pa; no stress of its own."""
+    """Excess of the modulus over the declared one, in Pa; no stress at no strain."""
     return values.modulus - cable.modulus, 0.0
 
 

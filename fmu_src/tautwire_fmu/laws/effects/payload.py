@@ -1,4 +1,4 @@
-"""A load that the platform carries and its file does not know."""
+"""Undeclared payload: a load that the platform carries and its file does not declare."""
 
 from typing import Any, NamedTuple, Tuple
 

@@ -1,4 +1,4 @@
-"""A swivelling pulley at the exit point, over which the rope wraps.
+"""Swivelling pulley at the exit point, over which the rope wraps.
 
 In the vertical plane through exit point A and platform P the rope comes up at A, wraps over the top of the pulley
 and leaves on a tangent toward P. With ``d`` the horizontal distance of P from A, ``o`` the horizontal unit vector
@@ -18,8 +18,8 @@ from ..vectors import dot
 from .effect import Effect, Parameter
 
 HALF_TURN = 3.141592653589793
-# Square of a distance in m below which the platform is straight under the exit point and no plane is left.
-AT_AXIS = 1e-24
+# m^2: square of the distance below which the platform is straight under the exit point and the plane is undefined.
+DISTANCE_SQUARED_FLOOR = 1e-24
 
 
 class Values(NamedTuple):
@@ -32,16 +32,20 @@ def path(m: Mathematics, values: Values, line: Tuple[Any, Any, Any]) -> Tuple[Tu
     """Unit vector at the platform along the rope, and the rope's length in m with the part on the pulley."""
     radius = values.radius
     x, y, z = line
-    away = m.sqrt(x * x + y * y + AT_AXIS)
-    free = m.sqrt(dot(line, line) - 2.0 * radius * away)
-    slope = radius / free
-    factor = (1.0 / free) / (1.0 + slope * slope)
-    # Of C - P turned by a quarter: outward z, upward d - r.
-    outward = (radius + slope * z) / away
-    direction = (factor * (x - outward * x), factor * (y - outward * y), factor * (z + slope * (away - radius)))
-    inward = -factor * (radius - away + slope * z)
-    theta = m.atan2(inward, direction[2])
-    return direction, free + radius * (HALF_TURN - theta)
+    horizontal_distance = m.sqrt(x * x + y * y + DISTANCE_SQUARED_FLOOR)
+    free_length = m.sqrt(dot(line, line) - 2.0 * radius * horizontal_distance)
+    slope = radius / free_length
+    factor = (1.0 / free_length) / (1.0 + slope * slope)
+    # C - P turned by a quarter: outward z, upward d - r.
+    outward_ratio = (radius + slope * z) / horizontal_distance
+    direction = (
+        factor * (x - outward_ratio * x),
+        factor * (y - outward_ratio * y),
+        factor * (z + slope * (horizontal_distance - radius)),
+    )
+    normal_horizontal = -factor * (radius - horizontal_distance + slope * z)
+    contact_angle = m.atan2(normal_horizontal, direction[2])
+    return direction, free_length + radius * (HALF_TURN - contact_angle)
 
 
 PULLEY = Effect(

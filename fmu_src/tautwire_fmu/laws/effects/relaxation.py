@@ -20,8 +20,8 @@ class Values(NamedTuple):
 def stiffness(m: Mathematics, values: Values, states: Tuple[Any, ...], cable: Any) -> Tuple[Any, Any]:
     """``sum E_k`` and ``-sum E_k e_k``: each branch carries ``E_k (eps - e_k)``; in Pa."""
     moduli = (values.modulus, values.modulus_2, values.modulus_3)
-    held = sum(modulus * strain for modulus, strain in zip(moduli, states))
-    return moduli[0] + moduli[1] + moduli[2], -held
+    branch_stress = sum(modulus * strain for modulus, strain in zip(moduli, states))
+    return moduli[0] + moduli[1] + moduli[2], -branch_stress
 
 
 def state_rates(m: Mathematics, values: Values, states: Tuple[Any, ...], cable: Any, motion: Any) -> Tuple[Any, ...]:
@@ -30,28 +30,28 @@ def state_rates(m: Mathematics, values: Values, states: Tuple[Any, ...], cable: 
     return tuple((motion.strain - strain) / time for strain, time in zip(states, times))
 
 
-def _branch(number: str, time: float) -> Tuple[Parameter, Parameter]:
-    """Parameters of one branch; ``time`` is where fits begin, and the neutral value of a branch without modulus."""
-    which = f"branch {number[1:] or '1'}"
+def _branch_parameters(suffix: str, time: float) -> Tuple[Parameter, Parameter]:
+    """Parameters of one branch; ``time`` is where fits start, and the neutral value of a branch without modulus."""
+    branch_name = f"branch {suffix[1:] or '1'}"
     return (
         Parameter(
-            name=f"modulus{number}",
+            name=f"modulus{suffix}",
             unit="Pa",
-            description=f"modulus of {which}, on the declared area",
+            description=f"modulus of {branch_name}, on the declared area",
             minimum=0.0,
             maximum=1e13,
             neutral=0.0,
             start=1e10,
         ),
         Parameter(
-            name=f"time{number}",
+            name=f"time{suffix}",
             unit="s",
-            description=f"time in which {which} relaxes; far shorter ones are damping, far longer ones modulus",
+            description=f"time in which {branch_name} relaxes; far shorter ones are damping, far longer ones modulus",
             minimum=1e-3,
             maximum=1e7,
             neutral=time,
             start=time,
-            trials=() if number else (0.03, 0.3, 3.0, 30.0),
+            multistart_values=() if suffix else (0.03, 0.3, 3.0, 30.0),
         ),
     )
 
@@ -60,7 +60,7 @@ RELAXATION = Effect(
     name="relaxation",
     component="cable",
     description="viscoelastic relaxation: Maxwell branches beside the declared modulus",
-    parameters=(*_branch("", 1.0), *_branch("_2", 10.0), *_branch("_3", 0.1)),
+    parameters=(*_branch_parameters("", 1.0), *_branch_parameters("_2", 10.0), *_branch_parameters("_3", 0.1)),
     values=Values,
     forms=(
         ("modulus", "time"),

@@ -1,4 +1,4 @@
-"""A rope with weight: it hangs in an arc longer than its chord, and its ends hold it.
+"""Cable sag: a rope with weight hangs in an arc longer than its chord, and its ends carry the weight.
 
 Chord ``l`` of horizontal span ``d``, weight ``w`` per length, tension ``T`` along the chord, ``x = w l / (2 T)`` and
 ``c = d / l``. The arc is
@@ -22,97 +22,117 @@ from typing import Any, NamedTuple, Sequence, Tuple
 from ..mathematics import Mathematics
 from .effect import Effect, Parameter
 
-# Newton's steps in ln T; four reach rounding from the guess below while the rope weighs less than three tensions.
-ITERATIONS = 5
-LONGEST_STEP = 2.0
-# N and N^3: far below any tension, so that a weightless rope that hangs slack has numbers too.
-SMALLEST, SMALLEST_CUBE = 1e-3, 1e-9
+# Newton steps in ln T; four reach rounding from the initial guess while the rope weighs less than three tensions.
+NEWTON_ITERATIONS = 5
+MAX_NEWTON_STEP = 2.0
+# N and N^3: far below any tension, so that a weightless slack rope has finite values too.
+TENSION_FLOOR, TENSION_CUBE_FLOOR = 1e-3, 1e-9
 # Power series in z = x^2 of sinh^2 x / x^2 = 1 + z / 3 + z^2 (...), of sinh x / x, and of cosh x - sinh x / x.
-SQUARE = (2.0 / 45.0, 1.0 / 315.0, 2.0 / 14175.0, 2.0 / 467775.0, 4.0 / 42567525.0)
-SQUARE_SLOPE = (4.0 / 45.0, 3.0 / 315.0, 8.0 / 14175.0, 10.0 / 467775.0, 24.0 / 42567525.0)
-SINE = (1.0, 1.0 / 6.0, 1.0 / 120.0, 1.0 / 5040.0, 1.0 / 362880.0, 1.0 / 39916800.0)
-EXCESS = (0.0, 1.0 / 3.0, 1.0 / 30.0, 1.0 / 840.0, 1.0 / 45360.0, 1.0 / 3991680.0)
+SINH_SQUARED_SERIES = (2.0 / 45.0, 1.0 / 315.0, 2.0 / 14175.0, 2.0 / 467775.0, 4.0 / 42567525.0)
+SINH_SQUARED_SLOPE_SERIES = (4.0 / 45.0, 3.0 / 315.0, 8.0 / 14175.0, 10.0 / 467775.0, 24.0 / 42567525.0)
+SINH_SERIES = (1.0, 1.0 / 6.0, 1.0 / 120.0, 1.0 / 5040.0, 1.0 / 362880.0, 1.0 / 39916800.0)
+COSH_EXCESS_SERIES = (0.0, 1.0 / 3.0, 1.0 / 30.0, 1.0 / 840.0, 1.0 / 45360.0, 1.0 / 3991680.0)
 
 
 class Values(NamedTuple):
-    """Mass of the rope for each metre, and how much of a catenary it is rather than a parabola."""
+    """Mass of the rope for each metre, and the weight of the catenary against the parabola."""
 
     linear_density: Any
     catenary: Any
 
 
-class _Hanging(NamedTuple):
-    """``square`` is ``(w l / 2)^2`` in N^2, ``flat`` is ``c^2``; both make the arc at a tension."""
+class _HangingRope(NamedTuple):
+    """Hanging rope: ``half_weight_squared`` is ``(w l / 2)^2`` in N^2, ``horizontal_ratio_squared`` is ``c^2``."""
 
-    square: Any
-    flat: Any
+    half_weight_squared: Any
+    horizontal_ratio_squared: Any
     catenary: Any
 
-    def arc(self, z: Any) -> Tuple[Any, Any]:
+    def arc_ratio_squared(self, z: Any) -> Tuple[Any, Any]:
         """``(arc / l)^2`` and its slope by ``z``."""
-        flat, share = self.flat, self.catenary
-        higher = flat * share
-        own = (1.0 - share) * flat * flat / 36.0
-        value = flat / 3.0 + z * (own + higher * _series(SQUARE, z))
-        slope = flat / 3.0 + z * (2.0 * own + higher * _series(SQUARE_SLOPE, z))
+        horizontal, catenary_weight = self.horizontal_ratio_squared, self.catenary
+        catenary_coefficient = horizontal * catenary_weight
+        parabola_coefficient = (1.0 - catenary_weight) * horizontal * horizontal / 36.0
+        value = horizontal / 3.0 + z * (
+            parabola_coefficient + catenary_coefficient * _polynomial(SINH_SQUARED_SERIES, z)
+        )
+        slope = horizontal / 3.0 + z * (
+            2.0 * parabola_coefficient + catenary_coefficient * _polynomial(SINH_SQUARED_SLOPE_SERIES, z)
+        )
         return 1.0 + z * value, slope
 
 
 def sag(
     m: Mathematics, values: Values, cable: Any, line: Any, strain: Any, modulus: Any, stress: Any
 ) -> Tuple[Any, Any]:
-    """``ln(arc / l)`` now and at the start; the tension between them by Newton's method."""
-    at_start = _hanging(values, cable.gravity, cable.start_length, cable.start_direction)
-    first = m.maximum(cable.start_tension, SMALLEST)
-    before = 0.5 * m.log(at_start.arc(at_start.square / (first * first))[0])
-    now = _hanging(values, cable.gravity, line.length, line.direction)
-    axial = cable.area * modulus
-    base = axial * (strain - before) + cable.area * stress + cable.start_tension
-    logarithm = m.log(_guess(m, base, axial * now.square * now.flat / 6.0))
-    for _ in range(ITERATIONS):
-        tension = m.exp(logarithm)
-        z = now.square / (tension * tension)
-        arc, slope = now.arc(z)
-        step = (tension - base - 0.5 * axial * m.log(arc)) / (tension + axial * z * slope / arc)
-        logarithm = logarithm - _within(m, step, LONGEST_STEP)
-    tension = m.exp(logarithm)
-    return 0.5 * m.log(now.arc(now.square / (tension * tension))[0]), before
+    """``ln(arc / l)`` now and at the start; Newton's method solves for the tension."""
+    start_rope = _hanging_rope(values, cable.gravity, cable.start_length, cable.start_direction)
+    start_tension = m.maximum(cable.start_tension, TENSION_FLOOR)
+    start_log_ratio = 0.5 * m.log(
+        start_rope.arc_ratio_squared(start_rope.half_weight_squared / (start_tension * start_tension))[0]
+    )
+    rope = _hanging_rope(values, cable.gravity, line.length, line.direction)
+    axial_stiffness = cable.area * modulus
+    unsagged_tension = axial_stiffness * (strain - start_log_ratio) + cable.area * stress + cable.start_tension
+    log_tension = m.log(
+        _initial_tension(
+            m, unsagged_tension, axial_stiffness * rope.half_weight_squared * rope.horizontal_ratio_squared / 6.0
+        )
+    )
+    for _ in range(NEWTON_ITERATIONS):
+        tension = m.exp(log_tension)
+        z = rope.half_weight_squared / (tension * tension)
+        arc, slope = rope.arc_ratio_squared(z)
+        step = (tension - unsagged_tension - 0.5 * axial_stiffness * m.log(arc)) / (
+            tension + axial_stiffness * z * slope / arc
+        )
+        log_tension = log_tension - _clamp_symmetric(m, step, MAX_NEWTON_STEP)
+    tension = m.exp(log_tension)
+    return 0.5 * m.log(rope.arc_ratio_squared(rope.half_weight_squared / (tension * tension))[0]), start_log_ratio
 
 
 def ends(m: Mathematics, values: Values, gravity: Any, line: Any, tension: Any) -> Tuple[Tuple[Any, Any, Any], Any]:
-    """What hangs on the platform beside the tension along the chord, a vector in N; and N more at the load cell."""
-    hanging = _hanging(values, gravity, line.length, line.direction)
-    pull = m.maximum(tension, SMALLEST)
-    z = hanging.square / (pull * pull)
-    longer = values.catenary * (m.sqrt(hanging.arc(z)[0]) - 1.0)
-    half = 0.5 * values.linear_density * gravity * line.chord * (1.0 + longer)
-    upward = line.direction[2]
-    lift = values.catenary * _series(EXCESS, z) / _series(SINE, z) * tension * upward
-    risen = half + lift
+    """Force on the platform beside the tension along the chord, a vector in N; and the excess at the load cell in N."""
+    rope = _hanging_rope(values, gravity, line.length, line.direction)
+    floored_tension = m.maximum(tension, TENSION_FLOOR)
+    z = rope.half_weight_squared / (floored_tension * floored_tension)
+    relative_excess_length = values.catenary * (m.sqrt(rope.arc_ratio_squared(z)[0]) - 1.0)
+    half_weight = 0.5 * values.linear_density * gravity * line.chord * (1.0 + relative_excess_length)
+    vertical_component = line.direction[2]
+    catenary_lift = (
+        values.catenary
+        * _polynomial(COSH_EXCESS_SERIES, z)
+        / _polynomial(SINH_SERIES, z)
+        * tension
+        * vertical_component
+    )
+    vertical_force = half_weight + catenary_lift
     # The length of T u + risen e_z, less T; the small number keeps the root's slope finite.
-    more = risen * (2.0 * tension * upward + risen)
-    at_cell = more / (tension + m.sqrt(tension * tension + more + SMALLEST * SMALLEST))
-    return (0.0, 0.0, lift - half), at_cell
+    squared_tension_excess = vertical_force * (2.0 * tension * vertical_component + vertical_force)
+    cell_tension = squared_tension_excess / (
+        tension + m.sqrt(tension * tension + squared_tension_excess + TENSION_FLOOR * TENSION_FLOOR)
+    )
+    return (0.0, 0.0, catenary_lift - half_weight), cell_tension
 
 
-def _hanging(values: Values, gravity: Any, length: Any, direction: Sequence[Any]) -> _Hanging:
-    half = 0.5 * values.linear_density * gravity * length
-    flat = direction[0] * direction[0] + direction[1] * direction[1]
-    return _Hanging(half * half, flat, values.catenary)
+def _hanging_rope(values: Values, gravity: Any, length: Any, direction: Sequence[Any]) -> _HangingRope:
+    half_weight = 0.5 * values.linear_density * gravity * length
+    horizontal_ratio_squared = direction[0] * direction[0] + direction[1] * direction[1]
+    return _HangingRope(half_weight * half_weight, horizontal_ratio_squared, values.catenary)
 
 
-def _guess(m: Mathematics, base: Any, cube: Any) -> Any:
-    """Near the root of ``T^2 (T - base) = cube``, which is the parabola's while it is flat."""
-    middle = m.exp(m.log(cube + SMALLEST_CUBE) / 3.0)
-    slack = m.sqrt((cube + SMALLEST_CUBE) / (m.absolute(base) + middle))
-    return m.where(base, base + middle, slack)
+def _initial_tension(m: Mathematics, base: Any, cube: Any) -> Any:
+    """Initial guess near the root of ``T^2 (T - base) = cube``, exact for a flat parabola."""
+    cube_root = m.exp(m.log(cube + TENSION_CUBE_FLOOR) / 3.0)
+    slack_tension = m.sqrt((cube + TENSION_CUBE_FLOOR) / (m.absolute(base) + cube_root))
+    return m.where(base, base + cube_root, slack_tension)
 
 
-def _within(m: Mathematics, value: Any, bound: float) -> Any:
+def _clamp_symmetric(m: Mathematics, value: Any, bound: float) -> Any:
     return -m.maximum(-m.maximum(value, -bound), -bound)
 
 
-def _series(coefficients: Sequence[float], z: Any) -> Any:
+def _polynomial(coefficients: Sequence[float], z: Any) -> Any:
     total: Any = 0.0
     for coefficient in reversed(coefficients):
         total = coefficient + z * total

@@ -1,4 +1,4 @@
-"""Sensors that show late."""
+"""Sensor delays of load cells and of the measured position."""
 
 from typing import Any, NamedTuple, Tuple
 
@@ -7,20 +7,20 @@ from .effect import Effect, Parameter
 
 
 class Values(NamedTuple):
-    """Lags: of the load cells of the named cables, and of the platform's position."""
+    """Delays: of the load cells of the named cables, and of the platform's position."""
 
     tension_delay: Any
     position_delay: Any
 
 
 def delay(m: Mathematics, values: Values) -> Tuple[Any, Any]:
-    """The lags themselves, in s; until one has passed the sensor shows the start."""
+    """Sensor delays, in s; until one has passed the sensor gives the start value."""
     return values.tension_delay, values.position_delay
 
 
-def _lag(of: str, sensor: str) -> Parameter:
+def _delay_parameter(quantity: str, sensor: str) -> Parameter:
     return Parameter(
-        name=f"{of}_delay",
+        name=f"{quantity}_delay",
         unit="s",
         description=f"time by which {sensor} shows late",
         minimum=0.0,
@@ -34,7 +34,7 @@ SENSOR_DELAY = Effect(
     name="sensor_delay",
     component="sensor",
     description="load cells or measured position that lag",
-    parameters=(_lag("tension", "a load cell"), _lag("position", "the measured position")),
+    parameters=(_delay_parameter("tension", "a load cell"), _delay_parameter("position", "the measured position")),
     values=Values,
     forms=(("tension_delay",), ("position_delay",)),
     delay=delay,

@@ -1,4 +1,4 @@
-"""Sensors that show too much or too little."""
+"""Sensor gain errors of load cells and of the measured position."""
 
 from typing import Any, NamedTuple, Tuple
 
@@ -7,14 +7,14 @@ from .effect import Effect, Parameter
 
 
 class Values(NamedTuple):
-    """Shown over true: of the load cells of the named cables, and of the platform's coordinates."""
+    """Measured over true value: of the load cells of the named cables, and of the platform's coordinates."""
 
     tension_gain: Any
     position_gain: Any
 
 
 def gain(m: Mathematics, values: Values) -> Tuple[Any, Any]:
-    """The factors themselves."""
+    """Sensor gains of tension and position."""
     return values.tension_gain, values.position_gain
 
 

@@ -1,4 +1,4 @@
-"""Heat: a rope that grows with its temperature."""
+"""Thermal expansion: a rope that grows with its temperature."""
 
 from typing import Any, NamedTuple, Tuple
 
@@ -7,7 +7,7 @@ from .effect import Effect, Parameter, State
 
 
 class Values(NamedTuple):
-    """Expansion of the rope, and how its temperature moves: a rise that settles, and a steady rate."""
+    """Thermal expansion coefficient, and the temperature: a rise that settles, and a steady rate."""
 
     expansion: Any
     rise: Any
@@ -18,8 +18,8 @@ class Values(NamedTuple):
 def free_strain(m: Mathematics, values: Values, states: Tuple[Any, ...]) -> Any:
     """``alpha (D (1 - exp(-t / tau)) + R t)``."""
     elapsed = states[0]
-    warmth = values.rise * (1.0 - m.exp(-elapsed / values.time)) + values.rate * elapsed
-    return values.expansion * warmth
+    temperature_change = values.rise * (1.0 - m.exp(-elapsed / values.time)) + values.rate * elapsed
+    return values.expansion * temperature_change
 
 
 def free_strain_rate(m: Mathematics, values: Values, states: Tuple[Any, ...], cable: Any, tension: Any) -> Any:
@@ -28,7 +28,7 @@ def free_strain_rate(m: Mathematics, values: Values, states: Tuple[Any, ...], ca
 
 
 def state_rates(m: Mathematics, values: Values, states: Tuple[Any, ...], cable: Any, motion: Any) -> Tuple[Any, ...]:
-    """Of the time, which is one."""
+    """Rate of the time, which is one."""
     return (1.0,)
 
 
@@ -63,7 +63,7 @@ THERMAL = Effect(
             maximum=1e7,
             neutral=60.0,
             start=60.0,
-            trials=(5.0, 60.0),
+            multistart_values=(5.0, 60.0),
         ),
         Parameter(
             name="rate",

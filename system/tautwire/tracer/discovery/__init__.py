@@ -1,1 +1,1 @@
-"""Effects outside the list: formulas and resonances that the residual at the ports shows."""
+"""Discovery of formulas and resonances outside the list of known effects."""

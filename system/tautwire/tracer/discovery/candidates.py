@@ -1,7 +1,7 @@
-"""How every candidate term of a formula would move the innovations, to first order, and which few of them do best.
+"""Forward selection of a few formula terms by the first-order effect of each on the innovations.
 
-Terms are added one by one, each time the one that takes most off the sum of squares beside those chosen, while it
-takes more than chance would with so many to choose from; then each is exchanged where another does better.
+Terms are added one by one, each time the one that reduces the sum of squares most beside those selected, while the gain
+exceeds the extended Bayesian information criterion; then each is exchanged where another reduces it more.
 
 Source: Chen, Billings and Luo (1989), Orthogonal least squares methods and their application to non-linear system
 identification, Int. J. Control 50(5), 1873-1896; Chen and Chen (2008), Extended Bayesian information criteria for
@@ -17,136 +17,151 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
-from ...model.symbolic import OF_FORMULAS
+from ...model.symbolic import FORMULA_INDEX
 from ...robots.robot import Robot
-from ...runs.start import placed
-from ..data import Sample
+from ...runs.start import with_start
+from ..data import DataSet
 from ..fit import Fitter
 from ..hypotheses import Hypothesis, free_parameters
-from ..linearisation import linearise_run
-from .library import Reach, Term, reach_of
-from .ports import Along, Ports, moves
+from ..linearisation import linearise_filter
+from .library import SignalRanges, Term, signal_ranges
+from .ports import FormulaPorts, PortSignals, series_sensitivities
 
 Array = NDArray[np.float64]
 
-MOST_TERMS = 6
-MOST_EXCHANGES = 12
-# Of a term's slopes, the share that others may leave of it at least.
-OWN_SHARE = 1e-6
+MAX_TERMS = 6
+MAX_EXCHANGES = 12
+# Least share of a term's squared slopes that is linearly independent of the other terms.
+MIN_INDEPENDENT_RATIO = 1e-6
 
 
 @dataclass(frozen=True)
-class Slopes:
-    """Slopes ``J`` of the whitened innovations ``e`` by some nuisances, then by each term: ``J' J``, ``J' e``.
+class NormalEquations:
+    """Normal equations of the whitened innovations ``e`` by nuisance parameters, then by each term.
 
-    ``count`` is how many innovations there are.
+    With slopes ``J``: ``fisher_information`` is ``J' J``, ``score`` ``J' e``; ``observation_count`` the number of
+    innovations.
     """
 
-    nuisances: int
+    nuisance_count: int
     terms: tuple[Term, ...]
-    gram: Array
-    pull: Array
-    count: int
+    fisher_information: Array
+    score: Array
+    observation_count: int
 
 
-def reach(robot: Robot, accepted: Sequence[Hypothesis], fitter: Fitter, sample: Sample) -> Reach:
-    """How far the run of a model over a recording goes."""
+def run_signal_ranges(robot: Robot, accepted: Sequence[Hypothesis], fitter: Fitter, sample: DataSet) -> SignalRanges:
+    """Ranges of the signals that formulas may use, along the run of a model over a recording."""
     likelihood, values = fitter.likelihood(robot, accepted, sample)
-    ports = Ports(placed(robot, sample.start), likelihood.model.state_names)
-    return reach_of([ports.along(run) for run in linearise_run(likelihood, values, sample.recording)])
+    ports = FormulaPorts(with_start(robot, sample.start), likelihood.model.state_names)
+    return signal_ranges([ports.signals(run) for run in linearise_filter(likelihood, values, sample.recording)])
 
 
-def slopes_of(
-    robot: Robot, accepted: Sequence[Hypothesis], terms: Sequence[Term], fitter: Fitter, sample: Sample
-) -> Slopes:
-    """Of terms added to a robot; the nuisances are the parameters of the accepted hypotheses."""
+def term_normal_equations(
+    robot: Robot, accepted: Sequence[Hypothesis], terms: Sequence[Term], fitter: Fitter, sample: DataSet
+) -> NormalEquations:
+    """Normal equations of terms added to a robot; the nuisances are the parameters of the accepted hypotheses."""
     likelihood, values = fitter.likelihood(robot, accepted, sample)
     free = free_parameters(robot, accepted)
-    own = [place for place, parameter in enumerate(free) if parameter.setting != OF_FORMULAS]
-    ports = Ports(placed(robot, sample.start), likelihood.model.state_names)
-    size = len(own) + len(terms)
-    gram, pull, count = np.zeros((size, size)), np.zeros(size), 0
+    nuisance_columns = [place for place, parameter in enumerate(free) if parameter.effect_index != FORMULA_INDEX]
+    ports = FormulaPorts(with_start(robot, sample.start), likelihood.model.state_names)
+    size = len(nuisance_columns) + len(terms)
+    fisher_information, score, count = np.zeros((size, size)), np.zeros(size), 0
     sites = [term.site for term in terms]
-    slopes, begun, last = np.zeros((len(likelihood.model.state_names), len(terms))), None, 0
-    for run in linearise_run(likelihood, values, sample.recording):
-        fitter.between()
-        along = ports.along(run)
-        series = _series(terms, along)
-        begun = [values[:, 0] for values in series] if begun is None else begun
-        slopes, moved = run.carry(slopes, *moves(sites, series, begun, ports, run, along.platform["time"]))
-        rows = np.zeros(len(run.own), dtype=bool)
-        rows[run.own] = sample.rows[last : last + int(np.sum(run.own))]
-        last += int(np.sum(run.own))
-        matrix = np.concatenate([run.slopes[:, :, own], moved], axis=2)[rows]
-        seen = run.seen[rows]
-        gram += matrix[seen].T @ matrix[seen]
-        pull += matrix[seen].T @ run.values[rows][seen]
-        count += int(np.sum(seen))
-    fine = np.isfinite(np.diag(gram))
-    gram = np.where(np.outer(fine, fine), gram, 0.0)
-    return Slopes(len(own), tuple(terms), gram, np.where(fine, pull, 0.0), count)
+    state_sensitivities, initial_values, next_row = np.zeros((len(likelihood.model.state_names), len(terms))), None, 0
+    for segment in linearise_filter(likelihood, values, sample.recording):
+        fitter.poll_interrupts()
+        signals = ports.signals(segment)
+        series = _term_series(terms, signals)
+        initial_values = [values[:, 0] for values in series] if initial_values is None else initial_values
+        state_sensitivities, innovation_sensitivities = segment.propagate_sensitivities(
+            state_sensitivities,
+            *series_sensitivities(sites, series, initial_values, ports, segment, signals.platform["time"]),
+        )
+        rows = np.zeros(len(segment.is_recorded), dtype=bool)
+        rows[segment.is_recorded] = sample.rows[next_row : next_row + int(np.sum(segment.is_recorded))]
+        next_row += int(np.sum(segment.is_recorded))
+        matrix = np.concatenate([segment.sensitivities[:, :, nuisance_columns], innovation_sensitivities], axis=2)[rows]
+        is_observed = segment.observed[rows]
+        fisher_information += matrix[is_observed].T @ matrix[is_observed]
+        score += matrix[is_observed].T @ segment.values[rows][is_observed]
+        count += int(np.sum(is_observed))
+    is_finite = np.isfinite(np.diag(fisher_information))
+    fisher_information = np.where(np.outer(is_finite, is_finite), fisher_information, 0.0)
+    return NormalEquations(
+        len(nuisance_columns), tuple(terms), fisher_information, np.where(is_finite, score, 0.0), count
+    )
 
 
-def _series(terms: Sequence[Term], along: Along) -> list[Array]:
-    """Of each term its series: (1, K + 1) on the platform, else a row for each of its cables."""
+def _term_series(terms: Sequence[Term], signals: PortSignals) -> list[Array]:
+    """Series of each term: (1, K + 1) on the platform, else a row for each of its cables."""
     return [
-        np.array([term.series(along.ropes[cable - 1]) for cable in term.cables])
+        np.array([term.series(signals.ropes[cable - 1]) for cable in term.cables])
         if term.cables
-        else term.series(along.platform)[None, :]
+        else term.series(signals.platform)[None, :]
         for term in terms
     ]
 
 
-def best_terms(slopes: Slopes, present: dict[Term, float], between: Callable[[], None]) -> dict[Term, float]:
-    """The few terms that explain most, with their coefficients; ``present`` are those that the run had already."""
-    wanted = np.array([present.get(term, 0.0) for term in slopes.terms])
-    # What would be left without the present ones.
-    pull = slopes.pull - slopes.gram[:, slopes.nuisances :] @ wanted
-    least = 0.5 * log(max(slopes.count, 2)) + log(max(len(slopes.terms), 1))
-    chosen: list[int] = []
-    while len(chosen) < MOST_TERMS:
-        gains = _gains(slopes, pull, chosen)
+def select_terms(
+    equations: NormalEquations, present: dict[Term, float], poll_interrupts: Callable[[], None]
+) -> dict[Term, float]:
+    """Select the few terms that explain most, with coefficients; ``present`` are those that the run had already."""
+    present_coefficients = np.array([present.get(term, 0.0) for term in equations.terms])
+    # The score as it would be without the present terms.
+    score = equations.score - equations.fisher_information[:, equations.nuisance_count :] @ present_coefficients
+    min_gain = 0.5 * log(max(equations.observation_count, 2)) + log(max(len(equations.terms), 1))
+    selected: list[int] = []
+    while len(selected) < MAX_TERMS:
+        gains = _gains(equations, score, selected)
         best = int(np.argmax(gains))
-        if gains[best] < least:
+        if gains[best] < min_gain:
             break
-        chosen.append(best)
-        between()
-    for number in range(MOST_EXCHANGES if len(chosen) > 1 else 0):
-        place = number % len(chosen)
-        rest = [*chosen[:place], *chosen[place + 1 :]]
-        gains = _gains(slopes, pull, rest)
+        selected.append(best)
+        poll_interrupts()
+    for number in range(MAX_EXCHANGES if len(selected) > 1 else 0):
+        index = number % len(selected)
+        others = [*selected[:index], *selected[index + 1 :]]
+        gains = _gains(equations, score, others)
         best = int(np.argmax(gains))
-        if gains[best] > gains[chosen[place]] * (1.0 + OWN_SHARE):
-            chosen[place] = best
-    coefficients = _solved(slopes, pull, chosen)
-    return {slopes.terms[term]: float(c) for term, c in zip(chosen, coefficients, strict=True)}
+        if gains[best] > gains[selected[index]] * (1.0 + MIN_INDEPENDENT_RATIO):
+            selected[index] = best
+    coefficients = _solve_coefficients(equations, score, selected)
+    return {equations.terms[term]: float(c) for term, c in zip(selected, coefficients, strict=True)}
 
 
-def _places(slopes: Slopes, chosen: Sequence[int]) -> list[int]:
-    return [*range(slopes.nuisances), *(slopes.nuisances + term for term in chosen)]
+def _column_indices(equations: NormalEquations, selected: Sequence[int]) -> list[int]:
+    return [*range(equations.nuisance_count), *(equations.nuisance_count + term for term in selected)]
 
 
-def _gains(slopes: Slopes, pull: Array, chosen: Sequence[int]) -> Array:
-    """Nats that each term would gain beside the nuisances and the chosen ones."""
-    places = _places(slopes, chosen)
-    own = np.diag(slopes.gram)[slopes.nuisances :]
-    left, force = own.copy(), pull[slopes.nuisances :].copy()
-    if places:
-        size = np.sqrt(np.maximum(np.diag(slopes.gram)[places], np.finfo(float).tiny))
-        inner = slopes.gram[np.ix_(places, places)] / np.outer(size, size)
-        across = slopes.gram[np.ix_(places, range(slopes.nuisances, len(slopes.gram)))] / size[:, None]
-        held = np.linalg.lstsq(inner, np.column_stack([across, pull[places] / size]), rcond=1e-12)[0]
-        left = left - np.sum(across * held[:, :-1], axis=0)
-        force = force - across.T @ held[:, -1]
-    fine = left > OWN_SHARE * own
-    gains: Array = np.where(fine, 0.5 * force**2 / np.where(fine, left, 1.0), 0.0)
+def _gains(equations: NormalEquations, score: Array, selected: Sequence[int]) -> Array:
+    """Predicted gain in nats of each term beside the nuisances and the selected terms (score test)."""
+    columns = _column_indices(equations, selected)
+    diagonal = np.diag(equations.fisher_information)[equations.nuisance_count :]
+    residual_information, residual_score = diagonal.copy(), score[equations.nuisance_count :].copy()
+    if columns:
+        scale = np.sqrt(np.maximum(np.diag(equations.fisher_information)[columns], np.finfo(float).tiny))
+        inner = equations.fisher_information[np.ix_(columns, columns)] / np.outer(scale, scale)
+        cross_products = (
+            equations.fisher_information[
+                np.ix_(columns, range(equations.nuisance_count, len(equations.fisher_information)))
+            ]
+            / scale[:, None]
+        )
+        projection = np.linalg.lstsq(inner, np.column_stack([cross_products, score[columns] / scale]), rcond=1e-12)[0]
+        residual_information = residual_information - np.sum(cross_products * projection[:, :-1], axis=0)
+        residual_score = residual_score - cross_products.T @ projection[:, -1]
+    is_independent = residual_information > MIN_INDEPENDENT_RATIO * diagonal
+    gains: Array = np.where(
+        is_independent, 0.5 * residual_score**2 / np.where(is_independent, residual_information, 1.0), 0.0
+    )
     return gains
 
 
-def _solved(slopes: Slopes, pull: Array, chosen: Sequence[int]) -> Array:
-    """Coefficients of the chosen terms by least squares."""
-    places = _places(slopes, chosen)
-    size = np.sqrt(np.maximum(np.diag(slopes.gram)[places], np.finfo(float).tiny))
-    inner = slopes.gram[np.ix_(places, places)] / np.outer(size, size)
-    moves: Array = -np.linalg.lstsq(inner, pull[places] / size, rcond=1e-12)[0] / size
-    return moves[slopes.nuisances :]
+def _solve_coefficients(equations: NormalEquations, score: Array, selected: Sequence[int]) -> Array:
+    """Coefficients of the selected terms by least squares."""
+    columns = _column_indices(equations, selected)
+    scale = np.sqrt(np.maximum(np.diag(equations.fisher_information)[columns], np.finfo(float).tiny))
+    inner = equations.fisher_information[np.ix_(columns, columns)] / np.outer(scale, scale)
+    coefficients: Array = -np.linalg.lstsq(inner, score[columns] / scale, rcond=1e-12)[0] / scale
+    return coefficients[equations.nuisance_count :]

@@ -1,7 +1,7 @@
-"""Looks for a formula of what no known effect explains: found on some samples, to be judged on others.
+"""Sparse regression of a formula for what no known effect explains, found on some samples and judged on others.
 
-Each round linearises the filter's run with the formula so far, chooses the few terms of the library that explain most
-of what would be left without it, and fits their coefficients and shapes exactly.
+Each round linearises the filter's run with the formula so far, selects the few candidate terms that explain most of the
+residual without it, and fits their coefficients and shape parameters to the exact model.
 
 Source: Brunton, Proctor and Kutz (2016), Discovering governing equations from data by sparse identification of
 nonlinear dynamical systems, PNAS 113(15), 3932-3937; here on innovations, since measured positions are noisy.
@@ -19,199 +19,228 @@ from threadpoolctl import threadpool_limits
 
 from ...errors import UnreachableError
 from ...robots.robot import Formula, Robot
-from ..adequacy import is_noise
-from ..data import Evidence, Sample
-from ..fit import EXACT, Fit, Fitter, NoFitError
+from ..adequacy import residuals_are_white
+from ..data import DataSet, DataSplit
+from ..fit import FINE_COST_TOLERANCE, Fit, Fitter, NoFitError
 from ..hypotheses import Hypothesis
-from .candidates import best_terms, reach, slopes_of
-from .library import Term, library
-from .spectrum import rhythms
-from .written import closed, opened, shape_names
+from .candidates import run_signal_ranges, select_terms, term_normal_equations
+from .library import Term, candidate_terms
+from .spectrum import spectral_lines
+from .written import numeric_formulas, parametrised_formulas, shape_names
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
 
-ROUNDS = 3
-# What a formula may bring about that makes no model: a push that the ropes cannot hold, a slope that is not finite.
-NO_MODEL = (UnreachableError, NoFitError, np.linalg.LinAlgError)
-# Terms are chosen by the first so many samples, and fitted to all.
-MOST_SAMPLES = 10_000
-# Shares of the linear estimate from which a fit may begin.
-STEPS = (1.0, 0.3)
-# Standard deviations that a coefficient has to be away from nothing.
-SURE = 4.0
-# Standard deviations within which two shapes are one.
-ALIKE = 4.0
-# Of what a formula explains, the part that no known effect looks like is at least this.
-OWN_SHARE = 0.05
+MAX_ROUNDS = 3
+# Errors of infeasible formulas: a force that the ropes cannot hold, a slope that is not finite.
+INFEASIBLE_MODEL_ERRORS = (UnreachableError, NoFitError, np.linalg.LinAlgError)
+# Terms are selected on the first so many samples, and fitted to all.
+MAX_SELECTION_SAMPLES = 10_000
+# Fractions of the linear step at which a fit may start.
+STEP_FRACTIONS = (1.0, 0.3)
+# Standard deviations by which a coefficient has to differ from zero.
+MIN_COEFFICIENT_SIGMAS = 4.0
+# Standard deviations within which two shape parameters count as equal.
+EQUAL_SHAPE_SIGMAS = 4.0
+# Least share of a formula's gain that no term resembling a known effect achieves.
+MIN_NOVEL_GAIN_RATIO = 0.05
 
 
 @dataclass(frozen=True)
 class Discovery:
-    """A robot with ``formulas`` that it lacked, and what they leave on the samples that found them and on the others.
+    """A robot with the ``formulas`` that it lacked, validated on the samples that did not find them.
 
-    ``evidence`` is the log-likelihood on those others over that of the model without it at its best there,
-    ``own_evidence`` over that with those terms alone that look like effects that the project knows.
+    ``log_likelihood_gain`` is the log-likelihood on the judging samples over that of the model without formulas fitted
+    there, ``novel_gain`` over that with those terms alone that resemble known effects. ``residuals_are_white`` holds on
+    both sets of samples.
     """
 
     robot: Robot
     formulas: tuple[Formula, ...]
-    evidence: float
-    own_evidence: float
-    leaves_noise: bool
+    log_likelihood_gain: float
+    novel_gain: float
+    residuals_are_white: bool
 
-    def earns_its_place(self, threshold: float) -> bool:
-        """Whether it is significant, and more than known effects by another name."""
-        return self.evidence > threshold and self.own_evidence > max(threshold, OWN_SHARE * self.evidence)
+    def is_accepted(self, threshold: float) -> bool:
+        """Whether the formula is significant, and more than known effects by another name."""
+        return self.log_likelihood_gain > threshold and self.novel_gain > max(
+            threshold, MIN_NOVEL_GAIN_RATIO * self.log_likelihood_gain
+        )
 
 
 @dataclass(frozen=True)
-class _State:
-    """Terms with coefficients, the robot that has them, and how well it does on the samples that fit."""
+class _FormulaFit:
+    """Terms with coefficients, the fitted robot, and the information criterion on the fitting samples."""
 
     terms: dict[Term, float]
     fit: Fit
-    worth: float
+    criterion: float
 
 
 @threadpool_limits.wrap(limits=1)
-def discover(
-    base: Robot, accepted: Sequence[Hypothesis], fitter: Fitter, evidence: Evidence, progress: Progress
+def discover_formula(
+    base: Robot, accepted: Sequence[Hypothesis], fitter: Fitter, evidence: DataSplit, progress: Progress
 ) -> Discovery | None:
-    """A formula beside the accepted hypotheses; None where no term explains anything."""
-    sample = evidence.fit
-    best = _worth(fitter, _start(base), accepted, sample)
-    for number in range(1, ROUNDS + 1):
-        progress(f"looking for a formula, round {number}", (number - 1) / ROUNDS)
-        present = best
+    """Discover a formula beside the accepted hypotheses; None where no term explains anything."""
+    sample = evidence.estimation
+    best = _with_criterion(fitter, _without_terms(base), accepted, sample)
+    for number in range(1, MAX_ROUNDS + 1):
+        progress(f"looking for a formula, round {number}", (number - 1) / MAX_ROUNDS)
+        previous = best
         try:
-            after = _round(present, accepted, fitter, sample)
-        except NO_MODEL:
+            candidate = _select_and_fit(previous, accepted, fitter, sample)
+        except INFEASIBLE_MODEL_ERRORS:
             break
-        if after is None or after.worth <= present.worth:
+        if candidate is None or candidate.criterion <= previous.criterion:
             break
-        best = after
-        if is_noise(fitter.judged(best.fit.robot, accepted, sample), sample.rows):
+        best = candidate
+        if residuals_are_white(fitter.judged(best.fit.robot, accepted, sample), sample.rows):
             break
     progress("looking for a formula", 1.0)
-    return _judged(base, best, accepted, fitter, evidence) if best.terms else None
+    return _validate(base, best, accepted, fitter, evidence) if best.terms else None
 
 
-def _start(base: Robot) -> _State:
-    return _State({}, Fit(base, (), np.zeros(0), np.zeros((0, 0))), -inf)
+def _without_terms(base: Robot) -> _FormulaFit:
+    return _FormulaFit({}, Fit(base, (), np.zeros(0), np.zeros((0, 0))), -inf)
 
 
-def _worth(fitter: Fitter, state: _State, accepted: Sequence[Hypothesis], sample: Sample) -> _State:
-    """With the log-likelihood less what its parameters cost."""
+def _with_criterion(fitter: Fitter, state: _FormulaFit, accepted: Sequence[Hypothesis], sample: DataSet) -> _FormulaFit:
+    """With its information criterion: log-likelihood less ``log(N) / 2`` for each parameter."""
     innovations = fitter.judged(state.fit.robot, accepted, sample)
-    count = int(np.sum(innovations.seen[sample.rows]))
-    cost = 0.5 * log(max(count, 2)) * len(state.fit.free)
-    return replace(state, worth=innovations.log_likelihood(sample.rows) - cost)
+    count = int(np.sum(innovations.observed[sample.rows]))
+    penalty = 0.5 * log(max(count, 2)) * len(state.fit.free)
+    return replace(state, criterion=innovations.log_likelihood(sample.rows) - penalty)
 
 
-def _round(present: _State, accepted: Sequence[Hypothesis], fitter: Fitter, sample: Sample) -> _State | None:
-    robot = present.fit.robot
-    found = rhythms(sample.recording.time, fitter.judged(robot, accepted, sample), sample.rows)
-    terms = library(robot, reach(robot, accepted, fitter, sample.beginning(MOST_SAMPLES)), found)
-    terms = tuple(dict.fromkeys((*present.terms, *terms)))
-    slopes = slopes_of(robot, accepted, terms, fitter, sample.beginning(MOST_SAMPLES))
-    chosen = best_terms(slopes, present.terms, fitter.between)
-    if not chosen:
+def _select_and_fit(
+    previous: _FormulaFit, accepted: Sequence[Hypothesis], fitter: Fitter, sample: DataSet
+) -> _FormulaFit | None:
+    robot = previous.fit.robot
+    frequencies = spectral_lines(sample.recording.time, fitter.judged(robot, accepted, sample), sample.rows)
+    terms = candidate_terms(
+        robot, run_signal_ranges(robot, accepted, fitter, sample.first(MAX_SELECTION_SAMPLES)), frequencies
+    )
+    terms = tuple(dict.fromkeys((*previous.terms, *terms)))
+    slopes = term_normal_equations(robot, accepted, terms, fitter, sample.first(MAX_SELECTION_SAMPLES))
+    selected = select_terms(slopes, previous.terms, fitter.poll_interrupts)
+    if not selected:
         return None
-    least = fitter.judged(robot, accepted, sample).log_likelihood(sample.rows)
-    after = _fitted(robot, chosen, present, accepted, fitter, sample, least)
-    merged = _merged(after)
-    if len(shape_names(list(merged))) < len(shape_names(list(after.terms))):
-        after = _fitted(after.fit.robot, merged, after, accepted, fitter, sample, -inf)
-    weak = _weak(after)
-    while weak and len(after.terms) > 1:
-        kept = {term: c for term, c in after.terms.items() if term != weak}
-        after = _fitted(after.fit.robot, kept, after, accepted, fitter, sample, -inf)
-        weak = _weak(after)
-    return _worth(fitter, after, accepted, sample)
+    min_log_likelihood = fitter.judged(robot, accepted, sample).log_likelihood(sample.rows)
+    candidate = _fit_terms(robot, selected, previous, accepted, fitter, sample, min_log_likelihood)
+    merged = _merge_equal_shapes(candidate)
+    if len(shape_names(list(merged))) < len(shape_names(list(candidate.terms))):
+        candidate = _fit_terms(candidate.fit.robot, merged, candidate, accepted, fitter, sample, -inf)
+    insignificant = _least_significant_term(candidate)
+    while insignificant and len(candidate.terms) > 1:
+        remaining_terms = {term: c for term, c in candidate.terms.items() if term != insignificant}
+        candidate = _fit_terms(candidate.fit.robot, remaining_terms, candidate, accepted, fitter, sample, -inf)
+        insignificant = _least_significant_term(candidate)
+    return _with_criterion(fitter, candidate, accepted, sample)
 
 
-def _fitted(
+def _fit_terms(
     robot: Robot,
     terms: dict[Term, float],
-    before: _State,
+    previous: _FormulaFit,
     accepted: Sequence[Hypothesis],
     fitter: Fitter,
-    sample: Sample,
-    least: float,
-) -> _State:
-    """The terms' coefficients and shapes, and the accepted hypotheses' parameters, fitted exactly."""
-    old = before.terms
-    declared = tuple(formula for formula in robot.formulas if not formula.numbers)
-    steps = [{t: old.get(t, 0.0) + s * (c - old.get(t, 0.0)) for t, c in terms.items()} for s in STEPS]
-    starts = [replace(robot, formulas=(*declared, *opened(step))) for step in steps]
-    fit = fitter.fit_from(starts, accepted, sample, least, EXACT)
-    numbers = _numbers(fit.robot.formulas)
+    sample: DataSet,
+    min_log_likelihood: float,
+) -> _FormulaFit:
+    """Fit the terms' coefficients and shapes, and the accepted hypotheses' parameters, to the exact model."""
+    previous_coefficients = previous.terms
+    fixed_formulas = tuple(formula for formula in robot.formulas if not formula.numbers)
+    steps = [
+        {t: previous_coefficients.get(t, 0.0) + s * (c - previous_coefficients.get(t, 0.0)) for t, c in terms.items()}
+        for s in STEP_FRACTIONS
+    ]
+    starts = [replace(robot, formulas=(*fixed_formulas, *parametrised_formulas(step))) for step in steps]
+    fit = fitter.fit_from(starts, accepted, sample, min_log_likelihood, FINE_COST_TOLERANCE)
+    numbers = _formula_numbers(fit.robot.formulas)
     names = shape_names(list(terms))
-    found = {
+    fitted_terms = {
         replace(term, shape=numbers[names[term.family, term.shape]] if term.family else 0.0): numbers[f"c{index}"]
         for index, term in enumerate(terms, start=1)
     }
-    return _State(found, fit, -inf)
+    return _FormulaFit(fitted_terms, fit, -inf)
 
 
-def _merged(state: _State) -> dict[Term, float]:
-    """With shapes that the samples do not tell apart made one."""
-    deviations = _deviations(state)
-    kept: dict[tuple[str, float], float] = {}
+def _merge_equal_shapes(state: _FormulaFit) -> dict[Term, float]:
+    """Terms with shape parameters merged that do not differ significantly."""
+    deviations = _standard_deviations(state)
+    distinct: dict[tuple[str, float], float] = {}
     for (family, shape), name in shape_names(list(state.terms)).items():
-        near = [(f, s) for f, s in kept if f == family and abs(s - shape) < ALIKE * max(deviations[name], kept[f, s])]
-        kept.setdefault(near[0] if near else (family, shape), deviations[name])
-        if near:
-            same = {t: replace(t, shape=near[0][1]) for t in state.terms if (t.family, t.shape) == (family, shape)}
-            state = replace(state, terms={same.get(t, t): c for t, c in state.terms.items()})
+        matches = [
+            (f, s)
+            for f, s in distinct
+            if f == family and abs(s - shape) < EQUAL_SHAPE_SIGMAS * max(deviations[name], distinct[f, s])
+        ]
+        distinct.setdefault(matches[0] if matches else (family, shape), deviations[name])
+        if matches:
+            replacements = {
+                t: replace(t, shape=matches[0][1]) for t in state.terms if (t.family, t.shape) == (family, shape)
+            }
+            state = replace(state, terms={replacements.get(t, t): c for t, c in state.terms.items()})
     return state.terms
 
 
-def _numbers(formulas: Sequence[Formula]) -> dict[str, float]:
+def _formula_numbers(formulas: Sequence[Formula]) -> dict[str, float]:
     return {name: float(value) for formula in formulas for name, value in formula.numbers.items()}
 
 
-def _deviations(state: _State) -> dict[str, float]:
-    return {free.name: float(d) for free, d in zip(state.fit.free, state.fit.deviations, strict=True)}
+def _standard_deviations(state: _FormulaFit) -> dict[str, float]:
+    return {free.name: float(d) for free, d in zip(state.fit.free, state.fit.standard_deviations, strict=True)}
 
 
-def _weak(state: _State) -> Term | None:
-    """The term whose coefficient is least sure, if it is not sure."""
-    deviations = _deviations(state)
-    sure = {term: abs(c) / max(deviations[f"c{i}"], 1e-300) for i, (term, c) in enumerate(state.terms.items(), start=1)}
-    least = min(sure, key=lambda term: sure[term])
-    return least if sure[least] < SURE else None
+def _least_significant_term(state: _FormulaFit) -> Term | None:
+    """The term with the least significant coefficient; None where that is significant too."""
+    deviations = _standard_deviations(state)
+    significances = {
+        term: abs(c) / max(deviations[f"c{i}"], 1e-300) for i, (term, c) in enumerate(state.terms.items(), start=1)
+    }
+    weakest = min(significances, key=lambda term: significances[term])
+    return weakest if significances[weakest] < MIN_COEFFICIENT_SIGMAS else None
 
 
-def _judged(
-    base: Robot, best: _State, accepted: Sequence[Hypothesis], fitter: Fitter, evidence: Evidence
+def _validate(
+    base: Robot, best: _FormulaFit, accepted: Sequence[Hypothesis], fitter: Fitter, evidence: DataSplit
 ) -> Discovery | None:
-    """With rounded numbers, on the samples that did not find it."""
-    formulas = closed(best.terms, _deviations(best))
+    """Validate the formula with rounded numbers on the samples that did not find it; None where it is infeasible."""
+    formulas = numeric_formulas(best.terms, _standard_deviations(best))
     robot = replace(best.fit.robot, formulas=(*base.formulas, *formulas))
-    fit, judge = evidence.fit, evidence.judge
+    fit, judge = evidence.estimation, evidence.validation
     try:
-        shown = fitter.judged(robot, accepted, judge)
-        noise = is_noise(shown, judge.rows) and is_noise(fitter.judged(robot, accepted, fit), fit.rows)
-        rival = fitter.fit_from([base], accepted, judge, -inf).robot if accepted else base
-        without = fitter.judged(rival, accepted, judge).log_likelihood(judge.rows)
-        familiar = _familiar(base, best, accepted, fitter, judge, without)
-    except NO_MODEL:
+        innovations = fitter.judged(robot, accepted, judge)
+        is_white = residuals_are_white(innovations, judge.rows) and residuals_are_white(
+            fitter.judged(robot, accepted, fit), fit.rows
+        )
+        reference_robot = fitter.fit_from([base], accepted, judge, -inf).robot if accepted else base
+        reference_log_likelihood = fitter.judged(reference_robot, accepted, judge).log_likelihood(judge.rows)
+        known_log_likelihood = _log_likelihood_of_known_terms(
+            base, best, accepted, fitter, judge, reference_log_likelihood
+        )
+    except INFEASIBLE_MODEL_ERRORS:
         return None
-    reached = shown.log_likelihood(judge.rows)
-    return Discovery(robot, formulas, reached - without, reached - familiar, noise)
+    log_likelihood = innovations.log_likelihood(judge.rows)
+    return Discovery(
+        robot, formulas, log_likelihood - reference_log_likelihood, log_likelihood - known_log_likelihood, is_white
+    )
 
 
-def _familiar(
-    base: Robot, best: _State, accepted: Sequence[Hypothesis], fitter: Fitter, judge: Sample, without: float
+def _log_likelihood_of_known_terms(
+    base: Robot,
+    best: _FormulaFit,
+    accepted: Sequence[Hypothesis],
+    fitter: Fitter,
+    judge: DataSet,
+    reference_log_likelihood: float,
 ) -> float:
-    """Log-likelihood of the judging samples under the terms alone that look like known effects, at their best there."""
-    kept = {term: c for term, c in best.terms.items() if term.listed}
-    if len(kept) == len(best.terms):
+    """Log-likelihood of the judging samples under the terms alone that resemble known effects, fitted there."""
+    known_terms = {term: c for term, c in best.terms.items() if term.resembles_effect}
+    if len(known_terms) == len(best.terms):
         return inf
-    if not kept:
-        return without
-    found = _fitted(best.fit.robot, kept, best, accepted, fitter, judge, -inf)
-    reached = fitter.judged(found.fit.robot, accepted, judge).log_likelihood(judge.rows)
-    return max(without, reached)
+    if not known_terms:
+        return reference_log_likelihood
+    fitted = _fit_terms(best.fit.robot, known_terms, best, accepted, fitter, judge, -inf)
+    log_likelihood = fitter.judged(fitted.fit.robot, accepted, judge).log_likelihood(judge.rows)
+    return max(reference_log_likelihood, log_likelihood)

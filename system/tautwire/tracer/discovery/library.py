@@ -1,4 +1,4 @@
-"""Terms that a formula may be made of, place by place: what is left over by known effects is looked for among them."""
+"""Library of candidate terms, target by target, for what known effects leave unexplained."""
 
 from __future__ import annotations
 
@@ -9,150 +9,169 @@ from itertools import combinations_with_replacement
 import numpy as np
 from numpy.typing import NDArray
 
-from tautwire_fmu.laws.expression import evaluate, read_expression
-from tautwire_fmu.laws.formula import FORCES, PLACES
+from tautwire_fmu.laws.expression import evaluate, parse_expression
+from tautwire_fmu.laws.formula import FORCE_TARGETS, VARIABLES_BY_TARGET
 
-from ...model.arrays import NUMPY
+from ...model.arrays import NUMPY_MATHEMATICS
 from ...robots.robot import Robot
-from .ports import Along, Site
+from .ports import PortSignals, Site
 
 Array = NDArray[np.float64]
 
-# Where tanh bends, in root mean squares of its argument; waves in a room and on a drum, in shares of the motion.
-BENDS = (0.1, 0.3, 1.0)
-WAVES = 14
-LONGEST_WAVE, SHORTEST_WAVE = 3.0, 0.1
-SHAPE = "shape"
+# Scales of tanh in root mean squares of its argument; wavelengths in a room and on a drum, in shares of the motion.
+TANH_SCALES = (0.1, 0.3, 1.0)
+WAVELENGTH_COUNT = 14
+MAX_WAVELENGTH_RATIO, MIN_WAVELENGTH_RATIO = 3.0, 0.1
+SHAPE_PARAMETER = "shape"
 # The last term keeps its slope finite at rest.
-SPEED = "sqrt(vx**2 + vy**2 + vz**2 + 1e-12)"
+SPEED_EXPRESSION = "sqrt(vx**2 + vy**2 + vz**2 + 1e-12)"
 
 
 @dataclass(frozen=True)
 class Term:
-    """One term in a place: ``text`` may use a ``shape``, a number to be fitted with the coefficient.
+    """Candidate term of a formula: ``text`` may use a ``shape``, a parameter fitted with the coefficient.
 
-    Terms of one ``family`` and shape share the number. ``cables`` as in a formula. A ``listed`` term looks like an
-    effect that the project knows, and is there to go along with others.
+    Terms of one ``family`` and shape share the parameter. ``cables`` as in a formula. ``resembles_effect`` marks a term
+    that looks like a known effect, and accompanies others.
     """
 
-    place: str
+    target: str
     text: str
     cables: tuple[int, ...] = ()
     family: str = ""
     shape: float = 0.0
-    listed: bool = False
+    resembles_effect: bool = False
 
     @property
     def site(self) -> Site:
-        """Where it acts."""
-        return Site(self.place, self.cables)
+        """The site where the term acts."""
+        return Site(self.target, self.cables)
 
     def series(self, names: dict[str, Array]) -> Array:
-        """Its values along a run, (K,)."""
-        tree = read_expression(self.text, (*PLACES[self.place], SHAPE))
-        some = next(iter(names.values()))
-        values: Array = evaluate(NUMPY, tree, {**names, SHAPE: self.shape}) * np.ones_like(some)
+        """Values of the term along a run, (K,)."""
+        tree = parse_expression(self.text, (*VARIABLES_BY_TARGET[self.target], SHAPE_PARAMETER))
+        example = next(iter(names.values()))
+        values: Array = evaluate(NUMPY_MATHEMATICS, tree, {**names, SHAPE_PARAMETER: self.shape}) * np.ones_like(
+            example
+        )
         return values
 
 
 @dataclass(frozen=True)
-class Reach:
-    """How far a run goes: mean and root mean square of each name, on the platform and over all ropes."""
+class SignalRanges:
+    """Ranges of a run's signals: mean and root mean square of each name, on the platform and over all ropes.
+
+    ``peak_to_peak`` is largest less smallest value by name.
+    """
 
     platform: dict[str, tuple[float, float]]
     rope: dict[str, tuple[float, float]]
-    spread: dict[str, float] = field(default_factory=dict)
+    peak_to_peak: dict[str, float] = field(default_factory=dict)
 
 
-def reach_of(runs: Sequence[Along]) -> Reach:
-    """Of a run, stretch by stretch."""
+def signal_ranges(runs: Sequence[PortSignals]) -> SignalRanges:
+    """Signal ranges of a run, given segment by segment."""
     platform = {name: np.concatenate([run.platform[name] for run in runs]) for name in runs[0].platform}
     rope = {name: np.concatenate([r[name] for run in runs for r in run.ropes]) for name in runs[0].ropes[0]}
-    spread = {name: float(np.ptp(values)) for name, values in (platform | rope).items()}
-    return Reach(_sizes(platform), _sizes(rope), spread)
+    peak_to_peak = {name: float(np.ptp(values)) for name, values in (platform | rope).items()}
+    return SignalRanges(_means_and_rms(platform), _means_and_rms(rope), peak_to_peak)
 
 
-def _sizes(columns: dict[str, Array]) -> dict[str, tuple[float, float]]:
+def _means_and_rms(columns: dict[str, Array]) -> dict[str, tuple[float, float]]:
     return {name: (float(np.mean(v)), float(np.sqrt(np.mean(v**2)))) for name, v in columns.items()}
 
 
-def library(robot: Robot, reach: Reach, rhythms: Sequence[float]) -> tuple[Term, ...]:
-    """All candidate terms; ``rhythms`` are angular frequencies (rad/s) at which something happens in time."""
-    terms = [*_masses(), *(term for force in FORCES for term in _forces(force, robot, reach, rhythms))]
-    every = robot.cable_numbers
-    for cables in (every, *((cable,) for cable in every)):
-        terms += _tensions(cables, reach, rhythms)
+def candidate_terms(robot: Robot, ranges: SignalRanges, frequencies: Sequence[float]) -> tuple[Term, ...]:
+    """All candidate terms; ``frequencies`` are angular ones (rad/s) of lines in the residual's spectrum."""
+    terms = [
+        *_mass_terms(),
+        *(term for force in FORCE_TARGETS for term in _force_terms(force, robot, ranges, frequencies)),
+    ]
+    all_cables = robot.cable_numbers
+    for cables in (all_cables, *((cable,) for cable in all_cables)):
+        terms += _tension_terms(cables, ranges, frequencies)
     return tuple(terms)
 
 
-def _masses() -> Iterator[Term]:
+def _mass_terms() -> Iterator[Term]:
     for text in ("time", "time**2"):
         yield Term("mass", text)
 
 
-def _forces(force: str, robot: Robot, reach: Reach, rhythms: Sequence[float]) -> Iterator[Term]:
-    centred = [_from(axis, value) for axis, value in zip("xyz", robot.platform.start, strict=True)]
+def _force_terms(force: str, robot: Robot, ranges: SignalRanges, frequencies: Sequence[float]) -> Iterator[Term]:
+    centred = [_centred(axis, value) for axis, value in zip("xyz", robot.platform.start, strict=True)]
     moving = [*centred, "vx", "vy", "vz"]
-    yield Term(force, "1", listed=True)
+    yield Term(force, "1", resembles_effect=True)
     for text in _monomials(moving, 3):
         yield Term(force, text)
     for velocity in ("vx", "vy", "vz"):
-        yield Term(force, f"{velocity}*{SPEED}", listed=True)
-        yield from _bent(force, velocity, (), reach.platform[velocity][1])
+        yield Term(force, f"{velocity}*{SPEED_EXPRESSION}", resembles_effect=True)
+        yield from _saturating_terms(force, velocity, (), ranges.platform[velocity][1])
     for text in ("time", "time**2", *(f"time*{name}" for name in moving)):
         yield Term(force, text)
-    yield from _rhythms(force, (), rhythms)
+    yield from _periodic_terms(force, (), frequencies)
     for axis, start in zip("xyz", centred, strict=True):
-        for length in _waves(reach.spread[axis]):
-            yield from _turning(force, start, (), axis, 2.0 * np.pi / length)
+        for length in _wavelengths(ranges.peak_to_peak[axis]):
+            yield from _harmonic_terms(force, start, (), axis, 2.0 * np.pi / length)
 
 
-def _tensions(cables: tuple[int, ...], reach: Reach, rhythms: Sequence[float]) -> Iterator[Term]:
-    """What grows with time looks like creep or warmth, waves over the travel like a drum out of round."""
-    alone = ("tension", "strain_rate", "winch_speed", "travel", "time")
-    for text in (*_monomials(alone, 2), *(f"{name}**3" for name in alone)):
-        yield Term("tension", text, cables, listed=text in alone or "time" in text)
+def _tension_terms(cables: tuple[int, ...], ranges: SignalRanges, frequencies: Sequence[float]) -> Iterator[Term]:
+    """Candidate tensions: growth with time resembles creep or heat, waves over the travel an eccentric drum."""
+    names = ("tension", "strain_rate", "winch_speed", "travel", "time")
+    for text in (*_monomials(names, 2), *(f"{name}**3" for name in names)):
+        yield Term("tension", text, cables, resembles_effect=text in names or "time" in text)
     for name in ("strain_rate", "winch_speed"):
         yield Term("tension", f"abs({name})", cables)
         yield Term("tension", f"{name}*abs({name})", cables)
-        yield from _bent("tension", name, cables, reach.rope[name][1], listed=True)
-    yield from _rhythms("tension", cables, rhythms)
-    for length in _waves(reach.spread["travel"]):
-        yield from _turning("tension", "travel", cables, "travel", 2.0 * np.pi / length, listed=True)
+        yield from _saturating_terms("tension", name, cables, ranges.rope[name][1], resembles_effect=True)
+    yield from _periodic_terms("tension", cables, frequencies)
+    for length in _wavelengths(ranges.peak_to_peak["travel"]):
+        yield from _harmonic_terms("tension", "travel", cables, "travel", 2.0 * np.pi / length, resembles_effect=True)
 
 
-def _from(axis: str, start: float) -> str:
+def _centred(axis: str, start: float) -> str:
     return f"({axis} {'-' if start >= 0.0 else '+'} {abs(start):.4g})" if round(start, 3) else axis
 
 
 def _monomials(names: Sequence[str], degree: int) -> Iterator[str]:
     for order in range(1, degree + 1):
-        for chosen in combinations_with_replacement(names, order):
-            powers = {name: chosen.count(name) for name in chosen}
+        for selected in combinations_with_replacement(names, order):
+            powers = {name: selected.count(name) for name in selected}
             yield "*".join(name if power == 1 else f"{name}**{power}" for name, power in powers.items())
 
 
-def _bent(place: str, name: str, cables: tuple[int, ...], size: float, listed: bool = False) -> Iterator[Term]:
-    for bend in BENDS:
-        if size > 0.0:
-            yield Term(place, f"tanh({SHAPE}*{name})", cables, f"{name} bent", 1.0 / (bend * size), listed)
+def _saturating_terms(
+    target: str, name: str, cables: tuple[int, ...], rms: float, resembles_effect: bool = False
+) -> Iterator[Term]:
+    for scale in TANH_SCALES:
+        if rms > 0.0:
+            yield Term(
+                target, f"tanh({SHAPE_PARAMETER}*{name})", cables, f"{name} bent", 1.0 / (scale * rms), resembles_effect
+            )
 
 
-def _rhythms(place: str, cables: tuple[int, ...], rhythms: Sequence[float]) -> Iterator[Term]:
-    for rhythm in rhythms:
-        yield from _turning(place, "time", cables, "time", rhythm)
+def _periodic_terms(target: str, cables: tuple[int, ...], frequencies: Sequence[float]) -> Iterator[Term]:
+    for frequency in frequencies:
+        yield from _harmonic_terms(target, "time", cables, "time", frequency)
 
 
-def _turning(
-    place: str, name: str, cables: tuple[int, ...], family: str, pace: float, listed: bool = False
+def _harmonic_terms(
+    target: str,
+    name: str,
+    cables: tuple[int, ...],
+    family: str,
+    angular_frequency: float,
+    resembles_effect: bool = False,
 ) -> Iterator[Term]:
     for function in ("sin", "cos"):
-        yield Term(place, f"{function}({SHAPE}*{name})", cables, family, pace, listed)
+        yield Term(target, f"{function}({SHAPE_PARAMETER}*{name})", cables, family, angular_frequency, resembles_effect)
 
 
-def _waves(spread: float) -> list[float]:
-    """Lengths of waves that a motion so far could show, m."""
-    if spread <= 0.0:
+def _wavelengths(peak_to_peak: float) -> list[float]:
+    """Wavelengths in m that a motion of this extent could show."""
+    if peak_to_peak <= 0.0:
         return []
-    lengths: list[float] = np.geomspace(LONGEST_WAVE * spread, SHORTEST_WAVE * spread, WAVES).tolist()
+    lengths: list[float] = np.geomspace(
+        MAX_WAVELENGTH_RATIO * peak_to_peak, MIN_WAVELENGTH_RATIO * peak_to_peak, WAVELENGTH_COUNT
+    ).tolist()
     return lengths

@@ -1,12 +1,12 @@
-"""Hidden degrees of freedom: something that swings along and is not in the model, told by its frequency and place.
+"""Hidden oscillators, degrees of freedom that the model lacks, detected by frequency and place.
 
-A mass on a spring that rides along gives ``k (u - s)`` to what carries it, with ``s`` the motion of that, and
+An attached mass on a spring exerts ``k (u - s)`` on its carrier, with ``s`` the motion of that, and
 
     u'' + 2 zeta w u' + w^2 u = w^2 s + 2 zeta w s'
 
-On the platform ``s`` is its position; at an exit point or in a rope that gives way, the tension. For each frequency
-this force is one more series, and what it takes off the innovations is a spectrum that no rhythm of the motion itself
-can fake: where the motion has a peak, its series has that too.
+On the platform ``s`` is its position; at an exit point or in a compliant rope, the tension. For each frequency this
+force is one more series, and its gain in log-likelihood is a spectrum that no frequency of the motion itself can fake:
+where the motion has a peak, its series has that too.
 
 Source: the tuned absorber, Den Hartog (1956), Mechanical Vibrations, sec. 3.3; Ljung (1999), sec. 11.4.
 """
@@ -21,43 +21,43 @@ from numpy.typing import NDArray
 from scipy.signal import cont2discrete, lfilter
 from threadpoolctl import threadpool_limits
 
-from tautwire_fmu.laws.formula import FORCES
+from tautwire_fmu.laws.formula import FORCE_TARGETS
 
 from ...errors import TautwireError
 from ...linear import linearise
 from ...robots.robot import Robot
-from ...runs.start import placed
-from ..data import Evidence, Sample
+from ...runs.start import with_start
+from ..data import DataSet, DataSplit
 from ..fit import Fitter
 from ..likelihood import Likelihood
-from ..linearisation import linearise_run
+from ..linearisation import linearise_filter
 from ..verdict import Resonance
-from .ports import Along, Ports, Site, moves
+from .ports import FormulaPorts, PortSignals, Site, series_sensitivities
 
 Array = NDArray[np.float64]
 
-# The first so many samples are looked at.
-MOST_SAMPLES = 10_000
+# Only the first so many samples are used.
+MAX_SAMPLES = 10_000
 DAMPING_RATIO = 0.02
-SPACING = 0.03
-# The slowest swings so often in the recording; the fastest is below this share of the sampling rate.
-FEWEST_SWINGS, FASTEST_SHARE = 4.0, 0.2
-FREQUENCIES = 110
-# Of the platform's unknown white acceleration, m/s^2 per root hertz: the first under which the run follows the data.
-ROUGHNESS = (0.01, 0.03, 0.1, 0.3)
-FOLLOWS = 3.0
-# Nats on both samples together and on each, and how much more than at any other frequency.
-TOGETHER, EACH, MORE = 20.0, 5.0, 2.5
-# So much more is enough where both samples peak so near each other, as a share of the frequency.
-SHARP, MORE_OF_SHARP = 0.035, 1.8
-# How far apart two frequencies are the same, as a share, or one over the duration; twice as far they are not.
-SAME = 0.12
-MODE_SHARE = 0.06
-OUTPUT_SHARE = 0.25
-# Of what the nuisances leave beyond chance.
-EXPLAINED = 0.1
-CHANCE = 3.0
-LEAST_SHARE = 1e-9
+LOG_FREQUENCY_STEP = 0.03
+# Periods of the lowest frequency in the recording; the highest is below this share of the sampling rate.
+MIN_PERIODS, MAX_FREQUENCY_RATIO = 4.0, 0.2
+MAX_FREQUENCIES = 110
+# Of the platform's unknown acceleration, m/s^2 per root hertz; the first is used under which the run follows the data.
+ACCELERATION_NOISE_DENSITIES = (0.01, 0.03, 0.1, 0.3)
+MAX_INNOVATION_VARIANCE = 3.0
+# Gains in nats on both samples together and on each, and their ratio to the gain at any other frequency.
+MIN_TOTAL_GAIN, MIN_SAMPLE_GAIN, MIN_GAIN_RATIO = 20.0, 5.0, 2.5
+# A smaller ratio is enough where both peaks are as close as this share of the frequency.
+SHARP_PEAK_DISTANCE, MIN_GAIN_RATIO_OF_SHARP_PEAKS = 0.035, 1.8
+# Two frequencies within this share, or one over the duration, are equal; beyond twice that they differ.
+FREQUENCY_TOLERANCE = 0.12
+MODE_TOLERANCE = 0.06
+MIN_OUTPUT_GAIN_RATIO = 0.25
+# Least share of the available gain beyond chance that a peak explains.
+MIN_EXPLAINED_RATIO = 0.1
+CHANCE_SIGMAS = 3.0
+RANK_TOLERANCE = 1e-9
 
 
 class _Column(NamedTuple):
@@ -65,93 +65,109 @@ class _Column(NamedTuple):
     series: Array
 
 
-class _Scan(NamedTuple):
-    """Nats that each frequency (F,) gains, and each of its sites alone (F, sites); ``left`` are there to be gained."""
+class _GainSpectrum(NamedTuple):
+    """Gains in nats at each frequency (F,), and of each site alone (F, sites); ``available_gain`` bounds them."""
 
-    together: Array
-    alone: Array
-    left: float
+    joint_gains: Array
+    site_gains: Array
+    available_gain: float
 
 
 @threadpool_limits.wrap(limits=1)
-def resonances(robot: Robot, fitter: Fitter, evidence: Evidence) -> tuple[Resonance, ...]:
-    """What swings on the platform or at the exit points, where both samples say so."""
-    samples = [sample.beginning(MOST_SAMPLES) for sample in (evidence.fit, evidence.judge)]
-    frequencies = _frequencies(samples)
-    modes = _modes(robot)
-    scans = [_scans(robot, fitter, sample, frequencies) for sample in samples]
-    names = evidence.fit.recording.channel_names
-    found = []
+def find_resonances(robot: Robot, fitter: Fitter, evidence: DataSplit) -> tuple[Resonance, ...]:
+    """Hidden oscillators on the platform or at the exit points, where both samples agree."""
+    samples = [sample.first(MAX_SAMPLES) for sample in (evidence.estimation, evidence.validation)]
+    frequencies = _frequency_grid(samples)
+    modal_frequencies = _modal_frequencies(robot)
+    spectra = [_gain_spectra_of(robot, fitter, sample, frequencies) for sample in samples]
+    names = evidence.estimation.recording.channel_names
+    candidates = []
     for group, outputs in ((0, names[:3]), (1, names[3:])):
-        fit, judge = scans[0][group], scans[1][group]
-        if not _agree(frequencies, fit, judge, FEWEST_SWINGS / frequencies[0]):
+        fit, judge = spectra[0][group], spectra[1][group]
+        if not _peaks_agree(frequencies, fit, judge, MIN_PERIODS / frequencies[0]):
             continue
-        places = [int(np.argmax(scan.together)) for scan in (fit, judge)]
-        gains = [float(scan.together[place]) for scan, place in zip((fit, judge), places, strict=True)]
-        frequency = float(np.average(frequencies[places], weights=gains))
-        alone = fit.alone[places[0]] + judge.alone[places[1]]
-        shown = tuple(n for n, gain in zip(outputs, alone, strict=True) if gain >= OUTPUT_SHARE * np.max(alone))
-        if not np.any(np.abs(modes - frequency) < MODE_SHARE * modes):
-            found.append((sum(gains), Resonance(frequency, shown, ("fit", "check"))))
-    best = max((gain for gain, _ in found), default=0.0)
-    return tuple(resonance for gain, resonance in found if gain > best / MORE)
+        peak_indices = [int(np.argmax(scan.joint_gains)) for scan in (fit, judge)]
+        gains = [float(scan.joint_gains[place]) for scan, place in zip((fit, judge), peak_indices, strict=True)]
+        frequency = float(np.average(frequencies[peak_indices], weights=gains))
+        site_gains = fit.site_gains[peak_indices[0]] + judge.site_gains[peak_indices[1]]
+        affected_outputs = tuple(
+            n for n, gain in zip(outputs, site_gains, strict=True) if gain >= MIN_OUTPUT_GAIN_RATIO * np.max(site_gains)
+        )
+        if not np.any(np.abs(modal_frequencies - frequency) < MODE_TOLERANCE * modal_frequencies):
+            candidates.append((sum(gains), Resonance(frequency, affected_outputs, ("fit", "check"))))
+    best = max((gain for gain, _ in candidates), default=0.0)
+    return tuple(resonance for gain, resonance in candidates if gain > best / MIN_GAIN_RATIO)
 
 
-def _frequencies(samples: Sequence[Sample]) -> Array:
+def _frequency_grid(samples: Sequence[DataSet]) -> Array:
     duration = min(sample.recording.duration for sample in samples)
     step = max(float(np.median(np.diff(sample.recording.time))) for sample in samples)
-    slowest = FEWEST_SWINGS / duration
-    count = min(FREQUENCIES, int(np.log(max(FASTEST_SHARE / step / slowest, 1.1)) / SPACING))
-    found: Array = slowest * np.exp(SPACING * np.arange(count + 1))
-    return found
+    slowest = MIN_PERIODS / duration
+    count = min(MAX_FREQUENCIES, int(np.log(max(MAX_FREQUENCY_RATIO / step / slowest, 1.1)) / LOG_FREQUENCY_STEP))
+    grid: Array = slowest * np.exp(LOG_FREQUENCY_STEP * np.arange(count + 1))
+    return grid
 
 
-def _modes(robot: Robot) -> Array:
+def _modal_frequencies(robot: Robot) -> Array:
     try:
         return linearise(robot).modes.frequencies
     except TautwireError:
         return np.zeros(0)
 
 
-def _agree(frequencies: Array, fit: _Scan, judge: _Scan, duration: float) -> bool:
-    """Whether both samples, of at least so many seconds, have one clear peak, in one place."""
-    peaks, others, tops = [], 0.0, 0.0
+def _peaks_agree(frequencies: Array, fit: _GainSpectrum, judge: _GainSpectrum, duration: float) -> bool:
+    """Whether both samples, of at least ``duration`` seconds, have one clear peak at the same frequency."""
+    peaks, other_gain, peak_gain = [], 0.0, 0.0
     for scan in (fit, judge):
-        place = int(np.argmax(scan.together))
-        if place in (0, len(frequencies) - 1) or scan.together[place] < max(EACH, EXPLAINED * scan.left):
+        index = int(np.argmax(scan.joint_gains))
+        if index in (0, len(frequencies) - 1) or scan.joint_gains[index] < max(
+            MIN_SAMPLE_GAIN, MIN_EXPLAINED_RATIO * scan.available_gain
+        ):
             return False
-        same = max(1.0 / duration, SAME * frequencies[place])
-        peaks.append((frequencies[place], same))
-        tops += float(scan.together[place])
-        others += float(np.max(scan.together[np.abs(frequencies - frequencies[place]) > 2.0 * same], initial=0.0))
-    (first, near), (second, close) = peaks
-    more = MORE_OF_SHARP if abs(first - second) < SHARP * first else MORE
-    return bool(abs(first - second) < max(near, close) and tops > TOGETHER and tops > more * others)
+        tolerance = max(1.0 / duration, FREQUENCY_TOLERANCE * frequencies[index])
+        peaks.append((frequencies[index], tolerance))
+        peak_gain += float(scan.joint_gains[index])
+        other_gain += float(
+            np.max(scan.joint_gains[np.abs(frequencies - frequencies[index]) > 2.0 * tolerance], initial=0.0)
+        )
+    (first, first_tolerance), (second, second_tolerance) = peaks
+    min_gain_ratio = (
+        MIN_GAIN_RATIO_OF_SHARP_PEAKS if abs(first - second) < SHARP_PEAK_DISTANCE * first else MIN_GAIN_RATIO
+    )
+    return bool(
+        abs(first - second) < max(first_tolerance, second_tolerance)
+        and peak_gain > MIN_TOTAL_GAIN
+        and peak_gain > min_gain_ratio * other_gain
+    )
 
 
-def _scans(robot: Robot, fitter: Fitter, sample: Sample, frequencies: Array) -> tuple[_Scan, _Scan]:
-    """On the platform, and in the ropes."""
+def _gain_spectra_of(
+    robot: Robot, fitter: Fitter, sample: DataSet, frequencies: Array
+) -> tuple[_GainSpectrum, _GainSpectrum]:
+    """Gain spectra of one sample on the platform, and in the ropes."""
     likelihood, values = fitter.likelihood(robot, (), sample)
-    roughness = _following(likelihood, values, sample)
-    here = placed(robot, sample.start)
-    ports = Ports(here, likelihood.model.state_names)
-    runs = linearise_run(likelihood, values, sample.recording, roughness)
-    whole = _joined([ports.along(run) for run in runs])
+    acceleration_noise_density = _sufficient_noise_density(likelihood, values, sample)
+    robot_at_start = with_start(robot, sample.start)
+    ports = FormulaPorts(robot_at_start, likelihood.model.state_names)
+    segments = linearise_filter(likelihood, values, sample.recording, acceleration_noise_density)
+    signals = _concatenated([ports.signals(run) for run in segments])
     step = float(np.median(np.diff(sample.recording.time)))
-    quiet, swinging = _nuisances(whole, step), _swinging(whole, step, frequencies)
-    return _gains(here, likelihood, values, sample, roughness, quiet, swinging, fitter)
+    nuisances, oscillators = _nuisance_columns(signals, step), _oscillator_columns(signals, step, frequencies)
+    return _accumulated_gains(
+        robot_at_start, likelihood, values, sample, acceleration_noise_density, nuisances, oscillators, fitter
+    )
 
 
-def _following(likelihood: Likelihood, values: list[float], sample: Sample) -> float:
-    for roughness in ROUGHNESS:
-        innovations = likelihood.innovations(sample.recording, values, roughness)
-        if float(np.nanmean(innovations.mean_square(sample.rows))) < FOLLOWS:
-            return roughness
-    return ROUGHNESS[-1]
+def _sufficient_noise_density(likelihood: Likelihood, values: list[float], sample: DataSet) -> float:
+    for acceleration_noise_density in ACCELERATION_NOISE_DENSITIES:
+        innovations = likelihood.innovations(sample.recording, values, acceleration_noise_density)
+        if float(np.nanmean(innovations.mean_square(sample.rows))) < MAX_INNOVATION_VARIANCE:
+            return acceleration_noise_density
+    return ACCELERATION_NOISE_DENSITIES[-1]
 
 
-def _joined(parts: Sequence[Along]) -> Along:
-    """Stretches overlap by one sample."""
+def _concatenated(parts: Sequence[PortSignals]) -> PortSignals:
+    """Join segments, which overlap by one sample."""
 
     def join(columns: Sequence[dict[str, Array]]) -> dict[str, Array]:
         return {
@@ -160,106 +176,114 @@ def _joined(parts: Sequence[Along]) -> Along:
         }
 
     ropes = tuple(join([part.ropes[index] for part in parts]) for index in range(len(parts[0].ropes)))
-    return Along(join([part.platform for part in parts]), ropes)
+    return PortSignals(join([part.platform for part in parts]), ropes)
 
 
-def _nuisances(whole: Along, step: float) -> list[_Column]:
-    """What swings infinitely fast or slowly, or not at all: loads, masses, stiffnesses and dampings."""
-    found = []
-    for force, axis in zip(FORCES, "xyz", strict=True):
-        speed = whole.platform[f"v{axis}"]
-        place = whole.platform[axis] - whole.platform[axis][0]
-        series = (np.ones_like(speed), place, speed, np.gradient(speed, step))
-        found += [_Column(Site(force), column) for column in series]
-    for cable, rope in enumerate(whole.ropes, start=1):
-        found += [_Column(Site("tension", (cable,)), rope[name]) for name in ("tension", "strain_rate", "time")]
-    return found
+def _nuisance_columns(signals: PortSignals, step: float) -> list[_Column]:
+    """Nuisance series of non-oscillating errors: loads, masses, stiffnesses and dampings."""
+    columns = []
+    for force, axis in zip(FORCE_TARGETS, "xyz", strict=True):
+        speed = signals.platform[f"v{axis}"]
+        displacement = signals.platform[axis] - signals.platform[axis][0]
+        series = (np.ones_like(speed), displacement, speed, np.gradient(speed, step))
+        columns += [_Column(Site(force), column) for column in series]
+    for cable, rope in enumerate(signals.ropes, start=1):
+        columns += [_Column(Site("tension", (cable,)), rope[name]) for name in ("tension", "strain_rate", "time")]
+    return columns
 
 
-def _swinging(whole: Along, step: float, frequencies: Array) -> list[_Column]:
-    """For each frequency: the axes, then the ropes."""
-    found: list[_Column] = []
-    sites = [*map(Site, FORCES), *(Site("tension", (cable,)) for cable in range(1, len(whole.ropes) + 1))]
+def _oscillator_columns(signals: PortSignals, step: float, frequencies: Array) -> list[_Column]:
+    """Series of an oscillator at each frequency: the axes, then the ropes."""
+    columns: list[_Column] = []
+    sites = [*map(Site, FORCE_TARGETS), *(Site("tension", (cable,)) for cable in range(1, len(signals.ropes) + 1))]
     for frequency in frequencies.tolist():
-        carriers = [whole.platform[axis] for axis in "xyz"] + [rope["tension"] for rope in whole.ropes]
-        found += map(_Column, sites, _ridden(np.array(carriers), frequency, step))
-    return found
+        carriers = [signals.platform[axis] for axis in "xyz"] + [rope["tension"] for rope in signals.ropes]
+        columns += map(_Column, sites, _oscillator_response(np.array(carriers), frequency, step))
+    return columns
 
 
-def _ridden(carriers: Array, frequency: float, step: float) -> Array:
-    """``u - s`` of riders that are at rest at the start, a row each."""
-    w = 2.0 * np.pi * frequency
-    lower = np.array([1.0, 2.0 * DAMPING_RATIO * w, w**2])
-    upper, below, _ = cont2discrete((lower[1:], lower), step, method="foh")
-    moved = carriers - carriers[:, :1]
-    ridden: Array = lfilter(np.ravel(upper), below, moved, axis=1) - moved
-    return ridden
+def _oscillator_response(carriers: Array, frequency: float, step: float) -> Array:
+    """Response ``u - s`` of oscillators that are at rest at the start, a row each."""
+    angular_frequency = 2.0 * np.pi * frequency
+    continuous_denominator = np.array([1.0, 2.0 * DAMPING_RATIO * angular_frequency, angular_frequency**2])
+    numerator, denominator, _ = cont2discrete((continuous_denominator[1:], continuous_denominator), step, method="foh")
+    displacement = carriers - carriers[:, :1]
+    response: Array = lfilter(np.ravel(numerator), denominator, displacement, axis=1) - displacement
+    return response
 
 
-def _gains(
+def _accumulated_gains(
     robot: Robot,
     likelihood: Likelihood,
     values: list[float],
-    sample: Sample,
-    roughness: float,
-    quiet: Sequence[_Column],
-    swinging: Sequence[_Column],
+    sample: DataSet,
+    acceleration_noise_density: float,
+    nuisances: Sequence[_Column],
+    oscillators: Sequence[_Column],
     fitter: Fitter,
-) -> tuple[_Scan, _Scan]:
-    """Nats by frequency beside the nuisances, from one run."""
-    columns = [*quiet, *swinging]
+) -> tuple[_GainSpectrum, _GainSpectrum]:
+    """Gains in nats by frequency beside the nuisances, from one run of the filter."""
+    columns = [*nuisances, *oscillators]
     sites = [column.site for column in columns]
-    begun = [column.series[:1] for column in columns]
-    still, width = len(quiet), 3 + robot.cable_count
-    inner, across = np.zeros((still, still)), np.zeros((still, len(swinging)))
-    own, pull = np.zeros((len(swinging) // width, width, width)), np.zeros(len(columns))
-    ports = Ports(robot, likelihood.model.state_names)
-    slopes, first, last = np.zeros((len(likelihood.model.state_names), len(columns))), 0, 0
-    squares, number = 0.0, 0
-    for run in linearise_run(likelihood, values, sample.recording, roughness):
-        fitter.between()
-        count = len(run.step)
-        time = ports.along(run).platform["time"]
-        series = [column.series[None, first : first + count + 1] for column in columns]
-        slopes, moved = run.carry(slopes, *moves(sites, series, begun, ports, run, time))
-        first += count
+    initial_values = [column.series[:1] for column in columns]
+    nuisance_count, width = len(nuisances), 3 + robot.cable_count
+    inner, cross_products = np.zeros((nuisance_count, nuisance_count)), np.zeros((nuisance_count, len(oscillators)))
+    information, score = np.zeros((len(oscillators) // width, width, width)), np.zeros(len(columns))
+    ports = FormulaPorts(robot, likelihood.model.state_names)
+    slopes, first_sample, next_row = np.zeros((len(likelihood.model.state_names), len(columns))), 0, 0
+    squares, observation_count = 0.0, 0
+    for segment in linearise_filter(likelihood, values, sample.recording, acceleration_noise_density):
+        fitter.poll_interrupts()
+        count = len(segment.step)
+        time = ports.signals(segment).platform["time"]
+        series = [column.series[None, first_sample : first_sample + count + 1] for column in columns]
+        slopes, innovation_sensitivities = segment.propagate_sensitivities(
+            slopes, *series_sensitivities(sites, series, initial_values, ports, segment, time)
+        )
+        first_sample += count
         rows = np.zeros(count, dtype=bool)
-        rows[run.own] = sample.rows[last : last + int(np.sum(run.own))]
-        last += int(np.sum(run.own))
-        seen = run.seen[rows]
-        matrix, values_seen = moved[rows][seen], run.values[rows][seen]
+        rows[segment.is_recorded] = sample.rows[next_row : next_row + int(np.sum(segment.is_recorded))]
+        next_row += int(np.sum(segment.is_recorded))
+        is_observed = segment.observed[rows]
+        matrix, values_seen = innovation_sensitivities[rows][is_observed], segment.values[rows][is_observed]
         squares += float(values_seen @ values_seen)
-        number += len(values_seen)
-        inner += matrix[:, :still].T @ matrix[:, :still]
-        across += matrix[:, :still].T @ matrix[:, still:]
-        apart = matrix[:, still:].reshape(len(matrix), len(own), width)
-        own += np.einsum("rfg,rfh->fgh", apart, apart, optimize=True)
-        pull += matrix.T @ values_seen
-    beyond_chance = 0.5 * (squares - number) - CHANCE * np.sqrt(0.5 * number)
-    return _scanned(inner, across, own, pull, float(beyond_chance))
+        observation_count += len(values_seen)
+        inner += matrix[:, :nuisance_count].T @ matrix[:, :nuisance_count]
+        cross_products += matrix[:, :nuisance_count].T @ matrix[:, nuisance_count:]
+        oscillator_slopes = matrix[:, nuisance_count:].reshape(len(matrix), len(information), width)
+        information += np.einsum("rfg,rfh->fgh", oscillator_slopes, oscillator_slopes, optimize=True)
+        score += matrix.T @ values_seen
+    available_gain = 0.5 * (squares - observation_count) - CHANCE_SIGMAS * np.sqrt(0.5 * observation_count)
+    return _gain_spectra(inner, cross_products, information, score, float(available_gain))
 
 
-def _scanned(inner: Array, across: Array, own: Array, pull: Array, nats: float) -> tuple[_Scan, _Scan]:
-    """Of the sums of products, with the nuisances projected out; ``nats`` are there before that."""
-    still, width = len(inner), own.shape[1]
-    held = _solved(inner, np.column_stack([across, pull[:still]]))
-    nats -= 0.5 * float(pull[:still] @ held[:, -1])
-    left = (pull[still:] - across.T @ held[:, -1]).reshape(-1, width)
-    shaped, solved = (matrix.reshape(still, -1, width) for matrix in (across, held[:, :-1]))
-    rest = own - np.einsum("nfg,nfh->fgh", shaped, solved, optimize=True)
-    scans = []
+def _gain_spectra(
+    inner: Array, cross_products: Array, information: Array, score: Array, available_gain: float
+) -> tuple[_GainSpectrum, _GainSpectrum]:
+    """Gain spectra with the nuisances projected out; ``available_gain`` is before that."""
+    nuisance_count, width = len(inner), information.shape[1]
+    projection = _solve_scaled(inner, np.column_stack([cross_products, score[:nuisance_count]]))
+    available_gain -= 0.5 * float(score[:nuisance_count] @ projection[:, -1])
+    residual_score = (score[nuisance_count:] - cross_products.T @ projection[:, -1]).reshape(-1, width)
+    shaped, solved = (matrix.reshape(nuisance_count, -1, width) for matrix in (cross_products, projection[:, :-1]))
+    residual_information = information - np.einsum("nfg,nfh->fgh", shaped, solved, optimize=True)
+    spectra = []
     for group in (slice(0, 3), slice(3, width)):
-        together = np.array([_gain(r[group, group], f[group]) for r, f in zip(rest, left, strict=True)])
-        size = np.maximum(np.diagonal(rest, axis1=1, axis2=2)[:, group], np.finfo(float).tiny)
-        scans.append(_Scan(together, 0.5 * left[:, group] ** 2 / size, nats))
-    return scans[0], scans[1]
+        joint_gains = np.array(
+            [_joint_gain(r[group, group], f[group]) for r, f in zip(residual_information, residual_score, strict=True)]
+        )
+        diagonal = np.maximum(np.diagonal(residual_information, axis1=1, axis2=2)[:, group], np.finfo(float).tiny)
+        spectra.append(_GainSpectrum(joint_gains, 0.5 * residual_score[:, group] ** 2 / diagonal, available_gain))
+    return spectra[0], spectra[1]
 
 
-def _gain(gram: Array, pull: Array) -> float:
-    return float(0.5 * pull @ _solved(gram, pull[:, None])[:, 0])
+def _joint_gain(information: Array, score: Array) -> float:
+    return float(0.5 * score @ _solve_scaled(information, score[:, None])[:, 0])
 
 
-def _solved(gram: Array, right: Array) -> Array:
-    size = np.sqrt(np.maximum(np.diag(gram), np.finfo(float).tiny))
-    solved: Array = np.linalg.lstsq(gram / np.outer(size, size), right / size[:, None], rcond=LEAST_SHARE)[0]
-    return solved / size[:, None]
+def _solve_scaled(information: Array, right_hand_side: Array) -> Array:
+    scale = np.sqrt(np.maximum(np.diag(information), np.finfo(float).tiny))
+    solved: Array = np.linalg.lstsq(
+        information / np.outer(scale, scale), right_hand_side / scale[:, None], rcond=RANK_TOLERANCE
+    )[0]
+    return solved / scale[:, None]

@@ -1,4 +1,4 @@
-"""The spectrum of what a model leaves: frequencies at which something happens that it does not have."""
+"""Spectrum of the innovations: lines at frequencies that the model does not explain."""
 
 from __future__ import annotations
 
@@ -10,29 +10,31 @@ from ..likelihood import Innovations
 
 Array = NDArray[np.float64]
 
-# Zeros beside the samples, so that a line between two frequencies is not missed.
-PADDING = 4
-# A line stands out where it has so many times the power of the frequencies about it.
-STANDS_OUT = 12.0
-NEIGHBOURS = 80
-MOST_RHYTHMS = 4
+# Zero padding, so that a line between two frequencies is not missed.
+ZERO_PADDING_FACTOR = 4
+# Least power of a line over the median of the frequencies about it.
+MIN_LINE_POWER_RATIO = 12.0
+FLOOR_HALF_WINDOW = 80
+MAX_LINES = 4
 
 
-def rhythms(time: Array, innovations: Innovations, rows: NDArray[np.bool_]) -> list[float]:
+def spectral_lines(time: Array, innovations: Innovations, rows: NDArray[np.bool_]) -> list[float]:
     """Angular frequencies (rad/s) of the strongest lines in the innovations, strongest first."""
-    frequency, power = _power(time[rows], innovations.values[rows], innovations.seen[rows])
-    floor = np.array([np.median(power[max(0, k - NEIGHBOURS) : k + NEIGHBOURS]) for k in range(len(power))])
+    frequency, power = _power_spectrum(time[rows], innovations.values[rows], innovations.observed[rows])
+    floor = np.array(
+        [np.median(power[max(0, k - FLOOR_HALF_WINDOW) : k + FLOOR_HALF_WINDOW]) for k in range(len(power))]
+    )
     ratio = power / np.maximum(floor, np.finfo(float).tiny)
-    places, _ = find_peaks(ratio, height=STANDS_OUT, distance=2 * PADDING)
-    strongest = sorted(places, key=lambda place: -power[place])[:MOST_RHYTHMS]
+    peaks, _ = find_peaks(ratio, height=MIN_LINE_POWER_RATIO, distance=2 * ZERO_PADDING_FACTOR)
+    strongest = sorted(peaks, key=lambda place: -power[place])[:MAX_LINES]
     return [2.0 * np.pi * float(frequency[place]) for place in strongest]
 
 
-def _power(time: Array, values: Array, seen: NDArray[np.bool_]) -> tuple[Array, Array]:
+def _power_spectrum(time: Array, values: Array, seen: NDArray[np.bool_]) -> tuple[Array, Array]:
     """Frequencies (Hz) and power summed over the outputs, of samples taken as evenly spaced."""
     step = float(np.median(np.diff(time)))
-    known = np.where(seen, np.nan_to_num(values), 0.0)
-    windowed = (known - np.mean(known, axis=0)) * np.hanning(len(known))[:, None]
-    power: Array = np.sum(np.abs(np.fft.rfft(windowed, PADDING * len(known), axis=0)) ** 2, axis=1)
-    frequency: Array = np.asarray(np.fft.rfftfreq(PADDING * len(known), step), dtype=float)
+    filled = np.where(seen, np.nan_to_num(values), 0.0)
+    windowed = (filled - np.mean(filled, axis=0)) * np.hanning(len(filled))[:, None]
+    power: Array = np.sum(np.abs(np.fft.rfft(windowed, ZERO_PADDING_FACTOR * len(filled), axis=0)) ** 2, axis=1)
+    frequency: Array = np.asarray(np.fft.rfftfreq(ZERO_PADDING_FACTOR * len(filled), step), dtype=float)
     return frequency, power

@@ -1,4 +1,4 @@
-"""What is said where no known effect suffices: a formula that earns its place, or what its residual looks like."""
+"""Analysis of a residual that no known effect explains: an accepted formula, or the resonances that it shows."""
 
 from __future__ import annotations
 
@@ -7,71 +7,79 @@ from dataclasses import dataclass
 from math import log
 
 from ...robots.robot import Robot
-from ..attempts import fitter_apart
-from ..data import Evidence
+from ..attempts import worker_fitter
+from ..data import DataSplit
 from ..filter_step import Noise
 from ..fit import Fitter
 from ..hypotheses import hypotheses
-from ..search import Found
+from ..search import SelectionResult
 from ..verdict import Resonance
-from ..workers import Workers
-from .discovery import Discovery, discover
-from .resonance import resonances
+from ..workers import WorkerPool
+from .discovery import Discovery, discover_formula
+from .resonance import find_resonances
 from .written import formula_text
 
 Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
-class Rest:
-    """A ``discovery`` if one is good enough to be tried in the FMUs, the lines of the spectrum, and notes."""
+class UnexplainedResidual:
+    """Result of the analysis: an accepted ``discovery`` to be tried in the FMUs, hidden resonances, and notes."""
 
     discovery: Discovery | None = None
     resonances: tuple[Resonance, ...] = ()
     notes: tuple[str, ...] = ()
 
 
-def what_is_left(
+def explain_residual(
     robot: Robot,
-    found: Found,
+    selection: SelectionResult,
     fitter: Fitter,
-    evidence: Evidence,
+    evidence: DataSplit,
     alpha: float,
     progress: Progress,
-    workers: Workers,
-) -> Rest:
-    """Of a robot whose recordings known effects do not explain; ``found`` are those that come closest."""
-    apart = found.accepted and workers.processes > 1
-    together = workers.start(_beside, fitter.noise, found, evidence) if apart else None
+    workers: WorkerPool,
+) -> UnexplainedResidual:
+    """Analyse the residual of a robot that known effects do not explain; ``selection`` are those that come closest."""
+    runs_in_parallel = selection.accepted and workers.processes > 1
+    pending = workers.submit(_discover_beside_effects, fitter.noise, selection, evidence) if runs_in_parallel else None
     threshold = log((len(hypotheses(robot)) + 1) / alpha)
-    formula = _earned(discover(robot, (), fitter, evidence, progress), threshold)
-    if formula is not None and formula.leaves_noise:
-        return Rest(formula)
-    # Effects that only come closest may have taken the line's place.
-    lines = resonances(found.fit.robot, fitter, evidence)
-    if not lines and found.accepted:
-        lines = resonances(robot, fitter, evidence)
+    formula = _if_accepted(discover_formula(robot, (), fitter, evidence, progress), threshold)
+    if formula is not None and formula.residuals_are_white:
+        return UnexplainedResidual(formula)
+    # Effects that only come closest may have absorbed the resonance.
+    lines = find_resonances(selection.fit.robot, fitter, evidence)
+    if not lines and selection.accepted:
+        lines = find_resonances(robot, fitter, evidence)
     notes = [line.sentence for line in lines]
     if formula is not None:
-        said = formula_text(robot, formula.formulas)
-        notes.append(f"a formula explains part of the residual, not all of it: {said}")
-    if together is not None:
+        description = formula_text(robot, formula.formulas)
+        notes.append(f"a formula explains part of the residual, not all of it: {description}")
+    if pending is not None:
         progress("looking for a formula beside effects", 0.0)
-        beside = together.result()
+        joint_formula = pending.result()
     else:
-        beside = discover(found.fit.robot, found.accepted, fitter, evidence, progress) if found.accepted else None
-    beside = _earned(beside, threshold)
-    if beside is not None and beside.leaves_noise:
-        names = " and ".join(hypothesis.label(robot) for hypothesis in found.accepted)
-        said = formula_text(robot, beside.formulas)
-        notes.append(f"a formula together with {names} leaves noise, but either may stand for something else: {said}")
-    return Rest(None, lines, tuple(notes))
+        joint_formula = (
+            discover_formula(selection.fit.robot, selection.accepted, fitter, evidence, progress)
+            if selection.accepted
+            else None
+        )
+    joint_formula = _if_accepted(joint_formula, threshold)
+    if joint_formula is not None and joint_formula.residuals_are_white:
+        names = " and ".join(hypothesis.label(robot) for hypothesis in selection.accepted)
+        description = formula_text(robot, joint_formula.formulas)
+        notes.append(
+            f"a formula together with {names} leaves noise, but either may stand for something else: {description}"
+        )
+    return UnexplainedResidual(None, lines, tuple(notes))
 
 
-def _beside(noise: Noise, found: Found, evidence: Evidence) -> Discovery | None:
-    """A formula together with what comes closest, in a process that keeps a fitter of its own."""
-    return discover(found.fit.robot, found.accepted, fitter_apart(noise), evidence, lambda what, done: None)
+def _discover_beside_effects(noise: Noise, selection: SelectionResult, evidence: DataSplit) -> Discovery | None:
+    """Discover a formula beside the closest effects, in a worker process with its own fitter."""
+    return discover_formula(
+        selection.fit.robot, selection.accepted, worker_fitter(noise), evidence, lambda what, done: None
+    )
 
 
-def _earned(found: Discovery | None, threshold: float) -> Discovery | None:
-    return found if found is not None and found.earns_its_place(threshold) else None
+def _if_accepted(discovery: Discovery | None, threshold: float) -> Discovery | None:
+    return discovery if discovery is not None and discovery.is_accepted(threshold) else None

@@ -1,43 +1,46 @@
-"""Chosen terms as formulas: open, with names for their numbers, and closed, with as many digits as are known."""
+"""Formulas of selected terms: with named free parameters, or with numbers rounded to their uncertainty."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping, Sequence
 from math import floor, isfinite, log10
 
-from tautwire_fmu.laws.formula import PLACES
+from tautwire_fmu.laws.formula import VARIABLES_BY_TARGET
 
 from ...robots.robot import EffectSetting, Formula, Robot
-from .library import SHAPE, Term
+from .library import SHAPE_PARAMETER, Term
 from .ports import Site
 
 # Digits of a number beyond the first of its standard deviation.
-FURTHER = 1
+EXTRA_DIGITS = 1
 
 
-def opened(terms: Mapping[Term, float]) -> tuple[Formula, ...]:
-    """Formulas with a free number for each coefficient, ``c1`` ..., and for each shape, ``w1`` ..."""
+def parametrised_formulas(terms: Mapping[Term, float]) -> tuple[Formula, ...]:
+    """Formulas with a free parameter for each coefficient, ``c1`` ..., and for each shape, ``w1`` ..."""
     shapes = shape_names(list(terms))
     formulas = []
-    for place, cables in _sites(terms):
+    for target, cables in _sites(terms):
         parts, numbers = [], {}
         for index, (term, coefficient) in enumerate(terms.items(), start=1):
-            if (term.place, term.cables) != (place, cables):
+            if (term.target, term.cables) != (target, cables):
                 continue
             numbers[f"c{index}"] = coefficient
             text = term.text
             if term.family:
                 name = shapes[term.family, term.shape]
                 numbers[name] = term.shape
-                text = text.replace(SHAPE, name)
+                text = text.replace(SHAPE_PARAMETER, name)
             parts.append(f"c{index}*{text}")
-        formulas.append(Formula(place, " + ".join(parts), cables, numbers))
+        formulas.append(Formula(target, " + ".join(parts), cables, numbers))
     return tuple(formulas)
 
 
 def _sites(terms: Iterable[Term]) -> list[Site]:
-    """Where terms act, in the order of a robot file."""
-    return sorted(dict.fromkeys(term.site for term in terms), key=lambda site: (list(PLACES).index(site.place), site))
+    """Sites of terms, in the order of a robot file."""
+    return sorted(
+        dict.fromkeys(term.site for term in terms),
+        key=lambda site: (list(VARIABLES_BY_TARGET).index(site.target), site),
+    )
 
 
 def shape_names(terms: Sequence[Term]) -> dict[tuple[str, float], str]:
@@ -46,37 +49,39 @@ def shape_names(terms: Sequence[Term]) -> dict[tuple[str, float], str]:
     return {shape: f"w{index}" for index, shape in enumerate(shapes, start=1)}
 
 
-def closed(terms: Mapping[Term, float], deviations: Mapping[str, float]) -> tuple[Formula, ...]:
-    """Formulas with their numbers in the text; ``deviations`` by the names of :func:`opened`."""
+def numeric_formulas(terms: Mapping[Term, float], deviations: Mapping[str, float]) -> tuple[Formula, ...]:
+    """Formulas with numbers in the text; ``deviations`` by the names of :func:`parametrised_formulas`."""
     shapes = shape_names(list(terms))
     formulas = []
-    for place, cables in _sites(terms):
+    for target, cables in _sites(terms):
         text = ""
         for index, (term, coefficient) in enumerate(terms.items(), start=1):
-            if (term.place, term.cables) != (place, cables):
+            if (term.target, term.cables) != (target, cables):
                 continue
-            factor = known_digits(abs(coefficient), deviations[f"c{index}"])
+            factor = rounded_to_uncertainty(abs(coefficient), deviations[f"c{index}"])
             sign = "-" if coefficient < 0.0 else "+" if text else ""
-            inner = term.text
+            expression = term.text
             if term.family:
-                inner = inner.replace(SHAPE, known_digits(term.shape, deviations[shapes[term.family, term.shape]]))
-            said = factor if inner == "1" else f"{factor}*{inner}"
-            text += f" {sign} {said}" if text else f"{sign}{said}"
-        formulas.append(Formula(place, text, cables))
+                expression = expression.replace(
+                    SHAPE_PARAMETER, rounded_to_uncertainty(term.shape, deviations[shapes[term.family, term.shape]])
+                )
+            product = factor if expression == "1" else f"{factor}*{expression}"
+            text += f" {sign} {product}" if text else f"{sign}{product}"
+        formulas.append(Formula(target, text, cables))
     return tuple(formulas)
 
 
-def known_digits(value: float, deviation: float) -> str:
-    """A number to one digit more than the first of its standard deviation."""
+def rounded_to_uncertainty(value: float, deviation: float) -> str:
+    """A number rounded to one digit more than the first of its standard deviation."""
     if not (deviation > 0.0 and isfinite(deviation)) or value == 0.0:
         return repr(value)
-    digits = floor(log10(abs(value))) - floor(log10(deviation)) + 1 + FURTHER
+    digits = floor(log10(abs(value))) - floor(log10(deviation)) + 1 + EXTRA_DIGITS
     return f"{value:.{min(max(digits, 1), 15)}g}"
 
 
 def formula_text(robot: Robot, formulas: Sequence[Formula]) -> str:
-    """Formulas with their places in a robot, as in ``force_y = -31.2*vx; tension_2 = 4*travel``."""
-    return "; ".join(f"{_place(robot, formula)} = {formula.text}" for formula in formulas)
+    """Formulas with their targets in a robot, as in ``force_y = -31.2*vx; tension_2 = 4*travel``."""
+    return "; ".join(f"{_site_label(robot, formula)} = {formula.text}" for formula in formulas)
 
 
 def effects_text(settings: Iterable[tuple[str, EffectSetting]]) -> str:
@@ -88,7 +93,7 @@ def effects_text(settings: Iterable[tuple[str, EffectSetting]]) -> str:
     return "; ".join(texts)
 
 
-def _place(robot: Robot, formula: Formula) -> str:
+def _site_label(robot: Robot, formula: Formula) -> str:
     if formula.cables in ((), robot.cable_numbers):
-        return formula.place
-    return f"{formula.place}_{'_'.join(map(str, formula.cables))}"
+        return formula.target
+    return f"{formula.target}_{'_'.join(map(str, formula.cables))}"

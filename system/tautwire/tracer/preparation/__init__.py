@@ -1,1 +1,1 @@
-"""A recording made ready for the tracer: what its sensors are worth, and how its run begins."""
+"""Preprocessing of recordings for estimation: cleaning, measurement noise, clocks and the initial state."""

@@ -1,7 +1,8 @@
-"""Clocks of the sensors' recorder and of the winches' that are apart, otherwise in one recording than in the other.
+"""Clock offsets between the sensors' recorder and the winches', estimated where they differ between recordings.
 
-A sensor that shows late by the same time in both is an effect, ``sensor_delay``; what differs between recordings, or
-runs ahead, is a clock. Outputs ``y(t) = h(t - b)`` move the innovations by ``J = dv/db``; least squares gives ``b``.
+A sensor that lags by the same time in both recordings is an effect, ``sensor_delay``; what differs between them, or
+runs ahead, is a clock offset. Outputs ``y(t) = h(t - b)`` move the innovations by ``J = dv/db``; least squares gives
+``b``.
 """
 
 from __future__ import annotations
@@ -16,186 +17,213 @@ from numpy.typing import NDArray
 from ...errors import RecordingError
 from ...recordings.recording import Recording
 from ...robots.robot import Robot
-from ..data import Evidence, Sample
+from ..data import DataSet, DataSplit
 from ..fit import Fitter
 from ..likelihood import Likelihood
-from ..linearisation import Linearised, linearise_run
+from ..linearisation import LinearisedSegment, linearise_filter
 
 Array = NDArray[np.float64]
 
-PARTS, SIGMAS = 6, 6.0
-# An offset of half a swing's period takes some ten rounds.
-ROUNDS, SETTLED = 25, 0.002
-# Of a sample interval: less is no matter of clocks.
-LEAST = 0.1
-# Of the innovations' mean square: what an offset leaves at first order where it is worth a look, and in the end where
-# clocks are what is wrong most. A clock that runs ahead in both recordings has to leave this much at most.
-WORTH, MOSTLY = 0.8, 0.33
-EXPLAINED = 1.5
-# Taps on each side of a shifted sample, and the window's shape (Kaiser).
-TAPS, SHAPE = 24, 8.0
-EVEN = 1e-3
+JACKKNIFE_BLOCKS, MIN_OFFSET_SIGMAS = 6, 6.0
+# An offset of half an oscillation period takes some ten iterations.
+MAX_ITERATIONS, RELATIVE_TOLERANCE = 25, 0.002
+# In sample intervals: a smaller difference is no clock offset.
+MIN_OFFSET_INTERVALS = 0.1
+# Remaining share of the innovations' mean square: at first order to be a candidate, at convergence to be a clock;
+# then the largest mean square that a clock running ahead in both recordings may leave.
+MAX_CANDIDATE_VARIANCE_RATIO, MAX_CLOCK_VARIANCE_RATIO = 0.8, 0.33
+MAX_EXPLAINED_VARIANCE = 1.5
+# Taps of the windowed sinc on each side of a shifted sample, and the Kaiser window's beta.
+TAPS_PER_SIDE, KAISER_BETA = 24, 8.0
+UNIFORM_SAMPLING_TOLERANCE = 1e-3
 
 
 @dataclass(frozen=True)
-class Channels:
-    """Outputs that share a clock: their name, and the places from the first to before the last."""
+class ChannelGroup:
+    """Output channels that share a clock: their name, and the columns from ``start`` to before ``stop``."""
 
     name: str
-    first: int
-    last: int | None
+    start: int
+    stop: int | None
 
     @property
-    def places(self) -> slice:
-        """As an index."""
-        return slice(self.first, self.last)
+    def columns(self) -> slice:
+        """The columns as an index."""
+        return slice(self.start, self.stop)
 
 
-CHANNELS = (Channels("positions", 0, 3), Channels("tensions", 3, None))
+CHANNEL_GROUPS = (ChannelGroup("positions", 0, 3), ChannelGroup("tensions", 3, None))
 
 
 @dataclass(frozen=True)
-class Offset:
-    """By how many seconds outputs are late, its deviation by parts of the recording, and mean squares of innovations.
+class ClockOffset:
+    """Clock offset of a channel group: positive ``seconds`` where outputs lag, and its jackknife standard deviation.
 
-    ``without`` is what was there, ``left`` what stays with the outputs shifted back.
+    ``variance_before`` and ``variance_after`` are mean squares of the innovations without and with the outputs shifted
+    back.
     """
 
     seconds: float
-    deviation: float
-    without: float
-    left: float
+    standard_deviation: float
+    variance_before: float
+    variance_after: float
 
 
-def with_clocks_set(fitter: Fitter, robot: Robot, evidence: Evidence) -> tuple[Evidence, tuple[str, ...]]:
-    """The evidence with outputs shifted where clocks are apart, and notes.
+def with_clocks_set(fitter: Fitter, robot: Robot, evidence: DataSplit) -> tuple[DataSplit, tuple[str, ...]]:
+    """Data with outputs shifted where clocks are offset, and notes.
 
     Raises RecordingError where they are, and samples are too uneven or too sparse to be shifted.
     """
-    samples = (evidence.fit, evidence.judge)
-    if evidence.fit.recording is evidence.judge.recording:
+    samples = (evidence.estimation, evidence.validation)
+    if evidence.estimation.recording is evidence.validation.recording:
         return evidence, ()
     interval = max(float(np.median(np.diff(sample.recording.time))) for sample in samples)
-    firsts = [_steps(fitter, robot, sample) for sample in samples]
-    for channels in CHANNELS:
-        begun = [first.get(channels) for first in firsts]
-        if None in begun or not any(o and o.left < WORTH * o.without for o in begun):
+    first_steps = [_offset_steps(fitter, robot, sample) for sample in samples]
+    for channels in CHANNEL_GROUPS:
+        initial_offsets = [first.get(channels) for first in first_steps]
+        if None in initial_offsets or not any(
+            o and o.variance_after < MAX_CANDIDATE_VARIANCE_RATIO * o.variance_before for o in initial_offsets
+        ):
             continue
-        settled = [_offset(fitter, robot, sample, channels) for sample in samples]
-        offsets = [offset for offset in settled if offset is not None]
-        why = _why(offsets, interval) if len(offsets) == len(samples) else None
-        if why is None:
+        converged = [_estimate_offset(fitter, robot, sample, channels) for sample in samples]
+        offsets = [offset for offset in converged if offset is not None]
+        reason = _clock_reason(offsets, interval) if len(offsets) == len(samples) else None
+        if reason is None:
             continue
-        fit, judge = (_moved(sample, offset, channels) for sample, offset in zip(samples, offsets, strict=True))
-        notes = tuple(_note(s.recording.path, o, channels, why) for s, o in zip(samples, offsets, strict=True))
-        return Evidence(fit, judge, evidence.notes), notes
+        fit, judge = (_shift_sample(sample, offset, channels) for sample, offset in zip(samples, offsets, strict=True))
+        notes = tuple(
+            _offset_note(s.recording.path, o, channels, reason) for s, o in zip(samples, offsets, strict=True)
+        )
+        return DataSplit(fit, judge, evidence.notes), notes
     return evidence, ()
 
 
-def _why(offsets: list[Offset], interval: float) -> str | None:
-    """Why offsets of two recordings are of clocks; None where they are not, or other things count for more."""
-    least = max(SIGMAS * hypot(*(offset.deviation for offset in offsets)), LEAST * interval)
+def _clock_reason(offsets: list[ClockOffset], interval: float) -> str | None:
+    """Reason why the offsets of two recordings are clock offsets; None where they are not, or other errors dominate."""
+    min_difference = max(
+        MIN_OFFSET_SIGMAS * hypot(*(offset.standard_deviation for offset in offsets)), MIN_OFFSET_INTERVALS * interval
+    )
     larger = max(offsets, key=lambda offset: abs(offset.seconds))
-    if abs(offsets[0].seconds - offsets[1].seconds) > least and larger.left < MOSTLY * larger.without:
+    if (
+        abs(offsets[0].seconds - offsets[1].seconds) > min_difference
+        and larger.variance_after < MAX_CLOCK_VARIANCE_RATIO * larger.variance_before
+    ):
         return "not as in the other recording"
-    ahead = max(offset.seconds for offset in offsets) < -least
-    return "before the motion" if ahead and all(offset.left < EXPLAINED for offset in offsets) else None
+    ahead = max(offset.seconds for offset in offsets) < -min_difference
+    return (
+        "before the motion"
+        if ahead and all(offset.variance_after < MAX_EXPLAINED_VARIANCE for offset in offsets)
+        else None
+    )
 
 
-def _note(path: str, offset: Offset, channels: Channels, why: str) -> str:
-    way = "behind" if offset.seconds > 0.0 else "ahead of"
+def _offset_note(path: str, offset: ClockOffset, channels: ChannelGroup, reason: str) -> str:
+    relation = "behind" if offset.seconds > 0.0 else "ahead of"
     size = f"{1e3 * abs(offset.seconds):.2f} ms"
-    return f"{path}: {channels.name} run {size} {way} winch speeds, {why}: a clock, no effect; shifted back"
+    return f"{path}: {channels.name} run {size} {relation} winch speeds, {reason}: a clock, no effect; shifted back"
 
 
-def _moved(sample: Sample, offset: Offset, channels: Channels) -> Sample:
+def _shift_sample(sample: DataSet, offset: ClockOffset, channels: ChannelGroup) -> DataSet:
     return replace(sample, recording=shifted(sample.recording, offset.seconds, channels))
 
 
-def _offset(fitter: Fitter, robot: Robot, sample: Sample, channels: Channels) -> Offset | None:
-    """By Gauss and Newton's method, each step from the outputs as the last one shifted them; None if it does not end.
+def _estimate_offset(fitter: Fitter, robot: Robot, sample: DataSet, channels: ChannelGroup) -> ClockOffset | None:
+    """Estimate an offset by the Gauss-Newton method, shifting outputs at each step; None where it does not converge.
 
-    An offset that is still on its way would differ from the other recording's and pass for a clock.
+    An offset that has not converged would differ from the other recording's and pass for a clock.
     """
-    found = _steps(fitter, robot, sample)[channels]
-    without, total = found.without, found.seconds
-    for _ in range(ROUNDS):
-        if abs(found.seconds) < max(SETTLED * abs(total), 0.2 * found.deviation):
-            return Offset(total, found.deviation, without, found.left)
+    step = _offset_steps(fitter, robot, sample)[channels]
+    variance_before, total = step.variance_before, step.seconds
+    for _ in range(MAX_ITERATIONS):
+        if abs(step.seconds) < max(RELATIVE_TOLERANCE * abs(total), 0.2 * step.standard_deviation):
+            return ClockOffset(total, step.standard_deviation, variance_before, step.variance_after)
         current = replace(sample, recording=shifted(sample.recording, total, channels))
-        found = _steps(fitter, robot, current)[channels]
-        total += found.seconds
+        step = _offset_steps(fitter, robot, current)[channels]
+        total += step.seconds
     return None
 
 
-def _steps(fitter: Fitter, robot: Robot, sample: Sample) -> dict[Channels, Offset]:
-    """A correction of the offset of each kind of outputs that is seen, to first order."""
+def _offset_steps(fitter: Fitter, robot: Robot, sample: DataSet) -> dict[ChannelGroup, ClockOffset]:
+    """First-order corrections of the offset of each measured channel group."""
     likelihood, values = fitter.likelihood(robot, (), sample)
-    pulls, weights, squares = [], [], []
-    slopes = np.zeros((likelihood.model.states.numel(), len(CHANNELS)))
-    for run in linearise_run(likelihood, values, sample.recording):
-        fitter.between()
-        shown = np.zeros((*run.seen.shape, len(CHANNELS)))
-        rates = _rates(likelihood, run)
-        for number, channels in enumerate(CHANNELS):
-            shown[:, channels.places, number] = -rates[:, channels.places]
-        slopes, moved = run.carry(slopes, np.zeros((len(shown), len(slopes), len(CHANNELS))), shown)
-        pulls.append(np.einsum("kmp,km->kp", moved, run.values))
-        weights.append(np.sum(moved**2, axis=1))
-        squares.append(run.values[run.seen] ** 2)
-    pull, weight = np.concatenate(pulls), np.concatenate(weights)
-    columns = [sample.recording.measured()[:, channels.places] for channels in CHANNELS]
+    scores, informations, squares = [], [], []
+    state_sensitivities = np.zeros((likelihood.model.states.numel(), len(CHANNEL_GROUPS)))
+    for segment in linearise_filter(likelihood, values, sample.recording):
+        fitter.poll_interrupts()
+        output_sensitivities = np.zeros((*segment.observed.shape, len(CHANNEL_GROUPS)))
+        output_rates = _output_rates(likelihood, segment)
+        for number, channels in enumerate(CHANNEL_GROUPS):
+            output_sensitivities[:, channels.columns, number] = -output_rates[:, channels.columns]
+        state_sensitivities, innovation_sensitivities = segment.propagate_sensitivities(
+            state_sensitivities,
+            np.zeros((len(output_sensitivities), len(state_sensitivities), len(CHANNEL_GROUPS))),
+            output_sensitivities,
+        )
+        scores.append(np.einsum("kmp,km->kp", innovation_sensitivities, segment.values))
+        informations.append(np.sum(innovation_sensitivities**2, axis=1))
+        squares.append(segment.values[segment.observed] ** 2)
+    score, information = np.concatenate(scores), np.concatenate(informations)
+    columns = [sample.recording.measured()[:, channels.columns] for channels in CHANNEL_GROUPS]
     return {
-        channels: _step(pull[:, number], weight[:, number], np.concatenate(squares))
-        for number, channels in enumerate(CHANNELS)
+        channels: _gauss_newton_step(score[:, number], information[:, number], np.concatenate(squares))
+        for number, channels in enumerate(CHANNEL_GROUPS)
         if np.isfinite(columns[number]).any()
     }
 
 
-def _step(pull: Array, weight: Array, squares: Array) -> Offset:
-    total = max(float(np.sum(weight)), np.finfo(float).tiny)
-    step = -float(np.sum(pull)) / total
-    # By how much each part would rather have another step, weighed as it counts.
-    parts = np.array_split(np.arange(len(pull)), PARTS)
-    apart = np.array([-(np.sum(pull[part]) + step * np.sum(weight[part])) / total for part in parts])
-    deviation = float(np.sqrt(np.sum(apart**2) * PARTS / (PARTS - 1) + 1.0 / total))
-    before = float(np.mean(squares))
-    return Offset(step, deviation, before, before - step**2 * total / len(squares))
+def _gauss_newton_step(score: Array, information: Array, squares: Array) -> ClockOffset:
+    total = max(float(np.sum(information)), np.finfo(float).tiny)
+    step = -float(np.sum(score)) / total
+    # Deviation of each block's own step, weighted by its information.
+    blocks = np.array_split(np.arange(len(score)), JACKKNIFE_BLOCKS)
+    block_deviations = np.array([-(np.sum(score[part]) + step * np.sum(information[part])) / total for part in blocks])
+    deviation = float(np.sqrt(np.sum(block_deviations**2) * JACKKNIFE_BLOCKS / (JACKKNIFE_BLOCKS - 1) + 1.0 / total))
+    variance_before = float(np.mean(squares))
+    return ClockOffset(step, deviation, variance_before, variance_before - step**2 * total / len(squares))
 
 
-def _rates(likelihood: Likelihood, run: Linearised) -> Array:
-    """Rates (K, m) of what sensors would show along a stretch of the predicted run."""
+def _output_rates(likelihood: Likelihood, segment: LinearisedSegment) -> Array:
+    """Rates (K, m) of the predicted outputs along a segment of the filter's run."""
     model, count = likelihood.model, likelihood.cable_count
-    shown = casadi.vertcat(model.outputs[:3], model.outputs[6 : 6 + count])
-    outputs = casadi.Function("shown", [model.states, model.inputs], [shown])
-    speeds = np.vstack([run.speeds, np.zeros((model.inputs.numel() - count, run.speeds.shape[1]))])
-    values = np.array(outputs(run.states, speeds))
-    # After the last sample nothing moves.
-    time = np.append(0.0, np.cumsum(np.where(run.step > 0.0, run.step, 1.0)))
-    slopes: Array = np.gradient(values, time, axis=1)[:, :-1].T
-    slopes[:, :3] = run.states[3:6, :-1].T
-    return slopes
+    expression = casadi.vertcat(model.outputs[:3], model.outputs[6 : 6 + count])
+    outputs = casadi.Function("shown", [model.states, model.inputs], [expression])
+    speeds = np.vstack([segment.speeds, np.zeros((model.inputs.numel() - count, segment.speeds.shape[1]))])
+    values = np.array(outputs(segment.states, speeds))
+    # After the last sample of a recording the step is zero.
+    time = np.append(0.0, np.cumsum(np.where(segment.step > 0.0, segment.step, 1.0)))
+    rates: Array = np.gradient(values, time, axis=1)[:, :-1].T
+    rates[:, :3] = segment.states[3:6, :-1].T
+    return rates
 
 
-def shifted(recording: Recording, seconds: float, channels: Channels) -> Recording:
-    """The recording with some outputs as they were shown ``seconds`` later; NaN where they were not.
+def shifted(recording: Recording, seconds: float, channels: ChannelGroup) -> Recording:
+    """The recording with some outputs as they were measured ``seconds`` later; NaN where they were not.
 
-    By a windowed sinc, which leaves white noise white. Raises RecordingError where samples are uneven or too sparse.
+    Interpolates by a windowed sinc, which leaves white noise white.
+
+    Raises RecordingError where samples are uneven or too sparse.
     """
     interval = float(np.median(np.diff(recording.time)))
-    places = (recording.time - recording.time[0]) / interval
-    rows = np.round(places).astype(int)
-    late = f"{channels.name} run {1e3 * seconds:.3g} ms behind winch speeds"
-    if np.max(np.abs(places - rows)) > EVEN * max(1.0, float(rows[-1])) ** 0.5:
-        raise RecordingError(recording.path, f"{late}, and samples are uneven", "set the clocks right")
+    sample_positions = (recording.time - recording.time[0]) / interval
+    grid_rows = np.round(sample_positions).astype(int)
+    description = f"{channels.name} run {1e3 * seconds:.3g} ms behind winch speeds"
+    if (
+        np.max(np.abs(sample_positions - grid_rows))
+        > UNIFORM_SAMPLING_TOLERANCE * max(1.0, float(grid_rows[-1])) ** 0.5
+    ):
+        raise RecordingError(recording.path, f"{description}, and samples are uneven", "set the clocks right")
     measured = recording.measured()
-    steps = int(np.round(seconds / interval))
-    taps = np.sinc(np.arange(-TAPS, TAPS + 1) - (seconds / interval - steps)) * np.kaiser(2 * TAPS + 1, SHAPE)
-    reach = TAPS + abs(steps)
-    for column in measured[:, channels.places].T:
-        whole = np.full(int(rows[-1]) + 1 + 2 * reach, np.nan)
-        whole[reach + rows] = column
-        column[:] = np.correlate(whole, taps / np.sum(taps), mode="valid")[abs(steps) + steps + rows]
-    if not np.isfinite(measured[:, channels.places]).any():
-        raise RecordingError(recording.path, f"{late}, and are too sparse to be shifted", "set the clocks right")
+    whole_steps = int(np.round(seconds / interval))
+    kernel = np.sinc(np.arange(-TAPS_PER_SIDE, TAPS_PER_SIDE + 1) - (seconds / interval - whole_steps)) * np.kaiser(
+        2 * TAPS_PER_SIDE + 1, KAISER_BETA
+    )
+    margin = TAPS_PER_SIDE + abs(whole_steps)
+    for column in measured[:, channels.columns].T:
+        padded = np.full(int(grid_rows[-1]) + 1 + 2 * margin, np.nan)
+        padded[margin + grid_rows] = column
+        column[:] = np.correlate(padded, kernel / np.sum(kernel), mode="valid")[
+            abs(whole_steps) + whole_steps + grid_rows
+        ]
+    if not np.isfinite(measured[:, channels.columns]).any():
+        raise RecordingError(recording.path, f"{description}, and are too sparse to be shifted", "set the clocks right")
     return replace(recording, position=measured[:, :3], tension=measured[:, 3:])

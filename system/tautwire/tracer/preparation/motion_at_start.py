@@ -1,4 +1,4 @@
-"""Whether a recording starts in motion, told by its first positions and winch speeds."""
+"""Initial motion of a recording, estimated from its first positions and winch speeds."""
 
 from __future__ import annotations
 
@@ -11,104 +11,111 @@ from numpy.typing import NDArray
 from ...errors import RecordingError
 from ...recordings.recording import Recording
 from ...robots.robot import Robot
-from ...runs.start import placed, start_of
-from ...statics.equilibrium import directions
+from ...runs.start import start_position, with_start
+from ...statics.equilibrium import unit_directions
 from ..filter_step import Noise
 
 Array = NDArray[np.float64]
 
-SIGMAS = 8.0
-# What tells the velocity at the start: seconds, twice as many where samples are few, of which there must be so many.
-WINDOW, FEWEST = 0.25, 10
-# What tells how far the start is from equilibrium, s; and how far it may be, as a share of the shortest rope.
-SWING, FAR = 1.0, 0.02
-# The filter's deviations, over what was seen.
-WIDER = 1.5
+MIN_VELOCITY_SIGMAS = 8.0
+# Window of the velocity estimate in s, twice as long where samples are few, and the fewest samples in it.
+VELOCITY_WINDOW, MIN_WINDOW_SAMPLES = 0.25, 10
+# Window of the oscillation about equilibrium in s, and its largest amplitude as a share of the shortest rope.
+OSCILLATION_WINDOW, MAX_AMPLITUDE_RATIO = 1.0, 0.02
+# Standard deviations of the initial state over the motion that was estimated.
+PRIOR_WIDENING = 1.5
 
 
 @dataclass(frozen=True)
-class Beginning:
-    """``velocity`` of the platform at the start (m/s), and how far it swings about where the ropes hold it (m)."""
+class InitialMotion:
+    """Initial ``speed`` of the platform (m/s), and ``amplitude`` of its oscillation about equilibrium (m)."""
 
-    velocity: float
-    swing: float
+    speed: float
+    amplitude: float
 
 
 def with_motion_at_start(robot: Robot, noise: Noise, recordings: Sequence[Recording]) -> tuple[Noise, tuple[str, ...]]:
-    """Noise with a start as uncertain as the recordings that begin in motion need, and a note of each of these.
+    """Noise with an initial state as uncertain as recordings that begin in motion require, and a note of each of these.
 
-    Raises RecordingError where one is too far from rest for its ropes' reference, the static start, to be found.
+    Raises RecordingError where one is too far from rest to find its ropes' reference, the static start.
     """
     notes: list[str] = []
     for recording in recordings:
-        here = placed(robot, start_of(robot, noise.position, recording)[0])
-        found = beginning_of(here, noise, recording)
-        if found is None:
+        robot_at_start = with_start(robot, start_position(robot, noise.position, recording)[0])
+        motion = initial_motion(robot_at_start, noise, recording)
+        if motion is None:
             continue
-        shortest = min(float(np.linalg.norm(np.subtract(a, robot.platform.start))) for a in robot.anchors)
-        if found.swing > FAR * shortest:
-            problem = f"starts in motion, {found.velocity:.3g} m/s, and swings by {found.swing:.3g} m"
-            mend = "start the recording at rest: the ropes' reference is the static start"
-            raise RecordingError(recording.path, problem, mend)
+        shortest_cable = min(float(np.linalg.norm(np.subtract(a, robot.platform.start))) for a in robot.anchors)
+        if motion.amplitude > MAX_AMPLITUDE_RATIO * shortest_cable:
+            problem = f"starts in motion, {motion.speed:.3g} m/s, and swings by {motion.amplitude:.3g} m"
+            hint = "start the recording at rest: the ropes' reference is the static start"
+            raise RecordingError(recording.path, problem, hint)
         noise = replace(
             noise,
-            start_velocity=max(noise.start_velocity, WIDER * found.velocity),
-            start_stretch=max(noise.start_stretch, WIDER * found.swing),
+            start_velocity=max(noise.start_velocity, PRIOR_WIDENING * motion.speed),
+            start_stretch=max(noise.start_stretch, PRIOR_WIDENING * motion.amplitude),
         )
         notes.append(
-            f"{recording.path} starts in motion, at about {found.velocity:.3g} m/s: where, how fast and under which "
+            f"{recording.path} starts in motion, at about {motion.speed:.3g} m/s: where, how fast and under which "
             "tensions was fitted beside every effect; what ropes remember (relaxation, creep) is taken as at rest"
         )
     return noise, tuple(notes)
 
 
-def beginning_of(robot: Robot, noise: Noise, recording: Recording) -> Beginning | None:
-    """How a recording begins; None where at rest as far as is seen.
+def initial_motion(robot: Robot, noise: Noise, recording: Recording) -> InitialMotion | None:
+    """Initial motion of a recording; None where it is at rest within noise.
 
-    Winch speeds alone would move a platform on stiff ropes at ``v`` with ``U' v = V``. What positions do beside that is
-    fitted by ``e_0 + e_1 t + e_2 t^2``; the velocity is ``v + e_1``, and counts where it is eight sigma from none.
+    Winch speeds alone would move a platform on stiff ropes at ``v`` with ``U' v = V``. The residual of the positions is
+    fitted by ``e_0 + e_1 t + e_2 t^2``; the velocity is ``v + e_1``, significant at eight sigma from zero.
     """
     time = recording.time - recording.time[0]
-    leading = np.linalg.pinv(directions(robot), rcond=1e-9)
-    led = recording.winch_speed @ leading
-    moved = _integral(time, led)
-    begun, line = recording.winch_speed[0], led[0]
-    spread = noise.winch_speed * np.linalg.norm(leading, axis=0)
-    early = time <= 2.0 * WINDOW
-    seen = [axis for axis, column in enumerate(recording.position.T) if np.sum(np.isfinite(column[early])) >= FEWEST]
-    if not seen:
-        runs = bool(np.any(np.abs(begun) > SIGMAS * noise.winch_speed)) and noise.winch_speed > 0.0
-        return Beginning(float(np.linalg.norm(line)), 0.0) if runs else None
-    own = noise.of_outputs(recording.cable_count)
-    velocity, significant, swings = np.zeros(3), False, [0.0]
-    for axis in seen:
-        beside = recording.position[:, axis] - moved[:, axis]
-        slope, deviation = _slope(time, beside, own[axis])
-        velocity[axis] = line[axis] + slope
-        significant |= bool(abs(velocity[axis]) > SIGMAS * np.hypot(deviation, spread[axis]))
-        swings.append(_swing(time, beside, own[axis]))
-    return Beginning(float(np.linalg.norm(velocity)), max(swings)) if significant else None
+    velocity_map = np.linalg.pinv(unit_directions(robot), rcond=1e-9)
+    winch_led_velocity = recording.winch_speed @ velocity_map
+    displacement = _cumulative_integral(time, winch_led_velocity)
+    initial_winch_speed, initial_velocity = recording.winch_speed[0], winch_led_velocity[0]
+    velocity_noise = noise.winch_speed * np.linalg.norm(velocity_map, axis=0)
+    is_early = time <= 2.0 * VELOCITY_WINDOW
+    measured_axes = [
+        axis
+        for axis, column in enumerate(recording.position.T)
+        if np.sum(np.isfinite(column[is_early])) >= MIN_WINDOW_SAMPLES
+    ]
+    if not measured_axes:
+        is_moving = (
+            bool(np.any(np.abs(initial_winch_speed) > MIN_VELOCITY_SIGMAS * noise.winch_speed))
+            and noise.winch_speed > 0.0
+        )
+        return InitialMotion(float(np.linalg.norm(initial_velocity)), 0.0) if is_moving else None
+    output_noise = noise.of_outputs(recording.cable_count)
+    velocity, significant, amplitudes = np.zeros(3), False, [0.0]
+    for axis in measured_axes:
+        residual = recording.position[:, axis] - displacement[:, axis]
+        slope, deviation = _initial_slope(time, residual, output_noise[axis])
+        velocity[axis] = initial_velocity[axis] + slope
+        significant |= bool(abs(velocity[axis]) > MIN_VELOCITY_SIGMAS * np.hypot(deviation, velocity_noise[axis]))
+        amplitudes.append(_oscillation_amplitude(time, residual, output_noise[axis]))
+    return InitialMotion(float(np.linalg.norm(velocity)), max(amplitudes)) if significant else None
 
 
-def _integral(time: Array, rates: Array) -> Array:
+def _cumulative_integral(time: Array, rates: Array) -> Array:
     steps = 0.5 * (rates[1:] + rates[:-1]) * np.diff(time)[:, None]
     total: Array = np.vstack([np.zeros((1, rates.shape[1])), np.cumsum(steps, axis=0)])
     return total
 
 
-def _slope(time: Array, signal: Array, sigma: float) -> tuple[float, float]:
-    """Slope at the start of the parabola through the first samples, and its deviation."""
-    there = np.flatnonzero(np.isfinite(signal))
-    chosen = there[: max(int(np.sum(time[there] <= WINDOW)), FEWEST)]
-    powers = np.vander(time[chosen], 3, increasing=True)
+def _initial_slope(time: Array, signal: Array, sigma: float) -> tuple[float, float]:
+    """Initial slope of the parabola through the first samples, and its standard deviation."""
+    measured = np.flatnonzero(np.isfinite(signal))
+    selected = measured[: max(int(np.sum(time[measured] <= VELOCITY_WINDOW)), MIN_WINDOW_SAMPLES)]
+    powers = np.vander(time[selected], 3, increasing=True)
     inverse = np.linalg.pinv(powers)
-    return float(inverse[1] @ signal[chosen]), sigma * float(np.linalg.norm(inverse[1]))
+    return float(inverse[1] @ signal[selected]), sigma * float(np.linalg.norm(inverse[1]))
 
 
-def _swing(time: Array, signal: Array, sigma: float) -> float:
-    """How far a signal is from the parabola that it swings about in its first second, noise apart."""
-    chosen = np.flatnonzero(np.isfinite(signal) & (time <= SWING))
-    if len(chosen) <= FEWEST:
+def _oscillation_amplitude(time: Array, signal: Array, sigma: float) -> float:
+    """Amplitude of the oscillation of a signal about a parabola in its first second, without noise."""
+    selected = np.flatnonzero(np.isfinite(signal) & (time <= OSCILLATION_WINDOW))
+    if len(selected) <= MIN_WINDOW_SAMPLES:
         return 0.0
-    left = signal[chosen] - np.polyval(np.polyfit(time[chosen], signal[chosen], 2), time[chosen])
-    return float(np.sqrt(max(2.0 * (float(np.mean(left**2)) - sigma**2), 0.0)))
+    residual = signal[selected] - np.polyval(np.polyfit(time[selected], signal[selected], 2), time[selected])
+    return float(np.sqrt(max(2.0 * (float(np.mean(residual**2)) - sigma**2), 0.0)))

@@ -1,26 +1,26 @@
-"""What the sensors add: from the robot file, else from the recording's own roughness."""
+"""Measurement noise of the sensors: from the robot file, else estimated from the recording."""
 
 from __future__ import annotations
 
 from ...recordings.recording import Recording
-from ...recordings.roughness import roughness
+from ...recordings.roughness import white_noise_deviation
 from ...robots.robot import Robot
 from ..filter_step import Noise
 
-START_SPREAD = 3.0
-START_UNSEEN = 1e-3
+INITIAL_POSITION_SIGMAS = 3.0
+UNMEASURED_INITIAL_DEVIATION = 1e-3
 
 
-def noise_of(robot: Robot, recording: Recording) -> Noise:
-    """Standard deviations as declared; one that is not declared, or zero, is measured on the recording.
+def estimate_noise(robot: Robot, recording: Recording) -> Noise:
+    """Standard deviations as declared; one that is not declared, or zero, is estimated from the recording.
 
     A winch speed may be declared free of noise; no position or tension is.
     """
-    position = robot.sensors.position_noise or roughness(recording.position)
+    position = robot.sensors.position_noise or white_noise_deviation(recording.position)
     speed = robot.sensors.winch_speed_noise
     return Noise(
         position=position,
-        tension=robot.sensors.tension_noise or roughness(recording.tension),
-        winch_speed=roughness(recording.winch_speed) if speed is None else speed,
-        start=START_SPREAD * position if recording.has_position else START_UNSEEN,
+        tension=robot.sensors.tension_noise or white_noise_deviation(recording.tension),
+        winch_speed=white_noise_deviation(recording.winch_speed) if speed is None else speed,
+        start_position=INITIAL_POSITION_SIGMAS * position if recording.has_position else UNMEASURED_INITIAL_DEVIATION,
     )

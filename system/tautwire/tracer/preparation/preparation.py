@@ -1,4 +1,4 @@
-"""Recordings as they are, made fit for judging: what is done to them, and what is not known of their start."""
+"""Preprocessing of recordings for estimation: cleaning, noise and the uncertainty of their initial state."""
 
 from __future__ import annotations
 
@@ -10,20 +10,20 @@ from ...robots.robot import Robot
 from ..filter_step import Noise
 from .gaps import without_gaps
 from .motion_at_start import with_motion_at_start
-from .noise import noise_of
-from .noise_check import checked_noise
+from .noise import estimate_noise
+from .noise_check import check_noise
 from .outliers import without_outliers
-from .silent import without_silent
-from .start_state import self_stress_of
+from .silent import without_dead_channels
+from .start_state import self_stress_deviation
 
-Cleaning = Callable[[Recording], tuple[Recording, tuple[str, ...]]]
+CleaningStep = Callable[[Recording], tuple[Recording, tuple[str, ...]]]
 
-CLEANINGS: tuple[Cleaning, ...] = (without_silent, without_outliers)
+CLEANING_STEPS: tuple[CleaningStep, ...] = (without_dead_channels, without_outliers)
 
 
 @dataclass(frozen=True)
-class Prepared:
-    """What a trace works on, with notes of all that was done to it."""
+class PreparedRecordings:
+    """Cleaned recordings and their noise, with notes of every step applied."""
 
     fit: Recording
     check: Recording | None
@@ -31,25 +31,27 @@ class Prepared:
     notes: tuple[str, ...]
 
 
-def prepare(robot: Robot, fit: Recording, check: Recording | None) -> Prepared:
-    """Clean both recordings, and hold the declared noise against them.
+def prepare_recordings(robot: Robot, fit: Recording, check: Recording | None) -> PreparedRecordings:
+    """Clean both recordings and test the declared noise against them.
 
-    Raises RecordingError where a recording has no output that shows something, or is not to be trusted.
+    Raises RecordingError where a recording has no output that carries information, or is not to be trusted.
     """
     recordings: list[Recording] = []
     notes: tuple[str, ...] = ()
     for recording in (fit,) if check is None else (fit, check):
         cleaned = recording
-        for cleaning in CLEANINGS:
-            cleaned, said = cleaning(cleaned)
-            notes += said
+        for cleaning in CLEANING_STEPS:
+            cleaned, new_notes = cleaning(cleaned)
+            notes += new_notes
         require_outputs(cleaned)
-        cleaned, said = without_gaps(robot, noise_of(robot, cleaned), cleaned)
+        cleaned, new_notes = without_gaps(robot, estimate_noise(robot, cleaned), cleaned)
         recordings.append(cleaned)
-        notes += said
-    checked = checked_noise(robot, noise_of(robot, recordings[0]), tuple(recordings))
-    self_stress, said = self_stress_of(robot, checked.recordings)
+        notes += new_notes
+    checked = check_noise(robot, estimate_noise(robot, recordings[0]), tuple(recordings))
+    self_stress, new_notes = self_stress_deviation(robot, checked.recordings)
     noise = replace(checked.noise, self_stress=self_stress)
-    noise, moving = with_motion_at_start(robot, noise, checked.recordings)
+    noise, motion_notes = with_motion_at_start(robot, noise, checked.recordings)
     first, *others = checked.recordings
-    return Prepared(first, others[0] if others else None, noise, (*notes, *checked.notes, *said, *moving))
+    return PreparedRecordings(
+        first, others[0] if others else None, noise, (*notes, *checked.notes, *new_notes, *motion_notes)
+    )

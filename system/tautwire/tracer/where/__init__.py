@@ -1,1 +1,1 @@
-"""Where the residual sits: each FMU cut at its measured ports, before any effect is fitted."""
+"""Localisation of model error: residuals of single FMUs at their measured ports, before any effect is fitted."""

@@ -1,4 +1,4 @@
-"""With which of some known signals a residual moves, told before anything is fitted."""
+"""Correlation of a residual with known signals, tested before anything is fitted."""
 
 from __future__ import annotations
 
@@ -10,25 +10,27 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-ALPHA = 0.01
-FEWEST = 30
-# Share of a recording up to which samples apart count as alike.
-FURTHEST_LAG = 4
+SIGNIFICANCE_LEVEL = 0.01
+MIN_SAMPLES = 30
+# Autocorrelations count up to a lag of the recording's length over this.
+MAX_LAG_DIVISOR = 4
 
 
 @dataclass(frozen=True)
-class Association:
-    """A signal by name, and the correlation of a residual with it."""
+class SignalCorrelation:
+    """Correlation of a residual with a named signal."""
 
     name: str
     correlation: float
 
 
-def strongest(residual: Array, signals: Mapping[str, Array], alpha: float = ALPHA) -> Association | None:
-    """The signal with which a residual (N,) correlates most of those where it does significantly; None if none does.
+def strongest_correlation(
+    residual: Array, signals: Mapping[str, Array], significance_level: float = SIGNIFICANCE_LEVEL
+) -> SignalCorrelation | None:
+    """Strongest significant correlation of a residual (N,) with any of the signals; None if none is significant.
 
     With correlation ``r`` and ``n`` independent samples ``r sqrt((n - 2) / (1 - r^2))`` has Student's distribution;
-    Holm's correction over all signals. Neighbours are alike in both, so that
+    Holm's correction over all signals. Neighbours are correlated in both, so that
 
         n = N / (1 + 2 sum_k rho_residual(k) rho_signal(k))
 
@@ -37,48 +39,50 @@ def strongest(residual: Array, signals: Mapping[str, Array], alpha: float = ALPH
     # Imported here: it takes long to import, and only traces need it.
     from scipy.stats import t as student
 
-    seen = np.isfinite(residual)
-    if np.sum(seen) < FEWEST:
+    is_finite = np.isfinite(residual)
+    if np.sum(is_finite) < MIN_SAMPLES:
         return None
-    left = _standard(residual[seen])
-    alike = _autocorrelation(left)
-    names, correlations, chances = [], [], []
+    standardised = _standardised(residual[is_finite])
+    autocorrelation = _autocorrelation(standardised)
+    names, correlations, p_values = [], [], []
     for name, signal in signals.items():
-        other = _standard(signal[seen])
+        other = _standardised(signal[is_finite])
         if not np.any(other):
             continue
-        correlation = float(np.clip(np.mean(left * other), -1.0 + 1e-12, 1.0 - 1e-12))
-        spread = 1.0 + 2.0 * float(np.sum(alike * _autocorrelation(other)))
-        free = len(left) / max(spread, 1.0) - 2.0
-        size = abs(correlation) * np.sqrt(max(free, 0.0) / (1.0 - correlation**2))
+        correlation = float(np.clip(np.mean(standardised * other), -1.0 + 1e-12, 1.0 - 1e-12))
+        variance_inflation = 1.0 + 2.0 * float(np.sum(autocorrelation * _autocorrelation(other)))
+        degrees_of_freedom = len(standardised) / max(variance_inflation, 1.0) - 2.0
+        t_statistic = abs(correlation) * np.sqrt(max(degrees_of_freedom, 0.0) / (1.0 - correlation**2))
         names.append(name)
         correlations.append(correlation)
-        chances.append(2.0 * float(student.sf(size, free)) if free > 1.0 else 1.0)
-    told = _holm(np.array(chances), alpha)
-    found = [Association(n, c) for n, c, sure in zip(names, correlations, told, strict=True) if sure]
-    return max(found, key=lambda each: abs(each.correlation), default=None)
+        p_values.append(2.0 * float(student.sf(t_statistic, degrees_of_freedom)) if degrees_of_freedom > 1.0 else 1.0)
+    is_significant = _holm_correction(np.array(p_values), significance_level)
+    candidates = [
+        SignalCorrelation(n, c) for n, c, sure in zip(names, correlations, is_significant, strict=True) if sure
+    ]
+    return max(candidates, key=lambda each: abs(each.correlation), default=None)
 
 
-def _holm(chances: Array, alpha: float) -> NDArray[np.bool_]:
-    """Which of some chances (k,) are too small for all together to err with more than ``alpha``."""
-    order = np.argsort(chances)
-    kept = np.minimum.accumulate(chances[order] * np.arange(len(chances), 0, -1) <= alpha)
-    told = np.zeros(len(chances), dtype=bool)
-    told[order] = kept
-    return told
+def _holm_correction(p_values: Array, significance_level: float) -> NDArray[np.bool_]:
+    """Hypotheses rejected by their p-values (k,) at a family-wise error rate of ``significance_level``."""
+    order = np.argsort(p_values)
+    is_rejected = np.minimum.accumulate(p_values[order] * np.arange(len(p_values), 0, -1) <= significance_level)
+    is_significant = np.zeros(len(p_values), dtype=bool)
+    is_significant[order] = is_rejected
+    return is_significant
 
 
-def _standard(values: Array) -> Array:
-    """Mean zero and mean square one; zeros where nothing moves."""
-    away = values - np.mean(values)
-    size = float(np.sqrt(np.mean(away**2)))
-    still = size <= 1e-12 * float(np.max(np.abs(values), initial=0.0))
-    standard: Array = np.zeros_like(away) if still else away / size
-    return standard
+def _standardised(values: Array) -> Array:
+    """Values standardised to zero mean and unit mean square; zeros where they are constant."""
+    centred = values - np.mean(values)
+    rms = float(np.sqrt(np.mean(centred**2)))
+    is_constant = rms <= 1e-12 * float(np.max(np.abs(values), initial=0.0))
+    standardised: Array = np.zeros_like(centred) if is_constant else centred / rms
+    return standardised
 
 
 def _autocorrelation(values: Array) -> Array:
-    """Of a standard series (N,), at lags from 1 to a quarter of it."""
+    """Autocorrelation of a standardised series (N,), at lags from 1 to a quarter of it."""
     power = np.abs(np.fft.rfft(values, 2 * len(values))) ** 2
-    found: Array = np.fft.irfft(power)[1 : len(values) // FURTHEST_LAG + 1] / len(values)
-    return found
+    autocorrelation: Array = np.fft.irfft(power)[1 : len(values) // MAX_LAG_DIVISOR + 1] / len(values)
+    return autocorrelation

@@ -1,10 +1,10 @@
-"""Where a robot errs: each FMU alone at its measured ports, before any effect is fitted.
+"""Localisation of model error: each FMU alone at its measured ports, before any effect is fitted.
 
-A cable FMU along the measured path with the recorded winch speed shows a tension, which its load cell should show; the
-platform FMU under the measured tensions shows an acceleration, which the measured path should have. A wrong rope or
-winch shows at its cable alone, since the measured tension is real; a wrong weight or an outer force at the platform
-alone; a wrong load cell at both, and the balance closes with the FMU's tension in its place; a wrong exit point at
-both, and it does not. The start tension of each cable is free: it follows from what the platform weighs.
+A cable FMU along the measured path with the recorded winch speed gives a tension, to be compared with its load cell;
+the platform FMU under the measured tensions gives an acceleration, to be compared with the measured path. A wrong rope
+or winch shows at its cable alone, since the measured tension is real; a wrong weight or an external force at the
+platform alone; a wrong load cell at both, and the balance closes with the FMU's tension instead; a wrong exit point at
+both, and it does not close. The initial tension of each cable is free: it follows from the platform's weight.
 """
 
 from __future__ import annotations
@@ -19,109 +19,122 @@ from numpy.typing import NDArray
 from ...fmus.packaging import RobotFmus, build_fmus
 from ...recordings.recording import Recording
 from ...robots.robot import Robot
-from ...runs.start import placed
-from ..data import Sample
+from ...runs.start import with_start
+from ..data import DataSet
 from ..filter_step import Noise
-from .blame import named, verdict_of
-from .cable_cut import CableRun, exit_shift, run_cable
-from .path import FEWEST_SEEN, Path, smoothed_path
-from .platform_cut import Balance, balance, measured_forces, run_platform
-from .port_parts import axis_part, cable_part
-from .port_residuals import ComponentResidual, Components, root_mean_square
+from .blame import isolation_verdict, numbered
+from .cable_cut import CableSimulation, exit_shift, simulate_cable
+from .path import MIN_MEASURED_SAMPLES, SmoothedPath, smooth_path
+from .platform_cut import ForceBalance, force_balance, measured_forces, simulate_platform
+from .port_parts import cable_residual, platform_residual
+from .port_residuals import ComponentResidual, FaultLocalisation, root_mean_square
 
 Array = NDArray[np.float64]
 
-# Samples that are looked at: the cost grows with them, and these tell.
-MOST_SAMPLES = 20_000
-CLOSED = 0.5
-SAME_PLANE = 1e-6
+# Samples that are evaluated: the cost grows with them, and these are enough.
+MAX_SAMPLES = 20_000
+MAX_CLOSURE_RATIO = 0.5
+PLANARITY_TOLERANCE = 1e-6
 
 
-def cut_at_ports(robot: Robot, sample: Sample, noise: Noise) -> Components:
-    """Run each FMU of a robot alone along a recording; raises ComponentError where one fails."""
-    recording = sample.recording.first(MOST_SAMPLES)
-    untold = list(_missing(robot, recording))
+def localise_residual(robot: Robot, sample: DataSet, noise: Noise) -> FaultLocalisation:
+    """Localise the model error of a robot by running each FMU alone along a recording; raises ComponentError."""
+    recording = sample.recording.first(MAX_SAMPLES)
+    limitations = list(_limitations(robot, recording))
     if recording.sample_count < sample.recording.sample_count:
-        untold.append(f"only the first {recording.duration:.4g} s were looked at")
+        limitations.append(f"only the first {recording.duration:.4g} s were looked at")
     if not _has_path(robot, recording):
-        return Components(recording.time, (), *verdict_of((), ()), tuple(untold))
-    here = placed(robot.as_modelled(), sample.start)
-    path = smoothed_path(recording, here.platform.start, noise.of_outputs(robot.cable_count)[:3])
+        return FaultLocalisation(recording.time, (), *isolation_verdict((), ()), tuple(limitations))
+    robot_at_start = with_start(robot.as_modelled(), sample.start)
+    path = smooth_path(recording, robot_at_start.platform.start, noise.of_outputs(robot.cable_count)[:3])
     with TemporaryDirectory(prefix="tautwire-cut-") as folder:
-        return _cut(here, build_fmus(here, FilePath(folder)), recording, path, noise, untold)
+        return _evaluate_components(
+            robot_at_start, build_fmus(robot_at_start, FilePath(folder)), recording, path, noise, limitations
+        )
 
 
-def _cut(
-    robot: Robot, fmus: RobotFmus, recording: Recording, path: Path, noise: Noise, untold: list[str]
-) -> Components:
+def _evaluate_components(
+    robot: Robot, fmus: RobotFmus, recording: Recording, path: SmoothedPath, noise: Noise, limitations: list[str]
+) -> FaultLocalisation:
     columns = recording.winch_speed.T
     runs = [
-        run_cable(f"cable_{i}", fmu, path, speed)
+        simulate_cable(f"cable_{i}", fmu, path, speed)
         for i, fmu, speed in zip(robot.cable_numbers, fmus.cables, columns, strict=True)
     ]
-    measured = np.sum(np.isfinite(recording.tension), axis=0) >= FEWEST_SEEN
-    cables = [
-        cable_part(number, run, recording, path, noise, np.array(robot.cables[number - 1].anchor))
-        for number, run, there in zip(robot.cable_numbers, runs, measured, strict=True)
+    has_tension = np.sum(np.isfinite(recording.tension), axis=0) >= MIN_MEASURED_SAMPLES
+    cable_residuals = [
+        cable_residual(number, run, recording, path, noise, np.array(robot.cables[number - 1].anchor))
+        for number, run, there in zip(robot.cable_numbers, runs, has_tension, strict=True)
         if there
     ]
-    if not np.all(measured):
-        return Components(path.time, tuple(cables), *verdict_of(cables, ()), tuple(untold))
+    if not np.all(has_tension):
+        return FaultLocalisation(
+            path.time, tuple(cable_residuals), *isolation_verdict(cable_residuals, ()), tuple(limitations)
+        )
 
     sigmas = noise.of_outputs(robot.cable_count)
 
-    def balanced(tension: Array) -> Balance:
+    def balance_under(tension: Array) -> ForceBalance:
         forces = measured_forces(runs, tension, np.array(robot.anchors), path.position)
-        shown = run_platform(fmus.platform, path, forces, robot.platform.mass)
-        return balance(path, recording.position, shown, forces, robot.platform.mass, sigmas)
+        accelerations = simulate_platform(fmus.platform, path, forces, robot.platform.mass)
+        return force_balance(path, recording.position, accelerations, forces, robot.platform.mass, sigmas)
 
-    found = balanced(recording.tension)
-    looked_at = np.flatnonzero(np.any(np.isfinite(found.force), axis=0))
-    platform = [axis_part(int(axis), found, path) for axis in looked_at]
-    wrong = [cable.is_off for cable in cables]
-    closes = False
-    if any(wrong) and any(part.is_off for part in platform):
-        shown = np.column_stack([run.tension for run in runs])
-        closes = _closer(balanced(np.where(wrong, shown, recording.tension)).force, found.force)
-    exits = [
+    measured_balance = balance_under(recording.tension)
+    measured_axes = np.flatnonzero(np.any(np.isfinite(measured_balance.force), axis=0))
+    platform_residuals = [platform_residual(int(axis), measured_balance, path) for axis in measured_axes]
+    is_deviating = [cable.is_significant for cable in cable_residuals]
+    balance_closes = False
+    if any(is_deviating) and any(part.is_significant for part in platform_residuals):
+        simulated_tension = np.column_stack([run.tension for run in runs])
+        balance_closes = _is_balance_closed(
+            balance_under(np.where(is_deviating, simulated_tension, recording.tension)).force, measured_balance.force
+        )
+    exit_candidates = [
         number
-        for number, cable, run in zip(robot.cable_numbers, cables, runs, strict=True)
-        if platform and cable.is_off and _may_be_exit(cable, run, platform)
+        for number, cable, run in zip(robot.cable_numbers, cable_residuals, runs, strict=True)
+        if platform_residuals and cable.is_significant and _may_be_exit_point(cable, run, platform_residuals)
     ]
-    parts = (*cables, *platform)
-    return Components(path.time, parts, *verdict_of(cables, platform, closes, exits), tuple(untold))
+    residuals = (*cable_residuals, *platform_residuals)
+    return FaultLocalisation(
+        path.time,
+        residuals,
+        *isolation_verdict(cable_residuals, platform_residuals, balance_closes, exit_candidates),
+        tuple(limitations),
+    )
 
 
-def _closer(swapped: Array, force: Array) -> bool:
-    """Whether the balance closes by other tensions: the force that is missing, and how it moves, less than half."""
-    moving = [values - np.nanmean(values, axis=0) for values in (swapped, force)]
-    pairs = ((swapped, force), (moving[0], moving[1]))
-    return all(root_mean_square(after) < CLOSED * root_mean_square(before) for after, before in pairs)
+def _is_balance_closed(swapped: Array, force: Array) -> bool:
+    """Whether swapped tensions close the balance: the missing force, and its variation, become less than half."""
+    centred = [values - np.nanmean(values, axis=0) for values in (swapped, force)]
+    pairs = ((swapped, force), (centred[0], centred[1]))
+    return all(root_mean_square(after) < MAX_CLOSURE_RATIO * root_mean_square(before) for after, before in pairs)
 
 
-def _may_be_exit(cable: ComponentResidual, run: CableRun, platform: Sequence[ComponentResidual]) -> bool:
-    """Whether a shift of the exit point that turns its pull by less than is seen explains a cable's residual."""
-    seen = min(part.limit * part.expected_rms for part in platform)
-    largest = seen * float(np.min(run.length)) / float(np.max(run.tension))
-    _, left = exit_shift(run, cable.residual, cable.expected_rms, largest)
-    return root_mean_square(left) < cable.limit * cable.expected_rms
+def _may_be_exit_point(cable: ComponentResidual, run: CableSimulation, platform: Sequence[ComponentResidual]) -> bool:
+    """Whether a shift of the exit point too small to show in the platform's balance explains a cable's residual."""
+    detectable_force = min(part.threshold * part.expected_rms for part in platform)
+    max_shift = detectable_force * float(np.min(run.length)) / float(np.max(run.tension))
+    _, remaining = exit_shift(run, cable.residual, cable.expected_rms, max_shift)
+    return root_mean_square(remaining) < cable.threshold * cable.expected_rms
 
 
 def _has_path(robot: Robot, recording: Recording) -> bool:
-    """Whether positions tell where the platform is: along all axes, but for one across which the robot is flat."""
+    """Whether positions determine the path: along all axes, but for one across which the robot is planar."""
     points = np.array([*robot.anchors, robot.platform.start])
-    flat = np.ptp(points, axis=0) <= SAME_PLANE * np.max(np.ptp(points, axis=0))
-    measured = np.sum(np.isfinite(recording.position), axis=0) >= FEWEST_SEEN
+    flat = np.ptp(points, axis=0) <= PLANARITY_TOLERANCE * np.max(np.ptp(points, axis=0))
+    measured = np.sum(np.isfinite(recording.position), axis=0) >= MIN_MEASURED_SAMPLES
     return bool(np.all(measured | flat) and np.any(measured))
 
 
-def _missing(robot: Robot, recording: Recording) -> list[str]:
-    """What cannot be told of a recording, in words."""
+def _limitations(robot: Robot, recording: Recording) -> list[str]:
+    """Limitations of a recording, in words."""
     if not _has_path(robot, recording):
         return ["positions are missing: no cable and not the platform can be looked at alone"]
-    without = [n for n in robot.cable_numbers if np.sum(np.isfinite(recording.tension[:, n - 1])) < FEWEST_SEEN]
-    if not without:
+    unmeasured = [
+        n for n in robot.cable_numbers if np.sum(np.isfinite(recording.tension[:, n - 1])) < MIN_MEASURED_SAMPLES
+    ]
+    if not unmeasured:
         return []
-    if len(without) == robot.cable_count:
+    if len(unmeasured) == robot.cable_count:
         return ["no tensions: no cable and not the platform can be looked at alone"]
-    return [f"no tension of {named('cable', without)}: neither that nor the platform can be looked at alone"]
+    return [f"no tension of {numbered('cable', unmeasured)}: neither that nor the platform can be looked at alone"]

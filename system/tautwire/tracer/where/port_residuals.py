@@ -1,4 +1,4 @@
-"""What each FMU alone leaves at its measured ports: values only, for reports to show."""
+"""Component residuals at the measured ports: values only, for reports to show."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .associations import Association
+from .associations import SignalCorrelation
 
 Array = NDArray[np.float64]
 
@@ -16,11 +16,11 @@ PLATFORM = "platform"
 
 @dataclass(frozen=True)
 class ComponentResidual:
-    """What one FMU alone leaves of one measured quantity, measured less shown, in ``unit``.
+    """Residual of one FMU alone in one measured quantity, measured less simulated, in ``unit``.
 
-    ``residual`` (N,) is NaN where nothing was measured; ``mean`` its mean, which is taken off a tension's. ``rms`` is
-    to be compared with ``expected_rms``, what noise alone would leave; chance does not reach the ratio ``limit``.
-    ``rings_at`` is the frequency (Hz) at which a force rings by itself, None where it does not.
+    ``residual`` (N,) is NaN where nothing was measured; ``mean`` its mean, which is subtracted from a tension's.
+    ``rms`` is to be compared with ``expected_rms``, that of noise alone; chance does not reach the ratio ``threshold``.
+    ``resonance_frequency`` (Hz) is that of a hidden oscillator, None where there is none.
     """
 
     component: str
@@ -30,42 +30,42 @@ class ComponentResidual:
     mean: float
     rms: float
     expected_rms: float
-    limit: float
-    moves_with: Association | None
-    rings_at: float | None = None
+    threshold: float
+    correlated_signal: SignalCorrelation | None
+    resonance_frequency: float | None = None
 
     @property
     def ratio(self) -> float:
-        """Root mean square over what noise alone would leave."""
+        """Root mean square over that of noise alone."""
         return self.rms / self.expected_rms
 
     @property
-    def is_off(self) -> bool:
-        """Whether it is more than noise."""
-        return self.ratio > self.limit
+    def is_significant(self) -> bool:
+        """Whether the residual is more than noise."""
+        return self.ratio > self.threshold
 
 
 def root_mean_square(values: Array) -> float:
     """Root mean square of what is finite; NaN where nothing is."""
-    seen = values[np.isfinite(values)]
-    return float(np.sqrt(np.mean(seen**2))) if seen.size else float("nan")
+    finite = values[np.isfinite(values)]
+    return float(np.sqrt(np.mean(finite**2))) if finite.size else float("nan")
 
 
 @dataclass(frozen=True)
-class Components:
-    """Residuals at the measured ports at ``time`` (N,), cables before the platform's axes; what they say.
+class FaultLocalisation:
+    """Localisation of model error by ``residuals`` at the measured ports at ``time`` (N,), cables before the platform.
 
-    ``blamed`` is the component in question, ``sentence`` says so with the figures; ``untold`` is what could not be
-    told.
+    ``faulty_component`` is the one in question, ``sentence`` says so with the figures; ``limitations`` name what could
+    not be evaluated.
     """
 
     time: Array
-    parts: tuple[ComponentResidual, ...]
-    blamed: str
+    residuals: tuple[ComponentResidual, ...]
+    faulty_component: str
     sentence: str
-    untold: tuple[str, ...]
+    limitations: tuple[str, ...]
 
     @property
     def ranking(self) -> tuple[ComponentResidual, ...]:
-        """The parts, the one furthest above its noise first."""
-        return tuple(sorted(self.parts, key=lambda part: -part.ratio))
+        """The residuals, the one furthest above its noise first."""
+        return tuple(sorted(self.residuals, key=lambda part: -part.ratio))

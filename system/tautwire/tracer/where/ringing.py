@@ -1,4 +1,4 @@
-"""A narrow peak that a residual force has and the platform's motion has not: something that swings by itself."""
+"""Resonance of a residual force: a narrow spectral peak that the platform's motion does not have."""
 
 from __future__ import annotations
 
@@ -9,42 +9,47 @@ from numpy.typing import NDArray
 
 Array = NDArray[np.float64]
 
-SEGMENTS = 3
-FEWEST, FEWEST_FREQUENCIES = 64, 5
-# A peak rises by this factor over both its sides, in power.
-PROMINENCE = 30.0
-# Of the residual's power, what lies within a quarter of the peak's frequency.
-SHARE, WIDTH = 0.3, 0.25
+WELCH_SEGMENTS = 3
+MIN_SAMPLES, MIN_FREQUENCIES = 64, 5
+# Prominence of a peak over both its sides, as a ratio of power.
+MIN_PROMINENCE = 30.0
+# Least share of the residual's power within a quarter of the peak's frequency.
+MIN_POWER_RATIO, PEAK_WIDTH_RATIO = 0.3, 0.25
 
 
-def ringing(time: Array, residual: Array, acceleration: Array, cutoff: float) -> float | None:
-    """Frequency (Hz) below ``cutoff`` (rad/s) at which a residual force (N,) rings; None where it does not.
+def resonance_frequency(time: Array, residual: Array, acceleration: Array, cutoff: float) -> float | None:
+    """Resonance frequency (Hz) of a residual force (N,) below ``cutoff`` (rad/s); None where there is none.
 
     The ratio of its power spectral density to that of the acceleration (N,) along it is that of a mass squared where
-    a weight is wrong, falls steadily for what brakes, and has a peak for a body that swings.
+    a weight is wrong, falls steadily for a damping force, and has a peak for an attached oscillator.
     """
     # Imported here: it takes long to import, and only traces need it.
     from scipy.signal import detrend, find_peaks, peak_prominences, welch
 
-    seen = np.isfinite(residual)
-    if np.sum(seen) < FEWEST:
+    is_finite = np.isfinite(residual)
+    if np.sum(is_finite) < MIN_SAMPLES:
         return None
     step = float(np.median(np.diff(time)))
-    even = np.arange(time[seen][0], time[seen][-1], step)
-    length = 2 * len(even) // (SEGMENTS + 1)
+    uniform_time = np.arange(time[is_finite][0], time[is_finite][-1], step)
+    length = 2 * len(uniform_time) // (WELCH_SEGMENTS + 1)
     spectra = [
-        welch(detrend(np.interp(even, time[seen], values[seen])), 1.0 / step, nperseg=length)
+        welch(detrend(np.interp(uniform_time, time[is_finite], values[is_finite])), 1.0 / step, nperseg=length)
         for values in (residual, acceleration)
     ]
     frequency = np.asarray(spectra[0][0], dtype=float)
-    below = (frequency > 0.0) & (2.0 * np.pi * frequency < cutoff)
-    frequency, (rings, moves) = frequency[below], (np.asarray(power, dtype=float)[below] for _, power in spectra)
-    if len(frequency) < FEWEST_FREQUENCIES or not (np.all(rings > 0.0) and np.all(moves > 0.0)):
+    is_below_cutoff = (frequency > 0.0) & (2.0 * np.pi * frequency < cutoff)
+    frequency, (residual_power, motion_power) = (
+        frequency[is_below_cutoff],
+        (np.asarray(power, dtype=float)[is_below_cutoff] for _, power in spectra),
+    )
+    if len(frequency) < MIN_FREQUENCIES or not (np.all(residual_power > 0.0) and np.all(motion_power > 0.0)):
         return None
-    ratio = np.log(rings / moves)
-    peaks = find_peaks(ratio, prominence=log(PROMINENCE))[0]
+    ratio = np.log(residual_power / motion_power)
+    peaks = find_peaks(ratio, prominence=log(MIN_PROMINENCE))[0]
     for peak in peaks[np.argsort(-peak_prominences(ratio, peaks)[0])]:
-        near = np.abs(frequency - frequency[peak]) <= max(WIDTH * frequency[peak], 1.5 * frequency[0])
-        if np.sum(rings[near]) > SHARE * np.sum(rings):
-            return float(np.sum(frequency[near] * rings[near]) / np.sum(rings[near]))
+        is_in_peak = np.abs(frequency - frequency[peak]) <= max(PEAK_WIDTH_RATIO * frequency[peak], 1.5 * frequency[0])
+        if np.sum(residual_power[is_in_peak]) > MIN_POWER_RATIO * np.sum(residual_power):
+            return float(
+                np.sum(frequency[is_in_peak] * residual_power[is_in_peak]) / np.sum(residual_power[is_in_peak])
+            )
     return None
