@@ -7,11 +7,11 @@ from pathlib import Path
 
 import numpy as np
 
-from tautwire.campaign.plan import Plan
-from tautwire.campaign.reading import read_plan
-from tautwire.campaign.run import RunResult, build_context, run_job
-from tautwire.campaign.running import path_recordings, planned_jobs, run_count
-from tautwire.robots.reading import robot_from_content
+from tautwire.campaigns.campaign_plan import Plan
+from tautwire.campaigns.campaign_run import RunResult, build_context, run_job
+from tautwire.campaigns.campaign_runner import path_recordings, planned_jobs, run_count
+from tautwire.campaigns.plan_file import read_plan
+from tautwire.robot.robot_file_reader import robot_from_content
 from tests.robots import EXAMPLES
 
 AT_REST = """

@@ -11,9 +11,9 @@ from pathlib import Path
 
 from distributed import Client
 
-from tautwire.campaign.dataset import read_rows
-from tautwire.campaign.plan import Plan
-from tautwire.campaign.rows import row_columns
+from tautwire.campaigns.campaign_dataset import read_rows
+from tautwire.campaigns.campaign_plan import Plan
+from tautwire.campaigns.dataset_schema import row_columns
 from tests.campaigns import bare_results
 
 Processes = list[subprocess.Popen[bytes]]

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from tautwire.robots.robot import PER_CABLE_COMPONENTS, EffectSetting, Robot
+from tautwire.robot.schema import PER_CABLE_COMPONENTS, EffectSetting, Robot
 from tautwire_fmu.laws.effects import BY_NAME
 
 

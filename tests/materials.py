@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from tautwire.materials.modulus import Material, MaxwellBranch, complex_modulus
-from tautwire.materials.observations import ModulusObservations
+from tautwire.materials.modulus_observations import ModulusObservations
+from tautwire.materials.viscoelastic_model import Material, MaxwellBranch, complex_modulus
 
 CONSTANT = Material(modulus=131e9, damping=0.49e9)
 RELAXING = Material(modulus=100e9, damping=0.3e9, branches=(MaxwellBranch(20e9, 0.02), MaxwellBranch(30e9, 1.0)))

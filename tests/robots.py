@@ -8,8 +8,8 @@ from pathlib import Path
 
 import numpy as np
 
-from tautwire.robots.reading import read_robot
-from tautwire.robots.robot import Cable, Platform, Robot, Sensors, Winch
+from tautwire.robot.robot_file_reader import read_robot
+from tautwire.robot.schema import Cable, Platform, Robot, Sensors, Winch
 
 EXAMPLES = Path(str(files("tautwire"))) / "examples"
 NAMES = ("three", "caroca", "eight")

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tautwire.master.acceleration import QuasiNewton, QuasiNewtonHistory
+from tautwire.cosimulation.quasi_newton import QuasiNewton, QuasiNewtonHistory
 
 SLOWLY = np.array([[0.6, 0.2, 0.0], [0.1, 0.5, -0.3], [0.0, 0.2, 0.4]])
 OFFSET = np.array([1.0, -2.0, 0.5])

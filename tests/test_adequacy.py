@@ -1,8 +1,8 @@
 import numpy as np
 import pytest
 
-from tautwire.tracer.adequacy import has_enough_samples, largest_autocorrelations, residuals_are_white
-from tautwire.tracer.likelihood import Innovations
+from tautwire.estimation.likelihood import Innovations
+from tautwire.estimation.residual_analysis import has_enough_samples, largest_autocorrelations, residuals_are_white
 
 
 def innovations(values: np.ndarray, seen: np.ndarray | None = None) -> Innovations:

@@ -3,9 +3,8 @@
 import numpy as np
 import pytest
 
-from tautwire.master.agreement import MAX_TOLERANCE_GROWTH, ConvergenceCriterion
-from tautwire.master.bends import InterpolationErrorEstimate
-from tautwire.master.hermite import DerivativeChain
+from tautwire.cosimulation.convergence import MAX_TOLERANCE_GROWTH, ConvergenceCriterion, InterpolationErrorEstimate
+from tautwire.cosimulation.hermite_interpolation import DerivativeChain
 
 STEP, TOLERANCE, SHARE = 0.1, 1e-13, 0.1
 MISSED = 720.0 * STEP**6 / 46080.0

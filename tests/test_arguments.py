@@ -10,7 +10,9 @@ from pathlib import Path
 
 import pytest
 
-from tautwire.arguments import (
+from tautwire.errors import ArgumentError, InputError, TautwireError
+from tautwire.robot.checked_table import NumberRule
+from tautwire.validation import (
     validate_attributes,
     validate_callable,
     validate_file,
@@ -19,8 +21,6 @@ from tautwire.arguments import (
     validate_integer,
     validate_number,
 )
-from tautwire.errors import ArgumentError, InputError, TautwireError
-from tautwire.robots.checked_table import NumberRule
 from tests.refusals import refused
 
 SPAN = NumberRule("the span", "m", positive=True)

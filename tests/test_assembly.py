@@ -7,8 +7,13 @@ import numpy as np
 import pytest
 from casadi import SX, Function
 
-from tautwire.native.assembly import INSTRUCTIONS, LIBRARY_CALLS, UntranslatableError, llvm_assembly
-from tautwire.native.repeated import CompiledFunction
+from tautwire.estimation.native_functions import (
+    INSTRUCTIONS,
+    LIBRARY_CALLS,
+    CompiledFunction,
+    UntranslatableError,
+    llvm_assembly,
+)
 
 NUMBERS = (-np.inf, -1e300, -2.5, -1.0, -0.3, -1e-310, -0.0, 0.0, 1e-310, 0.3, 1.0, 2.5, 1e300, np.inf, np.nan)
 PAIRS = np.array([[a, b] for a in NUMBERS for b in NUMBERS]).T

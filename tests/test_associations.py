@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from tautwire.tracer.where.associations import strongest_correlation
+from tautwire.estimation.localisation.component_residuals import strongest_correlation
 
 Array = NDArray[np.float64]
 

@@ -2,9 +2,9 @@
 
 import pytest
 
+from tautwire.cosimulation.robot_cosimulation import instantiate_robot
+from tautwire.cosimulation.run_statistics import RunStatistics
 from tautwire.fmus.packaging import RobotFmus
-from tautwire.master.audit import RunStatistics
-from tautwire.runs.cosimulation import instantiate_robot
 from tests.test_coupling import end_error
 
 

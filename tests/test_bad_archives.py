@@ -17,9 +17,10 @@ import fmpy
 import pytest
 
 from tautwire.cli import run
+from tautwire.cosimulation import Component
+from tautwire.fmus import fmu_archive as archive
+from tautwire.fmus.fmu_archive import ArchiveError, read_model_description, require_valid_archive, unpack
 from tautwire.fmus.packaging import RobotFmus
-from tautwire.master import Component, archive
-from tautwire.master.archive import ArchiveError, read_model_description, require_valid_archive, unpack
 from tests.own_fmus import DESCRIPTION, packed
 from tests.robots import EXAMPLES
 

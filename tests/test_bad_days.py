@@ -15,9 +15,9 @@ from pathlib import Path
 import pandas as pd
 import pytest
 
+from tautwire.atomic_output import STAGING_PREFIX, atomic_file, atomic_folder
 from tautwire.cli import run
 from tautwire.errors import DiskFullError, InputError
-from tautwire.output import STAGING_PREFIX, atomic_file, atomic_folder
 from tests.robots import EXAMPLES
 
 THREE = EXAMPLES / "three"
@@ -173,7 +173,7 @@ def test_a_folder_that_is_there_keeps_its_other_files(tmp_path: Path) -> None:
 LIMITED = """
 import json, resource, sys
 import matplotlib.font_manager  # it has files of its own
-from tautwire.cli import run
+from tautwire.cli.application import run
 
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), resource.RLIM_INFINITY))
 print(json.dumps([run(arguments) for arguments in json.loads(sys.argv[2])]))

@@ -19,13 +19,13 @@ import pytest
 from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 
-from tautwire import input_file
+from tautwire import input_files as input_file
 from tautwire.cli import run
 from tautwire.errors import InputError
 from tautwire.materials import PAPER_TABLE, read_material_table
 from tautwire.recordings.recording import read_recording
-from tautwire.robots.reading import read_robot
-from tautwire.statics.equilibrium import static_tensions
+from tautwire.robot.robot_file_reader import read_robot
+from tautwire.robot.static_equilibrium import static_tensions
 from tests.hostile import as_parquet, damaged, described, recorded, same_recordings, same_robots, zipped
 from tests.robots import EXAMPLES
 
@@ -290,8 +290,8 @@ def test_what_claims_to_be_vast_is_refused_soon_and_in_little_memory(tmp_path: P
 
 IN_LITTLE_MEMORY = """
 import resource, sys
-from tautwire.cli import main
-import tautwire.tracer, tautwire.recordings.recording, tautwire.materials
+from tautwire.cli.application import main
+import tautwire.estimation, tautwire.recordings.recording, tautwire.materials
 
 used = int(open("/proc/self/statm").read().split()[0]) * resource.getpagesize() if sys.platform == "linux" else 2**33
 resource.setrlimit(resource.RLIMIT_AS, (used + 2**30, resource.RLIM_INFINITY))

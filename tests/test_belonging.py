@@ -9,19 +9,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tautwire.checking import check_files
 from tautwire.cli import run
+from tautwire.cli.input_checks import check_files
 from tautwire.errors import RecordingError, UnreachableError
-from tautwire.recordings.recording import Recording, read_recording
-from tautwire.robots.robot import Robot
-from tautwire.runs.belonging import (
+from tautwire.recordings.consistency import (
     MAX_REELING_MISMATCH,
     MIN_CHECKED_START_SHARE,
     reeling_mismatch,
     require_matching_reeling,
     robot_size,
 )
-from tautwire.runs.start import start_position
+from tautwire.recordings.recording import Recording, read_recording
+from tautwire.recordings.start_position import start_position
+from tautwire.robot.schema import Robot
 from tests.recordings import recorded
 from tests.robots import EXAMPLES, example
 

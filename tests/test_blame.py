@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tautwire.tracer.where.blame import isolate_fault, isolation_verdict, numbered
-from tautwire.tracer.where.port_residuals import ComponentResidual
+from tautwire.estimation.localisation.component_residuals import ComponentResidual
+from tautwire.estimation.localisation.fault_isolation import isolate_fault, isolation_verdict, numbered
 
 FINE = {1: False, 2: False, 3: False}
 SECOND = {1: False, 2: True, 3: False}

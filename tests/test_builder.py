@@ -13,7 +13,7 @@ from tautwire.fmus.packaging import RobotFmus
 BUILD = """
 from pathlib import Path
 from tautwire.fmus.packaging import build_fmus
-from tautwire.master.component import Component
+from tautwire.fmus.component import Component
 from tests.robots import paper_robot
 built = build_fmus(paper_robot(), Path({folder!r}))
 with Component("built", built.platform) as component:
@@ -69,7 +69,7 @@ if __name__ == "__main__":
     sys.path.insert(0, {str(unpacked)!r})
     with get_context("spawn").Pool(1) as pool:
         path = pool.apply(build, ({str(tmp_path)!r},))
-    from tautwire.master.component import Component
+    from tautwire.fmus.component import Component
     with Component("built", Path(path)) as component:
         component.initialize(0.0, {{}})
 """,
@@ -88,7 +88,7 @@ shutil.copytree(Path(pythonfmu.__file__).parent, bare, ignore=shutil.ignore_patt
 for name in [name for name in sys.modules if name.startswith("pythonfmu")]:
     del sys.modules[name]
 sys.path.insert(0, str(bare.parent))
-from tautwire.fmus.builder import FmuLibraryError, builder
+from tautwire.fmus.pythonfmu_builder import FmuLibraryError, builder
 try:
     with builder(Path({str(tmp_path)!r}), ["none"]):
         pass

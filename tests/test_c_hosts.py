@@ -20,7 +20,7 @@ from fmpy.validation import validate_fmu
 from tautwire.fmus import c_hosts
 from tautwire.fmus.c_hosts import CHostError, EmbeddablePython, make_for_c_hosts
 from tautwire.fmus.packaging import RobotFmus, build_fmus
-from tautwire.model.reference import integrate
+from tautwire.robot.reference_simulation import integrate
 from tests.robots import paper_robot
 
 RAMPS = (0.3, 0.25, -0.25)

@@ -7,16 +7,16 @@ from tempfile import TemporaryDirectory
 import numpy as np
 import pytest
 
-from tautwire.fmus.packaging import build_fmus
-from tautwire.runs.cosimulation import CosimulationResult, cosimulate
-from tautwire.tracer.where.cable_cut import (
+from tautwire.cosimulation.robot_cosimulation import CosimulationResult, cosimulate
+from tautwire.estimation.localisation.cable_simulation import (
     CableSimulation,
     drift_variance,
     exit_shift,
     simulate_cable,
     tension_variance,
 )
-from tautwire.tracer.where.path import SmoothedPath
+from tautwire.estimation.localisation.path_smoothing import SmoothedPath
+from tautwire.fmus.packaging import build_fmus
 from tests.robots import example, gentle_speeds
 
 RATE = 100.0

@@ -16,12 +16,12 @@ pytest.importorskip("distributed", reason='Dask is not installed: pip install "d
 
 import dask
 
-from tautwire.campaign import cluster as clusters
-from tautwire.campaign.cluster import WORKER_LOST, dashboard_message, dask_client
-from tautwire.campaign.dataset import open_dataset, part_files, read_rows
-from tautwire.campaign.errors import UnfinishedError
-from tautwire.campaign.reading import read_plan
-from tautwire.campaign.running import run_campaign, run_count
+from tautwire.campaigns import dask_cluster as clusters
+from tautwire.campaigns.campaign_dataset import open_dataset, part_files, read_rows
+from tautwire.campaigns.campaign_plan import UnfinishedError
+from tautwire.campaigns.campaign_runner import run_campaign, run_count
+from tautwire.campaigns.dask_cluster import WORKER_LOST, dashboard_message, dask_client
+from tautwire.campaigns.plan_file import read_plan
 from tautwire.cli import run as command
 from tests.campaigns import AT_REST, moving, plan_file, read
 from tests.clusters import bare_rows, cluster, rows_of, wait_for
@@ -82,7 +82,17 @@ def test_the_same_rows_come_from_one_worker_and_from_two(tmp_path: Path) -> None
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_a_campaign_that_was_stopped_goes_on_where_it_was(how: signal.Signals, tmp_path: Path) -> None:
     file, out = plan_file(tmp_path, moving(16)), tmp_path / "out"
-    call = [sys.executable, "-m", "tautwire.cli", "campaign", str(file), "--out", str(out), "--workers", "2"]
+    call = [
+        sys.executable,
+        "-m",
+        "tautwire.cli",
+        "campaign",
+        str(file),
+        "--out",
+        str(out),
+        "--workers",
+        "2",
+    ]
     process = subprocess.Popen(call, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True)
     wait_for(lambda: process.poll() is not None or bool(list((out / "runs").glob("*.parquet"))))
     # As from a terminal Ctrl-C goes to all processes of the group; kill -9 hits the one.

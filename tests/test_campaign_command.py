@@ -17,7 +17,7 @@ pytest.importorskip("distributed", reason='Dask is not installed: pip install "d
 
 from distributed import Client
 
-from tautwire.campaign.reading import read_plan
+from tautwire.campaigns.plan_file import read_plan
 from tests.campaigns import moving, plan_file
 from tests.clusters import bare_rows, cluster, rows_of
 
@@ -26,7 +26,7 @@ pytestmark = pytest.mark.slow
 # Only what the command writes is bounded: what workers keep of FMUs is theirs.
 LIMITED = """
 import resource, sys
-from tautwire.cli import run
+from tautwire.cli.application import run
 
 resource.setrlimit(resource.RLIMIT_FSIZE, (int(sys.argv[1]), resource.RLIM_INFINITY))
 sys.exit(run(sys.argv[2:]))

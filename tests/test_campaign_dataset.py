@@ -10,11 +10,11 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
-from tautwire.campaign import dataset
-from tautwire.campaign.dataset import PartWriter, completed_runs, open_dataset, part_files, read_rows
-from tautwire.campaign.errors import PlanError, PlanMismatchError
-from tautwire.campaign.rows import row_columns
-from tautwire.campaign.run import RunResult
+from tautwire.campaigns import campaign_dataset as dataset
+from tautwire.campaigns.campaign_dataset import PartWriter, completed_runs, open_dataset, part_files, read_rows
+from tautwire.campaigns.campaign_plan import PlanError, PlanMismatchError
+from tautwire.campaigns.campaign_run import RunResult
+from tautwire.campaigns.dataset_schema import row_columns
 from tautwire.errors import InputError
 from tests.campaigns import AT_REST, moving, read
 

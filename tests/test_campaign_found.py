@@ -10,16 +10,16 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tautwire.campaign.plan import Plan
-from tautwire.campaign.reading import read_plan
-from tautwire.campaign.run import Job, build_context, run_job
-from tautwire.campaign.sampling import draw_samples
+from tautwire.campaigns.campaign_plan import Plan
+from tautwire.campaigns.campaign_run import Job, build_context, run_job
+from tautwire.campaigns.input_sampling import draw_samples
+from tautwire.campaigns.plan_file import read_plan
 from tautwire.errors import InputError
-from tautwire.report import trace_document
-from tautwire.robots.reading import robot_from_content
-from tautwire.tracer.estimates import estimated_effects, parameter_correlations
-from tautwire.tracer.search import SelectionResult
-from tautwire.tracer.workers import WorkerPool
+from tautwire.estimation.effect_estimates import estimated_effects, parameter_correlations
+from tautwire.estimation.stepwise_selection import SelectionResult
+from tautwire.estimation.worker_pool import WorkerPool
+from tautwire.reports import trace_document
+from tautwire.robot.robot_file_reader import robot_from_content
 from tests.campaigns import plan_file, read
 from tests.test_estimates import fitted
 from tests.traces import made_trace

@@ -8,7 +8,7 @@ import pytest
 
 pytest.importorskip("selenium", reason="the pages are not tried in a browser: selenium is in the dev extra")
 
-from tautwire.campaign.writing import write_summary
+from tautwire.campaigns.campaign_runner import write_summary
 from tests.browser.browser import LAPTOP, MISSING, PHONE_DARK, Browser, Screen, chromium
 from tests.campaigns import AT_REST, moving
 from tests.test_campaign_summary import GRID, written

@@ -10,16 +10,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tautwire.campaign import writing
-from tautwire.campaign.distributions import DISTRIBUTION_KINDS, Distribution
-from tautwire.campaign.keys import KeyPathError, expand_key_path, with_values
-from tautwire.campaign.plan import Compute
-from tautwire.campaign.reading import PLAN_KEYS, read_plan
-from tautwire.campaign.running import planned_jobs, run_count
-from tautwire.campaign.sampling import correlated_groups, draw_samples
+from tautwire.campaigns import campaign_runner as writing
+from tautwire.campaigns.campaign_plan import DISTRIBUTION_KINDS, Compute, Distribution
+from tautwire.campaigns.campaign_runner import planned_jobs, run_count
+from tautwire.campaigns.input_sampling import correlated_groups, draw_samples
+from tautwire.campaigns.parameter_space import KeyPathError, expand_key_path, with_values
+from tautwire.campaigns.plan_file import PLAN_KEYS, read_plan
 from tautwire.cli import run as command
 from tautwire.errors import InputError
-from tautwire.robots.reading import robot_content
+from tautwire.robot.robot_file_reader import robot_content
 from tests.campaigns import AT_REST, moving, plan_file, read
 from tests.robots import EXAMPLES
 

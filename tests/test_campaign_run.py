@@ -8,19 +8,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tautwire.campaign.built import FmuBundle, build_bundle, cached_fmus, structure_digest
-from tautwire.campaign.keys import with_values
-from tautwire.campaign.plan import Plan
-from tautwire.campaign.run import Job, build_context, run_job
-from tautwire.campaign.running import path_recordings
+from tautwire.campaigns.campaign_plan import Plan
+from tautwire.campaigns.campaign_run import Job, build_context, run_job
+from tautwire.campaigns.campaign_runner import path_recordings
+from tautwire.campaigns.fmu_cache import FmuBundle, build_bundle, cached_fmus, structure_digest
+from tautwire.campaigns.parameter_space import with_values
 from tautwire.control import cosimulate_closed_loop
+from tautwire.cosimulation.robot_cosimulation import cosimulate
 from tautwire.fmus.packaging import build_fmus
 from tautwire.linear import linearise
 from tautwire.recordings.recording import read_recording
-from tautwire.robots.reading import robot_from_content
-from tautwire.robots.robot import EffectSetting, Robot
-from tautwire.runs.cosimulation import cosimulate
-from tautwire.statics.equilibrium import static_tensions
+from tautwire.robot.robot_file_reader import robot_from_content
+from tautwire.robot.schema import EffectSetting, Robot
+from tautwire.robot.static_equilibrium import static_tensions
 from tests.campaigns import AT_REST, moving, read
 from tests.robots import EXAMPLES, LIMITED, example, with_winch
 

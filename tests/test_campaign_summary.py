@@ -12,15 +12,15 @@ import pyarrow as pa
 import pytest
 from scipy.stats import norm
 
-from tautwire.campaign.bands import quantile_bands
-from tautwire.campaign.dataset import PartWriter, open_dataset, read_rows
-from tautwire.campaign.plan import Plan
-from tautwire.campaign.rows import RowColumn, row_columns
-from tautwire.campaign.run import RunResult
-from tautwire.campaign.sampling import draw_samples
-from tautwire.campaign.season import summarise_traces
-from tautwire.campaign.summary import Summary, summarise_runs
-from tautwire.campaign.writing import write_summary
+from tautwire.campaigns.campaign_dataset import PartWriter, open_dataset, read_rows
+from tautwire.campaigns.campaign_figures import quantile_bands
+from tautwire.campaigns.campaign_plan import Plan
+from tautwire.campaigns.campaign_run import RunResult
+from tautwire.campaigns.campaign_runner import write_summary
+from tautwire.campaigns.campaign_summary import Summary, summarise_runs
+from tautwire.campaigns.dataset_schema import RowColumn, row_columns
+from tautwire.campaigns.input_sampling import draw_samples
+from tautwire.campaigns.trace_summary import summarise_traces
 from tautwire.errors import InputError
 from tests.campaigns import AT_REST, moving, read
 from tests.pages import FETCHING, Page

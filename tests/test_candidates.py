@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tautwire.tracer.discovery.candidates import MAX_TERMS, NormalEquations, select_terms
-from tautwire.tracer.discovery.library import Term
+from tautwire.estimation.discovery.candidate_terms import Term
+from tautwire.estimation.discovery.term_selection import MAX_TERMS, NormalEquations, select_terms
 
 ROWS, MANY = 2000, 60
 TERMS = tuple(Term("force_x", f"vx**{power % 8}*{power}") for power in range(MANY))

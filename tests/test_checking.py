@@ -7,10 +7,10 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tautwire.checking import MAX_PROBLEMS_PER_FILE, Problem, check_files
+from tautwire.cli.input_checks import MAX_PROBLEMS_PER_FILE, Problem, check_files
 from tautwire.errors import InputError, RobotFileError
-from tautwire.robots.reading import read_robot
-from tautwire.statics.equilibrium import static_tensions
+from tautwire.robot.robot_file_reader import read_robot
+from tautwire.robot.static_equilibrium import static_tensions
 from tests.own_fmus import packed
 from tests.robots import EXAMPLES
 

@@ -13,7 +13,7 @@ import pytest
 
 import tautwire
 from tautwire.cli import app, run
-from tautwire.robots.reading import read_robot
+from tautwire.robot.robot_file_reader import read_robot
 from tests.robots import EXAMPLES, example
 
 THREE = EXAMPLES / "three"

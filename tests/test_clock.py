@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from tautwire.errors import RecordingError
+from tautwire.estimation.clock_offsets import CHANNEL_GROUPS, shifted, with_clocks_set
+from tautwire.estimation.estimation_data import DataSplit, split_data
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.estimation.parameter_fit import Fitter
+from tautwire.estimation.residual_analysis import residuals_are_white
 from tautwire.recordings.recording import Recording
-from tautwire.tracer.adequacy import residuals_are_white
-from tautwire.tracer.data import DataSplit, split_data
-from tautwire.tracer.fit import Fitter
-from tautwire.tracer.preparation.clock import CHANNEL_GROUPS, shifted, with_clocks_set
-from tautwire.tracer.preparation.noise import estimate_noise
 from tests.recordings import recorded
 from tests.robots import example
 

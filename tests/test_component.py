@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tautwire.cosimulation import Component, ComponentError, FixedStep, MemoryRecorder, PiecewiseLinearInput, simulate
+from tautwire.cosimulation.robot_cosimulation import RunError, cosimulate, instantiate_robot
+from tautwire.cosimulation.robot_wiring import recorded_ports
 from tautwire.fmus.packaging import RobotFmus
-from tautwire.master import Component, ComponentError, FixedStep, MemoryRecorder, PiecewiseLinearInput, simulate
-from tautwire.runs.cosimulation import RunError, cosimulate, instantiate_robot
-from tautwire.runs.wiring import recorded_ports
 
 
 def test_a_failing_fmu_is_named_with_time_and_inputs(three_fmus: RobotFmus) -> None:

@@ -8,13 +8,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tautwire.estimation.estimation_data import split_data
+from tautwire.estimation.localisation.component_localisation import localise_residual
+from tautwire.estimation.localisation.component_residuals import ComponentResidual, FaultLocalisation
+from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.recordings.recording import Recording
-from tautwire.robots.robot import Cable, Robot
-from tautwire.statics.equilibrium import static_tensions
-from tautwire.tracer.data import split_data
-from tautwire.tracer.preparation.noise import estimate_noise
-from tautwire.tracer.where.components import localise_residual
-from tautwire.tracer.where.port_residuals import ComponentResidual, FaultLocalisation
+from tautwire.robot.schema import Cable, Robot
+from tautwire.robot.static_equilibrium import static_tensions
 from tests.recordings import recorded
 from tests.robots import example
 

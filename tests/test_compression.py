@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tautwire.model.symbolic import FreeParameter
-from tautwire.robots.robot import EffectSetting
-from tautwire.tracer.data import DataSet
-from tautwire.tracer.likelihood import Likelihood
-from tautwire.tracer.preparation.compression import compressed_residuals
-from tautwire.tracer.preparation.noise import estimate_noise
+from tautwire.estimation.estimation_data import DataSet
+from tautwire.estimation.likelihood import Likelihood
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.estimation.normal_equations import compressed_residuals
+from tautwire.robot.schema import EffectSetting
+from tautwire.robot.symbolic_model import FreeParameter
 from tests.recordings import recorded
 from tests.robots import example
 

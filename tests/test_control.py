@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 import tautwire
 from tautwire.control import ControlAim, PathController, cosimulate_closed_loop, design_controller, path_tensions
+from tautwire.cosimulation import FixedStep
+from tautwire.cosimulation.robot_cosimulation import CosimulationResult, cosimulate, run_cosimulation
 from tautwire.errors import InputError, UnreachableError
 from tautwire.fmus.packaging import RobotFmus, build_fmus
-from tautwire.master import FixedStep
-from tautwire.robots.reading import read_robot
-from tautwire.robots.robot import Robot
-from tautwire.runs.cosimulation import CosimulationResult, cosimulate, run_cosimulation
-from tautwire.trajectory import CAROCA_HELIX, PAPER_HELIX, Helix, Line, Trajectory, ideal_winch_speeds
+from tautwire.robot.robot_file_reader import read_robot
+from tautwire.robot.schema import Robot
+from tautwire.robot.trajectory import CAROCA_HELIX, PAPER_HELIX, Helix, Line, Trajectory, ideal_winch_speeds
 from tests.robots import paper_robot
 from tests.winch_ramp import WinchRamp
 

@@ -27,8 +27,8 @@ from tautwire.control import (
     shape_along,
 )
 from tautwire.fmus.packaging import RobotFmus, build_fmus
-from tautwire.robots.robot import Robot
-from tautwire.trajectory import Line, Trajectory
+from tautwire.robot.schema import Robot
+from tautwire.robot.trajectory import Line, Trajectory
 from tests.fmus import Hand, in_hand
 from tests.robots import LIMITED, example, with_winch
 

@@ -6,10 +6,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tautwire.cosimulation.robot_cosimulation import CosimulationResult, cosimulate
 from tautwire.fmus.packaging import RobotFmus, build_fmus
-from tautwire.model.reference import integrate
-from tautwire.robots.robot import EffectSetting, Platform, Robot
-from tautwire.runs.cosimulation import CosimulationResult, cosimulate
+from tautwire.robot.reference_simulation import integrate
+from tautwire.robot.schema import EffectSetting, Platform, Robot
 from tests.rig import RampProgram, SampledProgram, robot_from, simulate
 from tests.rig import Robot as RigRobot
 from tests.robots import NAMES, example, gentle_speeds, paper_robot, with_damping

@@ -3,8 +3,7 @@
 import numpy as np
 import pytest
 
-from tautwire.fmus.packaging import RobotFmus
-from tautwire.master import (
+from tautwire.cosimulation import (
     AdaptiveStep,
     Coupling,
     FixedStep,
@@ -13,8 +12,9 @@ from tautwire.master import (
     StepSizeError,
     simulate,
 )
-from tautwire.runs.cosimulation import instantiate_robot
-from tautwire.runs.wiring import recorded_ports, robot_connections, winch_input_ports
+from tautwire.cosimulation.robot_cosimulation import instantiate_robot
+from tautwire.cosimulation.robot_wiring import recorded_ports, robot_connections, winch_input_ports
+from tautwire.fmus.packaging import RobotFmus
 from tests.rig import RampProgram
 from tests.rig import simulate as rig_simulate
 from tests.robots import paper_robot

@@ -5,9 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tautwire.estimation.estimation_data import DataSet, split_data
+from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.recordings.recording import Recording
-from tautwire.tracer.data import DataSet, split_data
-from tautwire.tracer.preparation.noise import estimate_noise
 from tests.recordings import recorded
 from tests.robots import example
 

@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 
-from tautwire.robots.robot import Formula, Robot
-from tautwire.tracer.data import split_data
-from tautwire.tracer.discovery.discovery import Discovery, discover_formula
-from tautwire.tracer.discovery.written import formula_text
-from tautwire.tracer.fit import Fitter
-from tautwire.tracer.preparation.noise import estimate_noise
+from tautwire.estimation.discovery.candidate_terms import formula_text
+from tautwire.estimation.discovery.formula_discovery import Discovery, discover_formula
+from tautwire.estimation.estimation_data import split_data
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.estimation.parameter_fit import Fitter
+from tautwire.robot.schema import Formula, Robot
 from tests.recordings import recorded
 from tests.robots import example
 

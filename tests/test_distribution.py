@@ -2,8 +2,8 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from tautwire.robots.robot import TensionLimits
-from tautwire.statics.distribution import distribute_tensions, least_limit_violations
+from tautwire.robot.schema import TensionLimits
+from tautwire.robot.static_equilibrium import distribute_tensions, least_limit_violations
 
 DRAWS = np.random.default_rng(7)
 SKETCHES = [DRAWS.normal(size=(3, int(count))) for count in (4, 5, 6, 8)]

@@ -12,16 +12,16 @@ from typing import Any
 
 import pytest
 
-from tautwire.campaign import reading as plans
+from tautwire.campaigns import plan_file as plans
+from tautwire.cosimulation.robot_wiring import result_columns
+from tautwire.estimation.trace_result import Correlation, FittedParameter, Resonance
 from tautwire.linear import linearise
-from tautwire.linear.document import model_document
-from tautwire.materials.table import COLUMN_RULES
-from tautwire.recordings.header import known_columns
-from tautwire.report import trace_document
-from tautwire.robots import reading as robots
-from tautwire.robots.template import new_robot_text
-from tautwire.runs.wiring import result_columns
-from tautwire.tracer.verdict import Correlation, FittedParameter, Resonance
+from tautwire.linear.linear_plant import model_document
+from tautwire.materials.material_table import COLUMN_RULES
+from tautwire.recordings.recording_table import known_columns
+from tautwire.reports import trace_document
+from tautwire.robot import robot_file_reader as robots
+from tautwire.robot.robot_file_writer import new_robot_text
 from tautwire_fmu.laws.effects import BY_NAME
 from tautwire_fmu.laws.formula import VARIABLES_BY_TARGET
 from tests.robots import example
@@ -32,7 +32,7 @@ DOCS = ROOT / "docs"
 
 # Of the page about an effect of one's own, run after its example.
 EFFECT_HOLDS = """
-from tautwire.robots.reading import write_robot
+from tautwire.robot.robot_file_reader import write_robot
 assert abs(still.position - plain.platform.start).max() < 1e-6
 assert np.allclose(heavier, 1.0 + 15.0 * 5.0 / (300.0 * 9.81))
 assert not np.allclose(swings, linearise(plain).modes.frequencies, rtol=1e-6)

@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tautwire_fmu.laws import stages
+from tautwire_fmu.laws import effect_stages as stages
 from tautwire_fmu.laws.cable import (
     LAWS,
     CableConstants,

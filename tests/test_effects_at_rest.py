@@ -13,11 +13,11 @@ from scipy.integrate import trapezoid
 from tautwire.control import path_tensions
 from tautwire.errors import RobotFileError, UnreachableError
 from tautwire.linear import linearise
-from tautwire.model.symbolic import FreeParameter, SymbolicModel, symbolic_model
-from tautwire.robots.reading import read_robot, robot_text, write_robot
-from tautwire.robots.robot import PER_CABLE_COMPONENTS, EffectSetting, Platform, Robot
-from tautwire.statics.equilibrium import cable_routes, static_forces, static_tensions, unit_directions
-from tautwire.trajectory import Line, ideal_winch_speeds
+from tautwire.robot.robot_file_reader import read_robot, robot_text, write_robot
+from tautwire.robot.schema import PER_CABLE_COMPONENTS, EffectSetting, Platform, Robot
+from tautwire.robot.static_equilibrium import cable_routes, static_forces, static_tensions, unit_directions
+from tautwire.robot.symbolic_model import FreeParameter, SymbolicModel, symbolic_model
+from tautwire.robot.trajectory import Line, ideal_winch_speeds
 from tautwire_fmu.laws.effects import ALL, BY_NAME, Effect
 from tautwire_fmu.laws.mathematics import REAL
 from tests.effect_cases import CASES, Case, same

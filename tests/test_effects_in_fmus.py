@@ -9,9 +9,9 @@ import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 
+from tautwire.cosimulation.robot_cosimulation import CosimulationResult, cosimulate
 from tautwire.fmus.packaging import build_fmus
-from tautwire.robots.robot import Robot
-from tautwire.runs.cosimulation import CosimulationResult, cosimulate
+from tautwire.robot.schema import Robot
 from tests.effect_cases import CASES, PAIRS, Case, same
 from tests.fmus import in_hand
 from tests.rig import Rig, SampledProgram, wander

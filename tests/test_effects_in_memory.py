@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tautwire.model.reference import ReferenceRun, integrate
-from tautwire.robots.robot import Robot
+from tautwire.robot.reference_simulation import ReferenceRun, integrate
+from tautwire.robot.schema import Robot
 from tests.effect_cases import CASES, PAIRS, Case
 from tests.rig import Rig, SampledProgram
 from tests.rig.record import Accuracy, outputs

@@ -6,14 +6,14 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tautwire.model.symbolic import FORMULA_INDEX, FreeParameter
-from tautwire.robots.robot import EffectSetting, Robot
-from tautwire.tracer.data import DataSet, split_data
-from tautwire.tracer.estimates import parameter_correlations
-from tautwire.tracer.fit import Fit, Fitter
-from tautwire.tracer.hypotheses import Hypothesis, with_values
-from tautwire.tracer.preparation.noise import estimate_noise
-from tautwire.tracer.verdict import Estimate, FittedParameter, FoundEffect
+from tautwire.estimation.effect_estimates import parameter_correlations
+from tautwire.estimation.estimation_data import DataSet, split_data
+from tautwire.estimation.hypotheses import Hypothesis, with_values
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.estimation.parameter_fit import Fit, Fitter
+from tautwire.estimation.trace_result import Estimate, FittedParameter, FoundEffect
+from tautwire.robot.schema import EffectSetting, Robot
+from tautwire.robot.symbolic_model import FORMULA_INDEX, FreeParameter
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.recordings import recorded
 from tests.robots import example

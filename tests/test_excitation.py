@@ -6,9 +6,15 @@ import numpy as np
 import pytest
 
 from tautwire.cli import run
-from tautwire.excitation import ExcitationError, ExcitationLimits, MultisinePath, default_limits, design_excitation
-from tautwire.excitation.limits import effects_by_name
-from tautwire.model.reference import integrate
+from tautwire.estimation.input_design import (
+    ExcitationError,
+    ExcitationLimits,
+    default_limits,
+    design_excitation,
+    effects_by_name,
+)
+from tautwire.estimation.multisine import MultisinePath
+from tautwire.robot.reference_simulation import integrate
 from tests.robots import EXAMPLES, example
 
 THREE = example("three")

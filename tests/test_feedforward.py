@@ -17,11 +17,11 @@ from tautwire.control import (
     rigid_reference,
     sample_times,
 )
+from tautwire.cosimulation.robot_cosimulation import CosimulationResult
 from tautwire.errors import UnreachableError
 from tautwire.fmus.packaging import RobotFmus, build_fmus
-from tautwire.robots.robot import EffectSetting, Robot
-from tautwire.runs.cosimulation import CosimulationResult
-from tautwire.trajectory import Line, Trajectory
+from tautwire.robot.schema import EffectSetting, Robot
+from tautwire.robot.trajectory import Line, Trajectory
 from tests.robots import example, paper_robot
 from tests.winch_ramp import WinchRamp
 

@@ -1,10 +1,10 @@
 import pytest
 
-from tautwire.robots.robot import EffectSetting
-from tautwire.tracer.data import split_data
-from tautwire.tracer.fit import Fitter
-from tautwire.tracer.hypotheses import Hypothesis
-from tautwire.tracer.preparation.noise import estimate_noise
+from tautwire.estimation.estimation_data import split_data
+from tautwire.estimation.hypotheses import Hypothesis
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.estimation.parameter_fit import Fitter
+from tautwire.robot.schema import EffectSetting
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.recordings import recorded
 from tests.robots import example

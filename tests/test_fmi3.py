@@ -11,13 +11,13 @@ import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 
+from tautwire.cosimulation import CallAbortedError, CallJournal, Component, ComponentError, JournalledComponent
+from tautwire.cosimulation.call_journal import CallEntry
+from tautwire.cosimulation.connections import direct_feedthrough
+from tautwire.cosimulation.robot_cosimulation import CosimulationResult, RunError, cosimulate
+from tautwire.cosimulation.ssp_archive import write_ssp
 from tautwire.fmus.packaging import build_fmus
-from tautwire.master import CallAbortedError, CallJournal, Component, ComponentError, JournalledComponent
-from tautwire.master.journal import CallEntry
-from tautwire.master.wiring import direct_feedthrough
-from tautwire.robots.robot import UserFmu
-from tautwire.runs.cosimulation import CosimulationResult, RunError, cosimulate
-from tautwire.runs.ssp import write_ssp
+from tautwire.robot.schema import UserFmu
 from tests.own_fmus import LAG, compiler, lag_winch, lag_winch_3, packed_3
 from tests.robots import paper_robot
 

@@ -5,8 +5,8 @@ import json
 import pytest
 
 from tautwire.cli import run
+from tautwire.fmus.fmu_slots import fmu_ports, group_vectors
 from tautwire.fmus.packaging import RobotFmus
-from tautwire.fmus.ports import fmu_ports, group_vectors
 from tautwire_fmu.units import UNITS
 from tests.robots import EXAMPLES
 

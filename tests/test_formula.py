@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tautwire.cosimulation.robot_cosimulation import cosimulate
 from tautwire.fmus.packaging import build_fmus
 from tautwire.linear import linearise
-from tautwire.model.reference import integrate
-from tautwire.model.symbolic import FORMULA_INDEX, FreeParameter, symbolic_model
-from tautwire.robots.robot import Formula, Robot
-from tautwire.runs.cosimulation import cosimulate
-from tautwire.statics.equilibrium import static_tensions
+from tautwire.robot.reference_simulation import integrate
+from tautwire.robot.schema import Formula, Robot
+from tautwire.robot.static_equilibrium import static_tensions
+from tautwire.robot.symbolic_model import FORMULA_INDEX, FreeParameter, symbolic_model
 from tests.fmus import in_hand
 from tests.rig import Rig, SampledProgram
 from tests.rig.record import outputs

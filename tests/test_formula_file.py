@@ -8,8 +8,8 @@ from pathlib import Path
 import pytest
 
 from tautwire.errors import RobotFileError
-from tautwire.robots.reading import read_robot, robot_text, write_robot
-from tautwire.robots.robot import Formula, Robot
+from tautwire.robot.robot_file_reader import read_robot, robot_text, write_robot
+from tautwire.robot.schema import Formula, Robot
 from tests.robots import example
 
 ROBOT = example("three")

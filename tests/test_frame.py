@@ -5,10 +5,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tautwire.model.reference import integrate
-from tautwire.robots.reading import read_robot
-from tautwire.robots.robot import EffectSetting
-from tautwire.robots.writing import robot_text
+from tautwire.robot.reference_simulation import integrate
+from tautwire.robot.robot_file_reader import read_robot
+from tautwire.robot.robot_file_writer import robot_text
+from tautwire.robot.schema import EffectSetting
 from tautwire_fmu.laws.cable import LINEAR, CableConstants, CableInputs, CableState, cable_motion, cable_outputs, span
 from tautwire_fmu.laws.effects import ALL, BY_NAME, UNLISTED, ActiveEffect
 from tautwire_fmu.laws.mathematics import REAL

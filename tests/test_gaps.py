@@ -2,9 +2,9 @@ from dataclasses import replace
 
 import numpy as np
 
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.estimation.recording_preparation import without_gaps
 from tautwire.recordings.recording import Recording
-from tautwire.tracer.preparation.gaps import without_gaps
-from tautwire.tracer.preparation.noise import estimate_noise
 from tests.recordings import recorded
 from tests.robots import example
 

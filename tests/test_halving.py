@@ -5,13 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from tautwire.cosimulation import ComponentError, Coupling, FixedStep, MemoryRecorder, PiecewiseLinearInput, simulate
+from tautwire.cosimulation.coupling import Checkpoint
+from tautwire.cosimulation.macro_step import MAX_HALVINGS, step_with_rejection
+from tautwire.cosimulation.robot_cosimulation import instantiate_robot
+from tautwire.cosimulation.robot_wiring import recorded_ports
 from tautwire.fmus.packaging import RobotFmus, build_fmus
-from tautwire.master import ComponentError, Coupling, FixedStep, MemoryRecorder, PiecewiseLinearInput, simulate
-from tautwire.master.checkpoint import Checkpoint
-from tautwire.master.halving import MAX_HALVINGS, step_with_rejection
-from tautwire.robots.reading import read_robot
-from tautwire.runs.cosimulation import instantiate_robot
-from tautwire.runs.wiring import recorded_ports
+from tautwire.robot.robot_file_reader import read_robot
 from tests.planar import VERTICAL, program_of, robot_text
 from tests.rig import Robot as RigRobot
 from tests.rig import SampledProgram, load_robot

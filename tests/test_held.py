@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from tautwire.master import Connection, Port
-from tautwire.master.held import ZeroOrderHold
+from tautwire.cosimulation import Connection, Port
+from tautwire.cosimulation.zero_order_hold import ZeroOrderHold
 
 
 class Fake:

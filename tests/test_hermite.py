@@ -3,10 +3,15 @@
 import numpy as np
 import pytest
 
+from tautwire.cosimulation import Port
+from tautwire.cosimulation.hermite_interpolation import (
+    DerivativeChain,
+    derivative_chains,
+    hermite_weights,
+    scale_weights,
+)
+from tautwire.cosimulation.robot_cosimulation import instantiate_robot
 from tautwire.fmus.packaging import RobotFmus
-from tautwire.master import Port
-from tautwire.master.hermite import DerivativeChain, derivative_chains, hermite_weights, scale_weights
-from tautwire.runs.cosimulation import instantiate_robot
 
 NAMES = ("position", "velocity", "acceleration")
 

@@ -7,10 +7,10 @@ from pathlib import Path
 import pytest
 
 from tautwire.errors import RobotFileError
-from tautwire.recordings.header import parse_header
-from tautwire.robots.checked_table import suggest_name
-from tautwire.robots.reading import read_robot
-from tautwire.robots.robot import fmu_slots
+from tautwire.recordings.recording_table import parse_header
+from tautwire.robot.checked_table import suggest_name
+from tautwire.robot.robot_file_reader import read_robot
+from tautwire.robot.schema import fmu_slots
 from tests.robots import EXAMPLES
 
 

@@ -6,7 +6,7 @@ import math
 
 import pytest
 
-from tautwire_fmu.inner_steps import integrate_dormand_prince
+from tautwire_fmu.dormand_prince import integrate_dormand_prince
 
 
 def test_a_smooth_state_is_exact_to_the_tolerance() -> None:

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tautwire_fmu.interpolation import cubic_hermite, quintic_hermite, taylor_extrapolate
+from tautwire_fmu.hermite_quadrature import cubic_hermite, quintic_hermite, taylor_extrapolate
 
 FRACTIONS = (0.0, 0.2, 0.5, 0.9, 1.0)
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 
 import pytest
 
-from tautwire.interrupt import defer_interrupts
+from tautwire.process_signals import defer_interrupts
 
 
 @pytest.fixture(autouse=True)

@@ -6,10 +6,10 @@ import fmpy
 import numpy as np
 import pytest
 
+from tautwire.cosimulation import CallJournal, Component, JournalledComponent, Port
+from tautwire.cosimulation.call_journal import CALL_INDEX, CALL_TIME, CallEntry
+from tautwire.cosimulation.robot_cosimulation import instantiate_robot
 from tautwire.fmus.packaging import RobotFmus
-from tautwire.master import CallJournal, Component, JournalledComponent, Port
-from tautwire.master.journal import CALL_INDEX, CALL_TIME, CallEntry
-from tautwire.runs.cosimulation import instantiate_robot
 
 PORTS = [Port("left", "push"), Port("right", "push"), Port("right", "pull")]
 

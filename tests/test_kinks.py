@@ -5,12 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tautwire.cosimulation import FixedStep, MemoryRecorder, PiecewiseLinearInput, RunStatistics, simulate
+from tautwire.cosimulation.macro_step import _land_before_event
+from tautwire.cosimulation.robot_cosimulation import instantiate_robot
+from tautwire.cosimulation.robot_wiring import recorded_ports
 from tautwire.fmus.packaging import RobotFmus, build_fmus
-from tautwire.master import FixedStep, MemoryRecorder, PiecewiseLinearInput, RunStatistics, simulate
-from tautwire.master.kinks import _land_before_event
-from tautwire.robots.robot import Platform
-from tautwire.runs.cosimulation import instantiate_robot
-from tautwire.runs.wiring import recorded_ports
+from tautwire.robot.schema import Platform
 from tests.rig import SampledProgram
 from tests.rig import simulate as rig_simulate
 from tests.robots import paper_robot

@@ -9,8 +9,8 @@ import numpy as np
 import pint
 import pytest
 
-from tautwire.model.arrays import NUMPY_MATHEMATICS
-from tautwire.model.symbolic import CASADI_MATHEMATICS
+from tautwire.robot.robot_assembly import NUMPY_MATHEMATICS
+from tautwire.robot.symbolic_model import CASADI_MATHEMATICS
 from tautwire_fmu.laws.cable import (
     LAWS,
     CableConstants,

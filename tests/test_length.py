@@ -5,8 +5,9 @@ from functools import partial
 import numpy as np
 import pytest
 
-from tautwire.tracer import ready, trace
-from tautwire.tracer.preparation.length import shortened
+from tautwire.estimation import prepared_data as ready
+from tautwire.estimation import trace
+from tautwire.estimation.recording_preparation import shortened
 from tests.recordings import recorded
 from tests.robots import example
 

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tautwire.model.symbolic import FreeParameter
-from tautwire.robots.robot import EffectSetting
-from tautwire.tracer.likelihood import Likelihood
-from tautwire.tracer.preparation.noise import estimate_noise
+from tautwire.estimation.likelihood import Likelihood
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.robot.schema import EffectSetting
+from tautwire.robot.symbolic_model import FreeParameter
 from tests.effect_cases import Case, same
 from tests.recordings import recorded
 from tests.robots import example

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from tautwire.errors import InputError, UnreachableError
 from tautwire.linear import OperatingPointError, linearise, model_document
-from tautwire.robots.robot import Cable, EffectSetting, Platform, Robot, Sensors, TensionLimits
+from tautwire.robot.schema import Cable, EffectSetting, Platform, Robot, Sensors, TensionLimits
 from tautwire_fmu.laws.effects import BY_NAME, Effect, Parameter, State
 from tautwire_fmu.laws.effects.damping import Values
 

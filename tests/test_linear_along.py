@@ -3,8 +3,8 @@ import pytest
 
 from tautwire.errors import InputError, UnreachableError
 from tautwire.linear import linearise, modes_along
-from tautwire.robots.robot import Cable, Platform, Robot, Sensors, TensionLimits
-from tautwire.trajectory import PAPER_HELIX, Line
+from tautwire.robot.schema import Cable, Platform, Robot, Sensors, TensionLimits
+from tautwire.robot.trajectory import PAPER_HELIX, Line
 from tests.robots import example, paper_robot
 
 

@@ -13,6 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tautwire.cosimulation import Component, Connection, Coupling, Port
 from tautwire.errors import InputError
 from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.linear import (
@@ -22,8 +23,7 @@ from tautwire.linear import (
     linearise_fmus,
     linearise_robot_fmus,
 )
-from tautwire.master import Component, Connection, Coupling, Port
-from tautwire.robots.robot import EffectSetting, Robot, UserFmu, Winch
+from tautwire.robot.schema import EffectSetting, Robot, UserFmu, Winch
 from tests.effect_cases import CASES, Case
 from tests.own_fmus import LAG, compiler, falling_mass, lag_winch
 from tests.robots import NAMES, example, paper_robot, with_winch

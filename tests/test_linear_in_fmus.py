@@ -9,10 +9,10 @@ import pytest
 from numpy.typing import NDArray
 from scipy.optimize import curve_fit
 
+from tautwire.cosimulation.robot_cosimulation import CosimulationResult, cosimulate
 from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.linear import LinearPlant, linearise
-from tautwire.robots.robot import Robot
-from tautwire.runs.cosimulation import CosimulationResult, cosimulate
+from tautwire.robot.schema import Robot
 from tests.robots import NAMES, example
 
 Array = NDArray[np.float64]

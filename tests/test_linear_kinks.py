@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from tautwire.linear import OperatingPointError, linearise
-from tautwire.robots.robot import Cable, EffectSetting, Platform, Robot, Sensors
+from tautwire.robot.schema import Cable, EffectSetting, Platform, Robot, Sensors
 from tests.robots import example, paper_robot, with_damping
 
 # Straight below the line between two exit points the third cable has nothing to carry.

@@ -5,12 +5,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tautwire.model.symbolic import FreeParameter
-from tautwire.robots.robot import PER_CABLE_COMPONENTS, EffectSetting
-from tautwire.tracer.directions import EffectSensitivities
-from tautwire.tracer.likelihood import Likelihood
-from tautwire.tracer.linearisation import linearise_filter
-from tautwire.tracer.preparation.noise import estimate_noise
+from tautwire.estimation.innovation_sensitivities import EffectSensitivities, linearise_filter
+from tautwire.estimation.likelihood import Likelihood
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.robot.schema import PER_CABLE_COMPONENTS, EffectSetting
+from tautwire.robot.symbolic_model import FreeParameter
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.recordings import recorded
 from tests.robots import example

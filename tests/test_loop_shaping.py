@@ -6,7 +6,7 @@ import control
 import numpy as np
 import pytest
 
-from tautwire.control.loop_shaping import NORM_FACTOR, synthesise_controller, to_continuous, to_sampled
+from tautwire.control.hinf_loop_shaping import NORM_FACTOR, synthesise_controller, to_continuous, to_sampled
 
 PERIOD = 0.01
 

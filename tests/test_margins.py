@@ -23,7 +23,7 @@ from tautwire.control import (
     robot_with,
     speed_controller,
 )
-from tautwire.robots.robot import Robot
+from tautwire.robot.schema import Robot
 from tests.robots import example
 
 Array = NDArray[np.float64]

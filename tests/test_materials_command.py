@@ -7,7 +7,7 @@ import pytest
 
 from tautwire.cli import run
 from tautwire.materials import PAPER_TABLE
-from tautwire.robots.reading import read_robot
+from tautwire.robot.robot_file_reader import read_robot
 from tests.robots import EXAMPLES
 
 ROBOT = EXAMPLES / "three" / "robot.toml"

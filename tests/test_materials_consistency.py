@@ -5,13 +5,13 @@ from pathlib import Path
 
 import pytest
 
-from tautwire.materials.consistency import (
+from tautwire.materials.material_table import PAPER_TABLE, read_material_table
+from tautwire.materials.table_consistency import (
     ConsistencyCheck,
     consistency_checks,
     disagreements,
     understated_uncertainties,
 )
-from tautwire.materials.table import PAPER_TABLE, read_material_table
 
 HEADER = (
     "frequency,dynamic_modulus,dynamic_modulus_uncertainty,storage_modulus,storage_modulus_uncertainty,"

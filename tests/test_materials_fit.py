@@ -5,17 +5,16 @@ import pytest
 from scipy.optimize import approx_fprime
 from scipy.stats import chi2
 
-from tautwire.materials.fit import (
+from tautwire.materials.material_table import PAPER_TABLE, read_material_table
+from tautwire.materials.modulus_fit import (
     MIN_RELATIVE_MODULUS,
     LeastSquaresProblem,
     fit_structure,
     relaxation_floor,
     whitened_residuals,
 )
-from tautwire.materials.modulus import Material, MaxwellBranch
-from tautwire.materials.observations import ModulusObservations, observations_from_table
-from tautwire.materials.table import PAPER_TABLE, read_material_table
-from tautwire.materials.terms import ModelStructure
+from tautwire.materials.modulus_observations import ModulusObservations, observations_from_table
+from tautwire.materials.viscoelastic_model import Material, MaxwellBranch, ModelStructure
 from tests.materials import CONSTANT, RELAXING, observed
 
 FREQUENCY = np.geomspace(0.05, 50.0, 16)

@@ -5,9 +5,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tautwire.materials.leave_out import MAX_FOLDS, cross_validate
-from tautwire.materials.modulus import Material, MaxwellBranch
-from tautwire.materials.terms import ModelStructure
+from tautwire.materials.model_selection import MAX_FOLDS, cross_validate
+from tautwire.materials.viscoelastic_model import Material, MaxwellBranch, ModelStructure
 from tests.materials import CONSTANT, observed
 
 FREQUENCY = np.geomspace(0.1, 20.0, 8)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from tautwire.materials.modulus import (
+from tautwire.materials.viscoelastic_model import (
     Material,
     MaxwellBranch,
     complex_modulus,

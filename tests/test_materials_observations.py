@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tautwire.materials.observations import observations_from_table
-from tautwire.materials.table import PAPER_TABLE, read_material_table
+from tautwire.materials.material_table import PAPER_TABLE, read_material_table
+from tautwire.materials.modulus_observations import observations_from_table
 from tests.materials import CONSTANT, observed, written
 
 TABLE = read_material_table(PAPER_TABLE)

@@ -5,10 +5,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tautwire.materials.fit import fit_structure
-from tautwire.materials.modulus import Material, MaxwellBranch
-from tautwire.materials.profile import confidence_intervals, profile_chi_squared
-from tautwire.materials.terms import ModelStructure
+from tautwire.materials.modulus_fit import fit_structure
+from tautwire.materials.modulus_intervals import confidence_intervals, profile_chi_squared
+from tautwire.materials.viscoelastic_model import Material, MaxwellBranch, ModelStructure
 from tests.materials import CONSTANT, observed
 
 FREQUENCY = np.geomspace(0.1, 20.0, 8)

@@ -3,10 +3,9 @@
 import numpy as np
 import pytest
 
-from tautwire.materials.modulus import Material, MaxwellBranch
-from tautwire.materials.selection import CONSTANT_PAIR as PAIR
-from tautwire.materials.selection import likelihood_ratio_p_value, select_model
-from tautwire.materials.terms import ModelStructure
+from tautwire.materials.model_selection import CONSTANT_PAIR as PAIR
+from tautwire.materials.model_selection import likelihood_ratio_p_value, select_model
+from tautwire.materials.viscoelastic_model import Material, MaxwellBranch, ModelStructure
 from tests.materials import CONSTANT, observed
 
 FREQUENCY = np.geomspace(0.1, 20.0, 8)

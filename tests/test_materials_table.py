@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 
 from tautwire.errors import MaterialTableError
-from tautwire.materials.table import PAPER_TABLE, read_material_table
+from tautwire.materials.material_table import PAPER_TABLE, read_material_table
 
 HEADER = "frequency,storage_modulus,storage_modulus_uncertainty,loss_factor,loss_factor_uncertainty"
 ROWS = [f"{f},1.2e11,3e9,0.1,0.01" for f in (0.1, 1, 2, 5)]

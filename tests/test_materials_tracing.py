@@ -19,11 +19,10 @@ from tautwire.materials import (
     trace_material,
     with_material,
 )
-from tautwire.materials.document import material_document
-from tautwire.materials.figure import material_figure
-from tautwire.materials.modulus import Material, MaxwellBranch
+from tautwire.materials.material_files import material_document, material_figure
+from tautwire.materials.material_report import verdict_notes, verdict_sentence
 from tautwire.materials.robot_material import declared_material
-from tautwire.materials.wording import verdict_notes, verdict_sentence
+from tautwire.materials.viscoelastic_model import Material, MaxwellBranch
 from tests.materials import CONSTANT, observed, written
 from tests.robots import example
 

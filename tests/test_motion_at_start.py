@@ -6,15 +6,15 @@ import numpy as np
 import pytest
 
 from tautwire.errors import RecordingError
+from tautwire.estimation.cosimulation_validation import cosimulate_data_set, cosimulation_errors, noise_floor
+from tautwire.estimation.estimation_data import split_data
+from tautwire.estimation.initial_state_prior import initial_motion, with_motion_at_start
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.estimation.parameter_fit import Fitter
+from tautwire.estimation.recording_preparation import prepare_recordings
+from tautwire.estimation.residual_analysis import residuals_are_white
+from tautwire.estimation.smoothed_states import initial_state_note, with_initial_state
 from tautwire.recordings.recording import Recording
-from tautwire.tracer.adequacy import residuals_are_white
-from tautwire.tracer.cosimulated import cosimulate_data_set, cosimulation_errors, noise_floor
-from tautwire.tracer.data import split_data
-from tautwire.tracer.fit import Fitter
-from tautwire.tracer.preparation.motion_at_start import initial_motion, with_motion_at_start
-from tautwire.tracer.preparation.noise import estimate_noise
-from tautwire.tracer.preparation.preparation import prepare_recordings
-from tautwire.tracer.preparation.release import initial_state_note, with_initial_state
 from tests.recordings import recorded
 from tests.rig import SampledProgram, load_robot, make_recording, wander
 from tests.robots import EXAMPLES, NAMES, example

@@ -2,8 +2,8 @@ from dataclasses import replace
 
 import pytest
 
-from tautwire.robots.robot import Sensors
-from tautwire.tracer.preparation.noise import estimate_noise
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.robot.schema import Sensors
 from tests.recordings import recorded
 from tests.robots import example
 

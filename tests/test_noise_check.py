@@ -4,10 +4,9 @@ import numpy as np
 import pytest
 from scipy.signal import lfilter
 
+from tautwire.estimation.measurement_noise import CheckedNoise, check_noise, estimate_noise
 from tautwire.recordings.recording import Recording
-from tautwire.robots.robot import Robot, Sensors
-from tautwire.tracer.preparation.noise import estimate_noise
-from tautwire.tracer.preparation.noise_check import CheckedNoise, check_noise
+from tautwire.robot.schema import Robot, Sensors
 from tests.recordings import recorded
 from tests.robots import NAMES, example
 

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from tautwire.errors import RecordingError
+from tautwire.recordings.outliers import outlier_indices, without_outliers
 from tautwire.recordings.recording import Recording
-from tautwire.tracer.preparation.outliers import outlier_indices, without_outliers
 from tests.recordings import recorded
 from tests.robots import NAMES
 

@@ -2,8 +2,8 @@ from pathlib import Path
 
 import pytest
 
+from tautwire.atomic_output import atomic_file, atomic_folder
 from tautwire.errors import InputError
-from tautwire.output import atomic_file, atomic_folder
 
 
 def names(folder: Path) -> list[str]:

@@ -13,12 +13,12 @@ import pandas as pd
 import pytest
 
 from tautwire.cli import run
+from tautwire.cosimulation.robot_cosimulation import RunError, cosimulate
+from tautwire.cosimulation.robot_wiring import wire_robot
+from tautwire.fmus.fmu_slots import SlotError, missing_user_fmu_ports
 from tautwire.fmus.packaging import RobotFmus, build_fmus
-from tautwire.fmus.slots import SlotError, missing_user_fmu_ports
-from tautwire.robots.reading import write_robot
-from tautwire.robots.robot import UserFmu
-from tautwire.runs.cosimulation import RunError, cosimulate
-from tautwire.runs.wiring import wire_robot
+from tautwire.robot.robot_file_reader import write_robot
+from tautwire.robot.schema import UserFmu
 from tests.own_fmus import LAG, compiler, falling_mass, lag_winch, packed, spring_cable
 from tests.rig import RampProgram, simulate
 from tests.robots import paper_robot

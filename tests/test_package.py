@@ -53,7 +53,7 @@ def test_a_type_checker_refuses_names_that_are_not_ours(tmp_path: Path) -> None:
 
 
 def test_the_package_and_its_command_line_import_nothing_slow() -> None:
-    code = f"import sys, tautwire.cli; print([name for name in {SLOW!r} if name in sys.modules])"
+    code = f"import sys, tautwire.cli.application; print([name for name in {SLOW!r} if name in sys.modules])"
     shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
     assert shown.strip() == "[]"
 

@@ -13,7 +13,7 @@ from fmpy.validation import validate_fmu
 
 from tautwire.fmus import packaging
 from tautwire.fmus.packaging import RobotFmus, build_fmus
-from tautwire.robots.robot import EffectSetting
+from tautwire.robot.schema import EffectSetting
 from tests.fmus import in_hand
 from tests.robots import paper_robot
 
@@ -144,7 +144,7 @@ def test_an_interrupt_while_pythonfmu_works_ends_the_build_and_leaves_no_fmu(
     def interrupted(unfinished: Path, finished: Path) -> None:
         signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(packaging, "mend_exit", interrupted)
+    monkeypatch.setattr(packaging, "patch_wrapper_exit", interrupted)
     with pytest.raises(KeyboardInterrupt):
         build_fmus(paper_robot(), tmp_path)
     assert list(tmp_path.iterdir()) == []

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import pytest
 
-from tautwire.paper.claims import Claim, LedgerEntry, text_claims
+from tautwire.paper.paper_claims import Claim, LedgerEntry, text_claims
 
 CLAIM = Claim(
     "it",
@@ -23,13 +23,13 @@ CLAIM = Claim(
 @pytest.mark.parametrize(("ours", "agrees"), [(2.36, True), (2.49, True), (2.5, True), (2.51, False), (2.34, False)])
 def test_number_agrees_that_rounds_or_is_cut_off_to_the_printed_digits(ours: float, agrees: bool) -> None:
     assert CLAIM.agrees(ours) is agrees
-    assert replace(CLAIM, paper=-2.4).agrees(-ours) is agrees, "size counts, not sign"
+    assert replace(CLAIM, paper_value=-2.4).agrees(-ours) is agrees, "size counts, not sign"
 
 
 def test_bounds_and_ranges_are_kept_or_broken() -> None:
     assert replace(CLAIM, rule="below").agrees(2.3) and not replace(CLAIM, rule="below").agrees(2.5)
     assert replace(CLAIM, rule="above").agrees(2.5) and not replace(CLAIM, rule="above").agrees(2.3)
-    within = replace(CLAIM, paper=(1.0, 2.0), rule="within")
+    within = replace(CLAIM, paper_value=(1.0, 2.0), rule="within")
     assert within.agrees(1.5) and not within.agrees(2.1)
     assert not CLAIM.agrees(None)
 
@@ -40,7 +40,7 @@ BEYOND, TOO_SHORT = (-1.0, 9.0), (4.0, 8.0)
 
 @pytest.mark.parametrize("ours", [*FITTING, BEYOND, TOO_SHORT])
 def test_curve_agrees_that_lies_on_the_printed_axis_and_fills_it(ours: tuple[float, float]) -> None:
-    assert replace(CLAIM, paper=(0.0, 10.0), rule="axis").agrees(ours) is (ours in FITTING)
+    assert replace(CLAIM, paper_value=(0.0, 10.0), rule="axis").agrees(ours) is (ours in FITTING)
 
 
 def test_verdict_says_which_parameters_it_took() -> None:

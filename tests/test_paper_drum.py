@@ -5,9 +5,9 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tautwire.paper.drum import DrumWinding, ExactReel, LinearReel, LogarithmicReel, follow_path
-from tautwire.paper.parameters import read_parameters
-from tautwire.trajectory import Line
+from tautwire.paper.drum_winding import DrumWinding, ExactReel, LinearReel, LogarithmicReel, follow_path
+from tautwire.paper.paper_parameters import read_parameters
+from tautwire.robot.trajectory import Line
 from tests.robots import paper_robot
 
 STRAIN = 4e-4

@@ -10,16 +10,15 @@ import numpy as np
 import pytest
 
 from tautwire.paper import write_paper
-from tautwire.paper.beyond import PAPER_FRAME_WIDTH, TENSION_LIMITS, compare_sizes
-from tautwire.paper.claims import LedgerEntry
-from tautwire.paper.page import SECTION_FIGURES
-from tautwire.paper.panels import draw_time_figures
-from tautwire.paper.ramps import remaining_amplitude
-from tautwire.paper.records import Records
-from tautwire.paper.style import figure_style
-from tautwire.paper.tried import elongations_by_reading
-from tautwire.paper.values import max_abs
-from tautwire.paper.writing import PaperReproduction
+from tautwire.paper.figure_style import figure_style
+from tautwire.paper.open_claims import elongations_by_reading
+from tautwire.paper.paper_claims import LedgerEntry
+from tautwire.paper.paper_extensions import PAPER_FRAME_WIDTH, TENSION_LIMITS, compare_sizes
+from tautwire.paper.paper_figures import draw_time_figures
+from tautwire.paper.paper_page import SECTION_FIGURES
+from tautwire.paper.paper_reproduction import PaperReproduction
+from tautwire.paper.ramp_runs import remaining_amplitude
+from tautwire.paper.simulation_records import Records, max_abs
 from tests.rig import RampProgram, paper_robot, simulate
 
 pytestmark = pytest.mark.slow

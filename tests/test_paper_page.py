@@ -7,16 +7,16 @@ from dataclasses import replace
 
 from matplotlib.figure import Figure
 
-from tautwire.paper.beyond_figures import ExtensionFigure
-from tautwire.paper.claims import Claim, LedgerEntry
-from tautwire.paper.page import SECTION_FIGURES, PageContent, inline_svg, number_text, paper_page, prose_html
-from tautwire.paper.style import PaperFigure, figure_style, write_figures
-from tautwire.paper.tried import OpenClaim
+from tautwire.paper.figure_style import PaperFigure, figure_style, write_figures
+from tautwire.paper.open_claims import OpenClaim
+from tautwire.paper.paper_claims import Claim, LedgerEntry
+from tautwire.paper.paper_extensions import ExtensionFigure
+from tautwire.paper.paper_page import SECTION_FIGURES, PageContent, inline_svg, number_text, paper_page, prose_html
 
 CLAIM = Claim(
     "it", "4.1.1", "difference of r1 <27.5 s>", "mm", 2.4, 0.1, 0.05, explanation="at 9.8 m/s^2", printed_digits="2.40"
 )
-AXIS = replace(CLAIM, id="axis.07a", paper=(-0.5, 3.0), rule="axis", digits="")
+AXIS = replace(CLAIM, id="axis.07a", paper_value=(-0.5, 3.0), rule="axis", printed_digits="")
 
 
 def _drawn(name: str) -> PaperFigure:

@@ -7,10 +7,17 @@ from math import pi
 import numpy as np
 import pytest
 
-from tautwire.paper.parameters import PARAMETER_SETS, ParameterSetName, WinchRamp, read_parameters, with_law, with_rope
-from tautwire.paper.records import RigidPathError, reeled_length, rigid_path
-from tautwire.statics.equilibrium import static_tensions
-from tautwire.trajectory import CAROCA_HELIX, PAPER_HELIX
+from tautwire.paper.paper_parameters import (
+    PARAMETER_SETS,
+    ParameterSetName,
+    WinchRamp,
+    read_parameters,
+    with_law,
+    with_rope,
+)
+from tautwire.paper.simulation_records import RigidPathError, reeled_length, rigid_path
+from tautwire.robot.static_equilibrium import static_tensions
+from tautwire.robot.trajectory import CAROCA_HELIX, PAPER_HELIX
 from tests.robots import paper_robot
 
 PEAK = WinchRamp("held", (28.86, 0.0, 5.0), (0.3, 0.25, -0.25), 1.0, 7.0)

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from tautwire.materials import PAPER_TABLE, RobotMaterial, read_material_table
-from tautwire.materials.consistency import consistency_checks
-from tautwire.materials.modulus import Material, MaxwellBranch, complex_modulus
-from tautwire.paper.material import (
+from tautwire.materials.table_consistency import consistency_checks
+from tautwire.materials.viscoelastic_model import Material, MaxwellBranch, complex_modulus
+from tautwire.paper.rope_tests import (
     DISC_AREA,
     METALLIC_AREA,
     dynamic_modulus_error,

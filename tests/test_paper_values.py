@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tautwire.paper.records import SimulationRecord
-from tautwire.paper.values import (
+from tautwire.paper.simulation_records import (
+    SimulationRecord,
     amplitude,
     dominant_frequency,
     max_abs,

@@ -7,7 +7,7 @@ from itertools import pairwise
 import numpy as np
 import pytest
 
-from tautwire_fmu.past import DelayLine, SignalSample, append_segment, delayed_value
+from tautwire_fmu.delay_line import DelayLine, SignalSample, append_segment, delayed_value
 
 SIGNAL = np.polynomial.Polynomial([3.0, -2.0, 0.5, 4.0])
 

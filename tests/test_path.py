@@ -4,8 +4,13 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tautwire.estimation.localisation.path_smoothing import (
+    SmoothedPath,
+    maximum_likelihood_intensity,
+    smooth_axis,
+    smooth_path,
+)
 from tautwire.recordings.recording import Recording
-from tautwire.tracer.where.path import SmoothedPath, maximum_likelihood_intensity, smooth_axis, smooth_path
 
 Array = NDArray[np.float64]
 

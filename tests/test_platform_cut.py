@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tautwire.estimation.localisation.cable_simulation import CableSimulation
+from tautwire.estimation.localisation.force_balance import force_balance, measured_forces, simulate_platform
+from tautwire.estimation.localisation.path_smoothing import SmoothedPath
 from tautwire.fmus.packaging import build_fmus
-from tautwire.robots.robot import EffectSetting, Robot
-from tautwire.tracer.where.cable_cut import CableSimulation
-from tautwire.tracer.where.path import SmoothedPath
-from tautwire.tracer.where.platform_cut import force_balance, measured_forces, simulate_platform
+from tautwire.robot.schema import EffectSetting, Robot
 from tests.robots import example
 
 Array = NDArray[np.float64]

@@ -7,13 +7,13 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tautwire.model.symbolic import FORMULA_INDEX, FreeParameter
-from tautwire.robots.robot import Formula, Robot
-from tautwire.tracer.discovery.library import Term
-from tautwire.tracer.discovery.ports import FormulaPorts, series_sensitivities
-from tautwire.tracer.likelihood import Likelihood
-from tautwire.tracer.linearisation import linearise_filter
-from tautwire.tracer.preparation.noise import estimate_noise
+from tautwire.estimation.discovery.candidate_terms import Term
+from tautwire.estimation.discovery.formula_ports import FormulaPorts, series_sensitivities
+from tautwire.estimation.innovation_sensitivities import linearise_filter
+from tautwire.estimation.likelihood import Likelihood
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.robot.schema import Formula, Robot
+from tautwire.robot.symbolic_model import FORMULA_INDEX, FreeParameter
 from tests.recordings import recorded
 from tests.robots import example
 
@@ -59,7 +59,7 @@ TERMS = (
 )
 
 
-@pytest.mark.parametrize("term", TERMS, ids=lambda term: f"{term.place} {term.text}")
+@pytest.mark.parametrize("term", TERMS, ids=lambda term: f"{term.target} {term.text}")
 @pytest.mark.parametrize("formulas", [(), (Formula("force_x", "20*sin(3*time)*vx"),)], ids=["plain", "with time"])
 def test_a_term_moves_what_the_filter_says(term: Term, formulas: tuple[Formula, ...]) -> None:
     robot = replace(ROBOT, formulas=formulas)

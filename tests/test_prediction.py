@@ -5,9 +5,9 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from tautwire.master.bends import InterpolationErrorEstimate
-from tautwire.master.hermite import DerivativeChain
-from tautwire.master.prediction import Extrapolator
+from tautwire.cosimulation.convergence import InterpolationErrorEstimate
+from tautwire.cosimulation.extrapolation import Extrapolator
+from tautwire.cosimulation.hermite_interpolation import DerivativeChain
 
 STEP = 0.1
 # Value, rate and its rate, each at the end and in the middle of a step.

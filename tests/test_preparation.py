@@ -10,12 +10,12 @@ import pytest
 
 from tautwire.cli import run
 from tautwire.errors import RecordingError
+from tautwire.estimation.estimation_data import split_data
+from tautwire.estimation.identification import trace
+from tautwire.estimation.parameter_fit import Fitter
+from tautwire.estimation.recording_preparation import PreparedRecordings, prepare_recordings
+from tautwire.estimation.residual_analysis import residuals_are_white
 from tautwire.recordings.recording import Recording
-from tautwire.tracer.adequacy import residuals_are_white
-from tautwire.tracer.data import split_data
-from tautwire.tracer.fit import Fitter
-from tautwire.tracer.preparation.preparation import PreparedRecordings, prepare_recordings
-from tautwire.tracer.tracing import trace
 from tests.recordings import recorded
 from tests.robots import EXAMPLES, example
 

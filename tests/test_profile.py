@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
-from tautwire.tracer.data import DataSet, split_data
-from tautwire.tracer.fit import Fit, Fitter, parameter_bounds
-from tautwire.tracer.hypotheses import Hypothesis
-from tautwire.tracer.preparation.noise import estimate_noise
-from tautwire.tracer.profile import CHI_SQUARED_95, profile_intervals
-from tautwire.tracer.workers import WorkerPool
+from tautwire.estimation.estimation_data import DataSet, split_data
+from tautwire.estimation.hypotheses import Hypothesis
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.estimation.parameter_fit import Fit, Fitter, parameter_bounds
+from tautwire.estimation.profile_likelihood import CHI_SQUARED_95, profile_intervals
+from tautwire.estimation.worker_pool import WorkerPool
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.recordings import recorded
 from tests.robots import example

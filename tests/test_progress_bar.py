@@ -12,7 +12,7 @@ import pytest
 from rich.console import Console
 
 from tautwire.cli import COMMANDS, run
-from tautwire.commands import shared
+from tautwire.cli import console as shared
 from tautwire.errors import TautwireError
 from tests.campaigns import AT_REST, plan_file
 from tests.robots import EXAMPLES
@@ -33,8 +33,8 @@ AT_WORK = {
 }
 # These take minutes: what does the work is taken from them, after its first word.
 LONG = {
-    "trace": ([ROBOT, FIT, "--out", "out"], "tautwire.tracer.trace"),
-    "campaign": (["plan.toml", "--out", "out"], "tautwire.campaign.running.make_rows"),
+    "trace": ([ROBOT, FIT, "--out", "out"], "tautwire.estimation.trace"),
+    "campaign": (["plan.toml", "--out", "out"], "tautwire.campaigns.campaign_runner.run_campaign"),
     "paper": (["--out", "out"], "tautwire.paper.write_paper"),
 }
 # It only writes a text.
@@ -88,7 +88,7 @@ def test_a_long_command_hands_its_bar_on(
     plan_file(tmp_path, AT_REST)
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(worker, first_word)
-    monkeypatch.setattr("tautwire.campaign.cluster.connected", nobody)
+    monkeypatch.setattr("tautwire.campaigns.dask_cluster.dask_client", nobody)
     assert run([command, *arguments]) == 1
     assert "the first word" in heard.getvalue()
 

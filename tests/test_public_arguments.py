@@ -18,7 +18,7 @@ from tautwire.control import ControlAim
 from tautwire.errors import InputError, RecordingError
 from tautwire.linear import LinearPlant
 from tautwire.recordings.recording import Recording
-from tautwire.trajectory import Helix
+from tautwire.robot.trajectory import Helix
 from tests.refusals import refused
 from tests.robots import EXAMPLES, example
 

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tautwire_fmu.quadrature import (
+from tautwire_fmu.hermite_quadrature import (
     CUBIC_END,
     CUBIC_MIDDLE,
     QUINTIC_END,

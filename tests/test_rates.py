@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from tautwire.master.rates import DerivativeEstimator, derivative_weights
+from tautwire.cosimulation.extrapolation import DerivativeEstimator, derivative_weights
 
 
 @pytest.mark.parametrize("times", [[0.0, 0.1], [0.0, 0.1, 0.2], [0.0, 0.03, 0.1, 0.11, 0.3]])

@@ -5,14 +5,15 @@ from typing import Any
 
 import pytest
 
+from tautwire.estimation import prepared_data as ready
+from tautwire.estimation import trace
+from tautwire.estimation.clock_offsets import CHANNEL_GROUPS, shifted
+from tautwire.estimation.estimation_data import DataSplit
+from tautwire.estimation.parameter_fit import Fitter
+from tautwire.estimation.prepared_data import PreparedData, prepare_data
+from tautwire.estimation.worker_pool import WorkerPool
 from tautwire.recordings.recording import Recording
-from tautwire.robots.robot import Robot
-from tautwire.tracer import ready, trace
-from tautwire.tracer.data import DataSplit
-from tautwire.tracer.fit import Fitter
-from tautwire.tracer.preparation.clock import CHANNEL_GROUPS, shifted
-from tautwire.tracer.ready import PreparedData, prepare_data
-from tautwire.tracer.workers import WorkerPool
+from tautwire.robot.schema import Robot
 from tests.recordings import recorded
 from tests.robots import example
 

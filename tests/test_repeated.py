@@ -7,11 +7,11 @@ import numpy as np
 import pytest
 from casadi import SX, Function
 
-from tautwire.model.symbolic import FreeParameter, symbolic_model
-from tautwire.native.repeated import CompiledFunction, by_sample
-from tautwire.tracer.filter_step import Substeps, filter_step
-from tautwire.tracer.preparation.noise import estimate_noise
-from tautwire.tracer.preparation.start_state import initial_covariance
+from tautwire.estimation.initial_state_prior import initial_covariance
+from tautwire.estimation.kalman_filter import Substeps, filter_step
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.estimation.native_functions import CompiledFunction, by_sample
+from tautwire.robot.symbolic_model import FreeParameter, symbolic_model
 from tests.effect_cases import CASES, Case
 from tests.memory import TOLD, resident_memory
 from tests.recordings import recorded

@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tautwire.estimation.trace_result import Resonance
 from tautwire.linear import modes_along
-from tautwire.report.bands import merge_mode_bands, mode_bands, resonance_bands
-from tautwire.report.figures import trace_page_data
-from tautwire.report.page import trace_page
-from tautwire.tracer.verdict import Resonance
+from tautwire.reports.mode_bands import merge_mode_bands, mode_bands, resonance_bands
+from tautwire.reports.trace_figures import trace_page_data
+from tautwire.reports.trace_report_page import trace_page
 from tests.pages import Page
 from tests.robots import example
 from tests.traces import made_trace

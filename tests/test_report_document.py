@@ -10,8 +10,8 @@ from typing import Any, cast
 import numpy as np
 import pytest
 
-from tautwire.report import trace_document
-from tautwire.tracer.verdict import Correlation, FittedParameter
+from tautwire.estimation.trace_result import Correlation, FittedParameter
+from tautwire.reports import trace_document
 from tests.traces import HOSTILE, made_trace, nothing_found, without_positions
 
 # The example of the agreed format, with one entry of each kind.
@@ -118,7 +118,7 @@ def test_null_replaces_what_is_not_finite(strange: float) -> None:
     trace = made_trace()
     trace = replace(
         trace,
-        left=np.full(6, strange),
+        normalised_innovation_variance=np.full(6, strange),
         autocorrelations=(np.full(6, strange), np.full(6, strange)),
         noise_floor=replace(trace.noise_floor, tension_rms=strange),
         effects=(replace(trace.effects[0], evidence=strange),),

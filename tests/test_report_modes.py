@@ -12,10 +12,9 @@ import pytest
 
 from tautwire.cli import run as command
 from tautwire.linear import LinearPlant, linearise
-from tautwire.report.modes_figures import DRAWN_SWING_SHARE, modes_data
-from tautwire.report.modes_page import modes_page
-from tautwire.report.series import unpack_float32
-from tautwire.robots.robot import Robot
+from tautwire.reports.downsampling import unpack_float32
+from tautwire.reports.modes_page import DRAWN_SWING_SHARE, modes_data, modes_page
+from tautwire.robot.schema import Robot
 from tests.pages import FETCHING, Page
 from tests.robots import EXAMPLES, example
 from tests.traces import HOSTILE

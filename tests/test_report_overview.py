@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from tautwire.master import MemoryRecorder
-from tautwire.report.overview import RecorderPair, RunOverview
+from tautwire.cosimulation import MemoryRecorder
+from tautwire.reports.run_overview import RecorderPair, RunOverview
 
 
 def filled(values: np.ndarray, groups: int) -> RunOverview:

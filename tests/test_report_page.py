@@ -12,9 +12,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tautwire.report import trace_document, trace_page, write_report
-from tautwire.report.figures import MAX_CURVE_POINTS, deviation_magnification, trace_page_data
-from tautwire.report.series import (
+from tautwire.estimation.trace_result import Correlation, FittedParameter, Identifiability, Trace
+from tautwire.reports import trace_document, trace_page, write_report
+from tautwire.reports.downsampling import (
     envelope_times,
     min_max_envelope,
     pack_float32,
@@ -22,8 +22,8 @@ from tautwire.report.series import (
     unpack_float32,
     white_noise_density,
 )
-from tautwire.robots.reading import read_robot
-from tautwire.tracer.verdict import Correlation, FittedParameter, Identifiability, Trace
+from tautwire.reports.trace_figures import MAX_CURVE_POINTS, deviation_magnification, trace_page_data
+from tautwire.robot.robot_file_reader import read_robot
 from tests.pages import FETCHING, Page
 from tests.traces import HOSTILE, TENSION_NOISE, made_trace, nothing_found, without_positions
 
@@ -121,7 +121,7 @@ def test_page_says_what_would_have_shown_and_what_never() -> None:
     content = trace_page(made_trace(samples=200), {})
     assert "0.0195" in content
     assert "never" in content[content.index("Smallest sizes") :]
-    nothing = replace(made_trace(samples=200), separation=Identifiability((), ()))
+    nothing = replace(made_trace(samples=200), identifiability=Identifiability((), ()))
     assert "no size can be given" in trace_page(nothing, {})
 
 

@@ -11,10 +11,10 @@ import pandas as pd
 import pytest
 
 from tautwire.cli import run as command
-from tautwire.report.overview import RunOverview
-from tautwire.report.run_page import run_page
-from tautwire.report.series import unpack_float32
-from tautwire.runs.wiring import result_columns
+from tautwire.cosimulation.robot_wiring import result_columns
+from tautwire.reports.downsampling import unpack_float32
+from tautwire.reports.run_overview import RunOverview
+from tautwire.reports.run_page import run_page
 from tests.pages import FETCHING, Page
 from tests.robots import EXAMPLES
 from tests.traces import HOSTILE, made_run
@@ -76,7 +76,7 @@ def test_slack_cables_and_failures_are_named_at_the_top() -> None:
     row[list(run.columns).index("tension_2")] = 0.0
     run.overview.add(21.0, row)
     assert "Slack at times: cable 2" in Page(run_page(run, {})).text
-    failed = replace(run, account=None, failure="cable_1: doStep failed at 21 s")
+    failed = replace(run, statistics=None, failure="cable_1: doStep failed at 21 s")
     page = Page(run_page(failed, {}))
     assert "Stopped: an FMU failed" in page.text and "cable_1: doStep failed at 21 s" in page.text
 

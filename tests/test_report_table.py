@@ -9,16 +9,16 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
-from tautwire.report import trace_table
-from tautwire.report.summary import ROLES, comparison_by_role, explained_share, format_evidence
-from tautwire.report.units import (
+from tautwire.estimation.trace_result import Estimate, Trace
+from tautwire.number_format import (
     choose_unit,
     format_engineering,
     format_in_common_unit,
     format_percent,
     format_significant,
 )
-from tautwire.tracer.verdict import Estimate, Trace
+from tautwire.reports import trace_table
+from tautwire.reports.trace_texts import ROLES, comparison_by_role, explained_share, format_evidence
 from tests.traces import HOSTILE, made_trace, nothing_found, without_positions
 
 

@@ -6,9 +6,9 @@ from dataclasses import replace
 
 from rich.console import Console
 
-from tautwire.report import trace_table
-from tautwire.report.tried import candidates_section
-from tautwire.tracer.verdict import Candidate, Trace
+from tautwire.estimation.trace_result import Candidate, Trace
+from tautwire.reports import trace_table
+from tautwire.reports.trace_report_page import candidates_section
 from tests.pages import Page
 from tests.traces import made_trace
 

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 
-from tautwire.report import trace_document
-from tautwire.report.charts import log_bar
-from tautwire.report.where import localisation_section
-from tautwire.tracer.where.port_residuals import FaultLocalisation
+from tautwire.estimation.localisation.component_residuals import FaultLocalisation
+from tautwire.reports import trace_document
+from tautwire.reports.inline_charts import log_bar
+from tautwire.reports.trace_report_page import localisation_section
 from tests.pages import Page
 from tests.traces import HOSTILE, made_trace
 
@@ -42,7 +42,7 @@ def test_a_ringing_force_shows_its_frequency() -> None:
 
 def test_hostile_words_are_escaped() -> None:
     trace = made_trace(samples=200)
-    hostile = replace(trace.components, sentence=HOSTILE, untold=(HOSTILE,))
+    hostile = replace(trace.components, sentence=HOSTILE, limitations=(HOSTILE,))
     assert "img" not in [tag for tag, _ in Page(localisation_section(replace(trace, components=hostile))).elements]
 
 

@@ -8,12 +8,12 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tautwire.estimation.discovery.hidden_resonances import find_resonances
+from tautwire.estimation.estimation_data import split_data
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.estimation.parameter_fit import Fitter
+from tautwire.estimation.trace_result import Resonance
 from tautwire.recordings.recording import Recording
-from tautwire.tracer.data import split_data
-from tautwire.tracer.discovery.resonance import find_resonances
-from tautwire.tracer.fit import Fitter
-from tautwire.tracer.preparation.noise import estimate_noise
-from tautwire.tracer.verdict import Resonance
 from tests.recordings import recorded
 from tests.robots import example
 

@@ -11,9 +11,9 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 import pytest
 
+from tautwire.cosimulation import result_file
+from tautwire.cosimulation.result_file import BLOCK_BYTES, Column, open_result_file
 from tautwire.errors import TautwireError
-from tautwire.runs import result_file
-from tautwire.runs.result_file import BLOCK_BYTES, Column, open_result_file
 
 COLUMNS = [Column("time", "s"), Column("x", "m"), Column("tension_1", "N")]
 ROWS = np.column_stack([np.arange(7) * 0.1, np.geomspace(1e-9, 1e9, 7), np.linspace(-1.0, 1.0, 7) / 3.0])

@@ -5,7 +5,7 @@ import pytest
 from numpy.typing import NDArray
 from scipy.signal import lfilter
 
-from tautwire.tracer.where.ringing import resonance_frequency
+from tautwire.estimation.residual_spectrum import resonance_frequency
 
 Array = NDArray[np.float64]
 

@@ -9,15 +9,15 @@ from typing import Any
 import pytest
 
 from tautwire.errors import UnreachableError
-from tautwire.robots.robot import Robot
-from tautwire.tracer import trace
-from tautwire.tracer.data import DataSet, split_data
-from tautwire.tracer.fit import Fitter
-from tautwire.tracer.hypotheses import Hypothesis
-from tautwire.tracer.likelihood import Innovations
-from tautwire.tracer.preparation.noise import estimate_noise
-from tautwire.tracer.rivals import replace_by_confusable_models
-from tautwire.tracer.search import SelectionResult
+from tautwire.estimation import trace
+from tautwire.estimation.confusable_models import replace_by_confusable_models
+from tautwire.estimation.estimation_data import DataSet, split_data
+from tautwire.estimation.hypotheses import Hypothesis
+from tautwire.estimation.likelihood import Innovations
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.estimation.parameter_fit import Fitter
+from tautwire.estimation.stepwise_selection import SelectionResult
+from tautwire.robot.schema import Robot
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.recordings import recorded
 from tests.robots import example

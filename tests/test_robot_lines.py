@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tautwire.robots.lines import line_of_key
+from tautwire.robot.checked_table import line_of_key
 
 TEXT = '''\
 # a comment

@@ -9,8 +9,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tautwire.errors import InputError, RobotFileError
-from tautwire.robots.reading import read_robot
-from tautwire.robots.robot import Cable, EffectSetting, Platform, Robot, Sensors, TensionLimits, UserFmu, Winch
+from tautwire.robot.robot_file_reader import read_robot
+from tautwire.robot.schema import Cable, EffectSetting, Platform, Robot, Sensors, TensionLimits, UserFmu, Winch
 
 HALL = """\
 name = "hall"

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 
 from tautwire.cli import run
+from tautwire.cosimulation.robot_cosimulation import cosimulate
 from tautwire.fmus.packaging import build_fmus
-from tautwire.robots import reading
-from tautwire.robots.reading import read_robot
-from tautwire.robots.template import MAX_TEMPLATE_CABLES, MIN_TEMPLATE_CABLES, new_robot_text
-from tautwire.runs.cosimulation import cosimulate
-from tautwire.statics.equilibrium import static_tensions
+from tautwire.robot import robot_file_reader as reading
+from tautwire.robot.robot_file_reader import read_robot
+from tautwire.robot.robot_file_writer import MAX_TEMPLATE_CABLES, MIN_TEMPLATE_CABLES, new_robot_text
+from tautwire.robot.static_equilibrium import static_tensions
 
 
 @pytest.mark.parametrize("count", range(MIN_TEMPLATE_CABLES, MAX_TEMPLATE_CABLES + 1))

@@ -11,8 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tautwire.errors import RobotFileError
-from tautwire.robots.reading import read_robot, robot_text, write_robot
-from tautwire.robots.robot import (
+from tautwire.robot.robot_file_reader import read_robot, robot_text, write_robot
+from tautwire.robot.schema import (
     PER_CABLE_COMPONENTS,
     Cable,
     EffectSetting,

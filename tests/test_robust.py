@@ -25,10 +25,10 @@ from tautwire.control import (
     sample_times,
     schedule_robust,
 )
-from tautwire.control.plan import controller_data
+from tautwire.control.path_controller import controller_data
 from tautwire.fmus.packaging import RobotFmus, build_fmus
-from tautwire.robots.robot import Robot
-from tautwire.trajectory import Line
+from tautwire.robot.schema import Robot
+from tautwire.robot.trajectory import Line
 from tautwire_fmu.laws import sampled_control as law
 from tests.robots import example
 

@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from tautwire.recordings.roughness import white_noise_deviation
+from tautwire.recordings.white_noise_estimate import white_noise_deviation
 
 
 def test_roughness_passes_over_what_is_smooth_what_is_missing_and_outliers() -> None:

@@ -9,9 +9,9 @@ import pytest
 from scipy.optimize import brentq
 
 from tautwire_fmu.laws.cable import LAWS, CableConstants, CableInputs, CableState, cable_motion, cable_outputs, span
+from tautwire_fmu.laws.effect_stages import Route
 from tautwire_fmu.laws.effects import BY_NAME, ActiveEffect
 from tautwire_fmu.laws.mathematics import REAL
-from tautwire_fmu.laws.stages import Route
 
 GRAVITY = 9.81
 SAG = BY_NAME["sag"]

@@ -5,15 +5,15 @@ from collections.abc import Sequence
 import pytest
 
 from tautwire.errors import UnreachableError
-from tautwire.robots.robot import Robot
-from tautwire.tracer.data import DataSet, split_data
-from tautwire.tracer.fit import Fitter
-from tautwire.tracer.hypotheses import Hypothesis
-from tautwire.tracer.likelihood import Innovations
-from tautwire.tracer.preparation.noise import estimate_noise
-from tautwire.tracer.scan import grid_points, grid_search, zero_slope_predictions
-from tautwire.tracer.screen import PredictedGain, score_test
-from tautwire.tracer.workers import WorkerPool
+from tautwire.estimation.estimation_data import DataSet, split_data
+from tautwire.estimation.grid_search import grid_points, grid_search, zero_slope_predictions
+from tautwire.estimation.hypotheses import Hypothesis
+from tautwire.estimation.likelihood import Innovations
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.estimation.parameter_fit import Fitter
+from tautwire.estimation.score_test import PredictedGain, score_test
+from tautwire.estimation.worker_pool import WorkerPool
+from tautwire.robot.schema import Robot
 from tautwire_fmu.laws.effects import DAMPING, HYSTERESIS, SLACK
 from tests.recordings import recorded
 from tests.robots import example

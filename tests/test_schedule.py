@@ -17,8 +17,8 @@ from tautwire.control import (
     schedule_controller,
 )
 from tautwire.fmus.packaging import RobotFmus, build_fmus
-from tautwire.robots.robot import Robot
-from tautwire.trajectory import PAPER_HELIX, Line
+from tautwire.robot.schema import Robot
+from tautwire.robot.trajectory import PAPER_HELIX, Line
 from tests.robots import example
 
 Array = NDArray[np.float64]

@@ -5,16 +5,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tautwire.estimation.estimation_data import split_data
+from tautwire.estimation.hypotheses import Hypothesis, hypotheses
+from tautwire.estimation.innovation_sensitivities import SensitivityColumn
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.estimation.parameter_fit import Fitter
+from tautwire.estimation.prepared_data import prepare_data
+from tautwire.estimation.score_test import ScoreStatistics, _predicted_gain, score_test, score_test_in_workers
+from tautwire.estimation.worker_pool import WorkerPool
 from tautwire.recordings.recording import read_recording
-from tautwire.robots.reading import read_robot
-from tautwire.tracer.data import split_data
-from tautwire.tracer.directions import SensitivityColumn
-from tautwire.tracer.fit import Fitter
-from tautwire.tracer.hypotheses import Hypothesis, hypotheses
-from tautwire.tracer.preparation.noise import estimate_noise
-from tautwire.tracer.ready import prepare_data
-from tautwire.tracer.screen import ScoreStatistics, _predicted_gain, score_test, score_test_in_workers
-from tautwire.tracer.workers import WorkerPool
+from tautwire.robot.robot_file_reader import read_robot
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.planar import VERTICAL, planar_case
 from tests.recordings import recorded

@@ -6,13 +6,13 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tautwire.estimation.estimation_data import split_data
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.estimation.parameter_fit import Fitter
+from tautwire.estimation.residual_analysis import residuals_are_white
+from tautwire.estimation.stepwise_selection import SelectionResult, select_effects
 from tautwire.recordings.recording import Recording
-from tautwire.robots.robot import EffectSetting, Robot
-from tautwire.tracer.adequacy import residuals_are_white
-from tautwire.tracer.data import split_data
-from tautwire.tracer.fit import Fitter
-from tautwire.tracer.preparation.noise import estimate_noise
-from tautwire.tracer.search import SelectionResult, select_effects
+from tautwire.robot.schema import EffectSetting, Robot
 from tests.recordings import recorded
 from tests.robots import example
 

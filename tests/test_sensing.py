@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from tautwire.model.symbolic import FreeParameter, SymbolicModel, symbolic_model
-from tautwire.robots.robot import EffectSetting
-from tautwire.tracer.sensing import delayed_outputs, measurement_model
+from tautwire.estimation.measurement_model import delayed_outputs, measurement_model
+from tautwire.robot.schema import EffectSetting
+from tautwire.robot.symbolic_model import FreeParameter, SymbolicModel, symbolic_model
 from tests.robots import example
 
 DELAYS = {"tension_delay": 0.004, "position_delay": 0.003}

@@ -5,13 +5,13 @@ from math import sqrt
 import numpy as np
 import pytest
 
-from tautwire.robots.robot import Robot
-from tautwire.tracer.data import DataSplit, split_data
-from tautwire.tracer.fit import Fitter
-from tautwire.tracer.hypotheses import Hypothesis, hypotheses
-from tautwire.tracer.preparation.noise import estimate_noise
-from tautwire.tracer.separation import analyse_identifiability
-from tautwire.tracer.verdict import Detectable, Identifiability
+from tautwire.estimation.estimation_data import DataSplit, split_data
+from tautwire.estimation.hypotheses import Hypothesis, hypotheses
+from tautwire.estimation.identifiability import analyse_identifiability
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.estimation.parameter_fit import Fitter
+from tautwire.estimation.trace_result import Detectable, Identifiability
+from tautwire.robot.schema import Robot
 from tautwire_fmu.laws.effects import DAMPING, MODULUS, PAYLOAD, RELAXATION, SLACK
 from tests.recordings import recorded
 from tests.robots import example

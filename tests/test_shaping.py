@@ -21,10 +21,10 @@ from tautwire.control import (
     shaper,
     shaper_for_modes,
 )
-from tautwire.control.shaping import ShaperKind
+from tautwire.control.input_shaping import ShaperKind
 from tautwire.errors import InputError
 from tautwire.fmus.packaging import RobotFmus
-from tautwire.trajectory import Line, Trajectory
+from tautwire.robot.trajectory import Line, Trajectory
 from tests.robots import paper_robot
 from tests.winch_ramp import WinchRamp
 

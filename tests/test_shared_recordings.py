@@ -4,9 +4,9 @@ from pathlib import Path
 
 import pytest
 
+from tautwire.estimation import Trace, trace
 from tautwire.recordings.recording import read_recording
-from tautwire.robots.reading import read_robot
-from tautwire.tracer import Trace, trace
+from tautwire.robot.robot_file_reader import read_robot
 
 FOLDER = Path(__file__).parent.parent.parent / "shared" / "recordings"
 pytestmark = [

@@ -3,8 +3,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tautwire.recordings.dead_channels import without_dead_channels
 from tautwire.recordings.recording import Recording
-from tautwire.tracer.preparation.silent import without_dead_channels
 from tests.recordings import recorded
 from tests.robots import NAMES
 

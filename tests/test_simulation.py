@@ -8,12 +8,12 @@ import numpy as np
 import pyarrow.parquet as pq
 import pytest
 
+from tautwire.cosimulation import result_file
+from tautwire.cosimulation.isolation import CALL_TIMEOUT
+from tautwire.cosimulation.recording_simulation import simulate_recording
+from tautwire.cosimulation.result_file import open_result_file
+from tautwire.cosimulation.robot_wiring import result_columns
 from tautwire.errors import RecordingError
-from tautwire.master.watch import CALL_TIMEOUT
-from tautwire.runs import result_file
-from tautwire.runs.result_file import open_result_file
-from tautwire.runs.simulation import simulate_recording
-from tautwire.runs.wiring import result_columns
 from tests.bench.long import STEP, write_recording
 from tests.memory import TOLD, resident_memory
 from tests.robots import example

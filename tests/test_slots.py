@@ -11,8 +11,7 @@ import fmpy
 import pytest
 
 from tautwire.errors import InputError
-from tautwire.fmus.packaging import RobotFmus, build_fmus, with_user_fmus_copied
-from tautwire.fmus.slots import (
+from tautwire.fmus.fmu_slots import (
     SlotError,
     check_user_fmus,
     notes_on_unstated_units,
@@ -20,7 +19,8 @@ from tautwire.fmus.slots import (
     require_step_support,
     slot_ports,
 )
-from tautwire.robots.robot import UserFmu, fmu_slots
+from tautwire.fmus.packaging import RobotFmus, build_fmus, with_user_fmus_copied
+from tautwire.robot.schema import UserFmu, fmu_slots
 from tests.own_fmus import falling_mass, packed, packed_3
 from tests.robots import paper_robot
 

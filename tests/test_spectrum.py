@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from tautwire.tracer.discovery.spectrum import spectral_lines
-from tautwire.tracer.likelihood import Innovations
+from tautwire.estimation.likelihood import Innovations
+from tautwire.estimation.residual_spectrum import spectral_lines
 
 TIME = np.arange(1500) / 50.0
 EVERY = np.ones(1500, dtype=bool)

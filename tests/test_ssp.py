@@ -12,11 +12,11 @@ from fmpy.ssp.simulation import simulate_ssp
 from fmpy.ssp.ssd import read_ssd, validate_tree
 from lxml import etree
 
+from tautwire.cosimulation.robot_wiring import recorded_ports, robot_connections, winch_input_ports
+from tautwire.cosimulation.ssp_archive import COMPONENTS_ONLY, SYSTEM_STRUCTURE, ssp_name, write_ssp
 from tautwire.errors import InputError
 from tautwire.fmus.packaging import RobotFmus, build_fmus
-from tautwire.robots.robot import EffectSetting
-from tautwire.runs.ssp import COMPONENTS_ONLY, SYSTEM_STRUCTURE, ssp_name, write_ssp
-from tautwire.runs.wiring import recorded_ports, robot_connections, winch_input_ports
+from tautwire.robot.schema import EffectSetting
 from tautwire_fmu.units import UNITS
 from tests.robots import paper_robot
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize_scalar
 
-from tautwire_fmu.laws import stages
+from tautwire_fmu.laws import effect_stages as stages
 from tautwire_fmu.laws.effects import BY_NAME, ActiveEffect
 from tautwire_fmu.laws.mathematics import REAL
 

@@ -5,7 +5,7 @@ import pytest
 
 from tautwire.errors import UnreachableError
 from tautwire.recordings.recording import Recording
-from tautwire.runs.start import start_position, with_start
+from tautwire.recordings.start_position import start_position, with_start
 from tests.recordings import recorded
 from tests.robots import example
 

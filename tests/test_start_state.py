@@ -5,14 +5,14 @@ import casadi
 import numpy as np
 import pytest
 
-from tautwire.model.symbolic import symbolic_model
+from tautwire.estimation.initial_state_prior import initial_covariance, self_stress_deviation, self_stress_projection
+from tautwire.estimation.kalman_filter import Noise
+from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.recordings.recording import Recording
-from tautwire.robots.reading import read_robot, robot_text, write_robot
-from tautwire.robots.robot import InitialState
-from tautwire.statics.equilibrium import static_tensions
-from tautwire.tracer.filter_step import Noise
-from tautwire.tracer.preparation.noise import estimate_noise
-from tautwire.tracer.preparation.start_state import initial_covariance, self_stress_deviation, self_stress_projection
+from tautwire.robot.robot_file_reader import read_robot, robot_text, write_robot
+from tautwire.robot.schema import InitialState
+from tautwire.robot.static_equilibrium import static_tensions
+from tautwire.robot.symbolic_model import symbolic_model
 from tests.recordings import recorded
 from tests.robots import example
 

@@ -5,8 +5,8 @@ import pytest
 from scipy.optimize import minimize
 
 from tautwire.errors import UnreachableError
-from tautwire.robots.robot import EffectSetting, TensionLimits
-from tautwire.statics.equilibrium import static_tensions, unit_directions
+from tautwire.robot.schema import EffectSetting, TensionLimits
+from tautwire.robot.static_equilibrium import static_tensions, unit_directions
 from tests.robots import NAMES, example, paper_robot
 
 

@@ -5,8 +5,7 @@ from math import factorial
 import numpy as np
 import pytest
 
-from tautwire.tracer.filter_step import Substeps
-from tautwire.tracer.substeps import eigenvalues_at_start, substeps_of_eigenvalues, substeps_of_robot
+from tautwire.estimation.kalman_filter import Substeps, eigenvalues_at_start, substeps_of_eigenvalues, substeps_of_robot
 from tests.effect_cases import same
 from tests.robots import example
 

@@ -4,9 +4,9 @@ import casadi
 import numpy as np
 import pytest
 
-from tautwire.model.symbolic import FreeParameter, symbolic_model
-from tautwire.robots.robot import EffectSetting
-from tautwire.statics.equilibrium import static_tensions
+from tautwire.robot.schema import EffectSetting
+from tautwire.robot.static_equilibrium import static_tensions
+from tautwire.robot.symbolic_model import FreeParameter, symbolic_model
 from tests.robots import NAMES, example
 
 

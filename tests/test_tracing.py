@@ -6,9 +6,9 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tautwire.runs.cosimulation import CosimulationResult, cosimulate
-from tautwire.tracer import Trace, trace
-from tautwire.tracer.cosimulated import cosimulation_errors
+from tautwire.cosimulation.robot_cosimulation import CosimulationResult, cosimulate
+from tautwire.estimation import Trace, trace
+from tautwire.estimation.cosimulation_validation import cosimulation_errors
 from tests.recordings import recorded
 from tests.robots import example
 
@@ -52,7 +52,7 @@ def test_no_name_is_given_where_the_rebuilt_fmus_miss_the_recording(monkeypatch:
         runs.append(motion)
         return replace(motion, position=motion.position + 0.01) if len(runs) > 2 else motion
 
-    monkeypatch.setattr("tautwire.tracer.cosimulated.cosimulate", astray)
+    monkeypatch.setattr("tautwire.estimation.cosimulation_validation.cosimulate", astray)
     found = traced()
     assert len(runs) == 4
     assert found.verdict == "unexplained"

@@ -4,10 +4,17 @@ from __future__ import annotations
 
 import numpy as np
 
-from tautwire.tracer.fit import Fit
-from tautwire.tracer.hypotheses import Hypothesis
-from tautwire.tracer.screen import PredictedGain
-from tautwire.tracer.trials import MAX_FITS, MAX_FITS_PER_EFFECT, TIE_NATS, CandidateScore, most_parsimonious, shortlist
+from tautwire.estimation.candidate_scores import (
+    MAX_FITS,
+    MAX_FITS_PER_EFFECT,
+    TIE_NATS,
+    CandidateScore,
+    most_parsimonious,
+    shortlist,
+)
+from tautwire.estimation.hypotheses import Hypothesis
+from tautwire.estimation.parameter_fit import Fit
+from tautwire.estimation.score_test import PredictedGain
 from tautwire_fmu.laws.effects import ALL, BY_NAME
 from tests.robots import example
 

@@ -10,13 +10,13 @@ import numpy as np
 import pytest
 from casadi import DM
 
-from tautwire.model.symbolic import symbolic_model
-from tautwire.model.uncertain import perturbed_robot, sensor_offsets, uncertain_parameters
+from tautwire.estimation import Trace, trace
 from tautwire.recordings.recording import Recording
-from tautwire.robots.reading import read_robot
-from tautwire.robots.robot import Robot
-from tautwire.robots.writing import robot_text
-from tautwire.tracer import Trace, trace
+from tautwire.robot.robot_file_reader import read_robot
+from tautwire.robot.robot_file_writer import robot_text
+from tautwire.robot.schema import Robot
+from tautwire.robot.symbolic_model import symbolic_model
+from tautwire.robot.uncertain_parameters import perturbed_robot, sensor_offsets, uncertain_parameters
 from tests.recordings import recorded
 from tests.robots import example
 

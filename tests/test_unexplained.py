@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tautwire.cosimulation.robot_cosimulation import cosimulate
+from tautwire.estimation import Trace, trace
 from tautwire.fmus.packaging import build_fmus
-from tautwire.report.document import trace_document
-from tautwire.robots.reading import read_robot, write_robot
-from tautwire.runs.cosimulation import cosimulate
-from tautwire.tracer import Trace, trace
+from tautwire.reports.report_folder import trace_document
+from tautwire.robot.robot_file_reader import read_robot, write_robot
 from tests.recordings import recorded
 from tests.robots import example
 

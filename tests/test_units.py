@@ -3,7 +3,7 @@
 import pytest
 from fmpy.model_description import ScalarVariable, SimpleType
 
-from tautwire.master.units import nominal_of, unit_of
+from tautwire.fmus.variable_units import nominal_of, unit_of
 from tautwire_fmu.cable_variables import cable_variables
 
 FORCE = SimpleType("Force", "Real", unit="N", nominal="300")

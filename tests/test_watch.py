@@ -17,8 +17,7 @@ import numpy as np
 import pytest
 
 from tautwire.control import cosimulate_closed_loop, design_controller
-from tautwire.fmus.packaging import RobotFmus
-from tautwire.master import (
+from tautwire.cosimulation import (
     CallAbortedError,
     ComponentError,
     FixedStep,
@@ -28,10 +27,11 @@ from tautwire.master import (
     RunAbortedError,
     RunStatistics,
     simulate_isolated,
-    watch,
 )
-from tautwire.runs.cosimulation import CosimulationResult, RunError, cosimulate
-from tautwire.trajectory import PAPER_HELIX
+from tautwire.cosimulation import isolation as watch
+from tautwire.cosimulation.robot_cosimulation import CosimulationResult, RunError, cosimulate
+from tautwire.fmus.packaging import RobotFmus
+from tautwire.robot.trajectory import PAPER_HELIX
 from tests.faults import FAULT, NUMBERS, build_faulty, coupled
 from tests.robots import paper_robot
 

@@ -10,7 +10,7 @@ import pytest
 from fmpy.fmi1 import FMICallException
 
 from tautwire.fmus.packaging import RobotFmus, build_fmus
-from tautwire.robots.robot import Winch
+from tautwire.robot.schema import Winch
 from tests.fmus import Hand, in_hand
 from tests.rig import Drive
 from tests.robots import LIMITED, paper_robot, with_winch

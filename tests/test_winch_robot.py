@@ -10,10 +10,10 @@ from fmpy.ssp.ssd import read_ssd
 from scipy.interpolate import CubicHermiteSpline
 
 from tautwire.control import cosimulate_closed_loop, design_controller
+from tautwire.cosimulation.robot_cosimulation import cosimulate, instantiate_robot, wire_fmus
+from tautwire.cosimulation.ssp_archive import ssp_name, write_ssp
 from tautwire.fmus.packaging import RobotFmus, build_fmus
-from tautwire.robots.robot import Robot, Winch
-from tautwire.runs.cosimulation import cosimulate, instantiate_robot, wire_fmus
-from tautwire.runs.ssp import ssp_name, write_ssp
+from tautwire.robot.schema import Robot, Winch
 from tests.rig import simulate
 from tests.robots import LIMITED, example, paper_robot, with_winch
 from tests.test_control import PATHS, rms

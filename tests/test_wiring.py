@@ -2,10 +2,10 @@ from collections.abc import Iterator
 
 import pytest
 
+from tautwire.cosimulation import Component, Connection, Port, WiringError
+from tautwire.cosimulation.connections import check_connections, dependency_groups
+from tautwire.cosimulation.robot_wiring import robot_connections
 from tautwire.fmus.packaging import RobotFmus
-from tautwire.master import Component, Connection, Port, WiringError
-from tautwire.master.wiring import check_connections, dependency_groups
-from tautwire.runs.wiring import robot_connections
 
 
 @pytest.fixture

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from tautwire.tracer.workers import WorkerLostError, WorkerPool, processors
+from tautwire.estimation.worker_pool import WorkerLostError, WorkerPool, processors
 
 
 def square(number: int) -> int:

@@ -5,10 +5,9 @@ import numpy as np
 import pytest
 
 from tautwire.errors import InputError, UnreachableError
-from tautwire.robots.robot import Cable, EffectSetting, Platform, Robot, Sensors, TensionLimits
-from tautwire.statics.distribution import distribute_tensions
-from tautwire.statics.equilibrium import static_tensions, unit_directions
-from tautwire.statics.workspace import wrench_feasible_workspace, wrench_margin
+from tautwire.robot.schema import Cable, EffectSetting, Platform, Robot, Sensors, TensionLimits
+from tautwire.robot.static_equilibrium import distribute_tensions, static_tensions, unit_directions
+from tautwire.robot.workspace import wrench_feasible_workspace, wrench_margin
 from tests.robots import NAMES, example, paper_robot
 
 

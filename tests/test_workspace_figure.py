@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 
 from tautwire.errors import InputError
-from tautwire.statics.workspace import wrench_feasible_workspace
-from tautwire.statics.workspace_figure import require_figure_format, workspace_figure
+from tautwire.reports.workspace_figure import require_figure_format, workspace_figure
+from tautwire.robot.workspace import wrench_feasible_workspace
 from tests.robots import example
 
 

@@ -9,13 +9,13 @@ from pathlib import Path
 import pytest
 
 from tautwire.fmus.packaging import RobotFmus
-from tautwire.fmus.wrapper import RETURN_INSTRUCTION, patch_wrapper_exit, with_immediate_return
+from tautwire.fmus.pythonfmu_builder import RETURN_INSTRUCTION, patch_wrapper_exit, with_immediate_return
 
 LIBRARY = files("pythonfmu") / "resources/binaries/linux64/libpythonfmu-export.so"
 MANY = """
 import sys
 from pathlib import Path
-from tautwire.master import Component
+from tautwire.cosimulation import Component
 made = [Component(f"cable {k}", Path(sys.argv[1])) for k in range(4)]
 for component in made:
     component.initialize(0.0, {})

@@ -4,14 +4,15 @@ from dataclasses import replace
 
 import pytest
 
-from tautwire.robots.robot import Formula
-from tautwire.tracer.discovery.library import SHAPE_PARAMETER, Term
-from tautwire.tracer.discovery.written import (
+from tautwire.estimation.discovery.candidate_terms import (
+    SHAPE_PARAMETER,
+    Term,
     formula_text,
     numeric_formulas,
     parametrised_formulas,
     rounded_to_uncertainty,
 )
+from tautwire.robot.schema import Formula
 from tests.robots import example
 
 WAVE = Term("force_x", f"sin({SHAPE_PARAMETER}*time)", family="time", shape=10.68129)

@@ -7,13 +7,10 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from tautwire.master import RunStatistics
-from tautwire.recordings.recording import Recording
-from tautwire.report.overview import RunOverview
-from tautwire.report.run import ReportedRun
-from tautwire.robots.robot import Cable, EffectSetting, Platform, Robot, Sensors
-from tautwire.runs.cosimulation import CosimulationResult
-from tautwire.tracer.verdict import (
+from tautwire.cosimulation import RunStatistics
+from tautwire.cosimulation.robot_cosimulation import CosimulationResult
+from tautwire.estimation.localisation.component_residuals import ComponentResidual, FaultLocalisation, SignalCorrelation
+from tautwire.estimation.trace_result import (
     Candidate,
     Comparison,
     ConfusableEffect,
@@ -24,8 +21,9 @@ from tautwire.tracer.verdict import (
     Identifiability,
     Trace,
 )
-from tautwire.tracer.where.associations import SignalCorrelation
-from tautwire.tracer.where.port_residuals import ComponentResidual, FaultLocalisation
+from tautwire.recordings.recording import Recording
+from tautwire.reports.run_overview import ReportedRun, RunOverview
+from tautwire.robot.schema import Cable, EffectSetting, Platform, Robot, Sensors
 
 Array = NDArray[np.float64]
 

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from tautwire.robots.robot import Robot
-from tautwire.trajectory import cable_directions
+from tautwire.robot.schema import Robot
+from tautwire.robot.trajectory import cable_directions
 
 Array = NDArray[np.float64]
 

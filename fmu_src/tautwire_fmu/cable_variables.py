@@ -2,8 +2,8 @@
 
 from typing import Any, Dict, Tuple
 
-from .acting import effect_state_variables, effect_variables
-from .description import Variable, axis_names, vector_variables
+from .effect_variables import effect_state_variables, effect_variables
+from .model_description import Variable, axis_names, vector_variables
 from .slave import INPUT_TIME, MIDDLE_TIME
 
 MOTION_INPUTS = (*axis_names("position", "velocity"), "winch_speed")

@@ -16,8 +16,8 @@ from xml.etree.ElementTree import Element
 from pythonfmu import Fmi2Causality, Fmi2Initial, Fmi2Slave, Fmi2Variability, Real
 from pythonfmu.enums import Fmi2Status
 
-from .description import Variable, complete_model_description
-from .past import DelayLine
+from .delay_line import DelayLine
+from .model_description import Variable, complete_model_description
 
 Snapshot = Tuple[Tuple[float, ...], Optional[Tuple[float, ...]], float, bool, Tuple[DelayLine, ...]]
 

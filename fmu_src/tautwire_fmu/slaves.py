@@ -4,9 +4,9 @@ FMUs of one build share this package within a process. A later FMU could not imp
 the first, which may be deleted by then.
 """
 
-from .cable import Cable
-from .controller import Controller
-from .point_mass import PointMass
-from .winch import Winch
+from .cable_slave import Cable
+from .controller_slave import Controller
+from .point_mass_slave import PointMass
+from .winch_slave import Winch
 
 __all__ = ["Cable", "Controller", "PointMass", "Winch"]

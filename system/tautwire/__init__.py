@@ -26,14 +26,14 @@ from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from .control import cosimulate_closed_loop, design_controller
+    from .cosimulation.robot_cosimulation import cosimulate
+    from .estimation import trace
     from .fmus.packaging import build_fmus
     from .linear import bode_figure, linearise, modes_along, modes_along_figure
     from .recordings.recording import read_recording, recording_from_frame
-    from .report import write_report
-    from .robots.reading import read_robot
-    from .runs.cosimulation import cosimulate
-    from .tracer import trace
-    from .trajectory import Line, ideal_winch_speeds
+    from .reports import write_report
+    from .robot.robot_file_reader import read_robot
+    from .robot.trajectory import Line, ideal_winch_speeds
 else:
 
     def __getattr__(name: str) -> Any:
@@ -65,21 +65,21 @@ __all__ = [
 
 # CasADi, python-control and plotly take a second to import; reading a robot file needs none of them.
 _MODULES = {
-    "Line": ".trajectory",
+    "Line": ".robot.trajectory",
     "bode_figure": ".linear",
     "build_fmus": ".fmus.packaging",
-    "cosimulate": ".runs.cosimulation",
+    "cosimulate": ".cosimulation.robot_cosimulation",
     "cosimulate_closed_loop": ".control",
     "design_controller": ".control",
-    "ideal_winch_speeds": ".trajectory",
+    "ideal_winch_speeds": ".robot.trajectory",
     "linearise": ".linear",
     "modes_along": ".linear",
     "modes_along_figure": ".linear",
     "read_recording": ".recordings.recording",
-    "read_robot": ".robots.reading",
+    "read_robot": ".robot.robot_file_reader",
     "recording_from_frame": ".recordings.recording",
-    "trace": ".tracer",
-    "write_report": ".report",
+    "trace": ".estimation",
+    "write_report": ".reports",
 }
 
 

@@ -7,11 +7,11 @@ from time import perf_counter
 
 import numpy as np
 
+from tautwire.cosimulation import FixedStep, MemoryRecorder, PiecewiseLinearInput, simulate
+from tautwire.cosimulation.robot_cosimulation import instantiate_robot
+from tautwire.cosimulation.robot_wiring import recorded_ports
 from tautwire.fmus.packaging import build_fmus
-from tautwire.master import FixedStep, MemoryRecorder, PiecewiseLinearInput, simulate
-from tautwire.robots.robot import Cable, Platform, Robot, Sensors
-from tautwire.runs.cosimulation import instantiate_robot
-from tautwire.runs.wiring import recorded_ports
+from tautwire.robot.schema import Cable, Platform, Robot, Sensors
 
 
 def wheel_of_cables(count: int) -> Robot:

@@ -20,11 +20,11 @@ import numpy as np
 from psutil import Process
 from threadpoolctl import threadpool_limits
 
-from tautwire.campaign.cluster import Task, context_future, dask_client, task_results
-from tautwire.campaign.dataset import completed_runs, open_dataset
-from tautwire.campaign.plan import Plan
-from tautwire.campaign.run import build_context, run_job
-from tautwire.campaign.running import planned_jobs, run_campaign
+from tautwire.campaigns.campaign_dataset import completed_runs, open_dataset
+from tautwire.campaigns.campaign_plan import Plan
+from tautwire.campaigns.campaign_run import build_context, run_job
+from tautwire.campaigns.campaign_runner import planned_jobs, run_campaign
+from tautwire.campaigns.dask_cluster import Task, context_future, dask_client, task_results
 from tests.campaigns import read
 from tests.memory import resident_memory
 

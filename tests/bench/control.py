@@ -12,7 +12,7 @@ from pathlib import Path
 import numpy as np
 
 from tautwire.control import Design
-from tautwire.runs.cosimulation import CosimulationResult
+from tautwire.cosimulation.robot_cosimulation import CosimulationResult
 from tests.bench.control_figure import Curves, draw
 from tests.bench.control_runs import (
     Controlled,

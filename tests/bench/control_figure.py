@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from tautwire.control import Design, margins_of, robot_with
 from tautwire.linear import linearise
-from tautwire.robots.robot import Robot
+from tautwire.robot.schema import Robot
 
 Array = NDArray[np.float64]
 Curves = Mapping[str, tuple[Array, Array]]

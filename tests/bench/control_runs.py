@@ -24,10 +24,10 @@ from tautwire.control import (
     schedule_robust,
     shape_along,
 )
+from tautwire.cosimulation.robot_cosimulation import CosimulationResult
 from tautwire.fmus.packaging import RobotFmus, build_fmus
-from tautwire.robots.robot import Robot
-from tautwire.runs.cosimulation import CosimulationResult
-from tautwire.trajectory import CAROCA_HELIX, PAPER_HELIX, Line, Trajectory
+from tautwire.robot.schema import Robot
+from tautwire.robot.trajectory import CAROCA_HELIX, PAPER_HELIX, Line, Trajectory
 from tests.robots import example
 from tests.winch_ramp import WinchRamp
 

@@ -19,8 +19,8 @@ from tautwire.control import (
     speed_controller,
 )
 from tautwire.linear import LinearPlant, linearise
-from tautwire.robots.robot import Robot
-from tautwire.trajectory import Trajectory
+from tautwire.robot.schema import Robot
+from tautwire.robot.trajectory import Trajectory
 from tests.bench.control_runs import Measured
 
 Array = NDArray[np.float64]

@@ -11,10 +11,10 @@ import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
-from tautwire.master.watch import CALL_TIMEOUT
-from tautwire.runs.result_file import open_result_file
-from tautwire.runs.simulation import simulate_recording
-from tautwire.runs.wiring import result_columns
+from tautwire.cosimulation.isolation import CALL_TIMEOUT
+from tautwire.cosimulation.recording_simulation import simulate_recording
+from tautwire.cosimulation.result_file import open_result_file
+from tautwire.cosimulation.robot_wiring import result_columns
 from tests.memory import resident_memory
 from tests.robots import example, gentle_speeds
 
@@ -48,7 +48,8 @@ def run(folder: Path, steps: int) -> None:
         account, _ = simulate_recording(robot, recording, rows, STEP, None, None, tell, CALL_TIMEOUT)
     content = pq.ParquetFile(result).metadata
     print(
-        f"\n{account.steps} steps, {account.iterations} redos; {content.num_rows} rows of {content.num_columns} numbers in "
+        f"\n{account.steps} steps, {account.iterations} redos; {content.num_rows} rows of {content.num_columns} "
+        "numbers in "
         f"{content.num_row_groups} row groups, {result.stat().st_size / 1e6:.0f} MB on disk"
     )
 

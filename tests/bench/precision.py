@@ -11,8 +11,8 @@ from time import process_time
 import numpy as np
 from matplotlib.figure import Figure
 
+from tautwire.cosimulation import AdaptiveStep, FixedStep, StepSizeControl
 from tautwire.fmus.packaging import build_fmus
-from tautwire.master import AdaptiveStep, FixedStep, StepSizeControl
 from tests.importers.harness import IMPORTERS, NotInstallableError, exact_end, prepare, run_client
 from tests.robots import paper_robot
 

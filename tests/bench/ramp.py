@@ -9,12 +9,12 @@ from time import perf_counter
 import numpy as np
 from scipy.integrate import solve_ivp
 
+from tautwire.cosimulation import MemoryRecorder, PiecewiseLinearInput, StepSizeControl, simulate
+from tautwire.cosimulation.robot_cosimulation import instantiate_robot
+from tautwire.cosimulation.robot_wiring import recorded_ports
 from tautwire.fmus.packaging import RobotFmus
-from tautwire.master import MemoryRecorder, PiecewiseLinearInput, StepSizeControl, simulate
-from tautwire.model.assembly import assemble_robot
-from tautwire.robots.robot import Robot
-from tautwire.runs.cosimulation import instantiate_robot
-from tautwire.runs.wiring import recorded_ports
+from tautwire.robot.robot_assembly import assemble_robot
+from tautwire.robot.schema import Robot
 from tautwire_fmu.laws import cable as cable_law
 from tautwire_fmu.laws import point_mass as platform_law
 from tautwire_fmu.laws.mathematics import REAL

@@ -9,8 +9,8 @@ from time import perf_counter
 
 import numpy as np
 
+from tautwire.cosimulation.robot_cosimulation import cosimulate
 from tautwire.fmus.packaging import RobotFmus, build_fmus
-from tautwire.runs.cosimulation import cosimulate
 from tests.bench.ramp import ramp
 from tests.robots import paper_robot
 

@@ -9,9 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautwire.linear import linearise
-from tautwire.report.modes_page import modes_page
-from tautwire.report.page import trace_page
-from tautwire.report.run_page import run_page
+from tautwire.reports.modes_page import modes_page
+from tautwire.reports.run_page import run_page
+from tautwire.reports.trace_report_page import trace_page
 from tests.browser.browser import LAPTOP, Browser, Screen
 from tests.robots import example
 from tests.traces import HOSTILE, made_run, made_trace

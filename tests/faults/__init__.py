@@ -8,7 +8,7 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-from tautwire.master import CallJournal, Connection, Coupling, JournalledComponent, Port
+from tautwire.cosimulation import CallJournal, Connection, Coupling, JournalledComponent, Port
 
 HERE = Path(__file__).parent
 NAMES = ("left", "right")

@@ -12,9 +12,9 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 from numpy.typing import NDArray
 
-from tautwire.robots.robot import Robot
-from tautwire.tracer import Trace
-from tautwire.tracer.verdict import Comparison
+from tautwire.estimation import Trace
+from tautwire.estimation.trace_result import Comparison
+from tautwire.robot.schema import Robot
 
 Array = NDArray[np.float64]
 

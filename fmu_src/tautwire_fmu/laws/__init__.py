@@ -1,1 +1,1 @@
-"""Physical laws, written once: plain functions of scalars and small tuples, with the mathematics passed in."""
+"""Physical laws, written once: plain functions of scalars and small tuples, with the mathematics handed in."""

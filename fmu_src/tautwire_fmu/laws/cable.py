@@ -14,7 +14,7 @@ Source: Baklouti et al. 2017, Eqs. 1 to 4 and 12, with the reference length movi
 
 from typing import Any, Callable, NamedTuple, Sequence, Tuple
 
-from . import stages
+from . import effect_stages as stages
 from .effects import ActiveEffect
 from .mathematics import Mathematics
 from .vectors import Vector, add, dot, norm, scale, subtract

@@ -1,4 +1,4 @@
-"""Parser and evaluator of arithmetic expressions in numbers, listed names and a few functions; nothing is executed.
+"""Parser and evaluator of arithmetic expressions; nothing is ever executed as Python.
 
     numbers, names, + - * / and unary -, x ** n with a whole n from -8 to 8, sin cos exp log sqrt tanh abs
 

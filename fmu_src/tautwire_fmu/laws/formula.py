@@ -1,4 +1,4 @@
-"""Formula effects: arithmetic expressions in the variables of the laws, for what no known effect explains.
+"""Formula effects: arithmetic expressions for what no known effect explains.
 
 Targets: ``tension`` (N) is added in the rope, less its value at the start, where the tension is the static one;
 ``force_x``, ``force_y`` and ``force_z`` (N) act on the platform, also at the start; ``mass`` (kg) is carried by it.

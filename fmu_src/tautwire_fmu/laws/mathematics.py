@@ -1,4 +1,4 @@
-"""Mathematical functions passed to the laws, for one kind of number: floats or complex steps.
+"""Mathematical functions handed to the laws, for one kind of number: floats or complex steps.
 
 A law calls ``m.log(x)``, never ``math.log(x)``, so the same source runs on floats inside an FMU, on complex
 numbers for exact rates, and on arrays or symbols outside. Nonsmooth functions are written with ``m.maximum``,

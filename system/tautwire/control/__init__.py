@@ -1,6 +1,5 @@
 """Sampled controllers for path tracking, with limits, anti-windup and one sample of computing delay."""
 
-from .aim import POSITION_NOISE, TENSION_NOISE, ControlAim, measurement_noise
 from .closed_loop import (
     build_controller_fmu,
     controller_wires,
@@ -8,17 +7,25 @@ from .closed_loop import (
     cosimulate_with_controller,
     sample_times,
 )
-from .design import Design, Feedforward, Knot
-from .errors import MarginError, StretchError
-from .feedforward import elastic_reference
+from .design import (
+    POSITION_NOISE,
+    TENSION_NOISE,
+    ControlAim,
+    Design,
+    Feedforward,
+    Knot,
+    MarginError,
+    StretchError,
+    measurement_noise,
+)
+from .feedforward import Reference, elastic_reference, path_tensions, rigid_reference
+from .gain_scheduling import ScheduledController, schedule_controller
+from .hinf_loop_shaping import RobustAim, RobustController, design_robust, schedule_robust
+from .input_shaping import ShapedTrajectory, Shaper, shape_along, shaped, shaper, shaper_for_modes
 from .lqg import Controller, design_controller
-from .margins import Margins, Range, margins_of, margins_over, robot_with, speed_controller
-from .path import Reference, path_tensions, rigid_reference
-from .plant import ramp_plant, sampled_plant
-from .robust import RobustAim, RobustController, design_robust, schedule_robust
-from .schedule import ScheduledController, schedule_controller
-from .shaping import ShapedTrajectory, Shaper, shape_along, shaped, shaper, shaper_for_modes
-from .source import PathController
+from .path_controller import PathController
+from .sampled_plant import ramp_plant, sampled_plant
+from .stability_margins import Margins, Range, margins_of, margins_over, robot_with, speed_controller
 
 __all__ = [
     "POSITION_NOISE",

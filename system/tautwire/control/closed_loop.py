@@ -8,22 +8,8 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..arguments import (
-    validate_attributes,
-    validate_file,
-    validate_folder,
-    validate_instance,
-    validate_integer,
-    validate_number,
-    validate_robot,
-)
-from ..array_arguments import validate_array, validate_increasing
-from ..errors import InputError
-from ..fmus.packaging import RobotFmus, package_controller_fmu
-from ..master import Connection, FixedStep, InputSource, Port, Progress
-from ..robots.robot import Robot
-from ..runs.asked import validate_fmus, validate_options
-from ..runs.cosimulation import (
+from ..cosimulation import Connection, FixedStep, InputSource, Port, Progress
+from ..cosimulation.robot_cosimulation import (
     DEFAULT_STEP,
     NO_ADDITIONAL_COMPONENTS,
     TIME_MEANING,
@@ -32,14 +18,27 @@ from ..runs.cosimulation import (
     run_cosimulation,
     wire_fmus,
 )
-from ..runs.wiring import AXES, PLATFORM, winch_input_ports
-from ..trajectory import DURATION_RULE as OF_PATH
-from ..trajectory import Trajectory, require_trajectory
+from ..cosimulation.robot_wiring import AXES, PLATFORM, winch_input_ports
+from ..cosimulation.run_arguments import validate_fmus, validate_options
+from ..errors import InputError
+from ..fmus.packaging import RobotFmus, package_controller_fmu
+from ..robot.schema import Robot
+from ..robot.trajectory import DURATION_RULE as OF_PATH
+from ..robot.trajectory import Trajectory, require_trajectory
+from ..validation import (
+    validate_array,
+    validate_attributes,
+    validate_file,
+    validate_folder,
+    validate_increasing,
+    validate_instance,
+    validate_integer,
+    validate_number,
+    validate_robot,
+)
 from .design import Design
-from .feedforward import elastic_reference
-from .path import Reference
-from .plan import controller_data
-from .source import PathController
+from .feedforward import Reference, elastic_reference
+from .path_controller import PathController, controller_data
 
 Array = NDArray[np.float64]
 

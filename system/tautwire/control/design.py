@@ -1,4 +1,4 @@
-"""What every controller design has: limits, and gains at points of a path."""
+"""What every controller design has: weights, limits, sensor noise and gains at points of a path."""
 
 from __future__ import annotations
 
@@ -9,10 +9,109 @@ import control
 import numpy as np
 from numpy.typing import NDArray
 
-from ..runs.wiring import AXES
-from .aim import ControlAim
+from ..cosimulation.robot_wiring import AXES
+from ..errors import ArgumentError, InputError
+from ..robot.checked_table import NumberRule
+from ..robot.schema import Robot
+from ..validation import validate_number
+
+
+class MarginError(InputError):
+    """No controller of a design has the ``required`` disk margin; ``achieved`` is the best one."""
+
+    def __init__(self, where: str, required: float, achieved: float, hint: str) -> None:
+        super().__init__(where, f"a disk margin of {required:g} cannot be kept, {achieved:.3g} is the best", hint)
+        self.required = required
+        self.achieved = achieved
+        self.args = (where, required, achieved, hint)
+
+
+class StretchError(InputError):
+    """No winch speeds make the elastic model follow a path; ``time`` in s is where the inverse simulation failed."""
+
+    def __init__(self, where: str, time: float, hint: str) -> None:
+        super().__init__(where, f"no winch speeds were found that follow the path at {time:g} s", hint)
+        self.time = time
+        self.args = (where, time, hint)
+
 
 Array = NDArray[np.float64]
+
+# Assumed if the robot file declares no sensors.
+POSITION_NOISE = 1e-4
+TENSION_NOISE = 1.0
+
+AIM_RULES = {
+    "period": NumberRule("the sample period", "s", positive=True),
+    "position": NumberRule("a deviation of position", "m", positive=True),
+    "tension": NumberRule("a share of the mean static tension", "", positive=True),
+    "winch_speed": NumberRule("a winch speed", "m/s", positive=True),
+    "winch_acceleration": NumberRule("a winch acceleration", "m/s^2", positive=True),
+    "integral_time": NumberRule("a time", "s", positive=True),
+    "speed_limit": NumberRule("the largest winch speed", "m/s", positive=True),
+    "acceleration_disturbance": NumberRule("a wander of velocity", "m/s^2", positive=True),
+    "speed_disturbance": NumberRule("a wander of rope", "m/s", positive=True),
+    "acceleration_limit": NumberRule("the largest winch acceleration", "m/s^2", positive=True),
+    "lowest_tension": NumberRule("the least tension", "N", minimum=0.0),
+    "highest_tension": NumberRule("the largest tension", "N", positive=True),
+    "yield_time": NumberRule("a time", "s", positive=True),
+}
+UNBOUNDED_KEYS = ("speed_limit", "acceleration_limit", "highest_tension")
+OPTIONAL_KEYS = ("lowest_tension", "highest_tension")
+
+
+@dataclass(frozen=True)
+class ControlAim:
+    """Weights and limits of a controller; weights are deviations of equal cost (Bryson's rule).
+
+    ``period`` in s; ``position`` in m; ``tension`` as a share of the mean static tension; ``winch_speed`` in
+    m/s and ``winch_acceleration`` in m/s^2, beyond the ideal ones; ``integral_time`` in s, after which a
+    lasting error of position costs as much.
+
+    The observer expects velocity to wander by ``acceleration_disturbance`` (m/s^2) and rope by
+    ``speed_disturbance`` (m/s) within a second. A larger ``speed_disturbance`` makes the loop more robust
+    against a wrong modulus or payload, a smaller one calmer under noise (loop transfer recovery).
+
+    Limits of every design: ``speed_limit`` in m/s and ``acceleration_limit`` in m/s^2 bound the commands of each winch,
+    in addition to those of the robot file. No cable is let out below ``lowest_tension`` or reeled in above
+    ``highest_tension``, in N; by default the bounds of the robot file's tension distribution, otherwise 0 and none. A
+    cable beyond its limit yields such that its tension is back in about ``yield_time``, in s.
+
+    With ``tare`` the run starts at rest, and the tensions measured there reveal an undeclared payload.
+
+    Raises ArgumentError where a number is not finite or not above 0; limits may be infinite, the lowest tension 0.
+    """
+
+    period: float = 0.01
+    position: float = 2e-3
+    tension: float = 0.1
+    winch_speed: float = 0.03
+    winch_acceleration: float = 0.2
+    integral_time: float = 0.35
+    speed_limit: float = 3.0
+    acceleration_disturbance: float = 0.2
+    speed_disturbance: float = 0.03
+    acceleration_limit: float = float("inf")
+    lowest_tension: float | None = None
+    highest_tension: float | None = None
+    yield_time: float = 0.06
+    tare: bool = True
+
+    def __post_init__(self) -> None:
+        for name, rule in AIM_RULES.items():
+            value = getattr(self, name)
+            if not (value is None and name in OPTIONAL_KEYS):
+                validate_number(f"ControlAim: {name}", value, rule, allow_infinite=name in UNBOUNDED_KEYS)
+        lowest, highest = self.lowest_tension, self.highest_tension
+        if lowest is not None and highest is not None and lowest > highest:
+            problem = f"is {lowest:g} N, above highest_tension, {highest:g} N"
+            raise ArgumentError("ControlAim: lowest_tension", lowest, problem, "lower it, or raise the other")
+
+
+def measurement_noise(robot: Robot) -> Array:
+    """Standard deviation of one sample of x, y, z (m) and the tensions (N), shape (3 + n,)."""
+    position, tension = robot.sensors.position_noise, robot.sensors.tension_noise
+    return np.repeat([position or POSITION_NOISE, tension or TENSION_NOISE], [3, robot.cable_count])
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""LQG with integral action: a Kalman filter of the plant, and feedback of its state estimate.
+"""LQG with integral action: a Kalman filter of the plant, and feedback of its state.
 
     a_k = -K (x_k, w_k, z_k),                 x the estimate from samples before t_k: one sample of delay
     x_k+1 = F x_k + G (w_k, a_k) + L (y_k - C x_k - D w_k),           z_k+1 = z_k + (position error)_k
@@ -17,13 +17,12 @@ import control
 import numpy as np
 from numpy.typing import NDArray
 
-from ..arguments import validate_instance, validate_robot
+from ..cosimulation.robot_wiring import AXES
 from ..linear import LinearPlant, linearise
-from ..robots.robot import Robot
-from ..runs.wiring import AXES
-from .aim import ControlAim, measurement_noise
-from .design import Knot, regulator_signals
-from .plant import sampled_plant
+from ..robot.schema import Robot
+from ..validation import validate_instance, validate_robot
+from .design import ControlAim, Knot, measurement_noise, regulator_signals
+from .sampled_plant import sampled_plant
 
 Array = NDArray[np.float64]
 

@@ -1,4 +1,4 @@
-"""FMUs for C hosts: they run in importers that are not Python processes.
+"""FMUs for C hosts: importers that are not Python processes.
 
 pythonfmu's wrapper has undefined symbols of libpython, which only a Python process resolves. Here a launcher library
 takes the wrapper's name inside the FMU and the wrapper lies beside it. On loading, the launcher opens and starts
@@ -27,9 +27,9 @@ from functools import lru_cache
 from importlib.resources import files
 from pathlib import Path
 
+from ..atomic_output import atomic_file
 from ..errors import TautwireError, one_line
-from ..master.archive import require_valid_archive
-from ..output import atomic_file
+from .fmu_archive import require_valid_archive
 
 BINARIES = "binaries/linux64/"
 LIBRARY_SUFFIX = ".so"

@@ -17,14 +17,19 @@ import tautwire_fmu
 from tautwire_fmu.laws.effects import BY_NAME
 from tautwire_fmu.laws.winch_drive import NO_LIMIT
 
-from ..arguments import validate_callable, validate_folder, validate_robot
-from ..interrupt import defer_interrupts
-from ..model.assembly import assemble_robot
-from ..robots.robot import EffectSetting, Robot
-from ..statics.equilibrium import formula_texts, has_sensor_effects, platform_settings, static_forces, static_tensions
-from .builder import installed_builder
-from .slots import check_user_fmus
-from .wrapper import patch_wrapper_exit
+from ..process_signals import defer_interrupts
+from ..robot.robot_assembly import assemble_robot
+from ..robot.schema import EffectSetting, Robot
+from ..robot.static_equilibrium import (
+    formula_texts,
+    has_sensor_effects,
+    platform_settings,
+    static_forces,
+    static_tensions,
+)
+from ..validation import validate_callable, validate_folder, validate_robot
+from .fmu_slots import check_user_fmus
+from .pythonfmu_builder import installed_builder, patch_wrapper_exit
 
 # pythonfmu 0.7.0 runs the script at every instantiation and then releases a reference to its globals that it does
 # not own; without the one taken here the second instance gets an empty module.

@@ -1,15 +1,12 @@
 """The linearised plant: a python-control state space with named signals, its modes and figures."""
 
-from .along import ModesAlong, modes_along
-from .black_box import BlackBoxPlant, linearise_fmus
-from .channels import minimal, transfer_function
-from .document import model_document
-from .experiments import IdentificationError
-from .figures import bode_figure, modes_along_figure, pole_figure
+from .black_box import BlackBoxPlant, linearise_fmus, linearise_robot_fmus
+from .linear_plant import LinearPlant, linearise, minimal, model_document, transfer_function
 from .modes import Modes
-from .plant import LinearPlant, linearise
-from .rest import OperatingPointError
-from .robot_fmus import linearise_robot_fmus
+from .modes_along_path import ModesAlong, modes_along
+from .operating_point import OperatingPointError
+from .plant_figures import bode_figure, modes_along_figure, pole_figure
+from .pulse_experiments import IdentificationError
 
 __all__ = [
     "BlackBoxPlant",

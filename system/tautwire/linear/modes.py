@@ -11,9 +11,9 @@ from numpy.typing import NDArray
 from scipy.linalg import eigh
 from scipy.optimize import linear_sum_assignment
 
-from ..robots.robot import Robot
-from ..statics.equilibrium import unit_directions
-from .rest import OperatingPointError
+from ..robot.schema import Robot
+from ..robot.static_equilibrium import unit_directions
+from .operating_point import OperatingPointError
 
 Array = NDArray[np.float64]
 

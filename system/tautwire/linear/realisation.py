@@ -1,4 +1,4 @@
-"""State-space realisation: the matrices of a continuous linear system from its pulse responses.
+"""State-space realisation of pulse responses (eigensystem realisation).
 
 After the pulse the response is free: ``z_k+1 = F z_k`` for measured states, or for coordinates of the outputs of a few
 steps stacked (block Hankel matrix). F from all of them by least squares, ``A = log(F) / h``, then B, C and D.
@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.linalg import expm, logm
 
-from .experiments import IdentificationError, Responses
+from .pulse_experiments import IdentificationError, Responses
 
 Array = NDArray[np.float64]
 

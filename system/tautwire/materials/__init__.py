@@ -1,9 +1,9 @@
 """Identification of a rope's viscoelastic constants from a dynamic test, for use in a robot file."""
 
+from .material_identification import pair_of_row, trace_material
+from .material_table import PAPER_PAIR_FREQUENCY, PAPER_TABLE, MaterialTable, read_material_table
+from .material_verdict import MaterialOptions, MaterialVerdict
 from .robot_material import RobotMaterial, robot_material, with_material
-from .table import PAPER_PAIR_FREQUENCY, PAPER_TABLE, MaterialTable, read_material_table
-from .tracing import pair_of_row, trace_material
-from .verdict import MaterialOptions, MaterialVerdict
 
 __all__ = [
     "PAPER_PAIR_FREQUENCY",

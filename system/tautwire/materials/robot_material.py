@@ -11,8 +11,8 @@ from dataclasses import dataclass, replace
 from tautwire_fmu.laws.effects import BY_NAME
 
 from ..errors import InputError
-from ..robots.robot import EffectSetting, Robot
-from .modulus import Material, MaxwellBranch
+from ..robot.schema import EffectSetting, Robot
+from .viscoelastic_model import Material, MaxwellBranch
 
 # Effects of a robot that the fitted constants and branches replace.
 REPLACED_EFFECTS = ("modulus", "damping", "relaxation")

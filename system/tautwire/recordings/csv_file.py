@@ -14,9 +14,8 @@ import pandas as pd  # type: ignore[import-untyped,unused-ignore]
 from numpy.typing import NDArray
 
 from ..errors import RecordingError, format_value, raise_error
-from ..input_file import read_text_bytes
-from .header import ErrorSink, Header, parse_header
-from .rules import MISSING_CELLS, Row
+from ..input_files import read_text_bytes
+from .recording_table import MISSING_CELLS, ErrorSink, Header, Row, parse_header
 
 MAX_FILE_SIZE = 2**31  # bytes; it is held in memory
 

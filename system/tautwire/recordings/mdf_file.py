@@ -12,9 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordingError, format_value, raise_error
-from ..input_file import readable_file
-from .columns import ColumnTable
-from .header import AXES, ErrorSink, Header, parse_header, require_samples
+from ..input_files import readable_file
+from .recording_table import AXES, ColumnTable, ErrorSink, Header, parse_header, require_samples
 
 MDF_SUFFIXES = (".mf4", ".mdf")
 _MDF_MAGIC = b"MDF     "

@@ -8,9 +8,8 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from ..errors import RecordingError, format_value, raise_error
-from ..input_file import readable_file
-from .columns import ColumnTable
-from .header import ErrorSink, parse_header, require_samples
+from ..input_files import readable_file
+from .recording_table import ColumnTable, ErrorSink, parse_header, require_samples
 
 BATCH_ROWS = 2**16
 

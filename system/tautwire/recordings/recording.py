@@ -8,16 +8,14 @@ import numpy as np
 import pandas as pd  # type: ignore[import-untyped,unused-ignore]
 from numpy.typing import NDArray
 
-from ..arguments import validate_instance, validate_integer
 from ..errors import RecordingError, format_value, raise_error
-from ..input_file import validate_path
-from ..robots.reading import MAX_CABLES
-from .columns import ColumnTable
+from ..input_files import validate_path
+from ..robot.robot_file_reader import MAX_CABLES
+from ..validation import validate_instance, validate_integer
 from .csv_file import CsvTable, open_csv
-from .header import AXES, ErrorSink, parse_header
 from .mdf_file import is_mdf, open_mdf
 from .parquet_file import is_parquet, open_parquet
-from .rules import MAX_MAGNITUDE, not_a_table_error, row_errors
+from .recording_table import AXES, MAX_MAGNITUDE, ColumnTable, ErrorSink, not_a_table_error, parse_header, row_errors
 
 CABLE_COUNT_HINT = "give the robot's cable_count"
 

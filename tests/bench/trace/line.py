@@ -8,8 +8,8 @@ from math import isfinite
 from pathlib import Path
 from typing import Any
 
-from tautwire.tracer import Trace
-from tautwire.tracer.verdict import Errors
+from tautwire.estimation import Trace
+from tautwire.estimation.trace_result import Errors
 
 MOST_RIVALS = 6
 

@@ -7,7 +7,7 @@ import traceback
 from pathlib import Path
 from resource import RUSAGE_CHILDREN, RUSAGE_SELF, getrusage
 
-from tautwire.tracer import trace
+from tautwire.estimation import trace
 from tests.robots import example
 
 from .cases import Case

@@ -14,7 +14,7 @@ ALARM = "alarm"
 MOST_EMPTY = 100_000
 # Where the verdict comes from: the tracer, the laws, and what builds and runs them.
 FOLDERS = (
-    *(f"system/tautwire/{name}" for name in ("tracer", "native", "master", "model", "runs", "statics", "robots")),
+    *(f"system/tautwire/{name}" for name in ("estimation", "recordings", "cosimulation", "fmus", "robot")),
     "fmu_src/tautwire_fmu",
 )
 

@@ -1,4 +1,4 @@
-"""Hysteresis (Bouc-Wen) of a rope: rate-independent friction between its strands."""
+"""Hysteresis (Bouc-Wen) of the rope: rate-independent friction between its strands."""
 
 from typing import Any, NamedTuple, Tuple
 

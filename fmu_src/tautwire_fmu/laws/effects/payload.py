@@ -1,4 +1,4 @@
-"""Undeclared payload: a load that the platform carries and its file does not declare."""
+"""Undeclared payload: a load that the platform carries and its file does not know."""
 
 from typing import Any, NamedTuple, Tuple
 

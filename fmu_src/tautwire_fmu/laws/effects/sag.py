@@ -1,4 +1,4 @@
-"""Cable sag: a rope with weight hangs in an arc longer than its chord, and its ends carry the weight.
+"""Cable sag: a rope with weight hangs in an arc longer than its chord.
 
 Chord ``l`` of horizontal span ``d``, weight ``w`` per length, tension ``T`` along the chord, ``x = w l / (2 T)`` and
 ``c = d / l``. The arc is

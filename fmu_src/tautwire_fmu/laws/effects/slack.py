@@ -1,4 +1,4 @@
-"""Soft transition into slackness, as of a rope whose strands unload one after the other."""
+"""Soft transition into slackness, as of a rope whose strands let go one after the other."""
 
 from typing import Any, NamedTuple
 

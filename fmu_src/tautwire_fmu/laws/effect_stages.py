@@ -1,0 +1,160 @@
+"""Combined contributions of a cable's effects, stage by stage."""
+
+from typing import Any, NamedTuple, Sequence, Tuple
+
+from .effects import ActiveEffect
+from .mathematics import Mathematics
+from .vectors import Vector, add, norm, scale, subtract
+
+Effects = Sequence[ActiveEffect]
+States = Sequence[Tuple[Any, ...]]
+
+
+class Route(NamedTuple):
+    """Route of the rope to the exit point: ``direction`` is its unit vector at the platform, ``length`` in m.
+
+    ``chord`` is the straight distance in m.
+    """
+
+    direction: Vector
+    length: Any
+    chord: Any
+
+
+def route(m: Mathematics, effects: Effects, anchor: Vector, position: Vector) -> Route:
+    """Route straight to the declared exit point, or as the effects change it."""
+    for active in effects:
+        if active.effect.exit_point is not None:
+            anchor = add(anchor, active.effect.exit_point(m, active.values))
+    line = subtract(anchor, position)
+    chord = norm(m, line)
+    for active in effects:
+        if active.effect.path is not None:
+            direction, length = active.effect.path(m, active.values, line)
+            return Route(direction, length, chord)
+    return Route(scale(1.0 / chord, line), chord, chord)
+
+
+def stiffness(m: Mathematics, effects: Effects, states: States, cable: Any) -> Tuple[Any, Any]:
+    """Modulus, and the stress at no strain beside that of the start tension; both in Pa."""
+    modulus: Any = cable.modulus
+    stress: Any = 0.0
+    for active, effect_states in zip(effects, states):
+        if active.effect.stiffness is not None:
+            modulus_change, stress_change = active.effect.stiffness(m, active.values, effect_states, cable)
+            modulus = modulus + modulus_change
+            stress = stress + stress_change
+    return modulus, stress
+
+
+def viscosity(m: Mathematics, effects: Effects, cable: Any) -> Any:
+    """Total damping, in Pa s."""
+    total: Any = cable.damping
+    for active in effects:
+        if active.effect.viscosity is not None:
+            total = total + active.effect.viscosity(m, active.values, cable)
+    return total
+
+
+def free_strain(m: Mathematics, effects: Effects, states: States) -> Any:
+    """Strain that carries no tension."""
+    total: Any = 0.0
+    for active, effect_states in zip(effects, states):
+        if active.effect.free_strain is not None:
+            total = total + active.effect.free_strain(m, active.values, effect_states)
+    return total
+
+
+def free_strain_rate(m: Mathematics, effects: Effects, states: States, cable: Any, tension: Any) -> Any:
+    """Rate of the free strain under an elastic tension, in 1/s."""
+    total: Any = 0.0
+    for active, effect_states in zip(effects, states):
+        if active.effect.free_strain_rate is not None:
+            total = total + active.effect.free_strain_rate(m, active.values, effect_states, cable, tension)
+    return total
+
+
+def sag(
+    m: Mathematics, effects: Effects, cable: Any, line: Any, strain: Any, modulus: Any, stress: Any
+) -> Tuple[Any, Any]:
+    """``ln(arc / chord)`` of the rope, now and at the start."""
+    for active in effects:
+        if active.effect.sag is not None:
+            now, at_start = active.effect.sag(m, active.values, cable, line, strain, modulus, stress)
+            return now, at_start
+    return 0.0, 0.0
+
+
+def rope_speed(m: Mathematics, effects: Effects, states: States, winch_speed: Any, tension: Any) -> Any:
+    """Speed at which rope is reeled in, in m/s: the encoder speed and what the effects add to it."""
+    speed = winch_speed
+    for active, effect_states in zip(effects, states):
+        if active.effect.rope_speed is not None:
+            speed = speed + active.effect.rope_speed(m, active.values, effect_states, winch_speed, tension)
+    return speed
+
+
+def added_tension(m: Mathematics, effects: Effects, states: States, cable: Any, motion: Any) -> Any:
+    """Tension beside that of the law, in N."""
+    total: Any = 0.0
+    for active, effect_states in zip(effects, states):
+        if active.effect.tension is not None:
+            total = total + active.effect.tension(m, active.values, effect_states, cable, motion)
+    return total
+
+
+def carried_tension(m: Mathematics, effects: Effects, cable: Any, pull: Any) -> Any:
+    """Tension that a rope carries where the law gives ``pull``; never negative, in N."""
+    tension = m.maximum(pull, 0.0)
+    for active in effects:
+        if active.effect.softening is not None:
+            tension = tension + active.effect.softening(m, active.values, cable, pull)
+    return tension
+
+
+def end_forces(m: Mathematics, effects: Effects, gravity: Any, line: Any, tension: Any) -> Tuple[Vector, Any]:
+    """Forces at the ends beside the tension: a vector on the platform, and at the load cell; in N."""
+    platform_force: Vector = (0.0, 0.0, 0.0)
+    cell_tension: Any = 0.0
+    for active in effects:
+        if active.effect.ends is not None:
+            force, tension_change = active.effect.ends(m, active.values, gravity, line, tension)
+            platform_force = add(platform_force, force)
+            cell_tension = cell_tension + tension_change
+    return platform_force, cell_tension
+
+
+def transmission(m: Mathematics, effects: Effects, motion: Any) -> Tuple[Any, Any]:
+    """Logarithms of the tensions at the platform and at the load cell over that of the span."""
+    at_platform: Any = 0.0
+    at_cell: Any = 0.0
+    for active in effects:
+        if active.effect.transmission is not None:
+            first, second = active.effect.transmission(m, active.values, motion)
+            at_platform = at_platform + first
+            at_cell = at_cell + second
+    return at_platform, at_cell
+
+
+def sensor_gains(m: Mathematics, effects: Effects) -> Tuple[Any, Any]:
+    """Sensor gains of measured tension and measured position."""
+    tension: Any = 1.0
+    position: Any = 1.0
+    for active in effects:
+        if active.effect.gain is not None:
+            first, second = active.effect.gain(m, active.values)
+            tension = tension * first
+            position = position * second
+    return tension, position
+
+
+def sensor_delays(m: Mathematics, effects: Effects) -> Tuple[Any, Any]:
+    """Sensor delays of measured tension and measured position, in s."""
+    tension: Any = 0.0
+    position: Any = 0.0
+    for active in effects:
+        if active.effect.delay is not None:
+            first, second = active.effect.delay(m, active.values)
+            tension = tension + first
+            position = position + second
+    return tension, position

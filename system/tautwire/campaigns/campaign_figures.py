@@ -1,0 +1,174 @@
+"""Data of the figures on a campaign's page: quantile bands over time, histograms and grids."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pyarrow as pa
+import pyarrow.parquet as pq
+from numpy.typing import NDArray
+
+from ..number_format import format_significant
+from ..reports.downsampling import evenly_spaced_indices, pack_float32
+from .campaign_dataset import SERIES_FOLDER, part_files
+from .campaign_plan import Input, Plan
+from .campaign_summary import Summary, column_values, rows_by_variant
+from .dataset_schema import RowColumn, series_columns
+
+Array = NDArray[np.float64]
+
+# Quantiles of this many runs are as good as those of all, and memory stays bounded.
+MAX_BAND_RUNS = 4000
+BAND_QUANTILE_LEVELS = (0.025, 0.5, 0.975)
+
+
+@dataclass(frozen=True)
+class QuantileBands:
+    """Quantile bands of a path and a controller over ``time`` (P,) in s: ``quantiles`` (3, P) by channel, in SI units.
+
+    Their levels are :data:`BAND_QUANTILE_LEVELS`, of ``run_count`` runs; empty where no run was completed.
+    """
+
+    time: Array
+    quantiles: dict[str, Array]
+    run_count: int
+
+
+def quantile_bands(plan: Plan, folder: Path, variant: int, channels: tuple[str, ...]) -> QuantileBands:
+    """Quantile bands of one path with one controller, of at most :data:`MAX_BAND_RUNS` runs spread evenly over all."""
+    samples = np.unique(np.linspace(0, plan.count - 1, min(plan.count, MAX_BAND_RUNS)).round().astype(np.int64))
+    run_indices = samples * len(plan.variants) + variant
+    point_count = plan.compute.series
+    time, quantiles, run_count = np.zeros(0), {}, 0
+    for name in ("time", *channels):
+        part_values = [_read_channel(part, name, run_indices) for part in part_files(folder, SERIES_FOLDER)]
+        values = np.concatenate([np.zeros(0), *part_values]).reshape(-1, max(point_count, 1))
+        if not len(values):
+            return QuantileBands(np.zeros(0), {}, 0)
+        if name == "time":
+            time, run_count = values[0], len(values)
+        else:
+            quantiles[name] = np.nanquantile(values, BAND_QUANTILE_LEVELS, axis=0)
+    return QuantileBands(time, quantiles, run_count)
+
+
+def _read_channel(part: Path, name: str, run_indices: NDArray[np.int64]) -> Array:
+    table = pq.read_table(part, columns=["index", name], partitioning=None)
+    return np.asarray(table[name].to_numpy(), dtype=float)[np.isin(table["index"].to_numpy(), run_indices)]
+
+
+MAX_HISTOGRAM_BINS = 40
+MAX_GRID_POINTS = 2000
+
+
+def figure_data(
+    plan: Plan, columns: Sequence[RowColumn], cable_count: int, summary: Summary, rows: pa.Table, folder: Path
+) -> dict[str, Any]:
+    """Quantile bands and histograms of each path with each controller, packed for the page."""
+    outputs = numeric_outputs(columns)
+    variants = []
+    for variant, (path, controller, variant_rows) in enumerate(rows_by_variant(plan, rows)):
+        thinned_rows = (
+            variant_rows.take(pa.array(evenly_spaced_indices(variant_rows.num_rows, MAX_GRID_POINTS)))
+            if variant_rows.num_rows
+            else variant_rows
+        )
+        quantiles = {
+            each.name: each.quantiles for each in summary.spreads if (each.path, each.controller) == (path, controller)
+        }
+        bands: dict[str, Any] = {"time": "", "bands": []}
+        if plan.paths and plan.compute.series > 1:
+            names = series_columns(cable_count)
+            bands = _band_data(quantile_bands(plan, folder, variant, names), names)
+        variants.append(
+            {
+                "label": variant_label(path, controller),
+                **bands,
+                "spreads": [
+                    _spread_data(variant_rows, thinned_rows, each, quantiles, plan.method == "grid") for each in outputs
+                ],
+                "inputs": [pack_float32(_numeric_values(thinned_rows, each)) for each in plan.inputs]
+                if plan.method == "grid"
+                else [],
+            }
+        )
+    inputs = [{"label": _axis_label(each), "place": place} for place, each in enumerate(plan.inputs)]
+    # The scripts shared by all pages start from choices where there are any; those of campaigns start by themselves.
+    return {"choices": [], "variants": variants, "inputs": inputs}
+
+
+def _axis_label(varied: Input) -> str:
+    """Axis label of an input: its key, and the numbers that stand for its texts."""
+    codes = ", ".join(f"{place} {words}" for place, words in enumerate(varied.distribution.texts))
+    return f"{varied.key} ({codes})" if codes else varied.key
+
+
+def _numeric_values(rows: pa.Table, varied: Input) -> Array:
+    """Values of an input in each run; texts as their indices."""
+    if not varied.distribution.texts:
+        return column_values(rows, varied.key)
+    return np.array([float(varied.distribution.texts.index(each)) for each in rows[varied.key].to_pylist()])
+
+
+def numeric_outputs(columns: Sequence[RowColumn]) -> list[RowColumn]:
+    """The numeric outputs."""
+    return [each for each in columns if each.role == "output" and each.kind == "number"]
+
+
+def variant_label(path: str, controller: str) -> str:
+    """Label of a path with a controller."""
+    return f"{path}, {controller}" if path else "at rest"
+
+
+def column_label(name: str) -> str:
+    """A column's name in words."""
+    return name.replace("_", " ")
+
+
+def channel_description(name: str) -> tuple[str, str, str]:
+    """Title, label and unit of a time series."""
+    prefix, _, cable = name.rpartition("_")
+    return ("Tension", f"cable {cable}", "N") if prefix else ("Position", name, "m")
+
+
+def _band_data(bands: QuantileBands, names: Sequence[str]) -> dict[str, Any]:
+    channels = []
+    for name in names:
+        title, label, unit = channel_description(name)
+        quantiles = bands.quantiles.get(name)
+        low, middle, high = (None, None, None) if quantiles is None else map(pack_float32, quantiles)
+        width = "" if quantiles is None else format_significant(float(np.nanmax(quantiles[2] - quantiles[0])))
+        channels.append(
+            {"title": title, "label": label, "unit": unit, "low": low, "middle": middle, "high": high, "width": width}
+        )
+    return {"time": pack_float32(bands.time), "bands": channels}
+
+
+def _spread_data(
+    rows: pa.Table, thinned_rows: pa.Table, column: RowColumn, quantiles: Mapping[str, Sequence[float]], is_grid: bool
+) -> dict[str, Any]:
+    """A histogram of an output, or its values over a grid."""
+    common: dict[str, Any] = {"label": column_label(column.name), "unit": column.unit or "1", "words": ""}
+    values = column_values(rows, column.name)
+    finite = values[np.isfinite(values)]
+    if not finite.size:
+        return {**common, "edges": None, "counts": None, "quantiles": [], "values": None}
+    if is_grid:
+        range_text = (
+            f"{format_significant(float(finite.min()), 4)} to "
+            f"{format_significant(float(finite.max()), 4)} {column.unit}"
+        ).rstrip()
+        return {**common, "words": range_text, "values": pack_float32(column_values(thinned_rows, column.name))}
+    counts, edges = np.histogram(finite, min(MAX_HISTOGRAM_BINS, max(5, int(np.sqrt(finite.size)))))
+    low, _, middle, _, high = quantiles[column.name]
+    words = f"{format_significant(low, 4)} to {format_significant(high, 4)} {column.unit}".rstrip()
+    histogram = {
+        "edges": pack_float32(edges),
+        "counts": pack_float32(counts.astype(float)),
+        "quantiles": [low, middle, high],
+    }
+    return {**common, "words": words, **histogram}

@@ -1,0 +1,288 @@
+"""One run of a campaign as a pure function: reference input, co-simulation, outputs as a row."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field
+from math import ceil, log
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tautwire_fmu.laws.effects.slack import SLACK
+
+from ..control import (
+    Design,
+    Feedforward,
+    Reference,
+    cosimulate_closed_loop,
+    design_controller,
+    design_robust,
+    elastic_reference,
+    sample_times,
+    schedule_controller,
+)
+from ..cosimulation.robot_cosimulation import CosimulationResult, cosimulate
+from ..cosimulation.robot_wiring import AXES
+from ..errors import one_line
+from ..fmus.packaging import RobotFmus
+from ..linear import linearise
+from ..linear.linear_plant import LinearPlant
+from ..linear.modes import POSITION, VELOCITY
+from ..recordings.recording import Recording
+from ..recordings.start_position import with_start
+from ..robot.robot_file_reader import robot_from_content
+from ..robot.schema import Point, Robot
+from ..robot.static_equilibrium import static_tensions
+from ..robot.trajectory import Helix, Line, Trajectory, ideal_winch_speeds
+from .campaign_plan import OPEN_LOOP, Compute, PathPlan, Plan
+from .dataset_schema import FAILURE_COLUMN, MODE_NUMBERS, Row, series_columns
+from .fmu_cache import FmuBundle, build_bundle, cached_fmus
+from .parameter_space import with_values
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ReferenceInput:
+    """Reference input of a run: ``time`` (N,) in s with ``winch_speeds`` (N, n), or ``design`` with its ``reference``.
+
+    ``desired_position`` (N, 3) is the path in m, None for a recording; ``nominal_robot`` is the model for the design.
+    """
+
+    nominal_robot: Robot
+    time: Array
+    desired_position: Array | None
+    trajectory: Trajectory | None
+    winch_speeds: Array | None = None
+    design: Design | None = None
+    reference: Reference | None = None
+
+
+def path_start(robot: Robot, path: PathPlan) -> Point:
+    """Start position of a run along a path."""
+    if path.kind == "helix":
+        x, y, z = _path_trajectory(robot, path).position(np.zeros(1))[0].tolist()
+        return (x, y, z)
+    return path.start or robot.platform.start
+
+
+def build_reference_input(
+    robot: Robot, path: PathPlan, controller: str, compute: Compute, recordings: Mapping[str, Recording]
+) -> ReferenceInput:
+    """Reference input along a path: a controller designed for the robot, or winch speeds for inelastic cables.
+
+    Raises UnreachableError where the path asks a cable to push, and what designs of controllers raise.
+    """
+    nominal_robot = with_start(robot, path_start(robot, path))
+    if path.kind == "recording":
+        recording = recordings[path.name]
+        count = int(np.searchsorted(recording.time, recording.time[0] + path.numbers["duration"], side="right"))
+        time = recording.time[:count]
+        return ReferenceInput(nominal_robot, time, None, None, recording.winch_speed[:count])
+    trajectory = _path_trajectory(nominal_robot, path)
+    duration = path.numbers["duration"] + compute.settle
+    if controller == OPEN_LOOP:
+        time = np.linspace(0.0, duration, ceil(duration / compute.step) + 1)
+        winch_speeds = ideal_winch_speeds(nominal_robot, trajectory, time)
+        return ReferenceInput(nominal_robot, time, trajectory.position(time), trajectory, winch_speeds)
+    design = _designed_controller(nominal_robot, trajectory, controller)
+    time = sample_times(design.aim.period, duration)
+    reference = elastic_reference(nominal_robot, trajectory, time)
+    return ReferenceInput(nominal_robot, time, trajectory.position(time), trajectory, None, design, reference)
+
+
+def _designed_controller(robot: Robot, trajectory: Trajectory, controller: str) -> Design:
+    if controller == "feedforward":
+        return Feedforward(robot.cable_count)
+    if controller == "lqg":
+        return design_controller(robot)
+    return schedule_controller(robot, trajectory) if controller == "scheduled" else design_robust(robot)
+
+
+def _path_trajectory(robot: Robot, path: PathPlan) -> Trajectory:
+    numbers = path.numbers
+    end = path.end or robot.platform.start
+    if path.kind == "helix":
+        return Helix(end, numbers["radius"], numbers["rise"], numbers["angle"], numbers["duration"])
+    return Line(path.start or robot.platform.start, end, numbers["duration"])
+
+
+Series = dict[str, Array]
+
+MAX_REASON_LENGTH = 2000
+
+
+@dataclass(frozen=True)
+class Job:
+    """One run: its ``index``, its ``sample``, its variant of path and controller, and its inputs' values."""
+
+    index: int
+    sample: int
+    variant: int
+    values: tuple[float | str, ...] = ()
+
+
+@dataclass(frozen=True)
+class CampaignContext:
+    """Context that all runs of a plan share; ``reference_inputs`` by variant where they do not depend on the run."""
+
+    plan: Plan
+    recordings: Mapping[str, Recording]
+    bundle: FmuBundle | None = None
+    reference_inputs: Mapping[int, ReferenceInput] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class RunResult:
+    """Result of a run: a ``row`` by column, and its time ``series`` by column, empty where none is stored."""
+
+    row: Row
+    series: Series = field(default_factory=dict)
+
+
+def build_context(plan: Plan, recordings: Mapping[str, Recording]) -> CampaignContext:
+    """Build the FMUs and design the controllers that all runs share.
+
+    Raises what building and design raise where the declared robot cannot follow a path.
+    """
+    if not plan.paths:
+        return CampaignContext(plan, recordings)
+    robot = robot_from_content(dict(plan.content), plan.file)
+    bundle = build_bundle(with_start(robot, path_start(robot, plan.paths[0])))
+    reference_inputs = {
+        variant: build_reference_input(robot, plan.paths[path], controller, plan.compute, recordings)
+        for variant, (path, controller) in enumerate(plan.variants)
+    }
+    differs_by_run = plan.belief == "varied" or any(key.startswith("platform.start") for key in plan.keys)
+    return CampaignContext(plan, recordings, bundle, {} if differs_by_run else reference_inputs)
+
+
+def run_job(context: CampaignContext, job: Job, fmu_folder: Path) -> RunResult:
+    """Simulate one run; its row has the outputs computed before a failure, and the reason of the failure.
+
+    The row depends on the plan and the job alone. ``fmu_folder`` caches FMUs between runs.
+
+    Raises OSError where the machine fails, not the run.
+    """
+    path, controller = context.plan.variants[job.variant]
+    row: Row = {"index": job.index, "sample": job.sample}
+    if path >= 0:
+        row |= {"path": context.plan.paths[path].name, "controller": controller}
+    row |= dict(zip(context.plan.keys, job.values, strict=True))
+    series: Series = {}
+    try:
+        for outputs, stage_series in _run_stages(context, job, fmu_folder):
+            row |= outputs
+            series = stage_series
+    except OSError:
+        raise
+    except Exception as error:
+        row[FAILURE_COLUMN] = failure_reason(error)
+    return RunResult(row, series)
+
+
+def failure_reason(error: BaseException) -> str:
+    """The text of an error on one line, for a row."""
+    message = one_line(" ".join(str(error).split())) or "no message"
+    return f"{type(error).__name__}: {message}"[:MAX_REASON_LENGTH]
+
+
+def _run_stages(context: CampaignContext, job: Job, fmu_folder: Path) -> Iterable[tuple[Row, Series]]:
+    plan = context.plan
+    robot = robot_from_content(with_values(plan.content, dict(zip(plan.keys, job.values, strict=True))), plan.file)
+    path_index, controller = plan.variants[job.variant]
+    if path_index >= 0:
+        robot = with_start(robot, path_start(robot, plan.paths[path_index]))
+    if plan.compute.statics:
+        yield {"held": False}, {}
+        tensions = static_tensions(robot)
+        yield (
+            {"held": True} | {f"static_tension_{cable}": float(each) for cable, each in enumerate(tensions, start=1)},
+            {},
+        )
+    if plan.compute.modes:
+        yield _modal_outputs(robot, linearise(robot)), {}
+    if path_index >= 0 and context.bundle is not None:
+        reference_input = context.reference_inputs.get(job.variant) or build_reference_input(
+            _nominal_robot(robot, plan), plan.paths[path_index], controller, plan.compute, context.recordings
+        )
+        motion = _simulate(cached_fmus(robot, context.bundle, fmu_folder), reference_input, plan, job)
+        yield _motion_outputs(robot, reference_input, motion), _resampled_series(motion, plan.compute.series)
+
+
+def _nominal_robot(robot: Robot, plan: Plan) -> Robot:
+    """The nominal robot, for which controllers and winch speeds are designed."""
+    if plan.belief == "varied":
+        return robot
+    return with_start(robot_from_content(dict(plan.content), plan.file), robot.platform.start)
+
+
+def _modal_outputs(robot: Robot, plant: LinearPlant) -> Row:
+    """Natural frequencies, damping ratios, and the smallest eigenvalue of the stiffness at the platform."""
+    modes, A, B = plant.modes, plant.system.A, plant.system.B
+    stiffness = -np.linalg.solve(B[VELOCITY, robot.cable_count :], A[VELOCITY, POSITION])
+    min_stiffness = float(np.linalg.eigvalsh(0.5 * (stiffness + stiffness.T))[0])
+    frequencies = {f"frequency_{mode}": float(modes.frequencies[mode - 1]) for mode in MODE_NUMBERS}
+    damping_ratios = {f"damping_ratio_{mode}": float(modes.damping_ratios[mode - 1]) for mode in MODE_NUMBERS}
+    return {**frequencies, **damping_ratios, "stiffness_least": min_stiffness}
+
+
+def _simulate(fmus: RobotFmus, reference_input: ReferenceInput, plan: Plan, job: Job) -> CosimulationResult:
+    if reference_input.winch_speeds is not None:
+        return cosimulate(fmus, reference_input.time, reference_input.winch_speeds, plan.compute.step)
+    if reference_input.design is None or reference_input.trajectory is None:
+        raise ValueError("a drive without speeds needs a controller and its path")
+    seed = int(np.random.SeedSequence((plan.seed, job.index)).generate_state(1)[0]) if plan.compute.noise else None
+    return cosimulate_closed_loop(
+        fmus,
+        reference_input.nominal_robot,
+        reference_input.design,
+        reference_input.trajectory,
+        float(reference_input.time[-1]),
+        plan.compute.step,
+        seed,
+        reference=reference_input.reference,
+    )
+
+
+def _motion_outputs(robot: Robot, reference_input: ReferenceInput, motion: CosimulationResult) -> Row:
+    """Outputs of a motion: end position, path error, and the range of tensions."""
+    row: dict[str, Any] = {f"end_{axis}": float(each) for axis, each in zip(AXES, motion.position[-1], strict=True)}
+    if reference_input.desired_position is not None:
+        path_error = np.linalg.norm(motion.position - reference_input.desired_position, axis=1)
+        errors = {"end": path_error[-1], "largest": path_error.max(), "rms": np.sqrt(np.mean(path_error**2))}
+        row |= {f"path_error_{name}": float(value) for name, value in errors.items()}
+    min_tension, max_tension = motion.tension.min(axis=0), motion.tension.max(axis=0)
+    for cable in robot.cable_numbers:
+        row |= {f"tension_{cable}_least": float(min_tension[cable - 1])}
+        row |= {f"tension_{cable}_largest": float(max_tension[cable - 1])}
+    row["slack"] = bool(np.any(min_tension <= _slack_tension(robot)))
+    if robot.tension is not None:
+        row["limit_broken"] = bool(
+            min_tension.min() < robot.tension.minimum or max_tension.max() > robot.tension.maximum
+        )
+    return row
+
+
+def _slack_tension(robot: Robot) -> Array:
+    """Tension (n,) in N of a cable that nothing pulls at: zero, or ``s ln 2`` of the effect slack's softness s."""
+    tension = np.zeros(robot.cable_count)
+    for setting in robot.effects:
+        if setting.name == SLACK.name:
+            tension[[cable - 1 for cable in setting.cables]] = setting.values["softness"] * log(2.0)
+    return tension
+
+
+def _resampled_series(motion: CosimulationResult, point_count: int) -> Series:
+    """Positions and tensions at evenly spaced times, from the start of a motion to its end."""
+    if point_count < 2:
+        return {}
+    time = np.linspace(motion.time[0], motion.time[-1], point_count)
+    outputs = motion.measured()
+    names = series_columns(motion.tension.shape[1])
+    return {"time": time} | {
+        name: np.interp(time, motion.time, column) for name, column in zip(names, outputs.T, strict=True)
+    }

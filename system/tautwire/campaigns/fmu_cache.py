@@ -1,0 +1,111 @@
+"""FMU cache: FMUs as bytes, built once for all robots of the same structure, with numbers set as FMU parameters."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import os
+import shutil
+import tempfile
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from ..fmus.packaging import RobotFmus, build_fmus, cable_resources, platform_resource, start_values, winch_resource
+from ..robot.schema import Robot
+from ..robot.static_equilibrium import has_sensor_effects
+
+FMU_SUFFIX = ".fmu"
+
+
+@dataclass(frozen=True)
+class FmuBundle:
+    """FMUs of a robot: ``files`` by component without the user's; ``structure`` is its :func:`structure_digest`."""
+
+    structure: str
+    files: Mapping[str, bytes]
+
+
+def structure_digest(robot: Robot) -> str:
+    """Digest of what decides which FMUs a robot needs: laws, effects and formulas, not the numbers in them."""
+    components = {name: _component_structure(data) for name, data in component_data(robot).items()}
+    user_fmus = {fmu.slot: str(fmu.path) for fmu in robot.fmus}
+    return hashlib.sha256(json.dumps([components, user_fmus], sort_keys=True).encode()).hexdigest()[:16]
+
+
+def component_data(robot: Robot) -> dict[str, dict[str, Any]]:
+    """Data that each FMU built by the project carries, by component, without the user's FMUs."""
+    user_slots = {fmu.slot for fmu in robot.fmus}
+    data = {f"cable_{i}": each for i, each in enumerate(cable_resources(robot), start=1)}
+    data["platform"] = platform_resource(robot)
+    if robot.winch is not None:
+        data |= {f"winch_{i}": winch_resource(robot, i) for i in robot.cable_numbers}
+    return {name: each for name, each in data.items() if name not in user_slots}
+
+
+def build_bundle(robot: Robot) -> FmuBundle:
+    """Build the FMUs of a robot and read them into memory."""
+    with tempfile.TemporaryDirectory(prefix="tautwire-campaign-") as folder:
+        build_fmus(robot, Path(folder))
+        return FmuBundle(
+            structure_digest(robot), {path.stem: path.read_bytes() for path in Path(folder).glob(f"*{FMU_SUFFIX}")}
+        )
+
+
+def cached_fmus(robot: Robot, bundle: FmuBundle, cache_folder: Path) -> RobotFmus:
+    """FMUs of a robot with all its numbers as start values: from the bundle if its structure matches, else built anew.
+
+    They are unpacked into ``cache_folder`` once for each structure.
+
+    Raises SlotError where an FMU of the user's does not fit, OSError where the disk refuses.
+    """
+    structure = structure_digest(robot)
+    structure_folder = cache_folder / structure
+    if not structure_folder.exists():
+        files = bundle.files if structure == bundle.structure else build_bundle(robot).files
+        _write_atomically(files, structure_folder)
+    user_fmus = {fmu.slot: fmu.path for fmu in robot.fmus}
+
+    def fmu_path(name: str) -> Path:
+        return user_fmus.get(name, structure_folder / f"{name}{FMU_SUFFIX}")
+
+    return RobotFmus(
+        cables=tuple(fmu_path(f"cable_{i}") for i in robot.cable_numbers),
+        platform=fmu_path("platform"),
+        winches=tuple(fmu_path(f"winch_{i}") if i in robot.winch_numbers else None for i in robot.cable_numbers),
+        user_start_values={slot: start_values(robot, slot) for slot in user_fmus},
+        has_position_sensor="platform" not in user_fmus and has_sensor_effects(robot),
+        start_settings={name: dict(_fmu_parameters(data)) for name, data in component_data(robot).items()},
+    )
+
+
+def _write_atomically(files: Mapping[str, bytes], target: Path) -> None:
+    """Write files into a folder atomically, also when several processes write the same one."""
+    target.parent.mkdir(parents=True, exist_ok=True)
+    scratch = Path(tempfile.mkdtemp(prefix=".fmus-", dir=target.parent))
+    try:
+        for name, content in files.items():
+            (scratch / f"{name}{FMU_SUFFIX}").write_bytes(content)
+        os.rename(scratch, target)
+    except OSError:
+        if not target.exists():
+            raise
+    finally:
+        shutil.rmtree(scratch, ignore_errors=True)
+
+
+def _component_structure(data: Mapping[str, Any]) -> list[Any]:
+    effects = [effect["name"] for effect in data.get("effects", ())]
+    return [data.get("law"), effects, data.get("formulas"), sorted(data)]
+
+
+def _fmu_parameters(data: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
+    """The numeric start values of a component by FMU parameter name; a name may be no parameter of the FMU."""
+    for name, value in data.items():
+        if isinstance(value, int | float):
+            yield name, float(value)
+        elif name in ("anchor", "start"):
+            yield from ((f"{name}.{axis}", float(each)) for axis, each in zip("xyz", value, strict=True))
+    for effect in data.get("effects", ()):
+        yield from ((f"effect.{effect['name']}.{name}", float(value)) for name, value in effect["values"].items())

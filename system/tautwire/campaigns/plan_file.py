@@ -1,0 +1,353 @@
+"""Reader of plan files: TOML with every key checked against the robot file that it names."""
+
+from __future__ import annotations
+
+import hashlib
+import sys
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, NoReturn
+
+from ..errors import InputError, RobotFileError, format_value
+from ..input_files import read_bytes, require_utf8_text
+from ..recordings.recording import read_recording
+from ..robot.checked_table import CheckedTable, NumberRule, suggest_name
+from ..robot.robot_file_reader import robot_content, robot_from_content
+from ..robot.trajectory import ANGLE_RULE, RADIUS_RULE, RISE_RULE
+from ..robot.trajectory import DURATION_RULE as OF_PATH
+from .campaign_plan import (
+    BELIEFS,
+    CONTROLLERS,
+    METHODS,
+    OPEN_LOOP,
+    Compute,
+    Correlation,
+    Input,
+    PathPlan,
+    Plan,
+    PlanError,
+    TracePlan,
+)
+from .identified_inputs import IdentifiedInputs, identified_inputs
+from .input_sampling import correlated_groups, median_value, saltelli_block_size
+from .parameter_space import KeyPathError, read_parameter_space, with_values
+
+
+def file_relative_to_plan(table: CheckedTable, name: str | None) -> Path:
+    """The absolute path of a file that a plan names relative to itself."""
+    return (Path(table.file).parent / str(name)).absolute()
+
+
+def whole_number(table: CheckedTable, key: str, rule: NumberRule) -> int:
+    """The whole number under a key, or the rule's default."""
+    number = table.number(key, rule)
+    if number != int(number):
+        table.refuse(key, f"is {number!r}, not a whole number", rule.hint())
+    return int(number)
+
+
+def choice(table: CheckedTable, key: str, choices: tuple[str, ...]) -> str:
+    """The text under a key, one of the choices; empty where the key is absent."""
+    if key not in table.content:
+        return ""
+    listed = ", ".join(f'"{each}"' for each in choices)
+    value = table.text(key, f"write one of {listed}") or ""
+    if value not in choices:
+        table.refuse(key, f"is {format_value(value)}, must be one of {listed}", f"write {suggest_name(value, choices)}")
+    return value
+
+
+def flag(table: CheckedTable, key: str, default: bool) -> bool:
+    """The boolean under a key, or the default where the key is absent."""
+    value = table.content.get(key, default)
+    if not isinstance(value, bool):
+        table.refuse(key, f"is {format_value(value)}, not true or false", f"write {key} = true or {key} = false")
+    return bool(value)
+
+
+def file_digest(file: Path) -> str:
+    """Digest of a file's content."""
+    return hashlib.sha256(read_bytes(file, PlanError)).hexdigest()[:16]
+
+
+# Narrower than for one run: an error in a plan is repeated in many runs.
+DURATION_RULE = OF_PATH._replace(minimum=1e-3, maximum=1e5)
+UNTIL_RULE = NumberRule("where the recording is left", "s", 1e-3, 1e6)
+HELIX_RULES = {
+    "radius": RADIUS_RULE._replace(positive=True),
+    "rise": RISE_RULE,
+    "angle": ANGLE_RULE,
+    "duration": DURATION_RULE,
+}
+
+
+def read_paths(table: CheckedTable, cable_count: int, inputs: tuple[Input, ...]) -> tuple[PathPlan, ...]:
+    """Read all paths of a plan; names must be unique."""
+    paths: list[PathPlan] = []
+    for number, path_table in enumerate(table.tables("path") if "path" in table.content else (), start=1):
+        path = _read_path(path_table, f"path {number}", cable_count)
+        if path.name in [each.name for each in paths]:
+            path_table.refuse("name", f"is {format_value(path.name)} again", "give each path its own name")
+        start_varies = any(each.key.startswith("platform.start") for each in inputs)
+        if start_varies and (path.kind == "helix" or path.start is not None):
+            path_table.refuse("", "starts where it says, but platform.start varies", "leave start out of a line")
+        paths.append(path)
+    return tuple(paths)
+
+
+def _read_path(table: CheckedTable, default: str, cable_count: int) -> PathPlan:
+    hint = 'give the path a name of one line, as in name = "up"'
+    name = (table.text("name", hint) or "") if "name" in table.content else default
+    if not name.strip() or not name.isprintable():
+        table.refuse("name", f"is {format_value(name)}", hint)
+    kind_keys = [key for key in ("end", "radius", "recording") if key in table.content]
+    if len(kind_keys) != 1:
+        hint = "give end and duration (a line), centre, radius, rise, angle and duration (a helix), or recording"
+        table.refuse("", "is no path" if not kind_keys else f"has {' and '.join(kind_keys)}", hint)
+    if kind_keys == ["end"]:
+        table.require_known(("name", "start", "end", "duration"))
+        start = table.point("start", "where the line starts") if "start" in table.content else None
+        end = table.point("end", "where the line ends")
+        return PathPlan(name, "line", {"duration": table.number("duration", DURATION_RULE)}, start, end)
+    if kind_keys == ["radius"]:
+        table.require_known(("name", "centre", *HELIX_RULES))
+        numbers = {key: table.number(key, rule) for key, rule in HELIX_RULES.items()}
+        return PathPlan(name, "helix", numbers, table.point("centre", "the centre of the helix at its start"))
+    table.require_known(("name", "recording", "until"))
+    file = file_relative_to_plan(table, table.text("recording", "name a recording with winch speeds"))
+    recording = read_recording(file, cable_count)
+    duration, second_time = recording.duration, float(recording.time[1] - recording.time[0])
+    until = table.number("until", UNTIL_RULE) if "until" in table.content else duration
+    if until < second_time:
+        table.refuse("until", f"is {until!r}, before the recording's second sample", f"write {second_time:g} or more")
+    return PathPlan(name, "recording", {"duration": min(until, duration)}, None, None, str(file), file_digest(file))
+
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib  # type: ignore[import-not-found,unused-ignore]
+
+PLAN_KEYS = (
+    "robot",
+    "seed",
+    "believes",
+    "controllers",
+    "sample",
+    "vary",
+    "found",
+    "correlation",
+    "path",
+    "compute",
+    "trace",
+)
+SIMULATION_KEYS = ("sample", "vary", "found", "correlation", "path", "controllers", "believes", "compute")
+MAX_PLAN_SIZE = 1_000_000  # bytes
+MAX_RUNS = 10_000_000
+RECORDING_SUFFIXES = (".csv", ".parquet", ".mf4", ".mdf")
+
+SEED_RULE = NumberRule("a seed", "", 0.0, 2.0**53, default=0.0)
+COUNT_RULE = NumberRule("the number of samples", "", 1.0, float(MAX_RUNS))
+CORRELATION_RULE = NumberRule("the correlation", "", -0.999, 0.999)
+ALPHA_RULE = NumberRule("the rate of false alarms allowed", "", 1e-9, 0.5, default=TracePlan.alpha)
+STEP_RULE = NumberRule("the longest macro step", "s", 1e-4, 1.0, default=Compute.step)
+SETTLE_RULE = NumberRule("how long runs go on after a path", "s", minimum=0.0, maximum=1e4, default=Compute.settle)
+SERIES_RULE = NumberRule("the points of each motion to keep", "", 0.0, 10_000.0, default=float(Compute.series))
+
+
+def read_plan(path: str | Path) -> Plan:
+    """Read a plan file; files that it names are relative to it.
+
+    Raises PlanError, RobotFileError or RecordingError where it, or a file that it names, is invalid.
+    """
+    table = _load_plan(Path(path))
+    table.require_known(PLAN_KEYS)
+    robot_file = file_relative_to_plan(table, table.text("robot", 'name the robot file, as in robot = "robot.toml"'))
+    content = robot_content(robot_file)
+    cables = robot_from_content(content, robot_file).cable_count
+    seed = whole_number(table, "seed", SEED_RULE)
+    if "trace" in table.content:
+        return Plan(str(robot_file), content, seed, "grid", paths=(), trace=_read_trace(table, cables))
+    identified = _read_identified_inputs(table, content, robot_file)
+    inputs = _read_inputs(table, identified)
+    method, count = _read_sample(table, inputs)
+    plan = Plan(
+        file=str(robot_file),
+        content=identified.content,
+        seed=seed,
+        method=method,
+        count=count,
+        inputs=inputs,
+        correlations=_read_correlations(table, inputs, method, identified.correlations),
+        paths=read_paths(table, cables, inputs),
+        controllers=_read_controllers(table),
+        belief=choice(table, "believes", BELIEFS) or BELIEFS[0],
+        compute=_read_compute(table),
+        notes=identified.notes,
+    )
+    if method == "saltelli":
+        if plan.correlations and len(set(correlated_groups(plan))) == 1:
+            hint = 'choose method = "sobol", or let one more number vary'
+            table.refuse("sample.method", "is saltelli, but all inputs are correlated: they share one index, 1", hint)
+        plan = replace(plan, count=count * saltelli_block_size(plan))
+    _require_feasible(table, plan, robot_file)
+    return plan
+
+
+def _load_plan(path: Path) -> CheckedTable:
+    text = read_bytes(path, PlanError, MAX_PLAN_SIZE)
+    require_utf8_text(text, str(path), PlanError, "TOML")
+    try:
+        content = tomllib.loads(text.decode("utf-8-sig"))
+    except (ValueError, RecursionError) as problem:
+        raise PlanError(str(path), f"is not TOML ({problem})", "correct it there") from problem
+    return CheckedTable(str(path), "", content, _raise_plan_error)
+
+
+def _raise_plan_error(error: RobotFileError) -> NoReturn:
+    raise PlanError(error.where, error.problem, error.hint)
+
+
+def _read_identified_inputs(table: CheckedTable, content: dict[str, Any], robot_file: Path) -> IdentifiedInputs:
+    """The robot file's content with the effects that a trace identified."""
+    section = table.table("found")
+    if section is None:
+        return IdentifiedInputs(content)
+    section.require_known(("report", "correlated"))
+    hint = 'name the report of a trace, as in report = "report/report.json"'
+    report = file_relative_to_plan(section, section.text("report", hint))
+    return identified_inputs(report, content, robot_file, flag(section, "correlated", True))
+
+
+def _read_inputs(table: CheckedTable, identified: IdentifiedInputs) -> tuple[Input, ...]:
+    """All inputs, those identified by a trace first."""
+    vary = table.table("vary")
+    inputs = identified.inputs + (read_parameter_space(vary, identified.content) if vary is not None else ())
+    for index, each in enumerate(inputs):
+        if each.key in {other.key for other in inputs[:index]}:
+            (vary or table).refuse(each.key, "varies twice", "let it vary once; [found] has the effects of its report")
+    return inputs
+
+
+def _read_sample(table: CheckedTable, inputs: tuple[Input, ...]) -> tuple[Any, int]:
+    """The sampling method and the number of samples."""
+    sample = table.table("sample")
+    if sample is None:
+        if inputs:
+            hint = 'add [sample] with method = "sobol" and count = 64, or method = "grid"'
+            table.refuse("sample", "is missing", hint)
+        return "grid", 1
+    sample.require_known(("method", "count"))
+    method = choice(sample, "method", METHODS) or METHODS[0]
+    if not inputs:
+        sample.refuse("", "samples nothing", "add [vary] with a key of the robot file, or remove [sample]")
+    if method == "grid":
+        if "count" in sample.content:
+            sample.refuse("count", "is given, a grid has as many as its lists make", "remove it")
+        count = 1
+        for each in inputs:
+            if not each.distribution.discrete_values:
+                hint = "write a list or a linspace, or choose another method"
+                table.refuse("vary", f"lets {each.key} be {each.distribution.kind}, a grid takes steps", hint)
+            count *= len(each.distribution.discrete_values)
+    else:
+        count = whole_number(sample, "count", COUNT_RULE)
+        if method in ("sobol", "saltelli") and count & (count - 1):
+            low = 1 << (count.bit_length() - 1)
+            sample.refuse("count", f"is {count}, must be a power of 2 for {method}", f"write {low} or {2 * low}")
+    return method, count
+
+
+def _read_correlations(
+    table: CheckedTable, inputs: tuple[Input, ...], method: str, identified: tuple[Correlation, ...]
+) -> tuple[Correlation, ...]:
+    """Correlations of the trace report and of the plan, which takes precedence."""
+    by_pair = {frozenset((each.first, each.second)): each for each in identified}
+    keys = [each.key for each in inputs]
+    for entry in table.tables("correlation") if "correlation" in table.content else ():
+        entry.require_known(("between", "value"))
+        between = entry.content.get("between")
+        if not (isinstance(between, list) and len(between) == 2 and between[0] != between[1]):
+            entry.refuse("between", "does not name two keys", 'write between = ["cable.modulus", "platform.mass"]')
+            continue
+        for key in between:
+            if key not in keys:
+                entry.refuse(
+                    "between",
+                    f"names {format_value(key)}, which does not vary",
+                    f"write {suggest_name(str(key), keys)}",
+                )
+        if method == "grid":
+            entry.refuse("", "correlates numbers of a grid", "remove it, or choose another method")
+        first, second = (keys.index(key) for key in between)
+        by_pair[frozenset((first, second))] = Correlation(first, second, entry.number("value", CORRELATION_RULE))
+    return tuple(each for each in by_pair.values() if each.value != 0.0)
+
+
+def _read_controllers(table: CheckedTable) -> tuple[str, ...]:
+    if "controllers" not in table.content:
+        return (OPEN_LOOP,)
+    names = table.content["controllers"]
+    listed = ", ".join(f'"{each}"' for each in CONTROLLERS)
+    if not isinstance(names, list) or not names:
+        table.refuse("controllers", f"is {format_value(names)}, not a list of controllers", f"name some of {listed}")
+    for name in names:
+        if name not in CONTROLLERS:
+            hint = f"write {suggest_name(str(name), CONTROLLERS)}"
+            table.refuse("controllers", f"has {format_value(name)}, must be one of {listed}", hint)
+    if "path" not in table.content:
+        table.refuse("controllers", "have no path to follow", "add [[path]], or remove controllers")
+    return tuple(dict.fromkeys(names))
+
+
+def _read_compute(table: CheckedTable) -> Compute:
+    compute = table.table("compute")
+    if compute is None:
+        return Compute()
+    compute.require_known(("statics", "modes", "step", "settle", "series", "noise"))
+    return Compute(
+        statics=flag(compute, "statics", Compute.statics),
+        modes=flag(compute, "modes", Compute.modes),
+        step=compute.number("step", STEP_RULE),
+        settle=compute.number("settle", SETTLE_RULE),
+        series=whole_number(compute, "series", SERIES_RULE),
+        noise=flag(compute, "noise", Compute.noise),
+    )
+
+
+def _read_trace(table: CheckedTable, cable_count: int) -> TracePlan:
+    for key in SIMULATION_KEYS:
+        if key in table.content:
+            table.refuse(key, "has no part in a trace of recordings", "remove it, or make two plans")
+    trace = table.table("trace")
+    if trace is None:
+        return TracePlan((), ())
+    trace.require_known(("recordings", "alpha"))
+    folder = file_relative_to_plan(trace, trace.text("recordings", 'name a folder, as in recordings = "season"'))
+    if not folder.is_dir():
+        trace.refuse("recordings", f"is {format_value(str(folder))}, no folder", "name a folder of recordings")
+    files = sorted(each for each in folder.iterdir() if each.suffix.lower() in RECORDING_SUFFIXES and each.is_file())
+    if not files:
+        trace.refuse("recordings", f"has no recording in {folder}", f"put files there that end in {RECORDING_SUFFIXES}")
+    return TracePlan(tuple(map(str, files)), tuple(map(file_digest, files)), trace.number("alpha", ALPHA_RULE))
+
+
+def _require_feasible(table: CheckedTable, plan: Plan, robot_file: Path) -> None:
+    """Refuse inputs that the robot file's rules reject, at the median of numbers and at each text."""
+    if plan.paths and any(path.kind == "recording" for path in plan.paths) and plan.controllers != (OPEN_LOOP,):
+        table.refuse("controllers", "cannot follow a recording, which is winch speeds", "remove controllers")
+    if not (plan.paths or plan.compute.statics or plan.compute.modes):
+        table.refuse("compute", "leaves nothing to compute", "add [[path]], or statics = true or modes = true")
+    runs = plan.count * len(plan.variants)
+    if runs > MAX_RUNS:
+        table.refuse("sample", f"makes {runs} runs, at most {MAX_RUNS} are made", "make it smaller")
+    for varied in plan.inputs:
+        where = f"{table.file}: vary.{varied.key}"
+        try:
+            for value in varied.distribution.texts or (median_value(varied),):
+                robot_from_content(with_values(plan.content, {varied.key: value}), robot_file)
+        except KeyPathError as problem:
+            raise PlanError(where, problem.problem, problem.hint) from problem
+        except InputError as error:
+            _, _, key = error.where.rpartition(": ")
+            raise PlanError(where, f"does not suit the robot file, {key} {error.problem}", error.hint) from error

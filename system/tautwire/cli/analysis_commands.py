@@ -1,0 +1,174 @@
+"""The commands ``linearise`` and ``workspace``: the linear plant, and the wrench-feasible workspace."""
+
+from __future__ import annotations
+
+import json
+import math
+from collections.abc import Mapping
+from contextlib import ExitStack
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from ..errors import InputError, UnreachableError
+from ..robot.robot_file_reader import read_robot
+from ..robot.schema import Robot
+from .console import (
+    AsJson,
+    CommandOutput,
+    Quiet,
+    RobotFile,
+    note_unused_tables,
+    parse_position,
+    progress_bar,
+    read_holdable_robot,
+    relative_links,
+)
+
+if TYPE_CHECKING:
+    from ..linear.linear_plant import LinearPlant
+    from ..robot.workspace import Workspace
+
+
+def linearise(
+    robot_file: RobotFile,
+    out: Annotated[
+        Path | None, typer.Option(metavar="MODEL.json", help="Where the model goes; not needed with --json.")
+    ] = None,
+    at: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Position, m; by default the start.")] = None,
+    report: Annotated[
+        Path | None, typer.Option(metavar="PAGE.html", help="Modes in motion and gains, as a page.")
+    ] = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Linearise the robot at rest: modes, and A, B, C, D.
+
+    Inputs are the speeds of the drums: [winch] and [fmu] of the robot file have no part in it.
+
+    Example: tautwire linearise robot.toml --at 10,5.5,4 --out model.json --report modes.html
+    """
+    from ..atomic_output import refuse_overwriting_inputs, refuse_same_output
+    from ..linear import linearise as linearised
+    from ..linear import model_document
+
+    require_output(out, as_json, "model.json")
+    refuse_overwriting_inputs([robot_file], [path for path in (out, report) if path])
+    refuse_same_output(out, report)
+    output = CommandOutput(as_json, quiet)
+    robot = read_holdable_robot(robot_file)
+    try:
+        with progress_bar(output) as progress:
+            progress("linearising", 0.0)
+            plant = linearised(robot, None if at is None else parse_position(at))
+    except UnreachableError as error:
+        raise UnreachableError("--at", error.position, error.cable, error.tension, error.reason) from error
+    document = model_document(plant)
+    written = _write_model(document, out, robot, plant, report, robot_file)
+    note_unused_tables(robot, output)
+    for note in plant.notes:
+        output.note(note)
+    output.result([*_mode_lines(plant), *written.values()], {**written, **document, "notes": plant.notes})
+
+
+def _mode_lines(plant: LinearPlant) -> list[str]:
+    pairs = zip(plant.modes.frequencies, plant.modes.damping_ratios, strict=True)
+    return [f"mode {i}: {frequency:.4f} Hz, damping ratio {ratio:.5f}" for i, (frequency, ratio) in enumerate(pairs, 1)]
+
+
+def _write_model(
+    document: Mapping[str, Any],
+    out: Path | None,
+    robot: Robot,
+    plant: LinearPlant,
+    report: Path | None,
+    robot_file: Path,
+) -> dict[str, Path]:
+    """Writes the model and its page as requested, both or neither; returns the written files by name."""
+    from ..atomic_output import atomic_file
+
+    with ExitStack() as stack:
+        if out is not None:
+            scratch = stack.enter_context(atomic_file(out))
+            scratch.write_text(json.dumps(document, indent=1), encoding="utf-8")
+        if report is not None:
+            from ..reports.modes_page import modes_page
+
+            links = relative_links(report, robot_file, *([out] if out else []))
+            page = stack.enter_context(atomic_file(report))
+            page.write_text(modes_page(robot, plant, links), encoding="utf-8")
+    return ({"model": out} if out else {}) | ({"report": report} if report else {})
+
+
+def workspace(
+    robot_file: RobotFile,
+    out: Annotated[
+        Path | None, typer.Option(metavar="WORKSPACE.csv", help="Where the table goes; not needed with --json.")
+    ] = None,
+    plot: Annotated[Path | None, typer.Option(metavar="FIGURE.png", help="Slices as a figure; or .pdf, .svg.")] = None,
+    lower: Annotated[
+        str | None, typer.Option(metavar="X,Y,Z", help="Lower corner, m; by default of all exit points and the start.")
+    ] = None,
+    upper: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Upper corner, m.")] = None,
+    spacing: Annotated[float | None, typer.Option(help="Grid spacing, m; by default a twentieth of the box.")] = None,
+    acceleration: Annotated[float, typer.Option(help="Required along each axis beside the weight, m/s^2.")] = 0.0,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Find where the cables, which only pull, hold the platform.
+
+    Margins and static tensions on a grid.
+
+    Example: tautwire workspace robot.toml --out workspace.csv --plot workspace.png
+    """
+    from ..atomic_output import refuse_overwriting_inputs, refuse_same_output
+    from ..reports.workspace_figure import require_figure_format
+    from ..robot.workspace import wrench_feasible_workspace
+
+    require_output(out, as_json, "workspace.csv")
+    refuse_overwriting_inputs([robot_file], [path for path in (out, plot) if path])
+    refuse_same_output(out, plot, "--plot")
+    if plot is not None:
+        require_figure_format(plot)
+    output = CommandOutput(as_json, quiet)
+    robot = read_robot(robot_file)
+    lower_corner = None if lower is None else parse_position(lower, "--lower")
+    upper_corner = None if upper is None else parse_position(upper, "--upper")
+    with progress_bar(output) as progress:
+        grid_progress = partial(progress, "looking where the cables hold it")
+        feasibility = wrench_feasible_workspace(robot, lower_corner, upper_corner, spacing, acceleration, grid_progress)
+    written = _write_workspace(feasibility, out, robot, plot)
+    counts = {"feasible": int(feasibility.feasible.sum()), "positions": int(feasibility.feasible.size)}
+    summary_line = "{feasible} of {positions} positions are wrench-feasible".format_map(counts)
+    # Without a table file, JSON output holds the rows.
+    output.result(
+        [summary_line, *written.values()],
+        {**written, **counts, **({} if out else {"rows": _workspace_records(feasibility)})},
+    )
+
+
+def _write_workspace(feasibility: Workspace, out: Path | None, robot: Robot, plot: Path | None) -> dict[str, Path]:
+    """Writes the table and the figure as requested, both or neither; returns the written files by name."""
+    from ..atomic_output import atomic_file
+    from ..reports.workspace_figure import workspace_figure
+
+    with ExitStack() as stack:
+        if out is not None:
+            feasibility.frame().to_csv(stack.enter_context(atomic_file(out)), index=False, float_format="%.10g")
+        if plot is not None:
+            workspace_figure(robot, feasibility).savefig(stack.enter_context(atomic_file(plot)))
+    return ({"workspace": out} if out else {}) | ({"plot": plot} if plot else {})
+
+
+def require_output(out: Path | None, as_json: bool, name: str) -> None:
+    """Raises InputError where neither an output file nor JSON output is requested."""
+    if out is None and not as_json:
+        raise InputError("--out", "is missing", f"name a file, as in --out {name}, or add --json")
+
+
+def _workspace_records(feasibility: Workspace) -> list[dict[str, float | None]]:
+    """One record for each position; None for a number that is not finite."""
+    records = feasibility.frame().to_dict("records")
+    return [{str(key): value if math.isfinite(value) else None for key, value in record.items()} for record in records]

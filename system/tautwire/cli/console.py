@@ -1,0 +1,164 @@
+"""Console of the commands: common options, output as lines or JSON, progress bar, robust standard streams."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import sys
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager, suppress
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, TextIO
+
+import typer
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    Progress,
+    SpinnerColumn,
+    TextColumn,
+    TimeElapsedColumn,
+    TimeRemainingColumn,
+)
+
+from ..errors import InputError, UnreachableError
+from ..robot.robot_file_reader import read_robot
+from ..robot.schema import Robot
+
+RobotFile = Annotated[Path, typer.Argument(metavar="ROBOT.toml", help="The robot file.")]
+AsJson = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object, and nothing else.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but what is wrong.")]
+
+
+@dataclass(frozen=True)
+class CommandOutput:
+    """Output of a command: results on standard output, notes on standard error; ``quiet`` suppresses both."""
+
+    as_json: bool = False
+    quiet: bool = False
+
+    def result(self, lines: Iterable[object], document: Mapping[str, object]) -> None:
+        """Prints the result, as lines or as one JSON object."""
+        if self.as_json:
+            print(json.dumps(document, default=str))
+        elif not self.quiet:
+            for line in lines:
+                print(line)
+
+    def note(self, text: str) -> None:
+        """Prints a remark for the user."""
+        if not self.quiet:
+            print(text, file=sys.stderr)
+
+    def suggest_next(self, text: str) -> None:
+        """Prints what to do next; not with JSON output."""
+        if not self.as_json:
+            self.note(f"next: {text}")
+
+
+DEFAULT_OUTPUT = CommandOutput()
+
+
+def read_holdable_robot(path: Path) -> Robot:
+    """Reads a robot file; raises UnreachableError where its cables cannot hold the platform at the start."""
+    from ..robot.static_equilibrium import static_tensions
+
+    robot = read_robot(path)
+    try:
+        static_tensions(robot)
+    except UnreachableError as error:
+        where = f"{path}: platform.start"
+        raise UnreachableError(where, error.position, error.cable, error.tension, error.reason) from error
+    return robot
+
+
+def note_unused_tables(robot: Robot, output: CommandOutput = DEFAULT_OUTPUT) -> None:
+    """Notes which tables of the robot file a command does not use."""
+    tables = [name for name, content in (("[winch]", robot.winch), ("[fmu]", robot.fmus)) if content]
+    if tables:
+        explanation = (
+            "no part in this: winch speeds are those of the drums' encoders, and all components the project's own"
+        )
+        output.note(f"{' and '.join(tables)}: {explanation}")
+
+
+def relative_links(page: Path, *files: Path) -> dict[str, str]:
+    """Relative paths from a page to files, by file name."""
+    folder = page.absolute().parent
+    return {file.name: Path(os.path.relpath(file.absolute(), folder)).as_posix() for file in files}
+
+
+def parse_position(text: str, option: str = "--at") -> tuple[float, float, float]:
+    """Parses three finite numbers separated by commas; raises InputError that names the option."""
+    hint = f"give three numbers in m, such as {option} 10,5.5,4"
+    try:
+        x, y, z = (float(part) for part in text.split(","))
+    except ValueError:
+        raise InputError(option, f"{text!r} is not a position", hint) from None
+    if not all(map(math.isfinite, (x, y, z))):
+        raise InputError(option, f"{text!r} is not a position", hint)
+    return x, y, z
+
+
+@contextmanager
+def progress_bar(output: CommandOutput = DEFAULT_OUTPUT) -> Iterator[Callable[[str, float], None]]:
+    """Context manager for a progress bar on standard error; none where that is no terminal, or with ``quiet``."""
+    console = Console(stderr=True)
+    if output.quiet or not console.is_terminal:
+        yield lambda what, done: None
+        return
+    columns = (
+        SpinnerColumn(),
+        TextColumn("{task.description:<32}"),
+        BarColumn(),
+        TimeElapsedColumn(),
+        TimeRemainingColumn(),
+    )
+    # A campaign's runs may come minutes apart; the remaining time is estimated from the last hour.
+    with Progress(*columns, console=console, transient=True, speed_estimate_period=3600.0) as bar:
+        task = bar.add_task("", total=1.0)
+        current_activity = ""
+
+        def report_progress(activity: str, fraction: float) -> None:
+            nonlocal current_activity
+            if activity != current_activity:
+                bar.reset(task, description=activity)
+                current_activity = activity
+            bar.update(task, completed=fraction)
+
+        yield report_progress
+
+
+def open_closed_streams() -> None:
+    """Opens closed standard streams on the null device, so that no other file takes their descriptors."""
+    for number, name in enumerate(("stdin", "stdout", "stderr")):
+        try:
+            os.fstat(number)
+        except OSError:
+            # The system assigns the lowest free descriptor, which is the missing one.
+            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)
+        if getattr(sys, name) is None:
+            setattr(sys, name, open(number, "w" if number else "r", encoding="utf-8", closefd=False))  # noqa: SIM115
+
+
+def print_error(text: str) -> None:
+    """Prints a line to standard error, if it can be written."""
+    try:
+        print(text, file=sys.stderr, flush=True)
+    except OSError:
+        flush_or_discard(sys.stderr)
+
+
+def flush_or_discard(stream: TextIO) -> None:
+    """Flushes a stream; where that fails redirects it to the null device, since Python would flush again at exit."""
+    with suppress(OSError):
+        try:
+            stream.flush()
+            return
+        except OSError:
+            pass
+        null_device = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(null_device, stream.fileno())
+        os.close(null_device)

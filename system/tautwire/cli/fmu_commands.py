@@ -1,0 +1,185 @@
+"""The commands ``build``, ``simulate`` and ``fmus``: FMUs built, co-simulated and listed with their ports."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+from rich.console import Console
+from rich.table import Table
+from rich.text import Text
+
+from ..robot.schema import fmu_slots
+from .console import AsJson, CommandOutput, Quiet, RobotFile, progress_bar, read_holdable_robot, relative_links
+
+if TYPE_CHECKING:
+    from ..fmus.fmu_slots import FmuPort
+
+NON_TERMINAL_WIDTH = 160
+PORT_COLUMNS = ("name", "causality", "unit", "start", "description")
+C_HOSTS_HELP = (
+    "Make FMUs that also run in importers that are not Python processes; needs a C compiler, and Python's headers "
+    "and shared library (Debian: gcc, python3-dev)."
+)
+OWN_FMU_HELP = (
+    "An FMU of yours in place of ours, such as platform=mine.fmu, cable_2=... or winch_1=...; may be repeated."
+)
+
+
+def build(
+    robot_file: RobotFile,
+    out: Annotated[Path, typer.Option(help="Folder for the FMUs.")] = Path("build"),
+    for_c_hosts: Annotated[bool, typer.Option("--for-c-hosts", help=C_HOSTS_HELP)] = False,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Build the FMUs of a robot, and an SSP archive of them.
+
+    There is one for each cable and each winch, and one for the platform.
+
+    Example: tautwire build robot.toml --out build/
+    """
+    from ..atomic_output import atomic_folder, refuse_overwriting_inputs
+    from ..cosimulation.ssp_archive import ssp_name, write_ssp
+    from ..fmus.c_hosts import embeddable_python, find_compiler, make_for_c_hosts
+    from ..fmus.packaging import build_fmus, with_user_fmus_copied
+
+    output = CommandOutput(as_json, quiet)
+    robot = read_holdable_robot(robot_file)
+    refuse_overwriting_inputs(
+        [fmu.path for fmu in robot.fmus], [out / f"{slot}.fmu" for slot in fmu_slots(robot.cable_count)]
+    )
+    if for_c_hosts:
+        embeddable_python()
+        find_compiler()
+    with atomic_folder(out) as scratch, progress_bar(output) as progress:
+        fmus = with_user_fmus_copied(build_fmus(robot, scratch, partial(progress, "building")), scratch)
+        if for_c_hosts:
+            project_slots = sorted(fmus.by_component.keys() - fmus.user_start_values.keys())
+            for index, slot in enumerate(project_slots):
+                progress("making them for C hosts", index / len(project_slots))
+                make_for_c_hosts(fmus.by_component[slot])
+        archive = write_ssp(robot, fmus, scratch / ssp_name(robot))
+    paths = [out / path.name for path in (*fmus.paths, archive)]
+    output.result(
+        paths, {"fmus": {slot: out / path.name for slot, path in fmus.by_component.items()}, "ssp": paths[-1]}
+    )
+    output.suggest_next(f"tautwire fmus {robot_file}, for their ports; or load {paths[-1]} in your tool")
+
+
+def simulate(
+    robot_file: RobotFile,
+    speeds: Annotated[Path, typer.Option(metavar="RECORDING.csv", help="Winch speeds over time; CSV, Parquet or MDF.")],
+    out: Annotated[Path, typer.Option(metavar="RESULT.csv", help="Where the result goes; Parquet if .parquet.")],
+    step: Annotated[float, typer.Option(help="Longest macro step, s.")] = 0.01,
+    tolerance: Annotated[
+        float | None, typer.Option(help="Error allowed, m; chooses the steps, in place of --step.")
+    ] = None,
+    until: Annotated[float | None, typer.Option(help="Stop at this time, s.")] = None,
+    patience: Annotated[float, typer.Option(help="An FMU in the same call for so long hangs, s.")] = 60.0,
+    fmu: Annotated[list[str] | None, typer.Option(metavar="SLOT=FILE", help=OWN_FMU_HELP)] = None,
+    report: Annotated[Path | None, typer.Option(metavar="PAGE.html", help="The run as a page, in 3D.")] = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Co-simulate the FMUs over recorded winch speeds.
+
+    With [winch] in the robot file these are what is asked of the winches.
+
+    Example: tautwire simulate robot.toml --speeds recording.csv --out result.csv --report run.html
+    """
+    from ..atomic_output import refuse_overwriting_inputs, refuse_same_output
+    from ..cosimulation.recording_simulation import simulate_recording
+    from ..cosimulation.result_file import open_result_file
+    from ..cosimulation.robot_wiring import result_columns
+    from ..cosimulation.run_arguments import validate_numbers
+    from ..fmus.fmu_slots import check_user_fmus, missing_user_fmu_ports, parse_user_fmus
+    from ..reports.run_overview import RecorderPair, RunOverview
+    from ..reports.run_page import atomic_run_page
+
+    validate_numbers("--", step, tolerance, patience, until)
+    output = CommandOutput(as_json, quiet)
+    robot = read_holdable_robot(robot_file)
+    robot = robot.with_fmus(parse_user_fmus(fmu or [], robot.cable_count))
+    refuse_overwriting_inputs(
+        [robot_file, speeds, *(own.path for own in robot.fmus)], [out, *([report] if report else [])]
+    )
+    refuse_same_output(out, report)
+    check_user_fmus(robot)
+    missing_ports = missing_user_fmu_ports({own.slot: own.path for own in robot.fmus}, robot.cable_count)
+    columns = result_columns(robot.cable_count, robot.winch_numbers, missing_ports)
+    overview, links = RunOverview(), {} if report is None else relative_links(report, robot_file, out)
+    with (
+        atomic_run_page(report, robot, columns, overview, speeds, links) as write_page,
+        open_result_file(out, columns) as result,
+        progress_bar(output) as progress,
+    ):
+        recorder = result if report is None else RecorderPair(result, overview)
+        statistics, notes = simulate_recording(robot, speeds, recorder, step, tolerance, until, progress, patience)
+        write_page(statistics, notes)
+    for note in notes:
+        output.note(note)
+    error_text = "" if statistics.estimated_error is None else f", estimated error {statistics.estimated_error:.2g} m"
+    summary_lines = [
+        f"{out}: {statistics.steps} steps, {statistics.iterations} redos, coupling made "
+        f"{statistics.energy_residual:.2g} J{error_text}"
+    ]
+    written = {"result": out} | ({"report": report} if report else {})
+    statistics_record = {
+        "steps": statistics.steps,
+        "redos": statistics.iterations,
+        "energy_made": statistics.energy_residual,
+        "error": statistics.estimated_error,
+    }
+    output.result([*summary_lines, *([report] if report else [])], {**written, **statistics_record, "notes": notes})
+    output.suggest_next(
+        f"tautwire trace {robot_file} {speeds} --out report/, if positions or tensions were measured too"
+    )
+
+
+def fmus(robot_file: RobotFile, as_json: AsJson = False, quiet: Quiet = False) -> None:
+    """List the ports of each FMU with units and causality.
+
+    Example: tautwire fmus robot.toml
+    """
+    from ..fmus.fmu_slots import fmu_ports
+    from ..fmus.packaging import build_fmus
+
+    output = CommandOutput(as_json, quiet)
+    robot = read_holdable_robot(robot_file)
+    with TemporaryDirectory(prefix="tautwire-fmus-") as folder, progress_bar(output) as progress:
+        paths = build_fmus(robot, Path(folder), partial(progress, "building")).by_component
+        ports = {slot: fmu_ports(path) for slot, path in paths.items()}
+    listing = [{"fmu": slot, "ports": [asdict(port) for port in slot_ports]} for slot, slot_ports in ports.items()]
+    output.result((), {"robot": robot.name, "fmus": listing})
+    if as_json or quiet:
+        return
+    # Without a terminal rich would cut tables to a default width.
+    console = Console(width=None if sys.stdout.isatty() else NON_TERMINAL_WIDTH)
+    for table in port_tables(ports):
+        console.print(table)
+    output.suggest_next(f"tautwire build {robot_file} --out build/")
+
+
+def port_tables(ports: Mapping[str, Sequence[FmuPort]]) -> list[Table]:
+    """Tables of the ports of each FMU; FMUs with the same ports share one, with the start values of the first."""
+    from ..fmus.fmu_slots import group_vectors
+
+    slots_by_port_names: dict[tuple[str, ...], list[str]] = {}
+    for slot, slot_ports in ports.items():
+        slots_by_port_names.setdefault(tuple(port.name for port in slot_ports), []).append(slot)
+    tables = []
+    for names in slots_by_port_names.values():
+        title = ", ".join(f"{slot}.fmu" for slot in names) + (", starts of the first" if len(names) > 1 else "")
+        table = Table(*PORT_COLUMNS, title=title, title_justify="left", title_style="bold", box=None)
+        for port in group_vectors(ports[names[0]]):
+            start = "" if port.start is None else port.start
+            table.add_row(port.name, port.causality, port.unit or "", start, Text(port.description))
+        tables.append(table)
+    return tables

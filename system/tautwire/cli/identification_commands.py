@@ -1,0 +1,204 @@
+"""The commands ``trace``, ``excite`` and ``material``: identification of robots and ropes, and its excitation."""
+
+from __future__ import annotations
+
+import math
+import shutil
+from pathlib import Path
+from typing import Annotated
+
+import typer
+from rich.console import Console
+
+from ..errors import InputError
+from ..robot.robot_file_reader import read_robot
+from .console import AsJson, CommandOutput, Quiet, RobotFile, note_unused_tables, progress_bar, read_holdable_robot
+
+DYNAMIC_TEST_HELP = "A dynamic test of the rope; if none, Table 1 of the paper, with the pair that it uses."
+
+
+def material(
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where fit.json and the figure go.")],
+    table: Annotated[Path | None, typer.Argument(metavar="TABLE.csv", help=DYNAMIC_TEST_HELP)] = None,
+    at: Annotated[float | None, typer.Option(help="The row, Hz, whose pair of E' and c is in use as constant.")] = None,
+    robot_file: Annotated[
+        Path | None, typer.Option("--robot", metavar="ROBOT.toml", help="A robot with this rope; written anew.")
+    ] = None,
+    shared: Annotated[float, typer.Option(help="Share of each variance that all rows have in common.")] = 0.0,
+    coverage: Annotated[float, typer.Option(help="Standard deviations that the table's uncertainties are.")] = 1.0,
+    alpha: Annotated[float, typer.Option(help="Rate of false alarms allowed.")] = 0.01,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Fit a rope's constants and relaxation to a dynamic test.
+
+    Judges a constant modulus and damping, and fits what the rope has besides.
+
+    Example: tautwire material dma.csv --robot robot.toml --out material/
+    """
+    from ..atomic_output import atomic_folder, refuse_overwriting_inputs
+    from ..materials import (
+        PAPER_PAIR_FREQUENCY,
+        PAPER_TABLE,
+        MaterialOptions,
+        pair_of_row,
+        read_material_table,
+        trace_material,
+    )
+    from ..materials.material_files import MATERIAL_FILES, material_document, write_material
+    from ..materials.material_report import material_verdict_table
+    from ..materials.robot_material import declared_material
+
+    for name, value, minimum in (("--shared", shared, 0.0), ("--alpha", alpha, math.nextafter(0.0, 1.0))):
+        if not minimum <= value < 1.0:
+            raise InputError(name, f"{value:g} is not a share below 1", "give a number such as 0.01")
+    if not 0.0 < coverage < math.inf:
+        raise InputError("--coverage", f"{coverage:g} is not positive", "give 1, or 2 for intervals of 95 %")
+    if at is not None and robot_file:
+        raise InputError("--at", "the pair in use is the robot's", "give either --at or --robot")
+    output = CommandOutput(as_json, quiet)
+    measurements = read_material_table(table or PAPER_TABLE)
+    robot = read_holdable_robot(robot_file) if robot_file else None
+    refuse_overwriting_inputs([path for path in (table, robot_file) if path], [out / name for name in MATERIAL_FILES])
+    declared = declared_material(robot, str(robot_file)) if robot else None
+    if table is None and robot is None and at is None:
+        at = PAPER_PAIR_FREQUENCY
+    if at is not None:
+        declared = pair_of_row(measurements, at)
+    with atomic_folder(out) as scratch:
+        with progress_bar(output) as progress:
+            verdict = trace_material(
+                measurements,
+                declared,
+                MaterialOptions(shared_variance=shared, coverage_factor=coverage, significance_level=alpha),
+                progress,
+            )
+        write_material(verdict, scratch, robot)
+    if not (quiet or as_json):
+        Console().print(material_verdict_table(verdict))
+    output.result([out / "fit.json"], {"folder": out, **material_document(verdict)})
+    if robot is not None:
+        output.suggest_next(
+            f"tautwire check {out / 'robot.toml'} RECORDING.csv, and trace: does the robot move like that?"
+        )
+
+
+def judge_rope_material(table: Path, robot_file: Path, out: Path, alpha: float, output: CommandOutput) -> None:
+    """Traces a robot's rope: its constants are tested against a dynamic test, and the extended robot gets its FMUs.
+
+    Writes what :func:`material` writes, the same verdict as ``report.json``, and the FMUs.
+    """
+    from ..atomic_output import atomic_folder, refuse_overwriting_inputs
+    from ..fmus.packaging import build_fmus
+    from ..materials import MaterialOptions, read_material_table, trace_material
+    from ..materials.material_files import MATERIAL_FILES, material_document, write_material
+    from ..materials.material_report import material_verdict_table
+    from ..materials.robot_material import declared_material
+
+    measurements, robot = read_material_table(table), read_holdable_robot(robot_file)
+    refuse_overwriting_inputs([table, robot_file], [out / name for name in (*MATERIAL_FILES, "report.json")])
+    declared = declared_material(robot, str(robot_file))
+    with atomic_folder(out) as scratch:
+        with progress_bar(output) as progress:
+            verdict = trace_material(measurements, declared, MaterialOptions(significance_level=alpha), progress)
+        write_material(verdict, scratch, robot)
+        shutil.copyfile(scratch / "fit.json", scratch / "report.json")
+        build_fmus(read_robot(scratch / "robot.toml"), scratch)
+    if not (output.quiet or output.as_json):
+        Console().print(material_verdict_table(verdict))
+    output.result([out / "report.json"], {"folder": out, **material_document(verdict)})
+
+
+def trace(
+    robot_file: RobotFile,
+    fit: Annotated[Path, typer.Argument(metavar="FIT.csv", help="The recording to fit; CSV, Parquet or MDF.")],
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where the report goes.")],
+    check: Annotated[Path | None, typer.Option(metavar="CHECK.csv", help="A recording to judge on.")] = None,
+    alpha: Annotated[float, typer.Option(help="Rate of false alarms allowed.")] = 0.01,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Find what the model lacks, and add it to the FMUs.
+
+    The report shows the error before and after.
+
+    FIT may also be a dynamic test of the rope, a table with a column "frequency": see "tautwire material".
+
+    Recorded winch speeds are what the drums' encoders give: [winch] and [fmu] of the robot file have no part in it.
+
+    Example: tautwire trace robot.toml fit.csv --check check.csv --out report/
+    """
+    from ..atomic_output import atomic_folder, refuse_overwriting_inputs
+    from ..estimation import processors
+    from ..estimation import trace as traced
+    from ..estimation.identification import validated_false_alarm_rate
+    from ..materials.material_table import is_material_table
+    from ..recordings.recording import read_recording
+    from ..reports import trace_document, trace_table, write_report
+
+    validated_false_alarm_rate("--alpha", alpha)
+    output = CommandOutput(as_json, quiet)
+    if is_material_table(fit):
+        if check is not None:
+            raise InputError("--check", f"{fit} is a dynamic test of a rope", "leave it out: its rows judge each other")
+        judge_rope_material(fit, robot_file, out, alpha, output)
+        return
+    robot = read_holdable_robot(robot_file)
+    recording = read_recording(fit, robot.cable_count)
+    check_recording = None if check is None else read_recording(check, robot.cable_count)
+    file_names = ["robot.toml", "report.json", "index.html"]
+    refuse_overwriting_inputs([robot_file, fit, *([check] if check else [])], [out / name for name in file_names])
+    with atomic_folder(out) as scratch, progress_bar(output) as progress:
+        trace_result = traced(robot, recording, check_recording, progress, alpha, processors())
+        progress("writing the report", 0.0)
+        write_report(trace_result, scratch)
+    note_unused_tables(robot, output)
+    if not (quiet or as_json):
+        Console().print(trace_table(trace_result))
+    output.result([out / "index.html"], {"folder": out, **trace_document(trace_result)})
+    output.suggest_next(
+        f"open {out / 'index.html'}; {out / 'robot.toml'} is the robot as found, its FMUs are beside it"
+    )
+
+
+def excite(
+    robot_file: RobotFile,
+    out: Annotated[Path, typer.Option(metavar="PROGRAM.csv", help="Where the winch speeds go; a recording's form.")],
+    effects: Annotated[str | None, typer.Option(help="Effects to tell apart, with commas; all when absent.")] = None,
+    speed: Annotated[float | None, typer.Option(help="Largest winch speed, m/s; [winch] or 0.5.", min=1e-6)] = None,
+    reach: Annotated[float | None, typer.Option(help="Farthest from the start along an axis, m.", min=1e-6)] = None,
+    duration: Annotated[float, typer.Option(help="s", min=1.0, max=3600.0)] = 30.0,
+    rate: Annotated[float, typer.Option(help="Samples per second.", min=1.0, max=1000.0)] = 50.0,
+    programs: Annotated[int, typer.Option(help="About how many programs are tried.", min=1, max=100_000)] = 64,
+    seed: Annotated[int, typer.Option(help="The same seed gives the same program.", min=0)] = 0,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Design a motion after which effects can be told apart.
+
+    The largest smallest separation within the limits, as winch speeds.
+
+    Example: tautwire excite robot.toml --effects damping,relaxation,hysteresis --out program.csv
+    """
+    from ..atomic_output import atomic_file, refuse_overwriting_inputs
+    from ..estimation.input_design import default_limits, design_excitation, effects_by_name
+
+    output = CommandOutput(as_json, quiet)
+    refuse_overwriting_inputs([robot_file], [out])
+    robot = read_holdable_robot(robot_file)
+    selected_effects = effects_by_name(robot, effects)
+    with progress_bar(output) as progress:
+        excitation = design_excitation(
+            robot, selected_effects, default_limits(robot, speed, reach), duration, 1.0 / rate, programs, seed, progress
+        )
+    with atomic_file(out) as scratch:
+        excitation.frame().to_csv(scratch, index=False, float_format="%.10g")
+    pairs = [(pair.effect.label(robot), pair.other.label(robot), pair.nats) for pair in excitation.pairs]
+    lines = [f"{effect}, and {other} in its place: {nats:.3g} nats apart" for effect, other, nats in pairs[:5]]
+    median_line = f"closest pair of the median program: {excitation.median_separation:.3g} nats"
+    pair_records = [{"effect": effect, "other": other, "nats": nats} for effect, other, nats in pairs]
+    output.result(
+        [*lines, median_line, out], {"program": out, "pairs": pair_records, "median": excitation.median_separation}
+    )
+    trace_command = f"tautwire trace {robot_file} RECORDING.csv --out report/"
+    output.suggest_next(f"run it on the robot, record positions and tensions, then {trace_command}")

@@ -1,0 +1,76 @@
+"""Gain scheduling: a controller designed at several points of a path, with interpolated gains.
+
+All designs must estimate the same quantities. Then the transfer is bumpless: the state is continuous, and continuous
+gains give continuous accelerations.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Protocol
+
+import numpy as np
+
+from ..linear import LinearPlant
+from ..robot.schema import Robot
+from ..robot.trajectory import Trajectory
+from .design import ControlAim, Design, Knot
+from .lqg import design_controller
+
+DESIGN_POINTS = 9
+
+
+class DesignOfOnePlant(Design, Protocol):
+    """Interface of a design at one operating point."""
+
+    @property
+    def linear(self) -> LinearPlant:
+        """The plant that it is designed on."""
+        ...
+
+
+@dataclass(frozen=True)
+class ScheduledController:
+    """Controllers of one kind for ``times`` (s), rising, along a path."""
+
+    times: tuple[float, ...]
+    controllers: tuple[DesignOfOnePlant, ...]
+
+    @property
+    def aim(self) -> ControlAim:
+        """See :class:`tautwire.control.Design`."""
+        return self.controllers[0].aim
+
+    @property
+    def cable_count(self) -> int:
+        """Number of cables."""
+        return self.controllers[0].cable_count
+
+    @property
+    def feels(self) -> bool:
+        """See :class:`tautwire.control.Design`."""
+        return True
+
+    @property
+    def plants(self) -> tuple[LinearPlant, ...]:
+        """The plants that it is designed on."""
+        return tuple(controller.linear for controller in self.controllers)
+
+    def knots(self) -> tuple[Knot, ...]:
+        """See :class:`tautwire.control.Design`."""
+        return tuple(
+            replace(controller.knots()[0], time=time)
+            for time, controller in zip(self.times, self.controllers, strict=True)
+        )
+
+
+def schedule_controller(
+    robot: Robot, trajectory: Trajectory, aim: ControlAim | None = None, points: int = DESIGN_POINTS
+) -> ScheduledController:
+    """Gain-scheduled LQG designs at ``points`` equidistant times of a path, from its start to its end.
+
+    Raises what :func:`tautwire.linear.linearise` raises.
+    """
+    times = np.linspace(0.0, trajectory.duration, points)
+    controllers = [design_controller(robot, aim, at) for at in trajectory.position(times).tolist()]
+    return ScheduledController(tuple(times.tolist()), tuple(controllers))

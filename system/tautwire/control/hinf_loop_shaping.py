@@ -1,0 +1,312 @@
+"""H-infinity loop shaping that keeps disk margins over a range of moduli and payloads.
+
+Four-block mixed sensitivity, ``min || [S_o, S_o G; K S_o, K S_o G] ||``, G the plant with its weights: disturbances
+also enter where the winches act, so lightly damped modes are damped, not cancelled. A bilinear map (Tustin)
+transforms the sampled plant to a continuous one and the controller back; it preserves the norm.
+
+Sources: McFarlane and Glover (1992), IEEE Transactions on Automatic Control 37(6), 759-769; Glover and Doyle (1988),
+Systems and Control Letters 11, 167-172, for the controller, by SLICOT's SB10AD.
+
+The loop is as fast as the margins allow: of several bandwidths the largest is taken at which the worst disk margin
+over the whole range, of all winches at once and of each sensor alone, is the required one. The designs at points of a
+path have states that estimate the same quantities, so gains can be interpolated.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import control
+import numpy as np
+from numpy.typing import NDArray
+from slycot import sb10ad
+from threadpoolctl import threadpool_limits
+
+from ..linear import LinearPlant, linearise
+from ..robot.schema import Robot
+from ..robot.trajectory import Trajectory
+from .design import ControlAim, Knot, MarginError, regulator_signals
+from .gain_scheduling import DESIGN_POINTS, ScheduledController
+from .sampled_plant import ramp_plant
+from .stability_margins import Margins, Range, margins_of
+
+Array = NDArray[np.float64]
+
+# The optimal controller has poles at infinity; a slightly suboptimal one has not.
+NORM_FACTOR = 1.1
+SB10AD_GIVEN_NORM_JOB = 4
+# Shift of the plant's integrators off the imaginary axis, in 1/s.
+INTEGRATOR_LEAK = 1e-5
+
+
+def synthesise_controller(plant: Any, weights: Any) -> Any:
+    """Synthesises the H-infinity controller of a sampled ``plant``, to be closed with positive feedback.
+
+    ``weights`` is a continuous ``control.StateSpace`` in the w-plane on the plant's outputs. The
+    controller has the states of both.
+    """
+    period = plant.dt
+    shaped = weights * to_continuous(plant)
+    state_count, output_count, input_count = shaped.nstates, shaped.noutputs, shaped.ninputs
+    A = shaped.A - INTEGRATOR_LEAK * np.eye(state_count)
+    B = np.hstack([shaped.B, np.zeros((state_count, output_count)), shaped.B])
+    C = np.vstack([shaped.C, np.zeros((input_count, state_count)), shaped.C])
+    identity = np.eye(output_count)
+    D = np.block(
+        [
+            [shaped.D, identity, shaped.D],
+            [np.zeros((input_count, input_count + output_count)), np.eye(input_count)],
+            [shaped.D, identity, shaped.D],
+        ]
+    )
+    # Small matrices: thread synchronisation would dominate the time.
+    with threadpool_limits(limits=1, user_api="blas"):
+        _, _, norm, _ = control.hinfsyn(control.ss(A, B, C, D), output_count, input_count)
+        synthesis = sb10ad(
+            state_count,
+            B.shape[1],
+            C.shape[0],
+            input_count,
+            output_count,
+            NORM_FACTOR * norm,
+            A,
+            B,
+            C,
+            D,
+            job=SB10AD_GIVEN_NORM_JOB,
+        )
+    return to_sampled(control.ss(*synthesis[1:5]) * weights, period)
+
+
+def to_continuous(system: Any) -> Any:
+    """Bilinear transform to the w-plane, ``z = (1 + s h / 2) / (1 - s h / 2)``; no pole may be at -1."""
+    h = system.dt
+    identity = np.eye(system.nstates)
+    inverse = np.linalg.inv(system.A + identity)
+    return control.ss(
+        2.0 / h * (system.A - identity) @ inverse,
+        2.0 / np.sqrt(h) * inverse @ system.B,
+        2.0 / np.sqrt(h) * system.C @ inverse,
+        system.D - system.C @ inverse @ system.B,
+    )
+
+
+def to_sampled(system: Any, period: float) -> Any:
+    """The inverse of :func:`to_continuous`."""
+    identity = np.eye(system.nstates)
+    inverse = np.linalg.inv(identity - 0.5 * period * system.A)
+    return control.ss(
+        inverse @ (identity + 0.5 * period * system.A),
+        np.sqrt(period) * inverse @ system.B,
+        np.sqrt(period) * system.C @ inverse,
+        system.D + 0.5 * period * system.C @ inverse @ system.B,
+        period,
+    )
+
+
+# Multiples of the lowest mode, from fast to slow.
+RELATIVE_BANDWIDTHS = (1.6, 1.2, 0.9, 0.65, 0.48, 0.35, 0.26, 0.19, 0.14, 0.1)
+# From measurement to the end of the resulting ramp: one sample for computing, one for the ramp.
+LOOP_DELAY_SAMPLES = 2
+# Rate of back-calculation relative to the integral action.
+BACK_CALCULATION_FACTOR = 3.0
+
+
+@dataclass(frozen=True)
+class RobustAim:
+    """Design aims of a robust controller: ``margin`` is the disk margin; 2/3 allows gain by 2 and 37 degrees of phase.
+
+    As multiples of the lowest mode's angular frequency: ``damping``, the rate at which a cable yields to its own
+    tension, and ``integral``, the corner frequency of the integral action of position.
+    """
+
+    margin: float = 2.0 / 3.0
+    damping: float = 1.0
+    integral: float = 0.2
+
+
+@dataclass(frozen=True)
+class RobustController:
+    """A robust controller with q states, the first three of which are integrals of position.
+
+    ``linear`` is the plant in the middle of the range; ``regulator`` and ``tracking`` (q, n) are as in :class:`Knot`;
+    ``bandwidth``, that of position, is a multiple of the lowest mode; ``margins`` are the worst over the range.
+    """
+
+    aim: ControlAim
+    linear: LinearPlant
+    regulator: Any
+    tracking: Array
+    bandwidth: float
+    margins: Margins
+
+    @property
+    def cable_count(self) -> int:
+        """Number of cables."""
+        return int(self.regulator.noutputs)
+
+    @property
+    def feels(self) -> bool:
+        """See :class:`tautwire.control.Design`."""
+        return True
+
+    def knots(self) -> tuple[Knot, ...]:
+        """See :class:`tautwire.control.Design`; one for the whole path."""
+        return (Knot(0.0, self.regulator, self.tracking),)
+
+
+def design_robust(
+    robot: Robot,
+    aim: ControlAim | None = None,
+    parameter_range: Range | None = None,
+    robust: RobustAim | None = None,
+    at: Sequence[float] | None = None,
+) -> RobustController:
+    """Designs the fastest loop whose disk margins hold over a range, at a position (m), by default the start.
+
+    The default range is :meth:`Range.of` the robot.
+
+    Raises MarginError where no design does, and what :func:`tautwire.linear.linearise` raises.
+    """
+    start = robot.platform.start if at is None else at
+    (design,) = _fastest_designs(
+        robot, np.array([start]), aim or ControlAim(), parameter_range or Range.of(robot), robust or RobustAim()
+    )
+    return design
+
+
+def schedule_robust(
+    robot: Robot,
+    trajectory: Trajectory,
+    aim: ControlAim | None = None,
+    parameter_range: Range | None = None,
+    robust: RobustAim | None = None,
+    points: int = DESIGN_POINTS,
+) -> ScheduledController:
+    """Gain-scheduled :func:`design_robust` at equidistant times of a path, from its start to its end.
+
+    Raises MarginError where no design does, and what :func:`tautwire.linear.linearise` raises.
+    """
+    times = np.linspace(0.0, trajectory.duration, points)
+    positions = trajectory.position(times)
+    designs = _fastest_designs(
+        robot, positions, aim or ControlAim(), parameter_range or Range.of(robot), robust or RobustAim()
+    )
+    return ScheduledController(tuple(times.tolist()), tuple(designs))
+
+
+def _fastest_designs(
+    robot: Robot, positions: Array, aim: ControlAim, parameter_range: Range, robust: RobustAim
+) -> list[RobustController]:
+    """Designs of one bandwidth at all positions, the largest at which all have the required margin."""
+    nominal_plants = [linearise(parameter_range.middle(robot), position) for position in positions]
+    range_plants = [
+        [linearise(each, position) for _, _, each in parameter_range.robots(robot)] for position in positions
+    ]
+    best_margin = 0.0
+    for bandwidth in RELATIVE_BANDWIDTHS:
+        designs: list[RobustController] = []
+        for nominal_plant, varied_plants in zip(nominal_plants, range_plants, strict=True):
+            design = _design_at(robot, nominal_plant, varied_plants, aim, robust, bandwidth)
+            if design.margins.min_disk < robust.margin:
+                best_margin = max(best_margin, design.margins.min_disk)
+                break
+            designs.append(design)
+        else:
+            return designs
+    raise MarginError(robot.name, robust.margin, best_margin, "ask for less, narrow the range, or sample faster")
+
+
+def _design_at(
+    robot: Robot,
+    linear: LinearPlant,
+    plants: Sequence[LinearPlant],
+    aim: ControlAim,
+    robust: RobustAim,
+    bandwidth: float,
+) -> RobustController:
+    """A design with its worst margins over some plants, up to the first that falls short."""
+    regulator = _shape_regulator(robot, linear, aim.period, bandwidth, robust)
+    tracking = back_calculation(
+        regulator, BACK_CALCULATION_FACTOR * robust.integral * _lowest_frequency(linear) * aim.period
+    )
+    knot = Knot(0.0, regulator, tracking)
+    worst = margins_of(plants[0], knot)
+    for plant in plants[1:]:
+        if worst.min_disk < robust.margin:
+            break
+        worst = worst.worst_of(margins_of(plant, knot))
+    return RobustController(aim, linear, regulator, tracking, bandwidth, worst)
+
+
+def back_calculation(regulator: Any, share: float) -> Array:
+    """Anti-windup gain of the integrals, (q, n): a ``share`` of what makes the commanded speed the limited one.
+
+    The other states of the regulator are stable by themselves.
+    """
+    count = regulator.noutputs
+    others = slice(3, regulator.nstates - count)
+    speed_rows = regulator.A[-count:]
+    steady_state = np.linalg.solve(np.eye(others.stop - 3) - regulator.A[others, others], regulator.A[others, :3])
+    steady_gain = speed_rows[:, :3] + speed_rows[:, others] @ steady_state
+    gain = np.zeros((regulator.nstates, count))
+    gain[:3] = share * regulator.dt * np.linalg.pinv(steady_gain)
+    return gain
+
+
+def _lowest_frequency(linear: LinearPlant) -> float:
+    """Angular frequency of the lowest mode, in rad/s."""
+    return 2.0 * np.pi * float(linear.modes.frequencies[0])
+
+
+def _shape_regulator(robot: Robot, linear: LinearPlant, period: float, bandwidth: float, robust: RobustAim) -> Any:
+    """Regulator of one loop shape: scaled position and tensions, and winches that respond two samples later."""
+    count = len(linear.tensions)
+    lowest_frequency = _lowest_frequency(linear)
+    lengths = np.linalg.norm(np.array(robot.anchors) - linear.position, axis=1)
+    stiffness = float(np.mean([cable.modulus * cable.area for cable in robot.cables] / lengths))
+    signal_weights = np.repeat(
+        [bandwidth * lowest_frequency, robust.damping * lowest_frequency / stiffness], [3, count]
+    )
+    plant = ramp_plant(linear, period)
+    scaled = control.ss(plant.A, plant.B, signal_weights[:, None] * plant.C, signal_weights[:, None] * plant.D, period)
+    # Position also by its integral: (s + w) / s.
+    corner = robust.integral * lowest_frequency
+    position_selector = np.eye(3 + count, 3)
+    weights = control.ss(np.zeros((3, 3)), corner * position_selector.T, position_selector, np.eye(3 + count))
+    synthesised = synthesise_controller(scaled * _delay_system(count, period), weights)
+    return _as_regulator(
+        control.ss(
+            synthesised.A, synthesised.B * signal_weights, synthesised.C, synthesised.D * signal_weights, period
+        ),
+        count,
+    )
+
+
+def _delay_system(count: int, period: float) -> Any:
+    """Delay of LOOP_DELAY_SAMPLES samples for each of ``count`` signals."""
+    zeros = np.zeros((count, count))
+    unit_delay = control.ss(zeros, np.eye(count), np.eye(count), zeros, period)
+    delayed = unit_delay
+    for _ in range(LOOP_DELAY_SAMPLES - 1):
+        delayed = delayed * unit_delay
+    return delayed
+
+
+def _as_regulator(speed_controller: Any, count: int) -> Any:
+    """Converts a controller of the speed two samples later to accelerations of the next sample.
+
+    The speed at the sample's end was computed one sample ago and is part of the state.
+    """
+    size, sensors, period = speed_controller.nstates, speed_controller.ninputs, speed_controller.dt
+    identity_rate, none = np.eye(count) / period, np.zeros
+    return control.ss(
+        np.block([[speed_controller.A, none((size, count))], [speed_controller.C, none((count, count))]]),
+        np.block([[speed_controller.B, none((size, count))], [speed_controller.D, none((count, count))]]),
+        np.hstack([none((count, size)), identity_rate]),
+        np.hstack([none((count, sensors)), -identity_rate]),
+        period,
+        **regulator_signals(count),
+    )

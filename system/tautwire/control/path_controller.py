@@ -1,0 +1,142 @@
+"""A controller put on a path: its data as plain numbers, and its run as an input source of the master."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tautwire_fmu.laws import sampled_control as law
+from tautwire_fmu.laws.sampled_control import Limits
+from tautwire_fmu.laws.winch_drive import NO_LIMIT
+
+from ..errors import InputError
+from ..robot.schema import Robot
+from ..robot.trajectory import Trajectory
+from .design import Design, Knot, measurement_noise
+from .feedforward import Reference, elastic_reference
+
+Array = NDArray[np.float64]
+
+
+def controller_data(robot: Robot, design: Design, reference: Reference) -> dict[str, Any]:
+    """The content of a controller's resource: lists and numbers, as the law of the FMU takes them.
+
+    Raises InputError where a regulator acts on position or tension without a sample of delay.
+    """
+    period = design.aim.period
+    return {
+        "description": f"controller of {robot.name}",
+        "period": period,
+        "speeds": reference.rigid.tolist(),
+        "stretches": (reference.speeds - reference.rigid).tolist(),
+        "expected": reference.expected.tolist(),
+        "at_rest": reference.at_rest.tolist(),
+        "knots": [_knot_data(knot, period) for knot in design.knots()],
+        "compliances": cable_compliances(robot).tolist(),
+        "yield_time": design.aim.yield_time,
+        "tares": design.feels and design.aim.tare,
+        "limits": control_limits(robot, design)._asdict(),
+    }
+
+
+def control_limits(robot: Robot, design: Design) -> Limits:
+    """The tighter limits of aim and robot file; no tension limits without feedback."""
+    aim, winch, bounds = design.aim, robot.winch, robot.tension
+    speed = [aim.speed_limit, winch.speed_limit if winch else None]
+    acceleration = [aim.acceleration_limit, winch.acceleration_limit if winch else None]
+    lowest = next(x for x in (aim.lowest_tension, bounds.minimum if bounds else None, 0.0) if x is not None)
+    highest = next(x for x in (aim.highest_tension, bounds.maximum if bounds else None, NO_LIMIT) if x is not None)
+    return Limits(
+        speed=min(NO_LIMIT, *(value for value in speed if value is not None)),
+        acceleration=min(NO_LIMIT, *(value for value in acceleration if value is not None)),
+        lowest_tension=lowest if design.feels else -NO_LIMIT,
+        highest_tension=min(highest, NO_LIMIT) if design.feels else NO_LIMIT,
+    )
+
+
+def cable_compliances(robot: Robot) -> Array:
+    """Compliance of each cable at the start, ``l / (E S)``, shape (n,), in m/N."""
+    lengths = np.linalg.norm(np.array(robot.anchors) - robot.platform.start, axis=1)
+    stiffness = np.array([cable.modulus * cable.area for cable in robot.cables])
+    result: Array = lengths / stiffness
+    return result
+
+
+def _knot_data(knot: Knot, period: float) -> dict[str, Any]:
+    regulator = knot.regulator
+    sensors = regulator.ninputs - regulator.noutputs
+    if np.any(regulator.D[:, :sensors]):
+        hint = "give it one sample for computing: no direct gain from position or tension"
+        raise InputError(regulator.name, "acts on the sample just measured", hint)
+    return {
+        "sample": knot.time / period,
+        "A": regulator.A.tolist(),
+        "B": regulator.B.tolist(),
+        "C": regulator.C.tolist(),
+        "D": regulator.D[:, sensors:].tolist(),
+        "M": knot.tracking.tolist(),
+    }
+
+
+class PathController:
+    """A controller on one path as a source of winch speeds for the master, at the controller's samples.
+
+    ``robot`` is the controller's model; ``times`` (N,) in s are its samples. It follows ``reference``, by
+    default that of the elastic model. ``seed`` enables measurement noise. ``speeds`` (N, n) are the winch speeds
+    at the samples so far.
+
+    Raises UnreachableError where the path requires a cable to push.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        controller: Design,
+        trajectory: Trajectory,
+        times: Array,
+        seed: int | None = None,
+        reference: Reference | None = None,
+    ) -> None:
+        self.controller = controller
+        reference = reference or elastic_reference(robot, trajectory, times)
+        self.plan = law.plan_from_resource(controller_data(robot, controller, reference))
+        self.limits = control_limits(robot, controller)
+        self.noise = np.zeros_like(reference.expected)
+        if seed is not None:
+            standard_noise = np.random.default_rng(seed).standard_normal(self.noise.shape)
+            self.noise = standard_noise * measurement_noise(robot)
+        self.times = times
+        self._controller_state = law.initial_controller_state(self.plan, self.limits)
+        self._measurement: list[float] | None = None
+        self._speeds = [self._controller_state.begin, self._controller_state.end]
+
+    @property
+    def speeds(self) -> Array:
+        """Winch speeds at the past samples and at the end of the present one, in m/s."""
+        return np.array(self._speeds)
+
+    def interval(self, index: int, time: float, step: float, outputs: Array) -> tuple[Array, Array]:
+        """See :class:`tautwire.cosimulation.Source`; ``index`` counts the controller's samples."""
+        if step > 0.0:
+            self._take_sample(index, outputs)
+        begin, rate = (
+            np.array(self._controller_state.begin),
+            np.array(law.acceleration(self.plan, self._controller_state)),
+        )
+        start = begin + (time - self.times[index]) * rate
+        return np.column_stack([start, rate]).ravel(), np.column_stack([start + step * rate, rate]).ravel()
+
+    def _take_sample(self, index: int, outputs: Array) -> None:
+        """Takes a sample once; the measurement of the previous sample is then processed and acts."""
+        if self._measurement is not None and index == self._controller_state.sample:
+            return
+        if self._measurement is not None:
+            self._controller_state = law.next_controller_state(
+                self.plan, self.limits, self._controller_state, self._measurement
+            )
+            self._speeds.append(self._controller_state.end)
+        count = self.controller.cable_count
+        measured = np.concatenate([outputs[:3], outputs[6 : 6 + count]])
+        self._measurement = (measured + self.noise[index]).tolist()

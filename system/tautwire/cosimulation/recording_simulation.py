@@ -1,0 +1,149 @@
+"""Co-simulates a robot over a recording's winch speeds, with an error estimate by step doubling."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import RecordingError
+from ..fmus.fmu_slots import notes_on_unstated_units
+from ..fmus.packaging import build_fmus
+from ..recordings.recording import Recording, read_recording
+from ..recordings.start_position import start_position, with_start
+from ..recordings.white_noise_estimate import white_noise_deviation
+from ..robot.schema import Robot
+from . import ComponentError, Coupling, FixedStep, PiecewiseLinearInput, Recorder, RunStatistics, StepSizeControl
+from .robot_cosimulation import record_cosimulation, step_size_control_for, wire_fmus
+from .robot_wiring import RobotWiring
+from .step_size_control import ExternalInputs, ReadLengths
+
+Array = NDArray[np.float64]
+Run = Callable[[int, StepSizeControl, Recorder], RunStatistics]
+
+MAX_COMPARED_ROWS = 5000
+# Error of the first run over its difference to the second, for a method of first order.
+FIRST_ORDER_FACTOR = 2.0
+
+
+class FirstPositionsRecorder:
+    """A recorder that keeps the positions of the first rows, shape (N, 3), and passes every row on."""
+
+    def __init__(self, count: int, recorder: Recorder | None = None) -> None:
+        self._rows = np.empty((min(count, MAX_COMPARED_ROWS), 3))
+        self._recorder = recorder
+        self._count = 0
+
+    def add(self, time: float, row: Array) -> None:
+        """See :class:`tautwire.cosimulation.Recorder`."""
+        if self._count < len(self._rows):
+            self._rows[self._count] = row[:3]
+            self._count += 1
+        if self._recorder is not None:
+            self._recorder.add(time, row)
+
+    @property
+    def positions(self) -> Array:
+        """The positions recorded so far."""
+        return self._rows[: self._count]
+
+
+@dataclass(frozen=True)
+class HalvedStep:
+    """Half of each step that a :class:`FixedStep` of this length makes."""
+
+    max_step: float
+    coupling_tolerance: None = None
+
+    def advance(
+        self, coupling: Coupling, begin: float, span: float, external_inputs: ExternalInputs, read_lengths: ReadLengths
+    ) -> None:
+        """See :class:`tautwire.cosimulation.StepSizeControl`."""
+        count = max(1, math.ceil(span / self.max_step * (1.0 - 1e-9)))
+        FixedStep(0.5 * span / count).advance(coupling, begin, span, external_inputs, read_lengths)
+
+
+def step_doubling_note(run: Run, time: Array, step: float, positions: Array) -> str:
+    """A note on the error of ``positions`` (N, 3), recorded at ``time`` (N or more,) in steps of ``step``.
+
+    ``run(count, step_size_control, recorder)`` repeats the run, up to ``count`` of its times. The error is twice the
+    difference of the two, as for a method of first order; for second order it is half too large.
+    """
+    recorder = FirstPositionsRecorder(len(positions))
+    try:
+        run(len(positions), HalvedStep(step), recorder)
+    except ComponentError as error:
+        return f"the error is not known: with half the step, {error}"
+    position_error = FIRST_ORDER_FACTOR * float(np.max(np.abs(positions - recorder.positions), initial=0.0))
+    period = "" if len(positions) == len(time) else f" over the first {time[len(positions) - 1]:g} s"
+    return f"estimated error of the position{period}: {position_error:.2g} m, by a second run with half the step"
+
+
+def simulate_recording(
+    robot: Robot,
+    path: Path,
+    recorder: Recorder,
+    step: float,
+    tolerance: float | None,
+    until: float | None,
+    progress: Callable[[str, float], None],
+    call_timeout: float | None = None,
+) -> tuple[RunStatistics, tuple[str, ...]]:
+    """Record a run at the recording's times, up to ``until`` (s); returns its statistics and notes for the user.
+
+    ``call_timeout`` is as for :func:`record_cosimulation`.
+
+    Raises RecordingError where fewer than two samples lie before ``until``, ComponentError where an FMU fails: the
+    recorder has what came before.
+    """
+    recording = read_recording(path, robot.cable_count)
+    noise = robot.sensors.position_noise or white_noise_deviation(recording.position)
+    start, notes = start_position(robot, noise, recording)
+    count = _sample_count(recording, until)
+    time, winch_speed = recording.time[:count], recording.winch_speed[:count]
+    # The start is known; measurements need not stay in memory through a long run.
+    del recording
+    if robot.winch_numbers:
+        notes = (*notes, f"{path}: winch speeds are what the winches are asked for")
+    notes = (*notes, *notes_on_unstated_units(robot.fmus, robot.cable_count))
+    with TemporaryDirectory(prefix="tautwire-simulate-") as folder:
+        fmus = build_fmus(with_start(robot, start), Path(folder), partial(progress, "building"))
+        source, first_positions = PiecewiseLinearInput(time, winch_speed), FirstPositionsRecorder(count, recorder)
+
+        def run(
+            rows: int, stepping: StepSizeControl, target: Recorder, activity: str = "estimating the error"
+        ) -> RunStatistics:
+            return record_cosimulation(
+                fmus, source, time[:rows], stepping, target, partial(progress, activity), call_timeout
+            )
+
+        statistics = run(count, step_size_control_for(step, tolerance, time), first_positions, "co-simulating")
+        notes = (*notes, *missing_column_notes(wire_fmus(fmus)), *statistics.fallback_notes())
+        if statistics.fallback_notes() and tolerance is None:
+            notes = (*notes, step_doubling_note(run, time, step, first_positions.positions))
+    return statistics, (*notes, *statistics.warnings())
+
+
+def _sample_count(recording: Recording, until: float | None) -> int:
+    """Number of samples up to ``until``."""
+    count = len(recording.time) if until is None else int(np.searchsorted(recording.time, until, side="right"))
+    if count < 2:
+        raise RecordingError(
+            recording.path,
+            f"fewer than two samples up to {until:g} s",
+            f"give --until after {recording.time[1]:g}",
+        )
+    return count
+
+
+def missing_column_notes(wiring: RobotWiring) -> tuple[str, ...]:
+    """A note on outputs that no FMU provides, so that the result has no column for them."""
+    return (
+        (f"not in the result, no FMU shows it: {', '.join(wiring.missing_columns)}",) if wiring.missing_columns else ()
+    )

@@ -1,0 +1,322 @@
+"""Co-simulation of a robot's FMUs: cables, winches and platform, driven by winch speeds."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+from numpy.typing import ArrayLike, NDArray
+
+from ..errors import TautwireError
+from ..fmus.fmu_slots import SlotError, missing_user_fmu_ports, require_step_support
+from ..fmus.packaging import RobotFmus
+from ..process_signals import defer_interrupts
+from ..validation import validate_array, validate_increasing
+from . import (
+    AdaptiveStep,
+    CallJournal,
+    Component,
+    ComponentError,
+    Connection,
+    Coupling,
+    FixedStep,
+    InputSource,
+    JournalledComponent,
+    MemoryRecorder,
+    PiecewiseLinearInput,
+    Port,
+    Progress,
+    Recorder,
+    RunStatistics,
+    StepSizeControl,
+    simulate,
+    simulate_isolated,
+)
+from .robot_wiring import AXES, CABLE_QUANTITIES, PLATFORM, RobotWiring, result_columns, wire_robot, with_connections
+from .run_arguments import validate_fmus, validate_options
+
+Array = NDArray[np.float64]
+
+DEFAULT_STEP = 0.01
+START_TOLERANCE = 1e-6  # m
+EQUAL_STEP_RTOL = 1e-6
+
+WINCH_SPEED_MEANING = "finite speeds in m/s, a row for each time and a column for each of the {count} cables"
+TIME_MEANING = "rising, finite times (N,) in s, two or more"
+
+
+@dataclass(frozen=True)
+class CosimulationResult:
+    """Result of a co-simulation of a robot with n cables at N times; SI units.
+
+    ``statistics`` has steps, iterations and the energy residual of the coupling. ``time`` (N,); ``position`` and
+    ``velocity`` (N, 3); ``tension``, ``length``, ``elongation`` and ``strain``
+    (N, n). ``elongation`` is the paper's r, see :func:`tautwire_fmu.laws.cable.reading`. ``winch_speed`` (N,) is the
+    speed of the winch of a cable, counted from 1, where it has one. Columns of a result file that no FMU provides are
+    ``missing_columns``, their numbers not finite.
+    """
+
+    time: Array
+    position: Array
+    velocity: Array
+    tension: Array
+    length: Array
+    elongation: Array
+    strain: Array
+    statistics: RunStatistics = field(default_factory=RunStatistics, compare=False)
+    winch_speed: Mapping[int, Array] = field(default_factory=dict)
+    missing_columns: tuple[str, ...] = ()
+
+    def measured(self) -> Array:
+        """Measured outputs, shape (N, 3 + n): x, y, z, then the tensions."""
+        return np.hstack([self.position, self.tension])
+
+    def frame(self) -> pd.DataFrame:
+        """The run as a table with the columns of a result file."""
+        cables = [getattr(self, name) for name in CABLE_QUANTITIES]
+        rows = np.column_stack([self.time, self.position, self.velocity, *cables, *self.winch_speed.values()])
+        columns = result_columns(self.tension.shape[1], tuple(self.winch_speed))
+        return pd.DataFrame(rows, columns=[column.name for column in columns]).drop(columns=list(self.missing_columns))
+
+
+class RunError(TautwireError):
+    """An FMU failed in a run; ``result`` is the run until then."""
+
+    def __init__(self, cause: ComponentError, result: CosimulationResult) -> None:
+        self.cause = cause
+        self.result = result
+        super().__init__(str(cause))
+
+
+@dataclass(frozen=True)
+class AdditionalComponents:
+    """Additional components: FMUs by name, such as a controller, and ``connections`` from and to them.
+
+    ``external_inputs`` are further external inputs; their values follow those of the winches.
+    """
+
+    fmu_paths: Mapping[str, Path] = field(default_factory=dict)
+    connections: tuple[Connection, ...] = ()
+    external_inputs: tuple[Port, ...] = ()
+
+
+NO_ADDITIONAL_COMPONENTS = AdditionalComponents()
+
+
+@contextmanager
+def instantiate_robot(
+    fmus: RobotFmus,
+    journal: CallJournal | None = None,
+    external_inputs: Sequence[Port] = (),
+    additional: AdditionalComponents = NO_ADDITIONAL_COMPONENTS,
+) -> Iterator[Coupling]:
+    """The coupled robot in initialization mode; instances and folders are removed when the block ends.
+
+    With a ``journal`` each FMU call is noted in it; ``external_inputs`` are further ones besides those of the winches.
+    """
+    wiring = with_connections(
+        wire_fmus(fmus), len(fmus.cables), additional.connections, (*additional.external_inputs, *external_inputs)
+    )
+    new_component = Component if journal is None else partial(JournalledComponent, journal)
+    allocate_inputs = None if journal is None else journal.allocate_inputs
+    with ExitStack() as stack:
+        components = {
+            name: stack.enter_context(new_component(name, path))
+            for name, path in {**fmus.by_component, **additional.fmu_paths}.items()
+        }
+        for name, component in components.items():
+            start = {**fmus.user_start_values.get(name, {}), **fmus.start_settings.get(name, {})}
+            component.initialize(0.0, {key: value for key, value in start.items() if _is_parameter(component, key)})
+        _require_platform_start(fmus, components[PLATFORM])
+        yield Coupling(
+            components,
+            wiring.connections,
+            wiring.external_inputs,
+            wiring.power_bonds,
+            wiring.event_indicators,
+            allocate_inputs=allocate_inputs,
+            derivative_connections=wiring.derivative_connections,
+        )
+
+
+def _is_parameter(component: Component, name: str) -> bool:
+    return name in component.variables and component.variables[name].causality == "parameter"
+
+
+def _require_platform_start(fmus: RobotFmus, platform: Component) -> None:
+    """Refuse a user's platform whose start position differs from that of the cables."""
+    if PLATFORM not in fmus.user_start_values:
+        return
+    block = platform.block([f"position.{axis}" for axis in AXES])
+    platform.read(block)
+    expected = np.array([fmus.user_start_values[PLATFORM][f"start.{axis}"] for axis in AXES])
+    if not np.max(np.abs(block.values - expected)) < START_TOLERANCE:
+        platform_text, expected_text = (
+            ", ".join(f"{value:.9g}" for value in position) for position in (block.values, expected)
+        )
+        hint = "start it there, or give it parameters start.x, start.y and start.z, which are then set"
+        raise SlotError(
+            fmus.platform, PLATFORM, None, f"it starts at {platform_text} m, the run at {expected_text} m", hint
+        )
+
+
+def wire_fmus(fmus: RobotFmus) -> RobotWiring:
+    """How a robot's FMUs are wired; raises SlotError where one of the user's cannot be read."""
+    count = len(fmus.cables)
+    user_fmus = {slot: fmus.by_component[slot] for slot in fmus.user_start_values}
+    return wire_robot(count, fmus.winch_numbers, missing_user_fmu_ports(user_fmus, count), fmus.has_position_sensor)
+
+
+def cosimulate(
+    fmus: RobotFmus,
+    time: ArrayLike,
+    winch_speed: ArrayLike,
+    step: float = DEFAULT_STEP,
+    tolerance: float | None = None,
+    progress: Progress | None = None,
+    patience: float | None = None,
+) -> CosimulationResult:
+    """Co-simulate a robot over sampled winch speeds, linear between samples.
+
+    ``time`` (N,) in s, rising, and ``winch_speed`` (N, n) in m/s, positive reels in, are arrays or columns of a frame.
+    Speeds are those of the rope, or the commands of the winches where the robot has such. Macro steps are no longer
+    than ``step`` (s); or such that their estimated errors of all lengths sum to at most ``tolerance`` (m), where one is
+    given. ``progress`` gets the share that is done. With a ``patience`` (s) an FMU that is in one call for so long, or
+    takes its process down, is one that fails. Returns the run at ``time``: arrays (N, 3) and (N, n) in SI units.
+
+    Raises RunError where an FMU fails, StepError where no step meets the tolerance, SlotError where an FMU of the
+    user's starts elsewhere or cannot make such steps, ArgumentError where an argument is none of these.
+    """
+    validate_fmus("cosimulate: fmus", fmus)
+    sample_times = validate_increasing("cosimulate: time", time, TIME_MEANING)
+    count = len(fmus.cables)
+    speeds = validate_array(
+        "cosimulate: winch_speed", winch_speed, (len(sample_times), count), WINCH_SPEED_MEANING.format(count=count)
+    )
+    validate_options("cosimulate", step, tolerance, progress, patience)
+    return run_cosimulation(
+        fmus,
+        PiecewiseLinearInput(sample_times, speeds),
+        sample_times,
+        step_size_control_for(step, tolerance, sample_times),
+        progress,
+        patience,
+    )
+
+
+def step_size_control_for(step: float, tolerance: float | None, time: Array) -> StepSizeControl:
+    """Steps no longer than ``step`` (s), or by a ``tolerance`` (m) for a run over ``time`` where one is given."""
+    return FixedStep(step) if tolerance is None else AdaptiveStep(tolerance, float(time[-1] - time[0]))
+
+
+def run_cosimulation(
+    fmus: RobotFmus,
+    input_source: InputSource,
+    time: Array,
+    step_size_control: StepSizeControl,
+    progress: Progress | None = None,
+    call_timeout: float | None = None,
+    additional: AdditionalComponents = NO_ADDITIONAL_COMPONENTS,
+) -> CosimulationResult:
+    """Co-simulate a robot under any source of winch speeds, recorded at ``time``.
+
+    ``call_timeout`` and ``additional`` are as for :func:`record_cosimulation`.
+
+    Raises RunError, which has the run until then, where an FMU fails.
+    """
+    wiring = wire_fmus(fmus)
+    recorder = MemoryRecorder(len(time), len(wiring.outputs))
+    try:
+        statistics = record_cosimulation(
+            fmus, input_source, time, step_size_control, recorder, progress, call_timeout, additional
+        )
+    except ComponentError as error:
+        raise RunError(error, result_from_rows(time[: recorder.count], recorder.rows, fmus, wiring)) from error
+    return replace(result_from_rows(time, recorder.rows, fmus, wiring), statistics=statistics)
+
+
+def record_cosimulation(
+    fmus: RobotFmus,
+    input_source: InputSource,
+    time: Array,
+    step_size_control: StepSizeControl,
+    recorder: Recorder,
+    progress: Progress | None = None,
+    call_timeout: float | None = None,
+    additional: AdditionalComponents = NO_ADDITIONAL_COMPONENTS,
+) -> RunStatistics:
+    """Co-simulate a robot under any source of winch speeds; the recorder gets a row at each ``time``.
+
+    A row is in the order of :attr:`RobotWiring.outputs`. Nothing else is kept of a run, however long. With a
+    ``call_timeout`` (s) the FMUs run in a worker process, so that one that hangs for so long, or crashes its process,
+    is an FMU that fails; see :func:`tautwire.cosimulation.simulate_isolated`. ``additional`` components run with them.
+
+    Raises ComponentError where an FMU fails; the recorder has what came before. Raises SlotError where an FMU of the
+    user's starts elsewhere, or cannot make such steps.
+    """
+    is_adaptive, intervals = isinstance(step_size_control, AdaptiveStep), np.diff(time)
+    equal_steps = not is_adaptive and bool(np.ptp(intervals) <= EQUAL_STEP_RTOL * np.max(intervals))
+    require_step_support({slot: fmus.by_component[slot] for slot in fmus.user_start_values}, is_adaptive, equal_steps)
+    wiring = with_connections(wire_fmus(fmus), len(fmus.cables), additional.connections, additional.external_inputs)
+    ports, input_source = wiring.outputs, SelectedInputs(input_source, wiring.external_indices)
+    if call_timeout is not None:
+        return simulate_isolated(
+            partial(instantiate_robot, fmus, additional=additional),
+            input_source,
+            time,
+            ports,
+            step_size_control,
+            recorder,
+            progress,
+            call_timeout,
+        )
+    with defer_interrupts() as raise_interrupt, instantiate_robot(fmus, additional=additional) as coupling:
+
+        def report_progress(done: float) -> None:
+            raise_interrupt()
+            if progress is not None:
+                progress(done)
+
+        simulate(coupling, input_source, time, ports, step_size_control, recorder, report_progress)
+        return coupling.statistics
+
+
+@dataclass(frozen=True)
+class SelectedInputs:
+    """A source of which only the values at ``indices`` are external inputs."""
+
+    source: InputSource
+    indices: tuple[int, ...]
+
+    def interval(self, index: int, time: float, step: float, outputs: Array) -> tuple[Array, Array]:
+        """See :class:`tautwire.cosimulation.InputSource`."""
+        start, end = self.source.interval(index, time, step, outputs)
+        if len(start) == len(self.indices):
+            return start, end
+        indices = list(self.indices)
+        return start[indices], end[indices]
+
+
+def result_from_rows(time: Array, rows: Array, fmus: RobotFmus, wiring: RobotWiring) -> CosimulationResult:
+    """Sort recorded columns, in the order of :attr:`RobotWiring.outputs`, into a result."""
+    count, winches = len(fmus.cables), fmus.winch_numbers
+    all_columns = np.full((len(rows), len(wiring.output_indices) + len(wiring.missing_columns)), np.nan)
+    all_columns[:, wiring.output_indices] = rows
+    first_winch = 6 + len(CABLE_QUANTITIES) * count
+    tension, length, elongation, strain = np.split(all_columns[:, 6:first_winch], len(CABLE_QUANTITIES), axis=1)
+    return CosimulationResult(
+        time,
+        all_columns[:, :3],
+        all_columns[:, 3:6],
+        tension,
+        length,
+        elongation,
+        strain,
+        winch_speed=dict(zip(winches, all_columns[:, first_winch:].T, strict=True)),
+        missing_columns=wiring.missing_columns,
+    )

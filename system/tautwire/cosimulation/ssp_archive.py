@@ -1,0 +1,206 @@
+"""Writes a robot's FMUs, their connections, parameter values and units as one SSP 1.0 archive.
+
+``SystemStructure.ssd`` has system connectors for the external inputs of the winches and for the recorded outputs.
+Importers that know connections between components only (libcosim, ecos) refuse those, so ``ComponentsOnly.ssd``, a
+second variant in the same archive, omits them.
+"""
+
+from __future__ import annotations
+
+import re
+import unicodedata
+import zipfile
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from xml.etree.ElementTree import Element, SubElement, indent, tostring
+
+from fmpy.model_description import ModelDescription, ScalarVariable
+
+from tautwire_fmu.units import UNITS
+
+from ..atomic_output import atomic_file
+from ..errors import one_line
+from ..fmus.fmi_binding import is_real_scalar
+from ..fmus.fmu_archive import read_model_description
+from ..fmus.fmu_slots import slot_ports
+from ..fmus.packaging import RobotFmus
+from ..fmus.variable_units import SI_BASE_UNITS, definition_from_exponents, unit_definition, unit_of
+from ..robot.schema import Robot
+from . import Connection, Port
+from .robot_cosimulation import wire_fmus
+from .robot_wiring import PLATFORM, midpoint_connections
+
+SYSTEM_STRUCTURE = "SystemStructure.ssd"
+COMPONENTS_ONLY = "ComponentsOnly.ssd"
+SYSTEM_NAME = "robot"
+NAMESPACE = "http://ssp-standard.org/SSP1/SystemStructure"
+NAMESPACES = {
+    "xmlns:ssd": f"{NAMESPACE}Description",
+    "xmlns:ssc": f"{NAMESPACE}Common",
+    "xmlns:ssv": f"{NAMESPACE}ParameterValues",
+}
+MAX_STEM_BYTES = 100
+RESERVED_NAMES = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\.|$)", re.IGNORECASE)
+# Reproducible archives: the same FMUs give the same bytes, without the time of writing.
+ENTRY_DATE = (1980, 1, 1, 0, 0, 0)
+
+
+@dataclass(frozen=True)
+class _SspComponent:
+    """An SSP component: its name and FMU, the FMU's variables by name, its connectors and their units."""
+
+    name: str
+    path: Path
+    description: ModelDescription
+    variables: Mapping[str, ScalarVariable]
+    connectors: Mapping[str, str]
+
+    def unit_attributes(self, unit: str) -> dict[str, str]:
+        """The attributes of a unit's BaseUnit element, as the FMU defines it."""
+        if unit in UNITS:
+            return {base: str(exponent) for base, exponent in UNITS[unit].items()}
+        *exponents, factor, offset = unit_definition(self.description, unit) or definition_from_exponents({})
+        powers = {base: str(int(power)) for base, power in zip(SI_BASE_UNITS, exponents, strict=True) if power}
+        return powers | ({} if (factor, offset) == (1.0, 0.0) else {"factor": repr(factor), "offset": repr(offset)})
+
+
+def ssp_name(robot: Robot) -> str:
+    """A file name for a robot's archive that any file system takes, whatever the robot is called."""
+    text = re.sub(r"[^\w.-]+", "_", unicodedata.normalize("NFC", robot.name))
+    stem = text.encode("utf-8", "ignore")[:MAX_STEM_BYTES].decode("utf-8", "ignore").strip("._-")
+    return f"{SYSTEM_NAME}_{stem}.ssp" if RESERVED_NAMES.match(stem) else f"{stem or SYSTEM_NAME}.ssp"
+
+
+def write_ssp(robot: Robot, fmus: RobotFmus, path: Path) -> Path:
+    """Write the archive to ``path``; it appears there only when it is complete.
+
+    Raises InputError where ``path`` cannot be written.
+    """
+    wiring = wire_fmus(fmus)
+    # Importers do not set midpoint inputs.
+    midpoint_wires = midpoint_connections(len(fmus.cables))
+    wires = [wire for wire in wiring.connections if wire not in midpoint_wires]
+    system_inputs = {_system_connector_name(port): port for port in wiring.external_inputs}
+    system_outputs = {_system_connector_name(port): port for port in wiring.outputs}
+    ends = [end for wire in wires for end in (wire.source, wire.target)]
+    parts = _ssp_components(fmus, [*ends, *system_inputs.values(), *system_outputs.values()])
+    with atomic_file(path) as scratch, zipfile.ZipFile(scratch, "w") as archive:
+        _add_entry(archive, SYSTEM_STRUCTURE, _system_description(robot, parts, wires, system_inputs, system_outputs))
+        _add_entry(archive, COMPONENTS_ONLY, _system_description(robot, parts, wires, {}, {}))
+        for part in parts.values():
+            _add_entry(archive, _fmu_path(part), part.path.read_bytes(), zipfile.ZIP_STORED)
+    return path
+
+
+def _ssp_components(fmus: RobotFmus, ports: Iterable[Port]) -> dict[str, _SspComponent]:
+    names: dict[str, dict[str, None]] = {name: {} for name in fmus.by_component}
+    for port in ports:
+        names[port.component][port.variable] = None
+    return {name: _ssp_component(name, path, names[name], len(fmus.cables)) for name, path in fmus.by_component.items()}
+
+
+def _ssp_component(name: str, path: Path, connectors: Iterable[str], cable_count: int) -> _SspComponent:
+    description = read_model_description(path)
+    variables = {variable.name: variable for variable in description.modelVariables}
+    default_units = {port.name: port.unit for port in slot_ports(name, cable_count)}
+    units = {connector: unit_of(variables[connector]) or default_units[connector] for connector in connectors}
+    return _SspComponent(name, path, description, variables, units)
+
+
+def _system_connector_name(port: Port) -> str:
+    """The name of a system connector: ``tension_2`` for the tension of the second cable."""
+    return port.variable if port.component == PLATFORM else f"{port.variable}_{port.component.rpartition('_')[2]}"
+
+
+def _fmu_path(part: _SspComponent) -> str:
+    return f"resources/{part.name}.fmu"
+
+
+def _add_entry(archive: zipfile.ZipFile, name: str, data: bytes, method: int = zipfile.ZIP_DEFLATED) -> None:
+    entry = zipfile.ZipInfo(name, ENTRY_DATE)
+    entry.compress_type = method
+    entry.external_attr = 0o644 << 16
+    archive.writestr(entry, data)
+
+
+def _system_description(
+    robot: Robot,
+    parts: Mapping[str, _SspComponent],
+    wires: Iterable[Connection],
+    system_inputs: Mapping[str, Port],
+    system_outputs: Mapping[str, Port],
+) -> bytes:
+    name = one_line(robot.name)
+    root = Element("ssd:SystemStructureDescription", {**NAMESPACES, "version": "1.0", "name": name})
+    root.set("generationTool", "Tautwire")
+    system = SubElement(root, "ssd:System", {"name": SYSTEM_NAME, "description": f"cable robot {name}"})
+    if system_inputs or system_outputs:
+        frame = SubElement(system, "ssd:Connectors")
+        for kind, ports in (("input", system_inputs), ("output", system_outputs)):
+            for outer, port in ports.items():
+                _add_connector(frame, outer, kind, port.variable, parts[port.component])
+    elements = SubElement(system, "ssd:Elements")
+    for component, part in parts.items():
+        _add_component(elements, component, part)
+    _add_connections(system, wires, system_inputs, system_outputs)
+    _add_units(root, parts.values())
+    indent(root)
+    return bytes(tostring(root, encoding="utf-8", xml_declaration=True))
+
+
+def _add_component(elements: Element, name: str, part: _SspComponent) -> None:
+    attributes = {"name": name, "type": "application/x-fmu-sharedlibrary", "source": _fmu_path(part)}
+    component = SubElement(elements, "ssd:Component", attributes | {"implementation": "CoSimulation"})
+    frame = SubElement(component, "ssd:Connectors")
+    for connector in part.connectors:
+        _add_connector(frame, connector, part.variables[connector].causality, connector, part)
+    bindings = SubElement(component, "ssd:ParameterBindings")
+    values = SubElement(SubElement(bindings, "ssd:ParameterBinding"), "ssd:ParameterValues")
+    settings = SubElement(values, "ssv:ParameterSet", {"version": "1.0", "name": "values"})
+    numbers = SubElement(settings, "ssv:Parameters")
+    parameters = [v for v in part.variables.values() if v.causality == "parameter" and is_real_scalar(v)]
+    for parameter in parameters:
+        number = SubElement(numbers, "ssv:Parameter", {"name": parameter.name})
+        unit = unit_of(parameter)
+        SubElement(number, "ssv:Real", {"value": str(parameter.start)} | ({"unit": unit} if unit else {}))
+    _add_unit_list(
+        settings, "ssv:Units", {unit: part.unit_attributes(unit) for unit in filter(None, map(unit_of, parameters))}
+    )
+
+
+def _add_connector(frame: Element, name: str, kind: str, variable: str, part: _SspComponent) -> None:
+    connector = SubElement(frame, "ssd:Connector", {"name": name, "kind": kind})
+    if part.variables[variable].description:
+        connector.set("description", part.variables[variable].description)
+    SubElement(connector, "ssc:Real", {"unit": part.connectors[variable]})
+
+
+def _add_connections(
+    system: Element, wires: Iterable[Connection], system_inputs: Mapping[str, Port], system_outputs: Mapping[str, Port]
+) -> None:
+    frame = SubElement(system, "ssd:Connections")
+    for wire in wires:
+        SubElement(frame, "ssd:Connection", _connection_end("start", wire.source) | _connection_end("end", wire.target))
+    for outer, port in system_inputs.items():
+        SubElement(frame, "ssd:Connection", {"startConnector": outer} | _connection_end("end", port))
+    for outer, port in system_outputs.items():
+        SubElement(frame, "ssd:Connection", _connection_end("start", port) | {"endConnector": outer})
+
+
+def _connection_end(side: str, port: Port) -> dict[str, str]:
+    return {f"{side}Element": port.component, f"{side}Connector": port.variable}
+
+
+def _add_units(root: Element, parts: Iterable[_SspComponent]) -> None:
+    """The units of all connectors; parameter sets list their own."""
+    _add_unit_list(
+        root, "ssd:Units", {unit: part.unit_attributes(unit) for part in parts for unit in part.connectors.values()}
+    )
+
+
+def _add_unit_list(parent: Element, tag: str, units: Mapping[str, Mapping[str, str]]) -> None:
+    frame = SubElement(parent, tag)
+    for unit, bases in sorted(units.items()):
+        node = SubElement(frame, "ssc:Unit", {"name": unit})
+        SubElement(node, "ssc:BaseUnit", dict(bases))

@@ -1,0 +1,7 @@
+"""System identification: finds what a model lacks from recordings, or says that it does not know."""
+
+from .identification import trace
+from .trace_result import Candidate, Comparison, Errors, Estimate, FoundEffect, Trace
+from .worker_pool import processors
+
+__all__ = ["Candidate", "Comparison", "Errors", "Estimate", "FoundEffect", "Trace", "processors", "trace"]

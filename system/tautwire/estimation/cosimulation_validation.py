@@ -1,0 +1,110 @@
+"""Validation of a robot by co-simulating its FMUs beside the recordings: errors before and after."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..cosimulation.robot_cosimulation import CosimulationResult, cosimulate
+from ..fmus.packaging import build_fmus
+from ..recordings.recording import Recording
+from ..robot.schema import Robot
+from .estimation_data import DataSet
+from .parameter_fit import Fitter
+from .smoothed_states import calibrate, with_initial_state
+from .trace_result import Comparison, Errors
+from .worker_pool import PendingResult, WorkerPool
+
+Array = NDArray[np.float64]
+
+ROLES = ("fit", "check")
+MAX_ERROR_TO_NOISE_FLOOR = 1.5
+
+
+def start_cosimulations(
+    workers: WorkerPool, fitter: Fitter, robot: Robot, data_sets: Sequence[DataSet]
+) -> list[PendingResult[CosimulationResult]]:
+    """Start the co-simulations of a robot over some recordings, each from its smoothed initial state."""
+    return [
+        workers.submit(cosimulate_data_set, with_initial_state(fitter, robot, sample), sample) for sample in data_sets
+    ]
+
+
+def cosimulate_data_set(robot: Robot, data: DataSet) -> CosimulationResult:
+    """Co-simulate a robot placed where a recording starts."""
+    with TemporaryDirectory(prefix="tautwire-trace-") as folder:
+        fmus = build_fmus(robot.as_modelled(), Path(folder))
+        return cosimulate(fmus, data.recording.time, data.recording.winch_speed)
+
+
+def validate_by_cosimulation(
+    identified: Robot,
+    fitter: Fitter,
+    data_sets: Sequence[DataSet],
+    runs_before: Sequence[CosimulationResult],
+    workers: WorkerPool,
+) -> tuple[tuple[Comparison, ...], list[Errors]] | None:
+    """Errors that the co-simulation of a better robot leaves; None where they are more than noise.
+
+    It has the last word: a filter follows what the model itself would not do.
+    """
+    runs_after = [run.result() for run in start_cosimulations(workers, fitter, identified, data_sets)]
+    comparisons, noise_floors = compare_cosimulations(identified, fitter, data_sets, runs_before, runs_after)
+    all_near_floor = all(
+        _is_near_noise_floor(c.errors_after, floor) for c, floor in zip(comparisons, noise_floors, strict=True)
+    )
+    return (comparisons, noise_floors) if all_near_floor else None
+
+
+def compare_cosimulations(
+    robot: Robot,
+    fitter: Fitter,
+    data_sets: Sequence[DataSet],
+    runs_before: Sequence[CosimulationResult],
+    runs_after: Sequence[CosimulationResult],
+) -> tuple[tuple[Comparison, ...], list[Errors]]:
+    """Compare both runs with each recording, and with the noise floor under the later robot.
+
+    Recordings are corrected for the constant errors that their sensors may have, as far as those are stated.
+    """
+    recordings = [calibrate(fitter, robot, sample).without_sensor_offsets(sample.recording) for sample in data_sets]
+    comparisons = tuple(
+        Comparison(role, recording, b, a, cosimulation_errors(recording, b), cosimulation_errors(recording, a))
+        for role, recording, b, a in zip(ROLES, recordings, runs_before, runs_after, strict=False)
+    )
+    return comparisons, [noise_floor(fitter, robot, sample) for sample in data_sets]
+
+
+def cosimulation_errors(recording: Recording, motion: CosimulationResult) -> Errors:
+    """Root-mean-square errors: measured less co-simulated."""
+    return _root_mean_squares((recording.measured() - motion.measured()) ** 2)
+
+
+def noise_floor(fitter: Fitter, robot: Robot, data: DataSet) -> Errors:
+    """Noise floor: the errors that noise of the sensors and winch speeds alone would leave in a simulation."""
+    variances = fitter.open_loop_variances(robot, data)
+    return _root_mean_squares(np.where(np.isfinite(data.recording.measured()), variances, np.nan))
+
+
+def _is_near_noise_floor(after: Errors, noise_floor_errors: Errors) -> bool:
+    """Whether the errors of a co-simulation are at most 1.5 times the noise floor."""
+    pairs = ((after.position_rms, noise_floor_errors.position_rms), (after.tension_rms, noise_floor_errors.tension_rms))
+    return all(not error > MAX_ERROR_TO_NOISE_FLOOR * least for error, least in pairs)
+
+
+def _root_mean_squares(squares: Array) -> Errors:
+    return Errors(
+        position_rms=_root_mean(squares[:, :3]),
+        tension_rms=_root_mean(squares[:, 3:]),
+        axes=np.array([_root_mean(column) for column in squares[:, :3].T]),
+        cables=np.array([_root_mean(column) for column in squares[:, 3:].T]),
+    )
+
+
+def _root_mean(squares: Array) -> float:
+    seen = squares[np.isfinite(squares)]
+    return float(np.sqrt(np.mean(seen))) if seen.size else float("nan")

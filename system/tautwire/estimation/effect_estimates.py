@@ -1,0 +1,69 @@
+"""Estimates of the accepted effects: their parameters with intervals and correlations."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from itertools import combinations
+
+from tautwire_fmu.laws.effects import UNLISTED
+
+from ..robot.schema import Robot
+from ..robot.symbolic_model import FORMULA_INDEX
+from .estimation_data import DataSet
+from .hypotheses import declared_value
+from .parameter_fit import Fit, Fitter
+from .profile_likelihood import profile_intervals
+from .stepwise_selection import SelectionResult
+from .trace_result import Correlation, Estimate, FittedParameter, FoundEffect
+from .worker_pool import WorkerPool
+
+
+def estimated_effects(
+    robot: Robot, selection: SelectionResult, fitter: Fitter, data: DataSet, workers: WorkerPool
+) -> tuple[FoundEffect, ...]:
+    """Estimates of the accepted effects of the list, in order; ``robot`` is as declared, ``data`` was fitted."""
+    indices = _parameter_indices(selection.fit)
+    interval_ends = profile_intervals(fitter, selection.fit, selection.accepted, data, workers)
+    effects = []
+    for hypothesis, evidence in zip(selection.accepted, selection.evidence, strict=True):
+        if hypothesis.effect in UNLISTED:
+            continue
+        estimates = {}
+        for parameter in hypothesis.parameters:
+            index = indices[FittedParameter(hypothesis.effect.name, hypothesis.cables, parameter.name)]
+            low, high = interval_ends[index]
+            declared = declared_value(robot, parameter, hypothesis.cables)
+            estimates[parameter.name] = Estimate(
+                float(selection.fit.values[index]), parameter.unit, low, high, declared
+            )
+        effects.append(
+            FoundEffect(hypothesis.effect.name, hypothesis.effect.component, hypothesis.cables, estimates, evidence)
+        )
+    return tuple(effects)
+
+
+def parameter_correlations(fit: Fit, effects: Sequence[FoundEffect]) -> tuple[Correlation, ...]:
+    """Correlations of each two parameters of some effects, whatever else was fitted beside them.
+
+    ``C_ik / (d_i d_k)`` of the fit's covariance C and its deviations d; none where one has no deviation.
+    """
+    indices, deviations = _parameter_indices(fit), fit.standard_deviations
+    fitted = [FittedParameter(each.name, each.cables, parameter) for each in effects for parameter in each.parameters]
+    correlations = []
+    for first, second in combinations(fitted, 2):
+        i, k = indices[first], indices[second]
+        scale = deviations[i] * deviations[k]
+        if scale > 0.0:
+            value = min(max(float(fit.covariance[i, k] / scale), -1.0), 1.0)
+            correlations.append(Correlation((first, second), value))
+    return tuple(correlations)
+
+
+def _parameter_indices(fit: Fit) -> dict[FittedParameter, int]:
+    """Index in the fit of each parameter of its robot's effects."""
+    of_effects = [(index, free) for index, free in enumerate(fit.free) if free.effect_index != FORMULA_INDEX]
+    settings = fit.robot.effects
+    return {
+        FittedParameter(settings[free.effect_index].name, settings[free.effect_index].cables, free.name): index
+        for index, free in of_effects
+    }

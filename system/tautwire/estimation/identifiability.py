@@ -1,0 +1,222 @@
+"""Identifiability and detectability: the smallest effects that a recording would have shown, and which are confusable.
+
+The Jacobian ``J`` of the whitened innovations by all parameters, with those of the accepted hypotheses projected out,
+gives both. An effect of one parameter moved by ``d`` is expected to gain ``d^2 |J|^2 / 2`` nats; the share of an effect
+that another could mimic is the squared cosine of the angle between its signature and what the other's span.
+
+Source: Kay (1998), Fundamentals of Statistical Signal Processing II, sec. 4.4; Ljung (1999), sec. 13.3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from math import inf, log, sqrt
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tautwire_fmu.laws.effects import BY_NAME
+
+from ..robot.schema import Robot
+from .estimation_data import DataSet
+from .grid_search import detectable_value
+from .hypotheses import SINGLE_CABLE_EFFECTS, Hypothesis, hypotheses
+from .parameter_fit import Fitter
+from .score_test import ScoreStatistics, grid_size, parameter_columns, score_statistics, starting_grid
+from .trace_result import ConfusableEffect, Detectable, Identifiability
+
+Array = NDArray[np.float64]
+
+# Normal quantile of the probability, 90 %, with which an effect of that size is found.
+POWER_QUANTILE = 1.2816
+# Nats that fitting a parameter on other samples is expected to cost.
+FIT_COST_NATS = 1.0
+INFORMATION_RANK_TOLERANCE = 1e-9
+# Effects with a smaller cosine are not reported as confusable.
+MIN_CONFUSABLE_COSINE = 0.9
+
+
+def analyse_identifiability(
+    robot: Robot, declared: Robot, accepted: Sequence[Hypothesis], fitter: Fitter, data: DataSet, alpha: float
+) -> Identifiability:
+    """Identifiability of all hypotheses beside the accepted ones, at the values of ``robot``; ``declared`` lacks them.
+
+    ``alpha`` is the false-alarm rate that the effects would have to pass.
+    """
+    candidates = hypotheses(declared)
+    others = [h for h in candidates if not any(a.overlaps(h) for a in accepted)]
+    statistics = score_statistics(robot, accepted, others, fitter, data)
+    column_groups = _column_indices(accepted)
+    threshold = log(len(candidates) / alpha)
+    reported = [h for h in others if h.cables in ((), declared.cable_numbers) or h.effect in SINGLE_CABLE_EFFECTS]
+    accepted_columns = [column for group in column_groups for column in group]
+    detectable = [d for h in reported for d in _detectable_sizes(statistics, h, accepted_columns, threshold)]
+    detectable = [_detectable_by_simulation(robot, accepted, fitter, data, size, threshold) for size in detectable]
+    confusable = [
+        likeness
+        for index, own in enumerate(accepted)
+        for other in others
+        if (
+            likeness := _confusable_effect(
+                statistics, robot, declared, (own, column_groups[index]), other, column_groups
+            )
+        )
+        is not None
+    ]
+    return Identifiability(tuple(detectable), tuple(sorted(confusable, key=lambda found: found.nats)))
+
+
+def separation_nats(statistics: ScoreStatistics, step: Array, other: Hypothesis, nuisance: Sequence[int] = ()) -> float:
+    """Separation in nats of a parameter step (columns, 1) from the best that another hypothesis can do instead."""
+    information = float(_projected_information(statistics.fisher_information, step, list(nuisance))[0, 0])
+    return (
+        0.5 * information * (1.0 - _explained_share(statistics, step, other, nuisance, information))
+        if information > 0.0
+        else 0.0
+    )
+
+
+def start_steps(statistics: ScoreStatistics, robot: Robot, hypothesis: Hypothesis) -> Array:
+    """Parameter step (columns, 1) from where an effect is absent to where fits of it begin, at its first grid point."""
+    names, columns = parameter_columns(statistics, hypothesis, 0)
+    neutral_values = hypothesis.neutral(robot, hypothesis.cables).values
+    start_values = hypothesis.setting(robot).values
+    steps = np.array([float(start_values[name]) - float(neutral_values[name]) for name in names])
+    combined: Array = (columns @ steps)[:, None]
+    return combined
+
+
+def _explained_share(
+    statistics: ScoreStatistics, step: Array, other: Hypothesis, nuisance: Sequence[int], information: float
+) -> float:
+    """Share of a step's squared length that another hypothesis can explain, at its best grid point."""
+    largest_share = 0.0
+    for number in range(grid_size(other)):
+        _, columns = parameter_columns(statistics, other, number)
+        if columns.shape[1]:
+            projected = _projected_information(
+                statistics.fisher_information, np.hstack([step, columns]), list(nuisance)
+            )
+            largest_share = max(
+                largest_share,
+                float(projected[0, 1:] @ _scaled_least_squares(projected[1:, 1:], projected[1:, :1])[:, 0])
+                / information,
+            )
+    return min(max(largest_share, 0.0), 1.0)
+
+
+def _column_indices(accepted: Sequence[Hypothesis]) -> list[list[int]]:
+    """Column indices of each accepted hypothesis."""
+    column_groups, first = [], 0
+    for hypothesis in accepted:
+        column_groups.append(list(range(first, first + len(hypothesis.form))))
+        first += len(hypothesis.form)
+    return column_groups
+
+
+def _detectable_sizes(
+    statistics: ScoreStatistics, hypothesis: Hypothesis, nuisance: list[int], threshold: float
+) -> list[Detectable]:
+    shape_values = starting_grid(hypothesis.effect)[0]
+    smallest = {
+        p.name: Detectable(hypothesis.effect.name, hypothesis.cables, p.name, inf, p.unit, {})
+        for p in hypothesis.parameters
+        if p.name not in shape_values
+    }
+    for number, shapes in enumerate(starting_grid(hypothesis.effect)[: grid_size(hypothesis)]):
+        names, columns = parameter_columns(statistics, hypothesis, number)
+        projected = _projected_information(statistics.fisher_information, columns, nuisance)
+        for index, name in enumerate(names):
+            parameter = next(p for p in hypothesis.parameters if p.name == name)
+            strength = sqrt(max(projected[index, index], 0.0))
+            nominal = float(statistics.values @ columns[:, index] / np.sum(columns[:, index]))
+            size = _required_norm(threshold) / strength if strength > 0.0 else inf
+            if size > max(parameter.maximum - nominal, nominal - parameter.minimum):
+                size = inf
+            other_values = {key: value for key, value in shapes.items() if key in hypothesis.form}
+            detectable = Detectable(hypothesis.effect.name, hypothesis.cables, name, size, parameter.unit, other_values)
+            if size < smallest[name].size:
+                smallest[name] = detectable
+    return list(smallest.values())
+
+
+def _required_norm(threshold: float) -> float:
+    """Norm by which an effect has to move the whitened innovations to be detected."""
+    return POWER_QUANTILE + sqrt(POWER_QUANTILE**2 + 2.0 * (threshold + FIT_COST_NATS))
+
+
+def _detectable_by_simulation(
+    robot: Robot,
+    accepted: Sequence[Hypothesis],
+    fitter: Fitter,
+    data: DataSet,
+    detectable: Detectable,
+    threshold: float,
+) -> Detectable:
+    """Detectable size by runs of the model where the Jacobian vanishes."""
+    effect = BY_NAME[detectable.name]
+    parameter = next(p for p in effect.parameters if p.name == detectable.parameter)
+    if not parameter.grid_values or detectable.size < inf:
+        return detectable
+    hypothesis = Hypothesis(effect, detectable.cables)
+    return replace(
+        detectable,
+        size=detectable_value(robot, accepted, fitter, data, hypothesis, parameter, _required_norm(threshold)),
+    )
+
+
+def _projected_information(fisher_information: Array, columns: Array, nuisance: list[int]) -> Array:
+    """Information matrix of combinations of columns, with the nuisance columns projected out."""
+    projected = columns.T @ fisher_information @ columns
+    if nuisance:
+        cross_information = fisher_information[nuisance] @ columns
+        projected = projected - cross_information.T @ _scaled_least_squares(
+            fisher_information[np.ix_(nuisance, nuisance)], cross_information
+        )
+    reduced: Array = projected
+    return reduced
+
+
+def _scaled_least_squares(matrix: Array, right_side: Array) -> Array:
+    """Least squares with columns scaled to the same size."""
+    scale = np.sqrt(np.maximum(np.diag(matrix), np.finfo(float).tiny))
+    scaled: Array = np.linalg.lstsq(
+        matrix / np.outer(scale, scale), right_side / scale[:, None], rcond=INFORMATION_RANK_TOLERANCE
+    )[0]
+    solution: Array = scaled / scale[:, None]
+    return solution
+
+
+def _confusable_effect(
+    statistics: ScoreStatistics,
+    robot: Robot,
+    declared: Robot,
+    tested: tuple[Hypothesis, list[int]],
+    other: Hypothesis,
+    column_groups: Sequence[list[int]],
+) -> ConfusableEffect | None:
+    """The other effect as confusable with a tested one, at its best grid point; None where the cosine is small."""
+    hypothesis, own_columns = tested
+    nuisance = [column for group in column_groups if group is not own_columns for column in group]
+    step = np.zeros((len(statistics.columns), 1))
+    step[own_columns, 0] = _parameter_steps(robot, declared, hypothesis)
+    information = float(_projected_information(statistics.fisher_information, step, nuisance)[0, 0])
+    if information <= 0.0:
+        return None
+    cosine = sqrt(_explained_share(statistics, step, other, nuisance, information))
+    if cosine < MIN_CONFUSABLE_COSINE:
+        return None
+    nats = 0.5 * information * (1.0 - cosine**2)
+    return ConfusableEffect(hypothesis.effect.name, hypothesis.cables, other.effect.name, other.cables, cosine, nats)
+
+
+def _parameter_steps(robot: Robot, declared: Robot, hypothesis: Hypothesis) -> list[float]:
+    """Parameter step from where the effect is absent to its values; zero for parameters that only shape it."""
+    setting = next(s for s in robot.effects if (s.name, s.cables) == (hypothesis.effect.name, hypothesis.cables))
+    neutral = hypothesis.neutral(declared, hypothesis.cables)
+    shape_values = starting_grid(hypothesis.effect)[0]
+    return [
+        0.0 if p.name in shape_values else float(setting.values[p.name]) - float(neutral.values[p.name])
+        for p in hypothesis.parameters
+    ]

@@ -1,0 +1,185 @@
+"""Prior of the filter's initial state: its covariance, self-stress, and motion at the start of a recording."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import RecordingError
+from ..recordings.recording import Recording
+from ..recordings.start_position import start_position, with_start
+from ..robot.schema import Robot
+from ..robot.static_equilibrium import static_tensions, unit_directions
+from .kalman_filter import Noise
+
+Array = NDArray[np.float64]
+
+# Standard deviation of self-stress where no tension is measured, as a share of the mean static tension.
+DEFAULT_SELF_STRESS_RATIO = 0.25
+RANK_TOLERANCE = 1e-9
+
+
+def initial_covariance(robot: Robot, noise: Noise, state_count: int, constant_count: int = 0) -> Array:
+    """Prior covariance (state_count, state_count) of the initial state.
+
+    Beside positions, velocities and lengths only the last ``constant_count`` states are uncertain.
+
+    Self-stress, the tensions in the null space of redundant robots' structure matrix, has the standard deviation
+    ``noise.self_stress``: with ``U`` the ropes' directions and ``F = l / (E S)``, unstrained lengths by
+    ``s^2 F (I - U^+ U) F``.
+    """
+    count = robot.cable_count
+    lengths = slice(6, 6 + count)
+    covariance = np.zeros((state_count, state_count))
+    position_variance = np.full(3, noise.start_position**2 + noise.start_stretch**2)
+    covariance[:3, :3] = np.diag(position_variance)
+    covariance[3:6, 3:6] = np.diag(np.full(3, noise.start_velocity**2))
+    covariance[lengths, lengths] = np.diag(np.full(count, noise.start_position**2 + noise.start_stretch**2))
+    covariance[state_count - constant_count :, state_count - constant_count :] = np.eye(constant_count)
+    if noise.self_stress > 0.0:
+        length_modes = _cable_compliances(robot)[:, None] * self_stress_projection(robot)
+        covariance[lengths, lengths] += noise.self_stress**2 * length_modes @ length_modes.T
+    return covariance
+
+
+def self_stress_projection(robot: Robot) -> Array:
+    """Projection (n, n) of tensions on self-stress, the null space of the structure matrix; zero where it is empty."""
+    direction_matrix = unit_directions(robot)
+    projection: Array = (
+        np.eye(robot.cable_count) - np.linalg.pinv(direction_matrix, rcond=RANK_TOLERANCE) @ direction_matrix
+    )
+    return projection
+
+
+def self_stress_deviation(robot: Robot, recordings: tuple[Recording, ...]) -> tuple[float, tuple[str, ...]]:
+    """Standard deviation of self-stress in N, and a note where it matters.
+
+    The robot file's value; without one, zero with tensions measured, else a quarter of the mean static one.
+    """
+    if float(np.trace(self_stress_projection(robot))) < 0.5:
+        return 0.0, ()
+    declared = robot.tension.preferred_uncertainty if robot.tension else None
+    is_tension_unmeasured = not any(recording.has_tension for recording in recordings)
+    if declared is None and not is_tension_unmeasured:
+        return 0.0, ()
+    deviation = DEFAULT_SELF_STRESS_RATIO * float(np.mean(static_tensions(robot))) if declared is None else declared
+    if deviation == 0.0:
+        return 0.0, ()
+    reason = "tension.preferred_uncertainty" if declared is not None else "no tensions are measured, so"
+    return deviation, (
+        f"{reason}: start tensions may differ from the tension rule's by {deviation:.3g} N; they were fitted beside "
+        "every effect, so a wrong pretension is none",
+    )
+
+
+def _cable_compliances(robot: Robot) -> Array:
+    """Axial compliances of the cables (n,) in m/N: length over axial stiffness."""
+    lengths = [float(np.linalg.norm(np.subtract(anchor, robot.platform.start))) for anchor in robot.anchors]
+    return np.array([length / (c.modulus * c.area) for length, c in zip(lengths, robot.cables, strict=True)])
+
+
+MIN_VELOCITY_SIGMAS = 8.0
+# Window of the velocity estimate in s, twice as long where samples are few, and the fewest samples in it.
+VELOCITY_WINDOW, MIN_WINDOW_SAMPLES = 0.25, 10
+# Window of the oscillation about equilibrium in s, and its largest amplitude as a share of the shortest rope.
+OSCILLATION_WINDOW, MAX_AMPLITUDE_RATIO = 1.0, 0.02
+# Standard deviations of the initial state over the motion that was estimated.
+PRIOR_WIDENING = 1.5
+
+
+@dataclass(frozen=True)
+class InitialMotion:
+    """Initial ``speed`` of the platform (m/s), and ``amplitude`` of its oscillation about equilibrium (m)."""
+
+    speed: float
+    amplitude: float
+
+
+def with_motion_at_start(robot: Robot, noise: Noise, recordings: Sequence[Recording]) -> tuple[Noise, tuple[str, ...]]:
+    """Noise with an initial state as uncertain as recordings that begin in motion require, and a note of each of these.
+
+    Raises RecordingError where one is too far from rest to find its ropes' reference, the static start.
+    """
+    notes: list[str] = []
+    for recording in recordings:
+        robot_at_start = with_start(robot, start_position(robot, noise.position, recording)[0])
+        motion = initial_motion(robot_at_start, noise, recording)
+        if motion is None:
+            continue
+        shortest_cable = min(float(np.linalg.norm(np.subtract(a, robot.platform.start))) for a in robot.anchors)
+        if motion.amplitude > MAX_AMPLITUDE_RATIO * shortest_cable:
+            problem = f"starts in motion, {motion.speed:.3g} m/s, and swings by {motion.amplitude:.3g} m"
+            hint = "start the recording at rest: the ropes' reference is the static start"
+            raise RecordingError(recording.path, problem, hint)
+        noise = replace(
+            noise,
+            start_velocity=max(noise.start_velocity, PRIOR_WIDENING * motion.speed),
+            start_stretch=max(noise.start_stretch, PRIOR_WIDENING * motion.amplitude),
+        )
+        notes.append(
+            f"{recording.path} starts in motion, at about {motion.speed:.3g} m/s: where, how fast and under which "
+            "tensions was fitted beside every effect; what ropes remember (relaxation, creep) is taken as at rest"
+        )
+    return noise, tuple(notes)
+
+
+def initial_motion(robot: Robot, noise: Noise, recording: Recording) -> InitialMotion | None:
+    """Initial motion of a recording; None where it is at rest within noise.
+
+    Winch speeds alone would move a platform on stiff ropes at ``v`` with ``U' v = V``. The residual of the positions is
+    fitted by ``e_0 + e_1 t + e_2 t^2``; the velocity is ``v + e_1``, significant at eight sigma from zero.
+    """
+    time = recording.time - recording.time[0]
+    velocity_map = np.linalg.pinv(unit_directions(robot), rcond=1e-9)
+    winch_led_velocity = recording.winch_speed @ velocity_map
+    displacement = _cumulative_integral(time, winch_led_velocity)
+    initial_winch_speed, initial_velocity = recording.winch_speed[0], winch_led_velocity[0]
+    velocity_noise = noise.winch_speed * np.linalg.norm(velocity_map, axis=0)
+    is_early = time <= 2.0 * VELOCITY_WINDOW
+    measured_axes = [
+        axis
+        for axis, column in enumerate(recording.position.T)
+        if np.sum(np.isfinite(column[is_early])) >= MIN_WINDOW_SAMPLES
+    ]
+    if not measured_axes:
+        is_moving = (
+            bool(np.any(np.abs(initial_winch_speed) > MIN_VELOCITY_SIGMAS * noise.winch_speed))
+            and noise.winch_speed > 0.0
+        )
+        return InitialMotion(float(np.linalg.norm(initial_velocity)), 0.0) if is_moving else None
+    output_noise = noise.of_outputs(recording.cable_count)
+    velocity, significant, amplitudes = np.zeros(3), False, [0.0]
+    for axis in measured_axes:
+        residual = recording.position[:, axis] - displacement[:, axis]
+        slope, deviation = _initial_slope(time, residual, output_noise[axis])
+        velocity[axis] = initial_velocity[axis] + slope
+        significant |= bool(abs(velocity[axis]) > MIN_VELOCITY_SIGMAS * np.hypot(deviation, velocity_noise[axis]))
+        amplitudes.append(_oscillation_amplitude(time, residual, output_noise[axis]))
+    return InitialMotion(float(np.linalg.norm(velocity)), max(amplitudes)) if significant else None
+
+
+def _cumulative_integral(time: Array, rates: Array) -> Array:
+    steps = 0.5 * (rates[1:] + rates[:-1]) * np.diff(time)[:, None]
+    total: Array = np.vstack([np.zeros((1, rates.shape[1])), np.cumsum(steps, axis=0)])
+    return total
+
+
+def _initial_slope(time: Array, signal: Array, sigma: float) -> tuple[float, float]:
+    """Initial slope of the parabola through the first samples, and its standard deviation."""
+    measured = np.flatnonzero(np.isfinite(signal))
+    selected = measured[: max(int(np.sum(time[measured] <= VELOCITY_WINDOW)), MIN_WINDOW_SAMPLES)]
+    powers = np.vander(time[selected], 3, increasing=True)
+    inverse = np.linalg.pinv(powers)
+    return float(inverse[1] @ signal[selected]), sigma * float(np.linalg.norm(inverse[1]))
+
+
+def _oscillation_amplitude(time: Array, signal: Array, sigma: float) -> float:
+    """Amplitude of the oscillation of a signal about a parabola in its first second, without noise."""
+    selected = np.flatnonzero(np.isfinite(signal) & (time <= OSCILLATION_WINDOW))
+    if len(selected) <= MIN_WINDOW_SAMPLES:
+        return 0.0
+    residual = signal[selected] - np.polyval(np.polyfit(time[selected], signal[selected], 2), time[selected])
+    return float(np.sqrt(max(2.0 * (float(np.mean(residual**2)) - sigma**2), 0.0)))

@@ -1,0 +1,321 @@
+"""Sensitivities of the innovations: the filter's run linearised, and how an absent effect would begin to act along it.
+
+With the filter's gain held, sensitivities ``S`` of the predicted state to parameters follow
+
+    dv = C S + D          S' = A (S - K dv) + B
+
+where ``C`` and ``A`` are the derivatives of the outputs and of the next state by the state, and ``D`` and ``B``
+those by the parameters. All but ``D`` and ``B`` belong to the run, so that any number of parameters costs one run.
+
+Source: Ljung (1999), System Identification, sec. 11.4; Anderson and Moore (1979), Optimal Filtering, ch. 5.
+
+With the effect's states ``z`` and their sensitivities ``Z`` to its parameters
+
+    dz/dt = g(x, z)        dZ/dt = g_z Z + g_p        d(dx/dt) = f_p + f_z Z        d(outputs) = h_p + h_z Z
+
+are taken along the run's states ``x``: an absent effect moves nothing, so it need not be simulated with them.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+import casadi
+import numpy as np
+from casadi import SX, Function
+from numpy.typing import NDArray
+
+from tautwire_fmu.laws.effects import Effect
+
+from ..recordings.recording import Recording
+from ..robot.schema import PER_CABLE_COMPONENTS, Robot
+from ..robot.symbolic_model import FreeParameter, symbolic_model
+from ..robot.uncertain_parameters import uncertain_parameters
+from .hypotheses import Hypothesis
+from .likelihood import Likelihood
+from .measurement_model import delayed_outputs
+from .native_functions import CompiledFunction, by_sample
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class LinearisedSegment:
+    """Linearised filter segment: Linearised filter segment: K successive samples of a run.
+
+    ``states`` (n, K + 1) as predicted and winch ``speeds`` (cables, K + 1), of the next sample too; ``step`` (K) and
+    ``shift`` (m, K) in s. ``transition`` A (K, n, n), ``half_transition`` the same from half a step before the next
+    sample, ``output_matrix`` C (K, m, n), ``gain`` K (K, n, m); ``whitening`` (K, m, m) makes innovations independent
+    with unit variance and is zero where nothing was ``observed`` (K, m). ``is_recorded``, ``values`` and
+    ``sensitivities`` as for FilterSegment, values and sensitivities zero where nothing was observed.
+    """
+
+    states: Array
+    speeds: Array
+    step: Array
+    shift: Array
+    transition: Array
+    half_transition: Array
+    output_matrix: Array
+    gain: Array
+    whitening: Array
+    observed: NDArray[np.bool_]
+    is_recorded: NDArray[np.bool_]
+    values: Array
+    sensitivities: Array
+
+    def propagate_sensitivities(
+        self, state_sensitivities: Array, state_forcing: Array, output_forcing: Array
+    ) -> tuple[Array, Array]:
+        """Sensitivities of the predicted state (n, p) after this segment, and of the whitened innovations (K, m, p).
+
+        ``state_forcing`` is B (K, n, p), ``output_forcing`` D (K, m, p).
+        """
+        output_changes = np.empty_like(output_forcing)
+        sensitivities = state_sensitivities
+        for k in range(len(output_forcing)):
+            output_changes[k] = self.output_matrix[k] @ sensitivities + output_forcing[k]
+            sensitivities = self.transition[k] @ (sensitivities - self.gain[k] @ output_changes[k]) + state_forcing[k]
+        return sensitivities, -(self.whitening @ output_changes)
+
+
+def linearise_filter(
+    likelihood: Likelihood, values: list[float], recording: Recording, acceleration_noise_density: float = 0.0
+) -> Iterator[LinearisedSegment]:
+    """Linearise a filter's run over a recording, segment by segment, at some values of its free parameters.
+
+    With ``acceleration_noise_density`` (m/s^2 per root hertz) the run follows what was measured where the model does
+    not.
+    """
+    theta = np.array(values, dtype=float)[:, None]
+    noise = likelihood.noise
+    variances = np.square(noise.of_outputs(likelihood.cable_count))
+    for segment in likelihood.segments(recording, values, acceleration_noise_density):
+        measured, observed, shift, speed, later, step, _ = segment.columns
+        count = measured.shape[1]
+        predicted = segment.states[:, :-1]
+        is_observed = observed.T[:, :, None] > 0.0
+        innovations = np.where(is_observed[:, :, 0], segment.values, 0.0)
+        output_matrix = by_sample(
+            likelihood.jacobians(count, predicted, predicted, theta, shift, speed, later, step)[0], count
+        )
+        cross_covariance = segment.covariances @ np.where(is_observed, output_matrix, 0.0).swapaxes(1, 2)
+        covariance = np.where(is_observed, output_matrix, 0.0) @ cross_covariance + np.diag(variances)
+        cholesky_factor = np.linalg.cholesky(covariance)
+        whitening = np.where(is_observed, np.linalg.inv(cholesky_factor), 0.0)
+        gain = cross_covariance @ np.linalg.inv(covariance)
+        corrections = np.einsum("kij,kjl,kl->ki", gain, cholesky_factor, innovations)
+        updated = predicted + corrections.T
+        _, *jacobians = likelihood.jacobians(count, predicted, updated, theta, shift, speed, later, step)
+        transition, half_transition = (by_sample(matrix, count) for matrix in jacobians)
+        yield LinearisedSegment(
+            segment.states,
+            np.hstack([speed, later[:, -1:]]),
+            step[0],
+            shift,
+            transition,
+            half_transition,
+            output_matrix,
+            gain,
+            whitening,
+            is_observed[:, :, 0],
+            segment.is_recorded,
+            innovations,
+            np.where(is_observed, segment.sensitivities, 0.0),
+        )
+
+
+# Integration steps of an effect's states in a sample; they can be stiffer than the robot.
+EFFECT_SUBSTEPS = 4
+
+
+@dataclass(frozen=True)
+class SensitivityColumn:
+    """A column of the sensitivities: an effect's parameter on a cable (none on the platform), at one grid point."""
+
+    effect: str
+    cables: tuple[int, ...]
+    parameter: str
+    trial: int
+
+
+class EffectSensitivities:
+    """Sensitivities to one effect, switched on and neutral on each cable alone, beside what a robot has already.
+
+    ``columns`` (p) name the parameters; ``values`` (p) where they begin; ``start_sensitivities`` (n, p) are those of
+    the start.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        effect: Effect,
+        cables: Sequence[int],
+        forms: Sequence[tuple[str, ...]],
+        trials: Sequence[Mapping[str, float]],
+        state_names: Sequence[str],
+    ) -> None:
+        cable_groups = [()] if effect.component not in PER_CABLE_COMPONENTS else [(cable,) for cable in cables]
+        free, extended_robot, fixed, nominal = [], robot, [], []
+        for group in cable_groups:
+            setting = Hypothesis(effect, group).neutral(robot, group)
+            extended_robot = extended_robot.with_effect(setting)
+            index = next(i for i, s in enumerate(extended_robot.effects) if (s.name, s.cables) == (effect.name, group))
+            names = list(dict.fromkeys(name for form in forms for name in form if name not in trials[0]))
+            free += [FreeParameter(index, name) for name in names]
+            nominal += [(group, name, float(setting.values[name])) for name in names]
+            fixed += [FreeParameter(index, name) for name in trials[0]]
+        self._grid_points = trials
+        self._moving_indices = [
+            _moving_parameters(nominal, forms, trial, number) for number, trial in enumerate(trials)
+        ]
+        self.columns = tuple(
+            SensitivityColumn(effect.name, nominal[i][0], nominal[i][1], number)
+            for number, kept in enumerate(self._moving_indices)
+            for i in kept
+        )
+        self.values = np.array([nominal[i][2] for kept in self._moving_indices for i in kept])
+        self._nominal_values = np.array([value for _, _, value in nominal])
+        self._shape_values = [np.tile(list(trial.values()), len(cable_groups)) for trial in trials]
+        self._compile(extended_robot, free, fixed, state_names, robot.cable_count)
+        self._effect_states_now = [self._initial_states(number)[0] for number in range(len(trials))]
+        self.start_sensitivities = np.hstack(
+            [self._initial_states(number)[1][:, kept] for number, kept in enumerate(self._moving_indices)]
+        )
+
+    def _compile(
+        self,
+        extended_robot: Robot,
+        free: Sequence[FreeParameter],
+        fixed: Sequence[FreeParameter],
+        state_names: Sequence[str],
+        cable_count: int,
+    ) -> None:
+        model = symbolic_model(extended_robot, [*free, *fixed], uncertain_parameters(extended_robot))
+        shared_indices = [model.state_names.index(name) for name in state_names]
+        effect_indices = [place for place in range(len(model.state_names)) if place not in shared_indices]
+        z, theta, p = model.states[effect_indices], model.parameters, model.parameters[: len(free)]
+        next_speed, step, shift = SX.sym("later", cable_count), SX.sym("step"), SX.sym("shift", 3 + cable_count)
+        state_sensitivities = SX.sym("slopes", len(effect_indices), len(free))
+        outputs = delayed_outputs(model, cable_count, next_speed, step, shift)
+        arguments = [model.states[shared_indices], z, state_sensitivities, model.inputs, theta]
+
+        def total_derivative(expression: SX) -> SX:
+            return casadi.densify(
+                casadi.jacobian(expression, p) + casadi.mtimes(casadi.jacobian(expression, z), state_sensitivities)
+            )
+
+        self._effect_state_count, self._parameter_count = len(effect_indices), len(free)
+        self._forcing_function = CompiledFunction(
+            Function(
+                "moved",
+                [*arguments, next_speed, step, shift],
+                [total_derivative(model.rates[shared_indices]), total_derivative(outputs)],
+            )
+        )
+        rates = Function(
+            "rates",
+            arguments,
+            [casadi.densify(model.rates[effect_indices]), total_derivative(model.rates[effect_indices])],
+        )
+        self._step_function = CompiledFunction(
+            _effect_state_step(rates, len(shared_indices), len(effect_indices), len(free), cable_count, theta.numel()),
+            carried=2,
+        )
+        start_sensitivities = casadi.jacobian(model.start[shared_indices], p)
+        self._start_function = Function(
+            "start", [theta], [casadi.densify(model.start[effect_indices]), casadi.densify(start_sensitivities)]
+        )
+        self._input_count = model.inputs.numel()
+
+    def _initial_states(self, trial: int) -> tuple[tuple[Array, Array], Array]:
+        effect_states, start = self._start_function(self._parameter_values(trial))
+        return (np.array(effect_states), np.zeros((self._effect_state_count, self._parameter_count))), np.array(start)
+
+    def _parameter_values(self, trial: int) -> Array:
+        theta: Array = np.append(self._nominal_values, self._shape_values[trial])
+        return theta
+
+    def forcing_terms(self, run: LinearisedSegment) -> tuple[Array, Array]:
+        """Forcing terms of the sensitivities along the next segment of the run: B (K, n, p) and D (K, m, p)."""
+        per_trial = [self._forcing_at_grid_point(run, number) for number in range(len(self._grid_points))]
+        state_forcing, output_forcing = (np.concatenate(parts, axis=2) for parts in zip(*per_trial, strict=True))
+        return state_forcing, output_forcing
+
+    def _forcing_at_grid_point(self, run: LinearisedSegment, trial: int) -> tuple[Array, Array]:
+        """Forcing terms along the predicted states, which the noise of what they predict has not touched."""
+        theta, count = self._parameter_values(trial)[:, None], run.states.shape[1]
+        inputs = np.vstack([run.speeds, np.zeros((self._input_count - len(run.speeds), count))])
+        effect_states, sensitivities = self._propagate_effect_states(run, theta, trial)
+        instant = [_with_last_column_repeated(column) for column in (run.speeds[:, 1:], run.step[None, :], run.shift)]
+        derivatives = self._forcing_function(count, run.states, effect_states, sensitivities, inputs, theta, *instant)
+        rate_sensitivities, output_sensitivities = (
+            by_sample(part, count)[:, :, self._moving_indices[trial]] for part in derivatives
+        )
+        begin, end = rate_sensitivities[:-1], rate_sensitivities[1:]
+        state_forcing = (
+            run.step[:, None, None] / 6.0 * (run.transition @ begin + 2.0 * run.half_transition @ (begin + end) + end)
+        )
+        return state_forcing, output_sensitivities[:-1]
+
+    def _propagate_effect_states(self, run: LinearisedSegment, theta: Array, trial: int) -> tuple[Array, Array]:
+        """The effect's states (z, K + 1) and their sensitivities (z, p x (K + 1))."""
+        count, parameter_count = len(run.step), self._parameter_count
+        if not self._effect_state_count:
+            return np.zeros((0, count + 1)), np.zeros((0, parameter_count * (count + 1)))
+        interval_ends = (run.states[:, :-1], run.states[:, 1:], run.speeds[:, :-1], run.speeds[:, 1:])
+        effect_states, sensitivities = self._step_function(
+            count, *self._effect_states_now[trial], *interval_ends, run.step[None, :], theta
+        )
+        self._effect_states_now[trial] = (effect_states[:, -1:], sensitivities[:, parameter_count * count :])
+        return effect_states, sensitivities
+
+
+def _with_last_column_repeated(columns: Array) -> Array:
+    """The columns, with the last one twice."""
+    return np.hstack([columns, columns[:, -1:]])
+
+
+def _moving_parameters(
+    nominal: Sequence[tuple[tuple[int, ...], str, float]],
+    forms: Sequence[tuple[str, ...]],
+    trial: Mapping[str, float],
+    trial_index: int,
+) -> list[int]:
+    """Indices of the parameters that differ from one grid point to the next; at the first all."""
+    moving = {name for form in forms if set(form) & set(trial) for name in form}
+    return [i for i, (_, name, _) in enumerate(nominal) if trial_index == 0 or name in moving]
+
+
+def _effect_state_step(
+    rates: Function, state_count: int, effect_state_count: int, parameter_count: int, cable_count: int, value_count: int
+) -> Function:
+    """One sample's step of the effect's states and their sensitivities, straight between two states of the run."""
+    z, sensitivities = SX.sym("z", effect_state_count), SX.sym("slopes", effect_state_count, parameter_count)
+    begin, end = SX.sym("begin", state_count), SX.sym("end", state_count)
+    speed, later = SX.sym("speed", cable_count), SX.sym("later", cable_count)
+    step, theta = SX.sym("step"), SX.sym("theta", value_count)
+
+    def rates_at(fraction: float, effect_states: SX, effect_sensitivities: SX) -> list[SX]:
+        state = begin + fraction * (end - begin)
+        inputs = casadi.vertcat(speed + fraction * (later - speed), SX(3, 1))
+        return list(rates(state, effect_states, effect_sensitivities, inputs, theta))
+
+    next_states, next_sensitivities = z, sensitivities
+    substep = step / EFFECT_SUBSTEPS
+    for k in range(EFFECT_SUBSTEPS):
+        begin_fraction, middle_fraction, end_fraction = (
+            k / EFFECT_SUBSTEPS,
+            (k + 0.5) / EFFECT_SUBSTEPS,
+            (k + 1.0) / EFFECT_SUBSTEPS,
+        )
+        a = rates_at(begin_fraction, next_states, next_sensitivities)
+        b = rates_at(middle_fraction, next_states + 0.5 * substep * a[0], next_sensitivities + 0.5 * substep * a[1])
+        c = rates_at(middle_fraction, next_states + 0.5 * substep * b[0], next_sensitivities + 0.5 * substep * b[1])
+        d = rates_at(end_fraction, next_states + substep * c[0], next_sensitivities + substep * c[1])
+        next_states = next_states + substep / 6.0 * (a[0] + 2.0 * (b[0] + c[0]) + d[0])
+        next_sensitivities = next_sensitivities + substep / 6.0 * (a[1] + 2.0 * (b[1] + c[1]) + d[1])
+    return Function(
+        "own_step", [z, sensitivities, begin, end, speed, later, step, theta], [next_states, next_sensitivities]
+    )

@@ -1,0 +1,259 @@
+"""Optimal input design: winch programs that maximise the smallest separation between effects within limits.
+
+The separation follows from linearising the estimator's filter along the program: an effect ``i`` of the size at which
+fits start, with signature ``a_i``, is ``|a_i|^2 (1 - cos^2) / 2`` nats from the best that effect ``j`` can do in its
+place.
+
+Source: optimal input design, Goodwin and Payne (1977), Dynamic System Identification, ch. 6; differential evolution,
+Storn and Price (1997), J. Global Optimization 11, 341-359.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+from math import log10
+
+import numpy as np
+import pandas as pd
+from numpy.typing import NDArray
+from scipy.optimize import Bounds, differential_evolution
+
+from ..errors import InputError, TautwireError
+from ..recordings.recording import Recording
+from ..robot.schema import Robot
+from ..robot.static_equilibrium import static_tensions
+from ..robot.trajectory import ideal_winch_speeds
+from .estimation_data import DataSet
+from .hypotheses import Hypothesis, hypotheses
+from .identifiability import separation_nats, start_steps
+from .kalman_filter import Noise
+from .likelihood import Likelihood
+from .measurement_noise import estimate_noise
+from .multisine import MultisinePath
+from .parameter_fit import Fitter
+from .score_test import score_statistics
+
+Array = NDArray[np.float64]
+Progress = Callable[[str, float], None]
+
+# Sines of each axis: slow ones that cover the workspace, and one near the lowest modes.
+SLOW_SINES, FAST_SINES = 2, 1
+SHRINK_FACTOR, MAX_SHRINKS = 0.7, 12
+INFEASIBLE_SCORE, MIN_SEPARATION = -99.0, 1e-12
+
+
+class ExcitationError(TautwireError):
+    """No program within the limits was found; carries the number of trials."""
+
+    def __init__(self, trial_count: int) -> None:
+        self.trial_count = trial_count
+        super().__init__(
+            f"none of {trial_count} programs keeps the winch speeds and tensions within their limits: "
+            "give more --speed or less --reach, or wider [tension] limits in the robot file"
+        )
+
+
+@dataclass(frozen=True)
+class ExcitationLimits:
+    """Limits of an excitation: winch speed in m/s, distance from the start along each axis in m, tensions in N."""
+
+    speed: float
+    reach: float
+    min_tension: float
+    max_tension: float
+
+
+@dataclass(frozen=True)
+class EffectSeparation:
+    """Separation of an effect from the best that another can do in its place, in nats."""
+
+    effect: Hypothesis
+    other: Hypothesis
+    nats: float
+
+
+@dataclass(frozen=True)
+class Excitation:
+    """Excitation program: ``time`` (N,) in s, ``winch_speed`` (N, n) in m/s, and separations, the closest pair first.
+
+    ``median_separation`` is the smallest separation in nats of the median program that was tried.
+    """
+
+    path: MultisinePath
+    time: Array
+    winch_speed: Array
+    pairs: tuple[EffectSeparation, ...]
+    median_separation: float
+
+    def frame(self) -> pd.DataFrame:
+        """A table in the form of a recording: time and winch_speed_i."""
+        names = [f"winch_speed_{i + 1}" for i in range(self.winch_speed.shape[1])]
+        return pd.DataFrame(np.column_stack([self.time, self.winch_speed]), columns=["time", *names])
+
+
+def design_excitation(
+    robot: Robot,
+    effects: Sequence[Hypothesis],
+    limits: ExcitationLimits,
+    duration: float,
+    interval: float,
+    programs: int,
+    seed: int,
+    progress: Progress,
+) -> Excitation:
+    """Design the motion that maximises the smallest separation between effects; the same for the same seed.
+
+    ``duration`` and sample ``interval`` in s. About so many ``programs`` are tried, by differential evolution.
+
+    Raises ExcitationError where none is within the limits.
+    """
+    declared = robot.sensors
+    noise = Noise(declared.position_noise or 0.0, declared.tension_noise or 0.0, declared.winch_speed_noise or 0.0, 0.0)
+    likelihood = Likelihood(robot, (), noise, interval)
+    design = _DesignProblem(robot, tuple(effects), limits, duration, interval, likelihood)
+    count = 6 * (SLOW_SINES + FAST_SINES)
+    bounds = Bounds(np.zeros(count), np.ones(count))
+    generations = max(1, programs // count - 1)
+    scores: list[float] = []
+
+    def cost(decision_variables: Array) -> float:
+        progress("trying programs", min(len(scores) / ((generations + 1) * count), 1.0))
+        scores.append(design.score(decision_variables))
+        return -scores[-1]
+
+    best = differential_evolution(
+        cost, bounds, init="sobol", popsize=1, maxiter=generations, polish=False, seed=seed, tol=0.0
+    )
+    if max(scores) <= INFEASIBLE_SCORE:
+        raise ExcitationError(len(scores))
+    path = design.path(best.x)
+    time, speed = design.sampled_program(path)
+    median_separation = 10.0 ** float(np.median([score for score in scores if score > INFEASIBLE_SCORE]))
+    return Excitation(path, time, speed, tuple(design.separations(path)), median_separation)
+
+
+@dataclass(frozen=True)
+class _DesignProblem:
+    robot: Robot
+    effects: tuple[Hypothesis, ...]
+    limits: ExcitationLimits
+    duration: float
+    interval: float
+    likelihood: Likelihood
+
+    def score(self, decision_variables: Array) -> float:
+        """Log10 of the smallest separation in nats."""
+        try:
+            pairs = self.separations(self.path(decision_variables))
+        except _InfeasibleError:
+            return INFEASIBLE_SCORE
+        return log10(max(pairs[0].nats, MIN_SEPARATION)) if pairs else INFEASIBLE_SCORE
+
+    def path(self, decision_variables: Array) -> MultisinePath:
+        """Decode decision variables between 0 and 1 into a path, shrunk until it is within the limits."""
+        amplitude, frequency_fraction = np.asarray(decision_variables).reshape(2, SLOW_SINES + FAST_SINES, 3)
+        slowest, middle, fastest = 1.0 / self.duration, 6.0 / self.duration, 0.2 / self.interval
+        begin = np.array([slowest] * SLOW_SINES + [middle] * FAST_SINES)[:, None]
+        end = np.array([middle] * SLOW_SINES + [max(min(fastest, 3.0), middle)] * FAST_SINES)[:, None]
+        frequencies = begin * (end / begin) ** frequency_fraction
+        # Amplitudes are limited by speed too: a fast sine is small.
+        max_amplitude = np.minimum(
+            self.limits.reach / (SLOW_SINES + FAST_SINES), self.limits.speed / (2.0 * np.pi * frequencies)
+        )
+        path = MultisinePath(
+            self.robot.platform.start, self.duration, _as_rows(amplitude * max_amplitude), _as_rows(frequencies)
+        )
+        for _ in range(MAX_SHRINKS):
+            if self._is_within_limits(path):
+                return path
+            path = path.scaled(SHRINK_FACTOR)
+        raise _InfeasibleError
+
+    def sampled_program(self, path: MultisinePath) -> tuple[Array, Array]:
+        time = np.asarray(self.interval * np.arange(round(self.duration / self.interval) + 1), dtype=np.float64)
+        return time, ideal_winch_speeds(self.robot, path, time)
+
+    def _is_within_limits(self, path: MultisinePath) -> bool:
+        _, speed = self.sampled_program(path)
+        if np.max(np.abs(speed)) > self.limits.speed:
+            return False
+        tension = self._simulate(path).tension
+        min_tension, max_tension = float(np.min(tension)), float(np.max(tension))
+        return bool(self.limits.min_tension <= min_tension and max_tension <= self.limits.max_tension)
+
+    def _simulate(self, path: MultisinePath) -> Recording:
+        """Simulated recording of sensors without noise."""
+        time, speed = self.sampled_program(path)
+        unmeasured = np.full(speed.shape, np.nan)
+        template = Recording("program", time, speed, unmeasured, unmeasured[:, :3])
+        outputs = self.likelihood.simulated_outputs(template, ())
+        return replace(template, position=outputs[:, :3], tension=outputs[:, 3:])
+
+    def separations(self, path: MultisinePath) -> list[EffectSeparation]:
+        """Separations of each effect from each other, the closest first."""
+        recording = self._simulate(path)
+        fitter = Fitter(estimate_noise(self.robot, recording))
+        sample = DataSet(recording, self.robot.platform.start, np.ones(len(recording.time), dtype=bool))
+        signatures = score_statistics(self.robot, (), self.effects, fitter, sample)
+        start_directions = {one: start_steps(signatures, self.robot, one) for one in self.effects}
+        # An effect that this motion would not show at all (slack, where no rope hangs) does not rank programs.
+        visible_effects = [
+            one
+            for one, move in start_directions.items()
+            if float((move.T @ signatures.fisher_information @ move)[0, 0]) > 0.0
+        ]
+        separations = [
+            EffectSeparation(one, other, separation_nats(signatures, start_directions[one], other))
+            for one in visible_effects
+            for other in visible_effects
+            if one.effect is not other.effect
+        ]
+        return sorted(separations, key=lambda pair: pair.nats)
+
+
+class _InfeasibleError(Exception):
+    """Even a small motion along this path breaks a limit."""
+
+
+def _as_rows(matrix: Array) -> tuple[tuple[float, float, float], ...]:
+    return tuple((float(x), float(y), float(z)) for x, y, z in matrix)
+
+
+DEFAULT_SPEED_LIMIT = 0.5
+# Shares of the mean rope length, of the smallest and of the largest static tension.
+DEFAULT_REACH_RATIO, MIN_TENSION_RATIO, MAX_TENSION_RATIO = 0.05, 0.1, 3.0
+
+
+def default_limits(robot: Robot, speed: float | None = None, reach: float | None = None) -> ExcitationLimits:
+    """Default limits: [winch] speed_limit or 0.5 m/s, a twentieth of the mean rope length, and [tension].
+
+    Without [tension] a tenth of the least static tension to three times the largest.
+    """
+    tensions = static_tensions(robot)
+    lengths = np.linalg.norm(np.array(robot.anchors) - np.array(robot.platform.start), axis=1)
+    declared_speed = robot.winch.speed_limit if robot.winch else None
+    return ExcitationLimits(
+        speed=speed or declared_speed or DEFAULT_SPEED_LIMIT,
+        reach=reach or DEFAULT_REACH_RATIO * float(np.mean(lengths)),
+        min_tension=robot.tension.minimum if robot.tension else MIN_TENSION_RATIO * float(np.min(tensions)),
+        max_tension=robot.tension.maximum if robot.tension else MAX_TENSION_RATIO * float(np.max(tensions)),
+    )
+
+
+def effects_by_name(robot: Robot, names: str | None) -> tuple[Hypothesis, ...]:
+    """The hypotheses on all cables or the platform, of the effects that a list with commas names, or of all.
+
+    Raises InputError for a name that is no effect, and for fewer than two.
+    """
+    candidates = [h for h in hypotheses(robot) if h.cables in ((), robot.cable_numbers)]
+    if names is None:
+        return tuple(candidates)
+    requested = [name.strip() for name in names.split(",") if name.strip()]
+    available = sorted({hypothesis.effect.name for hypothesis in candidates})
+    for name in requested:
+        if name not in available:
+            raise InputError("--effects", f"{name!r} is no effect on all cables", f"take from {', '.join(available)}")
+    if len(set(requested)) < 2:
+        raise InputError("--effects", "fewer than two effects", "name two at least, such as damping,relaxation")
+    return tuple(hypothesis for hypothesis in candidates if hypothesis.effect.name in requested)

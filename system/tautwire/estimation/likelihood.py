@@ -1,0 +1,279 @@
+"""Likelihood of a recording under a robot with its effects: an extended Kalman filter's innovations.
+
+The filter predicts each sample from all before it, so noise of the winch speeds, which integrates into a drift of
+the unstrained lengths, is accounted for instead of piling up as in plain simulation. With innovations ``e_k`` of
+variance ``s_k``
+
+    log p(recording) = -1/2 sum_k (e_k^2 / s_k + log s_k + log 2 pi)
+
+Source: Ljung (1999), System Identification, sec. 7.4.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator, Sequence
+from dataclasses import dataclass
+from functools import cached_property
+from math import log, pi
+
+import casadi
+import numpy as np
+from numpy.typing import NDArray
+
+from ..recordings.recording import Recording
+from ..robot.schema import Robot
+from ..robot.symbolic_model import FreeParameter, symbolic_model
+from ..robot.uncertain_parameters import uncertain_parameters
+from .initial_state_prior import initial_covariance
+from .kalman_filter import Noise, filter_jacobians, filter_step, substeps_of_robot
+from .native_functions import CompiledFunction, by_sample
+
+Array = NDArray[np.float64]
+
+CHUNK_SAMPLES = 500
+# In medians of the sample interval.
+MAX_STEP_TO_MEDIAN = 1.5
+
+
+@dataclass(frozen=True)
+class Innovations:
+    """Whitened innovations of N samples of m outputs, NaN where nothing was ``observed`` (N, m).
+
+    ``values`` (N, m) have unit variance where the model is right; ``sensitivities`` (N, m, p) are their derivatives by
+    the free parameters; ``log_variances`` (N, m) the log of the variances that they were divided by.
+    """
+
+    observed: NDArray[np.bool_]
+    values: Array
+    sensitivities: Array
+    log_variances: Array
+
+    def log_likelihood(self, rows: NDArray[np.bool_]) -> float:
+        """Log of the probability density, in SI units, of the samples in ``rows`` given those before them."""
+        mask = self.observed & rows[:, None]
+        terms = self.values[mask] ** 2 + self.log_variances[mask] + log(2.0 * pi)
+        return float(-0.5 * np.sum(terms))
+
+    def mean_square(self, rows: NDArray[np.bool_]) -> Array:
+        """Mean square of each output's innovations, shape (m,); one where the model is right, NaN if unobserved."""
+        count = np.sum(self.observed[rows], axis=0)
+        total = np.nansum(self.values[rows] ** 2, axis=0)
+        return np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0)
+
+
+@dataclass(frozen=True)
+class FilterSegment:
+    """Filter segment: K successive samples of a filter's run.
+
+    ``columns`` are measured, observed and shift (m, K), speed and next speed (cables, K), time step and drift (1, K);
+    ``is_recorded`` tells which samples are the recording's, the others fill gaps. ``states`` (n, K + 1) and
+    ``covariances`` (K, n, n) are those predicted; ``values``, ``log_variances`` (K, m) and ``sensitivities`` (K, m, p)
+    as in Innovations.
+    """
+
+    columns: tuple[Array, ...]
+    is_recorded: NDArray[np.bool_]
+    states: Array
+    covariances: Array
+    values: Array
+    log_variances: Array
+    sensitivities: Array
+
+
+class Likelihood:
+    """Innovations of recordings under a robot whose free parameters vary; compiled once."""
+
+    def __init__(self, robot: Robot, free: Sequence[FreeParameter], noise: Noise, sample_time: float) -> None:
+        self.uncertain = uncertain_parameters(robot)
+        self.model = symbolic_model(robot, free, self.uncertain)
+        self.robot = robot
+        self.noise = noise
+        self.cable_count = robot.cable_count
+        self._start_function = casadi.Function(
+            "start",
+            [self.model.parameters],
+            [self.model.start, casadi.jacobian(self.model.start, self.model.parameters)],
+        )
+        state_count = self.model.states.numel()
+        has_effect_states = state_count > 6 + robot.cable_count + len(self.uncertain)
+        self.substeps = substeps_of_robot(robot, sample_time, state_count, has_effect_states)
+        self._lag_function = casadi.Function("lags", [self.model.parameters], [self.model.sensor_delays])
+        self._filter_function = CompiledFunction(
+            filter_step(self.model, robot.cable_count, noise, self.substeps), carried=3
+        )
+
+    def innovations(
+        self, recording: Recording, parameters: Sequence[float] | Array, acceleration_noise_density: float = 0.0
+    ) -> Innovations:
+        """Filter a recording at some values of the free parameters.
+
+        ``acceleration_noise_density`` (m/s^2 per root hertz) adds process noise, an unknown white acceleration of the
+        platform: a fit that starts far from the solution then follows the data instead of losing phase.
+        """
+        measured, shift = self._aligned_outputs(recording, parameters)
+        observed = np.isfinite(measured)
+        filter_segments = self._filter(
+            recording, measured, shift, parameters, self._start_covariance(), acceleration_noise_density
+        )
+        values, log_variances, sensitivities = _concatenated(filter_segments)
+        recorded = np.isfinite(recording.measured())
+        values[~recorded] = np.nan
+        log_variances[~recorded] = np.nan
+        _fill_unaligned(values, log_variances, sensitivities, recorded & ~observed)
+        return Innovations(recorded, values, sensitivities, log_variances)
+
+    @cached_property
+    def jacobians(self) -> CompiledFunction:
+        """See :func:`tautwire.estimation.kalman_filter.filter_jacobians`; compiled at first use."""
+        return CompiledFunction(filter_jacobians(self.model, self.cable_count, self.substeps))
+
+    def start(self, parameters: Sequence[float] | Array) -> tuple[Array, Array]:
+        """Initial state (n,) and covariance (n, n) of the filter."""
+        state, _ = self._start_function(np.asarray(parameters, dtype=float))
+        return np.array(state).ravel(), self._start_covariance()
+
+    def segments(
+        self, recording: Recording, parameters: Sequence[float] | Array, acceleration_noise_density: float = 0.0
+    ) -> Iterator[FilterSegment]:
+        """The filter's run over a recording, segment by segment: memory does not grow with its length.
+
+        For ``acceleration_noise_density`` see :meth:`innovations`.
+        """
+        measured, shift = self._aligned_outputs(recording, parameters)
+        yield from self._filter(
+            recording, measured, shift, parameters, self._start_covariance(), acceleration_noise_density
+        )
+
+    def simulated_outputs(self, recording: Recording, parameters: Sequence[float] | Array) -> Array:
+        """Simulated outputs without noise or lag over a recording's winch speeds, shape (N, m)."""
+        no_measurements = np.full(recording.measured().shape, np.nan)
+        outputs = casadi.vertcat(self.model.outputs[:3], self.model.outputs[6 : 6 + self.cable_count])
+        function = casadi.Function("shown", [self.model.states, self.model.inputs, self.model.parameters], [outputs])
+        no_force = np.zeros(self.model.inputs.numel() - self.cable_count)
+        parts = []
+        for segment in self._filter(
+            recording, no_measurements, np.zeros_like(no_measurements), parameters, self._start_covariance(), 0.0
+        ):
+            states, speeds = segment.states[:, :-1][:, segment.is_recorded], segment.columns[3][:, segment.is_recorded]
+            count = states.shape[1]
+            inputs = np.vstack([speeds, np.repeat(no_force[:, None], count, axis=1)])
+            theta = np.repeat(np.asarray(parameters, dtype=float)[:, None], count, axis=1)
+            parts.append(np.array(function.map(count)(states, inputs, theta)).T)
+        return np.vstack(parts)
+
+    def _aligned_outputs(self, recording: Recording, parameters: Sequence[float] | Array) -> tuple[Array, Array]:
+        lags = np.array(self._lag_function(np.asarray(parameters, dtype=float))).ravel()
+        return align_delayed_outputs(recording.time, recording.measured(), lags)
+
+    def open_loop_variances(self, recording: Recording, parameters: Sequence[float] | Array) -> Array:
+        """Variance of measured less simulated, shape (N, m), where the model is right and its start exact.
+
+        Noise of the sensors, and of the recorded winch speeds as it integrates.
+        """
+        no_measurements = np.full(recording.measured().shape, np.nan)
+        state_count = self.model.states.numel()
+        zero_covariance = np.zeros((state_count, state_count))
+        filter_segments = self._filter(
+            recording, no_measurements, np.zeros_like(no_measurements), parameters, zero_covariance, 0.0
+        )
+        _, log_variances, _ = _concatenated(filter_segments)
+        variances: Array = np.exp(log_variances)
+        return variances
+
+    def _filter(
+        self,
+        recording: Recording,
+        measured: Array,
+        shift: Array,
+        parameters: Sequence[float] | Array,
+        start_covariance: Array,
+        acceleration_noise_density: float,
+    ) -> Iterator[FilterSegment]:
+        theta = np.asarray(parameters, dtype=float)
+        columns, is_recorded = _filter_columns(recording, measured, shift)
+        state, sensitivities = self._start_function(theta)
+        filter_state = (np.array(state), start_covariance, np.array(sensitivities))
+        state_count, parameter_count = len(start_covariance), len(theta)
+        for begin in range(0, len(is_recorded), CHUNK_SAMPLES):
+            chunk = tuple(column[:, begin : begin + CHUNK_SAMPLES] for column in columns)
+            count = chunk[0].shape[1]
+            results = self._filter_function(
+                count, *filter_state, theta[:, None], *chunk, np.full((1, 1), acceleration_noise_density)
+            )
+            states, covariances, state_slopes, values, log_variances, innovation_sensitivities = results
+            yield FilterSegment(
+                chunk,
+                is_recorded[begin : begin + CHUNK_SAMPLES],
+                states,
+                by_sample(covariances, count + 1)[:-1],
+                values.T,
+                log_variances.T,
+                by_sample(innovation_sensitivities, count),
+            )
+            filter_state = (
+                states[:, -1:],
+                covariances[:, state_count * count :],
+                state_slopes[:, parameter_count * count :],
+            )
+
+    def _start_covariance(self) -> Array:
+        return initial_covariance(self.robot, self.noise, self.model.states.numel(), len(self.uncertain))
+
+
+def _concatenated(segments: Iterable[FilterSegment]) -> tuple[Array, Array, Array]:
+    """Innovations, log variances and sensitivities of the recording's samples."""
+    parts = [
+        (s.values[s.is_recorded], s.log_variances[s.is_recorded], s.sensitivities[s.is_recorded]) for s in segments
+    ]
+    values, log_variances, sensitivities = (np.concatenate(part) for part in zip(*parts, strict=True))
+    return values, log_variances, sensitivities
+
+
+def _fill_unaligned(values: Array, log_variances: Array, sensitivities: Array, unaligned: NDArray[np.bool_]) -> None:
+    """Samples that a lag leaves without a state count as noise: dropping them must neither pay nor cost."""
+    for column in np.flatnonzero(unaligned.any(axis=0)):
+        indices = np.flatnonzero(unaligned[:, column])
+        values[indices, column] = np.where(indices % 2, 1.0, -1.0)
+        log_variances[indices, column] = np.median(np.delete(log_variances[:, column], indices))
+        sensitivities[indices, column] = 0.0
+
+
+def align_delayed_outputs(time: Array, measured: Array, lags: Array) -> tuple[Array, Array]:
+    """Align the outputs of sensors that lag with the state at each time: the sample nearest to time plus lag.
+
+    Returns the values, NaN where there is none, and by how many seconds later than the state they were shown.
+    """
+    values, shift = measured.copy(), np.zeros_like(measured)
+    half_interval = 0.5 * float(np.median(np.diff(time)))
+    for column in np.flatnonzero(lags > half_interval):
+        shown_at = time + lags[column]
+        following = np.clip(np.searchsorted(time, shown_at), 1, len(time) - 1)
+        nearest = np.where(shown_at - time[following - 1] < time[following] - shown_at, following - 1, following)
+        is_near = np.abs(time[nearest] - shown_at) <= 2.0 * half_interval
+        values[:, column] = np.where(is_near, measured[nearest, column], np.nan)
+        shift[:, column] = np.where(is_near, time[nearest] - time, 0.0)
+    return values, shift
+
+
+def _filter_columns(recording: Recording, measured: Array, shift: Array) -> tuple[tuple[Array, ...], NDArray[np.bool_]]:
+    """The filter's inputs, a column a sample, and whether each is one of the recording's samples.
+
+    A gap in time is filled with samples without measurements, so that no step is longer than usual.
+    """
+    steps = np.diff(recording.time)
+    step_counts = np.maximum(np.ceil(steps / (MAX_STEP_TO_MEDIAN * np.median(steps))), 1).astype(int)
+    rows = np.append(0, np.cumsum(step_counts))
+    time = np.interp(np.arange(rows[-1] + 1), rows, recording.time)
+    speed = np.array([np.interp(time, recording.time, column) for column in recording.winch_speed.T])
+    measured_columns = np.zeros((measured.shape[1], len(time)))
+    observed_columns, shift_columns = np.zeros_like(measured_columns), np.zeros_like(measured_columns)
+    observed = np.isfinite(measured)
+    measured_columns[:, rows] = np.where(observed, measured, 0.0).T
+    observed_columns[:, rows] = observed.T
+    shift_columns[:, rows] = shift.T
+    step = np.append(np.diff(time), 0.0)
+    drift = step * np.append(np.repeat(steps, step_counts), 0.0)
+    speeds = (speed, np.hstack([speed[:, 1:], speed[:, -1:]]))
+    is_recorded = np.zeros(len(time), dtype=bool)
+    is_recorded[rows] = True
+    return (measured_columns, observed_columns, shift_columns, *speeds, step[None, :], drift[None, :]), is_recorded

@@ -1,0 +1,1 @@
+"""Localisation of model error: residuals of single FMUs at their measured ports."""

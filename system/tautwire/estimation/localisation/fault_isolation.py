@@ -1,0 +1,148 @@
+"""Fault isolation: which component is in question, by which residuals at the measured ports exceed noise."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+
+from .component_residuals import PLATFORM, ComponentResidual
+
+UNDETERMINED = "cannot tell"
+NO_COMPONENT = "nothing"
+
+
+def isolate_fault(
+    deviating_by_cable: Mapping[int, bool],
+    platform_deviates: bool | None,
+    balance_closes: bool = False,
+    exit_candidates: Collection[int] = (),
+) -> str:
+    """The component in question, by the pattern of significant residuals.
+
+    ``deviating_by_cable`` tells by number whether the tension of a cable's FMU deviates, without cables that could not
+    be evaluated; ``platform_deviates`` whether the platform's balance does, None where it could not be.
+    ``balance_closes`` tells that the balance closes with the tensions of those cables' FMUs; ``exit_candidates`` are
+    cables whose residual a shifted exit point would explain without showing in the balance.
+
+    ==================== ================ ====================================================
+    deviating tensions   platform's force component
+    ==================== ================ ====================================================
+    none                 within noise     nothing
+    none                 deviates         platform
+    of cable i           within noise     cable i (rope or winch): its measured tension is real
+    of cable i           deviates, closes load cell i, or friction between it and the platform
+    of cable i           deviates         load cell i or exit point i, or several components
+    of cable i           not known        cable i (rope, winch, load cell or exit point)
+    none                 not known        nothing in these cables, cannot tell more
+    not known            not known        cannot tell
+    ==================== ================ ====================================================
+
+    Where all of several cables deviate the position sensor is in question as well.
+    """
+    deviating_cables = [number for number, is_off in deviating_by_cable.items() if is_off]
+    position_sensor = ["the position sensor"] if len(deviating_cables) == len(deviating_by_cable) > 1 else []
+    if platform_deviates is None:
+        return _without_balance(deviating_by_cable, deviating_cables)
+    if not deviating_cables:
+        return PLATFORM if platform_deviates else NO_COMPONENT
+    if not platform_deviates:
+        cable_parts = "rope, winch or exit point" if set(deviating_cables) <= set(exit_candidates) else "rope or winch"
+        return alternatives([f"{numbered('cable', deviating_cables)} ({cable_parts})", *position_sensor])
+    if balance_closes:
+        return alternatives(
+            [
+                numbered("load cell", deviating_cables),
+                "friction before it" if len(deviating_cables) == 1 else "friction before them",
+            ]
+        )
+    return alternatives(
+        [
+            numbered("load cell", deviating_cables),
+            numbered("exit point", deviating_cables),
+            *position_sensor,
+            "several components",
+        ]
+    )
+
+
+def isolation_verdict(
+    cables: Sequence[ComponentResidual],
+    platform: Sequence[ComponentResidual],
+    balance_closes: bool = False,
+    exit_candidates: Collection[int] = (),
+) -> tuple[str, str]:
+    """The component in question, and the sentence that says why; ``platform`` is empty where it was not evaluated."""
+    deviating_by_cable = {int(part.component.split()[1]): part.is_significant for part in cables}
+    faulty_component = isolate_fault(
+        deviating_by_cable,
+        any(part.is_significant for part in platform) if platform else None,
+        balance_closes,
+        exit_candidates,
+    )
+    facts = [*_cable_facts(cables), *_platform_facts(platform)]
+    oscillating = [part for part in platform if part.is_significant and part.resonance_frequency is not None]
+    if faulty_component == PLATFORM and oscillating:
+        frequency = max(oscillating, key=lambda part: part.ratio).resonance_frequency
+        facts.append(f"it rings at {frequency:.2f} Hz, as something that swings or shakes by itself does")
+    evidence = "; ".join(facts)
+    conclusion = {PLATFORM: "it is at the platform", NO_COMPONENT: "nothing is off"}.get(
+        faulty_component, f"in question: {faulty_component}"
+    )
+    return (
+        faulty_component,
+        f"{evidence[:1].upper()}{evidence[1:]}. {conclusion[:1].upper()}{conclusion[1:]}."
+        if evidence
+        else _verdict_without_evidence(faulty_component),
+    )
+
+
+def _verdict_without_evidence(faulty_component: str) -> str:
+    return f"{faulty_component[:1].upper()}{faulty_component[1:]} which component is off."
+
+
+def _cable_facts(cables: Sequence[ComponentResidual]) -> list[str]:
+    deviating = [part for part in cables if part.is_significant]
+    if not deviating:
+        subject = "the cables' tensions are" if len(cables) > 1 else "the cable's tension is"
+        return [f"{subject} within noise"] if cables else []
+    if len(deviating) == 1:
+        return [f"{deviating[0].component}'s tension is {_deviation_text(deviating[0])}"]
+    worst = max(deviating, key=lambda part: part.ratio)
+    numbers = numbered("cable", [int(part.component.split()[1]) for part in deviating])
+    return [f"the tensions of {numbers} are off, that of {worst.component} most: {_deviation_text(worst)}"]
+
+
+def _platform_facts(platform: Sequence[ComponentResidual]) -> list[str]:
+    if not platform:
+        return []
+    worst = max(platform, key=lambda part: part.ratio)
+    if not worst.is_significant:
+        return ["the platform's force balance is within its noise"]
+    return [f"the platform's {worst.quantity} is {_deviation_text(worst)}"]
+
+
+def _deviation_text(part: ComponentResidual) -> str:
+    return f"off by {_two_digits(part.rms)} {part.unit} rms (expected {_two_digits(part.expected_rms)} {part.unit})"
+
+
+def _two_digits(value: float) -> str:
+    """Two significant digits, without an exponent."""
+    return f"{value:.0f}" if value >= 10.0 else f"{value:.2g}"
+
+
+def _without_balance(deviating_by_cable: Mapping[int, bool], deviating_cables: Sequence[int]) -> str:
+    if deviating_cables:
+        return f"{numbered('cable', deviating_cables)} (rope, winch, load cell or exit point)"
+    if deviating_by_cable:
+        return f"nothing in {numbered('cable', list(deviating_by_cable))}; {UNDETERMINED} more"
+    return UNDETERMINED
+
+
+def numbered(noun: str, numbers: Sequence[int]) -> str:
+    """As in "cable 2" and "cables 1, 3"."""
+    return f"{noun}{'s' if len(numbers) > 1 else ''} {', '.join(map(str, numbers))}"
+
+
+def alternatives(names: Sequence[str]) -> str:
+    """As in "a", "a or b" and "a; b or c" where names have commas of their own."""
+    *before, last = names
+    return f"{'; '.join(before)} or {last}" if before else last

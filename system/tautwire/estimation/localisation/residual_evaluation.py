@@ -1,0 +1,125 @@
+"""Residual evaluation: each component residual against the noise that it would have if the model were right."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ...recordings.recording import Recording
+from ..kalman_filter import Noise
+from ..residual_spectrum import resonance_frequency
+from .cable_simulation import AXES, CableSimulation, drift_variance, tension_variance
+from .component_residuals import PLATFORM, ComponentResidual, root_mean_square, strongest_correlation
+from .force_balance import ForceBalance
+from .path_smoothing import SmoothedPath
+
+Array = NDArray[np.float64]
+
+SIGNIFICANT_SIGMAS = 5.0
+NEGLIGIBLE_EXCESS = 0.1
+# Relative standard deviation of the mean square of a random walk about its mean.
+RANDOM_WALK_DEVIATION = 0.9
+
+
+def cable_residual(
+    number: int, run: CableSimulation, recording: Recording, path: SmoothedPath, noise: Noise, anchor: Array
+) -> ComponentResidual:
+    """Residual of a cable: its load cell (``number`` from 1) less its FMU, without the mean, that of the start tension.
+
+    With ``k`` the sensitivities of the tension, ``P`` the path's covariance, ``kappa`` the stiffness and ``t`` the time
+
+        expected^2 = sigma_T^2 + k' P k + kappa^2 sigma_V^2 sum h^2, the last less that of its mean
+    """
+    load_cell_noise = noise.of_outputs(recording.cable_count)[2 + number]
+    residual = recording.tension[:, number - 1] - run.tension
+    is_measured = np.isfinite(residual)
+    mean = float(np.mean(residual[is_measured]))
+    residual = residual - mean
+    drift, drift_of_mean = drift_variance(run, path.time, noise.winch_speed)
+    steady_variance = float(np.mean(tension_variance(run, path, load_cell_noise, noise.winch_speed)[is_measured]))
+    drift_excess = max(float(np.mean(drift[is_measured])) - drift_of_mean, 0.0)
+    expected = steady_variance + drift_excess
+    independent_samples = (
+        2.0 * (path.time[-1] - path.time[0]) * float(np.min(path.cutoff[path.measured])) / (2.0 * np.pi)
+    )
+    path_variance = max(steady_variance - load_cell_noise**2, 0.0)
+    terms = (
+        load_cell_noise**2 * np.sqrt(2.0 / np.sum(is_measured)),
+        path_variance * np.sqrt(2.0 / max(independent_samples, 1.0)),
+        RANDOM_WALK_DEVIATION * drift_excess,
+    )
+    return ComponentResidual(
+        component=f"cable {number}",
+        quantity="tension",
+        unit="N",
+        residual=residual,
+        mean=mean,
+        rms=root_mean_square(residual),
+        expected_rms=float(np.sqrt(expected)),
+        threshold=_threshold(float(np.sqrt(np.sum(np.square(terms)))) / expected),
+        correlated_signal=strongest_correlation(
+            residual, _cable_signals(run, recording.winch_speed[:, number - 1], path, anchor)
+        ),
+    )
+
+
+def platform_residual(axis: int, balance: ForceBalance, path: SmoothedPath) -> ComponentResidual:
+    """Residual of the platform: the missing force along an axis."""
+    residual = balance.force[:, axis]
+    is_known = np.isfinite(residual)
+    expected = root_mean_square(balance.expected_deviation[is_known, axis])
+    duration = (path.time[-1] - path.time[0]) * float(np.mean(is_known))
+    independent_samples = max(2.0 * duration * float(balance.cutoff[axis]) / (2.0 * np.pi), 1.0)
+    return ComponentResidual(
+        component=PLATFORM,
+        quantity=f"force {AXES[axis]}",
+        unit="N",
+        residual=residual,
+        mean=float(np.mean(residual[is_known])) if np.any(is_known) else float("nan"),
+        rms=root_mean_square(residual),
+        expected_rms=expected,
+        threshold=_threshold(np.sqrt(2.0 / independent_samples)),
+        correlated_signal=strongest_correlation(residual, _platform_signals(path)),
+        resonance_frequency=resonance_frequency(
+            path.time, residual, path.acceleration[:, axis], float(balance.cutoff[axis])
+        ),
+    )
+
+
+def _threshold(deviation: float) -> float:
+    """Threshold of the ratio that chance does not reach, by the relative standard deviation of the mean square."""
+    return float(np.sqrt(1.0 + SIGNIFICANT_SIGMAS * deviation + NEGLIGIBLE_EXCESS))
+
+
+def _cable_signals(run: CableSimulation, winch_speed: Array, path: SmoothedPath, anchor: Array) -> dict[str, Array]:
+    line = anchor - path.position
+    length = np.linalg.norm(line, axis=1)
+    stretch_rate = winch_speed - np.sum(line * path.velocity, axis=1) / length
+    travel = np.concatenate([[0.0], np.cumsum(0.5 * (winch_speed[1:] + winch_speed[:-1]) * np.diff(path.time))])
+    return {
+        "strain rate": stretch_rate / length,
+        "tension": run.tension,
+        "winch travel": travel,
+        "winch speed": winch_speed,
+        "direction of the winch": np.sign(np.sum(line * path.velocity, axis=1)),
+        "direction of stretching": np.sign(stretch_rate),
+        **_slow_signals(path),
+    }
+
+
+def _platform_signals(path: SmoothedPath) -> dict[str, Array]:
+    speed = np.linalg.norm(path.velocity, axis=1)
+    motion = {
+        "velocity": path.velocity,
+        "velocity times speed": path.velocity * speed[:, None],
+        "acceleration": path.acceleration,
+    }
+    by_axis = {f"{name} {axis}": values[:, k] for name, values in motion.items() for k, axis in enumerate(AXES)}
+    return {**by_axis, "speed": speed, **_slow_signals(path)}
+
+
+def _slow_signals(path: SmoothedPath) -> dict[str, Array]:
+    """Slow signals: position, time, and a drift that settles as that of a temperature does."""
+    relative_time = (path.time - path.time[0]) / (path.time[-1] - path.time[0])
+    positions = {f"position {axis}": path.position[:, k] for k, axis in enumerate(AXES) if path.measured[k]}
+    return {**positions, "time": relative_time, "a drift that settles": 1.0 - np.exp(-4.0 * relative_time)}

@@ -1,0 +1,196 @@
+"""Measurement noise of the sensors: declared, estimated from a recording, and one tested against the other."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import ceil, log
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import spectrogram
+
+from ..recordings.recording import Recording
+from ..recordings.white_noise_estimate import white_noise_deviation
+from ..robot.schema import Robot
+from .kalman_filter import Noise
+
+Array = NDArray[np.float64]
+
+SEGMENT_SAMPLES, MIN_SPECTRUM_SAMPLES = 64, 300
+# Bands from this share of the sampling rate to half of it, and their largest ratio for white noise.
+MIN_FREQUENCY_RATIO, BAND_COUNT = 0.19, 5
+MAX_BAND_RATIO = 1.7
+# A low quantile over segments: in the louder ones the robot may jolt.
+QUIET_SEGMENT_QUANTILE = 0.3
+
+
+def noise_levels(signal: Array) -> Array | None:
+    """Variances (5,) of white noise with the spectral level of a signal in five bands; the signal (N,) is equidistant.
+
+    The signal is NaN where not measured. None where fewer than 300 samples are, or all are the same. Spectra of second
+    differences, over ``(2 sin(pi f))^4``: slow motion does not leak into them. Of segments (Welch, 1967) the 0.3
+    quantile, over that of an exponential distribution, ``-ln(0.7)``.
+    """
+    finite = signal[np.isfinite(signal)]
+    if len(finite) < MIN_SPECTRUM_SAMPLES or not np.any(np.diff(finite)):
+        return None
+    frequency, _, segments = spectrogram(
+        np.diff(finite, 2), window="hann", nperseg=SEGMENT_SAMPLES, noverlap=SEGMENT_SAMPLES // 2
+    )
+    density = np.quantile(segments, QUIET_SEGMENT_QUANTILE, axis=1) / -log(1.0 - QUIET_SEGMENT_QUANTILE)
+    high = frequency >= MIN_FREQUENCY_RATIO
+    level = density[high] / (2.0 * np.sin(np.pi * frequency[high])) ** 4
+    # The last line (Nyquist) of a one-sided spectrum is not doubled.
+    level[-1] *= 2.0
+    bands = np.array([0.5 * float(np.mean(band)) for band in np.array_split(level, BAND_COUNT)])
+    return bands if np.all(bands > 0.0) else None
+
+
+def is_flat(levels: Sequence[Array]) -> bool:
+    """Whether several spectra, each over its own mean, are flat in all bands on average."""
+    shape = np.mean([level / np.mean(level) for level in levels], axis=0)
+    return bool(np.max(shape) <= MAX_BAND_RATIO * np.min(shape))
+
+
+INITIAL_POSITION_SIGMAS = 3.0
+UNMEASURED_INITIAL_DEVIATION = 1e-3
+
+
+def estimate_noise(robot: Robot, recording: Recording) -> Noise:
+    """Standard deviations as declared; one that is not declared, or zero, is estimated from the recording.
+
+    A winch speed may be declared free of noise; no position or tension is.
+    """
+    position = robot.sensors.position_noise or white_noise_deviation(recording.position)
+    speed = robot.sensors.winch_speed_noise
+    return Noise(
+        position=position,
+        tension=robot.sensors.tension_noise or white_noise_deviation(recording.tension),
+        winch_speed=white_noise_deviation(recording.winch_speed) if speed is None else speed,
+        start_position=INITIAL_POSITION_SIGMAS * position if recording.has_position else UNMEASURED_INITIAL_DEVIATION,
+    )
+
+
+# Ratio of declared and measured standard deviation, either way, beyond which the declared one is wrong.
+MAX_NOISE_RATIO = 1.5
+# Autocorrelation at which samples of coloured noise count as independent, and the largest thinning factor.
+MAX_CORRELATION, MAX_THINNING = 0.15, 20
+# Standstill: winch speeds within so many sigma of zero, for so many samples.
+STANDSTILL_SIGMAS, MIN_STANDSTILL_SAMPLES = 5.0, 200
+
+
+@dataclass(frozen=True)
+class CheckedNoise:
+    """Noise after the test, the recordings with coloured channels thinned, and notes."""
+
+    noise: Noise
+    recordings: tuple[Recording, ...]
+    notes: tuple[str, ...]
+
+
+def check_noise(robot: Robot, noise: Noise, recordings: tuple[Recording, ...]) -> CheckedNoise:
+    """Test each output's declared noise against the white floor of its spectrum, or against a standstill.
+
+    A floor 1.5 times the declared standard deviation or more, or less than 1 / 1.5 of it, replaces the declared one.
+    Where the spectrum falls to its end below the declared level, the noise is coloured: it is thinned to independent
+    samples. Winch speeds may be declared noisier than they are.
+    """
+    checked = CheckedNoise(noise, recordings, ())
+    tensions = range(3, 3 + robot.cable_count)
+    if robot.sensors.position_noise is not None:
+        checked = _check_sensor_kind(checked, range(3), "m", noise.of_outputs(robot.cable_count))
+    if robot.sensors.tension_noise is not None:
+        checked = _check_sensor_kind(checked, tensions, "N", checked.noise.of_outputs(robot.cable_count))
+    speed_levels = [level for r in recordings for c in r.winch_speed.T if (level := noise_levels(c)) is not None]
+    if not robot.sensors.winch_speed_noise or not speed_levels:
+        return checked
+    measured = float(np.sqrt(np.mean(speed_levels)))
+    if not is_flat(speed_levels) or measured <= MAX_NOISE_RATIO * noise.winch_speed:
+        return checked
+    note = _replacement_note("winch speeds", noise.winch_speed, measured, "m/s")
+    return CheckedNoise(replace(checked.noise, winch_speed=measured), checked.recordings, (*checked.notes, note))
+
+
+def _check_sensor_kind(checked: CheckedNoise, columns: range, unit: str, declared: tuple[float, ...]) -> CheckedNoise:
+    """Test the outputs of one kind of sensor, whose noise has one colour."""
+    recordings, deviations, notes = checked.recordings, list(declared), list(checked.notes)
+    levels = {}
+    for column in columns:
+        spectra = [level for r in recordings if (level := noise_levels(r.measured()[:, column])) is not None]
+        if spectra:
+            levels[column] = np.mean(spectra, axis=0)
+    if not levels:
+        return checked
+    flat = is_flat(list(levels.values()))
+    for column, level in levels.items():
+        name = recordings[0].channel_names[column]
+        floor = float(np.sqrt(np.mean(level) if flat else np.min(level)))
+        if declared[column] / MAX_NOISE_RATIO <= floor <= declared[column] * MAX_NOISE_RATIO:
+            continue
+        if flat:
+            notes.append(_replacement_note(name, declared[column], floor, unit))
+            deviations[column] = floor
+        elif floor < declared[column]:
+            standstill = _standstill_statistics(recordings, column, checked.noise.winch_speed)
+            step, deviations[column], basis = _thinning(declared[column], floor, standstill)
+            recordings = tuple(_thinned(recording, column, step) for recording in recordings)
+            description = f"noise is coloured ({basis}; {deviations[column]:.3g} {unit} in all)"
+            notes.append(f"{name}: {description}; one sample of {step} was used")
+        else:
+            notes.append(
+                f"{name}: its spectrum stays above the declared noise, {declared[column]:.3g} {unit}, and has no "
+                "floor: "
+                "either the noise is larger and coloured, or something fast is not resolved; the declared one is used"
+            )
+    if len(notes) == len(checked.notes):
+        return checked
+    return CheckedNoise(replace(checked.noise, own=tuple(deviations)), recordings, tuple(notes))
+
+
+def _replacement_note(name: str, declared: float, measured: float, unit: str) -> str:
+    return f"{name}: declared noise {declared:.3g} {unit}, by its spectrum's floor {measured:.3g} {unit}: that is used"
+
+
+def _thinning(declared: float, floor: float, standstill: tuple[float, float] | None) -> tuple[int, float, str]:
+    """Thinning factor of coloured noise, its standard deviation, and the basis of both.
+
+    The correlation ``a`` of neighbours is that at standstill; without one, that of first-order filtered noise, whose
+    spectrum ends at ``(1 - a) / (1 + a)`` of its mean.
+    """
+    variance_ratio = (floor / declared) ** 2
+    correlation, deviation, basis = (
+        (1.0 - variance_ratio) / (1.0 + variance_ratio),
+        declared,
+        "its spectrum falls up to its end",
+    )
+    if standstill is not None:
+        deviation, correlation = standstill
+        basis = f"at rest neighbours are alike by {correlation:.2f}"
+    step = min(ceil(log(MAX_CORRELATION) / log(correlation)), MAX_THINNING) if 0.0 < correlation < 1.0 else 1
+    return step, deviation, basis
+
+
+def _thinned(recording: Recording, column: int, step: int) -> Recording:
+    measured = recording.measured()
+    measured_rows = np.flatnonzero(np.isfinite(measured[:, column]))
+    measured[np.setdiff1d(measured_rows, measured_rows[::step]), column] = np.nan
+    return replace(recording, position=measured[:, :3], tension=measured[:, 3:])
+
+
+def _standstill_statistics(recordings: Sequence[Recording], column: int, noise: float) -> tuple[float, float] | None:
+    """Standard deviation and lag-one autocorrelation in the longest standstill; None without one long enough."""
+    longest = np.zeros(0)
+    for recording in recordings:
+        signal = recording.measured()[:, column]
+        is_at_standstill = np.all(np.abs(recording.winch_speed) <= STANDSTILL_SIGMAS * noise, axis=1) & np.isfinite(
+            signal
+        )
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], is_at_standstill.astype(int), [0]])))
+        for first, last in zip(edges[::2], edges[1::2], strict=True):
+            longest = signal[first:last] if last - first > len(longest) else longest
+    if len(longest) < MIN_STANDSTILL_SAMPLES:
+        return None
+    time = np.arange(len(longest))
+    residual = longest - np.polyval(np.polyfit(time, longest, 1), time)
+    return float(np.std(residual)), float(residual[1:] @ residual[:-1] / max(residual @ residual, np.finfo(float).tiny))

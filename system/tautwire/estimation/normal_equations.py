@@ -1,0 +1,64 @@
+"""Normal equations of whitened innovations, reduced to a few rows that least squares cannot tell from all of them.
+
+With innovations ``e``, slopes ``J``, the norms ``D`` of its columns, and ``J' J = D V L V' D``: rows ``L^(1/2) V' D``
+with residuals ``L^(-1/2) V' D^-1 J' e``, and one row without slope that makes up the sum of squares. Cost, gradient and
+curvature are those of all rows; memory does not grow with a recording's length.
+
+Source: Golub and Van Loan (2013), Matrix Computations, sec. 5.3.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .estimation_data import DataSet
+from .likelihood import Likelihood
+
+Array = NDArray[np.float64]
+
+# Of the largest eigenvalue: smaller ones are rounding errors.
+MIN_EIGENVALUE_RATIO = 1e-13
+
+
+def compressed_residuals(
+    likelihood: Likelihood, values: Array, sample: DataSet, acceleration_noise_density: float
+) -> tuple[Array, Array]:
+    """Equivalent residuals (p + 1,) and slopes (p + 1, p) of all selected samples; not finite where one of them is not.
+
+    A sample that a sensor delay leaves without a state counts as noise, as in the likelihood's innovations.
+    """
+    is_measured = np.isfinite(sample.recording.measured())
+    count = len(values)
+    fisher_information, score, sum_of_squares = np.zeros((count, count)), np.zeros(count), 0.0
+    next_row = 0
+    for segment in likelihood.segments(sample.recording, values, acceleration_noise_density):
+        segment_rows = slice(next_row, next_row + int(np.sum(segment.is_recorded)))
+        next_row = segment_rows.stop
+        rows = sample.rows[segment_rows, None]
+        is_observed = segment.columns[1].T[segment.is_recorded] > 0.0
+        is_selected = is_observed & rows
+        residuals, slopes = (
+            segment.values[segment.is_recorded][is_selected],
+            segment.sensitivities[segment.is_recorded][is_selected],
+        )
+        fisher_information += slopes.T @ slopes
+        score += slopes.T @ residuals
+        sum_of_squares += float(residuals @ residuals) + float(np.sum(is_measured[segment_rows] & ~is_observed & rows))
+    return _equivalent_rows(fisher_information, score, sum_of_squares)
+
+
+def _equivalent_rows(fisher_information: Array, score: Array, sum_of_squares: float) -> tuple[Array, Array]:
+    count = len(score)
+    if not (np.isfinite(sum_of_squares) and np.all(np.isfinite(fisher_information)) and np.all(np.isfinite(score))):
+        return np.full(count + 1, np.nan), np.zeros((count + 1, count))
+    scale = np.sqrt(np.maximum(np.diag(fisher_information), np.finfo(float).tiny))
+    eigenvalues, eigenvectors = np.linalg.eigh(fisher_information / np.outer(scale, scale))
+    eigenvalues = np.where(
+        eigenvalues > MIN_EIGENVALUE_RATIO * max(float(eigenvalues[-1]), np.finfo(float).tiny), eigenvalues, 0.0
+    )
+    root = np.sqrt(eigenvalues)
+    projected = np.divide(eigenvectors.T @ (score / scale), root, out=np.zeros(count), where=root > 0.0)
+    unexplained = np.sqrt(max(sum_of_squares - float(projected @ projected), 0.0))
+    slopes = root[:, None] * eigenvectors.T * scale
+    return np.append(projected, unexplained), np.vstack([slopes, np.zeros((1, count))])

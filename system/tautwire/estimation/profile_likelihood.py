@@ -1,0 +1,285 @@
+"""Profile likelihood: 95 % intervals where the sum of squares about a fit is not a parabola.
+
+A value ``t`` of one parameter is inside while the others, at their best beside it, leave a sum of squares little above
+that of the fit:
+
+    min over the others of S(t, others) - S(fit) <= 1.96^2
+
+with ``S`` the sum of squares of the whitened innovations. Where ``S`` is a parabola the ends are 1.96 standard
+deviations away. It is not where a parameter ends, and where it hardly shows: a relaxation's time, a drum's radius.
+
+Source: Venzon and Moolgavkar (1988), A method for computing profile-likelihood-based confidence intervals, Applied
+Statistics 37(1), 87-94.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import brentq, least_squares
+
+from ..errors import TautwireError
+from .estimation_data import DataSet
+from .hypotheses import Hypothesis
+from .kalman_filter import Noise
+from .likelihood import Likelihood
+from .normal_equations import compressed_residuals
+from .parameter_fit import NORMAL_QUANTILE_95, Fit, Fitter, parameter_bounds, parameter_scales, worker_fitter
+from .worker_pool import WorkerPool
+
+Array = NDArray[np.float64]
+
+# Rise of the sum of squares where the model has no finite output.
+NON_FINITE_RISE = 1e4
+# A fall below the fit that the fit's cost tolerance does not explain.
+SIGNIFICANT_FALL = 0.1
+# Runs over the sample, in all and in one fit of the others; and the least distance from bounds, in deviations.
+MAX_PROFILE_RUNS, MAX_PROFILE_EVALUATIONS, MIN_BOUND_DISTANCE = 300, 15, 1e-6
+
+
+class LowerMinimumError(TautwireError):
+    """Other values have a lower sum of squares than the fit; carries them."""
+
+    def __init__(self, values: Array) -> None:
+        self.values = values
+        super().__init__(f"the fit is not the best: {values.tolist()} leaves less")
+
+
+class TooManyRunsError(TautwireError):
+    """The profile has taken more runs than it is worth; carries how many."""
+
+    def __init__(self, runs: int) -> None:
+        self.runs = runs
+        super().__init__(f"{runs} runs have not found where an interval ends")
+
+
+class ProfileLikelihood:
+    """Profile likelihood about a fit of ``values``, which stay within ``lower`` and ``upper``.
+
+    It is by sums of squares of the whitened innovations. ``scales`` (p,) are the parameters' scales;
+    ``standard_deviations`` (p,) are zero where the curvature gives none.
+    """
+
+    def __init__(
+        self,
+        likelihood: Likelihood,
+        fit: Fit,
+        data: DataSet,
+        lower: Array,
+        upper: Array,
+        poll_interrupts: Callable[[], None],
+    ) -> None:
+        self._likelihood, self._fit, self._sample, self._poll_interrupts = likelihood, fit, data, poll_interrupts
+        self._lower, self._upper = lower, upper
+        self.values = fit.values
+        self.scales = parameter_scales(fit.robot, fit.free)
+        variances = np.diag(fit.covariance)
+        self.standard_deviations = np.sqrt(np.where(np.isfinite(variances), np.maximum(variances, 0.0), 0.0))
+        self._units = np.where(self.standard_deviations > 0.0, self.standard_deviations, self.scales)
+        self._run_count = 0
+        self._minimum = float(np.sum(self._residuals(fit.values)[0] ** 2))
+
+    def recentred(self, values: Array) -> ProfileLikelihood:
+        """The same profile likelihood about other values."""
+        recentred_fit = replace(self._fit, values=values)
+        return ProfileLikelihood(
+            self._likelihood, recentred_fit, self._sample, self._lower, self._upper, self._poll_interrupts
+        )
+
+    def rise(self, index: int, value: float) -> float:
+        """Rise of the sum of squares with one parameter at a value; 1e4 where the model has no finite output.
+
+        Raises LowerError, TooManyRunsError.
+        """
+        others = np.arange(len(self.values)) != index
+        if not np.any(others):
+            return self._checked_rise(float(np.sum(self._residuals(np.array([value]))[0] ** 2)), np.array([value]))
+        for start in (self._linear_prediction(index, value), self.values):
+            profile_rise = self._profile_point(index, value, start[others], others)
+            if profile_rise is not None:
+                return profile_rise
+        return NON_FINITE_RISE
+
+    def _profile_point(self, index: int, value: float, origin: Array, others: NDArray[np.bool_]) -> float | None:
+        units = self._units[others]
+        low, high = (self._lower[others] - origin) / units, (self._upper[others] - origin) / units
+        start = np.clip(np.zeros(len(origin)), np.minimum(low + MIN_BOUND_DISTANCE, 0.5 * (low + high)), high)
+        start = np.clip(start, low, np.maximum(high - MIN_BOUND_DISTANCE, 0.5 * (low + high)))
+        residual = _ConstrainedResidual(self._residuals, index, value, origin, units)
+        if not np.all(np.isfinite(residual.residuals(start))):
+            return None
+        solution = least_squares(
+            residual.residuals,
+            start,
+            jac=residual.jacobian,
+            bounds=(low, high),
+            x_scale="jac",
+            ftol=1e-6,
+            max_nfev=MAX_PROFILE_EVALUATIONS,
+        )
+        return self._checked_rise(2.0 * float(solution.cost), np.insert(origin + solution.x * units, index, value))
+
+    def _checked_rise(self, sum_of_squares: float, values: Array) -> float:
+        rise = sum_of_squares - self._minimum
+        if rise < -SIGNIFICANT_FALL:
+            raise LowerMinimumError(values)
+        return rise if np.isfinite(rise) else NON_FINITE_RISE
+
+    def _linear_prediction(self, index: int, value: float) -> Array:
+        """Linear prediction of the others from the fit's covariance, within their bounds."""
+        variance = self._fit.covariance[index, index]
+        slopes = self._fit.covariance[:, index] / variance if variance > 0.0 else np.zeros(len(self.values))
+        predicted = self.values + np.where(np.isfinite(slopes), slopes, 0.0) * (value - self.values[index])
+        return np.clip(predicted, self._lower, self._upper)
+
+    def _residuals(self, values: Array) -> tuple[Array, Array]:
+        self._poll_interrupts()
+        self._run_count += 1
+        if self._run_count > MAX_PROFILE_RUNS:
+            raise TooManyRunsError(MAX_PROFILE_RUNS)
+        return compressed_residuals(self._likelihood, values, self._sample, 0.0)
+
+
+class _ConstrainedResidual:
+    """Residuals with one parameter fixed, and their Jacobian by the others, in units from where they begin."""
+
+    def __init__(
+        self,
+        residuals: Callable[[Array], tuple[Array, Array]],
+        index: int,
+        fixed_value: float,
+        origin: Array,
+        units: Array,
+    ) -> None:
+        self._residuals, self._index, self._fixed_value, self._origin, self._units = (
+            residuals,
+            index,
+            fixed_value,
+            origin,
+            units,
+        )
+        self._evaluated_at: Array | None = None
+        self._cached: tuple[Array, Array] = (np.zeros(0), np.zeros((0, 0)))
+
+    def residuals(self, offset: Array) -> Array:
+        return self._evaluate(offset)[0]
+
+    def jacobian(self, offset: Array) -> Array:
+        return self._evaluate(offset)[1]
+
+    def _evaluate(self, offset: Array) -> tuple[Array, Array]:
+        if self._evaluated_at is None or not np.array_equal(self._evaluated_at, offset):
+            residuals, jacobian = self._residuals(
+                np.insert(self._origin + offset * self._units, self._index, self._fixed_value)
+            )
+            self._cached = residuals, np.delete(jacobian, self._index, axis=1) * self._units
+            self._evaluated_at = offset.copy()
+        return self._cached
+
+
+CHI_SQUARED_95 = NORMAL_QUANTILE_95**2
+# Largest relative difference of the rise from that of a parabola at which an end by curvature is taken.
+MAX_PARABOLA_DEVIATION = 0.1
+# Relative to the distance from the fit to an end.
+INTERVAL_END_TOLERANCE = 0.01
+# Relative to the parameter's scale: first distance of the search where the curvature is unknown.
+FIRST_RELATIVE_DISTANCE = 1e-3
+# How often the distance is doubled in search of an end, and how often the fit may turn out not to be the best.
+MAX_DISTANCE_DOUBLINGS, MAX_RECENTRINGS = 20, 3
+
+
+def profile_intervals(
+    fitter: Fitter, fit: Fit, chosen: Sequence[Hypothesis], data: DataSet, workers: WorkerPool
+) -> list[tuple[float, float]]:
+    """Profile-likelihood interval of each free parameter of a fit, which was made with ``chosen`` on ``data``.
+
+    An end is the parameter's bound if the profile does not rise before; infinite where there is none. It is by
+    curvature where :class:`ProfileLikelihood` takes too many runs to find it.
+    """
+    count = len(fit.free)
+    if workers.processes == 1:
+        return [profile_interval(fitter, fit, chosen, data, index) for index in range(count)]
+    calls = [(fitter.noise, fit, chosen, data, index) for index in range(count)]
+    return [found for _, found in sorted(workers.map_unordered(_profile_interval_in_worker, calls))]
+
+
+def profile_interval(
+    fitter: Fitter, fit: Fit, chosen: Sequence[Hypothesis], data: DataSet, index: int
+) -> tuple[float, float]:
+    """Profile-likelihood interval of one parameter; its value is inside."""
+    likelihood, _ = fitter.likelihood(fit.robot, chosen, data)
+    lower, upper = parameter_bounds(fit.robot, fit.free)
+    minimum, maximum = float(lower[index]), float(upper[index])
+    value, half_width = float(fit.values[index]), NORMAL_QUANTILE_95 * float(fit.standard_deviations[index])
+    profile = ProfileLikelihood(likelihood, fit, data, lower, upper, fitter.poll_interrupts)
+    try:
+        low, high = _both_ends(profile, index, (minimum, maximum), MAX_RECENTRINGS)
+    except (LowerMinimumError, TooManyRunsError):
+        return (
+            (max(value - half_width, minimum), min(value + half_width, maximum))
+            if half_width > 0.0
+            else (minimum, maximum)
+        )
+    return max(min(low, value), minimum), min(max(high, value), maximum)
+
+
+def _profile_interval_in_worker(
+    noise: Noise, fit: Fit, chosen: Sequence[Hypothesis], data: DataSet, index: int
+) -> tuple[float, float]:
+    return profile_interval(worker_fitter(noise), fit, chosen, data, index)
+
+
+def _both_ends(
+    profile: ProfileLikelihood, index: int, bounds: tuple[float, float], recentrings: int
+) -> tuple[float, float]:
+    """Both ends, recentred on better values where some turn up."""
+    try:
+        return _interval_end(profile, index, -1.0, bounds[0]), _interval_end(profile, index, 1.0, bounds[1])
+    except LowerMinimumError as better:
+        if not recentrings:
+            raise
+        return _both_ends(profile.recentred(better.values), index, bounds, recentrings - 1)
+
+
+def _interval_end(profile: ProfileLikelihood, index: int, sign: float, bound: float) -> float:
+    estimate, standard_deviation = float(profile.values[index]), float(profile.standard_deviations[index])
+    inner = 0.0
+    for distance in _search_distances(
+        NORMAL_QUANTILE_95 * standard_deviation,
+        FIRST_RELATIVE_DISTANCE * float(profile.scales[index]),
+        abs(bound - estimate),
+    ):
+        excess_at_distance = profile.rise(index, estimate + sign * distance) - CHI_SQUARED_95
+        if (
+            inner == 0.0
+            and distance == NORMAL_QUANTILE_95 * standard_deviation
+            and abs(excess_at_distance) < MAX_PARABOLA_DEVIATION * CHI_SQUARED_95
+        ):
+            return estimate + sign * distance
+        if excess_at_distance > 0.0:
+            break
+        inner = distance
+    else:
+        return bound
+
+    def excess(length: float) -> float:
+        return profile.rise(index, estimate + sign * length) - CHI_SQUARED_95 if length > 0.0 else -CHI_SQUARED_95
+
+    return estimate + sign * float(
+        brentq(excess, inner, distance, xtol=INTERVAL_END_TOLERANCE * distance, rtol=INTERVAL_END_TOLERANCE)
+    )
+
+
+def _search_distances(by_curvature: float, by_size: float, farthest: float) -> Iterator[float]:
+    """Distances of the search, each twice the last, up to the farthest if that is not infinite."""
+    distance = by_curvature if by_curvature > 0.0 else by_size
+    for _ in range(MAX_DISTANCE_DOUBLINGS):
+        if distance >= farthest:
+            break
+        yield distance
+        distance = max(2.0 * distance, by_size)
+    if 0.0 < farthest < np.inf:
+        yield farthest

@@ -1,0 +1,88 @@
+"""Spectral analysis of residuals: lines in the innovations, and resonance peaks of a residual force."""
+
+from __future__ import annotations
+
+from math import log
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import find_peaks
+
+from .likelihood import Innovations
+
+Array = NDArray[np.float64]
+
+# Zero padding, so that a line between two frequencies is not missed.
+ZERO_PADDING_FACTOR = 4
+# Least power of a line over the median of the frequencies about it.
+MIN_LINE_POWER_RATIO = 12.0
+FLOOR_HALF_WINDOW = 80
+MAX_LINES = 4
+
+
+def spectral_lines(time: Array, innovations: Innovations, rows: NDArray[np.bool_]) -> list[float]:
+    """Angular frequencies (rad/s) of the strongest lines in the innovations, strongest first."""
+    frequency, power = _power_spectrum(time[rows], innovations.values[rows], innovations.observed[rows])
+    floor = np.array(
+        [np.median(power[max(0, k - FLOOR_HALF_WINDOW) : k + FLOOR_HALF_WINDOW]) for k in range(len(power))]
+    )
+    ratio = power / np.maximum(floor, np.finfo(float).tiny)
+    peaks, _ = find_peaks(ratio, height=MIN_LINE_POWER_RATIO, distance=2 * ZERO_PADDING_FACTOR)
+    strongest = sorted(peaks, key=lambda place: -power[place])[:MAX_LINES]
+    return [2.0 * np.pi * float(frequency[place]) for place in strongest]
+
+
+def _power_spectrum(time: Array, values: Array, seen: NDArray[np.bool_]) -> tuple[Array, Array]:
+    """Frequencies (Hz) and power summed over the outputs, of samples taken as evenly spaced."""
+    step = float(np.median(np.diff(time)))
+    filled = np.where(seen, np.nan_to_num(values), 0.0)
+    windowed = (filled - np.mean(filled, axis=0)) * np.hanning(len(filled))[:, None]
+    power: Array = np.sum(np.abs(np.fft.rfft(windowed, ZERO_PADDING_FACTOR * len(filled), axis=0)) ** 2, axis=1)
+    frequency: Array = np.asarray(np.fft.rfftfreq(ZERO_PADDING_FACTOR * len(filled), step), dtype=float)
+    return frequency, power
+
+
+WELCH_SEGMENTS = 3
+MIN_SAMPLES, MIN_FREQUENCIES = 64, 5
+# Prominence of a peak over both its sides, as a ratio of power.
+MIN_PROMINENCE = 30.0
+# Least share of the residual's power within a quarter of the peak's frequency.
+MIN_POWER_RATIO, PEAK_WIDTH_RATIO = 0.3, 0.25
+
+
+def resonance_frequency(time: Array, residual: Array, acceleration: Array, cutoff: float) -> float | None:
+    """Resonance frequency (Hz) of a residual force (N,) below ``cutoff`` (rad/s); None where there is none.
+
+    The ratio of its power spectral density to that of the acceleration (N,) along it is that of a mass squared where
+    a weight is wrong, falls steadily for a damping force, and has a peak for an attached oscillator.
+    """
+    # Imported here: it takes long to import, and only traces need it.
+    from scipy.signal import detrend, find_peaks, peak_prominences, welch
+
+    is_finite = np.isfinite(residual)
+    if np.sum(is_finite) < MIN_SAMPLES:
+        return None
+    step = float(np.median(np.diff(time)))
+    uniform_time = np.arange(time[is_finite][0], time[is_finite][-1], step)
+    length = 2 * len(uniform_time) // (WELCH_SEGMENTS + 1)
+    spectra = [
+        welch(detrend(np.interp(uniform_time, time[is_finite], values[is_finite])), 1.0 / step, nperseg=length)
+        for values in (residual, acceleration)
+    ]
+    frequency = np.asarray(spectra[0][0], dtype=float)
+    is_below_cutoff = (frequency > 0.0) & (2.0 * np.pi * frequency < cutoff)
+    frequency, (residual_power, motion_power) = (
+        frequency[is_below_cutoff],
+        (np.asarray(power, dtype=float)[is_below_cutoff] for _, power in spectra),
+    )
+    if len(frequency) < MIN_FREQUENCIES or not (np.all(residual_power > 0.0) and np.all(motion_power > 0.0)):
+        return None
+    ratio = np.log(residual_power / motion_power)
+    peaks = find_peaks(ratio, prominence=log(MIN_PROMINENCE))[0]
+    for peak in peaks[np.argsort(-peak_prominences(ratio, peaks)[0])]:
+        is_in_peak = np.abs(frequency - frequency[peak]) <= max(PEAK_WIDTH_RATIO * frequency[peak], 1.5 * frequency[0])
+        if np.sum(residual_power[is_in_peak]) > MIN_POWER_RATIO * np.sum(residual_power):
+            return float(
+                np.sum(frequency[is_in_peak] * residual_power[is_in_peak]) / np.sum(residual_power[is_in_peak])
+            )
+    return None

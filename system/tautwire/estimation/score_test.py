@@ -1,0 +1,251 @@
+"""Score test: the predicted gain of each hypothesis, which spares hopeless fits.
+
+An effect too small to see moves the innovations in proportion to its parameters, ``e + J d``. One run of the filter,
+linearised, gives ``J`` for all hypotheses at once; least squares on the estimation data gives ``d``, and its gain
+there. Parameters that count only while others are not neutral (the time of a relaxation) have no slope there: the
+others are tried at several values of theirs.
+
+Source: Rao's score test, e.g. Cox and Hinkley (1974), Theoretical Statistics, sec. 9.3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from tautwire_fmu.laws.effects import Effect
+
+from ..recordings.start_position import with_start
+from ..robot.schema import Robot
+from .estimation_data import DataSet
+from .hypotheses import PLATFORM_SENSOR_FORMS, Hypothesis, free_parameters
+from .innovation_sensitivities import EffectSensitivities, SensitivityColumn, linearise_filter
+from .kalman_filter import Noise
+from .parameter_fit import Fitter, worker_fitter
+from .worker_pool import WorkerPool
+
+Array = NDArray[np.float64]
+
+# Singular values of the scaled information matrix below this share of the largest count as zero.
+SCORE_RANK_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True)
+class PredictedGain:
+    """Predicted gain of a hypothesis: log-likelihood on estimation data, and the values that would gain it."""
+
+    gain: float
+    values: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class ScoreStatistics:
+    """Score and Fisher information of the parameters, by the innovations ``e`` of all samples that count.
+
+    ``columns`` (p) name the parameters, ``values`` (p) are where the Jacobian ``J`` was taken; ``fisher_information``
+    is ``J' J`` (p, p), ``score`` is ``J' e`` (p).
+    """
+
+    columns: tuple[SensitivityColumn, ...]
+    values: Array
+    fisher_information: Array
+    score: Array
+
+
+def score_test(
+    robot: Robot,
+    accepted: Sequence[Hypothesis],
+    candidates: Sequence[Hypothesis],
+    fitter: Fitter,
+    data: DataSet,
+    acceleration_noise_density: float = 0.0,
+) -> dict[Hypothesis, PredictedGain]:
+    """Score test of each hypothesis beside the accepted ones, whose parameters are refitted with it.
+
+    Far from noise the score misleads: an oscillation out of phase after a while asks for damping whatever it lacks.
+    With ``acceleration_noise_density`` (m/s^2 per root hertz) the run follows the measurements, and the score is right.
+    """
+    statistics = score_statistics(robot, accepted, candidates, fitter, data, acceleration_noise_density)
+    best: dict[Hypothesis, PredictedGain] = {}
+    for hypothesis in candidates:
+        trials = enumerate(starting_grid(hypothesis.effect)[: grid_size(hypothesis)])
+        predictions = [_predicted_gain(statistics, accepted, hypothesis, number, shapes) for number, shapes in trials]
+        best[hypothesis] = max(predictions, key=lambda prospect: prospect.gain)
+    return best
+
+
+def score_test_in_workers(
+    robot: Robot,
+    accepted: Sequence[Hypothesis],
+    candidates: Sequence[Hypothesis],
+    fitter: Fitter,
+    data: DataSet,
+    workers: WorkerPool,
+    acceleration_noise_density: float = 0.0,
+) -> dict[Hypothesis, PredictedGain]:
+    """As :func:`score_test`, with the effects shared out to the worker processes."""
+    count = workers.processes
+    if count == 1:
+        return score_test(robot, accepted, candidates, fitter, data, acceleration_noise_density)
+    effects = list(dict.fromkeys(hypothesis.effect for hypothesis in candidates))
+    shares = [[h for h in candidates if h.effect in effects[number::count]] for number in range(count)]
+    calls = [(fitter.noise, robot, accepted, own, data, acceleration_noise_density) for own in shares if own]
+    predictions = {
+        h: prospect
+        for _, prospects in workers.map_unordered(_score_test_in_worker, calls)
+        for h, prospect in prospects.items()
+    }
+    return {hypothesis: predictions[hypothesis] for hypothesis in candidates}
+
+
+def _score_test_in_worker(
+    noise: Noise,
+    robot: Robot,
+    accepted: Sequence[Hypothesis],
+    candidates: Sequence[Hypothesis],
+    data: DataSet,
+    acceleration_noise_density: float,
+) -> dict[Hypothesis, PredictedGain]:
+    return score_test(robot, accepted, candidates, worker_fitter(noise), data, acceleration_noise_density)
+
+
+def score_statistics(
+    robot: Robot,
+    accepted: Sequence[Hypothesis],
+    hypotheses: Sequence[Hypothesis],
+    fitter: Fitter,
+    data: DataSet,
+    acceleration_noise_density: float = 0.0,
+) -> ScoreStatistics:
+    """Score statistics of the accepted hypotheses' parameters, and of the others' on each cable alone, neutral."""
+    likelihood, values = fitter.likelihood(robot, accepted, data)
+    free = free_parameters(robot, accepted)
+    settings = [robot.effects[f.effect_index] for f in free]
+    columns = [SensitivityColumn(s.name, s.cables, f.name, 0) for s, f in zip(settings, free, strict=True)]
+    sensitivities = list(_effect_sensitivities(with_start(robot, data.start), hypotheses, likelihood.model.state_names))
+    columns += [column for direction in sensitivities for column in direction.columns]
+    nominal_values = np.concatenate([np.array(values), *(direction.values for direction in sensitivities)])
+    fisher_information, score = np.zeros((len(nominal_values), len(nominal_values))), np.zeros(len(nominal_values))
+    state_sensitivities = np.hstack([direction.start_sensitivities for direction in sensitivities])
+    recorded_rows = 0
+    for run in linearise_filter(likelihood, values, data.recording, acceleration_noise_density):
+        fitter.poll_interrupts()
+        rows = np.zeros(len(run.is_recorded), dtype=bool)
+        rows[run.is_recorded] = data.rows[recorded_rows : recorded_rows + int(np.sum(run.is_recorded))]
+        recorded_rows += int(np.sum(run.is_recorded))
+        parts = zip(*(direction.forcing_terms(run) for direction in sensitivities), strict=True)
+        state_sensitivities, innovation_sensitivities = run.propagate_sensitivities(
+            state_sensitivities, *(np.concatenate(part, axis=2) for part in parts)
+        )
+        jacobian = np.concatenate([run.sensitivities, innovation_sensitivities], axis=2)[rows].reshape(
+            -1, len(nominal_values)
+        )
+        fisher_information += jacobian.T @ jacobian
+        score += jacobian.T @ run.values[rows].ravel()
+    return _without_non_finite(ScoreStatistics(tuple(columns), nominal_values, fisher_information, score))
+
+
+def _without_non_finite(statistics: ScoreStatistics) -> ScoreStatistics:
+    """The statistics without non-finite columns: an effect too stiff for the filter's step has no valid score."""
+    finite = np.isfinite(np.diag(statistics.fisher_information))
+    fisher_information = np.where(np.outer(finite, finite), statistics.fisher_information, 0.0)
+    return ScoreStatistics(
+        statistics.columns, statistics.values, fisher_information, np.where(finite, statistics.score, 0.0)
+    )
+
+
+def _effect_sensitivities(
+    robot: Robot, hypotheses: Sequence[Hypothesis], state_names: Sequence[str]
+) -> Iterator[EffectSensitivities]:
+    for effect in dict.fromkeys(hypothesis.effect for hypothesis in hypotheses):
+        of_effect = [hypothesis for hypothesis in hypotheses if hypothesis.effect is effect]
+        cables = sorted({cable for hypothesis in of_effect for cable in hypothesis.cables})
+        forms = list(dict.fromkeys(hypothesis.form for hypothesis in of_effect))
+        yield EffectSensitivities(robot, effect, cables, forms, starting_grid(effect), state_names)
+
+
+def starting_grid(effect: Effect) -> list[dict[str, float]]:
+    """Grid of the values from which fits of an effect begin; one empty point where it has none."""
+    gridded = [p for p in effect.parameters if p.multistart_values]
+    return [
+        dict(zip([p.name for p in gridded], values, strict=True))
+        for values in product(*(p.multistart_values for p in gridded))
+    ]
+
+
+def grid_size(hypothesis: Hypothesis) -> int:
+    """Number of grid points for a hypothesis: one where its form has no gridded parameter."""
+    trials = starting_grid(hypothesis.effect)
+    return len(trials) if set(trials[0]) & set(hypothesis.form) else 1
+
+
+def _predicted_gain(
+    statistics: ScoreStatistics,
+    accepted: Sequence[Hypothesis],
+    hypothesis: Hypothesis,
+    trial: int,
+    shapes: Mapping[str, float],
+) -> PredictedGain:
+    accepted_columns = _leading_columns(statistics, sum(len(a.form) for a in accepted))
+    names, new_columns = parameter_columns(statistics, hypothesis, trial)
+    accepted_gain, _ = _least_squares_gain(statistics, accepted_columns)
+    gain, step = _least_squares_gain(statistics, np.hstack([accepted_columns, new_columns]))
+    start_values = statistics.values @ new_columns / np.maximum(np.sum(new_columns, axis=0), 1.0)
+    values = dict(zip(names, (start_values + step[accepted_columns.shape[1] :]).tolist(), strict=True))
+    bounds = {p.name: (p.minimum, p.maximum) for p in hypothesis.parameters}
+    if any(not bounds[name][0] <= value <= bounds[name][1] for name, value in values.items()):
+        clipped = {name: float(np.clip(value, *bounds[name])) for name, value in values.items()}
+        # A bound crossed by one parameter of several is left to the fit.
+        if len(values) == 1:
+            gain = accepted_gain + (gain - accepted_gain) * _gain_share_at_bound(
+                start_values[0], values[names[0]], clipped[names[0]]
+            )
+        values = clipped
+    shape_values = {name: value for name, value in shapes.items() if name in hypothesis.form}
+    return PredictedGain(gain - accepted_gain, {**shape_values, **values})
+
+
+def _gain_share_at_bound(start: float, best: float, bound: float) -> float:
+    """Share of a parabola's gain, from ``start`` to its ``best``, that is reached at a bound between."""
+    return 1.0 - ((best - bound) / (best - start)) ** 2
+
+
+def parameter_columns(statistics: ScoreStatistics, hypothesis: Hypothesis, trial: int) -> tuple[list[str], Array]:
+    """Parameters of a hypothesis that have a score, and the columns that each moves (columns, parameters)."""
+    names, columns = [], []
+    acting_cables = set(hypothesis.cables[:1] if hypothesis.form in PLATFORM_SENSOR_FORMS else hypothesis.cables)
+    for name in hypothesis.form:
+        weights = [
+            float(
+                (column.effect, column.parameter, column.trial) == (hypothesis.effect.name, name, trial)
+                and set(column.cables) <= acting_cables
+            )
+            for column in statistics.columns
+        ]
+        if np.diag(statistics.fisher_information) @ np.array(weights) > 0.0:
+            names.append(name)
+            columns.append(weights)
+    return names, np.array(columns).reshape(len(names), len(statistics.columns)).T
+
+
+def _leading_columns(statistics: ScoreStatistics, count: int) -> Array:
+    selected: Array = np.eye(len(statistics.columns))[:, :count]
+    return selected
+
+
+def _least_squares_gain(statistics: ScoreStatistics, combinations: Array) -> tuple[float, Array]:
+    """Half the decrease of the sum of squares by least squares over combinations of columns, and the step."""
+    if not combinations.shape[1]:
+        return 0.0, np.zeros(0)
+    fisher_information = combinations.T @ statistics.fisher_information @ combinations
+    scale = np.sqrt(np.maximum(np.diag(fisher_information), np.finfo(float).tiny))
+    score = combinations.T @ statistics.score
+    step = (
+        np.linalg.lstsq(fisher_information / np.outer(scale, scale), -score / scale, rcond=SCORE_RANK_TOLERANCE)[0]
+        / scale
+    )
+    return float(-0.5 * score @ step), step

@@ -1,0 +1,161 @@
+"""Smoothed estimates from a whole recording: uncertain declared constants and the initial state.
+
+They are constant states of the augmented filter, so its last state estimates them from the whole recording.
+
+Fixed-point smoothing of the filter's first state by all samples: with whitened innovations ``e_k`` and their slopes
+``J_k`` by it
+
+    x_0|N = x_0 - P_0 sum_k J_k' e_k
+
+Source: Anderson and Moore (1979), Optimal Filtering, sec. 7.2.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import casadi
+import numpy as np
+from numpy.typing import NDArray
+
+from ..recordings.recording import Recording
+from ..recordings.start_position import with_start
+from ..robot.schema import InitialState, Robot
+from ..robot.static_equilibrium import static_tensions
+from ..robot.symbolic_model import SymbolicModel
+from ..robot.uncertain_parameters import (
+    DAMPING,
+    MASS,
+    MODULUS,
+    UncertainParameter,
+    perturbed_robot,
+    sensor_offsets,
+    uncertain_parameters,
+)
+from .estimation_data import DataSet
+from .innovation_sensitivities import linearise_filter
+from .kalman_filter import Noise
+from .likelihood import Likelihood
+from .parameter_fit import Fitter
+
+Array = NDArray[np.float64]
+
+# Standard deviations by which a constant has to differ from its declared value to be reported.
+MIN_REPORTED_SIGMAS = 2.0
+
+
+@dataclass(frozen=True)
+class Calibration:
+    """Estimates (k,) of uncertain constants and their posterior standard deviations (k,).
+
+    Both count in declared standard deviations; the estimates from the declared values.
+    """
+
+    numbers: tuple[UncertainParameter, ...]
+    estimates: Array
+    standard_deviations: Array
+
+    def calibrated_robot(self, robot: Robot) -> Robot:
+        """The robot with its constants as estimated, each with its posterior uncertainty."""
+        updated = perturbed_robot(robot, self.numbers, self.estimates.tolist())
+        platform, cables = updated.platform, list(updated.cables)
+        for number, deviation in zip(self.numbers, self.standard_deviations.tolist(), strict=True):
+            if number.kind == MASS:
+                platform = replace(platform, mass_uncertainty=number.standard_deviation * deviation)
+            elif number.kind in (MODULUS, DAMPING):
+                key, index = f"{number.kind}_uncertainty", number.index - 1
+                cables[index] = replace(cables[index], **{key: number.standard_deviation * deviation})
+        return replace(updated, platform=platform, cables=tuple(cables))
+
+    def without_sensor_offsets(self, recording: Recording) -> Recording:
+        """The recording without the estimated constant errors of its sensors."""
+        offset_vector = np.array(sensor_offsets(self.numbers, self.estimates.tolist(), recording.tension.shape[1]))
+        if not np.any(offset_vector):
+            return recording
+        return replace(
+            recording, position=recording.position - offset_vector[:3], tension=recording.tension - offset_vector[3:]
+        )
+
+    def notes(self, robot: Robot, path: str) -> tuple[str, ...]:
+        """A note of the constants that differ significantly from their declared values."""
+        significant = []
+        for number, estimate, deviation in zip(
+            self.numbers, self.estimates.tolist(), self.standard_deviations.tolist(), strict=True
+        ):
+            if abs(estimate) < MIN_REPORTED_SIGMAS * deviation:
+                continue
+            value, half_width = (
+                number.declared(robot) + number.standard_deviation * estimate,
+                1.96 * number.standard_deviation * deviation,
+            )
+            significant.append(f"{number.label} {value:.4g} {number.unit}, +- {half_width:.2g}")
+        if not significant:
+            return ()
+        return (f"{path}: within what the robot file says of its own uncertainty, {'; '.join(significant)}",)
+
+
+def calibrate(fitter: Fitter, robot: Robot, sample: DataSet) -> Calibration:
+    """Estimate the uncertain constants of a robot with its effects from a recording."""
+    numbers = uncertain_parameters(robot)
+    if not numbers:
+        return Calibration((), np.zeros(0), np.zeros(0))
+    likelihood, values = fitter.likelihood(robot, (), sample)
+    *_, last_segment = likelihood.segments(sample.recording, values)
+    count = len(numbers)
+    deviations = np.sqrt(np.maximum(np.diag(last_segment.covariances[-1])[-count:], 0.0))
+    return Calibration(numbers, last_segment.states[-count:, -1], deviations)
+
+
+def is_initial_state_uncertain(noise: Noise) -> bool:
+    """Whether the initial state is uncertain beyond the sensors' noise."""
+    return max(noise.start_velocity, noise.start_stretch, noise.self_stress) > 0.0
+
+
+def with_initial_state(fitter: Fitter, robot: Robot, sample: DataSet) -> Robot:
+    """The robot with the smoothed initial state of a recording; at rest where the recording starts at rest."""
+    robot_at_start = with_start(robot, sample.start)
+    if not is_initial_state_uncertain(fitter.noise):
+        return robot_at_start
+    likelihood, values = fitter.likelihood(robot, (), sample)
+    state = _smoothed_initial_state(likelihood, values, sample)
+    x, y, z, vx, vy, vz = state[:6].tolist()
+    smoothed_robot = with_start(robot_at_start, (x, y, z))
+    velocity = (vx, vy, vz) if fitter.noise.start_velocity > 0.0 else (0.0, 0.0, 0.0)
+    extra_tensions = _static_tensions_of(likelihood.model, state, robot.cable_count) - static_tensions(smoothed_robot)
+    return replace(smoothed_robot, initial_state=InitialState(velocity, tuple(extra_tensions.tolist())))
+
+
+def initial_state_note(robot: Robot, path: str) -> tuple[str, ...]:
+    """A note of the initial state of a recording where it is not the robot file's."""
+    release = robot.initial_state
+    if release is None:
+        return ()
+    tensions = ", ".join(f"{tension:.4g}" for tension in static_tensions(robot) + np.array(release.tensions))
+    speed = float(np.linalg.norm(release.velocity))
+    moving = f", at {speed:.3g} m/s" if speed > 0.0 else ""
+    return (f"{path}: the run starts with tensions of {tensions} N{moving}, as what was measured says",)
+
+
+def _smoothed_initial_state(likelihood: Likelihood, values: list[float], sample: DataSet) -> Array:
+    """Initial state (n,), smoothed by all samples of the recording."""
+    state, covariance = likelihood.start(values)
+    state_sensitivities = np.eye(len(state))
+    score = np.zeros(len(state))
+    for segment in linearise_filter(likelihood, values, sample.recording):
+        count = len(segment.is_recorded)
+        no_direct_sensitivity = np.zeros((count, len(state), len(state)))
+        state_sensitivities, innovation_sensitivities = segment.propagate_sensitivities(
+            state_sensitivities, no_direct_sensitivity, np.zeros((count, segment.observed.shape[1], len(state)))
+        )
+        score += np.einsum("kmp,km->p", innovation_sensitivities, segment.values)
+    smoothed: Array = state - covariance @ score
+    return smoothed
+
+
+def _static_tensions_of(model: SymbolicModel, state: Array, cable_count: int) -> Array:
+    """Static tensions of the ropes (n,) in N with platform and winches held at a state's position."""
+    static_state = state.copy()
+    static_state[3:6] = 0.0
+    tensions = casadi.Function("tensions", [model.states, model.inputs], [model.span_tensions])
+    result: Array = np.array(tensions(static_state, np.zeros(cable_count + 3))).ravel()
+    return result

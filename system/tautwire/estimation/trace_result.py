@@ -1,0 +1,189 @@
+"""Result of a trace: values only, for reports to show."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..cosimulation.robot_cosimulation import CosimulationResult
+from ..recordings.recording import Recording
+from ..robot.schema import Robot
+from .localisation.component_residuals import FaultLocalisation
+
+Array = NDArray[np.float64]
+Verdict = Literal["effects", "none", "discovered", "unexplained"]
+
+
+@dataclass(frozen=True)
+class Estimate:
+    """A parameter with its 95 % interval; ``declared`` is what the robot file says, where it says anything."""
+
+    value: float
+    unit: str
+    low: float
+    high: float
+    declared: float | None
+
+
+@dataclass(frozen=True)
+class FoundEffect:
+    """An effect that was accepted; ``evidence`` is the natural log of its likelihood ratio on unseen data."""
+
+    name: str
+    component: str
+    cables: tuple[int, ...]
+    parameters: Mapping[str, Estimate]
+    evidence: float
+
+
+@dataclass(frozen=True)
+class FittedParameter:
+    """Identifies a fitted parameter: effect, cables and parameter name."""
+
+    name: str
+    cables: tuple[int, ...]
+    parameter: str
+
+
+@dataclass(frozen=True)
+class Correlation:
+    """Correlation of the errors of two estimates, from -1 to 1."""
+
+    between: tuple[FittedParameter, FittedParameter]
+    value: float
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A hypothesis that was tried: one effect more than the model had in its round.
+
+    ``evidence`` is the natural log of its likelihood ratio on unseen data, against the model without it;
+    ``mean_square`` the mean square of the whitened innovations there (one where the residual is white noise).
+    """
+
+    round: int
+    name: str
+    cables: tuple[int, ...]
+    values: Mapping[str, float]
+    evidence: float
+    mean_square: float
+    accepted: bool
+
+
+@dataclass(frozen=True)
+class Errors:
+    """Root mean squares of residuals: positions in m over each axis and all, tensions in N over each cable and all.
+
+    NaN where nothing was measured; ``axes`` has shape (3,), ``cables`` (n,).
+    """
+
+    position_rms: float
+    tension_rms: float
+    axes: Array
+    cables: Array
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """One recording beside the co-simulations of the robot before and after; ``role`` is "fit" or "check"."""
+
+    role: str
+    recording: Recording
+    before: CosimulationResult
+    after: CosimulationResult
+    errors_before: Errors
+    errors_after: Errors
+
+
+@dataclass(frozen=True)
+class Detectable:
+    """Detectable size of a parameter, from where the effect is absent: a recording shows it nine times out of ten.
+
+    ``other_values`` are the values of the effect's other parameters that this holds for. Infinite where no size would
+    show, or none that the parameter may have.
+    """
+
+    name: str
+    cables: tuple[int, ...]
+    parameter: str
+    size: float
+    unit: str
+    other_values: Mapping[str, float]
+
+
+@dataclass(frozen=True)
+class ConfusableEffect:
+    """Confusable effect: how much of an accepted effect another could mimic, by the ``cosine`` of their angle.
+
+    It is 1 where all of it; ``nats`` is the evidence lost if the other replaced it, as far as linearisation holds.
+    """
+
+    name: str
+    cables: tuple[int, ...]
+    other: str
+    other_cables: tuple[int, ...]
+    cosine: float
+    nats: float
+
+
+@dataclass(frozen=True)
+class Identifiability:
+    """Identifiability: what one recording could have shown beside the accepted effects."""
+
+    detectable: tuple[Detectable, ...]
+    confusable: tuple[ConfusableEffect, ...]
+
+
+@dataclass(frozen=True)
+class Resonance:
+    """A frequency (Hz) at which something swings, the outputs in which it shows, and the recordings it was seen on."""
+
+    frequency: float
+    outputs: tuple[str, ...]
+    on: tuple[str, ...]
+
+    @property
+    def sentence(self) -> str:
+        """In words."""
+        places = ", ".join(self.outputs)
+        return f"something swings at {self.frequency:.2g} Hz that the model does not have: it shows in {places}"
+
+
+@dataclass(frozen=True)
+class Trace:
+    """Result of a trace: what the model lacks.
+
+    ``correlations`` are those of each two parameters of the effects. ``noise_floor`` is what noise of the sensors and
+    of the recorded winch speeds would leave; ``normalised_innovation_variance`` is the mean square of the whitened
+    innovations of each output (x, y, z, tensions) under the final model on unseen data, shape (3 + n,), 1 where the
+    residual is white noise, and ``autocorrelations`` the largest correlation of each with itself, and what noise stays
+    below, as :func:`residual_analysis.largest_autocorrelations` gives them. ``identifiability`` is what those data
+    could have shown beside the effects; empty where the model leaves more than noise. ``components`` tells where the
+    fit recording errs, before any effect is fitted.
+    """
+
+    verdict: Verdict
+    sentence: str
+    robot_before: Robot
+    robot_after: Robot
+    effects: tuple[FoundEffect, ...]
+    correlations: tuple[Correlation, ...]
+    also_possible: tuple[tuple[str, ...], ...]
+    candidates: tuple[Candidate, ...]
+    formula: str | None
+    comparisons: tuple[Comparison, ...]
+    noise_floor: Errors
+    noise_before: bool
+    noise_after: bool
+    normalised_innovation_variance: Array
+    autocorrelations: tuple[Array, Array]
+    identifiability: Identifiability
+    components: FaultLocalisation
+    resonances: tuple[Resonance, ...]
+    alpha: float
+    notes: tuple[str, ...]
+    seconds: float

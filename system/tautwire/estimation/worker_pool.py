@@ -1,0 +1,180 @@
+"""Pool of worker processes for what a trace can do in parallel: fits and co-simulations."""
+
+from __future__ import annotations
+
+import os
+import signal
+import tempfile
+from collections.abc import Callable, Generator, Iterator, Sequence
+from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
+from concurrent.futures.process import BrokenProcessPool
+from contextlib import contextmanager
+from multiprocessing import get_context
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Generic, TypeVar
+
+from threadpoolctl import threadpool_limits
+
+from ..errors import TautwireError
+from ..process_signals import TERMINATION_SIGNALS, exit_with_parent
+
+Result = TypeVar("Result")
+
+# Seconds between two checks whether the user wants to stop.
+POLL_INTERVAL = 0.1
+
+
+class WorkerLostError(TautwireError):
+    """A worker process ended before its work did; carries how many there were."""
+
+    def __init__(self, processes: int) -> None:
+        self.processes = processes
+        super().__init__(
+            f"one of {processes} worker processes ended by itself: was it killed, or memory full? Run it again where "
+            "more memory is free, or with fewer processors (taskset on Linux)"
+        )
+
+
+def processors() -> int:
+    """How many processors this process may use."""
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+
+
+class PendingResult(Generic[Result]):
+    """A pending result; ``result`` waits for it."""
+
+    def __init__(
+        self,
+        future: Future[Result] | None,
+        compute: Callable[[], Result],
+        poll_interrupts: Callable[[], None],
+        processes: int,
+    ) -> None:
+        self._future, self._compute, self._poll_interrupts, self._processes = (
+            future,
+            compute,
+            poll_interrupts,
+            processes,
+        )
+
+    def result(self) -> Result:
+        """The result, or what the work raised. Without a process of its own it is done here."""
+        if self._future is None:
+            return self._compute()
+        while not wait([self._future], POLL_INTERVAL).done:
+            self._poll_interrupts()
+        with _worker_loss_raised(self._processes):
+            return self._future.result()
+
+
+class WorkerPool:
+    """Pool of worker processes that call functions with picklable arguments; with one process, they run here.
+
+    ``poll_interrupts`` is called while they are waited for. Leaving the context ends the processes, whatever they do,
+    and removes what they left in temporary folders. A program that asks for more than one process has to guard its main
+    module by ``if __name__ == "__main__"``, as multiprocessing wants.
+    """
+
+    def __init__(self, processes: int, poll_interrupts: Callable[[], None] = lambda: None) -> None:
+        self.processes = processes
+        self.poll_interrupts = poll_interrupts
+        self._folder = tempfile.TemporaryDirectory(prefix="tautwire-workers-") if processes > 1 else None
+        self._executor: ProcessPoolExecutor | None = None
+
+    def __enter__(self) -> WorkerPool:
+        return self
+
+    def __exit__(
+        self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
+    ) -> None:
+        if self._executor is not None:
+            # The executor has no public way to end work that has begun.
+            running = list((getattr(self._executor, "_processes", None) or {}).values())
+            self._executor.shutdown(wait=False, cancel_futures=True)
+            for process in running:
+                process.kill()
+            for process in running:
+                process.join()
+        if self._folder is not None:
+            self._folder.cleanup()
+
+    def warm_up(self) -> None:
+        """Start the processes, which takes a while; else the first call does."""
+        if self._started_executor() is not None:
+            for _ in range(self.processes):
+                self._submit(_no_operation)
+
+    def submit(self, function: Callable[..., Result], *arguments: Any) -> PendingResult[Result]:
+        """Start a call; its result may be fetched once."""
+        future = None if self._started_executor() is None else self._submit(function, *arguments)
+        return PendingResult(future, lambda: function(*arguments), self.poll_interrupts, self.processes)
+
+    def map_unordered(
+        self, function: Callable[..., Result], calls: Sequence[tuple[Any, ...]]
+    ) -> Generator[tuple[int, Result]]:
+        """Number and result of each call, in the order in which they end; closing it drops those not begun."""
+        if self._started_executor() is None:
+            for number, arguments in enumerate(calls):
+                yield number, function(*arguments)
+            return
+        futures = {self._submit(function, *arguments): number for number, arguments in enumerate(calls)}
+        waiting = set(futures)
+        try:
+            while waiting:
+                self.poll_interrupts()
+                done, waiting = wait(waiting, POLL_INTERVAL, FIRST_COMPLETED)
+                for future in sorted(done, key=futures.__getitem__):
+                    with _worker_loss_raised(self.processes):
+                        result = future.result()
+                    yield futures[future], result
+        finally:
+            for future in waiting:
+                future.cancel()
+
+    def _submit(self, function: Callable[..., Result], *arguments: Any) -> Future[Result]:
+        with _interrupts_blocked(), _worker_loss_raised(self.processes):
+            future: Future[Result] = self._started_executor().submit(function, *arguments)
+            return future
+
+    def _started_executor(self) -> Any:
+        if self.processes > 1 and self._executor is None and self._folder is not None:
+            # Not forked: threads of libraries would be missing. No fork server: its socket's path may be too long.
+            self._executor = ProcessPoolExecutor(
+                self.processes, get_context("spawn"), _initialise_worker, (self._folder.name,)
+            )
+        return self._executor
+
+
+@contextmanager
+def _worker_loss_raised(processes: int) -> Iterator[None]:
+    try:
+        yield
+    except BrokenProcessPool as error:
+        raise WorkerLostError(processes) from error
+
+
+@contextmanager
+def _interrupts_blocked() -> Iterator[None]:
+    """Processes started in the block do not receive Ctrl-C and the like; here it is only delayed."""
+    if not hasattr(signal, "pthread_sigmask"):
+        yield
+        return
+    previous_mask = signal.pthread_sigmask(signal.SIG_BLOCK, set(TERMINATION_SIGNALS))
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, previous_mask)
+
+
+def _no_operation() -> None:
+    """No operation: makes a process start."""
+
+
+def _initialise_worker(folder: str) -> None:
+    """Ignore signals that the parent handles; make temporary folders where the parent removes them."""
+    for number in TERMINATION_SIGNALS:
+        signal.signal(number, signal.SIG_IGN)
+    exit_with_parent(Path(folder))
+    tempfile.tempdir = folder
+    threadpool_limits(1)

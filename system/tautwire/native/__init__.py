@@ -1,1 +1,0 @@
-"""CasADi functions in machine code."""

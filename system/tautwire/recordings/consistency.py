@@ -1,0 +1,97 @@
+"""Consistency of a recording and a robot: start position and winch travel."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import RecordingError
+from ..robot.schema import Robot
+from .recording import Recording
+
+Array = NDArray[np.float64]
+
+# Shares of the robot's size: a nearer start, or a shorter winch travel, is not checked.
+MIN_CHECKED_START_SHARE, MIN_REELED_SHARE = 0.1, 1e-3
+# Share of the winch travel: stretch, wrong drums and drift stay far below, another robot mismatches by all of it.
+MAX_REELING_MISMATCH = 0.5
+CHECKED_DURATION = 60.0  # s
+# Rows at rest at the start, and the quantile of rows without outliers of the tracker.
+ROWS_AT_REST, INLIER_QUANTILE = 5, 0.95
+CONSISTENCY_HINT = (
+    "give a recording of this robot, with positions in m in the robot file's frame, or correct the robot file"
+)
+
+
+def describe_start(robot: Robot, start: Array) -> str:
+    """Describe how far a start is from the robot file's."""
+    return (
+        f"{_start_distance(robot, start):.3g} m from where the robot file starts it, at "
+        f"[{_position_text(robot.platform.start)}] m"
+    )
+
+
+def require_start_within_robot(robot: Robot, start: Array, where: str) -> None:
+    """Raises RecordingError where a start is farther from the robot file's than the robot is large."""
+    size = robot_size(robot)
+    if _start_distance(robot, start) > size:
+        raise RecordingError(
+            where, f"{_start_text(robot, start)}, and the robot is no larger than {size:.3g} m", CONSISTENCY_HINT
+        )
+
+
+def require_matching_reeling(robot: Robot, recording: Recording, start: Array, where: str) -> None:
+    """Refuse a recording that starts far away and whose winch travel does not match its positions.
+
+    Rope lengths are ``|a_i - p|``. Raises RecordingError.
+    """
+    size = robot_size(robot)
+    if _start_distance(robot, start) < MIN_CHECKED_START_SHARE * size:
+        return
+    reeled, mismatch = reeling_mismatch(robot, recording)
+    if reeled > MIN_REELED_SHARE * size and mismatch > MAX_REELING_MISMATCH * reeled:
+        mismatch_text = f"ropes there would not be reeled so: {reeled:.2g} m were, {mismatch:.2g} m do not fit (rms)"
+        raise RecordingError(where, f"{_start_text(robot, start)}, and {mismatch_text}", CONSISTENCY_HINT)
+
+
+def reeling_mismatch(robot: Robot, recording: Recording) -> tuple[float, float]:
+    """Winch travel, and its mismatch with the rope lengths at the recorded positions; rms in m.
+
+    The rows with the largest mismatch are left out, since they may be outliers.
+    """
+    time, speeds = recording.time, recording.winch_speed
+    reeled = np.zeros_like(speeds)
+    np.cumsum(0.5 * (speeds[1:] + speeds[:-1]) * np.diff(time)[:, None], axis=0, out=reeled[1:])
+    rows = np.isfinite(recording.position).all(axis=1) & (time <= time[0] + CHECKED_DURATION)
+    if not rows.any():
+        return 0.0, 0.0
+    lengths = np.linalg.norm(np.array(robot.anchors) - recording.position[rows][:, None], axis=2)
+    reeled_length = reeled[rows] - reeled[rows][0]
+    errors = reeled_length + lengths - np.median(lengths[:ROWS_AT_REST], axis=0)
+    mean_squares = np.mean(errors**2, axis=1)
+    inliers = mean_squares <= np.quantile(mean_squares, INLIER_QUANTILE)
+    return _rms(reeled_length[inliers]), _rms(errors[inliers])
+
+
+def robot_size(robot: Robot) -> float:
+    """The largest distance between two of the exit points and the start, in m."""
+    points = np.array([*robot.anchors, robot.platform.start])
+    return float(np.max(np.linalg.norm(points[:, None] - points[None], axis=2)))
+
+
+def _start_distance(robot: Robot, start: Array) -> float:
+    return float(np.linalg.norm(start - np.array(robot.platform.start)))
+
+
+def _start_text(robot: Robot, start: Array) -> str:
+    return f"they begin at [{_position_text(start)}] m, {describe_start(robot, start)}"
+
+
+def _position_text(position: Sequence[float] | Array) -> str:
+    return ", ".join(f"{coordinate:.5g}" for coordinate in position)
+
+
+def _rms(values: Array) -> float:
+    return float(np.sqrt(np.mean(values**2)))

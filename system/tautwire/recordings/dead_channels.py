@@ -1,0 +1,132 @@
+"""Dead and frozen channels: outputs that are constant, show noise alone, stay at one value, or repeat each value."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .recording import Recording
+from .white_noise_estimate import white_noise_deviation
+
+Array = NDArray[np.float64]
+
+# Standard deviation over noise: a live output exceeds the first, a dead one stays below the second.
+LIVE_NOISE_RATIO, DEAD_NOISE_RATIO = 10.0, 1.2
+# Samples for which a frozen output stays at one value while others of its kind move.
+MIN_FROZEN_SAMPLES = 40
+# A slower sensor: least share of repeated samples, and of equal intervals between new values.
+MIN_REPEATED_RATIO, MIN_EVEN_RATIO = 0.4, 0.8
+
+
+def without_dead_channels(recording: Recording) -> tuple[Recording, tuple[str, ...]]:
+    """The recording with cells emptied where an output carries no information, and notes that name it."""
+    measured = recording.measured()
+    notes: list[str] = []
+    for kind in (slice(0, 3), slice(3, 3 + recording.cable_count)):
+        columns, names = measured[:, kind], recording.channel_names[kind]
+        notes += _clear_channels(columns, names, _constant_channels(columns), "shows one value all along: not used")
+        notes += _clear_channels(
+            columns, names, _noise_only_channels(columns), "shows noise alone while others move: not used"
+        )
+        hold_length = _hold_length(columns)
+        if hold_length > 1:
+            _clear_repeats(columns)
+            affected = ", ".join(
+                name for name, column in zip(names, columns.T, strict=True) if np.isfinite(column).any()
+            )
+            notes.append(
+                f"{affected}: each value is repeated about {hold_length} times: only the first of each was used"
+            )
+        for index, count in enumerate(_clear_frozen(columns)):
+            if count:
+                notes.append(
+                    f"{names[index]}: stays at one value for {count} samples while others move: not used there"
+                )
+    if not notes:
+        return recording, ()
+    messages = tuple(f"{recording.path}: {note}" for note in notes)
+    return replace(recording, position=measured[:, :3], tension=measured[:, 3:]), messages
+
+
+def _clear_channels(columns: Array, names: tuple[str, ...], indices: list[int], reason: str) -> list[str]:
+    columns[:, indices] = np.nan
+    return [f"{names[place]} {reason}" for place in indices]
+
+
+def _finite(column: Array) -> Array:
+    finite: Array = column[np.isfinite(column)]
+    return finite
+
+
+def _constant_channels(columns: Array) -> list[int]:
+    """Indices of constant channels; even a robot at rest shows noise."""
+    return [
+        place for place, column in enumerate(columns.T) if len(_finite(column)) > 1 and np.ptp(_finite(column)) == 0.0
+    ]
+
+
+def _noise_only_channels(columns: Array) -> list[int]:
+    """Indices of channels that show noise alone while all others vary by far more than theirs."""
+    noise_ratios = {}
+    for index, column in enumerate(columns.T):
+        values = _finite(column)
+        if len(values) > MIN_FROZEN_SAMPLES:
+            noise_ratios[index] = float(np.std(values)) / white_noise_deviation(values[:, None])
+    dead = [place for place, size in noise_ratios.items() if size < DEAD_NOISE_RATIO]
+    others = [size for size in noise_ratios.values() if size >= DEAD_NOISE_RATIO]
+    return dead if others and min(others) > LIVE_NOISE_RATIO else []
+
+
+def _hold_length(columns: Array) -> int:
+    """Samples for which a slower sensor holds each value; 1 where values are not repeated."""
+    is_changed = _changed_rows(columns)
+    changed_rows = np.flatnonzero(is_changed)
+    if len(changed_rows) < MIN_FROZEN_SAMPLES or np.mean(is_changed) > 1.0 - MIN_REPEATED_RATIO:
+        return 1
+    intervals = np.diff(changed_rows)
+    median_interval = int(np.median(intervals))
+    even_ratio = float(np.mean(np.abs(intervals - median_interval) <= 1))
+    return median_interval if median_interval > 1 and even_ratio > MIN_EVEN_RATIO else 1
+
+
+def _changed_rows(columns: Array) -> NDArray[np.bool_]:
+    """Rows (N,) in which some value differs from the row before, over the columns that have any value."""
+    alive = columns[:, np.isfinite(columns).any(axis=0)]
+    if not alive.shape[1]:
+        return np.ones(len(columns), dtype=bool)
+    is_different = np.any(~(alive[1:] == alive[:-1]), axis=1)
+    return np.append(True, is_different)
+
+
+def _clear_repeats(columns: Array) -> None:
+    columns[~_changed_rows(columns)] = np.nan
+
+
+def _clear_frozen(columns: Array) -> list[int]:
+    """Empty the cells of an output that is frozen while another of its kind moves; returns their number by output."""
+    counts = []
+    original = columns.copy()
+    for index, column in enumerate(original.T):
+        is_frozen = np.zeros(len(column), dtype=bool)
+        is_repeated = np.append(False, column[1:] == column[:-1])
+        edges = np.flatnonzero(np.diff(np.concatenate([[0], is_repeated.astype(int), [0]])))
+        for first, last in zip(edges[::2], edges[1::2], strict=True):
+            if last - first >= MIN_FROZEN_SAMPLES and _others_move(original, index, first, last):
+                is_frozen[first:last] = True
+        columns[is_frozen, index] = np.nan
+        counts.append(int(np.sum(is_frozen)))
+    return counts
+
+
+def _others_move(columns: Array, index: int, first: int, last: int) -> bool:
+    for other, column in enumerate(columns.T):
+        values = _finite(column[first:last])
+        if (
+            other != index
+            and len(values) >= MIN_FROZEN_SAMPLES
+            and np.std(values) > LIVE_NOISE_RATIO * white_noise_deviation(_finite(column)[:, None])
+        ):
+            return True
+    return False

@@ -1,0 +1,140 @@
+"""Outlier removal: single samples that jump by many sigma and come back, which no robot does."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from math import sqrt
+
+import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
+from numpy.typing import NDArray
+from scipy.ndimage import median_filter
+
+from ..errors import RecordingError
+from .recording import Recording
+from .white_noise_estimate import DIFFERENCE_ORDER, RELATIVE_RESOLUTION, white_noise_deviation
+
+Array = NDArray[np.float64]
+
+OUTLIER_SIGMAS = 25.0
+# A sensor with values in fewer than this share of the samples is less smooth, so its threshold is larger.
+SPARSE_RATIO, SPARSE_THRESHOLD_FACTOR = 0.5, 1.5
+# Largest mismatch with the pattern of a single outlier, as a share of its energy: a step leaves 0.08, a kink 0.02.
+MAX_PATTERN_MISMATCH = 0.013
+# Samples on each side that give the local noise; samples at the ends that give the local median.
+HALF_WINDOW_SAMPLES, END_SAMPLES = 25, 10
+# At the ends, largest deviation of a neighbour relative to the outlier's.
+MAX_NEIGHBOUR_RATIO = 0.25
+MAX_OUTLIER_RATIO = 0.01
+ALLOWED_OUTLIERS = 3
+NORMAL_MEDIAN = 0.6745
+PATTERN_REACH = DIFFERENCE_ORDER // 2
+# Sixth difference of a unit impulse, over its value in the middle.
+OUTLIER_PATTERN = np.array([-1.0, 6.0, -15.0, 20.0, -15.0, 6.0, -1.0]) / 20.0
+
+
+def without_outliers(recording: Recording) -> tuple[Recording, tuple[str, ...]]:
+    """The recording with outliers of outputs emptied and those of winch speeds interpolated, and a note.
+
+    Raises RecordingError where more than 1 % of a channel's samples are outliers.
+    """
+    measured, winch_speed = recording.measured(), recording.winch_speed.copy()
+    counts: dict[str, int] = {}
+    names = (*recording.channel_names, *(f"winch_speed_{cable + 1}" for cable in range(recording.cable_count)))
+    for name, column in zip(names, (*measured.T, *winch_speed.T), strict=True):
+        measured_rows = np.flatnonzero(np.isfinite(column))
+        outlier_rows = measured_rows[
+            outlier_indices(
+                column[measured_rows],
+                OUTLIER_SIGMAS * (SPARSE_THRESHOLD_FACTOR if len(measured_rows) < SPARSE_RATIO * len(column) else 1.0),
+            )
+        ]
+        if not len(outlier_rows):
+            continue
+        if len(outlier_rows) > max(MAX_OUTLIER_RATIO * len(measured_rows), ALLOWED_OUTLIERS):
+            problem = f"jumps and comes back in {len(outlier_rows)} of {len(measured_rows)} samples, more than 1 %"
+            hint = "mend the sensor, or leave the column out"
+            raise RecordingError(f"{recording.path}: column {name}", problem, hint)
+        counts[name] = len(outlier_rows)
+        column[outlier_rows] = np.nan
+    if not counts:
+        return recording, ()
+    for column in winch_speed.T:
+        is_missing = ~np.isfinite(column)
+        column[is_missing] = np.interp(recording.time[is_missing], recording.time[~is_missing], column[~is_missing])
+    description = ", ".join(f"{count} of {name}" for name, count in counts.items())
+    note = (
+        f"{recording.path}: samples that jump by more than {OUTLIER_SIGMAS:g} sigma and come back are taken "
+        f"out: {description}"
+    )
+    cleaned = replace(recording, position=measured[:, :3], tension=measured[:, 3:], winch_speed=winch_speed)
+    return cleaned, (note,)
+
+
+def outlier_indices(signal: Array, sigmas: float = OUTLIER_SIGMAS) -> NDArray[np.intp]:
+    """Indices of single-sample outliers in a signal (N,) without gaps.
+
+    Each sample is compared with the polynomial of degree five through its six neighbours,
+    ``r_k = (y_(k-3) - 6 y_(k-2) + 15 y_(k-1) - 20 y_k + ...) / -20``; an outlier leaves a known pattern in ``r``.
+    """
+    indices: list[int] = []
+    cleaned = signal.copy()
+    if len(signal) < 4 * END_SAMPLES:
+        return np.array(indices, dtype=np.intp)
+    sigma = white_noise_deviation(signal[:, None])
+    indices += _end_outliers(cleaned, sigma, sigmas)
+    cleaned[indices] = np.interp(indices, np.delete(np.arange(len(cleaned)), indices), np.delete(cleaned, indices))
+    while True:
+        new_indices = _interior_outliers(cleaned, sigma, sigmas)
+        if not len(new_indices) or len(indices) > MAX_OUTLIER_RATIO * len(signal) + ALLOWED_OUTLIERS:
+            return np.array(sorted({*indices, *new_indices.tolist()}), dtype=np.intp)
+        indices += new_indices.tolist()
+        others = np.setdiff1d(np.arange(len(cleaned)), indices)
+        cleaned[indices] = np.interp(indices, others, cleaned[others])
+
+
+def _interior_outliers(signal: Array, sigma: float, sigmas: float) -> NDArray[np.intp]:
+    """Indices of interior outliers, each the strongest of its neighbourhood."""
+    residual = np.convolve(signal, OUTLIER_PATTERN, mode="valid")
+    windows = sliding_window_view(residual, len(OUTLIER_PATTERN))
+    pattern_energy = float(OUTLIER_PATTERN @ OUTLIER_PATTERN)
+    amplitude = windows @ OUTLIER_PATTERN / pattern_energy
+    mismatch = np.sum((windows - amplitude[:, None] * OUTLIER_PATTERN) ** 2, axis=1)
+    noise_level = sigma * sqrt(pattern_energy)
+    local_noise = np.maximum(_noisier_side(np.abs(residual)) / NORMAL_MEDIAN, noise_level)[PATTERN_REACH:-PATTERN_REACH]
+    energy = np.sum(windows**2, axis=1)
+    is_peak = np.abs(amplitude) >= np.max(
+        np.abs(sliding_window_view(np.pad(amplitude, PATTERN_REACH), len(OUTLIER_PATTERN))), axis=1
+    )
+    is_outlier = (
+        (np.abs(amplitude) > sigmas * local_noise / sqrt(pattern_energy))
+        & (mismatch < MAX_PATTERN_MISMATCH * energy)
+        & is_peak
+    )
+    return np.flatnonzero(is_outlier) + 2 * PATTERN_REACH
+
+
+def _noisier_side(values: Array) -> Array:
+    """Larger of the running medians before and after each value: where motion begins or ends one side is quiet."""
+    sides = (
+        median_filter(values, 2 * HALF_WINDOW_SAMPLES + 1, mode="mirror", origin=side)
+        for side in (-HALF_WINDOW_SAMPLES, HALF_WINDOW_SAMPLES)
+    )
+    larger: Array = np.maximum(*sides)
+    return larger
+
+
+def _end_outliers(signal: Array, sigma: float, sigmas: float) -> list[int]:
+    """Indices of outliers among the first and last six samples, where neighbours on one side are missing."""
+    indices = []
+    for first in (0, len(signal) - END_SAMPLES):
+        window = signal[first : first + END_SAMPLES]
+        distance = np.abs(window - np.median(window))
+        spread = max(
+            float(np.median(distance)) / NORMAL_MEDIAN, sigma, RELATIVE_RESOLUTION * float(np.max(np.abs(signal)))
+        )
+        outer = range(2 * PATTERN_REACH) if first == 0 else range(END_SAMPLES - 2 * PATTERN_REACH, END_SAMPLES)
+        neighbour_distance = np.maximum(np.append(distance[1:], 0.0), np.append(0.0, distance[:-1]))
+        is_outlier = (distance > sigmas * spread) & (neighbour_distance < MAX_NEIGHBOUR_RATIO * distance)
+        indices += [first + place for place in outer if is_outlier[place]]
+    return indices

@@ -1,0 +1,277 @@
+"""A linearised robot as one HTML page that needs no network: its modes in motion, and the gains of its plant."""
+
+from __future__ import annotations
+
+from collections import Counter
+from collections.abc import Mapping
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..cosimulation.robot_wiring import AXES
+from ..linear import LinearPlant
+from ..number_format import format_percent, format_significant
+from ..robot.schema import Robot
+from . import inline_charts as charts
+from .downsampling import pack_float32
+from .html_markup import (
+    TableColumn,
+    bullet_list,
+    download_links,
+    escape_text,
+    html_page,
+    number_html,
+    panel_groups,
+    section,
+    table,
+)
+from .mode_bands import merge_mode_bands
+from .robot_scene import (
+    RobotScene,
+    ScenePath,
+    choice_buttons,
+    figures_container,
+    legend_key,
+    pack_columns,
+    scene_data,
+    scene_section,
+)
+
+Array = NDArray[np.float64]
+
+# Outputs whose gains are drawn, by the prefix of their names.
+GAIN_OUTPUT_TITLES = {"position": "Position", "tension": "Tension"}
+# Unit of an input or output on the page, and its size in SI units.
+SIGNAL_UNITS = {
+    "position": ("mm", 1e-3),
+    "tension": ("N", 1.0),
+    "winch_speed": ("mm/s", 1e-3),
+    "external_force": ("N", 1.0),
+}
+SWING_AMPLITUDE = 1e-3  # m, for which the change of tension is stated
+DRAWN_SWING_SHARE = 0.08  # of the robot's size, as drawn
+FRAME_COUNT = 73
+PLAYBACK_PERIOD = 2.0  # s, playback time of one period
+FREQUENCY_POINTS = 300
+FREQUENCY_MARGIN_FACTOR = 5.0
+
+
+def modes_data(robot: Robot, plant: LinearPlant) -> dict[str, Any]:
+    """The figure data: mode shapes in motion, and the frequency response of the plant from each input."""
+    frequency = _frequency_grid(plant)
+    bands = [band.document() for band in merge_mode_bands(np.array([plant.modes.frequencies]))]
+    return {
+        "anchors": [[float(value) for value in anchor] for anchor in robot.anchors],
+        "magnifications": [1],
+        "choices": [_mode_data(robot, plant, mode) for mode in range(len(plant.modes.frequencies))],
+        "frequency": pack_float32(frequency),
+        "bands": bands,
+        "gains": _gains_data(plant, frequency),
+    }
+
+
+def signal_label(name: str) -> str:
+    """A signal's name as text: "tension_2" is "tension 2"."""
+    return name.replace("_", " ")
+
+
+def _mode_data(robot: Robot, plant: LinearPlant, mode: int) -> dict[str, Any]:
+    """One mode shape as a looping scene; "time" is the phase in per cent of a period."""
+    phase = np.linspace(0.0, 1.0, FRAME_COUNT)
+    swing = np.cos(2.0 * np.pi * phase)[:, None]
+    shape = plant.modes.shapes[:, mode]
+    size = float(np.max(np.ptp(np.vstack((np.array(robot.anchors), plant.position)), axis=0)))
+    platform = plant.position + DRAWN_SWING_SHARE * size * swing * shape
+    tension_change = SWING_AMPLITUDE * swing * (plant.tension_slopes @ shape)
+    max_tension_change = float(np.max(np.abs(tension_change), initial=0.0)) or 1.0
+    scene = scene_data(
+        RobotScene(100.0 * phase, platform, tension_change, (ScenePath("swing", platform, "accent", 5),))
+    )
+    label = f"{mode + 1}: {format_significant(float(plant.modes.frequencies[mode]))} Hz"
+    animation = {
+        "clock": "% of a period",
+        "decimals": 0,
+        "pace": PLAYBACK_PERIOD / 100.0,
+        "cycle": True,
+        "tensionRange": [-max_tension_change, max_tension_change],
+        "tensionTitle": "Change of tension for 1 mm (N)",
+    }
+    return {"label": label, "scene": scene | animation}
+
+
+def _frequency_grid(plant: LinearPlant) -> Array:
+    """Frequency grid in Hz around the modes, including the modal frequencies, where gains peak."""
+    modes = plant.modes.frequencies
+    around = np.geomspace(
+        modes.min() / FREQUENCY_MARGIN_FACTOR, modes.max() * FREQUENCY_MARGIN_FACTOR, FREQUENCY_POINTS
+    )
+    return np.union1d(around, modes)
+
+
+def _gains_data(plant: LinearPlant, frequency: Array) -> list[dict[str, Any]]:
+    """Gain and phase of each output from each input."""
+    system = plant.system
+    response = np.asarray(system(2j * np.pi * frequency))
+    return [
+        {
+            "label": signal_label(name),
+            "from": [_gain_data(system, response, output_index, input_index) for input_index in range(system.ninputs)],
+        }
+        for output_index, name in enumerate(system.output_labels)
+        if name.rpartition("_")[0] in GAIN_OUTPUT_TITLES
+    ]
+
+
+def _gain_data(system: Any, response: Array, output_index: int, input_index: int) -> dict[str, Any]:
+    """Gain in the page's units and phase in degrees; None where the input does not act on the output."""
+    output_name, input_name = system.output_labels[output_index], system.input_labels[input_index]
+    (output_unit, output_unit_size), (input_unit, input_unit_size) = (
+        SIGNAL_UNITS[output_name.rpartition("_")[0]],
+        SIGNAL_UNITS[input_name.rpartition("_")[0]],
+    )
+    description = {"unit": f"{output_unit} per {input_unit}", "by": signal_label(input_name)}
+    values = response[output_index, input_index]
+    magnitude = np.abs(values) * input_unit_size / output_unit_size
+    if not np.max(magnitude) > 0.0:
+        return {**description, "gain": None, "phase": None, "peak": None}
+    phase = np.degrees(np.unwrap(np.angle(values)))
+    packed_gain, packed_phase = pack_columns(np.column_stack((magnitude, phase)))
+    return {
+        **description,
+        "gain": packed_gain,
+        "phase": packed_phase,
+        "peak": format_significant(float(np.max(magnitude))),
+    }
+
+
+def modes_page(robot: Robot, plant: LinearPlant, links: Mapping[str, str]) -> str:
+    """The page of a robot linearised about rest; ``links`` maps labels to paths beside the page."""
+    data = modes_data(robot, plant)
+    choices = choice_buttons("Mode", [choice["label"] for choice in data["choices"]])
+    parts = [
+        _masthead(robot, plant, links),
+        _modes_section(plant),
+        figures_container(choices, _scene_section(robot)),
+        _cables_section(plant),
+        _gains_section(plant),
+        _notes_section(plant),
+    ]
+    title = f"{robot.name}: {_modes_sentence(plant)}"
+    return html_page(title, "\n".join(parts), data, ("modes.js",))
+
+
+def _masthead(robot: Robot, plant: LinearPlant, links: Mapping[str, str]) -> str:
+    position_text = ", ".join(format_significant(float(value), 4) for value in plant.position)
+    verdict, css_class = (
+        ("Small motions are linear here", "none") if not plant.notes else ("See the notes", "unexplained")
+    )
+    return (
+        f'<header><p class="eyebrow"><strong>Tautwire linear plant</strong> '
+        f"<span>{escape_text(robot.name)}, {robot.cable_count} cables</span></p>"
+        f'<p class="verdict verdict-{css_class}">{verdict}</p><h1>{escape_text(_modes_sentence(plant))}</h1>'
+        f'<p class="aside">At rest at {number_html(position_text)} m, with {plant.system.nstates} states, '
+        f"{plant.system.ninputs} "
+        f"inputs and {plant.system.noutputs} outputs.</p>{download_links(links)}</header>"
+    )
+
+
+def _modes_sentence(plant: LinearPlant) -> str:
+    """The modes in one sentence."""
+    modes = plant.modes
+    frequency_counts = Counter(f"{format_significant(float(value))} Hz" for value in modes.frequencies)
+    frequency_texts = [
+        frequency_text if count == 1 else f"{frequency_text} ({count} modes)"
+        for frequency_text, count in frequency_counts.items()
+    ]
+    frequencies_text = (
+        frequency_texts[0]
+        if len(frequency_texts) == 1
+        else f"{', '.join(frequency_texts[:-1])} and {frequency_texts[-1]}"
+    )
+    min_ratio, max_ratio = (
+        format_percent(float(value)) for value in (modes.damping_ratios.min(), modes.damping_ratios.max())
+    )
+    damping_text = (
+        f"a damping ratio of {min_ratio}" if min_ratio == max_ratio else f"damping ratios of {min_ratio} to {max_ratio}"
+    )
+    return f"The platform swings at {frequencies_text}, with {damping_text}."
+
+
+def _modes_section(plant: LinearPlant) -> str:
+    modes = plant.modes
+    columns = (
+        TableColumn("Mode"),
+        TableColumn("Frequency", True),
+        TableColumn("Damping ratio", True),
+        TableColumn("When damped", True),
+        *(TableColumn(f"Along {axis}", True) for axis in AXES),
+    )
+    rows = [
+        [
+            f"Mode {mode + 1}",
+            f"{format_significant(float(modes.frequencies[mode]), 4)} Hz",
+            number_html(f"{format_significant(100.0 * float(modes.damping_ratios[mode]))} %"),
+            "overdamped" if damped_frequency == 0.0 else f"{format_significant(float(damped_frequency), 4)} Hz",
+            *(number_html(f"{round(float(value), 3) + 0.0:.3f}") for value in modes.shapes[:, mode]),
+        ]
+        for mode, damped_frequency in enumerate(modes.damped_frequencies)
+    ]
+    lead = (
+        "How the platform swings by itself about rest, with the winches held: undamped frequency, damping ratio (100 % "
+        "where it just no longer swings), frequency with that damping, and the direction, as a vector of length one."
+    )
+    return section("modes", "Modes", table("Modes of the platform", columns, rows, "modes", True), lead)
+
+
+def _scene_section(robot: Robot) -> str:
+    """The mode's shape in motion, with its controls."""
+    lead = (
+        "The shape is drawn far larger than it swings, and without its decay. Cables are coloured by how their tension "
+        "changes for a swing of 1 mm."
+    )
+    label = (
+        f"The robot in space: {robot.cable_count} cables from their exit points to the platform, which swings along "
+        "the chosen mode, coloured by the change of their tension."
+    )
+    return scene_section("Shapes in motion", lead, label, legend_key("after", "swing of the platform"), slider="Phase")
+
+
+def _cables_section(plant: LinearPlant) -> str:
+    """Each cable's tension at rest, and its share of the potential energy of each mode."""
+    shares, count = plant.modes.cable_shares, plant.modes.cable_shares.shape[1]
+    columns = [TableColumn("Cable"), TableColumn("Tension at rest", True, True)]
+    for mode in range(count):
+        columns += [TableColumn(f"Of mode {mode + 1}", True), TableColumn("As a bar")]
+    rows = []
+    for cable, tension in enumerate(plant.tensions):
+        row = [f"Cable {cable + 1}", f"{number_html(format_significant(float(tension), 4))} N"]
+        for share in shares[cable]:
+            row += [number_html(format_percent(float(share))), charts.bar(float(share), float(shares.max()))]
+        rows.append(row)
+    lead = "Each cable&rsquo;s part of the energy that a mode stores."
+    return section("cables", "Which cables hold it", table("Cables", columns, rows, "shares", True), lead)
+
+
+def _gains_section(plant: LinearPlant) -> str:
+    """A panel for each output: gain and phase from the chosen input."""
+    options = "".join(
+        f'<option value="{place}">{escape_text(signal_label(name))}</option>'
+        for place, name in enumerate(plant.system.input_labels)
+    )
+    control = f'<p class="controls"><label>Driven by <select id="source">{options}</select></label></p>'
+    groups: dict[str, list[tuple[int, str]]] = {title: [] for title in GAIN_OUTPUT_TITLES.values()}
+    shown = [name for name in plant.system.output_labels if name.rpartition("_")[0] in GAIN_OUTPUT_TITLES]
+    for place, name in enumerate(shown):
+        groups[GAIN_OUTPUT_TITLES[name.rpartition("_")[0]]].append((place, signal_label(name)))
+    gain_key, mode_key = legend_key("after", "gain, and below it the phase"), legend_key("mode", "modes, by number")
+    keys = f'<p class="keys">{gain_key}{mode_key}</p>'
+    lead = (
+        "How much each output swings for each unit of the input that swings, over frequency (gain), and how far ahead "
+        "of the input it is (phase; behind where negative)."
+    )
+    return section("gains", "Gains", control + keys + panel_groups("gain", groups, "Gain and phase"), lead)
+
+
+def _notes_section(plant: LinearPlant) -> str:
+    return section("notes", "Notes", bullet_list(plant.notes)) if plant.notes else ""

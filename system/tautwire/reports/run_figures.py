@@ -1,0 +1,172 @@
+"""The data of the figures on a run's page."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..cosimulation.robot_wiring import AXES
+from ..number_format import choose_unit, format_significant
+from .downsampling import envelope_times, evenly_spaced_indices, min_max_envelope, pack_float32
+from .robot_scene import RobotScene, ScenePath, scene_data
+from .run_overview import ReportedRun
+from .trace_figures import MAGNIFICATIONS, deviation_magnification
+
+Array = NDArray[np.float64]
+
+# SI units of the display units that are not SI.
+SI_UNITS = {"mm": "m"}
+MAX_SERIES_POINTS = 3000
+MAX_PATH_POINTS = 900
+
+
+@dataclass(frozen=True)
+class OutputSeries:
+    """One output of a run over time: its column, its labels, and its recorded values.
+
+    ``scale`` turns SI into ``unit``. ``recorded`` (N,) is over the recording's time, None where it has none;
+    ``difference`` (M,) is recorded minus co-simulated at the overview's first M rows, in SI.
+    """
+
+    column_index: int
+    title: str
+    label: str
+    unit: str
+    scale: float
+    recorded: Array | None
+    difference: Array
+
+    @property
+    def rms_difference(self) -> float:
+        """Root mean square of the difference, in SI; NaN where nothing can be compared."""
+        finite = self.difference[np.isfinite(self.difference)]
+        return float(np.sqrt(np.mean(finite**2))) if finite.size else math.nan
+
+    @property
+    def difference_unit(self) -> tuple[str, float]:
+        """The display unit of the difference, and its size in SI units."""
+        magnitudes = np.abs(self.difference[np.isfinite(self.difference)])
+        return choose_unit(float(np.max(magnitudes, initial=0.0)), SI_UNITS.get(self.unit, self.unit))
+
+
+def output_series(run: ReportedRun) -> list[OutputSeries]:
+    """All outputs that a page shows, ordered by quantity."""
+    recording, cables = run.recording, run.robot.cable_numbers
+    positions: Mapping[str, Array] = dict(zip(AXES, recording.position.T, strict=True))
+    tensions: Mapping[str, Array] = {str(i): recording.tension[:, i - 1] for i in cables}
+    speeds: Mapping[str, Array] = {str(i): recording.winch_speed[:, i - 1] for i in cables}
+    quantities: tuple[tuple[str, str, Sequence[object], str, float, Mapping[str, Array]], ...] = (
+        ("Position", "", AXES, "m", 1.0, positions),
+        ("Tension", "tension_", cables, "N", 1.0, tensions),
+        ("Velocity", "v", AXES, "m/s", 1.0, {}),
+        ("Elongation", "elongation_", cables, "mm", 1e3, {}),
+        ("Winch speed", "winch_speed_", cables, "m/s", 1.0, speeds),
+    )
+    return [
+        _series_of_column(
+            run, index, title, name if names is AXES else f"cable {name}", unit, scale, recorded.get(name)
+        )
+        for title, prefix, names, unit, scale, recorded in quantities
+        for index, name in run.column_indices(prefix, names).items()
+    ]
+
+
+def run_data(run: ReportedRun, series: Sequence[OutputSeries]) -> dict[str, Any]:
+    """The figure data of a run."""
+    choice = {
+        "label": "Run",
+        "channels": [_series_data(run, each) for each in series],
+        "scene": scene_data(_run_scene(run)),
+    }
+    return {
+        "anchors": [[float(value) for value in anchor] for anchor in run.robot.anchors],
+        "magnifications": list(MAGNIFICATIONS),
+        "choices": [choice],
+    }
+
+
+def _series_of_column(
+    run: ReportedRun, column_index: int, title: str, label: str, unit: str, scale: float, recorded: Array | None
+) -> OutputSeries:
+    if recorded is None or not np.isfinite(recorded).any():
+        return OutputSeries(column_index, title, label, unit, scale, None, np.zeros(0))
+    thinned_recording, rows = recorded[:: run.overview.group_size], run.overview.rows[:, column_index]
+    count = min(len(thinned_recording), len(rows))
+    return OutputSeries(column_index, title, label, unit, scale, recorded, thinned_recording[:count] - rows[:count])
+
+
+def _series_data(run: ReportedRun, series: OutputSeries) -> dict[str, Any]:
+    """An output over time, and its recorded values until the run ended."""
+    time, values = run.overview.curve(series.column_index)
+    description: dict[str, Any] = {"label": series.label, "title": series.title, "unit": series.unit}
+    curve = {
+        "time": pack_float32(time),
+        "values": pack_float32(series.scale * values),
+        "range": _range_texts(series.scale * values),
+    }
+    if series.recorded is None:
+        return {**description, **curve, "recorded": None, "difference": None}
+    sample_count = int(np.searchsorted(run.recording.time, run.overview.last_time, side="right"))
+    recorded = {
+        "time": pack_float32(envelope_times(run.recording.time[:sample_count], MAX_SERIES_POINTS)),
+        "values": pack_float32(series.scale * min_max_envelope(series.recorded[:sample_count], MAX_SERIES_POINTS)),
+    }
+    return {**description, **curve, "recorded": recorded, "difference": _difference_data(run, series)}
+
+
+def _difference_data(run: ReportedRun, series: OutputSeries) -> dict[str, Any] | None:
+    """Recorded minus co-simulated over time, in a unit of fitting size; None where nothing can be compared."""
+    if not math.isfinite(series.rms_difference):
+        return None
+    unit, unit_size = series.difference_unit
+    return {
+        "time": pack_float32(run.overview.time[: len(series.difference)]),
+        "values": pack_float32(series.difference / unit_size),
+        "apart": format_significant(series.rms_difference / unit_size),
+        "unit": unit,
+    }
+
+
+def _range_texts(values: Array) -> list[str]:
+    """Minimum and maximum as text with a true minus sign; empty where nothing is finite."""
+    finite = values[np.isfinite(values)]
+    ends = (float(finite.min()), float(finite.max())) if finite.size else ()
+    return [format_significant(end).replace("-", "\N{MINUS SIGN}") for end in ends]
+
+
+def _run_scene(run: ReportedRun) -> RobotScene:
+    """The scene of the run, with the recorded path beside the co-simulated one."""
+    row_indices = evenly_spaced_indices(len(run.overview.rows), MAX_PATH_POINTS)
+    rows, sample_indices = (
+        run.overview.rows[row_indices],
+        np.minimum(row_indices * run.overview.group_size, run.recording.sample_count - 1),
+    )
+    platform = _columns_by_name(rows, run.column_indices("", AXES), AXES)
+    paths = [ScenePath("co-simulated", platform, "accent", 5)]
+    recording, magnification = run.recording, 1
+    if recording.has_position:
+        measured = recording.position[sample_indices]
+        paths.insert(0, ScenePath("recorded", measured, "before", 2, "dot"))
+        magnification = deviation_magnification(np.array(run.robot.anchors), platform, [measured - platform])
+    return RobotScene(
+        time=run.overview.time[row_indices],
+        platform=platform,
+        tension=_columns_by_name(
+            rows, run.column_indices("tension_", run.robot.cable_numbers), run.robot.cable_numbers
+        ),
+        paths=tuple(paths),
+        measured_tension=recording.tension[sample_indices] if recording.has_tension else None,
+        magnification=magnification,
+    )
+
+
+def _columns_by_name(rows: Array, column_indices: Mapping[int, str], names: Sequence[object]) -> Array:
+    """Columns selected by name; NaN for one that an FMU does not output."""
+    index_by_name = {name: index for index, name in column_indices.items()}
+    missing = np.full(len(rows), np.nan)
+    return np.column_stack([rows[:, index_by_name[str(n)]] if str(n) in index_by_name else missing for n in names])

@@ -1,0 +1,170 @@
+"""The data of the figures on a trace's page, as one JSON value; the scripts in ``assets`` draw them."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..estimation.trace_result import Comparison, Trace
+from ..number_format import format_significant
+from .downsampling import (
+    envelope_times,
+    evenly_spaced_indices,
+    min_max_envelope,
+    pack_float32,
+    residual_spectra,
+    white_noise_density,
+)
+from .mode_bands import Band, mode_bands, resonance_bands
+from .robot_scene import RobotScene, ScenePath, scene_data
+from .trace_texts import MeasuredOutput, axis_outputs, cable_outputs
+
+Array = NDArray[np.float64]
+
+MAX_RESIDUAL_POINTS = 260_000  # in all residual curves of a page, which so stays a few MB
+MAX_CURVE_POINTS, MIN_CURVE_POINTS = 3000, 400  # per curve
+MAX_PATH_POINTS = 900
+MAGNIFICATIONS = (1, 10, 100, 1000)
+# Deviations are magnified until the largest reaches this share of the robot's size, or of the path's extent.
+MAX_SHARE_OF_ROBOT_SIZE, MAX_SHARE_OF_PATH_SIZE = 0.03, 0.15
+ROLE_LABELS = {"fit": "Fit recording", "check": "Check recording"}
+
+
+def trace_page_data(trace: Trace) -> dict[str, Any]:
+    """The figure data of all recordings of a trace."""
+    return {
+        "anchors": [[float(value) for value in anchor] for anchor in trace.robot_before.anchors],
+        "magnifications": list(MAGNIFICATIONS),
+        "choices": [_recording_data(trace, comparison) for comparison in trace.comparisons],
+    }
+
+
+def measured_outputs(trace: Trace) -> list[MeasuredOutput]:
+    """All measured outputs in the order of a recording: axes, then cables."""
+    return [*axis_outputs(), *cable_outputs(trace.robot_before.cable_count)]
+
+
+def noise_deviation(trace: Trace, output: MeasuredOutput) -> tuple[float, bool]:
+    """Standard deviation of an output's measurement noise in its unit, and whether the robot file declares it.
+
+    Where it does not, the trace's noise floor of that output is returned.
+    """
+    sensors = trace.robot_before.sensors
+    declared = sensors.position_noise if output.errors_key[0] == "axes" else sensors.tension_noise
+    if declared is not None:
+        return output.scale * declared, True
+    return output.error_of(trace.noise_floor), False
+
+
+def _recording_data(trace: Trace, comparison: Comparison) -> dict[str, Any]:
+    page_outputs = measured_outputs(trace)
+    points = int(np.clip(MAX_RESIDUAL_POINTS // (4 * len(page_outputs)), MIN_CURVE_POINTS, MAX_CURVE_POINTS))
+    return {
+        "role": comparison.role,
+        "label": ROLE_LABELS.get(comparison.role, comparison.role),
+        "time": pack_float32(envelope_times(comparison.recording.time, points)),
+        "channels": [
+            _channel_data(trace, comparison, output, index, points) for index, output in enumerate(page_outputs)
+        ],
+        "bands": [band.document() for band in spectrum_bands(trace, comparison)],
+        "scene": scene_data(_trace_scene(trace, comparison)),
+    }
+
+
+def spectrum_bands(trace: Trace, comparison: Comparison) -> list[Band]:
+    """Bands of the extended model's modes along a run, and of resonances in that recording that the model lacks."""
+    resonances = [each for each in trace.resonances if comparison.role in each.on]
+    return [*mode_bands(trace.robot_after, comparison.after.position), *resonance_bands(resonances)]
+
+
+def _channel_data(
+    trace: Trace, comparison: Comparison, output: MeasuredOutput, index: int, points: int
+) -> dict[str, Any]:
+    """Residuals of one output, measured minus model, and their spectra; None where it was not measured."""
+    time = comparison.recording.time
+    measured = comparison.recording.measured()[:, index]
+    before = output.scale * (measured - comparison.before.measured()[:, index])
+    after = output.scale * (measured - comparison.after.measured()[:, index])
+    sigma, _ = noise_deviation(trace, output)
+    description = {
+        "label": output.label,
+        "unit": output.unit,
+        "rms": [
+            format_significant(output.error_of(errors))
+            for errors in (comparison.errors_before, comparison.errors_after)
+        ],
+        "sigma": sigma if math.isfinite(sigma) else None,
+    }
+    if not np.isfinite(before).any() and not np.isfinite(after).any():
+        return {**description, "before": None, "after": None, "reach": None, "spectrum": None}
+    return {
+        **description,
+        "before": pack_float32(min_max_envelope(before, points)),
+        "after": pack_float32(min_max_envelope(after, points)),
+        "reach": float(np.max(np.abs(after[np.isfinite(after)]), initial=0.0)),
+        "spectrum": _spectrum_data(time, before, after, sigma),
+    }
+
+
+def _spectrum_data(time: Array, before: Array, after: Array, sigma: float) -> dict[str, Any] | None:
+    spectra = residual_spectra(time, before, after)
+    if spectra is None:
+        return None
+    return {
+        "frequency": pack_float32(spectra.frequency),
+        "before": pack_float32(spectra.before),
+        "after": pack_float32(spectra.after),
+        "floor": white_noise_density(sigma, time) if math.isfinite(sigma) else None,
+    }
+
+
+def _trace_scene(trace: Trace, comparison: Comparison) -> RobotScene:
+    """The scene of the extended model's run, with the paths of the declared model and of the recording."""
+    recording = comparison.recording
+    indices = evenly_spaced_indices(recording.time.size, MAX_PATH_POINTS)
+    paths = [
+        ScenePath("before", comparison.before.position[indices], "before", 4),
+        ScenePath("after", comparison.after.position[indices], "accent", 5),
+    ]
+    if recording.has_position:
+        paths.insert(0, ScenePath("measured", recording.position[indices], "measured", 2, "dot"))
+    return RobotScene(
+        time=recording.time[indices],
+        platform=comparison.after.position[indices],
+        tension=comparison.after.tension[indices],
+        paths=tuple(paths),
+        measured_tension=recording.tension[indices] if recording.has_tension else None,
+        magnification=_trace_magnification(trace, comparison),
+    )
+
+
+def _trace_magnification(trace: Trace, comparison: Comparison) -> int:
+    """Magnification of the deviations of the declared model and the recording from the extended model."""
+    path = comparison.after.position
+    deviations = [comparison.before.position - path]
+    if comparison.recording.has_position:
+        deviations.append(comparison.recording.position - path)
+    return deviation_magnification(np.array(trace.robot_before.anchors), path, deviations)
+
+
+def deviation_magnification(anchors: Array, path: Array, deviations: Sequence[Array]) -> int:
+    """Magnification at which ``deviations`` (N, 3) from a ``path`` (N, 3) are visible beside the ``anchors``.
+
+    The bound by the path's extent does not hold for a robot at rest, which has no path that they could hide.
+    """
+    distances = np.concatenate([np.linalg.norm(each, axis=1) for each in deviations])
+    largest = float(np.max(distances[np.isfinite(distances)], initial=0.0))
+    finite_path = path[np.isfinite(path).all(axis=1)]
+    max_drawn_deviation = MAX_SHARE_OF_ROBOT_SIZE * float(np.max(np.ptp(np.vstack((anchors, finite_path)), axis=0)))
+    path_extent = float(np.max(np.ptp(finite_path, axis=0))) if len(finite_path) else 0.0
+    if path_extent > largest:
+        max_drawn_deviation = min(max_drawn_deviation, MAX_SHARE_OF_PATH_SIZE * path_extent)
+    return (
+        max((factor for factor in MAGNIFICATIONS if factor * largest <= max_drawn_deviation), default=1)
+        if largest > 0.0
+        else 1
+    )

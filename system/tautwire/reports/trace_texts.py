@@ -1,0 +1,144 @@
+"""Texts and numbers about a trace that the terminal and the page share: error comparisons, shares, names."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import groupby
+
+from tautwire_fmu.laws.effects import BY_NAME
+
+from ..cosimulation.robot_wiring import AXES
+from ..estimation.trace_result import Candidate, Comparison, Errors, Estimate, Trace
+from ..number_format import ABSENT_TEXT, format_engineering, format_in_common_unit, format_significant
+
+ROLES = ("fit", "check")
+VERDICTS = {
+    "effects": "Effect found",
+    "none": "Nothing is missing",
+    "discovered": "New effect, formula found",
+    "unexplained": "Not explained",
+}
+MILLIMETRES_PER_METRE = 1e3
+# An error below this multiple of the noise floor leaves nothing for a model to explain.
+NOISE_FLOOR_MARGIN = 1.05
+
+
+@dataclass(frozen=True)
+class MeasuredOutput:
+    """A measured output or a total: ``scale`` converts SI to ``unit``; ``errors_key`` locates it in Errors."""
+
+    label: str
+    unit: str
+    scale: float
+    errors_key: tuple[str, int | None]
+
+    def error_of(self, errors: Errors | None) -> float:
+        """The root mean square error in ``unit``; NaN where nothing was measured."""
+        if errors is None:
+            return math.nan
+        name, index = self.errors_key
+        field = getattr(errors, name)
+        return self.scale * float(field if index is None else field[index])
+
+
+POSITION = MeasuredOutput("position", "mm", MILLIMETRES_PER_METRE, ("position_rms", None))
+TENSION = MeasuredOutput("tension", "N", 1.0, ("tension_rms", None))
+
+
+def axis_outputs() -> list[MeasuredOutput]:
+    """One output for each axis."""
+    return [MeasuredOutput(axis, "mm", MILLIMETRES_PER_METRE, ("axes", index)) for index, axis in enumerate(AXES)]
+
+
+def cable_outputs(cable_count: int) -> list[MeasuredOutput]:
+    """One output for each cable."""
+    return [MeasuredOutput(f"cable {index + 1}", "N", 1.0, ("cables", index)) for index in range(cable_count)]
+
+
+def comparison_by_role(trace: Trace, role: str) -> Comparison | None:
+    """The comparison with the recording of a role; None where there is no such recording."""
+    return next((each for each in trace.comparisons if each.role == role), None)
+
+
+def explained_share(before: float, after: float, floor: float) -> float | None:
+    """Share of the mean square error above the noise floor that the model explains; None where there was none."""
+    if not math.isfinite(before) or not math.isfinite(after):
+        return None
+    noise = floor if math.isfinite(floor) else 0.0
+    if before <= NOISE_FLOOR_MARGIN * noise or before == 0.0:
+        return None
+    return min(1.0, (before**2 - after**2) / (before**2 - noise**2))
+
+
+def cables_text(cables: Sequence[int], cable_count: int) -> str:
+    """Cable numbers as text: "all cables", "cable 2", "cables 1, 3"; a dash for none."""
+    if not cables:
+        return "-"
+    if len(cables) == cable_count:
+        return "all cables"
+    return f"cable{'s' if len(cables) > 1 else ''} {', '.join(str(cable) for cable in cables)}"
+
+
+def parameter_unit(effect: str, parameter: str) -> str:
+    """The unit of an effect's parameter; empty where the effect or parameter is unknown."""
+    effect_definition = BY_NAME.get(effect)
+    units = {each.name: each.unit for each in effect_definition.parameters} if effect_definition else {}
+    return units.get(parameter, "")
+
+
+def values_text(effect: str, values: Mapping[str, float]) -> str:
+    """Parameter values of an effect on one line, as in "damping 2.10 GPa s"."""
+    return ", ".join(
+        f"{name} {format_engineering(value, parameter_unit(effect, name))}" for name, value in values.items()
+    )
+
+
+@dataclass(frozen=True)
+class EstimateText:
+    """A formatted estimate: one unit for all numbers, as many decimals as its interval justifies."""
+
+    value: str
+    low: str
+    high: str
+    declared: str
+    unit: str
+
+
+def format_estimate(estimate: Estimate) -> EstimateText:
+    """Formats an estimate with its interval and declared value."""
+    numbers = (estimate.value, estimate.low, estimate.high, estimate.declared)
+    texts, unit = format_in_common_unit(numbers, estimate.unit, (estimate.high - estimate.low) / 2.0)
+    value, low, high, declared = texts
+    return EstimateText(value, low, high, declared, unit)
+
+
+def candidates_by_round(candidates: Sequence[Candidate]) -> list[tuple[int, list[Candidate]]]:
+    """Rounds of the search in order, each with its candidates by descending evidence."""
+
+    def sort_key(candidate: Candidate) -> tuple[int, float, str, tuple[int, ...]]:
+        evidence = candidate.evidence if math.isfinite(candidate.evidence) else -math.inf
+        return (candidate.round, -evidence, candidate.name, candidate.cables)
+
+    ordered = sorted(candidates, key=sort_key)
+    return [(number, list(group)) for number, group in groupby(ordered, key=lambda each: each.round)]
+
+
+def noise_sentence(trace: Trace) -> str:
+    """Whether the residual is white noise, before and after, in one sentence."""
+    before, after = trace.noise_before, trace.noise_after
+    if before and after:
+        return "The declared model already leaves nothing but noise."
+    if after:
+        return "What the extended model leaves is noise; what the declared one leaves is not."
+    if before:
+        return "The declared model leaves noise, the final one more than that."
+    return "More than noise is left."
+
+
+def format_evidence(evidence: float) -> str:
+    """Formats evidence in natural logarithms to one decimal; to four digits where it is large."""
+    if not math.isfinite(evidence):
+        return ABSENT_TEXT
+    return format_significant(evidence, 4) if abs(evidence) >= 1000.0 else f"{evidence:.1f}"

@@ -1,0 +1,106 @@
+"""The effects and formulas of a robot file, each validated."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+from tautwire_fmu.laws.effects import BY_NAME, Effect, Parameter
+from tautwire_fmu.laws.expression import expression_errors
+from tautwire_fmu.laws.formula import VARIABLES_BY_TARGET
+
+from ..errors import format_value
+from .checked_table import CheckedTable, NumberRule, suggest_name
+from .schema import PER_CABLE_COMPONENTS, EffectSetting, Formula
+
+
+def read_effects(table: CheckedTable, cable_count: int) -> tuple[EffectSetting, ...]:
+    """Reads the effect settings of ``[effect]`` in a robot file; errors go to the table's sink."""
+    settings: list[EffectSetting] = []
+    for name in table.content:
+        if name not in BY_NAME:
+            table.refuse(
+                name, "is not an effect that the project knows", f"write {suggest_name(name, BY_NAME)}, or remove it"
+            )
+            continue
+        tables_by_cable: dict[int, str] = {}
+        for effect_table in table.table_or_tables(name):
+            setting = _read_effect(effect_table, BY_NAME[name], cable_count)
+            # Effects that act on no cable count as cable 0, so that they too are set once.
+            for cable in setting.cables or (0,):
+                if cable in tables_by_cable:
+                    which = f"cable {cable}" if cable else "the robot"
+                    problem = f"is set twice for {which}, in {tables_by_cable[cable]} too"
+                    effect_table.refuse("cables" if cable else "", problem, "set it once")
+                tables_by_cable[cable] = effect_table.key
+            settings.append(setting)
+    return tuple(settings)
+
+
+def _read_effect(table: CheckedTable, effect: Effect, cable_count: int) -> EffectSetting:
+    per_cable = effect.component in PER_CABLE_COMPONENTS
+    if "cables" in table.content and not per_cable:
+        table.refuse("cables", f"{effect.name} acts on the {effect.component}", "remove cables")
+    names = [parameter.name for parameter in effect.parameters]
+    table.require_known([*names, "cables"])
+    values = {each.name: table.number(each.name, _parameter_rule(each)) for each in effect.parameters}
+    # A missing number without a neutral value is reported already.
+    if not any(name in table.content for name in names) and all(each.neutral is not None for each in effect.parameters):
+        hint = f"give {effect.parameters[0].description}, as in {names[0]} = {effect.parameters[0].start:g}"
+        table.refuse("", "sets none of its numbers", hint)
+    return EffectSetting(effect.name, values, read_cable_list(table, cable_count) if per_cable else ())
+
+
+def _parameter_rule(parameter: Parameter) -> NumberRule:
+    bounds = (parameter.minimum, parameter.maximum)
+    return NumberRule(parameter.description, parameter.unit, *bounds, default=parameter.neutral)
+
+
+def read_cable_list(table: CheckedTable, cable_count: int) -> tuple[int, ...]:
+    """Reads the cables, from 1, on which a table acts; all if it names none."""
+    if "cables" not in table.content:
+        return tuple(range(1, cable_count + 1))
+    hint = "list cables as in cables = [2], or remove the key for all cables"
+    entries = table.content["cables"]
+    if not isinstance(entries, list) or not entries:
+        problem = "is empty" if entries == [] else f"is {format_value(entries)}, not a list of cables"
+        table.refuse("cables", problem, hint)
+        return ()
+    cable_numbers: set[int] = set()
+    for cable in entries:
+        if isinstance(cable, bool) or not isinstance(cable, int) or not 1 <= cable <= cable_count:
+            table.refuse("cables", f"has {format_value(cable)}, must be from 1 to {cable_count}", hint)
+        elif cable in cable_numbers:
+            table.refuse("cables", f"names cable {cable} twice", hint)
+        else:
+            cable_numbers.add(cable)
+    return tuple(sorted(cable_numbers))
+
+
+def read_formulas(root: CheckedTable, cable_reader: Callable[[CheckedTable], tuple[int, ...]]) -> tuple[Formula, ...]:
+    """Reads ``[formula]`` or ``[[formula]]`` of a robot file, if any; ``cable_reader`` returns the cables of a table.
+
+    Raises RobotFileError.
+    """
+    if "formula" not in root.content:
+        return ()
+    return tuple(
+        formula for table in root.table_or_tables("formula") for formula in _read_formula_table(table, cable_reader)
+    )
+
+
+def _read_formula_table(table: CheckedTable, cable_reader: Callable[[CheckedTable], tuple[int, ...]]) -> list[Formula]:
+    table.require_known((*VARIABLES_BY_TARGET, "cables"))
+    targets = [target for target in VARIABLES_BY_TARGET if target in table.content]
+    if not targets:
+        table.refuse("", "holds no formula", 'write one, as in force_x = "-20 * vx"')
+    elif "cables" in table.content and "tension" not in targets:
+        table.refuse("cables", "only a formula of the tension acts in cables", "remove cables")
+    formulas = []
+    for place in targets:
+        text = table.text(place, 'write it as a text, as in "-20 * vx"')
+        if text is None:
+            continue
+        for error in expression_errors(text, VARIABLES_BY_TARGET[place]):
+            table.refuse(place, f"character {error.position}: {error.problem}", error.hint)
+        formulas.append(Formula(place, text, cable_reader(table) if place == "tension" else ()))
+    return formulas

@@ -1,0 +1,88 @@
+"""Assembles a robot for the physical laws: constants and active effects of each component; NumPy mathematics."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from tautwire_fmu.laws.cable import LAWS, CableConstants
+from tautwire_fmu.laws.effects import ActiveEffect
+from tautwire_fmu.laws.mathematics import REAL, Mathematics
+from tautwire_fmu.laws.point_mass import PointMassConstants
+
+from .schema import Robot
+from .static_equilibrium import cable_effects, cable_routes, platform_effects, static_tensions
+
+NUMPY_MATHEMATICS = Mathematics(
+    log=np.log,
+    exp=np.exp,
+    sqrt=np.sqrt,
+    sin=np.sin,
+    cos=np.cos,
+    tanh=np.tanh,
+    atan2=np.arctan2,
+    absolute=np.abs,
+    maximum=np.maximum,
+    where=lambda condition, a, b: np.where(condition > 0.0, a, b),
+)
+
+
+@dataclass(frozen=True)
+class CableComponent:
+    """One cable: its declared constants, and the effects that act in it."""
+
+    constants: CableConstants
+    effects: tuple[ActiveEffect, ...]
+
+
+@dataclass(frozen=True)
+class RobotAssembly:
+    """A robot as the laws take it; positions in m, the initial velocity in m/s."""
+
+    cables: tuple[CableComponent, ...]
+    platform: PointMassConstants
+    platform_effects: tuple[ActiveEffect, ...]
+    start: tuple[float, float, float]
+    velocity: tuple[float, float, float]
+
+
+def assemble_robot(
+    robot: Robot, start_tensions: Sequence[Any] | None = None, mathematics: Mathematics = REAL
+) -> RobotAssembly:
+    """Assembles constants and effects; start tensions are by default those of static equilibrium.
+
+    ``mathematics`` are the functions for the effects' parameters.
+
+    Raises UnreachableError where the cables cannot hold the platform at its start.
+    """
+    tensions = static_tensions(robot) if start_tensions is None else start_tensions
+    if robot.initial_state:
+        tensions = [tension + beside for tension, beside in zip(tensions, robot.initial_state.tensions, strict=True)]
+    cable_paths = cable_routes(mathematics, robot, robot.platform.start)
+    cables = tuple(
+        CableComponent(
+            constants=CableConstants(
+                law=LAWS[cable.law],
+                anchor=cable.anchor,
+                modulus=cable.modulus,
+                area=cable.area,
+                damping=cable.damping,
+                start_length=line.length,
+                start_tension=tension,
+                start_direction=line.direction,
+                gravity=robot.gravity,
+            ),
+            effects=cable_effects(robot, index),
+        )
+        for index, (cable, line, tension) in enumerate(zip(robot.cables, cable_paths, tensions, strict=True), start=1)
+    )
+    return RobotAssembly(
+        cables=cables,
+        platform=PointMassConstants(robot.platform.mass, robot.gravity),
+        platform_effects=platform_effects(robot),
+        start=robot.platform.start,
+        velocity=robot.initial_state.velocity if robot.initial_state else (0.0, 0.0, 0.0),
+    )

@@ -1,0 +1,282 @@
+"""Reads robot files with every key checked, and writes files that read back equal."""
+
+import math
+import os
+import re
+import sys
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+from tautwire_fmu.laws.cable import LAWS
+from tautwire_fmu.laws.effects import BY_NAME
+
+from ..errors import RobotFileError, format_value, one_line, raise_error
+from ..input_files import read_bytes, require_utf8_text, validate_path
+from .checked_table import CheckedTable, ErrorSink, NumberRule, suggest_name
+from .effect_tables import read_cable_list, read_effects, read_formulas
+from .robot_file_writer import robot_text
+from .schema import Cable, Platform, Point, Robot, Sensors, TensionLimits, UserFmu, Winch, fmu_slots
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib  # type: ignore[import-not-found,unused-ignore]
+
+__all__ = ["read_robot", "robot_text", "write_robot"]
+
+TOP_LEVEL_KEYS = ("name", "gravity", "platform", "tension", "sensors", "cable", "effect", "winch", "fmu", "formula")
+MAX_FILE_BYTES = 10_000_000  # bytes
+MAX_CABLES = 100
+MIN_POINT_DISTANCE = 1e-6  # m; no two exit points can be built closer
+
+GRAVITY_RULE = NumberRule("the gravity along -z", "m/s^2", minimum=0.0, default=9.81)
+MASS_RULE = NumberRule("the platform's mass", "kg", positive=True)
+MIN_TENSION_RULE = NumberRule("the least tension", "N", minimum=0.0)
+MAX_TENSION_RULE = NumberRule("the largest tension", "N", positive=True)
+PREFERRED_TENSION_RULE = NumberRule("the tension to aim at", "N", minimum=0.0)
+PREFERRED_UNCERTAINTY_RULE = NumberRule(
+    "the standard deviation of true start tensions from the rule's", "N", minimum=0.0
+)
+NOISE_RULES = {
+    "position_noise": NumberRule("the standard deviation of one position", "m", minimum=0.0),
+    "tension_noise": NumberRule("the standard deviation of one tension", "N", minimum=0.0),
+    "winch_speed_noise": NumberRule("the standard deviation of one winch speed", "m/s", minimum=0.0),
+}
+OFFSET_RULES = {
+    "tension_offset_uncertainty": NumberRule(
+        "the standard deviation of a load cell's constant error", "N", minimum=0.0, default=0.0
+    ),
+    "position_offset_uncertainty": NumberRule(
+        "the standard deviation of the tracker's constant error", "m", minimum=0.0, default=0.0
+    ),
+}
+MASS_UNCERTAINTY_RULE = NumberRule("the standard deviation of the true mass", "kg", minimum=0.0, default=0.0)
+MODULUS_UNCERTAINTY_RULE = NumberRule("the standard deviation of the true modulus", "Pa", minimum=0.0, default=0.0)
+DAMPING_UNCERTAINTY_RULE = NumberRule("the standard deviation of the true damping", "Pa s", minimum=0.0, default=0.0)
+MODULUS_RULE = NumberRule("the modulus of elasticity", "Pa", positive=True)
+AREA_RULE = NumberRule("the area of the rope's cross-section", "m^2", positive=True)
+DAMPING_RULE = NumberRule("the damping", "Pa s", minimum=0.0, default=0.0)
+DRUM_RADIUS_RULE = NumberRule("the radius at which rope lies on the drum", "m", positive=True)
+GEAR_RULE = NumberRule("the turns of the motor for one turn of the drum", "", positive=True, default=Winch.gear)
+BANDWIDTH_RULE = NumberRule("the natural frequency of the speed loop", "Hz", 0.01, 1000.0, default=Winch.bandwidth)
+DAMPING_RATIO_RULE = NumberRule("the damping ratio of the speed loop", "", 0.05, 20.0, default=Winch.damping_ratio)
+WINCH_LIMIT_RULES = {
+    "speed_limit": NumberRule("the largest speed of the rope", "m/s", positive=True),
+    "acceleration_limit": NumberRule("the largest acceleration of the rope", "m/s^2", positive=True),
+}
+
+
+def read_robot(path: str | Path) -> Robot:
+    """Reads the robot that a TOML file declares, with n cables; lengths in m, forces in N, moduli in Pa, masses in kg.
+
+    Raises RobotFileError, which names the first invalid key, if the file declares no robot; ArgumentError if ``path``
+    is no path. ``tautwire check`` reports all errors at once.
+    """
+    return read_robot_with_sink(validate_path("read_robot: path", path), raise_error)
+
+
+def read_robot_with_sink(path: str | Path, sink: ErrorSink) -> Robot:
+    """Reads a robot file and passes each error to ``sink``.
+
+    If that does not raise, reading continues to the next error, and the robot must not be used. A file that is not
+    TOML raises RobotFileError all the same.
+    """
+    file = str(path)
+    parsed = _parse_toml(robot_file_text(path), file)
+    return _read_robot_table(CheckedTable(file, "", parsed, sink), default_name=one_line(Path(path).stem))
+
+
+def robot_content(path: str | Path) -> dict[str, Any]:
+    """The unvalidated keys and values of a robot file; raises RobotFileError if it is not TOML."""
+    return _parse_toml(robot_file_text(path), str(path))
+
+
+def robot_from_content(content: dict[str, Any], path: str | Path) -> Robot:
+    """The robot that keys and values declare, as if read from ``path``; raises RobotFileError if they declare none."""
+    return _read_robot_table(CheckedTable(str(path), "", content), default_name=one_line(Path(path).stem))
+
+
+def robot_file_text(path: str | Path) -> str:
+    """The text of a robot file; raises RobotFileError if it is not text."""
+    content = read_bytes(path, RobotFileError, MAX_FILE_BYTES)
+    require_utf8_text(content, str(path), RobotFileError, "TOML")
+    return content.decode("utf-8-sig")
+
+
+def write_robot(robot: Robot, path: str | Path) -> None:
+    """Writes a robot file atomically, such that it reads back equal.
+
+    Raises RobotFileError if no file may declare such a robot, OSError if writing fails.
+    """
+    text = robot_text(robot)
+    if _read_robot_table(CheckedTable(str(path), "", _parse_toml(text, str(path))), robot.name) != _with_neutral_values(
+        robot
+    ):
+        raise RobotFileError(str(path), "would not read back equal", "build the robot as read_robot does")
+    target = Path(path)
+    temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
+    try:
+        temporary.write_bytes(text.encode("utf-8"))
+        temporary.replace(target)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _with_neutral_values(robot: Robot) -> Robot:
+    """The robot with the neutral values of its effects filled in."""
+    effects = (replace(s, values=BY_NAME[s.name].completed_values(s.values)) for s in robot.effects)
+    return replace(robot, effects=tuple(effects))
+
+
+def _parse_toml(text: str, file: str) -> dict[str, Any]:
+    try:
+        return tomllib.loads(text)
+    except RecursionError as problem:
+        raise RobotFileError(file, "is nested too deeply", "write it as a flat robot file") from problem
+    except ValueError as problem:
+        reason, _, location = str(problem).partition(" (at ")
+        match = re.match(r"line (\d+), column (\d+)", location)
+        line = int(match.group(1)) if match else text.count("\n") + 1
+        column = f", column {match.group(2)}" if match else ""
+        where = f"{file}: line {line}"
+        raise RobotFileError(where, f"is not TOML ({reason}{column})", "correct this line", line=line) from problem
+
+
+def _read_robot_table(root: CheckedTable, default_name: str) -> Robot:
+    root.require_known(TOP_LEVEL_KEYS)
+    name = _read_name(root, default_name)
+    gravity = root.number("gravity", GRAVITY_RULE)
+    platform = _read_platform(root)
+    cables = _read_cables(root, platform.start)
+    tension, sensors, effect = root.table("tension"), root.table("sensors"), root.table("effect")
+    winch, fmu = root.table("winch"), root.table("fmu")
+    return Robot(
+        name=name,
+        gravity=gravity,
+        platform=platform,
+        tension=_read_tension_limits(tension) if tension else None,
+        sensors=_read_sensors(sensors) if sensors else Sensors(),
+        cables=cables,
+        effects=read_effects(effect, len(cables)) if effect else (),
+        winch=_read_winch(winch) if winch else None,
+        fmus=_read_fmus(fmu, len(cables)) if fmu else (),
+        formulas=read_formulas(root, partial(read_cable_list, cable_count=len(cables))),
+    )
+
+
+def _read_name(root: CheckedTable, default: str) -> str:
+    if "name" not in root.content:
+        return default
+    hint = 'give the robot a name, as in name = "hall"'
+    name = root.text("name", hint)
+    if name is not None and (not name.strip() or not name.isprintable()):
+        root.refuse("name", f"is {format_value(name)}, must be one line of printable text", hint)
+    return name or default
+
+
+def _read_platform(root: CheckedTable) -> Platform:
+    table = root.table("platform")
+    if table is None:
+        if "platform" not in root.content:
+            root.refuse("platform", "is missing", "add a table [platform] with mass and start")
+        return Platform(math.nan, (math.nan, math.nan, math.nan))
+    table.require_known(("mass", "start", "mass_uncertainty"))
+    return Platform(
+        table.number("mass", MASS_RULE),
+        table.point("start", "where the run starts"),
+        table.number("mass_uncertainty", MASS_UNCERTAINTY_RULE),
+    )
+
+
+def _read_tension_limits(table: CheckedTable) -> TensionLimits:
+    table.require_known(("minimum", "maximum", "preferred", "preferred_uncertainty"))
+    minimum, maximum = table.number("minimum", MIN_TENSION_RULE), table.number("maximum", MAX_TENSION_RULE)
+    preferred = table.number("preferred", PREFERRED_TENSION_RULE)
+    if minimum > maximum:
+        problem = f"is {minimum!r}, must be at most the maximum, {maximum!r} N"
+        table.refuse("minimum", problem, "lower minimum or raise maximum")
+    elif preferred < minimum or preferred > maximum:
+        problem = f"is {preferred!r}, must lie between minimum and maximum, {minimum!r} and {maximum!r} N"
+        table.refuse("preferred", problem, "choose a tension between them")
+    return TensionLimits(
+        minimum, maximum, preferred, table.optional_number("preferred_uncertainty", PREFERRED_UNCERTAINTY_RULE)
+    )
+
+
+def _read_sensors(table: CheckedTable) -> Sensors:
+    table.require_known([*NOISE_RULES, *OFFSET_RULES])
+    noises = {key: table.optional_number(key, rule) for key, rule in NOISE_RULES.items()}
+    offsets = {key: table.number(key, rule) for key, rule in OFFSET_RULES.items()}
+    return Sensors(
+        noises["position_noise"],
+        noises["tension_noise"],
+        noises["winch_speed_noise"],
+        offsets["tension_offset_uncertainty"],
+        offsets["position_offset_uncertainty"],
+    )
+
+
+def _read_cables(root: CheckedTable, start: Point) -> tuple[Cable, ...]:
+    entries = root.content.get("cable", [])
+    tables = root.tables("cable") if "cable" in root.content else ()
+    if isinstance(entries, list) and len(entries) < 3:
+        problem = f"{len(entries)} given, a robot has three or more"
+        root.refuse("cable", problem, "add one table [[cable]] for each cable")
+    if len(tables) > MAX_CABLES:
+        root.refuse("cable", f"{len(tables)} given, at most {MAX_CABLES} are read", "leave out the others")
+        tables = tables[:MAX_CABLES]
+    cables = tuple(_read_cable(table) for table in tables)
+    for index, (table, cable) in enumerate(zip(tables, cables, strict=True)):
+        if math.dist(cable.anchor, start) < MIN_POINT_DISTANCE:
+            problem = f"is {list(cable.anchor)}, the same as platform.start"
+            table.refuse("anchor", problem, "move one of them")
+        for other in range(index):
+            if math.dist(cable.anchor, cables[other].anchor) < MIN_POINT_DISTANCE:
+                problem = f"is {list(cable.anchor)}, the same as that of cable {other + 1}"
+                table.refuse("anchor", problem, "give each cable its own exit point")
+    return cables
+
+
+def _read_cable(table: CheckedTable) -> Cable:
+    table.require_known(("anchor", "modulus", "area", "damping", "law", "modulus_uncertainty", "damping_uncertainty"))
+    laws = " or ".join(f'"{law}"' for law in LAWS)
+    law = table.text("law", f"write law = {laws}")
+    if law is not None and law not in LAWS:
+        table.refuse("law", f"is {format_value(law)}, must be {laws}", f"write {suggest_name(law, LAWS)}")
+    return Cable(
+        anchor=table.point("anchor", "the exit point on the frame"),
+        modulus=table.number("modulus", MODULUS_RULE),
+        area=table.number("area", AREA_RULE),
+        damping=table.number("damping", DAMPING_RULE),
+        law=law or "",
+        modulus_uncertainty=table.number("modulus_uncertainty", MODULUS_UNCERTAINTY_RULE),
+        damping_uncertainty=table.number("damping_uncertainty", DAMPING_UNCERTAINTY_RULE),
+    )
+
+
+def _read_winch(table: CheckedTable) -> Winch:
+    table.require_known(("drum_radius", "gear", "bandwidth", "damping_ratio", *WINCH_LIMIT_RULES))
+    return Winch(
+        drum_radius=table.number("drum_radius", DRUM_RADIUS_RULE),
+        gear=table.number("gear", GEAR_RULE),
+        bandwidth=table.number("bandwidth", BANDWIDTH_RULE),
+        damping_ratio=table.number("damping_ratio", DAMPING_RATIO_RULE),
+        **{key: table.optional_number(key, rule) for key, rule in WINCH_LIMIT_RULES.items()},
+    )
+
+
+def _read_fmus(table: CheckedTable, cable_count: int) -> tuple[UserFmu, ...]:
+    table.require_known(fmu_slots(cable_count))
+    hint = 'name an FMU, as in platform = "mine.fmu"'
+    fmus = []
+    for slot in table.content:
+        name = table.text(slot, hint)
+        if name is None:
+            continue
+        if not name.strip() or not name.isprintable():
+            table.refuse(slot, f"is {format_value(name)}, must be the path of a file", hint)
+        # Absolute, so that the robot file may be written to another folder.
+        fmus.append(UserFmu(slot, Path(os.path.abspath(Path(table.file).parent / name))))
+    return tuple(fmus)

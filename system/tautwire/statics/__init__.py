@@ -1,1 +1,0 @@
-"""The robot at rest: tensions, their distribution, and where a wrench can be held."""

@@ -1,1 +1,0 @@
-"""Preprocessing of recordings for estimation: cleaning, measurement noise, clocks and the initial state."""

@@ -1,1 +1,0 @@
-"""Localisation of model error: residuals of single FMUs at their measured ports, before any effect is fitted."""

@@ -1,0 +1,187 @@
+"""Validation of arguments that a program passes to the library's functions: single values, arrays and frames."""
+
+from __future__ import annotations
+
+import math
+from numbers import Integral, Real
+from pathlib import Path
+from stat import S_ISDIR, S_ISREG
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .errors import ArgumentError, describe_value, format_value, with_article
+from .input_files import validate_path
+from .robot.checked_table import NumberRule
+from .robot.schema import Robot
+
+Kind = TypeVar("Kind")
+
+
+def validate_instance(where: str, value: object, expected_class: type[Kind], hint: str) -> Kind:
+    """Returns the value if it is an instance of ``expected_class``; raises ArgumentError otherwise."""
+    if isinstance(value, expected_class):
+        return value
+    raise ArgumentError(
+        where, value, f"is {describe_value(value)}, must be {with_article(expected_class.__name__)}", hint
+    )
+
+
+def validate_robot(where: str, value: object) -> Robot:
+    """Returns the value if it is a Robot; raises ArgumentError otherwise."""
+    return validate_instance(where, value, Robot, "give what read_robot returns")
+
+
+def validate_attributes(where: str, value: Kind, attribute_names: tuple[str, ...], expected: str, hint: str) -> Kind:
+    """Returns the value if it has all attributes of a protocol; ``expected`` names the protocol in messages.
+
+    Raises ArgumentError.
+    """
+    # A class has its instances' attributes, but is not an instance.
+    missing = [name for name in attribute_names if isinstance(value, type) or not hasattr(value, name)]
+    if missing:
+        problem = f"is {describe_value(value)}, which is no {expected}: it has no {', '.join(missing)}"
+        raise ArgumentError(where, value, problem, hint)
+    return value
+
+
+def validate_callable(where: str, value: Kind) -> Kind:
+    """Returns the value if it is callable or None; raises ArgumentError otherwise."""
+    if value is None or callable(value):
+        return value
+    raise ArgumentError(
+        where, value, f"is {describe_value(value)}, cannot be called", "give a function, or leave it out"
+    )
+
+
+def validate_folder(where: str, value: object) -> Path:
+    """The path of a folder, which need not exist; raises ArgumentError where it is no folder or cannot be one."""
+    folder = validate_path(where, value)
+    file_mode = _file_mode_of(where, value, folder, "name a folder")
+    if file_mode is not None and not S_ISDIR(file_mode):
+        raise ArgumentError(where, value, f"is {format_value(str(folder))}, which is no folder", "name a folder")
+    return folder
+
+
+def validate_file(where: str, value: object) -> Path:
+    """The path of an existing regular file; raises ArgumentError otherwise."""
+    file = validate_path(where, value)
+    file_mode = _file_mode_of(where, value, file, "check the path")
+    if file_mode is None or not S_ISREG(file_mode):
+        raise ArgumentError(where, value, f"is {format_value(str(file))}, where no file is", "check the path")
+    return file
+
+
+def _file_mode_of(where: str, value: object, path: Path, hint: str) -> int | None:
+    """The file mode (``st_mode``) of what a path leads to; None where nothing exists there.
+
+    Raises ArgumentError where the system rejects the path: a name in it is too long, or cannot be encoded.
+    """
+    try:
+        return path.stat().st_mode
+    except FileNotFoundError:
+        return None
+    except (OSError, ValueError) as error:
+        reason = getattr(error, "strerror", None) or getattr(error, "reason", None) or str(error)
+        raise ArgumentError(
+            where, value, f"is {format_value(str(path))}, which cannot be looked up ({reason})", hint
+        ) from error
+
+
+def validate_number(where: str, value: object, rule: NumberRule, allow_infinite: bool = False) -> float:
+    """Returns the number as a float if it satisfies a rule; raises ArgumentError otherwise.
+
+    ``allow_infinite`` accepts positive infinity, where it means that there is no bound.
+    """
+    if isinstance(value, bool) or not isinstance(value, Real):
+        raise ArgumentError(where, value, f"is {describe_value(value)}, not a number", rule.hint())
+    try:
+        number = float(value)
+    except OverflowError:
+        number = math.inf
+    if allow_infinite and number == math.inf:
+        return number
+    if not math.isfinite(number):
+        raise ArgumentError(where, value, f"is {format_value(number)}, must be finite", rule.hint())
+    bound = rule.violated_bound(number)
+    if bound is not None:
+        raise ArgumentError(where, value, f"is {number!r}, must be {bound}", rule.hint())
+    return number
+
+
+def validate_integer(where: str, value: object, minimum: int, hint: str, maximum: int | None = None) -> int:
+    """Returns an integer of ``minimum`` to ``maximum`` (None: unbounded); raises ArgumentError otherwise."""
+    if isinstance(value, bool) or not isinstance(value, Integral):
+        raise ArgumentError(where, value, f"is {describe_value(value)}, not a whole number", hint)
+    number = int(value)
+    if number < minimum:
+        raise ArgumentError(where, value, f"is {format_value(number)}, must be at least {minimum}", hint)
+    if maximum is not None and number > maximum:
+        raise ArgumentError(where, value, f"is {format_value(number)}, must be at most {maximum}", hint)
+    return number
+
+
+Array = NDArray[np.float64]
+Shape = tuple[int | None, ...]
+
+
+def validate_array(where: str, value: object, shape: Shape, meaning: str) -> Array:
+    """Converts an array, a list or a frame to finite floats; an entry of ``shape`` is None where any length is valid.
+
+    ``meaning`` says what to pass, for messages. Raises ArgumentError, which names the first entry that is not finite.
+    """
+    hint = f"give {meaning}"
+    try:
+        array = np.asarray(value)
+        if np.iscomplexobj(array) or array.dtype.kind in "mM":
+            raise TypeError
+        array = array.astype(np.float64)
+    except (TypeError, ValueError, OverflowError) as error:
+        raise ArgumentError(where, value, f"is {describe_value(value)}, not an array of numbers", hint) from error
+    if array.ndim != len(shape) or any(
+        expected not in (None, actual) for expected, actual in zip(shape, array.shape, strict=True)
+    ):
+        raise ArgumentError(
+            where, value, f"has the shape {_format_shape(array.shape)}, must have {_format_shape(shape)}", hint
+        )
+    non_finite = np.argwhere(~np.isfinite(array))
+    if len(non_finite):
+        index = tuple(non_finite[0])
+        raise ArgumentError(where, value, f"{_format_index(index)} is {array[index]}, must be finite", hint)
+    return array
+
+
+def validate_increasing(
+    where: str, value: object, meaning: str, min_length: int = 2, lower_bound: float = -np.inf
+) -> Array:
+    """Strictly increasing numbers (N,) above ``lower_bound``, at least ``min_length`` of them; raises ArgumentError."""
+    array = validate_array(where, value, (None,), meaning)
+    hint = f"give {meaning}"
+    if len(array) < min_length:
+        raise ArgumentError(where, value, f"has {len(array)} entries, must have {min_length} or more", hint)
+    if array[0] <= lower_bound:
+        raise ArgumentError(where, value, f"entry 1 is {float(array[0])!r}, must be above {lower_bound:g}", hint)
+    decreases = np.flatnonzero(np.diff(array) <= 0.0)
+    if len(decreases):
+        index = int(decreases[0])
+        before, after = float(array[index]), float(array[index + 1])
+        problem = f"entry {index + 2} is {after!r} after {before!r}, must rise from entry to entry"
+        raise ArgumentError(where, value, problem, hint)
+    return array
+
+
+def validate_point(where: str, value: object) -> tuple[float, float, float]:
+    """A point as three finite coordinates in m; raises ArgumentError otherwise."""
+    x, y, z = validate_array(where, value, (3,), "three finite coordinates x, y, z in m").tolist()
+    return (x, y, z)
+
+
+def _format_shape(shape: Shape) -> str:
+    lengths = ["N" if length is None else str(length) for length in shape]
+    return f"({', '.join(lengths)}{',' if len(lengths) == 1 else ''})"
+
+
+def _format_index(index: tuple[int, ...]) -> str:
+    names = ("entry",) if len(index) == 1 else ("row", "column")
+    return ", ".join(f"{name} {position + 1}" for name, position in zip(names, index, strict=False))
