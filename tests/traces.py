@@ -208,5 +208,5 @@ def without_positions(trace: Trace) -> Trace:
         np.append([np.nan] * 3, values[3:])
         for values in (trace.normalised_innovation_variance, *trace.autocorrelations)
     )
-    shown = replace(trace, left=left, autocorrelations=(one, other))
+    shown = replace(trace, normalised_innovation_variance=left, autocorrelations=(one, other))
     return replace(shown, robot_before=robot, comparisons=tuple(comparisons), noise_floor=floor)
