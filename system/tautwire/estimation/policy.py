@@ -1,0 +1,160 @@
+"""Policy of an identification: every threshold that decides something, with its reason and how it was calibrated.
+
+"Calibrated blind" means on the recordings of docs/tracer.md: 74 that hide an effect, 200 that hide nothing.
+Log-likelihoods are in nats, on all samples unless a field says otherwise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+
+@dataclass(frozen=True)
+class ResidualAnalysisPolicy:
+    """When a residual counts as white noise."""
+
+    # Standard deviations of chance limits on variance and correlation: 200 of 200 blind recordings without an effect
+    # passed for noise.
+    whiteness_sigmas: float = 4.0
+    # With many samples everything is significant: 3 % of variance or correlation is no effect worth a name.
+    # Chosen, not calibrated.
+    negligible_deviation: float = 0.03
+    # Lags at which correlation is tested; more need longer recordings. Chosen, not calibrated.
+    autocorrelation_lags: int = 20
+    # Below, chance limits at 20 lags are too wide to tell noise from more. Chosen, not calibrated.
+    min_samples: int = 100
+
+
+@dataclass(frozen=True)
+class FitPolicy:
+    """How exactly parameters are fitted, and to how much of the data first."""
+
+    # Acceleration noise density (m/s^2 per root hertz) and relative change of the cost at which to stop, by stage: a
+    # run that follows the measurements has no far minima. Then without noise. Chosen, not calibrated.
+    coarse_stages: tuple[tuple[float, float], ...] = ((0.1, 1e-3), (0.01, 1e-3))
+    # Relative change of the cost at which the last stage stops: far below ties of some nats. Chosen, not calibrated.
+    fine_cost_tolerance: float = 1e-7
+    # For fits that are only ranked, whose ties are wide enough for it (``SelectionPolicy``). Chosen, not calibrated.
+    coarse_cost_tolerance: float = 1e-4
+    # Runs with sensitivities in one stage, so that no fit takes minutes. Chosen, not calibrated.
+    max_evaluations: int = 15
+    # The part of the data that ranks hypotheses: a third of the samples, of 800 to 20,000. Chosen, not calibrated.
+    head_divisor: int = 3
+    min_head_samples: int = 800
+    max_head_samples: int = 20_000
+
+
+@dataclass(frozen=True)
+class ScoreTestPolicy:
+    """Which hypotheses the score test sends on to a fit."""
+
+    # Nats on estimation data: less is what chance gives some of some 80 hypotheses. Chosen, not calibrated.
+    min_predicted_gain: float = 4.0
+    # Of the best gain: what explains less than 2 % of it is not the first effect to add. Chosen, not calibrated.
+    min_gain_ratio: float = 0.02
+    # How many of the best are fitted: each fit costs seconds. Chosen, not calibrated.
+    max_fits: int = 8
+    # How many of these may come from the second test, with process noise. Chosen, not calibrated.
+    max_rough_fits: int = 3
+    # One effect on each of eight cables must not crowd out the others. Chosen, not calibrated.
+    max_fits_per_effect: int = 3
+    # Acceleration noise density (m/s^2 per root hertz) of the second test: where a model has lost the phase of an
+    # oscillation, scores ask for damping whatever it lacks. Tried on a planar robot whose payload lacks 1 kg: found.
+    rough_noise_density: float = 0.1
+
+
+@dataclass(frozen=True)
+class GridSearchPolicy:
+    """Where a grid search ends."""
+
+    # Nats: where gains are this small, smaller values of the parameter have no effect either. Chosen, not calibrated.
+    negligible_gain: float = 0.01
+    # Of the natural log of a detectable value: one per cent of the value. Chosen, not calibrated.
+    log_value_tolerance: float = 0.01
+
+
+@dataclass(frozen=True)
+class SelectionPolicy:
+    """What is accepted beside what, and how much work a round is worth."""
+
+    # Default of --alpha: likelihood ratios above n / alpha come by chance in fewer than 1 % of recordings, whatever
+    # the model (universal inference); 0 of 200 blind recordings without an effect got a name.
+    false_alarm_rate: float = 0.01
+    # Effects at most; blind recordings hide two at most. Chosen, not calibrated.
+    max_rounds: int = 4
+    # Nats within which two hypotheses explain as much, so that fewer parameters win: a likelihood ratio of 150.
+    # Chosen, not calibrated.
+    tie_nats: float = 5.0
+    # Fits to a part of the data count as tied within these nats plus this share of the log-likelihood, which their
+    # cost tolerance of 1e-4 explains ten times over. Chosen, not calibrated.
+    coarse_tie_nats: float = 50.0
+    coarse_tie_ratio: float = 1e-3
+    # How many of the best predictions are fitted to all samples whatever their coarse fit says. Chosen.
+    always_refitted: int = 2
+    # Mean square of innovations below which a model needs no larger form of the same effects; white noise has 1.
+    # Chosen, not calibrated.
+    max_noise_mean_square: float = 1.1
+    # Replacements in the backward elimination: two that replace each other have to end. Chosen, not calibrated.
+    max_swaps: int = 4
+    # Samples by which starting values are ranked, and alternatives that deserve a fit to all samples; two effects
+    # took 69 s of processor time where fits to more of it took 118 s, with the same answer.
+    coarse_samples: int = 600
+
+    def coarse_tie(self, log_likelihood: float) -> float:
+        """The nats within which a fit to a part of the data ties with one of that log-likelihood."""
+        return self.coarse_tie_nats + self.coarse_tie_ratio * abs(log_likelihood)
+
+
+@dataclass(frozen=True)
+class ProfileLikelihoodPolicy:
+    """How exactly the ends of 95 % intervals are found, and with how many runs at most."""
+
+    # A fall of the sum of squares below the fit that the fit's cost tolerance does not explain. Chosen.
+    significant_fall: float = 0.1
+    # Of 1.96^2: where the rise at 1.96 deviations is this near the parabola's, the end by curvature is taken. Chosen.
+    max_parabola_deviation: float = 0.1
+    # Of the distance from the fit to an end, to which the end is found. Chosen, not calibrated.
+    end_tolerance: float = 0.01
+    # Of the parameter's scale: first distance of the search where the curvature is unknown. Chosen, not calibrated.
+    first_relative_distance: float = 1e-3
+    # Doublings reach a million times the first distance. Chosen, not calibrated.
+    max_distance_doublings: int = 20
+    # How often the fit may turn out not to be the best before the curvature's interval is told. Chosen.
+    max_recentrings: int = 3
+    # Runs over the sample, in all and in one fit of the others: more is not worth an end. Chosen, not calibrated.
+    max_runs: int = 300
+    max_evaluations: int = 15
+
+
+@dataclass(frozen=True)
+class IdentifiabilityPolicy:
+    """What counts as detectable and as confusable."""
+
+    # Normal quantile of the probability, 90 %, with which an effect of the stated size is found. Chosen.
+    power_quantile: float = 1.2816
+    # Nats that fitting a parameter on other samples is expected to cost: for one parameter asymptotically one.
+    fit_cost_nats: float = 1.0
+    # Cosine between signatures: above it a fifth of an effect or less is its own. Chosen, not calibrated.
+    min_confusable_cosine: float = 0.9
+
+
+@dataclass(frozen=True)
+class CosimulationPolicy:
+    """When the co-simulated FMUs confirm what the filter found."""
+
+    # Errors over what noise alone would leave; rightly named effects left at most 1.2 in 55 of 55 blind recordings.
+    max_error_ratio: float = 1.5
+
+
+@dataclass(frozen=True)
+class IdentificationPolicy:
+    """Policy of an identification, by theme."""
+
+    residual_analysis: ResidualAnalysisPolicy = field(default_factory=ResidualAnalysisPolicy)
+    fit: FitPolicy = field(default_factory=FitPolicy)
+    score_test: ScoreTestPolicy = field(default_factory=ScoreTestPolicy)
+    grid_search: GridSearchPolicy = field(default_factory=GridSearchPolicy)
+    selection: SelectionPolicy = field(default_factory=SelectionPolicy)
+    profile_likelihood: ProfileLikelihoodPolicy = field(default_factory=ProfileLikelihoodPolicy)
+    identifiability: IdentifiabilityPolicy = field(default_factory=IdentifiabilityPolicy)
+    cosimulation: CosimulationPolicy = field(default_factory=CosimulationPolicy)
