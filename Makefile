@@ -10,8 +10,11 @@ BIN := $(VENV)/bin
 READY := $(VENV)/.ready
 EXAMPLE := system/tautwire/examples/three
 FLOORS := .venv-floors
-FLOOR_TESTS := $(addprefix tests/test_,$(addsuffix .py,checking cli cli_refusals control cosimulation linear linear_figures \
-	materials_command package preparation recording recording_mdf recording_parquet report_page robust statics))
+FLOOR_TESTS := $(addprefix tests/,$(addsuffix .py,cli/test_commands cli/test_input_checks cli/test_material_command \
+	cli/test_refused_input control/test_lqg control/test_robust_design cosimulation/test_robot_cosimulation \
+	estimation/test_recording_preparation linear/test_linear_plant linear/test_plant_figures project/test_public_names \
+	recordings/test_csv_file recordings/test_mdf_file recordings/test_parquet_file reports/test_trace_report_page \
+	robot/test_static_equilibrium))
 
 .PHONY: run test lint types docs pictures floors bench bench-long bench-trace bench-control bench-campaign clean
 

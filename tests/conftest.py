@@ -7,10 +7,10 @@ from typing import TYPE_CHECKING
 import pytest
 
 from tautwire.fmus.packaging import RobotFmus, build_fmus
-from tests.robots import LIMITED, example, paper_robot, with_damping, with_winch
+from tests.support.robots import LIMITED, example, paper_robot, with_damping, with_winch
 
 if TYPE_CHECKING:
-    from tests.browser.browser import Browser
+    from tests.support.browser.browser import Browser
 
 
 @pytest.fixture(scope="session")
@@ -40,7 +40,7 @@ def eight_fmus(tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
 @pytest.fixture(scope="module")
 def browser() -> Iterator[Browser]:
     """One browser for all tests of a file, which skips itself where there is none."""
-    from tests.browser.browser import browser_at, chromium
+    from tests.support.browser.browser import browser_at, chromium
 
     found = chromium()
     assert found is not None
@@ -51,6 +51,6 @@ def browser() -> Iterator[Browser]:
 @pytest.fixture(scope="module")
 def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """Report pages of all kinds, for the browser."""
-    from tests.browser.report_pages import report_pages
+    from tests.support.browser.report_pages import report_pages
 
     return report_pages(tmp_path_factory.mktemp("pages"))

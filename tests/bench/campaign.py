@@ -25,8 +25,8 @@ from tautwire.campaigns.campaign_plan import Plan
 from tautwire.campaigns.campaign_run import build_context, run_job
 from tautwire.campaigns.campaign_runner import planned_jobs, run_campaign
 from tautwire.campaigns.dask_cluster import Task, context_future, dask_client, task_results
-from tests.campaigns import read
-from tests.memory import resident_memory
+from tests.support.campaigns import read
+from tests.support.memory import resident_memory
 
 RUNS, CHEAP, ROUNDS = 8, 100_000, 3
 ALONG = """

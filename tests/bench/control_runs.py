@@ -28,8 +28,8 @@ from tautwire.cosimulation.robot_cosimulation import CosimulationResult
 from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.robot.schema import Robot
 from tautwire.robot.trajectory import CAROCA_HELIX, PAPER_HELIX, Line, Trajectory
-from tests.robots import example
-from tests.winch_ramp import WinchRamp
+from tests.support.robots import example
+from tests.support.winch_ramp import WinchRamp
 
 Array = NDArray[np.float64]
 

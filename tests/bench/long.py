@@ -15,8 +15,8 @@ from tautwire.cosimulation.isolation import CALL_TIMEOUT
 from tautwire.cosimulation.recording_simulation import simulate_recording
 from tautwire.cosimulation.result_file import open_result_file
 from tautwire.cosimulation.robot_wiring import result_columns
-from tests.memory import resident_memory
-from tests.robots import example, gentle_speeds
+from tests.support.memory import resident_memory
+from tests.support.robots import example, gentle_speeds
 
 STEP = 1e-3
 STEPS = 1_000_000

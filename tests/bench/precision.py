@@ -14,7 +14,7 @@ from matplotlib.figure import Figure
 from tautwire.cosimulation import AdaptiveStep, FixedStep, StepSizeControl
 from tautwire.fmus.packaging import build_fmus
 from tests.importers.harness import IMPORTERS, NotInstallableError, exact_end, prepare, run_client
-from tests.robots import paper_robot
+from tests.support.robots import paper_robot
 
 from .ramp import by_fmus, by_solve_ivp
 

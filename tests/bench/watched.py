@@ -12,7 +12,7 @@ import numpy as np
 from tautwire.cosimulation.robot_cosimulation import cosimulate
 from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tests.bench.ramp import ramp
-from tests.robots import paper_robot
+from tests.support.robots import paper_robot
 
 RUNS = 20
 STEP = 0.01

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from tests.robots import paper_robot
+from tests.support.robots import paper_robot
 
 from .harness import IMPORTERS, NotInstallableError, exact_end, prepare, run_client
 

@@ -7,7 +7,7 @@ from pathlib import Path
 
 from tautwire import read_recording, read_robot, trace
 from tests.pictures.traced_run import draw
-from tests.robots import EXAMPLES
+from tests.support.robots import EXAMPLES
 
 THREE = EXAMPLES / "three"
 

@@ -6,7 +6,7 @@ import argparse
 from collections.abc import Sequence
 from pathlib import Path
 
-from tests.robots import EXAMPLES
+from tests.support.robots import EXAMPLES
 
 from . import tables
 from .cases import Case, main_cases, quick_cases

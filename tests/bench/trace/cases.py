@@ -9,7 +9,7 @@ from dataclasses import dataclass, replace
 from typing import Any, Literal
 from zlib import crc32
 
-from tests.robots import EXAMPLES, NAMES
+from tests.support.robots import EXAMPLES, NAMES
 
 from .forms import FORMS, LISTED, UNLISTED, Form, forms_of
 from .motion import MOTIONS, Motion, declared

@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 
 from tests.rig import PathProgram, Robot, SampledProgram, load_robot, wander
-from tests.robots import EXAMPLES
+from tests.support.robots import EXAMPLES
 
 
 @dataclass(frozen=True)

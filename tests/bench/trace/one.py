@@ -8,7 +8,7 @@ from pathlib import Path
 from resource import RUSAGE_CHILDREN, RUSAGE_SELF, getrusage
 
 from tautwire.estimation import trace
-from tests.robots import example
+from tests.support.robots import example
 
 from .cases import Case
 from .line import Line, Used, line_of

@@ -6,7 +6,7 @@ import hashlib
 from collections.abc import Sequence
 from fnmatch import fnmatchcase
 
-from tests.robots import EXAMPLES
+from tests.support.robots import EXAMPLES
 
 from .cases import Case, empty_cases, main_cases, quick_cases
 

@@ -1,0 +1,63 @@
+"""A campaign's page in a real browser: nothing fails, nothing is asked for, all is drawn, the chooser works."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pytest
+
+pytest.importorskip("selenium", reason="the pages are not tried in a browser: selenium is in the dev extra")
+
+from tautwire.campaigns.campaign_runner import write_summary
+from tests.campaigns.test_campaign_summary import GRID, written
+from tests.support.browser.browser import LAPTOP, MISSING, PHONE_DARK, Browser, Screen, chromium
+from tests.support.campaigns import AT_REST, moving
+
+pytestmark = pytest.mark.skipif(chromium() is None, reason=f"the pages are not tried in a browser: {MISSING}")
+
+DRAW_ALL = "window.dispatchEvent(new Event('beforeprint'))"
+INDICES = AT_REST.replace('"sobol"\ncount = 8', '"saltelli"\ncount = 16').replace(
+    "cable.modulus = {normal = [1.022e11, 2.2e9]}", '"cable[*].anchor[*]" = {normal = [40.0, 0.1]}'
+)
+MEDIANS = "return document.querySelector('figure[data-kind=band] .plot').data[2].y"
+
+
+@pytest.fixture(scope="module", params=["path", "grid", "indices"])
+def page(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The page of samples along a path, that of a grid at rest, and one with Sobol indices of many inputs."""
+    texts = {"path": moving(64), "grid": GRID, "indices": INDICES}
+    plan, out = written(tmp_path_factory.mktemp(request.param), texts[request.param])
+    write_summary(plan, out)
+    return out / "index.html"
+
+
+@pytest.mark.parametrize("screen", [LAPTOP, PHONE_DARK], ids=lambda screen: screen.name)
+def test_page_loads_in_silence_fits_its_screen_and_draws_every_figure(
+    browser: Browser, page: Path, screen: Screen
+) -> None:
+    browser.show(screen)
+    browser.open(page)
+    browser.run(DRAW_ALL)
+    assert browser.heard() == []
+    assert [url for url in browser.requests() if not url.startswith(("data:", "blob:"))] == [page.resolve().as_uri()]
+    assert browser.run("return document.documentElement.scrollWidth") <= screen.width
+    figures = browser.run("return document.querySelectorAll('figure').length")
+    assert figures >= 10
+    assert browser.run("return document.querySelectorAll('.js-plotly-plot .trace').length") >= figures
+
+
+@pytest.mark.parametrize("page", ["path", "grid"], indirect=True)
+def test_another_path_or_input_is_drawn_when_it_is_chosen(browser: Browser, page: Path) -> None:
+    browser.show(LAPTOP)
+    browser.open(page)
+    if page.parent.parent.name.startswith("grid"):
+        browser.see("figure[data-kind=against]")
+        script = "return document.querySelector('figure[data-kind=against] .plot').data[0].x"
+        change = "const s = document.getElementById('against'); s.value = '1'; s.dispatchEvent(new Event('change'))"
+    else:
+        browser.see("figure[data-kind=band]")
+        script, change = MEDIANS, "document.querySelectorAll('input[name=choice]')[1].click()"
+    before = browser.run(script)
+    browser.run(change)
+    browser.wait(lambda: browser.run(script) != before, "the other one to be drawn")
+    assert browser.heard() == []

@@ -1,0 +1,75 @@
+"""A planar robot on four cables of which positions alone were measured, traced by the command."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import pandas as pd
+import pytest
+
+from tautwire.cli import run
+from tests.support.planar import HORIZONTAL, VERTICAL, Plane, planar_case
+
+pytestmark = pytest.mark.slow
+
+
+def traced(paths: list[Path]) -> dict[str, Any]:
+    robot, fit, check = map(str, paths)
+    out = paths[0].parent / "report"
+    assert run(["trace", robot, fit, "--check", check, "--out", str(out)]) == 0
+    report: dict[str, Any] = json.loads((out / "report.json").read_text())
+    return report
+
+
+def assert_reached(report: dict[str, Any]) -> None:
+    for role in ("fit", "check"):
+        assert report["error_after"][role]["position_rms"] < 1.2 * report["noise_floor"]["position_rms"]
+        assert report["error_after"][role]["tension_rms"] is None
+
+
+@pytest.mark.parametrize("plane", [VERTICAL, HORIZONTAL], ids=["vertical", "horizontal"])
+def test_a_pretension_that_is_not_the_preferred_one_is_no_effect(tmp_path: Path, plane: Plane) -> None:
+    report = traced(planar_case(tmp_path, plane, {}, 1, preferred=60.0))
+    assert report["verdict"] == "none"
+    assert_reached(report)
+    assert any("a wrong pretension is none" in note for note in report["notes"])
+    told = next(note for note in report["notes"] if "fit.csv: the run starts with tensions of" in note)
+    tensions = [float(value) for value in told.split(" tensions of ")[1].split(" N")[0].split(", ")]
+    assert sum(tensions) / 4 == pytest.approx(60.0, rel=0.1)
+
+
+HIDDEN = [
+    (VERTICAL, {"payload": {"mass": 1.0}}, 80.0),
+    (VERTICAL, {"modulus": {"modulus": 0.7e10}}, 60.0),
+    (VERTICAL, {"pulley": {"radius": 0.03}}, 80.0),
+    (VERTICAL, {"payload": {"mass": -1.0}}, 30.0),
+]
+
+
+@pytest.mark.parametrize(("plane", "effects", "preferred"), HIDDEN, ids=lambda value: str(value)[:20])
+def test_a_hidden_effect_is_named_and_measured(
+    tmp_path: Path, plane: Plane, effects: dict[str, dict[str, float]], preferred: float
+) -> None:
+    report = traced(planar_case(tmp_path, plane, effects, 1, preferred=preferred))
+    ((name, values),) = effects.items()
+    assert [effect["name"] for effect in report["effects"]] == [name]
+    for parameter, value in values.items():
+        assert report["effects"][0]["parameters"][parameter]["value"] == pytest.approx(value, rel=0.02)
+    assert_reached(report)
+
+
+def test_an_unlisted_effect_gets_no_listed_name(tmp_path: Path) -> None:
+    report = traced(planar_case(tmp_path, VERTICAL, {"unlisted_swing": {"mass": 0.5, "length": 0.3}}, 1))
+    assert report["verdict"] in ("unexplained", "discovered")
+    assert report["effects"] == []
+
+
+def test_one_coordinate_is_enough(tmp_path: Path) -> None:
+    paths = planar_case(tmp_path, VERTICAL, {"payload": {"mass": 1.0}}, 1)
+    for path in paths[1:]:
+        pd.read_csv(path).drop(columns="x").to_csv(path, index=False)
+    report = traced(paths)
+    assert [effect["name"] for effect in report["effects"]] == ["payload"]
+    assert report["effects"][0]["parameters"]["mass"]["value"] == pytest.approx(1.0, rel=0.05)

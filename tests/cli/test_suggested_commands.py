@@ -1,0 +1,92 @@
+"""What commands say is to be done next: one line, the last, with a command that is one."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from types import SimpleNamespace
+
+import pytest
+from typer.main import get_command
+
+from tautwire.cli import app, run
+from tests.support.robots import EXAMPLES
+
+THREE = EXAMPLES / "three"
+ROBOT, FIT = str(THREE / "robot.toml"), str(THREE / "fit.csv")
+SLOW = pytest.mark.slow
+PROGRAMS = ["--effects", "damping,payload", "--programs", "2", "--duration", "5"]
+
+CASES = {
+    "new": (["new", "hall"], "check hall.toml"),
+    "check": (["check", ROBOT], f"build {ROBOT} --out build/"),
+    "check a recording": (["check", ROBOT, FIT], f"trace {ROBOT} {FIT} --out report/"),
+    "build": (["build", ROBOT, "--out", "fmus"], f"fmus {ROBOT}"),
+    "fmus": (["fmus", ROBOT], f"build {ROBOT} --out build/"),
+    "simulate": (
+        ["simulate", ROBOT, "--speeds", FIT, "--until", "0.1", "--out", "result.csv"],
+        f"trace {ROBOT} {FIT} --out report/",
+    ),
+    "excite": (["excite", ROBOT, *PROGRAMS, "--out", "out.csv"], f"trace {ROBOT} RECORDING.csv --out report/"),
+    "material": (["material", "--robot", ROBOT, "--out", "rope"], "check rope/robot.toml RECORDING.csv"),
+}
+
+
+@pytest.mark.parametrize("case", [pytest.param(case, marks=SLOW if case == "excite" else ()) for case in CASES])
+def test_the_last_line_names_a_command_that_is_one(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], case: str
+) -> None:
+    arguments, expected = CASES[case]
+    monkeypatch.chdir(tmp_path)
+    assert run(arguments) == 0
+    told = capsys.readouterr()
+    assert "next: " not in told.out
+    *before, last = told.err.splitlines()
+    assert last.startswith("next: ") and not [line for line in before if line.startswith("next: ")]
+    (named,) = re.findall(r"tautwire (.+?)(?:,|;|$)", last)
+    assert named == expected
+    name, *given = named.split()
+    # What is asked of the command is there, and it knows all that it is given.
+    get_command(app).commands[name].make_context(name, given)  # type: ignore[attr-defined]
+
+
+@pytest.mark.parametrize("how", ["--json", "--quiet"])
+@pytest.mark.parametrize("case", ["new", "check", "build", "fmus", "simulate"])
+def test_nothing_of_it_is_for_machines(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], case: str, how: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run([*CASES[case][0], how]) == 0
+    told = capsys.readouterr()
+    assert "next: " not in told.out + told.err
+
+
+def test_from_a_new_robot_on_each_line_leads_to_the_next(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    arguments, gone = ["new", "hall"], []
+    while arguments[0] not in gone:
+        gone.append(arguments[0])
+        assert run(arguments) == 0
+        last = capsys.readouterr().err.splitlines()[-1]
+        arguments = re.findall(r"tautwire (.+?)(?:,|;|$)", last)[0].split()
+    assert gone == ["new", "check", "build", "fmus"]
+    assert (tmp_path / "build" / "hall.ssp").exists()
+
+
+def test_the_papers_page_is_to_be_opened(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    found = SimpleNamespace(counts={"reproduced": 1}, entries=(1,))
+    monkeypatch.setattr("tautwire.paper.write_paper", lambda folder, tell: found)
+    out = tmp_path / "paper"
+    assert run(["paper", "--out", str(out)]) == 0
+    assert capsys.readouterr().err.splitlines() == ["1 reproduced", f"next: open {out / 'claims.html'} in a browser"]
+
+
+def test_what_is_wrong_is_to_be_mended_first(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    robot = tmp_path / "robot.toml"
+    robot.write_text(Path(ROBOT).read_text(encoding="utf-8").replace("mass", "mas", 1), encoding="utf-8")
+    assert run(["check", str(robot)]) == 2
+    assert re.search(r"^next: mend \d problems? in 1 file, then run this again$", capsys.readouterr().err, re.MULTILINE)

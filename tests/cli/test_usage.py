@@ -1,0 +1,75 @@
+"""Commands used wrongly say how they are used; those that print their result need no file for it."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+
+import pytest
+
+from tautwire.cli import run
+from tests.support.robots import EXAMPLES
+
+ROBOT = str(EXAMPLES / "three" / "robot.toml")
+EXAMPLES_OF = {
+    "linearise": "tautwire linearise robot.toml --at ",
+    "workspace": "tautwire workspace robot.toml --out ",
+    "simulate": "tautwire simulate robot.toml --speeds ",
+    "excite": "tautwire excite robot.toml --effects ",
+    "new": "tautwire new hall --cables ",
+    "material": "tautwire material dma.csv --robot ",
+    "campaign": "tautwire campaign plan.toml --out ",
+    "paper": "tautwire paper --out ",
+    "build": "tautwire build robot.toml --out ",
+    "fly": "tautwire --help",
+}
+
+
+@pytest.mark.parametrize(
+    "arguments",
+    [
+        ["linearise", ROBOT],
+        ["linearise", ROBOT, "--out", "m.json", "--at", "1,2"],
+        ["workspace", ROBOT],
+        ["workspace", ROBOT, "--out", "w.csv", "--lower", "here"],
+        ["simulate", ROBOT, "--speeds", "s.csv", "--out", "r.csv", "--step", "0"],
+        ["simulate", ROBOT, "--speeds", "s.csv", "--out", "r.csv", "--fmu", "wing=a.fmu"],
+        ["excite", ROBOT, "--effects", "damping", "--out", "p.csv"],
+        ["new", ""],
+        ["new", "hall", "--cables", "99"],
+        ["material", "--out", "m", "--coverage", "0"],
+        ["campaign"],
+        ["paper", "--step", "1"],
+        ["build"],
+        ["build", ROBOT, "--outt", "build"],
+        ["fly"],
+    ],
+)
+def test_wrong_usage_ends_with_an_example(
+    arguments: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(arguments) == 2
+    told = capsys.readouterr()
+    assert told.out == "" and told.err.count("\n") == 1
+    said, _, example = told.err.rstrip("\n").rpartition("; example: ")
+    assert said and example.startswith(EXAMPLES_OF[arguments[0]])
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_wrong_file_is_told_without_an_example(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["linearise", str(tmp_path / "none.toml"), "--out", str(tmp_path / "m.json")]) == 2
+    assert "example:" not in capsys.readouterr().err
+
+
+def test_linearise_prints_the_model_as_json_and_writes_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert run(["linearise", ROBOT, "--json"]) == 0
+    model = json.loads(capsys.readouterr().out)
+    assert len(model["A"]) == len(model["states"]) and "model" not in model
+    assert list(tmp_path.iterdir()) == []
+    assert run(["linearise", ROBOT, "--json", "--report", "modes.html"]) == 0
+    assert json.loads(capsys.readouterr().out) == {**model, "report": "modes.html"}
+    assert [path.name for path in tmp_path.iterdir()] == ["modes.html"]

@@ -1,0 +1,82 @@
+import json
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from tautwire.cli import run
+from tests.support.robots import EXAMPLES
+
+CAROCA = str(EXAMPLES / "caroca" / "robot.toml")
+
+
+def test_it_writes_the_table_and_the_figure(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table, figure = tmp_path / "workspace.csv", tmp_path / "workspace.png"
+    arguments = ["--lower", "-3,-2,1", "--upper", "3,2,3", "--spacing", "1", "--acceleration", "0.5"]
+    assert run(["workspace", CAROCA, "--out", str(table), "--plot", str(figure), *arguments]) == 0
+    positions = pd.read_csv(table)
+    assert list(positions)[:5] == ["x", "y", "z", "feasible", "margin"]
+    assert len(positions) == 7 * 5 * 3
+    count = int(positions.feasible.sum())
+    assert 0 < count < len(positions)
+    assert f"{count} of 105 positions are wrench-feasible" in capsys.readouterr().out
+    assert figure.read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize(
+    ("arguments", "told"),
+    [
+        (["--lower", "here"], "--lower: 'here' is not a position"),
+        (["--spacing", "-1"], "not positive"),
+        (["--plot", "figure.csv"], "no suffix of a figure"),
+        (["--lower", "0,0,9", "--upper", "0,0,1"], "lower ones first"),
+    ],
+)
+def test_what_is_wrong_is_one_line_and_nothing_written(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], told: str
+) -> None:
+    assert run(["workspace", CAROCA, "--out", str(tmp_path / "w.csv"), *arguments]) == 2
+    captured = capsys.readouterr()
+    assert told in captured.err and captured.err.count("\n") == 1
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_table_and_figure_are_not_written_to_one_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    one = str(tmp_path / "w.png")
+    assert run(["workspace", CAROCA, "--out", one, "--plot", one]) == 2
+    assert "--plot: " in (told := capsys.readouterr().err) and "is what --out writes; choose another --plot" in told
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_json_without_a_file_prints_the_table_and_writes_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    def refuse(constant: str) -> None:
+        pytest.fail(f"{constant} is no JSON")
+
+    monkeypatch.chdir(tmp_path)
+    arguments = ["workspace", CAROCA, "--spacing", "2"]
+    assert run([*arguments, "--json"]) == 0
+    printed = json.loads(capsys.readouterr().out, parse_constant=refuse)
+    assert list(tmp_path.iterdir()) == []
+    assert run([*arguments, "--out", "w.csv"]) == 0
+    written = pd.read_csv("w.csv")
+    assert written.lowest_tension.isna().any()
+    pd.testing.assert_frame_equal(pd.DataFrame(printed["rows"]).astype(float), written.astype(float), rtol=1e-9)
+    assert (printed["feasible"], printed["positions"]) == (written.feasible.sum(), len(written))
+
+
+def test_a_robot_that_its_start_does_not_hold_is_mapped_too(tmp_path: Path) -> None:
+    robot = tmp_path / "robot.toml"
+    robot.write_text(Path(CAROCA).read_text().replace("start = [1.0, 0.0, 1.0]", "start = [3.0, 1.5, 1.0]"))
+    assert run(["workspace", str(robot), "--out", str(tmp_path / "w.csv"), "--spacing", "1"]) == 0
+
+
+def test_linearise_says_what_is_near(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["linearise", CAROCA, "--out", str(tmp_path / "model.json")]) == 0
+    assert "cable 3 goes slack at a swing of 0.0023 m" in capsys.readouterr().err
+
+
+def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["workspace", "--help"]) == 0
+    assert "Example: tautwire workspace" in " ".join(capsys.readouterr().out.split())

@@ -1,0 +1,169 @@
+"""Cut at its measured ports a robot tells which component is off, on recordings that the rig makes."""
+
+import json
+from dataclasses import replace
+from functools import cache
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tautwire.estimation.estimation_data import split_data
+from tautwire.estimation.localisation.component_localisation import localise_residual
+from tautwire.estimation.localisation.component_residuals import ComponentResidual, FaultLocalisation
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.recordings.recording import Recording
+from tautwire.robot.schema import Cable, Robot
+from tautwire.robot.static_equilibrium import static_tensions
+from tests.support.recordings import recorded
+from tests.support.robots import example
+
+ALL = "cables 1, 2, 3 (rope or winch) or the position sensor"
+MANY = "load cells 1, 2, 3; exit points 1, 2, 3; the position sensor or several components"
+HIDDEN: list[tuple[dict[str, Any], str]] = [
+    ({}, "nothing"),
+    ({"damping": {"damping": 9e8}}, ALL),
+    ({"modulus": {"modulus": 0.95e11, "cables": [2]}}, "cable 2 (rope or winch)"),
+    ({"drum": {"radius_ratio": 1.003, "cables": [2]}}, "cable 2 (rope or winch)"),
+    ({"payload": {"mass": 6.0}}, "platform"),
+    ({"drag": {"drag_area": 20.0}}, "platform"),
+    ({"sensor_gain": {"gain": 1.02, "cables": [3]}}, "load cell 3 or friction before it"),
+    ({"sensor_delay": {"seconds": 0.03, "cables": [1]}}, "load cell 1 or friction before it"),
+    (
+        {"anchor": {"x": 0.05, "y": -0.04, "z": 0.08, "cables": [1]}},
+        "load cell 1; exit point 1 or several components",
+    ),
+    ({"anchor": {"x": 0.0075, "y": -0.006, "z": 0.012, "cables": [1]}}, "cable 1 (rope, winch or exit point)"),
+    ({"friction": {"coefficient": 0.02, "cables": [2]}}, "load cell 2 or friction before it"),
+    ({"damping": {"damping": 9e8}, "payload": {"mass": 6.0}}, MANY),
+]
+
+
+def cut(robot: Robot, recording: Recording) -> FaultLocalisation:
+    noise = estimate_noise(robot, recording)
+    return localise_residual(robot, split_data(robot, noise, recording, recording).estimation, noise)
+
+
+@cache
+def _found(text: str) -> FaultLocalisation:
+    return cut(example("three"), recorded("three", 3, json.loads(text)))
+
+
+def found(effects: dict[str, Any]) -> FaultLocalisation:
+    """The components of the three-cable robot with an effect hidden in it; made once."""
+    return _found(json.dumps(effects))
+
+
+def part(components: FaultLocalisation, component: str, quantity: str = "tension") -> ComponentResidual:
+    return next(p for p in components.residuals if (p.component, p.quantity) == (component, quantity))
+
+
+@pytest.mark.parametrize(("effects", "blamed"), HIDDEN, ids=str)
+def test_the_component_in_question_is_named(effects: dict[str, Any], blamed: str) -> None:
+    assert found(effects).faulty_component == blamed
+
+
+def test_where_nothing_is_hidden_residuals_are_as_large_as_expected() -> None:
+    components = found({})
+    assert [p.component for p in components.residuals] == ["cable 1", "cable 2", "cable 3", *["platform"] * 3]
+    for each in components.residuals:
+        assert 0.8 < each.ratio < 1.2
+        assert each.correlated_signal is None and each.resonance_frequency is None
+        assert each.residual.shape == components.time.shape
+    assert components.limitations == ()
+
+
+@pytest.mark.parametrize(
+    ("effects", "component", "quantity", "signal", "sign"),
+    [
+        ({"damping": {"damping": 9e8}}, "cable 1", "tension", "strain rate", 1),
+        ({"modulus": {"modulus": 0.95e11, "cables": [2]}}, "cable 2", "tension", "tension", -1),
+        ({"drum": {"radius_ratio": 1.003, "cables": [2]}}, "cable 2", "tension", "winch travel", 1),
+        ({"drag": {"drag_area": 20.0}}, "platform", "force z", "velocity times speed z", -1),
+        ({"payload": {"mass": 6.0}}, "platform", "force z", "acceleration z", -1),
+    ],
+)
+def test_what_a_residual_moves_with_is_named(
+    effects: dict[str, Any], component: str, quantity: str, signal: str, sign: int
+) -> None:
+    moved = part(found(effects), component, quantity).correlated_signal
+    assert moved is not None and moved.name == signal
+    assert sign * moved.correlation > 0.8
+
+
+def test_a_payload_shows_by_its_weight_and_not_at_the_cables() -> None:
+    components = found({"payload": {"mass": 6.0}})
+    assert part(components, "platform", "force z").mean == pytest.approx(-6.0 * 9.81, rel=0.02)
+    assert not any(p.is_significant for p in components.residuals if p.component != "platform")
+    assert components.ranking[0].quantity == "force z"
+
+
+def test_a_swinging_load_rings_at_the_platform_with_its_frequency() -> None:
+    components = found({"unlisted_swing": {"mass": 20.0, "length": 2.0}})
+    assert components.faulty_component == "platform"
+    frequency = part(components, "platform", "force x").resonance_frequency
+    assert frequency == pytest.approx(np.sqrt(9.81 / 2.0) / (2.0 * np.pi), rel=0.06)
+    assert "rings at 0.3" in components.sentence
+
+
+def test_without_positions_nothing_can_be_told() -> None:
+    recording = recorded("three", 3)
+    blind = replace(recording, position=np.full_like(recording.position, np.nan))
+    components = cut(example("three"), blind)
+    assert (components.residuals, components.faulty_component) == ((), "cannot tell")
+    assert "positions are missing" in components.limitations[0]
+    one_axis = recording.position.copy()
+    one_axis[:, 1] = np.nan
+    assert cut(example("three"), replace(recording, position=one_axis)).faulty_component == "cannot tell"
+
+
+def test_without_tensions_nothing_can_be_told() -> None:
+    recording = recorded("three", 3)
+    components = cut(example("three"), replace(recording, tension=np.full_like(recording.tension, np.nan)))
+    assert (components.residuals, components.faulty_component) == ((), "cannot tell")
+    assert "no tensions" in components.limitations[0]
+
+
+def test_without_one_load_cell_the_other_cables_are_still_told() -> None:
+    recording = recorded("three", 3, {"modulus": {"modulus": 0.95e11, "cables": [2]}})
+    tension = recording.tension.copy()
+    tension[:, 2] = np.nan
+    components = cut(example("three"), replace(recording, tension=tension))
+    assert [p.component for p in components.residuals] == ["cable 1", "cable 2"]
+    assert components.faulty_component == "cable 2 (rope, winch, load cell or exit point)"
+    assert "cable 3" in components.limitations[0]
+
+
+def test_dropouts_do_no_harm() -> None:
+    recording = recorded("three", 3, gap=(5.0, 5.6))
+    position, tension = recording.position.copy(), recording.tension.copy()
+    position[np.arange(len(position)) % 5 != 0] = np.nan
+    tension[300:330, 1] = np.nan
+    components = cut(example("three"), replace(recording, position=position, tension=tension))
+    assert components.faulty_component == "nothing"
+    assert np.all(np.isnan(part(components, "cable 2").residual[300:330]))
+
+
+def test_a_flat_robot_needs_no_positions_across_it() -> None:
+    robot = example("three")
+    flat: list[Cable] = [replace(c, anchor=(c.anchor[0], 0.0, c.anchor[2])) for c in robot.cables]
+    robot = replace(robot, cables=tuple(flat[1:]))
+    time = np.arange(0.0, 8.0, 0.02)
+    still = np.zeros((len(time), 2))
+    random = np.random.default_rng(1)
+    place = np.array(robot.platform.start) + random.normal(0.0, 3e-4, (len(time), 3))
+    place[:, 1] = np.nan
+    tension = static_tensions(robot) + random.normal(0.0, 2.0, still.shape)
+    components = cut(robot, Recording("flat", time, still, tension, place))
+    assert {p.quantity for p in components.residuals} == {"tension", "force x", "force z"}
+    assert components.faulty_component == "nothing"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["caroca", "eight"])
+def test_other_robots_are_cut_as_well(name: str) -> None:
+    robot = example(name)
+    assert cut(robot, recorded(name, 3)).faulty_component == "nothing"
+    assert (
+        cut(robot, recorded(name, 3, {"payload": {"mass": 0.02 * robot.platform.mass}})).faulty_component == "platform"
+    )

@@ -1,0 +1,69 @@
+"""Which prospects are worth a fit, and which of the fitted is the simplest."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from tautwire.estimation.candidate_scores import (
+    MAX_FITS,
+    MAX_FITS_PER_EFFECT,
+    TIE_NATS,
+    CandidateScore,
+    most_parsimonious,
+    shortlist,
+)
+from tautwire.estimation.hypotheses import Hypothesis
+from tautwire.estimation.parameter_fit import Fit
+from tautwire.estimation.score_test import PredictedGain
+from tautwire_fmu.laws.effects import ALL, BY_NAME
+from tests.support.robots import example
+
+ROBOT = example("three")
+ONE_OF_EACH = [Hypothesis(effect, (1,)) for effect in ALL]
+
+
+def promised(ranked: list[Hypothesis], best: float = 100.0) -> dict[Hypothesis, PredictedGain]:
+    """Prospects that gain less, the later they are in the list."""
+    return {hypothesis: PredictedGain(best - place, {}) for place, hypothesis in enumerate(ranked)}
+
+
+def test_the_best_are_fitted_and_no_more() -> None:
+    assert shortlist(promised(ONE_OF_EACH)) == ONE_OF_EACH[:MAX_FITS]
+
+
+def test_no_effect_takes_all_places() -> None:
+    damping = [Hypothesis(BY_NAME["damping"], (cable,)) for cable in (1, 2, 3)]
+    damping.append(Hypothesis(BY_NAME["damping"], (1, 2, 3)))
+    worth = shortlist(promised([*damping, Hypothesis(BY_NAME["payload"], ())]))
+    assert worth == [*damping[:MAX_FITS_PER_EFFECT], Hypothesis(BY_NAME["payload"], ())]
+
+
+def test_what_promises_next_to_nothing_is_not_fitted() -> None:
+    first, second, third = ONE_OF_EACH[:3]
+    assert shortlist(
+        {first: PredictedGain(1e4, {}), second: PredictedGain(100.0, {}), third: PredictedGain(300.0, {})}
+    ) == [
+        first,
+        third,
+    ]
+    assert shortlist({first: PredictedGain(3.0, {})}) == []
+
+
+def test_another_look_puts_its_best_in_the_place_of_the_last() -> None:
+    beside = [*reversed(ONE_OF_EACH)]
+    worth = shortlist(promised(ONE_OF_EACH), promised(beside))
+    assert len(worth) == MAX_FITS
+    assert worth == [*ONE_OF_EACH[: MAX_FITS - 3], *beside[:3]]
+
+
+def test_another_look_at_the_same_changes_nothing() -> None:
+    assert shortlist(promised(ONE_OF_EACH), promised(ONE_OF_EACH)) == ONE_OF_EACH[:MAX_FITS]
+
+
+def test_of_those_alike_the_one_with_fewest_parameters_is_simplest() -> None:
+    fit = Fit(ROBOT, (), np.zeros(0), np.zeros((0, 0)))
+    relaxation, damping = (Hypothesis(BY_NAME[name], (1,)) for name in ("relaxation", "damping"))
+    better = CandidateScore(relaxation, fit, 100.0, 1.0)
+    assert most_parsimonious([better, CandidateScore(damping, fit, 100.0 - 0.5 * TIE_NATS, 1.0)]).hypothesis is damping  # type: ignore[union-attr]
+    assert most_parsimonious([better, CandidateScore(damping, fit, 100.0 - 2.0 * TIE_NATS, 1.0)]) is better
+    assert most_parsimonious([]) is None

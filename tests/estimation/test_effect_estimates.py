@@ -1,0 +1,111 @@
+"""How the estimates of a fit go together: by its covariance, the curvature of the likelihood, and many recordings."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from tautwire.estimation.effect_estimates import parameter_correlations
+from tautwire.estimation.estimation_data import DataSet, split_data
+from tautwire.estimation.hypotheses import Hypothesis, with_values
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.estimation.parameter_fit import Fit, Fitter
+from tautwire.estimation.trace_result import Estimate, FittedParameter, FoundEffect
+from tautwire.robot.schema import EffectSetting, Robot
+from tautwire.robot.symbolic_model import FORMULA_INDEX, FreeParameter
+from tautwire_fmu.laws.effects import BY_NAME
+from tests.support.recordings import recorded
+from tests.support.robots import example
+
+Array = NDArray[np.float64]
+
+# A heavier platform and load cells that show too much: what is seen of both is nearly their product.
+TRUTH = {"payload": {"mass": 1.5}, "sensor_gain": {"gain": 1.01}}
+VALUES = np.array([1.5, 1.01])
+SEEDS = 12
+
+
+def fitted(seed: int) -> tuple[Fitter, list[Hypothesis], DataSet, Fit]:
+    """The fit of both effects to a recording of their truth."""
+    robot = example("three")
+    chosen = [Hypothesis(BY_NAME["payload"], ()), Hypothesis(BY_NAME["sensor_gain"], robot.cable_numbers)]
+    for hypothesis in chosen:
+        robot = robot.with_effect(hypothesis.setting(robot))
+    recording = recorded("three", seed, TRUTH)
+    noise = estimate_noise(robot, recording)
+    sample, fitter = split_data(robot, noise, recording, None).estimation, Fitter(noise)
+    return fitter, chosen, sample, fitter.fit(robot, chosen, sample)
+
+
+def effects_of(robot: Robot) -> list[FoundEffect]:
+    """The effects that a robot has, as a trace names them."""
+    estimate = Estimate(0.0, "", 0.0, 0.0, None)
+    return [
+        FoundEffect(each.name, BY_NAME[each.name].component, each.cables, dict.fromkeys(each.values, estimate), 1.0)
+        for each in robot.effects
+    ]
+
+
+def correlation_of(fit: Fit) -> float:
+    """The one between mass and gain."""
+    gain = FittedParameter("sensor_gain", (1, 2, 3), "tension_gain")
+    effects = [
+        FoundEffect("payload", "platform", (), {"mass": Estimate(0.0, "kg", 0.0, 0.0, None)}, 1.0),
+        FoundEffect("sensor_gain", "sensor", gain.cables, {gain.parameter: Estimate(0.0, "1", 0.0, 0.0, None)}, 1.0),
+    ]
+    (found,) = parameter_correlations(fit, effects)
+    assert found.between == (FittedParameter("payload", (), "mass"), gain)
+    return found.value
+
+
+def test_correlations_are_those_of_each_two_parameters_beside_what_else_was_fitted() -> None:
+    robot = example("three").with_effect(EffectSetting("payload", {"mass": 1.0}))
+    robot = robot.with_effect(EffectSetting("damping", {"damping": 1e9}, (2,)))
+    robot = robot.with_effect(EffectSetting("damping", {"damping": 2e9}, (1, 3)))
+    free = (
+        FreeParameter(1, "damping"),
+        FreeParameter(FORMULA_INDEX, "k1"),
+        FreeParameter(0, "mass"),
+        FreeParameter(2, "damping"),
+    )
+    covariance = np.array([[4e16, 1e8, -1e7, 0.0], [1e8, 1.0, 0.0, 0.0], [-1e7, 0.0, 0.01, 0.0], [0.0, 0.0, 0.0, 0.0]])
+    found = parameter_correlations(Fit(robot, free, np.zeros(4), covariance), effects_of(robot))
+    # The last one has no deviation, and so no correlation.
+    assert [each.between for each in found] == [
+        (FittedParameter("payload", (), "mass"), FittedParameter("damping", (2,), "damping"))
+    ]
+    assert found[0].value == pytest.approx(-1e7 / (2e8 * 0.1))
+
+
+@pytest.mark.slow
+def test_a_correlation_is_that_of_the_curvature_of_the_likelihood() -> None:
+    fitter, chosen, sample, fit = fitted(3)
+
+    def log_likelihood(moves: Array) -> float:
+        values = fit.values + moves * fit.standard_deviations
+        robot = with_values(fit.robot, fit.free, dict(zip(fit.free, values.tolist(), strict=True)))
+        return fitter.judged(robot, chosen, sample).log_likelihood(sample.rows)
+
+    steps = 0.5 * np.eye(2)
+    curvature = [
+        [sum(u * v * log_likelihood(u * a + v * b) for u in (-1, 1) for v in (-1, 1)) for b in steps] for a in steps
+    ]
+    covariance = np.linalg.inv(-np.array(curvature))
+    expected = covariance[0, 1] / np.sqrt(covariance[0, 0] * covariance[1, 1])
+    assert correlation_of(fit) == pytest.approx(expected, abs=0.01)
+    assert expected < -0.9
+
+
+@pytest.mark.slow
+def test_a_correlation_is_that_of_fits_to_many_recordings() -> None:
+    fits = [fitted(seed)[3] for seed in range(SEEDS)]
+    errors = np.array([(fit.values - VALUES) / fit.standard_deviations for fit in fits])
+    spread = float(np.corrcoef(errors.T)[0, 1])
+    reported = float(np.mean([correlation_of(fit) for fit in fits]))
+    # Fisher's transformation makes the spread of a correlation that of a normal variable.
+    assert abs(np.arctanh(spread) - np.arctanh(reported)) < 3.0 / np.sqrt(SEEDS - 3)
+    assert np.arctanh(reported) < -4.0 / np.sqrt(SEEDS - 3)
+    # By both together: a sum of squares of 2 per recording, which correlated errors weighed apart would not give.
+    squares = sum(float(e @ np.linalg.inv(fit.covariance) @ e) for fit in fits for e in [fit.values - VALUES])
+    assert 0.35 < squares / (2 * SEEDS) < 2.2

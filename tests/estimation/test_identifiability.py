@@ -1,0 +1,100 @@
+"""What a recording could have shown, held to what fits of recordings with something in them really gain."""
+
+from math import sqrt
+
+import numpy as np
+import pytest
+
+from tautwire.estimation.estimation_data import DataSplit, split_data
+from tautwire.estimation.hypotheses import Hypothesis, hypotheses
+from tautwire.estimation.identifiability import analyse_identifiability
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.estimation.parameter_fit import Fitter
+from tautwire.estimation.trace_result import Detectable, Identifiability
+from tautwire.robot.schema import Robot
+from tautwire_fmu.laws.effects import DAMPING, MODULUS, PAYLOAD, RELAXATION, SLACK
+from tests.support.recordings import recorded
+from tests.support.robots import example
+
+THREE = example("three")
+ALL = (1, 2, 3)
+
+
+def shown_by(
+    robot: Robot, effects: dict[str, dict[str, float]], seed: int
+) -> tuple[Identifiability, Fitter, DataSplit]:
+    fit, check = recorded("three", seed, effects), recorded("three", seed + 50, effects)
+    noise = estimate_noise(robot, fit)
+    evidence, fitter = split_data(robot, noise, fit, check), Fitter(noise)
+    return analyse_identifiability(robot, robot, (), fitter, evidence.validation, 0.01), fitter, evidence
+
+
+def size_of(found: Identifiability, name: str, parameter: str) -> Detectable:
+    return next(d for d in found.detectable if (d.name, d.parameter) == (name, parameter) and d.cables in ((), ALL))
+
+
+def test_an_effect_of_that_size_gains_what_the_threshold_asks_for() -> None:
+    hypothesis = Hypothesis(PAYLOAD, ())
+    found, _, _ = shown_by(THREE, {}, 11)
+    size = size_of(found, "payload", "mass")
+    threshold = np.log(len(hypotheses(THREE)) / 0.01)
+    gains = []
+    for seed in (12, 13, 14, 15):
+        _, fitter, evidence = shown_by(THREE, {"payload": {"mass": size.size}}, seed)
+        start = THREE.with_effect(hypothesis.setting(THREE))
+        fit = fitter.fit(start, [hypothesis], evidence.estimation)
+        whole = fitter.judged(fit.robot, [hypothesis], evidence.validation).log_likelihood(evidence.validation.rows)
+        without = fitter.innovations(THREE, evidence.validation).log_likelihood(evidence.validation.rows)
+        gains.append(whole - without)
+    # 1.28 standard deviations of sqrt(2 gain) above the threshold on average, which is the power asked for.
+    expected = sqrt(2.0 * threshold) + 1.28
+    assert np.mean(np.sqrt(2.0 * np.array(gains))) == pytest.approx(expected, abs=1.3)
+
+
+def test_sizes_are_given_for_every_effect_and_never_beyond_its_bounds() -> None:
+    found, _, _ = shown_by(THREE, {}, 11)
+    assert {d.name for d in found.detectable} == {h.effect.name for h in hypotheses(THREE)}
+    assert all(d.size > 0.0 for d in found.detectable)
+    assert size_of(found, "payload", "mass").size < 1.0
+
+
+def separation_beside(hypothesis: Hypothesis, value: float) -> Identifiability:
+    """Of recordings that hide an effect of one parameter, by the model that has it."""
+    (name,) = hypothesis.form
+    fit, check = (recorded("three", seed, {hypothesis.effect.name: {name: value}}) for seed in (3, 53))
+    noise = estimate_noise(THREE, fit)
+    robot = THREE.with_effect(hypothesis.setting(THREE, {name: value}))
+    return analyse_identifiability(
+        robot, THREE, [hypothesis], Fitter(noise), split_data(THREE, noise, fit, check).validation, 0.01
+    )
+
+
+def test_relaxation_that_is_fast_looks_like_damping_and_payload_does_not() -> None:
+    found = separation_beside(Hypothesis(DAMPING, ALL), 9e8)
+    alike = {(each.other, each.other_cables): each for each in found.confusable}
+    assert alike[RELAXATION.name, ALL].cosine > 0.95
+    assert (PAYLOAD.name, ()) not in alike
+    assert (DAMPING.name, ALL) not in alike
+    assert all(0.9 <= each.cosine <= 1.0 and each.nats >= 0.0 for each in found.confusable)
+
+
+def test_slow_relaxation_can_hardly_be_told_from_modulus() -> None:
+    found = separation_beside(Hypothesis(MODULUS, ALL), 1.12e11)
+    assert found.confusable[0].other == RELAXATION.name
+    assert found.confusable[0].cosine > 0.999
+
+
+def test_a_size_that_slopes_cannot_see_is_found_by_runs() -> None:
+    found, _, _ = shown_by(THREE, {}, 11)
+    size = size_of(found, "slack", "softness").size
+    hypothesis = Hypothesis(SLACK, ALL)
+    threshold = np.log(len(hypotheses(THREE)) / 0.01)
+    gains = []
+    for share in (1.0, 0.5):
+        _, fitter, evidence = shown_by(THREE, {"slack": {"softness": share * size}}, 12)
+        without = fitter.innovations(THREE, evidence.validation).log_likelihood(evidence.validation.rows)
+        true = THREE.with_effect(hypothesis.setting(THREE, {"softness": share * size}))
+        gains.append(
+            fitter.judged(true, [hypothesis], evidence.validation).log_likelihood(evidence.validation.rows) - without
+        )
+    assert gains[0] > threshold > 5.0 * gains[1]

@@ -1,0 +1,61 @@
+"""What a trace makes of a search: the co-simulation of the rebuilt FMUs has the last word."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tautwire.cosimulation.robot_cosimulation import CosimulationResult, cosimulate
+from tautwire.estimation import Trace, trace
+from tautwire.estimation.cosimulation_validation import cosimulation_errors
+from tests.support.recordings import recorded
+from tests.support.robots import example
+
+HIDDEN = {"damping": {"damping": 9e8}}
+
+
+def traced() -> Trace:
+    fit, check = recorded("three", 3, HIDDEN), recorded("three", 53, HIDDEN)
+    return trace(example("three"), fit, check, lambda what, done: None)
+
+
+@pytest.mark.slow
+def test_the_rebuilt_fmus_give_the_error_after() -> None:
+    found = traced()
+    assert found.verdict == "effects"
+    for comparison in found.comparisons:
+        again = cosimulation_errors(comparison.recording, comparison.after)
+        assert again.tension_rms == comparison.errors_after.tension_rms
+        assert again.tension_rms < 1.2 * found.noise_floor.tension_rms < comparison.errors_before.tension_rms
+    assert found.robot_after.effects[0].name == "damping"
+    assert found.robot_before == example("three")
+
+
+@pytest.mark.slow
+def test_what_was_found_comes_with_its_correlations() -> None:
+    # Load cells that show too much weigh like a heavier platform.
+    hidden = {"payload": {"mass": 1.5}, "sensor_gain": {"gain": 1.01}}
+    found = trace(example("three"), recorded("three", 3, hidden))
+    assert {effect.name for effect in found.effects} == {"payload", "sensor_gain"}
+    (correlation,) = found.correlations
+    assert {each.name for each in correlation.between} == {"payload", "sensor_gain"}
+    assert -1.0 < correlation.value < -0.9
+
+
+@pytest.mark.slow
+def test_no_name_is_given_where_the_rebuilt_fmus_miss_the_recording(monkeypatch: pytest.MonkeyPatch) -> None:
+    runs = []
+
+    def astray(*arguments: Any, **options: Any) -> CosimulationResult:
+        motion = cosimulate(*arguments, **options)
+        runs.append(motion)
+        return replace(motion, position=motion.position + 0.01) if len(runs) > 2 else motion
+
+    monkeypatch.setattr("tautwire.estimation.cosimulation_validation.cosimulate", astray)
+    found = traced()
+    assert len(runs) == 4
+    assert found.verdict == "unexplained"
+    assert found.effects == ()
+    assert found.robot_after == found.robot_before
+    assert all(np.array_equal(c.after.position, c.before.position) for c in found.comparisons)

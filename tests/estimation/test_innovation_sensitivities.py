@@ -1,0 +1,89 @@
+"""The linearised run against runs of the filter itself, moved a little."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tautwire.estimation.innovation_sensitivities import EffectSensitivities, linearise_filter
+from tautwire.estimation.likelihood import Likelihood
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.robot.schema import PER_CABLE_COMPONENTS, EffectSetting
+from tautwire.robot.symbolic_model import FreeParameter
+from tautwire_fmu.laws.effects import BY_NAME
+from tests.support.recordings import recorded
+from tests.support.robots import example
+
+ROBOT = example("three")
+RECORDING = recorded("three", 1).first(600)
+NOISE = estimate_noise(ROBOT, RECORDING)
+INTERVAL = float(RECORDING.time[1] - RECORDING.time[0])
+EVERYWHERE = (1, 2, 3)
+
+
+def along(name: str, form: tuple[str, ...], trial: dict[str, float]) -> np.ndarray:
+    """Slopes of the innovations by an effect's parameters, cable by cable: (N, m, p)."""
+    likelihood = Likelihood(ROBOT, (), NOISE, INTERVAL)
+    directions = EffectSensitivities(ROBOT, BY_NAME[name], EVERYWHERE, [form], [trial], likelihood.model.state_names)
+    slopes, parts = directions.start_sensitivities, []
+    for run in linearise_filter(likelihood, [], RECORDING):
+        slopes, moved = run.propagate_sensitivities(slopes, *directions.forcing_terms(run))
+        parts.append(moved[run.is_recorded])
+    return np.concatenate(parts)
+
+
+def exact(name: str, parameter: str, trial: dict[str, float]) -> np.ndarray:
+    """The same for one parameter on all cables, by the filter's own sensitivities."""
+    effect = BY_NAME[name]
+    declared = {p.name: 0.0 for p in effect.parameters if p.neutral is None}
+    cables = EVERYWHERE if effect.component in PER_CABLE_COMPONENTS else ()
+    robot = ROBOT.with_effect(EffectSetting(name, effect.completed_values({**declared, **trial}), cables))
+    values = [robot.effects[0].values[parameter]]
+    if effect.parameters[0].neutral is None:
+        values = [float(getattr(ROBOT.cables[0], parameter))]
+    return (
+        Likelihood(robot, [FreeParameter(0, parameter)], NOISE, INTERVAL).innovations(RECORDING, values).sensitivities
+    )
+
+
+@pytest.mark.parametrize(
+    ("name", "parameter", "trial"),
+    [
+        ("damping", "damping", {}),
+        ("modulus", "modulus", {}),
+        ("relaxation", "modulus", {"time": 0.3}),
+        ("creep", "compliance", {"time": 10.0}),
+        ("thermal", "rise", {"time": 5.0}),
+        ("drum", "eccentricity", {"phase": 0.0, "radius": 0.2}),
+        ("payload", "mass", {}),
+        ("drag", "drag_area", {}),
+        ("pulley", "radius", {}),
+        ("sensor_gain", "tension_gain", {}),
+        ("sensor_delay", "tension_delay", {}),
+    ],
+)
+def test_slopes_of_an_absent_effect_are_those_of_the_filter_itself(
+    name: str, parameter: str, trial: dict[str, float]
+) -> None:
+    expected = exact(name, parameter, trial)[:, :, 0]
+    found = np.sum(along(name, (parameter, *trial), trial), axis=2)
+    alike = np.sum(found * expected) / np.sqrt(np.sum(found**2) * np.sum(expected**2))
+    assert alike > 0.999
+    assert np.sum(found**2) == pytest.approx(np.sum(expected**2), rel=0.02)
+
+
+def test_what_was_not_seen_moves_nothing() -> None:
+    blind = replace(RECORDING, tension=RECORDING.tension.copy())
+    blind.tension[100:300, 1] = np.nan
+    likelihood = Likelihood(ROBOT, (), NOISE, INTERVAL)
+    runs = list(linearise_filter(likelihood, [], blind))
+    seen = np.concatenate([run.observed[run.is_recorded] for run in runs])
+    assert np.array_equal(seen, np.isfinite(blind.measured()))
+    whitening = np.concatenate([run.whitening[run.is_recorded] for run in runs])
+    assert not np.any(whitening[~seen])
+
+
+def test_the_run_has_the_innovations_of_the_filter() -> None:
+    likelihood = Likelihood(ROBOT, (), NOISE, INTERVAL)
+    values = np.concatenate([run.values[run.is_recorded] for run in linearise_filter(likelihood, [], RECORDING)])
+    assert np.allclose(values, likelihood.innovations(RECORDING, []).values, atol=1e-12)

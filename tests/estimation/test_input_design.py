@@ -1,0 +1,81 @@
+"""A program that tells effects apart, within its limits."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tautwire.cli import run
+from tautwire.estimation.input_design import (
+    ExcitationError,
+    ExcitationLimits,
+    default_limits,
+    design_excitation,
+    effects_by_name,
+)
+from tautwire.estimation.multisine import MultisinePath
+from tautwire.robot.reference_simulation import integrate
+from tests.support.robots import EXAMPLES, example
+
+THREE = example("three")
+LIMITS = ExcitationLimits(speed=0.8, reach=3.0, min_tension=300.0, max_tension=5000.0)
+
+
+def quiet(what: str, done: float) -> None:
+    """No progress."""
+
+
+def test_a_path_of_sines_begins_and_ends_at_rest_and_has_its_own_derivatives() -> None:
+    path = MultisinePath((1.0, 2.0, 3.0), 10.0, ((0.2, 0.1, 0.3),), ((0.4, 0.7, 0.2),))
+    times = np.linspace(0.0, 10.0, 20_001)
+    position, velocity, acceleration = path.position(times), path.velocity(times), path.acceleration(times)
+    for end in (0, -1):
+        assert position[end] == pytest.approx((1.0, 2.0, 3.0), abs=1e-12)
+        assert velocity[end] == pytest.approx((0.0, 0.0, 0.0), abs=1e-12)
+    assert np.allclose(np.gradient(position, times, axis=0)[1:-1], velocity[1:-1], atol=1e-5)
+    assert np.allclose(np.gradient(velocity, times, axis=0)[1:-1], acceleration[1:-1], atol=3e-3)
+    assert np.max(np.abs(path.scaled(0.5).position(times) - position[0])) < np.max(np.abs(position - position[0]))
+
+
+@pytest.mark.slow
+def test_the_best_program_is_within_the_limits_and_better_than_most() -> None:
+    effects = effects_by_name(THREE, "damping,relaxation")
+    found = design_excitation(THREE, effects, LIMITS, 3.0, 0.05, 10, 1, quiet)
+    assert np.max(np.abs(found.winch_speed)) <= 0.8
+    assert found.winch_speed[0] == pytest.approx(0.0, abs=1e-12)
+    run = integrate(THREE, found.time, found.winch_speed)
+    assert np.min(run.tension) > 299.0
+    assert np.max(run.tension) < 5001.0
+    assert [pair.nats for pair in found.pairs] == sorted(pair.nats for pair in found.pairs)
+    assert found.pairs[0].nats > 1.2 * found.median_separation
+    assert all(pair.effect.effect is not pair.other.effect for pair in found.pairs)
+    again = design_excitation(THREE, effects, LIMITS, 3.0, 0.05, 10, 1, quiet)
+    assert np.array_equal(again.winch_speed, found.winch_speed)
+
+
+def test_limits_that_no_program_keeps_are_an_error() -> None:
+    narrow = ExcitationLimits(speed=0.5, reach=1.0, min_tension=1e4, max_tension=1.1e4)
+    with pytest.raises(ExcitationError, match=r"none of \d+ programs"):
+        design_excitation(THREE, effects_by_name(THREE, "damping,payload"), narrow, 2.0, 0.1, 1, 1, quiet)
+
+
+def test_limits_not_given_come_from_the_robot() -> None:
+    limits = default_limits(THREE)
+    assert limits.speed == 0.5
+    assert 0.0 < limits.min_tension < limits.max_tension
+    assert default_limits(THREE, 0.2, 0.1).reach == 0.1
+    eight = example("eight")
+    assert eight.tension is not None
+    assert default_limits(eight).min_tension == eight.tension.minimum
+
+
+@pytest.mark.parametrize(
+    ("names", "part"), [("damping", "fewer than two"), ("damping,wobble", "'wobble' is no effect")]
+)
+def test_effects_that_cannot_be_told_apart_are_refused(
+    names: str, part: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    robot, out = EXAMPLES / "three" / "robot.toml", tmp_path / "p.csv"
+    assert run(["excite", str(robot), "--effects", names, "--out", str(out)]) == 2
+    assert part in capsys.readouterr().err
+    assert not out.exists()

@@ -1,0 +1,119 @@
+"""Innovations against what a Kalman filter must do."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tautwire.estimation.likelihood import Likelihood
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.robot.schema import EffectSetting
+from tautwire.robot.symbolic_model import FreeParameter
+from tests.support.effect_cases import Case, same
+from tests.support.recordings import recorded
+from tests.support.robots import example
+
+ROBOT = example("three")
+RECORDING = recorded("three", 1)
+NOISE = estimate_noise(ROBOT, RECORDING)
+ALL = np.ones(len(RECORDING.time), dtype=bool)
+
+
+@pytest.mark.parametrize("name", ["three", "caroca", "eight"])
+def test_innovations_of_a_true_model_are_white_with_unit_variance(name: str) -> None:
+    robot, recording = example(name), recorded(name, 1)
+    interval = recording.time[1] - recording.time[0]
+    innovations = Likelihood(robot, (), estimate_noise(robot, recording), interval).innovations(recording, [])
+    square = innovations.mean_square(np.ones(len(recording.time), dtype=bool))
+    assert np.all(np.abs(square - 1.0) < 5.0 * np.sqrt(2.0 / len(recording.time)))
+    values = innovations.values
+    for lag in (1, 2, 5):
+        alike = np.mean(values[lag:] * values[:-lag], axis=0)
+        assert np.all(np.abs(alike) < 5.0 / np.sqrt(len(values)))
+
+
+def test_slopes_are_the_derivatives_of_the_innovations() -> None:
+    robot = ROBOT.with_effect(EffectSetting("damping", {"damping": 6e8}, (1, 2, 3)))
+    robot = robot.with_effect(EffectSetting("payload", {"mass": 1.0}))
+    free = [FreeParameter(0, "damping"), FreeParameter(1, "mass")]
+    likelihood = Likelihood(robot, free, NOISE, 0.02)
+    short = replace(
+        RECORDING,
+        time=RECORDING.time[:60],
+        winch_speed=RECORDING.winch_speed[:60],
+        tension=RECORDING.tension[:60],
+        position=RECORDING.position[:60],
+    )
+    at = np.array([6e8, 1.0])
+    slopes = likelihood.innovations(short, at).sensitivities
+    for index, width in enumerate((1e5, 1e-4)):
+        step = np.zeros(2)
+        step[index] = width
+        more, less = (likelihood.innovations(short, at + sign * step).values for sign in (1, -1))
+        difference = (more - less) / (2.0 * width)
+        assert np.max(np.abs(difference - slopes[:, :, index])) < 0.02 * np.max(np.abs(difference))
+
+
+def test_missing_cells_are_passed_over() -> None:
+    tension = RECORDING.tension.copy()
+    tension[100:300, 1] = np.nan
+    blind = replace(RECORDING, tension=tension, position=np.full_like(RECORDING.position, np.nan))
+    innovations = Likelihood(ROBOT, (), NOISE, 0.02).innovations(blind, [])
+    assert np.array_equal(innovations.observed, np.isfinite(blind.measured()))
+    square = innovations.mean_square(ALL)
+    assert np.all(np.isnan(square[:3]))
+    assert np.all(np.abs(square[3:] - 1.0) < 0.3)
+
+
+def test_a_wrong_model_is_less_probable() -> None:
+    right = Likelihood(ROBOT, (), NOISE, 0.02).innovations(RECORDING, [])
+    heavier = ROBOT.with_effect(EffectSetting("payload", {"mass": 1.0}))
+    wrong = Likelihood(heavier, [FreeParameter(0, "mass")], NOISE, 0.02).innovations(RECORDING, [1.0])
+    assert right.log_likelihood(ALL) - wrong.log_likelihood(ALL) > 100.0
+
+
+def test_parts_of_a_recording_add_up() -> None:
+    innovations = Likelihood(ROBOT, (), NOISE, 0.02).innovations(RECORDING, [])
+    first = np.arange(len(ALL)) < 300
+    parts = innovations.log_likelihood(first) + innovations.log_likelihood(~first)
+    assert parts == pytest.approx(innovations.log_likelihood(ALL), rel=1e-12)
+
+
+def test_the_open_loop_variance_starts_at_the_sensors_and_grows_with_the_winches() -> None:
+    variance = Likelihood(ROBOT, (), NOISE, 0.02).open_loop_variances(RECORDING, [])
+    assert variance[0] == pytest.approx([NOISE.position**2] * 3 + [NOISE.tension**2] * 3)
+    assert np.all(variance[-1] > variance[0])
+
+
+@pytest.mark.parametrize(
+    ("effect", "within"),
+    [
+        (same("damping", damping=1.7e9), 1e-4),
+        (same("relaxation", modulus=3e10, time=0.5), 1e-4),
+        (same("relaxation", modulus=3e10, time=0.001), 0.02),
+        # It yields within the sample.
+        (same("hysteresis", force=60.0, yield_strain=1e-4), 0.02),
+    ],
+    ids=str,
+)
+def test_the_transition_of_a_sample_is_the_derivative_of_the_next_state(effect: Case, within: float) -> None:
+    """Of eight cables, whose vibrations turn by half a radian and more in a sample."""
+    robot, recording = example("eight"), recorded("eight", 1)
+    robot = robot.with_effect(effect.setting(robot))
+    likelihood = Likelihood(robot, (), estimate_noise(robot, recording), 0.01)
+    state, speeds = likelihood.start([])[0][:, None], np.full((8, 1), 0.02)
+    unseen, moment = np.zeros((11, 1)), (speeds, 1.1 * speeds, np.full((1, 1), 0.01))
+
+    def moved(begun: np.ndarray) -> np.ndarray:
+        size = len(begun)
+        carried = (begun, np.eye(size), np.zeros((size, 0)), np.zeros((0, 1)))
+        return likelihood._filter_function(
+            1, *carried, unseen, unseen, unseen, *moment, np.zeros((1, 1)), np.zeros((1, 1))
+        )[0][:, 1]
+
+    _, transition, _ = likelihood.jacobians(1, state, state, np.zeros((0, 1)), unseen, *moment)
+    for place, width in ((0, 1e-7), (4, 1e-5), (6, 1e-7), (len(state) - 1, 1e-7)):
+        step = np.zeros_like(state)
+        step[place] = width
+        difference = (moved(state + step) - moved(state - step)) / (2.0 * width)
+        assert np.max(np.abs(difference - transition[:, place])) < within * np.max(np.abs(difference))

@@ -1,0 +1,37 @@
+import pytest
+
+from tautwire.estimation.estimation_data import split_data
+from tautwire.estimation.hypotheses import Hypothesis
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.estimation.parameter_fit import Fitter
+from tautwire.robot.schema import EffectSetting
+from tautwire_fmu.laws.effects import BY_NAME
+from tests.support.recordings import recorded
+from tests.support.robots import example
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("begin", [1.0, 0.0, -1e-15, 40.0])
+def test_a_fit_arrives_wherever_it_begins(begin: float) -> None:
+    robot = example("caroca").with_effect(EffectSetting("payload", {"mass": begin}))
+    recording = recorded("caroca", 3, {"payload": {"mass": 1.5}})
+    noise = estimate_noise(robot, recording)
+    sample = split_data(robot, noise, recording, None).estimation
+    fit = Fitter(noise).fit(robot, [Hypothesis(BY_NAME["payload"], ())], sample)
+    assert abs(fit.values[0] - 1.5) < 4.5 * fit.standard_deviations[0]
+    assert fit.standard_deviations[0] < 0.05
+
+
+@pytest.mark.slow
+def test_a_relaxation_is_found_that_is_quicker_than_where_the_fit_begins() -> None:
+    truth = {"modulus": 3e10, "time": 0.003}
+    robot, recording = example("three"), recorded("three", 3, {"relaxation": truth})
+    noise = estimate_noise(robot, recording)
+    sample = split_data(robot, noise, recording, None).estimation
+    true, begin = (EffectSetting("relaxation", {**truth, "time": time}, (1, 2, 3)) for time in (0.003, 0.03))
+    fit = Fitter(noise).fit(robot.with_effect(begin), [Hypothesis(BY_NAME["relaxation"], (1, 2, 3))], sample)
+    found, at_truth = (
+        Fitter(noise).innovations(known, sample).log_likelihood(sample.rows)
+        for known in (fit.robot, robot.with_effect(true))
+    )
+    assert at_truth - 0.1 < found < at_truth + 10.0

@@ -1,0 +1,74 @@
+"""What hypotheses promise, worked out here and by workers."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tautwire.estimation.estimation_data import split_data
+from tautwire.estimation.hypotheses import Hypothesis, hypotheses
+from tautwire.estimation.innovation_sensitivities import SensitivityColumn
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.estimation.parameter_fit import Fitter
+from tautwire.estimation.prepared_data import prepare_data
+from tautwire.estimation.score_test import ScoreStatistics, _predicted_gain, score_test, score_test_in_workers
+from tautwire.estimation.worker_pool import WorkerPool
+from tautwire.recordings.recording import read_recording
+from tautwire.robot.robot_file_reader import read_robot
+from tautwire_fmu.laws.effects import BY_NAME
+from tests.support.planar import VERTICAL, planar_case
+from tests.support.recordings import recorded
+from tests.support.robots import example
+
+ROBOT = example("three")
+RECORDING = recorded("three", 1, {"payload": {"mass": 0.5}})
+NOISE = estimate_noise(ROBOT, RECORDING)
+SAMPLE = split_data(ROBOT, NOISE, RECORDING, None).estimation
+
+
+def test_what_is_there_promises_most_and_its_values() -> None:
+    found = score_test(ROBOT, (), hypotheses(ROBOT), Fitter(NOISE), SAMPLE)
+    best = max(found, key=lambda hypothesis: found[hypothesis].gain)
+    assert best.effect.name == "payload"
+    assert found[best].values["mass"] == pytest.approx(0.5, rel=0.05)
+
+
+def test_workers_promise_the_same() -> None:
+    damped = Hypothesis(BY_NAME["damping"], ROBOT.cable_numbers)
+    robot, accepted = ROBOT.with_effect(damped.setting(ROBOT)), (damped,)
+    others = [h for h in hypotheses(ROBOT) if not h.overlaps(damped)]
+    here = score_test(robot, accepted, others, Fitter(NOISE), SAMPLE)
+    with WorkerPool(2) as workers:
+        apart = score_test_in_workers(robot, accepted, others, Fitter(NOISE), SAMPLE, workers)
+    assert list(apart) == list(here)
+    for hypothesis, prospect in here.items():
+        assert apart[hypothesis].gain == pytest.approx(prospect.gain, rel=1e-6, abs=1e-6)
+        assert apart[hypothesis].values == pytest.approx(dict(prospect.values), rel=1e-6)
+
+
+def test_far_from_noise_a_rough_look_tells_what_slopes_do_not(tmp_path: Path) -> None:
+    """After a second the oscillations of a platform a fifth lighter are out of phase with the model's."""
+    robot_file, fit, check = planar_case(tmp_path, VERTICAL, {"payload": {"mass": -1.0}}, 1, preferred=30.0)
+    robot = read_robot(robot_file)
+    with WorkerPool(1) as workers:
+        ready, *_ = prepare_data(robot, read_recording(fit, 4), read_recording(check, 4), workers)
+    sample = ready.split.estimation.head
+    found = [score_test(robot, (), hypotheses(robot), ready.fitter, sample, roughness) for roughness in (0.0, 0.1)]
+    ranks = [sorted(prospects, key=lambda h: -prospects[h].gain) for prospects in found]
+    payload = Hypothesis(BY_NAME["payload"], ())
+    assert ranks[0].index(payload) > 10
+    assert ranks[1].index(payload) == 0
+    assert found[1][payload].values["mass"] == pytest.approx(-1.0, rel=0.2)
+
+
+@pytest.mark.parametrize(("best", "kept", "value"), [(1.0, 1.0, 1.0), (20.0, 0.75, 10.0), (-1.0, 0.0, 0.0)])
+def test_a_bound_before_the_best_value_leaves_what_the_way_there_gains(best: float, kept: float, value: float) -> None:
+    pulley = Hypothesis(BY_NAME["pulley"], (1,))
+    least, most = pulley.parameters[0].minimum, pulley.parameters[0].maximum
+    assert least == 0.0
+    unit = most / 10.0
+    column = SensitivityColumn("pulley", (1,), "radius", 0)
+    signatures = ScoreStatistics((column,), np.zeros(1), np.ones((1, 1)), np.array([-best * unit]))
+    found = _predicted_gain(signatures, (), pulley, 0, {})
+    assert found.gain == pytest.approx(kept * 0.5 * (best * unit) ** 2)
+    assert found.values["radius"] == pytest.approx(value * unit)

@@ -1,0 +1,31 @@
+"""Recordings that lie beside the project, where they do; the project needs none of them."""
+
+import pytest
+
+from tautwire.estimation import Trace, trace
+from tautwire.recordings.recording import read_recording
+from tautwire.robot.robot_file_reader import read_robot
+from tests.support.folders import SHARED_RECORDINGS as FOLDER
+
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(not FOLDER.is_dir(), reason="no shared recordings beside the project"),
+]
+
+
+def traced(name: str) -> Trace:
+    robot = read_robot(FOLDER / name / "robot.toml")
+    fit, check = (read_recording(FOLDER / name / f"{role}.csv", robot.cable_count) for role in ("fit", "check"))
+    return trace(robot, fit, check, lambda what, done: None)
+
+
+def test_a_lacks_damping() -> None:
+    found = traced("a")
+    assert [effect.name for effect in found.effects] == ["damping"]
+    check = found.comparisons[1]
+    assert check.errors_after.position_rms < 1.2 * found.noise_floor.position_rms
+    assert check.errors_after.tension_rms < 1.2 * found.noise_floor.tension_rms
+
+
+def test_d_lacks_nothing() -> None:
+    assert traced("d").verdict == "none"

@@ -1,0 +1,118 @@
+"""The tracer's decision on recordings that the rig makes: the right name, or none."""
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tautwire.estimation.estimation_data import split_data
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.estimation.parameter_fit import Fitter
+from tautwire.estimation.residual_analysis import residuals_are_white
+from tautwire.estimation.stepwise_selection import SelectionResult, select_effects
+from tautwire.recordings.recording import Recording
+from tautwire.robot.schema import EffectSetting, Robot
+from tests.support.recordings import recorded
+from tests.support.robots import example
+
+
+def quiet(what: str, done: float) -> None:
+    """No progress."""
+
+
+def pair(name: str, seed: int, effects: dict[str, Any]) -> tuple[Recording, Recording]:
+    return recorded(name, seed, effects), recorded(name, seed + 50, effects)
+
+
+def found_in(robot: Robot, fit: Recording, check: Recording) -> SelectionResult:
+    noise = estimate_noise(robot, fit)
+    return select_effects(robot, Fitter(noise), split_data(robot, noise, fit, check), 0.01, quiet)
+
+
+def searched(name: str, seed: int, effects: dict[str, Any]) -> tuple[SelectionResult, bool]:
+    robot = example(name)
+    fit, check = pair(name, seed, effects)
+    noise = estimate_noise(robot, fit)
+    evidence = split_data(robot, noise, fit, check)
+    fitter = Fitter(noise)
+    found = select_effects(robot, fitter, evidence, 0.01, quiet)
+    samples = (evidence.estimation, evidence.validation)
+    return found, all(residuals_are_white(fitter.innovations(found.fit.robot, s), s.rows) for s in samples)
+
+
+HIDDEN: list[tuple[str, dict[str, Any]]] = [
+    ("three", {"damping": {"damping": 9e8}}),
+    ("three", {"modulus": {"modulus": 1.12e11}}),
+    ("three", {"modulus": {"modulus": 0.9e11, "cables": [2]}}),
+    ("three", {"modulus": {"modulus": 1.1e11, "cables": [1, 2]}}),
+    ("three", {"slack": {"softness": 400.0}}),
+    ("caroca", {"payload": {"mass": 1.5}}),
+    ("caroca", {"damping": {"damping": 1.6e8, "cables": [3]}}),
+]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "effects"), HIDDEN, ids=str)
+def test_a_hidden_effect_is_named_and_measured(name: str, effects: dict[str, Any]) -> None:
+    found, noise_is_left = searched(name, 3, effects)
+    ((effect, values),) = effects.items()
+    assert [h.effect.name for h in found.accepted] == [effect]
+    cables = () if effect == "payload" else tuple(values.get("cables", example(name).cable_numbers))
+    assert found.accepted[0].cables == cables
+    assert noise_is_left
+    truth = next(value for key, value in values.items() if key != "cables")
+    assert abs(found.fit.values[0] - truth) < 4.5 * found.fit.standard_deviations[0]
+
+
+@pytest.mark.slow
+def test_two_effects_are_found_together() -> None:
+    found, noise_is_left = searched("three", 4, {"damping": {"damping": 9e8}, "payload": {"mass": 6.0}})
+    assert {h.effect.name for h in found.accepted} == {"damping", "payload"}
+    assert noise_is_left
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", ["three", "caroca"])
+def test_where_nothing_is_hidden_nothing_is_found(name: str) -> None:
+    for seed in (5, 6):
+        found, noise_is_left = searched(name, seed, {})
+        assert found.accepted == ()
+        assert noise_is_left
+
+
+@pytest.mark.slow
+def test_an_effect_outside_the_list_leaves_more_than_noise() -> None:
+    _, noise_is_left = searched("three", 7, {"unlisted_swing": {"mass": 20.0, "length": 2.0}})
+    assert not noise_is_left
+
+
+@pytest.mark.slow
+def test_tensions_alone_are_enough() -> None:
+    robot = example("three")
+    effects = {"damping": {"damping": 9e8}}
+    fit, check = (replace(r, position=np.full_like(r.position, np.nan)) for r in pair("three", 3, effects))
+    found = found_in(robot, fit, check)
+    assert [h.effect.name for h in found.accepted] == ["damping"]
+    assert abs(found.fit.values[0] - 9e8) < 4.5 * found.fit.standard_deviations[0]
+
+
+@pytest.mark.slow
+def test_a_gap_in_time_is_no_effect() -> None:
+    fit, check = recorded("three", 5, gap=(6.0, 6.8)), recorded("three", 55, gap=(3.0, 4.5))
+    assert found_in(example("three"), fit, check).accepted == ()
+
+
+@pytest.mark.slow
+def test_a_declared_effect_that_is_wrong_is_replaced() -> None:
+    robot = example("three").with_effect(EffectSetting("damping", {"damping": 6e8}, (1, 2, 3)))
+    found = found_in(robot, *pair("three", 3, {"damping": {"damping": 9e8}}))
+    assert [h.effect.name for h in found.accepted] == ["damping"]
+    assert found.fit.robot.effects[0].values["damping"] == pytest.approx(9e8, rel=0.05)
+
+
+@pytest.mark.slow
+def test_two_cables_may_be_softer_each_by_its_own() -> None:
+    effects = {"modulus": [{"modulus": 0.92e11, "cables": [1]}, {"modulus": 1.1e11, "cables": [3]}]}
+    found = found_in(example("three"), *pair("three", 8, effects))
+    assert {(h.effect.name, h.cables) for h in found.accepted} == {("modulus", (1,)), ("modulus", (3,))}

@@ -1,0 +1,191 @@
+"""The slaves through FMI: they are the laws, remember everything, and are good to any master."""
+
+import numpy as np
+import pytest
+from fmpy.fmi1 import FMICallException
+
+from tautwire.fmus.packaging import RobotFmus
+from tests.support.fmus import Hand, in_hand
+
+MOTION = {"position__z": 5.1, "velocity__x": 0.2, "velocity__z": -0.3, "winch_speed": 0.4}
+SHOWN = ("tension", "force.x", "force.y", "force.z", "force_rate.x", "tension_rate", "length", "strain", "elongation")
+
+
+def test_a_cable_shows_the_law(damped_fmus: RobotFmus) -> None:
+    with in_hand(damped_fmus.cables[0]) as cable:
+        cable.set(**MOTION)
+        tension, length = cable.get("tension", "length")
+    anchors = np.array([[0.0, 50.0, 50.0], [0.0, -50.0, 50.0], [86.6, 0.0, 50.0]])
+    spans = anchors - [28.86, 0.0, 5.0]
+    lengths = np.linalg.norm(spans, axis=1)
+    start_tension = np.linalg.solve((spans / lengths[:, None]).T, [0.0, 0.0, 300.0 * 9.8])[0]
+    span = anchors[0] - [28.86, 0.0, 5.1]
+    now = np.linalg.norm(span)
+    rate = -span @ [0.2, 0.0, -0.3] / now
+    stress = 134.8e9 * np.log(now / lengths[0]) + 2.08e9 * (rate + 0.4) / now
+    assert length == pytest.approx(now, rel=1e-15)
+    assert tension == pytest.approx(np.pi * 0.002**2 * stress + start_tension, rel=1e-12)
+
+
+def test_rates_are_the_derivatives_of_the_outputs(damped_fmus: RobotFmus) -> None:
+    with in_hand(damped_fmus.cables[0]) as cable:
+        cable.set(**MOTION, acceleration__z=0.7, winch_acceleration=-0.2)
+        cable.run()
+        rates = cable.get("tension_rate", "force_rate.x")
+        before = cable.get("tension", "force.x")
+        cable.step(0.0, 1e-5)
+        after = cable.get("tension", "force.x")
+    assert rates == pytest.approx([(b - a) / 1e-5 for a, b in zip(before, after, strict=True)], rel=1e-4)
+
+
+def test_a_falling_platform_follows_the_parabola(three_fmus: RobotFmus) -> None:
+    with in_hand(three_fmus.platform) as platform:
+        free = {f"force_{i}__{axis}": 0.0 for i in (1, 2, 3) for axis in "xyz"}
+        platform.set(**free)
+        assert platform.get("acceleration.z") == [-9.8]
+        platform.run()
+        platform.step(0.0, 0.5)
+        assert platform.get("velocity.z", "position.z") == pytest.approx([-4.9, 5.0 - 0.5 * 9.8 * 0.25], rel=1e-15)
+
+
+def test_inputs_are_extrapolated_by_their_rates(three_fmus: RobotFmus) -> None:
+    with in_hand(three_fmus.platform) as platform:
+        platform.set(force_1__x=0.0, force_2__x=0.0, force_3__x=0.0, force_rate_1__x=600.0)
+        platform.run()
+        platform.step(0.0, 0.1)
+        assert platform.get("velocity.x", "acceleration.x") == pytest.approx([0.01, 0.2], rel=1e-12)
+
+
+def test_stamped_inputs_run_on_the_cubic_through_both_ends(three_fmus: RobotFmus) -> None:
+    force = np.polynomial.Polynomial([30.0, -200.0, 5000.0, 9000.0])
+    acceleration = force / 300.0
+    rate = force.deriv()
+    with in_hand(three_fmus.platform) as platform:
+        platform.set(force_1__x=force(0.0), force_2__x=0.0, force_3__x=0.0, force_rate_1__x=rate(0.0))
+        platform.run()
+        platform.set(input_time=0.1)
+        platform.set(force_1__x=force(0.1), force_rate_1__x=rate(0.1))
+        platform.step(0.0, 0.1)
+        velocity, position = platform.get("velocity.x", "position.x")
+    assert velocity == pytest.approx(acceleration.integ()(0.1), rel=1e-13)
+    assert position - 28.86 == pytest.approx(acceleration.integ(2)(0.1), rel=1e-9)
+
+
+def test_inputs_may_be_set_all_at_once_in_any_order_or_one_by_one(damped_fmus: RobotFmus) -> None:
+    generator, shown = np.random.default_rng(2), []
+    for way in ("one by one", "in order", "in another order"):
+        values = np.random.default_rng(3)
+        with in_hand(damped_fmus.cables[1]) as cable:
+            inputs = [v.name for v in cable.description.modelVariables if v.causality == "input"]
+            start = dict(zip(inputs, cable.get(*inputs), strict=True))
+            cable.run()
+            for k in range(1, 4):
+                now = {n: v + 0.01 * values.normal() for n, v in start.items()} | {"input_time": 0.1 * k}
+                now |= {"middle_time": 0.1 * k - 0.05}
+                order = generator.permutation(inputs).tolist() if way == "in another order" else inputs
+                groups = [[name] for name in inputs] if way == "one by one" else [order]
+                for group in groups:
+                    cable.set(**{name.replace(".", "__"): now[name] for name in group})
+                cable.step(0.1 * (k - 1), 0.1)
+            shown.append(cable.get(*SHOWN, "unstrained_length"))
+    assert shown[0] == shown[1] == shown[2]
+
+
+def shown_after_steps(cable: Hand) -> list[float]:
+    for k in range(3):
+        cable.set(position__z=5.0 + 0.01 * k, winch_speed=0.1 * k)
+        cable.step(0.1 + 0.01 * k, 0.01)
+    return cable.get(*SHOWN, "unstrained_length")
+
+
+def test_a_redo_from_a_saved_state_gives_the_same_bits(damped_fmus: RobotFmus) -> None:
+    with in_hand(damped_fmus.cables[2]) as cable:
+        cable.set(**MOTION)
+        cable.run()
+        cable.step(0.0, 0.1)
+        saved = cable.fmu.getFMUstate()
+        first = shown_after_steps(cable)
+        cable.fmu.setFMUstate(saved)
+        assert shown_after_steps(cable) == first
+        cable.fmu.freeFMUstate(saved)
+
+
+def test_a_serialised_state_goes_on_in_another_instance(damped_fmus: RobotFmus) -> None:
+    with in_hand(damped_fmus.cables[2]) as cable:
+        cable.set(**MOTION, modulus=1.1e11)
+        cable.run()
+        cable.step(0.0, 0.1)
+        state = cable.fmu.getFMUstate()
+        content = cable.fmu.serializeFMUstate(state)
+        expected = shown_after_steps(cable)
+    with in_hand(damped_fmus.cables[2]) as other:
+        other.run()
+        other.fmu.setFMUstate(other.fmu.deSerializeFMUstate(content))
+        assert shown_after_steps(other) == expected
+
+
+def test_parameters_move_the_start_before_the_first_step(three_fmus: RobotFmus) -> None:
+    with in_hand(three_fmus.cables[0]) as cable:
+        cable.set(anchor__z=60.0, start_tension=2000.0)
+        length, unstrained, tension = cable.get("length", "unstrained_length", "tension")
+    assert length == unstrained == pytest.approx(np.sqrt(28.86**2 + 50.0**2 + 55.0**2), rel=1e-15)
+    assert tension == 2000.0
+
+
+@pytest.mark.parametrize("step", [0.0, -0.01, float("nan")])
+def test_an_impossible_step_is_refused_and_changes_nothing(three_fmus: RobotFmus, step: float) -> None:
+    with in_hand(three_fmus.platform) as platform:
+        platform.run()
+        before = platform.get("position.x", "velocity.z")
+        with pytest.raises(FMICallException):
+            platform.step(0.0, step)
+        assert platform.get("position.x", "velocity.z") == before
+
+
+def test_an_impossible_input_does_not_bring_the_process_down(three_fmus: RobotFmus) -> None:
+    with in_hand(three_fmus.cables[0]) as cable:
+        cable.run()
+        cable.set(position__x=0.0, position__y=50.0, position__z=50.0)
+        for _ in range(5):
+            with pytest.raises(FMICallException):
+                cable.step(0.0, 0.01)
+        cable.set(position__x=28.86, position__y=0.0, position__z=5.0)
+        cable.step(0.0, 0.01)
+        assert cable.get("length") == pytest.approx([73.1977], abs=1e-4)
+
+
+def test_unknown_references_spoil_the_instance_but_not_the_process(three_fmus: RobotFmus) -> None:
+    with in_hand(three_fmus.cables[0]) as cable:
+        cable.run()
+        for _ in range(5):
+            assert np.isnan(cable.fmu.getReal([9999])[0])
+            cable.fmu.setReal([9999], [1.0])
+        with pytest.raises(FMICallException):
+            cable.step(0.0, 0.01)
+
+
+@pytest.mark.parametrize("content", [b"", b"no state", b"[[1.0], null, 0.0, true]", b'{"a": 1}'])
+def test_bytes_that_are_no_state_are_refused_at_the_next_step(three_fmus: RobotFmus, content: bytes) -> None:
+    with in_hand(three_fmus.platform) as platform:
+        platform.run()
+        saved = platform.fmu.getFMUstate()
+        for _ in range(4):
+            platform.fmu.setFMUstate(platform.fmu.deSerializeFMUstate(content))
+        with pytest.raises(FMICallException):
+            platform.step(0.0, 0.01)
+        platform.fmu.setFMUstate(saved)
+        platform.step(0.0, 0.01)
+
+
+@pytest.mark.parametrize("value", [float("nan"), float("inf")])
+def test_inputs_that_are_no_numbers_are_refused(three_fmus: RobotFmus, value: float) -> None:
+    with in_hand(three_fmus.cables[0]) as cable, in_hand(three_fmus.platform) as platform:
+        cable.set(winch_speed=value)
+        platform.set(force_1__x=value)
+        for hand, state in ((cable, "unstrained_length"), (platform, "position.x")):
+            hand.run()
+            before = hand.get(state)
+            for _ in range(4):
+                with pytest.raises(FMICallException):
+                    hand.step(0.0, 0.01)
+            assert hand.get(state) == before

@@ -1,0 +1,97 @@
+"""Wheel and sdist, installed in empty environments outside the checkout, build and run FMUs on every Python here."""
+
+import os
+import shutil
+import subprocess
+import sys
+import tarfile
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from tests.support.folders import ROOT
+
+EXAMPLE = ROOT / "system" / "tautwire" / "examples" / "caroca"
+SUPPORTED = ("3.10", "3.11", "3.12", "3.13")
+
+
+def interpreters() -> dict[str, str]:
+    """The Pythons of this machine that are supported, by version: this one, those on the path, and pyenv's."""
+    found = {f"{sys.version_info.major}.{sys.version_info.minor}": sys.executable}
+    pyenv = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv")) / "versions"
+    for version in SUPPORTED:
+        installed = sorted(pyenv.glob(f"{version}.*/bin/python"))
+        places = [shutil.which(f"python{version}"), *map(str, installed)]
+        for place in places:
+            if place and version not in found and _runs(place, version):
+                found[version] = place
+    return found
+
+
+def _runs(python: str, version: str) -> bool:
+    """Whether it is that Python and can make environments; a shim may be on the path without its Python."""
+    ask = "import ensurepip, sys, venv; print('%d.%d' % sys.version_info[:2])"
+    told = subprocess.run([python, "-c", ask], capture_output=True, text=True, timeout=60)
+    return told.returncode == 0 and told.stdout.strip() == version
+
+
+@pytest.fixture(scope="module")
+def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A folder with the sdist and the wheel that is built from it."""
+    folder = tmp_path_factory.mktemp("dist")
+    subprocess.run([sys.executable, "-m", "build", "--outdir", str(folder), str(ROOT)], check=True, timeout=600)
+    return folder
+
+
+@pytest.mark.slow
+def test_both_packages_and_the_examples_are_in_the_wheel(built: Path) -> None:
+    (wheel,) = built.glob("tautwire-*.whl")
+    names = set(zipfile.ZipFile(wheel).namelist())
+    assert {
+        "tautwire/cli.py",
+        "tautwire/commands/tracing.py",
+        "tautwire/py.typed",
+        "tautwire/report/assets/style.css",
+        "tautwire/examples/three/robot.toml",
+        "tautwire/examples/three/fit.csv",
+        "tautwire_fmu/slaves.py",
+        "tautwire_fmu/laws/effects/damping.py",
+    } <= names
+    assert not [name for name in names if name.startswith(("tests", "build")) or "__pycache__" in name]
+
+
+@pytest.mark.slow
+def test_what_the_documents_name_is_in_the_sdist(built: Path) -> None:
+    (sdist,) = built.glob("tautwire-*.tar.gz")
+    with tarfile.open(sdist) as archive:
+        names = {name.partition("/")[2] for name in archive.getnames()}
+    there = ("Makefile", "LICENSE", "CHANGELOG.md", "CONTRIBUTING.md", "CITATION.cff", "mkdocs.yml", "docs/system.svg")
+    assert set(there) <= names
+    assert {str(page.relative_to(ROOT)) for page in (ROOT / "docs").glob("*.md")} <= names
+    assert "tests/project/test_wheel.py" in names
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("version", SUPPORTED)
+def test_it_works_in_an_empty_environment(version: str, built: Path, tmp_path: Path) -> None:
+    python = interpreters().get(version)
+    if python is None:
+        pytest.skip(f"there is no Python {version} on this machine")
+    environment, work = tmp_path / "environment", tmp_path / "work"
+    subprocess.run([python, "-m", "venv", str(environment)], check=True, timeout=120)
+    # This Python takes the sdist, the others the wheel.
+    (package,) = built.glob("tautwire-*.tar.gz" if python == sys.executable else "tautwire-*.whl")
+    install = [environment / "bin" / "python", "-m", "pip", "install", "--quiet", str(package)]
+    subprocess.run(install, check=True, timeout=1800)
+    shutil.copytree(EXAMPLE, work / "caroca")
+    for arguments in (
+        ["new", "hall"],
+        ["check", "caroca/robot.toml", "caroca/fit.csv"],
+        ["build", "caroca/robot.toml", "--out", "fmus"],
+        ["simulate", "caroca/robot.toml", "--speeds", "caroca/fit.csv", "--until", "0.5", "--out", "result.csv"],
+        ["linearise", "caroca/robot.toml", "--out", "model.json"],
+    ):
+        subprocess.run([environment / "bin" / "tautwire", *arguments], cwd=work, check=True, timeout=300)
+    assert len(list((work / "fmus").glob("*.fmu"))) == 4
+    assert len((work / "result.csv").read_text().splitlines()) == 102

@@ -1,0 +1,122 @@
+"""A recording that cannot be one of the robot is refused; one that merely starts elsewhere is not."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tautwire.cli import run
+from tautwire.cli.input_checks import check_files
+from tautwire.errors import RecordingError, UnreachableError
+from tautwire.recordings.consistency import (
+    MAX_REELING_MISMATCH,
+    MIN_CHECKED_START_SHARE,
+    reeling_mismatch,
+    require_matching_reeling,
+    robot_size,
+)
+from tautwire.recordings.recording import Recording, read_recording
+from tautwire.recordings.start_position import start_position
+from tautwire.robot.schema import Robot
+from tests.support.recordings import recorded
+from tests.support.robots import EXAMPLES, example
+
+THREE, CAROCA = example("three"), example("caroca")
+NOISE = 3e-4
+
+
+def of(name: str) -> Recording:
+    return read_recording(EXAMPLES / name / "check.csv", example(name).cable_count)
+
+
+def moved(recording: Recording, offset: list[float]) -> Recording:
+    return replace(recording, position=recording.position + np.array(offset))
+
+
+def elsewhere(robot: Robot, offset: list[float]) -> Robot:
+    """The robot file with another start: of it, recordings of the old one start elsewhere."""
+    start = np.array(robot.platform.start) + np.array(offset)
+    return replace(robot, platform=replace(robot.platform, start=tuple(start.tolist())))
+
+
+def test_another_robots_recording_is_refused_by_its_ropes() -> None:
+    with pytest.raises(RecordingError, match=r"first positions: they begin at .*28\.1 m from .*28\.86, 0, 5\]") as e:
+        start_position(THREE, NOISE, of("caroca"))
+    assert "would not be reeled so" in e.value.problem and "correct the robot file" in e.value.hint
+
+
+def test_a_start_farther_away_than_the_robot_is_large_is_refused() -> None:
+    assert robot_size(CAROCA) == pytest.approx(7.0, rel=1e-3)
+    with pytest.raises(RecordingError, match=r"28\.1 m from .*\[1, 0, 1\] m, and the robot is no larger than 7 m"):
+        start_position(CAROCA, NOISE, of("three"))
+
+
+def test_a_start_that_cables_cannot_hold_tells_how_far_it_is_from_the_robot_files() -> None:
+    with pytest.raises(UnreachableError, match=r"60 m from where the robot file starts it.*cable \d would need -") as e:
+        start_position(THREE, NOISE, moved(recorded("three", 1), [-60.0, 0.0, 0.0]))
+    assert "correct the robot file" in e.value.hint
+
+
+@pytest.mark.parametrize("name", ["three", "caroca", "eight"])
+def test_a_start_far_from_the_robot_files_is_taken_where_the_ropes_fit(name: str) -> None:
+    away = elsewhere(example(name), [0.0, 0.0, -1.5 * MIN_CHECKED_START_SHARE * robot_size(example(name))])
+    start, notes = start_position(away, NOISE, of(name))
+    assert start == pytest.approx(example(name).platform.start, abs=2e-3)
+    assert "starts where it says" in notes[0]
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        {"payload": {"mass": 100.0}},
+        {"modulus": {"modulus": 3e10}},
+        {"drum": {"radius_ratio": 1.15, "eccentricity": 0.05, "slip": 1e-6}},
+        {"anchor": {"x": 1.0, "z": -2.0, "cables": [1]}},
+        {"creep": {"compliance": 1e-11, "time": 5.0}},
+        {"sensor_delay": {"seconds": 0.3}},
+        {"unlisted_frame": {"stiffness_constant": 1e5, "viscosity": 2e3}},
+    ],
+)
+def test_what_a_model_may_lack_does_not_make_it_another_robots(effects: dict[str, dict[str, float]]) -> None:
+    recording = recorded("three", 3, effects)
+    far = elsewhere(THREE, [0.0, 0.0, 15.0])
+    reeled, missed = reeling_mismatch(far, recording)
+    assert missed < 0.5 * MAX_REELING_MISMATCH * reeled
+    require_matching_reeling(far, recording, recording.position[0], "here")
+
+
+@pytest.mark.parametrize("name", ["three", "caroca", "eight"])
+def test_a_tracker_that_jumps_now_and_then_does_not_make_it_another_robots(name: str) -> None:
+    recording = of(name)
+    position = recording.position.copy()
+    position[[0, 500, 501, 900]] += 100.0
+    far = elsewhere(example(name), [0.0, 0.0, -1.5 * MIN_CHECKED_START_SHARE * robot_size(example(name))])
+    require_matching_reeling(far, replace(recording, position=position), recording.position[1], "here")
+
+
+def test_a_recording_without_positions_or_motion_is_no_other_robots() -> None:
+    far, still = elsewhere(THREE, [0.0, 0.0, 15.0]), recorded("three", 1)
+    at_rest = replace(still, winch_speed=np.zeros_like(still.winch_speed))
+    unseen = replace(still, position=np.full_like(still.position, np.nan))
+    start = np.array(THREE.platform.start)
+    require_matching_reeling(far, at_rest, start, "here")
+    require_matching_reeling(far, unseen, start, "here")
+
+
+@pytest.mark.parametrize("command", ["trace", "simulate", "check"])
+def test_commands_tell_of_another_robots_recording(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], command: str
+) -> None:
+    robot, recording = str(EXAMPLES / "three" / "robot.toml"), str(EXAMPLES / "caroca" / "fit.csv")
+    out = ["--out", str(tmp_path / "out")]
+    arguments = {"check": [recording, "--json"], "trace": [recording, *out], "simulate": ["--speeds", recording, *out]}
+    assert run([command, robot, *arguments[command]]) == 2
+    told = capsys.readouterr()
+    said = json.loads(told.out)["problems"][0]["problem"] if command == "check" else told.err
+    assert "28.1 m from where the robot file starts it" in said
+    assert list(tmp_path.iterdir()) == []
+    assert check_files(EXAMPLES / "three" / "robot.toml", EXAMPLES / "three" / "fit.csv").problems == ()

@@ -1,0 +1,73 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tautwire.recordings.dead_channels import without_dead_channels
+from tautwire.recordings.recording import Recording
+from tests.support.recordings import recorded
+from tests.support.robots import NAMES
+
+WHOLE = recorded("three", 1)
+
+
+def with_tension(place: int, values: np.ndarray) -> Recording:
+    tension = WHOLE.tension.copy()
+    tension[:, place] = values
+    return replace(WHOLE, tension=tension)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_recording_as_it_should_be_stays(name: str) -> None:
+    recording = recorded(name, 1)
+    cleaned, notes = without_dead_channels(recording)
+    assert cleaned is recording and notes == ()
+
+
+def test_a_load_cell_that_shows_one_value_all_along_is_not_used() -> None:
+    cleaned, notes = without_dead_channels(with_tension(1, np.full(801, 1432.0)))
+    assert np.isnan(cleaned.tension[:, 1]).all() and np.isfinite(cleaned.tension[:, [0, 2]]).all()
+    assert notes == (f"{WHOLE.path}: tension_2 shows one value all along: not used",)
+
+
+def test_a_load_cell_that_shows_noise_alone_is_not_used() -> None:
+    noise = np.random.default_rng(1).normal(scale=2.0, size=801)
+    cleaned, notes = without_dead_channels(with_tension(2, 700.0 + noise))
+    assert np.isnan(cleaned.tension[:, 2]).all()
+    assert "tension_3 shows noise alone" in notes[0]
+
+
+def test_a_robot_that_rests_all_along_keeps_its_load_cells() -> None:
+    noise = np.random.default_rng(1).normal(scale=2.0, size=(801, 3))
+    resting = replace(WHOLE, tension=1000.0 + noise, position=WHOLE.position[:1] + 1e-4 * noise)
+    assert without_dead_channels(resting)[0] is resting
+
+
+def test_a_load_cell_that_dies_on_the_way_is_used_until_then() -> None:
+    values = WHOLE.tension[:, 0].copy()
+    values[500:] = values[500]
+    cleaned, notes = without_dead_channels(with_tension(0, values))
+    assert np.isfinite(cleaned.tension[:501, 0]).all() and np.isnan(cleaned.tension[501:, 0]).all()
+    assert "tension_1: stays at one value for 300 samples" in notes[0]
+
+
+def test_a_slower_sensor_whose_values_are_repeated_is_used_once_a_value() -> None:
+    held = WHOLE.position[np.arange(801) // 5 * 5]
+    cleaned, notes = without_dead_channels(replace(WHOLE, position=held))
+    assert np.flatnonzero(np.isfinite(cleaned.position).all(axis=1)).tolist() == list(range(0, 801, 5))
+    assert "x, y, z: each value is repeated about 5 times" in notes[0]
+
+
+def test_a_coordinate_that_never_changes_is_not_used() -> None:
+    position = WHOLE.position.copy()
+    position[:, 1] = 0.0
+    cleaned, notes = without_dead_channels(replace(WHOLE, position=position))
+    assert np.isnan(cleaned.position[:, 1]).all() and np.isfinite(cleaned.position[:, 0]).all()
+    assert "y shows one value all along" in notes[0]
+
+
+def test_a_coarse_sensor_is_no_slow_one() -> None:
+    coarse = np.round(WHOLE.tension / 20.0) * 20.0
+    cleaned, notes = without_dead_channels(replace(WHOLE, tension=coarse))
+    assert np.mean(np.isfinite(cleaned.tension)) > 0.8
+    assert not any("repeated" in note for note in notes)

@@ -1,0 +1,51 @@
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tautwire.errors import UnreachableError
+from tautwire.recordings.recording import Recording
+from tautwire.recordings.start_position import start_position, with_start
+from tests.support.recordings import recorded
+from tests.support.robots import example
+
+ROBOT = example("three")
+FIT = recorded("three", 1)
+NOISE = 3e-4
+
+
+def moved(offset: list[float]) -> Recording:
+    return replace(FIT, position=FIT.position + np.array(offset))
+
+
+def test_noise_alone_does_not_move_the_start() -> None:
+    start, notes = start_position(ROBOT, NOISE, FIT)
+    assert start == ROBOT.platform.start
+    assert notes == ()
+
+
+def test_a_recording_that_starts_elsewhere_starts_where_it_says() -> None:
+    recording = moved([0.0, 0.5, 0.0])
+    start, notes = start_position(ROBOT, NOISE, recording)
+    assert start == pytest.approx(recording.position[:5].mean(axis=0), abs=1e-12)
+    assert "starts where it says" in notes[0]
+    assert with_start(ROBOT, start).platform.start == start
+
+
+def test_a_missing_axis_stays_at_the_robot_files_start() -> None:
+    recording = moved([0.0, 0.5, np.nan])
+    start, _ = start_position(ROBOT, NOISE, recording)
+    assert start[2] == ROBOT.platform.start[2]
+    assert start[1] == pytest.approx(recording.position[:5, 1].mean(), abs=1e-12)
+
+
+def test_a_first_row_that_dropped_out_does_not_hide_the_start() -> None:
+    recording = moved([0.0, 0.5, 0.0])
+    recording.position[:2] = np.nan
+    start, _ = start_position(ROBOT, NOISE, recording)
+    assert start[1] == pytest.approx(0.5, abs=1e-3)
+
+
+def test_a_start_that_the_cables_cannot_hold_names_the_recording() -> None:
+    with pytest.raises(UnreachableError, match=r"three-1\.csv: first positions: .*cable \d would need -"):
+        start_position(ROBOT, NOISE, moved([-60.0, 0.0, 0.0]))

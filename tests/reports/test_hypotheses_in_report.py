@@ -1,0 +1,42 @@
+"""What was tried, as the page and the terminal tell it: what was fitted apart from what promised too little."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from rich.console import Console
+
+from tautwire.estimation.trace_result import Candidate, Trace
+from tautwire.reports import trace_table
+from tautwire.reports.trace_report_page import candidates_section
+from tests.support.pages import Page
+from tests.support.traces import made_trace
+
+
+def with_hopeless_round() -> Trace:
+    """A trace whose second round fitted nothing."""
+    trace = made_trace(samples=200)
+    hopeless = tuple(Candidate(2, "creep", (i,), {"time": 10.0}, 0.0, float("nan"), False) for i in (1, 2, 3))
+    return replace(trace, candidates=(*(each for each in trace.candidates if each.round == 1), *hopeless))
+
+
+def test_page_folds_away_what_was_not_fitted() -> None:
+    page = Page(candidates_section(with_hopeless_round()))
+    assert "3 not fitted, they promised too little" in page.text
+    assert "Nothing promised enough to be fitted." in page.text
+    assert "1 not fitted" in page.text  # drag, in the first round
+    assert page.text.index("damping") < page.text.index("1 not fitted") < page.text.index("drag")
+
+
+def test_effects_on_no_cable_are_said_to_be_on_the_platform() -> None:
+    page = Page(candidates_section(made_trace(samples=200)))
+    assert "payloadplatform" in page.text
+
+
+def test_terminal_leaves_out_what_was_not_fitted() -> None:
+    console = Console(width=80, color_system=None)
+    with console.capture() as captured:
+        console.print(trace_table(with_hopeless_round()))
+    text = " ".join(captured.get().split())
+    assert "creep 1" not in text and "drag" not in text
+    assert "promised" in text and "or not fitted" in text

@@ -1,0 +1,124 @@
+"""The pages in a real browser, as they are read: nothing is cut, nothing lies over another, all stands out."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+pytest.importorskip("selenium", reason="the pages are not tried in a browser: selenium is in the dev extra")
+
+from tests.reports.test_html_markup import TEXT, themes
+from tests.support.browser.browser import (
+    LAPTOP,
+    LAPTOP_DARK,
+    MISSING,
+    PHONE,
+    PHONE_DARK,
+    Browser,
+    Screen,
+    chromium,
+)
+from tests.support.browser.report_pages import DRAW_ALL, KINDS, near, opened
+from tests.support.folders import SUPPORT
+
+pytestmark = pytest.mark.skipif(chromium() is None, reason=f"the pages are not tried in a browser: {MISSING}")
+
+SCREENS = (LAPTOP, LAPTOP_DARK, PHONE, PHONE_DARK)
+CONTRAST = (SUPPORT / "browser" / "contrast.js").read_text(encoding="utf-8")
+# Every title and label of figures that reaches beyond its figure, or lies over another of its figure.
+CUT = """
+const cut = [];
+for (const plot of document.querySelectorAll('.panel > .plot.js-plotly-plot')) {
+  const frame = plot.getBoundingClientRect();
+  const words = [...plot.querySelectorAll('.xtitle, .ytitle, .y2title, .annotation-text')];
+  const boxes = words.map((each) => each.getBoundingClientRect());
+  boxes.forEach((box, place) => {
+    const inside = box.left >= frame.left && box.right <= frame.right && box.top >= frame.top
+      && box.bottom <= frame.bottom;
+    const over = boxes.slice(0, place).some((other) => box.left < other.right - 1 && other.left < box.right - 1
+      && box.top < other.bottom - 1 && other.top < box.bottom - 1);
+    if (!inside || over || box.width === 0) cut.push(words[place].textContent);
+  });
+}
+return cut;
+"""
+
+
+@pytest.mark.parametrize("screen", SCREENS, ids=lambda screen: screen.name)
+@pytest.mark.parametrize("kind", KINDS)
+def test_page_fits_its_screen_and_its_words_stand_out(
+    browser: Browser, pages: dict[str, Path], kind: str, screen: Screen
+) -> None:
+    opened(browser, pages[kind], screen).run(DRAW_ALL)
+    browser.run("for (const d of document.querySelectorAll('details')) d.open = true")
+    assert browser.run("return document.documentElement.scrollWidth") <= screen.width
+    assert browser.run("return innerWidth") == screen.width
+    assert browser.run(CONTRAST, TEXT) == []
+
+
+@pytest.mark.parametrize("screen", [LAPTOP, PHONE], ids=lambda screen: screen.name)
+@pytest.mark.parametrize("kind", [*KINDS, "close"])
+def test_titles_of_axes_and_labels_of_modes_can_be_read(
+    browser: Browser, pages: dict[str, Path], kind: str, screen: Screen
+) -> None:
+    opened(browser, pages[kind], screen).run(DRAW_ALL)
+    assert browser.run("return document.querySelectorAll('.panel .ytitle').length") >= 6
+    assert browser.run(CUT) == []
+
+
+@pytest.mark.parametrize("axis", ["x", "y", "z"])
+@pytest.mark.parametrize("kind", [*KINDS, "close"])
+def test_titles_in_space_are_whole_on_a_phone(browser: Browser, pages: dict[str, Path], kind: str, axis: str) -> None:
+    opened(browser, pages[kind], PHONE).see("figure.scene")
+    titled = browser.pixels("#scene")
+    browser.run(f"return Plotly.relayout('scene', {{ 'scene.{axis}axis.title.text': '' }})")
+    rows, columns = np.nonzero((browser.pixels("#scene") != titled).any(axis=2))
+    assert len(rows) > 40
+    assert columns.min() > 3 and columns.max() < titled.shape[1] - 4
+
+
+def test_labels_that_would_run_into_each_other_stand_in_two_lines(browser: Browser, pages: dict[str, Path]) -> None:
+    script = """const band = (at, label) => ({ low: at, high: 1.1 * at, label, spans: [[at, 1.1 * at]] });
+    const bands = [band(5, "2 and 3"), band(4, "1"), band(40, "?")];
+    return frequencyBands(bands, [0.1, 100], colours()).annotations.map(({ text, yshift }) => [text, yshift > 0]);"""
+    labels = opened(browser, pages["modes"]).run(script)
+    assert labels == [["1", False], ["2 and 3", True], ["?", False]]
+
+
+@pytest.mark.parametrize("screen", [LAPTOP, PHONE_DARK], ids=lambda screen: screen.name)
+def test_what_was_recorded_shows_beside_the_run_and_below_it_the_difference(
+    browser: Browser, pages: dict[str, Path], screen: Screen
+) -> None:
+    opened(browser, pages["run"], screen)
+    colours = themes()["dark" if screen.dark else "light"]
+    picture = browser.pixels("figure[data-kind=compared]")
+    upper, lower = np.array_split(picture[30:], [int(0.6 * len(picture)) - 30])
+    assert near(upper, colours["before"]) > 100 and near(upper, colours["accent"]) > 100
+    assert near(lower, colours["text"]) > 100
+    label = "return document.querySelector('figure[data-kind=compared] > .plot').getAttribute('aria-label')"
+    assert "recorded minus co-simulated has a root mean square of" in browser.run(label)
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_figure_of_every_page_has_words(browser: Browser, pages: dict[str, Path], kind: str) -> None:
+    opened(browser, pages[kind]).run(DRAW_ALL)
+    script = (
+        "return [...document.querySelectorAll('figure > .plot')].map((p) => [p.role, p.getAttribute('aria-label')])"
+    )
+    words = browser.run(script)
+    assert all(role == "img" and len(label) > 30 for role, label in words)
+    assert len({label for _, label in words if "Spectrum" not in label}) > 6
+
+
+def test_figures_say_in_words_what_they_show(browser: Browser, pages: dict[str, Path]) -> None:
+    opened(browser, pages["trace"]).run(DRAW_ALL)
+    script = "return [...document.querySelectorAll('.panel > .plot')].map((p) => p.getAttribute('aria-label'))"
+    labels = browser.run(script)
+    assert len(labels) == 12
+    assert all("Fit recording: root mean square" in label for label in labels)
+    assert all("Modes 1 to" in label or "Mode 1" in label for label in labels[6:])
+    browser.run("document.querySelectorAll('input[name=choice]')[1].click()")
+    browser.run(DRAW_ALL)
+    assert all("Check recording: root mean square" in label for label in browser.run(script))

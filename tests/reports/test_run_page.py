@@ -1,0 +1,147 @@
+"""The page of a run: what it says, that it needs no network, and that names in it do nothing."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tautwire.cli import run as command
+from tautwire.cosimulation.robot_wiring import result_columns
+from tautwire.reports.downsampling import unpack_float32
+from tautwire.reports.run_overview import RunOverview
+from tautwire.reports.run_page import run_page
+from tests.support.pages import FETCHING, Page
+from tests.support.robots import EXAMPLES
+from tests.support.traces import HOSTILE, made_run
+
+THREE = EXAMPLES / "three"
+
+
+def test_page_says_how_long_how_far_and_under_what() -> None:
+    page = Page(run_page(made_run(), {"result.csv": "result.csv"}))
+    assert page.open == []
+    for words in (
+        "Complete",
+        "20.0 s along",
+        "2000 steps of the master, and 17 repeats",
+        "The winches were slow.",
+        "cable 3",
+    ):
+        assert words in page.text
+    assert [each["href"] for each in page.all("a")][1:] == ["result.csv"]
+
+
+def test_every_output_has_its_panel_with_what_was_recorded() -> None:
+    run = made_run()
+    page = Page(run_page(run, {}))
+    channels = page.data()["choices"][0]["channels"]
+    panels = [each for each in page.all("figure") if each.get("data-kind") in ("output", "compared")]
+    assert [each["data-kind"] for each in panels] == 6 * ["compared"] + 6 * ["output"]
+    assert [int(each["data-channel"]) for each in panels] == list(range(len(channels)))
+    assert [each["title"] for each in channels] == 3 * ["Position"] + 3 * ["Tension"] + 3 * ["Velocity"] + [
+        "Elongation"
+    ] * 3
+    tension = channels[3]
+    assert unpack_float32(tension["values"]) == pytest.approx(run.overview.rows[:, 6], rel=1e-6)
+    assert float(tension["difference"]["apart"]) == pytest.approx(2.0, rel=0.1)
+    assert channels[6]["recorded"] is None and channels[6]["difference"] is None
+
+
+def test_difference_is_recorded_minus_co_simulated_in_a_handy_unit() -> None:
+    run = made_run()
+    channels = Page(run_page(run, {})).data()["choices"][0]["channels"]
+    for channel, recorded, column, unit, one in (
+        (channels[2], run.recording.position[:, 2], "z", "µm", 1e-6),
+        (channels[3], run.recording.tension[:, 0], "tension_1", "N", 1.0),
+    ):
+        simulated = run.overview.rows[:, run.columns.index(column)]
+        assert channel["difference"]["unit"] == unit
+        expected = (recorded - simulated) / one
+        assert unpack_float32(channel["difference"]["values"]) == pytest.approx(expected, rel=1e-5, abs=1e-3)
+        assert unpack_float32(channel["difference"]["time"]) == pytest.approx(run.overview.time)
+
+
+def test_page_stays_small_for_long_runs() -> None:
+    assert len(run_page(made_run(samples=40_000, eight=True), {})) < 7_000_000
+
+
+def test_slack_cables_and_failures_are_named_at_the_top() -> None:
+    run = made_run(samples=200)
+    row = run.overview.last_row.copy()
+    row[list(run.columns).index("tension_2")] = 0.0
+    run.overview.add(21.0, row)
+    assert "Slack at times: cable 2" in Page(run_page(run, {})).text
+    failed = replace(run, statistics=None, failure="cable_1: doStep failed at 21 s")
+    page = Page(run_page(failed, {}))
+    assert "Stopped: an FMU failed" in page.text and "cable_1: doStep failed at 21 s" in page.text
+
+
+def test_output_that_no_fmu_shows_has_no_panel() -> None:
+    run = made_run(samples=200)
+    kept = [place for place, name in enumerate(run.columns) if name != "tension_2"]
+    overview = RunOverview()
+    for time, row in zip(run.overview.time, run.overview.rows, strict=True):
+        overview.add(float(time), row[kept])
+    page = Page(run_page(replace(run, columns=tuple(run.columns[k] for k in kept), overview=overview), {}))
+    labels = [each["label"] for each in page.data()["choices"][0]["channels"] if each["title"] == "Tension"]
+    assert labels == ["cable 1", "cable 3"]
+    assert np.isnan(unpack_float32(page.data()["choices"][0]["scene"]["tension"][1])).all()
+
+
+def test_page_asks_nothing_of_the_network() -> None:
+    for tag, attributes in Page(run_page(made_run(samples=200), {"a b.csv": "../a b.csv"})).elements:
+        assert not FETCHING & set(attributes), tag
+        assert not re.match(r"(?i)\s*([a-z]+:|//)", attributes.get("href", ""))
+
+
+def test_hostile_names_do_nothing() -> None:
+    run = replace(made_run(HOSTILE, 200), notes=(HOSTILE,), failure=HOSTILE)
+    hostile = Page(run_page(replace(run, recording=replace(run.recording, unknown_columns=(HOSTILE,))), {}))
+    assert "img" not in [tag for tag, _ in hostile.elements]
+    assert len(hostile.scripts) == 3 and hostile.open == []
+    assert hostile.text.count("onerror") >= 3
+
+
+def test_simulate_writes_the_page_beside_the_result(tmp_path: Path) -> None:
+    speeds, result, page = str(THREE / "fit.csv"), tmp_path / "result.csv", tmp_path / "pages" / "run.html"
+    arguments = ["simulate", str(THREE / "robot.toml"), "--speeds", speeds, "--until", "0.5", "--out", str(result)]
+    assert command([*arguments, "--report", str(page)]) == 0
+    found = Page(page.read_text(encoding="utf-8"))
+    assert "0.500 s along" in found.text
+    assert "../result.csv" in [each["href"] for each in found.all("a")]
+
+
+def test_page_in_the_place_of_the_result_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    result = str(tmp_path / "result.csv")
+    arguments = ["simulate", str(THREE / "robot.toml"), "--speeds", str(THREE / "fit.csv"), "--out", result]
+    assert command([*arguments, "--report", result]) == 2
+    assert "--report" in capsys.readouterr().err
+    assert not any(tmp_path.iterdir())
+
+
+def test_columns_are_those_of_a_result_file() -> None:
+    assert made_run(samples=200).columns == tuple(column.name for column in result_columns(3)[1:])
+
+
+def test_a_run_that_fails_leaves_a_page_that_says_where(tmp_path: Path) -> None:
+    recording, page = tmp_path / "torn.csv", tmp_path / "run.html"
+    speeds = {"time": [0.0, 0.1, 0.2, 0.3]} | {f"winch_speed_{i}": [0.0, 0.0, 0.0, 1e6] for i in (1, 2, 3)}
+    pd.DataFrame(speeds).to_csv(recording, index=False)
+    arguments = ["simulate", str(THREE / "robot.toml"), "--speeds", str(recording)]
+    assert command([*arguments, "--out", str(tmp_path / "result.csv"), "--report", str(page)]) == 1
+    found = Page(page.read_text(encoding="utf-8"))
+    assert "Stopped: an FMU failed" in found.text and "the run until then is in" in found.text
+    assert unpack_float32(found.data()["choices"][0]["scene"]["time"]) == pytest.approx([0.0, 0.1, 0.2])
+
+
+def test_a_run_that_cannot_begin_leaves_no_page(tmp_path: Path) -> None:
+    recording, page = tmp_path / "empty.csv", tmp_path / "run.html"
+    recording.write_text("time,winch_speed_1\n0.0,0.0\n", encoding="utf-8")
+    arguments = ["simulate", str(THREE / "robot.toml"), "--speeds", str(recording)]
+    assert command([*arguments, "--out", str(tmp_path / "result.csv"), "--report", str(page)]) == 2
+    assert [path.name for path in tmp_path.iterdir()] == ["empty.csv"]

@@ -1,0 +1,142 @@
+"""Declared numbers with a stated uncertainty: refitted under every hypothesis, and no effect within it."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from casadi import DM
+
+from tautwire.estimation import Trace, trace
+from tautwire.recordings.recording import Recording
+from tautwire.robot.robot_file_reader import read_robot
+from tautwire.robot.robot_file_writer import robot_text
+from tautwire.robot.schema import Robot
+from tautwire.robot.symbolic_model import symbolic_model
+from tautwire.robot.uncertain_parameters import perturbed_robot, sensor_offsets, uncertain_parameters
+from tests.support.recordings import recorded
+from tests.support.robots import example
+
+STIFFER = {"modulus": {"modulus": 1.03 * 1.022e11}}
+DAMPING = {"damping": {"damping": 9e8}}
+
+
+def unsure(modulus: float = 0.0, damping: float = 0.0, mass: float = 0.0, tension: float = 0.0) -> Robot:
+    """The three-cable robot with stated uncertainties."""
+    robot = example("three")
+    cables = tuple(replace(c, modulus_uncertainty=modulus, damping_uncertainty=damping) for c in robot.cables)
+    sensors = replace(robot.sensors, tension_offset_uncertainty=tension)
+    return replace(robot, cables=cables, sensors=sensors, platform=replace(robot.platform, mass_uncertainty=mass))
+
+
+def traced(robot: Robot, effects: dict[str, Any], off: tuple[float, ...] = (0.0, 0.0, 0.0)) -> Trace:
+    fit, check = (with_offsets(recorded("three", seed, effects), off) for seed in (3, 53))
+    return trace(robot, fit, check, lambda what, done: None)
+
+
+def with_offsets(recording: Recording, off: tuple[float, ...]) -> Recording:
+    return replace(recording, tension=recording.tension + np.array(off))
+
+
+def test_a_robot_file_states_them_and_reads_back(tmp_path: Path) -> None:
+    robot = unsure(2e9, 1e8, 3.0, 5.0)
+    robot = replace(robot, sensors=replace(robot.sensors, position_offset_uncertainty=1e-3))
+    (tmp_path / "robot.toml").write_text(robot_text(robot), encoding="utf-8")
+    assert read_robot(tmp_path / "robot.toml") == robot
+    assert len(uncertain_parameters(robot)) == 1 + 3 * 3 + 3
+
+
+def test_nothing_is_uncertain_that_is_not_stated() -> None:
+    assert uncertain_parameters(example("three")) == ()
+
+
+def test_numbers_move_by_their_own_standard_deviations() -> None:
+    robot = unsure(modulus=2e9, mass=3.0, tension=5.0)
+    numbers = uncertain_parameters(robot)
+    moves = [float(place) for place in range(len(numbers))]
+    by_label = {number.label: move for number, move in zip(numbers, moves, strict=True)}
+    moved = perturbed_robot(robot, numbers, moves)
+    assert moved.platform.mass == robot.platform.mass + 3.0 * by_label["mass"]
+    assert moved.cables[1].modulus == robot.cables[1].modulus + 2e9 * by_label["modulus of cable 2"]
+    assert moved.cables[1].damping == robot.cables[1].damping
+    assert sensor_offsets(numbers, moves, 3)[3:] == [
+        5.0 * by_label[f"offset of tension {cable}"] for cable in (1, 2, 3)
+    ]
+
+
+def test_they_are_states_that_never_move_and_start_as_declared() -> None:
+    robot = unsure(modulus=2e9, mass=3.0, tension=5.0)
+    numbers = uncertain_parameters(robot)
+    plain, model = symbolic_model(robot), symbolic_model(robot, (), numbers)
+    assert model.states.numel() == plain.states.numel() + len(numbers)
+    assert model.rates[-len(numbers) :].is_zero()
+    assert model.state_names[-len(numbers) :] == tuple(f"uncertain {number.label}" for number in numbers)
+    assert np.array_equal(np.array(DM(model.start[: plain.states.numel()])), np.array(DM(plain.start)))
+
+
+@pytest.mark.slow
+def test_a_stiffness_within_what_is_stated_is_no_effect_and_is_put_right() -> None:
+    found = traced(unsure(modulus=3e9), STIFFER)
+    assert found.verdict == "none"
+    for cable in found.robot_after.cables:
+        assert cable.modulus == pytest.approx(1.03 * 1.022e11, abs=4.0 * cable.modulus_uncertainty)
+        assert cable.modulus_uncertainty < 0.3 * 3e9
+    assert any("modulus of cable 1 1.05" in note for note in found.notes)
+    for comparison in found.comparisons:
+        assert comparison.errors_after.tension_rms < 1.2 * found.noise_floor.tension_rms
+        assert comparison.errors_after.tension_rms < comparison.errors_before.tension_rms
+
+
+@pytest.mark.slow
+def test_a_mass_within_what_is_stated_is_no_payload() -> None:
+    found = traced(unsure(mass=3.0), {"payload": {"mass": 2.0}})
+    assert found.verdict == "none"
+    assert found.robot_after.platform.mass == pytest.approx(
+        302.0, abs=4.0 * found.robot_after.platform.mass_uncertainty
+    )
+    assert found.robot_after.platform.mass_uncertainty < 0.3
+    assert found.components.faulty_component == "nothing"
+
+
+@pytest.mark.slow
+def test_a_tracker_off_its_frame_is_no_anchor_elsewhere() -> None:
+    robot = example("three")
+    robot = replace(robot, sensors=replace(robot.sensors, position_offset_uncertainty=5e-3))
+    fit, check = (recorded("three", seed, {}) for seed in (3, 53))
+    off = np.array([4e-3, -3e-3, 2e-3])
+    shifted = [replace(each, position=each.position + off) for each in (fit, check)]
+    found = trace(robot, *shifted, lambda what, done: None)
+    assert found.verdict == "none"
+    assert found.components.faulty_component == "nothing"
+
+
+@pytest.mark.slow
+def test_a_stiffness_far_beyond_what_is_stated_is_an_effect() -> None:
+    found = traced(unsure(modulus=2e8), STIFFER)
+    assert [effect.name for effect in found.effects] == ["modulus"]
+    assert found.effects[0].parameters["modulus"].value == pytest.approx(1.03 * 1.022e11, rel=2e-3)
+
+
+@pytest.mark.slow
+def test_an_effect_is_found_beside_load_cells_that_are_off_zero() -> None:
+    off = (8.0, -5.0, 12.0)
+    found = traced(unsure(tension=10.0), DAMPING, off)
+    assert [effect.name for effect in found.effects] == ["damping"]
+    assert found.effects[0].parameters["damping"].value == pytest.approx(9e8, rel=0.01)
+    assert any("offset of tension 3 12" in note or "offset of tension 3 11.9" in note for note in found.notes)
+    for comparison in found.comparisons:
+        assert comparison.errors_after.tension_rms < 1.2 * found.noise_floor.tension_rms
+
+
+@pytest.mark.slow
+def test_load_cells_off_zero_are_none_where_that_is_stated_and_no_listed_effect_where_not() -> None:
+    off = (8.0, -5.0, 12.0)
+    found = traced(unsure(tension=10.0), {}, off)
+    assert found.verdict == "none"
+    assert found.components.faulty_component == "nothing"
+    without = traced(example("three"), {}, off)
+    assert without.effects == ()
+    assert without.components.faulty_component != "nothing"
