@@ -6,17 +6,46 @@ import math
 from numbers import Integral, Real
 from pathlib import Path
 from stat import S_ISDIR, S_ISREG
-from typing import TypeVar
+from typing import NamedTuple, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .errors import ArgumentError, describe_value, format_value, with_article
 from .input_files import validate_path
-from .robot.checked_table import NumberRule
-from .robot.schema import Robot
 
 Kind = TypeVar("Kind")
+Array = NDArray[np.float64]
+Shape = tuple[int | None, ...]
+
+# No quantity of a cable robot is larger, and squares of numbers stay finite.
+MAX_MAGNITUDE = 1e15
+
+
+class NumberRule(NamedTuple):
+    """Validity range of a number; ``positive`` excludes zero; ``meaning`` and ``unit`` are for messages."""
+
+    meaning: str
+    unit: str
+    minimum: float = -MAX_MAGNITUDE
+    maximum: float = MAX_MAGNITUDE
+    positive: bool = False
+    default: float | None = None
+
+    def violated_bound(self, value: float) -> str | None:
+        """The bound that a finite number violates, such as ``above 0 kg``; None if it violates none."""
+        if self.positive and value <= 0.0:
+            return f"above 0{self._unit()}"
+        if value < self.minimum:
+            return f"at least {self.minimum:g}{self._unit()}"
+        return f"at most {self.maximum:g}{self._unit()}" if value > self.maximum else None
+
+    def hint(self) -> str:
+        """Hint about what to write."""
+        return f"give {self.meaning}" + (f" in{self._unit()}" if self._unit() else "")
+
+    def _unit(self) -> str:
+        return f" {self.unit}" if self.unit not in ("", "1") else ""
 
 
 def validate_instance(where: str, value: object, expected_class: type[Kind], hint: str) -> Kind:
@@ -26,11 +55,6 @@ def validate_instance(where: str, value: object, expected_class: type[Kind], hin
     raise ArgumentError(
         where, value, f"is {describe_value(value)}, must be {with_article(expected_class.__name__)}", hint
     )
-
-
-def validate_robot(where: str, value: object) -> Robot:
-    """Returns the value if it is a Robot; raises ArgumentError otherwise."""
-    return validate_instance(where, value, Robot, "give what read_robot returns")
 
 
 def validate_attributes(where: str, value: Kind, attribute_names: tuple[str, ...], expected: str, hint: str) -> Kind:
@@ -120,10 +144,6 @@ def validate_integer(where: str, value: object, minimum: int, hint: str, maximum
     if maximum is not None and number > maximum:
         raise ArgumentError(where, value, f"is {format_value(number)}, must be at most {maximum}", hint)
     return number
-
-
-Array = NDArray[np.float64]
-Shape = tuple[int | None, ...]
 
 
 def validate_array(where: str, value: object, shape: Shape, meaning: str) -> Array:

@@ -11,8 +11,8 @@ from pathlib import Path
 import pytest
 
 from tautwire.errors import ArgumentError, InputError, TautwireError
-from tautwire.robot.checked_table import NumberRule
 from tautwire.validation import (
+    NumberRule,
     validate_attributes,
     validate_callable,
     validate_file,

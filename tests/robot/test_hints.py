@@ -7,8 +7,8 @@ from pathlib import Path
 import pytest
 
 from tautwire.errors import RobotFileError
+from tautwire.name_suggestions import suggest_name
 from tautwire.recordings.recording_table import parse_header
-from tautwire.robot.checked_table import suggest_name
 from tautwire.robot.robot_file_reader import read_robot
 from tautwire.robot.schema import fmu_slots
 from tests.support.robots import EXAMPLES

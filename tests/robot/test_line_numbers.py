@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from tautwire.robot.checked_table import line_of_key
+from tautwire.toml_text import line_of_key
 
 TEXT = '''\
 # a comment

@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 import hashlib
-import sys
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, NoReturn
 
 from ..errors import InputError, RobotFileError, format_value
 from ..input_files import read_bytes, require_utf8_text
+from ..name_suggestions import suggest_name
 from ..recordings.recording import read_recording
-from ..robot.checked_table import CheckedTable, NumberRule, suggest_name
+from ..robot.checked_table import CheckedTable
 from ..robot.robot_file_reader import robot_content, robot_from_content
 from ..robot.trajectory import ANGLE_RULE, RADIUS_RULE, RISE_RULE
 from ..robot.trajectory import DURATION_RULE as OF_PATH
+from ..toml_text import parse_toml
+from ..validation import NumberRule
 from .campaign_plan import (
     BELIEFS,
     CONTROLLERS,
@@ -123,11 +125,6 @@ def _read_path(table: CheckedTable, default: str, cable_count: int) -> PathPlan:
     return PathPlan(name, "recording", {"duration": min(until, duration)}, None, None, str(file), file_digest(file))
 
 
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib  # type: ignore[import-not-found,unused-ignore]
-
 PLAN_KEYS = (
     "robot",
     "seed",
@@ -198,7 +195,7 @@ def _load_plan(path: Path) -> CheckedTable:
     text = read_bytes(path, PlanError, MAX_PLAN_SIZE)
     require_utf8_text(text, str(path), PlanError, "TOML")
     try:
-        content = tomllib.loads(text.decode("utf-8-sig"))
+        content = parse_toml(text.decode("utf-8-sig"))
     except (ValueError, RecursionError) as problem:
         raise PlanError(str(path), f"is not TOML ({problem})", "correct it there") from problem
     return CheckedTable(str(path), "", content, _raise_plan_error)

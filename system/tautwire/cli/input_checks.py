@@ -14,10 +14,10 @@ from ..fmus.fmu_slots import check_user_fmus
 from ..recordings.recording import Recording, read_recording, recording_errors
 from ..recordings.start_position import start_position
 from ..recordings.white_noise_estimate import white_noise_deviation
-from ..robot.checked_table import line_of_key
 from ..robot.robot_file_reader import read_robot_with_sink, robot_file_text
 from ..robot.schema import Robot, fmu_slots
 from ..robot.static_equilibrium import static_tensions
+from ..toml_text import line_of_key
 
 # Per file; a recording with a wrong separator breaks rules in each of its cells.
 MAX_PROBLEMS_PER_FILE = 1000

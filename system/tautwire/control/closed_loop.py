@@ -22,7 +22,7 @@ from ..cosimulation.robot_wiring import AXES, PLATFORM, winch_input_ports
 from ..cosimulation.run_arguments import validate_fmus, validate_options
 from ..errors import InputError
 from ..fmus.packaging import RobotFmus, package_controller_fmu
-from ..robot.schema import Robot
+from ..robot.schema import Robot, validate_robot
 from ..robot.trajectory import DURATION_RULE as OF_PATH
 from ..robot.trajectory import Trajectory, require_trajectory
 from ..validation import (
@@ -34,7 +34,6 @@ from ..validation import (
     validate_instance,
     validate_integer,
     validate_number,
-    validate_robot,
 )
 from .design import Design
 from .feedforward import Reference, elastic_reference

@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from ..cosimulation.robot_wiring import AXES
 from ..errors import ArgumentError, InputError
-from ..robot.checked_table import NumberRule
 from ..robot.schema import Robot
-from ..validation import validate_number
+from ..validation import NumberRule, validate_number
 
 
 class MarginError(InputError):

@@ -6,8 +6,7 @@ from collections.abc import Callable
 
 from ..errors import ArgumentError
 from ..fmus.packaging import RobotFmus
-from ..robot.checked_table import NumberRule
-from ..validation import validate_callable, validate_instance, validate_number
+from ..validation import NumberRule, validate_callable, validate_instance, validate_number
 
 STEP_RULE = NumberRule("the longest macro step", "s", positive=True)
 TOLERANCE_RULE = NumberRule("the error allowed", "m", positive=True)

@@ -14,10 +14,9 @@ from ..cosimulation.robot_cosimulation import CosimulationResult
 from ..errors import ArgumentError
 from ..process_signals import defer_interrupts
 from ..recordings.recording import Recording, require_outputs
-from ..robot.checked_table import NumberRule
-from ..robot.schema import Robot
+from ..robot.schema import Robot, validate_robot
 from ..robot.uncertain_parameters import uncertain_parameters
-from ..validation import validate_callable, validate_instance, validate_integer, validate_number, validate_robot
+from ..validation import NumberRule, validate_callable, validate_instance, validate_integer, validate_number
 from .candidate_scores import setting_of
 from .confusable_models import replace_by_confusable_models
 from .cosimulation_validation import compare_cosimulations, start_cosimulations, validate_by_cosimulation

@@ -19,7 +19,7 @@ from tautwire_fmu.laws.winch_drive import NO_LIMIT
 
 from ..process_signals import defer_interrupts
 from ..robot.robot_assembly import assemble_robot
-from ..robot.schema import EffectSetting, Robot
+from ..robot.schema import EffectSetting, Robot, validate_robot
 from ..robot.static_equilibrium import (
     formula_texts,
     has_sensor_effects,
@@ -27,7 +27,7 @@ from ..robot.static_equilibrium import (
     static_forces,
     static_tensions,
 )
-from ..validation import validate_callable, validate_folder, validate_robot
+from ..validation import validate_callable, validate_folder
 from .fmu_slots import check_user_fmus
 from .pythonfmu_builder import installed_builder, patch_wrapper_exit
 

@@ -13,11 +13,10 @@ from numpy.typing import NDArray
 from scipy.linalg import matrix_balance
 
 from ..errors import InputError
-from ..robot.checked_table import NumberRule
-from ..robot.schema import Robot
+from ..robot.schema import Robot, validate_robot
 from ..robot.static_equilibrium import static_tensions
 from ..robot.symbolic_model import SymbolicModel, freeze_drifting_states, symbolic_model
-from ..validation import validate_number, validate_robot
+from ..validation import NumberRule, validate_number
 from .modes import POSITION, Modes, modes_of
 from .nonsmooth import DEFAULT_SWING, OperatingPoint, validity_notes
 from .operating_point import equilibrium_state, requested_position

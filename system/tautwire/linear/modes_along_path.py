@@ -12,9 +12,9 @@ from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
 from ..errors import ArgumentError
-from ..robot.schema import Robot
+from ..robot.schema import Robot, validate_robot
 from ..robot.trajectory import Trajectory, require_trajectory
-from ..validation import validate_array, validate_increasing, validate_integer, validate_robot
+from ..validation import validate_array, validate_increasing, validate_integer
 from .linear_plant import linearise
 from .modes import Modes, cable_shares
 

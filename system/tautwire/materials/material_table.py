@@ -14,8 +14,9 @@ from pathlib import Path
 
 from ..errors import MaterialTableError, format_value
 from ..input_files import read_text_bytes, readable_file
+from ..name_suggestions import suggest_name
 from ..recordings.recording_table import MISSING_CELLS
-from ..robot.checked_table import NumberRule, suggest_name
+from ..validation import NumberRule
 
 PAPER_TABLE = Path(__file__).parent / "steel_wire_rope_baklouti_2017.csv"
 # The row, in Hz, whose pair the paper takes as constant (sec. 4.3).

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-import sys
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -15,11 +14,7 @@ from numpy.typing import NDArray
 from ..robot.robot_file_reader import read_robot
 from ..robot.schema import Point, Robot
 from ..robot.trajectory import Helix
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib  # type: ignore[import-not-found,unused-ignore]
+from ..toml_text import parse_toml
 
 Array = NDArray[np.float64]
 ParameterSetName = Literal["printed", "corrected"]
@@ -84,7 +79,7 @@ def read_parameters(name: ParameterSetName) -> PaperParameters:
 
 def read_data(path: Path) -> dict[str, Any]:
     """Read one of the project's own TOML files."""
-    return tomllib.loads(path.read_text(encoding="utf-8"))
+    return parse_toml(path.read_text(encoding="utf-8"))
 
 
 def with_law(robot: Robot, law: str) -> Robot:

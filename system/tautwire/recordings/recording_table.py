@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordingError, format_value, raise_error
-from ..robot.checked_table import closest_name
+from ..name_suggestions import closest_name
 
 AXES = ("x", "y", "z")
 

@@ -9,7 +9,9 @@ from tautwire_fmu.laws.expression import expression_errors
 from tautwire_fmu.laws.formula import VARIABLES_BY_TARGET
 
 from ..errors import format_value
-from .checked_table import CheckedTable, NumberRule, suggest_name
+from ..name_suggestions import suggest_name
+from ..validation import NumberRule
+from .checked_table import CheckedTable
 from .schema import PER_CABLE_COMPONENTS, EffectSetting, Formula
 
 

@@ -3,7 +3,6 @@
 import math
 import os
 import re
-import sys
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -14,15 +13,13 @@ from tautwire_fmu.laws.effects import BY_NAME
 
 from ..errors import RobotFileError, format_value, one_line, raise_error
 from ..input_files import read_bytes, require_utf8_text, validate_path
-from .checked_table import CheckedTable, ErrorSink, NumberRule, suggest_name
+from ..name_suggestions import suggest_name
+from ..toml_text import parse_toml
+from ..validation import NumberRule
+from .checked_table import CheckedTable, ErrorSink
 from .effect_tables import read_cable_list, read_effects, read_formulas
 from .robot_file_writer import robot_text
 from .schema import Cable, Platform, Point, Robot, Sensors, TensionLimits, UserFmu, Winch, fmu_slots
-
-if sys.version_info >= (3, 11):
-    import tomllib
-else:
-    import tomli as tomllib  # type: ignore[import-not-found,unused-ignore]
 
 __all__ = ["read_robot", "robot_text", "write_robot"]
 
@@ -84,13 +81,13 @@ def read_robot_with_sink(path: str | Path, sink: ErrorSink) -> Robot:
     TOML raises RobotFileError all the same.
     """
     file = str(path)
-    parsed = _parse_toml(robot_file_text(path), file)
+    parsed = _parse_robot_file(robot_file_text(path), file)
     return _read_robot_table(CheckedTable(file, "", parsed, sink), default_name=one_line(Path(path).stem))
 
 
 def robot_content(path: str | Path) -> dict[str, Any]:
     """The unvalidated keys and values of a robot file; raises RobotFileError if it is not TOML."""
-    return _parse_toml(robot_file_text(path), str(path))
+    return _parse_robot_file(robot_file_text(path), str(path))
 
 
 def robot_from_content(content: dict[str, Any], path: str | Path) -> Robot:
@@ -111,9 +108,8 @@ def write_robot(robot: Robot, path: str | Path) -> None:
     Raises RobotFileError if no file may declare such a robot, OSError if writing fails.
     """
     text = robot_text(robot)
-    if _read_robot_table(CheckedTable(str(path), "", _parse_toml(text, str(path))), robot.name) != _with_neutral_values(
-        robot
-    ):
+    written = _read_robot_table(CheckedTable(str(path), "", _parse_robot_file(text, str(path))), robot.name)
+    if written != _with_neutral_values(robot):
         raise RobotFileError(str(path), "would not read back equal", "build the robot as read_robot does")
     target = Path(path)
     temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
@@ -130,9 +126,9 @@ def _with_neutral_values(robot: Robot) -> Robot:
     return replace(robot, effects=tuple(effects))
 
 
-def _parse_toml(text: str, file: str) -> dict[str, Any]:
+def _parse_robot_file(text: str, file: str) -> dict[str, Any]:
     try:
-        return tomllib.loads(text)
+        return parse_toml(text)
     except RecursionError as problem:
         raise RobotFileError(file, "is nested too deeply", "write it as a flat robot file") from problem
     except ValueError as problem:

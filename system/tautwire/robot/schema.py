@@ -4,6 +4,8 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from ..validation import validate_instance
+
 Point = tuple[float, float, float]
 
 # Components that exist once per cable: an effect in them may apply to some cables only.
@@ -251,3 +253,8 @@ class Robot:
     def without_effects(self) -> "Robot":
         """This robot without any effect or formula."""
         return replace(self, effects=(), formulas=())
+
+
+def validate_robot(where: str, value: object) -> Robot:
+    """Returns the value if it is a Robot; raises ArgumentError otherwise."""
+    return validate_instance(where, value, Robot, "give what read_robot returns")

@@ -10,9 +10,8 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..errors import ArgumentError
-from ..validation import validate_array, validate_attributes, validate_number, validate_point, validate_robot
-from .checked_table import NumberRule
-from .schema import Point, Robot
+from ..validation import NumberRule, validate_array, validate_attributes, validate_number, validate_point
+from .schema import Point, Robot, validate_robot
 from .static_equilibrium import has_routing_effects
 from .static_equilibrium import unit_directions as rope_directions
 

@@ -1,0 +1,84 @@
+"""Imports between the product's rooms go one way, at the top of modules and inside of functions alike."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+SYSTEM = Path(__file__).resolve().parents[1] / "system"
+FMU_SOURCES = SYSTEM.parent / "fmu_src"
+FILES = ("atomic_output", "input_files", "name_suggestions", "number_format", "process_signals", "toml_text")
+ROOMS = (
+    "robot",
+    "recordings",
+    "fmus",
+    "cosimulation",
+    "linear",
+    "control",
+    "estimation",
+    "materials",
+    "reports",
+    "campaigns",
+    "paper",
+    "cli",
+)
+LAYERS = (("errors",), FILES, ("validation",), *((room,) for room in ROOMS))
+# What a co-simulation knows of a port is asked for one level too low.
+EXCEPTIONS = ("tautwire/fmus/fmu_slots.py",)
+LAYER_OF = {name: layer for layer, names in enumerate(LAYERS) for name in names}
+
+
+def imported_modules(file: Path, root: Path) -> Iterator[tuple[int, tuple[str, ...]]]:
+    """Line and full dotted name of each import anywhere in a module; names imported from a package are appended."""
+    package = file.relative_to(root).parts[:-1]
+    for node in ast.walk(ast.parse(file.read_text(encoding="utf-8"))):
+        if isinstance(node, ast.Import):
+            yield from ((node.lineno, tuple(alias.name.split("."))) for alias in node.names)
+        elif isinstance(node, ast.ImportFrom):
+            base = package[: len(package) - node.level + 1] if node.level else ()
+            module = (*base, *(node.module.split(".") if node.module else ()))
+            yield from ((node.lineno, (*module, alias.name)) for alias in node.names)
+
+
+def upward_imports(system: Path) -> list[str]:
+    """The imports of a module in a higher layer, or in another one of the same layer."""
+    found = []
+    for file in sorted((system / "tautwire").rglob("*.py")):
+        room = file.relative_to(system / "tautwire").with_suffix("").parts[0]
+        for line, imported in imported_modules(file, system):
+            if room == "__init__" or imported[0] != "tautwire" or imported[1] in ("__version__", room):
+                continue
+            if LAYER_OF[imported[1]] >= LAYER_OF[room]:
+                found.append(f"{file.relative_to(system)}:{line} imports {'.'.join(imported)}")
+    return found
+
+
+def test_every_module_and_package_of_the_root_has_a_layer():
+    names = {path.stem for path in (SYSTEM / "tautwire").iterdir() if path.suffix == ".py" or list(path.glob("*.py"))}
+    assert names - {"__init__"} == set(LAYER_OF)
+
+
+def test_imports_lead_to_lower_layers_only():
+    assert [found for found in upward_imports(SYSTEM) if not found.startswith(EXCEPTIONS)] == []
+
+
+@pytest.mark.parametrize(
+    "statement",
+    (
+        "from ..estimation.likelihood import Likelihood",
+        "from .. import estimation",
+        "import tautwire.estimation.likelihood",
+        "def late():\n    from ..estimation import trace",
+    ),
+)
+def test_an_import_of_a_higher_layer_is_found(tmp_path, statement):
+    room = tmp_path / "tautwire" / "robot"
+    room.mkdir(parents=True)
+    (room / "schema.py").write_text(statement, encoding="utf-8")
+    assert len(upward_imports(tmp_path)) == 1
+
+
+def test_what_travels_in_fmus_imports_nothing_of_the_system():
+    imported = {name[0] for file in FMU_SOURCES.rglob("*.py") for _, name in imported_modules(file, FMU_SOURCES)}
+    assert "tautwire" not in imported
