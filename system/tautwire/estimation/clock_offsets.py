@@ -80,9 +80,10 @@ def with_clocks_set(fitter: Fitter, robot: Robot, evidence: DataSplit) -> tuple[
     interval = max(float(np.median(np.diff(sample.recording.time))) for sample in samples)
     first_steps = [_offset_steps(fitter, robot, sample) for sample in samples]
     for channels in CHANNEL_GROUPS:
-        initial_offsets = [first.get(channels) for first in first_steps]
+        initial_offsets = [steps.get(channels) for steps in first_steps]
         if None in initial_offsets or not any(
-            o and o.variance_after < MAX_CANDIDATE_VARIANCE_RATIO * o.variance_before for o in initial_offsets
+            offset and offset.variance_after < MAX_CANDIDATE_VARIANCE_RATIO * offset.variance_before
+            for offset in initial_offsets
         ):
             continue
         converged = [_estimate_offset(fitter, robot, sample, channels) for sample in samples]
@@ -186,7 +187,7 @@ def _output_rates(likelihood: Likelihood, segment: LinearisedSegment) -> Array:
     """Rates (K, m) of the predicted outputs along a segment of the filter's run."""
     model, count = likelihood.model, likelihood.cable_count
     expression = casadi.vertcat(model.outputs[:3], model.outputs[6 : 6 + count])
-    outputs = casadi.Function("shown", [model.states, model.inputs], [expression])
+    outputs = casadi.Function("outputs", [model.states, model.inputs], [expression])
     speeds = np.vstack([segment.speeds, np.zeros((model.inputs.numel() - count, segment.speeds.shape[1]))])
     values = np.array(outputs(segment.states, speeds))
     # After the last sample of a recording the step is zero.

@@ -69,7 +69,9 @@ def innovations_of(fitter: Fitter, robot: Robot, split: DataSplit) -> tuple[Inno
 def all_residuals_white(innovations: Sequence[Innovations], split: DataSplit) -> bool:
     """Whether the residuals are white noise on both estimation and validation data."""
     data_sets = (split.estimation, split.validation)
-    return all(residuals_are_white(found, sample.rows) for found, sample in zip(innovations, data_sets, strict=True))
+    return all(
+        residuals_are_white(residuals, data.rows) for residuals, data in zip(innovations, data_sets, strict=True)
+    )
 
 
 def calibrated_estimation_data(prepared: PreparedData, robot: Robot) -> tuple[Robot, DataSet]:
@@ -82,10 +84,10 @@ def calibrated_estimation_data(prepared: PreparedData, robot: Robot) -> tuple[Ro
 
 
 def _require_samples(innovations: tuple[Innovations, Innovations], split: DataSplit) -> None:
-    for found, sample in zip(innovations, (split.estimation, split.validation), strict=True):
-        if not has_enough_samples(found, sample.rows):
+    for residuals, data in zip(innovations, (split.estimation, split.validation), strict=True):
+        if not has_enough_samples(residuals, data.rows):
             hint = f"record at least {MIN_SAMPLES} samples, {2 * MIN_SAMPLES} where there is no check recording"
-            raise RecordingError(sample.recording.path, "too few samples to tell noise from more", hint)
+            raise RecordingError(data.recording.path, "too few samples to tell noise from more", hint)
 
 
 def _notes(split: DataSplit, data_sets: tuple[DataSet, ...]) -> tuple[str, ...]:

@@ -35,13 +35,13 @@ def without_gaps(robot: Robot, noise: Noise, recording: Recording) -> tuple[Reco
     median_step = float(np.median(steps))
     tolerance = _detectable_length(robot, noise, recording)
     gaps = [
-        place
-        for place in np.flatnonzero(steps > MAX_STEP_INTERVALS * median_step)
-        if _interpolation_error(recording, steps[place], median_step) > tolerance
+        row
+        for row in np.flatnonzero(steps > MAX_STEP_INTERVALS * median_step)
+        if _interpolation_error(recording, steps[row], median_step) > tolerance
     ]
     if not gaps:
         return recording, ()
-    edges = [0, *(place + 1 for place in gaps), recording.sample_count]
+    edges = [0, *(row + 1 for row in gaps), recording.sample_count]
     first, last = max(pairwise(edges), key=lambda part: part[1] - part[0])
     part = replace(
         recording,
@@ -50,7 +50,7 @@ def without_gaps(robot: Robot, noise: Noise, recording: Recording) -> tuple[Reco
         tension=recording.tension[first:last],
         position=recording.position[first:last],
     )
-    gap_times = ", ".join(f"{recording.time[place]:.6g} s" for place in gaps[:5]) + (" ..." if len(gaps) > 5 else "")
+    gap_times = ", ".join(f"{recording.time[row]:.6g} s" for row in gaps[:5]) + (" ..." if len(gaps) > 5 else "")
     used_part = f"from {part.time[0]:.6g} to {part.time[-1]:.6g} s was used"
     return part, (
         f"{recording.path}: nobody knows what winches did in its gaps (at {gap_times}): only the part {used_part}",

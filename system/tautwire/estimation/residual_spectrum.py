@@ -28,14 +28,14 @@ def spectral_lines(time: Array, innovations: Innovations, rows: NDArray[np.bool_
     )
     ratio = power / np.maximum(floor, np.finfo(float).tiny)
     peaks, _ = find_peaks(ratio, height=MIN_LINE_POWER_RATIO, distance=2 * ZERO_PADDING_FACTOR)
-    strongest = sorted(peaks, key=lambda place: -power[place])[:MAX_LINES]
-    return [2.0 * np.pi * float(frequency[place]) for place in strongest]
+    strongest = sorted(peaks, key=lambda index: -power[index])[:MAX_LINES]
+    return [2.0 * np.pi * float(frequency[index]) for index in strongest]
 
 
-def _power_spectrum(time: Array, values: Array, seen: NDArray[np.bool_]) -> tuple[Array, Array]:
+def _power_spectrum(time: Array, values: Array, observed: NDArray[np.bool_]) -> tuple[Array, Array]:
     """Frequencies (Hz) and power summed over the outputs, of samples taken as evenly spaced."""
     step = float(np.median(np.diff(time)))
-    filled = np.where(seen, np.nan_to_num(values), 0.0)
+    filled = np.where(observed, np.nan_to_num(values), 0.0)
     windowed = (filled - np.mean(filled, axis=0)) * np.hanning(len(filled))[:, None]
     power: Array = np.sum(np.abs(np.fft.rfft(windowed, ZERO_PADDING_FACTOR * len(filled), axis=0)) ** 2, axis=1)
     frequency: Array = np.asarray(np.fft.rfftfreq(ZERO_PADDING_FACTOR * len(filled), step), dtype=float)

@@ -51,25 +51,25 @@ class Calibration:
     Both count in declared standard deviations; the estimates from the declared values.
     """
 
-    numbers: tuple[UncertainParameter, ...]
+    parameters: tuple[UncertainParameter, ...]
     estimates: Array
     standard_deviations: Array
 
     def calibrated_robot(self, robot: Robot) -> Robot:
         """The robot with its constants as estimated, each with its posterior uncertainty."""
-        updated = perturbed_robot(robot, self.numbers, self.estimates.tolist())
+        updated = perturbed_robot(robot, self.parameters, self.estimates.tolist())
         platform, cables = updated.platform, list(updated.cables)
-        for number, deviation in zip(self.numbers, self.standard_deviations.tolist(), strict=True):
-            if number.kind == MASS:
-                platform = replace(platform, mass_uncertainty=number.standard_deviation * deviation)
-            elif number.kind in (MODULUS, DAMPING):
-                key, index = f"{number.kind}_uncertainty", number.index - 1
-                cables[index] = replace(cables[index], **{key: number.standard_deviation * deviation})
+        for parameter, deviation in zip(self.parameters, self.standard_deviations.tolist(), strict=True):
+            if parameter.kind == MASS:
+                platform = replace(platform, mass_uncertainty=parameter.standard_deviation * deviation)
+            elif parameter.kind in (MODULUS, DAMPING):
+                key, index = f"{parameter.kind}_uncertainty", parameter.index - 1
+                cables[index] = replace(cables[index], **{key: parameter.standard_deviation * deviation})
         return replace(updated, platform=platform, cables=tuple(cables))
 
     def without_sensor_offsets(self, recording: Recording) -> Recording:
         """The recording without the estimated constant errors of its sensors."""
-        offset_vector = np.array(sensor_offsets(self.numbers, self.estimates.tolist(), recording.tension.shape[1]))
+        offset_vector = np.array(sensor_offsets(self.parameters, self.estimates.tolist(), recording.tension.shape[1]))
         if not np.any(offset_vector):
             return recording
         return replace(
@@ -79,16 +79,16 @@ class Calibration:
     def notes(self, robot: Robot, path: str) -> tuple[str, ...]:
         """A note of the constants that differ significantly from their declared values."""
         significant = []
-        for number, estimate, deviation in zip(
-            self.numbers, self.estimates.tolist(), self.standard_deviations.tolist(), strict=True
+        for parameter, estimate, deviation in zip(
+            self.parameters, self.estimates.tolist(), self.standard_deviations.tolist(), strict=True
         ):
             if abs(estimate) < MIN_REPORTED_SIGMAS * deviation:
                 continue
             value, half_width = (
-                number.declared(robot) + number.standard_deviation * estimate,
-                1.96 * number.standard_deviation * deviation,
+                parameter.declared(robot) + parameter.standard_deviation * estimate,
+                1.96 * parameter.standard_deviation * deviation,
             )
-            significant.append(f"{number.label} {value:.4g} {number.unit}, +- {half_width:.2g}")
+            significant.append(f"{parameter.label} {value:.4g} {parameter.unit}, +- {half_width:.2g}")
         if not significant:
             return ()
         return (f"{path}: within what the robot file says of its own uncertainty, {'; '.join(significant)}",)
@@ -96,14 +96,14 @@ class Calibration:
 
 def calibrate(fitter: Fitter, robot: Robot, sample: DataSet) -> Calibration:
     """Estimate the uncertain constants of a robot with its effects from a recording."""
-    numbers = uncertain_parameters(robot)
-    if not numbers:
+    parameters = uncertain_parameters(robot)
+    if not parameters:
         return Calibration((), np.zeros(0), np.zeros(0))
     likelihood, values = fitter.likelihood(robot, (), sample)
     *_, last_segment = likelihood.segments(sample.recording, values)
-    count = len(numbers)
+    count = len(parameters)
     deviations = np.sqrt(np.maximum(np.diag(last_segment.covariances[-1])[-count:], 0.0))
-    return Calibration(numbers, last_segment.states[-count:, -1], deviations)
+    return Calibration(parameters, last_segment.states[-count:, -1], deviations)
 
 
 def is_initial_state_uncertain(noise: Noise) -> bool:
@@ -127,11 +127,11 @@ def with_initial_state(fitter: Fitter, robot: Robot, sample: DataSet) -> Robot:
 
 def initial_state_note(robot: Robot, path: str) -> tuple[str, ...]:
     """A note of the initial state of a recording where it is not the robot file's."""
-    release = robot.initial_state
-    if release is None:
+    initial_state = robot.initial_state
+    if initial_state is None:
         return ()
-    tensions = ", ".join(f"{tension:.4g}" for tension in static_tensions(robot) + np.array(release.tensions))
-    speed = float(np.linalg.norm(release.velocity))
+    tensions = ", ".join(f"{tension:.4g}" for tension in static_tensions(robot) + np.array(initial_state.tensions))
+    speed = float(np.linalg.norm(initial_state.velocity))
     moving = f", at {speed:.3g} m/s" if speed > 0.0 else ""
     return (f"{path}: the run starts with tensions of {tensions} N{moving}, as what was measured says",)
 

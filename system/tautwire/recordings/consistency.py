@@ -59,7 +59,7 @@ def require_matching_reeling(robot: Robot, recording: Recording, start: Array, w
 def reeling_mismatch(robot: Robot, recording: Recording) -> tuple[float, float]:
     """Winch travel, and its mismatch with the rope lengths at the recorded positions; rms in m.
 
-    The rows with the largest mismatch are left out, since they may be outliers.
+    Omits the rows with the largest mismatch, since they may be outliers.
     """
     time, speeds = recording.time, recording.winch_speed
     reeled = np.zeros_like(speeds)

@@ -52,7 +52,7 @@ def without_dead_channels(recording: Recording) -> tuple[Recording, tuple[str, .
 
 def _clear_channels(columns: Array, names: tuple[str, ...], indices: list[int], reason: str) -> list[str]:
     columns[:, indices] = np.nan
-    return [f"{names[place]} {reason}" for place in indices]
+    return [f"{names[index]} {reason}" for index in indices]
 
 
 def _finite(column: Array) -> Array:
@@ -63,7 +63,7 @@ def _finite(column: Array) -> Array:
 def _constant_channels(columns: Array) -> list[int]:
     """Indices of constant channels; even a robot at rest shows noise."""
     return [
-        place for place, column in enumerate(columns.T) if len(_finite(column)) > 1 and np.ptp(_finite(column)) == 0.0
+        index for index, column in enumerate(columns.T) if len(_finite(column)) > 1 and np.ptp(_finite(column)) == 0.0
     ]
 
 
@@ -74,9 +74,9 @@ def _noise_only_channels(columns: Array) -> list[int]:
         values = _finite(column)
         if len(values) > MIN_FROZEN_SAMPLES:
             noise_ratios[index] = float(np.std(values)) / white_noise_deviation(values[:, None])
-    dead = [place for place, size in noise_ratios.items() if size < DEAD_NOISE_RATIO]
-    others = [size for size in noise_ratios.values() if size >= DEAD_NOISE_RATIO]
-    return dead if others and min(others) > LIVE_NOISE_RATIO else []
+    dead = [index for index, ratio in noise_ratios.items() if ratio < DEAD_NOISE_RATIO]
+    live_ratios = [ratio for ratio in noise_ratios.values() if ratio >= DEAD_NOISE_RATIO]
+    return dead if live_ratios and min(live_ratios) > LIVE_NOISE_RATIO else []
 
 
 def _hold_length(columns: Array) -> int:
@@ -93,10 +93,10 @@ def _hold_length(columns: Array) -> int:
 
 def _changed_rows(columns: Array) -> NDArray[np.bool_]:
     """Rows (N,) in which some value differs from the row before, over the columns that have any value."""
-    alive = columns[:, np.isfinite(columns).any(axis=0)]
-    if not alive.shape[1]:
+    measured = columns[:, np.isfinite(columns).any(axis=0)]
+    if not measured.shape[1]:
         return np.ones(len(columns), dtype=bool)
-    is_different = np.any(~(alive[1:] == alive[:-1]), axis=1)
+    is_different = np.any(~(measured[1:] == measured[:-1]), axis=1)
     return np.append(True, is_different)
 
 
@@ -105,7 +105,7 @@ def _clear_repeats(columns: Array) -> None:
 
 
 def _clear_frozen(columns: Array) -> list[int]:
-    """Empty the cells of an output that is frozen while another of its kind moves; returns their number by output."""
+    """Empty the cells of each output that is frozen while another of its kind moves; returns their number by output."""
     counts = []
     original = columns.copy()
     for index, column in enumerate(original.T):
@@ -113,14 +113,15 @@ def _clear_frozen(columns: Array) -> list[int]:
         is_repeated = np.append(False, column[1:] == column[:-1])
         edges = np.flatnonzero(np.diff(np.concatenate([[0], is_repeated.astype(int), [0]])))
         for first, last in zip(edges[::2], edges[1::2], strict=True):
-            if last - first >= MIN_FROZEN_SAMPLES and _others_move(original, index, first, last):
+            if last - first >= MIN_FROZEN_SAMPLES and _any_other_moves(original, index, first, last):
                 is_frozen[first:last] = True
         columns[is_frozen, index] = np.nan
         counts.append(int(np.sum(is_frozen)))
     return counts
 
 
-def _others_move(columns: Array, index: int, first: int, last: int) -> bool:
+def _any_other_moves(columns: Array, index: int, first: int, last: int) -> bool:
+    """Whether another channel varies by more than noise in the rows from ``first`` to before ``last``."""
     for other, column in enumerate(columns.T):
         values = _finite(column[first:last])
         if (

@@ -85,8 +85,11 @@ def _read_channels(content: Any, file: str, cable_count: int, sink: ErrorSink) -
     for group in content.groups:
         require_samples(group.channel_group.cycles_nr, file)
     masters = set(content.masters_db.items())
-    locations = {name: [at for at in found if at not in masters] for name, found in content.channels_db.items()}
-    names = [name for name, found in locations.items() if found and name != "time"]
+    locations = {
+        name: [location for location in candidates if location not in masters]
+        for name, candidates in content.channels_db.items()
+    }
+    names = [name for name, channel_locations in locations.items() if channel_locations and name != "time"]
     header = parse_header(["time", *names], file, cable_count, sink)
     channels = {}
     for name in header.known_names:

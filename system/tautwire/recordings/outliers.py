@@ -89,8 +89,8 @@ def outlier_indices(signal: Array, sigmas: float = OUTLIER_SIGMAS) -> NDArray[np
         if not len(new_indices) or len(indices) > MAX_OUTLIER_RATIO * len(signal) + ALLOWED_OUTLIERS:
             return np.array(sorted({*indices, *new_indices.tolist()}), dtype=np.intp)
         indices += new_indices.tolist()
-        others = np.setdiff1d(np.arange(len(cleaned)), indices)
-        cleaned[indices] = np.interp(indices, others, cleaned[others])
+        inliers = np.setdiff1d(np.arange(len(cleaned)), indices)
+        cleaned[indices] = np.interp(indices, inliers, cleaned[inliers])
 
 
 def _interior_outliers(signal: Array, sigma: float, sigmas: float) -> NDArray[np.intp]:
@@ -136,5 +136,5 @@ def _end_outliers(signal: Array, sigma: float, sigmas: float) -> list[int]:
         outer = range(2 * PATTERN_REACH) if first == 0 else range(END_SAMPLES - 2 * PATTERN_REACH, END_SAMPLES)
         neighbour_distance = np.maximum(np.append(distance[1:], 0.0), np.append(0.0, distance[:-1]))
         is_outlier = (distance > sigmas * spread) & (neighbour_distance < MAX_NEIGHBOUR_RATIO * distance)
-        indices += [first + place for place in outer if is_outlier[place]]
+        indices += [first + index for index in outer if is_outlier[index]]
     return indices

@@ -51,8 +51,8 @@ def parse_header(
         raise RecordingError(where, problem, "keep those of the robot", line)
     allowed_names = known_columns(cable_count)
     names = tuple(cell or f"(column {index})" for index, cell in enumerate(cells, 1))
-    for place, name in enumerate(names):
-        if name in names[:place]:
+    for index, name in enumerate(names):
+        if name in names[:index]:
             sink(RecordingError(where, f"the column {format_value(name)} is there twice", "keep one of the two", line))
         cable_match = _CABLE_COLUMN.fullmatch(name)
         if cable_match and not 1 <= int(cable_match.group(1)) <= cable_count:

@@ -66,8 +66,8 @@ class FormulaPorts:
             *(("tension", (i,)) for i in robot.cable_numbers),
         ]
         formulas = [
-            Formula(place, text, cables, {number: 0.0})
-            for (place, cables), text, number in zip(sites, texts, numbers, strict=True)
+            Formula(target, text, cables, {number: 0.0})
+            for (target, cables), text, number in zip(sites, texts, numbers, strict=True)
         ]
         extended_robot = replace(robot, formulas=(*robot.formulas, *formulas))
         self._sensitivities = CompiledFunction(_build_sensitivities(extended_robot, numbers, state_names))
@@ -140,20 +140,20 @@ def series_sensitivities(
     rate_sensitivities, output_sensitivities, initial_rate_sensitivities, initial_output_sensitivities = (
         ports.sensitivities(segment, time)
     )
-    cases = list(zip(sites, series, initial_values, strict=True))
+    site_series = list(zip(sites, series, initial_values, strict=True))
     by_rates = np.stack(
-        [_site_sensitivity(*each, rate_sensitivities, initial_rate_sensitivities) for each in cases], axis=2
+        [_site_sensitivity(*case, rate_sensitivities, initial_rate_sensitivities) for case in site_series], axis=2
     )
     by_outputs = np.stack(
-        [_site_sensitivity(*each, output_sensitivities, initial_output_sensitivities) for each in cases], axis=2
+        [_site_sensitivity(*case, output_sensitivities, initial_output_sensitivities) for case in site_series], axis=2
     )
     begin, end = by_rates[:-1], by_rates[1:]
-    carried = (
+    integrated = (
         segment.step[:, None, None]
         / 6.0
         * (segment.transition @ begin + 2.0 * segment.half_transition @ (begin + end) + end)
     )
-    return carried, by_outputs[:-1]
+    return integrated, by_outputs[:-1]
 
 
 def _site_sensitivity(
@@ -170,7 +170,9 @@ def _site_sensitivity(
         by_mass: Array = slopes[:, :, 3] * values[0][:, None]
         return by_mass
     rows = zip(site.cables, values, initial_values, strict=True)
-    by_tension: Array = np.sum([slopes[:, :, 3 + cable] * (row - at)[:, None] for cable, row, at in rows], axis=0)
+    by_tension: Array = np.sum(
+        [slopes[:, :, 3 + cable] * (row - initial)[:, None] for cable, row, initial in rows], axis=0
+    )
     return by_tension
 
 
@@ -180,10 +182,10 @@ def _build_sensitivities(robot: Robot, numbers: Sequence[str], state_names: Sequ
     model = symbolic_model(robot, free, uncertain_parameters(robot))
     count = robot.cable_count
     state_indices = [model.state_names.index(name) for name in state_names]
-    next_speeds, step, shift = SX.sym("later", count), SX.sym("step"), SX.sym("shift", 3 + count)
+    next_speeds, step, shift = SX.sym("next_speeds", count), SX.sym("step"), SX.sym("shift", 3 + count)
     outputs = delayed_outputs(model, count, next_speeds, step, shift)
     time = SX.sym("time")
-    omitted_states = [place for place in range(model.states.numel()) if place not in state_indices]
+    omitted_states = [index for index in range(model.states.numel()) if index not in state_indices]
     external_forces = model.inputs[count:]
     results: list[tuple[SX, SX]] = []
     for expression in (model.rates[state_indices], outputs):

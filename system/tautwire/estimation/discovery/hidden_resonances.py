@@ -1,4 +1,4 @@
-"""Hidden oscillators, degrees of freedom that the model lacks, detected by frequency and place.
+"""Hidden oscillators, degrees of freedom that the model lacks, detected by frequency and site.
 
 An attached mass on a spring exerts ``k (u - s)`` on its carrier, with ``s`` the motion of that, and
 
@@ -86,8 +86,8 @@ def find_resonances(robot: Robot, fitter: Fitter, evidence: DataSplit) -> tuple[
         fit, judge = spectra[0][group], spectra[1][group]
         if not _peaks_agree(frequencies, fit, judge, MIN_PERIODS / frequencies[0]):
             continue
-        peak_indices = [int(np.argmax(scan.joint_gains)) for scan in (fit, judge)]
-        gains = [float(scan.joint_gains[place]) for scan, place in zip((fit, judge), peak_indices, strict=True)]
+        peak_indices = [int(np.argmax(spectrum.joint_gains)) for spectrum in (fit, judge)]
+        gains = [float(s.joint_gains[peak]) for s, peak in zip((fit, judge), peak_indices, strict=True)]
         frequency = float(np.average(frequencies[peak_indices], weights=gains))
         site_gains = fit.site_gains[peak_indices[0]] + judge.site_gains[peak_indices[1]]
         affected_outputs = tuple(
@@ -118,17 +118,17 @@ def _modal_frequencies(robot: Robot) -> Array:
 def _peaks_agree(frequencies: Array, fit: _GainSpectrum, judge: _GainSpectrum, duration: float) -> bool:
     """Whether both samples, of at least ``duration`` seconds, have one clear peak at the same frequency."""
     peaks, other_gain, peak_gain = [], 0.0, 0.0
-    for scan in (fit, judge):
-        index = int(np.argmax(scan.joint_gains))
-        if index in (0, len(frequencies) - 1) or scan.joint_gains[index] < max(
-            MIN_SAMPLE_GAIN, MIN_EXPLAINED_RATIO * scan.available_gain
+    for spectrum in (fit, judge):
+        index = int(np.argmax(spectrum.joint_gains))
+        if index in (0, len(frequencies) - 1) or spectrum.joint_gains[index] < max(
+            MIN_SAMPLE_GAIN, MIN_EXPLAINED_RATIO * spectrum.available_gain
         ):
             return False
         tolerance = max(1.0 / duration, FREQUENCY_TOLERANCE * frequencies[index])
         peaks.append((frequencies[index], tolerance))
-        peak_gain += float(scan.joint_gains[index])
+        peak_gain += float(spectrum.joint_gains[index])
         other_gain += float(
-            np.max(scan.joint_gains[np.abs(frequencies - frequencies[index]) > 2.0 * tolerance], initial=0.0)
+            np.max(spectrum.joint_gains[np.abs(frequencies - frequencies[index]) > 2.0 * tolerance], initial=0.0)
         )
     (first, first_tolerance), (second, second_tolerance) = peaks
     min_gain_ratio = (
@@ -245,14 +245,14 @@ def _accumulated_gains(
         rows[segment.is_recorded] = sample.rows[next_row : next_row + int(np.sum(segment.is_recorded))]
         next_row += int(np.sum(segment.is_recorded))
         is_observed = segment.observed[rows]
-        matrix, values_seen = innovation_sensitivities[rows][is_observed], segment.values[rows][is_observed]
-        squares += float(values_seen @ values_seen)
-        observation_count += len(values_seen)
+        matrix, residuals = innovation_sensitivities[rows][is_observed], segment.values[rows][is_observed]
+        squares += float(residuals @ residuals)
+        observation_count += len(residuals)
         inner += matrix[:, :nuisance_count].T @ matrix[:, :nuisance_count]
         cross_products += matrix[:, :nuisance_count].T @ matrix[:, nuisance_count:]
         oscillator_slopes = matrix[:, nuisance_count:].reshape(len(matrix), len(information), width)
         information += np.einsum("rfg,rfh->fgh", oscillator_slopes, oscillator_slopes, optimize=True)
-        score += matrix.T @ values_seen
+        score += matrix.T @ residuals
     available_gain = 0.5 * (squares - observation_count) - CHANCE_SIGMAS * np.sqrt(0.5 * observation_count)
     return _gain_spectra(inner, cross_products, information, score, float(available_gain))
 

@@ -1,6 +1,6 @@
 """Forward selection of a few formula terms by the first-order effect of each on the innovations.
 
-Terms are added one by one, each time the one that reduces the sum of squares most beside those selected, while the gain
+Terms are added one by one, each time the one that most reduces the sum of squares beside those selected, while the gain
 exceeds the extended Bayesian information criterion; then each is exchanged where another reduces it more.
 
 Source: Chen, Billings and Luo (1989), Orthogonal least squares methods and their application to non-linear system
@@ -63,7 +63,7 @@ def term_normal_equations(
     """Normal equations of terms added to a robot; the nuisances are the parameters of the accepted hypotheses."""
     likelihood, values = fitter.likelihood(robot, accepted, sample)
     free = free_parameters(robot, accepted)
-    nuisance_columns = [place for place, parameter in enumerate(free) if parameter.effect_index != FORMULA_INDEX]
+    nuisance_columns = [index for index, parameter in enumerate(free) if parameter.effect_index != FORMULA_INDEX]
     ports = FormulaPorts(with_start(robot, sample.start), likelihood.model.state_names)
     size = len(nuisance_columns) + len(terms)
     fisher_information, score, count = np.zeros((size, size)), np.zeros(size), 0
@@ -121,8 +121,8 @@ def select_terms(
         poll_interrupts()
     for number in range(MAX_EXCHANGES if len(selected) > 1 else 0):
         index = number % len(selected)
-        others = [*selected[:index], *selected[index + 1 :]]
-        gains = _gains(equations, score, others)
+        kept_terms = [*selected[:index], *selected[index + 1 :]]
+        gains = _gains(equations, score, kept_terms)
         best = int(np.argmax(gains))
         if gains[best] > gains[selected[index]] * (1.0 + MIN_INDEPENDENT_RATIO):
             selected[index] = best

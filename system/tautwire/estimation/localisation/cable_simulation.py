@@ -50,7 +50,7 @@ def simulate_cable(name: str, fmu: FilePath, path: SmoothedPath, winch_speed: Ar
     results = np.empty((len(time), len(OUTPUTS)))
     linearised_rows = np.unique(np.linspace(0, len(time) - 1, min(MAX_LINEARISATIONS, len(time))).astype(int))
     sensitivities = np.empty((len(linearised_rows), len(PERTURBATIONS)))
-    linearisation_index = {int(row): place for place, row in enumerate(linearised_rows)}
+    linearisation_index = {int(row): index for index, row in enumerate(linearised_rows)}
     with Component(name, fmu) as component:
         inputs, outputs = component.block((INPUT_TIME, *MOTION, "winch_speed", *INPUT_RATES)), component.block(OUTPUTS)
         next_rate = component.block(INPUT_RATES[-1:])

@@ -64,8 +64,8 @@ def _evaluate_components(
     has_tension = np.sum(np.isfinite(recording.tension), axis=0) >= MIN_MEASURED_SAMPLES
     cable_residuals = [
         cable_residual(number, run, recording, path, noise, np.array(robot.cables[number - 1].anchor))
-        for number, run, there in zip(robot.cable_numbers, runs, has_tension, strict=True)
-        if there
+        for number, run, is_measured in zip(robot.cable_numbers, runs, has_tension, strict=True)
+        if is_measured
     ]
     if not np.all(has_tension):
         return FaultLocalisation(

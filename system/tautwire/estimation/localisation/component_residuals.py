@@ -58,9 +58,11 @@ def strongest_correlation(
         p_values.append(2.0 * float(student.sf(t_statistic, degrees_of_freedom)) if degrees_of_freedom > 1.0 else 1.0)
     is_significant = _holm_correction(np.array(p_values), significance_level)
     candidates = [
-        SignalCorrelation(n, c) for n, c, sure in zip(names, correlations, is_significant, strict=True) if sure
+        SignalCorrelation(name, correlation)
+        for name, correlation, significant in zip(names, correlations, is_significant, strict=True)
+        if significant
     ]
-    return max(candidates, key=lambda each: abs(each.correlation), default=None)
+    return max(candidates, key=lambda candidate: abs(candidate.correlation), default=None)
 
 
 def _holm_correction(p_values: Array, significance_level: float) -> NDArray[np.bool_]:

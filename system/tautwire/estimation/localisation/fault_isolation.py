@@ -38,7 +38,7 @@ def isolate_fault(
 
     Where all of several cables deviate the position sensor is in question as well.
     """
-    deviating_cables = [number for number, is_off in deviating_by_cable.items() if is_off]
+    deviating_cables = [number for number, deviates in deviating_by_cable.items() if deviates]
     position_sensor = ["the position sensor"] if len(deviating_cables) == len(deviating_by_cable) > 1 else []
     if platform_deviates is None:
         return _without_balance(deviating_by_cable, deviating_cables)

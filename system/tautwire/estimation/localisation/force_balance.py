@@ -35,7 +35,7 @@ MIN_PERIODS = 5
 MAX_STEP_INTERVALS = 5.5
 SLACK_TENSION_RATIO = 1e-9
 # Least share of the load cells' variance along an axis, for one perpendicular to all cables.
-MIN_FELT_VARIANCE_RATIO = 1e-6
+MIN_AXIS_VARIANCE_RATIO = 1e-6
 
 
 @dataclass(frozen=True)
@@ -113,7 +113,7 @@ def force_balance(
         np.full(3, np.nan),
     )
     if np.sum(has_acceleration) >= MIN_MEASURED_SAMPLES:
-        load_cell_noise = _felt_noise(forces[has_acceleration], np.array(sigmas[3:])) / mass
+        load_cell_noise = _summed_force_noise(forces[has_acceleration], np.array(sigmas[3:])) / mass
         min_cutoff = 2.0 * pi * MIN_PERIODS / float(path.time[-1] - path.time[0])
         for axis in np.flatnonzero(path.measured).tolist():
             cutoff[axis] = max(float(np.sqrt(load_cell_noise[axis] / sigmas[axis])), min_cutoff)
@@ -124,11 +124,11 @@ def force_balance(
     return ForceBalance(force, expected, cutoff)
 
 
-def _felt_noise(forces: Array, sigmas: Array) -> Array:
+def _summed_force_noise(forces: Array, sigmas: Array) -> Array:
     """Standard deviation of the cables' summed force along each axis by noise of the load cells (n,), in N; (3,)."""
     sizes = np.maximum(np.linalg.norm(forces, axis=2), np.finfo(float).tiny)
     squares = np.mean((forces / sizes[:, :, None]) ** 2, axis=0)
-    noise: Array = np.sqrt(np.maximum(sigmas**2 @ squares, MIN_FELT_VARIANCE_RATIO * np.sum(sigmas**2)))
+    noise: Array = np.sqrt(np.maximum(sigmas**2 @ squares, MIN_AXIS_VARIANCE_RATIO * np.sum(sigmas**2)))
     return noise
 
 
