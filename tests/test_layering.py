@@ -8,7 +8,15 @@ import pytest
 
 SYSTEM = Path(__file__).resolve().parents[1] / "system"
 FMU_SOURCES = SYSTEM.parent / "fmu_src"
-FILES = ("atomic_output", "input_files", "name_suggestions", "number_format", "process_signals", "toml_text")
+FILES = (
+    "array_validation",
+    "atomic_output",
+    "input_files",
+    "name_suggestions",
+    "number_format",
+    "process_signals",
+    "toml_text",
+)
 ROOMS = (
     "robot",
     "recordings",

@@ -1,4 +1,4 @@
-"""Validation of arguments that a program passes to the library's functions: single values, arrays and frames."""
+"""Validation of arguments that a program passes to the library's functions: numbers, paths, objects."""
 
 from __future__ import annotations
 
@@ -8,15 +8,10 @@ from pathlib import Path
 from stat import S_ISDIR, S_ISREG
 from typing import NamedTuple, TypeVar
 
-import numpy as np
-from numpy.typing import NDArray
-
 from .errors import ArgumentError, describe_value, format_value, with_article
 from .input_files import validate_path
 
 Kind = TypeVar("Kind")
-Array = NDArray[np.float64]
-Shape = tuple[int | None, ...]
 
 # No quantity of a cable robot is larger, and squares of numbers stay finite.
 MAX_MAGNITUDE = 1e15
@@ -144,64 +139,3 @@ def validate_integer(where: str, value: object, minimum: int, hint: str, maximum
     if maximum is not None and number > maximum:
         raise ArgumentError(where, value, f"is {format_value(number)}, must be at most {maximum}", hint)
     return number
-
-
-def validate_array(where: str, value: object, shape: Shape, meaning: str) -> Array:
-    """Converts an array, a list or a frame to finite floats; an entry of ``shape`` is None where any length is valid.
-
-    ``meaning`` says what to pass, for messages. Raises ArgumentError, which names the first entry that is not finite.
-    """
-    hint = f"give {meaning}"
-    try:
-        array = np.asarray(value)
-        if np.iscomplexobj(array) or array.dtype.kind in "mM":
-            raise TypeError
-        array = array.astype(np.float64)
-    except (TypeError, ValueError, OverflowError) as error:
-        raise ArgumentError(where, value, f"is {describe_value(value)}, not an array of numbers", hint) from error
-    if array.ndim != len(shape) or any(
-        expected not in (None, actual) for expected, actual in zip(shape, array.shape, strict=True)
-    ):
-        raise ArgumentError(
-            where, value, f"has the shape {_format_shape(array.shape)}, must have {_format_shape(shape)}", hint
-        )
-    non_finite = np.argwhere(~np.isfinite(array))
-    if len(non_finite):
-        index = tuple(non_finite[0])
-        raise ArgumentError(where, value, f"{_format_index(index)} is {array[index]}, must be finite", hint)
-    return array
-
-
-def validate_increasing(
-    where: str, value: object, meaning: str, min_length: int = 2, lower_bound: float = -np.inf
-) -> Array:
-    """Strictly increasing numbers (N,) above ``lower_bound``, at least ``min_length`` of them; raises ArgumentError."""
-    array = validate_array(where, value, (None,), meaning)
-    hint = f"give {meaning}"
-    if len(array) < min_length:
-        raise ArgumentError(where, value, f"has {len(array)} entries, must have {min_length} or more", hint)
-    if array[0] <= lower_bound:
-        raise ArgumentError(where, value, f"entry 1 is {float(array[0])!r}, must be above {lower_bound:g}", hint)
-    decreases = np.flatnonzero(np.diff(array) <= 0.0)
-    if len(decreases):
-        index = int(decreases[0])
-        before, after = float(array[index]), float(array[index + 1])
-        problem = f"entry {index + 2} is {after!r} after {before!r}, must rise from entry to entry"
-        raise ArgumentError(where, value, problem, hint)
-    return array
-
-
-def validate_point(where: str, value: object) -> tuple[float, float, float]:
-    """A point as three finite coordinates in m; raises ArgumentError otherwise."""
-    x, y, z = validate_array(where, value, (3,), "three finite coordinates x, y, z in m").tolist()
-    return (x, y, z)
-
-
-def _format_shape(shape: Shape) -> str:
-    lengths = ["N" if length is None else str(length) for length in shape]
-    return f"({', '.join(lengths)}{',' if len(lengths) == 1 else ''})"
-
-
-def _format_index(index: tuple[int, ...]) -> str:
-    names = ("entry",) if len(index) == 1 else ("row", "column")
-    return ", ".join(f"{name} {position + 1}" for name, position in zip(names, index, strict=False))

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..array_validation import validate_array, validate_increasing
 from ..cosimulation import Connection, FixedStep, InputSource, Port, Progress
 from ..cosimulation.robot_cosimulation import (
     DEFAULT_STEP,
@@ -26,11 +27,9 @@ from ..robot.schema import Robot, validate_robot
 from ..robot.trajectory import DURATION_RULE as OF_PATH
 from ..robot.trajectory import Trajectory, require_trajectory
 from ..validation import (
-    validate_array,
     validate_attributes,
     validate_file,
     validate_folder,
-    validate_increasing,
     validate_instance,
     validate_integer,
     validate_number,

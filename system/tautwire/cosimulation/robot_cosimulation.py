@@ -12,11 +12,11 @@ import numpy as np
 import pandas as pd
 from numpy.typing import ArrayLike, NDArray
 
+from ..array_validation import validate_array, validate_increasing
 from ..errors import TautwireError
 from ..fmus.fmu_slots import SlotError, missing_user_fmu_ports, require_step_support
 from ..fmus.packaging import RobotFmus
 from ..process_signals import defer_interrupts
-from ..validation import validate_array, validate_increasing
 from . import (
     AdaptiveStep,
     CallJournal,

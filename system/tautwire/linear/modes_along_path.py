@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.optimize import linear_sum_assignment
 
+from ..array_validation import validate_array, validate_increasing
 from ..errors import ArgumentError
 from ..robot.schema import Robot, validate_robot
 from ..robot.trajectory import Trajectory, require_trajectory
-from ..validation import validate_array, validate_increasing, validate_integer
+from ..validation import validate_integer
 from .linear_plant import linearise
 from .modes import Modes, cable_shares
 

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from tautwire_fmu.laws.mathematics import REAL
 
+from ..array_validation import validate_point
 from ..errors import TautwireError
 from ..robot.schema import Robot
 from ..robot.static_equilibrium import cable_routes, static_tensions
 from ..robot.symbolic_model import SymbolicModel
-from ..validation import validate_point
 
 Array = NDArray[np.float64]
 

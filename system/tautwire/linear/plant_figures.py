@@ -13,8 +13,9 @@ import numpy as np
 from matplotlib.figure import Figure
 from numpy.typing import ArrayLike, NDArray
 
+from ..array_validation import validate_increasing
 from ..errors import ArgumentError, describe_value
-from ..validation import validate_increasing, validate_instance
+from ..validation import validate_instance
 from .linear_plant import minimal
 from .modes_along_path import ModesAlong
 

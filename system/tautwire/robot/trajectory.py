@@ -9,8 +9,9 @@ from typing import Protocol, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..array_validation import validate_array, validate_point
 from ..errors import ArgumentError
-from ..validation import NumberRule, validate_array, validate_attributes, validate_number, validate_point
+from ..validation import NumberRule, validate_attributes, validate_number
 from .schema import Point, Robot, validate_robot
 from .static_equilibrium import has_routing_effects
 from .static_equilibrium import unit_directions as rope_directions
