@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautwire.control import (
+    ClosedLoopOptions,
     Design,
     Feedforward,
     Range,
@@ -143,9 +144,7 @@ def run(move: Move, controller: Controlled, fmus: RobotFmus) -> CosimulationResu
         controller.design,
         controller.path,
         move.duration,
-        seed=SEED,
-        reference=controller.reference,
-        external_force=move.push,
+        ClosedLoopOptions(seed=SEED, reference=controller.reference, external_force=move.push),
     )
 
 

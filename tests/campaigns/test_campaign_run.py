@@ -13,7 +13,7 @@ from tautwire.campaigns.campaign_run import Job, build_context, run_job
 from tautwire.campaigns.campaign_runner import path_recordings
 from tautwire.campaigns.fmu_cache import FmuBundle, build_bundle, cached_fmus, structure_digest
 from tautwire.campaigns.parameter_space import with_values
-from tautwire.control import cosimulate_closed_loop
+from tautwire.control import ClosedLoopOptions, cosimulate_closed_loop
 from tautwire.cosimulation.robot_cosimulation import cosimulate
 from tautwire.fmus.packaging import build_fmus
 from tautwire.linear import linearise
@@ -85,7 +85,12 @@ def test_noise_of_sensors_depends_on_seed_and_run_alone(tmp_path: Path) -> None:
     seed = int(np.random.SeedSequence((plan.seed, 1)).generate_state(1)[0])
     fmus = build_fmus(varied(plan), tmp_path / "built")
     motion = cosimulate_closed_loop(
-        fmus, drive.nominal_robot, drive.design, drive.trajectory, 0.15, seed=seed, reference=drive.reference
+        fmus,
+        drive.nominal_robot,
+        drive.design,
+        drive.trajectory,
+        0.15,
+        ClosedLoopOptions(seed=seed, reference=drive.reference),
     )
     assert one["end_z"] == motion.position[-1, 2]
 

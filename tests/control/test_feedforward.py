@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tautwire.control import (
+    ClosedLoopOptions,
     Feedforward,
     cosimulate_closed_loop,
     elastic_reference,
@@ -44,7 +45,7 @@ def both(fmus: RobotFmus, robot: Robot, path: Trajectory) -> tuple[CosimulationR
     times = sample_times(0.01, path.duration + 1.0)
     rigid = rigid_reference(robot, path, times)
     return (
-        cosimulate_closed_loop(fmus, robot, Feedforward(count), path, times[-1], reference=rigid),
+        cosimulate_closed_loop(fmus, robot, Feedforward(count), path, times[-1], ClosedLoopOptions(reference=rigid)),
         cosimulate_closed_loop(fmus, robot, Feedforward(count), path, times[-1]),
     )
 

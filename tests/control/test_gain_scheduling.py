@@ -7,6 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tautwire.control import (
+    ClosedLoopOptions,
     ControlAim,
     Design,
     PathController,
@@ -80,7 +81,7 @@ def test_one_design_takes_over_from_the_next_without_a_bump(three: Robot) -> Non
 @pytest.mark.slow
 def test_scheduled_controller_holds_the_paper_helix_under_noise(three: Robot, three_example_fmus: RobotFmus) -> None:
     design = schedule_controller(three, PAPER_HELIX)
-    motion = cosimulate_closed_loop(three_example_fmus, three, design, PAPER_HELIX, 52.0, seed=1)
+    motion = cosimulate_closed_loop(three_example_fmus, three, design, PAPER_HELIX, 52.0, ClosedLoopOptions(seed=1))
     away = np.linalg.norm(motion.position - PAPER_HELIX.position(motion.time), axis=1)
     assert np.sqrt(np.mean(away**2)) < 5e-4
     assert motion.tension.min() > 1000.0

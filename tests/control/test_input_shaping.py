@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 import control
 from tautwire.control import (
+    ClosedLoopOptions,
     Feedforward,
     Shaper,
     cosimulate_closed_loop,
@@ -132,7 +133,9 @@ def test_swing_after_the_ramp_is_cut_by_far_more_than_twenty(three_fmus: RobotFm
     left = []
     for path in (ramp, shape_along(robot, ramp)):
         reference = rigid_reference(robot, path, times)
-        motion = cosimulate_closed_loop(three_fmus, robot, feedforward, path, 9.0, reference=reference)
+        motion = cosimulate_closed_loop(
+            three_fmus, robot, feedforward, path, 9.0, ClosedLoopOptions(reference=reference)
+        )
         left.append(swing(times, motion.position - path.position(times), 6.0))
         assert motion.tension.min() > 900.0
     assert left[0] > 5e-3

@@ -11,7 +11,14 @@ from numpy.typing import NDArray
 
 import control
 import tautwire
-from tautwire.control import ControlAim, PathController, cosimulate_closed_loop, design_controller, path_tensions
+from tautwire.control import (
+    ClosedLoopOptions,
+    ControlAim,
+    PathController,
+    cosimulate_closed_loop,
+    design_controller,
+    path_tensions,
+)
 from tautwire.cosimulation import FixedStep
 from tautwire.cosimulation.robot_cosimulation import CosimulationResult, cosimulate, run_cosimulation
 from tautwire.errors import InputError, UnreachableError
@@ -119,8 +126,8 @@ def test_closed_loop_follows_a_path_that_the_open_loop_misses(name: str, fmus: d
 def test_noise_of_the_sensors_stays_noise(name: str, fmus: dict[str, RobotFmus]) -> None:
     robot, path = robot_named(name), PATHS[name]
     design = design_controller(robot)
-    noisy = cosimulate_closed_loop(fmus[name], robot, design, path, path.duration + 1.0, seed=5)
-    again = cosimulate_closed_loop(fmus[name], robot, design, path, path.duration + 1.0, seed=5)
+    noisy = cosimulate_closed_loop(fmus[name], robot, design, path, path.duration + 1.0, ClosedLoopOptions(seed=5))
+    again = cosimulate_closed_loop(fmus[name], robot, design, path, path.duration + 1.0, ClosedLoopOptions(seed=5))
     quiet = cosimulate_closed_loop(fmus[name], robot, design, path, path.duration + 1.0)
     assert np.array_equal(noisy.position, again.position)
     assert robot.sensors.position_noise is not None
@@ -222,7 +229,9 @@ def test_tension_stays_near_its_limits_where_the_path_asks_for_more(fmus: dict[s
 def test_design_holds_another_modulus_and_payload(name: str, modulus: float, mass: float, tmp_path: Path) -> None:
     robot, path = robot_named(name), PATHS[name]
     built = build_fmus(off_nominal(robot, modulus, mass), tmp_path)
-    motion = cosimulate_closed_loop(built, robot, design_controller(robot), path, path.duration + 3.0, seed=2)
+    motion = cosimulate_closed_loop(
+        built, robot, design_controller(robot), path, path.duration + 3.0, ClosedLoopOptions(seed=2)
+    )
     assert motion.tension.min() > 0.0
     assert errors(motion, path)[-50:].max() < 2e-3
 
@@ -232,7 +241,7 @@ def test_design_holds_another_modulus_and_payload(name: str, modulus: float, mas
 def test_helices_of_the_paper(name: str, path: Helix, fmus: dict[str, RobotFmus]) -> None:
     robot = robot_named(name)
     design = design_controller(robot)
-    closed = cosimulate_closed_loop(fmus[name], robot, design, path, path.duration + 2.0, seed=1)
+    closed = cosimulate_closed_loop(fmus[name], robot, design, path, path.duration + 2.0, ClosedLoopOptions(seed=1))
     opened = cosimulate(fmus[name], closed.time, ideal_winch_speeds(robot, path, closed.time))
     assert rms(errors(closed, path)) < 0.05 * rms(errors(opened, path))
     assert rms(errors(closed, path)) < 1e-3

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 import control
 from tautwire.control import (
+    ClosedLoopOptions,
     ControlAim,
     Knot,
     MarginError,
@@ -98,7 +99,7 @@ def test_margin_that_no_loop_has_is_refused(three: Robot) -> None:
 def test_path_is_held_at_the_corners_of_the_range(three: Robot, design: RobustController, tmp_path: Path) -> None:
     for modulus, payload, robot in Range().robots(three, 2):
         fmus = build_fmus(robot, tmp_path / f"{modulus:g}-{payload:g}")
-        motion = cosimulate_closed_loop(fmus, three, design, PATH, 12.0, seed=1)
+        motion = cosimulate_closed_loop(fmus, three, design, PATH, 12.0, ClosedLoopOptions(seed=1))
         away = errors(motion.position, motion.time)
         assert motion.tension.min() > 1000.0
         assert np.sqrt(np.mean(away[-100:] ** 2)) < 1e-3
@@ -109,7 +110,9 @@ def test_force_is_answered_without_a_lasting_error(
 ) -> None:
     push = np.zeros((1201, 3))
     push[100:, 2] = -0.05 * 300.0 * 9.81
-    motion = cosimulate_closed_loop(three_example_fmus, three, design, STAY, 12.0, external_force=push)
+    motion = cosimulate_closed_loop(
+        three_example_fmus, three, design, STAY, 12.0, ClosedLoopOptions(external_force=push)
+    )
     away = np.linalg.norm(motion.position - three.platform.start, axis=1)
     assert 5e-3 < away.max() < 2e-2
     assert away[-1] < 1e-4

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tautwire.control import cosimulate_closed_loop, design_controller
+from tautwire.control import ClosedLoopOptions, cosimulate_closed_loop, design_controller
 from tautwire.cosimulation import (
     CallAbortedError,
     ComponentError,
@@ -215,7 +215,9 @@ def test_so_is_a_run_with_a_controller(damped_fmus: RobotFmus) -> None:
     robot = paper_robot(damping=2.08e9)
     controller = design_controller(robot)
     here, apart = (
-        cosimulate_closed_loop(damped_fmus, robot, controller, PAPER_HELIX, 0.2, seed=3, call_timeout=patience)
+        cosimulate_closed_loop(
+            damped_fmus, robot, controller, PAPER_HELIX, 0.2, ClosedLoopOptions(seed=3, patience=patience)
+        )
         for patience in (None, 60.0)
     )
     assert len(here.time) > 5

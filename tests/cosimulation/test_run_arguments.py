@@ -13,8 +13,10 @@ import pytest
 import tautwire
 from tautwire.cli import run
 from tautwire.control import (
+    ClosedLoopOptions,
     Controller,
     Reference,
+    RunOptions,
     build_controller_fmu,
     cosimulate_with_controller,
     rigid_reference,
@@ -121,8 +123,8 @@ WRONG_LOOPS: list[tuple[str, Any, tuple[str, ...]]] = [
     ("patience", -1.0, ("above 0 s",)),
     ("seed", -1, ("-1", "at least 0")),
     ("seed", 1.5, ("1.5", "whole number")),
-    ("push", np.zeros((2, 2)), ("(2, 2)", "(3, 3)", "in N")),
-    ("push", np.full((3, 3), NAN), ("row 1, column 1 is nan",)),
+    ("external_force", np.zeros((2, 2)), ("(2, 2)", "(3, 3)", "in N")),
+    ("external_force", np.full((3, 3), NAN), ("row 1, column 1 is nan",)),
     ("reference", LINE, ("a Line", "elastic_reference")),
 ]
 
@@ -130,7 +132,9 @@ WRONG_LOOPS: list[tuple[str, Any, tuple[str, ...]]] = [
 @pytest.mark.parametrize(("name", "value", "words"), WRONG_LOOPS)
 def test_a_closed_loop_refuses(three_fmus: RobotFmus, name: str, value: Any, words: tuple[str, ...]) -> None:
     good = {"fmus": three_fmus, "robot": ROBOT, "controller": controller(), "trajectory": LINE, "duration": 0.02}
-    arguments: dict[str, Any] = good | {name: value}
+    arguments: dict[str, Any] = good | (
+        {name: value} if name in good else {"options": ClosedLoopOptions(**{name: value})}
+    )
     refused(lambda: tautwire.cosimulate_closed_loop(**arguments), f"cosimulate_closed_loop: {name}", *words)
 
 
@@ -138,7 +142,9 @@ def test_a_closed_loop_refuses_the_reference_of_another_duration(three_fmus: Rob
     reference: Reference = rigid_reference(ROBOT, LINE, sample_times(controller().aim.period, 0.05))
 
     def call() -> object:
-        return tautwire.cosimulate_closed_loop(three_fmus, ROBOT, controller(), LINE, 0.02, reference=reference)
+        return tautwire.cosimulate_closed_loop(
+            three_fmus, ROBOT, controller(), LINE, 0.02, ClosedLoopOptions(reference=reference)
+        )
 
     refused(call, "cosimulate_closed_loop: reference.speeds", "(6, 3)", "(3, 3)")
 
@@ -150,7 +156,7 @@ def test_a_closed_loop_refuses_the_reference_of_another_duration(three_fmus: Rob
         ("controller", "controller.fmu", ("no file is",)),
         ("time", [0.0, 0.0], ("must rise",)),
         ("step", 0.0, ("above 0 s",)),
-        ("push", np.zeros((3, 3)), ("(3, 3)", "(4, 3)")),
+        ("external_force", np.zeros((3, 3)), ("(3, 3)", "(4, 3)")),
     ],
 )
 def test_a_run_with_a_controllers_fmu_refuses(
@@ -158,7 +164,7 @@ def test_a_run_with_a_controllers_fmu_refuses(
 ) -> None:
     # Any file will do: it is not opened before all else is checked.
     good = {"fmus": three_fmus, "controller": three_fmus.platform, "time": TIME}
-    arguments: dict[str, Any] = good | {name: value}
+    arguments: dict[str, Any] = good | ({name: value} if name in good else {"options": RunOptions(**{name: value})})
     refused(lambda: cosimulate_with_controller(**arguments), f"cosimulate_with_controller: {name}", *words)
 
 

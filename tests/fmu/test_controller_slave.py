@@ -12,9 +12,11 @@ from fmpy.validation import validate_fmu
 from numpy.typing import NDArray
 
 from tautwire.control import (
+    ClosedLoopOptions,
     ControlAim,
     Design,
     Feedforward,
+    RunOptions,
     build_controller_fmu,
     cosimulate_closed_loop,
     cosimulate_with_controller,
@@ -73,9 +75,9 @@ def difference(
     push = np.zeros((len(times), 3))
     push[30:, 2] = -0.05 * robot.platform.mass * robot.gravity
     force = push if pushed else None
-    own = cosimulate_closed_loop(fmus, robot, design, path, DURATION, external_force=force)
+    own = cosimulate_closed_loop(fmus, robot, design, path, DURATION, ClosedLoopOptions(external_force=force))
     fmu = build_controller_fmu(robot, design, path, DURATION, folder)
-    other = cosimulate_with_controller(fmus, fmu, times, external_force=force)
+    other = cosimulate_with_controller(fmus, fmu, times, RunOptions(external_force=force))
     assert np.max(np.abs(own.position - own.position[0])) > 0.3
     assert other.tension == pytest.approx(own.tension, abs=1e-5)
     return float(np.max(np.abs(own.position - other.position)))
@@ -123,18 +125,22 @@ def test_winches_are_asked_for_the_same_speeds(three: Robot, tmp_path: Path) -> 
 def test_macro_step_within_a_sample_does_not_matter(three_example_fmus: RobotFmus, controller: Path) -> None:
     times = sample_times(0.01, 1.5)
     whole = cosimulate_with_controller(three_example_fmus, controller, times)
-    thirds = cosimulate_with_controller(three_example_fmus, controller, times, step=0.01 / 3)
+    thirds = cosimulate_with_controller(three_example_fmus, controller, times, RunOptions(step=0.01 / 3))
     assert thirds.position == pytest.approx(whole.position, abs=1e-9)
 
 
 def test_a_watched_run_gives_the_same(three: Robot, three_example_fmus: RobotFmus, controller: Path) -> None:
     times = sample_times(0.01, 0.5)
     push = np.full((len(times), 3), 20.0)
-    here = cosimulate_with_controller(three_example_fmus, controller, times, external_force=push)
-    apart = cosimulate_with_controller(three_example_fmus, controller, times, external_force=push, call_timeout=60.0)
+    here = cosimulate_with_controller(three_example_fmus, controller, times, RunOptions(external_force=push))
+    apart = cosimulate_with_controller(
+        three_example_fmus, controller, times, RunOptions(external_force=push, patience=60.0)
+    )
     assert np.array_equal(here.position, apart.position)
     design, path = design_controller(three), PATHS["three"]
-    own = cosimulate_closed_loop(three_example_fmus, three, design, path, 0.5, external_force=push, call_timeout=60.0)
+    own = cosimulate_closed_loop(
+        three_example_fmus, three, design, path, 0.5, ClosedLoopOptions(external_force=push, patience=60.0)
+    )
     assert own.position == pytest.approx(here.position, abs=1e-9)
 
 

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from tautwire_fmu.laws.effects.slack import SLACK
 
 from ..control import (
+    ClosedLoopOptions,
     Design,
     Feedforward,
     Reference,
@@ -242,9 +243,7 @@ def _simulate(fmus: RobotFmus, reference_input: ReferenceInput, plan: Plan, job:
         reference_input.design,
         reference_input.trajectory,
         float(reference_input.time[-1]),
-        plan.compute.step,
-        seed,
-        reference=reference_input.reference,
+        ClosedLoopOptions(plan.compute.step, seed=seed, reference=reference_input.reference),
     )
 
 

@@ -1,6 +1,8 @@
 """Sampled controllers for path tracking, with limits, anti-windup and one sample of computing delay."""
 
 from .closed_loop import (
+    ClosedLoopOptions,
+    RunOptions,
     build_controller_fmu,
     controller_wires,
     cosimulate_closed_loop,
@@ -30,6 +32,7 @@ from .stability_margins import Margins, Range, margins_of, margins_over, robot_w
 __all__ = [
     "POSITION_NOISE",
     "TENSION_NOISE",
+    "ClosedLoopOptions",
     "ControlAim",
     "Controller",
     "Design",
@@ -42,6 +45,7 @@ __all__ = [
     "Reference",
     "RobustAim",
     "RobustController",
+    "RunOptions",
     "ScheduledController",
     "ShapedTrajectory",
     "Shaper",

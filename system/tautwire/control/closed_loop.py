@@ -89,44 +89,64 @@ def sample_times(period: float, duration: float) -> Array:
     return np.linspace(0.0, (count - 1) * period, count)
 
 
+@dataclass(frozen=True)
+class RunOptions:
+    """Options of a run with a controller: ``step`` bounds the macro step in s.
+
+    ``external_force`` (N, 3) in N acts on the platform, held from sample to sample; ``progress`` and ``patience``
+    are as for :func:`tautwire.cosimulate`.
+    """
+
+    step: float = DEFAULT_STEP
+    external_force: ArrayLike | None = None
+    progress: Progress | None = None
+    patience: float | None = None
+
+
+@dataclass(frozen=True)
+class ClosedLoopOptions(RunOptions):
+    """Options of a run whose controller is in the master: ``seed`` enables the noise of the robot's sensors.
+
+    ``reference`` is at the controller's samples, by default that of the elastic model.
+    """
+
+    seed: int | None = None
+    reference: Reference | None = None
+
+
 def cosimulate_closed_loop(
     fmus: RobotFmus,
     robot: Robot,
     controller: Design,
     trajectory: Trajectory,
     duration: float,
-    step: float = DEFAULT_STEP,
-    seed: int | None = None,
-    progress: Progress | None = None,
-    call_timeout: float | None = None,
-    reference: Reference | None = None,
-    external_force: ArrayLike | None = None,
+    options: ClosedLoopOptions | None = None,
 ) -> CosimulationResult:
     """Co-simulates the FMUs in closed loop over N whole samples until ``duration`` (s) is reached.
 
-    ``robot`` is the controller's model; the controller follows ``reference`` at its samples, by default that of the
-    elastic model. ``step`` bounds the macro step in s; ``seed`` enables the noise of the robot's sensors;
-    ``external_force`` (N, 3) in N is held from sample to sample. ``progress`` and ``call_timeout`` are as for
-    :func:`tautwire.cosimulate`. Returns the run at the controller's samples.
-
-    With winches the controller's speeds are their commands.
+    ``robot`` is the controller's model. Returns the run at the controller's samples. With winches the controller's
+    speeds are their commands.
 
     Raises UnreachableError where the path requires a cable to push, StretchError where no speeds follow it, RunError
     where an FMU fails, InputError where an FMU lacks a tension output or robot, controller and FMUs do not match,
     ArgumentError for an invalid argument.
     """
-    caller = "cosimulate_closed_loop"
-    _require_loop(caller, fmus, robot, controller, trajectory, duration, seed)
-    validate_options(caller, step, None, progress, call_timeout)
+    caller, options = "cosimulate_closed_loop", options or ClosedLoopOptions()
+    validate_fmus(f"{caller}: fmus", fmus)
+    _require_design(caller, robot, controller, trajectory)
+    validate_number(f"{caller}: duration", duration, RUN_DURATION_RULE)
+    if options.seed is not None:
+        validate_integer(f"{caller}: seed", options.seed, 0, "give a whole number, or None for no noise")
+    _require_cables(fmus, robot, controller)
+    _require_tensions(fmus, robot)
+    validate_options(caller, options.step, None, options.progress, options.patience)
     times = sample_times(controller.aim.period, duration)
-    if reference is not None:
-        _require_reference(caller, reference, len(times), robot.cable_count)
-    source: InputSource = PathController(robot, controller, trajectory, times, seed, reference)
-    extra = NO_ADDITIONAL_COMPONENTS
-    if external_force is not None:
-        forces = _require_force(caller, external_force, len(times))
-        source, extra = JoinedSources((source, SampledForce(forces))), AdditionalComponents(external_inputs=FORCE_PORTS)
-    return run_cosimulation(fmus, source, times, FixedStep(step), progress, call_timeout, extra)
+    if options.reference is not None:
+        _require_reference(caller, options.reference, len(times), robot.cable_count)
+    force = _external_force(caller, options, len(times))
+    source: InputSource = PathController(robot, controller, trajectory, times, options.seed, options.reference)
+    extra = AdditionalComponents(external_inputs=FORCE_PORTS) if force else NO_ADDITIONAL_COMPONENTS
+    return _run(fmus, JoinedSources((source, *force)) if force else source, times, options, extra)
 
 
 def build_controller_fmu(
@@ -156,37 +176,24 @@ def build_controller_fmu(
 
 
 def cosimulate_with_controller(
-    fmus: RobotFmus,
-    controller: str | Path,
-    time: ArrayLike,
-    step: float = DEFAULT_STEP,
-    external_force: ArrayLike | None = None,
-    progress: Progress | None = None,
-    call_timeout: float | None = None,
+    fmus: RobotFmus, controller: str | Path, time: ArrayLike, options: RunOptions | None = None
 ) -> CosimulationResult:
     """Co-simulates a robot's FMUs with a controller FMU, such as :func:`build_controller_fmu` writes.
 
-    ``time`` (N,) in s, rising, from 0; macro steps are no longer than ``step`` (s) and end at each of these times,
-    which should contain the controller's samples. ``external_force`` (N, 3) in N is held from time to time.
+    ``time`` (N,) in s, rising, from 0; macro steps end at each of these times, which should contain the controller's
+    samples.
 
     Raises RunError where an FMU fails, ArgumentError for an invalid argument.
     """
-    caller = "cosimulate_with_controller"
+    caller, options = "cosimulate_with_controller", options or RunOptions()
     validate_fmus(f"{caller}: fmus", fmus)
-    parts = {CONTROLLER_NAME: validate_file(f"{caller}: controller", controller)}
+    components = {CONTROLLER_NAME: validate_file(f"{caller}: controller", controller)}
     instants = validate_increasing(f"{caller}: time", time, TIME_MEANING)
-    validate_options(caller, step, None, progress, call_timeout)
-    connections = controller_wires(fmus)
+    validate_options(caller, options.step, None, options.progress, options.patience)
+    force = _external_force(caller, options, len(instants))
     zero_input = ZeroInput(len(winch_input_ports(len(fmus.cables))))
-    if external_force is None:
-        extra, source = AdditionalComponents(parts, connections), JoinedSources((zero_input,))
-    else:
-        forces = _require_force(caller, external_force, len(instants))
-        extra, source = (
-            AdditionalComponents(parts, connections, FORCE_PORTS),
-            JoinedSources((zero_input, SampledForce(forces))),
-        )
-    return run_cosimulation(fmus, source, instants, FixedStep(step), progress, call_timeout, extra)
+    extra = AdditionalComponents(components, controller_wires(fmus), FORCE_PORTS if force else ())
+    return _run(fmus, JoinedSources((zero_input, *force)), instants, options, extra)
 
 
 def controller_wires(fmus: RobotFmus) -> tuple[Connection, ...]:
@@ -208,23 +215,10 @@ def controller_wires(fmus: RobotFmus) -> tuple[Connection, ...]:
     )
 
 
-def _require_loop(
-    caller: str,
-    fmus: RobotFmus,
-    robot: Robot,
-    controller: Design,
-    trajectory: Trajectory,
-    duration: float,
-    seed: int | None,
-) -> None:
-    """Validates the arguments of a closed-loop run."""
-    validate_fmus(f"{caller}: fmus", fmus)
-    _require_design(caller, robot, controller, trajectory)
-    validate_number(f"{caller}: duration", duration, RUN_DURATION_RULE)
-    if seed is not None:
-        validate_integer(f"{caller}: seed", seed, 0, "give a whole number, or None for no noise")
-    _require_cables(fmus, robot, controller)
-    _require_tensions(fmus, robot)
+def _run(
+    fmus: RobotFmus, source: InputSource, times: Array, options: RunOptions, extra: AdditionalComponents
+) -> CosimulationResult:
+    return run_cosimulation(fmus, source, times, FixedStep(options.step), options.progress, options.patience, extra)
 
 
 def _require_design(caller: str, robot: Robot, controller: Design, trajectory: Trajectory) -> None:
@@ -235,9 +229,12 @@ def _require_design(caller: str, robot: Robot, controller: Design, trajectory: T
     require_trajectory(f"{caller}: trajectory", trajectory)
 
 
-def _require_force(caller: str, external_force: ArrayLike, count: int) -> Array:
+def _external_force(caller: str, options: RunOptions, count: int) -> tuple[SampledForce, ...]:
+    """The external force as a source of inputs, empty where there is none."""
+    if options.external_force is None:
+        return ()
     meaning = "finite forces in N, a row for each sample and columns x, y, z"
-    return validate_array(f"{caller}: push", external_force, (count, 3), meaning)
+    return (SampledForce(validate_array(f"{caller}: external_force", options.external_force, (count, 3), meaning)),)
 
 
 def _require_reference(caller: str, reference: Reference, count: int, cables: int) -> None:
