@@ -25,7 +25,7 @@ def test_every_python_example_runs(
     assert len(examples) >= 4
     for example in examples:
         exec(compile(example, str(README), "exec"), {})
-    assert "The model lacks damping; with it, what is left is noise." in capsys.readouterr().out
+    assert "The model lacks damping; with it, the residual is white noise." in capsys.readouterr().out
     assert (tmp_path / "report" / "index.html").exists()
 
 

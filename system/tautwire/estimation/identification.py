@@ -74,6 +74,7 @@ def validated_false_alarm_rate(argument: str, value: object) -> float:
 Progress = Callable[[str, float], None]
 
 SIGNIFICANCE_LEVEL = 0.01
+IS_WHITE = "the residual is white noise"
 
 
 def trace(
@@ -283,18 +284,18 @@ def _release_notes(prepared: PreparedData, final: Robot) -> list[str]:
 def _verdict(robot: Robot, outcome: _Outcome, white_before: bool) -> tuple[Verdict, str]:
     selection, discovery = outcome.selection, outcome.discovery
     names = " and ".join(h.label(robot) for h in selection.accepted)
+    lacks = f"The model lacks {names}; with {'it' if len(selection.accepted) == 1 else 'them'}, {IS_WHITE}."
     if outcome.effects_hold and _unlisted_hypotheses(outcome):
-        sentence = f"The model lacks {names}; with it, what is left is noise."
-        return "discovered", f"{sentence} No kind of the list does it: {_formula(robot, outcome)}."
+        return "discovered", f"{lacks} This effect is not on the list of known ones: {_formula(robot, outcome)}."
     if outcome.effects_hold:
-        return "effects", f"The model lacks {names}; with it, what is left is noise."
+        return "effects", lacks
     if discovery:
         sentence = f"No known effect explains the residual; a formula does: {formula_text(robot, discovery.formulas)}."
-        return "discovered", f"{sentence} With it, what is left is noise."
+        return "discovered", f"{sentence} With it, {IS_WHITE}."
     if not selection.accepted and white_before:
-        return "none", "The residual is noise: this recording shows nothing that the model lacks."
-    closest = f"; {names} comes closest but leaves too much" if selection.accepted else ""
-    return "unexplained", f"The residual is more than noise, and no known effect explains it{closest}."
+        return "none", f"{IS_WHITE.capitalize()}: this recording shows nothing that the model lacks."
+    closest = f"; {names} comes closest but does not make it white" if selection.accepted else ""
+    return "unexplained", f"The residual is not white noise, and no known effect explains it{closest}."
 
 
 def _unlisted_hypotheses(outcome: _Outcome) -> list[Hypothesis]:
