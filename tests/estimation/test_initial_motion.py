@@ -11,7 +11,7 @@ from tautwire.estimation.estimation_data import split_data
 from tautwire.estimation.initial_state_prior import initial_motion, with_motion_at_start
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fitter
-from tautwire.estimation.recording_preparation import prepare_recordings
+from tautwire.estimation.preprocessing import prepare_recordings
 from tautwire.estimation.residual_analysis import residuals_are_white
 from tautwire.estimation.smoothed_states import initial_state_note, with_initial_state
 from tautwire.recordings.recording import Recording

@@ -5,9 +5,8 @@ from functools import partial
 import numpy as np
 import pytest
 
-from tautwire.estimation import prepared_data as ready
-from tautwire.estimation import trace
-from tautwire.estimation.recording_preparation import shortened
+from tautwire.estimation import preprocessing, trace
+from tautwire.estimation.preprocessing import shortened
 from tests.support.recordings import recorded
 from tests.support.robots import example
 
@@ -36,7 +35,7 @@ def test_the_only_one_keeps_twice_as_much_since_it_judges_too() -> None:
 
 @pytest.mark.slow
 def test_a_trace_takes_the_beginning_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(ready, "shortened", partial(shortened, most=300))
+    monkeypatch.setattr(preprocessing, "shortened", partial(shortened, most=300))
     found = trace(example("three"), FIT, CHECK)
     assert found.verdict == "none"
     assert [c.recording.sample_count for c in found.comparisons] == [300, 300]

@@ -13,7 +13,7 @@ from tautwire.errors import RecordingError
 from tautwire.estimation.estimation_data import split_data
 from tautwire.estimation.identification import trace
 from tautwire.estimation.parameter_fit import Fitter
-from tautwire.estimation.recording_preparation import PreparedRecordings, prepare_recordings
+from tautwire.estimation.preprocessing import PreparedRecordings, prepare_recordings
 from tautwire.estimation.residual_analysis import residuals_are_white
 from tautwire.recordings.recording import Recording
 from tests.support.recordings import recorded

@@ -10,7 +10,7 @@ from tautwire.estimation.hypotheses import Hypothesis, hypotheses
 from tautwire.estimation.innovation_sensitivities import SensitivityColumn
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fitter
-from tautwire.estimation.prepared_data import prepare_data
+from tautwire.estimation.preprocessing import prepare_data
 from tautwire.estimation.score_test import ScoreStatistics, _predicted_gain, score_test, score_test_in_workers
 from tautwire.estimation.worker_pool import WorkerPool
 from tautwire.recordings.recording import read_recording

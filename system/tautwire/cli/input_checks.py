@@ -9,7 +9,7 @@ from itertools import islice
 from pathlib import Path
 
 from ..errors import InputError, RobotFileError, one_line
-from ..estimation.recording_preparation import prepare_recordings
+from ..estimation.preprocessing import prepare_recordings
 from ..fmus.fmu_slots import check_user_fmus
 from ..recordings.recording import Recording, read_recording, recording_errors
 from ..recordings.start_position import start_position

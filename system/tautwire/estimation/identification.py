@@ -27,7 +27,7 @@ from .effect_estimates import estimated_effects, parameter_correlations
 from .hypotheses import Hypothesis
 from .identifiability import analyse_identifiability
 from .localisation.component_localisation import FaultLocalisation, localise_residual
-from .prepared_data import PreparedData, all_residuals_white, calibrated_estimation_data, innovations_of, prepare_data
+from .preprocessing import PreparedData, all_residuals_white, calibrated_estimation_data, innovations_of, prepare_data
 from .residual_analysis import largest_autocorrelations
 from .smoothed_states import calibrate, initial_state_note, with_initial_state
 from .stepwise_selection import SelectionResult, select_effects

@@ -67,12 +67,17 @@ class Recording:
 
     def first(self, count: int) -> "Recording":
         """The first samples."""
+        return self.part(0, count)
+
+    def part(self, start: int, stop: int) -> "Recording":
+        """The samples from ``start`` to before ``stop``."""
+        rows = slice(start, stop)
         return replace(
             self,
-            time=self.time[:count],
-            winch_speed=self.winch_speed[:count],
-            tension=self.tension[:count],
-            position=self.position[:count],
+            time=self.time[rows],
+            winch_speed=self.winch_speed[rows],
+            tension=self.tension[rows],
+            position=self.position[rows],
         )
 
     def measured(self) -> NDArray[np.float64]:

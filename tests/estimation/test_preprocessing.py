@@ -5,12 +5,11 @@ from typing import Any
 
 import pytest
 
-from tautwire.estimation import prepared_data as ready
-from tautwire.estimation import trace
+from tautwire.estimation import preprocessing, trace
 from tautwire.estimation.clock_offsets import CHANNEL_GROUPS, shifted
 from tautwire.estimation.estimation_data import DataSplit
 from tautwire.estimation.parameter_fit import Fitter
-from tautwire.estimation.prepared_data import PreparedData, prepare_data
+from tautwire.estimation.preprocessing import PreparedData, prepare_data
 from tautwire.estimation.worker_pool import WorkerPool
 from tautwire.recordings.recording import Recording
 from tautwire.robot.schema import Robot
@@ -53,7 +52,7 @@ def test_an_effect_that_explains_all_goes_before_a_clock(monkeypatch: pytest.Mon
         late = shifted(evidence.estimation.recording, 0.01, CHANNEL_GROUPS[1])
         return DataSplit(replace(evidence.estimation, recording=late), evidence.validation, ()), ("a clock, no effect",)
 
-    monkeypatch.setattr(ready, "with_clocks_set", always)
+    monkeypatch.setattr(preprocessing, "with_clocks_set", always)
     found = trace(THREE, *pair({"damping": {"damping": 9e8}}))
     assert [effect.name for effect in found.effects] == ["damping"]
     assert not any("clock" in note for note in found.notes)

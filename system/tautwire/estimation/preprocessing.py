@@ -1,0 +1,210 @@
+"""Preprocessing of recordings, step by step: from what was recorded to data that a filter may trust.
+
+1. Long recordings are truncated (:func:`shortened`).
+2. Each alone loses dead channels and outliers, and is cut at gaps (:data:`CLEANING_STEPS`).
+3. The declared noise is tested against all of them; self-stress and motion at the start widen the prior of the initial
+   state (:func:`prepare_recordings`).
+4. They are split into estimation and validation data, and clock offsets are corrected (:func:`prepare_data`).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..errors import RecordingError
+from ..recordings.dead_channels import without_dead_channels
+from ..recordings.gaps import without_gaps
+from ..recordings.outliers import without_outliers
+from ..recordings.recording import Recording, require_outputs
+from ..robot.schema import Robot
+from .clock_offsets import with_clocks_set
+from .estimation_data import DataSet, DataSplit, split_data
+from .initial_state_prior import self_stress_deviation, with_motion_at_start
+from .kalman_filter import Noise
+from .likelihood import Innovations
+from .measurement_noise import check_noise, estimate_noise
+from .parameter_fit import Fitter
+from .residual_analysis import MIN_SAMPLES, has_enough_samples, residuals_are_white
+from .smoothed_states import calibrate
+from .worker_pool import WorkerPool
+
+# A fit runs the filter over each recording some hundred times, 30 us a sample.
+MAX_SAMPLES = 100_000
+# Largest admissible interpolation error of rope length, in standard deviations of the best sensor.
+MAX_LENGTH_ERROR_SIGMAS = 1.0
+
+
+@dataclass(frozen=True)
+class PreparedRecordings:
+    """Cleaned recordings and their noise, with notes of every step applied."""
+
+    fit: Recording
+    check: Recording | None
+    noise: Noise
+    notes: tuple[str, ...]
+
+
+def _with_outputs(robot: Robot, recording: Recording) -> tuple[Recording, tuple[str, ...]]:
+    """The recording as it is; raises RecordingError where the steps before left no output."""
+    require_outputs(recording)
+    return recording, ()
+
+
+def _without_gaps(robot: Robot, recording: Recording) -> tuple[Recording, tuple[str, ...]]:
+    noise = estimate_noise(robot, recording)
+    return without_gaps(recording, MAX_LENGTH_ERROR_SIGMAS * detectable_length(robot, noise, recording))
+
+
+CleaningStep = Callable[[Robot, Recording], tuple[Recording, tuple[str, ...]]]
+
+CLEANING_STEPS: tuple[CleaningStep, ...] = (
+    lambda robot, recording: without_dead_channels(recording),
+    lambda robot, recording: without_outliers(recording),
+    _with_outputs,
+    _without_gaps,
+)
+
+
+def prepare_recordings(robot: Robot, fit: Recording, check: Recording | None) -> PreparedRecordings:
+    """Clean both recordings, test the declared noise against them, and widen the prior of the initial state.
+
+    Raises RecordingError where a recording has no output that carries information, or is not to be trusted.
+    """
+    cleaned: list[Recording] = []
+    notes: tuple[str, ...] = ()
+    for recording in (fit,) if check is None else (fit, check):
+        cleaned.append(recording)
+        for step in CLEANING_STEPS:
+            cleaned[-1], step_notes = step(robot, cleaned[-1])
+            notes += step_notes
+    checked = check_noise(robot, estimate_noise(robot, cleaned[0]), tuple(cleaned))
+    self_stress, self_stress_notes = self_stress_deviation(robot, checked.recordings)
+    noise = replace(checked.noise, self_stress=self_stress)
+    noise, motion_notes = with_motion_at_start(robot, noise, checked.recordings)
+    return PreparedRecordings(
+        fit=checked.recordings[0],
+        check=None if check is None else checked.recordings[1],
+        noise=noise,
+        notes=(*notes, *checked.notes, *self_stress_notes, *motion_notes),
+    )
+
+
+@dataclass(frozen=True)
+class PreparedData:
+    """Preprocessed data, the declared model's innovations on them, and notes on what was done."""
+
+    split: DataSplit
+    data_sets: tuple[DataSet, ...]
+    fitter: Fitter
+    innovations: tuple[Innovations, Innovations]
+    notes: tuple[str, ...]
+
+
+def prepare_data(
+    robot: Robot, fit: Recording, check: Recording | None, workers: WorkerPool
+) -> tuple[PreparedData, ...]:
+    """Preprocess the recordings; in two versions where clocks seem to be apart but more is wrong.
+
+    The first is as recorded then: an effect that explains all of it goes before a clock that explains a part.
+    """
+    fit, check, truncation_notes = shortened(fit, check)
+    prepared = prepare_recordings(robot, fit, check)
+    data_split = split_data(robot, prepared.noise, prepared.fit, prepared.check)
+    fitter = Fitter(prepared.noise, workers.poll_interrupts)
+    innovations = innovations_of(fitter, robot, data_split)
+    _require_samples(innovations, data_split)
+
+    def assembled(
+        data_split: DataSplit, innovations: tuple[Innovations, Innovations], clock_notes: tuple[str, ...]
+    ) -> PreparedData:
+        data_sets = (data_split.estimation,) if check is None else (data_split.estimation, data_split.validation)
+        all_notes = (*truncation_notes, *prepared.notes, *clock_notes, *_notes(data_split, data_sets))
+        return PreparedData(data_split, data_sets, fitter, innovations, all_notes)
+
+    as_recorded = assembled(data_split, innovations, ())
+    if all_residuals_white(innovations, data_split):
+        return (as_recorded,)
+    data_split, clock_notes = with_clocks_set(fitter, robot, data_split)
+    if not clock_notes:
+        return (as_recorded,)
+    innovations = innovations_of(fitter, robot, data_split)
+    clock_corrected = assembled(data_split, innovations, clock_notes)
+    return (clock_corrected,) if all_residuals_white(innovations, data_split) else (as_recorded, clock_corrected)
+
+
+def innovations_of(fitter: Fitter, robot: Robot, split: DataSplit) -> tuple[Innovations, Innovations]:
+    """Innovations of a robot as it is, on estimation and on validation data."""
+    return fitter.innovations(robot, split.estimation), fitter.innovations(robot, split.validation)
+
+
+def all_residuals_white(innovations: Sequence[Innovations], split: DataSplit) -> bool:
+    """Whether the residuals are white noise on both estimation and validation data."""
+    data_sets = (split.estimation, split.validation)
+    return all(
+        residuals_are_white(residuals, data.rows) for residuals, data in zip(innovations, data_sets, strict=True)
+    )
+
+
+def calibrated_estimation_data(prepared: PreparedData, robot: Robot) -> tuple[Robot, DataSet]:
+    """Robot and FIT with uncertain numbers as FIT has them: what is within their bounds is no component's residual."""
+    data = prepared.split.estimation
+    calibration = calibrate(prepared.fitter, robot, data)
+    return calibration.calibrated_robot(robot), replace(
+        data, recording=calibration.without_sensor_offsets(data.recording)
+    )
+
+
+def _require_samples(innovations: tuple[Innovations, Innovations], split: DataSplit) -> None:
+    for residuals, data in zip(innovations, (split.estimation, split.validation), strict=True):
+        if not has_enough_samples(residuals, data.rows):
+            hint = f"record at least {MIN_SAMPLES} samples, {2 * MIN_SAMPLES} where there is no check recording"
+            raise RecordingError(data.recording.path, "too few samples to tell noise from more", hint)
+
+
+def _notes(split: DataSplit, data_sets: tuple[DataSet, ...]) -> tuple[str, ...]:
+    unknown = tuple(
+        f"{s.recording.path}: columns not used: {', '.join(s.recording.unknown_columns)}"
+        for s in data_sets
+        if s.recording.unknown_columns
+    )
+    return (*split.notes, *unknown)
+
+
+def shortened(
+    fit: Recording, check: Recording | None, most: int = MAX_SAMPLES
+) -> tuple[Recording, Recording | None, tuple[str, ...]]:
+    """Two recordings truncated to ``most`` samples, and notes; a single one, which also validates, to twice as many.
+
+    The beginning is used and not every n-th sample: ropes have memory, so a model has to follow a recording from its
+    start.
+    """
+    if check is None:
+        short_fit, notes = _truncated(fit, 2 * most)
+        return short_fit, None, notes
+    (short_fit, notes), (short_check, check_notes) = _truncated(fit, most), _truncated(check, most)
+    return short_fit, short_check, (*notes, *check_notes)
+
+
+def _truncated(recording: Recording, max_samples: int) -> tuple[Recording, tuple[str, ...]]:
+    count = recording.sample_count
+    if count <= max_samples:
+        return recording, ()
+    short = recording.first(max_samples)
+    description = (
+        f"its first {short.duration:.4g} s, {max_samples:,} of {count:,} samples, were traced; give "
+        "another part for more"
+    )
+    return short, (f"{recording.path}: {description}",)
+
+
+def detectable_length(robot: Robot, noise: Noise, recording: Recording) -> float:
+    """Smallest detectable error of rope length, in m: the noise of the best sensor as a length."""
+    detectable = [noise.position] if recording.has_position else []
+    if recording.has_tension:
+        lengths = [float(np.linalg.norm(np.subtract(anchor, robot.platform.start))) for anchor in robot.anchors]
+        stiffest = max(c.modulus * c.area / length for c, length in zip(robot.cables, lengths, strict=True))
+        detectable.append(noise.tension / stiffest)
+    return min(detectable, default=0.0)
