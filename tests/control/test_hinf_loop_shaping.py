@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import control
 import numpy as np
 import pytest
 
-import control
 from tautwire.control.hinf_loop_shaping import NORM_FACTOR, synthesise_controller, to_continuous, to_sampled
 
 PERIOD = 0.01

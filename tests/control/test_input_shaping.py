@@ -5,11 +5,11 @@ from __future__ import annotations
 from pathlib import Path
 from typing import cast
 
+import control
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-import control
 from tautwire.control import (
     ClosedLoopOptions,
     Feedforward,

@@ -5,11 +5,11 @@ from __future__ import annotations
 from dataclasses import replace
 from pathlib import Path
 
+import control
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-import control
 import tautwire
 from tautwire.control import (
     ClosedLoopOptions,

@@ -5,11 +5,11 @@ from __future__ import annotations
 from itertools import pairwise
 from typing import Any
 
+import control
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-import control
 from tautwire.control import (
     Controller,
     Feedforward,

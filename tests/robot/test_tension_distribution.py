@@ -3,7 +3,7 @@ import pytest
 from scipy.optimize import minimize
 
 from tautwire.robot.schema import TensionLimits
-from tautwire.robot.static_equilibrium import distribute_tensions, least_limit_violations
+from tautwire.robot.tension_distribution import distribute_tensions, least_limit_violations
 
 DRAWS = np.random.default_rng(7)
 SKETCHES = [DRAWS.normal(size=(3, int(count))) for count in (4, 5, 6, 8)]

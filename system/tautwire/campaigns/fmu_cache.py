@@ -13,8 +13,8 @@ from pathlib import Path
 from typing import Any
 
 from ..fmus.packaging import RobotFmus, build_fmus, cable_resources, platform_resource, start_values, winch_resource
+from ..robot.active_effects import has_sensor_effects
 from ..robot.schema import Robot
-from ..robot.static_equilibrium import has_sensor_effects
 
 FMU_SUFFIX = ".fmu"
 

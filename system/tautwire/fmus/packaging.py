@@ -18,15 +18,10 @@ from tautwire_fmu.laws.effects import BY_NAME
 from tautwire_fmu.laws.winch_drive import NO_LIMIT
 
 from ..process_signals import defer_interrupts
+from ..robot.active_effects import formula_texts, has_sensor_effects, platform_settings
 from ..robot.robot_assembly import assemble_robot
 from ..robot.schema import EffectSetting, Robot, validate_robot
-from ..robot.static_equilibrium import (
-    formula_texts,
-    has_sensor_effects,
-    platform_settings,
-    static_forces,
-    static_tensions,
-)
+from ..robot.static_equilibrium import static_forces, static_tensions
 from ..validation import validate_callable, validate_folder
 from .fmu_slots import check_user_fmus
 from .pythonfmu_builder import installed_builder, patch_wrapper_exit

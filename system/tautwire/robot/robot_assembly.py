@@ -13,8 +13,9 @@ from tautwire_fmu.laws.effects import ActiveEffect
 from tautwire_fmu.laws.mathematics import REAL, Mathematics
 from tautwire_fmu.laws.point_mass import PointMassConstants
 
+from .active_effects import cable_effects, platform_effects
 from .schema import Robot
-from .static_equilibrium import cable_effects, cable_routes, platform_effects, static_tensions
+from .static_equilibrium import cable_routes, static_tensions
 
 NUMPY_MATHEMATICS = Mathematics(
     log=np.log,
@@ -61,7 +62,7 @@ def assemble_robot(
     tensions = static_tensions(robot) if start_tensions is None else start_tensions
     if robot.initial_state:
         tensions = [tension + beside for tension, beside in zip(tensions, robot.initial_state.tensions, strict=True)]
-    cable_paths = cable_routes(mathematics, robot, robot.platform.start)
+    routes = cable_routes(mathematics, robot, robot.platform.start)
     cables = tuple(
         CableComponent(
             constants=CableConstants(
@@ -70,14 +71,14 @@ def assemble_robot(
                 modulus=cable.modulus,
                 area=cable.area,
                 damping=cable.damping,
-                start_length=line.length,
+                start_length=route.length,
                 start_tension=tension,
-                start_direction=line.direction,
+                start_direction=route.direction,
                 gravity=robot.gravity,
             ),
             effects=cable_effects(robot, index),
         )
-        for index, (cable, line, tension) in enumerate(zip(robot.cables, cable_paths, tensions, strict=True), start=1)
+        for index, (cable, route, tension) in enumerate(zip(robot.cables, routes, tensions, strict=True), start=1)
     )
     return RobotAssembly(
         cables=cables,

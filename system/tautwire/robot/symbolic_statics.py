@@ -9,13 +9,13 @@ from numpy.typing import NDArray
 
 from tautwire_fmu.laws.mathematics import Mathematics
 
+from .active_effects import cables_have_weight
 from .schema import Robot
 from .static_equilibrium import (
     DEFAULT_LIMITS,
     SINGULARITY_TOLERANCE,
     cable_routes,
     cable_weight_force,
-    cables_have_weight,
     static_load,
     static_tensions,
     unit_directions,
@@ -40,16 +40,14 @@ def symbolic_start_tensions(nominal: Robot, symbolic_robot: Robot, mathematics: 
     if len(tensions) > 3:
         at_limit = (tensions - limits.minimum < limit_distance) | (limits.maximum - tensions < limit_distance)
     start = nominal.platform.start
-    cable_paths = cable_routes(mathematics, symbolic_robot, start)
+    routes = cable_routes(mathematics, symbolic_robot, start)
     basis = SX(_wrench_basis(unit_directions(nominal))).T
-    directions_in_basis = casadi.mtimes(
-        basis, casadi.horzcat(*(casadi.vertcat(*line.direction) for line in cable_paths))
-    )
+    directions_in_basis = casadi.mtimes(basis, casadi.horzcat(*(casadi.vertcat(*route.direction) for route in routes)))
     load_vector = SX(casadi.vertcat(*static_load(mathematics, symbolic_robot, start)))
     result = [SX(float(tension)) for tension in tensions]
     for _ in range(WEIGHT_ITERATIONS if cables_have_weight(symbolic_robot) else 1):
         remaining_load = casadi.mtimes(
-            basis, load_vector - casadi.vertcat(*cable_weight_force(mathematics, symbolic_robot, cable_paths, result))
+            basis, load_vector - casadi.vertcat(*cable_weight_force(mathematics, symbolic_robot, routes, result))
         )
         result = _distribute_symbolically(directions_in_basis, remaining_load, result, at_limit, limits.preferred)
     return result

@@ -12,8 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..array_validation import validate_array, validate_point
 from ..errors import ArgumentError
 from ..validation import NumberRule, validate_attributes, validate_number
+from .active_effects import has_routing_effects
 from .schema import Point, Robot, validate_robot
-from .static_equilibrium import has_routing_effects
 from .static_equilibrium import unit_directions as rope_directions
 
 Array = NDArray[np.float64]

@@ -15,16 +15,9 @@ from tautwire_fmu.laws.point_mass import PointMassConstants, total_mass
 
 from ..errors import InputError, UnreachableError
 from ..process_signals import defer_interrupts
+from .active_effects import cables_have_weight, platform_effects
 from .schema import Robot, TensionLimits
-from .static_equilibrium import (
-    DEFAULT_LIMITS,
-    cable_routes,
-    cable_weight_force,
-    cables_have_weight,
-    platform_effects,
-    static_load,
-    static_tensions,
-)
+from .static_equilibrium import DEFAULT_LIMITS, cable_routes, cable_weight_force, static_load, static_tensions
 
 Array = NDArray[np.float64]
 
@@ -112,12 +105,12 @@ def wrench_margin(robot: Robot, position: Array, acceleration: float = 0.0) -> f
 
     Raises UnreachableError where a cable has no length there.
     """
-    cable_paths = cable_routes(REAL, robot, position.tolist())
-    direction_matrix = np.array([line.direction for line in cable_paths]).T
+    routes = cable_routes(REAL, robot, position.tolist())
+    direction_matrix = np.array([route.direction for route in routes]).T
     load_vector = np.array(static_load(REAL, robot, position.tolist()))
     if cables_have_weight(robot):
         load_vector = load_vector - np.array(
-            cable_weight_force(REAL, robot, cable_paths, [float(np.linalg.norm(load_vector))] * len(cable_paths))
+            cable_weight_force(REAL, robot, routes, [float(np.linalg.norm(load_vector))] * len(routes))
         )
     constants = PointMassConstants(robot.platform.mass, robot.gravity)
     mass = float(total_mass(REAL, constants, platform_effects(robot)))
