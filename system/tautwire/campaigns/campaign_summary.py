@@ -14,6 +14,7 @@ import pyarrow.compute as pc
 from numpy.typing import NDArray
 from scipy.stats import binomtest
 
+from ..json_document import json_value
 from .campaign_plan import MissingExtraError, Plan
 from .dataset_schema import FAILURE_COLUMN, RowColumn
 from .input_sampling import salib_problem, saltelli_block_size
@@ -101,7 +102,7 @@ class Summary:
                 f"{100 * share:g} %": value
                 for share, value in zip(SPREAD_QUANTILE_LEVELS, each["quantiles"], strict=True)
             }
-        return dict(_json_value(fields))
+        return dict(json_value(fields))
 
 
 def summarise_runs(plan: Plan, columns: tuple[RowColumn, ...], rows: pa.Table) -> Summary:
@@ -239,11 +240,3 @@ def _salib_analysis(method: str, problem: dict[str, Any], *arguments: Array, **o
         analysis = (sobol if method == "sobol" else rbd_fast).analyze(problem, *arguments, **options)
     analysis["names"] = list(dict.fromkeys(problem.get("groups", problem["names"])))
     return analysis
-
-
-def _json_value(value: Any) -> Any:
-    if isinstance(value, dict):
-        return {name: _json_value(each) for name, each in value.items()}
-    if isinstance(value, list | tuple):
-        return [_json_value(each) for each in value]
-    return None if isinstance(value, float) and not np.isfinite(value) else value

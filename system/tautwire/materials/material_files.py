@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-import json
-import math
+from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
@@ -11,26 +10,27 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
+from ..json_document import write_json
 from ..robot.robot_file_writer import robot_text
 from ..robot.schema import Robot
-from .material_report import MODEL_TITLES, verdict_notes, verdict_sentence
+from .material_report import GIGA, MODEL_TITLES, verdict_notes, verdict_sentence
 from .material_verdict import (
     ErrorAssumption,
     Estimate,
     EvaluatedModel,
     IdentifiedEffect,
     MaterialVerdict,
-    RmsErrors,
     Role,
     StaticCheck,
 )
+from .model_selection import CrossValidation
+from .modulus_observations import ModulusObservations
 from .robot_material import robot_material, with_material
-from .table_consistency import ConsistencyCheck
 from .viscoelastic_model import storage_modulus, viscous_damping
 
 
 def material_document(verdict: MaterialVerdict) -> dict[str, Any]:
-    """The verdict in plain JSON types, SI units; null where a number is not finite."""
+    """The verdict in plain types, SI units."""
     rope = robot_material(verdict.model("robot").material)
     return {
         "verdict": verdict.verdict,
@@ -40,19 +40,19 @@ def material_document(verdict: MaterialVerdict) -> dict[str, Any]:
         "effects": [_effect(effect) for effect in verdict.effects],
         "also_possible": [list(names) for names in verdict.confusable_effects],
         "formula": None,
-        "error_before": {role: _errors(each) for role, each in verdict.error_before.items()},
-        "error_after": {role: _errors(each) for role, each in verdict.error_after.items()},
-        "noise_floor": _errors(verdict.noise_floor),
+        "error_before": {role: asdict(each) for role, each in verdict.error_before.items()},
+        "error_after": {role: asdict(each) for role, each in verdict.error_after.items()},
+        "noise_floor": asdict(verdict.noise_floor),
         "residual_is_noise": {"before": verdict.adequate_before, "after": verdict.adequate_after},
         "alpha": verdict.options.significance_level,
         "shared": verdict.options.shared_variance,
         "coverage": verdict.options.coverage_factor,
-        "rows": _rows(verdict),
+        "rows": _rows(verdict.observations),
         "models": [_model(model) for model in verdict.models],
         "relaxation_floor": verdict.relaxation_floor,
         "other_readings": [_assumption(assumption) for assumption in verdict.error_assumptions],
         "static": [_static(check) for check in verdict.static_checks],
-        "consistency": [_check(check) for check in verdict.consistency_checks],
+        "consistency": [_fields(check, "range_gap") for check in verdict.consistency_checks],
         "robot": {
             "modulus": rope.modulus,
             "damping": rope.damping,
@@ -69,113 +69,66 @@ def _effect(effect: IdentifiedEffect) -> dict[str, Any]:
         "cables": [],
         "parameters": {name: _estimate(estimate) for name, estimate in effect.parameters.items()},
         "component": "cable",
-        "evidence": _number(effect.log_likelihood_ratio),
+        "evidence": effect.log_likelihood_ratio,
     }
 
 
 def _estimate(estimate: Estimate) -> dict[str, Any]:
-    return {
-        "value": _number(estimate.value),
-        "unit": estimate.unit,
-        "low": _number(estimate.low),
-        "high": _number(estimate.high),
-        "low_is_open": estimate.low_is_open,
-        "high_is_open": estimate.high_is_open,
-        "declared": _number(estimate.declared),
-    }
+    return _fields(estimate, "effect", "name")
 
 
-def _errors(errors: RmsErrors) -> dict[str, Any]:
-    return {
-        "storage_modulus_rms": _number(errors.storage_modulus_rms),
-        "damping_rms": _number(errors.damping_rms),
-    }
+def _fields(record: Any, *omitted: str) -> dict[str, Any]:
+    """The fields of a dataclass by name, without those that are omitted."""
+    return {name: value for name, value in asdict(record).items() if name not in omitted}
 
 
-def _rows(verdict: MaterialVerdict) -> list[dict[str, Any]]:
+def _rows(observations: ModulusObservations) -> list[dict[str, float]]:
     """Measured values of each row, with one standard deviation."""
-    observations = verdict.observations
-    columns = (
-        observations.frequency,
-        observations.storage,
-        observations.storage_uncertainty,
-        observations.damping,
-        observations.damping_uncertainty,
-    )
-    names = ("frequency", "storage_modulus", "storage_modulus_uncertainty", "damping", "damping_uncertainty")
-    return [dict(zip(names, map(float, row), strict=True)) for row in zip(*columns, strict=True)]
+    columns = {
+        "frequency": observations.frequency,
+        "storage_modulus": observations.storage,
+        "storage_modulus_uncertainty": observations.storage_uncertainty,
+        "damping": observations.damping,
+        "damping_uncertainty": observations.damping_uncertainty,
+    }
+    return [dict(zip(columns, row, strict=True)) for row in np.column_stack([*columns.values()]).tolist()]
 
 
 def _model(model: EvaluatedModel) -> dict[str, Any]:
-    cross_validation = model.cross_validation
     return {
         "role": model.role,
         "title": MODEL_TITLES[model.role],
         "terms": model.label,
-        "parameters": [
-            {"effect": estimate.effect, "name": estimate.name, **_estimate(estimate)} for estimate in model.estimates
-        ],
+        "parameters": [asdict(estimate) for estimate in model.estimates],
         "modulus": model.material.modulus,
         "damping": model.material.damping,
-        "chi_squared": _number(model.chi_squared),
+        "chi_squared": model.chi_squared,
         "degrees_of_freedom": model.degrees_of_freedom,
-        "p_value": _number(model.p_value),
-        "bic": _number(model.bic),
-        "storage_modulus_sigmas": [_number(value) for value in model.storage_residuals],
-        "damping_sigmas": [_number(value) for value in model.damping_residuals],
-        "leave_one_out": None
-        if cross_validation is None
-        else {
-            "chi_squared": [_number(value) for value in cross_validation.chi_squared],
-            "total": _number(cross_validation.total_chi_squared),
-            "total_inside": _number(cross_validation.interpolated_chi_squared),
-            "p_value_of_rest": [_number(fit.p_value) for fit in cross_validation.fits],
-        },
+        "p_value": model.p_value,
+        "bic": model.bic,
+        "storage_modulus_sigmas": model.storage_residuals.tolist(),
+        "damping_sigmas": model.damping_residuals.tolist(),
+        "leave_one_out": model.cross_validation and _cross_validation(model.cross_validation),
+    }
+
+
+def _cross_validation(cross_validation: CrossValidation) -> dict[str, Any]:
+    return {
+        "chi_squared": cross_validation.chi_squared.tolist(),
+        "total": cross_validation.total_chi_squared,
+        "total_inside": cross_validation.interpolated_chi_squared,
+        "p_value_of_rest": [fit.p_value for fit in cross_validation.fits],
     }
 
 
 def _assumption(assumption: ErrorAssumption) -> dict[str, Any]:
-    outcomes: dict[str, Any] = {
-        role: {
-            "chi_squared": _number(chi_squared),
-            "degrees_of_freedom": degrees_of_freedom,
-            "p_value": _number(p_value),
-        }
-        for role, (chi_squared, degrees_of_freedom, p_value) in assumption.outcomes.items()
-    }
-    return {"reading": assumption.label, **outcomes}
+    return {"reading": assumption.label, **{role: each._asdict() for role, each in assumption.outcomes.items()}}
 
 
 def _static(check: StaticCheck) -> dict[str, Any]:
-    return {
-        "model": check.role,
-        "measured": check.measured,
-        "uncertainty": check.uncertainty,
-        "predicted": _estimate(check.predicted),
-    }
+    return {"model": check.role, **_fields(check, "role"), "predicted": _estimate(check.predicted)}
 
 
-def _check(check: ConsistencyCheck) -> dict[str, Any]:
-    return {
-        "frequency": check.frequency,
-        "column": check.column,
-        "formula": check.formula,
-        "written": check.written,
-        "recomputed": check.recomputed,
-        "low": check.low,
-        "high": check.high,
-        "uncertainty": check.uncertainty,
-        "written_uncertainty": check.written_uncertainty,
-        "agreement": check.agreement,
-    }
-
-
-def _number(value: float | None) -> float | None:
-    """A plain float; None where it is none or not finite."""
-    return None if value is None or not math.isfinite(value) else float(value)
-
-
-GIGA = 1e9
 CURVE_POINTS = 400
 LINE_STYLES: dict[Role, tuple[str, str]] = {
     "declared": ("#999999", ":"),
@@ -272,8 +225,7 @@ def write_material(verdict: MaterialVerdict, folder: Path, robot: Robot | None =
 
     ``robot`` is written too, as ``robot.toml``, with the rope on all its cables.
     """
-    document = json.dumps(material_document(verdict), indent=1, allow_nan=False)
-    (folder / "fit.json").write_text(document + "\n", encoding="utf-8")
+    write_json(folder / "fit.json", material_document(verdict))
     figure = material_figure(verdict)
     figure.savefig(folder / "material.png", dpi=DOTS_PER_INCH)
     figure.savefig(folder / "material.svg")

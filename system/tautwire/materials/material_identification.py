@@ -14,6 +14,7 @@ from .material_verdict import (
     ErrorAssumption,
     Estimate,
     EvaluatedModel,
+    FitOutcome,
     IdentifiedEffect,
     MaterialOptions,
     MaterialVerdict,
@@ -21,9 +22,9 @@ from .material_verdict import (
     Role,
     StaticCheck,
     VerdictName,
-    declared_model,
+    evaluate_fit,
+    evaluate_model,
     fit_errors,
-    fitted_model,
     noise_floor,
     prediction_errors,
 )
@@ -51,42 +52,37 @@ def error_assumptions(
     coverage_factor: float,
     structures: Mapping[Role, ModelStructure],
 ) -> tuple[ErrorAssumption, ...]:
-    """Chi-squared, degrees of freedom and p value of each model under each reading of the errors, that in use first."""
+    """Goodness of fit of each model under each reading of the errors, that in use first."""
     return tuple(
         ErrorAssumption(label, {role: _fit_outcome(observations, each) for role, each in structures.items()})
         for label, observations in _error_readings(table, pair, shared_variance, coverage_factor)
     )
 
 
-def _fit_outcome(observations: ModulusObservations, structure: ModelStructure) -> tuple[float, int, float]:
+def _fit_outcome(observations: ModulusObservations, structure: ModelStructure) -> FitOutcome:
     fit = fit_structure(observations, structure)
-    return fit.chi_squared, fit.degrees_of_freedom, fit.p_value
+    return FitOutcome(fit.chi_squared, fit.degrees_of_freedom, fit.p_value)
 
 
 def _error_readings(
     table: MaterialTable, pair: tuple[str, str], shared_variance: float, coverage_factor: float
 ) -> Iterator[tuple[str, ModulusObservations]]:
-    yield "as fitted", observations_from_table(table, pair, shared_variance, coverage_factor)
+    def read(
+        read_pair: tuple[str, str] = pair, shared: float = shared_variance, coverage: float = coverage_factor
+    ) -> ModulusObservations:
+        return observations_from_table(table, read_pair, shared, coverage)
+
+    yield "as fitted", read()
     for other in table.modulus_pairs():
         if other != pair:
-            yield (
-                f"from {other[0]} and {other[1]}",
-                observations_from_table(table, other, shared_variance, coverage_factor),
-            )
+            yield f"from {other[0]} and {other[1]}", read(other)
     for assumed_share in (0.0, ASSUMED_SHARED_VARIANCE):
         if assumed_share != shared_variance:
-            label = f"{assumed_share:.0%} of each variance common to all rows"
-            yield label, observations_from_table(table, pair, assumed_share, coverage_factor)
+            yield f"{assumed_share:.0%} of each variance common to all rows", read(shared=assumed_share)
     if coverage_factor != TWO_SIGMA_COVERAGE:
-        yield (
-            "uncertainties are two standard deviations",
-            observations_from_table(table, pair, shared_variance, TWO_SIGMA_COVERAGE),
-        )
+        yield "uncertainties are two standard deviations", read(coverage=TWO_SIGMA_COVERAGE)
     if table.static_rows:
-        yield (
-            "static rows fitted too",
-            observations_from_table(table, pair, shared_variance, coverage_factor).with_static_rows(table),
-        )
+        yield "static rows fitted too", read().with_static_rows(table)
 
 
 # Real residuals are never quite white: a root mean square up to this many standard deviations is adequate.
@@ -182,17 +178,17 @@ def _evaluated_models(
         ("chosen", selection.fit),
         *(("rival", selection.best_fits[rival]) for rival in selection.confusable_models(significance_level)),
     ]
-    models = [declared_model(observations, declared)] if declared else []
+    models = [evaluate_model(observations, "declared", CONSTANT_PAIR.label, declared)] if declared else []
     for index, (role, fit) in enumerate(fits):
         progress(f"leaving out rows: {fit.structure.label}", index / len(fits))
-        models.append(fitted_model(observations, role, fit, declared, cross_validate(observations, fit.structure)))
+        models.append(evaluate_fit(observations, role, fit, declared, cross_validate(observations, fit.structure)))
     progress("fitting what a robot file can hold", 0.0)
     robot_fit = (
         best_linear_fit(observations.with_static_rows(table))
         if table.static_rows
         else selection.best_fits[LINEAR_VISCOELASTIC]
     )
-    return [*models, fitted_model(observations, "robot", robot_fit, declared)]
+    return [*models, evaluate_fit(observations, "robot", robot_fit, declared)]
 
 
 def _identified_effects(

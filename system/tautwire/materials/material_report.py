@@ -293,6 +293,7 @@ def _assumption_table(verdict: MaterialVerdict) -> Table:
         "Chi-squared (p) under other readings of the errors", ("reading", *(MODEL_TITLES[r] for r in roles))
     )
     for assumption in verdict.error_assumptions:
-        cells = [f"{assumption.outcomes[role][0]:.1f} ({assumption.outcomes[role][2]:.1g})" for role in roles]
+        outcomes = [assumption.outcomes[role] for role in roles]
+        cells = [f"{each.chi_squared:.1f} ({each.p_value:.1g})" for each in outcomes]
         table.add_row(assumption.label, *cells)
     return table

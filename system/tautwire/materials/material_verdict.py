@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Literal
+from typing import Literal, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -47,8 +47,8 @@ class Estimate:
 
     effect: str
     name: str
-    unit: str
     value: float
+    unit: str
     low: float
     high: float
     low_is_open: bool
@@ -87,12 +87,20 @@ class EvaluatedModel:
     cross_validation: CrossValidation | None = None
 
 
+class FitOutcome(NamedTuple):
+    """Goodness of fit of one model: chi-squared, degrees of freedom and p value."""
+
+    chi_squared: float
+    degrees_of_freedom: int
+    p_value: float
+
+
 @dataclass(frozen=True)
 class ErrorAssumption:
-    """Chi-squared, degrees of freedom and p value of models, by role, under another reading of the table's errors."""
+    """Goodness of fit of models, by role, under another reading of the table's errors."""
 
     label: str
-    outcomes: Mapping[Role, tuple[float, int, float]]
+    outcomes: Mapping[Role, FitOutcome]
 
 
 @dataclass(frozen=True)
@@ -160,14 +168,34 @@ class MaterialVerdict:
         return self.model("chosen")
 
 
-def declared_model(observations: ModulusObservations, material: Material) -> EvaluatedModel:
-    """Evaluate a material whose constants were not fitted."""
+def evaluate_model(
+    observations: ModulusObservations,
+    role: Role,
+    label: str,
+    material: Material,
+    estimates: tuple[Estimate, ...] = (),
+    cross_validation: CrossValidation | None = None,
+) -> EvaluatedModel:
+    """Evaluate a material on observations; ``estimates`` are of its fitted constants, empty for declared ones."""
     chi_squared = float(np.sum(whitened_residuals(observations, material) ** 2))
-    count = observations.measurement_count
-    return _evaluate_model(observations, "declared", "damping", material, (), chi_squared, count, chi_squared)
+    degrees_of_freedom = observations.measurement_count - len(estimates)
+    storage, viscous = _model_errors(observations, material)
+    return EvaluatedModel(
+        role=role,
+        label=label,
+        material=material,
+        estimates=estimates,
+        chi_squared=chi_squared,
+        degrees_of_freedom=degrees_of_freedom,
+        p_value=float(chi2.sf(chi_squared, degrees_of_freedom)),
+        bic=chi_squared + len(estimates) * float(np.log(observations.measurement_count)),
+        storage_residuals=storage / observations.storage_uncertainty,
+        damping_residuals=viscous / observations.damping_uncertainty,
+        cross_validation=cross_validation,
+    )
 
 
-def fitted_model(
+def evaluate_fit(
     observations: ModulusObservations,
     role: Role,
     fit: MaterialFit,
@@ -176,20 +204,7 @@ def fitted_model(
 ) -> EvaluatedModel:
     """Evaluate a fit, with its confidence intervals, on ``observations``; ``declared`` gives the present constants."""
     estimates = parameter_estimates(fit, declared)
-    chi_squared = float(np.sum(whitened_residuals(observations, fit.material) ** 2))
-    degrees_of_freedom = observations.measurement_count - len(fit.values)
-    bic = chi_squared + len(fit.values) * float(np.log(observations.measurement_count))
-    return _evaluate_model(
-        observations,
-        role,
-        fit.structure.label,
-        fit.material,
-        estimates,
-        chi_squared,
-        degrees_of_freedom,
-        bic,
-        cross_validation,
-    )
+    return evaluate_model(observations, role, fit.structure.label, fit.material, estimates, cross_validation)
 
 
 def parameter_estimates(fit: MaterialFit, declared: Material | None) -> tuple[Estimate, ...]:
@@ -201,8 +216,8 @@ def parameter_estimates(fit: MaterialFit, declared: Material | None) -> tuple[Es
         Estimate(
             effect=parameter.effect,
             name=parameter.name,
-            unit=parameter.unit,
             value=value,
+            unit=parameter.unit,
             low=interval.low,
             high=interval.high,
             low_is_open=interval.low_is_open,
@@ -217,10 +232,7 @@ def parameter_estimates(fit: MaterialFit, declared: Material | None) -> tuple[Es
 
 def fit_errors(observations: ModulusObservations, model: EvaluatedModel) -> RmsErrors:
     """Root mean square errors, model less measured, over the rows that the model was fitted to."""
-    return _rms_errors(
-        storage_modulus(model.material, observations.frequency, observations.amplitude) - observations.storage,
-        viscous_damping(model.material, observations.frequency, observations.amplitude) - observations.damping,
-    )
+    return _rms_errors(*_model_errors(observations, model.material))
 
 
 def prediction_errors(observations: ModulusObservations, model: EvaluatedModel) -> RmsErrors:
@@ -237,33 +249,13 @@ def noise_floor(observations: ModulusObservations) -> RmsErrors:
     return _rms_errors(observations.storage_uncertainty, observations.damping_uncertainty)
 
 
-def _rms_errors(storage: np.ndarray, viscous: np.ndarray) -> RmsErrors:
+def _rms_errors(storage: Array, viscous: Array) -> RmsErrors:
     return RmsErrors(float(np.sqrt(np.mean(storage**2))), float(np.sqrt(np.mean(viscous**2))))
 
 
-def _evaluate_model(
-    observations: ModulusObservations,
-    role: Role,
-    label: str,
-    material: Material,
-    estimates: tuple[Estimate, ...],
-    chi_squared: float,
-    degrees_of_freedom: int,
-    bic: float,
-    cross_validation: CrossValidation | None = None,
-) -> EvaluatedModel:
-    storage = storage_modulus(material, observations.frequency, observations.amplitude) - observations.storage
-    viscous = viscous_damping(material, observations.frequency, observations.amplitude) - observations.damping
-    return EvaluatedModel(
-        role=role,
-        label=label,
-        material=material,
-        estimates=estimates,
-        chi_squared=chi_squared,
-        degrees_of_freedom=degrees_of_freedom,
-        p_value=float(chi2.sf(chi_squared, degrees_of_freedom)),
-        bic=bic,
-        storage_residuals=storage / observations.storage_uncertainty,
-        damping_residuals=viscous / observations.damping_uncertainty,
-        cross_validation=cross_validation,
+def _model_errors(observations: ModulusObservations, material: Material) -> tuple[Array, Array]:
+    """Model less measured: storage modulus (Pa) and damping (Pa s), each (N,)."""
+    return (
+        storage_modulus(material, observations.frequency, observations.amplitude) - observations.storage,
+        viscous_damping(material, observations.frequency, observations.amplitude) - observations.damping,
     )

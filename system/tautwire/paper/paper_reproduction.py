@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field
@@ -10,6 +9,7 @@ from functools import partial
 from pathlib import Path
 
 from ..estimation.worker_pool import WorkerPool, processors
+from ..json_document import write_json
 from ..materials import RobotMaterial
 from . import helix_runs as helix
 from . import large_robot_runs as large_robots
@@ -17,7 +17,7 @@ from . import open_claims as tried
 from . import paper_extensions as beyond
 from . import ramp_runs as ramps
 from .figure_style import figure_style, write_figures
-from .open_claims import OpenClaim, examine_open_claims
+from .open_claims import examine_open_claims
 from .paper_claims import LedgerEntry, axis_claims, judge_claims, table_1_entries, text_claims
 from .paper_extensions import draw_extensions
 from .paper_figures import axis_values, draw_rope_tests, draw_space_figures, draw_time_figures
@@ -72,9 +72,12 @@ def write_paper(folder: Path, progress: Progress) -> PaperReproduction:
             *(each.figure for each in extensions),
         ]
         svgs = write_figures(figures, folder, partial(progress, "drawing"))
-    _write_ledger(
-        folder, reproduction.entries, PageContent(reproduction.entries, figures, svgs, _open_claims(runs), extensions)
+    write_json(folder / "claims.json", [entry.document() for entry in reproduction.entries])
+    claims = examine_open_claims(runs.parameters, runs.records)
+    page = paper_page(
+        PageContent(reproduction.entries, figures, svgs, claims, extensions), {"claims.json": "claims.json"}
     )
+    (folder / "claims.html").write_text(page, encoding="utf-8")
     return reproduction
 
 
@@ -123,14 +126,3 @@ def _collect_runs(
     for section_module in SECTION_MODULES:
         values |= section_module.quantities(parameters, records)
     return PaperRuns(parameters, records, rope_tests, values | axis_values(records, parameters.name))
-
-
-def _open_claims(runs: PaperRuns) -> tuple[OpenClaim, ...]:
-    return examine_open_claims(runs.parameters, runs.records)
-
-
-def _write_ledger(folder: Path, entries: tuple[LedgerEntry, ...], content: PageContent) -> None:
-    document = json.dumps([entry.document() for entry in entries], indent=1, allow_nan=False)
-    (folder / "claims.json").write_text(document + "\n", encoding="utf-8")
-    page = paper_page(content, {"claims.json": "claims.json"})
-    (folder / "claims.html").write_text(page, encoding="utf-8")
