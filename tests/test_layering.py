@@ -12,6 +12,7 @@ FILES = (
     "array_validation",
     "atomic_output",
     "input_files",
+    "json_document",
     "name_suggestions",
     "number_format",
     "process_signals",
