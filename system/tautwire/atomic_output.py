@@ -17,13 +17,14 @@ import time
 from collections.abc import Iterable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
-from typing import BinaryIO
+from typing import IO, Any, BinaryIO
 
 from .errors import DiskFullError, InputError
 
 if sys.platform != "win32":
     import fcntl
 
+CAN_LOCK_FILES = sys.platform != "win32"
 STAGING_PREFIX = ".tautwire-"
 LOCK_NAME = "lock"
 SCRATCH_NAME = "new"
@@ -74,6 +75,16 @@ def atomic_file(target: Path) -> Iterator[Path]:
     with _staging_folder(_nearest_existing_folder(target.parent), target) as scratch:
         yield scratch / target.name
         _publish(scratch, target.parent)
+
+
+def acquire_lock(file: IO[Any]) -> bool:
+    """Acquires an exclusive file lock, which ends with the process; False if the file was removed meanwhile.
+
+    Raises BlockingIOError where another process holds it. Without effect where :data:`CAN_LOCK_FILES` is false.
+    """
+    if sys.platform != "win32":
+        fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    return os.fstat(file.fileno()).st_nlink > 0
 
 
 def _nearest_existing_folder(target: Path) -> Path:
@@ -136,13 +147,13 @@ def _lock_staging(parent: Path, target: Path) -> tuple[Path, BinaryIO | None]:
     digest = hashlib.sha256(os.fsencode(os.path.realpath(target))).hexdigest()[:12]
     staging = parent / f"{STAGING_PREFIX}{digest}"
     deadline = time.monotonic() + LOCK_TIMEOUT
-    while sys.platform != "win32":
+    while CAN_LOCK_FILES:
         staging.mkdir(exist_ok=True)
         # A process that finishes may remove the folder at any time.
         with suppress(FileNotFoundError), ExitStack() as stack:
             lock = stack.enter_context((staging / LOCK_NAME).open("ab"))
             try:
-                if _acquire_lock(lock):
+                if acquire_lock(lock):
                     stack.pop_all()
                     return staging, lock
             except BlockingIOError:
@@ -155,17 +166,11 @@ def _lock_staging(parent: Path, target: Path) -> tuple[Path, BinaryIO | None]:
     return Path(tempfile.mkdtemp(prefix=STAGING_PREFIX, dir=parent)), None
 
 
-def _acquire_lock(lock: BinaryIO) -> bool:
-    """Acquires a file lock; False if the file was removed meanwhile, BlockingIOError if another process holds it."""
-    fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    return os.fstat(lock.fileno()).st_nlink > 0
-
-
 def _remove_stale_staging(parent: Path) -> None:
     """Removes staging folders of killed runs."""
-    for lock_file in parent.glob(f"{STAGING_PREFIX}*/{LOCK_NAME}") if sys.platform != "win32" else ():
+    for lock_file in parent.glob(f"{STAGING_PREFIX}*/{LOCK_NAME}") if CAN_LOCK_FILES else ():
         with suppress(OSError), lock_file.open("rb") as lock:
-            if _acquire_lock(lock):
+            if acquire_lock(lock):
                 _remove_staging(lock_file.parent)
 
 

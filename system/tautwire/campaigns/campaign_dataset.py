@@ -8,7 +8,6 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from types import TracebackType
-from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -16,6 +15,7 @@ import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
 from .. import __version__
+from ..atomic_output import acquire_lock
 from ..errors import InputError
 from .campaign_plan import Plan, PlanError, PlanMismatchError
 from .campaign_run import RunResult
@@ -166,16 +166,10 @@ def _write_atomically(path: Path, content: bytes) -> None:
 
 @contextmanager
 def _exclusive_lock(folder: Path) -> Iterator[None]:
-    """Hold an exclusive file lock that ends with this process, on systems that have fcntl."""
-    fcntl: Any
-    try:
-        import fcntl
-    except ImportError:
-        yield
-        return
+    """Hold an exclusive file lock that ends with this process, where files can be locked."""
     with (folder / LOCK_FILE).open("w") as file:
         try:
-            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            acquire_lock(file)
         except BlockingIOError as error:
             hint = "wait until it has ended, or choose another --out"
             raise InputError(str(folder), "another process writes there", hint) from error
