@@ -1,13 +1,15 @@
-# make run: the main job on a shipped recording. make test: lint, types and all tests. make bench: the co-simulation's
-# speed; make bench-long: memory over a million steps; make bench-trace: the tracer on blind recordings, goes on where
-# it was stopped; make bench-control: the controllers; make bench-campaign: many runs. make docs: the pages in docs/,
-# into build/docs; make pictures: those of README and docs that come from runs. make floors: tests with the lowest
-# versions that pyproject.toml declares, on a Python of at most 3.12. Each sets up what it needs.
+# make run: the main job on a shipped recording. make test: lint, types and a test of everything, in minutes. make
+# validate: all tests that take longer. make bench: the co-simulation's speed; make bench-long: memory over a million
+# steps; make bench-trace: the tracer on blind recordings, goes on where it was stopped; make bench-control: the
+# controllers; make bench-campaign: many runs. make docs: the pages in docs/, into build/docs; make pictures: those of
+# README and docs that come from runs. make floors: tests with the lowest versions that pyproject.toml declares, on a
+# Python of at most 3.12. Each sets up what it needs.
 
 PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
+PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 EXAMPLE := system/tautwire/examples/three
 FLOORS := .venv-floors
 FLOOR_TESTS := $(addprefix tests/,$(addsuffix .py,cli/test_commands cli/test_input_checks cli/test_material_command \
@@ -16,13 +18,16 @@ FLOOR_TESTS := $(addprefix tests/,$(addsuffix .py,cli/test_commands cli/test_inp
 	recordings/test_csv_file recordings/test_mdf_file recordings/test_parquet_file reports/test_trace_report_page \
 	robot/test_static_equilibrium))
 
-.PHONY: run test lint types docs pictures floors bench bench-long bench-trace bench-control bench-campaign clean
+.PHONY: run test validate lint types docs pictures floors bench bench-long bench-trace bench-control bench-campaign clean
 
 run: $(READY)
 	$(BIN)/tautwire trace $(EXAMPLE)/robot.toml $(EXAMPLE)/fit.csv --check $(EXAMPLE)/check.csv --out build/three
 
 test: lint types
-	$(BIN)/python -m pytest -n 2 --dist loadfile
+	$(PYTEST) -m "not validate"
+
+validate: $(READY) floors
+	$(PYTEST) -m validate
 
 lint: $(READY)
 	$(BIN)/ruff check .
@@ -47,7 +52,7 @@ floors: $(READY)
 	$(BIN)/python -m tests.floors > build/floors.txt
 	$(PYTHON) -m venv --clear $(FLOORS)
 	$(FLOORS)/bin/python -m pip install --quiet --constraint build/floors.txt --editable ".[mdf]" pytest hypothesis
-	$(FLOORS)/bin/python -m pytest -m "not slow" $(FLOOR_TESTS)
+	$(FLOORS)/bin/python -m pytest -m "not validate" $(FLOOR_TESTS)
 
 bench: $(READY)
 	$(BIN)/python -m tests.bench

@@ -12,6 +12,58 @@ from tests.support.robots import LIMITED, example, paper_robot, with_damping, wi
 if TYPE_CHECKING:
     from tests.support.browser.browser import Browser
 
+# Modules by the time they take, so that none is left to one worker at the end.
+SLOWEST_FIRST = (
+    "unexplained_residual",
+    "planar_robots",
+    "uncertain_parameters",
+    "wheel",
+    "stepwise_selection",
+    "effects_in_fmus",
+    "commands",
+    "dask_cluster",
+    "winch_robot",
+    "identification",
+    "paper_reproduction",
+    "importers",
+    "suggested_commands",
+    "robot_cosimulation",
+    "interrupted_commands",
+    "black_box",
+    "component_localisation",
+    "shared_recordings",
+    "isolation",
+    "readme",
+    "formula_discovery",
+    "clock_offsets",
+    "lqg",
+    "fmi3",
+    "robust_design",
+    "lost_fmus",
+    "campaign_run",
+    "input_design",
+    "profile_likelihood",
+    "prepared_data",
+    "initial_motion",
+    "winch_slave",
+    "user_fmus",
+    "hostile_files",
+    "batch_commands",
+    "c_hosts",
+)
+
+
+@pytest.hookimpl(tryfirst=True)
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    """Leave in ``make test`` the cases that a ``validate`` mark excepts, and begin with the slowest modules."""
+    for item in items:
+        mark = item.get_closest_marker("validate")
+        excepted = mark.kwargs.get("but", ()) if mark else ()
+        if isinstance(item, pytest.Function) and any(word in item.callspec.id for word in excepted):
+            item.own_markers = [each for each in item.own_markers if each is not mark]
+    ranks = {f"test_{name}": rank for rank, name in enumerate(SLOWEST_FIRST)}
+    items.sort(key=lambda item: ranks.get(item.path.stem, len(ranks)))
+
 
 @pytest.fixture(scope="session")
 def three_fmus(tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:

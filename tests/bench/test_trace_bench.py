@@ -84,7 +84,6 @@ def test_every_case_has_a_stored_size() -> None:
                 assert 0.5 < size.nats / NATS[part.size] < 2.0, case.key
 
 
-@pytest.mark.slow
 def test_a_stored_size_shows_as_much_as_it_says() -> None:
     case = BY_KEY["quick-damping"]
     size = stored()[case.key]["damping"]
@@ -282,7 +281,6 @@ def test_the_matrix_the_picture_and_the_page_show_each_answer(tmp_path: Path) ->
     assert "1 of 1 (100.0 %" in text
 
 
-@pytest.mark.slow
 def test_the_robots_move_within_their_ropes() -> None:
     for name in NAMES:
         stage = Stage(Case("made", "empty", name, ()))

@@ -28,13 +28,12 @@ from tests.support.clusters import bare_rows, cluster, rows_of, wait_for
 from tests.support.faults import FAULT, build_faulty
 from tests.support.robots import EXAMPLES
 
-pytestmark = pytest.mark.slow
-
 
 def silently(what: str, done: float) -> None:
     """Tells nobody."""
 
 
+@pytest.mark.validate
 def test_a_worker_killed_in_the_middle_costs_no_row_and_changes_none(tmp_path: Path) -> None:
     plan = read(tmp_path, moving(8))
     out = tmp_path / "out"
@@ -53,6 +52,7 @@ def test_a_worker_killed_in_the_middle_costs_no_row_and_changes_none(tmp_path: P
     assert series.num_rows == 16 * 5
 
 
+@pytest.mark.validate
 def test_a_cluster_of_ours_spends_little_beside_runs() -> None:
     with dask_client(None, 1) as client:
         (found,) = client.run(lambda: {name: dask.config.get(name) for name in clusters.LOW_OVERHEAD_CONFIG}).values()
@@ -66,6 +66,7 @@ def test_the_dashboard_of_ours_needs_a_library_here_that_of_others_there(monkeyp
     assert dashboard_message(SimpleNamespace(cluster=None, dashboard_link=link)) == f"Dask's dashboard: {link}"
 
 
+@pytest.mark.validate
 def test_the_same_rows_come_from_one_worker_and_from_two(tmp_path: Path) -> None:
     plan = read(tmp_path, AT_REST)
     found = []
@@ -78,6 +79,7 @@ def test_the_same_rows_come_from_one_worker_and_from_two(tmp_path: Path) -> None
     assert found[0] == found[1] == bare_rows(plan, tmp_path / "bare")
 
 
+@pytest.mark.validate
 @pytest.mark.skipif(sys.platform == "win32", reason="needs process groups")
 @pytest.mark.parametrize("how", [signal.SIGINT, signal.SIGKILL])
 def test_a_campaign_that_was_stopped_goes_on_where_it_was(how: signal.Signals, tmp_path: Path) -> None:
@@ -111,6 +113,7 @@ def test_a_campaign_that_was_stopped_goes_on_where_it_was(how: signal.Signals, t
     assert (out / "index.html").exists() and not list(out.rglob("*.partial"))
 
 
+@pytest.mark.validate
 def test_a_run_that_ends_its_workers_is_a_row_that_says_so(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     build_faulty(tmp_path)
     file = plan_file(tmp_path, moving(1).replace('method = "sobol"\ncount = 1', 'method = "random"\ncount = 1'))
@@ -129,6 +132,7 @@ def test_a_run_that_ends_its_workers_is_a_row_that_says_so(tmp_path: Path, monke
     assert rows[0]["platform.mass"] is not None
 
 
+@pytest.mark.validate
 def test_a_scheduler_that_is_lost_leaves_what_came_until_then(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     plan = read(tmp_path, moving(16))
     out = tmp_path / "out"
@@ -144,6 +148,7 @@ def test_a_scheduler_that_is_lost_leaves_what_came_until_then(tmp_path: Path, mo
     assert part_files(out)
 
 
+@pytest.mark.validate
 def test_recordings_are_traced_each_to_a_row(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     season = tmp_path / "season"
     season.mkdir()

@@ -21,8 +21,6 @@ from tautwire.campaigns.plan_file import read_plan
 from tests.support.campaigns import moving, plan_file
 from tests.support.clusters import bare_rows, cluster, rows_of
 
-pytestmark = pytest.mark.slow
-
 # Only what the command writes is bounded: what workers keep of FMUs is theirs.
 LIMITED = """
 import resource, sys
@@ -55,6 +53,7 @@ def users(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Users]:
         yield Users(address, folder / "local")
 
 
+@pytest.mark.validate
 def test_two_workers_of_the_users_make_what_a_bare_loop_makes(users: Users, tmp_path: Path) -> None:
     file, out = plan_file(tmp_path, moving(8)), tmp_path / "out"
     told = users.campaign(file, out)
@@ -71,6 +70,7 @@ def test_two_workers_of_the_users_make_what_a_bare_loop_makes(users: Users, tmp_
     assert (again.returncode, again.stdout.splitlines()[0]) == (0, "16 runs, 0 of them now, 0 failed")
 
 
+@pytest.mark.validate
 def test_the_dashboard_is_where_the_command_says(users: Users, tmp_path: Path) -> None:
     pytest.importorskip("bokeh", reason="the dashboard needs bokeh")
     told = users.campaign(plan_file(tmp_path, moving(1)), tmp_path / "out")
@@ -103,6 +103,7 @@ def test_fmus_reach_each_worker_once(users: Users, tmp_path: Path) -> None:
     assert unpacked() == before
 
 
+@pytest.mark.validate
 @pytest.mark.skipif(sys.platform == "win32", reason="there are no such limits")
 @pytest.mark.parametrize(("largest", "kept"), [(2_000, 0), (60_000, 8)], ids=["rows", "page"])
 def test_after_a_full_disk_the_same_command_gives_all_rows(

@@ -96,7 +96,6 @@ def test_linearise_writes_the_model(tmp_path: Path) -> None:
     assert len(model["B"][0]) == len(model["inputs"])
 
 
-@pytest.mark.slow
 def test_trace_finds_the_damping_of_the_shipped_robot(
     tmp_path: Path, short: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -126,7 +125,7 @@ def test_trace_finds_the_damping_of_the_shipped_robot(
     assert (gap**2).mean() ** 0.5 < 1.3 * report["noise_floor"]["tension_rms"]
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_trace_without_a_check_recording_judges_on_the_second_half(
     tmp_path: Path, short: tuple[Path, Path], capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -191,6 +190,7 @@ JSON_RUNS = [
 ]
 
 
+@pytest.mark.validate(but=["build", "simulate", "linearise", "workspace"])
 @pytest.mark.parametrize(("arguments", "out", "keys"), JSON_RUNS, ids=[case[0][0] for case in JSON_RUNS])
 def test_json_is_one_object_and_quiet_is_silent(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], out: str, keys: set[str]
@@ -205,6 +205,7 @@ def test_json_is_one_object_and_quiet_is_silent(
     assert tuple(capsys.readouterr()) == ("", "")
 
 
+@pytest.mark.validate
 def test_nothing_is_coloured_that_is_no_terminal(tmp_path: Path) -> None:
     for colour in ({}, {"NO_COLOR": "1"}):
         process = subprocess.run(
@@ -220,7 +221,7 @@ def test_shipped_robots_are_read(capsys: pytest.CaptureFixture[str]) -> None:
     assert [example(name).cable_count for name in ("three", "caroca", "eight")] == [3, 3, 8]
 
 
-@pytest.mark.slow
+@pytest.mark.validate(but=["trace-0.3", "build"])
 @pytest.mark.parametrize(
     ("command", "delay"), [("trace", 0.3), ("trace", 2.0), ("trace", 6.0), ("simulate", 3.0), ("build", 0.5)]
 )

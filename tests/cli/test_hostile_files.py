@@ -117,7 +117,7 @@ def robot_is_sound(place: Path) -> bool | None:
     return None if robot.fmus else True
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 @settings(HOSTILE, max_examples=EXAMPLES_OF_ROBOTS)
 @given(content=described(ROBOT_TEXT), command=st.sampled_from(sorted(ROBOT_COMMANDS)))
 def test_any_robot_file_is_read_or_refused(
@@ -148,7 +148,7 @@ RECORDING_COMMANDS = {
 SUFFIXES = (".csv", ".csv", ".csv", ".parquet", ".mf4", ".txt", "")
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 @settings(HOSTILE, max_examples=EXAMPLES_OF_RECORDINGS)
 @given(
     content=recorded(RECORDED) | damaged(as_parquet(RECORDED)),
@@ -270,6 +270,7 @@ VAST = {
 }
 
 
+@pytest.mark.validate(but=["many rows", "many"])
 @pytest.mark.parametrize(
     ("case", "reader"), [(case, reader) for case, (_, readers, _) in VAST.items() for reader in readers]
 )
@@ -300,6 +301,7 @@ main()
 """
 
 
+@pytest.mark.validate(but=["noise"])
 @pytest.mark.parametrize(
     ("content", "reader"), [("zip", "build"), ("gzip", "table"), ("Parquet", "fit"), ("MDF", "fit"), ("noise", "fit")]
 )

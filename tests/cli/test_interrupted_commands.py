@@ -93,8 +93,8 @@ CASES = {
 }
 
 
+@pytest.mark.validate(but=["build"])
 @linux
-@pytest.mark.slow
 @pytest.mark.parametrize("case", CASES)
 def test_what_a_killed_run_leaves_is_cleared_by_the_next(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], case: str
@@ -114,7 +114,7 @@ def test_what_a_killed_run_leaves_is_cleared_by_the_next(
     assert names(tmp_path) == ["scratch", "workspace.csv"]
 
 
-@pytest.mark.slow
+@pytest.mark.validate(but=["build"])
 @pytest.mark.skipif(sys.platform == "win32", reason="there are no such signals")
 @pytest.mark.parametrize(("case", "number"), [("build", 1), ("build", 15), ("simulate", 15), ("trace", 15)])
 def test_a_request_to_end_is_like_ctrl_c(tmp_path: Path, case: str, number: int) -> None:
@@ -132,6 +132,7 @@ def test_a_request_to_end_is_like_ctrl_c(tmp_path: Path, case: str, number: int)
     assert names(tmp_path / "scratch") == []
 
 
+@pytest.mark.validate
 def test_a_second_run_to_the_same_target_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     out = tmp_path / "out.csv"
     with begun(tmp_path, [*LONG, "--until", "0.5"], out) as process:
@@ -190,8 +191,9 @@ WRITING = [
 ]
 
 
+@pytest.mark.validate(but=["False"])
 @pytest.mark.skipif(sys.platform == "win32", reason="there are no such limits")
-@pytest.mark.parametrize("already", [False, pytest.param(True, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("already", [False, True])
 def test_a_full_disk_is_told_and_nothing_is_half_written(tmp_path: Path, already: bool) -> None:
     if already:
         (tmp_path / "out").mkdir()
@@ -285,6 +287,7 @@ SHELL = {
 }
 
 
+@pytest.mark.validate(but=["nobody"])
 @linux
 @pytest.mark.parametrize("case", SHELL)
 def test_streams_that_nobody_reads_cost_no_result(tmp_path: Path, case: str) -> None:

@@ -13,7 +13,7 @@ from tests.support.robots import EXAMPLES
 ROBOT = EXAMPLES / "three" / "robot.toml"
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_the_papers_table_is_judged_without_arguments(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["material", "--out", str(tmp_path / "out")]) == 0
     assert sorted(path.name for path in (tmp_path / "out").iterdir()) == [
@@ -31,7 +31,7 @@ def test_the_papers_table_is_judged_without_arguments(tmp_path: Path, capsys: py
     assert "[effect.relaxation]" in (tmp_path / "out" / "relaxation.toml").read_text(encoding="utf-8")
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_a_robot_is_written_with_the_rope_and_reads_back(tmp_path: Path) -> None:
     assert run(["material", str(PAPER_TABLE), "--robot", str(ROBOT), "--out", str(tmp_path)]) == 0
     document = json.loads((tmp_path / "fit.json").read_text(encoding="utf-8"))
@@ -72,7 +72,7 @@ def test_an_input_is_never_written_over(tmp_path: Path, capsys: pytest.CaptureFi
     assert "is an input" in capsys.readouterr().err
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_trace_takes_a_dynamic_test_for_a_recording(tmp_path: Path) -> None:
     assert run(["trace", str(ROBOT), str(PAPER_TABLE), "--out", str(tmp_path)]) == 0
     report = json.loads((tmp_path / "report.json").read_text(encoding="utf-8"))

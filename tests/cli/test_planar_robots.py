@@ -12,7 +12,7 @@ import pytest
 from tautwire.cli import run
 from tests.support.planar import HORIZONTAL, VERTICAL, Plane, planar_case
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.validate
 
 
 def traced(paths: list[Path]) -> dict[str, Any]:

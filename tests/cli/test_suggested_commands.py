@@ -14,7 +14,6 @@ from tests.support.robots import EXAMPLES
 
 THREE = EXAMPLES / "three"
 ROBOT, FIT = str(THREE / "robot.toml"), str(THREE / "fit.csv")
-SLOW = pytest.mark.slow
 PROGRAMS = ["--effects", "damping,payload", "--programs", "2", "--duration", "5"]
 
 CASES = {
@@ -32,7 +31,7 @@ CASES = {
 }
 
 
-@pytest.mark.parametrize("case", [pytest.param(case, marks=SLOW if case == "excite" else ()) for case in CASES])
+@pytest.mark.parametrize("case", CASES)
 def test_the_last_line_names_a_command_that_is_one(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], case: str
 ) -> None:

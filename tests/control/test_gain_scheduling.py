@@ -78,7 +78,7 @@ def test_one_design_takes_over_from_the_next_without_a_bump(three: Robot) -> Non
     assert bumps[0] < 0.05 * bumps[1]
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_scheduled_controller_holds_the_paper_helix_under_noise(three: Robot, three_example_fmus: RobotFmus) -> None:
     design = schedule_controller(three, PAPER_HELIX)
     motion = cosimulate_closed_loop(three_example_fmus, three, design, PAPER_HELIX, 52.0, ClosedLoopOptions(seed=1))

@@ -122,6 +122,7 @@ def test_closed_loop_follows_a_path_that_the_open_loop_misses(name: str, fmus: d
     assert closed.tension.min() > 0.9 * path_tensions(robot, path, closed.time).min()
 
 
+@pytest.mark.validate(but=["three"])
 @pytest.mark.parametrize("name", NAMES)
 def test_noise_of_the_sensors_stays_noise(name: str, fmus: dict[str, RobotFmus]) -> None:
     robot, path = robot_named(name), PATHS[name]
@@ -223,7 +224,7 @@ def test_tension_stays_near_its_limits_where_the_path_asks_for_more(fmus: dict[s
     assert errors(held, quick)[-1] < 1e-4
 
 
-@pytest.mark.slow
+@pytest.mark.validate(but=["1.0-1.2-caroca"])
 @pytest.mark.parametrize("name", NAMES)
 @pytest.mark.parametrize(("modulus", "mass"), [(1.32, 1.0), (1.32, 0.8), (1.0, 1.2)])
 def test_design_holds_another_modulus_and_payload(name: str, modulus: float, mass: float, tmp_path: Path) -> None:
@@ -236,7 +237,7 @@ def test_design_holds_another_modulus_and_payload(name: str, modulus: float, mas
     assert errors(motion, path)[-50:].max() < 2e-3
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 @pytest.mark.parametrize(("name", "path"), [("three", PAPER_HELIX), ("caroca", CAROCA_HELIX)])
 def test_helices_of_the_paper(name: str, path: Helix, fmus: dict[str, RobotFmus]) -> None:
     robot = robot_named(name)

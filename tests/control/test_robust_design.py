@@ -35,7 +35,6 @@ from tests.support.robots import example
 
 Array = NDArray[np.float64]
 
-pytestmark = pytest.mark.slow
 
 PATH = Line((28.86, 0.0, 5.0), (29.5, 0.7, 6.2), 4.0)
 STAY = Line((28.86, 0.0, 5.0), (28.86, 0.0, 5.0), 1.0)
@@ -69,12 +68,14 @@ def test_margins_hold_on_a_finer_grid_than_that_of_the_design(three: Robot, desi
     assert lqg.winch_disk < 0.8 * found.winch_disk
 
 
+@pytest.mark.validate
 def test_loop_is_the_fastest_of_those_that_keep_the_margin(three: Robot, design: RobustController) -> None:
     slower = design_robust(three, robust=RobustAim(margin=0.85))
     assert slower.bandwidth < design.bandwidth
     assert min(slower.margins.winch_disk, slower.margins.sensor_disk) >= 0.85
 
 
+@pytest.mark.validate
 def test_scheduled_loop_keeps_the_margin_along_the_path_and_between_its_places(three: Robot) -> None:
     rise = Line((28.86, 0.0, 5.0), (24.0, 3.0, 14.0), 10.0)
     scheduled = schedule_robust(three, rise, points=3)
@@ -89,6 +90,7 @@ def test_scheduled_loop_keeps_the_margin_along_the_path_and_between_its_places(t
         assert found.min_disk > 0.97 * 2.0 / 3.0
 
 
+@pytest.mark.validate
 def test_margin_that_no_loop_has_is_refused(three: Robot) -> None:
     narrow = Range((118e9, 119e9), (0.99, 1.01))
     with pytest.raises(MarginError, match=r"a disk margin of 1\.9 cannot be kept") as caught:
@@ -96,6 +98,7 @@ def test_margin_that_no_loop_has_is_refused(three: Robot) -> None:
     assert 0.5 < caught.value.achieved < 1.9
 
 
+@pytest.mark.validate
 def test_path_is_held_at_the_corners_of_the_range(three: Robot, design: RobustController, tmp_path: Path) -> None:
     for modulus, payload, robot in Range().robots(three, 2):
         fmus = build_fmus(robot, tmp_path / f"{modulus:g}-{payload:g}")

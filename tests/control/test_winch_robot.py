@@ -53,7 +53,7 @@ def limited_end() -> np.ndarray:
     return end_of(paper_robot(), LIMITED)
 
 
-@pytest.mark.slow
+@pytest.mark.validate(but=["0.02-1e-06"])
 @pytest.mark.parametrize(("step", "bound"), [(0.02, 1e-6), (0.01, 1e-7), (0.002, 1e-8)])
 def test_the_chain_ends_where_the_rig_ends_with_limits_on_the_way(
     winch_fmus: RobotFmus, limited_end: np.ndarray, step: float, bound: float
@@ -64,7 +64,7 @@ def test_the_chain_ends_where_the_rig_ends_with_limits_on_the_way(
     assert motion.statistics.fallback_notes() == ()
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 @pytest.mark.parametrize("tolerance", [1e-4, 1e-6])
 def test_a_tolerance_holds_with_limits_on_the_way(
     winch_fmus: RobotFmus, limited_end: np.ndarray, tolerance: float
@@ -74,7 +74,6 @@ def test_a_tolerance_holds_with_limits_on_the_way(
     assert motion.statistics.steps < 300
 
 
-@pytest.mark.slow
 def test_without_limits_as_well(tmp_path: Path) -> None:
     robot = paper_robot(damping=2.08e9)
     motion = cosimulate(build_fmus(with_winch(robot, FREE), tmp_path), CORNERS, SPEEDS)
@@ -100,7 +99,7 @@ def test_winches_go_first(winch_fmus: RobotFmus) -> None:
         assert coupling.convergence_order == 4
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_stiff_winches_are_no_winches(tmp_path: Path) -> None:
     robot = paper_robot(damping=2.08e9)
     times = np.linspace(0.0, 2.0, 201)
@@ -115,7 +114,7 @@ def test_stiff_winches_are_no_winches(tmp_path: Path) -> None:
     assert gaps[0] / gaps[1] > 50.0
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 @pytest.mark.parametrize("name", ["caroca", "eight"])
 def test_the_controller_holds_its_path_through_winches_of_ten_hertz(name: str, tmp_path: Path) -> None:
     robot, path = example(name), PATHS[name]

@@ -238,7 +238,6 @@ def test_a_failing_robot_keeps_its_run(three_fmus: RobotFmus) -> None:
     assert same(here.motion, apart.motion)
 
 
-@pytest.mark.slow
 def test_a_fresh_process_does_as_well_as_a_fork(faulty: Path, numbers: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(watch, "start_method", lambda: "spawn")
     account, kept = run(faulty)

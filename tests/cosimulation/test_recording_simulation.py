@@ -47,7 +47,7 @@ def test_less_than_two_samples_are_refused(tmp_path: Path) -> None:
         )
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 @pytest.mark.skipif(not TOLD, reason="only Linux tells the resident memory this way")
 def test_memory_stays_flat_over_a_long_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(result_file, "BLOCK_BYTES", 2**17)

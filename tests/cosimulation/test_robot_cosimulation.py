@@ -48,7 +48,7 @@ def test_the_papers_ramp_ends_where_the_rig_ends(three_fmus: RobotFmus, step: fl
     assert ramp_error(three_fmus, paper_robot(), step) < bound
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 @pytest.mark.parametrize(("name", "step"), [("caroca", 0.001), ("eight", 0.001), ("caroca", 0.01), ("eight", 0.01)])
 def test_with_more_cables_the_step_errs_as_little(name: str, step: float, tmp_path: Path) -> None:
     robot = example(name)
@@ -59,7 +59,7 @@ def test_with_more_cables_the_step_errs_as_little(name: str, step: float, tmp_pa
     assert np.max(np.abs(motion.position - exact.position)) < 1e-9 * max(reach, 1.0)
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_steps_of_a_millisecond_add_up_to_nothing(three_fmus: RobotFmus) -> None:
     assert ramp_error(three_fmus, paper_robot(), 0.001) < 1e-9
 
@@ -80,6 +80,7 @@ def test_every_example_follows_the_rig(name: str, tmp_path: Path) -> None:
     assert np.max(np.abs(motion.tension - exact.tension)) < 1e-3
 
 
+@pytest.mark.validate(but=["three"])
 @pytest.mark.parametrize("name", NAMES)
 def test_co_simulation_equals_the_model_in_memory(name: str, tmp_path: Path) -> None:
     robot = with_damping(example(name), 6e8).with_effect(EffectSetting("payload", {"mass": 3.0}))
@@ -93,6 +94,7 @@ def test_co_simulation_equals_the_model_in_memory(name: str, tmp_path: Path) -> 
     assert np.max(np.abs(motion.length - whole.length)) < 1e-8
 
 
+@pytest.mark.validate
 @pytest.mark.parametrize("effect", ["damping", "modulus", "payload"])
 def test_an_effect_in_the_fmus_is_the_effect_in_the_rig(effect: str, tmp_path: Path) -> None:
     robot = example("three")

@@ -37,6 +37,7 @@ def milliseconds(note: str) -> float:
     return float(note.split(" run ")[1].split(" ms")[0])
 
 
+@pytest.mark.validate(but=["tensions-three"])
 @pytest.mark.parametrize("name", ["three", "caroca"])
 @pytest.mark.parametrize("kind", LATE)
 def test_outputs_that_are_late_in_one_recording_only_are_shifted_back(name: str, kind: str) -> None:
@@ -68,6 +69,7 @@ def test_positions_before_their_motion_are_a_clock_even_in_both() -> None:
     assert all("ahead of winch speeds, before the motion" in note for note in notes)
 
 
+@pytest.mark.validate(but=["friction"])
 @pytest.mark.parametrize(
     "effects",
     [

@@ -22,8 +22,6 @@ from tautwire_fmu.laws.effects import BY_NAME
 from tests.support.recordings import recorded
 from tests.support.robots import example
 
-pytestmark = pytest.mark.slow
-
 FRAME = {"unlisted_frame": {"stiffness_constant": 3e6, "viscosity": 2e3, "mass": 50.0}}
 SOFTER = {"modulus": {"modulus": 0.97e11, "cables": [1, 2]}}
 
@@ -47,6 +45,7 @@ def test_a_softer_rope_keeps_its_name() -> None:
     assert list(judged(SOFTER, softer).accepted) == softer
 
 
+@pytest.mark.validate
 def test_softer_ropes_with_damping_make_room_for_the_frame_that_they_stood_for() -> None:
     both = [Hypothesis(BY_NAME[name], (1, 2, 3)) for name in ("modulus", "damping")]
     found = judged(FRAME, both)
@@ -70,6 +69,7 @@ def test_a_frame_without_which_nothing_can_be_run_has_evidence_beyond_measure(mo
     assert found.evidence == (inf,)
 
 
+@pytest.mark.validate
 def test_a_frame_that_gives_way_is_discovered_and_not_named_after_a_rope() -> None:
     found = trace(example("three"), recorded("three", 9, FRAME), recorded("three", 59, FRAME), lambda what, done: None)
     assert found.verdict == "discovered"

@@ -78,7 +78,6 @@ def test_correlations_are_those_of_each_two_parameters_beside_what_else_was_fitt
     assert found[0].value == pytest.approx(-1e7 / (2e8 * 0.1))
 
 
-@pytest.mark.slow
 def test_a_correlation_is_that_of_the_curvature_of_the_likelihood() -> None:
     fitter, chosen, sample, fit = fitted(3)
 
@@ -97,7 +96,7 @@ def test_a_correlation_is_that_of_the_curvature_of_the_likelihood() -> None:
     assert expected < -0.9
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_a_correlation_is_that_of_fits_to_many_recordings() -> None:
     fits = [fitted(seed)[3] for seed in range(SEEDS)]
     errors = np.array([(fit.values - VALUES) / fit.standard_deviations for fit in fits])

@@ -33,6 +33,7 @@ def size_of(found: Identifiability, name: str, parameter: str) -> Detectable:
     return next(d for d in found.detectable if (d.name, d.parameter) == (name, parameter) and d.cables in ((), ALL))
 
 
+@pytest.mark.validate
 def test_an_effect_of_that_size_gains_what_the_threshold_asks_for() -> None:
     hypothesis = Hypothesis(PAYLOAD, ())
     found, _, _ = shown_by(THREE, {}, 11)
@@ -84,6 +85,7 @@ def test_slow_relaxation_can_hardly_be_told_from_modulus() -> None:
     assert found.confusable[0].cosine > 0.999
 
 
+@pytest.mark.validate
 def test_a_size_that_slopes_cannot_see_is_found_by_runs() -> None:
     found, _, _ = shown_by(THREE, {}, 11)
     size = size_of(found, "slack", "softness").size

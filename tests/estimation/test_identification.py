@@ -12,6 +12,8 @@ from tautwire.estimation.cosimulation_validation import cosimulation_errors
 from tests.support.recordings import recorded
 from tests.support.robots import example
 
+pytestmark = pytest.mark.validate
+
 HIDDEN = {"damping": {"damping": 9e8}}
 
 
@@ -20,7 +22,6 @@ def traced() -> Trace:
     return trace(example("three"), fit, check, lambda what, done: None)
 
 
-@pytest.mark.slow
 def test_the_rebuilt_fmus_give_the_error_after() -> None:
     found = traced()
     assert found.verdict == "effects"
@@ -32,7 +33,6 @@ def test_the_rebuilt_fmus_give_the_error_after() -> None:
     assert found.robot_before == example("three")
 
 
-@pytest.mark.slow
 def test_what_was_found_comes_with_its_correlations() -> None:
     # Load cells that show too much weigh like a heavier platform.
     hidden = {"payload": {"mass": 1.5}, "sensor_gain": {"gain": 1.01}}
@@ -43,7 +43,6 @@ def test_what_was_found_comes_with_its_correlations() -> None:
     assert -1.0 < correlation.value < -0.9
 
 
-@pytest.mark.slow
 def test_no_name_is_given_where_the_rebuilt_fmus_miss_the_recording(monkeypatch: pytest.MonkeyPatch) -> None:
     runs = []
 

@@ -74,7 +74,7 @@ def test_a_recording_that_starts_at_rest_does_not_start_in_motion(name: str) -> 
     assert with_motion_at_start(robot, noise, pair) == (noise, ())
 
 
-@pytest.mark.slow
+@pytest.mark.validate(but=["caroca"])
 @pytest.mark.parametrize("name", NAMES)
 def test_a_start_in_motion_leaves_noise_in_filter_and_co_simulation(name: str) -> None:
     pair = [cut(recorded(name, seed), BEGIN[name]) for seed in (1, 2)]
@@ -85,7 +85,7 @@ def test_a_start_in_motion_leaves_noise_in_filter_and_co_simulation(name: str) -
         assert position < 1.2 and tension < 1.2
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_a_swing_under_resting_winches_is_a_start_in_motion() -> None:
     recording = swinging()
     assert np.max(np.abs(recording.winch_speed[:90])) < 2e-3

@@ -37,7 +37,7 @@ def test_a_path_of_sines_begins_and_ends_at_rest_and_has_its_own_derivatives() -
     assert np.max(np.abs(path.scaled(0.5).position(times) - position[0])) < np.max(np.abs(position - position[0]))
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_the_best_program_is_within_the_limits_and_better_than_most() -> None:
     effects = effects_by_name(THREE, "damping,relaxation")
     found = design_excitation(THREE, effects, LIMITS, 3.0, 0.05, 10, 1, quiet)

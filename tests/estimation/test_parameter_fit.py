@@ -10,7 +10,6 @@ from tests.support.recordings import recorded
 from tests.support.robots import example
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("begin", [1.0, 0.0, -1e-15, 40.0])
 def test_a_fit_arrives_wherever_it_begins(begin: float) -> None:
     robot = example("caroca").with_effect(EffectSetting("payload", {"mass": begin}))
@@ -22,7 +21,7 @@ def test_a_fit_arrives_wherever_it_begins(begin: float) -> None:
     assert fit.standard_deviations[0] < 0.05
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_a_relaxation_is_found_that_is_quicker_than_where_the_fit_begins() -> None:
     truth = {"modulus": 3e10, "time": 0.003}
     robot, recording = example("three"), recorded("three", 3, {"relaxation": truth})

@@ -46,7 +46,7 @@ def test_a_clock_that_leaves_more_than_noise_waits_behind_the_recordings_as_they
     assert second.split.estimation.recording is not first.split.estimation.recording
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_an_effect_that_explains_all_goes_before_a_clock(monkeypatch: pytest.MonkeyPatch) -> None:
     def always(fitter: Fitter, robot: Robot, evidence: DataSplit) -> tuple[DataSplit, tuple[str, ...]]:
         late = shifted(evidence.estimation.recording, 0.01, CHANNEL_GROUPS[1])
@@ -58,7 +58,7 @@ def test_an_effect_that_explains_all_goes_before_a_clock(monkeypatch: pytest.Mon
     assert not any("clock" in note for note in found.notes)
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_a_clock_beside_an_effect_is_set_once_no_effect_explains_all() -> None:
     found = trace(THREE, recorded("three", 1, {"payload": {"mass": 6.0}, **LATE}), pair({"payload": {"mass": 6.0}})[1])
     assert [effect.name for effect in found.effects] == ["payload"]

@@ -40,11 +40,13 @@ def left_at(made: Made, values: list[float]) -> float:
     return float(np.nansum(found.values[sample.rows] ** 2))
 
 
+@pytest.mark.validate
 def test_a_round_surface_keeps_the_curvatures_interval() -> None:
     fitter, chosen, sample, fit = fitted("damping", {"damping": {"damping": 8e8}})
     assert profile_intervals(fitter, fit, chosen, sample, HERE) == [fit.interval(0)]
 
 
+@pytest.mark.validate
 def test_ends_leave_as_much_as_the_level_says_with_the_other_parameter_at_its_best() -> None:
     made = fitted("relaxation", {"relaxation": {"modulus": 2e9, "time": 5.0}})
     fitter, chosen, sample, fit = made
@@ -89,7 +91,7 @@ def several(names: tuple[str, ...], truth: dict[str, dict[str, float]]) -> Made:
     return fitter, chosen, sample, fitter.fit(robot, chosen, sample)
 
 
-@pytest.mark.slow
+@pytest.mark.validate(but=["friction"])
 @pytest.mark.parametrize(
     "names", [("modulus", "relaxation"), ("relaxation", "hysteresis"), ("friction", "thermal")], ids="-".join
 )
@@ -111,6 +113,7 @@ def test_a_fit_that_is_not_the_best_gets_the_interval_about_the_best() -> None:
     assert (found, reached) == pytest.approx((low, high), abs=0.05 * (high - low))
 
 
+@pytest.mark.validate
 def test_workers_find_the_same_ends() -> None:
     fitter, chosen, sample, fit = fitted("relaxation", {"relaxation": {"modulus": 2e9, "time": 5.0}})
     with WorkerPool(2) as workers:

@@ -96,7 +96,7 @@ def test_a_noise_that_was_declared_too_small_leaves_noise() -> None:
     assert noise_is_left(prepared)
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_what_is_hidden_is_found_in_recordings_as_they_are() -> None:
     effects: dict[str, Any] = {"payload": {"mass": 6.0}}
     pair = (spoilt(recorded("three", seed, effects)) for seed in (3, 53))

@@ -33,6 +33,7 @@ def test_what_is_there_promises_most_and_its_values() -> None:
     assert found[best].values["mass"] == pytest.approx(0.5, rel=0.05)
 
 
+@pytest.mark.validate
 def test_workers_promise_the_same() -> None:
     damped = Hypothesis(BY_NAME["damping"], ROBOT.cable_numbers)
     robot, accepted = ROBOT.with_effect(damped.setting(ROBOT)), (damped,)
@@ -46,6 +47,7 @@ def test_workers_promise_the_same() -> None:
         assert apart[hypothesis].values == pytest.approx(dict(prospect.values), rel=1e-6)
 
 
+@pytest.mark.validate
 def test_far_from_noise_a_rough_look_tells_what_slopes_do_not(tmp_path: Path) -> None:
     """After a second the oscillations of a platform a fifth lighter are out of phase with the model's."""
     robot_file, fit, check = planar_case(tmp_path, VERTICAL, {"payload": {"mass": -1.0}}, 1, preferred=30.0)

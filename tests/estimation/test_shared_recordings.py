@@ -8,7 +8,7 @@ from tautwire.robot.robot_file_reader import read_robot
 from tests.support.folders import SHARED_RECORDINGS as FOLDER
 
 pytestmark = [
-    pytest.mark.slow,
+    pytest.mark.validate,
     pytest.mark.skipif(not FOLDER.is_dir(), reason="no shared recordings beside the project"),
 ]
 

@@ -52,7 +52,7 @@ HIDDEN: list[tuple[str, dict[str, Any]]] = [
 ]
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 @pytest.mark.parametrize(("name", "effects"), HIDDEN, ids=str)
 def test_a_hidden_effect_is_named_and_measured(name: str, effects: dict[str, Any]) -> None:
     found, noise_is_left = searched(name, 3, effects)
@@ -65,14 +65,14 @@ def test_a_hidden_effect_is_named_and_measured(name: str, effects: dict[str, Any
     assert abs(found.fit.values[0] - truth) < 4.5 * found.fit.standard_deviations[0]
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_two_effects_are_found_together() -> None:
     found, noise_is_left = searched("three", 4, {"damping": {"damping": 9e8}, "payload": {"mass": 6.0}})
     assert {h.effect.name for h in found.accepted} == {"damping", "payload"}
     assert noise_is_left
 
 
-@pytest.mark.slow
+@pytest.mark.validate(but=["three"])
 @pytest.mark.parametrize("name", ["three", "caroca"])
 def test_where_nothing_is_hidden_nothing_is_found(name: str) -> None:
     for seed in (5, 6):
@@ -81,13 +81,13 @@ def test_where_nothing_is_hidden_nothing_is_found(name: str) -> None:
         assert noise_is_left
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_an_effect_outside_the_list_leaves_more_than_noise() -> None:
     _, noise_is_left = searched("three", 7, {"unlisted_swing": {"mass": 20.0, "length": 2.0}})
     assert not noise_is_left
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_tensions_alone_are_enough() -> None:
     robot = example("three")
     effects = {"damping": {"damping": 9e8}}
@@ -97,13 +97,12 @@ def test_tensions_alone_are_enough() -> None:
     assert abs(found.fit.values[0] - 9e8) < 4.5 * found.fit.standard_deviations[0]
 
 
-@pytest.mark.slow
 def test_a_gap_in_time_is_no_effect() -> None:
     fit, check = recorded("three", 5, gap=(6.0, 6.8)), recorded("three", 55, gap=(3.0, 4.5))
     assert found_in(example("three"), fit, check).accepted == ()
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_a_declared_effect_that_is_wrong_is_replaced() -> None:
     robot = example("three").with_effect(EffectSetting("damping", {"damping": 6e8}, (1, 2, 3)))
     found = found_in(robot, *pair("three", 3, {"damping": {"damping": 9e8}}))
@@ -111,7 +110,7 @@ def test_a_declared_effect_that_is_wrong_is_replaced() -> None:
     assert found.fit.robot.effects[0].values["damping"] == pytest.approx(9e8, rel=0.05)
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_two_cables_may_be_softer_each_by_its_own() -> None:
     effects = {"modulus": [{"modulus": 0.92e11, "cables": [1]}, {"modulus": 1.1e11, "cables": [3]}]}
     found = found_in(example("three"), *pair("three", 8, effects))

@@ -23,7 +23,6 @@ def traced(effects: dict[str, Any]) -> Trace:
     return trace(example("three"), fit, check, lambda what, done: None)
 
 
-@pytest.mark.slow
 def test_a_formula_that_is_discovered_runs_in_the_fmus(tmp_path: Path) -> None:
     found = traced({"unlisted_sideways": {"constant": 30.0}})
     assert found.verdict == "discovered"
@@ -41,7 +40,6 @@ def test_a_formula_that_is_discovered_runs_in_the_fmus(tmp_path: Path) -> None:
     assert np.allclose(again.position, found.comparisons[0].after.position[:101], atol=1e-9)
 
 
-@pytest.mark.slow
 def test_what_swings_is_not_explained_but_said() -> None:
     found = traced({"unlisted_swing": {"mass": 20.0, "length": 2.0}})
     assert found.verdict == "unexplained"

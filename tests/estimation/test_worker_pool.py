@@ -35,6 +35,7 @@ def sleep_for_long(folder: Path) -> None:
     time.sleep(600.0)
 
 
+@pytest.mark.validate
 def test_processes_may_be_begun_before_there_is_work() -> None:
     with WorkerPool(1) as here, WorkerPool(2) as apart:
         here.warm_up()
@@ -42,6 +43,7 @@ def test_processes_may_be_begun_before_there_is_work() -> None:
         assert here.submit(square, 3).result() == apart.submit(square, 3).result() == 9
 
 
+@pytest.mark.validate
 @pytest.mark.parametrize("count", [1, 2])
 def test_each_call_is_answered_by_its_number(count: int) -> None:
     with WorkerPool(count) as workers:
@@ -60,6 +62,7 @@ def test_one_worker_is_this_process_and_two_are_others(tmp_path: Path) -> None:
     assert os.getpid() not in others
 
 
+@pytest.mark.validate
 @pytest.mark.parametrize("count", [1, 2])
 def test_what_a_call_raises_is_raised_here(count: int) -> None:
     with WorkerPool(count) as workers:
@@ -80,6 +83,7 @@ def test_an_interrupt_ends_work_that_has_begun(tmp_path: Path) -> None:
     assert time.perf_counter() - began < 60.0
 
 
+@pytest.mark.validate
 def test_a_worker_that_ends_by_itself_is_told() -> None:
     with WorkerPool(2) as workers, pytest.raises(WorkerLostError, match="one of 2 worker processes"):
         workers.submit(end_at_once).result()

@@ -83,6 +83,7 @@ def difference(
     return float(np.max(np.abs(own.position - other.position)))
 
 
+@pytest.mark.validate(but=["three"])
 @pytest.mark.parametrize("name", sorted(PATHS))
 def test_lqg_gives_the_same_numbers_as_fmu(name: str, tmp_path: Path) -> None:
     robot = example(name)
@@ -100,23 +101,26 @@ def test_shaped_path_does_so(three: Robot, three_example_fmus: RobotFmus, tmp_pa
     assert difference(three, three_example_fmus, Feedforward(3), tmp_path, moved=path) < 1e-9
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_robust_controllers_do_so(three: Robot, three_example_fmus: RobotFmus, tmp_path: Path) -> None:
     assert difference(three, three_example_fmus, design_robust(three), tmp_path, pushed=True) < 1e-9
     scheduled = schedule_robust(three, PATHS["three"], points=3)
     assert difference(three, three_example_fmus, scheduled, tmp_path, pushed=True) < 1e-9
 
 
+@pytest.mark.validate
 def test_limits_act_alike(three: Robot, three_example_fmus: RobotFmus, tmp_path: Path) -> None:
     aim = ControlAim(speed_limit=0.5, acceleration_limit=1.0, highest_tension=1750.0, lowest_tension=1450.0)
     assert difference(three, three_example_fmus, design_controller(three, aim), tmp_path) < 1e-9
 
 
+@pytest.mark.validate
 def test_payload_that_nobody_declared_is_tared_alike(three: Robot, tmp_path: Path) -> None:
     fmus = build_fmus(robot_with(three, 1.2e11, 0.8), tmp_path)
     assert difference(three, fmus, design_controller(three), tmp_path) < 1e-9
 
 
+@pytest.mark.validate
 def test_winches_are_asked_for_the_same_speeds(three: Robot, tmp_path: Path) -> None:
     robot = with_winch(three, LIMITED)
     assert difference(robot, build_fmus(robot, tmp_path), design_controller(robot), tmp_path) < 1e-9

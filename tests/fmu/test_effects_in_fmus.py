@@ -42,7 +42,7 @@ def test_effects_in_the_fmus_are_those_of_the_rig(cases: tuple[Case, ...], tmp_p
 SHAKEN = ("relaxation", "hysteresis", "creep", "sag", "pulley", "friction", "sensor_delay")
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 @pytest.mark.parametrize("name", SHAKEN)
 def test_they_are_so_with_eight_cables_that_shake(name: str, tmp_path: Path) -> None:
     case = [case for case in CASES if case.name == name and "position_delay" not in case.law][-1]

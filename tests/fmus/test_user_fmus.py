@@ -70,7 +70,6 @@ def end_errors(own: tuple[UserFmu, ...], exact: np.ndarray, folder: Path) -> lis
     ]
 
 
-@pytest.mark.slow
 def test_a_plain_platform_without_rates_and_states_is_of_second_order(platform: Path, tmp_path: Path) -> None:
     exact = simulate(rig_of(paper_robot()), None, RampProgram(RAMP, 1.0), CORNERS, rtol=1e-12, atol=1e-13)
     coarse, fine = end_errors((UserFmu("platform", platform),), exact.position[-1], tmp_path)
@@ -79,7 +78,7 @@ def test_a_plain_platform_without_rates_and_states_is_of_second_order(platform: 
     assert coarse / fine == pytest.approx(100.0, rel=0.1)
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 @needs_compiler
 def test_winches_from_a_c_compiler_are_of_second_order(winch: Path, tmp_path: Path) -> None:
     exact = simulate(rig_of(paper_robot()), None, LaggedRamps(), CORNERS, rtol=1e-12, atol=1e-13)
@@ -100,7 +99,6 @@ def test_what_it_goes_on_without_is_said(platform: Path, tmp_path: Path) -> None
     assert motion.statistics.iterations == 0
 
 
-@pytest.mark.slow
 def test_a_plain_cable_is_told_where_the_run_starts_and_its_lacking_columns_are_left_out(tmp_path: Path) -> None:
     robot, own = paper_robot(), (UserFmu("cable_2", spring_cable(tmp_path)),)
     linear = [replace(cable, law="linear") if place == 1 else cable for place, cable in enumerate(robot.cables)]
@@ -129,7 +127,6 @@ def test_a_rate_worked_out_is_as_good_as_it_says(winch: Path, tmp_path: Path) ->
     assert error < doubt < 1.0
 
 
-@pytest.mark.slow
 def test_the_command_line_says_it_with_the_error(
     platform: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:

@@ -55,7 +55,7 @@ def swings(system: Any) -> NDArray[np.complex128]:
     return np.array(sorted(poles[poles.imag > 1.0], key=lambda pole: pole.imag))
 
 
-@pytest.mark.slow
+@pytest.mark.validate(but=["three"])
 @pytest.mark.parametrize("name", NAMES)
 def test_it_is_the_plant_of_the_laws(name: str, tmp_path: Path) -> None:
     robot = example(name)
@@ -74,7 +74,7 @@ def smooth(case: Case) -> bool:
     return case.name not in ("hysteresis", "sensor_delay") and "slip" not in case.law
 
 
-@pytest.mark.slow
+@pytest.mark.validate(but=["relaxation"])
 @pytest.mark.parametrize("case", [case for case in CASES if smooth(case)], ids=str)
 def test_it_is_the_plant_of_the_laws_with_each_effect(case: Case, tmp_path: Path) -> None:
     robot = with_effects(paper_robot(damping=4e8), case)
@@ -85,7 +85,7 @@ def test_it_is_the_plant_of_the_laws_with_each_effect(case: Case, tmp_path: Path
     assert max(distances(found, exact).values()) < AGREES
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_effects_are_found_with_their_states(tmp_path: Path) -> None:
     robot = paper_robot(damping=4e8)
     effects = {
@@ -102,7 +102,6 @@ def test_effects_are_found_with_their_states(tmp_path: Path) -> None:
     assert max(distances(found, exact).values()) < AGREES
 
 
-@pytest.mark.slow
 def test_states_that_are_not_named_are_found(damped_fmus: RobotFmus) -> None:
     exact = linearise(paper_robot(damping=2.08e9)).system
     found = linearise_robot_fmus(damped_fmus, states=()).system
@@ -114,7 +113,7 @@ def test_states_that_are_not_named_are_found(damped_fmus: RobotFmus) -> None:
     assert swings(found) == pytest.approx(swings(exact), rel=AGREES)
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_winches_add_their_speed_loops(tmp_path: Path) -> None:
     winch = Winch(drum_radius=0.2, bandwidth=8.0, damping_ratio=0.7)
     plain = paper_robot(damping=2.08e9)
@@ -135,7 +134,7 @@ def own_robot(robot: Robot, slot: str, path: Path, folder: Path) -> RobotFmus:
     return build_fmus(replace(robot, fmus=(UserFmu(slot, path),)), folder)
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 @needs_compiler
 def test_a_robot_with_a_users_winch(tmp_path: Path) -> None:
     robot = paper_robot(damping=2.08e9)
@@ -148,7 +147,7 @@ def test_a_robot_with_a_users_winch(tmp_path: Path) -> None:
     assert swings(found.system) == pytest.approx(swings(exact), rel=AGREES)
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_a_robot_with_a_users_platform_that_cannot_save_its_state(tmp_path: Path) -> None:
     robot = paper_robot(damping=2.08e9)
     found = linearise_robot_fmus(own_robot(robot, "platform", falling_mass(tmp_path), tmp_path / "built"))
@@ -217,7 +216,7 @@ def test_a_port_that_the_master_does_not_drive_is_refused(tmp_path: Path) -> Non
         linearise_fmus(make, {"v": speed}, {"v": speed})
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_states_that_do_not_tell_all_are_refused(damped_fmus: RobotFmus) -> None:
     with pytest.raises(IdentificationError, match=r"name all states, or none|short enough"):
         linearise_robot_fmus(damped_fmus, states=["position_x", "velocity_x"])
@@ -228,14 +227,13 @@ def test_an_unknown_state_is_refused(damped_fmus: RobotFmus) -> None:
         linearise_robot_fmus(damped_fmus, states=["speed"])
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_dead_time_is_refused(tmp_path: Path) -> None:
     robot = paper_robot(damping=4e8).with_effect(EffectSetting("sensor_delay", {"position_delay": 0.05}, (1, 2, 3)))
     with pytest.raises(IdentificationError):
         linearise_robot_fmus(build_fmus(robot, tmp_path))
 
 
-@pytest.mark.slow
 def test_drift_is_said(tmp_path: Path) -> None:
     setting = EffectSetting("thermal", {"rise": 10.0, "time": 20.0, "expansion": 1.2e-5}, (1, 2, 3))
     robot = paper_robot(damping=4e8).with_effect(setting)
@@ -250,7 +248,7 @@ def slipping(slip: float) -> Robot:
     return robot.with_effect(EffectSetting("drum", {"slip": slip}, (1,)))
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_a_small_kink_at_rest_is_said(tmp_path: Path) -> None:
     notes = linearise_robot_fmus(build_fmus(slipping(2e-5), tmp_path)).notes
     assert len(notes) == 1

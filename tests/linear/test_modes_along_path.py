@@ -43,6 +43,7 @@ def test_a_coarse_path_finds_the_same_modes_as_a_fine_one() -> None:
     assert coarse.modal_assurance.min() < 0.6
 
 
+@pytest.mark.validate
 def test_modes_that_come_near_cross_however_finely_the_path_is_cut() -> None:
     # The two upper modes miss each other by 0.03 %, and turn into each other within a few centimetres.
     path = Line((28.86, 0.0, 5.0), (20.3, 0.23, 8.5), 7.0)

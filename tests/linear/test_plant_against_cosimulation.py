@@ -28,7 +28,7 @@ def fmus(robot: Robot, tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
     return build_fmus(robot, tmp_path_factory.mktemp(robot.name))
 
 
-@pytest.mark.slow
+@pytest.mark.validate(but=["three"])
 @pytest.mark.parametrize("mode", [0, 1, 2])
 def test_free_decay_has_frequency_and_damping_of_the_mode(robot: Robot, fmus: RobotFmus, mode: int) -> None:
     plant = linearise(robot)
@@ -60,7 +60,7 @@ def decay(robot: Robot, fmus: RobotFmus, plant: LinearPlant, mode: int) -> tuple
     return time[count:] - time[count], swing[count:]
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_a_swept_sine_has_gain_and_phase_of_the_transfer_functions(robot: Robot, fmus: RobotFmus) -> None:
     plant = linearise(robot)
     low, high = 0.6 * plant.modes.frequencies[0], 1.4 * plant.modes.frequencies[-1]

@@ -12,13 +12,13 @@ FREQUENCY = np.geomspace(0.1, 20.0, 8)
 BRANCH = (MaxwellBranch(25e9, 0.4),)
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_constant_pairs_are_left_alone() -> None:
     for seed in range(8):
         assert select_model(observed(CONSTANT, FREQUENCY, 0.02, seed), 0.01).chosen == PAIR
 
 
-@pytest.mark.slow
+@pytest.mark.validate(but=["material0"])
 @pytest.mark.parametrize(
     ("material", "effects"),
     [

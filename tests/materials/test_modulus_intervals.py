@@ -47,7 +47,7 @@ def test_a_side_that_only_a_bound_ends_is_open() -> None:
     assert not damping.high_is_open
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_intervals_of_a_branch_hold_the_truth_as_often_as_they_say() -> None:
     true = Material(100e9, 0.3e9, (MaxwellBranch(30e9, 0.5),))
     terms = ModelStructure(damping=True, branches=1)

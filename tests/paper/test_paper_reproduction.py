@@ -21,7 +21,8 @@ from tautwire.paper.ramp_runs import remaining_amplitude
 from tautwire.paper.simulation_records import Records, max_abs
 from tests.rig import RampProgram, paper_robot, simulate
 
-pytestmark = pytest.mark.slow
+pytestmark = pytest.mark.validate
+
 
 FIGURE_NAMES = {name for names in SECTION_FIGURES.values() for name in names} | {
     "beyond_drum",

@@ -24,7 +24,7 @@ from tautwire.paper.rope_tests import (
 ROPE = RobotMaterial(1.0e11, 0.4e9, (MaxwellBranch(3e10, 1.5),))
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_loops_have_the_complex_modulus_of_the_rope() -> None:
     runs = run_tensile_and_dynamic_tests(ROPE)
     material = Material(ROPE.modulus, ROPE.damping, ROPE.branches)
@@ -44,7 +44,7 @@ def test_elastic_rope_returns_its_modulus_by_equation_7() -> None:
     assert abs(np.argmax(runs.tensile.load) - len(runs.tensile.load) // 2) <= 1, "up and down again"
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_relaxing_rope_has_the_static_modulus_and_most_of_the_rise() -> None:
     rope = relaxing_rope()
     assert rope.modulus == pytest.approx(102.2e9, rel=0.02)

@@ -52,7 +52,6 @@ def code_of(page: str) -> dict[str, str]:
     return {title or str(number): code for number, (title, code) in enumerate(blocks)}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("page", ["index.md", "linear.md"])
 def test_examples_of_a_page_run(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
@@ -60,7 +59,6 @@ def test_examples_of_a_page_run(page: str, tmp_path: Path, monkeypatch: pytest.M
         exec(compile(code, page, "exec"), {})
 
 
-@pytest.mark.slow
 def test_example_of_the_controllers_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (example,) = code_of("control.md").values()
@@ -70,7 +68,6 @@ def test_example_of_the_controllers_page_runs(tmp_path: Path, monkeypatch: pytes
     assert abs(difference).max() < 1e-9
 
 
-@pytest.mark.slow
 def test_an_effect_is_added_by_following_its_page(tmp_path: Path) -> None:
     for source in ("system/tautwire", "fmu_src/tautwire_fmu"):
         shutil.copytree(ROOT / source, tmp_path / source, ignore=shutil.ignore_patterns("__pycache__"))
@@ -98,7 +95,6 @@ def put_in(file: Path, where: str, text: str) -> None:
     file.write_text(changed, encoding="utf-8")
 
 
-@pytest.mark.slow
 def test_the_site_builds_without_a_warning_and_asks_nothing_of_the_network(tmp_path: Path) -> None:
     pytest.importorskip("material", reason="mkdocs-material is not installed: pip install mkdocs-material")
     build = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path)]

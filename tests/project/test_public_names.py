@@ -41,7 +41,7 @@ def test_type_checkers_see_the_same_names() -> None:
     assert Path(str(tautwire.__file__)).with_name("py.typed").exists()
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_a_type_checker_refuses_names_that_are_not_ours(tmp_path: Path) -> None:
     (tmp_path / "user.py").write_text("from tautwire import tracee\n", encoding="utf-8")
     root = Path(str(tautwire.__file__)).parents[1]

@@ -16,7 +16,7 @@ LEFT_OUT = ("trace", "excite", "paper", "campaign")
 README = ROOT / "README.md"
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_every_python_example_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
@@ -46,7 +46,7 @@ def test_the_shell_s_variable_is_the_folder_of_a_shipped_robot() -> None:
     assert (README.parent / folder).resolve() == (EXAMPLES / "three").resolve()
 
 
-@pytest.mark.slow
+@pytest.mark.validate(but=["new", "check", "build", "fmus"])
 @pytest.mark.parametrize(
     "words", [each for each in shown_commands() if each[0] not in LEFT_OUT], ids=lambda each: each[0]
 )

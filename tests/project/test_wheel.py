@@ -44,7 +44,7 @@ def built(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return folder
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_both_packages_and_the_examples_are_in_the_wheel(built: Path) -> None:
     (wheel,) = built.glob("tautwire-*.whl")
     names = set(zipfile.ZipFile(wheel).namelist())
@@ -61,7 +61,7 @@ def test_both_packages_and_the_examples_are_in_the_wheel(built: Path) -> None:
     assert not [name for name in names if name.startswith(("tests", "build")) or "__pycache__" in name]
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_what_the_documents_name_is_in_the_sdist(built: Path) -> None:
     (sdist,) = built.glob("tautwire-*.tar.gz")
     with tarfile.open(sdist) as archive:
@@ -72,7 +72,7 @@ def test_what_the_documents_name_is_in_the_sdist(built: Path) -> None:
     assert "tests/project/test_wheel.py" in names
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 @pytest.mark.parametrize("version", SUPPORTED)
 def test_it_works_in_an_empty_environment(version: str, built: Path, tmp_path: Path) -> None:
     python = interpreters().get(version)

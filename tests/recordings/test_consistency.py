@@ -69,6 +69,7 @@ def test_a_start_far_from_the_robot_files_is_taken_where_the_ropes_fit(name: str
     assert "starts where it says" in notes[0]
 
 
+@pytest.mark.validate(but=["effects4"])
 @pytest.mark.parametrize(
     "effects",
     [

@@ -52,7 +52,6 @@ def test_page_loads_in_silence_and_asks_for_nothing_but_itself(
     assert outside == [pages[kind].resolve().as_uri()]
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("screen", [LAPTOP, PHONE_DARK], ids=lambda screen: screen.name)
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_plot_is_empty(browser: Browser, pages: dict[str, Path], kind: str, screen: Screen) -> None:

@@ -14,7 +14,7 @@ from tests.support.effect_cases import CASES, PAIRS, Case
 from tests.support.robots import example, gentle_speeds
 
 EXACT = Accuracy("DOP853", 1e-11, 1e-12)
-SLOW_EIGHT = pytest.param("eight", marks=pytest.mark.slow)
+SLOW_EIGHT = pytest.param("eight", marks=pytest.mark.validate)
 
 
 def with_effects(robot: Robot, *cases: Case) -> Robot:

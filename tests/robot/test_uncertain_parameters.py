@@ -77,7 +77,7 @@ def test_they_are_states_that_never_move_and_start_as_declared() -> None:
     assert np.array_equal(np.array(DM(model.start[: plain.states.numel()])), np.array(DM(plain.start)))
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_a_stiffness_within_what_is_stated_is_no_effect_and_is_put_right() -> None:
     found = traced(unsure(modulus=3e9), STIFFER)
     assert found.verdict == "none"
@@ -90,7 +90,7 @@ def test_a_stiffness_within_what_is_stated_is_no_effect_and_is_put_right() -> No
         assert comparison.errors_after.tension_rms < comparison.errors_before.tension_rms
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_a_mass_within_what_is_stated_is_no_payload() -> None:
     found = traced(unsure(mass=3.0), {"payload": {"mass": 2.0}})
     assert found.verdict == "none"
@@ -101,7 +101,7 @@ def test_a_mass_within_what_is_stated_is_no_payload() -> None:
     assert found.components.faulty_component == "nothing"
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_a_tracker_off_its_frame_is_no_anchor_elsewhere() -> None:
     robot = example("three")
     robot = replace(robot, sensors=replace(robot.sensors, position_offset_uncertainty=5e-3))
@@ -113,14 +113,14 @@ def test_a_tracker_off_its_frame_is_no_anchor_elsewhere() -> None:
     assert found.components.faulty_component == "nothing"
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_a_stiffness_far_beyond_what_is_stated_is_an_effect() -> None:
     found = traced(unsure(modulus=2e8), STIFFER)
     assert [effect.name for effect in found.effects] == ["modulus"]
     assert found.effects[0].parameters["modulus"].value == pytest.approx(1.03 * 1.022e11, rel=2e-3)
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_an_effect_is_found_beside_load_cells_that_are_off_zero() -> None:
     off = (8.0, -5.0, 12.0)
     found = traced(unsure(tension=10.0), DAMPING, off)
@@ -131,7 +131,7 @@ def test_an_effect_is_found_beside_load_cells_that_are_off_zero() -> None:
         assert comparison.errors_after.tension_rms < 1.2 * found.noise_floor.tension_rms
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_load_cells_off_zero_are_none_where_that_is_stated_and_no_listed_effect_where_not() -> None:
     off = (8.0, -5.0, 12.0)
     found = traced(unsure(tension=10.0), {}, off)

@@ -40,24 +40,24 @@ def found_in(effects: dict[str, Any], pattern: str) -> list[float]:
     return [float(number) for number in numbers.groups()]
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_a_force_across_the_motion() -> None:
     across, along = found_in({"unlisted_sideways": {"constant": 30.0}}, r"force_x = #\*vy; force_y = #\*vx")
     assert (across, along) == pytest.approx((-30.0, 30.0), rel=0.01)
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_a_rope_that_stiffens() -> None:
     (factor,) = found_in({"unlisted_stiffening": {"quadratic": 100.0}}, r"tension = #\*tension\*\*2")
     assert factor == pytest.approx(100.0 / AXIAL, rel=0.01)
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_a_tank_that_fills() -> None:
     assert found_in({"unlisted_filling": {"rate": 1.0}}, r"mass = #\*time") == pytest.approx([1.0], rel=0.01)
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_a_machine_that_shakes() -> None:
     shaken = {"unlisted_shaker": {"amplitude": [10.0, 0.0, 10.0], "frequency": 1.7}}
     first, pace, second, same = found_in(shaken, r"force_x = #\*sin\(#\*time\); force_z = #\*sin\(#\*time\)")
@@ -65,7 +65,6 @@ def test_a_machine_that_shakes() -> None:
     assert pace == same == pytest.approx(10.6814, rel=1e-4)
 
 
-@pytest.mark.slow
 def test_a_formula_of_the_robot_file_stays() -> None:
     half = replace(ROBOT, formulas=(Formula("force_x", "-30*vy"),))
     found = discovered({"unlisted_sideways": {"constant": 30.0}}, robot=half)
@@ -75,13 +74,12 @@ def test_a_formula_of_the_robot_file_stays() -> None:
     assert found.robot.formulas == (*half.formulas, *found.formulas)
 
 
-@pytest.mark.slow
 def test_nothing_is_found_where_nothing_is_hidden() -> None:
     found = [discovered({}, seed) for seed in (5, 6)]
     assert not any(each is not None and each.is_accepted(THRESHOLD) for each in found)
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 @pytest.mark.parametrize(
     "effects",
     [
@@ -97,7 +95,7 @@ def test_a_known_effect_by_another_name_earns_no_place(effects: dict[str, Any]) 
     assert not found.is_accepted(THRESHOLD)
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 def test_what_swings_has_no_formula() -> None:
     found = discovered({"unlisted_swing": {"mass": 20.0, "length": 2.0}})
     assert found is None or not found.residuals_are_white

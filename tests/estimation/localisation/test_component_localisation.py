@@ -58,6 +58,7 @@ def part(components: FaultLocalisation, component: str, quantity: str = "tension
     return next(p for p in components.residuals if (p.component, p.quantity) == (component, quantity))
 
 
+@pytest.mark.validate(but=["payload", "friction"])
 @pytest.mark.parametrize(("effects", "blamed"), HIDDEN, ids=str)
 def test_the_component_in_question_is_named(effects: dict[str, Any], blamed: str) -> None:
     assert found(effects).faulty_component == blamed
@@ -98,6 +99,7 @@ def test_a_payload_shows_by_its_weight_and_not_at_the_cables() -> None:
     assert components.ranking[0].quantity == "force z"
 
 
+@pytest.mark.validate
 def test_a_swinging_load_rings_at_the_platform_with_its_frequency() -> None:
     components = found({"unlisted_swing": {"mass": 20.0, "length": 2.0}})
     assert components.faulty_component == "platform"
@@ -159,7 +161,7 @@ def test_a_flat_robot_needs_no_positions_across_it() -> None:
     assert components.faulty_component == "nothing"
 
 
-@pytest.mark.slow
+@pytest.mark.validate
 @pytest.mark.parametrize("name", ["caroca", "eight"])
 def test_other_robots_are_cut_as_well(name: str) -> None:
     robot = example(name)
