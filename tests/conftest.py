@@ -43,7 +43,7 @@ SLOWEST_FIRST = (
     "campaign_run",
     "input_design",
     "profile_likelihood",
-    "prepared_data",
+    "preprocessing",
     "initial_motion",
     "winch_slave",
     "user_fmus",
