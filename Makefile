@@ -71,5 +71,5 @@ bench-campaign: $(READY)
 	$(BIN)/python -m tests.bench.campaign
 
 clean:
-	rm -rf $(VENV) $(FLOORS) build/* dist
+	rm -rf $(VENV) $(FLOORS) .venv-wheels build/* dist
 	git checkout -- build/README.md

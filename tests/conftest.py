@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
-from tautwire.fmus.packaging import RobotFmus, build_fmus
+from tautwire.fmus.packaging import RobotFmus
+from tests.support.built_once import fmus_built_once
 from tests.support.robots import LIMITED, example, paper_robot, with_damping, with_winch
 
 if TYPE_CHECKING:
@@ -68,25 +69,25 @@ def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
 @pytest.fixture(scope="session")
 def three_fmus(tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
     """The paper's undamped three-cable robot, built once."""
-    return build_fmus(paper_robot(), tmp_path_factory.mktemp("three"))
+    return fmus_built_once(paper_robot(), "three", tmp_path_factory)
 
 
 @pytest.fixture(scope="session")
 def damped_fmus(tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
     """The paper's robot with its damping at 2 Hz."""
-    return build_fmus(paper_robot(damping=2.08e9), tmp_path_factory.mktemp("damped"))
+    return fmus_built_once(paper_robot(damping=2.08e9), "damped", tmp_path_factory)
 
 
 @pytest.fixture(scope="session")
 def winch_fmus(tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
     """The paper's undamped robot on winches with limits."""
-    return build_fmus(with_winch(paper_robot(), LIMITED), tmp_path_factory.mktemp("winch"))
+    return fmus_built_once(with_winch(paper_robot(), LIMITED), "winch", tmp_path_factory)
 
 
 @pytest.fixture(scope="session")
 def eight_fmus(tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
     """The example with eight cables."""
-    return build_fmus(with_damping(example("eight"), 3e8), tmp_path_factory.mktemp("eight"))
+    return fmus_built_once(with_damping(example("eight"), 3e8), "eight", tmp_path_factory)
 
 
 @pytest.fixture(scope="module")
