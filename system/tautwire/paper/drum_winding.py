@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
@@ -28,7 +29,6 @@ from ..robot.trajectory import Trajectory, ideal_winch_speeds
 from .simulation_records import reeled_length
 
 Array = NDArray[np.float64]
-StrainLaw = Callable[[float, float], float]
 
 MAX_NEWTON_ITERATIONS, NEWTON_TOLERANCE, STRAIN_ITERATIONS = 12, 1e-12, 2
 
@@ -85,16 +85,11 @@ def follow_path(robot: Robot, path: Trajectory, time: Array, law: str) -> QuasiS
     for row in range(len(time)):
         previous_strain = strain
         for _ in range(STRAIN_ITERATIONS):
-            unstrained = np.array(
-                [
-                    r.unstrained_length(s, e)
-                    for r, s, e in zip(reels, reeled[row], 0.5 * (previous_strain + strain), strict=True)
-                ]
-            )
-            position = _equilibrium_position(
-                anchors, unstrained, start_tension, stiffness, load[row], position, reels[0].strain
-            )
-            strain = reels[0].strain(np.linalg.norm(anchors - position, axis=1), unstrained)
+            winding = zip(reels, reeled[row], 0.5 * (previous_strain + strain), strict=True)
+            unstrained = np.array([reel.unstrained_length(wound, mean) for reel, wound, mean in winding])
+            strain_at = partial(reels[0].strain, unstrained=unstrained)
+            position = _equilibrium_position(anchors, start_tension, stiffness, strain_at, load[row], position)
+            strain = strain_at(np.linalg.norm(anchors - position, axis=1))
         for reel, wound, mean in zip(reels, reeled[row], 0.5 * (previous_strain + strain), strict=True):
             reel.wind(float(wound), float(mean))
         positions[row], tensions[row] = position, start_tension + stiffness * strain
@@ -170,20 +165,19 @@ REEL_MODELS: Mapping[str, Callable[[float], ExactReel | LogarithmicReel | Linear
 
 def _equilibrium_position(
     anchors: Array,
-    unstrained: Array,
     start_tension: Array,
     stiffness: Array,
+    strain_at: Callable[[Array], Array],
     load: Array,
     guess: Array,
-    strain: Callable[[Array, Array], Array],
 ) -> Array:
-    """Equilibrium position of ropes of known unstrained length under a load (N), by Newton's method; (3,) in m."""
+    """Equilibrium position of ropes under a load (N), by Newton's method, (3,) in m; strains by the ropes' lengths."""
     position = guess
     for _ in range(MAX_NEWTON_ITERATIONS):
         spans = anchors - position
         lengths = np.linalg.norm(spans, axis=1)
         unit = spans / lengths[:, None]
-        tension = start_tension + stiffness * strain(lengths, unstrained)
+        tension = start_tension + stiffness * strain_at(lengths)
         along = np.einsum("ia,ib->iab", unit, unit)
         gradient = np.einsum("i,iab->ab", stiffness / lengths, along)
         gradient += np.einsum("i,iab->ab", tension / lengths, np.eye(3) - along)

@@ -93,11 +93,6 @@ def with_rope(robot: Robot, modulus: float, damping: float = 0.0, area: float | 
     return replace(robot, cables=tuple(cables))
 
 
-def with_start(robot: Robot, start: Point) -> Robot:
-    """The robot at another start, in m."""
-    return replace(robot, platform=replace(robot.platform, start=start))
-
-
 def _read_helix(table: Mapping[str, Any]) -> Helix:
     """Eq. 13: the angle is the sum of the coefficients; the rise is the pitch times the angle."""
     a5, a4, a3 = table["coefficients"]

@@ -12,7 +12,6 @@ from ..estimation.worker_pool import WorkerPool, processors
 from ..json_document import write_json
 from ..materials import RobotMaterial
 from . import helix_runs as helix
-from . import large_robot_runs as large_robots
 from . import open_claims as tried
 from . import paper_extensions as beyond
 from . import ramp_runs as ramps
@@ -26,7 +25,7 @@ from .paper_parameters import PARAMETER_SETS, PaperParameters, ParameterSetName,
 from .rope_tests import RopeTestRuns, printed_rope, relaxing_rope, rope_test_values, run_tensile_and_dynamic_tests
 from .simulation_records import ClaimValues, Progress, SimulationCase, SimulationRecord, run_case
 
-SECTION_MODULES = (helix, large_robots, ramps)
+SECTION_MODULES = (helix, ramps)
 MAX_PROCESSES = 2
 
 

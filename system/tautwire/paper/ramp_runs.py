@@ -9,7 +9,8 @@ import numpy as np
 from ..linear.modes_along_path import modes_along
 from ..materials import PAPER_TABLE, pair_of_row, read_material_table
 from ..materials.viscoelastic_model import Material
-from .paper_parameters import PaperParameters, with_rope, with_start
+from ..recordings.start_position import with_start
+from .paper_parameters import PaperParameters, with_rope
 from .simulation_records import (
     ClaimValues,
     Records,
@@ -69,11 +70,9 @@ def quantities(parameters: PaperParameters, records: Records) -> ClaimValues:
         values |= _ramp_values(name, records)
     static = parameters.robots["three"].cables[0].modulus
     values["ramp.three.stiffening"] = 100.0 * (dynamic_rope("three").modulus / static - 1.0)
-    values["ramp.three.frequency_dynamic"] = records["three/modes/dynamic"]["frequency_1"][0]
-    values["ramp.three.frequency_static"] = records["three/modes/static"]["frequency_1"][0]
-    values["ramp.three.frequency_ratio"] = (
-        records["three/modes/dynamic"]["frequency_1"][0] / records["three/modes/static"]["frequency_1"][0]
-    )
+    dynamic, quasi_static = (records[f"three/modes/{kind}"]["frequency_1"][0] for kind in ("dynamic", "static"))
+    values["ramp.three.frequency_dynamic"], values["ramp.three.frequency_static"] = dynamic, quasi_static
+    values["ramp.three.frequency_ratio"] = dynamic / quasi_static
     return values | _damping_values(parameters, records)
 
 
@@ -102,7 +101,6 @@ def _ramp_values(name: str, records: Records) -> ClaimValues:
 
 def _damping_values(parameters: PaperParameters, records: Records) -> ClaimValues:
     undamped, damped = records["three/dynamic"], records["three/damped"]
-
     return {
         "damping.coefficient": 1e-9 * dynamic_rope("three").damping,
         "damping.modulus": 1e-9 * dynamic_rope("three").modulus,

@@ -10,6 +10,7 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 
 from ..cosimulation import Component
 from ..cosimulation.execution_order import INPUT_TIME
@@ -92,8 +93,7 @@ def _run_program(fmu: Path, test: RopeTest, time: Array, speed: Array) -> RopeTe
             component.write(inputs)
             component.read(output)
             load[row] = output.values[0]
-    increments = 0.5 * np.diff(time) * (speed[1:] + speed[:-1])
-    return RopeTestRecord(time, np.append(0.0, np.cumsum(increments)), load)
+    return RopeTestRecord(time, np.asarray(cumulative_trapezoid(speed, time, initial=0)), load)
 
 
 # Sec. 3.1 and 3.2.

@@ -9,15 +9,17 @@ from tempfile import TemporaryDirectory
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.integrate import cumulative_trapezoid
 from scipy.signal import find_peaks
 from scipy.signal.windows import hann
 
 from ..cosimulation.robot_cosimulation import CosimulationResult, cosimulate
 from ..errors import TautwireError
 from ..fmus.packaging import build_fmus
+from ..recordings.start_position import with_start
 from ..robot.schema import Robot
 from ..robot.trajectory import Trajectory, ideal_winch_speeds
-from .paper_parameters import WinchRamp, with_start
+from .paper_parameters import WinchRamp
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -107,8 +109,7 @@ def rigid_path(robot: Robot, time: Array, winch_speed: Array) -> Array:
 
 def reeled_length(time: Array, winch_speed: Array) -> Array:
     """Rope reeled in since the start, in m, of speeds (N, n) that are linear between samples."""
-    increments = 0.5 * np.diff(time)[:, None] * (winch_speed[1:] + winch_speed[:-1])
-    return np.vstack([np.zeros(winch_speed.shape[1]), np.cumsum(increments, axis=0)])
+    return np.asarray(cumulative_trapezoid(winch_speed, time, axis=0, initial=0))
 
 
 def run_case(case: SimulationCase) -> SimulationRecord:
