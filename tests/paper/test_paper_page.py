@@ -11,7 +11,8 @@ from tautwire.paper.figure_style import PaperFigure, figure_style, write_figures
 from tautwire.paper.open_claims import OpenClaim
 from tautwire.paper.paper_claims import Claim, LedgerEntry
 from tautwire.paper.paper_extensions import ExtensionFigure
-from tautwire.paper.paper_page import SECTION_FIGURES, PageContent, inline_svg, number_text, paper_page, prose_html
+from tautwire.paper.paper_page import SECTION_FIGURES, PageContent, inline_svg, number_text, paper_page
+from tautwire.reports.page_rendering import typeset_number, typeset_prose
 
 CLAIM = Claim(
     "it", "4.1.1", "difference of r1 <27.5 s>", "mm", 2.4, 0.1, 0.05, explanation="at 9.8 m/s^2", printed_digits="2.40"
@@ -41,8 +42,8 @@ def test_page_has_every_claim_figure_and_trial_and_asks_for_nothing(tmp_path) ->
     assert "Difference of r1 &lt;27.5 s&gt;" in page and ">2.40 <" in page.replace("2.40<span", "2.40 <span")
     assert "Axes of the figures: 2 " not in page and "Axes of the figures: 1 reproduced after correction" in page
     assert page.count('role="img"') == sum(map(len, SECTION_FIGURES.values())) + 1
-    assert 'aria-label="What &quot;fig_07&quot; shows"' in page
-    assert "What came of it." in page and "2.81&nbsp;&times;&nbsp;10<sup>6</sup> N" in page
+    assert 'aria-label="What &#34;fig_07&#34; shows"' in page
+    assert "What came of it." in page and "2.81\u00a0\u00d7\u00a010⁶ N" in page
     links = re.findall(r'(?:src|href)="([^"]*)"', page)
     assert [link for link in links if not link.startswith("#")] == ["claims.json"]
 
@@ -65,4 +66,9 @@ def test_numbers_are_written_short() -> None:
     assert [number_text(value) for value in (None, 1e-15, 1594.2667, 0.00144210, (-0.5, 2.9))] == [
         "-", "0", "1594.3", "0.001442", "-0.5 to 2.9"
     ]  # fmt: skip
-    assert prose_html("12 mm^2 & N m^-1") == "12 mm<sup>2</sup> &amp; N m<sup>-1</sup>"
+
+
+def test_powers_and_absent_numbers_are_typeset() -> None:
+    assert typeset_prose("12 mm^2 & N m^-1") == "12 mm² &amp; N m⁻¹"
+    assert typeset_number("-1.5e-08 m") == "\u22121.5\u00a0\u00d7\u00a010⁻⁸ m"
+    assert typeset_number("- to 2e+03 %") == "\u2013 to 2\u00a0\u00d7\u00a010³\u00a0%"

@@ -7,9 +7,8 @@ from dataclasses import replace
 from rich.console import Console
 
 from tautwire.estimation.trace_result import Candidate, Trace
-from tautwire.reports import trace_table
-from tautwire.reports.trace_report_page import candidates_section
-from tests.support.pages import Page
+from tautwire.reports import trace_page, trace_table
+from tests.support.pages import section_of
 from tests.support.traces import made_trace
 
 
@@ -21,7 +20,7 @@ def with_hopeless_round() -> Trace:
 
 
 def test_page_folds_away_what_was_not_fitted() -> None:
-    page = Page(candidates_section(with_hopeless_round()))
+    page = section_of(trace_page(with_hopeless_round(), {}), "candidates")
     assert "3 not fitted, they promised too little" in page.text
     assert "Nothing promised enough to be fitted." in page.text
     assert "1 not fitted" in page.text  # drag, in the first round
@@ -29,7 +28,7 @@ def test_page_folds_away_what_was_not_fitted() -> None:
 
 
 def test_effects_on_no_cable_are_said_to_be_on_the_platform() -> None:
-    page = Page(candidates_section(made_trace(samples=200)))
+    page = section_of(trace_page(made_trace(samples=200), {}), "candidates")
     assert "payloadplatform" in page.text
 
 

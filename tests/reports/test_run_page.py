@@ -33,7 +33,7 @@ def test_page_says_how_long_how_far_and_under_what() -> None:
         "cable 3",
     ):
         assert words in page.text
-    assert [each["href"] for each in page.all("a")][1:] == ["result.csv"]
+    assert page.links() == ["result.csv"]
 
 
 def test_every_output_has_its_panel_with_what_was_recorded() -> None:
@@ -113,7 +113,7 @@ def test_simulate_writes_the_page_beside_the_result(tmp_path: Path) -> None:
     assert command([*arguments, "--report", str(page)]) == 0
     found = Page(page.read_text(encoding="utf-8"))
     assert "0.500 s along" in found.text
-    assert "../result.csv" in [each["href"] for each in found.all("a")]
+    assert "../result.csv" in found.links()
 
 
 def test_page_in_the_place_of_the_result_is_refused(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -46,7 +46,17 @@ class Page(HTMLParser):
         """Attributes of all elements of a kind."""
         return [attributes for name, attributes in self.elements if name == tag]
 
+    def links(self) -> list[str]:
+        """Targets of all links to something outside the page."""
+        return [each["href"] for each in self.all("a") if not each["href"].startswith("#")]
+
     def data(self) -> dict[str, Any]:
         """What the figures draw."""
         found: dict[str, Any] = json.loads(self.scripts[0])
         return found
+
+
+def section_of(content: str, identity: str) -> Page:
+    """One section of a page."""
+    start = content.index(f'<section id="{identity}"')
+    return Page(content[start : content.index("</section>", start)] + "</section>")

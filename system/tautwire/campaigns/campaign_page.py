@@ -4,23 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 import pyarrow as pa
 
 from ..number_format import format_engineering, format_percent, format_significant
 from ..reports import inline_charts as charts
-from ..reports.html_markup import (
-    TableColumn,
-    bullet_list,
-    download_links,
-    escape_text,
-    html_page,
-    number_html,
-    panel_groups,
-    section,
-    table,
-)
-from ..reports.robot_scene import choice_buttons, figures_container, legend_key
+from ..reports.page_rendering import Number, PageHeader, Row, render_page
 from ..robot.schema import Robot
 from .campaign_figures import channel_description, column_label, figure_data, numeric_outputs, variant_label
 from .campaign_plan import PARAMETER_NAMES, Distribution, Plan
@@ -28,7 +18,6 @@ from .campaign_summary import FlagProbability, SobolIndices, Spread, Summary
 from .dataset_schema import RowColumn, series_columns
 from .trace_summary import IdentifiedParameter, TraceSummary
 
-PAGE_SCRIPTS = ("campaign.js",)
 # Sobol indices below this are only in the summary.
 MIN_SOBOL_INDEX = 0.05
 OUTPUT_GROUPS = {
@@ -58,45 +47,25 @@ def campaign_page(
 ) -> str:
     """The page of a campaign over samples or a grid; ``links`` maps labels to paths beside the page."""
     figures = figure_data(plan, columns, robot.cable_count, summary, rows, folder)
-    labels = [each["label"] for each in figures["variants"]]
-    figure_sections = _bands_section(plan, robot) + _spreads_section(plan, columns)
-    parts = [
-        _masthead(plan, robot, summary, links),
-        _probabilities(summary.probabilities),
-        _inputs(plan),
-        figures_container(choice_buttons("Path and controller", labels) if len(labels) > 1 else "", figure_sections),
-        _sobol_section(summary.dependences),
-        _spread_tables(summary.spreads),
-        _failures(summary),
-        section("notes", "Notes", bullet_list(summary.notes)) if summary.notes else "",
-    ]
-    return html_page(f"{robot.name}: {_headline(plan, summary)}", "\n".join(parts), figures, PAGE_SCRIPTS)
-
-
-def trace_summary_page(plan: Plan, summary: TraceSummary, rows: pa.Table, links: Mapping[str, str]) -> str:
-    """The page of a campaign of traces; its figures need no scripts."""
-    counts = ", ".join(f"{count} {verdict}" for verdict, count in summary.verdicts) or "none could be traced"
-    sentence = f"{summary.count} recordings: {counts}."
-    kind, verdict = ("unexplained", f"{summary.failed} failed") if summary.failed else ("none", "All traced")
-    header = (
-        '<header><p class="eyebrow"><strong>Tautwire campaign</strong> '
-        f"<span>{escape_text(Path(plan.file).stem)}</span></p>"
-        '<p class="verdict '
-        f'verdict-{kind}">{verdict}</p><h1>{escape_text(sentence)}</h1>{download_links(links)}</header>'
-    )
-    return html_page(sentence, "\n".join([header, _findings(summary.findings), _recordings(rows)]))
-
-
-def _masthead(plan: Plan, robot: Robot, summary: Summary, links: Mapping[str, str]) -> str:
-    verdict, kind = ("All runs came to their end", "none")
+    subject, headline = f"{robot.name}, {robot.cable_count} cables", _headline(plan, summary)
+    verdict = ("All runs came to their end", "none")
     if summary.failed:
-        verdict, kind = f"{summary.failed} of {summary.count} runs failed", "unexplained"
-    method_text = f"Method {plan.method}, seed {plan.seed}; {len(plan.inputs)} numbers vary."
-    return (
-        f'<header><p class="eyebrow"><strong>Tautwire campaign</strong> '
-        f"<span>{escape_text(robot.name)}, {robot.cable_count} cables</span></p>"
-        f'<p class="verdict verdict-{kind}">{escape_text(verdict)}</p><h1>{escape_text(_headline(plan, summary))}</h1>'
-        f'<p class="aside">{number_html(method_text)}</p>{download_links(links)}</header>'
+        verdict = (f"{summary.failed} of {summary.count} runs failed", "unexplained")
+    return render_page(
+        "campaign",
+        PageHeader("Tautwire campaign", subject, headline, f"{robot.name}: {headline}", *verdict, links),
+        figures,
+        plan=plan,
+        variants=[each["label"] for each in figures["variants"]],
+        probabilities=[_probability_row(each) for each in summary.probabilities],
+        inputs=_input_rows(plan),
+        band_panels=_band_panels(plan, robot),
+        output_panels=_output_panels(plan, columns),
+        dependences=_sobol_rows(summary.dependences),
+        min_sobol_index=f"{MIN_SOBOL_INDEX:g}",
+        spreads=_spread_rows(summary.spreads),
+        failures=[[reason, Number(str(count))] for reason, count in summary.reasons] if summary.failed else [],
+        notes=summary.notes,
     )
 
 
@@ -119,47 +88,28 @@ def _headline(plan: Plan, summary: Summary) -> str:
     return f"{run_count_text}."
 
 
-def _probabilities(probabilities: Sequence[FlagProbability]) -> str:
-    if not probabilities:
-        return ""
-    columns = [
-        TableColumn("What"),
-        TableColumn("Path"),
-        TableColumn("Probability", True),
-        TableColumn(""),
-        TableColumn("95 % interval", True, True),
+def _probability_row(each: FlagProbability) -> Row:
+    interval = f"{format_percent(each.low)} to {format_percent(each.high)}, {each.times} of {each.count}"
+    return [
+        FLAG_LABELS.get(each.name, column_label(each.name)),
+        variant_label(each.path, each.controller),
+        Number(format_percent(each.relative_frequency)),
+        charts.bar(each.relative_frequency, 1.0),
+        Number(interval),
     ]
-    rows = [
-        [
-            escape_text(FLAG_LABELS.get(each.name, column_label(each.name))),
-            escape_text(variant_label(each.path, each.controller)),
-            number_html(format_percent(each.relative_frequency)),
-            charts.bar(each.relative_frequency, 1.0),
-            number_html(f"{format_percent(each.low)} to {format_percent(each.high)}, {each.times} of {each.count}"),
-        ]
-        for each in probabilities
-    ]
-    return section("probabilities", "How probable", table("Probabilities", columns, rows, "shares", True))
 
 
-def _inputs(plan: Plan) -> str:
-    if not plan.inputs:
-        return ""
-    descriptions = {each.key: _distribution_text(each.distribution) for each in plan.inputs}
-    rows = [
-        [escape_text(each.key), (escape_text if each.distribution.texts else number_html)(descriptions[each.key])]
-        for each in plan.inputs
-    ]
+def _input_rows(plan: Plan) -> list[Row]:
+    """The distribution of each input, and the correlations between them."""
+    rows: list[Row] = []
+    for each in plan.inputs:
+        text = _distribution_text(each.distribution)
+        rows.append([each.key, text if each.distribution.texts else Number(text)])
     rows += [
-        [
-            escape_text(f"{plan.keys[each.first]} and {plan.keys[each.second]}"),
-            number_html(f"correlation {each.value:g}"),
-        ]
+        [f"{plan.keys[each.first]} and {plan.keys[each.second]}", Number(f"correlation {each.value:g}")]
         for each in plan.correlations
     ]
-    return section(
-        "inputs", "What varies", table("Inputs", [TableColumn("Number"), TableColumn("Distribution")], rows, "", True)
-    )
+    return rows if plan.inputs else []
 
 
 def _distribution_text(distribution: Distribution) -> str:
@@ -172,96 +122,67 @@ def _distribution_text(distribution: Distribution) -> str:
     return f"{distribution.kind}: {parameters}"
 
 
-def _bands_section(plan: Plan, robot: Robot) -> str:
-    if not plan.paths or plan.compute.series < 2:
-        return ""
+def _band_panels(plan: Plan, robot: Robot) -> dict[str, list[tuple[int, str]]]:
+    """Channel indices and labels of the bands over time, by quantity; empty where nothing moves."""
     groups: dict[str, list[tuple[int, str]]] = {}
-    for index, name in enumerate(series_columns(robot.cable_count)):
-        title, label, _ = channel_description(name)
-        groups.setdefault(title, []).append((index, label))
-    keys = f'<p class="keys">{legend_key("after", "median")}{legend_key("band", "the middle 95 % of runs")}</p>'
-    return section("bands", "Over time", keys + panel_groups("band", groups, "Band over time"))
+    if plan.paths and plan.compute.series > 1:
+        for index, name in enumerate(series_columns(robot.cable_count)):
+            title, label, _ = channel_description(name)
+            groups.setdefault(title, []).append((index, label))
+    return groups
 
 
-def _spreads_section(plan: Plan, columns: Sequence[RowColumn]) -> str:
-    is_grid = plan.method == "grid"
-    if is_grid and not plan.inputs:
-        return ""
+def _output_panels(plan: Plan, columns: Sequence[RowColumn]) -> dict[str, list[tuple[int, str]]]:
+    """Indices and labels of the numeric outputs, by group; empty for a grid without inputs."""
     groups: dict[str, list[tuple[int, str]]] = {}
-    for index, column in enumerate(numeric_outputs(columns)):
-        groups.setdefault(_output_group(column.name), []).append((index, column_label(column.name)))
-    control = ""
-    if is_grid:
-        options = "".join(
-            f'<option value="{place}">{escape_text(name)}</option>' for place, name in enumerate(plan.keys)
-        )
-        control = f'<p class="controls"><label>Over <select id="against">{options}</select></label></p>'
-    kind, title, lead = (
-        ("against", "Over the grid", "Each point is a run.")
-        if is_grid
-        else ("spread", "How outputs spread", "Dotted: median, and the ends of the middle 95 % of runs.")
-    )
-    return section("spreads", title, control + panel_groups(kind, groups, title), lead)
+    if plan.inputs or plan.method != "grid":
+        for index, column in enumerate(numeric_outputs(columns)):
+            groups.setdefault(_output_group(column.name), []).append((index, column_label(column.name)))
+    return groups
 
 
 def _output_group(name: str) -> str:
     return next((title for prefix, title in OUTPUT_GROUPS.items() if name.startswith(prefix)), "Others")
 
 
-def _sobol_section(dependences: Sequence[SobolIndices]) -> str:
-    """A table of Sobol indices for each path and controller: for each output a row per influential input."""
-    if not dependences:
-        return ""
-    columns = [
-        TableColumn("Output"),
-        TableColumn("Input"),
-        TableColumn("Alone", True),
-        TableColumn(""),
-        TableColumn("In all", True),
-    ]
-    content = ""
+def _sobol_rows(dependences: Sequence[SobolIndices]) -> dict[str, list[Row]]:
+    """Sobol indices by path and controller: for each output a row per influential input, the largest first."""
+    tables: dict[str, list[Row]] = {}
     for path, controller in dict.fromkeys((each.path, each.controller) for each in dependences):
         variant_indices = [each for each in dependences if (each.path, each.controller) == (path, controller)]
-        rows = [
-            [escape_text(column_label(each.output)), escape_text(each.input), *_index_cells(each)]
+        tables[variant_label(path, controller)] = [
+            _sobol_row(each)
             for output in dict.fromkeys(each.output for each in variant_indices)
             for each in sorted(
                 (one for one in variant_indices if one.output == output), key=_largest_index, reverse=True
             )
             if _largest_index(each) >= MIN_SOBOL_INDEX
         ]
-        content += table(variant_label(path, controller), columns, rows, "shares")
-    lead = (
-        "Sobol indices: the part of an output&rsquo;s variance that an input makes alone, and with all its "
-        "interactions where the samples tell that; &plusmn; half the 95 % interval. "
-        f"Those below {MIN_SOBOL_INDEX:g} are in the summary alone."
-    )
-    return section("dependences", "What outputs depend on", content, lead)
+    return tables
 
 
 def _largest_index(each: SobolIndices) -> float:
     return max(each.first, each.total or 0.0)
 
 
-def _index_cells(each: SobolIndices) -> tuple[str, str, str]:
-    first = number_html(f"{each.first:.2f} \N{PLUS-MINUS SIGN} {each.first_width:.2f}")
+def _sobol_row(each: SobolIndices) -> Row:
     known = each.total is not None and each.total_width is not None
-    total = number_html(f"{each.total:.2f} \N{PLUS-MINUS SIGN} {each.total_width:.2f}") if known else ""
-    return first, charts.bar(max(0.0, min(each.first, 1.0)), 1.0), total
+    return [
+        column_label(each.output),
+        each.input,
+        Number(f"{each.first:.2f} ± {each.first_width:.2f}"),
+        charts.bar(max(0.0, min(each.first, 1.0)), 1.0),
+        Number(f"{each.total:.2f} ± {each.total_width:.2f}") if known else "",
+    ]
 
 
-def _spread_tables(spreads: Sequence[Spread]) -> str:
-    titles = ("Mean", "Deviation", "2.5 %", "Median", "97.5 %", "Least", "Largest")
-    columns = [TableColumn("Output"), *(TableColumn(title, True) for title in titles)]
-    content = ""
-    for path, controller in dict.fromkeys((each.path, each.controller) for each in spreads):
-        rows = [
-            [escape_text(column_label(each.name)), *(_value_cell(value, each.unit) for value in _spread_values(each))]
-            for each in spreads
-            if (each.path, each.controller) == (path, controller)
-        ]
-        content += table(variant_label(path, controller), columns, rows, "extremes")
-    return section("summary", "In figures", content) if content else ""
+def _spread_rows(spreads: Sequence[Spread]) -> dict[str, list[Row]]:
+    """Mean, deviation, quantiles and extremes of each output, by path and controller."""
+    tables: dict[str, list[Row]] = {}
+    for each in spreads:
+        numbers = [Number(format_significant(value, 4), each.unit) for value in _spread_values(each)]
+        tables.setdefault(variant_label(each.path, each.controller), []).append([column_label(each.name), *numbers])
+    return tables
 
 
 def _spread_values(each: Spread) -> tuple[float, ...]:
@@ -269,69 +190,43 @@ def _spread_values(each: Spread) -> tuple[float, ...]:
     return (each.mean, each.standard_deviation, low, middle, high, each.least, each.largest)
 
 
-def _value_cell(value: float, unit: str) -> str:
-    return f'{number_html(format_significant(value, 4))} <span class="unit">{escape_text(unit)}</span>'
+def trace_summary_page(plan: Plan, summary: TraceSummary, rows: pa.Table, links: Mapping[str, str]) -> str:
+    """The page of a campaign of traces; its figures need no scripts."""
+    counts = ", ".join(f"{count} {verdict}" for verdict, count in summary.verdicts) or "none could be traced"
+    sentence = f"{summary.count} recordings: {counts}."
+    verdict = (f"{summary.failed} failed", "unexplained") if summary.failed else ("All traced", "none")
+    header = PageHeader("Tautwire campaign", Path(plan.file).stem, sentence, sentence, *verdict, links)
+    recordings = [_recording_row(row) for row in rows.to_pylist()]
+    return render_page("trace_summary", header, findings=_finding_rows(summary.findings), recordings=recordings)
 
 
-def _failures(summary: Summary) -> str:
-    if not summary.failed:
-        return ""
-    rows = [[escape_text(reason), number_html(str(count))] for reason, count in summary.reasons]
-    columns = [TableColumn("Reason"), TableColumn("Runs", True)]
-    return section("failures", "Why runs failed", table("Failures", columns, rows, "", True))
-
-
-def _findings(findings: Sequence[IdentifiedParameter]) -> str:
-    """A table for each parameter of each effect: its interval in each recording, drawn on one scale."""
-    content = ""
+def _finding_rows(findings: Sequence[IdentifiedParameter]) -> dict[str, list[Row]]:
+    """For each parameter of each effect, its interval in each recording, with the first recording's value as a tick."""
+    tables: dict[str, list[Row]] = {}
     for effect, cables, parameter in dict.fromkeys((f.effect, f.cables, f.parameter) for f in findings):
         same_parameter = [f for f in findings if (f.effect, f.cables, f.parameter) == (effect, cables, parameter)]
         cable_text = f", cables {', '.join(map(str, cables))}" if cables else ""
-        columns = [
-            TableColumn("Recording"),
-            TableColumn("Value", True),
-            TableColumn(""),
-            TableColumn("95 % interval", True, True),
+        tables[f"{effect}: {column_label(parameter)}{cable_text}"] = [
+            _finding_row(each, same_parameter[0].value) for each in same_parameter
         ]
-        rows = [
-            [
-                escape_text(each.recording),
-                number_html(format_engineering(each.value, each.unit, 4)),
-                charts.whisker(each.value, each.low or each.value, each.high or each.value, same_parameter[0].value),
-                number_html(
-                    f"{format_engineering(each.low, each.unit, 4)} to {format_engineering(each.high, each.unit, 4)}"
-                ),
-            ]
-            for each in same_parameter
-        ]
-        content += table(f"{effect}: {column_label(parameter)}{cable_text}", columns, rows, "extremes")
-    lead = "Each interval is drawn on a scale of its own; the tick is the first recording&rsquo;s value."
-    return section("findings", "What was found", content, lead) if content else ""
+    return tables
 
 
-def _recordings(rows: pa.Table) -> str:
-    columns = [
-        TableColumn("Recording"),
-        TableColumn("Verdict"),
-        TableColumn("Position before", True),
-        TableColumn("after", True),
-        TableColumn("Tension before", True),
-        TableColumn("after", True),
-        TableColumn("In words", False, True),
+def _finding_row(each: IdentifiedParameter, reference: float) -> Row:
+    value, low, high = (format_engineering(number, each.unit, 4) for number in (each.value, each.low, each.high))
+    chart = charts.whisker(each.value, each.low or each.value, each.high or each.value, reference)
+    return [each.recording, Number(value), chart, Number(f"{low} to {high}")]
+
+
+def _recording_row(row: Mapping[str, Any]) -> Row:
+    columns = (("position", "m"), ("tension", "N"))
+    return [
+        row["recording"],
+        row["verdict"] or "failed",
+        *(
+            Number(format_engineering(row[f"{quantity}_rms_{when}"], unit))
+            for quantity, unit in columns
+            for when in ("before", "after")
+        ),
+        row["sentence"] or row["failure"] or "",
     ]
-    names = (
-        ("position_rms_before", "m"),
-        ("position_rms_after", "m"),
-        ("tension_rms_before", "N"),
-        ("tension_rms_after", "N"),
-    )
-    cells = [
-        [
-            escape_text(row["recording"]),
-            escape_text(row["verdict"] or "failed"),
-            *(number_html(format_engineering(row[name], unit)) for name, unit in names),
-            escape_text(row["sentence"] or row["failure"] or ""),
-        ]
-        for row in rows.to_pylist()
-    ]
-    return section("recordings", "Recording by recording", table("Recordings", columns, cells, "extremes", True))

@@ -3,40 +3,20 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cosimulation.robot_wiring import AXES
 from ..linear import LinearPlant
 from ..number_format import format_percent, format_significant
 from ..robot.schema import Robot
 from . import inline_charts as charts
 from .downsampling import pack_float32
-from .html_markup import (
-    TableColumn,
-    bullet_list,
-    download_links,
-    escape_text,
-    html_page,
-    number_html,
-    panel_groups,
-    section,
-    table,
-)
 from .mode_bands import merge_mode_bands
-from .robot_scene import (
-    RobotScene,
-    ScenePath,
-    choice_buttons,
-    figures_container,
-    legend_key,
-    pack_columns,
-    scene_data,
-    scene_section,
-)
+from .page_rendering import Number, PageHeader, Row, render_page
+from .robot_scene import RobotScene, ScenePath, pack_columns, scene_data
 
 Array = NDArray[np.float64]
 
@@ -147,32 +127,21 @@ def _gain_data(system: Any, response: Array, output_index: int, input_index: int
 
 def modes_page(robot: Robot, plant: LinearPlant, links: Mapping[str, str]) -> str:
     """The page of a robot linearised about rest; ``links`` maps labels to paths beside the page."""
-    data = modes_data(robot, plant)
-    choices = choice_buttons("Mode", [choice["label"] for choice in data["choices"]])
-    parts = [
-        _masthead(robot, plant, links),
-        _modes_section(plant),
-        figures_container(choices, _scene_section(robot)),
-        _cables_section(plant),
-        _gains_section(plant),
-        _notes_section(plant),
-    ]
-    title = f"{robot.name}: {_modes_sentence(plant)}"
-    return html_page(title, "\n".join(parts), data, ("modes.js",))
-
-
-def _masthead(robot: Robot, plant: LinearPlant, links: Mapping[str, str]) -> str:
-    position_text = ", ".join(format_significant(float(value), 4) for value in plant.position)
-    verdict, css_class = (
-        ("Small motions are linear here", "none") if not plant.notes else ("See the notes", "unexplained")
-    )
-    return (
-        f'<header><p class="eyebrow"><strong>Tautwire linear plant</strong> '
-        f"<span>{escape_text(robot.name)}, {robot.cable_count} cables</span></p>"
-        f'<p class="verdict verdict-{css_class}">{verdict}</p><h1>{escape_text(_modes_sentence(plant))}</h1>'
-        f'<p class="aside">At rest at {number_html(position_text)} m, with {plant.system.nstates} states, '
-        f"{plant.system.ninputs} "
-        f"inputs and {plant.system.noutputs} outputs.</p>{download_links(links)}</header>"
+    figures, headline = modes_data(robot, plant), _modes_sentence(plant)
+    subject, title = f"{robot.name}, {robot.cable_count} cables", f"{robot.name}: {headline}"
+    verdict = ("See the notes", "unexplained") if plant.notes else ("Small motions are linear here", "none")
+    return render_page(
+        "modes",
+        PageHeader("Tautwire linear plant", subject, headline, title, *verdict, links),
+        figures,
+        robot=robot,
+        plant=plant,
+        position=", ".join(format_significant(float(value), 4) for value in plant.position),
+        modes=_mode_rows(plant),
+        mode_labels=[choice["label"] for choice in figures["choices"]],
+        cables=_cable_rows(plant),
+        inputs=[signal_label(name) for name in plant.system.input_labels],
+        outputs=_gain_panels(figures["gains"]),
     )
 
 
@@ -198,80 +167,43 @@ def _modes_sentence(plant: LinearPlant) -> str:
     return f"The platform swings at {frequencies_text}, with {damping_text}."
 
 
-def _modes_section(plant: LinearPlant) -> str:
+def _mode_rows(plant: LinearPlant) -> list[Row]:
+    """Frequency, damping ratio, damped frequency and shape of each mode."""
     modes = plant.modes
-    columns = (
-        TableColumn("Mode"),
-        TableColumn("Frequency", True),
-        TableColumn("Damping ratio", True),
-        TableColumn("When damped", True),
-        *(TableColumn(f"Along {axis}", True) for axis in AXES),
-    )
-    rows = [
+    return [
         [
             f"Mode {mode + 1}",
             f"{format_significant(float(modes.frequencies[mode]), 4)} Hz",
-            number_html(f"{format_significant(100.0 * float(modes.damping_ratios[mode]))} %"),
+            Number(f"{format_significant(100.0 * float(modes.damping_ratios[mode]))} %"),
             "overdamped" if damped_frequency == 0.0 else f"{format_significant(float(damped_frequency), 4)} Hz",
-            *(number_html(f"{round(float(value), 3) + 0.0:.3f}") for value in modes.shapes[:, mode]),
+            *(Number(f"{round(float(value), 3) + 0.0:.3f}") for value in modes.shapes[:, mode]),
         ]
         for mode, damped_frequency in enumerate(modes.damped_frequencies)
     ]
-    lead = (
-        "How the platform swings by itself about rest, with the winches held: undamped frequency, damping ratio (100 % "
-        "where it just no longer swings), frequency with that damping, and the direction, as a vector of length one."
-    )
-    return section("modes", "Modes", table("Modes of the platform", columns, rows, "modes", True), lead)
 
 
-def _scene_section(robot: Robot) -> str:
-    """The mode's shape in motion, with its controls."""
-    lead = (
-        "The shape is drawn far larger than it swings, and without its decay. Cables are coloured by how their tension "
-        "changes for a swing of 1 mm."
-    )
-    label = (
-        f"The robot in space: {robot.cable_count} cables from their exit points to the platform, which swings along "
-        "the chosen mode, coloured by the change of their tension."
-    )
-    return scene_section("Shapes in motion", lead, label, legend_key("after", "swing of the platform"), slider="Phase")
+def _cable_rows(plant: LinearPlant) -> list[Row]:
+    """Each cable's tension at rest, and its share of the potential energy of each mode as a number and a bar."""
+    shares = plant.modes.cable_shares
+    largest = float(shares.max())
+    return [
+        [
+            f"Cable {cable + 1}",
+            Number(f"{format_significant(float(tension), 4)} N"),
+            *(
+                cell
+                for share in map(float, shares[cable])
+                for cell in (Number(format_percent(share)), charts.bar(share, largest))
+            ),
+        ]
+        for cable, tension in enumerate(plant.tensions)
+    ]
 
 
-def _cables_section(plant: LinearPlant) -> str:
-    """Each cable's tension at rest, and its share of the potential energy of each mode."""
-    shares, count = plant.modes.cable_shares, plant.modes.cable_shares.shape[1]
-    columns = [TableColumn("Cable"), TableColumn("Tension at rest", True, True)]
-    for mode in range(count):
-        columns += [TableColumn(f"Of mode {mode + 1}", True), TableColumn("As a bar")]
-    rows = []
-    for cable, tension in enumerate(plant.tensions):
-        row = [f"Cable {cable + 1}", f"{number_html(format_significant(float(tension), 4))} N"]
-        for share in shares[cable]:
-            row += [number_html(format_percent(float(share))), charts.bar(float(share), float(shares.max()))]
-        rows.append(row)
-    lead = "Each cable&rsquo;s part of the energy that a mode stores."
-    return section("cables", "Which cables hold it", table("Cables", columns, rows, "shares", True), lead)
-
-
-def _gains_section(plant: LinearPlant) -> str:
-    """A panel for each output: gain and phase from the chosen input."""
-    options = "".join(
-        f'<option value="{place}">{escape_text(signal_label(name))}</option>'
-        for place, name in enumerate(plant.system.input_labels)
-    )
-    control = f'<p class="controls"><label>Driven by <select id="source">{options}</select></label></p>'
-    groups: dict[str, list[tuple[int, str]]] = {title: [] for title in GAIN_OUTPUT_TITLES.values()}
-    shown = [name for name in plant.system.output_labels if name.rpartition("_")[0] in GAIN_OUTPUT_TITLES]
-    for place, name in enumerate(shown):
-        groups[GAIN_OUTPUT_TITLES[name.rpartition("_")[0]]].append((place, signal_label(name)))
-    gain_key, mode_key = legend_key("after", "gain, and below it the phase"), legend_key("mode", "modes, by number")
-    keys = f'<p class="keys">{gain_key}{mode_key}</p>'
-    lead = (
-        "How much each output swings for each unit of the input that swings, over frequency (gain), and how far ahead "
-        "of the input it is (phase; behind where negative)."
-    )
-    return section("gains", "Gains", control + keys + panel_groups("gain", groups, "Gain and phase"), lead)
-
-
-def _notes_section(plant: LinearPlant) -> str:
-    return section("notes", "Notes", bullet_list(plant.notes)) if plant.notes else ""
+def _gain_panels(gains: Sequence[Mapping[str, Any]]) -> dict[str, list[tuple[int, str]]]:
+    """Channel indices and labels of the drawn outputs, by quantity."""
+    channels = list(enumerate(gain["label"] for gain in gains))
+    return {
+        title: [(index, label) for index, label in channels if label.startswith(prefix)]
+        for prefix, title in GAIN_OUTPUT_TITLES.items()
+    }

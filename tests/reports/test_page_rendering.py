@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from tautwire.reports.html_markup import asset
+from tautwire.reports.page_rendering import asset
 
 TEXT, GRAPHIC = 4.5, 3.0  # WCAG 2.2, 1.4.3 and 1.4.11
 TEXTS = ("text", "muted", "accent", "good", "warn", "mode")
