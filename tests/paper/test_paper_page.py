@@ -12,7 +12,6 @@ from tautwire.paper.open_claims import OpenClaim
 from tautwire.paper.paper_claims import Claim, LedgerEntry
 from tautwire.paper.paper_extensions import ExtensionFigure
 from tautwire.paper.paper_page import SECTION_FIGURES, PageContent, inline_svg, number_text, paper_page
-from tautwire.reports.page_rendering import typeset_number, typeset_prose
 
 CLAIM = Claim(
     "it", "4.1.1", "difference of r1 <27.5 s>", "mm", 2.4, 0.1, 0.05, explanation="at 9.8 m/s^2", printed_digits="2.40"
@@ -66,9 +65,3 @@ def test_numbers_are_written_short() -> None:
     assert [number_text(value) for value in (None, 1e-15, 1594.2667, 0.00144210, (-0.5, 2.9))] == [
         "-", "0", "1594.3", "0.001442", "-0.5 to 2.9"
     ]  # fmt: skip
-
-
-def test_powers_and_absent_numbers_are_typeset() -> None:
-    assert typeset_prose("12 mm^2 & N m^-1") == "12 mm² &amp; N m⁻¹"
-    assert typeset_number("-1.5e-08 m") == "\u22121.5\u00a0\u00d7\u00a010⁻⁸ m"
-    assert typeset_number("- to 2e+03 %") == "\u2013 to 2\u00a0\u00d7\u00a010³\u00a0%"

@@ -9,7 +9,7 @@ import pytest
 
 pytest.importorskip("selenium", reason="the pages are not tried in a browser: selenium is in the dev extra")
 
-from tests.reports.test_html_markup import TEXT, themes
+from tests.reports.test_page_rendering import TEXT, themes
 from tests.support.browser.browser import (
     LAPTOP,
     LAPTOP_DARK,

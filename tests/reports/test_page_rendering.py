@@ -1,4 +1,4 @@
-"""Colours of the pages can be told from what they stand on, in the light and in the dark."""
+"""What all pages share: typeset numbers, and colours that stand out from their ground in the light and in the dark."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ import re
 
 import pytest
 
-from tautwire.reports.page_rendering import asset
+from tautwire.reports.page_rendering import asset, typeset_number, typeset_prose
 
 TEXT, GRAPHIC = 4.5, 3.0  # WCAG 2.2, 1.4.3 and 1.4.11
 TEXTS = ("text", "muted", "accent", "good", "warn", "mode")
@@ -57,3 +57,9 @@ def test_chosen_and_pressed_controls_stand_out(theme: str) -> None:
 def test_before_and_after_differ_for_those_who_see_no_hue() -> None:
     for colours in themes().values():
         assert contrast(colours["before"], colours["accent"]) >= 1.3
+
+
+def test_powers_and_absent_numbers_are_typeset() -> None:
+    assert typeset_prose("12 mm^2 & N m^-1") == "12 mm² &amp; N m⁻¹"
+    assert typeset_number("-1.5e-08 m") == "\u22121.5\u00a0\u00d7\u00a010⁻⁸ m"
+    assert typeset_number("- to 2e+03 %") == "\u2013 to 2\u00a0\u00d7\u00a010³\u00a0%"

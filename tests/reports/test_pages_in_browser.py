@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 pytest.importorskip("selenium", reason="the pages are not tried in a browser: selenium is in the dev extra")
 
-from tests.reports.test_html_markup import themes
+from tests.reports.test_page_rendering import themes
 from tests.support.browser.browser import (
     LAPTOP,
     LAPTOP_DARK,
