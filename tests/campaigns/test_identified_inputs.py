@@ -20,8 +20,8 @@ from tautwire.estimation.stepwise_selection import SelectionResult
 from tautwire.estimation.worker_pool import WorkerPool
 from tautwire.reports import trace_document
 from tautwire.robot.robot_file_reader import robot_from_content
-from tests.estimation.test_effect_estimates import fitted
 from tests.support.campaigns import plan_file, read
+from tests.support.fits import fitted
 from tests.support.traces import made_trace
 
 SAMPLED = 'robot = "robot.toml"\nseed = 3\n[sample]\nmethod = "sobol"\ncount = 4096\n[found]\nreport = "report.json"\n'

@@ -15,9 +15,8 @@ from tautwire.cosimulation.ssp_archive import ssp_name, write_ssp
 from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.robot.schema import Robot, Winch
 from tests.control.test_lqg import PATHS, rms
-from tests.cosimulation.test_robot_cosimulation import CORNERS, RAMP, rig_of
-from tests.fmu.test_winch_slave import drive_of
 from tests.rig import simulate
+from tests.support.rig_robots import CORNERS, RAMP, drive_of, rig_of
 from tests.support.robots import LIMITED, example, paper_robot, with_winch
 
 SPEEDS = np.clip(RAMP * CORNERS[:, None], -1.0, 1.0)

@@ -15,9 +15,9 @@ from tautwire.cosimulation import (
 from tautwire.cosimulation.robot_cosimulation import instantiate_robot
 from tautwire.cosimulation.robot_wiring import recorded_ports, robot_connections, winch_input_ports
 from tautwire.fmus.packaging import RobotFmus
-from tests.cosimulation.test_robot_cosimulation import CORNERS, RAMP, rig_of
 from tests.rig import RampProgram
 from tests.rig import simulate as rig_simulate
+from tests.support.rig_robots import CORNERS, RAMP, rig_of
 from tests.support.robots import paper_robot
 
 RAMPS = PiecewiseLinearInput(CORNERS, np.clip(RAMP * CORNERS[:, None], -1.0, 1.0))

@@ -10,29 +10,9 @@ from tautwire.cosimulation.robot_cosimulation import CosimulationResult, cosimul
 from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.robot.reference_simulation import integrate
 from tautwire.robot.schema import EffectSetting, Platform, Robot
-from tests.rig import RampProgram, SampledProgram, robot_from, simulate
-from tests.rig import Robot as RigRobot
+from tests.rig import RampProgram, SampledProgram, simulate
+from tests.support.rig_robots import CORNERS, RAMP, rig_of
 from tests.support.robots import NAMES, example, gentle_speeds, paper_robot, with_damping
-
-RAMP = np.array([0.3, 0.25, -0.25])
-CORNERS = np.array([0.0, 1.0 / 0.3, 4.0, 7.0])
-
-
-def rig_of(robot: Robot) -> RigRobot:
-    """The same robot as the rig declares it."""
-    content = {
-        "name": robot.name,
-        "gravity": robot.gravity,
-        "platform": {"mass": robot.platform.mass, "start": list(robot.platform.start)},
-        "sensors": {},
-        "cable": [
-            {"anchor": list(c.anchor), "modulus": c.modulus, "area": c.area, "damping": c.damping, "law": c.law}
-            for c in robot.cables
-        ],
-    }
-    if robot.tension is not None:
-        content["tension"] = vars(robot.tension)
-    return robot_from(content)
 
 
 def ramp_error(fmus: RobotFmus, robot: Robot, step: float) -> float:

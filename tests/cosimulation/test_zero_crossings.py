@@ -11,9 +11,9 @@ from tautwire.cosimulation.robot_cosimulation import instantiate_robot
 from tautwire.cosimulation.robot_wiring import recorded_ports
 from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.robot.schema import Platform
-from tests.cosimulation.test_robot_cosimulation import rig_of
 from tests.rig import SampledProgram
 from tests.rig import simulate as rig_simulate
+from tests.support.rig_robots import rig_of
 from tests.support.robots import paper_robot
 
 ROBOT = replace(paper_robot(damping=2e8), platform=Platform(300.0, (28.86, 0.0, 5.0)))

@@ -7,35 +7,20 @@ import pytest
 from numpy.typing import NDArray
 
 from tautwire.estimation.effect_estimates import parameter_correlations
-from tautwire.estimation.estimation_data import DataSet, split_data
-from tautwire.estimation.hypotheses import Hypothesis, with_values
-from tautwire.estimation.measurement_noise import estimate_noise
-from tautwire.estimation.parameter_fit import Fit, Fitter
+from tautwire.estimation.hypotheses import with_values
+from tautwire.estimation.parameter_fit import Fit
 from tautwire.estimation.trace_result import Estimate, FittedParameter, FoundEffect
 from tautwire.robot.schema import EffectSetting, Robot
 from tautwire.robot.symbolic_model import FORMULA_INDEX, FreeParameter
 from tautwire_fmu.laws.effects import BY_NAME
-from tests.support.recordings import recorded
+from tests.support.fits import fitted
 from tests.support.robots import example
 
 Array = NDArray[np.float64]
 
 # A heavier platform and load cells that show too much: what is seen of both is nearly their product.
-TRUTH = {"payload": {"mass": 1.5}, "sensor_gain": {"gain": 1.01}}
 VALUES = np.array([1.5, 1.01])
 SEEDS = 12
-
-
-def fitted(seed: int) -> tuple[Fitter, list[Hypothesis], DataSet, Fit]:
-    """The fit of both effects to a recording of their truth."""
-    robot = example("three")
-    chosen = [Hypothesis(BY_NAME["payload"], ()), Hypothesis(BY_NAME["sensor_gain"], robot.cable_numbers)]
-    for hypothesis in chosen:
-        robot = robot.with_effect(hypothesis.setting(robot))
-    recording = recorded("three", seed, TRUTH)
-    noise = estimate_noise(robot, recording)
-    sample, fitter = split_data(robot, noise, recording, None).estimation, Fitter(noise)
-    return fitter, chosen, sample, fitter.fit(robot, chosen, sample)
 
 
 def effects_of(robot: Robot) -> list[FoundEffect]:

@@ -12,12 +12,12 @@ from fmpy.validation import validate_fmu
 from tautwire.cosimulation.robot_cosimulation import CosimulationResult, cosimulate
 from tautwire.fmus.packaging import build_fmus
 from tautwire.robot.schema import Robot
-from tests.cosimulation.test_robot_cosimulation import rig_of
 from tests.rig import Rig, SampledProgram, wander
 from tests.rig.record import outputs
-from tests.robot.test_reference_simulation import EXACT, by_the_rig, with_effects
 from tests.support.effect_cases import CASES, PAIRS, Case, same
+from tests.support.effects import EXACT, by_the_rig, with_effects
 from tests.support.fmus import in_hand
+from tests.support.rig_robots import rig_of
 from tests.support.robots import example, gentle_speeds, with_damping
 
 # Of the passage over one sample of a kink: strands that stick again, a drum that turns back.

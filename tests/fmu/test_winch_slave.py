@@ -11,8 +11,8 @@ from fmpy.fmi1 import FMICallException
 
 from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.robot.schema import Winch
-from tests.rig import Drive
 from tests.support.fmus import Hand, in_hand
+from tests.support.rig_robots import drive_of
 from tests.support.robots import LIMITED, paper_robot, with_winch
 
 CORNERS = [0.0, 0.5, 1.0, 2.0, 2.2, 3.0]
@@ -34,18 +34,6 @@ def slope(time: float) -> float:
     """Its rate around a time that is no corner."""
     place = int(np.searchsorted(CORNERS, time)) - 1
     return (SPEEDS[place + 1] - SPEEDS[place]) / (CORNERS[place + 1] - CORNERS[place])
-
-
-def drive_of(winch: Winch) -> Drive:
-    """The same winch as the rig declares it."""
-    return Drive(
-        radius=winch.drum_radius,
-        gear=winch.gear,
-        bandwidth=winch.bandwidth,
-        damping_ratio=winch.damping_ratio,
-        speed_limit=np.inf if winch.speed_limit is None else winch.speed_limit,
-        acceleration_limit=np.inf if winch.acceleration_limit is None else winch.acceleration_limit,
-    )
 
 
 def stamped(hand: Hand, begin: float, end: float) -> None:

@@ -19,9 +19,9 @@ from tautwire.fmus.fmu_slots import SlotError, missing_user_fmu_ports
 from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.robot.robot_file_reader import write_robot
 from tautwire.robot.schema import UserFmu
-from tests.cosimulation.test_robot_cosimulation import CORNERS, RAMP, rig_of
 from tests.rig import RampProgram, simulate
 from tests.support.own_fmus import LAG, compiler, falling_mass, lag_winch, packed, spring_cable
+from tests.support.rig_robots import CORNERS, RAMP, rig_of
 from tests.support.robots import paper_robot
 
 SPEEDS = np.clip(RAMP * CORNERS[:, None], -1.0, 1.0)

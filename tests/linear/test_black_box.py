@@ -24,8 +24,8 @@ from tautwire.linear import (
     linearise_robot_fmus,
 )
 from tautwire.robot.schema import EffectSetting, Robot, UserFmu, Winch
-from tests.robot.test_reference_simulation import with_effects
 from tests.support.effect_cases import CASES, Case
+from tests.support.effects import with_effects
 from tests.support.own_fmus import LAG, compiler, falling_mass, lag_winch
 from tests.support.robots import NAMES, example, paper_robot, with_winch
 

@@ -20,10 +20,10 @@ from tautwire.robot.symbolic_model import FreeParameter, SymbolicModel, symbolic
 from tautwire.robot.trajectory import Line, ideal_winch_speeds
 from tautwire_fmu.laws.effects import ALL, BY_NAME, Effect
 from tautwire_fmu.laws.mathematics import REAL
-from tests.cosimulation.test_robot_cosimulation import rig_of
 from tests.rig import Rig, StillProgram
-from tests.robot.test_reference_simulation import with_effects
 from tests.support.effect_cases import CASES, Case, same
+from tests.support.effects import with_effects
+from tests.support.rig_robots import rig_of
 from tests.support.robots import example
 
 DRIFTING = {"creep", "thermal"}

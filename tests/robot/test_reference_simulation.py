@@ -6,27 +6,11 @@ import numpy as np
 import pytest
 
 from tautwire.robot.reference_simulation import ReferenceRun, integrate
-from tautwire.robot.schema import Robot
-from tests.cosimulation.test_robot_cosimulation import rig_of
-from tests.rig import Rig, SampledProgram
-from tests.rig.record import Accuracy, outputs
 from tests.support.effect_cases import CASES, PAIRS, Case
+from tests.support.effects import by_the_rig, with_effects
 from tests.support.robots import example, gentle_speeds
 
-EXACT = Accuracy("DOP853", 1e-11, 1e-12)
 SLOW_EIGHT = pytest.param("eight", marks=pytest.mark.validate)
-
-
-def with_effects(robot: Robot, *cases: Case) -> Robot:
-    for case in cases:
-        robot = robot.with_effect(case.setting(robot))
-    return robot
-
-
-def by_the_rig(robot: Robot, time: np.ndarray, speed: np.ndarray, *cases: Case) -> tuple[np.ndarray, np.ndarray]:
-    """Tensions and positions as the sensors show them."""
-    effects = {case.name: case.for_rig() for case in cases}
-    return outputs(Rig(rig_of(robot), effects, SampledProgram(time, speed)), time, EXACT)
 
 
 def differ(run: ReferenceRun, tension: np.ndarray, position: np.ndarray) -> tuple[float, float]:

@@ -16,11 +16,11 @@ from tautwire.robot.reference_simulation import integrate
 from tautwire.robot.schema import Formula, Robot
 from tautwire.robot.static_equilibrium import static_tensions
 from tautwire.robot.symbolic_model import FORMULA_INDEX, FreeParameter, symbolic_model
-from tests.cosimulation.test_robot_cosimulation import rig_of
 from tests.rig import Rig, SampledProgram
 from tests.rig.record import outputs
-from tests.robot.test_reference_simulation import EXACT
+from tests.support.effects import EXACT
 from tests.support.fmus import in_hand
+from tests.support.rig_robots import rig_of
 from tests.support.robots import example, gentle_speeds
 
 ROBOT = example("three")
