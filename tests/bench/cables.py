@@ -7,7 +7,7 @@ from time import perf_counter
 
 import numpy as np
 
-from tautwire.cosimulation import FixedStep, MemoryRecorder, PiecewiseLinearInput, simulate
+from tautwire.cosimulation import CouplingSolver, Experiment, FixedStep, MemoryRecorder, PiecewiseLinearInput, simulate
 from tautwire.cosimulation.robot_cosimulation import instantiate_robot
 from tautwire.cosimulation.robot_wiring import recorded_ports
 from tautwire.fmus.packaging import build_fmus
@@ -27,8 +27,10 @@ def time_per_step(count: int, folder: Path) -> float:
     fmus = build_fmus(wheel_of_cables(count), folder)
     time = np.array([0.0, 1.0])
     speeds = np.vstack([np.zeros(count), np.linspace(-0.1, 0.1, count)])
-    with instantiate_robot(fmus) as coupling:
+    with instantiate_robot(fmus) as graph:
+        coupling = CouplingSolver(graph)
+        experiment = Experiment(PiecewiseLinearInput(time, speeds), time, FixedStep(0.01))
         kept = MemoryRecorder(2, len(recorded_ports(count)))
         begun = perf_counter()
-        simulate(coupling, PiecewiseLinearInput(time, speeds), time, recorded_ports(count), FixedStep(0.01), kept)
+        simulate(coupling, experiment, recorded_ports(count), kept)
         return (perf_counter() - begun) / coupling.statistics.steps

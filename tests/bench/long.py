@@ -15,6 +15,7 @@ from tautwire.cosimulation.isolation import CALL_TIMEOUT
 from tautwire.cosimulation.recording_simulation import simulate_recording
 from tautwire.cosimulation.result_file import open_result_file
 from tautwire.cosimulation.robot_wiring import result_columns
+from tautwire.cosimulation.run_arguments import SimulationOptions
 from tests.support.memory import resident_memory
 from tests.support.robots import example, gentle_speeds
 
@@ -45,7 +46,9 @@ def run(folder: Path, steps: int) -> None:
 
     print("| done | resident memory | of the FMUs' process | wall time |\n| --- | --- | --- | --- |")
     with open_result_file(result, result_columns(robot.cable_count)) as rows:
-        account, _ = simulate_recording(robot, recording, rows, STEP, None, None, tell, CALL_TIMEOUT)
+        account, _ = simulate_recording(
+            robot, recording, rows, SimulationOptions(STEP, call_timeout=CALL_TIMEOUT), tell
+        )
     content = pq.ParquetFile(result).metadata
     print(
         f"\n{account.steps} steps, {account.iterations} redos; {content.num_rows} rows of {content.num_columns} "

@@ -9,7 +9,14 @@ from time import perf_counter
 import numpy as np
 from scipy.integrate import solve_ivp
 
-from tautwire.cosimulation import MemoryRecorder, PiecewiseLinearInput, StepSizeControl, simulate
+from tautwire.cosimulation import (
+    CouplingSolver,
+    Experiment,
+    MemoryRecorder,
+    PiecewiseLinearInput,
+    StepSizeControl,
+    simulate,
+)
 from tautwire.cosimulation.robot_cosimulation import instantiate_robot
 from tautwire.cosimulation.robot_wiring import recorded_ports
 from tautwire.fmus.packaging import RobotFmus
@@ -67,8 +74,10 @@ def by_fmus(
 ) -> tuple[np.ndarray, float, int]:
     """End position, wall time of the run, or that of another clock, and macro steps."""
     speeds = np.array([ramp(time) for time in CORNERS])
-    with instantiate_robot(fmus) as coupling:
+    experiment = Experiment(PiecewiseLinearInput(CORNERS, speeds), CORNERS, stepping)
+    with instantiate_robot(fmus) as graph:
+        coupling = CouplingSolver(graph, stepping.solver_options)
         kept = MemoryRecorder(len(CORNERS), len(recorded_ports(3)))
         begun = clock()
-        simulate(coupling, PiecewiseLinearInput(CORNERS, speeds), CORNERS, recorded_ports(3), stepping, kept)
+        simulate(coupling, experiment, recorded_ports(3), kept)
         return kept.rows[-1, :3], clock() - begun, coupling.statistics.steps

@@ -19,7 +19,7 @@ from tautwire.control import (
     design_controller,
     path_tensions,
 )
-from tautwire.cosimulation import FixedStep
+from tautwire.cosimulation import Experiment, FixedStep
 from tautwire.cosimulation.robot_cosimulation import CosimulationResult, cosimulate, run_cosimulation
 from tautwire.errors import InputError, UnreachableError
 from tautwire.fmus.packaging import RobotFmus, build_fmus
@@ -141,7 +141,7 @@ def test_limit_of_speed_is_kept_and_nothing_winds_up(fmus: dict[str, RobotFmus])
     design = design_controller(robot, ControlAim(speed_limit=0.3))
     times = np.linspace(0.0, 8.0, 801)
     source = PathController(robot, design, path, times)
-    motion = run_cosimulation(fmus["three"], source, times, FixedStep(0.01))
+    motion = run_cosimulation(fmus["three"], Experiment(source, times, FixedStep(0.01)))
     assert np.abs(ideal_winch_speeds(robot, path, times)).max() > 0.35
     assert np.abs(source.speeds).max() == pytest.approx(0.3, abs=1e-12)
     assert errors(motion, path).max() > 0.05

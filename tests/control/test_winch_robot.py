@@ -88,14 +88,14 @@ def test_a_result_tells_what_the_winches_did(winch_fmus: RobotFmus) -> None:
 
 
 def test_winches_go_first(winch_fmus: RobotFmus) -> None:
-    with instantiate_robot(winch_fmus) as coupling:
-        assert [seat.component.name[:5] for seat in coupling._execution_order] == [
+    with instantiate_robot(winch_fmus) as graph:
+        assert [instance.component.name[:5] for instance in graph.instances] == [
             *["winch"] * 3,
             *["cable"] * 3,
             "platf",
         ]
         # What winches do in the middle of a step nobody is told.
-        assert coupling.convergence_order == 4
+        assert graph.convergence_order == 4
 
 
 @pytest.mark.validate

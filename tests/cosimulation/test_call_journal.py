@@ -6,7 +6,7 @@ import fmpy
 import numpy as np
 import pytest
 
-from tautwire.cosimulation import CallJournal, Component, JournalledComponent, Port
+from tautwire.cosimulation import CallJournal, Component, CouplingSolver, JournalledComponent, Port
 from tautwire.cosimulation.call_journal import CALL_INDEX, CALL_TIME, CallEntry
 from tautwire.cosimulation.robot_cosimulation import instantiate_robot
 from tautwire.fmus.packaging import RobotFmus
@@ -74,8 +74,9 @@ def test_every_call_is_noted_before_it_is_made(
 ) -> None:
     seen: list[CallEntry] = []
     journal, reader = CallJournal(tmp_path), CallJournal(tmp_path)
-    with instantiate_robot(three_fmus, journal) as coupling:
-        component = coupling.components["cable_2"]
+    with instantiate_robot(three_fmus, journal) as graph:
+        CouplingSolver(graph, inputs=journal.allocate_inputs(graph.input_ports))
+        component = graph.components["cable_2"]
         block, saved = component.block(["tension"]), component.save()
         arguments = {"read": [block], "write": [block], "step": [0.25, 0.01], "restore": [saved], "release": [saved]}
         with monkeypatch.context() as patched:
@@ -106,4 +107,4 @@ def test_unpacking_is_noted_as_such(three_fmus: RobotFmus, tmp_path: Path, monke
 
 def test_no_method_that_calls_the_fmu_is_forgotten() -> None:
     methods = {name for name, value in vars(Component).items() if callable(value) and not name.startswith("_")}
-    assert methods - {"block", "refuse", "run"} == methods & set(vars(JournalledComponent))
+    assert methods - {"block", "raise_not_finite", "run"} == methods & set(vars(JournalledComponent))

@@ -15,7 +15,7 @@ class Looks(InterpolationErrorEstimate):
 
     count = 0
 
-    def largest(self, begun: np.ndarray, shown: np.ndarray, step: float) -> float:
+    def max_error(self, begun: np.ndarray, shown: np.ndarray, step: float) -> float:
         self.count += 1
         return super().max_error(begun, shown, step)
 
@@ -30,25 +30,29 @@ def sixth_power(time: float) -> np.ndarray:
     return np.array([k for at in (time, 0.5 * time) for k in (at**6, 6.0 * at**5, 30.0 * at**4)])
 
 
-def lacking(agreement: ConvergenceCriterion, error: float, share: float = SHARE, step: float = STEP) -> bool:
-    return agreement.is_unconverged(error, TOLERANCE, share, sixth_power(0.0), sixth_power(step), step)
+def criterion(bends: InterpolationErrorEstimate, share: float = SHARE) -> ConvergenceCriterion:
+    return ConvergenceCriterion(bends, TOLERANCE, share)
+
+
+def lacking(agreement: ConvergenceCriterion, error: float, step: float = STEP) -> bool:
+    return agreement.is_unconverged(error, sixth_power(0.0), sixth_power(step), step)
 
 
 def test_without_a_share_the_tolerance_decides(bends: Looks) -> None:
-    agreement = ConvergenceCriterion(bends)
-    assert lacking(agreement, 1.1 * TOLERANCE, share=0.0)
-    assert not lacking(agreement, 0.9 * TOLERANCE, share=0.0)
+    agreement = criterion(bends, share=0.0)
+    assert lacking(agreement, 1.1 * TOLERANCE)
+    assert not lacking(agreement, 0.9 * TOLERANCE)
     assert bends.count == 0
 
 
 def test_a_share_of_what_the_polynomials_miss_is_enough(bends: Looks) -> None:
-    agreement = ConvergenceCriterion(bends)
+    agreement = criterion(bends)
     assert lacking(agreement, 1.01 * SHARE * MISSED)
     assert not lacking(agreement, 0.99 * SHARE * MISSED)
 
 
 def test_what_is_far_off_is_not_looked_at_closely(bends: Looks) -> None:
-    agreement = ConvergenceCriterion(bends)
+    agreement = criterion(bends)
     lacking(agreement, SHARE * MISSED)
     assert lacking(agreement, 1.01 * MAX_TOLERANCE_GROWTH * SHARE * MISSED)
     assert bends.count == 1
@@ -57,37 +61,35 @@ def test_what_is_far_off_is_not_looked_at_closely(bends: Looks) -> None:
 
 
 def test_a_step_of_another_length_is_looked_at_closely(bends: Looks) -> None:
-    agreement = ConvergenceCriterion(bends)
+    agreement = criterion(bends)
     lacking(agreement, SHARE * MISSED)
     assert not lacking(agreement, 20.0 * SHARE * MISSED, step=2.0 * STEP)
 
 
 def test_an_error_that_is_no_number_ends_redos(bends: Looks) -> None:
     """It is refused where outputs are recorded, with the name of the FMU."""
-    assert not lacking(ConvergenceCriterion(bends), np.nan)
+    assert not lacking(criterion(bends), np.nan)
 
 
 def test_what_is_far_off_is_looked_at_when_no_redo_is_left(bends: Looks) -> None:
     """Else a step at rest would hold those of a motion to what itself was allowed."""
-    agreement = ConvergenceCriterion(bends)
-    agreement.is_unconverged(1e-6, TOLERANCE, SHARE, np.zeros(6), np.zeros(6), STEP)
+    agreement = criterion(bends)
+    agreement.is_unconverged(1e-6, np.zeros(6), np.zeros(6), STEP)
     few = 0.5 * SHARE * MISSED
     assert lacking(agreement, few)
-    assert not agreement.is_unconverged(
-        few, TOLERANCE, SHARE, sixth_power(0.0), sixth_power(STEP), STEP, is_last_iteration=True
-    )
+    assert not agreement.is_unconverged(few, sixth_power(0.0), sixth_power(STEP), STEP, is_last_iteration=True)
     assert not lacking(agreement, few)
 
 
 def test_behind_a_kink_what_was_allowed_does_not_count(bends: Looks) -> None:
-    agreement = ConvergenceCriterion(bends)
-    agreement.is_unconverged(1e-6, TOLERANCE, SHARE, np.zeros(6), np.zeros(6), STEP)
+    agreement = criterion(bends)
+    agreement.is_unconverged(1e-6, np.zeros(6), np.zeros(6), STEP)
     agreement.reset()
     assert not lacking(agreement, 0.5 * SHARE * MISSED)
 
 
 def test_steps_that_differ_by_rounding_are_of_one_length(bends: Looks) -> None:
-    agreement = ConvergenceCriterion(bends)
+    agreement = criterion(bends)
     lacking(agreement, SHARE * MISSED)
     assert lacking(agreement, 1.01 * MAX_TOLERANCE_GROWTH * SHARE * MISSED, step=STEP * (1.0 + 1e-12))
     assert bends.count == 1

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tautwire.cosimulation.convergence import InterpolationErrorEstimate
-from tautwire.cosimulation.extrapolation import Extrapolator
+from tautwire.cosimulation.extrapolation import Extrapolator, restart_history
 from tautwire.cosimulation.hermite_interpolation import DerivativeChain
 
 STEP = 0.1
@@ -29,14 +29,14 @@ def misses(motion: Callable[[float], list[float]], steps: int, chain: Derivative
     count = len(chain.ends) * (1 if chain.midpoints is None else 2)
     places = np.array([*chain.ends, *(chain.midpoints or ())])
     prediction = Extrapolator([chain], places, np.array([1.0, 10.0, 100.0] * 2)[:count])
-    prediction.reset(0.0, shown(motion, 0.0))
+    history = restart_history(0.0, shown(motion, 0.0))
     found = []
     for number in range(1, steps + 1):
         time = number * STEP
         expected, true = shown(motion, time - STEP), shown(motion, time)
-        prediction.begin_step(time, expected)
+        history = prediction.begin_step(history, time, expected)
         found.append(float(np.max(np.abs(expected - true)[places] / np.array([1.0, 10.0, 100.0] * 2)[:count])))
-        prediction.end_step(time, true)
+        history = prediction.end_step(history, time, true)
     return found
 
 
@@ -78,30 +78,30 @@ def test_after_a_corner_only_what_follows_it_counts() -> None:
 def test_a_corner_in_a_short_step_tells_nothing_about_a_time_far_ahead() -> None:
     jump, corner = np.array([0.0, 0.0, 1.0] * 2), 10 * STEP
     prediction = Extrapolator([CHAIN], np.arange(6), np.array([1.0, 10.0, 100.0] * 2))
-    prediction.reset(0.0, shown(swing, 0.0))
+    history = restart_history(0.0, shown(swing, 0.0))
     for time in np.arange(1, 11) * STEP:
-        prediction.begin_step(time, np.zeros(6))
-        prediction.end_step(time, shown(swing, time))
-    prediction.begin_step(corner + 3e-6, np.zeros(6))
-    prediction.end_step(corner + 3e-6, shown(swing, corner + 3e-6) + jump)
+        history = prediction.begin_step(history, time, np.zeros(6))
+        history = prediction.end_step(history, time, shown(swing, time))
+    history = prediction.begin_step(history, corner + 3e-6, np.zeros(6))
+    history = prediction.end_step(history, corner + 3e-6, shown(swing, corner + 3e-6) + jump)
     expected = np.zeros(6)
-    prediction.begin_step(corner + STEP, expected)
+    history = prediction.begin_step(history, corner + STEP, expected)
     assert np.max(np.abs(expected[:3] - swing(corner + STEP)) / [1.0, 10.0, 100.0]) < 0.5
 
 
 def test_a_memory_taken_back_predicts_the_same() -> None:
     prediction = Extrapolator([CHAIN], np.arange(6), np.ones(6))
-    prediction.reset(0.0, shown(swing, 0.0))
+    history = restart_history(0.0, shown(swing, 0.0))
     for number in range(1, 10):
-        prediction.begin_step(number * STEP, np.zeros(6))
-        prediction.end_step(number * STEP, shown(swing, number * STEP))
-    memory, found = prediction.history, []
+        history = prediction.begin_step(history, number * STEP, np.zeros(6))
+        history = prediction.end_step(history, number * STEP, shown(swing, number * STEP))
+    memory, found = history, []
     for _ in range(2):
         expected = np.zeros(6)
-        prediction.begin_step(10 * STEP, expected)
-        prediction.end_step(10 * STEP, shown(swing, 10 * STEP) + 1.0)
+        history = prediction.begin_step(history, 10 * STEP, expected)
+        history = prediction.end_step(history, 10 * STEP, shown(swing, 10 * STEP) + 1.0)
         found.append(expected)
-        prediction.history = memory
+        history = memory
     assert np.array_equal(found[0], found[1])
 
 

@@ -13,7 +13,7 @@ from fmpy.validation import validate_fmu
 
 from tautwire.cosimulation import CallAbortedError, CallJournal, Component, ComponentError, JournalledComponent
 from tautwire.cosimulation.call_journal import CallEntry
-from tautwire.cosimulation.connections import direct_feedthrough
+from tautwire.cosimulation.direct_feedthrough import direct_feedthrough
 from tautwire.cosimulation.robot_cosimulation import CosimulationResult, RunError, cosimulate
 from tautwire.cosimulation.ssp_archive import write_ssp
 from tautwire.fmus.packaging import build_fmus

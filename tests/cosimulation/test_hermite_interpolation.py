@@ -31,11 +31,11 @@ def test_a_polynomial_is_continued_exactly() -> None:
 def test_fmus_tell_which_output_is_the_rate_of_which(three_fmus: RobotFmus) -> None:
     shown = [Port("platform", f"{middle}{name}.x") for middle in ("", "middle_") for name in NAMES]
     shown += [Port("cable_1", name) for name in ("force_rate.y", "force.y", "tension")]
-    with instantiate_robot(three_fmus) as coupling:
+    with instantiate_robot(three_fmus) as graph:
         wanted = range(len(shown))
-        assert derivative_chains(coupling.components, shown, wanted) == [
+        assert derivative_chains(graph.components, shown, wanted) == [
             DerivativeChain((0, 1, 2), (3, 4, 5)),
             DerivativeChain((7, 6), None),
             DerivativeChain((8,), None),
         ]
-        assert derivative_chains(coupling.components, shown, (4,)) == [DerivativeChain((0, 1, 2), (3, 4, 5))]
+        assert derivative_chains(graph.components, shown, (4,)) == [DerivativeChain((0, 1, 2), (3, 4, 5))]

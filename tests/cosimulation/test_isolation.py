@@ -20,6 +20,7 @@ from tautwire.control import ClosedLoopOptions, cosimulate_closed_loop, design_c
 from tautwire.cosimulation import (
     CallAbortedError,
     ComponentError,
+    Experiment,
     FixedStep,
     MemoryRecorder,
     PiecewiseLinearInput,
@@ -82,7 +83,7 @@ def run(
     kept = MemoryRecorder(len(TIMES), 2) if recorder is None else recorder
     ramp = PiecewiseLinearInput(TIMES, 2.0 * TIMES[:, None])
     account = simulate_isolated(
-        partial(coupled, fmu), source or ramp, TIMES, SHOWN, FixedStep(0.01), kept, call_timeout=patience
+        partial(coupled, fmu), Experiment(source or ramp, TIMES, FixedStep(0.01)), SHOWN, kept, call_timeout=patience
     )
     return account, kept
 

@@ -13,6 +13,7 @@ from tautwire.cosimulation.isolation import CALL_TIMEOUT
 from tautwire.cosimulation.recording_simulation import simulate_recording
 from tautwire.cosimulation.result_file import open_result_file
 from tautwire.cosimulation.robot_wiring import result_columns
+from tautwire.cosimulation.run_arguments import SimulationOptions
 from tautwire.errors import RecordingError
 from tests.bench.long import STEP, write_recording
 from tests.support.memory import TOLD, resident_memory
@@ -30,7 +31,7 @@ def test_the_recorder_gets_a_row_for_every_sample_until_the_end(tmp_path: Path) 
     write_recording(tmp_path / "recording.parquet", 50)
     rows, robot = Rows(), example("three")
     account, notes = simulate_recording(
-        robot, tmp_path / "recording.parquet", rows, 0.5 * STEP, None, 0.02, lambda what, done: None
+        robot, tmp_path / "recording.parquet", rows, SimulationOptions(0.5 * STEP, until=0.02), lambda what, done: None
     )
     assert [time for time, _ in rows] == pytest.approx(np.arange(21) * STEP)
     assert {row.shape for _, row in rows} == {(len(result_columns(3)) - 1,)}
@@ -43,7 +44,11 @@ def test_less_than_two_samples_are_refused(tmp_path: Path) -> None:
     write_recording(tmp_path / "recording.parquet", 50)
     with pytest.raises(RecordingError, match="fewer than two samples"):
         simulate_recording(
-            example("three"), tmp_path / "recording.parquet", Rows(), STEP, None, -1.0, lambda what, done: None
+            example("three"),
+            tmp_path / "recording.parquet",
+            Rows(),
+            SimulationOptions(STEP, until=-1.0),
+            lambda what, done: None,
         )
 
 
@@ -59,6 +64,12 @@ def test_memory_stays_flat_over_a_long_run(tmp_path: Path, monkeypatch: pytest.M
             seen[int(100.0 * done)] = sum(resident_memory())
 
     with open_result_file(tmp_path / "result.parquet", result_columns(3)) as rows:
-        simulate_recording(example("three"), tmp_path / "recording.parquet", rows, STEP, None, None, look, CALL_TIMEOUT)
+        simulate_recording(
+            example("three"),
+            tmp_path / "recording.parquet",
+            rows,
+            SimulationOptions(STEP, call_timeout=CALL_TIMEOUT),
+            look,
+        )
     assert pq.read_metadata(tmp_path / "result.parquet").num_rows == 8_001
     assert seen[100] < seen[20] + 1.0

@@ -3,7 +3,8 @@ from collections.abc import Iterator
 import pytest
 
 from tautwire.cosimulation import Component, Connection, Port, WiringError
-from tautwire.cosimulation.connections import check_connections, dependency_groups
+from tautwire.cosimulation.connections import check_connections
+from tautwire.cosimulation.direct_feedthrough import dependency_groups
 from tautwire.cosimulation.robot_wiring import robot_connections
 from tautwire.fmus.packaging import RobotFmus
 

@@ -1,11 +1,14 @@
 """What the books of a run tell a user."""
 
+from dataclasses import replace
+
 import pytest
 
+from tautwire.cosimulation import CouplingSolver, SolverOptions
 from tautwire.cosimulation.robot_cosimulation import instantiate_robot
 from tautwire.cosimulation.run_statistics import RunStatistics
 from tautwire.fmus.packaging import RobotFmus
-from tests.cosimulation.test_coupling import end_error
+from tests.cosimulation.test_coupling_solver import end_error
 
 
 def test_energy_that_the_coupling_makes_is_told() -> None:
@@ -22,8 +25,8 @@ def test_a_few_steps_at_corners_may_run_out_of_redos() -> None:
 
 @pytest.mark.parametrize(("redos", "settles"), [(8, True), (1, False)])
 def test_steps_that_are_too_long_for_their_redos_are_counted(redos: int, settles: bool, three_fmus: RobotFmus) -> None:
-    with instantiate_robot(three_fmus) as coupling:
-        coupling.max_iterations = redos
+    with instantiate_robot(three_fmus) as graph:
+        coupling = CouplingSolver(graph, SolverOptions(max_iterations=redos))
         end_error(coupling, 0.14)
         assert (coupling.statistics.unconverged_steps == 0) is settles
         assert (coupling.statistics.warnings() == ()) is settles
@@ -31,7 +34,7 @@ def test_steps_that_are_too_long_for_their_redos_are_counted(redos: int, settles
 
 def test_steps_that_cannot_be_redone_are_told_elsewhere(three_fmus: RobotFmus) -> None:
     """They are a fallback of their own."""
-    with instantiate_robot(three_fmus) as coupling:
-        coupling.supports_rollback = False
+    with instantiate_robot(three_fmus) as graph:
+        coupling = CouplingSolver(replace(graph, supports_rollback=False))
         end_error(coupling, 0.05)
         assert coupling.statistics.unconverged_steps == 0

@@ -2,11 +2,21 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
-from tautwire.cosimulation import ComponentError, Coupling, FixedStep, MemoryRecorder, PiecewiseLinearInput, simulate
-from tautwire.cosimulation.coupling import Checkpoint
+from tautwire.cosimulation import (
+    ComponentError,
+    CouplingSolver,
+    Experiment,
+    FixedStep,
+    MemoryRecorder,
+    PiecewiseLinearInput,
+    simulate,
+)
+from tautwire.cosimulation.coupling_state import Checkpoint
 from tautwire.cosimulation.macro_step import MAX_HALVINGS, step_with_rejection
 from tautwire.cosimulation.robot_cosimulation import instantiate_robot
 from tautwire.cosimulation.robot_wiring import recorded_ports
@@ -36,13 +46,16 @@ def shaken(rig: RigRobot, every: float) -> tuple[np.ndarray, np.ndarray]:
     return time, np.array([program.speed(float(at)) for at in time])
 
 
-def errors(planar: tuple[RobotFmus, RigRobot], step: float) -> tuple[float, Coupling]:
+def errors(planar: tuple[RobotFmus, RigRobot], step: float) -> tuple[float, CouplingSolver]:
     """How far the platform is from the rig's at most, m."""
     fmus, rig = planar
     time, speed = shaken(rig, step)
-    with instantiate_robot(fmus) as coupling:
+    with instantiate_robot(fmus) as graph:
+        coupling = CouplingSolver(graph)
         kept = MemoryRecorder(len(time), len(recorded_ports(4)))
-        simulate(coupling, PiecewiseLinearInput(time, speed), time, recorded_ports(4), FixedStep(step), kept)
+        simulate(
+            coupling, Experiment(PiecewiseLinearInput(time, speed), time, FixedStep(step)), recorded_ports(4), kept
+        )
     exact = rig_simulate(rig, PULLEY, SampledProgram(time, speed), time).position
     return float(np.max(np.abs(kept.rows[:, :3] - exact))), coupling
 
@@ -63,20 +76,20 @@ def test_steps_that_lead_somewhere_stay_whole(planar: tuple[RobotFmus, RigRobot]
 
 
 class Given:
-    """A coupling of which only steps up to ``longest`` (s) are not lost; an FMU fails with ``status`` in the others."""
+    """A solver of which only steps up to ``longest`` (s) do not diverge; an FMU fails with ``status`` in the others."""
 
     def __init__(self, longest: float, status: str | None = None) -> None:
         self.longest, self.status = longest, status
-        self.lost = False
+        self.state = SimpleNamespace(diverged=False)
         self.tried: list[float] = []
         self.released = 0
 
-    def attempt(self, time: float, step: float, start: np.ndarray, end: np.ndarray) -> Checkpoint | None:
+    def attempt_step(self, time: float, step: float, start: np.ndarray, end: np.ndarray) -> Checkpoint | None:
         self.tried.append(step)
-        self.lost = step > self.longest
-        if self.lost and self.status is not None:
+        self.state.diverged = step > self.longest
+        if self.state.diverged and self.status is not None:
             raise ComponentError("cable_1", "fmi2DoStep", self.status, time, {}, ())
-        return Checkpoint((), np.zeros(0), np.zeros(0), np.zeros(0), None, None)  # type: ignore[arg-type]
+        return Checkpoint((), None)  # type: ignore[arg-type]
 
     def restore(self, checkpoint: Checkpoint) -> None:
         pass
@@ -100,7 +113,7 @@ def test_a_step_is_halved_until_it_holds(status: str | None) -> None:
 def test_the_shortest_is_kept_even_if_it_is_lost() -> None:
     given = Given(0.0)
     assert held(given) == pytest.approx(0.16 / 2**MAX_HALVINGS)
-    assert given.lost
+    assert given.state.diverged
 
 
 @pytest.mark.parametrize(("status", "tries"), [("discard", MAX_HALVINGS + 1), ("fatal", 1)])

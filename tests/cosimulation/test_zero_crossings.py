@@ -5,7 +5,15 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tautwire.cosimulation import FixedStep, MemoryRecorder, PiecewiseLinearInput, RunStatistics, simulate
+from tautwire.cosimulation import (
+    CouplingSolver,
+    Experiment,
+    FixedStep,
+    MemoryRecorder,
+    PiecewiseLinearInput,
+    RunStatistics,
+    simulate,
+)
 from tautwire.cosimulation.macro_step import _land_before_event
 from tautwire.cosimulation.robot_cosimulation import instantiate_robot
 from tautwire.cosimulation.robot_wiring import recorded_ports
@@ -33,10 +41,11 @@ def fmus(tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
 
 
 def run(fmus: RobotFmus, step: float, cut: bool = True) -> tuple[np.ndarray, RunStatistics]:
-    with instantiate_robot(fmus) as coupling:
-        coupling.supports_variable_step = cut
+    experiment = Experiment(PiecewiseLinearInput(TIME, SPEED), TIME, FixedStep(step))
+    with instantiate_robot(fmus) as graph:
+        coupling = CouplingSolver(replace(graph, supports_variable_step=cut))
         kept = MemoryRecorder(len(TIME), len(recorded_ports(3)))
-        simulate(coupling, PiecewiseLinearInput(TIME, SPEED), TIME, recorded_ports(3), FixedStep(step), kept)
+        simulate(coupling, experiment, recorded_ports(3), kept)
         return kept.rows[:, :3].copy(), coupling.statistics
 
 
@@ -73,8 +82,8 @@ def test_the_way_back_from_a_root_ends_where_every_step_tried_there_is_bent() ->
 
 
 def test_the_cable_pulls_less_than_nothing_only_while_its_tension_is_zero(fmus: RobotFmus) -> None:
-    with instantiate_robot(fmus) as coupling:
-        cable = coupling.components["cable_3"]
+    with instantiate_robot(fmus) as graph:
+        cable = graph.components["cable_3"]
         block = cable.block(["pull", "tension"])
         pulls = []
         for height in (0.0, 0.5, 1.0):

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from tautwire.cosimulation import Connection, Port
-from tautwire.cosimulation.zero_order_hold import ZeroOrderHold
+from tautwire.cosimulation.zero_order_hold import ZeroOrderHold, inputs_from_discrete_outputs
 
 
 class Fake:
@@ -38,44 +38,38 @@ def test_only_discrete_outputs_are_held() -> None:
     _, _, held = system()
     assert held.ports == (Port("a", "rate"), Port("b", "mode"))
     shown = np.array([1.0, 2.0, 3.0, 4.0])
-    assert held.begin_step(shown)
+    values = held.sample(shown)
     shown[:] = [10.0, 20.0, 30.0, 40.0]
-    held.apply(shown)
+    held.apply(shown, values)
     assert shown.tolist() == [1.0, 20.0, 3.0, 40.0]
 
 
-def test_at_the_end_what_the_components_show_counts_and_tells_of_a_jump() -> None:
+def test_at_the_end_what_the_components_show_counts() -> None:
     parts, _, held = system()
     shown = np.array([1.0, 2.0, 3.0, 4.0])
-    held.begin_step(shown)
-    parts["a"].now["rate"], parts["b"].now["mode"] = 1.0, 3.0
-    held.end_step(shown)
-    assert not held.begin_step(shown)
-    parts["a"].now["rate"] = 5.0
+    parts["a"].now["rate"], parts["b"].now["mode"] = 5.0, 3.0
     held.end_step(shown)
     assert shown.tolist() == [5.0, 2.0, 3.0, 4.0]
-    assert held.begin_step(shown) and not held.begin_step(shown)
+    assert held.sample(shown).tolist() == [5.0, 3.0]
 
 
-def test_after_going_back_every_value_counts_as_new() -> None:
+def test_first_sample_counts_as_a_jump() -> None:
     _, _, held = system()
-    shown = np.array([1.0, 2.0, 3.0, 4.0])
-    held.begin_step(shown)
-    held.reset()
-    assert held.begin_step(shown)
+    assert not np.array_equal(held.initial_values(), held.sample(np.zeros(4)))
 
 
 def test_inputs_that_jump_are_those_wired_to_discrete_outputs() -> None:
-    _, _, held = system()
+    parts, _, _ = system()
     wires = [Connection(Port("a", name), Port("c", f"{name}_in")) for name in ("rate", "speed")]
-    assert held.targets(wires) == [Port("c", "rate_in")]
+    assert inputs_from_discrete_outputs(parts, wires) == [Port("c", "rate_in")]
 
 
 def test_system_without_discrete_outputs_is_left_alone() -> None:
     parts: dict[str, Any] = {"a": Fake(speed="continuous")}
     held = ZeroOrderHold(parts, [Port("a", "speed")])
     shown = np.array([1.0])
-    assert not held.begin_step(shown)
-    held.apply(shown)
+    values = held.sample(shown)
+    assert np.array_equal(values, held.initial_values())
+    held.apply(shown, values)
     held.end_step(shown)
     assert shown.tolist() == [1.0]

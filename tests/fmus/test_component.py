@@ -5,7 +5,16 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from tautwire.cosimulation import Component, ComponentError, FixedStep, MemoryRecorder, PiecewiseLinearInput, simulate
+from tautwire.cosimulation import (
+    Component,
+    ComponentError,
+    CouplingSolver,
+    Experiment,
+    FixedStep,
+    MemoryRecorder,
+    PiecewiseLinearInput,
+    simulate,
+)
 from tautwire.cosimulation.robot_cosimulation import RunError, cosimulate, instantiate_robot
 from tautwire.cosimulation.robot_wiring import recorded_ports
 from tautwire.fmus.packaging import RobotFmus
@@ -28,15 +37,10 @@ def test_a_failing_fmu_is_named_with_time_and_inputs(three_fmus: RobotFmus) -> N
 
 def test_a_value_that_is_not_finite_stops_the_run(three_fmus: RobotFmus) -> None:
     speeds = np.array([[0.0, 0.0, 0.0], [0.0, np.inf, 0.0]])
-    with instantiate_robot(three_fmus) as coupling, pytest.raises(ComponentError, match="not finite"):
-        simulate(
-            coupling,
-            PiecewiseLinearInput(np.array([0.0, 0.1]), speeds),
-            np.array([0.0, 0.1]),
-            recorded_ports(3),
-            FixedStep(0.01),
-            MemoryRecorder(2, 18),
-        )
+    source = PiecewiseLinearInput(np.array([0.0, 0.1]), speeds)
+    experiment = Experiment(source, source.time, FixedStep(0.01))
+    with instantiate_robot(three_fmus) as graph, pytest.raises(ComponentError, match="not finite"):
+        simulate(CouplingSolver(graph), experiment, recorded_ports(3), MemoryRecorder(2, 18))
 
 
 def test_folders_go_when_the_block_ends(three_fmus: RobotFmus) -> None:

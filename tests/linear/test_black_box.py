@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tautwire.cosimulation import Component, Connection, Coupling, Port
+from tautwire.cosimulation import Component, Connection, CouplingGraph, Port, Wiring, build_coupling_graph
 from tautwire.errors import InputError
 from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.linear import (
@@ -163,12 +163,12 @@ def test_a_robot_with_a_users_platform_that_cannot_save_its_state(tmp_path: Path
 @contextmanager
 def wired(
     parts: dict[str, Path], connections: Sequence[Connection], drives: Sequence[Port], **start: float
-) -> Iterator[Coupling]:
+) -> Iterator[CouplingGraph]:
     with ExitStack() as stack:
         components = {name: stack.enter_context(Component(name, path)) for name, path in parts.items()}
         for component in components.values():
             component.initialize(0.0, start)
-        yield Coupling(components, connections, drives)
+        yield build_coupling_graph(components, Wiring(connections=tuple(connections), external_inputs=tuple(drives)))
 
 
 @needs_compiler

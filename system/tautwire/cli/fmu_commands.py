@@ -98,7 +98,7 @@ def simulate(
     from ..cosimulation.recording_simulation import simulate_recording
     from ..cosimulation.result_file import open_result_file
     from ..cosimulation.robot_wiring import result_columns
-    from ..cosimulation.run_arguments import validate_numbers
+    from ..cosimulation.run_arguments import SimulationOptions, validate_numbers
     from ..fmus.fmu_slots import check_user_fmus, missing_user_fmu_ports, parse_user_fmus
     from ..reports.run_overview import RecorderPair, RunOverview
     from ..reports.run_page import atomic_run_page
@@ -121,7 +121,8 @@ def simulate(
         progress_bar(output) as progress,
     ):
         recorder = result if report is None else RecorderPair(result, overview)
-        statistics, notes = simulate_recording(robot, speeds, recorder, step, tolerance, until, progress, patience)
+        options = SimulationOptions(step, tolerance, until, patience)
+        statistics, notes = simulate_recording(robot, speeds, recorder, options, progress)
         write_page(statistics, notes)
     for note in notes:
         output.note(note)

@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..array_validation import validate_array, validate_increasing
-from ..cosimulation import Connection, FixedStep, InputSource, Port, Progress
+from ..cosimulation import Connection, Experiment, FixedStep, InputSource, Port, Progress
 from ..cosimulation.robot_cosimulation import (
     DEFAULT_STEP,
     NO_ADDITIONAL_COMPONENTS,
@@ -218,7 +218,8 @@ def controller_wires(fmus: RobotFmus) -> tuple[Connection, ...]:
 def _run(
     fmus: RobotFmus, source: InputSource, times: Array, options: RunOptions, extra: AdditionalComponents
 ) -> CosimulationResult:
-    return run_cosimulation(fmus, source, times, FixedStep(options.step), options.progress, options.patience, extra)
+    experiment = Experiment(source, times, FixedStep(options.step))
+    return run_cosimulation(fmus, experiment, options.progress, options.patience, extra)
 
 
 def _require_design(caller: str, robot: Robot, controller: Design, trajectory: Trajectory) -> None:

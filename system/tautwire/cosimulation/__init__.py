@@ -1,13 +1,15 @@
 """Co-simulation master: implicit coupling of FMI 2.0 and 3.0 FMUs, and of a robot's FMUs in particular."""
 
 from ..fmus.component import Component, ComponentError
+from ..fmus.fmu_variables import Port
 from .call_journal import CallJournal, JournalledComponent
-from .connections import Connection, Port, WiringError
-from .coupling import Coupling
+from .connections import Connection, PowerBond, Wiring, WiringError
+from .coupling_graph import CouplingGraph, build_coupling_graph
+from .coupling_solver import CouplingSolver, SolverOptions
 from .isolation import CALL_TIMEOUT, CallAbortedError, RunAbortedError, simulate_isolated
-from .run_statistics import PowerBond, RunStatistics
+from .run_statistics import RunStatistics
 from .step_size_control import AdaptiveStep, FixedStep, StepSizeControl, StepSizeError
-from .time_loop import InputSource, MemoryRecorder, PiecewiseLinearInput, Progress, Recorder, simulate
+from .time_loop import Experiment, InputSource, MemoryRecorder, PiecewiseLinearInput, Progress, Recorder, simulate
 
 __all__ = [
     "CALL_TIMEOUT",
@@ -17,7 +19,9 @@ __all__ = [
     "Component",
     "ComponentError",
     "Connection",
-    "Coupling",
+    "CouplingGraph",
+    "CouplingSolver",
+    "Experiment",
     "FixedStep",
     "InputSource",
     "JournalledComponent",
@@ -29,9 +33,12 @@ __all__ = [
     "Recorder",
     "RunAbortedError",
     "RunStatistics",
+    "SolverOptions",
     "StepSizeControl",
     "StepSizeError",
+    "Wiring",
     "WiringError",
+    "build_coupling_graph",
     "simulate",
     "simulate_isolated",
 ]

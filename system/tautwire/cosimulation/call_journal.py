@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..errors import one_line
 from ..fmus.component import Component, VariableBlock
 from ..fmus.fmi_binding import FMI_2, FMI_3, FMI_WARNING
-from .connections import Port
+from ..fmus.fmu_variables import Port
 
 Array = NDArray[np.float64]
 

@@ -1,32 +1,21 @@
-"""Connections between FMU variables, checked and sorted topologically by direct feedthrough."""
+"""Connections between FMU variables, and the checks that they are valid."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from graphlib import CycleError, TopologicalSorter
 
 from fmpy.model_description import ScalarVariable
 
 from ..errors import TautwireError
 from ..fmus.component import Component
 from ..fmus.fmi_binding import is_real_scalar, type_name
+from ..fmus.fmu_variables import Port
 from ..fmus.variable_units import UnitDefinition, same_unit, unit_definition, unit_of
 
 
 class WiringError(TautwireError):
     """A connection is invalid; the message says which and why."""
-
-
-@dataclass(frozen=True, order=True)
-class Port:
-    """A variable of a component, both by name."""
-
-    component: str
-    variable: str
-
-    def __str__(self) -> str:
-        return f"{self.component}.{self.variable}"
 
 
 @dataclass(frozen=True)
@@ -38,6 +27,31 @@ class Connection:
 
     def __str__(self) -> str:
         return f"{self.source} -> {self.target}"
+
+
+@dataclass(frozen=True)
+class PowerBond:
+    """Power bond: two connections whose product is a power, an effort one way (N) and a flow the other way (m/s)."""
+
+    effort: Connection
+    flow: Connection
+
+
+@dataclass(frozen=True, kw_only=True)
+class Wiring:
+    """The wiring of a coupled system, by the names of components and their variables.
+
+    ``external_inputs`` are the input ports that the master itself sets; ``power_bonds`` are audited for energy;
+    ``event_indicators`` are outputs whose zero crossings are state events, see :func:`step_with_events`.
+    ``derivative_connections`` are pairs whose target takes the time derivative of the source, estimated from past
+    communication points, see :class:`DerivativeEstimator`.
+    """
+
+    connections: tuple[Connection, ...]
+    external_inputs: tuple[Port, ...] = ()
+    power_bonds: tuple[PowerBond, ...] = ()
+    event_indicators: tuple[Port, ...] = ()
+    derivative_connections: tuple[Connection, ...] = ()
 
 
 def check_connections(components: Mapping[str, Component], connections: Sequence[Connection]) -> None:
@@ -89,73 +103,3 @@ def _require_real_scalars(connection: Connection, source: ScalarVariable, target
     if not (is_real_scalar(source) and is_real_scalar(target)):
         type_names = f"{type_name(source)} and {type_name(target)}"
         raise WiringError(f"{connection}: both must be Real or Float64, they are {type_names}")
-
-
-def direct_feedthrough(component: Component, assume_feedthrough: bool = True) -> dict[str, frozenset[str]]:
-    """Direct feedthrough: for each output, the inputs that act on it without delay.
-
-    Where the FMU does not declare it, all inputs, or none where ``assume_feedthrough`` is False.
-    """
-    inputs = [v for v in component.variables.values() if v.causality == "input"]
-    all_inputs = {_variable_key(v) for v in inputs}
-    declared = {
-        _variable_key(unknown.variable): {_variable_key(known) for known in unknown.dependencies}
-        for unknown in component.description.outputs
-        if unknown.dependencies is not None
-    }
-    undeclared = all_inputs if assume_feedthrough else set()
-    outputs = [v for v in component.variables.values() if v.causality == "output"]
-    return {
-        v.name: frozenset(
-            known.name for known in inputs if _variable_key(known) in declared.get(_variable_key(v), undeclared)
-        )
-        for v in outputs
-    }
-
-
-def _variable_key(variable: ScalarVariable) -> tuple[str, int]:
-    """A key shared by all aliases of a variable, of which FMI 3.0 lists dependencies under one only."""
-    return variable.type, variable.valueReference
-
-
-def dependency_groups(components: Mapping[str, Component], connections: Sequence[Connection]) -> list[list[Connection]]:
-    """Connections grouped topologically: outputs of a group depend on groups before it only.
-
-    An FMU that does not declare its dependencies is taken to have no direct feedthrough where there were an algebraic
-    loop otherwise.
-
-    Raises WiringError where declared dependencies make an algebraic loop.
-    """
-    try:
-        return _topological_groups(components, connections, assume_feedthrough=True)
-    except CycleError:
-        pass
-    try:
-        return _topological_groups(components, connections, assume_feedthrough=False)
-    except CycleError as error:
-        loop = " -> ".join(str(port) for port in error.args[1])
-        raise WiringError(f"outputs depend on each other without delay: {loop}") from error
-
-
-def _topological_groups(
-    components: Mapping[str, Component], connections: Sequence[Connection], assume_feedthrough: bool
-) -> list[list[Connection]]:
-    source_of_target = {connection.target: connection.source for connection in connections}
-    sources = {connection.source for connection in connections}
-    feedthrough = {name: direct_feedthrough(component, assume_feedthrough) for name, component in components.items()}
-    dependencies: dict[Port, set[Port]] = {
-        source: {
-            source_of_target[target]
-            for target in (Port(source.component, known) for known in feedthrough[source.component][source.variable])
-            if target in source_of_target
-        }
-        for source in sources
-    }
-    sorter = TopologicalSorter(dependencies)
-    sorter.prepare()
-    groups = []
-    while sorter.is_active():
-        ready = set(sorter.get_ready())
-        groups.append([connection for connection in connections if connection.source in ready])
-        sorter.done(*ready)
-    return groups

@@ -66,12 +66,18 @@ STEP_SIZE_RTOL = 1e-6
 class ConvergenceCriterion:
     """Convergence criterion: the iteration error against a tolerance or a share of the interpolation error.
 
+    ``tolerance`` is relative to nominal values; with an ``interpolation_error_share`` of zero it alone decides.
+
     The interpolation error is not evaluated where the iteration error is far above what the step before was allowed,
     unless no iteration is left. Iterating further is not worth while: the step itself has the interpolation error.
     """
 
-    def __init__(self, interpolation_error: InterpolationErrorEstimate) -> None:
+    def __init__(
+        self, interpolation_error: InterpolationErrorEstimate, tolerance: float, interpolation_error_share: float
+    ) -> None:
         self._interpolation_error = interpolation_error
+        self._tolerance = tolerance
+        self._interpolation_error_share = interpolation_error_share
         self.reset()
 
     def reset(self) -> None:
@@ -81,8 +87,6 @@ class ConvergenceCriterion:
     def is_unconverged(
         self,
         error: float,
-        tolerance: float,
-        interpolation_error_share: float,
         outputs_at_start: Array,
         outputs: Array,
         step: float,
@@ -90,10 +94,10 @@ class ConvergenceCriterion:
     ) -> bool:
         """Whether ``error`` exceeds what a ``step`` (s) from ``outputs_at_start`` to ``outputs`` may have.
 
-        ``error`` and ``tolerance`` are relative to nominal values; with ``is_last_iteration`` none is left.
+        ``error`` is relative to nominal values; with ``is_last_iteration`` none is left.
         """
-        if not interpolation_error_share or error <= tolerance:
-            return error > tolerance
+        if not self._interpolation_error_share or error <= self._tolerance:
+            return error > self._tolerance
         if (
             not is_last_iteration
             and abs(step - self._step_size) <= STEP_SIZE_RTOL * step
@@ -102,6 +106,7 @@ class ConvergenceCriterion:
             return True
         self._step_size = step
         self._allowed_error = max(
-            tolerance, interpolation_error_share * self._interpolation_error.max_error(outputs_at_start, outputs, step)
+            self._tolerance,
+            self._interpolation_error_share * self._interpolation_error.max_error(outputs_at_start, outputs, step),
         )
         return error > self._allowed_error

@@ -53,10 +53,15 @@ class ExtrapolationHistory(NamedTuple):
     errors: Array | None = None
 
 
+def restart_history(time: float, outputs: Array) -> ExtrapolationHistory:
+    """The history of outputs that are known at ``time`` only."""
+    return ExtrapolationHistory(((time, outputs.copy()),))
+
+
 class Extrapolator:
     """Extrapolates the outputs at ``indices``; ``nominals`` (number of indices,) are their nominal values.
 
-    ``chains`` tell which outputs are derivatives of which. ``history`` may be set back to that of an earlier time.
+    ``chains`` tell which outputs are derivatives of which.
     """
 
     def __init__(self, chains: Sequence[DerivativeChain], indices: Indices, nominals: Array) -> None:
@@ -68,18 +73,14 @@ class Extrapolator:
         self._indices = indices
         self._nominals = nominals
         self._weights: dict[tuple[float, ...], list[Array]] = {}
+        # Of the step that was last begun, for its end to rate.
         self._candidates: Array = np.zeros((1, len(indices)))
-        self.history = ExtrapolationHistory(())
 
-    def reset(self, time: float, outputs: Array) -> None:
-        """Restart the history at ``time``."""
-        self.history = ExtrapolationHistory(((time, outputs.copy()),))
-
-    def begin_step(self, time: float, outputs: Array) -> None:
-        """Begin a step that ends at ``time``: set ``outputs`` to their extrapolation."""
+    def begin_step(self, history: ExtrapolationHistory, time: float, outputs: Array) -> ExtrapolationHistory:
+        """Begin a step that ends at ``time``: set ``outputs`` to their extrapolation; returns the history used."""
         if not len(self._indices):
-            return
-        history = self.history = _drop_close_points(self.history, time)
+            return history
+        history = _drop_close_points(history, time)
         points = history.past[-min(history.smooth_points, MAX_POINTS) :]
         values = np.array([value for _, value in points])
         weights = self._weights_for([point_time for point_time, _ in points], time)
@@ -92,35 +93,27 @@ class Extrapolator:
             corrected = self._candidates[-1] + _predict_error(history.errors) * self._nominals
             self._candidates = np.concatenate([self._candidates, corrected[None, :]])
         outputs[self._indices] = self._candidates[min(history.best_candidate, len(self._candidates) - 1)]
+        return history
 
-    def end_step(self, time: float, outputs: Array) -> None:
-        """Add the outputs at ``time``, the end of the step, to the history, and rate the candidates by them."""
-        history = self.history
+    def end_step(self, history: ExtrapolationHistory, time: float, outputs: Array) -> ExtrapolationHistory:
+        """The history with the outputs at ``time``, the end of the step, which rate the candidates."""
         past = (*history.past[1 - MAX_PAST_POINTS :], (time, outputs.copy()))
         if not len(self._indices):
-            self.history = history._replace(past=past)
-            return
+            return history._replace(past=past)
         errors = (outputs[self._indices] - self._candidates) / self._nominals
         max_errors = np.abs(errors).max(axis=1)
         best_candidate, best_error = int(max_errors.argmin()), float(max_errors.min())
         points = min(history.smooth_points, MAX_POINTS)
         if best_error > CORNER_ERROR_RATIO * max(history.best_error, NEGLIGIBLE_ERROR):
             # Beginning and end of this step are taken to lie on the same side of the corner.
-            self.history = ExtrapolationHistory(past, smooth_points=2, best_candidate=1, best_error=best_error)
-        elif points < MAX_POINTS:
+            return ExtrapolationHistory(past, smooth_points=2, best_candidate=1, best_error=best_error)
+        if points < MAX_POINTS:
             # From now on there is one point more, which is tried where all points were of use.
-            self.history = ExtrapolationHistory(
-                past, points + 1, best_candidate + (best_candidate == points - 1), best_error
-            )
-        else:
-            newest_errors = errors[MAX_POINTS - 1 : MAX_POINTS]
-            previous_errors = history.errors
-            kept_errors = (
-                newest_errors
-                if previous_errors is None
-                else np.concatenate([newest_errors, previous_errors[: MAX_ERRORS - 1]])
-            )
-            self.history = ExtrapolationHistory(past, points, best_candidate, best_error, kept_errors)
+            return ExtrapolationHistory(past, points + 1, best_candidate + (best_candidate == points - 1), best_error)
+        kept_errors = errors[MAX_POINTS - 1 : MAX_POINTS]
+        if history.errors is not None:
+            kept_errors = np.concatenate([kept_errors, history.errors[: MAX_ERRORS - 1]])
+        return ExtrapolationHistory(past, points, best_candidate, best_error, kept_errors)
 
     def _weights_for(self, times: Sequence[float], end: float) -> list[Array]:
         """Weights of the past points in all candidates at a step's midpoint and end, for chains of each length."""
@@ -179,10 +172,6 @@ def _predict_error(errors: Array) -> Array:
     return predicted
 
 
-IndexArray = NDArray[np.intp]
-PastOutputs = Sequence[tuple[float, Array]]
-
-
 def derivative_weights(times: Sequence[float]) -> Array:
     """The weights of values at ``times`` (s, all different) in the derivative at the last one, in 1/s; shape (N,)."""
     *earlier, now = times
@@ -199,7 +188,7 @@ def derivative_weights(times: Sequence[float]) -> Array:
 class DerivativeEstimator:
     """Estimates the outputs at ``derivative_indices`` as derivatives of those at ``value_indices``, one for each."""
 
-    def __init__(self, value_indices: IndexArray, derivative_indices: IndexArray) -> None:
+    def __init__(self, value_indices: Indices, derivative_indices: Indices) -> None:
         self._value_indices = value_indices
         self._derivative_indices = derivative_indices
         self._past_sum = self._coarse_past_sum = np.zeros(len(value_indices))
@@ -210,7 +199,7 @@ class DerivativeEstimator:
         """Number of estimated derivatives."""
         return len(self._derivative_indices)
 
-    def begin_step(self, past: PastOutputs, time: float) -> None:
+    def begin_step(self, past: Past, time: float) -> None:
         """Begin a step that ends at ``time``; ``past`` holds the outputs at earlier communication points."""
         if not self.count:
             return
@@ -232,7 +221,7 @@ class DerivativeEstimator:
         )
         return errors
 
-    def _weighted_past(self, past: PastOutputs, time: float) -> tuple[Array, float]:
+    def _weighted_past(self, past: Past, time: float) -> tuple[Array, float]:
         weights = derivative_weights([at for at, _ in past] + [time])
         past_sum = sum(
             (weight * values[self._value_indices] for weight, (_, values) in zip(weights, past, strict=False)), 0.0

@@ -10,8 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..fmus.component import Component
-from .connections import Port
-from .execution_order import MIDDLE_PREFIX
+from ..fmus.fmu_variables import MIDDLE_PREFIX, Port
 
 Array = NDArray[np.float64]
 Indices = NDArray[np.intp]

@@ -19,7 +19,7 @@ import traceback
 import warnings
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, closing, contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
 from multiprocessing.process import BaseProcess
 from pathlib import Path
@@ -32,16 +32,16 @@ from numpy.typing import NDArray
 
 from ..errors import TautwireError
 from ..fmus.component import ComponentError
+from ..fmus.fmu_variables import Port
 from ..process_signals import defer_interrupts, exit_with_parent, restore_default_signals
 from .call_journal import CallEntry, CallJournal
-from .connections import Port
-from .coupling import Coupling
+from .coupling_graph import CouplingGraph
+from .coupling_solver import CouplingSolver
 from .run_statistics import RunStatistics
-from .step_size_control import StepSizeControl
-from .time_loop import InputSource, Progress, Recorder, simulate
+from .time_loop import Experiment, InputSource, Progress, Recorder, simulate
 
 Array = NDArray[np.float64]
-SystemBuilder = Callable[[CallJournal], AbstractContextManager[Coupling]]
+SystemBuilder = Callable[[CallJournal], AbstractContextManager[CouplingGraph]]
 
 ROW_MESSAGE, STATISTICS_MESSAGE, ERROR_MESSAGE = b"r", b"a", b"e"
 TEMPORARY_FOLDER_VARIABLES = ("TMPDIR", "TEMP", "TMP")
@@ -52,10 +52,8 @@ class Job:
     """A co-simulation for a worker process; ``build_system`` is called there, the rest is as for :func:`simulate`."""
 
     build_system: SystemBuilder
-    input_source: InputSource
-    times: Array
+    experiment: Experiment
     observed_outputs: tuple[Port, ...]
-    step_size_control: StepSizeControl
 
 
 class StopRequestedError(Exception):
@@ -73,17 +71,13 @@ def run_worker(job: Job, folder: Path, sender: Connection) -> None:
         sender,
         suppress(Exception),
         _sending_errors(sender),
-        job.build_system(journal) as coupling,
+        job.build_system(journal) as graph,
         _sending_errors(sender),
     ):
-        simulate(
-            coupling,
-            _JournalledSource(job.input_source, journal),
-            job.times,
-            job.observed_outputs,
-            job.step_size_control,
-            _PipeRecorder(sender),
-        )
+        experiment = replace(job.experiment, input_source=_JournalledSource(job.experiment.input_source, journal))
+        inputs = journal.allocate_inputs(graph.input_ports)
+        coupling = CouplingSolver(graph, experiment.step_size_control.solver_options, inputs)
+        simulate(coupling, experiment, job.observed_outputs, _PipeRecorder(sender))
         sender.send_bytes(pickle.dumps(coupling.statistics) + STATISTICS_MESSAGE)
 
 
@@ -175,25 +169,22 @@ class RemoteTracebackError(Exception):
 
 def simulate_isolated(
     build_system: SystemBuilder,
-    input_source: InputSource,
-    times: Array,
+    experiment: Experiment,
     observed_outputs: Sequence[Port],
-    step_size_control: StepSizeControl,
     recorder: Recorder,
     progress: Progress | None = None,
     call_timeout: float = CALL_TIMEOUT,
 ) -> RunStatistics:
     """Co-simulate as :func:`simulate` does, in a worker process under a watchdog.
 
-    ``build_system`` builds the coupling there, with components and input memory from its argument, the call journal.
-    The recorder and ``progress`` are called here; ``input_source`` and ``step_size_control`` are copies there. An FMU
-    call that takes ``call_timeout`` seconds is taken to hang. Ctrl-C ends the run within seconds. Returns the run
-    statistics.
+    ``build_system`` builds the coupling graph there, with components that use its argument, the call journal. The
+    recorder and ``progress`` are called here; the experiment is a copy there. An FMU call that takes ``call_timeout``
+    seconds is taken to hang. Ctrl-C ends the run within seconds. Returns the run statistics.
 
     Raises CallAbortedError where an FMU hangs or ends its process, RunAbortedError where the source does, and whatever
     the run raises; the recorder has the rows until then. No process and no temporary file remains.
     """
-    job = Job(build_system, input_source, times, tuple(observed_outputs), step_size_control)
+    job, times = Job(build_system, experiment, tuple(observed_outputs)), experiment.times
     with (
         defer_interrupts() as raise_interrupt,
         TemporaryDirectory(prefix="tautwire-run-", ignore_cleanup_errors=True) as folder,

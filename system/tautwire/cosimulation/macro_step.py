@@ -16,7 +16,8 @@ from numpy.typing import NDArray
 from scipy.optimize import brentq
 
 from ..fmus.component import ComponentError
-from .coupling import Checkpoint, Coupling
+from .coupling_solver import CouplingSolver
+from .coupling_state import Checkpoint
 
 Array = NDArray[np.float64]
 ExternalInputs = Callable[[float, float], tuple[Array, Array]]
@@ -25,7 +26,7 @@ MAX_HALVINGS = 4
 
 
 def step_with_rejection(
-    coupling: Coupling, time: float, step: float, external_inputs: ExternalInputs
+    coupling: CouplingSolver, time: float, step: float, external_inputs: ExternalInputs
 ) -> tuple[float, Checkpoint]:
     """A step from ``time``, halved until it does not diverge; returns its length and the checkpoint of its beginning.
 
@@ -43,7 +44,7 @@ def step_with_rejection(
                 raise
             first_error = first_error or error
         else:
-            if not coupling.diverged:
+            if not coupling.state.diverged:
                 return step, checkpoint
             coupling.restore(checkpoint)
             coupling.release(checkpoint)
@@ -54,7 +55,7 @@ def step_with_rejection(
         raise first_error or error from error
 
 
-def _attempt_step(coupling: Coupling, time: float, step: float, external_inputs: ExternalInputs) -> Checkpoint:
+def _attempt_step(coupling: CouplingSolver, time: float, step: float, external_inputs: ExternalInputs) -> Checkpoint:
     checkpoint = coupling.attempt_step(time, step, *external_inputs(time, step))
     assert checkpoint is not None
     return checkpoint
@@ -69,13 +70,13 @@ MIN_REMAINING_SHARE = 1e-6
 LANDING_RTOL = 1e-3
 
 
-def step_with_events(coupling: Coupling, time: float, step: float, external_inputs: ExternalInputs) -> float:
+def step_with_events(coupling: CouplingSolver, time: float, step: float, external_inputs: ExternalInputs) -> float:
     """One macro step from ``time``, split at events and where it is rejected, if FMUs support rollback.
 
     ``external_inputs(time, step)`` returns the external inputs at both ends. Two zero crossings of one indicator within
     a step are not seen. Returns the length of the first substep: ``step`` where it was not split.
     """
-    if not (coupling.supports_rollback and coupling.supports_variable_step):
+    if not (coupling.graph.supports_rollback and coupling.graph.supports_variable_step):
         coupling.step(time, step, *external_inputs(time, step))
         return step
     elapsed, first_length, max_substep = 0.0, step, step
@@ -92,7 +93,9 @@ def step_with_events(coupling: Coupling, time: float, step: float, external_inpu
     return first_length
 
 
-def _step_to_event(coupling: Coupling, time: float, step: float, external_inputs: ExternalInputs) -> tuple[float, bool]:
+def _step_to_event(
+    coupling: CouplingSolver, time: float, step: float, external_inputs: ExternalInputs
+) -> tuple[float, bool]:
     """Step to just before the first event, or over a near one; returns the length, and whether a step was rejected."""
     signs = np.sign(coupling.event_indicators())
     accepted_step, checkpoint = step_with_rejection(coupling, time, step, external_inputs)
@@ -139,7 +142,7 @@ def _land_before_event(
             indicators_after(EVENT_WIDTH)
             return 0.0
         known_indicators = {EVENT_WIDTH: begin_indicators, step_end: end_indicators}
-        crossing = min(_zero_crossing(indicators_after, known_indicators, int(place), tolerance) for place in changed)
+        crossing = min(_zero_crossing(indicators_after, known_indicators, int(index), tolerance) for index in changed)
         # Never further back than half of the remaining span, so that the loop terminates.
         retreat = max(tolerance, 4.0 * retreat)
         step_end = max(crossing - retreat, 0.5 * (EVENT_WIDTH + crossing))

@@ -14,14 +14,25 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError
 from ..fmus.fmu_slots import notes_on_unstated_units
-from ..fmus.packaging import build_fmus
+from ..fmus.packaging import RobotFmus, build_fmus
 from ..recordings.recording import Recording, read_recording
 from ..recordings.start_position import start_position, with_start
 from ..recordings.white_noise_estimate import white_noise_deviation
 from ..robot.schema import Robot
-from . import ComponentError, Coupling, FixedStep, PiecewiseLinearInput, Recorder, RunStatistics, StepSizeControl
+from . import (
+    ComponentError,
+    CouplingSolver,
+    Experiment,
+    FixedStep,
+    PiecewiseLinearInput,
+    Recorder,
+    RunStatistics,
+    StepSizeControl,
+)
+from .coupling_solver import DEFAULT_OPTIONS, SolverOptions
 from .robot_cosimulation import record_cosimulation, step_size_control_for, wire_fmus
 from .robot_wiring import RobotWiring
+from .run_arguments import SimulationOptions
 from .step_size_control import ExternalInputs, ReadLengths
 
 Array = NDArray[np.float64]
@@ -59,10 +70,15 @@ class HalvedStep:
     """Half of each step that a :class:`FixedStep` of this length makes."""
 
     max_step: float
-    coupling_tolerance: None = None
+    solver_options: SolverOptions = DEFAULT_OPTIONS
 
     def advance(
-        self, coupling: Coupling, begin: float, span: float, external_inputs: ExternalInputs, read_lengths: ReadLengths
+        self,
+        coupling: CouplingSolver,
+        begin: float,
+        span: float,
+        external_inputs: ExternalInputs,
+        read_lengths: ReadLengths,
     ) -> None:
         """See :class:`tautwire.cosimulation.StepSizeControl`."""
         count = max(1, math.ceil(span / self.max_step * (1.0 - 1e-9)))
@@ -73,7 +89,7 @@ def step_doubling_note(run: Run, time: Array, step: float, positions: Array) -> 
     """A note on the error of ``positions`` (N, 3), recorded at ``time`` (N or more,) in steps of ``step``.
 
     ``run(count, step_size_control, recorder)`` repeats the run, up to ``count`` of its times. The error is twice the
-    difference of the two, as for a method of first order; for second order it is half too large.
+    difference of the two, as for a method of first order. For second order it is 4/3 of it, so half too large is told.
     """
     recorder = FirstPositionsRecorder(len(positions))
     try:
@@ -86,18 +102,9 @@ def step_doubling_note(run: Run, time: Array, step: float, positions: Array) -> 
 
 
 def simulate_recording(
-    robot: Robot,
-    path: Path,
-    recorder: Recorder,
-    step: float,
-    tolerance: float | None,
-    until: float | None,
-    progress: Callable[[str, float], None],
-    call_timeout: float | None = None,
+    robot: Robot, path: Path, recorder: Recorder, options: SimulationOptions, progress: Callable[[str, float], None]
 ) -> tuple[RunStatistics, tuple[str, ...]]:
-    """Record a run at the recording's times, up to ``until`` (s); returns its statistics and notes for the user.
-
-    ``call_timeout`` is as for :func:`record_cosimulation`.
+    """Record a run at the recording's times; returns its statistics and notes for the user.
 
     Raises RecordingError where fewer than two samples lie before ``until``, ComponentError where an FMU fails: the
     recorder has what came before.
@@ -105,8 +112,8 @@ def simulate_recording(
     recording = read_recording(path, robot.cable_count)
     noise = robot.sensors.position_noise or white_noise_deviation(recording.position)
     start, notes = start_position(robot, noise, recording)
-    count = _sample_count(recording, until)
-    time, winch_speed = recording.time[:count], recording.winch_speed[:count]
+    count = _sample_count(recording, options.until)
+    inputs = PiecewiseLinearInput(recording.time[:count], recording.winch_speed[:count])
     # The start is known; measurements need not stay in memory through a long run.
     del recording
     if robot.winch_numbers:
@@ -114,20 +121,32 @@ def simulate_recording(
     notes = (*notes, *notes_on_unstated_units(robot.fmus, robot.cable_count))
     with TemporaryDirectory(prefix="tautwire-simulate-") as folder:
         fmus = build_fmus(with_start(robot, start), Path(folder), partial(progress, "building"))
-        source, first_positions = PiecewiseLinearInput(time, winch_speed), FirstPositionsRecorder(count, recorder)
+        statistics, run_notes = _run_with_error_estimate(fmus, inputs, recorder, options, progress)
+    return statistics, (*notes, *run_notes, *statistics.warnings())
 
-        def run(
-            rows: int, stepping: StepSizeControl, target: Recorder, activity: str = "estimating the error"
-        ) -> RunStatistics:
-            return record_cosimulation(
-                fmus, source, time[:rows], stepping, target, partial(progress, activity), call_timeout
-            )
 
-        statistics = run(count, step_size_control_for(step, tolerance, time), first_positions, "co-simulating")
-        notes = (*notes, *missing_column_notes(wire_fmus(fmus)), *statistics.fallback_notes())
-        if statistics.fallback_notes() and tolerance is None:
-            notes = (*notes, step_doubling_note(run, time, step, first_positions.positions))
-    return statistics, (*notes, *statistics.warnings())
+def _run_with_error_estimate(
+    fmus: RobotFmus,
+    inputs: PiecewiseLinearInput,
+    recorder: Recorder,
+    options: SimulationOptions,
+    progress: Callable[[str, float], None],
+) -> tuple[RunStatistics, tuple[str, ...]]:
+    """Run over the samples of the inputs; the notes estimate the error where FMUs lack a capability."""
+    time, first_positions = inputs.time, FirstPositionsRecorder(len(inputs.time), recorder)
+
+    def run(
+        rows: int, step_size_control: StepSizeControl, target: Recorder, activity: str = "estimating the error"
+    ) -> RunStatistics:
+        experiment = Experiment(inputs, time[:rows], step_size_control)
+        return record_cosimulation(fmus, experiment, target, partial(progress, activity), options.call_timeout)
+
+    step_size_control = step_size_control_for(options.step, options.tolerance, time)
+    statistics = run(len(time), step_size_control, first_positions, "co-simulating")
+    notes = (*missing_column_notes(wire_fmus(fmus)), *statistics.fallback_notes())
+    if statistics.fallback_notes() and options.tolerance is None:
+        notes = (*notes, step_doubling_note(run, time, options.step, first_positions.positions))
+    return statistics, notes
 
 
 def _sample_count(recording: Recording, until: float | None) -> int:

@@ -23,7 +23,9 @@ from . import (
     Component,
     ComponentError,
     Connection,
-    Coupling,
+    CouplingGraph,
+    CouplingSolver,
+    Experiment,
     FixedStep,
     InputSource,
     JournalledComponent,
@@ -34,6 +36,7 @@ from . import (
     Recorder,
     RunStatistics,
     StepSizeControl,
+    build_coupling_graph,
     simulate,
     simulate_isolated,
 )
@@ -114,8 +117,8 @@ def instantiate_robot(
     journal: CallJournal | None = None,
     external_inputs: Sequence[Port] = (),
     additional: AdditionalComponents = NO_ADDITIONAL_COMPONENTS,
-) -> Iterator[Coupling]:
-    """The coupled robot in initialization mode; instances and folders are removed when the block ends.
+) -> Iterator[CouplingGraph]:
+    """The coupling graph of a robot in initialization mode; instances and folders are removed when the block ends.
 
     With a ``journal`` each FMU call is noted in it; ``external_inputs`` are further ones besides those of the winches.
     """
@@ -123,7 +126,6 @@ def instantiate_robot(
         wire_fmus(fmus), len(fmus.cables), additional.connections, (*additional.external_inputs, *external_inputs)
     )
     new_component = Component if journal is None else partial(JournalledComponent, journal)
-    allocate_inputs = None if journal is None else journal.allocate_inputs
     with ExitStack() as stack:
         components = {
             name: stack.enter_context(new_component(name, path))
@@ -133,15 +135,7 @@ def instantiate_robot(
             start = {**fmus.user_start_values.get(name, {}), **fmus.start_settings.get(name, {})}
             component.initialize(0.0, {key: value for key, value in start.items() if _is_parameter(component, key)})
         _require_platform_start(fmus, components[PLATFORM])
-        yield Coupling(
-            components,
-            wiring.connections,
-            wiring.external_inputs,
-            wiring.power_bonds,
-            wiring.event_indicators,
-            allocate_inputs=allocate_inputs,
-            derivative_connections=wiring.derivative_connections,
-        )
+        yield build_coupling_graph(components, wiring)
 
 
 def _is_parameter(component: Component, name: str) -> bool:
@@ -199,14 +193,9 @@ def cosimulate(
         "cosimulate: winch_speed", winch_speed, (len(sample_times), count), WINCH_SPEED_MEANING.format(count=count)
     )
     validate_options("cosimulate", step, tolerance, progress, patience)
-    return run_cosimulation(
-        fmus,
-        PiecewiseLinearInput(sample_times, speeds),
-        sample_times,
-        step_size_control_for(step, tolerance, sample_times),
-        progress,
-        patience,
-    )
+    step_size_control = step_size_control_for(step, tolerance, sample_times)
+    experiment = Experiment(PiecewiseLinearInput(sample_times, speeds), sample_times, step_size_control)
+    return run_cosimulation(fmus, experiment, progress, patience)
 
 
 def step_size_control_for(step: float, tolerance: float | None, time: Array) -> StepSizeControl:
@@ -216,25 +205,21 @@ def step_size_control_for(step: float, tolerance: float | None, time: Array) -> 
 
 def run_cosimulation(
     fmus: RobotFmus,
-    input_source: InputSource,
-    time: Array,
-    step_size_control: StepSizeControl,
+    experiment: Experiment,
     progress: Progress | None = None,
     call_timeout: float | None = None,
     additional: AdditionalComponents = NO_ADDITIONAL_COMPONENTS,
 ) -> CosimulationResult:
-    """Co-simulate a robot under any source of winch speeds, recorded at ``time``.
+    """Co-simulate a robot in an experiment whose external inputs are winch speeds.
 
     ``call_timeout`` and ``additional`` are as for :func:`record_cosimulation`.
 
     Raises RunError, which has the run until then, where an FMU fails.
     """
-    wiring = wire_fmus(fmus)
+    wiring, time = wire_fmus(fmus), experiment.times
     recorder = MemoryRecorder(len(time), len(wiring.outputs))
     try:
-        statistics = record_cosimulation(
-            fmus, input_source, time, step_size_control, recorder, progress, call_timeout, additional
-        )
+        statistics = record_cosimulation(fmus, experiment, recorder, progress, call_timeout, additional)
     except ComponentError as error:
         raise RunError(error, result_from_rows(time[: recorder.count], recorder.rows, fmus, wiring)) from error
     return replace(result_from_rows(time, recorder.rows, fmus, wiring), statistics=statistics)
@@ -242,15 +227,13 @@ def run_cosimulation(
 
 def record_cosimulation(
     fmus: RobotFmus,
-    input_source: InputSource,
-    time: Array,
-    step_size_control: StepSizeControl,
+    experiment: Experiment,
     recorder: Recorder,
     progress: Progress | None = None,
     call_timeout: float | None = None,
     additional: AdditionalComponents = NO_ADDITIONAL_COMPONENTS,
 ) -> RunStatistics:
-    """Co-simulate a robot under any source of winch speeds; the recorder gets a row at each ``time``.
+    """Co-simulate a robot as :func:`run_cosimulation` does; the recorder gets a row at each time.
 
     A row is in the order of :attr:`RobotWiring.outputs`. Nothing else is kept of a run, however long. With a
     ``call_timeout`` (s) the FMUs run in a worker process, so that one that hangs for so long, or crashes its process,
@@ -259,31 +242,29 @@ def record_cosimulation(
     Raises ComponentError where an FMU fails; the recorder has what came before. Raises SlotError where an FMU of the
     user's starts elsewhere, or cannot make such steps.
     """
-    is_adaptive, intervals = isinstance(step_size_control, AdaptiveStep), np.diff(time)
-    equal_steps = not is_adaptive and bool(np.ptp(intervals) <= EQUAL_STEP_RTOL * np.max(intervals))
-    require_step_support({slot: fmus.by_component[slot] for slot in fmus.user_start_values}, is_adaptive, equal_steps)
+    _require_step_support(fmus, experiment)
     wiring = with_connections(wire_fmus(fmus), len(fmus.cables), additional.connections, additional.external_inputs)
-    ports, input_source = wiring.outputs, SelectedInputs(input_source, wiring.external_indices)
+    experiment = replace(experiment, input_source=SelectedInputs(experiment.input_source, wiring.external_indices))
     if call_timeout is not None:
-        return simulate_isolated(
-            partial(instantiate_robot, fmus, additional=additional),
-            input_source,
-            time,
-            ports,
-            step_size_control,
-            recorder,
-            progress,
-            call_timeout,
-        )
-    with defer_interrupts() as raise_interrupt, instantiate_robot(fmus, additional=additional) as coupling:
+        build_system = partial(instantiate_robot, fmus, additional=additional)
+        return simulate_isolated(build_system, experiment, wiring.outputs, recorder, progress, call_timeout)
+    with defer_interrupts() as raise_interrupt, instantiate_robot(fmus, additional=additional) as graph:
 
         def report_progress(done: float) -> None:
             raise_interrupt()
             if progress is not None:
                 progress(done)
 
-        simulate(coupling, input_source, time, ports, step_size_control, recorder, report_progress)
+        coupling = CouplingSolver(graph, experiment.step_size_control.solver_options)
+        simulate(coupling, experiment, wiring.outputs, recorder, report_progress)
         return coupling.statistics
+
+
+def _require_step_support(fmus: RobotFmus, experiment: Experiment) -> None:
+    """Raises SlotError where an FMU of the user's cannot make the steps of an experiment."""
+    is_adaptive, intervals = isinstance(experiment.step_size_control, AdaptiveStep), np.diff(experiment.times)
+    equal_steps = not is_adaptive and bool(np.ptp(intervals) <= EQUAL_STEP_RTOL * np.max(intervals))
+    require_step_support({slot: fmus.by_component[slot] for slot in fmus.user_start_values}, is_adaptive, equal_steps)
 
 
 @dataclass(frozen=True)

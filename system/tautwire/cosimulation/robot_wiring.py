@@ -5,7 +5,8 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
-from . import Connection, Port, PowerBond
+from ..fmus.fmu_variables import Port
+from .connections import Connection, PowerBond, Wiring
 from .result_file import Column
 
 AXES = ("x", "y", "z")
@@ -15,21 +16,15 @@ CABLE_QUANTITIES = {"tension": "N", "length": "m", "elongation": "m", "strain": 
 DERIVATIVES = {"acceleration": "velocity", "force_rate": "force", "winch_acceleration": "winch_speed"}
 
 
-@dataclass(frozen=True)
-class RobotWiring:
-    """The wiring of a robot whose FMUs may lack some ports.
+@dataclass(frozen=True, kw_only=True)
+class RobotWiring(Wiring):
+    """The wiring of a robot whose FMUs may lack some ports, and its recorded outputs.
 
-    ``derivative_connections`` are pairs whose target takes the time derivative of the source, in place of a connection.
     ``external_inputs`` are the entries of :func:`winch_input_ports` at ``external_indices``; ``outputs`` are the
     entries of :func:`recorded_ports` at ``output_indices``, and ``missing_columns`` the columns of the others.
     """
 
-    connections: tuple[Connection, ...]
-    derivative_connections: tuple[Connection, ...]
-    external_inputs: tuple[Port, ...]
     external_indices: tuple[int, ...]
-    power_bonds: tuple[PowerBond, ...]
-    event_indicators: tuple[Port, ...]
     outputs: tuple[Port, ...]
     output_indices: tuple[int, ...]
     missing_columns: tuple[str, ...]

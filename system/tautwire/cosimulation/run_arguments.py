@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 
 from ..errors import ArgumentError
 from ..fmus.packaging import RobotFmus
@@ -12,6 +13,19 @@ STEP_RULE = NumberRule("the longest macro step", "s", positive=True)
 TOLERANCE_RULE = NumberRule("the error allowed", "m", positive=True)
 UNTIL_RULE = NumberRule("the time at which to stop", "s")
 CALL_TIMEOUT_RULE = NumberRule("how long an FMU may take for one call, or infinity,", "s", positive=True)
+
+
+@dataclass(frozen=True)
+class SimulationOptions:
+    """Options of a run: the longest macro ``step`` (s), or a ``tolerance`` (m) that chooses the steps; times in s.
+
+    The run ends at ``until`` where one is given; with a ``call_timeout`` an FMU that is in one call for so long fails.
+    """
+
+    step: float
+    tolerance: float | None = None
+    until: float | None = None
+    call_timeout: float | None = None
 
 
 def validate_fmus(argument: str, fmus: RobotFmus) -> None:

@@ -2,16 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..fmus.component import Component
+from ..fmus.fmu_variables import INPUT_TIME, Port
 from ..fmus.variable_units import unit_of
-from .connections import Connection, Port
-from .execution_order import INPUT_TIME
+from .connections import Wiring
 
 Array = NDArray[np.float64]
 
@@ -39,16 +39,10 @@ class Fallbacks:
         return (*self.missing_capabilities, *derivative_notes)
 
 
-def find_fallbacks(
-    components: Mapping[str, Component],
-    connections: Sequence[Connection],
-    external_inputs: Sequence[Port],
-    derivative_connections: Sequence[Connection],
-) -> Fallbacks:
+def find_fallbacks(components: Mapping[str, Component], wiring: Wiring) -> Fallbacks:
     """Find the capabilities that these FMUs lack for a step of full order."""
-    components_with_inputs = {wire.target.component for wire in (*connections, *derivative_connections)} | {
-        port.component for port in external_inputs
-    }
+    components_with_inputs = {wire.target.component for wire in (*wiring.connections, *wiring.derivative_connections)}
+    components_with_inputs |= {port.component for port in wiring.external_inputs}
     holding = [
         name for name in components if name in components_with_inputs and INPUT_TIME not in components[name].variables
     ]
@@ -64,7 +58,7 @@ def find_fallbacks(
         )
     targets = {
         wire.source: components[wire.target.component].variables[wire.target.variable]
-        for wire in derivative_connections
+        for wire in wiring.derivative_connections
     }
     return Fallbacks(
         tuple(missing_capabilities), tuple((port, unit_of(target) or "") for port, target in targets.items())
@@ -73,14 +67,6 @@ def find_fallbacks(
 
 # Relative to the energy exchanged, and to all steps.
 MAX_ENERGY_RESIDUAL_SHARE, MAX_UNCONVERGED_SHARE = 0.01, 0.1
-
-
-@dataclass(frozen=True)
-class PowerBond:
-    """Power bond: two connections whose product is a power, an effort one way (N) and a flow the other way (m/s)."""
-
-    effort: Connection
-    flow: Connection
 
 
 @dataclass
@@ -118,6 +104,10 @@ class RunStatistics:
         effort_received, flow_received = received
         self.energy_residual += 0.5 * step * float(effort_received @ flow_sent - effort_sent @ flow_received)
         self.energy_exchanged += step * float(np.sum(np.abs(effort_sent * flow_sent)))
+
+    def add_estimated_error(self, error: float) -> None:
+        """Add the estimated error (m) of a step that was chosen by a tolerance."""
+        self.estimated_error = (self.estimated_error or 0.0) + error
 
     def add_derivative_errors(self, errors: Array) -> None:
         """Add the error estimates of a step's estimated derivatives, shape (number of derivatives,)."""

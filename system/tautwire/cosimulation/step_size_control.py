@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import TautwireError
-from .coupling import Coupling
+from .coupling_solver import DEFAULT_OPTIONS, CouplingSolver, SolverOptions
 from .macro_step import EVENT_WIDTH, ExternalInputs, step_with_events
 
 Array = NDArray[np.float64]
@@ -40,16 +40,21 @@ class StepSizeError(TautwireError):
 class StepSizeControl(Protocol):
     """Step-size control over an interval; ``external_inputs(time, step)`` returns the inputs at both ends.
 
-    ``coupling_tolerance`` is the tolerance of the coupling that fits the steps; None leaves it as it is.
+    ``solver_options`` are those of a solver that fits the steps.
     """
 
     @property
-    def coupling_tolerance(self) -> float | None:
-        """See :class:`Coupling`, ``tolerance``."""
+    def solver_options(self) -> SolverOptions:
+        """See :class:`SolverOptions`."""
         ...
 
     def advance(
-        self, coupling: Coupling, begin: float, span: float, external_inputs: ExternalInputs, read_lengths: ReadLengths
+        self,
+        coupling: CouplingSolver,
+        begin: float,
+        span: float,
+        external_inputs: ExternalInputs,
+        read_lengths: ReadLengths,
     ) -> None:
         """Advance the coupling by ``span`` (s); ``read_lengths()`` reads the outputs whose error counts."""
         ...
@@ -62,11 +67,17 @@ class FixedStep:
     max_step: float
 
     @property
-    def coupling_tolerance(self) -> None:
+    def solver_options(self) -> SolverOptions:
         """See :class:`StepSizeControl`."""
+        return DEFAULT_OPTIONS
 
     def advance(
-        self, coupling: Coupling, begin: float, span: float, external_inputs: ExternalInputs, read_lengths: ReadLengths
+        self,
+        coupling: CouplingSolver,
+        begin: float,
+        span: float,
+        external_inputs: ExternalInputs,
+        read_lengths: ReadLengths,
     ) -> None:
         """See :class:`StepSizeControl`."""
         count = max(1, math.ceil(span / self.max_step * (1.0 - 1e-9)))
@@ -88,12 +99,17 @@ class AdaptiveStep:
     next_step: float = 0.02
 
     @property
-    def coupling_tolerance(self) -> float:
+    def solver_options(self) -> SolverOptions:
         """A tenth of the tolerance, of outputs whose nominal values are taken for metres."""
-        return min(max(0.1 * self.tolerance, MIN_COUPLING_TOLERANCE), MAX_COUPLING_TOLERANCE)
+        return SolverOptions(min(max(0.1 * self.tolerance, MIN_COUPLING_TOLERANCE), MAX_COUPLING_TOLERANCE))
 
     def advance(
-        self, coupling: Coupling, begin: float, span: float, external_inputs: ExternalInputs, read_lengths: ReadLengths
+        self,
+        coupling: CouplingSolver,
+        begin: float,
+        span: float,
+        external_inputs: ExternalInputs,
+        read_lengths: ReadLengths,
     ) -> None:
         """See :class:`StepSizeControl`; raises StepError where no step is small enough."""
         elapsed = 0.0
@@ -103,7 +119,12 @@ class AdaptiveStep:
             elapsed += self._try_step(coupling, begin + elapsed, step, external_inputs, read_lengths)
 
     def _try_step(
-        self, coupling: Coupling, time: float, step: float, external_inputs: ExternalInputs, read_lengths: ReadLengths
+        self,
+        coupling: CouplingSolver,
+        time: float,
+        step: float,
+        external_inputs: ExternalInputs,
+        read_lengths: ReadLengths,
     ) -> float:
         """Try one step, or its part before an event; returns its length, zero if the error was too large."""
         checkpoint = coupling.save()
@@ -121,16 +142,15 @@ class AdaptiveStep:
             half = 0.5 * step
             step_with_events(coupling, time, half, external_inputs)
             step_with_events(coupling, time + half, half, external_inputs)
-            error = float(np.max(np.abs(read_lengths() - whole_step_lengths), initial=0.0)) / (
-                2**coupling.convergence_order - 1
-            )
+            order = coupling.graph.convergence_order
+            error = float(np.max(np.abs(read_lengths() - whole_step_lengths), initial=0.0)) / (2**order - 1)
             allowed_error = LOCAL_ERROR_SHARE * self.tolerance * step / self.duration
-            factor = SAFETY_FACTOR * (allowed_error / max(error, 1e-300)) ** (1.0 / coupling.convergence_order)
+            factor = SAFETY_FACTOR * (allowed_error / max(error, 1e-300)) ** (1.0 / order)
             # The quasi-Newton history serves steps of the same size only, so small changes do not pay.
             if not (1.0 <= factor < MIN_STEP_GROWTH or (shortened and factor > 1.0)):
                 self.next_step = step * min(max(factor, MIN_STEP_FACTOR), MAX_STEP_FACTOR)
             if error <= allowed_error:
-                coupling.statistics.estimated_error = (coupling.statistics.estimated_error or 0.0) + error
+                coupling.record_estimated_error(error)
                 return step
             if self.next_step < MIN_STEP_SHARE * self.duration:
                 raise StepSizeError(time, step, error)

@@ -12,15 +12,12 @@ from numpy.typing import NDArray
 from threadpoolctl import ThreadpoolController
 
 from ..fmus.component import Component, VariableBlock
-from .connections import Port
-from .coupling import Coupling
+from ..fmus.fmu_variables import Port
+from .coupling_solver import CouplingSolver
 from .step_size_control import StepSizeControl
 
 Array = NDArray[np.float64]
 Progress = Callable[[float], None]
-
-# Iteration stops when the remaining error is below 6 % of the interpolation error at mid-step.
-INTERPOLATION_ERROR_SHARE = 0.06
 
 
 class InputSource(Protocol):
@@ -85,36 +82,41 @@ class MemoryRecorder:
         return self._rows[: self.count]
 
 
+@dataclass(frozen=True)
+class Experiment:
+    """An experiment: its external inputs, the grid ``times`` (N,) of its recorded rows, and the steps between them."""
+
+    input_source: InputSource
+    times: Array
+    step_size_control: StepSizeControl
+
+
 def simulate(
-    coupling: Coupling,
-    input_source: InputSource,
-    times: Array,
+    coupling: CouplingSolver,
+    experiment: Experiment,
     observed_outputs: Sequence[Port],
-    step_size_control: StepSizeControl,
     recorder: Recorder,
     progress: Progress | None = None,
 ) -> None:
-    """Co-simulate over the grid ``times`` and record the observed outputs there.
+    """Co-simulate an experiment and record the observed outputs at its grid times.
 
     Each interval of the grid is divided into macro steps of its own, so kinks of the inputs at grid times never fall
-    inside a step. Components must be in initialization mode.
+    inside a step. Components must be in initialization mode; the coupling's options should be those of the step-size
+    control, see :attr:`StepSizeControl.solver_options`.
 
     Raises ComponentError where an FMU fails or has an output that is not finite; the recorder has the rows until then.
     """
-    if step_size_control.coupling_tolerance is not None:
-        coupling.tolerance = step_size_control.coupling_tolerance
-    coupling.interpolation_error_share = INTERPOLATION_ERROR_SHARE
     observed = _ObservedOutputs(coupling, observed_outputs)
-    outputs = np.zeros(len(observed_outputs))
-    start, _ = input_source.interval(0, float(times[0]), 0.0, outputs)
-    coupling.solve_initial_values(float(times[0]), start)
-    for component in coupling.components.values():
+    begin = float(experiment.times[0])
+    start, _ = experiment.input_source.interval(0, begin, 0.0, observed.row)
+    coupling.solve_initial_values(begin, start)
+    for component in coupling.graph.components.values():
         component.run()
-    observed.read(outputs)
-    recorder.add(float(times[0]), outputs)
+    observed.read(observed.row)
+    recorder.add(begin, observed.row)
     # The master's systems of equations are small: BLAS threads would only wait for each other.
     with _thread_pools().limit(limits=1, user_api="blas"):
-        _run_loop(coupling, input_source, times, outputs, step_size_control, recorder, observed, progress)
+        _run_loop(coupling, experiment, observed, recorder, progress)
 
 
 @cache
@@ -124,40 +126,40 @@ def _thread_pools() -> ThreadpoolController:
 
 
 def _run_loop(
-    coupling: Coupling,
-    input_source: InputSource,
-    times: Array,
-    outputs: Array,
-    step_size_control: StepSizeControl,
-    recorder: Recorder,
+    coupling: CouplingSolver,
+    experiment: Experiment,
     observed: _ObservedOutputs,
+    recorder: Recorder,
     progress: Progress | None,
 ) -> None:
+    times, row = experiment.times, observed.row
     for index in range(len(times) - 1):
         begin, span = float(times[index]), float(times[index + 1] - times[index])
 
         def external_inputs(time: float, step: float, index: int = index) -> tuple[Array, Array]:
-            return input_source.interval(index, time, step, outputs)
+            return experiment.input_source.interval(index, time, step, row)
 
-        step_size_control.advance(coupling, begin, span, external_inputs, observed.lengths)
-        observed.read(outputs)
-        recorder.add(float(times[index + 1]), outputs)
+        experiment.step_size_control.advance(coupling, begin, span, external_inputs, observed.lengths)
+        observed.read(row)
+        recorder.add(float(times[index + 1]), row)
         if progress is not None:
             progress((index + 1) / (len(times) - 1))
 
 
 class _ObservedOutputs:
-    """Reads the observed outputs, and those of them that are lengths (unit m)."""
+    """Reads the observed outputs, and those of them that are lengths (unit m); ``row`` is that of the last time."""
 
-    def __init__(self, coupling: Coupling, ports: Sequence[Port]) -> None:
+    def __init__(self, coupling: CouplingSolver, ports: Sequence[Port]) -> None:
         self._coupling = coupling
         self._blocks: list[tuple[Component, VariableBlock, NDArray[np.intp]]] = []
-        units = [coupling.components[p.component].variables[p.variable].unit for p in ports]
+        components = coupling.graph.components
+        self.row = np.zeros(len(ports))
+        units = [components[p.component].variables[p.variable].unit for p in ports]
         self._length_mask = np.array([unit == "m" for unit in units], dtype=bool)
         for name in dict.fromkeys(port.component for port in ports):
             indices = [i for i, port in enumerate(ports) if port.component == name]
-            block = coupling.components[name].block([ports[i].variable for i in indices])
-            self._blocks.append((coupling.components[name], block, np.array(indices)))
+            block = components[name].block([ports[i].variable for i in indices])
+            self._blocks.append((components[name], block, np.array(indices)))
 
     def read(self, row: Array) -> None:
         self._coupling.update_inputs()

@@ -8,7 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..fmus.component import Component
-from .connections import Connection, Port
+from ..fmus.fmu_variables import Port
+from .connections import Connection
 
 Array = NDArray[np.float64]
 
@@ -16,7 +17,8 @@ Array = NDArray[np.float64]
 class ZeroOrderHold:
     """Zero-order hold of the discrete outputs among ``output_ports``.
 
-    Their value at the end of a step is for the next one; within the step their value at its beginning holds.
+    Their value at the end of a step is for the next one; within the step the ``held_values`` that were sampled at its
+    beginning hold.
     """
 
     def __init__(self, components: Mapping[str, Component], output_ports: Sequence[Port]) -> None:
@@ -27,22 +29,19 @@ class ZeroOrderHold:
             (components[name], components[name].block([p.variable for p in self.ports if p.component == name]))
             for name in names
         ]
-        self._values: Array = np.full(len(self.ports), np.nan)
 
-    def begin_step(self, outputs: Array) -> bool:
-        """Sample the values to hold from now on; returns whether some have jumped."""
-        values = outputs[self._indices]
-        jumped = not np.array_equal(values, self._values)
-        self._values = values
-        return jumped
+    def initial_values(self) -> Array:
+        """Held values that differ from any sample: the next one counts as a jump."""
+        return np.full(len(self.ports), np.nan)
 
-    def reset(self) -> None:
-        """Treat the next values as jumps."""
-        self._values.fill(np.nan)
+    def sample(self, outputs: Array) -> Array:
+        """The values to hold from now on."""
+        held_values: Array = outputs[self._indices]
+        return held_values
 
-    def apply(self, outputs: Array) -> None:
+    def apply(self, outputs: Array, held_values: Array) -> None:
         """Set the outputs to the held values, in place of extrapolated or newer ones."""
-        outputs[self._indices] = self._values
+        outputs[self._indices] = held_values
 
     def end_step(self, outputs: Array) -> None:
         """Read the values at the end of the step."""
@@ -51,9 +50,10 @@ class ZeroOrderHold:
                 component.read(block)
             outputs[self._indices] = np.concatenate([block.values for _, block in self._blocks])
 
-    def targets(self, connections: Sequence[Connection]) -> list[Port]:
-        """The inputs that are connected to discrete outputs."""
-        return [wire.target for wire in connections if wire.source in self.ports]
+
+def inputs_from_discrete_outputs(components: Mapping[str, Component], connections: Sequence[Connection]) -> list[Port]:
+    """The inputs that are connected to discrete outputs."""
+    return [wire.target for wire in connections if _is_discrete(components, wire.source)]
 
 
 def _is_discrete(components: Mapping[str, Component], port: Port) -> bool:

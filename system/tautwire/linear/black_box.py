@@ -67,7 +67,8 @@ def linearise_fmus(
 ) -> BlackBoxPlant:
     """Linearises any coupled system of black-box FMUs about its start, where it rests, by pulse experiments.
 
-    ``make_coupling()`` returns a context with the :class:`tautwire.cosimulation.Coupling` in initialization mode.
+    ``make_coupling()`` returns a context with the :class:`tautwire.cosimulation.CouplingGraph` of FMUs in
+    initialization mode.
     ``inputs`` name some of its external inputs, ``outputs`` any variables of its FMUs, ``states`` those variables,
     outputs or locals, that are its states; without them the states are coordinates ``x_1`` ..., as few as the
     responses need. ``rest_inputs`` are the external inputs at rest, zero by default. External inputs that are rates of

@@ -13,16 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cosimulation import Coupling, Port
+from ..cosimulation import CouplingGraph, CouplingSolver, Port, SolverOptions
 from ..errors import TautwireError
 from ..process_signals import defer_interrupts
 
 Array = NDArray[np.float64]
-CouplingFactory = Callable[[], AbstractContextManager[Coupling]]
+CouplingFactory = Callable[[], AbstractContextManager[CouplingGraph]]
 
 FREE_STEPS = 16
 # The coupling converges to rounding: its residual is noise on small responses.
-COUPLING_TOLERANCE, MAX_COUPLING_ITERATIONS = 1e-13, 20
+SOLVER_OPTIONS = SolverOptions(tolerance=1e-13, max_iterations=20, interpolation_error_share=0.0)
 INITIAL_AMPLITUDE, MAX_AMPLITUDE, MIN_AMPLITUDE = 1e-2, 1e-1, 1e-7
 # Even part of a response relative to the odd one: between these both rounding and nonlinearity are small.
 MAX_NONLINEARITY, MIN_NONLINEARITY, MAX_AMPLITUDE_ROUNDS = 3e-4, 1e-8, 4
@@ -83,42 +83,42 @@ class PulseExperiment:
         self._rest_inputs = dict(rest_inputs)
         self.inputs, self.observed_ports = tuple(inputs), tuple(observed_ports)
         self._coupling = self._start_coupling(stack)
-        self._rest_snapshot = self._coupling.save() if self._coupling.supports_rollback else None
+        self._rest_snapshot = self._coupling.save() if self._coupling.graph.supports_rollback else None
         if self._rest_snapshot is not None:
             stack.callback(self._coupling.release, self._rest_snapshot)
         self._takes_whole_steps = (
-            self._coupling.supports_rollback and not self._coupling.statistics.fallbacks.estimated_derivatives
+            self._coupling.graph.supports_rollback and not self._coupling.graph.fallbacks.estimated_derivatives
         )
-        self.order = min(self._coupling.convergence_order, MAX_ERROR_ORDER) if self._takes_whole_steps else 1
+        self.order = min(self._coupling.graph.convergence_order, MAX_ERROR_ORDER) if self._takes_whole_steps else 1
         rest_values = self._rest_values(self._coupling)[self._input_indices(self._coupling)]
         self.nominal = np.maximum(self._nominal_values(inputs), np.abs(rest_values))
         self.negligible = NEGLIGIBLE_DEVIATION * np.maximum(
             self._nominal_values(observed_ports), np.abs(self._read_outputs(self._coupling))
         )
 
-    def _start_coupling(self, stack: ExitStack) -> Coupling:
-        coupling = stack.enter_context(self._make_coupling())
-        missing = [str(port) for port in self.inputs if port not in coupling.external_inputs]
+    def _start_coupling(self, stack: ExitStack) -> CouplingSolver:
+        graph = stack.enter_context(self._make_coupling())
+        missing = [str(port) for port in self.inputs if port not in graph.external_inputs]
         if missing:
             raise IdentificationError(f"{', '.join(missing)} is no driven input", "choose among the coupling's drives")
-        coupling.tolerance, coupling.max_iterations = COUPLING_TOLERANCE, MAX_COUPLING_ITERATIONS
+        coupling = CouplingSolver(graph, SOLVER_OPTIONS)
         coupling.solve_initial_values(0.0, self._rest_values(coupling))
-        for component in coupling.components.values():
+        for component in graph.components.values():
             component.run()
         return coupling
 
     def _nominal_values(self, ports: Sequence[Port]) -> Array:
-        variables = [self._coupling.components[port.component].variables[port.variable] for port in ports]
+        variables = [self._coupling.graph.components[port.component].variables[port.variable] for port in ports]
         return np.array([abs(float(variable.nominal or 1.0)) for variable in variables])
 
-    def _rest_values(self, coupling: Coupling) -> Array:
-        return np.array([self._rest_inputs.get(port, 0.0) for port in coupling.external_inputs])
+    def _rest_values(self, coupling: CouplingSolver) -> Array:
+        return np.array([self._rest_inputs.get(port, 0.0) for port in coupling.graph.external_inputs])
 
-    def _input_indices(self, coupling: Coupling) -> list[int]:
-        return [coupling.external_inputs.index(port) for port in self.inputs]
+    def _input_indices(self, coupling: CouplingSolver) -> list[int]:
+        return [coupling.graph.external_inputs.index(port) for port in self.inputs]
 
     @contextmanager
-    def _at_rest(self) -> Iterator[Coupling]:
+    def _at_rest(self) -> Iterator[CouplingSolver]:
         if self._rest_snapshot is not None:
             self._coupling.restore(self._rest_snapshot)
             yield self._coupling
@@ -149,11 +149,11 @@ class PulseExperiment:
                 rows[k] = self._read_outputs(coupling)
             return rows
 
-    def _read_outputs(self, coupling: Coupling) -> Array:
+    def _read_outputs(self, coupling: CouplingSolver) -> Array:
         row = np.empty(len(self.observed_ports))
         for name in dict.fromkeys(port.component for port in self.observed_ports):
             indices = [place for place, port in enumerate(self.observed_ports) if port.component == name]
-            component = coupling.components[name]
+            component = coupling.graph.components[name]
             block = component.block([self.observed_ports[place].variable for place in indices])
             component.read(block)
             if not np.all(np.isfinite(block.values)):

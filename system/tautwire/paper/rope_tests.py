@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.integrate import cumulative_trapezoid
 
 from ..cosimulation import Component
-from ..cosimulation.execution_order import INPUT_TIME
+from ..fmus.fmu_variables import INPUT_TIME
 from ..fmus.packaging import build_fmus
 from ..materials import PAPER_TABLE, RobotMaterial, read_material_table, robot_material, with_material
 from ..materials.material_table import MaterialRow, MaterialTable

@@ -8,7 +8,15 @@ from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
 
-from tautwire.cosimulation import CallJournal, Connection, Coupling, JournalledComponent, Port
+from tautwire.cosimulation import (
+    CallJournal,
+    Connection,
+    CouplingGraph,
+    JournalledComponent,
+    Port,
+    Wiring,
+    build_coupling_graph,
+)
 
 HERE = Path(__file__).parent
 NAMES = ("left", "right")
@@ -24,12 +32,12 @@ def build_faulty(folder: Path) -> Path:
 
 
 @contextmanager
-def coupled(path: Path, journal: CallJournal) -> Iterator[Coupling]:
+def coupled(path: Path, journal: CallJournal) -> Iterator[CouplingGraph]:
     """Two of the FMU: ``left`` is driven, and ``right`` is asked for what it shows."""
     with ExitStack() as stack:
         components = {name: stack.enter_context(JournalledComponent(journal, name, path)) for name in NAMES}
         for component in components.values():
             component.initialize(0.0, {})
-        wires = [Connection(Port("left", "winch_speed"), Port("right", "speed_command"))]
-        drives = [Port("left", "speed_command"), Port("left", "speed_command_rate")]
-        yield Coupling(components, wires, drives, allocate_inputs=journal.allocate_inputs)
+        connections = (Connection(Port("left", "winch_speed"), Port("right", "speed_command")),)
+        external_inputs = (Port("left", "speed_command"), Port("left", "speed_command_rate"))
+        yield build_coupling_graph(components, Wiring(connections=connections, external_inputs=external_inputs))

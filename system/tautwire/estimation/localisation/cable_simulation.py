@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...cosimulation import Component
-from ...cosimulation.execution_order import INPUT_TIME
+from ...fmus.fmu_variables import INPUT_TIME
 from .path_smoothing import SmoothedPath
 
 Array = NDArray[np.float64]

@@ -1,15 +1,20 @@
 """Coupling with FMUs that can do less than ours."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from tautwire.cosimulation import (
     AdaptiveStep,
-    Coupling,
+    CouplingSolver,
+    Experiment,
     FixedStep,
     MemoryRecorder,
     PiecewiseLinearInput,
     StepSizeError,
+    Wiring,
+    build_coupling_graph,
     simulate,
 )
 from tautwire.cosimulation.robot_cosimulation import instantiate_robot
@@ -23,16 +28,16 @@ from tests.support.robots import paper_robot
 RAMPS = PiecewiseLinearInput(CORNERS, np.clip(RAMP * CORNERS[:, None], -1.0, 1.0))
 
 
-def end_error(coupling: Coupling, step: float) -> float:
+def end_error(coupling: CouplingSolver, step: float) -> float:
     kept = MemoryRecorder(len(CORNERS), 18)
-    simulate(coupling, RAMPS, CORNERS, recorded_ports(3), FixedStep(step), kept)
+    simulate(coupling, Experiment(RAMPS, CORNERS, FixedStep(step)), recorded_ports(3), kept)
     exact = rig_simulate(rig_of(paper_robot()), None, RampProgram(RAMP, 1.0), CORNERS, rtol=1e-12, atol=1e-13)
     return float(np.linalg.norm(kept.rows[-1, :3] - exact.position[-1]))
 
 
 def test_without_saved_states_it_goes_on_with_one_pass(three_fmus: RobotFmus) -> None:
-    with instantiate_robot(three_fmus) as coupling:
-        coupling.supports_rollback = False
+    with instantiate_robot(three_fmus) as graph:
+        coupling = CouplingSolver(replace(graph, supports_rollback=False))
         assert end_error(coupling, 0.01) < 1e-4
         assert coupling.statistics.iterations == 0
         assert coupling.statistics.sweeps == coupling.statistics.steps
@@ -41,22 +46,23 @@ def test_without_saved_states_it_goes_on_with_one_pass(three_fmus: RobotFmus) ->
 def test_the_books_show_what_a_coupling_without_redo_makes(three_fmus: RobotFmus) -> None:
     shares = []
     for can_redo in (True, False):
-        with instantiate_robot(three_fmus) as coupling:
-            coupling.supports_rollback = can_redo
+        with instantiate_robot(three_fmus) as graph:
+            coupling = CouplingSolver(replace(graph, supports_rollback=can_redo))
             end_error(coupling, 0.05)
             shares.append(coupling.statistics.energy_residual_share)
     assert shares[1] > 100.0 * shares[0]
 
 
 def test_a_checkpoint_takes_everything_back(three_fmus: RobotFmus) -> None:
-    with instantiate_robot(three_fmus) as coupling:
-        simulate(coupling, RAMPS, CORNERS[:2], recorded_ports(3), FixedStep(0.02), MemoryRecorder(2, 18))
+    with instantiate_robot(three_fmus) as graph:
+        coupling = CouplingSolver(graph)
+        simulate(coupling, Experiment(RAMPS, CORNERS[:2], FixedStep(0.02)), recorded_ports(3), MemoryRecorder(2, 18))
         drives = RAMPS.interval(1, CORNERS[1], 0.02, np.zeros(0))
         checkpoint = coupling.save()
         ends = []
         for _ in range(2):
             coupling.step(CORNERS[1], 0.02, *drives)
-            platform = coupling.components["platform"]
+            platform = coupling.graph.components["platform"]
             block = platform.block(["position.x", "velocity.z"])
             platform.read(block)
             ends.append(block.values.copy())
@@ -66,16 +72,18 @@ def test_a_checkpoint_takes_everything_back(three_fmus: RobotFmus) -> None:
 
 
 def test_a_tolerance_that_no_step_meets_is_said(three_fmus: RobotFmus) -> None:
-    with instantiate_robot(three_fmus) as coupling, pytest.raises(StepSizeError, match="larger --tolerance"):
-        simulate(coupling, RAMPS, CORNERS, recorded_ports(3), AdaptiveStep(1e-22, 7.0), MemoryRecorder(4, 18))
+    experiment = Experiment(RAMPS, CORNERS, AdaptiveStep(1e-22, 7.0))
+    with instantiate_robot(three_fmus) as graph, pytest.raises(StepSizeError, match="larger --tolerance"):
+        coupling = CouplingSolver(graph, experiment.step_size_control.solver_options)
+        simulate(coupling, experiment, recorded_ports(3), MemoryRecorder(4, 18))
 
 
 def test_what_holds_in_the_middle_of_a_step_gives_the_sixth_order(three_fmus: RobotFmus) -> None:
     errors = []
     for step in (0.1, 0.05):
-        with instantiate_robot(three_fmus) as coupling:
-            assert coupling.convergence_order == 6
-            errors.append(end_error(coupling, step))
+        with instantiate_robot(three_fmus) as graph:
+            assert graph.convergence_order == 6
+            errors.append(end_error(CouplingSolver(graph), step))
     assert errors[0] < 2e-7
     assert 25.0 < errors[0] / errors[1] < 100.0
 
@@ -83,17 +91,18 @@ def test_what_holds_in_the_middle_of_a_step_gives_the_sixth_order(three_fmus: Ro
 def test_without_the_middle_the_order_is_four(three_fmus: RobotFmus) -> None:
     errors = []
     for step in (0.05, 0.025):
-        with instantiate_robot(three_fmus) as coupling:
-            plain = Coupling(coupling.components, robot_connections(3), winch_input_ports(3))
+        with instantiate_robot(three_fmus) as graph:
+            wiring = Wiring(connections=tuple(robot_connections(3)), external_inputs=tuple(winch_input_ports(3)))
+            plain = build_coupling_graph(graph.components, wiring)
             assert plain.convergence_order == 4
-            errors.append(end_error(plain, step))
+            errors.append(end_error(CouplingSolver(plain), step))
     assert errors[0] < 2e-5
     assert 10.0 < errors[0] / errors[1] < 30.0
 
 
-def parted(coupling: Coupling) -> float:
+def parted(coupling: CouplingSolver) -> float:
     """By how much what a cable was given of the platform's place differs from what the platform shows."""
-    platform, cable = coupling.components["platform"], coupling.components["cable_1"]
+    platform, cable = coupling.graph.components["platform"], coupling.graph.components["cable_1"]
     shown, given = (c.block(["position.x", "position.y", "position.z"]) for c in (platform, cable))
     platform.read(shown)
     cable.read(given)
@@ -101,16 +110,17 @@ def parted(coupling: Coupling) -> float:
 
 
 def test_what_is_recorded_follows_from_the_place_that_is_recorded(three_fmus: RobotFmus) -> None:
-    with instantiate_robot(three_fmus) as coupling:
+    with instantiate_robot(three_fmus) as graph:
+        coupling = CouplingSolver(graph)
         end_error(coupling, 0.1)
         assert parted(coupling) == 0.0
 
 
 @pytest.mark.parametrize("can_redo", [True, False])
 def test_inputs_that_agree_wait_until_outputs_are_read(can_redo: bool, three_fmus: RobotFmus) -> None:
-    with instantiate_robot(three_fmus) as coupling:
-        simulate(coupling, RAMPS, CORNERS[:2], recorded_ports(3), FixedStep(0.1), MemoryRecorder(2, 18))
-        coupling.supports_rollback = can_redo
+    with instantiate_robot(three_fmus) as graph:
+        coupling = CouplingSolver(replace(graph, supports_rollback=can_redo))
+        simulate(coupling, Experiment(RAMPS, CORNERS[:2], FixedStep(0.1)), recorded_ports(3), MemoryRecorder(2, 18))
         checkpoint = coupling.attempt_step(CORNERS[1], 0.1, *RAMPS.interval(1, CORNERS[1], 0.1, np.zeros(0)))
         assert (parted(coupling) > 0.0) is can_redo
         coupling.update_inputs()
