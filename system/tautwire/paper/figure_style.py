@@ -73,6 +73,12 @@ def panel_grid(count: int, columns: int) -> tuple[Figure, list[Axes]]:
     return figure, axes
 
 
+def label_panel(axes: Axes, label: str, title: str, x_label: str = "Time (s)") -> None:
+    """Label both axes of a panel, and put its title above on the left."""
+    axes.set(xlabel=x_label, ylabel=label)
+    axes.set_title(title, loc="left", fontsize="medium")
+
+
 def legend_above(figure: Figure, axes: Axes) -> None:
     """Place one legend for all panels above them; none where no curve has a label."""
     handles, labels = axes.get_legend_handles_labels()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from decimal import Decimal
 from typing import Any, Literal
 
@@ -232,18 +232,9 @@ def _value_entry(check: ConsistencyCheck, written: Quantity, loop: float, reason
     formula, label, unit, scale = TABLE_1_COLUMNS[check.column]
     # Half the range that the digits of the other columns allow, and one unit of this column's last digit.
     tolerance = scale * (0.5 * (check.high - check.low) + written.resolution)
-    claim = Claim(
-        id=f"table_1.{_entry_key(check)}",
-        section=TABLE_1_SECTION,
-        quantity=f"Table 1, {check.frequency:g} Hz: {label} from {formula}; corrected: the relaxing rope's loop",
-        unit=unit,
-        paper_value=_without_float_noise(scale * check.written),
-        upper_tolerance=tolerance,
-        lower_tolerance=tolerance,
-        explanation="; ".join(
-            filter(None, (TOLERANCE_TEXT.format(tolerance, unit), reasons.get(_entry_key(check), "")))
-        ),
-    )
+    explanation = "; ".join(filter(None, (TOLERANCE_TEXT.format(tolerance, unit), reasons.get(_entry_key(check), ""))))
+    quantity = f"{label} from {formula}; corrected: the relaxing rope's loop"
+    claim = _table_1_claim(check, quantity, scale * check.written, tolerance, explanation)
     return LedgerEntry(claim, scale * check.recomputed, scale * loop)
 
 
@@ -257,25 +248,27 @@ def _propagated_error(check: ConsistencyCheck, row: MaterialRow, error_share: fl
 def _uncertainty_entry(
     check: ConsistencyCheck, written: Quantity, errors: Mapping[ParameterSetName, float], reasons: Mapping[str, str]
 ) -> LedgerEntry:
-    _, label, unit, scale = TABLE_1_COLUMNS[check.column]
-    tolerance = scale * written.uncertainty_resolution
-    claim = Claim(
-        id=f"table_1.{_entry_key(check)}_uncertainty",
+    _, label, _, scale = TABLE_1_COLUMNS[check.column]
+    quantity, value = f"uncertainty of {label}, propagated", scale * (written.uncertainty or 0.0)
+    explanation = reasons.get(f"{check.column}_uncertainty", "")
+    claim = _table_1_claim(check, quantity, value, scale * written.uncertainty_resolution, explanation)
+    claim = replace(claim, id=f"{claim.id}_uncertainty")
+    return LedgerEntry(claim, scale * errors["printed"], scale * errors["corrected"])
+
+
+def _table_1_claim(check: ConsistencyCheck, quantity: str, value: float, tolerance: float, explanation: str) -> Claim:
+    return Claim(
+        id=f"table_1.{_entry_key(check)}",
         section=TABLE_1_SECTION,
-        quantity=f"Table 1, {check.frequency:g} Hz: uncertainty of {label}, propagated",
-        unit=unit,
-        paper_value=_without_float_noise(scale * (written.uncertainty or 0.0)),
+        quantity=f"Table 1, {check.frequency:g} Hz: {quantity}",
+        unit=TABLE_1_COLUMNS[check.column][2],
+        # A change of unit adds floating-point noise to a printed number.
+        paper_value=float(f"{value:.10g}"),
         upper_tolerance=tolerance,
         lower_tolerance=tolerance,
-        explanation=reasons.get(f"{check.column}_uncertainty", ""),
+        explanation=explanation,
     )
-    return LedgerEntry(claim, scale * errors["printed"], scale * errors["corrected"])
 
 
 def _entry_key(check: ConsistencyCheck) -> str:
     return f"{check.frequency:g}_hz.{check.column}"
-
-
-def _without_float_noise(value: float) -> float:
-    """A printed number after a change of unit, rounded to remove floating-point noise."""
-    return float(f"{value:.10g}")

@@ -11,7 +11,16 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..robot.schema import Robot
-from .figure_style import GRID_COLOUR, LINE_COLOURS, PANEL_WIDTH, TEXT_COLOUR, PaperFigure, legend_above, panel_grid
+from .figure_style import (
+    GRID_COLOUR,
+    LINE_COLOURS,
+    PANEL_WIDTH,
+    TEXT_COLOUR,
+    PaperFigure,
+    label_panel,
+    legend_above,
+    panel_grid,
+)
 from .paper_parameters import DATA_FOLDER, PaperParameters, ParameterSetName, read_data
 from .rope_tests import (
     BREAKING_FORCE,
@@ -163,12 +172,10 @@ def _draw_panel(axes: Axes, panel: TimePanel, figure: TimeFigure, records: Recor
         # Without a margin a curve along the end of a printed axis would be clipped to half its width.
         margin = AXIS_MARGIN * (panel.y[1] - panel.y[0])
         axes.set_ylim(panel.y[0] - margin, panel.y[1] + margin)
-    elif panel.x[0] > 0.0:
-        _limit_to_data(axes, panel, records)
-    axes.set_xlabel("Time (s)")
-    axes.set_ylabel(panel.label)
-    if panel.letter:
-        axes.set_title(f"({panel.letter})", loc="left", fontsize="medium")
+    elif panel.x[0] > 0.0 and (extent := panel.extent(records, "corrected")):
+        margin = 0.05 * (extent[1] - extent[0])
+        axes.set_ylim(extent[0] - margin, extent[1] + margin)
+    label_panel(axes, panel.label, panel.letter and f"({panel.letter})")
 
 
 def _fits_printed_axis(panel: TimePanel, records: Records) -> bool:
@@ -178,13 +185,6 @@ def _fits_printed_axis(panel: TimePanel, records: Records) -> bool:
         return False
     margin = AXIS_MARGIN * (panel.y[1] - panel.y[0])
     return panel.y[0] - margin <= extent[0] and extent[1] <= panel.y[1] + margin
-
-
-def _limit_to_data(axes: Axes, panel: TimePanel, records: Records) -> None:
-    extent = panel.extent(records, "corrected")
-    if extent is not None:
-        margin = 0.05 * (extent[1] - extent[0])
-        axes.set_ylim(extent[0] - margin, extent[1] + margin)
 
 
 def _description(figure: TimeFigure) -> str:
@@ -198,7 +198,6 @@ def _plain_label(label: str) -> str:
 
 
 def _read_figure(number: str, table: Mapping[str, Any]) -> TimeFigure:
-    panels = tuple(_read_panel(number, table, entry) for entry in table["panel"])
     return TimeFigure(
         number=number,
         section=table["section"],
@@ -207,7 +206,7 @@ def _read_figure(number: str, table: Mapping[str, Any]) -> TimeFigure:
         lines=tuple(table["lines"]),
         corrections=tuple(table["corrections"]),
         required_claim=table.get("needs", ""),
-        panels=panels,
+        panels=tuple(_read_panel(number, table, entry) for entry in table["panel"]),
     )
 
 
