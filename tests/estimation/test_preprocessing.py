@@ -9,6 +9,7 @@ from tautwire.estimation import preprocessing, trace
 from tautwire.estimation.clock_offsets import CHANNEL_GROUPS, shifted
 from tautwire.estimation.estimation_data import DataSplit
 from tautwire.estimation.parameter_fit import Fitter
+from tautwire.estimation.policy import ClockOffsetPolicy
 from tautwire.estimation.preprocessing import PreparedData, prepare_data
 from tautwire.estimation.worker_pool import WorkerPool
 from tautwire.recordings.recording import Recording
@@ -48,7 +49,9 @@ def test_a_clock_that_leaves_more_than_noise_waits_behind_the_recordings_as_they
 
 @pytest.mark.validate
 def test_an_effect_that_explains_all_goes_before_a_clock(monkeypatch: pytest.MonkeyPatch) -> None:
-    def always(fitter: Fitter, robot: Robot, evidence: DataSplit) -> tuple[DataSplit, tuple[str, ...]]:
+    def always(
+        fitter: Fitter, robot: Robot, evidence: DataSplit, policy: ClockOffsetPolicy
+    ) -> tuple[DataSplit, tuple[str, ...]]:
         late = shifted(evidence.estimation.recording, 0.01, CHANNEL_GROUPS[1])
         return DataSplit(replace(evidence.estimation, recording=late), evidence.validation, ()), ("a clock, no effect",)
 

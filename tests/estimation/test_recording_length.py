@@ -1,7 +1,5 @@
 """Of recordings longer than a trace can take the beginning is traced, and that is said."""
 
-from functools import partial
-
 import numpy as np
 import pytest
 
@@ -34,7 +32,7 @@ def test_the_only_one_keeps_twice_as_much_since_it_judges_too() -> None:
 
 
 def test_a_trace_takes_the_beginning_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(preprocessing, "shortened", partial(shortened, most=300))
+    monkeypatch.setattr(preprocessing, "shortened", lambda fit, check, _: shortened(fit, check, 300))
     found = trace(example("three"), FIT, CHECK)
     assert found.verdict == "none"
     assert [c.recording.sample_count for c in found.comparisons] == [300, 300]

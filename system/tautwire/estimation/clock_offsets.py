@@ -21,18 +21,11 @@ from .estimation_data import DataSet, DataSplit
 from .innovation_sensitivities import LinearisedSegment, linearise_filter
 from .likelihood import Likelihood
 from .parameter_fit import Fitter
+from .policy import DEFAULT_POLICY, ClockOffsetPolicy
 
 Array = NDArray[np.float64]
 
-JACKKNIFE_BLOCKS, MIN_OFFSET_SIGMAS = 6, 6.0
-# An offset of half an oscillation period takes some ten iterations.
-MAX_ITERATIONS, RELATIVE_TOLERANCE = 25, 0.002
-# In sample intervals: a smaller difference is no clock offset.
-MIN_OFFSET_INTERVALS = 0.1
-# Remaining share of the innovations' mean square: at first order to be a candidate, at convergence to be a clock;
-# then the largest mean square that a clock running ahead in both recordings may leave.
-MAX_CANDIDATE_VARIANCE_RATIO, MAX_CLOCK_VARIANCE_RATIO = 0.8, 0.33
-MAX_EXPLAINED_VARIANCE = 1.5
+JACKKNIFE_BLOCKS = 6
 # Taps of the windowed sinc on each side of a shifted sample, and the Kaiser window's beta.
 TAPS_PER_SIDE, KAISER_BETA = 24, 8.0
 UNIFORM_SAMPLING_TOLERANCE = 1e-3
@@ -69,51 +62,59 @@ class ClockOffset:
     variance_after: float
 
 
-def with_clocks_set(fitter: Fitter, robot: Robot, evidence: DataSplit) -> tuple[DataSplit, tuple[str, ...]]:
+def with_clocks_set(
+    fitter: Fitter,
+    robot: Robot,
+    split: DataSplit,
+    policy: ClockOffsetPolicy = DEFAULT_POLICY.preprocessing.clock_offsets,
+) -> tuple[DataSplit, tuple[str, ...]]:
     """Data with outputs shifted where clocks are offset, and notes.
 
     Raises RecordingError where they are, and samples are too uneven or too sparse to be shifted.
     """
-    samples = (evidence.estimation, evidence.validation)
-    if evidence.estimation.recording is evidence.validation.recording:
-        return evidence, ()
+    samples = (split.estimation, split.validation)
+    if split.estimation.recording is split.validation.recording:
+        return split, ()
     interval = max(float(np.median(np.diff(sample.recording.time))) for sample in samples)
     first_steps = [_offset_steps(fitter, robot, sample) for sample in samples]
     for channels in CHANNEL_GROUPS:
         initial_offsets = [steps.get(channels) for steps in first_steps]
         if None in initial_offsets or not any(
-            offset and offset.variance_after < MAX_CANDIDATE_VARIANCE_RATIO * offset.variance_before
+            offset and offset.variance_after < policy.max_candidate_variance_ratio * offset.variance_before
             for offset in initial_offsets
         ):
             continue
-        converged = [_estimate_offset(fitter, robot, sample, channels) for sample in samples]
+        converged = [_estimate_offset(fitter, robot, sample, channels, policy) for sample in samples]
         offsets = [offset for offset in converged if offset is not None]
-        reason = _clock_reason(offsets, interval) if len(offsets) == len(samples) else None
+        reason = _clock_reason(offsets, interval, policy) if len(offsets) == len(samples) else None
         if reason is None:
             continue
-        fit, judge = (_shift_sample(sample, offset, channels) for sample, offset in zip(samples, offsets, strict=True))
+        estimation, validation = (
+            _shift_sample(sample, offset, channels) for sample, offset in zip(samples, offsets, strict=True)
+        )
         notes = tuple(
             _offset_note(s.recording.path, o, channels, reason) for s, o in zip(samples, offsets, strict=True)
         )
-        return DataSplit(fit, judge, evidence.notes), notes
-    return evidence, ()
+        return DataSplit(estimation, validation, split.notes), notes
+    return split, ()
 
 
-def _clock_reason(offsets: list[ClockOffset], interval: float) -> str | None:
+def _clock_reason(offsets: list[ClockOffset], interval: float, policy: ClockOffsetPolicy) -> str | None:
     """Reason why the offsets of two recordings are clock offsets; None where they are not, or other errors dominate."""
     min_difference = max(
-        MIN_OFFSET_SIGMAS * hypot(*(offset.standard_deviation for offset in offsets)), MIN_OFFSET_INTERVALS * interval
+        policy.min_offset_sigmas * hypot(*(offset.standard_deviation for offset in offsets)),
+        policy.min_offset_intervals * interval,
     )
     larger = max(offsets, key=lambda offset: abs(offset.seconds))
     if (
         abs(offsets[0].seconds - offsets[1].seconds) > min_difference
-        and larger.variance_after < MAX_CLOCK_VARIANCE_RATIO * larger.variance_before
+        and larger.variance_after < policy.max_clock_variance_ratio * larger.variance_before
     ):
         return "not as in the other recording"
     ahead = max(offset.seconds for offset in offsets) < -min_difference
     return (
         "before the motion"
-        if ahead and all(offset.variance_after < MAX_EXPLAINED_VARIANCE for offset in offsets)
+        if ahead and all(offset.variance_after < policy.max_explained_variance for offset in offsets)
         else None
     )
 
@@ -128,15 +129,17 @@ def _shift_sample(sample: DataSet, offset: ClockOffset, channels: ChannelGroup) 
     return replace(sample, recording=shifted(sample.recording, offset.seconds, channels))
 
 
-def _estimate_offset(fitter: Fitter, robot: Robot, sample: DataSet, channels: ChannelGroup) -> ClockOffset | None:
+def _estimate_offset(
+    fitter: Fitter, robot: Robot, sample: DataSet, channels: ChannelGroup, policy: ClockOffsetPolicy
+) -> ClockOffset | None:
     """Estimate an offset by the Gauss-Newton method, shifting outputs at each step; None where it does not converge.
 
     An offset that has not converged would differ from the other recording's and pass for a clock.
     """
     step = _offset_steps(fitter, robot, sample)[channels]
     variance_before, total = step.variance_before, step.seconds
-    for _ in range(MAX_ITERATIONS):
-        if abs(step.seconds) < max(RELATIVE_TOLERANCE * abs(total), 0.2 * step.standard_deviation):
+    for _ in range(policy.max_iterations):
+        if abs(step.seconds) < max(policy.relative_tolerance * abs(total), 0.2 * step.standard_deviation):
             return ClockOffset(total, step.standard_deviation, variance_before, step.variance_after)
         current = replace(sample, recording=shifted(sample.recording, total, channels))
         step = _offset_steps(fitter, robot, current)[channels]

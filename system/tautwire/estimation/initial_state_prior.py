@@ -14,11 +14,10 @@ from ..recordings.start_position import start_position, with_start
 from ..robot.schema import Robot
 from ..robot.static_equilibrium import static_tensions, unit_directions
 from .kalman_filter import Noise
+from .policy import DEFAULT_POLICY, InitialStatePolicy
 
 Array = NDArray[np.float64]
 
-# Standard deviation of self-stress where no tension is measured, as a share of the mean static tension.
-DEFAULT_SELF_STRESS_RATIO = 0.25
 RANK_TOLERANCE = 1e-9
 
 
@@ -54,7 +53,11 @@ def self_stress_projection(robot: Robot) -> Array:
     return projection
 
 
-def self_stress_deviation(robot: Robot, recordings: tuple[Recording, ...]) -> tuple[float, tuple[str, ...]]:
+def self_stress_deviation(
+    robot: Robot,
+    recordings: tuple[Recording, ...],
+    policy: InitialStatePolicy = DEFAULT_POLICY.preprocessing.initial_state,
+) -> tuple[float, tuple[str, ...]]:
     """Standard deviation of self-stress in N, and a note where it matters.
 
     The robot file's value; without one, zero with tensions measured, else a quarter of the mean static one.
@@ -65,7 +68,7 @@ def self_stress_deviation(robot: Robot, recordings: tuple[Recording, ...]) -> tu
     is_tension_unmeasured = not any(recording.has_tension for recording in recordings)
     if declared is None and not is_tension_unmeasured:
         return 0.0, ()
-    deviation = DEFAULT_SELF_STRESS_RATIO * float(np.mean(static_tensions(robot))) if declared is None else declared
+    deviation = policy.self_stress_ratio * float(np.mean(static_tensions(robot))) if declared is None else declared
     if deviation == 0.0:
         return 0.0, ()
     reason = "tension.preferred_uncertainty" if declared is not None else "no tensions are measured, so"
@@ -81,15 +84,6 @@ def _cable_compliances(robot: Robot) -> Array:
     return np.array([length / (c.modulus * c.area) for length, c in zip(lengths, robot.cables, strict=True)])
 
 
-MIN_VELOCITY_SIGMAS = 8.0
-# Window of the velocity estimate in s, twice as long where samples are few, and the fewest samples in it.
-VELOCITY_WINDOW, MIN_WINDOW_SAMPLES = 0.25, 10
-# Window of the oscillation about equilibrium in s, and its largest amplitude as a share of the shortest rope.
-OSCILLATION_WINDOW, MAX_AMPLITUDE_RATIO = 1.0, 0.02
-# Standard deviations of the initial state over the motion that was estimated.
-PRIOR_WIDENING = 1.5
-
-
 @dataclass(frozen=True)
 class InitialMotion:
     """Initial ``speed`` of the platform (m/s), and ``amplitude`` of its oscillation about equilibrium (m)."""
@@ -98,7 +92,12 @@ class InitialMotion:
     amplitude: float
 
 
-def with_motion_at_start(robot: Robot, noise: Noise, recordings: Sequence[Recording]) -> tuple[Noise, tuple[str, ...]]:
+def with_motion_at_start(
+    robot: Robot,
+    noise: Noise,
+    recordings: Sequence[Recording],
+    policy: InitialStatePolicy = DEFAULT_POLICY.preprocessing.initial_state,
+) -> tuple[Noise, tuple[str, ...]]:
     """Noise with an initial state as uncertain as recordings that begin in motion require, and a note of each of these.
 
     Raises RecordingError where one is too far from rest to find its ropes' reference, the static start.
@@ -106,18 +105,18 @@ def with_motion_at_start(robot: Robot, noise: Noise, recordings: Sequence[Record
     notes: list[str] = []
     for recording in recordings:
         robot_at_start = with_start(robot, start_position(robot, noise.position, recording)[0])
-        motion = initial_motion(robot_at_start, noise, recording)
+        motion = initial_motion(robot_at_start, noise, recording, policy)
         if motion is None:
             continue
         shortest_cable = min(float(np.linalg.norm(np.subtract(a, robot.platform.start))) for a in robot.anchors)
-        if motion.amplitude > MAX_AMPLITUDE_RATIO * shortest_cable:
+        if motion.amplitude > policy.max_amplitude_ratio * shortest_cable:
             problem = f"starts in motion, {motion.speed:.3g} m/s, and swings by {motion.amplitude:.3g} m"
             hint = "start the recording at rest: the ropes' reference is the static start"
             raise RecordingError(recording.path, problem, hint)
         noise = replace(
             noise,
-            start_velocity=max(noise.start_velocity, PRIOR_WIDENING * motion.speed),
-            start_stretch=max(noise.start_stretch, PRIOR_WIDENING * motion.amplitude),
+            start_velocity=max(noise.start_velocity, policy.prior_widening * motion.speed),
+            start_stretch=max(noise.start_stretch, policy.prior_widening * motion.amplitude),
         )
         notes.append(
             f"{recording.path} starts in motion, at about {motion.speed:.3g} m/s: where, how fast and under which "
@@ -126,27 +125,32 @@ def with_motion_at_start(robot: Robot, noise: Noise, recordings: Sequence[Record
     return noise, tuple(notes)
 
 
-def initial_motion(robot: Robot, noise: Noise, recording: Recording) -> InitialMotion | None:
+def initial_motion(
+    robot: Robot,
+    noise: Noise,
+    recording: Recording,
+    policy: InitialStatePolicy = DEFAULT_POLICY.preprocessing.initial_state,
+) -> InitialMotion | None:
     """Initial motion of a recording; None where it is at rest within noise.
 
     Winch speeds alone would move a platform on stiff ropes at ``v`` with ``U' v = V``. The residual of the positions is
     fitted by ``e_0 + e_1 t + e_2 t^2``; the velocity is ``v + e_1``, significant at eight sigma from zero.
     """
     time = recording.time - recording.time[0]
-    velocity_map = np.linalg.pinv(unit_directions(robot), rcond=1e-9)
+    velocity_map = np.linalg.pinv(unit_directions(robot), rcond=RANK_TOLERANCE)
     winch_led_velocity = recording.winch_speed @ velocity_map
     displacement = _cumulative_integral(time, winch_led_velocity)
     initial_winch_speed, initial_velocity = recording.winch_speed[0], winch_led_velocity[0]
     velocity_noise = noise.winch_speed * np.linalg.norm(velocity_map, axis=0)
-    is_early = time <= 2.0 * VELOCITY_WINDOW
+    is_early = time <= 2.0 * policy.velocity_window
     measured_axes = [
         axis
         for axis, column in enumerate(recording.position.T)
-        if np.sum(np.isfinite(column[is_early])) >= MIN_WINDOW_SAMPLES
+        if np.sum(np.isfinite(column[is_early])) >= policy.min_window_samples
     ]
     if not measured_axes:
         is_moving = (
-            bool(np.any(np.abs(initial_winch_speed) > MIN_VELOCITY_SIGMAS * noise.winch_speed))
+            bool(np.any(np.abs(initial_winch_speed) > policy.min_velocity_sigmas * noise.winch_speed))
             and noise.winch_speed > 0.0
         )
         return InitialMotion(float(np.linalg.norm(initial_velocity)), 0.0) if is_moving else None
@@ -154,10 +158,12 @@ def initial_motion(robot: Robot, noise: Noise, recording: Recording) -> InitialM
     velocity, significant, amplitudes = np.zeros(3), False, [0.0]
     for axis in measured_axes:
         residual = recording.position[:, axis] - displacement[:, axis]
-        slope, deviation = _initial_slope(time, residual, output_noise[axis])
+        slope, deviation = _initial_slope(time, residual, output_noise[axis], policy)
         velocity[axis] = initial_velocity[axis] + slope
-        significant |= bool(abs(velocity[axis]) > MIN_VELOCITY_SIGMAS * np.hypot(deviation, velocity_noise[axis]))
-        amplitudes.append(_oscillation_amplitude(time, residual, output_noise[axis]))
+        significant |= bool(
+            abs(velocity[axis]) > policy.min_velocity_sigmas * np.hypot(deviation, velocity_noise[axis])
+        )
+        amplitudes.append(_oscillation_amplitude(time, residual, output_noise[axis], policy))
     return InitialMotion(float(np.linalg.norm(velocity)), max(amplitudes)) if significant else None
 
 
@@ -167,19 +173,19 @@ def _cumulative_integral(time: Array, rates: Array) -> Array:
     return total
 
 
-def _initial_slope(time: Array, signal: Array, sigma: float) -> tuple[float, float]:
+def _initial_slope(time: Array, signal: Array, sigma: float, policy: InitialStatePolicy) -> tuple[float, float]:
     """Initial slope of the parabola through the first samples, and its standard deviation."""
     measured = np.flatnonzero(np.isfinite(signal))
-    selected = measured[: max(int(np.sum(time[measured] <= VELOCITY_WINDOW)), MIN_WINDOW_SAMPLES)]
+    selected = measured[: max(int(np.sum(time[measured] <= policy.velocity_window)), policy.min_window_samples)]
     powers = np.vander(time[selected], 3, increasing=True)
     inverse = np.linalg.pinv(powers)
     return float(inverse[1] @ signal[selected]), sigma * float(np.linalg.norm(inverse[1]))
 
 
-def _oscillation_amplitude(time: Array, signal: Array, sigma: float) -> float:
+def _oscillation_amplitude(time: Array, signal: Array, sigma: float, policy: InitialStatePolicy) -> float:
     """Amplitude of the oscillation of a signal about a parabola in its first second, without noise."""
-    selected = np.flatnonzero(np.isfinite(signal) & (time <= OSCILLATION_WINDOW))
-    if len(selected) <= MIN_WINDOW_SAMPLES:
+    selected = np.flatnonzero(np.isfinite(signal) & (time <= policy.oscillation_window))
+    if len(selected) <= policy.min_window_samples:
         return 0.0
     residual = signal[selected] - np.polyval(np.polyfit(time[selected], signal[selected], 2), time[selected])
     return float(np.sqrt(max(2.0 * (float(np.mean(residual**2)) - sigma**2), 0.0)))

@@ -14,13 +14,13 @@ from ..recordings.recording import Recording
 from ..recordings.white_noise_estimate import white_noise_deviation
 from ..robot.schema import Robot
 from .kalman_filter import Noise
+from .policy import DEFAULT_POLICY, NoiseCheckPolicy
 
 Array = NDArray[np.float64]
 
 SEGMENT_SAMPLES, MIN_SPECTRUM_SAMPLES = 64, 300
-# Bands from this share of the sampling rate to half of it, and their largest ratio for white noise.
+# Bands from this share of the sampling rate to half of it.
 MIN_FREQUENCY_RATIO, BAND_COUNT = 0.19, 5
-MAX_BAND_RATIO = 1.7
 # A low quantile over segments: in the louder ones the robot may jolt.
 QUIET_SEGMENT_QUANTILE = 0.3
 
@@ -47,10 +47,10 @@ def noise_levels(signal: Array) -> Array | None:
     return bands if np.all(bands > 0.0) else None
 
 
-def is_flat(levels: Sequence[Array]) -> bool:
+def is_flat(levels: Sequence[Array], max_band_ratio: float) -> bool:
     """Whether several spectra, each over its own mean, are flat in all bands on average."""
     shape = np.mean([level / np.mean(level) for level in levels], axis=0)
-    return bool(np.max(shape) <= MAX_BAND_RATIO * np.min(shape))
+    return bool(np.max(shape) <= max_band_ratio * np.min(shape))
 
 
 INITIAL_POSITION_SIGMAS = 3.0
@@ -72,14 +72,6 @@ def estimate_noise(robot: Robot, recording: Recording) -> Noise:
     )
 
 
-# Ratio of declared and measured standard deviation, either way, beyond which the declared one is wrong.
-MAX_NOISE_RATIO = 1.5
-# Autocorrelation at which samples of coloured noise count as independent, and the largest thinning factor.
-MAX_CORRELATION, MAX_THINNING = 0.15, 20
-# Standstill: winch speeds within so many sigma of zero, for so many samples.
-STANDSTILL_SIGMAS, MIN_STANDSTILL_SAMPLES = 5.0, 200
-
-
 @dataclass(frozen=True)
 class CheckedNoise:
     """Noise after the test, the recordings with coloured channels thinned, and notes."""
@@ -89,7 +81,12 @@ class CheckedNoise:
     notes: tuple[str, ...]
 
 
-def check_noise(robot: Robot, noise: Noise, recordings: tuple[Recording, ...]) -> CheckedNoise:
+def check_noise(
+    robot: Robot,
+    noise: Noise,
+    recordings: tuple[Recording, ...],
+    policy: NoiseCheckPolicy = DEFAULT_POLICY.preprocessing.noise_check,
+) -> CheckedNoise:
     """Test each output's declared noise against the white floor of its spectrum, or against a standstill.
 
     A floor 1.5 times the declared standard deviation or more, or less than 1 / 1.5 of it, replaces the declared one.
@@ -97,24 +94,26 @@ def check_noise(robot: Robot, noise: Noise, recordings: tuple[Recording, ...]) -
     samples. Winch speeds may be declared noisier than they are.
     """
     checked = CheckedNoise(noise, recordings, ())
-    tensions = range(3, 3 + robot.cable_count)
+    positions, tensions = range(3), range(3, 3 + robot.cable_count)
     if robot.sensors.position_noise is not None:
-        checked = _check_sensor_kind(checked, range(3), "m", noise.of_outputs(robot.cable_count))
+        checked = _check_sensor_kind(checked, positions, "m", policy)
     if robot.sensors.tension_noise is not None:
-        checked = _check_sensor_kind(checked, tensions, "N", checked.noise.of_outputs(robot.cable_count))
+        checked = _check_sensor_kind(checked, tensions, "N", policy)
     speed_levels = [level for r in recordings for c in r.winch_speed.T if (level := noise_levels(c)) is not None]
     if not robot.sensors.winch_speed_noise or not speed_levels:
         return checked
     measured = float(np.sqrt(np.mean(speed_levels)))
-    if not is_flat(speed_levels) or measured <= MAX_NOISE_RATIO * noise.winch_speed:
+    if not is_flat(speed_levels, policy.max_band_ratio) or measured <= policy.max_noise_ratio * noise.winch_speed:
         return checked
     note = _replacement_note("winch speeds", noise.winch_speed, measured, "m/s")
     return CheckedNoise(replace(checked.noise, winch_speed=measured), checked.recordings, (*checked.notes, note))
 
 
-def _check_sensor_kind(checked: CheckedNoise, columns: range, unit: str, declared: tuple[float, ...]) -> CheckedNoise:
+def _check_sensor_kind(checked: CheckedNoise, columns: range, unit: str, policy: NoiseCheckPolicy) -> CheckedNoise:
     """Test the outputs of one kind of sensor, whose noise has one colour."""
-    recordings, deviations, notes = checked.recordings, list(declared), list(checked.notes)
+    recordings, notes = checked.recordings, list(checked.notes)
+    declared = checked.noise.of_outputs(recordings[0].cable_count)
+    deviations = list(declared)
     levels = {}
     for column in columns:
         spectra = [level for r in recordings if (level := noise_levels(r.measured()[:, column])) is not None]
@@ -122,18 +121,18 @@ def _check_sensor_kind(checked: CheckedNoise, columns: range, unit: str, declare
             levels[column] = np.mean(spectra, axis=0)
     if not levels:
         return checked
-    flat = is_flat(list(levels.values()))
+    flat = is_flat(list(levels.values()), policy.max_band_ratio)
     for column, level in levels.items():
         name = recordings[0].channel_names[column]
         floor = float(np.sqrt(np.mean(level) if flat else np.min(level)))
-        if declared[column] / MAX_NOISE_RATIO <= floor <= declared[column] * MAX_NOISE_RATIO:
+        if declared[column] / policy.max_noise_ratio <= floor <= declared[column] * policy.max_noise_ratio:
             continue
         if flat:
             notes.append(_replacement_note(name, declared[column], floor, unit))
             deviations[column] = floor
         elif floor < declared[column]:
-            standstill = _standstill_statistics(recordings, column, checked.noise.winch_speed)
-            step, deviations[column], basis = _thinning(declared[column], floor, standstill)
+            standstill = _standstill_statistics(recordings, column, checked.noise.winch_speed, policy)
+            step, deviations[column], basis = _thinning(declared[column], floor, standstill, policy)
             recordings = tuple(_thinned(recording, column, step) for recording in recordings)
             description = f"noise is coloured ({basis}; {deviations[column]:.3g} {unit} in all)"
             notes.append(f"{name}: {description}; one sample of {step} was used")
@@ -152,7 +151,9 @@ def _replacement_note(name: str, declared: float, measured: float, unit: str) ->
     return f"{name}: declared noise {declared:.3g} {unit}, by its spectrum's floor {measured:.3g} {unit}: that is used"
 
 
-def _thinning(declared: float, floor: float, standstill: tuple[float, float] | None) -> tuple[int, float, str]:
+def _thinning(
+    declared: float, floor: float, standstill: tuple[float, float] | None, policy: NoiseCheckPolicy
+) -> tuple[int, float, str]:
     """Thinning factor of coloured noise, its standard deviation, and the basis of both.
 
     The correlation ``a`` of neighbours is that at standstill; without one, that of first-order filtered noise, whose
@@ -167,8 +168,9 @@ def _thinning(declared: float, floor: float, standstill: tuple[float, float] | N
     if standstill is not None:
         deviation, correlation = standstill
         basis = f"at rest neighbours are alike by {correlation:.2f}"
-    step = min(ceil(log(MAX_CORRELATION) / log(correlation)), MAX_THINNING) if 0.0 < correlation < 1.0 else 1
-    return step, deviation, basis
+    if not 0.0 < correlation < 1.0:
+        return 1, deviation, basis
+    return min(ceil(log(policy.max_correlation) / log(correlation)), policy.max_thinning), deviation, basis
 
 
 def _thinned(recording: Recording, column: int, step: int) -> Recording:
@@ -178,18 +180,19 @@ def _thinned(recording: Recording, column: int, step: int) -> Recording:
     return replace(recording, position=measured[:, :3], tension=measured[:, 3:])
 
 
-def _standstill_statistics(recordings: Sequence[Recording], column: int, noise: float) -> tuple[float, float] | None:
+def _standstill_statistics(
+    recordings: Sequence[Recording], column: int, winch_speed_noise: float, policy: NoiseCheckPolicy
+) -> tuple[float, float] | None:
     """Standard deviation and lag-one autocorrelation in the longest standstill; None without one long enough."""
     longest = np.zeros(0)
     for recording in recordings:
         signal = recording.measured()[:, column]
-        is_at_standstill = np.all(np.abs(recording.winch_speed) <= STANDSTILL_SIGMAS * noise, axis=1) & np.isfinite(
-            signal
-        )
+        at_rest = np.all(np.abs(recording.winch_speed) <= policy.standstill_sigmas * winch_speed_noise, axis=1)
+        is_at_standstill = at_rest & np.isfinite(signal)
         edges = np.flatnonzero(np.diff(np.concatenate([[0], is_at_standstill.astype(int), [0]])))
         for first, last in zip(edges[::2], edges[1::2], strict=True):
             longest = signal[first:last] if last - first > len(longest) else longest
-    if len(longest) < MIN_STANDSTILL_SAMPLES:
+    if len(longest) < policy.min_standstill_samples:
         return None
     time = np.arange(len(longest))
     residual = longest - np.polyval(np.polyfit(time, longest, 1), time)

@@ -8,6 +8,85 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+from ..recordings.dead_channels import DeadChannelPolicy
+from ..recordings.outliers import OutlierPolicy
+
+
+@dataclass(frozen=True)
+class NoiseCheckPolicy:
+    """When a recording contradicts the declared measurement noise, and when noise is coloured."""
+
+    # Ratio of measured and declared standard deviation, either way: data sheets are no better than that. Chosen.
+    max_noise_ratio: float = 1.5
+    # Largest ratio of the spectrum's bands for white noise, whose estimates differ by chance. Chosen, not calibrated.
+    max_band_ratio: float = 1.7
+    # Autocorrelation at which samples of coloured noise count as independent. Chosen, not calibrated.
+    max_correlation: float = 0.15
+    # Largest thinning factor, so that a recording is not emptied. Chosen, not calibrated.
+    max_thinning: int = 20
+    # Standstill: winch speeds within so many sigma of zero, for so many samples that a correlation of 0.15 is
+    # significant. Chosen, not calibrated.
+    standstill_sigmas: float = 5.0
+    min_standstill_samples: int = 200
+
+
+@dataclass(frozen=True)
+class InitialStatePolicy:
+    """When a recording starts in motion, and how uncertain its initial state is then."""
+
+    # Standard deviation of self-stress where no tension is measured, as a share of the mean static one. Chosen.
+    self_stress_ratio: float = 0.25
+    # Standard deviations of an initial velocity from zero; a recording at rest must not pass for a moving one. Chosen.
+    min_velocity_sigmas: float = 8.0
+    # Window of the velocity estimate in s, twice as long where samples are few, and the fewest samples in it: short
+    # beside a period of the motion, long beside one of the platform on its ropes. Chosen, not calibrated.
+    velocity_window: float = 0.25
+    min_window_samples: int = 10
+    # Window of the oscillation about equilibrium in s: some periods of the platform on its ropes. Chosen.
+    oscillation_window: float = 1.0
+    # Largest amplitude of it as a share of the shortest rope: beyond, ropes have no reference. Chosen, not calibrated.
+    max_amplitude_ratio: float = 0.02
+    # Standard deviations of the initial state over the motion that was estimated. Chosen, not calibrated.
+    prior_widening: float = 1.5
+
+
+@dataclass(frozen=True)
+class ClockOffsetPolicy:
+    """When outputs that lag or lead have a clock of their own, and are no effect."""
+
+    # Jackknife standard deviations by which offsets of two recordings differ: they know of no model error. Chosen.
+    min_offset_sigmas: float = 6.0
+    # In sample intervals: a smaller difference is no clock offset. Chosen, not calibrated.
+    min_offset_intervals: float = 0.1
+    # Remaining share of the innovations' mean square: at first order to be a candidate, at convergence to be a clock
+    # and not a delay that some other error resembles. Chosen, not calibrated.
+    max_candidate_variance_ratio: float = 0.8
+    max_clock_variance_ratio: float = 0.33
+    # Largest mean square that a clock running ahead in both recordings may leave; noise has 1. Chosen.
+    max_explained_variance: float = 1.5
+    # A delay of 0.1 s in both recordings was still on its way after five iterations, elsewhere in each, and passed for
+    # a clock; half an oscillation period takes some ten.
+    max_iterations: int = 25
+    # Of the offset: a step that ends the iteration. Chosen, not calibrated.
+    relative_tolerance: float = 0.002
+
+
+@dataclass(frozen=True)
+class PreprocessingPolicy:
+    """What is removed from a recording before anything is fitted, and which declared noise is believed."""
+
+    # Samples of each recording: a fit runs the filter over each some hundred times, 30 us a sample.
+    max_samples: int = 100_000
+    # In medians of the sample interval: one lost sample doubles a step.
+    max_step_intervals: float = 1.5
+    # Error of rope length in a gap, in standard deviations of the best sensor: a smaller one does not show.
+    max_length_error_sigmas: float = 1.0
+    dead_channels: DeadChannelPolicy = field(default_factory=DeadChannelPolicy)
+    outliers: OutlierPolicy = field(default_factory=OutlierPolicy)
+    noise_check: NoiseCheckPolicy = field(default_factory=NoiseCheckPolicy)
+    initial_state: InitialStatePolicy = field(default_factory=InitialStatePolicy)
+    clock_offsets: ClockOffsetPolicy = field(default_factory=ClockOffsetPolicy)
+
 
 @dataclass(frozen=True)
 class ResidualAnalysisPolicy:
@@ -150,6 +229,7 @@ class CosimulationPolicy:
 class IdentificationPolicy:
     """Policy of an identification, by theme."""
 
+    preprocessing: PreprocessingPolicy = field(default_factory=PreprocessingPolicy)
     residual_analysis: ResidualAnalysisPolicy = field(default_factory=ResidualAnalysisPolicy)
     fit: FitPolicy = field(default_factory=FitPolicy)
     score_test: ScoreTestPolicy = field(default_factory=ScoreTestPolicy)
@@ -158,3 +238,6 @@ class IdentificationPolicy:
     profile_likelihood: ProfileLikelihoodPolicy = field(default_factory=ProfileLikelihoodPolicy)
     identifiability: IdentifiabilityPolicy = field(default_factory=IdentifiabilityPolicy)
     cosimulation: CosimulationPolicy = field(default_factory=CosimulationPolicy)
+
+
+DEFAULT_POLICY = IdentificationPolicy()

@@ -27,14 +27,10 @@ from .kalman_filter import Noise
 from .likelihood import Innovations
 from .measurement_noise import check_noise, estimate_noise
 from .parameter_fit import Fitter
+from .policy import DEFAULT_POLICY, PreprocessingPolicy
 from .residual_analysis import MIN_SAMPLES, has_enough_samples, residuals_are_white
 from .smoothed_states import calibrate
 from .worker_pool import WorkerPool
-
-# A fit runs the filter over each recording some hundred times, 30 us a sample.
-MAX_SAMPLES = 100_000
-# Largest admissible interpolation error of rope length, in standard deviations of the best sensor.
-MAX_LENGTH_ERROR_SIGMAS = 1.0
 
 
 @dataclass(frozen=True)
@@ -47,28 +43,33 @@ class PreparedRecordings:
     notes: tuple[str, ...]
 
 
-def _with_outputs(robot: Robot, recording: Recording) -> tuple[Recording, tuple[str, ...]]:
+def _with_outputs(robot: Robot, recording: Recording, policy: PreprocessingPolicy) -> tuple[Recording, tuple[str, ...]]:
     """The recording as it is; raises RecordingError where the steps before left no output."""
     require_outputs(recording)
     return recording, ()
 
 
-def _without_gaps(robot: Robot, recording: Recording) -> tuple[Recording, tuple[str, ...]]:
-    noise = estimate_noise(robot, recording)
-    return without_gaps(recording, MAX_LENGTH_ERROR_SIGMAS * detectable_length(robot, noise, recording))
+def _without_gaps(robot: Robot, recording: Recording, policy: PreprocessingPolicy) -> tuple[Recording, tuple[str, ...]]:
+    detectable = detectable_length(robot, estimate_noise(robot, recording), recording)
+    return without_gaps(recording, policy.max_length_error_sigmas * detectable, policy.max_step_intervals)
 
 
-CleaningStep = Callable[[Robot, Recording], tuple[Recording, tuple[str, ...]]]
+CleaningStep = Callable[[Robot, Recording, PreprocessingPolicy], tuple[Recording, tuple[str, ...]]]
 
 CLEANING_STEPS: tuple[CleaningStep, ...] = (
-    lambda robot, recording: without_dead_channels(recording),
-    lambda robot, recording: without_outliers(recording),
+    lambda robot, recording, policy: without_dead_channels(recording, policy.dead_channels),
+    lambda robot, recording, policy: without_outliers(recording, policy.outliers),
     _with_outputs,
     _without_gaps,
 )
 
 
-def prepare_recordings(robot: Robot, fit: Recording, check: Recording | None) -> PreparedRecordings:
+def prepare_recordings(
+    robot: Robot,
+    fit: Recording,
+    check: Recording | None,
+    policy: PreprocessingPolicy = DEFAULT_POLICY.preprocessing,
+) -> PreparedRecordings:
     """Clean both recordings, test the declared noise against them, and widen the prior of the initial state.
 
     Raises RecordingError where a recording has no output that carries information, or is not to be trusted.
@@ -78,12 +79,12 @@ def prepare_recordings(robot: Robot, fit: Recording, check: Recording | None) ->
     for recording in (fit,) if check is None else (fit, check):
         cleaned.append(recording)
         for step in CLEANING_STEPS:
-            cleaned[-1], step_notes = step(robot, cleaned[-1])
+            cleaned[-1], step_notes = step(robot, cleaned[-1], policy)
             notes += step_notes
-    checked = check_noise(robot, estimate_noise(robot, cleaned[0]), tuple(cleaned))
-    self_stress, self_stress_notes = self_stress_deviation(robot, checked.recordings)
+    checked = check_noise(robot, estimate_noise(robot, cleaned[0]), tuple(cleaned), policy.noise_check)
+    self_stress, self_stress_notes = self_stress_deviation(robot, checked.recordings, policy.initial_state)
     noise = replace(checked.noise, self_stress=self_stress)
-    noise, motion_notes = with_motion_at_start(robot, noise, checked.recordings)
+    noise, motion_notes = with_motion_at_start(robot, noise, checked.recordings, policy.initial_state)
     return PreparedRecordings(
         fit=checked.recordings[0],
         check=None if check is None else checked.recordings[1],
@@ -104,14 +105,18 @@ class PreparedData:
 
 
 def prepare_data(
-    robot: Robot, fit: Recording, check: Recording | None, workers: WorkerPool
+    robot: Robot,
+    fit: Recording,
+    check: Recording | None,
+    workers: WorkerPool,
+    policy: PreprocessingPolicy = DEFAULT_POLICY.preprocessing,
 ) -> tuple[PreparedData, ...]:
     """Preprocess the recordings; in two versions where clocks seem to be apart but more is wrong.
 
     The first is as recorded then: an effect that explains all of it goes before a clock that explains a part.
     """
-    fit, check, truncation_notes = shortened(fit, check)
-    prepared = prepare_recordings(robot, fit, check)
+    fit, check, truncation_notes = shortened(fit, check, policy.max_samples)
+    prepared = prepare_recordings(robot, fit, check, policy)
     data_split = split_data(robot, prepared.noise, prepared.fit, prepared.check)
     fitter = Fitter(prepared.noise, workers.poll_interrupts)
     innovations = innovations_of(fitter, robot, data_split)
@@ -127,7 +132,7 @@ def prepare_data(
     as_recorded = assembled(data_split, innovations, ())
     if all_residuals_white(innovations, data_split):
         return (as_recorded,)
-    data_split, clock_notes = with_clocks_set(fitter, robot, data_split)
+    data_split, clock_notes = with_clocks_set(fitter, robot, data_split, policy.clock_offsets)
     if not clock_notes:
         return (as_recorded,)
     innovations = innovations_of(fitter, robot, data_split)
@@ -174,17 +179,17 @@ def _notes(split: DataSplit, data_sets: tuple[DataSet, ...]) -> tuple[str, ...]:
 
 
 def shortened(
-    fit: Recording, check: Recording | None, most: int = MAX_SAMPLES
+    fit: Recording, check: Recording | None, max_samples: int
 ) -> tuple[Recording, Recording | None, tuple[str, ...]]:
-    """Two recordings truncated to ``most`` samples, and notes; a single one, which also validates, to twice as many.
+    """Two recordings truncated to ``max_samples``, and notes; a single one, which also validates, to twice as many.
 
     The beginning is used and not every n-th sample: ropes have memory, so a model has to follow a recording from its
     start.
     """
     if check is None:
-        short_fit, notes = _truncated(fit, 2 * most)
+        short_fit, notes = _truncated(fit, 2 * max_samples)
         return short_fit, None, notes
-    (short_fit, notes), (short_check, check_notes) = _truncated(fit, most), _truncated(check, most)
+    (short_fit, notes), (short_check, check_notes) = _truncated(fit, max_samples), _truncated(check, max_samples)
     return short_fit, short_check, (*notes, *check_notes)
 
 

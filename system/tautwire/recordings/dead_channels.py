@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,15 +12,29 @@ from .white_noise_estimate import white_noise_deviation
 
 Array = NDArray[np.float64]
 
-# Standard deviation over noise: a live output exceeds the first, a dead one stays below the second.
-LIVE_NOISE_RATIO, DEAD_NOISE_RATIO = 10.0, 1.2
-# Samples for which a frozen output stays at one value while others of its kind move.
-MIN_FROZEN_SAMPLES = 40
-# A slower sensor: least share of repeated samples, and of equal intervals between new values.
-MIN_REPEATED_RATIO, MIN_EVEN_RATIO = 0.4, 0.8
+
+@dataclass(frozen=True)
+class DeadChannelPolicy:
+    """When an output counts as dead, frozen, or repeated from a slower sensor."""
+
+    # Standard deviation over noise: a live output exceeds the first, a dead one stays below the second; in between
+    # nothing is decided. Chosen, not calibrated.
+    live_noise_ratio: float = 10.0
+    dead_noise_ratio: float = 1.2
+    # Samples for which a frozen output stays at one value while others of its kind move. Chosen, not calibrated.
+    min_frozen_samples: int = 40
+    # A slower sensor: least share of repeated samples, and of equal intervals between new values, which the coarse
+    # resolution of a fast sensor does not give. Chosen, not calibrated.
+    min_repeated_ratio: float = 0.4
+    min_even_ratio: float = 0.8
 
 
-def without_dead_channels(recording: Recording) -> tuple[Recording, tuple[str, ...]]:
+DEFAULT_DEAD_CHANNEL_POLICY = DeadChannelPolicy()
+
+
+def without_dead_channels(
+    recording: Recording, policy: DeadChannelPolicy = DEFAULT_DEAD_CHANNEL_POLICY
+) -> tuple[Recording, tuple[str, ...]]:
     """The recording with cells emptied where an output carries no information, and notes that name it."""
     measured = recording.measured()
     notes: list[str] = []
@@ -28,9 +42,9 @@ def without_dead_channels(recording: Recording) -> tuple[Recording, tuple[str, .
         columns, names = measured[:, kind], recording.channel_names[kind]
         notes += _clear_channels(columns, names, _constant_channels(columns), "shows one value all along: not used")
         notes += _clear_channels(
-            columns, names, _noise_only_channels(columns), "shows noise alone while others move: not used"
+            columns, names, _noise_only_channels(columns, policy), "shows noise alone while others move: not used"
         )
-        hold_length = _hold_length(columns)
+        hold_length = _hold_length(columns, policy)
         if hold_length > 1:
             _clear_repeats(columns)
             affected = ", ".join(
@@ -39,7 +53,7 @@ def without_dead_channels(recording: Recording) -> tuple[Recording, tuple[str, .
             notes.append(
                 f"{affected}: each value is repeated about {hold_length} times: only the first of each was used"
             )
-        for index, count in enumerate(_clear_frozen(columns)):
+        for index, count in enumerate(_clear_frozen(columns, policy)):
             if count:
                 notes.append(
                     f"{names[index]}: stays at one value for {count} samples while others move: not used there"
@@ -67,28 +81,28 @@ def _constant_channels(columns: Array) -> list[int]:
     ]
 
 
-def _noise_only_channels(columns: Array) -> list[int]:
+def _noise_only_channels(columns: Array, policy: DeadChannelPolicy) -> list[int]:
     """Indices of channels that show noise alone while all others vary by far more than theirs."""
     noise_ratios = {}
     for index, column in enumerate(columns.T):
         values = _finite(column)
-        if len(values) > MIN_FROZEN_SAMPLES:
+        if len(values) > policy.min_frozen_samples:
             noise_ratios[index] = float(np.std(values)) / white_noise_deviation(values[:, None])
-    dead = [index for index, ratio in noise_ratios.items() if ratio < DEAD_NOISE_RATIO]
-    live_ratios = [ratio for ratio in noise_ratios.values() if ratio >= DEAD_NOISE_RATIO]
-    return dead if live_ratios and min(live_ratios) > LIVE_NOISE_RATIO else []
+    dead = [index for index, ratio in noise_ratios.items() if ratio < policy.dead_noise_ratio]
+    live_ratios = [ratio for ratio in noise_ratios.values() if ratio >= policy.dead_noise_ratio]
+    return dead if live_ratios and min(live_ratios) > policy.live_noise_ratio else []
 
 
-def _hold_length(columns: Array) -> int:
+def _hold_length(columns: Array, policy: DeadChannelPolicy) -> int:
     """Samples for which a slower sensor holds each value; 1 where values are not repeated."""
     is_changed = _changed_rows(columns)
     changed_rows = np.flatnonzero(is_changed)
-    if len(changed_rows) < MIN_FROZEN_SAMPLES or np.mean(is_changed) > 1.0 - MIN_REPEATED_RATIO:
+    if len(changed_rows) < policy.min_frozen_samples or np.mean(is_changed) > 1.0 - policy.min_repeated_ratio:
         return 1
     intervals = np.diff(changed_rows)
     median_interval = int(np.median(intervals))
     even_ratio = float(np.mean(np.abs(intervals - median_interval) <= 1))
-    return median_interval if median_interval > 1 and even_ratio > MIN_EVEN_RATIO else 1
+    return median_interval if median_interval > 1 and even_ratio > policy.min_even_ratio else 1
 
 
 def _changed_rows(columns: Array) -> NDArray[np.bool_]:
@@ -104,7 +118,7 @@ def _clear_repeats(columns: Array) -> None:
     columns[~_changed_rows(columns)] = np.nan
 
 
-def _clear_frozen(columns: Array) -> list[int]:
+def _clear_frozen(columns: Array, policy: DeadChannelPolicy) -> list[int]:
     """Empty the cells of each output that is frozen while another of its kind moves; returns their number by output."""
     counts = []
     original = columns.copy()
@@ -113,21 +127,22 @@ def _clear_frozen(columns: Array) -> list[int]:
         is_repeated = np.append(False, column[1:] == column[:-1])
         edges = np.flatnonzero(np.diff(np.concatenate([[0], is_repeated.astype(int), [0]])))
         for first, last in zip(edges[::2], edges[1::2], strict=True):
-            if last - first >= MIN_FROZEN_SAMPLES and _any_other_moves(original, index, first, last):
-                is_frozen[first:last] = True
+            rows = slice(first, last)
+            if last - first >= policy.min_frozen_samples and _any_other_moves(original, index, rows, policy):
+                is_frozen[rows] = True
         columns[is_frozen, index] = np.nan
         counts.append(int(np.sum(is_frozen)))
     return counts
 
 
-def _any_other_moves(columns: Array, index: int, first: int, last: int) -> bool:
-    """Whether another channel varies by more than noise in the rows from ``first`` to before ``last``."""
+def _any_other_moves(columns: Array, index: int, rows: slice, policy: DeadChannelPolicy) -> bool:
+    """Whether another channel varies by more than noise in some rows."""
     for other, column in enumerate(columns.T):
-        values = _finite(column[first:last])
+        values = _finite(column[rows])
         if (
             other != index
-            and len(values) >= MIN_FROZEN_SAMPLES
-            and np.std(values) > LIVE_NOISE_RATIO * white_noise_deviation(_finite(column)[:, None])
+            and len(values) >= policy.min_frozen_samples
+            and np.std(values) > policy.live_noise_ratio * white_noise_deviation(_finite(column)[:, None])
         ):
             return True
     return False

@@ -8,22 +8,21 @@ import numpy as np
 
 from .recording import Recording
 
-# A longer step is a gap; in medians of the sample interval.
-MAX_STEP_INTERVALS = 1.5
 
-
-def without_gaps(recording: Recording, max_length_error: float) -> tuple[Recording, tuple[str, ...]]:
+def without_gaps(
+    recording: Recording, max_length_error: float, max_step_intervals: float = 1.5
+) -> tuple[Recording, tuple[str, ...]]:
     """The longest part without a gap in which unknown rope may have run, and a note where that is not the whole.
 
     Winch speeds are interpolated linearly in a gap. The error of rope length that this makes is estimated elsewhere in
-    the recording, over as many samples: the root mean square of ``integral of V dt - (V_0 + V_1) t / 2``. Up to
-    ``max_length_error`` (m) a gap is harmless.
+    the recording, over as many samples: the root mean square of ``integral of V dt - (V_0 + V_1) t / 2``. A gap is a
+    step longer than ``max_step_intervals`` medians of them, in which that error exceeds ``max_length_error`` (m).
     """
     steps = np.diff(recording.time)
     median_step = float(np.median(steps))
     gaps = [
         row
-        for row in np.flatnonzero(steps > MAX_STEP_INTERVALS * median_step)
+        for row in np.flatnonzero(steps > max_step_intervals * median_step)
         if _interpolation_error(recording, steps[row], median_step) > max_length_error
     ]
     if not gaps:

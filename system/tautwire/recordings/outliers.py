@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import sqrt
 
 import numpy as np
@@ -12,28 +12,43 @@ from scipy.ndimage import median_filter
 
 from ..errors import RecordingError
 from .recording import Recording
-from .white_noise_estimate import DIFFERENCE_ORDER, RELATIVE_RESOLUTION, white_noise_deviation
+from .white_noise_estimate import DIFFERENCE_ORDER, NORMAL_ABSOLUTE_MEDIAN, RELATIVE_RESOLUTION, white_noise_deviation
 
 Array = NDArray[np.float64]
 
-OUTLIER_SIGMAS = 25.0
-# A sensor with values in fewer than this share of the samples is less smooth, so its threshold is larger.
-SPARSE_RATIO, SPARSE_THRESHOLD_FACTOR = 0.5, 1.5
-# Largest mismatch with the pattern of a single outlier, as a share of its energy: a step leaves 0.08, a kink 0.02.
-MAX_PATTERN_MISMATCH = 0.013
 # Samples on each side that give the local noise; samples at the ends that give the local median.
 HALF_WINDOW_SAMPLES, END_SAMPLES = 25, 10
-# At the ends, largest deviation of a neighbour relative to the outlier's.
-MAX_NEIGHBOUR_RATIO = 0.25
-MAX_OUTLIER_RATIO = 0.01
-ALLOWED_OUTLIERS = 3
-NORMAL_MEDIAN = 0.6745
 PATTERN_REACH = DIFFERENCE_ORDER // 2
 # Sixth difference of a unit impulse, over its value in the middle.
 OUTLIER_PATTERN = np.array([-1.0, 6.0, -15.0, 20.0, -15.0, 6.0, -1.0]) / 20.0
 
 
-def without_outliers(recording: Recording) -> tuple[Recording, tuple[str, ...]]:
+@dataclass(frozen=True)
+class OutlierPolicy:
+    """When a sample counts as an outlier, and how many of them a channel may have."""
+
+    # Standard deviations of local noise: jolts of the robot stay below, losses of a tracker are far above.
+    # Chosen, not calibrated.
+    sigmas: float = 25.0
+    # A sensor with values in fewer than this share of the samples is less smooth, so its threshold is larger by the
+    # factor. Chosen, not calibrated.
+    sparse_ratio: float = 0.5
+    sparse_factor: float = 1.5
+    # Largest mismatch with the pattern of a single outlier, as a share of its energy: a step leaves 0.08, a kink 0.02.
+    max_pattern_mismatch: float = 0.013
+    # At the ends, largest deviation of a neighbour relative to the outlier's. Chosen, not calibrated.
+    max_neighbour_ratio: float = 0.25
+    # Share of a channel's samples, beside a few: with more the sensor is not to be trusted. Chosen, not calibrated.
+    max_ratio: float = 0.01
+    allowed_count: int = 3
+
+
+DEFAULT_OUTLIER_POLICY = OutlierPolicy()
+
+
+def without_outliers(
+    recording: Recording, policy: OutlierPolicy = DEFAULT_OUTLIER_POLICY
+) -> tuple[Recording, tuple[str, ...]]:
     """The recording with outliers of outputs emptied and those of winch speeds interpolated, and a note.
 
     Raises RecordingError where more than 1 % of a channel's samples are outliers.
@@ -43,15 +58,12 @@ def without_outliers(recording: Recording) -> tuple[Recording, tuple[str, ...]]:
     names = (*recording.channel_names, *(f"winch_speed_{cable + 1}" for cable in range(recording.cable_count)))
     for name, column in zip(names, (*measured.T, *winch_speed.T), strict=True):
         measured_rows = np.flatnonzero(np.isfinite(column))
-        outlier_rows = measured_rows[
-            outlier_indices(
-                column[measured_rows],
-                OUTLIER_SIGMAS * (SPARSE_THRESHOLD_FACTOR if len(measured_rows) < SPARSE_RATIO * len(column) else 1.0),
-            )
-        ]
+        is_sparse = len(measured_rows) < policy.sparse_ratio * len(column)
+        channel_policy = replace(policy, sigmas=policy.sigmas * policy.sparse_factor) if is_sparse else policy
+        outlier_rows = measured_rows[outlier_indices(column[measured_rows], channel_policy)]
         if not len(outlier_rows):
             continue
-        if len(outlier_rows) > max(MAX_OUTLIER_RATIO * len(measured_rows), ALLOWED_OUTLIERS):
+        if len(outlier_rows) > max(policy.max_ratio * len(measured_rows), policy.allowed_count):
             problem = f"jumps and comes back in {len(outlier_rows)} of {len(measured_rows)} samples, more than 1 %"
             hint = "mend the sensor, or leave the column out"
             raise RecordingError(f"{recording.path}: column {name}", problem, hint)
@@ -64,14 +76,14 @@ def without_outliers(recording: Recording) -> tuple[Recording, tuple[str, ...]]:
         column[is_missing] = np.interp(recording.time[is_missing], recording.time[~is_missing], column[~is_missing])
     description = ", ".join(f"{count} of {name}" for name, count in counts.items())
     note = (
-        f"{recording.path}: samples that jump by more than {OUTLIER_SIGMAS:g} sigma and come back are taken "
+        f"{recording.path}: samples that jump by more than {policy.sigmas:g} sigma and come back are taken "
         f"out: {description}"
     )
     cleaned = replace(recording, position=measured[:, :3], tension=measured[:, 3:], winch_speed=winch_speed)
     return cleaned, (note,)
 
 
-def outlier_indices(signal: Array, sigmas: float = OUTLIER_SIGMAS) -> NDArray[np.intp]:
+def outlier_indices(signal: Array, policy: OutlierPolicy = DEFAULT_OUTLIER_POLICY) -> NDArray[np.intp]:
     """Indices of single-sample outliers in a signal (N,) without gaps.
 
     Each sample is compared with the polynomial of degree five through its six neighbours,
@@ -82,18 +94,18 @@ def outlier_indices(signal: Array, sigmas: float = OUTLIER_SIGMAS) -> NDArray[np
     if len(signal) < 4 * END_SAMPLES:
         return np.array(indices, dtype=np.intp)
     sigma = white_noise_deviation(signal[:, None])
-    indices += _end_outliers(cleaned, sigma, sigmas)
+    indices += _end_outliers(cleaned, sigma, policy)
     cleaned[indices] = np.interp(indices, np.delete(np.arange(len(cleaned)), indices), np.delete(cleaned, indices))
     while True:
-        new_indices = _interior_outliers(cleaned, sigma, sigmas)
-        if not len(new_indices) or len(indices) > MAX_OUTLIER_RATIO * len(signal) + ALLOWED_OUTLIERS:
+        new_indices = _interior_outliers(cleaned, sigma, policy)
+        if not len(new_indices) or len(indices) > policy.max_ratio * len(signal) + policy.allowed_count:
             return np.array(sorted({*indices, *new_indices.tolist()}), dtype=np.intp)
         indices += new_indices.tolist()
         inliers = np.setdiff1d(np.arange(len(cleaned)), indices)
         cleaned[indices] = np.interp(indices, inliers, cleaned[inliers])
 
 
-def _interior_outliers(signal: Array, sigma: float, sigmas: float) -> NDArray[np.intp]:
+def _interior_outliers(signal: Array, sigma: float, policy: OutlierPolicy) -> NDArray[np.intp]:
     """Indices of interior outliers, each the strongest of its neighbourhood."""
     residual = np.convolve(signal, OUTLIER_PATTERN, mode="valid")
     windows = sliding_window_view(residual, len(OUTLIER_PATTERN))
@@ -101,14 +113,15 @@ def _interior_outliers(signal: Array, sigma: float, sigmas: float) -> NDArray[np
     amplitude = windows @ OUTLIER_PATTERN / pattern_energy
     mismatch = np.sum((windows - amplitude[:, None] * OUTLIER_PATTERN) ** 2, axis=1)
     noise_level = sigma * sqrt(pattern_energy)
-    local_noise = np.maximum(_noisier_side(np.abs(residual)) / NORMAL_MEDIAN, noise_level)[PATTERN_REACH:-PATTERN_REACH]
+    local_noise = np.maximum(_noisier_side(np.abs(residual)) / NORMAL_ABSOLUTE_MEDIAN, noise_level)
+    local_noise = local_noise[PATTERN_REACH:-PATTERN_REACH]
     energy = np.sum(windows**2, axis=1)
     is_peak = np.abs(amplitude) >= np.max(
         np.abs(sliding_window_view(np.pad(amplitude, PATTERN_REACH), len(OUTLIER_PATTERN))), axis=1
     )
     is_outlier = (
-        (np.abs(amplitude) > sigmas * local_noise / sqrt(pattern_energy))
-        & (mismatch < MAX_PATTERN_MISMATCH * energy)
+        (np.abs(amplitude) > policy.sigmas * local_noise / sqrt(pattern_energy))
+        & (mismatch < policy.max_pattern_mismatch * energy)
         & is_peak
     )
     return np.flatnonzero(is_outlier) + 2 * PATTERN_REACH
@@ -124,17 +137,19 @@ def _noisier_side(values: Array) -> Array:
     return larger
 
 
-def _end_outliers(signal: Array, sigma: float, sigmas: float) -> list[int]:
+def _end_outliers(signal: Array, sigma: float, policy: OutlierPolicy) -> list[int]:
     """Indices of outliers among the first and last six samples, where neighbours on one side are missing."""
     indices = []
     for first in (0, len(signal) - END_SAMPLES):
         window = signal[first : first + END_SAMPLES]
         distance = np.abs(window - np.median(window))
         spread = max(
-            float(np.median(distance)) / NORMAL_MEDIAN, sigma, RELATIVE_RESOLUTION * float(np.max(np.abs(signal)))
+            float(np.median(distance)) / NORMAL_ABSOLUTE_MEDIAN,
+            sigma,
+            RELATIVE_RESOLUTION * float(np.max(np.abs(signal))),
         )
         outer = range(2 * PATTERN_REACH) if first == 0 else range(END_SAMPLES - 2 * PATTERN_REACH, END_SAMPLES)
         neighbour_distance = np.maximum(np.append(distance[1:], 0.0), np.append(0.0, distance[:-1]))
-        is_outlier = (distance > sigmas * spread) & (neighbour_distance < MAX_NEIGHBOUR_RATIO * distance)
+        is_outlier = (distance > policy.sigmas * spread) & (neighbour_distance < policy.max_neighbour_ratio * distance)
         indices += [first + index for index in outer if is_outlier[index]]
     return indices
