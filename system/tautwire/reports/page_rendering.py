@@ -12,6 +12,7 @@ from urllib.parse import quote
 
 from markupsafe import Markup, escape
 
+from .. import __version__
 from ..errors import one_line
 from .inline_charts import Chart
 
@@ -140,5 +141,5 @@ def _environment() -> Environment:
     )
     environment.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
     environment.filters.update(number=typeset_number, prose=typeset_prose, relative_url=relative_url)
-    environment.globals.update(asset=asset, plotly_script=_plotly_script)
+    environment.globals.update(asset=asset, plotly_script=_plotly_script, version=__version__)
     return environment
