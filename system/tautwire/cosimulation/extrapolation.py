@@ -68,8 +68,8 @@ class Extrapolator:
         lengths = sorted({len(chain.ends) for chain in chains})
         self._groups = [[chain for chain in chains if len(chain.ends) == length] for length in lengths]
         self._ends = [np.array([chain.ends for chain in group]).T for group in self._groups]
-        target_indices = [place for group in self._groups for place in _target_indices(group)]
-        self._target_order = np.array([target_indices.index(place) for place in indices], dtype=np.intp)
+        target_indices = [index for group in self._groups for index in _target_indices(group)]
+        self._target_order = np.array([target_indices.index(index) for index in indices], dtype=np.intp)
         self._indices = indices
         self._nominals = nominals
         self._weights: dict[tuple[float, ...], list[Array]] = {}
@@ -84,11 +84,11 @@ class Extrapolator:
         points = history.past[-min(history.smooth_points, MAX_POINTS) :]
         values = np.array([value for _, value in points])
         weights = self._weights_for([point_time for point_time, _ in points], time)
-        parts = [
+        values_by_length = [
             (weight @ values.take(ends, axis=1).reshape(-1, ends.shape[1])).reshape(len(points), -1)
             for ends, weight in zip(self._ends, weights, strict=True)
         ]
-        self._candidates = np.concatenate(parts, axis=1).take(self._target_order, axis=1)
+        self._candidates = np.concatenate(values_by_length, axis=1).take(self._target_order, axis=1)
         if history.errors is not None and len(history.errors) >= MIN_ERRORS:
             corrected = self._candidates[-1] + _predict_error(history.errors) * self._nominals
             self._candidates = np.concatenate([self._candidates, corrected[None, :]])

@@ -32,7 +32,7 @@ def derivative_chains(
     components: Mapping[str, Component], output_ports: Sequence[Port], selected: Collection[int]
 ) -> list[DerivativeChain]:
     """The derivative chains of the ``selected`` outputs; FMUs declare which output is the derivative of which."""
-    indices = {port: place for place, port in enumerate(output_ports)}
+    indices = {port: index for index, port in enumerate(output_ports)}
     derivative_ports = {}
     for port in output_ports:
         variable = components[port.component].variables[port.variable] if port.component else None

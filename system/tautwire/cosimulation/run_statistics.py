@@ -32,9 +32,9 @@ class Fallbacks:
             max_errors[quantity] = max(max_errors.get(quantity, 0.0), float(error))
             component_names.setdefault(quantity, {})[port.component] = None
         derivative_notes = (
-            f"no rate of {name}, so it is worked out from the past, off by about {doubt:.2g} {unit}: "
+            f"no rate of {name}, so it is worked out from the past, off by about {max_error:.2g} {unit}: "
             f"FMU {', '.join(component_names[name, unit])}"
-            for (name, unit), doubt in max_errors.items()
+            for (name, unit), max_error in max_errors.items()
         )
         return (*self.missing_capabilities, *derivative_notes)
 

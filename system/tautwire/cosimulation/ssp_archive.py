@@ -84,12 +84,14 @@ def write_ssp(robot: Robot, fmus: RobotFmus, path: Path) -> Path:
     system_inputs = {_system_connector_name(port): port for port in wiring.external_inputs}
     system_outputs = {_system_connector_name(port): port for port in wiring.outputs}
     ends = [end for wire in wires for end in (wire.source, wire.target)]
-    parts = _ssp_components(fmus, [*ends, *system_inputs.values(), *system_outputs.values()])
+    components = _ssp_components(fmus, [*ends, *system_inputs.values(), *system_outputs.values()])
     with atomic_file(path) as scratch, zipfile.ZipFile(scratch, "w") as archive:
-        _add_entry(archive, SYSTEM_STRUCTURE, _system_description(robot, parts, wires, system_inputs, system_outputs))
-        _add_entry(archive, COMPONENTS_ONLY, _system_description(robot, parts, wires, {}, {}))
-        for part in parts.values():
-            _add_entry(archive, _fmu_path(part), part.path.read_bytes(), zipfile.ZIP_STORED)
+        _add_entry(
+            archive, SYSTEM_STRUCTURE, _system_description(robot, components, wires, system_inputs, system_outputs)
+        )
+        _add_entry(archive, COMPONENTS_ONLY, _system_description(robot, components, wires, {}, {}))
+        for component in components.values():
+            _add_entry(archive, _fmu_path(component), component.path.read_bytes(), zipfile.ZIP_STORED)
     return path
 
 
@@ -113,8 +115,8 @@ def _system_connector_name(port: Port) -> str:
     return port.variable if port.component == PLATFORM else f"{port.variable}_{port.component.rpartition('_')[2]}"
 
 
-def _fmu_path(part: _SspComponent) -> str:
-    return f"resources/{part.name}.fmu"
+def _fmu_path(component: _SspComponent) -> str:
+    return f"resources/{component.name}.fmu"
 
 
 def _add_entry(archive: zipfile.ZipFile, name: str, data: bytes, method: int = zipfile.ZIP_DEFLATED) -> None:
@@ -126,7 +128,7 @@ def _add_entry(archive: zipfile.ZipFile, name: str, data: bytes, method: int = z
 
 def _system_description(
     robot: Robot,
-    parts: Mapping[str, _SspComponent],
+    components: Mapping[str, _SspComponent],
     wires: Iterable[Connection],
     system_inputs: Mapping[str, Port],
     system_outputs: Mapping[str, Port],
@@ -136,71 +138,77 @@ def _system_description(
     root.set("generationTool", "Tautwire")
     system = SubElement(root, "ssd:System", {"name": SYSTEM_NAME, "description": f"cable robot {name}"})
     if system_inputs or system_outputs:
-        frame = SubElement(system, "ssd:Connectors")
+        connectors = SubElement(system, "ssd:Connectors")
         for kind, ports in (("input", system_inputs), ("output", system_outputs)):
-            for outer, port in ports.items():
-                _add_connector(frame, outer, kind, port.variable, parts[port.component])
+            for connector_name, port in ports.items():
+                _add_connector(connectors, connector_name, kind, port.variable, components[port.component])
     elements = SubElement(system, "ssd:Elements")
-    for component, part in parts.items():
-        _add_component(elements, component, part)
+    for component in components.values():
+        _add_component(elements, component)
     _add_connections(system, wires, system_inputs, system_outputs)
-    _add_units(root, parts.values())
+    _add_units(root, components.values())
     indent(root)
     return bytes(tostring(root, encoding="utf-8", xml_declaration=True))
 
 
-def _add_component(elements: Element, name: str, part: _SspComponent) -> None:
-    attributes = {"name": name, "type": "application/x-fmu-sharedlibrary", "source": _fmu_path(part)}
-    component = SubElement(elements, "ssd:Component", attributes | {"implementation": "CoSimulation"})
-    frame = SubElement(component, "ssd:Connectors")
-    for connector in part.connectors:
-        _add_connector(frame, connector, part.variables[connector].causality, connector, part)
-    bindings = SubElement(component, "ssd:ParameterBindings")
+def _add_component(elements: Element, component: _SspComponent) -> None:
+    attributes = {"name": component.name, "type": "application/x-fmu-sharedlibrary", "source": _fmu_path(component)}
+    element = SubElement(elements, "ssd:Component", attributes | {"implementation": "CoSimulation"})
+    connectors = SubElement(element, "ssd:Connectors")
+    for connector in component.connectors:
+        _add_connector(connectors, connector, component.variables[connector].causality, connector, component)
+    bindings = SubElement(element, "ssd:ParameterBindings")
     values = SubElement(SubElement(bindings, "ssd:ParameterBinding"), "ssd:ParameterValues")
     settings = SubElement(values, "ssv:ParameterSet", {"version": "1.0", "name": "values"})
     numbers = SubElement(settings, "ssv:Parameters")
-    parameters = [v for v in part.variables.values() if v.causality == "parameter" and is_real_scalar(v)]
+    parameters = [v for v in component.variables.values() if v.causality == "parameter" and is_real_scalar(v)]
     for parameter in parameters:
         number = SubElement(numbers, "ssv:Parameter", {"name": parameter.name})
         unit = unit_of(parameter)
         SubElement(number, "ssv:Real", {"value": str(parameter.start)} | ({"unit": unit} if unit else {}))
     _add_unit_list(
-        settings, "ssv:Units", {unit: part.unit_attributes(unit) for unit in filter(None, map(unit_of, parameters))}
+        settings,
+        "ssv:Units",
+        {unit: component.unit_attributes(unit) for unit in filter(None, map(unit_of, parameters))},
     )
 
 
-def _add_connector(frame: Element, name: str, kind: str, variable: str, part: _SspComponent) -> None:
-    connector = SubElement(frame, "ssd:Connector", {"name": name, "kind": kind})
-    if part.variables[variable].description:
-        connector.set("description", part.variables[variable].description)
-    SubElement(connector, "ssc:Real", {"unit": part.connectors[variable]})
+def _add_connector(parent: Element, name: str, kind: str, variable: str, component: _SspComponent) -> None:
+    connector = SubElement(parent, "ssd:Connector", {"name": name, "kind": kind})
+    if component.variables[variable].description:
+        connector.set("description", component.variables[variable].description)
+    SubElement(connector, "ssc:Real", {"unit": component.connectors[variable]})
 
 
 def _add_connections(
     system: Element, wires: Iterable[Connection], system_inputs: Mapping[str, Port], system_outputs: Mapping[str, Port]
 ) -> None:
-    frame = SubElement(system, "ssd:Connections")
+    connections = SubElement(system, "ssd:Connections")
     for wire in wires:
-        SubElement(frame, "ssd:Connection", _connection_end("start", wire.source) | _connection_end("end", wire.target))
-    for outer, port in system_inputs.items():
-        SubElement(frame, "ssd:Connection", {"startConnector": outer} | _connection_end("end", port))
-    for outer, port in system_outputs.items():
-        SubElement(frame, "ssd:Connection", _connection_end("start", port) | {"endConnector": outer})
+        SubElement(
+            connections, "ssd:Connection", _connection_end("start", wire.source) | _connection_end("end", wire.target)
+        )
+    for name, port in system_inputs.items():
+        SubElement(connections, "ssd:Connection", {"startConnector": name} | _connection_end("end", port))
+    for name, port in system_outputs.items():
+        SubElement(connections, "ssd:Connection", _connection_end("start", port) | {"endConnector": name})
 
 
 def _connection_end(side: str, port: Port) -> dict[str, str]:
     return {f"{side}Element": port.component, f"{side}Connector": port.variable}
 
 
-def _add_units(root: Element, parts: Iterable[_SspComponent]) -> None:
+def _add_units(root: Element, components: Iterable[_SspComponent]) -> None:
     """The units of all connectors; parameter sets list their own."""
     _add_unit_list(
-        root, "ssd:Units", {unit: part.unit_attributes(unit) for part in parts for unit in part.connectors.values()}
+        root,
+        "ssd:Units",
+        {unit: component.unit_attributes(unit) for component in components for unit in component.connectors.values()},
     )
 
 
 def _add_unit_list(parent: Element, tag: str, units: Mapping[str, Mapping[str, str]]) -> None:
-    frame = SubElement(parent, tag)
+    unit_list = SubElement(parent, tag)
     for unit, bases in sorted(units.items()):
-        node = SubElement(frame, "ssc:Unit", {"name": unit})
+        node = SubElement(unit_list, "ssc:Unit", {"name": unit})
         SubElement(node, "ssc:BaseUnit", dict(bases))

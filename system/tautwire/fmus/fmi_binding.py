@@ -91,7 +91,7 @@ class StepFunctions:
 class FmuInstance(Protocol):
     """A loaded FMU, to be instantiated and initialised once; each method raises what fmpy raises.
 
-    ``real`` is the type of its numbers.
+    ``real_type`` is the FMI type of its numbers.
     """
 
     call_names: CallNames
