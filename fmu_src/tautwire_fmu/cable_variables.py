@@ -20,14 +20,18 @@ def _inputs(data: Dict[str, Any]) -> Tuple[Variable, ...]:
     return (
         INPUT_TIME,
         MIDDLE_TIME,
-        *vector_variables("position", "input", "m", "position of the platform", start, nominal=length),
-        *vector_variables("velocity", "input", "m/s", "velocity of the platform, the rate of position"),
-        *vector_variables("acceleration", "input", "m/s2", "acceleration of the platform, the rate of velocity"),
+        *vector_variables(Variable("position", "input", "m", "position of the platform", nominal=length), start),
+        *vector_variables(Variable("velocity", "input", "m/s", "velocity of the platform, the rate of position")),
+        *vector_variables(
+            Variable("acceleration", "input", "m/s2", "acceleration of the platform, the rate of velocity")
+        ),
         Variable("winch_speed", "input", "m/s", "rope speed by the winch encoder, positive reels in"),
         Variable("winch_acceleration", "input", "m/s2", "rate of winch_speed"),
-        *vector_variables("middle_position", "input", "m", "position in the middle of a step", start, nominal=length),
-        *vector_variables("middle_velocity", "input", "m/s", "velocity in the middle of a step"),
-        *vector_variables("middle_acceleration", "input", "m/s2", "acceleration in the middle of a step"),
+        *vector_variables(
+            Variable("middle_position", "input", "m", "position in the middle of a step", nominal=length), start
+        ),
+        *vector_variables(Variable("middle_velocity", "input", "m/s", "velocity in the middle of a step")),
+        *vector_variables(Variable("middle_acceleration", "input", "m/s2", "acceleration in the middle of a step")),
     )
 
 
@@ -40,20 +44,24 @@ def _outputs(data: Dict[str, Any]) -> Tuple[Variable, ...]:
     pull_text = "tension that the law asks for, negative where the cable hangs slack"
     position_inputs = axis_names("position")
     return (
-        *vector_variables("force", "output", "N", "force on the platform", nominal=tension, depends_on=MOTION_INPUTS),
+        *vector_variables(
+            Variable("force", "output", "N", "force on the platform", nominal=tension, depends_on=MOTION_INPUTS)
+        ),
         Variable("tension", "output", "N", load_cell_text, minimum=0.0, nominal=tension, depends_on=MOTION_INPUTS),
         Variable("length", "output", "m", length_text, nominal=length, depends_on=position_inputs),
         Variable("elongation", "output", "m", elongation_text, depends_on=position_inputs),
         Variable("strain", "output", "1", "strain by the tension law", nominal=1e-3, depends_on=position_inputs),
         Variable("pull", "output", "N", pull_text, nominal=tension, depends_on=MOTION_INPUTS),
         *vector_variables(
-            "force_rate",
-            "output",
-            "N/s",
-            "rate of force",
-            nominal=tension,
-            depends_on=MOTION_AND_RATE_INPUTS,
-            rate_of="force",
+            Variable(
+                "force_rate",
+                "output",
+                "N/s",
+                "rate of force",
+                nominal=tension,
+                depends_on=MOTION_AND_RATE_INPUTS,
+                rate_of="force",
+            )
         ),
         Variable(
             "tension_rate",
@@ -64,9 +72,13 @@ def _outputs(data: Dict[str, Any]) -> Tuple[Variable, ...]:
             depends_on=MOTION_AND_RATE_INPUTS,
             rate_of="tension",
         ),
-        *vector_variables("middle_force", "output", "N", "force in the middle of the last step", nominal=tension),
         *vector_variables(
-            "middle_force_rate", "output", "N/s", "rate of force there", nominal=tension, rate_of="middle_force"
+            Variable("middle_force", "output", "N", "force in the middle of the last step", nominal=tension)
+        ),
+        *vector_variables(
+            Variable(
+                "middle_force_rate", "output", "N/s", "rate of force there", nominal=tension, rate_of="middle_force"
+            )
         ),
     )
 
@@ -84,9 +96,9 @@ def _parameters(data: Dict[str, Any]) -> Tuple[Variable, ...]:
     anchor, start = tuple(data["anchor"]), tuple(data["start"])
     area_text = "area that the modulus refers to"
     return (
-        *vector_variables("anchor", "parameter", "m", "exit point on the frame", anchor),
+        *vector_variables(Variable("anchor", "parameter", "m", "exit point on the frame"), anchor),
         *vector_variables(
-            "start", "parameter", "m", "position of the platform at the start, in static equilibrium", start
+            Variable("start", "parameter", "m", "position of the platform at the start, in static equilibrium"), start
         ),
         Variable("modulus", "parameter", "Pa", "modulus of elasticity", data["modulus"], True, 0.0, nominal=1e11),
         Variable("area", "parameter", "m2", area_text, data["area"], True, 0.0, nominal=1e-5),

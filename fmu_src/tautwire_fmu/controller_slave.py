@@ -98,7 +98,7 @@ def _inputs(data: Dict[str, Any]) -> Tuple[Variable, ...]:
     position, tensions = data["expected"][0][:3], data["expected"][0][3:]
     return (
         INPUT_TIME,
-        *vector_variables("position", "input", "m", "measured position of the platform", tuple(position)),
+        *vector_variables(Variable("position", "input", "m", "measured position of the platform"), tuple(position)),
         *(
             Variable(f"tension_{i}", "input", "N", f"measured tension of cable {i}", float(tension), nominal=1e3)
             for i, tension in enumerate(tensions, start=1)

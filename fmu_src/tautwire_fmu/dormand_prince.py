@@ -44,9 +44,8 @@ def integrate_dormand_prince(
     completed_fraction, step_fraction = 0.0, 1.0
     while completed_fraction < 1.0:
         step_fraction = min(step_fraction, 1.0 - completed_fraction)
-        next_state, next_slope, error = _trial_step(
-            rates, state, slope, scales, step, completed_fraction, step_fraction
-        )
+        next_state, next_slope, errors = _trial_step(rates, state, slope, step, completed_fraction, step_fraction)
+        error = max(abs(e) / scale for e, scale in zip(errors, scales)) / RELATIVE_TOLERANCE
         if error > 1.0 and step_fraction > MIN_STEP_FRACTION:
             step_fraction = max(MIN_STEP_FRACTION, step_fraction * max(MIN_STEP_FACTOR, SAFETY_FACTOR * error**-0.2))
             continue
@@ -64,21 +63,18 @@ def _trial_step(
     rates: StateDerivative,
     state: List[float],
     slope: List[float],
-    scales: Sequence[float],
     step: float,
     completed_fraction: float,
     step_fraction: float,
-) -> Tuple[List[float], List[float], float]:
-    """One trial step: states and rates after it, and its error in units of the tolerance."""
+) -> Tuple[List[float], List[float], List[float]]:
+    """One trial step: states and rates after it, and the estimated errors of the states."""
     h = step_fraction * step
     slopes = [slope]
     for node, weights in zip(STAGE_TIMES, STAGE_WEIGHTS):
         slopes.append(rates(completed_fraction + node * step_fraction, _weighted_sum(state, slopes, weights, h)))
     next_state = _weighted_sum(state, slopes, SOLUTION_WEIGHTS, h)
     slopes.append(rates(completed_fraction + step_fraction, next_state))
-    errors = _weighted_sum([0.0] * len(state), slopes, ERROR_WEIGHTS, h)
-    largest_error = max(abs(e) / scale for e, scale in zip(errors, scales)) / RELATIVE_TOLERANCE
-    return next_state, slopes[-1], largest_error
+    return next_state, slopes[-1], _weighted_sum([0.0] * len(state), slopes, ERROR_WEIGHTS, h)
 
 
 def _weighted_sum(state: List[float], slopes: Sequence[List[float]], weights: Sequence[float], h: float) -> List[float]:

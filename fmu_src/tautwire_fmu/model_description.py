@@ -27,27 +27,14 @@ class Variable(NamedTuple):
     rate_of: Optional[str] = None
 
 
-def vector_variables(
-    name: str,
-    causality: str,
-    unit: str,
-    description: str,
-    start: Tuple[float, float, float] = (0.0, 0.0, 0.0),
-    nominal: Optional[float] = None,
-    depends_on: Tuple[str, ...] = (),
-    rate_of: Optional[str] = None,
-) -> Tuple[Variable, ...]:
-    """Three variables ``name.x``, ``name.y``, ``name.z`` of one vector."""
+def vector_variables(vector: Variable, start: Tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Tuple[Variable, ...]:
+    """Three variables ``name.x``, ``name.y``, ``name.z`` of a vector, which is given as if it were one variable."""
     return tuple(
-        Variable(
-            f"{name}.{axis}",
-            causality,
-            unit,
-            f"{description}, {axis} axis",
+        vector._replace(
+            name=f"{vector.name}.{axis}",
+            description=f"{vector.description}, {axis} axis",
             start=value,
-            nominal=nominal,
-            depends_on=depends_on,
-            rate_of=None if rate_of is None else f"{rate_of}.{axis}",
+            rate_of=None if vector.rate_of is None else f"{vector.rate_of}.{axis}",
         )
         for axis, value in zip("xyz", start)
     )

@@ -18,7 +18,7 @@ from .laws import effect_stages as stages
 from .laws import point_mass as law
 from .laws.effects import Effect
 from .laws.mathematics import COMPLEX_STEP, REAL, Mathematics, rates_of, vector_with_rates, with_rate
-from .laws.vectors import Vector
+from .laws.vectors import Vector, add
 from .model_description import Variable, axis_names, vector_variables
 from .slave import INPUT_TIME, MIDDLE_TIME, Slave, read_resource
 
@@ -218,7 +218,9 @@ class PointMass(Slave):
         return AccelerationNode((x.real, y.real, z.real), rates_of(acceleration_with_rate))
 
     def _acceleration(self, m: Mathematics, position: Vector, velocity: Vector, force: Vector, time: Any) -> Vector:
-        return law.acceleration(m, self.constants, self.effects, self._states(time), position, velocity, force)
+        states = self._states(time)
+        total_force = add(force, law.wrench(m, self.effects, states, position, velocity))
+        return law.acceleration(m, self.constants, self.effects, states, total_force)
 
 
 def _has_position_sensor(effects: Sequence[Effect]) -> bool:
@@ -228,58 +230,73 @@ def _has_position_sensor(effects: Sequence[Effect]) -> bool:
 
 def _variables(data: Dict[str, Any]) -> Tuple[Variable, ...]:
     start = tuple(data["start"])
-    weight = float(data["mass"]) * float(data["gravity"])
-    force_variables = [
-        (f"force_{number}", f"force_rate_{number}", f"force of cable {number}", tuple(force))
-        for number, force in enumerate(data["start_forces"], start=1)
-    ]
-    force_variables.append(("external_force", "external_force_rate", "external force", (0.0, 0.0, 0.0)))
-    inputs: Tuple[Variable, ...] = ()
-    for name, rate, description, force in force_variables:
-        inputs += vector_variables(name, "input", "N", description, force, nominal=weight)
-        inputs += vector_variables(rate, "input", "N/s", f"rate of the {description}", nominal=weight)
-    middle: Tuple[Variable, ...] = ()
-    for name, rate, description, force in force_variables[:-1]:
-        middle_description = f"{description} in the middle of a step"
-        middle += vector_variables(f"middle_{name}", "input", "N", middle_description, force, nominal=weight)
-        middle += vector_variables(
-            f"middle_{rate}", "input", "N/s", f"rate of the {middle_description}", nominal=weight
-        )
-    measured = vector_variables("measured_position", "output", "m", "position as its sensor shows it", start)
-    if not _has_position_sensor(effects_from_resource(data)):
-        measured = ()
     return (
-        INPUT_TIME,
-        MIDDLE_TIME,
-        *inputs,
-        *middle,
-        *vector_variables("position", "output", "m", "position of the point mass", start),
-        *vector_variables("velocity", "output", "m/s", "velocity of the point mass", rate_of="position"),
-        *vector_variables(
-            "acceleration",
-            "output",
-            "m/s2",
-            "acceleration of the point mass",
-            nominal=float(data["gravity"]) or None,
-            depends_on=axis_names(*(name for name, *_ in force_variables)),
-            rate_of="velocity",
-        ),
-        *vector_variables("middle_position", "output", "m", "position in the middle of the last step", start),
-        *vector_variables(
-            "middle_velocity", "output", "m/s", "velocity in the middle of the last step", rate_of="middle_position"
-        ),
-        *vector_variables(
-            "middle_acceleration",
-            "output",
-            "m/s2",
-            "acceleration in the middle of the last step",
-            nominal=float(data["gravity"]) or None,
-            rate_of="middle_velocity",
-        ),
-        *measured,
+        *_inputs(data),
+        *_motion_outputs(data),
         *effect_state_variables(data),
         Variable("mass", "parameter", "kg", "mass of the platform", data["mass"], True, 0.0, nominal=data["mass"]),
         Variable("gravity", "parameter", "m/s2", "gravity, along -z", data["gravity"], True),
-        *vector_variables("start", "parameter", "m", "position at the start, at rest", start),
+        *vector_variables(Variable("start", "parameter", "m", "position at the start, at rest"), start),
         *effect_variables(data["effects"]),
+    )
+
+
+def _inputs(data: Dict[str, Any]) -> Tuple[Variable, ...]:
+    """Forces and their rates at the end of a step, then those of the cables in its middle."""
+    weight = float(data["mass"]) * float(data["gravity"])
+    cable_forces = tuple(
+        (f"_{number}", f"force of cable {number}", tuple(force))
+        for number, force in enumerate(data["start_forces"], start=1)
+    )
+    variables = [INPUT_TIME, MIDDLE_TIME]
+    for number, description, force in cable_forces:
+        variables += _force_inputs(f"force{number}", f"force_rate{number}", description, force, weight)
+    variables += _force_inputs("external_force", "external_force_rate", "external force", (0.0, 0.0, 0.0), weight)
+    for number, description, force in cable_forces:
+        middle_description = f"{description} in the middle of a step"
+        variables += _force_inputs(
+            f"middle_force{number}", f"middle_force_rate{number}", middle_description, force, weight
+        )
+    return tuple(variables)
+
+
+def _force_inputs(
+    name: str, rate_name: str, description: str, start: Tuple[float, float, float], weight: float
+) -> Tuple[Variable, ...]:
+    return (
+        *vector_variables(Variable(name, "input", "N", description, nominal=weight), start),
+        *vector_variables(Variable(rate_name, "input", "N/s", f"rate of the {description}", nominal=weight)),
+    )
+
+
+def _motion_outputs(data: Dict[str, Any]) -> Tuple[Variable, ...]:
+    """Motion at the end of a step and in its middle, and the measured position if a sensor distorts it."""
+    start, gravity = tuple(data["start"]), float(data["gravity"]) or None
+    forces = axis_names(*(f"force_{number}" for number in range(1, len(data["start_forces"]) + 1)), "external_force")
+    position = Variable("position", "output", "m", "position of the point mass")
+    velocity = Variable("velocity", "output", "m/s", "velocity of the point mass", rate_of="position")
+    acceleration = Variable(
+        "acceleration",
+        "output",
+        "m/s2",
+        "acceleration of the point mass",
+        nominal=gravity,
+        depends_on=forces,
+        rate_of="velocity",
+    )
+    text = "{} in the middle of the last step".format
+    middle_position = Variable("middle_position", "output", "m", text("position"))
+    middle_velocity = Variable("middle_velocity", "output", "m/s", text("velocity"), rate_of="middle_position")
+    middle_acceleration = Variable(
+        "middle_acceleration", "output", "m/s2", text("acceleration"), nominal=gravity, rate_of="middle_velocity"
+    )
+    measured_position = Variable("measured_position", "output", "m", "position as its sensor shows it")
+    return (
+        *vector_variables(position, start),
+        *vector_variables(velocity),
+        *vector_variables(acceleration),
+        *vector_variables(middle_position, start),
+        *vector_variables(middle_velocity),
+        *vector_variables(middle_acceleration),
+        *(vector_variables(measured_position, start) if _has_position_sensor(effects_from_resource(data)) else ()),
     )

@@ -50,7 +50,7 @@ def laws_in_memory(robot: Robot) -> Callable[[float, np.ndarray], list[float]]:
             pull = cable_law.cable_outputs(REAL, constants, (), own, moving).force
             force = [a + b for a, b in zip(force, pull, strict=True)]
             slopes.append(cable_law.state_rates(REAL, constants, (), own, moving).unstrained_length)
-        pushed = platform_law.acceleration(REAL, assembly.platform, (), (), position, velocity, force)
+        pushed = platform_law.acceleration(REAL, assembly.platform, (), (), force)
         return [*velocity, *pushed, *slopes]
 
     return rates

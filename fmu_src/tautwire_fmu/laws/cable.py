@@ -175,9 +175,9 @@ def cable_motion(
             cable.area * (cable.modulus * strain) + cable.start_tension,
         )
     effect_states = state.effects
-    modulus, stress = stages.stiffness(m, effects, effect_states, cable)
+    modulus, stress = stiffness = stages.stiffness(m, effects, effect_states, cable)
     strain = strain - stages.free_strain(m, effects, effect_states)
-    sag, start_sag = stages.sag(m, effects, cable, line, strain, modulus, stress)
+    sag, start_sag = stages.sag(m, effects, cable, line, strain, stiffness)
     strain = strain + (sag - start_sag)
     arc = line.length * m.exp(sag)
     elastic_tension = cable.area * (modulus * strain + stress) + cable.start_tension

@@ -75,12 +75,12 @@ def free_strain_rate(m: Mathematics, effects: Effects, states: States, cable: An
 
 
 def sag(
-    m: Mathematics, effects: Effects, cable: Any, line: Any, strain: Any, modulus: Any, stress: Any
+    m: Mathematics, effects: Effects, cable: Any, line: Any, strain: Any, stiffness: Tuple[Any, Any]
 ) -> Tuple[Any, Any]:
-    """``ln(arc / chord)`` of the rope, now and at the start."""
+    """``ln(arc / chord)`` of the rope, now and at the start; ``stiffness`` as the stage of that name gives it."""
     for active in effects:
         if active.effect.sag is not None:
-            now, at_start = active.effect.sag(m, active.values, cable, line, strain, modulus, stress)
+            now, at_start = active.effect.sag(m, active.values, cable, line, strain, stiffness)
             return now, at_start
     return 0.0, 0.0
 

@@ -27,9 +27,13 @@ ELAPSED_TIME = State("time", "s", "time since the start", drifts=True)
 
 
 class Formulas(NamedTuple):
-    """Expression trees of one component by target; those of one target add up."""
+    """Expression trees of one component by target, and the names of the states that they use.
+
+    Its methods but :meth:`value` are stages of an effect whose ``values`` are the coefficients by name.
+    """
 
     trees: Mapping[str, Tuple[ExpressionNode, ...]]
+    state_names: Tuple[str, ...]
 
     def value(self, m: Mathematics, target: str, values: Mapping[str, Any]) -> Any:
         """Sum of the formulas of a target, in its unit."""
@@ -37,6 +41,37 @@ class Formulas(NamedTuple):
         for tree in self.trees.get(target, ()):
             total = total + evaluate(m, tree, values)
         return total
+
+    def tension(
+        self, m: Mathematics, values: Mapping[str, Any], states: Tuple[Any, ...], cable: Any, motion: Any
+    ) -> Any:
+        """Tension added in the rope, less that at the start, in N."""
+        present_values = _cable_values(
+            motion.strain, motion.strain_rate, motion.elastic_tension, motion.line.length, motion.winch_speed
+        )
+        start_values = _cable_values(0.0, 0.0, cable.start_tension, cable.start_length, 0.0)
+        present_tension = self.value(m, "tension", {**values, **present_values, **dict(zip(self.state_names, states))})
+        return present_tension - self.value(
+            m, "tension", {**values, **start_values, **dict.fromkeys(self.state_names, 0.0)}
+        )
+
+    def state_rates(
+        self, m: Mathematics, values: Mapping[str, Any], states: Tuple[Any, ...], cable: Any, motion: Any
+    ) -> Tuple[Any, ...]:
+        """Rates of the states in a rope: the encoder's speed, and one."""
+        return tuple(motion.winch_speed if name == ENCODER_TRAVEL.name else 1.0 for name in self.state_names)
+
+    def wrench(
+        self, m: Mathematics, values: Mapping[str, Any], states: Tuple[Any, ...], position: Vector, velocity: Vector
+    ) -> Vector:
+        """Force on the platform, in N."""
+        motion_values = dict(zip(PLATFORM_VARIABLES, (*position, *velocity)))
+        present_values = {**values, **motion_values, **dict(zip(self.state_names, states))}
+        return tuple(self.value(m, target, present_values) for target in FORCE_TARGETS)
+
+    def inertia(self, m: Mathematics, values: Mapping[str, Any], states: Tuple[Any, ...]) -> Any:
+        """Mass carried by the platform, in kg."""
+        return self.value(m, "mass", {**values, **dict(zip(self.state_names, states))})
 
 
 def formula_effect(texts: Mapping[str, Sequence[str]], coefficient_names: Sequence[str] = ()) -> Effect:
@@ -47,44 +82,12 @@ def formula_effect(texts: Mapping[str, Sequence[str]], coefficient_names: Sequen
     Raises ExpressionError where a text is no formula.
     """
     trees = {
-        place: tuple(parse_expression(text, (*VARIABLES_BY_TARGET[place], *coefficient_names)) for text in given)
-        for place, given in texts.items()
+        target: tuple(parse_expression(text, (*VARIABLES_BY_TARGET[target], *coefficient_names)) for text in given)
+        for target, given in texts.items()
     }
-    formulas = Formulas(trees)
     used_names = {name for given in trees.values() for tree in given for name in variable_names(tree)}
     states = tuple(state for state in (ENCODER_TRAVEL, ELAPSED_TIME) if state.name in used_names)
-    state_names = [state.name for state in states]
-
-    def tension(
-        m: Mathematics, values: Mapping[str, Any], effect_states: Tuple[Any, ...], cable: Any, motion: Any
-    ) -> Any:
-        length = motion.line.length
-        present_values = _cable_values(
-            motion.strain, motion.strain_rate, motion.elastic_tension, length, motion.winch_speed
-        )
-        start_values = _cable_values(0.0, 0.0, cable.start_tension, cable.start_length, 0.0)
-        present_tension = formulas.value(
-            m, "tension", {**values, **present_values, **dict(zip(state_names, effect_states))}
-        )
-        return present_tension - formulas.value(
-            m, "tension", {**values, **start_values, **dict.fromkeys(state_names, 0.0)}
-        )
-
-    def state_rates(
-        m: Mathematics, values: Mapping[str, Any], effect_states: Tuple[Any, ...], cable: Any, motion: Any
-    ) -> Tuple[Any, ...]:
-        return tuple(motion.winch_speed if name == ENCODER_TRAVEL.name else 1.0 for name in state_names)
-
-    def wrench(
-        m: Mathematics, values: Mapping[str, Any], effect_states: Tuple[Any, ...], position: Vector, velocity: Vector
-    ) -> Vector:
-        motion_values = dict(zip(PLATFORM_VARIABLES, (*position, *velocity)))
-        present_values = {**values, **motion_values, **dict(zip(state_names, effect_states))}
-        return tuple(formulas.value(m, place, present_values) for place in FORCE_TARGETS)
-
-    def inertia(m: Mathematics, values: Mapping[str, Any], effect_states: Tuple[Any, ...]) -> Any:
-        return formulas.value(m, "mass", {**values, **dict(zip(state_names, effect_states))})
-
+    formulas = Formulas(trees, tuple(state.name for state in states))
     acts_in_cable = "tension" in trees
     return Effect(
         name=FORMULA_EFFECT_NAME,
@@ -94,10 +97,10 @@ def formula_effect(texts: Mapping[str, Sequence[str]], coefficient_names: Sequen
         values=dict,
         source="found on recordings of this robot",
         states=states,
-        state_rates=state_rates if acts_in_cable else None,
-        tension=tension if acts_in_cable else None,
-        wrench=wrench if any(place in trees for place in FORCE_TARGETS) else None,
-        inertia=inertia if "mass" in trees else None,
+        state_rates=formulas.state_rates if acts_in_cable else None,
+        tension=formulas.tension if acts_in_cable else None,
+        wrench=formulas.wrench if any(target in trees for target in FORCE_TARGETS) else None,
+        inertia=formulas.inertia if "mass" in trees else None,
     )
 
 

@@ -58,11 +58,8 @@ def acceleration(
     platform: PointMassConstants,
     effects: Sequence[ActiveEffect],
     states: Sequence[Tuple[Any, ...]],
-    position: Vector,
-    velocity: Vector,
-    cable_force: Vector,
+    force: Vector,
 ) -> Vector:
-    """Acceleration in m/s^2 under the total force of the cables."""
-    force = add(cable_force, wrench(m, effects, states, position, velocity))
+    """Acceleration in m/s^2 under weight and a force in N: the sum of the cables' and of :func:`wrench`."""
     specific_force = scale(1.0 / total_mass(m, platform, effects, states), force)
     return (specific_force[0], specific_force[1], specific_force[2] - platform.gravity)

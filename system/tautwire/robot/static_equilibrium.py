@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from typing import Any
 
 import numpy as np
@@ -157,6 +157,6 @@ def _distribute(robot: Robot, position: Array, direction_matrix: Array, load: Ar
 
 
 def _unreachable_error(
-    robot: Robot, position: Sequence[Any], reason: str, cable: int | None = None, tension: float | None = None
+    robot: Robot, position: Iterable[Any], reason: str, cable: int | None = None, tension: float | None = None
 ) -> UnreachableError:
     return UnreachableError(robot.name, tuple(map(float, position)), cable=cable, tension=tension, reason=reason)

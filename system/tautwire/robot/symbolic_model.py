@@ -81,7 +81,28 @@ class SymbolicModel:
 
 
 @dataclass(frozen=True)
+class _Variables:
+    """The mechanical states, and the inputs, as symbols."""
+
+    position: SX
+    velocity: SX
+    unstrained_lengths: SX
+    winch_speeds: SX
+    external_force: SX
+
+    @property
+    def states(self) -> SX:
+        return casadi.vertcat(self.position, self.velocity, self.unstrained_lengths)
+
+    @property
+    def inputs(self) -> SX:
+        return casadi.vertcat(self.winch_speeds, self.external_force)
+
+
+@dataclass(frozen=True)
 class _Equations:
+    """Rates of the mechanical states and of those of effects, outputs, and tensions of the free spans."""
+
     rates: SX
     outputs: SX
     span_tensions: SX
@@ -119,52 +140,32 @@ def symbolic_model(
         symbolic_robot, symbolic_start_tensions(robot, symbolic_robot, CASADI_MATHEMATICS), CASADI_MATHEMATICS
     )
     count = len(assembly.cables)
-    position, velocity = SX.sym("position", 3), SX.sym("velocity", 3)
-    unstrained = SX.sym("unstrained_length", count)
-    winch_speeds, external_force = SX.sym("winch_speed", count), SX.sym("external_force", 3)
-    effect_states = _effect_states(assembly)
-    equations = _equations(
-        assembly, position, velocity, unstrained, winch_speeds, external_force, [e.symbol for e in effect_states]
+    variables = _Variables(
+        position=SX.sym("position", 3),
+        velocity=SX.sym("velocity", 3),
+        unstrained_lengths=SX.sym("unstrained_length", count),
+        winch_speeds=SX.sym("winch_speed", count),
+        external_force=SX.sym("external_force", 3),
     )
-    mechanical_states = casadi.vertcat(position, velocity, unstrained)
-    unique_indices = [place for place, state in enumerate(effect_states) if state not in effect_states[:place]]
-    effect_states = [effect_states[place] for place in unique_indices]
-    rows = [*range(mechanical_states.numel()), *(mechanical_states.numel() + place for place in unique_indices)]
-    equations = replace(equations, rates=equations.rates[rows])
-    relevant_indices = _relevant_effect_states(
-        casadi.vertcat(mechanical_states, *(e.symbol for e in effect_states)), mechanical_states.numel(), equations
-    )
-    lengths = [SX(c.constants.start_length) for c in assembly.cables]
-    initial_state = casadi.vertcat(
-        SX(list(assembly.start)), SX(list(assembly.velocity)), *lengths, SX(len(relevant_indices), 1)
-    )
+    effect_states, equations = _minimal_equations(assembly, variables)
+    constant = SX(len(perturbations), 1)
     sensor_offset = casadi.vertcat(*map(SX, sensor_offsets(uncertain_parameters, perturbations, count)))
+    first_effect_state = variables.states.numel()
     return SymbolicModel(
-        states=casadi.vertcat(
-            mechanical_states, *(effect_states[place].symbol for place in relevant_indices), *perturbations
-        ),
-        inputs=casadi.vertcat(winch_speeds, external_force),
+        states=casadi.vertcat(variables.states, *(each.symbol for each in effect_states), *perturbations),
+        inputs=variables.inputs,
         parameters=casadi.vertcat(*symbols) if symbols else SX(0, 1),
-        rates=casadi.vertcat(
-            equations.rates[
-                [*range(mechanical_states.numel()), *(mechanical_states.numel() + place for place in relevant_indices)]
-            ],
-            SX(len(perturbations), 1),
-        ),
+        rates=casadi.vertcat(equations.rates, constant),
         outputs=equations.outputs + casadi.vertcat(sensor_offset[:3], SX(3, 1), sensor_offset[3:], SX(count, 1)),
         span_tensions=equations.span_tensions,
         sensor_delays=_sensor_delays(assembly),
-        start=casadi.vertcat(_nominal_start(initial_state, perturbations), SX(len(perturbations), 1)),
-        drifting=tuple(
-            mechanical_states.numel() + i
-            for i, place in enumerate(relevant_indices)
-            if effect_states[place].state.drifts
-        ),
+        start=casadi.vertcat(_nominal_start(_initial_state(assembly, len(effect_states)), perturbations), constant),
+        drifting=tuple(first_effect_state + i for i, each in enumerate(effect_states) if each.state.drifts),
         state_names=(
             *_axis_names("position"),
             *_axis_names("velocity"),
             *_numbered_names("unstrained_length", count),
-            *(effect_states[place].name for place in relevant_indices),
+            *(each.name for each in effect_states),
             *(f"uncertain {number.label}" for number in uncertain_parameters),
         ),
         input_names=(*_numbered_names("winch_speed", count), *_axis_names("external_force")),
@@ -175,6 +176,11 @@ def symbolic_model(
             *_numbered_names("length", count),
         ),
     )
+
+
+def _initial_state(assembly: RobotAssembly, effect_state_count: int) -> SX:
+    lengths = [SX(component.constants.start_length) for component in assembly.cables]
+    return casadi.vertcat(SX(list(assembly.start)), SX(list(assembly.velocity)), *lengths, SX(effect_state_count, 1))
 
 
 def _nominal_start(start: SX, perturbations: Sequence[SX]) -> SX:
@@ -222,6 +228,21 @@ def _effect_states(assembly: RobotAssembly) -> list[_EffectState]:
     return [time if (each.effect, each.state) == (FORMULA_NAME, ELAPSED_TIME) else each for each in effect_states]
 
 
+def _minimal_equations(assembly: RobotAssembly, variables: _Variables) -> tuple[list[_EffectState], _Equations]:
+    """The equations with those states of effects alone, each once, that influence an output; and these states."""
+    effect_states = _effect_states(assembly)
+    equations = _equations(assembly, variables, [each.symbol for each in effect_states])
+    mechanical_count = variables.states.numel()
+
+    def select(indices: Sequence[int]) -> tuple[list[_EffectState], _Equations]:
+        rows = [*range(mechanical_count), *(mechanical_count + index for index in indices)]
+        return [effect_states[index] for index in indices], replace(equations, rates=equations.rates[rows])
+
+    effect_states, equations = select([i for i, each in enumerate(effect_states) if each not in effect_states[:i]])
+    states = casadi.vertcat(variables.states, *(each.symbol for each in effect_states))
+    return select(_relevant_effect_states(states, mechanical_count, equations))
+
+
 def _relevant_effect_states(states: SX, mechanical_count: int, equations: _Equations) -> list[int]:
     """Indices of the effect states that influence an output, directly or through other states."""
     outputs = casadi.vertcat(equations.outputs, equations.span_tensions)
@@ -260,24 +281,17 @@ def _owner_name(robot: Robot, parameter: FreeParameter) -> str:
     return FORMULA_NAME if parameter.effect_index == FORMULA_INDEX else robot.effects[parameter.effect_index].name
 
 
-def _equations(
-    assembly: RobotAssembly,
-    position: SX,
-    velocity: SX,
-    unstrained: SX,
-    winch_speeds: SX,
-    external_force: SX,
-    effect_states: list[SX],
-) -> _Equations:
-    force: Sequence[SX] = _components(external_force)
+def _equations(assembly: RobotAssembly, variables: _Variables, effect_states: list[SX]) -> _Equations:
+    position, velocity = _components(variables.position), _components(variables.velocity)
+    force: Sequence[SX] = _components(variables.external_force)
     readings = []
     cable_rates = []
     effect_rates: list[SX] = []
     symbols = iter(effect_states)
     for index, component in enumerate(assembly.cables):
         states = tuple(tuple(next(symbols) for _ in a.effect.states) for a in component.effects)
-        state = cable_law.CableState(unstrained[index], 0.0, states)
-        inputs = cable_law.CableInputs(_components(position), _components(velocity), winch_speeds[index])
+        state = cable_law.CableState(variables.unstrained_lengths[index], 0.0, states)
+        inputs = cable_law.CableInputs(position, velocity, variables.winch_speeds[index])
         arguments = (CASADI_MATHEMATICS, component.constants, component.effects, state)
         span = cable_law.span(CASADI_MATHEMATICS, component.constants, inputs, component.effects)
         motion = cable_law.cable_motion(*arguments, span, inputs.winch_speed)
@@ -290,19 +304,15 @@ def _equations(
     platform_states = tuple(tuple(next(symbols) for _ in a.effect.states) for a in assembly.platform_effects)
     # On the platform only formulas have states: the time since the start.
     effect_rates += [SX(1.0) for states in platform_states for _ in states]
-    acceleration = platform_law.acceleration(
-        CASADI_MATHEMATICS,
-        assembly.platform,
-        assembly.platform_effects,
-        platform_states,
-        _components(position),
-        _components(velocity),
-        force,
-    )
-    measured = scale(stages.sensor_gains(CASADI_MATHEMATICS, assembly.platform_effects)[1], _components(position))
+    effects = assembly.platform_effects
+    force = add(force, platform_law.wrench(CASADI_MATHEMATICS, effects, platform_states, position, velocity))
+    acceleration = platform_law.acceleration(CASADI_MATHEMATICS, assembly.platform, effects, platform_states, force)
+    measured = scale(stages.sensor_gains(CASADI_MATHEMATICS, effects)[1], position)
     return _Equations(
-        rates=casadi.vertcat(velocity, *acceleration, *cable_rates, *effect_rates),
-        outputs=casadi.vertcat(*measured, velocity, *(r.tension for r in readings), *(r.length for r in readings)),
+        rates=casadi.vertcat(variables.velocity, *acceleration, *cable_rates, *effect_rates),
+        outputs=casadi.vertcat(
+            *measured, variables.velocity, *(r.tension for r in readings), *(r.length for r in readings)
+        ),
         span_tensions=casadi.vertcat(*(r.span_tension for r in readings)),
     )
 

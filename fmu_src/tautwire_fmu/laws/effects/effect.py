@@ -57,7 +57,7 @@ class Effect(NamedTuple):
     ``viscosity``        ``cable``                                      Pa s, added to the damping
     ``free_strain``      ``states``                                     strain that carries no tension
     ``free_strain_rate`` ``states, cable, tension``                     1/s, its rate under an elastic tension in N
-    ``sag``              ``cable, line, strain, modulus, stress``       ln(arc / chord), now and at the start
+    ``sag``              ``cable, line, strain, stiffness``             ln(arc / chord), now and at the start
     ``rope_speed``       ``states, winch_speed, tension``               m/s, added at the winch
     ``tension``          ``states, cable, motion``                      N, added in the rope
     ``softening``        ``cable, pull``                                N, added to ``max(pull, 0)``

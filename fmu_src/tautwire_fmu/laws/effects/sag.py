@@ -63,9 +63,13 @@ class _HangingRope(NamedTuple):
 
 
 def sag(
-    m: Mathematics, values: Values, cable: Any, line: Any, strain: Any, modulus: Any, stress: Any
+    m: Mathematics, values: Values, cable: Any, line: Any, strain: Any, stiffness: Tuple[Any, Any]
 ) -> Tuple[Any, Any]:
-    """``ln(arc / l)`` now and at the start; Newton's method solves for the tension."""
+    """``ln(arc / l)`` now and at the start; Newton's method solves for the tension.
+
+    ``stiffness`` is the modulus, and the stress at no strain, both in Pa.
+    """
+    modulus, stress = stiffness
     start_rope = _hanging_rope(values, cable.gravity, cable.start_length, cable.start_direction)
     start_tension = m.maximum(cable.start_tension, TENSION_FLOOR)
     start_log_ratio = 0.5 * m.log(
