@@ -18,13 +18,13 @@ from tests.support.recordings import recorded
 from tests.support.robots import example
 
 
-def traced(effects: dict[str, Any]) -> Trace:
-    fit, check = recorded("three", 3, effects), recorded("three", 53, effects)
+def traced(effects: dict[str, Any], samples: int) -> Trace:
+    fit, check = (recorded("three", seed, effects).first(samples) for seed in (3, 53))
     return trace(example("three"), fit, check, lambda what, done: None)
 
 
 def test_a_formula_that_is_discovered_runs_in_the_fmus(tmp_path: Path) -> None:
-    found = traced({"unlisted_sideways": {"constant": 30.0}})
+    found = traced({"unlisted_sideways": {"constant": 30.0}}, 401)
     assert found.verdict == "discovered"
     assert found.effects == ()
     assert found.formula is not None
@@ -40,13 +40,18 @@ def test_a_formula_that_is_discovered_runs_in_the_fmus(tmp_path: Path) -> None:
     assert np.allclose(again.position, found.comparisons[0].after.position[:101], atol=1e-9)
 
 
-def test_what_swings_is_not_explained_but_said() -> None:
-    found = traced({"unlisted_swing": {"mass": 20.0, "length": 2.0}})
+@pytest.mark.validate(but=["8 s"])
+@pytest.mark.parametrize(
+    ("length", "frequency", "accuracy", "samples"),
+    [pytest.param(2.0, 0.352, 0.06, 801, id="16 s"), pytest.param(0.5, 0.705, 0.1, 401, id="8 s")],
+)
+def test_what_swings_is_not_explained_but_said(length: float, frequency: float, accuracy: float, samples: int) -> None:
+    found = traced({"unlisted_swing": {"mass": 20.0, "length": length}}, samples)
     assert found.verdict == "unexplained"
     assert found.formula is None
     assert found.robot_after == found.robot_before
     (line,) = trace_document(found)["resonance"]
-    assert line["frequency_hz"] == pytest.approx(0.352, rel=0.06)
+    assert line["frequency_hz"] == pytest.approx(frequency, rel=accuracy)
     assert line["outputs"] == ["x", "y"]
     assert line["on"] == ["fit", "check"]
-    assert any("something swings at 0.3" in note for note in found.notes)
+    assert any(f"something swings at {line['frequency_hz']:.2g}" in note for note in found.notes)
