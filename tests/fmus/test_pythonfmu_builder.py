@@ -89,9 +89,9 @@ shutil.copytree(Path(pythonfmu.__file__).parent, bare, ignore=shutil.ignore_patt
 for name in [name for name in sys.modules if name.startswith("pythonfmu")]:
     del sys.modules[name]
 sys.path.insert(0, str(bare.parent))
-from tautwire.fmus.pythonfmu_builder import FmuLibraryError, builder
+from tautwire.fmus.pythonfmu_builder import FmuLibraryError, installed_builder
 try:
-    with builder(Path({str(tmp_path)!r}), ["none"]):
+    with installed_builder(Path({str(tmp_path)!r}), ["none"]):
         pass
 except FmuLibraryError as error:
     assert error.place == bare and "install it again" in str(error)
