@@ -16,8 +16,9 @@ from tautwire.campaigns.input_sampling import draw_samples
 from tautwire.campaigns.plan_file import read_plan
 from tautwire.errors import InputError
 from tautwire.estimation.effect_estimates import estimated_effects, parameter_correlations
+from tautwire.estimation.estimation_data import DataSplit
+from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.stepwise_selection import SelectionResult
-from tautwire.estimation.worker_pool import WorkerPool
 from tautwire.reports import trace_document
 from tautwire.robot.robot_file_reader import robot_from_content
 from tests.support.campaigns import plan_file, read
@@ -145,7 +146,8 @@ def test_what_is_no_report_is_refused(document: dict[str, Any], said: str, tmp_p
 def test_samples_spread_as_the_fit_of_a_recording_does(tmp_path: Path) -> None:
     fitter, chosen, sample, fit = fitted(3)
     found = SelectionResult(tuple(chosen), (1.0, 1.0), fit, (), ())
-    effects = estimated_effects(fit.robot, found, fitter, sample, WorkerPool(1))
+    context = IdentificationContext(fit.robot, fitter, DataSplit(sample, sample, ()))
+    effects = estimated_effects(context, found)
     trace = replace(made_trace(), effects=effects, correlations=parameter_correlations(fit, effects))
     (tmp_path / "report.json").write_text(json.dumps(trace_document(trace)), encoding="utf-8")
     plan = read(tmp_path, SAMPLED)

@@ -4,16 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from tautwire.estimation.candidate_scores import (
-    MAX_FITS,
-    MAX_FITS_PER_EFFECT,
-    TIE_NATS,
-    CandidateScore,
-    most_parsimonious,
-    shortlist,
-)
+from tautwire.estimation.candidate_proposals import shortlist
+from tautwire.estimation.candidate_scores import CandidateScore, most_parsimonious
 from tautwire.estimation.hypotheses import Hypothesis
 from tautwire.estimation.parameter_fit import Fit
+from tautwire.estimation.policy import ScoreTestPolicy, SelectionPolicy
 from tautwire.estimation.score_test import PredictedGain
 from tautwire_fmu.laws.effects import ALL, BY_NAME
 from tests.support.robots import example
@@ -28,14 +23,14 @@ def promised(ranked: list[Hypothesis], best: float = 100.0) -> dict[Hypothesis, 
 
 
 def test_the_best_are_fitted_and_no_more() -> None:
-    assert shortlist(promised(ONE_OF_EACH)) == ONE_OF_EACH[:MAX_FITS]
+    assert shortlist(promised(ONE_OF_EACH)) == ONE_OF_EACH[: ScoreTestPolicy.max_fits]
 
 
 def test_no_effect_takes_all_places() -> None:
     damping = [Hypothesis(BY_NAME["damping"], (cable,)) for cable in (1, 2, 3)]
     damping.append(Hypothesis(BY_NAME["damping"], (1, 2, 3)))
     worth = shortlist(promised([*damping, Hypothesis(BY_NAME["payload"], ())]))
-    assert worth == [*damping[:MAX_FITS_PER_EFFECT], Hypothesis(BY_NAME["payload"], ())]
+    assert worth == [*damping[: ScoreTestPolicy.max_fits_per_effect], Hypothesis(BY_NAME["payload"], ())]
 
 
 def test_what_promises_next_to_nothing_is_not_fitted() -> None:
@@ -52,18 +47,20 @@ def test_what_promises_next_to_nothing_is_not_fitted() -> None:
 def test_another_look_puts_its_best_in_the_place_of_the_last() -> None:
     beside = [*reversed(ONE_OF_EACH)]
     worth = shortlist(promised(ONE_OF_EACH), promised(beside))
-    assert len(worth) == MAX_FITS
-    assert worth == [*ONE_OF_EACH[: MAX_FITS - 3], *beside[:3]]
+    assert len(worth) == ScoreTestPolicy.max_fits
+    assert worth == [*ONE_OF_EACH[: ScoreTestPolicy.max_fits - 3], *beside[:3]]
 
 
 def test_another_look_at_the_same_changes_nothing() -> None:
-    assert shortlist(promised(ONE_OF_EACH), promised(ONE_OF_EACH)) == ONE_OF_EACH[:MAX_FITS]
+    assert shortlist(promised(ONE_OF_EACH), promised(ONE_OF_EACH)) == ONE_OF_EACH[: ScoreTestPolicy.max_fits]
 
 
 def test_of_those_alike_the_one_with_fewest_parameters_is_simplest() -> None:
     fit = Fit(ROBOT, (), np.zeros(0), np.zeros((0, 0)))
     relaxation, damping = (Hypothesis(BY_NAME[name], (1,)) for name in ("relaxation", "damping"))
     better = CandidateScore(relaxation, fit, 100.0, 1.0)
-    assert most_parsimonious([better, CandidateScore(damping, fit, 100.0 - 0.5 * TIE_NATS, 1.0)]).hypothesis is damping  # type: ignore[union-attr]
-    assert most_parsimonious([better, CandidateScore(damping, fit, 100.0 - 2.0 * TIE_NATS, 1.0)]) is better
-    assert most_parsimonious([]) is None
+    policy = SelectionPolicy()
+    near, far = (CandidateScore(damping, fit, 100.0 - share * policy.tie_nats, 1.0) for share in (0.5, 2.0))
+    assert most_parsimonious([better, near], policy) is near
+    assert most_parsimonious([better, far], policy) is better
+    assert most_parsimonious([], policy) is None

@@ -13,6 +13,7 @@ from tautwire.estimation import trace
 from tautwire.estimation.confusable_models import replace_by_confusable_models
 from tautwire.estimation.estimation_data import DataSet, split_data
 from tautwire.estimation.hypotheses import Hypothesis
+from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.likelihood import Innovations
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fitter
@@ -37,7 +38,7 @@ def judged(hidden: dict[str, Any], chosen: list[Hypothesis]) -> SelectionResult:
     fit = fitter.fit_from([start], chosen, evidence.estimation, -inf)
     alike = tuple((hypothesis.effect.name, "creep") for hypothesis in chosen)
     found = SelectionResult(tuple(chosen), (100.0,) * len(chosen), fit, (), alike)
-    return replace_by_confusable_models(robot, found, fitter, evidence, 0.01, lambda what, done: None)
+    return replace_by_confusable_models(IdentificationContext(robot, fitter, evidence), found)
 
 
 def test_a_softer_rope_keeps_its_name() -> None:

@@ -35,4 +35,4 @@ def blank(count: int) -> Recording:
 @pytest.mark.parametrize(("count", "ranked"), [(500, 500), (900, 800), (6000, 2000), (90_000, 20_000)])
 def test_hypotheses_are_ranked_by_a_third_within_bounds(count: int, ranked: int) -> None:
     sample = DataSet(blank(count), (0.0, 0.0, 0.0), np.ones(count, dtype=bool))
-    assert np.sum(sample.head.rows) == len(sample.head.recording.time) == ranked
+    assert np.sum(sample.head().rows) == len(sample.head().recording.time) == ranked

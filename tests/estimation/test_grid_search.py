@@ -8,11 +8,11 @@ from tautwire.errors import UnreachableError
 from tautwire.estimation.estimation_data import DataSet, split_data
 from tautwire.estimation.grid_search import grid_points, grid_search, zero_slope_predictions
 from tautwire.estimation.hypotheses import Hypothesis
+from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.likelihood import Innovations
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fitter
 from tautwire.estimation.score_test import PredictedGain, score_test
-from tautwire.estimation.worker_pool import WorkerPool
 from tautwire.robot.schema import Robot
 from tautwire_fmu.laws.effects import DAMPING, HYSTERESIS, SLACK
 from tests.support.recordings import recorded
@@ -24,40 +24,41 @@ STICKY = Hypothesis(HYSTERESIS, ALL)
 VISCOUS = Hypothesis(DAMPING, ALL)
 
 
-def looked(effects: dict[str, dict[str, float]]) -> tuple[Robot, Fitter, DataSet]:
+def looked(effects: dict[str, dict[str, float]]) -> tuple[IdentificationContext, Fitter, DataSet]:
     robot, fit = example("three"), recorded("three", 3, effects)
     noise = estimate_noise(robot, fit)
-    return robot, Fitter(noise), split_data(robot, noise, fit, None).estimation
+    context = IdentificationContext(robot, Fitter(noise), split_data(robot, noise, fit, None))
+    return context, context.fitter, context.split.estimation
 
 
 def test_a_softness_that_slopes_cannot_see_is_seen_by_a_run() -> None:
-    robot, fitter, sample = looked({"slack": {"softness": 400.0}})
-    slopes = score_test(robot, (), [SOFT, VISCOUS], fitter, sample)
+    context, fitter, sample = looked({"slack": {"softness": 400.0}})
+    slopes = score_test(context.robot, (), [SOFT, VISCOUS], fitter, sample)
     assert slopes[SOFT].gain == 0.0
     assert set(zero_slope_predictions(slopes)) == {SOFT}
-    found = grid_search(robot, (), fitter, sample, zero_slope_predictions(slopes), WorkerPool(1))
+    found = grid_search(context, context.robot, (), sample, zero_slope_predictions(slopes))
     assert found[SOFT].values == {"softness": 300.0}
     assert found[SOFT].gain > slopes[VISCOUS].gain > 0.0
 
 
 def test_nothing_is_promised_where_nothing_is_hidden() -> None:
-    robot, fitter, sample = looked({})
-    found = grid_search(robot, (), fitter, sample, {SOFT: PredictedGain(0.0, {})}, WorkerPool(1))
+    context, _, sample = looked({})
+    found = grid_search(context, context.robot, (), sample, {SOFT: PredictedGain(0.0, {})})
     assert found[SOFT].gain < 4.0
 
 
 def test_a_promise_that_a_run_holds_better_stays() -> None:
-    robot, fitter, sample = looked({"hysteresis": {"force": 30.0, "yield_strain": 1e-4}})
+    context, _, sample = looked({"hysteresis": {"force": 30.0, "yield_strain": 1e-4}})
     true = PredictedGain(1.0, {"force": 30.0, "yield_strain": 1e-4})
-    assert grid_search(robot, (), fitter, sample, {STICKY: true}, WorkerPool(1)) == {STICKY: true}
+    assert grid_search(context, context.robot, (), sample, {STICKY: true}) == {STICKY: true}
     wrong = PredictedGain(1.0, {"force": 0.5, "yield_strain": 1e-5})
-    better = grid_search(robot, (), fitter, sample, {STICKY: wrong}, WorkerPool(1))[STICKY]
+    better = grid_search(context, context.robot, (), sample, {STICKY: wrong})[STICKY]
     assert better.values["force"] > wrong.values["force"]
     assert better.gain > 1000.0
 
 
 def test_a_promise_that_cannot_be_run_gives_way(monkeypatch: pytest.MonkeyPatch) -> None:
-    robot, fitter, sample = looked({"hysteresis": {"force": 30.0, "yield_strain": 1e-4}})
+    context, fitter, sample = looked({"hysteresis": {"force": 30.0, "yield_strain": 1e-4}})
     judged = fitter.judged
 
     def unheld(robot: Robot, chosen: Sequence[Hypothesis], sample: DataSet) -> Innovations:
@@ -67,7 +68,7 @@ def test_a_promise_that_cannot_be_run_gives_way(monkeypatch: pytest.MonkeyPatch)
 
     monkeypatch.setattr(fitter, "judged", unheld)
     unrun = PredictedGain(1.0, {"force": 0.5, "yield_strain": 1e-5})
-    assert grid_search(robot, (), fitter, sample, {STICKY: unrun}, WorkerPool(1))[STICKY].gain > 1000.0
+    assert grid_search(context, context.robot, (), sample, {STICKY: unrun})[STICKY].gain > 1000.0
 
 
 def test_scales_are_looked_at_from_the_largest_each_with_all_shapes() -> None:
@@ -80,9 +81,9 @@ def test_scales_are_looked_at_from_the_largest_each_with_all_shapes() -> None:
 
 
 def test_smaller_values_are_spared_once_one_is_not_felt(monkeypatch: pytest.MonkeyPatch) -> None:
-    robot, fitter, sample = looked({})
+    context, fitter, sample = looked({})
     runs = []
     judged = fitter.judged
     monkeypatch.setattr(fitter, "judged", lambda *asked: runs.append(asked[0]) or judged(*asked))
-    grid_search(robot, (), fitter, sample, {SOFT: PredictedGain(0.0, {})}, WorkerPool(1))
+    grid_search(context, context.robot, (), sample, {SOFT: PredictedGain(0.0, {})})
     assert 2 < len(runs) < 1 + len(SLACK.parameters[0].grid_values)

@@ -8,6 +8,7 @@ import pytest
 from tautwire.estimation.estimation_data import DataSplit, split_data
 from tautwire.estimation.hypotheses import Hypothesis, hypotheses
 from tautwire.estimation.identifiability import analyse_identifiability
+from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fitter
 from tautwire.estimation.trace_result import Detectable, Identifiability
@@ -26,7 +27,7 @@ def shown_by(
     fit, check = recorded("three", seed, effects), recorded("three", seed + 50, effects)
     noise = estimate_noise(robot, fit)
     evidence, fitter = split_data(robot, noise, fit, check), Fitter(noise)
-    return analyse_identifiability(robot, robot, (), fitter, evidence.validation, 0.01), fitter, evidence
+    return analyse_identifiability(IdentificationContext(robot, fitter, evidence), robot, ()), fitter, evidence
 
 
 def size_of(found: Identifiability, name: str, parameter: str) -> Detectable:
@@ -43,7 +44,7 @@ def test_an_effect_of_that_size_gains_what_the_threshold_asks_for() -> None:
     for seed in (12, 13, 14, 15):
         _, fitter, evidence = shown_by(THREE, {"payload": {"mass": size.size}}, seed)
         start = THREE.with_effect(hypothesis.setting(THREE))
-        fit = fitter.fit(start, [hypothesis], evidence.estimation)
+        fit = fitter.fit_from([start], [hypothesis], evidence.estimation)
         whole = fitter.judged(fit.robot, [hypothesis], evidence.validation).log_likelihood(evidence.validation.rows)
         without = fitter.innovations(THREE, evidence.validation).log_likelihood(evidence.validation.rows)
         gains.append(whole - without)
@@ -65,9 +66,8 @@ def separation_beside(hypothesis: Hypothesis, value: float) -> Identifiability:
     fit, check = (recorded("three", seed, {hypothesis.effect.name: {name: value}}) for seed in (3, 53))
     noise = estimate_noise(THREE, fit)
     robot = THREE.with_effect(hypothesis.setting(THREE, {name: value}))
-    return analyse_identifiability(
-        robot, THREE, [hypothesis], Fitter(noise), split_data(THREE, noise, fit, check).validation, 0.01
-    )
+    context = IdentificationContext(THREE, Fitter(noise), split_data(THREE, noise, fit, check))
+    return analyse_identifiability(context, robot, [hypothesis])
 
 
 def test_relaxation_that_is_fast_looks_like_damping_and_payload_does_not() -> None:

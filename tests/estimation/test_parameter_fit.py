@@ -16,7 +16,7 @@ def test_a_fit_arrives_wherever_it_begins(begin: float) -> None:
     recording = recorded("caroca", 3, {"payload": {"mass": 1.5}})
     noise = estimate_noise(robot, recording)
     sample = split_data(robot, noise, recording, None).estimation
-    fit = Fitter(noise).fit(robot, [Hypothesis(BY_NAME["payload"], ())], sample)
+    fit = Fitter(noise).fit_from([robot], [Hypothesis(BY_NAME["payload"], ())], sample)
     assert abs(fit.values[0] - 1.5) < 4.5 * fit.standard_deviations[0]
     assert fit.standard_deviations[0] < 0.05
 
@@ -28,7 +28,7 @@ def test_a_relaxation_is_found_that_is_quicker_than_where_the_fit_begins() -> No
     noise = estimate_noise(robot, recording)
     sample = split_data(robot, noise, recording, None).estimation
     true, begin = (EffectSetting("relaxation", {**truth, "time": time}, (1, 2, 3)) for time in (0.003, 0.03))
-    fit = Fitter(noise).fit(robot.with_effect(begin), [Hypothesis(BY_NAME["relaxation"], (1, 2, 3))], sample)
+    fit = Fitter(noise).fit_from([robot.with_effect(begin)], [Hypothesis(BY_NAME["relaxation"], (1, 2, 3))], sample)
     found, at_truth = (
         Fitter(noise).innovations(known, sample).log_likelihood(sample.rows)
         for known in (fit.robot, robot.with_effect(true))

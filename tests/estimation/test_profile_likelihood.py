@@ -29,7 +29,7 @@ def fitted(effect: str, truth: dict[str, dict[str, float]], form: tuple[str, ...
     chosen = [Hypothesis(known, robot.cable_numbers if known.component == "cable" else (), form or known.forms[0])]
     noise = estimate_noise(robot, recording)
     sample, fitter = split_data(robot, noise, recording, None).estimation, Fitter(noise)
-    return fitter, chosen, sample, fitter.fit(robot.with_effect(chosen[0].setting(robot)), chosen, sample)
+    return fitter, chosen, sample, fitter.fit_from([robot.with_effect(chosen[0].setting(robot))], chosen, sample)
 
 
 def left_at(made: Made, values: list[float]) -> float:
@@ -88,7 +88,7 @@ def several(names: tuple[str, ...], truth: dict[str, dict[str, float]]) -> Made:
     for hypothesis in chosen:
         robot = robot.with_effect(hypothesis.setting(robot))
     sample, fitter = split_data(robot, noise, recording, None).estimation, Fitter(noise)
-    return fitter, chosen, sample, fitter.fit(robot, chosen, sample)
+    return fitter, chosen, sample, fitter.fit_from([robot], chosen, sample)
 
 
 @pytest.mark.validate(but=["friction"])

@@ -7,6 +7,7 @@ import pytest
 
 from tautwire.estimation.estimation_data import split_data
 from tautwire.estimation.hypotheses import Hypothesis, hypotheses
+from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.innovation_sensitivities import SensitivityColumn
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fitter
@@ -23,7 +24,8 @@ from tests.support.robots import example
 ROBOT = example("three")
 RECORDING = recorded("three", 1, {"payload": {"mass": 0.5}})
 NOISE = estimate_noise(ROBOT, RECORDING)
-SAMPLE = split_data(ROBOT, NOISE, RECORDING, None).estimation
+SPLIT = split_data(ROBOT, NOISE, RECORDING, None)
+SAMPLE = SPLIT.estimation
 
 
 def test_what_is_there_promises_most_and_its_values() -> None:
@@ -40,7 +42,8 @@ def test_workers_promise_the_same() -> None:
     others = [h for h in hypotheses(ROBOT) if not h.overlaps(damped)]
     here = score_test(robot, accepted, others, Fitter(NOISE), SAMPLE)
     with WorkerPool(2) as workers:
-        apart = score_test_in_workers(robot, accepted, others, Fitter(NOISE), SAMPLE, workers)
+        context = IdentificationContext(ROBOT, Fitter(NOISE), SPLIT, workers=workers)
+        apart = score_test_in_workers(context, robot, accepted, others, SAMPLE)
     assert list(apart) == list(here)
     for hypothesis, prospect in here.items():
         assert apart[hypothesis].gain == pytest.approx(prospect.gain, rel=1e-6, abs=1e-6)
@@ -54,7 +57,7 @@ def test_far_from_noise_a_rough_look_tells_what_slopes_do_not(tmp_path: Path) ->
     robot = read_robot(robot_file)
     with WorkerPool(1) as workers:
         ready, *_ = prepare_data(robot, read_recording(fit, 4), read_recording(check, 4), workers)
-    sample = ready.split.estimation.head
+    sample = ready.split.estimation.head()
     found = [score_test(robot, (), hypotheses(robot), ready.fitter, sample, roughness) for roughness in (0.0, 0.1)]
     ranks = [sorted(prospects, key=lambda h: -prospects[h].gain) for prospects in found]
     payload = Hypothesis(BY_NAME["payload"], ())

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tautwire.estimation.estimation_data import split_data
+from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fitter
 from tautwire.estimation.residual_analysis import residuals_are_white
@@ -17,17 +18,13 @@ from tests.support.recordings import recorded
 from tests.support.robots import example
 
 
-def quiet(what: str, done: float) -> None:
-    """No progress."""
-
-
 def pair(name: str, seed: int, effects: dict[str, Any]) -> tuple[Recording, Recording]:
     return recorded(name, seed, effects), recorded(name, seed + 50, effects)
 
 
 def found_in(robot: Robot, fit: Recording, check: Recording) -> SelectionResult:
     noise = estimate_noise(robot, fit)
-    return select_effects(robot, Fitter(noise), split_data(robot, noise, fit, check), 0.01, quiet)
+    return select_effects(IdentificationContext(robot, Fitter(noise), split_data(robot, noise, fit, check)))
 
 
 def searched(name: str, seed: int, effects: dict[str, Any]) -> tuple[SelectionResult, bool]:
@@ -36,7 +33,7 @@ def searched(name: str, seed: int, effects: dict[str, Any]) -> tuple[SelectionRe
     noise = estimate_noise(robot, fit)
     evidence = split_data(robot, noise, fit, check)
     fitter = Fitter(noise)
-    found = select_effects(robot, fitter, evidence, 0.01, quiet)
+    found = select_effects(IdentificationContext(robot, fitter, evidence))
     samples = (evidence.estimation, evidence.validation)
     return found, all(residuals_are_white(fitter.innovations(found.fit.robot, s), s.rows) for s in samples)
 

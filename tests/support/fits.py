@@ -22,4 +22,4 @@ def fitted(seed: int) -> tuple[Fitter, list[Hypothesis], DataSet, Fit]:
     recording = recorded("three", seed, TRUTH)
     noise = estimate_noise(robot, recording)
     sample, fitter = split_data(robot, noise, recording, None).estimation, Fitter(noise)
-    return fitter, chosen, sample, fitter.fit(robot, chosen, sample)
+    return fitter, chosen, sample, fitter.fit_from([robot], chosen, sample)

@@ -5,60 +5,57 @@ They are known effects that are not on the list, and larger forms of fewer effec
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from itertools import chain, combinations
-from math import inf, log
+from math import inf
 
 from tautwire_fmu.laws.effects import UNLISTED
 
 from ..errors import UnreachableError
 from ..robot.schema import EffectSetting, Robot
-from .candidate_scores import TIE_NATS, setting_of
-from .estimation_data import DataSet, DataSplit
-from .hypotheses import Hypothesis, hypotheses, with_hypothesis, with_larger_forms
-from .parameter_fit import FINE_COST_TOLERANCE, Fit, Fitter, NoFitError
+from .candidate_scores import setting_of
+from .hypotheses import Hypothesis, with_hypothesis, with_larger_forms
+from .identification_context import IdentificationContext
+from .parameter_fit import Fit, NoFitError
 from .residual_analysis import residuals_are_white
-from .stepwise_selection import COARSE_COST_TOLERANCE, COARSE_TIE_NATS, COARSE_TIE_SHARE, SelectionResult
-
-Progress = Callable[[str, float], None]
+from .stepwise_selection import SelectionResult
 
 
-def replace_by_confusable_models(
-    robot: Robot, selection: SelectionResult, fitter: Fitter, split: DataSplit, alpha: float, progress: Progress
-) -> SelectionResult:
+def replace_by_confusable_models(context: IdentificationContext, selection: SelectionResult) -> SelectionResult:
     """The selection, or one with a confusable model instead: an unlisted effect or a larger form of one effect.
 
     The alternative has to explain more with no more parameters, or as much with fewer. Where the selection leaves more
     than noise, an unlisted effect is tried beside it too, and has to leave noise. Judged on validation data.
     """
-    validation = split.validation
-    is_adequate = residuals_are_white(
-        fitter.judged(selection.fit.robot, selection.accepted, validation), validation.rows
-    )
+    robot, validation, tie_nats = context.robot, context.split.validation, context.policy.selection.tie_nats
+    is_adequate = _leaves_white_residuals(context, selection.fit.robot, selection.accepted)
     if is_adequate and not selection.accepted:
         return selection
-    threshold = log((len(hypotheses(robot)) + 1) / alpha)
-    best, log_likelihood = selection, _log_likelihood(fitter, selection.fit, selection.accepted, validation)
+    best = selection
+    log_likelihood = context.fitter.log_likelihood(selection.fit.robot, selection.accepted, validation)
     alternatives = [*_unlisted_alternatives(robot, selection.accepted, is_adequate), *_larger_forms(selection.accepted)]
     for number, chosen in enumerate(alternatives):
-        progress(f"rivals: {chosen[-1].label(robot)}", number / len(alternatives))
-        fit = _fit_alternative(robot, selection, chosen, fitter, split)
-        if fit is None or not (
-            is_adequate or residuals_are_white(fitter.judged(fit.robot, chosen, validation), validation.rows)
-        ):
+        context.progress(f"rivals: {chosen[-1].label(robot)}", number / len(alternatives))
+        fit = _fit_alternative(context, selection, chosen)
+        if fit is None or not (is_adequate or _leaves_white_residuals(context, fit.robot, chosen)):
             continue
-        gain = _log_likelihood(fitter, fit, chosen, validation) - log_likelihood
+        gain = context.fitter.log_likelihood(fit.robot, chosen, validation) - log_likelihood
         extra_parameters = _parameter_count(chosen) - _parameter_count(best.accepted)
-        if gain > (-TIE_NATS if extra_parameters < 0 else TIE_NATS if extra_parameters == 0 else threshold):
+        required = context.evidence_threshold(others=1)
+        if extra_parameters <= 0:
+            required = tie_nats if extra_parameters == 0 else -tie_nats
+        if gain > required:
             log_likelihood += gain
-            best = _with_alternative(
-                selection,
-                chosen,
-                fit,
-                log_likelihood - _log_likelihood_without_last(robot, fit, chosen, fitter, validation),
-            )
+            evidence = log_likelihood - _log_likelihood_without_last(context, fit, chosen)
+            best = _with_alternative(selection, chosen, fit, evidence)
     return best
+
+
+def _leaves_white_residuals(context: IdentificationContext, robot: Robot, chosen: Sequence[Hypothesis]) -> bool:
+    validation = context.split.validation
+    innovations = context.fitter.judged(robot, chosen, validation)
+    return residuals_are_white(innovations, validation.rows, context.policy.residual_analysis)
 
 
 def _larger_forms(accepted: Sequence[Hypothesis]) -> Iterator[tuple[Hypothesis, ...]]:
@@ -87,21 +84,19 @@ def _unlisted_alternatives(
 
 
 def _fit_alternative(
-    robot: Robot, selection: SelectionResult, chosen: Sequence[Hypothesis], fitter: Fitter, split: DataSplit
+    context: IdentificationContext, selection: SelectionResult, chosen: Sequence[Hypothesis]
 ) -> Fit | None:
     """Fit of an alternative to all samples; None where a fit to a part of them stays far below the selection."""
-    head = split.estimation.head
-    start = robot
+    fitter, head, start = context.fitter, context.head, context.robot
     for hypothesis in chosen:
-        start = start.with_effect(_start_setting(robot, selection, hypothesis))
-    reference = _log_likelihood(fitter, selection.fit, selection.accepted, head)
+        start = start.with_effect(_start_setting(context.robot, selection, hypothesis))
+    reference = fitter.log_likelihood(selection.fit.robot, selection.accepted, head)
+    min_log_likelihood = reference - context.policy.selection.coarse_tie(reference)
     try:
-        coarse_fit = fitter.fit_from([start], chosen, head, -inf, COARSE_COST_TOLERANCE)
-        if _log_likelihood(fitter, coarse_fit, chosen, head) < reference - COARSE_TIE_NATS - COARSE_TIE_SHARE * abs(
-            reference
-        ):
+        coarse_fit = fitter.fit_from([start], chosen, head, -inf, context.policy.fit.coarse_cost_tolerance)
+        if fitter.log_likelihood(coarse_fit.robot, chosen, head) < min_log_likelihood:
             return None
-        return fitter.fit_from([coarse_fit.robot], chosen, split.estimation, -inf, FINE_COST_TOLERANCE)
+        return fitter.fit_from([coarse_fit.robot], chosen, context.split.estimation, -inf)
     except (UnreachableError, NoFitError):
         return None
 
@@ -116,24 +111,18 @@ def _start_setting(robot: Robot, selection: SelectionResult, hypothesis: Hypothe
     return start
 
 
-def _log_likelihood(fitter: Fitter, fit: Fit, chosen: Sequence[Hypothesis], data: DataSet) -> float:
-    return fitter.judged(fit.robot, chosen, data).log_likelihood(data.rows)
-
-
 def _parameter_count(chosen: Sequence[Hypothesis]) -> int:
     return sum(len(hypothesis.form) for hypothesis in chosen)
 
 
-def _log_likelihood_without_last(
-    robot: Robot, fit: Fit, chosen: Sequence[Hypothesis], fitter: Fitter, validation: DataSet
-) -> float:
+def _log_likelihood_without_last(context: IdentificationContext, fit: Fit, chosen: Sequence[Hypothesis]) -> float:
     """Log-likelihood of the validation data under the others at their best there; -inf where they cannot be run."""
-    others = chosen[:-1]
+    fitter, validation, others, robot = context.fitter, context.split.validation, chosen[:-1], context.robot
     for hypothesis in others:
         robot = robot.with_effect(setting_of(fit.robot, hypothesis))
     try:
-        best = fitter.fit_from([robot], others, validation, -inf) if others else replace(fit, robot=robot)
-        return _log_likelihood(fitter, best, others, validation)
+        best = fitter.fit_from([robot], others, validation, -inf).robot if others else robot
+        return fitter.log_likelihood(best, others, validation)
     except (UnreachableError, NoFitError):
         return -inf
 

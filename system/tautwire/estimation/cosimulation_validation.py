@@ -15,6 +15,7 @@ from ..recordings.recording import Recording
 from ..robot.schema import Robot
 from .estimation_data import DataSet
 from .parameter_fit import Fitter
+from .policy import CosimulationPolicy
 from .smoothed_states import calibrate, with_initial_state
 from .trace_result import Comparison, Errors
 from .worker_pool import PendingResult, WorkerPool
@@ -22,7 +23,6 @@ from .worker_pool import PendingResult, WorkerPool
 Array = NDArray[np.float64]
 
 ROLES = ("fit", "check")
-MAX_ERROR_TO_NOISE_FLOOR = 1.5
 
 
 def start_cosimulations(
@@ -47,6 +47,7 @@ def validate_by_cosimulation(
     data_sets: Sequence[DataSet],
     runs_before: Sequence[CosimulationResult],
     workers: WorkerPool,
+    policy: CosimulationPolicy,
 ) -> tuple[tuple[Comparison, ...], list[Errors]] | None:
     """Errors that the co-simulation of a better robot leaves; None where they are more than noise.
 
@@ -55,7 +56,8 @@ def validate_by_cosimulation(
     runs_after = [run.result() for run in start_cosimulations(workers, fitter, identified, data_sets)]
     comparisons, noise_floors = compare_cosimulations(identified, fitter, data_sets, runs_before, runs_after)
     all_near_floor = all(
-        _is_near_noise_floor(c.errors_after, floor) for c, floor in zip(comparisons, noise_floors, strict=True)
+        _is_near_noise_floor(c.errors_after, floor, policy.max_error_ratio)
+        for c, floor in zip(comparisons, noise_floors, strict=True)
     )
     return (comparisons, noise_floors) if all_near_floor else None
 
@@ -90,10 +92,10 @@ def noise_floor(fitter: Fitter, robot: Robot, data: DataSet) -> Errors:
     return _root_mean_squares(np.where(np.isfinite(data.recording.measured()), variances, np.nan))
 
 
-def _is_near_noise_floor(after: Errors, noise_floor_errors: Errors) -> bool:
-    """Whether the errors of a co-simulation are at most 1.5 times the noise floor."""
+def _is_near_noise_floor(after: Errors, noise_floor_errors: Errors, max_ratio: float) -> bool:
+    """Whether the errors of a co-simulation are at most a multiple of the noise floor."""
     pairs = ((after.position_rms, noise_floor_errors.position_rms), (after.tension_rms, noise_floor_errors.tension_rms))
-    return all(not error > MAX_ERROR_TO_NOISE_FLOOR * least for error, least in pairs)
+    return all(not error > max_ratio * least for error, least in pairs)
 
 
 def _root_mean_squares(squares: Array) -> Errors:

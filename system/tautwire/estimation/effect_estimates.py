@@ -7,23 +7,26 @@ from itertools import combinations
 
 from tautwire_fmu.laws.effects import UNLISTED
 
-from ..robot.schema import Robot
 from ..robot.symbolic_model import FORMULA_INDEX
-from .estimation_data import DataSet
 from .hypotheses import declared_value
-from .parameter_fit import Fit, Fitter
+from .identification_context import IdentificationContext
+from .parameter_fit import Fit
 from .profile_likelihood import profile_intervals
 from .stepwise_selection import SelectionResult
 from .trace_result import Correlation, Estimate, FittedParameter, FoundEffect
-from .worker_pool import WorkerPool
 
 
-def estimated_effects(
-    robot: Robot, selection: SelectionResult, fitter: Fitter, data: DataSet, workers: WorkerPool
-) -> tuple[FoundEffect, ...]:
-    """Estimates of the accepted effects of the list, in order; ``robot`` is as declared, ``data`` was fitted."""
+def estimated_effects(context: IdentificationContext, selection: SelectionResult) -> tuple[FoundEffect, ...]:
+    """Estimates of the accepted effects of the list, in order, on the estimation data that they were fitted to."""
     indices = _parameter_indices(selection.fit)
-    interval_ends = profile_intervals(fitter, selection.fit, selection.accepted, data, workers)
+    interval_ends = profile_intervals(
+        context.fitter,
+        selection.fit,
+        selection.accepted,
+        context.split.estimation,
+        context.workers,
+        context.policy.profile_likelihood,
+    )
     effects = []
     for hypothesis, evidence in zip(selection.accepted, selection.evidence, strict=True):
         if hypothesis.effect in UNLISTED:
@@ -32,7 +35,7 @@ def estimated_effects(
         for parameter in hypothesis.parameters:
             index = indices[FittedParameter(hypothesis.effect.name, hypothesis.cables, parameter.name)]
             low, high = interval_ends[index]
-            declared = declared_value(robot, parameter, hypothesis.cables)
+            declared = declared_value(context.robot, parameter, hypothesis.cables)
             estimates[parameter.name] = Estimate(
                 float(selection.fit.values[index]), parameter.unit, low, high, declared
             )

@@ -11,9 +11,7 @@ from ..recordings.recording import Recording
 from ..recordings.start_position import start_position
 from ..robot.schema import Robot
 from .kalman_filter import Noise
-
-HEAD_DIVISOR = 3
-MIN_HEAD_SAMPLES, MAX_HEAD_SAMPLES = 800, 20_000
+from .policy import DEFAULT_POLICY, FitPolicy
 
 
 @dataclass(frozen=True)
@@ -24,11 +22,10 @@ class DataSet:
     start: tuple[float, float, float]
     rows: NDArray[np.bool_]
 
-    @property
-    def head(self) -> DataSet:
+    def head(self, policy: FitPolicy = DEFAULT_POLICY.fit) -> DataSet:
         """The first samples that count, enough to rank hypotheses by: a third, of 800 to 20,000."""
-        third = int(np.sum(self.rows)) // HEAD_DIVISOR
-        return self.first(min(max(third, MIN_HEAD_SAMPLES), MAX_HEAD_SAMPLES))
+        third = int(np.sum(self.rows)) // policy.head_divisor
+        return self.first(min(max(third, policy.min_head_samples), policy.max_head_samples))
 
     def first(self, count: int) -> DataSet:
         """The first ``count`` samples that count; all where there are no more."""

@@ -8,10 +8,9 @@ wrong valley. The model itself is run at some values instead.
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from functools import partial
+from dataclasses import dataclass
 from itertools import product
 from math import exp, inf, isfinite, log
-from typing import Any
 
 import numpy as np
 from scipy.optimize import brentq
@@ -22,15 +21,10 @@ from ..errors import UnreachableError
 from ..robot.schema import EffectSetting, Robot
 from .estimation_data import DataSet
 from .hypotheses import Hypothesis, with_hypothesis
-from .kalman_filter import Noise
-from .parameter_fit import Fitter, worker_fitter
+from .identification_context import IdentificationContext
+from .parameter_fit import Fitter
+from .policy import GridSearchPolicy
 from .score_test import PredictedGain
-from .worker_pool import WorkerPool
-
-# Nats: where gains are this small, smaller values of the parameter have no effect either.
-NEGLIGIBLE_GAIN = 0.01
-# Of the natural log of the value.
-LOG_VALUE_TOLERANCE = 0.01
 
 
 def zero_slope_predictions(predictions: Mapping[Hypothesis, PredictedGain]) -> dict[Hypothesis, PredictedGain]:
@@ -39,12 +33,11 @@ def zero_slope_predictions(predictions: Mapping[Hypothesis, PredictedGain]) -> d
 
 
 def grid_search(
+    context: IdentificationContext,
     robot: Robot,
     accepted: Sequence[Hypothesis],
-    fitter: Fitter,
     data: DataSet,
     predictions: Mapping[Hypothesis, PredictedGain],
-    workers: WorkerPool,
 ) -> dict[Hypothesis, PredictedGain]:
     """Grid search of the hypotheses that have grid values: the best grid point, or the prediction if it gains more.
 
@@ -53,60 +46,51 @@ def grid_search(
     candidates = [hypothesis for hypothesis in predictions if any(p.grid_values for p in hypothesis.parameters)]
     if not candidates:
         return {}
+    fitter, policy = context.fitter, context.policy.grid_search
     baseline = fitter.judged(robot, accepted, data).log_likelihood(data.rows)
-    tasks = [(robot, with_hypothesis(accepted, h), data, predictions[h], baseline) for h in candidates]
-    if workers.processes == 1:
-        results = workers.map_unordered(partial(best_grid_point, fitter), tasks)
-    else:
-        results = workers.map_unordered(best_grid_point_in_worker, [(fitter.noise, *task) for task in tasks])
+    tasks = [GridTask(robot, tuple(with_hypothesis(accepted, h)), predictions[h], baseline) for h in candidates]
+    results = context.workers.map_unordered(best_grid_point, [(fitter, task, data, policy) for task in tasks])
     return {candidates[number]: prospect for number, prospect in results}
 
 
-def best_grid_point(
-    fitter: Fitter,
-    robot: Robot,
-    chosen: Sequence[Hypothesis],
-    data: DataSet,
-    prediction: PredictedGain,
-    baseline: float,
-) -> PredictedGain:
-    """Best grid point of the last of the chosen hypotheses, or its predicted values where they gain more.
+@dataclass(frozen=True)
+class GridTask:
+    """Grid search of the last of the chosen hypotheses; ``baseline`` is the log-likelihood of the data without it."""
 
-    ``baseline`` is the log-likelihood of the data without it.
-    """
-    gains = []
-    if prediction.values and isfinite(
-        simulated_gain := _log_likelihood_at(robot, chosen, fitter, data, prediction.values) - baseline
-    ):
+    robot: Robot
+    chosen: tuple[Hypothesis, ...]
+    prediction: PredictedGain
+    baseline: float
+
+
+def best_grid_point(fitter: Fitter, task: GridTask, data: DataSet, policy: GridSearchPolicy) -> PredictedGain:
+    """Best grid point of a task, or its predicted values where they gain more."""
+    prediction, gains = task.prediction, []
+    if prediction.values and isfinite(simulated_gain := _gain_at(fitter, task, data, prediction.values)):
         gains.append((simulated_gain, prediction))
-    for shapes in grid_points(chosen[-1]):
+    for shapes in grid_points(task.chosen[-1]):
         points = [{**prediction.values, **values} for values in shapes]
-        point_gains = [_log_likelihood_at(robot, chosen, fitter, data, values) - baseline for values in points]
+        point_gains = [_gain_at(fitter, task, data, values) for values in points]
         gains += [(g, PredictedGain(g, values)) for g, values in zip(point_gains, points, strict=True) if isfinite(g)]
-        if all(abs(gain) < NEGLIGIBLE_GAIN for gain in point_gains):
+        if all(abs(gain) < policy.negligible_gain for gain in point_gains):
             break
     return max(gains, key=lambda each: each[0], default=(0.0, prediction))[1]
 
 
-def best_grid_point_in_worker(noise: Noise, *arguments: Any) -> PredictedGain:
-    """As :func:`best_grid_point`, in a worker process with its own fitter."""
-    return best_grid_point(worker_fitter(noise), *arguments)
-
-
 def detectable_value(
+    context: IdentificationContext,
     robot: Robot,
     accepted: Sequence[Hypothesis],
-    fitter: Fitter,
-    data: DataSet,
     hypothesis: Hypothesis,
     parameter: Parameter,
     required_norm: float,
 ) -> float:
-    """Detectable value of a gridded parameter: it moves the whitened innovations by ``required_norm``.
+    """Detectable value of a gridded parameter: it moves the innovations of validation data by ``required_norm``.
 
     That is the root of the sum of squares; infinite where the largest grid value does not reach it. The other
     parameters are where fits begin.
     """
+    fitter, data = context.fitter, context.split.validation
     chosen = with_hypothesis(accepted, hypothesis)
     baseline = fitter.judged(robot, accepted, data).values[data.rows]
 
@@ -123,9 +107,8 @@ def detectable_value(
     log_minimum, log_maximum = log(min(parameter.grid_values)), log(max(parameter.grid_values))
     if excess(log_maximum) < 0.0:
         return inf
-    return exp(
-        log_minimum if excess(log_minimum) > 0.0 else brentq(excess, log_minimum, log_maximum, xtol=LOG_VALUE_TOLERANCE)
-    )
+    tolerance = context.policy.grid_search.log_value_tolerance
+    return exp(log_minimum if excess(log_minimum) > 0.0 else brentq(excess, log_minimum, log_maximum, xtol=tolerance))
 
 
 def grid_points(hypothesis: Hypothesis) -> Iterator[list[dict[str, float]]]:
@@ -140,13 +123,12 @@ def grid_points(hypothesis: Hypothesis) -> Iterator[list[dict[str, float]]]:
         yield [dict(zip(names, (*scale_values, *values), strict=True)) for values in shaped]
 
 
-def _log_likelihood_at(
-    robot: Robot, chosen: Sequence[Hypothesis], fitter: Fitter, data: DataSet, values: Mapping[str, float]
-) -> float:
-    """Log-likelihood with the last of the chosen at some values; NaN where the cables cannot hold them."""
-    start = chosen[-1].setting(robot)
+def _gain_at(fitter: Fitter, task: GridTask, data: DataSet, values: Mapping[str, float]) -> float:
+    """Gain of log-likelihood with the last of the chosen at some values; NaN where the cables cannot hold them."""
+    start = task.chosen[-1].setting(task.robot)
     setting = EffectSetting(start.name, {**start.values, **values}, start.cables)
     try:
-        return fitter.judged(robot.with_effect(setting), chosen, data).log_likelihood(data.rows)
+        innovations = fitter.judged(task.robot.with_effect(setting), task.chosen, data)
+        return innovations.log_likelihood(data.rows) - task.baseline
     except UnreachableError:
         return float("nan")

@@ -9,9 +9,9 @@ Source: Kay (1998), Fundamentals of Statistical Signal Processing II, sec. 4.4; 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import replace
-from math import inf, log, sqrt
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+from math import inf, sqrt
 
 import numpy as np
 from numpy.typing import NDArray
@@ -19,50 +19,36 @@ from numpy.typing import NDArray
 from tautwire_fmu.laws.effects import BY_NAME
 
 from ..robot.schema import Robot
-from .estimation_data import DataSet
 from .grid_search import detectable_value
 from .hypotheses import SINGLE_CABLE_EFFECTS, Hypothesis, hypotheses
-from .parameter_fit import Fitter
+from .identification_context import IdentificationContext
+from .policy import IdentifiabilityPolicy
 from .score_test import ScoreStatistics, grid_size, parameter_columns, score_statistics, starting_grid
 from .trace_result import ConfusableEffect, Detectable, Identifiability
 
 Array = NDArray[np.float64]
 
-# Normal quantile of the probability, 90 %, with which an effect of that size is found.
-POWER_QUANTILE = 1.2816
-# Nats that fitting a parameter on other samples is expected to cost.
-FIT_COST_NATS = 1.0
 INFORMATION_RANK_TOLERANCE = 1e-9
-# Effects with a smaller cosine are not reported as confusable.
-MIN_CONFUSABLE_COSINE = 0.9
 
 
 def analyse_identifiability(
-    robot: Robot, declared: Robot, accepted: Sequence[Hypothesis], fitter: Fitter, data: DataSet, alpha: float
+    context: IdentificationContext, robot: Robot, accepted: Sequence[Hypothesis]
 ) -> Identifiability:
-    """Identifiability of all hypotheses beside the accepted ones, at the values of ``robot``; ``declared`` lacks them.
-
-    ``alpha`` is the false-alarm rate that the effects would have to pass.
-    """
+    """Identifiability of all hypotheses beside the accepted ones, which ``robot`` has, on validation data."""
+    declared, policy = context.robot, context.policy.identifiability
     candidates = hypotheses(declared)
     others = [h for h in candidates if not any(a.overlaps(h) for a in accepted)]
-    statistics = score_statistics(robot, accepted, others, fitter, data)
-    column_groups = _column_indices(accepted)
-    threshold = log(len(candidates) / alpha)
+    statistics = score_statistics(robot, accepted, others, context.fitter, context.split.validation)
+    required_norm = _required_norm(context.evidence_threshold(), policy)
     reported = [h for h in others if h.cables in ((), declared.cable_numbers) or h.effect in SINGLE_CABLE_EFFECTS]
-    accepted_columns = [column for group in column_groups for column in group]
-    detectable = [d for h in reported for d in _detectable_sizes(statistics, h, accepted_columns, threshold)]
-    detectable = [_detectable_by_simulation(robot, accepted, fitter, data, size, threshold) for size in detectable]
+    accepted_columns = [column for group in _column_indices(accepted) for column in group]
+    detectable = [d for h in reported for d in _detectable_sizes(statistics, h, accepted_columns, required_norm)]
+    detectable = [_detectable_by_simulation(context, robot, accepted, size, required_norm) for size in detectable]
     confusable = [
         likeness
-        for index, own in enumerate(accepted)
+        for tested in _tested_effects(statistics, robot, declared, accepted)
         for other in others
-        if (
-            likeness := _confusable_effect(
-                statistics, robot, declared, (own, column_groups[index]), other, column_groups
-            )
-        )
-        is not None
+        if (likeness := _confusable_effect(statistics, tested, other, policy.min_confusable_cosine)) is not None
     ]
     return Identifiability(tuple(detectable), tuple(sorted(confusable, key=lambda found: found.nats)))
 
@@ -116,7 +102,7 @@ def _column_indices(accepted: Sequence[Hypothesis]) -> list[list[int]]:
 
 
 def _detectable_sizes(
-    statistics: ScoreStatistics, hypothesis: Hypothesis, nuisance: list[int], threshold: float
+    statistics: ScoreStatistics, hypothesis: Hypothesis, nuisance: list[int], required_norm: float
 ) -> list[Detectable]:
     shape_values = starting_grid(hypothesis.effect)[0]
     smallest = {
@@ -131,7 +117,7 @@ def _detectable_sizes(
             parameter = next(p for p in hypothesis.parameters if p.name == name)
             strength = sqrt(max(projected[index, index], 0.0))
             nominal = float(statistics.values @ columns[:, index] / np.sum(columns[:, index]))
-            size = _required_norm(threshold) / strength if strength > 0.0 else inf
+            size = required_norm / strength if strength > 0.0 else inf
             if size > max(parameter.maximum - nominal, nominal - parameter.minimum):
                 size = inf
             other_values = {key: value for key, value in shapes.items() if key in hypothesis.form}
@@ -141,18 +127,17 @@ def _detectable_sizes(
     return list(smallest.values())
 
 
-def _required_norm(threshold: float) -> float:
+def _required_norm(threshold: float, policy: IdentifiabilityPolicy) -> float:
     """Norm by which an effect has to move the whitened innovations to be detected."""
-    return POWER_QUANTILE + sqrt(POWER_QUANTILE**2 + 2.0 * (threshold + FIT_COST_NATS))
+    return policy.power_quantile + sqrt(policy.power_quantile**2 + 2.0 * (threshold + policy.fit_cost_nats))
 
 
 def _detectable_by_simulation(
+    context: IdentificationContext,
     robot: Robot,
     accepted: Sequence[Hypothesis],
-    fitter: Fitter,
-    data: DataSet,
     detectable: Detectable,
-    threshold: float,
+    required_norm: float,
 ) -> Detectable:
     """Detectable size by runs of the model where the Jacobian vanishes."""
     effect = BY_NAME[detectable.name]
@@ -160,10 +145,7 @@ def _detectable_by_simulation(
     if not parameter.grid_values or detectable.size < inf:
         return detectable
     hypothesis = Hypothesis(effect, detectable.cables)
-    return replace(
-        detectable,
-        size=detectable_value(robot, accepted, fitter, data, hypothesis, parameter, _required_norm(threshold)),
-    )
+    return replace(detectable, size=detectable_value(context, robot, accepted, hypothesis, parameter, required_norm))
 
 
 def _projected_information(fisher_information: Array, columns: Array, nuisance: list[int]) -> Array:
@@ -188,27 +170,38 @@ def _scaled_least_squares(matrix: Array, right_side: Array) -> Array:
     return solution
 
 
+@dataclass(frozen=True)
+class _TestedEffect:
+    """An accepted effect with its parameter step (columns, 1); nuisance columns are those of the other ones."""
+
+    hypothesis: Hypothesis
+    step: Array
+    nuisance: list[int]
+
+
+def _tested_effects(
+    statistics: ScoreStatistics, robot: Robot, declared: Robot, accepted: Sequence[Hypothesis]
+) -> Iterator[_TestedEffect]:
+    column_groups = _column_indices(accepted)
+    for own_columns, hypothesis in zip(column_groups, accepted, strict=True):
+        nuisance = [column for group in column_groups if group is not own_columns for column in group]
+        step = np.zeros((len(statistics.columns), 1))
+        step[own_columns, 0] = _parameter_steps(robot, declared, hypothesis)
+        yield _TestedEffect(hypothesis, step, nuisance)
+
+
 def _confusable_effect(
-    statistics: ScoreStatistics,
-    robot: Robot,
-    declared: Robot,
-    tested: tuple[Hypothesis, list[int]],
-    other: Hypothesis,
-    column_groups: Sequence[list[int]],
+    statistics: ScoreStatistics, tested: _TestedEffect, other: Hypothesis, min_cosine: float
 ) -> ConfusableEffect | None:
     """The other effect as confusable with a tested one, at its best grid point; None where the cosine is small."""
-    hypothesis, own_columns = tested
-    nuisance = [column for group in column_groups if group is not own_columns for column in group]
-    step = np.zeros((len(statistics.columns), 1))
-    step[own_columns, 0] = _parameter_steps(robot, declared, hypothesis)
-    information = float(_projected_information(statistics.fisher_information, step, nuisance)[0, 0])
+    information = float(_projected_information(statistics.fisher_information, tested.step, tested.nuisance)[0, 0])
     if information <= 0.0:
         return None
-    cosine = sqrt(_explained_share(statistics, step, other, nuisance, information))
-    if cosine < MIN_CONFUSABLE_COSINE:
+    cosine = sqrt(_explained_share(statistics, tested.step, other, tested.nuisance, information))
+    if cosine < min_cosine:
         return None
-    nats = 0.5 * information * (1.0 - cosine**2)
-    return ConfusableEffect(hypothesis.effect.name, hypothesis.cables, other.effect.name, other.cables, cosine, nats)
+    own, nats = tested.hypothesis, 0.5 * information * (1.0 - cosine**2)
+    return ConfusableEffect(own.effect.name, own.cables, other.effect.name, other.cables, cosine, nats)
 
 
 def _parameter_steps(robot: Robot, declared: Robot, hypothesis: Hypothesis) -> list[float]:

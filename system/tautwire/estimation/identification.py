@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
 from time import perf_counter
 
 from threadpoolctl import threadpool_limits
-
-from tautwire_fmu.laws.effects import UNLISTED
 
 from ..cosimulation.robot_cosimulation import CosimulationResult
 from ..errors import ArgumentError
@@ -17,21 +15,21 @@ from ..recordings.recording import Recording, require_outputs
 from ..robot.schema import Robot, validate_robot
 from ..robot.uncertain_parameters import uncertain_parameters
 from ..validation import NumberRule, validate_callable, validate_instance, validate_integer, validate_number
-from .candidate_scores import setting_of
 from .confusable_models import replace_by_confusable_models
 from .cosimulation_validation import compare_cosimulations, start_cosimulations, validate_by_cosimulation
-from .discovery.candidate_terms import effects_text, formula_text
 from .discovery.formula_discovery import Discovery
 from .discovery.unexplained_residual import UnexplainedResidual, explain_residual
 from .effect_estimates import estimated_effects, parameter_correlations
-from .hypotheses import Hypothesis
 from .identifiability import analyse_identifiability
+from .identification_context import IdentificationContext, Progress, no_progress
 from .localisation.component_localisation import FaultLocalisation, localise_residual
+from .policy import DEFAULT_POLICY
 from .preprocessing import PreparedData, all_residuals_white, calibrated_estimation_data, innovations_of, prepare_data
 from .residual_analysis import largest_autocorrelations
 from .smoothed_states import calibrate, initial_state_note, with_initial_state
-from .stepwise_selection import SelectionResult, select_effects
-from .trace_result import Comparison, Errors, Identifiability, Trace, Verdict
+from .stepwise_selection import SelectionResult, nothing_selected, select_effects
+from .trace_result import Comparison, Errors, FoundEffect, Identifiability, Trace, Verdict
+from .verdict import confirmed_formula, verdict_of
 from .worker_pool import PendingResult, WorkerPool
 
 FALSE_ALARM_RATE_RULE = NumberRule("a rate of false alarms below 1, such as 0.01", "", positive=True)
@@ -41,7 +39,7 @@ def validate_trace_arguments(
     robot: Robot,
     fit: Recording,
     check: Recording | None,
-    progress: Callable[[str, float], None] | None,
+    progress: Progress | None,
     alpha: float,
     processes: int,
 ) -> None:
@@ -71,10 +69,140 @@ def validated_false_alarm_rate(argument: str, value: object) -> float:
     return rate
 
 
-Progress = Callable[[str, float], None]
+@dataclass(frozen=True)
+class Identification:
+    """State of an identification: what its stages have found so far.
 
-SIGNIFICANCE_LEVEL = 0.01
-IS_WHITE = "the residual is white noise"
+    ``clock_corrected`` are the data to take where no effects explain those as recorded. ``final_robot`` is the best
+    model that the FMUs confirm, with uncertain numbers as FIT has them, the declared one until then. ``effects_hold``
+    tells whether the FMUs confirm the selection, ``discovery`` is a formula that they confirm.
+    """
+
+    context: IdentificationContext
+    prepared: PreparedData
+    clock_corrected: tuple[PreparedData, ...]
+    selection: SelectionResult
+    final_robot: Robot
+    pending_runs: tuple[PendingResult[CosimulationResult], ...] = ()
+    pending_localisation: tuple[PendingResult[FaultLocalisation], ...] = ()
+    runs_before: tuple[CosimulationResult, ...] = ()
+    comparisons: tuple[Comparison, ...] = ()
+    noise_floors: tuple[Errors, ...] = ()
+    effects_hold: bool = False
+    discovery: Discovery | None = None
+    unexplained: UnexplainedResidual = field(default_factory=UnexplainedResidual)
+    verdict: tuple[Verdict, str] = ("unexplained", "")
+    effects: tuple[FoundEffect, ...] = ()
+    identifiability: Identifiability = field(default_factory=Identifiability)
+
+    @property
+    def is_white_before(self) -> bool:
+        """Whether the declared model leaves white noise."""
+        policy = self.context.policy.residual_analysis
+        return all_residuals_white(self.prepared.innovations, self.prepared.split, policy)
+
+    @property
+    def selection_explains(self) -> bool:
+        """Whether effects were selected that leave white noise."""
+        if not self.selection.accepted:
+            return False
+        context, policy = self.context, self.context.policy.residual_analysis
+        innovations = innovations_of(context.fitter, self.selection.fit.robot, context.split)
+        return all_residuals_white(innovations, context.split, policy)
+
+
+def start_side_runs(state: Identification) -> Identification:
+    """Co-simulate the declared robot, and localise its error in a component, beside all that follows."""
+    context, prepared = state.context, state.prepared
+    runs = start_cosimulations(context.workers, context.fitter, context.robot, prepared.data_sets)
+    robot, data = calibrated_estimation_data(prepared, context.robot)
+    localisation = context.workers.submit(localise_residual, robot, data, context.fitter.noise)
+    return replace(state, pending_runs=tuple(runs), pending_localisation=(localisation,))
+
+
+def select(state: Identification) -> Identification:
+    """Select effects in the recordings as they are; with clocks corrected where no effects explain those."""
+    state = replace(state, selection=select_effects(state.context))
+    for prepared in state.clock_corrected:
+        if not state.selection_explains:
+            context = replace(state.context, fitter=prepared.fitter, split=prepared.split)
+            state = start_side_runs(replace(state, context=context, prepared=prepared))
+            state = replace(state, selection=select_effects(context))
+    return state
+
+
+def try_confusable_models(state: Identification) -> Identification:
+    """Replace the selection by a model that is easily confused with it, where that explains more."""
+    return replace(state, selection=replace_by_confusable_models(state.context, state.selection))
+
+
+def cosimulate_before(state: Identification) -> Identification:
+    """Compare the declared robot's co-simulations with the recordings."""
+    context = state.context
+    context.progress("co-simulating before", 0.0)
+    runs = tuple(run.result() for run in state.pending_runs)
+    comparisons, floors = compare_cosimulations(context.robot, context.fitter, state.prepared.data_sets, runs, runs)
+    return replace(state, runs_before=runs, comparisons=comparisons, noise_floors=tuple(floors))
+
+
+def confirm_effects(state: Identification) -> Identification:
+    """Confirm by co-simulation the effects that leave white noise, or the calibrated robot where nothing is lacking."""
+    robot = state.context.robot
+    state.context.progress("co-simulating after", 0.0)
+    if state.selection_explains:
+        confirmed = _confirmed(state, state.selection.fit.robot)
+        return state if confirmed is None else replace(confirmed, effects_hold=True)
+    if _nothing_lacks(state) and uncertain_parameters(robot):
+        return _confirmed(state, robot) or state
+    return state
+
+
+def explain_by_formula(state: Identification) -> Identification:
+    """Look for a formula, confirmed by co-simulation, or resonances, where effects do not explain the residual."""
+    if state.effects_hold or _nothing_lacks(state):
+        return state
+    unexplained = explain_residual(state.context, state.selection)
+    state = replace(state, unexplained=unexplained)
+    confirmed = _confirmed(state, unexplained.discovery.robot) if unexplained.discovery else None
+    return state if confirmed is None else replace(confirmed, discovery=unexplained.discovery)
+
+
+def judge(state: Identification) -> Identification:
+    """Put the verdict in words."""
+    verdict = verdict_of(
+        state.context.robot, state.selection, state.effects_hold, state.discovery, state.is_white_before
+    )
+    return replace(state, verdict=verdict)
+
+
+def estimate_intervals(state: Identification) -> Identification:
+    """Estimate the confirmed effects' parameters with intervals."""
+    state.context.progress("intervals", 0.0)
+    return replace(state, effects=estimated_effects(state.context, state.selection)) if state.effects_hold else state
+
+
+def analyse_detectability(state: Identification) -> Identification:
+    """Tell what the recordings could have shown, where the model leaves white noise."""
+    if not (state.effects_hold or state.verdict[0] == "none"):
+        return state
+    state.context.progress("what these recordings could show", 0.0)
+    selection = state.selection
+    return replace(
+        state, identifiability=analyse_identifiability(state.context, selection.fit.robot, selection.accepted)
+    )
+
+
+STAGES: tuple[Callable[[Identification], Identification], ...] = (
+    start_side_runs,
+    select,
+    try_confusable_models,
+    cosimulate_before,
+    confirm_effects,
+    explain_by_formula,
+    judge,
+    estimate_intervals,
+    analyse_detectability,
+)
 
 
 def trace(
@@ -82,7 +210,7 @@ def trace(
     fit: Recording,
     check: Recording | None = None,
     progress: Progress | None = None,
-    alpha: float = SIGNIFICANCE_LEVEL,
+    alpha: float = DEFAULT_POLICY.selection.false_alarm_rate,
     processes: int = 1,
 ) -> Trace:
     """Identify what a robot's model lacks, and show by co-simulating its FMUs what adding it does to the error.
@@ -98,214 +226,87 @@ def trace(
     argument is none of these.
     """
     validate_trace_arguments(robot, fit, check, progress, alpha, processes)
+    start_time = perf_counter()
     # BLAS rounds differently with several threads, which the worker processes could not reproduce.
     with (
         defer_interrupts() as raise_interrupt,
         threadpool_limits(1, "blas"),
         WorkerPool(processes, raise_interrupt) as workers,
     ):
-        return _trace(robot, fit, check, progress or _no_progress, alpha, workers)
+        workers.warm_up()
+        prepared, *clock_corrected = prepare_data(robot, fit, check, workers)
+        context = IdentificationContext(robot, prepared.fitter, prepared.split, alpha, progress or no_progress, workers)
+        state = Identification(context, prepared, tuple(clock_corrected), nothing_selected(robot), robot)
+        for stage in STAGES:
+            state = stage(state)
+        return _result(state, perf_counter() - start_time)
 
 
-def _no_progress(label: str, share: float) -> None:
-    """Discards the progress."""
+def _nothing_lacks(state: Identification) -> bool:
+    return not state.selection.accepted and state.is_white_before
 
 
-@dataclass(frozen=True)
-class _Outcome:
-    """Outcome of an identification: the effects or the formula that the FMUs confirm; else the unexplained residual.
-
-    ``robot`` is the best validated model, with uncertain numbers as FIT has them.
-    """
-
-    robot: Robot
-    selection: SelectionResult
-    effects_hold: bool
-    discovery: Discovery | None
-    unexplained: UnexplainedResidual
-    comparisons: tuple[Comparison, ...]
-    noise_floors: Sequence[Errors]
-
-
-def _trace(
-    robot: Robot,
-    fit: Recording,
-    check: Recording | None,
-    progress: Progress,
-    alpha: float,
-    workers: WorkerPool,
-) -> Trace:
-    start_time = perf_counter()
-    workers.warm_up()
-    selected = _select(robot, fit, check, progress, alpha, workers)
-    prepared, selection = selected.prepared, selected.selection
-    white_before = all_residuals_white(prepared.innovations, prepared.split)
-    outcome = _outcome(robot, prepared, selection, selected.runs_before, white_before, alpha, progress, workers)
-    final, effects_hold = outcome.robot, outcome.effects_hold
-    verdict, sentence = _verdict(robot, outcome, white_before)
-    calibration_notes = [] if verdict == "unexplained" else _calibration_notes(prepared, outcome)
-    progress("intervals", 0.0)
-    effects = (
-        estimated_effects(robot, selection, prepared.fitter, prepared.split.estimation, workers) if effects_hold else ()
+def _confirmed(state: Identification, robot: Robot) -> Identification | None:
+    """The state with a better robot whose co-simulations leave no more than noise; None where they do."""
+    context, data_sets = state.context, state.prepared.data_sets
+    calibrated_robot = calibrate(context.fitter, robot, context.split.estimation).calibrated_robot(robot)
+    policy = context.policy.cosimulation
+    validation = validate_by_cosimulation(
+        calibrated_robot, context.fitter, data_sets, state.runs_before, context.workers, policy
     )
+    if validation is None:
+        return None
+    comparisons, floors = validation
+    return replace(state, final_robot=calibrated_robot, comparisons=comparisons, noise_floors=tuple(floors))
+
+
+def _result(state: Identification, seconds: float) -> Trace:
+    context, prepared, final, effects = state.context, state.prepared, state.final_robot, state.effects
     validation = prepared.split.validation
     innovations = prepared.fitter.innovations(final, validation)
-    identifiability = Identifiability((), ())
-    if effects_hold or verdict == "none":
-        progress("what these recordings could show", 0.0)
-        identifiability = analyse_identifiability(
-            selection.fit.robot, robot, selection.accepted, prepared.fitter, validation, alpha
-        )
+    verdict, sentence = state.verdict
+    calibration_notes = [] if verdict == "unexplained" else _calibration_notes(state)
+    (localisation,) = state.pending_localisation
+    white_before = state.is_white_before
     return Trace(
         verdict=verdict,
         sentence=sentence,
-        robot_before=robot,
+        robot_before=context.robot,
         robot_after=final,
         effects=effects,
-        correlations=parameter_correlations(selection.fit, effects),
-        also_possible=selection.confusable if effects_hold else (),
-        candidates=selection.candidates,
-        formula=_formula(robot, outcome),
-        comparisons=outcome.comparisons,
-        noise_floor=outcome.noise_floors[-1],
+        correlations=parameter_correlations(state.selection.fit, effects),
+        also_possible=state.selection.confusable if state.effects_hold else (),
+        candidates=state.selection.candidates,
+        formula=confirmed_formula(context.robot, state.selection, state.effects_hold, state.discovery),
+        comparisons=state.comparisons,
+        noise_floor=state.noise_floors[-1],
         noise_before=white_before,
-        noise_after=effects_hold or outcome.discovery is not None or white_before,
+        noise_after=state.effects_hold or state.discovery is not None or white_before,
         normalised_innovation_variance=innovations.mean_square(validation.rows),
-        autocorrelations=largest_autocorrelations(innovations, validation.rows),
-        identifiability=identifiability,
-        components=selected.components.result(),
-        resonances=outcome.unexplained.resonances,
-        alpha=alpha,
-        notes=(*prepared.notes, *outcome.unexplained.notes, *_release_notes(prepared, final), *calibration_notes),
-        seconds=perf_counter() - start_time,
+        autocorrelations=largest_autocorrelations(innovations, validation.rows, context.policy.residual_analysis),
+        identifiability=state.identifiability,
+        components=localisation.result(),
+        resonances=state.unexplained.resonances,
+        alpha=context.alpha,
+        notes=(*prepared.notes, *state.unexplained.notes, *_initial_state_notes(state), *calibration_notes),
+        seconds=seconds,
     )
 
 
-@dataclass(frozen=True)
-class _Selected:
-    """Result of the selection with its data, the co-simulations before, and the component residuals."""
-
-    prepared: PreparedData
-    selection: SelectionResult
-    runs_before: Sequence[CosimulationResult]
-    components: PendingResult[FaultLocalisation]
-
-
-def _select(
-    robot: Robot, fit: Recording, check: Recording | None, progress: Progress, alpha: float, workers: WorkerPool
-) -> _Selected:
-    """Select effects in the recordings as they are; with clocks corrected where no effects explain those."""
-    prepared, *others = prepare_data(robot, fit, check, workers)
-    runs, components = _start_side_runs(prepared, robot, workers)
-    selection = select_effects(robot, prepared.fitter, prepared.split, alpha, progress, workers)
-    if others and not (selection.accepted and _leaves_white_residuals(prepared, selection)):
-        prepared = others[0]
-        runs, components = _start_side_runs(prepared, robot, workers)
-        selection = select_effects(robot, prepared.fitter, prepared.split, alpha, progress, workers)
-    selection = replace_by_confusable_models(robot, selection, prepared.fitter, prepared.split, alpha, progress)
-    progress("co-simulating before", 0.0)
-    return _Selected(prepared, selection, [run.result() for run in runs], components)
-
-
-def _start_side_runs(
-    prepared: PreparedData, robot: Robot, workers: WorkerPool
-) -> tuple[list[PendingResult[CosimulationResult]], PendingResult[FaultLocalisation]]:
-    runs = start_cosimulations(workers, prepared.fitter, robot, prepared.data_sets)
-    return runs, workers.submit(localise_residual, *calibrated_estimation_data(prepared, robot), prepared.fitter.noise)
-
-
-def _leaves_white_residuals(prepared: PreparedData, selection: SelectionResult) -> bool:
-    return all_residuals_white(innovations_of(prepared.fitter, selection.fit.robot, prepared.split), prepared.split)
-
-
-def _outcome(
-    robot: Robot,
-    prepared: PreparedData,
-    selection: SelectionResult,
-    runs_before: Sequence[CosimulationResult],
-    white_before: bool,
-    alpha: float,
-    progress: Progress,
-    workers: WorkerPool,
-) -> _Outcome:
-    """The effects if they leave white noise, in the filter and in the FMUs; else a formula that does."""
-    fitter, data_sets = prepared.fitter, prepared.data_sets
-
-    def validated(candidate: Robot) -> tuple[Robot, tuple[Comparison, ...], Sequence[Errors]] | None:
-        calibrated_robot = calibrate(fitter, candidate, prepared.split.estimation).calibrated_robot(candidate)
-        validation = validate_by_cosimulation(calibrated_robot, fitter, data_sets, runs_before, workers)
-        return None if validation is None else (calibrated_robot, *validation)
-
-    unchanged = robot, *compare_cosimulations(robot, fitter, data_sets, runs_before, runs_before)
-    progress("co-simulating after", 0.0)
-    if selection.accepted and _leaves_white_residuals(prepared, selection):
-        improved = validated(selection.fit.robot)
-        if improved is not None:
-            return _outcome_of(improved, selection, True, None, UnexplainedResidual())
-    if not selection.accepted and white_before:
-        improved = validated(robot) if uncertain_parameters(robot) else None
-        return _outcome_of(improved or unchanged, selection, False, None, UnexplainedResidual())
-    unexplained = explain_residual(robot, selection, fitter, prepared.split, alpha, progress, workers)
-    improved = validated(unexplained.discovery.robot) if unexplained.discovery else None
-    return _outcome_of(
-        improved or unchanged, selection, False, unexplained.discovery if improved else None, unexplained
-    )
-
-
-def _outcome_of(
-    validated: tuple[Robot, tuple[Comparison, ...], Sequence[Errors]],
-    selection: SelectionResult,
-    effects_hold: bool,
-    discovery: Discovery | None,
-    unexplained: UnexplainedResidual,
-) -> _Outcome:
-    robot, comparisons, noise_floors = validated
-    return _Outcome(robot, selection, effects_hold, discovery, unexplained, comparisons, noise_floors)
-
-
-def _calibration_notes(prepared: PreparedData, outcome: _Outcome) -> list[str]:
+def _calibration_notes(state: Identification) -> list[str]:
     """Notes on declared numbers that the robot file calls uncertain, as the recordings have them."""
-    final_robot = outcome.selection.fit.robot if outcome.discovery is None else outcome.discovery.robot
+    final_robot = state.selection.fit.robot if state.discovery is None else state.discovery.robot
     return [
         note
-        for sample in prepared.data_sets
-        for note in calibrate(prepared.fitter, final_robot, sample).notes(final_robot, sample.recording.path)
+        for data in state.prepared.data_sets
+        for note in calibrate(state.prepared.fitter, final_robot, data).notes(final_robot, data.recording.path)
     ]
 
 
-def _release_notes(prepared: PreparedData, final: Robot) -> list[str]:
+def _initial_state_notes(state: Identification) -> list[str]:
     """Notes on the smoothed initial state of each recording under the final model."""
     starts = [
-        (with_initial_state(prepared.fitter, final, sample), sample.recording.path) for sample in prepared.data_sets
+        (with_initial_state(state.prepared.fitter, state.final_robot, data), data.recording.path)
+        for data in state.prepared.data_sets
     ]
     return [note for start, path in starts for note in initial_state_note(start, path)]
-
-
-def _verdict(robot: Robot, outcome: _Outcome, white_before: bool) -> tuple[Verdict, str]:
-    selection, discovery = outcome.selection, outcome.discovery
-    names = " and ".join(h.label(robot) for h in selection.accepted)
-    lacks = f"The model lacks {names}; with {'it' if len(selection.accepted) == 1 else 'them'}, {IS_WHITE}."
-    if outcome.effects_hold and _unlisted_hypotheses(outcome):
-        return "discovered", f"{lacks} This effect is not on the list of known ones: {_formula(robot, outcome)}."
-    if outcome.effects_hold:
-        return "effects", lacks
-    if discovery:
-        sentence = f"No known effect explains the residual; a formula does: {formula_text(robot, discovery.formulas)}."
-        return "discovered", f"{sentence} With it, {IS_WHITE}."
-    if not selection.accepted and white_before:
-        return "none", f"{IS_WHITE.capitalize()}: this recording shows nothing that the model lacks."
-    closest = f"; {names} comes closest but does not make it white" if selection.accepted else ""
-    return "unexplained", f"The residual is not white noise, and no known effect explains it{closest}."
-
-
-def _unlisted_hypotheses(outcome: _Outcome) -> list[Hypothesis]:
-    """Accepted effects that are not on the list."""
-    return [hypothesis for hypothesis in outcome.selection.accepted if hypothesis.effect in UNLISTED]
-
-
-def _formula(robot: Robot, outcome: _Outcome) -> str | None:
-    """Formula of what is not on the list; None where there is none."""
-    if outcome.discovery:
-        return formula_text(robot, outcome.discovery.formulas)
-    unlisted = _unlisted_hypotheses(outcome) if outcome.effects_hold else []
-    return effects_text([(h.label(robot), setting_of(outcome.selection.fit.robot, h)) for h in unlisted]) or None

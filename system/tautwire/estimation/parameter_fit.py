@@ -1,4 +1,4 @@
-"""Maximum-likelihood fits of the parameters of a robot's effects, and their validation on other samples."""
+"""Maximum-likelihood fits of the parameters of a robot's effects."""
 
 from __future__ import annotations
 
@@ -21,13 +21,10 @@ from .hypotheses import Hypothesis, free_parameters, value_of, with_values
 from .kalman_filter import Noise
 from .likelihood import Innovations, Likelihood
 from .normal_equations import compressed_residuals
+from .policy import DEFAULT_POLICY, FitPolicy
 
 Array = NDArray[np.float64]
 
-# Acceleration noise density and relative change of the cost at which to stop, stage by stage; then without it.
-COARSE_FIT_STAGES = ((0.1, 1e-3), (0.01, 1e-3))
-FINE_COST_TOLERANCE = 1e-7
-MAX_FIT_EVALUATIONS = 15
 MAX_COMPILED_LIKELIHOODS = 40
 NORMAL_QUANTILE_95 = 1.959964
 
@@ -52,6 +49,11 @@ class Fit:
     values: Array
     covariance: Array
 
+    @classmethod
+    def without_parameters(cls, robot: Robot) -> Fit:
+        """The fit of a robot with nothing to fit."""
+        return cls(robot, (), np.zeros(0), np.zeros((0, 0)))
+
     @property
     def standard_deviations(self) -> Array:
         """Standard deviations (p,)."""
@@ -64,58 +66,52 @@ class Fit:
 
 
 class Fitter:
-    """Fits and validates robots on data sets; keeps compiled likelihoods, calls ``poll_interrupts`` before each run."""
+    """Fits robots to data sets; keeps compiled likelihoods, calls ``poll_interrupts`` before each run.
 
-    def __init__(self, noise: Noise, poll_interrupts: Callable[[], None] = lambda: None) -> None:
+    Sent to a worker process it becomes the fitter of that process, whose compiled likelihoods serve the next task.
+    """
+
+    def __init__(
+        self,
+        noise: Noise,
+        poll_interrupts: Callable[[], None] = lambda: None,
+        policy: FitPolicy = DEFAULT_POLICY.fit,
+    ) -> None:
         self.noise = noise
         self.poll_interrupts = poll_interrupts
+        self.policy = policy
         self._compiled: dict[tuple[object, ...], Likelihood] = {}
 
-    def fit(self, robot: Robot, chosen: Collection[Hypothesis], data: DataSet) -> Fit:
-        """Least squares on whitened innovations, first with acceleration noise, then under the exact model.
-
-        Frees the parameters of the chosen hypotheses. The exact stage begins where the coarse one ended or where that
-        began, whichever is more probable.
-        """
-        return self._fit(robot, chosen, data, (*COARSE_FIT_STAGES, (0.0, FINE_COST_TOLERANCE)))
+    def __reduce__(self) -> tuple[Callable[[Noise, FitPolicy], Fitter], tuple[Noise, FitPolicy]]:
+        return _fitter_of_process, (self.noise, self.policy)
 
     def fit_from(
         self,
         starts: Sequence[Robot],
         chosen: Collection[Hypothesis],
         data: DataSet,
-        min_log_likelihood: float,
-        cost_tolerance: float = FINE_COST_TOLERANCE,
+        min_log_likelihood: float = np.inf,
+        cost_tolerance: float | None = None,
     ) -> Fit:
-        """Fit from the first start whose log-likelihood is at least ``min_log_likelihood``, under the exact model.
+        """Least squares on whitened innovations, which frees the parameters of the chosen hypotheses.
 
-        Where none does, the last start is fitted as :meth:`fit` does. ``cost_tolerance`` is the relative change of the
-        cost at which the exact stage ends.
+        Begins at the first start whose log-likelihood is at least ``min_log_likelihood``, under the exact model. Where
+        none does, at the last one with acceleration noise; the exact stage begins where that ended or where it began,
+        whichever is more probable, and ends at ``cost_tolerance``, a relative change of the cost.
 
         Raises NoFitError, UnreachableError.
         """
-        for start in starts:
-            try:
-                log_likelihood = self.judged(start, chosen, data).log_likelihood(data.rows)
-            except UnreachableError:
-                continue
-            if log_likelihood >= min_log_likelihood:
-                return self._fit(start, chosen, data, ((0.0, cost_tolerance),))
-        return self._fit(starts[-1], chosen, data, (*COARSE_FIT_STAGES, (0.0, cost_tolerance)))
-
-    def _fit(
-        self, robot: Robot, chosen: Collection[Hypothesis], data: DataSet, stages: Sequence[tuple[float, float]]
-    ) -> Fit:
+        robot, is_near = self._first_near(starts, chosen, data, min_log_likelihood)
+        exact_stage = (0.0, self.policy.fine_cost_tolerance if cost_tolerance is None else cost_tolerance)
+        stages = (exact_stage,) if is_near else (*self.policy.coarse_stages, exact_stage)
         free = free_parameters(robot, chosen)
         if not free:
-            return Fit(robot, (), np.zeros(0), np.zeros((0, 0)))
-        start = np.array([value_of(robot, f) for f in free])
+            return Fit.without_parameters(robot)
         scale = parameter_scales(robot, free)
         lower, upper = (bounds / scale for bounds in parameter_bounds(robot, free))
         likelihood = self._compiled_likelihood(with_start(robot, data.start), free, data)
-        scaled_start = scaled = start / scale
-        jacobian = np.zeros((0, len(free)))
-        for noise_density, cost_tolerance in stages:
+        scaled_start = scaled = np.array([value_of(robot, f) for f in free]) / scale
+        for noise_density, stage_tolerance in stages:
             residual = _Residual(likelihood, data, scale, noise_density, self.poll_interrupts)
             if noise_density == 0.0:
                 scaled = max((scaled, scaled_start), key=residual.log_likelihood)
@@ -129,15 +125,24 @@ class Fitter:
                 jac=residual.jacobian,
                 bounds=(lower - residual.origin, upper - residual.origin),
                 x_scale="jac",
-                ftol=cost_tolerance,
-                max_nfev=MAX_FIT_EVALUATIONS,
+                ftol=stage_tolerance,
+                max_nfev=self.policy.max_evaluations,
             )
-            scaled, jacobian = residual.origin + solution.x, np.asarray(solution.jac, dtype=float)
-        # What is scaled back may end beyond a bound by its last digit.
-        values = np.clip(scaled * scale, *parameter_bounds(robot, free))
-        covariance = np.linalg.pinv(jacobian.T @ jacobian) * np.outer(scale, scale)
-        fitted = with_values(robot, free, dict(zip(free, values.tolist(), strict=True)))
-        return Fit(fitted, free, values, covariance)
+            scaled = residual.origin + solution.x
+        return _scaled_back(robot, free, scaled, np.asarray(solution.jac, dtype=float))
+
+    def _first_near(
+        self, starts: Sequence[Robot], chosen: Collection[Hypothesis], data: DataSet, min_log_likelihood: float
+    ) -> tuple[Robot, bool]:
+        """The first start that is probable enough, and whether there is one; the last start if not."""
+        for start in starts if min_log_likelihood < np.inf else ():
+            try:
+                log_likelihood = self.log_likelihood(start, chosen, data)
+            except UnreachableError:
+                continue
+            if log_likelihood >= min_log_likelihood:
+                return start, True
+        return starts[-1], False
 
     def innovations(self, robot: Robot, data: DataSet) -> Innovations:
         """Innovations of all samples of a recording under a robot as it is."""
@@ -147,6 +152,10 @@ class Fitter:
         """As :meth:`innovations`, with the likelihood that was compiled for fitting the chosen hypotheses."""
         likelihood, values = self.likelihood(robot, chosen, data)
         return likelihood.innovations(data.recording, values)
+
+    def log_likelihood(self, robot: Robot, chosen: Collection[Hypothesis], data: DataSet) -> float:
+        """Log-likelihood of the rows of some data, by :meth:`judged`."""
+        return self.judged(robot, chosen, data).log_likelihood(data.rows)
 
     def likelihood(self, robot: Robot, chosen: Collection[Hypothesis], data: DataSet) -> tuple[Likelihood, list[float]]:
         """The likelihood compiled for fitting the chosen hypotheses, and the robot's values of their parameters."""
@@ -170,6 +179,16 @@ class Fitter:
                 self._compiled.pop(next(iter(self._compiled)))
             self._compiled[key] = Likelihood(robot, free, self.noise, interval)
         return self._compiled[key]
+
+
+def _scaled_back(robot: Robot, free: tuple[FreeParameter, ...], scaled: Array, jacobian: Array) -> Fit:
+    """The fit of parameters that were fitted in units of their scales."""
+    scale = parameter_scales(robot, free)
+    # What is scaled back may end beyond a bound by its last digit.
+    values = np.clip(scaled * scale, *parameter_bounds(robot, free))
+    covariance = np.linalg.pinv(jacobian.T @ jacobian) * np.outer(scale, scale)
+    fitted = with_values(robot, free, dict(zip(free, values.tolist(), strict=True)))
+    return Fit(fitted, free, values, covariance)
 
 
 def parameter_bounds(robot: Robot, free: Sequence[FreeParameter]) -> tuple[Array, Array]:
@@ -240,47 +259,7 @@ class _Residual:
         return self._cached
 
 
-@dataclass(frozen=True)
-class FitTask:
-    """Fit of the chosen hypotheses to estimation data, from starts that are tried in turn; validated on other data.
-
-    ``min_log_likelihood`` is that of the data without the last of them; for ``cost_tolerance`` see
-    :meth:`Fitter.fit_from`.
-    """
-
-    chosen: tuple[Hypothesis, ...]
-    starts: tuple[Robot, ...]
-    min_log_likelihood: float
-    cost_tolerance: float
-
-
-@dataclass(frozen=True)
-class ValidatedFit:
-    """A fit with its validation: log-likelihood and mean square of the innovations on validation data."""
-
-    fit: Fit
-    log_likelihood: float
-    mean_square: float
-
-
-def fit_and_validate(fitter: Fitter, task: FitTask, data: DataSet, validation: DataSet) -> ValidatedFit | None:
-    """Fit and validate a task; None where the cables cannot hold the platform, or nothing finite comes out."""
-    try:
-        fit = fitter.fit_from(task.starts, task.chosen, data, task.min_log_likelihood, task.cost_tolerance)
-        innovations = fitter.judged(fit.robot, task.chosen, validation)
-    except (UnreachableError, NoFitError):
-        return None
-    log_likelihood = innovations.log_likelihood(validation.rows)
-    mean_square = float(np.nanmean(innovations.mean_square(validation.rows)))
-    return ValidatedFit(fit, log_likelihood, mean_square) if np.isfinite(log_likelihood) else None
-
-
-def fit_and_validate_in_worker(noise: Noise, task: FitTask, data: DataSet, validation: DataSet) -> ValidatedFit | None:
-    """As :func:`fit_and_validate`, in a worker process with its own fitter."""
-    return fit_and_validate(worker_fitter(noise), task, data, validation)
-
-
 @lru_cache(maxsize=1)
-def worker_fitter(noise: Noise) -> Fitter:
-    """The fitter of this worker process. Its compiled likelihoods serve the next task of the same process."""
-    return Fitter(noise)
+def _fitter_of_process(noise: Noise, policy: FitPolicy) -> Fitter:
+    """The fitter of this worker process."""
+    return Fitter(noise, policy=policy)

@@ -27,8 +27,8 @@ from .kalman_filter import Noise
 from .likelihood import Innovations
 from .measurement_noise import check_noise, estimate_noise
 from .parameter_fit import Fitter
-from .policy import DEFAULT_POLICY, PreprocessingPolicy
-from .residual_analysis import MIN_SAMPLES, has_enough_samples, residuals_are_white
+from .policy import DEFAULT_POLICY, IdentificationPolicy, PreprocessingPolicy, ResidualAnalysisPolicy
+from .residual_analysis import has_enough_samples, residuals_are_white
 from .smoothed_states import calibrate
 from .worker_pool import WorkerPool
 
@@ -109,18 +109,18 @@ def prepare_data(
     fit: Recording,
     check: Recording | None,
     workers: WorkerPool,
-    policy: PreprocessingPolicy = DEFAULT_POLICY.preprocessing,
+    policy: IdentificationPolicy = DEFAULT_POLICY,
 ) -> tuple[PreparedData, ...]:
     """Preprocess the recordings; in two versions where clocks seem to be apart but more is wrong.
 
     The first is as recorded then: an effect that explains all of it goes before a clock that explains a part.
     """
-    fit, check, truncation_notes = shortened(fit, check, policy.max_samples)
-    prepared = prepare_recordings(robot, fit, check, policy)
+    fit, check, truncation_notes = shortened(fit, check, policy.preprocessing.max_samples)
+    prepared = prepare_recordings(robot, fit, check, policy.preprocessing)
     data_split = split_data(robot, prepared.noise, prepared.fit, prepared.check)
-    fitter = Fitter(prepared.noise, workers.poll_interrupts)
+    fitter = Fitter(prepared.noise, workers.poll_interrupts, policy.fit)
     innovations = innovations_of(fitter, robot, data_split)
-    _require_samples(innovations, data_split)
+    _require_samples(innovations, data_split, policy.residual_analysis)
 
     def assembled(
         data_split: DataSplit, innovations: tuple[Innovations, Innovations], clock_notes: tuple[str, ...]
@@ -130,14 +130,15 @@ def prepare_data(
         return PreparedData(data_split, data_sets, fitter, innovations, all_notes)
 
     as_recorded = assembled(data_split, innovations, ())
-    if all_residuals_white(innovations, data_split):
+    if all_residuals_white(innovations, data_split, policy.residual_analysis):
         return (as_recorded,)
-    data_split, clock_notes = with_clocks_set(fitter, robot, data_split, policy.clock_offsets)
+    data_split, clock_notes = with_clocks_set(fitter, robot, data_split, policy.preprocessing.clock_offsets)
     if not clock_notes:
         return (as_recorded,)
     innovations = innovations_of(fitter, robot, data_split)
     clock_corrected = assembled(data_split, innovations, clock_notes)
-    return (clock_corrected,) if all_residuals_white(innovations, data_split) else (as_recorded, clock_corrected)
+    explained = all_residuals_white(innovations, data_split, policy.residual_analysis)
+    return (clock_corrected,) if explained else (as_recorded, clock_corrected)
 
 
 def innovations_of(fitter: Fitter, robot: Robot, split: DataSplit) -> tuple[Innovations, Innovations]:
@@ -145,11 +146,16 @@ def innovations_of(fitter: Fitter, robot: Robot, split: DataSplit) -> tuple[Inno
     return fitter.innovations(robot, split.estimation), fitter.innovations(robot, split.validation)
 
 
-def all_residuals_white(innovations: Sequence[Innovations], split: DataSplit) -> bool:
+def all_residuals_white(
+    innovations: Sequence[Innovations],
+    split: DataSplit,
+    policy: ResidualAnalysisPolicy = DEFAULT_POLICY.residual_analysis,
+) -> bool:
     """Whether the residuals are white noise on both estimation and validation data."""
     data_sets = (split.estimation, split.validation)
     return all(
-        residuals_are_white(residuals, data.rows) for residuals, data in zip(innovations, data_sets, strict=True)
+        residuals_are_white(residuals, data.rows, policy)
+        for residuals, data in zip(innovations, data_sets, strict=True)
     )
 
 
@@ -162,10 +168,13 @@ def calibrated_estimation_data(prepared: PreparedData, robot: Robot) -> tuple[Ro
     )
 
 
-def _require_samples(innovations: tuple[Innovations, Innovations], split: DataSplit) -> None:
+def _require_samples(
+    innovations: tuple[Innovations, Innovations], split: DataSplit, policy: ResidualAnalysisPolicy
+) -> None:
+    least = policy.min_samples
     for residuals, data in zip(innovations, (split.estimation, split.validation), strict=True):
-        if not has_enough_samples(residuals, data.rows):
-            hint = f"record at least {MIN_SAMPLES} samples, {2 * MIN_SAMPLES} where there is no check recording"
+        if not has_enough_samples(residuals, data.rows, policy):
+            hint = f"record at least {least} samples, {2 * least} where there is no check recording"
             raise RecordingError(data.recording.path, "too few samples to tell noise from more", hint)
 
 

@@ -24,20 +24,19 @@ from scipy.optimize import brentq, least_squares
 from ..errors import TautwireError
 from .estimation_data import DataSet
 from .hypotheses import Hypothesis
-from .kalman_filter import Noise
 from .likelihood import Likelihood
 from .normal_equations import compressed_residuals
-from .parameter_fit import NORMAL_QUANTILE_95, Fit, Fitter, parameter_bounds, parameter_scales, worker_fitter
+from .parameter_fit import NORMAL_QUANTILE_95, Fit, Fitter, parameter_bounds, parameter_scales
+from .policy import DEFAULT_POLICY, ProfileLikelihoodPolicy
 from .worker_pool import WorkerPool
 
 Array = NDArray[np.float64]
 
 # Rise of the sum of squares where the model has no finite output.
 NON_FINITE_RISE = 1e4
-# A fall below the fit that the fit's cost tolerance does not explain.
-SIGNIFICANT_FALL = 0.1
-# Runs over the sample, in all and in one fit of the others; and the least distance from bounds, in deviations.
-MAX_PROFILE_RUNS, MAX_PROFILE_EVALUATIONS, MIN_BOUND_DISTANCE = 300, 15, 1e-6
+# Least distance of starts from bounds, in deviations.
+MIN_BOUND_DISTANCE = 1e-6
+CHI_SQUARED_95 = NORMAL_QUANTILE_95**2
 
 
 class LowerMinimumError(TautwireError):
@@ -57,7 +56,7 @@ class TooManyRunsError(TautwireError):
 
 
 class ProfileLikelihood:
-    """Profile likelihood about a fit of ``values``, which stay within ``lower`` and ``upper``.
+    """Profile likelihood about a fit of ``values``, which stay within ``bounds``, lower and upper (p,).
 
     It is by sums of squares of the whitened innovations. ``scales`` (p,) are the parameters' scales;
     ``standard_deviations`` (p,) are zero where the curvature gives none.
@@ -68,12 +67,13 @@ class ProfileLikelihood:
         likelihood: Likelihood,
         fit: Fit,
         data: DataSet,
-        lower: Array,
-        upper: Array,
+        bounds: tuple[Array, Array],
         poll_interrupts: Callable[[], None],
+        policy: ProfileLikelihoodPolicy,
     ) -> None:
         self._likelihood, self._fit, self._sample, self._poll_interrupts = likelihood, fit, data, poll_interrupts
-        self._lower, self._upper = lower, upper
+        self._lower, self._upper = bounds
+        self.policy = policy
         self.values = fit.values
         self.scales = parameter_scales(fit.robot, fit.free)
         variances = np.diag(fit.covariance)
@@ -84,10 +84,8 @@ class ProfileLikelihood:
 
     def recentred(self, values: Array) -> ProfileLikelihood:
         """The same profile likelihood about other values."""
-        recentred_fit = replace(self._fit, values=values)
-        return ProfileLikelihood(
-            self._likelihood, recentred_fit, self._sample, self._lower, self._upper, self._poll_interrupts
-        )
+        fit, bounds = replace(self._fit, values=values), (self._lower, self._upper)
+        return ProfileLikelihood(self._likelihood, fit, self._sample, bounds, self._poll_interrupts, self.policy)
 
     def rise(self, index: int, value: float) -> float:
         """Rise of the sum of squares with one parameter at a value; 1e4 where the model has no finite output.
@@ -118,13 +116,13 @@ class ProfileLikelihood:
             bounds=(low, high),
             x_scale="jac",
             ftol=1e-6,
-            max_nfev=MAX_PROFILE_EVALUATIONS,
+            max_nfev=self.policy.max_evaluations,
         )
         return self._checked_rise(2.0 * float(solution.cost), np.insert(origin + solution.x * units, index, value))
 
     def _checked_rise(self, sum_of_squares: float, values: Array) -> float:
         rise = sum_of_squares - self._minimum
-        if rise < -SIGNIFICANT_FALL:
+        if rise < -self.policy.significant_fall:
             raise LowerMinimumError(values)
         return rise if np.isfinite(rise) else NON_FINITE_RISE
 
@@ -138,8 +136,8 @@ class ProfileLikelihood:
     def _residuals(self, values: Array) -> tuple[Array, Array]:
         self._poll_interrupts()
         self._run_count += 1
-        if self._run_count > MAX_PROFILE_RUNS:
-            raise TooManyRunsError(MAX_PROFILE_RUNS)
+        if self._run_count > self.policy.max_runs:
+            raise TooManyRunsError(self.policy.max_runs)
         return compressed_residuals(self._likelihood, values, self._sample, 0.0)
 
 
@@ -180,83 +178,62 @@ class _ConstrainedResidual:
         return self._cached
 
 
-CHI_SQUARED_95 = NORMAL_QUANTILE_95**2
-# Largest relative difference of the rise from that of a parabola at which an end by curvature is taken.
-MAX_PARABOLA_DEVIATION = 0.1
-# Relative to the distance from the fit to an end.
-INTERVAL_END_TOLERANCE = 0.01
-# Relative to the parameter's scale: first distance of the search where the curvature is unknown.
-FIRST_RELATIVE_DISTANCE = 1e-3
-# How often the distance is doubled in search of an end, and how often the fit may turn out not to be the best.
-MAX_DISTANCE_DOUBLINGS, MAX_RECENTRINGS = 20, 3
-
-
 def profile_intervals(
-    fitter: Fitter, fit: Fit, chosen: Sequence[Hypothesis], data: DataSet, workers: WorkerPool
+    fitter: Fitter,
+    fit: Fit,
+    chosen: Sequence[Hypothesis],
+    data: DataSet,
+    workers: WorkerPool,
+    policy: ProfileLikelihoodPolicy = DEFAULT_POLICY.profile_likelihood,
 ) -> list[tuple[float, float]]:
     """Profile-likelihood interval of each free parameter of a fit, which was made with ``chosen`` on ``data``.
 
     An end is the parameter's bound if the profile does not rise before; infinite where there is none. It is by
     curvature where :class:`ProfileLikelihood` takes too many runs to find it.
     """
-    count = len(fit.free)
-    if workers.processes == 1:
-        return [profile_interval(fitter, fit, chosen, data, index) for index in range(count)]
-    calls = [(fitter.noise, fit, chosen, data, index) for index in range(count)]
-    return [found for _, found in sorted(workers.map_unordered(_profile_interval_in_worker, calls))]
+    calls = [(fitter, fit, chosen, data, index, policy) for index in range(len(fit.free))]
+    return [found for _, found in sorted(workers.map_unordered(profile_interval, calls))]
 
 
 def profile_interval(
-    fitter: Fitter, fit: Fit, chosen: Sequence[Hypothesis], data: DataSet, index: int
+    fitter: Fitter,
+    fit: Fit,
+    chosen: Sequence[Hypothesis],
+    data: DataSet,
+    index: int,
+    policy: ProfileLikelihoodPolicy,
 ) -> tuple[float, float]:
-    """Profile-likelihood interval of one parameter; its value is inside."""
+    """Profile-likelihood interval of one parameter, about better values where some turn up; its value is inside."""
     likelihood, _ = fitter.likelihood(fit.robot, chosen, data)
     lower, upper = parameter_bounds(fit.robot, fit.free)
     minimum, maximum = float(lower[index]), float(upper[index])
     value, half_width = float(fit.values[index]), NORMAL_QUANTILE_95 * float(fit.standard_deviations[index])
-    profile = ProfileLikelihood(likelihood, fit, data, lower, upper, fitter.poll_interrupts)
-    try:
-        low, high = _both_ends(profile, index, (minimum, maximum), MAX_RECENTRINGS)
-    except (LowerMinimumError, TooManyRunsError):
-        return (
-            (max(value - half_width, minimum), min(value + half_width, maximum))
-            if half_width > 0.0
-            else (minimum, maximum)
-        )
-    return max(min(low, value), minimum), min(max(high, value), maximum)
-
-
-def _profile_interval_in_worker(
-    noise: Noise, fit: Fit, chosen: Sequence[Hypothesis], data: DataSet, index: int
-) -> tuple[float, float]:
-    return profile_interval(worker_fitter(noise), fit, chosen, data, index)
-
-
-def _both_ends(
-    profile: ProfileLikelihood, index: int, bounds: tuple[float, float], recentrings: int
-) -> tuple[float, float]:
-    """Both ends, recentred on better values where some turn up."""
-    try:
-        return _interval_end(profile, index, -1.0, bounds[0]), _interval_end(profile, index, 1.0, bounds[1])
-    except LowerMinimumError as better:
-        if not recentrings:
-            raise
-        return _both_ends(profile.recentred(better.values), index, bounds, recentrings - 1)
+    profile = ProfileLikelihood(likelihood, fit, data, (lower, upper), fitter.poll_interrupts, policy)
+    for _ in range(policy.max_recentrings + 1):
+        try:
+            low, high = _interval_end(profile, index, -1.0, minimum), _interval_end(profile, index, 1.0, maximum)
+        except LowerMinimumError as better:  # noqa: PERF203 - a few rounds of many runs each
+            profile = profile.recentred(better.values)
+        except TooManyRunsError:
+            break
+        else:
+            return max(min(low, value), minimum), min(max(high, value), maximum)
+    if half_width > 0.0:
+        return max(value - half_width, minimum), min(value + half_width, maximum)
+    return minimum, maximum
 
 
 def _interval_end(profile: ProfileLikelihood, index: int, sign: float, bound: float) -> float:
-    estimate, standard_deviation = float(profile.values[index]), float(profile.standard_deviations[index])
+    estimate, policy = float(profile.values[index]), profile.policy
+    half_width = NORMAL_QUANTILE_95 * float(profile.standard_deviations[index])
+    first_distance = policy.first_relative_distance * float(profile.scales[index])
     inner = 0.0
-    for distance in _search_distances(
-        NORMAL_QUANTILE_95 * standard_deviation,
-        FIRST_RELATIVE_DISTANCE * float(profile.scales[index]),
-        abs(bound - estimate),
-    ):
+    for distance in _search_distances(half_width, first_distance, abs(bound - estimate), policy):
         excess_at_distance = profile.rise(index, estimate + sign * distance) - CHI_SQUARED_95
         if (
             inner == 0.0
-            and distance == NORMAL_QUANTILE_95 * standard_deviation
-            and abs(excess_at_distance) < MAX_PARABOLA_DEVIATION * CHI_SQUARED_95
+            and distance == half_width
+            and abs(excess_at_distance) < policy.max_parabola_deviation * CHI_SQUARED_95
         ):
             return estimate + sign * distance
         if excess_at_distance > 0.0:
@@ -269,14 +246,16 @@ def _interval_end(profile: ProfileLikelihood, index: int, sign: float, bound: fl
         return profile.rise(index, estimate + sign * length) - CHI_SQUARED_95 if length > 0.0 else -CHI_SQUARED_95
 
     return estimate + sign * float(
-        brentq(excess, inner, distance, xtol=INTERVAL_END_TOLERANCE * distance, rtol=INTERVAL_END_TOLERANCE)
+        brentq(excess, inner, distance, xtol=policy.end_tolerance * distance, rtol=policy.end_tolerance)
     )
 
 
-def _search_distances(by_curvature: float, by_size: float, farthest: float) -> Iterator[float]:
+def _search_distances(
+    by_curvature: float, by_size: float, farthest: float, policy: ProfileLikelihoodPolicy
+) -> Iterator[float]:
     """Distances of the search, each twice the last, up to the farthest if that is not infinite."""
     distance = by_curvature if by_curvature > 0.0 else by_size
-    for _ in range(MAX_DISTANCE_DOUBLINGS):
+    for _ in range(policy.max_distance_doublings):
         if distance >= farthest:
             break
         yield distance

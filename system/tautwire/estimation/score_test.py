@@ -23,10 +23,9 @@ from ..recordings.start_position import with_start
 from ..robot.schema import Robot
 from .estimation_data import DataSet
 from .hypotheses import PLATFORM_SENSOR_FORMS, Hypothesis, free_parameters
+from .identification_context import IdentificationContext
 from .innovation_sensitivities import EffectSensitivities, SensitivityColumn, linearise_filter
-from .kalman_filter import Noise
-from .parameter_fit import Fitter, worker_fitter
-from .worker_pool import WorkerPool
+from .parameter_fit import Fitter
 
 Array = NDArray[np.float64]
 
@@ -79,38 +78,24 @@ def score_test(
 
 
 def score_test_in_workers(
+    context: IdentificationContext,
     robot: Robot,
     accepted: Sequence[Hypothesis],
     candidates: Sequence[Hypothesis],
-    fitter: Fitter,
     data: DataSet,
-    workers: WorkerPool,
     acceleration_noise_density: float = 0.0,
 ) -> dict[Hypothesis, PredictedGain]:
     """As :func:`score_test`, with the effects shared out to the worker processes."""
-    count = workers.processes
-    if count == 1:
-        return score_test(robot, accepted, candidates, fitter, data, acceleration_noise_density)
+    fitter, count = context.fitter, context.workers.processes
     effects = list(dict.fromkeys(hypothesis.effect for hypothesis in candidates))
     shares = [[h for h in candidates if h.effect in effects[number::count]] for number in range(count)]
-    calls = [(fitter.noise, robot, accepted, own, data, acceleration_noise_density) for own in shares if own]
+    calls = [(robot, accepted, own, fitter, data, acceleration_noise_density) for own in shares if own]
     predictions = {
         h: prospect
-        for _, prospects in workers.map_unordered(_score_test_in_worker, calls)
+        for _, prospects in context.workers.map_unordered(score_test, calls)
         for h, prospect in prospects.items()
     }
     return {hypothesis: predictions[hypothesis] for hypothesis in candidates}
-
-
-def _score_test_in_worker(
-    noise: Noise,
-    robot: Robot,
-    accepted: Sequence[Hypothesis],
-    candidates: Sequence[Hypothesis],
-    data: DataSet,
-    acceleration_noise_density: float,
-) -> dict[Hypothesis, PredictedGain]:
-    return score_test(robot, accepted, candidates, worker_fitter(noise), data, acceleration_noise_density)
 
 
 def score_statistics(

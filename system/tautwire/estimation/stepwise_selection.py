@@ -9,47 +9,23 @@ Source: Wasserman, Ramdas and Balakrishnan (2020), Universal inference, PNAS 117
 
 from __future__ import annotations
 
-from collections.abc import Callable, Generator, Mapping, Sequence
-from contextlib import closing
-from dataclasses import dataclass
-from functools import partial
-from math import inf, log
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from math import inf
 
-from ..robot.schema import EffectSetting, Robot
-from .candidate_scores import CandidateScore, most_parsimonious, setting_of, shortlist, unfitted_score
-from .estimation_data import DataSet, DataSplit
+from ..robot.schema import Robot
+from .candidate_fits import fit_candidates, fit_model, leaves_noise, maximised_validation_likelihood
+from .candidate_proposals import SearchRound, shortlist, starting_robots
+from .candidate_scores import CandidateScore, most_parsimonious, unfitted_score
 from .grid_search import grid_search, zero_slope_predictions
-from .hypotheses import Hypothesis, hypotheses, split_by_cable, with_hypothesis, with_larger_forms
-from .parameter_fit import (
-    FINE_COST_TOLERANCE,
-    Fit,
-    FitTask,
-    Fitter,
-    ValidatedFit,
-    fit_and_validate,
-    fit_and_validate_in_worker,
-)
+from .hypotheses import Hypothesis, with_hypothesis
+from .identification_context import IdentificationContext
+from .parameter_fit import Fit
 from .residual_analysis import residuals_are_white
 from .score_test import PredictedGain, score_test_in_workers
 from .trace_result import Candidate
-from .worker_pool import WorkerPool
 
-Progress = Callable[[str, float], None]
-
-MAX_ROUNDS = 4
-# Fits to a part of the data count as tied within this many nats plus this share of the log-likelihood.
-COARSE_TIE_NATS, COARSE_TIE_SHARE = 50.0, 1e-3
-# Relative change of the cost at which fits to a part of the data stop.
-COARSE_COST_TOLERANCE = 1e-4
-# Acceleration noise density (m/s^2 per root hertz) of a second score test where the model is far from noise.
-SCREENING_NOISE_DENSITY = 0.1
-# How many of the best predictions are always fitted to all samples.
-ALWAYS_REFITTED = 2
-# Mean square of innovations below which a model needs no larger form of the same effects.
-MAX_NOISE_MEAN_SQUARE = 1.1
-MAX_SWAPS = 4
-# Samples by which starting values are ranked, and alternatives that deserve a fit to all samples.
-COARSE_SAMPLES = 600
+Predictions = dict[Hypothesis, PredictedGain]
 
 
 @dataclass(frozen=True)
@@ -63,286 +39,162 @@ class SelectionResult:
     confusable: tuple[tuple[str, ...], ...]
 
 
-class StepwiseSelection:
-    """Forward selection while a hypothesis is significant, then backward elimination of those made needless.
+def nothing_selected(robot: Robot) -> SelectionResult:
+    """The selection before any search: the robot as it is."""
+    return SelectionResult((), (), Fit.without_parameters(robot), (), ())
+
+
+def select_effects(context: IdentificationContext) -> SelectionResult:
+    """Select the effects that a model lacks: forward while one is significant, then backward.
 
     What the robot file declares, effects included, stays as it is until a hypothesis replaces it.
     """
+    accepted: list[Hypothesis] = []
+    current = fit_model(context, accepted)
+    candidates: list[Candidate] = []
+    complete_rounds: dict[tuple[Hypothesis, ...], list[CandidateScore]] = {}
+    for number in range(1, context.policy.selection.max_rounds + 1):
+        scores, is_complete = score_candidates(context, _search_round(context, number, current.robot, accepted))
+        if is_complete:
+            complete_rounds[tuple(accepted)] = scores
+        best = most_parsimonious(scores, context.policy.selection)
+        significant = best is not None and best.evidence > context.evidence_threshold()
+        candidates += [trial.candidate(number, significant and trial is best) for trial in scores]
+        if best is None or not significant:
+            break
+        accepted = with_hypothesis(accepted, best.hypothesis)
+        current = best.fit
+    return _BackwardElimination(context, accepted, current, candidates, complete_rounds).run()
 
-    def __init__(
-        self,
-        robot: Robot,
-        fitter: Fitter,
-        split: DataSplit,
-        alpha: float,
-        progress: Progress,
-        workers: WorkerPool | None = None,
-    ) -> None:
-        self.robot = robot
-        self.fitter = fitter
-        self.split = split
-        self.progress = progress
-        self.workers = workers or WorkerPool(1, fitter.poll_interrupts)
-        self.threshold = log(len(hypotheses(robot)) / alpha)
-        self._scores: dict[tuple[Hypothesis, ...], list[CandidateScore]] = {}
+
+def _search_round(
+    context: IdentificationContext,
+    number: int,
+    robot: Robot,
+    accepted: Sequence[Hypothesis],
+    rival: CandidateScore | None = None,
+) -> SearchRound:
+    is_white = all(
+        residuals_are_white(context.fitter.innovations(robot, data), data.rows, context.policy.residual_analysis)
+        for data in (context.split.validation, context.split.estimation)
+    )
+    return SearchRound(number, robot, tuple(accepted), rival, is_white)
+
+
+def score_candidates(context: IdentificationContext, search_round: SearchRound) -> tuple[list[CandidateScore], bool]:
+    """Score every hypothesis of a round, and tell whether all of the shortlist were fitted.
+
+    Those with a large enough predicted gain are fitted; with a rival only what comes near it to all samples.
+    """
+    policy, robot, accepted = context.policy, search_round.robot, search_round.accepted
+    label = f"round {search_round.number}"
+    context.progress(f"{label}: screening", 0.0)
+    predictions, rough_predictions = _predict_gains(context, search_round)
+    shortlisted = shortlist(predictions, rough_predictions, policy.score_test)
+    data = context.split.estimation
+    if not search_round.is_white:
+        coarse_data = data.first(policy.selection.coarse_samples)
+        predictions |= grid_search(context, robot, accepted, coarse_data, {h: predictions[h] for h in shortlisted})
+        data = coarse_data if search_round.rival else context.head
+    starts = {
+        h: starting_robots(robot, h, [p[h] for p in (predictions, rough_predictions) if h in p]) for h in shortlisted
+    }
+    # Far from noise the candidates need only be ranked against each other.
+    baseline = maximised_validation_likelihood(context, robot, accepted, -inf if search_round.is_white else inf)
+    min_log_likelihood = context.fitter.log_likelihood(robot, accepted, data)
+    tasks = search_round.tasks(starts, min_log_likelihood, policy.fit)
+    scores = fit_candidates(context, label, tasks, data, baseline, search_round.stops_at_first)
+    if not search_round.is_white:
+        if search_round.rival is None and not any(leaves_noise(context, score) for score in scores.values()):
+            tasks = search_round.tasks(search_round.larger_models(), min_log_likelihood, policy.fit)
+            scores |= fit_candidates(context, label, tasks, data, baseline)
+        tasks = search_round.refits(scores.values(), shortlisted, policy.selection, policy.fit.fine_cost_tolerance)
+        scores |= fit_candidates(context, f"{label}, all of it", tasks, context.split.estimation, baseline)
+    context.progress(f"{label}: done", 1.0)
+    unfitted = [unfitted_score(robot, h, predictions[h]) for h in predictions if h not in scores]
+    return [*scores.values(), *unfitted], not search_round.stops_at_first or scores.keys() >= set(shortlisted)
+
+
+def _predict_gains(context: IdentificationContext, search_round: SearchRound) -> tuple[Predictions, Predictions]:
+    """Predicted gains of a round's candidates, and with process noise, where the model is far from noise."""
+    robot, accepted = search_round.robot, search_round.accepted
+    candidates = search_round.candidates(context.robot)
+    # A model far from noise shows it in a part of the recording; a model near noise needs all of it.
+    data = context.split.estimation if search_round.is_white else context.head
+    predictions = score_test_in_workers(context, robot, accepted, candidates, data)
+    predictions |= grid_search(context, robot, accepted, data, zero_slope_predictions(predictions))
+    if search_round.is_white:
+        return predictions, {}
+    density = context.policy.score_test.rough_noise_density
+    return predictions, score_test_in_workers(context, robot, accepted, candidates, data, density)
+
+
+@dataclass
+class _BackwardElimination:
+    """Backward elimination: each accepted hypothesis against its best alternatives, and against its absence.
+
+    It is dropped where it is not needed, and replaced by an alternative that explains more, or as much with fewer
+    parameters.
+    """
+
+    context: IdentificationContext
+    accepted: list[Hypothesis]
+    current: Fit
+    candidates: list[Candidate]
+    complete_rounds: dict[tuple[Hypothesis, ...], list[CandidateScore]]
+    confusable: dict[Hypothesis, list[str]] = field(default_factory=dict)
+    evidences: dict[Hypothesis, float] = field(default_factory=dict)
+    swaps: int = 0
 
     def run(self) -> SelectionResult:
-        """The whole search."""
-        accepted: list[Hypothesis] = []
-        current = self._fit(accepted)
-        candidates: list[Candidate] = []
-        for round_number in range(1, MAX_ROUNDS + 1):
-            scores = self._score_candidates(round_number, current.robot, accepted)
-            best = most_parsimonious(scores)
-            significant = best is not None and best.evidence > self.threshold
-            candidates += [trial.candidate(round_number, significant and trial is best) for trial in scores]
-            if best is None or not significant:
-                break
-            accepted = with_hypothesis(accepted, best.hypothesis)
-            current = best.fit
-        return self._backward_elimination(accepted, current, candidates)
-
-    def _fit(self, chosen: Sequence[Hypothesis], start: Robot | None = None, coarse: bool = False) -> Fit:
-        """Fit of the chosen hypotheses, from the values of a robot that has them; coarse on a part of the samples."""
-        robot = self.robot
-        for hypothesis in chosen:
-            robot = robot.with_effect(setting_of(start, hypothesis) if start else hypothesis.setting(robot))
-        data = self.split.estimation.head if coarse else self.split.estimation
-        return self.fitter.fit_from(
-            [robot], chosen, data, -inf, COARSE_COST_TOLERANCE if coarse else FINE_COST_TOLERANCE
-        )
-
-    def _maximised_validation_likelihood(self, robot: Robot, chosen: Sequence[Hypothesis], reference: float) -> float:
-        """Maximised log-likelihood of the validation data, as the denominator of an e-value must be.
-
-        Coarse where it stays below ``reference`` by more than the fit's cost tolerance can be wrong.
-        """
-        validation = self.split.validation
-        if not chosen:
-            return self._log_likelihood(robot, chosen, validation)
-        for stop in (COARSE_COST_TOLERANCE, FINE_COST_TOLERANCE):
-            robot = self.fitter.fit_from([robot], chosen, validation, -inf, stop).robot
-            log_likelihood = self._log_likelihood(robot, chosen, validation)
-            if reference - log_likelihood > COARSE_TIE_NATS + COARSE_TIE_SHARE * abs(log_likelihood):
-                break
-        return log_likelihood
-
-    def _log_likelihood(self, robot: Robot, chosen: Sequence[Hypothesis], data: DataSet) -> float:
-        return self.fitter.judged(robot, chosen, data).log_likelihood(data.rows)
-
-    def _alternatives(
-        self, round_number: int, robot: Robot, accepted: list[Hypothesis], score: CandidateScore
-    ) -> list[CandidateScore]:
-        """Scores of the alternatives to one hypothesis beside the accepted ones."""
-        scores = self._scores.get(tuple(accepted))
-        if scores is not None:
-            return [trial for trial in scores if not trial.hypothesis.overlaps(score.hypothesis)]
-        return self._score_candidates(round_number, robot, accepted, score)
-
-    def _score_candidates(
-        self, round_number: int, robot: Robot, accepted: list[Hypothesis], rival: CandidateScore | None = None
-    ) -> list[CandidateScore]:
-        """Score every hypothesis beside the accepted ones; those with a large enough predicted gain are fitted.
-
-        With a ``rival`` only what comes near it is fitted to all samples. Without one, and beside others, the first
-        that leaves noise is enough: alternatives to all accepted ones are tried later.
-        """
-        validation, estimation = self.split.validation, self.split.estimation
-        excluded = [*accepted, rival.hypothesis] if rival else accepted
-        candidates = [h for h in hypotheses(self.robot) if not any(a.overlaps(h) for a in excluded)]
-        adequate = all(
-            residuals_are_white(self.fitter.innovations(robot, sample), sample.rows)
-            for sample in (validation, estimation)
-        )
-        # A model far from noise shows it in a part of the recording; a model near noise needs all of it.
-        screening_data = estimation if adequate else estimation.head
-        sample = screening_data if adequate or rival is None else estimation.first(COARSE_SAMPLES)
-        self.progress(f"round {round_number}: screening", 0.0)
-        predictions = score_test_in_workers(robot, accepted, candidates, self.fitter, screening_data, self.workers)
-        predictions |= grid_search(
-            robot, accepted, self.fitter, screening_data, zero_slope_predictions(predictions), self.workers
-        )
-        rough_predictions = (
-            {}
-            if adequate
-            else score_test_in_workers(
-                robot, accepted, candidates, self.fitter, screening_data, self.workers, SCREENING_NOISE_DENSITY
-            )
-        )
-        shortlisted = shortlist(predictions, rough_predictions)
-        if not adequate:
-            coarse_data, shortlisted_predictions = (
-                estimation.first(COARSE_SAMPLES),
-                {h: predictions[h] for h in shortlisted},
-            )
-            predictions |= grid_search(robot, accepted, self.fitter, coarse_data, shortlisted_predictions, self.workers)
-        starts = {
-            h: self._start_robots(robot, h, [p[h] for p in (predictions, rough_predictions) if h in p])
-            for h in shortlisted
-        }
-        # Far from noise the candidates need only be ranked against each other.
-        baseline = self._maximised_validation_likelihood(robot, accepted, -inf if adequate else inf)
-        min_log_likelihood = self._log_likelihood(robot, accepted, sample)
-        stop_at_first = bool(accepted) and rival is None and not adequate
-        scores = self._fit_candidates(
-            round_number, accepted, starts, sample, min_log_likelihood, baseline, stop_at_first
-        )
-        if not adequate and rival is None and not any(trial.mean_square < MAX_NOISE_MEAN_SQUARE for trial in scores):
-            larger = [*with_larger_forms(accepted), *split_by_cable(accepted)]
-            starts = {h: (robot.with_effect(h.setting(robot)),) for h in larger}
-            scores += self._fit_candidates(round_number, accepted, starts, sample, min_log_likelihood, baseline)
-        if not adequate:
-            scores = self._refit_best(
-                round_number, accepted, scores, () if rival else shortlisted[:ALWAYS_REFITTED], baseline, rival
-            )
-        self.progress(f"round {round_number}: done", 1.0)
-        fitted = {trial.hypothesis for trial in scores}
-        scores += [unfitted_score(robot, h, predictions[h]) for h in predictions if h not in fitted]
-        if not stop_at_first or fitted.issuperset(shortlisted):
-            self._scores[tuple(accepted)] = scores
-        return scores
-
-    def _fit_candidates(
-        self,
-        round_number: int,
-        accepted: list[Hypothesis],
-        starts: Mapping[Hypothesis, tuple[Robot, ...]],
-        data: DataSet,
-        min_log_likelihood: float,
-        baseline: float,
-        stop_at_first: bool = False,
-    ) -> list[CandidateScore]:
-        cost_tolerance = FINE_COST_TOLERANCE if data is self.split.estimation else COARSE_COST_TOLERANCE
-        tasks = {
-            h: FitTask(tuple(with_hypothesis(accepted, h)), starts[h], min_log_likelihood, cost_tolerance)
-            for h in starts
-        }
-        scores = self._run_fits(f"round {round_number}", tasks, data, baseline, stop_at_first)
-        return [scores[hypothesis] for hypothesis in starts if hypothesis in scores]
-
-    def _start_robots(
-        self, robot: Robot, hypothesis: Hypothesis, predictions: Sequence[PredictedGain]
-    ) -> tuple[Robot, ...]:
-        default_setting = hypothesis.setting(robot)
-        predicted_settings = [
-            EffectSetting(default_setting.name, {**default_setting.values, **p.values}, default_setting.cables)
-            for p in predictions
-        ]
-        return tuple(robot.with_effect(setting) for setting in (*predicted_settings, default_setting))
-
-    def _refit_best(
-        self,
-        round_number: int,
-        accepted: list[Hypothesis],
-        scores: list[CandidateScore],
-        always_refitted: Sequence[Hypothesis],
-        baseline: float,
-        rival: CandidateScore | None,
-    ) -> list[CandidateScore]:
-        """The best candidates refitted to all samples."""
-        top = max((trial.evidence for trial in (*scores, *([rival] if rival else []))), default=0.0)
-        min_evidence = top - COARSE_TIE_NATS - COARSE_TIE_SHARE * abs(top)
-        selected = [trial for trial in scores if trial.evidence >= min_evidence or trial.hypothesis in always_refitted]
-        tasks = {
-            t.hypothesis: FitTask(
-                tuple(with_hypothesis(accepted, t.hypothesis)), (t.fit.robot,), -inf, FINE_COST_TOLERANCE
-            )
-            for t in selected
-        }
-        refitted = self._run_fits(f"round {round_number}, all of it", tasks, self.split.estimation, baseline)
-        return [refitted.get(trial.hypothesis, trial) for trial in scores]
-
-    def _run_fits(
-        self,
-        label: str,
-        tasks: Mapping[Hypothesis, FitTask],
-        data: DataSet,
-        baseline: float,
-        stop_at_first: bool = False,
-    ) -> dict[Hypothesis, CandidateScore]:
-        """Scores of the hypotheses of some tasks, without those that the cables cannot hold.
-
-        With ``stop_at_first`` only until one leaves noise.
-        """
-        order = list(tasks)
-        scores = {}
-        with closing(self._submit_fits(list(tasks.values()), data)) as attempts:
-            for done, (index, validated) in enumerate(attempts, start=1):
-                hypothesis = order[index]
-                self.progress(f"{label}: {hypothesis.label(self.robot)}", done / len(order))
-                if validated is not None:
-                    gain = validated.log_likelihood - baseline
-                    scores[hypothesis] = CandidateScore(hypothesis, validated.fit, gain, validated.mean_square)
-                if stop_at_first and validated is not None and validated.mean_square < MAX_NOISE_MEAN_SQUARE:
-                    break
-        return scores
-
-    def _submit_fits(self, tasks: list[FitTask], data: DataSet) -> Generator[tuple[int, ValidatedFit | None]]:
-        validation = self.split.validation
-        if self.workers.processes == 1:
-            return self.workers.map_unordered(
-                partial(fit_and_validate, self.fitter), [(task, data, validation) for task in tasks]
-            )
-        return self.workers.map_unordered(
-            fit_and_validate_in_worker, [(self.fitter.noise, task, data, validation) for task in tasks]
-        )
-
-    def _backward_elimination(
-        self, accepted: list[Hypothesis], current: Fit, candidates: list[Candidate]
-    ) -> SelectionResult:
-        """Backward elimination: each accepted hypothesis against its best alternatives, and against its absence.
-
-        It is dropped where it is not needed, and replaced by an alternative that explains more, or as much with fewer
-        parameters.
-        """
-        confusable: dict[Hypothesis, list[str]] = {}
-        evidences: dict[Hypothesis, float] = {}
-        pending = list(accepted)
-        swaps = 0
-        reported = set(self._scores)
+        policy = self.context.policy.selection
+        pending = list(self.accepted)
+        reported = set(self.complete_rounds)
         while pending:
             tested = pending.pop(0)
-            others = [a for a in accepted if a is not tested]
-            without = self._fit(others, current.robot, coarse=True)
-            score = CandidateScore(tested, current, self._evidence(current, accepted, without, others), float("nan"))
-            if score.evidence < self.threshold:
-                accepted, current, pending = others, self._fit(others, without.robot), list(others)
+            others = [a for a in self.accepted if a is not tested]
+            without = fit_model(self.context, others, self.current.robot, coarse=True)
+            score = CandidateScore(tested, self.current, self._evidence(without, others), float("nan"))
+            if score.evidence < self.context.evidence_threshold():
+                self.accepted, self.current = others, fit_model(self.context, others, without.robot)
+                pending = list(others)
                 continue
-            round_number = MAX_ROUNDS + 1 + len(evidences) + swaps
-            alternatives = self._alternatives(round_number, without.robot, others, score)
-            best = most_parsimonious([score, *alternatives])
-            candidates += [t.candidate(round_number, t is best) for t in alternatives if tuple(others) not in reported]
+            number = policy.max_rounds + 1 + len(self.evidences) + self.swaps
+            alternatives = self._alternatives(number, without.robot, others, score)
+            best = most_parsimonious([score, *alternatives], policy)
+            if tuple(others) not in reported:
+                self.candidates += [t.candidate(number, t is best) for t in alternatives]
             reported.add(tuple(others))
-            if best is not None and best is not score and swaps < MAX_SWAPS:
-                accepted, current = with_hypothesis(others, best.hypothesis), best.fit
-                pending = [a for a in accepted if a is not accepted[-1]]
-                tested, score, swaps = accepted[-1], best, swaps + 1
-            evidences[tested] = score.evidence
-            names = {t.hypothesis.effect.name for t in alternatives if score.is_confusable_with(t)}
-            confusable[tested] = sorted(names - {tested.effect.name})
+            if best is not None and best is not score and self.swaps < policy.max_swaps:
+                self.accepted, self.current = with_hypothesis(others, best.hypothesis), best.fit
+                pending = [a for a in self.accepted if a is not self.accepted[-1]]
+                tested, score, self.swaps = self.accepted[-1], best, self.swaps + 1
+            self.evidences[tested] = score.evidence
+            names = {t.hypothesis.effect.name for t in alternatives if score.is_confusable_with(t, policy)}
+            self.confusable[tested] = sorted(names - {tested.effect.name})
         return SelectionResult(
-            tuple(accepted),
-            tuple(evidences[a] for a in accepted),
-            current,
-            tuple(candidates),
-            tuple((a.effect.name, other) for a in accepted for other in confusable[a]),
+            tuple(self.accepted),
+            tuple(self.evidences[a] for a in self.accepted),
+            self.current,
+            tuple(self.candidates),
+            tuple((a.effect.name, other) for a in self.accepted for other in self.confusable[a]),
         )
 
-    def _evidence(self, fit: Fit, chosen: Sequence[Hypothesis], without: Fit, others: Sequence[Hypothesis]) -> float:
-        """Log-likelihood ratio on validation data of all chosen hypotheses against the others at their best there."""
-        log_likelihood = self._log_likelihood(fit.robot, chosen, self.split.validation)
-        return log_likelihood - self._maximised_validation_likelihood(
-            without.robot, others, log_likelihood - self.threshold
+    def _alternatives(
+        self, number: int, robot: Robot, others: Sequence[Hypothesis], tested: CandidateScore
+    ) -> list[CandidateScore]:
+        """Scores of the alternatives to one hypothesis beside the others."""
+        known = self.complete_rounds.get(tuple(others))
+        if known is not None:
+            return [score for score in known if not score.hypothesis.overlaps(tested.hypothesis)]
+        scores, _ = score_candidates(self.context, _search_round(self.context, number, robot, others, tested))
+        self.complete_rounds[tuple(others)] = scores
+        return scores
+
+    def _evidence(self, without: Fit, others: Sequence[Hypothesis]) -> float:
+        """Log-likelihood ratio on validation data of all accepted hypotheses against the others at their best there."""
+        validation = self.context.split.validation
+        log_likelihood = self.context.fitter.log_likelihood(self.current.robot, self.accepted, validation)
+        return log_likelihood - maximised_validation_likelihood(
+            self.context, without.robot, others, log_likelihood - self.context.evidence_threshold()
         )
-
-
-def select_effects(
-    robot: Robot,
-    fitter: Fitter,
-    split: DataSplit,
-    alpha: float,
-    progress: Progress,
-    workers: WorkerPool | None = None,
-) -> SelectionResult:
-    """Select the effects that a model lacks; see :class:`StepwiseSelection`."""
-    return StepwiseSelection(robot, fitter, split, alpha, progress, workers).run()

@@ -134,8 +134,8 @@ class ConfusableEffect:
 class Identifiability:
     """Identifiability: what one recording could have shown beside the accepted effects."""
 
-    detectable: tuple[Detectable, ...]
-    confusable: tuple[ConfusableEffect, ...]
+    detectable: tuple[Detectable, ...] = ()
+    confusable: tuple[ConfusableEffect, ...] = ()
 
 
 @dataclass(frozen=True)

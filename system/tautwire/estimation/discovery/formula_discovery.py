@@ -21,7 +21,7 @@ from ...errors import UnreachableError
 from ...robot.schema import Formula, Robot
 from ..estimation_data import DataSet, DataSplit
 from ..hypotheses import Hypothesis
-from ..parameter_fit import FINE_COST_TOLERANCE, Fit, Fitter, NoFitError
+from ..parameter_fit import Fit, Fitter, NoFitError
 from ..residual_analysis import residuals_are_white
 from ..residual_spectrum import spectral_lines
 from .candidate_terms import Term, candidate_terms, numeric_formulas, parametrised_formulas, shape_names
@@ -154,7 +154,7 @@ def _fit_terms(
         for s in STEP_FRACTIONS
     ]
     starts = [replace(robot, formulas=(*fixed_formulas, *parametrised_formulas(step))) for step in steps]
-    fit = fitter.fit_from(starts, accepted, sample, min_log_likelihood, FINE_COST_TOLERANCE)
+    fit = fitter.fit_from(starts, accepted, sample, min_log_likelihood)
     numbers = _formula_numbers(fit.robot.formulas)
     names = shape_names(list(terms))
     fitted_terms = {

@@ -2,23 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import dataclass
-from math import log
 
-from ...robot.schema import Robot
-from ..estimation_data import DataSplit
-from ..hypotheses import hypotheses
-from ..kalman_filter import Noise
-from ..parameter_fit import Fitter, worker_fitter
+from ..identification_context import IdentificationContext, no_progress
 from ..stepwise_selection import SelectionResult
 from ..trace_result import Resonance
-from ..worker_pool import WorkerPool
 from .candidate_terms import formula_text
 from .formula_discovery import Discovery, discover_formula
 from .hidden_resonances import find_resonances
-
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
@@ -30,20 +21,14 @@ class UnexplainedResidual:
     notes: tuple[str, ...] = ()
 
 
-def explain_residual(
-    robot: Robot,
-    selection: SelectionResult,
-    fitter: Fitter,
-    evidence: DataSplit,
-    alpha: float,
-    progress: Progress,
-    workers: WorkerPool,
-) -> UnexplainedResidual:
+def explain_residual(context: IdentificationContext, selection: SelectionResult) -> UnexplainedResidual:
     """Analyse the residual of a robot that known effects do not explain; ``selection`` are those that come closest."""
+    robot, fitter, evidence, workers = context.robot, context.fitter, context.split, context.workers
+    beside = (selection.fit.robot, selection.accepted, fitter, evidence)
     runs_in_parallel = selection.accepted and workers.processes > 1
-    pending = workers.submit(_discover_beside_effects, fitter.noise, selection, evidence) if runs_in_parallel else None
-    threshold = log((len(hypotheses(robot)) + 1) / alpha)
-    formula = _if_accepted(discover_formula(robot, (), fitter, evidence, progress), threshold)
+    pending = workers.submit(discover_formula, *beside, no_progress) if runs_in_parallel else None
+    threshold = context.evidence_threshold(others=1)
+    formula = _if_accepted(discover_formula(robot, (), fitter, evidence, context.progress), threshold)
     if formula is not None and formula.residuals_are_white:
         return UnexplainedResidual(formula)
     # Effects that only come closest may have absorbed the resonance.
@@ -55,14 +40,10 @@ def explain_residual(
         description = formula_text(robot, formula.formulas)
         notes.append(f"a formula explains part of the residual, not all of it: {description}")
     if pending is not None:
-        progress("looking for a formula beside effects", 0.0)
+        context.progress("looking for a formula beside effects", 0.0)
         joint_formula = pending.result()
     else:
-        joint_formula = (
-            discover_formula(selection.fit.robot, selection.accepted, fitter, evidence, progress)
-            if selection.accepted
-            else None
-        )
+        joint_formula = discover_formula(*beside, context.progress) if selection.accepted else None
     joint_formula = _if_accepted(joint_formula, threshold)
     if joint_formula is not None and joint_formula.residuals_are_white:
         names = " and ".join(hypothesis.label(robot) for hypothesis in selection.accepted)
@@ -71,13 +52,6 @@ def explain_residual(
             f"a formula together with {names} leaves noise, but either may stand for something else: {description}"
         )
     return UnexplainedResidual(None, lines, tuple(notes))
-
-
-def _discover_beside_effects(noise: Noise, selection: SelectionResult, evidence: DataSplit) -> Discovery | None:
-    """Discover a formula beside the closest effects, in a worker process with its own fitter."""
-    return discover_formula(
-        selection.fit.robot, selection.accepted, worker_fitter(noise), evidence, lambda what, done: None
-    )
 
 
 def _if_accepted(discovery: Discovery | None, threshold: float) -> Discovery | None:

@@ -1,0 +1,103 @@
+"""Fits of a selection's candidates, in worker processes, and their validation on other data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from contextlib import closing
+from dataclasses import dataclass
+from math import inf
+
+import numpy as np
+
+from ..errors import UnreachableError
+from ..robot.schema import Robot
+from .candidate_proposals import FitTask
+from .candidate_scores import CandidateScore, setting_of
+from .estimation_data import DataSet
+from .hypotheses import Hypothesis
+from .identification_context import IdentificationContext
+from .parameter_fit import Fit, Fitter, NoFitError
+
+
+@dataclass(frozen=True)
+class ValidatedFit:
+    """A fit with its validation: log-likelihood and mean square of the innovations on validation data."""
+
+    fit: Fit
+    log_likelihood: float
+    mean_square: float
+
+
+def fit_and_validate(fitter: Fitter, task: FitTask, data: DataSet, validation: DataSet) -> ValidatedFit | None:
+    """Fit and validate a task; None where the cables cannot hold the platform, or nothing finite comes out."""
+    try:
+        fit = fitter.fit_from(task.starts, task.chosen, data, task.min_log_likelihood, task.cost_tolerance)
+        innovations = fitter.judged(fit.robot, task.chosen, validation)
+    except (UnreachableError, NoFitError):
+        return None
+    log_likelihood = innovations.log_likelihood(validation.rows)
+    mean_square = float(np.nanmean(innovations.mean_square(validation.rows)))
+    return ValidatedFit(fit, log_likelihood, mean_square) if np.isfinite(log_likelihood) else None
+
+
+def fit_candidates(
+    context: IdentificationContext,
+    label: str,
+    tasks: Mapping[Hypothesis, FitTask],
+    data: DataSet,
+    baseline: float,
+    stop_at_first: bool = False,
+) -> dict[Hypothesis, CandidateScore]:
+    """Scores of the hypotheses of some tasks, in their order, without those that the cables cannot hold.
+
+    ``baseline`` is the log-likelihood of the validation data without them. With ``stop_at_first`` only until one
+    leaves noise.
+    """
+    order, scores = list(tasks), {}
+    calls = [(context.fitter, task, data, context.split.validation) for task in tasks.values()]
+    with closing(context.workers.map_unordered(fit_and_validate, calls)) as attempts:
+        for done, (index, validated) in enumerate(attempts, start=1):
+            hypothesis = order[index]
+            context.progress(f"{label}: {hypothesis.label(context.robot)}", done / len(order))
+            if validated is None:
+                continue
+            gain = validated.log_likelihood - baseline
+            scores[hypothesis] = CandidateScore(hypothesis, validated.fit, gain, validated.mean_square)
+            if stop_at_first and leaves_noise(context, scores[hypothesis]):
+                break
+    return {hypothesis: scores[hypothesis] for hypothesis in order if hypothesis in scores}
+
+
+def leaves_noise(context: IdentificationContext, score: CandidateScore) -> bool:
+    """Whether the innovations of a candidate are about as small as noise."""
+    return score.mean_square < context.policy.selection.max_noise_mean_square
+
+
+def fit_model(
+    context: IdentificationContext, chosen: Sequence[Hypothesis], start: Robot | None = None, coarse: bool = False
+) -> Fit:
+    """Fit of the chosen hypotheses, from the values of a robot that has them; coarse on a part of the samples."""
+    robot, policy = context.robot, context.policy.fit
+    for hypothesis in chosen:
+        robot = robot.with_effect(setting_of(start, hypothesis) if start else hypothesis.setting(robot))
+    data = context.head if coarse else context.split.estimation
+    tolerance = policy.coarse_cost_tolerance if coarse else policy.fine_cost_tolerance
+    return context.fitter.fit_from([robot], chosen, data, -inf, tolerance)
+
+
+def maximised_validation_likelihood(
+    context: IdentificationContext, robot: Robot, chosen: Sequence[Hypothesis], reference: float
+) -> float:
+    """Maximised log-likelihood of the validation data, as the denominator of an e-value must be.
+
+    Coarse where it stays below ``reference`` by more than the fit's cost tolerance can be wrong.
+    """
+    fitter, validation, policy = context.fitter, context.split.validation, context.policy
+    if not chosen:
+        return fitter.log_likelihood(robot, chosen, validation)
+    for tolerance in (policy.fit.coarse_cost_tolerance, policy.fit.fine_cost_tolerance):
+        robot = fitter.fit_from([robot], chosen, validation, -inf, tolerance).robot
+        log_likelihood = fitter.log_likelihood(robot, chosen, validation)
+        if reference - log_likelihood > policy.selection.coarse_tie(log_likelihood):
+            break
+    return log_likelihood

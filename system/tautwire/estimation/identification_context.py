@@ -1,0 +1,47 @@
+"""Context of an identification: what each of its stages works with, and none of them changes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from functools import partial
+from math import log
+
+from ..robot.schema import Robot
+from .estimation_data import DataSet, DataSplit
+from .hypotheses import hypotheses
+from .parameter_fit import Fitter
+from .policy import DEFAULT_POLICY, IdentificationPolicy
+from .worker_pool import WorkerPool
+
+Progress = Callable[[str, float], None]
+
+
+def no_progress(activity: str, fraction: float) -> None:
+    """Discards the progress."""
+
+
+@dataclass(frozen=True)
+class IdentificationContext:
+    """Context of an identification.
+
+    ``robot`` is as declared, ``alpha`` the false-alarm rate; ``progress`` gets what is being done, and the share of it
+    that is done.
+    """
+
+    robot: Robot
+    fitter: Fitter
+    split: DataSplit
+    alpha: float = DEFAULT_POLICY.selection.false_alarm_rate
+    progress: Progress = no_progress
+    workers: WorkerPool = field(default_factory=partial(WorkerPool, 1))
+    policy: IdentificationPolicy = DEFAULT_POLICY
+
+    @property
+    def head(self) -> DataSet:
+        """The part of the estimation data that ranks hypotheses."""
+        return self.split.estimation.head(self.policy.fit)
+
+    def evidence_threshold(self, others: int = 0) -> float:
+        """Log-likelihood ratio, ``ln(n / alpha)``, above which one of n hypotheses, and ``others``, is significant."""
+        return log((len(hypotheses(self.robot)) + others) / self.alpha)
