@@ -15,7 +15,7 @@ class CountedEstimate(InterpolationErrorEstimate):
 
     count = 0
 
-    def max_error(self, begun: np.ndarray, shown: np.ndarray, step: float) -> float:
+    def max_error(self, outputs_at_start: np.ndarray, outputs: np.ndarray, step: float) -> float:
         self.count += 1
         return super().max_error(outputs_at_start, outputs, step)
 

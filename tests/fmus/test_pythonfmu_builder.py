@@ -94,7 +94,7 @@ try:
     with installed_builder(Path({str(tmp_path)!r}), ["none"]):
         pass
 except FmuLibraryError as error:
-    assert error.place == bare and "install it again" in str(error)
+    assert error.folder == bare and "install it again" in str(error)
 else:
     raise SystemExit("not told")
 """
