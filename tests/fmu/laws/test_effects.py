@@ -20,7 +20,8 @@ from tautwire_fmu.laws.cable import (
 )
 from tautwire_fmu.laws.effects import ALL, ActiveEffect, Effect, Parameter
 from tautwire_fmu.laws.mathematics import COMPLEX_STEP, REAL, Mathematics, rate_of, with_rate
-from tautwire_fmu.laws.point_mass import PointMassConstants, acceleration
+from tautwire_fmu.laws.point_mass import PointMassConstants, acceleration, wrench
+from tautwire_fmu.laws.vectors import add
 from tautwire_fmu.units import UNITS
 from tests.support.effect_cases import CASES, Case
 
@@ -55,10 +56,11 @@ def shown(effects: tuple[ActiveEffect, ...], inner: float = 0.0) -> tuple[Any, .
     state = state_of(effects, inner)
     moving = cable_motion(REAL, CABLE, effects, state, span(REAL, CABLE, INPUTS, effects), INPUTS.winch_speed)
     none = tuple(() for _ in effects)
+    force = add((5.0, 6.0, 7.0), wrench(REAL, effects, none, INPUTS.position, INPUTS.velocity))
     return (
         cable_outputs(REAL, CABLE, effects, state, moving),
         state_rates(REAL, CABLE, effects, state, moving)[:2],
-        acceleration(REAL, PLATFORM, effects, none, INPUTS.position, INPUTS.velocity, (5.0, 6.0, 7.0)),
+        acceleration(REAL, PLATFORM, effects, none, force),
         stages.sensor_gains(REAL, effects),
         stages.sensor_delays(REAL, effects),
     )

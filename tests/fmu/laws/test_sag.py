@@ -56,7 +56,7 @@ def test_the_catenary_has_the_arc_and_the_ends_of_a_hanging_rope(across: float, 
     assert force[[0, 2]] == pytest.approx(exact.lower, rel=1e-8, abs=1e-7 * tension)
     assert tension + at_cell == pytest.approx(float(np.linalg.norm(exact.upper)), rel=1e-8)
     at_start = cable(tension)._replace(start_length=route.length, start_direction=route.direction)
-    now, before = SAG.sag(REAL, values, at_start, route, 0.0, 1e11, 0.0)
+    now, before = SAG.sag(REAL, values, at_start, route, 0.0, (1e11, 0.0))
     assert now == pytest.approx(before, rel=1e-12)
     assert np.exp(now) * route.length == pytest.approx(exact.arc, rel=1e-8)
 
