@@ -199,5 +199,6 @@ def test_rates_are_finite_at_rest_at_the_start(effect: Effect, present: bool) ->
         push = tuple(with_rate(0.0, float(axis == k)) for k in range(3))
         for inputs in (still._replace(position=push), still._replace(velocity=push)):
             assert np.isfinite([rate_of(force) for force in read(COMPLEX_STEP, effects, state, inputs).force]).all()
-    pushed = acceleration(COMPLEX_STEP, PLATFORM, effects, ((),), push, push, (0.0, 0.0, 0.0))
+    force = wrench(COMPLEX_STEP, effects, ((),), push, push)
+    pushed = acceleration(COMPLEX_STEP, PLATFORM, effects, ((),), force)
     assert np.isfinite([rate_of(a) for a in pushed]).all()
