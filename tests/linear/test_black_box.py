@@ -19,6 +19,7 @@ from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.linear import (
     BlackBoxPlant,
     IdentificationError,
+    PlantSignals,
     linearise,
     linearise_fmus,
     linearise_robot_fmus,
@@ -177,7 +178,7 @@ def test_a_chain_of_a_users_fmus_that_is_no_robot(tmp_path: Path) -> None:
     command, speed = Port("first", "speed_command"), Port("second", "winch_speed")
     chain = [Connection(Port("first", "winch_speed"), Port("second", "speed_command"))]
     make = partial(wired, {"first": path, "second": path}, chain, [command], lag=0.1)
-    found = linearise_fmus(make, {"command": command}, {"speed": speed})
+    found = linearise_fmus(make, PlantSignals({"command": command}, {"speed": speed}))
     assert found.system.nstates == 2
     assert found.system.poles().real == pytest.approx([-10.0, -10.0], rel=1e-3)
     s = 1j * np.geomspace(0.1, 100.0, 10)
@@ -188,7 +189,7 @@ def test_a_chain_of_a_users_fmus_that_is_no_robot(tmp_path: Path) -> None:
 def test_states_may_be_named_in_any_system(tmp_path: Path) -> None:
     make, command = one_winch(tmp_path)
     speed = Port("winch", "winch_speed")
-    system = linearise_fmus(make, {"c": command}, {"v": speed}, {"v": speed}).system
+    system = linearise_fmus(make, PlantSignals({"c": command}, {"v": speed}, {"v": speed})).system
     assert system.state_labels == ["v"]
     assert system.A[0, 0] == pytest.approx(-1.0 / LAG, rel=AGREES)
     assert system.B[0, 0] == pytest.approx(1.0 / LAG, rel=AGREES)
@@ -205,7 +206,7 @@ def test_a_start_that_is_not_at_rest_is_refused(tmp_path: Path) -> None:
     make, command = one_winch(tmp_path)
     speed = Port("winch", "winch_speed")
     with pytest.raises(IdentificationError, match=r"not at rest, winch\.winch_speed moves by"):
-        linearise_fmus(make, {"c": command}, {"v": speed}, rest_inputs={command: 1.0})
+        linearise_fmus(make, PlantSignals({"c": command}, {"v": speed}), rest_inputs={command: 1.0})
 
 
 @needs_compiler
@@ -213,7 +214,7 @@ def test_a_port_that_the_master_does_not_drive_is_refused(tmp_path: Path) -> Non
     make, _ = one_winch(tmp_path)
     speed = Port("winch", "winch_speed")
     with pytest.raises(IdentificationError, match=r"winch\.winch_speed is no driven input"):
-        linearise_fmus(make, {"v": speed}, {"v": speed})
+        linearise_fmus(make, PlantSignals({"v": speed}, {"v": speed}))
 
 
 @pytest.mark.validate

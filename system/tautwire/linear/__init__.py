@@ -1,6 +1,6 @@
 """The linearised plant: a python-control state space with named signals, its modes and figures."""
 
-from .black_box import BlackBoxPlant, linearise_fmus, linearise_robot_fmus
+from .black_box import BlackBoxPlant, PlantSignals, linearise_fmus, linearise_robot_fmus
 from .linear_plant import LinearPlant, linearise, minimal, model_document, transfer_function
 from .modes import Modes
 from .modes_along_path import ModesAlong, modes_along
@@ -15,6 +15,7 @@ __all__ = [
     "Modes",
     "ModesAlong",
     "OperatingPointError",
+    "PlantSignals",
     "bode_figure",
     "linearise",
     "linearise_fmus",

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any
@@ -36,6 +36,10 @@ Array = NDArray[np.float64]
 
 DEFAULT_STEP = 0.02
 DEFAULT_TOLERANCE = 1e-6
+INPUT_VARIABLES = ("winch_speed", "speed_command")
+OUTPUT_VARIABLES = ("position", "measured_position", "velocity", "tension", "length", "winch_speed")
+EFFECT_PREFIX = "effect."
+MEASURED_PREFIX = "measured_"
 
 
 @dataclass(frozen=True)
@@ -56,11 +60,22 @@ class BlackBoxPlant:
     notes: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True)
+class PlantSignals:
+    """Ports of a system of FMUs by the plant's signal names.
+
+    ``inputs`` are some of its external inputs, ``outputs`` any variables of its FMUs, ``states`` those variables,
+    outputs or locals, that are its states, None where they are not shown.
+    """
+
+    inputs: Mapping[str, Port]
+    outputs: Mapping[str, Port]
+    states: Mapping[str, Port] | None = None
+
+
 def linearise_fmus(
     make_coupling: CouplingFactory,
-    inputs: Mapping[str, Port],
-    outputs: Mapping[str, Port],
-    states: Mapping[str, Port] | None = None,
+    signals: PlantSignals,
     rest_inputs: Mapping[Port, float] | None = None,
     step: float = DEFAULT_STEP,
     tolerance: float = DEFAULT_TOLERANCE,
@@ -68,11 +83,9 @@ def linearise_fmus(
     """Linearises any coupled system of black-box FMUs about its start, where it rests, by pulse experiments.
 
     ``make_coupling()`` returns a context with the :class:`tautwire.cosimulation.CouplingGraph` of FMUs in
-    initialization mode.
-    ``inputs`` name some of its external inputs, ``outputs`` any variables of its FMUs, ``states`` those variables,
-    outputs or locals, that are its states; without them the states are coordinates ``x_1`` ..., as few as the
-    responses need. ``rest_inputs`` are the external inputs at rest, zero by default. External inputs that are rates of
-    others are not inputs here: they stay constant.
+    initialization mode. Without states in ``signals`` they are coordinates ``x_1`` ..., as few as the responses need.
+    ``rest_inputs`` are the external inputs at rest, zero by default. External inputs that are rates of others are not
+    inputs here: they stay constant.
 
     From the state at rest each input gets a pulse of one macro step, up and down, and the free response afterwards
     gives the transition matrix of one step; its logarithm over the step is A. That is repeated with half the step,
@@ -88,15 +101,16 @@ def linearise_fmus(
     Raises IdentificationError where the system is not at rest, or is not smooth there, the named states are
     incomplete, or no step is short enough; ComponentError where an FMU fails.
     """
-    state_names = tuple(states or ())
-    observed_ports = list(dict.fromkeys([*outputs.values(), *(states or {}).values()]))
-    signals = SignalIndices(
-        outputs=tuple(observed_ports.index(port) for port in outputs.values()),
-        states=None if states is None else tuple(observed_ports.index(port) for port in states.values()),
-        state_names=state_names,
+    states, inputs = signals.states or {}, list(signals.inputs)
+    observed_ports = list(dict.fromkeys([*signals.outputs.values(), *states.values()]))
+    indices = SignalIndices(
+        outputs=tuple(observed_ports.index(port) for port in signals.outputs.values()),
+        states=tuple(observed_ports.index(port) for port in states.values()) or None,
+        state_names=tuple(states),
     )
-    with pulse_experiment(make_coupling, rest_inputs or {}, list(inputs.values()), observed_ports) as experiment:
-        refined = refine_step(experiment, signals, step, tolerance)
+    input_ports = list(signals.inputs.values())
+    with pulse_experiment(make_coupling, rest_inputs or {}, input_ports, observed_ports) as experiment:
+        refined = refine_step(experiment, indices, step, tolerance)
     matrices = refined.matrices
     if matrices.residual > MAX_RELATIVE_ERROR:
         raise IdentificationError(
@@ -105,9 +119,9 @@ def linearise_fmus(
         )
     system = control.ss(
         *(getattr(matrices, name) for name in "ABCD"),
-        states=list(state_names) or [f"x_{k}" for k in range(1, len(matrices.A) + 1)],
-        inputs=list(inputs),
-        outputs=list(outputs),
+        states=list(states) or [f"x_{k}" for k in range(1, len(matrices.A) + 1)],
+        inputs=inputs,
+        outputs=list(signals.outputs),
         name="black_box",
     )
     return BlackBoxPlant(
@@ -116,7 +130,7 @@ def linearise_fmus(
         refined.error,
         matrices.state_scales,
         refined.responses.amplitudes,
-        _operating_point_notes(list(inputs), observed_ports, refined.responses),
+        _operating_point_notes(inputs, observed_ports, refined.responses),
     )
 
 
@@ -136,30 +150,12 @@ def _operating_point_notes(
     return tuple(notes)
 
 
-INPUT_VARIABLES = ("winch_speed", "speed_command")
-OUTPUT_VARIABLES = ("position", "measured_position", "velocity", "tension", "length", "winch_speed")
-EFFECT_PREFIX = "effect."
-MEASURED_PREFIX = "measured_"
+def robot_signals(fmus: RobotFmus) -> PlantSignals:
+    """The signals of :func:`tautwire.linear.linearise` in a robot's FMUs, and the states of the winches.
 
-
-@dataclass(frozen=True)
-class RobotSignals:
-    """Ports of a robot's FMUs by the plant's signal names; ``states`` is None if a cable is a user's FMU.
-
-    States are those of :func:`tautwire.linear.linearise` and of the winches; of a user's platform its motion, of a
-    user's winch its speed.
-    """
-
-    inputs: dict[str, Port]
-    outputs: dict[str, Port]
-    states: dict[str, Port] | None
-
-
-def robot_signals(fmus: RobotFmus) -> RobotSignals:
-    """The signals of :func:`tautwire.linear.linearise` in a robot's FMUs.
-
-    Winch FMUs have the input ``speed_command_i`` and the output ``winch_speed_i``; an external force is an input if
-    the platform has one. Outputs that an FMU lacks are left out.
+    Of a user's platform the states are its motion, of a user's winch its speed; there are none if a cable is a user's
+    FMU. Winch FMUs have the input ``speed_command_i`` and the output ``winch_speed_i``; an external force is an input
+    if the platform has one. Outputs that an FMU lacks are left out.
     """
     wiring = wire_fmus(fmus)
     platform = read_model_description(fmus.platform)
@@ -169,7 +165,7 @@ def robot_signals(fmus: RobotFmus) -> RobotSignals:
         p for p in force_ports if p.variable in variable_names
     ]
     outputs = [port for port in wiring.outputs if port.variable.partition(".")[0] in OUTPUT_VARIABLES]
-    return RobotSignals(
+    return PlantSignals(
         inputs={_signal_name(port): port for port in inputs},
         outputs={_signal_name(port): port for port in outputs},
         states=None if any(cable in fmus.user_start_values for cable in _cable_names(fmus)) else _state_ports(fmus),
@@ -192,14 +188,13 @@ def linearise_robot_fmus(
     """
     signals = robot_signals(fmus)
     force_ports = [port for port in signals.inputs.values() if port.component == PLATFORM]
-    selected_states = signals.states if states is None else _select_states(states, signals.states or {})
+    if states is not None:
+        signals = replace(signals, states=_select_states(states, signals.states or {}))
     make_coupling = partial(instantiate_robot, fmus, external_inputs=force_ports)
-    return linearise_fmus(
-        make_coupling, signals.inputs, signals.outputs, selected_states or None, step=step, tolerance=tolerance
-    )
+    return linearise_fmus(make_coupling, signals, step=step, tolerance=tolerance)
 
 
-def _select_states(names: Sequence[str], known: dict[str, Port]) -> dict[str, Port]:
+def _select_states(names: Sequence[str], known: Mapping[str, Port]) -> dict[str, Port]:
     for name in names:
         if name not in known:
             raise InputError("states", f"no FMU shows a state {name!r}", f"choose among {', '.join(known)}")

@@ -81,9 +81,8 @@ def _continuous(
     max_phase, min_decay = np.max(np.abs(np.angle(values)), initial=0.0), np.min(np.abs(values), initial=1.0)
     if max_phase > MAX_PHASE_PER_STEP or min_decay < MIN_DECAY_FACTOR:
         return None
-    A, order = np.real(logm(transition.T)) / responses.step, len(state_units)
-    augmented = np.block([[A, np.eye(order)], [np.zeros((order, 2 * order))]])
-    input_integral = expm(responses.step * augmented)[:order, order:]
+    A = np.real(logm(transition.T)) / responses.step
+    _, input_integral = zero_order_hold(A, responses.step)
     pulse_states = (
         np.linalg.solve(transition.T, states[0].T) if pulse_states is None else pulse_states / state_units[:, None]
     )
@@ -102,6 +101,14 @@ def _continuous(
             _relative_residual(_flatten(states) @ output_map, _flatten(scaled_outputs)),
         ),
     )
+
+
+def zero_order_hold(A: Array, step: float) -> tuple[Array, Array]:
+    """Transition matrix of a step (s), and the integral of it over the step, which constant inputs act through."""
+    order = len(A)
+    augmented = np.block([[A, np.eye(order)], [np.zeros((order, 2 * order))]])
+    exponential = expm(step * augmented)
+    return exponential[:order, :order], exponential[:order, order:]
 
 
 def _relative_residual(predicted: Array, observed: Array) -> float:

@@ -11,7 +11,7 @@ from scipy.linalg import expm
 
 from ..cosimulation import Port
 from .pulse_experiments import IdentificationError, PulseExperiment, Responses, measure_responses
-from .realisation import TINY, SignalIndices, StateSpaceMatrices, realise
+from .realisation import TINY, SignalIndices, StateSpaceMatrices, realise, zero_order_hold
 
 Array = NDArray[np.float64]
 
@@ -72,27 +72,25 @@ def refine_step(experiment: PulseExperiment, signals: SignalIndices, step: float
         if change <= tolerance or change > DIVERGENCE_FACTOR * best.error:
             break
     if first is None or best is None or best.error > MAX_RELATIVE_ERROR:
-        remaining_change = (
-            "" if best is None else f", at {best.step:.2g} s the matrices still change by {best.error:.2g}"
-        )
-        raise IdentificationError(
-            f"no step from {step:g} s down is short enough{remaining_change}", "begin with a shorter step"
-        )
+        raise _divergence(step, best)
     _require_prediction(best.matrices, first, signals, experiment.observed_ports)
     return best
+
+
+def _divergence(step: float, best: RefinedMatrices | None) -> IdentificationError:
+    change = "" if best is None else f", at {best.step:.2g} s the matrices still change by {best.error:.2g}"
+    return IdentificationError(f"no step from {step:g} s down is short enough{change}", "begin with a shorter step")
 
 
 def _require_prediction(
     matrices: StateSpaceMatrices, responses: Responses, signals: SignalIndices, observed_ports: Sequence[Port]
 ) -> None:
     """Requires that the matrices predict the longest experiment: short ones miss dead time and slow states."""
-    order, step = len(matrices.A), responses.step
-    augmented = np.block([[matrices.A, np.eye(order)], [np.zeros((order, 2 * order))]])
-    exponential = expm(step * augmented)
-    states = exponential[:order, order:] @ matrices.B * responses.amplitudes
+    transition, input_integral = zero_order_hold(matrices.A, responses.step)
+    states = input_integral @ matrices.B * responses.amplitudes
     free_response = []
     for _ in responses.free_response:
-        states = exponential[:order, :order] @ states
+        states = transition @ states
         free_response.append((matrices.C @ states).T)
     output_indices = list(signals.outputs)
     deviations = np.max(np.abs(np.array(free_response) - responses.free_response[:, :, output_indices]), axis=(0, 1))

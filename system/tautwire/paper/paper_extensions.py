@@ -222,9 +222,9 @@ def _relaxation_text(records: Records) -> str:
         "takes 50 s. With the relaxation model (fitted to Table 1 and the static test) in the FMUs, "
         f"{amplitudes[1]:.0f} % of the swing of r1 is left late in the ramp's hold, where the pair of section "
         f"4.3 leaves {amplitudes[0]:.0f} %; the paths are up to {gap:.1f} mm apart. On the helix the "
-        f"largest positioning error is {errors[1]:.1f} mm, with the constant pair {errors[0]:.1f} mm, with the quasi-static modulus "
-        f"{errors[2]:.1f} mm: there the rope is as soft as the static test says, and the dynamic modulus is the "
-        "wrong one."
+        f"largest positioning error is {errors[1]:.1f} mm, with the constant pair {errors[0]:.1f} mm, with the "
+        f"quasi-static modulus {errors[2]:.1f} mm: there the rope is as soft as the static test says, and the "
+        "dynamic modulus is the wrong one."
     )
 
 
