@@ -4,13 +4,16 @@ from __future__ import annotations
 
 import json
 import math
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 
 def json_value(value: Any) -> Any:
-    """The value with null for each number that is not finite and lists for tuples, in all mappings and lists."""
-    if isinstance(value, dict):
+    """The value with null for each number that is not finite and lists for tuples and arrays, also inside of others."""
+    if hasattr(value, "tolist"):  # an array or a number of NumPy
+        value = value.tolist()
+    if isinstance(value, Mapping):
         return {name: json_value(each) for name, each in value.items()}
     if isinstance(value, list | tuple):
         return [json_value(each) for each in value]

@@ -12,6 +12,7 @@ import pytest
 
 from tautwire.estimation.trace_result import Correlation, FittedParameter
 from tautwire.reports import trace_document
+from tautwire.robot.schema import Numbers
 from tests.support.traces import HOSTILE, made_trace, nothing_found, without_positions
 
 # The example of the agreed format, with one entry of each kind.
@@ -148,6 +149,7 @@ def test_plain_numbers_come_from_numpy_ones() -> None:
         evidence=np.float64(3.0),
         accepted=cast(bool, np.bool_(True)),
         cables=(np.int64(2),),
+        values=Numbers({"damping": np.float64(2.0)}),
     )
     noise = cast(bool, np.bool_(False))
     assert plain(trace_document(replace(trace, candidates=(candidate,), noise_before=noise, alpha=np.float64(0.01))))
