@@ -19,7 +19,7 @@ from ..robot.schema import fmu_slots
 from .console import AsJson, CommandOutput, Quiet, RobotFile, progress_bar, read_holdable_robot, relative_links
 
 if TYPE_CHECKING:
-    from ..fmus.fmu_slots import FmuPort
+    from ..fmus.fmu_ports import FmuPort
 
 NON_TERMINAL_WIDTH = 160
 PORT_COLUMNS = ("name", "causality", "unit", "start", "description")
@@ -149,7 +149,7 @@ def fmus(robot_file: RobotFile, as_json: AsJson = False, quiet: Quiet = False) -
 
     Example: tautwire fmus robot.toml
     """
-    from ..fmus.fmu_slots import fmu_ports
+    from ..fmus.fmu_ports import fmu_ports
     from ..fmus.packaging import build_fmus
 
     output = CommandOutput(as_json, quiet)
@@ -170,7 +170,7 @@ def fmus(robot_file: RobotFile, as_json: AsJson = False, quiet: Quiet = False) -
 
 def port_tables(ports: Mapping[str, Sequence[FmuPort]]) -> list[Table]:
     """Tables of the ports of each FMU; FMUs with the same ports share one, with the start values of the first."""
-    from ..fmus.fmu_slots import group_vectors
+    from ..fmus.fmu_ports import group_vectors
 
     slots_by_port_names: dict[tuple[str, ...], list[str]] = {}
     for slot, slot_ports in ports.items():

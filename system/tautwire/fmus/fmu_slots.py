@@ -1,9 +1,9 @@
-"""Ports of FMUs, and the slots of a robot that a user FMU can take."""
+"""The slots of a robot that a user FMU can take, and the ports that it must have there."""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 from pathlib import Path
 
 import fmpy
@@ -18,62 +18,6 @@ from .fmi_binding import is_real_scalar, type_name
 from .fmu_archive import ArchiveError, read_model_description
 from .fmu_variables import INPUT_TIME, Port
 from .variable_units import definition_from_exponents, same_unit, unit_definition, unit_of
-
-VECTOR_AXES = ("x", "y", "z")
-LISTED_CAUSALITIES = ("input", "output", "parameter")
-
-
-@dataclass(frozen=True)
-class FmuPort:
-    """Variable of an FMU in the terms of FMI; ``unit`` and ``start`` are None where none is stated."""
-
-    name: str
-    causality: str
-    variability: str
-    type: str
-    unit: str | None
-    start: str | None
-    description: str
-
-
-def fmu_ports(path: Path) -> tuple[FmuPort, ...]:
-    """Inputs, outputs and parameters of a readable FMU, in its own order."""
-    variables = read_model_description(path).modelVariables
-    return tuple(
-        FmuPort(
-            name=variable.name,
-            causality=variable.causality,
-            variability=variable.variability or "",
-            type=type_name(variable),
-            unit=unit_of(variable),
-            start=None if variable.start is None else str(variable.start),
-            description=variable.description or "",
-        )
-        for variable in variables
-        if variable.causality in LISTED_CAUSALITIES
-    )
-
-
-def group_vectors(ports: Sequence[FmuPort]) -> tuple[FmuPort, ...]:
-    """Ports with the three axes of each vector merged into one, for display."""
-    vectors: dict[str, list[FmuPort]] = {}
-    for port in ports:
-        stem, _, axis = port.name.rpartition(".")
-        vectors.setdefault(stem if axis in VECTOR_AXES else port.name, []).append(port)
-    return tuple(
-        _vector_port(stem, parts) if len(parts) == len(VECTOR_AXES) else parts[0] for stem, parts in vectors.items()
-    )
-
-
-def _vector_port(stem: str, parts: Sequence[FmuPort]) -> FmuPort:
-    starts = [f"{float(part.start):g}" for part in parts if part.start is not None]
-    return replace(
-        parts[0],
-        name=f"{stem}.x .y .z",
-        start=", ".join(starts) if starts else None,
-        description=parts[0].description.removesuffix(", x axis"),
-    )
-
 
 AXES = ("x", "y", "z")
 MAX_REASON_CHARACTERS = 200
@@ -105,34 +49,44 @@ def slot_ports(slot: str, cable_count: int) -> tuple[SlotPort, ...]:
     """Ports that connect the component in a slot with the others, and those that a run records."""
     kind = slot.partition("_")[0]
     if kind == "platform":
-        numbers = range(1, cable_count + 1)
-        return (
-            *_vector_ports("position", "output", "m"),
-            *_vector_ports("velocity", "output", "m/s"),
-            *_vector_ports("acceleration", "output", "m/s2", False),
-            *(port for i in numbers for port in _vector_ports(f"force_{i}", "input", "N")),
-            *(port for i in numbers for port in _vector_ports(f"force_rate_{i}", "input", "N/s", False)),
-            *_middle_motion_ports("output"),
-            *(port for i in numbers for port in _vector_ports(f"middle_force_{i}", "input", "N", False)),
-            *(port for i in numbers for port in _vector_ports(f"middle_force_rate_{i}", "input", "N/s", False)),
-        )
-    if kind == "cable":
-        return (
-            *_vector_ports("position", "input", "m"),
-            *_vector_ports("velocity", "input", "m/s"),
-            *_vector_ports("acceleration", "input", "m/s2", False),
-            SlotPort("winch_speed", "input", "m/s", True),
-            SlotPort("winch_acceleration", "input", "m/s2", False),
-            *_vector_ports("force", "output", "N"),
-            *_vector_ports("force_rate", "output", "N/s", False),
-            SlotPort("tension", "output", "N", False),
-            SlotPort("pull", "output", "N", False),
-            *(SlotPort(name, "output", "m", False) for name in ("length", "elongation")),
-            SlotPort("strain", "output", "1", False),
-            *_middle_motion_ports("input"),
-            *_vector_ports("middle_force", "output", "N", False),
-            *_vector_ports("middle_force_rate", "output", "N/s", False),
-        )
+        return _platform_ports(cable_count)
+    return _cable_ports() if kind == "cable" else _winch_ports()
+
+
+def _platform_ports(cable_count: int) -> tuple[SlotPort, ...]:
+    numbers = range(1, cable_count + 1)
+    return (
+        *_vector_ports("position", "output", "m"),
+        *_vector_ports("velocity", "output", "m/s"),
+        *_vector_ports("acceleration", "output", "m/s2", False),
+        *(port for i in numbers for port in _vector_ports(f"force_{i}", "input", "N")),
+        *(port for i in numbers for port in _vector_ports(f"force_rate_{i}", "input", "N/s", False)),
+        *_middle_motion_ports("output"),
+        *(port for i in numbers for port in _vector_ports(f"middle_force_{i}", "input", "N", False)),
+        *(port for i in numbers for port in _vector_ports(f"middle_force_rate_{i}", "input", "N/s", False)),
+    )
+
+
+def _cable_ports() -> tuple[SlotPort, ...]:
+    return (
+        *_vector_ports("position", "input", "m"),
+        *_vector_ports("velocity", "input", "m/s"),
+        *_vector_ports("acceleration", "input", "m/s2", False),
+        SlotPort("winch_speed", "input", "m/s", True),
+        SlotPort("winch_acceleration", "input", "m/s2", False),
+        *_vector_ports("force", "output", "N"),
+        *_vector_ports("force_rate", "output", "N/s", False),
+        SlotPort("tension", "output", "N", False),
+        SlotPort("pull", "output", "N", False),
+        *(SlotPort(name, "output", "m", False) for name in ("length", "elongation")),
+        SlotPort("strain", "output", "1", False),
+        *_middle_motion_ports("input"),
+        *_vector_ports("middle_force", "output", "N", False),
+        *_vector_ports("middle_force_rate", "output", "N/s", False),
+    )
+
+
+def _winch_ports() -> tuple[SlotPort, ...]:
     return (
         SlotPort("speed_command", "input", "m/s", True),
         SlotPort("speed_command_rate", "input", "m/s2", False),
