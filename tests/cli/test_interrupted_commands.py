@@ -314,7 +314,7 @@ def test_what_is_wrong_does_not_end_up_in_the_result(tmp_path: Path) -> None:
     assert (told.returncode, told.stdout) == (2, "")
 
 
-def test_a_held_folder_is_not_taken_for_a_leftover(tmp_path: Path) -> None:
+def test_a_locked_folder_is_not_taken_for_a_leftover(tmp_path: Path) -> None:
     left = tmp_path / f"{STAGING_PREFIX}0123456789ab"
     (left / "new").mkdir(parents=True)
     (left / "new" / "half").write_text("half")

@@ -51,7 +51,7 @@ def test_a_share_of_what_the_polynomials_miss_is_enough(estimate: CountedEstimat
     assert not is_unconverged(convergence, 0.99 * SHARE * MISSED)
 
 
-def test_what_is_far_off_is_not_looked_at_closely(estimate: CountedEstimate) -> None:
+def test_what_is_far_off_is_not_evaluated(estimate: CountedEstimate) -> None:
     convergence = criterion(estimate)
     is_unconverged(convergence, SHARE * MISSED)
     assert is_unconverged(convergence, 1.01 * MAX_TOLERANCE_GROWTH * SHARE * MISSED)
@@ -60,18 +60,18 @@ def test_what_is_far_off_is_not_looked_at_closely(estimate: CountedEstimate) -> 
     assert estimate.count == 2
 
 
-def test_a_step_of_another_length_is_looked_at_closely(estimate: CountedEstimate) -> None:
+def test_a_step_of_another_size_is_evaluated(estimate: CountedEstimate) -> None:
     convergence = criterion(estimate)
     is_unconverged(convergence, SHARE * MISSED)
     assert not is_unconverged(convergence, 20.0 * SHARE * MISSED, step=2.0 * STEP)
 
 
-def test_an_error_that_is_no_number_ends_redos(estimate: CountedEstimate) -> None:
+def test_an_error_that_is_no_number_ends_the_iteration(estimate: CountedEstimate) -> None:
     """It is refused where outputs are recorded, with the name of the FMU."""
     assert not is_unconverged(criterion(estimate), np.nan)
 
 
-def test_what_is_far_off_is_looked_at_when_no_redo_is_left(estimate: CountedEstimate) -> None:
+def test_what_is_far_off_is_evaluated_in_the_last_iteration(estimate: CountedEstimate) -> None:
     """Else a step at rest would hold those of a motion to what itself was allowed."""
     convergence = criterion(estimate)
     convergence.is_unconverged(1e-6, np.zeros(6), np.zeros(6), STEP)
@@ -81,7 +81,7 @@ def test_what_is_far_off_is_looked_at_when_no_redo_is_left(estimate: CountedEsti
     assert not is_unconverged(convergence, few)
 
 
-def test_behind_a_kink_what_was_allowed_does_not_count(estimate: CountedEstimate) -> None:
+def test_behind_an_event_the_allowed_error_is_reset(estimate: CountedEstimate) -> None:
     convergence = criterion(estimate)
     convergence.is_unconverged(1e-6, np.zeros(6), np.zeros(6), STEP)
     convergence.reset()

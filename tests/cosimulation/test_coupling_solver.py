@@ -43,7 +43,7 @@ def test_without_saved_states_it_goes_on_with_one_pass(three_fmus: RobotFmus) ->
         assert coupling.statistics.sweeps == coupling.statistics.steps
 
 
-def test_the_books_show_what_a_coupling_without_redo_makes(three_fmus: RobotFmus) -> None:
+def test_the_statistics_show_the_energy_of_a_coupling_without_iteration(three_fmus: RobotFmus) -> None:
     shares = []
     for can_redo in (True, False):
         with instantiate_robot(three_fmus) as graph:

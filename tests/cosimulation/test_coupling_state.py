@@ -25,7 +25,7 @@ def test_rollback_takes_back_all_but_the_sweeps() -> None:
     assert state.statistics == RunStatistics(steps=1, sweeps=7)
 
 
-def test_held_values_count_as_jumps_after_a_rollback() -> None:
+def test_sampled_outputs_count_as_jumps_after_a_rollback() -> None:
     history = restart_history(0.0, np.zeros(1))
     state = CouplingState(np.zeros(1), np.zeros(0), np.zeros(0), np.array([2.0]), RunStatistics(), history)
     state.restore(state.copy())

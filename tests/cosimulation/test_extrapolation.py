@@ -105,14 +105,14 @@ def test_a_memory_taken_back_predicts_the_same() -> None:
     assert np.array_equal(found[0], found[1])
 
 
-def test_the_middle_of_a_quintic_bends_nowhere() -> None:
+def test_a_quintic_has_no_error_at_mid_step() -> None:
     quintic = np.polynomial.Polynomial([1.0, -2.0, 3.0, 4.0, -5.0, 6.0])
     bends = InterpolationErrorEstimate([CHAIN, VALUE_ONLY], np.ones(6))
     begun, end = (shown(lambda at: [quintic.deriv(k)(at) for k in range(3)], time) for time in (0.2, 0.2 + STEP))
     assert bends.max_error(begun, end, STEP) < 1e-11
 
 
-def test_the_middle_bends_by_the_sixth_rate() -> None:
+def test_the_error_at_mid_step_is_that_of_the_sixth_derivative() -> None:
     bends = InterpolationErrorEstimate([CHAIN], np.array([1.0, 1e9, 1e9, 1.0, 1e9, 1e9]))
     begun, end = (shown(lambda at: [at**6, 6.0 * at**5, 30.0 * at**4], time) for time in (0.0, STEP))
     assert bends.max_error(begun, end, STEP) == pytest.approx(720.0 * STEP**6 / 46080.0)

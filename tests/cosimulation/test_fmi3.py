@@ -59,7 +59,7 @@ def test_the_same_winch_by_either_version_gives_the_same_figures(
 
 
 @needs_compiler
-def test_both_versions_run_side_by_side_and_watched(winch: Path, tmp_path: Path) -> None:
+def test_both_versions_run_side_by_side_and_isolated(winch: Path, tmp_path: Path) -> None:
     winches = {1: winch, 2: lag_winch(tmp_path)}
     here = moved(winches, tmp_path / "here")
     apart = moved(winches, tmp_path / "apart", patience=60.0)

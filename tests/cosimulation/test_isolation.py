@@ -182,7 +182,7 @@ def test_errors_of_the_run_arrive_as_they_were_raised(faulty: Path, numbers: Pat
     assert nothing_is_left(numbers)
 
 
-def test_what_fails_in_the_watching_process_ends_the_other(faulty: Path, numbers: Path) -> None:
+def test_what_fails_in_the_parent_process_ends_the_isolated_run(faulty: Path, numbers: Path) -> None:
     class Full(MemoryRecorder):
         def add(self, time: float, row: np.ndarray) -> None:
             raise OSError("no space left")
@@ -201,7 +201,7 @@ def same(motion: CosimulationResult, other: CosimulationResult) -> bool:
 
 
 @pytest.mark.parametrize("tolerance", [None, 1e-6])
-def test_a_watched_run_is_the_same_to_the_last_bit(three_fmus: RobotFmus, tolerance: float | None) -> None:
+def test_an_isolated_run_is_the_same_to_the_last_bit(three_fmus: RobotFmus, tolerance: float | None) -> None:
     times = np.linspace(0.0, 2.0, 41)
     speeds = np.sin(times)[:, None] * np.array([0.3, 0.25, -0.25])
     told: list[float] = []
@@ -259,7 +259,7 @@ run(Path(sys.argv[1]), patience=600.0)
 
 
 @pytest.mark.parametrize("ending", [signal.SIGINT, signal.SIGKILL])
-def test_ending_the_watching_process_ends_the_watched(
+def test_ending_the_parent_process_ends_the_isolated_run(
     faulty: Path, numbers: Path, monkeypatch: pytest.MonkeyPatch, ending: signal.Signals
 ) -> None:
     # Killed outright, nobody but the watched process can clean up; it needs its interpreter for that.

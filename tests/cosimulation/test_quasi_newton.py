@@ -24,7 +24,7 @@ def error_after(redos: int, secants: QuasiNewton, given: np.ndarray, matrix: np.
     return float(np.max(np.abs(passed(given, matrix) - solution)))
 
 
-def test_a_linear_coupling_of_three_is_solved_by_four_redos() -> None:
+def test_a_linear_coupling_of_three_is_solved_in_four_iterations() -> None:
     assert error_after(4, QuasiNewton(3), np.zeros(3)) < 1e-12
 
 
@@ -47,7 +47,7 @@ def test_passes_that_lead_away_are_solved_too() -> None:
     assert error_after(4, QuasiNewton(3), np.zeros(3), -3.0 * SLOWLY) < 1e-12
 
 
-def test_the_first_redo_of_all_is_a_plain_one() -> None:
+def test_the_first_iteration_is_a_fixed_point_step() -> None:
     secants = QuasiNewton(3)
     secants.begin_step()
     secants.update(np.zeros(3), passed(np.zeros(3)))
@@ -79,7 +79,7 @@ def test_what_is_not_learnt_yet_is_taken_for_an_error() -> None:
     assert secants.error_estimate() == pytest.approx(np.max(np.abs(OFFSET)))
 
 
-def test_lessons_are_kept_by_the_length_of_the_step() -> None:
+def test_secant_pairs_are_kept_by_step_size() -> None:
     lessons = QuasiNewtonHistory(3)
     long, short = lessons.for_step_size(0.1), lessons.for_step_size(0.05)
     assert long is not short

@@ -17,14 +17,14 @@ def test_energy_that_the_coupling_makes_is_told() -> None:
     assert "-0.011 J" in told and "1.1 %" in told
 
 
-def test_a_few_steps_at_corners_may_run_out_of_redos() -> None:
+def test_a_few_steps_at_corners_may_reach_the_iteration_limit() -> None:
     assert RunStatistics(steps=10, unconverged_steps=1).warnings() == ()
     (told,) = RunStatistics(steps=10, unconverged_steps=2).warnings()
     assert "in 2 of 10 steps" in told and "--step" in told
 
 
 @pytest.mark.parametrize(("redos", "settles"), [(8, True), (1, False)])
-def test_steps_that_are_too_long_for_their_redos_are_counted(redos: int, settles: bool, three_fmus: RobotFmus) -> None:
+def test_steps_that_do_not_converge_are_counted(redos: int, settles: bool, three_fmus: RobotFmus) -> None:
     with instantiate_robot(three_fmus) as graph:
         coupling = CouplingSolver(graph, SolverOptions(max_iterations=redos))
         end_error(coupling, 0.14)
@@ -32,7 +32,7 @@ def test_steps_that_are_too_long_for_their_redos_are_counted(redos: int, settles
         assert (coupling.statistics.warnings() == ()) is settles
 
 
-def test_steps_that_cannot_be_redone_are_told_elsewhere(three_fmus: RobotFmus) -> None:
+def test_steps_without_rollback_are_told_elsewhere(three_fmus: RobotFmus) -> None:
     """They are a fallback of their own."""
     with instantiate_robot(three_fmus) as graph:
         coupling = CouplingSolver(replace(graph, supports_rollback=False))

@@ -55,13 +55,13 @@ def test_steps_keep_their_order_over_a_cable_that_goes_slack(fmus: RobotFmus, ex
     assert coarse > 4.0 * fine
 
 
-def test_without_cuts_a_slack_cable_costs_the_order(fmus: RobotFmus, exact: np.ndarray) -> None:
+def test_without_event_location_a_slack_cable_costs_the_order(fmus: RobotFmus, exact: np.ndarray) -> None:
     shown, account = run(fmus, 0.01, cut=False)
     assert np.max(np.abs(shown - exact)) > 1e-5
     assert account.steps == 150
 
 
-def test_each_kink_costs_few_steps(fmus: RobotFmus) -> None:
+def test_each_event_costs_few_steps(fmus: RobotFmus) -> None:
     assert run(fmus, 0.01)[1].steps < 150 + 6 * 4
 
 

@@ -34,7 +34,7 @@ def system() -> tuple[dict[str, Any], list[Port], ZeroOrderHold]:
     return parts, shown, ZeroOrderHold(parts, shown)
 
 
-def test_only_discrete_outputs_are_held() -> None:
+def test_only_discrete_outputs_are_extrapolated_as_constants() -> None:
     _, _, held = system()
     assert held.ports == (Port("a", "rate"), Port("b", "mode"))
     shown = np.array([1.0, 2.0, 3.0, 4.0])

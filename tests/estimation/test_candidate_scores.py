@@ -33,7 +33,7 @@ def test_no_effect_takes_all_places() -> None:
     assert worth == [*damping[: ScoreTestPolicy.max_fits_per_effect], Hypothesis(BY_NAME["payload"], ())]
 
 
-def test_what_promises_next_to_nothing_is_not_fitted() -> None:
+def test_what_has_next_to_no_score_is_not_fitted() -> None:
     first, second, third = ONE_OF_EACH[:3]
     assert shortlist(
         {first: PredictedGain(1e4, {}), second: PredictedGain(100.0, {}), third: PredictedGain(300.0, {})}

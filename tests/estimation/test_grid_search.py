@@ -41,13 +41,13 @@ def test_a_softness_that_slopes_cannot_see_is_seen_by_a_run() -> None:
     assert found[SOFT].gain > slopes[VISCOUS].gain > 0.0
 
 
-def test_nothing_is_promised_where_nothing_is_hidden() -> None:
+def test_no_gain_is_predicted_where_nothing_is_hidden() -> None:
     context, _, sample = looked({})
     found = grid_search(context, context.robot, (), sample, {SOFT: PredictedGain(0.0, {})})
     assert found[SOFT].gain < 4.0
 
 
-def test_a_promise_that_a_run_holds_better_stays() -> None:
+def test_a_predicted_gain_that_a_fit_exceeds_stays() -> None:
     context, _, sample = looked({"hysteresis": {"force": 30.0, "yield_strain": 1e-4}})
     true = PredictedGain(1.0, {"force": 30.0, "yield_strain": 1e-4})
     assert grid_search(context, context.robot, (), sample, {STICKY: true}) == {STICKY: true}
@@ -57,7 +57,7 @@ def test_a_promise_that_a_run_holds_better_stays() -> None:
     assert better.gain > 1000.0
 
 
-def test_a_promise_that_cannot_be_run_gives_way(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_predicted_gain_that_cannot_be_fitted_is_dropped(monkeypatch: pytest.MonkeyPatch) -> None:
     context, fitter, sample = looked({"hysteresis": {"force": 30.0, "yield_strain": 1e-4}})
     judged = fitter.judged
 

@@ -74,7 +74,7 @@ def test_a_recording_that_starts_at_rest_does_not_start_in_motion(name: str) -> 
     assert with_motion_at_start(robot, noise, pair) == (noise, ())
 
 
-@pytest.mark.validate(but=["caroca"])
+@pytest.mark.validate
 @pytest.mark.parametrize("name", NAMES)
 def test_a_start_in_motion_leaves_noise_in_filter_and_co_simulation(name: str) -> None:
     pair = [cut(recorded(name, seed), BEGIN[name]) for seed in (1, 2)]

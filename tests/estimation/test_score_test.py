@@ -28,7 +28,7 @@ SPLIT = split_data(ROBOT, NOISE, RECORDING, None)
 SAMPLE = SPLIT.estimation
 
 
-def test_what_is_there_promises_most_and_its_values() -> None:
+def test_what_is_there_has_the_largest_score_and_its_values() -> None:
     found = score_test(ROBOT, (), hypotheses(ROBOT), Fitter(NOISE), SAMPLE)
     best = max(found, key=lambda hypothesis: found[hypothesis].gain)
     assert best.effect.name == "payload"
@@ -36,7 +36,7 @@ def test_what_is_there_promises_most_and_its_values() -> None:
 
 
 @pytest.mark.validate
-def test_workers_promise_the_same() -> None:
+def test_workers_compute_the_same_scores() -> None:
     damped = Hypothesis(BY_NAME["damping"], ROBOT.cable_numbers)
     robot, accepted = ROBOT.with_effect(damped.setting(ROBOT)), (damped,)
     others = [h for h in hypotheses(ROBOT) if not h.overlaps(damped)]
@@ -51,7 +51,7 @@ def test_workers_promise_the_same() -> None:
 
 
 @pytest.mark.validate
-def test_far_from_noise_a_rough_look_tells_what_slopes_do_not(tmp_path: Path) -> None:
+def test_far_from_noise_a_coarse_grid_tells_what_scores_do_not(tmp_path: Path) -> None:
     """After a second the oscillations of a platform a fifth lighter are out of phase with the model's."""
     robot_file, fit, check = planar_case(tmp_path, VERTICAL, {"payload": {"mass": -1.0}}, 1, preferred=30.0)
     robot = read_robot(robot_file)

@@ -133,7 +133,7 @@ def test_macro_step_within_a_sample_does_not_matter(three_example_fmus: RobotFmu
     assert thirds.position == pytest.approx(whole.position, abs=1e-9)
 
 
-def test_a_watched_run_gives_the_same(three: Robot, three_example_fmus: RobotFmus, controller: Path) -> None:
+def test_an_isolated_run_gives_the_same(three: Robot, three_example_fmus: RobotFmus, controller: Path) -> None:
     times = sample_times(0.01, 0.5)
     push = np.full((len(times), 3), 20.0)
     here = cosimulate_with_controller(three_example_fmus, controller, times, RunOptions(external_force=push))

@@ -28,7 +28,12 @@ def errors(motion: CosimulationResult, tension: np.ndarray, position: np.ndarray
     return float(np.max(np.abs(motion.position - position))), float(np.max(np.abs(motion.tension - tension)))
 
 
-@pytest.mark.parametrize("cases", [*((case,) for case in CASES), *PAIRS], ids=lambda cases: "+".join(map(str, cases)))
+TOGETHER = [pytest.param(pair, marks=pytest.mark.validate) for pair in PAIRS]
+
+
+@pytest.mark.parametrize(
+    "cases", [*((case,) for case in CASES), *TOGETHER], ids=lambda cases: "+".join(map(str, cases))
+)
 def test_effects_in_the_fmus_are_those_of_the_rig(cases: tuple[Case, ...], tmp_path: Path) -> None:
     robot = example("three")
     time, speed = gentle_speeds(robot, 1.0, 0.02)

@@ -98,7 +98,7 @@ def shown_after_steps(cable: Hand) -> list[float]:
     return cable.get(*SHOWN, "unstrained_length")
 
 
-def test_a_redo_from_a_saved_state_gives_the_same_bits(damped_fmus: RobotFmus) -> None:
+def test_a_rollback_gives_the_same_bits(damped_fmus: RobotFmus) -> None:
     with in_hand(damped_fmus.cables[2]) as cable:
         cable.set(**MOTION)
         cable.run()

@@ -250,12 +250,12 @@ def slipping(slip: float) -> Robot:
 
 
 @pytest.mark.validate
-def test_a_small_kink_at_rest_is_said(tmp_path: Path) -> None:
+def test_a_small_slope_change_at_rest_is_reported(tmp_path: Path) -> None:
     notes = linearise_robot_fmus(build_fmus(slipping(2e-5), tmp_path)).notes
     assert len(notes) == 1
     assert notes[0].startswith("a kink at rest: what winch_speed_1 does upward and downward differs by 3%")
 
 
-def test_a_large_kink_at_rest_is_refused(tmp_path: Path) -> None:
+def test_a_large_slope_change_at_rest_is_refused(tmp_path: Path) -> None:
     with pytest.raises(IdentificationError, match=r"at a kink, what cable_1\.winch_speed does .* differs by 32%"):
         linearise_robot_fmus(build_fmus(slipping(2e-4), tmp_path))

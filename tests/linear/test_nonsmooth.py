@@ -21,7 +21,7 @@ def with_effect(robot: Robot, name: str, **values: float) -> Robot:
     return robot.with_effect(EffectSetting(name, values, robot.cable_numbers))
 
 
-def test_a_robot_without_kinks_has_no_notes() -> None:
+def test_a_smooth_robot_has_no_notes() -> None:
     assert linearise(paper_robot()).notes == ()
 
 

@@ -31,7 +31,7 @@ def test_complex_step_is_exact(name: str, at: float, slope: float) -> None:
     assert value.real == pytest.approx(getattr(REAL, name)(at), rel=1e-15)
 
 
-def test_kinks_choose_by_the_real_part() -> None:
+def test_piecewise_functions_choose_by_the_real_part() -> None:
     assert rate_of(COMPLEX_STEP.maximum(with_rate(1.0, 2.0), with_rate(0.5, 7.0))) == 2.0
     assert rate_of(COMPLEX_STEP.where(with_rate(-1.0, 1.0), with_rate(0.0, 2.0), with_rate(0.0, 5.0))) == 5.0
     assert REAL.where(1.0, 2.0, 3.0) == 2.0

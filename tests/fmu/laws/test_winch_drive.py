@@ -56,7 +56,7 @@ def slope(state: DriveState, command: float, change: float) -> float:
     return (acceleration(REAL, LIMITED, state, command + change) - acceleration(REAL, LIMITED, state, command)) / change
 
 
-def test_margins_change_their_sign_where_the_law_has_a_kink() -> None:
+def test_event_indicators_change_their_sign_where_the_law_has_a_kink() -> None:
     state = DriveState(0.79, 0.0)
     assert slope(state, 0.8, 1e-6) == 0.0
     assert slope(state, 0.8, -1e-6) == pytest.approx(48.0)
