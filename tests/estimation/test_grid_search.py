@@ -47,7 +47,7 @@ def test_no_gain_is_predicted_where_nothing_is_hidden() -> None:
     assert found[SOFT].gain < 4.0
 
 
-def test_a_predicted_gain_that_a_fit_exceeds_stays() -> None:
+def test_a_predicted_gain_is_replaced_only_by_a_larger_one() -> None:
     context, _, sample = looked({"hysteresis": {"force": 30.0, "yield_strain": 1e-4}})
     true = PredictedGain(1.0, {"force": 30.0, "yield_strain": 1e-4})
     assert grid_search(context, context.robot, (), sample, {STICKY: true}) == {STICKY: true}

@@ -3,9 +3,9 @@
 import json
 
 import pytest
-from tautwire.fmus.fmu_ports import fmu_ports, group_vectors
 
 from tautwire.cli import run
+from tautwire.fmus.fmu_ports import fmu_ports, group_vectors
 from tautwire.fmus.packaging import RobotFmus
 from tautwire_fmu.units import UNITS
 from tests.support.robots import EXAMPLES
