@@ -7,6 +7,7 @@ import pytest
 
 from tautwire.cli import run
 from tautwire.estimation.input_design import (
+    DesignOptions,
     ExcitationError,
     ExcitationLimits,
     default_limits,
@@ -40,7 +41,7 @@ def test_a_path_of_sines_begins_and_ends_at_rest_and_has_its_own_derivatives() -
 @pytest.mark.validate
 def test_the_best_program_is_within_the_limits_and_better_than_most() -> None:
     effects = effects_by_name(THREE, "damping,relaxation")
-    found = design_excitation(THREE, effects, LIMITS, 3.0, 0.05, 10, 1, quiet)
+    found = design_excitation(THREE, effects, DesignOptions(LIMITS, 3.0, 0.05, 10, 1), quiet)
     assert np.max(np.abs(found.winch_speed)) <= 0.8
     assert found.winch_speed[0] == pytest.approx(0.0, abs=1e-12)
     run = integrate(THREE, found.time, found.winch_speed)
@@ -49,14 +50,16 @@ def test_the_best_program_is_within_the_limits_and_better_than_most() -> None:
     assert [pair.nats for pair in found.pairs] == sorted(pair.nats for pair in found.pairs)
     assert found.pairs[0].nats > 1.2 * found.median_separation
     assert all(pair.effect.effect is not pair.other.effect for pair in found.pairs)
-    again = design_excitation(THREE, effects, LIMITS, 3.0, 0.05, 10, 1, quiet)
+    again = design_excitation(THREE, effects, DesignOptions(LIMITS, 3.0, 0.05, 10, 1), quiet)
     assert np.array_equal(again.winch_speed, found.winch_speed)
 
 
 def test_limits_that_no_program_keeps_are_an_error() -> None:
     narrow = ExcitationLimits(speed=0.5, reach=1.0, min_tension=1e4, max_tension=1.1e4)
     with pytest.raises(ExcitationError, match=r"none of \d+ programs"):
-        design_excitation(THREE, effects_by_name(THREE, "damping,payload"), narrow, 2.0, 0.1, 1, 1, quiet)
+        design_excitation(
+            THREE, effects_by_name(THREE, "damping,payload"), DesignOptions(narrow, 2.0, 0.1, 1, 1), quiet
+        )
 
 
 def test_limits_not_given_come_from_the_robot() -> None:

@@ -181,16 +181,15 @@ def excite(
     Example: tautwire excite robot.toml --effects damping,relaxation,hysteresis --out program.csv
     """
     from ..atomic_output import atomic_file, refuse_overwriting_inputs
-    from ..estimation.input_design import default_limits, design_excitation, effects_by_name
+    from ..estimation.input_design import DesignOptions, default_limits, design_excitation, effects_by_name
 
     output = CommandOutput(as_json, quiet)
     refuse_overwriting_inputs([robot_file], [out])
     robot = read_holdable_robot(robot_file)
     selected_effects = effects_by_name(robot, effects)
     with progress_bar(output) as progress:
-        excitation = design_excitation(
-            robot, selected_effects, default_limits(robot, speed, reach), duration, 1.0 / rate, programs, seed, progress
-        )
+        options = DesignOptions(default_limits(robot, speed, reach), duration, 1.0 / rate, programs, seed)
+        excitation = design_excitation(robot, selected_effects, options, progress)
     with atomic_file(out) as scratch:
         excitation.frame().to_csv(scratch, index=False, float_format="%.10g")
     pairs = [(pair.effect.label(robot), pair.other.label(robot), pair.nats) for pair in excitation.pairs]

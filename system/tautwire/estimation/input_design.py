@@ -65,6 +65,17 @@ class ExcitationLimits:
 
 
 @dataclass(frozen=True)
+class DesignOptions:
+    """Options of a design: ``duration`` and sample ``interval`` in s; about how many ``programs`` are tried, and seed."""
+
+    limits: ExcitationLimits
+    duration: float
+    interval: float
+    programs: int
+    seed: int = 0
+
+
+@dataclass(frozen=True)
 class EffectSeparation:
     """Separation of an effect from the best that another can do in its place, in nats."""
 
@@ -95,26 +106,22 @@ class Excitation:
 def design_excitation(
     robot: Robot,
     effects: Sequence[Hypothesis],
-    limits: ExcitationLimits,
-    duration: float,
-    interval: float,
-    programs: int,
-    seed: int,
+    options: DesignOptions,
     progress: Progress,
 ) -> Excitation:
     """Design the motion that maximises the smallest separation between effects; the same for the same seed.
 
-    ``duration`` and sample ``interval`` in s. About so many ``programs`` are tried, by differential evolution.
+    Searched by differential evolution.
 
     Raises ExcitationError where none is within the limits.
     """
     declared = robot.sensors
     noise = Noise(declared.position_noise or 0.0, declared.tension_noise or 0.0, declared.winch_speed_noise or 0.0, 0.0)
-    likelihood = Likelihood(robot, (), noise, interval)
-    design = _DesignProblem(robot, tuple(effects), limits, duration, interval, likelihood)
+    likelihood = Likelihood(robot, (), noise, options.interval)
+    design = _DesignProblem(robot, tuple(effects), options, likelihood)
     count = 6 * (SLOW_SINES + FAST_SINES)
     bounds = Bounds(np.zeros(count), np.ones(count))
-    generations = max(1, programs // count - 1)
+    generations = max(1, options.programs // count - 1)
     scores: list[float] = []
 
     def cost(decision_variables: Array) -> float:
@@ -123,7 +130,7 @@ def design_excitation(
         return -scores[-1]
 
     best = differential_evolution(
-        cost, bounds, init="sobol", popsize=1, maxiter=generations, polish=False, seed=seed, tol=0.0
+        cost, bounds, init="sobol", popsize=1, maxiter=generations, polish=False, seed=options.seed, tol=0.0
     )
     if max(scores) <= INFEASIBLE_SCORE:
         raise ExcitationError(len(scores))
@@ -137,9 +144,7 @@ def design_excitation(
 class _DesignProblem:
     robot: Robot
     effects: tuple[Hypothesis, ...]
-    limits: ExcitationLimits
-    duration: float
-    interval: float
+    options: DesignOptions
     likelihood: Likelihood
 
     def score(self, decision_variables: Array) -> float:
@@ -153,16 +158,17 @@ class _DesignProblem:
     def path(self, decision_variables: Array) -> MultisinePath:
         """Decode decision variables between 0 and 1 into a path, shrunk until it is within the limits."""
         amplitude, frequency_fraction = np.asarray(decision_variables).reshape(2, SLOW_SINES + FAST_SINES, 3)
-        slowest, middle, fastest = 1.0 / self.duration, 6.0 / self.duration, 0.2 / self.interval
+        slowest, middle, fastest = 1.0 / self.options.duration, 6.0 / self.options.duration, 0.2 / self.options.interval
         begin = np.array([slowest] * SLOW_SINES + [middle] * FAST_SINES)[:, None]
         end = np.array([middle] * SLOW_SINES + [max(min(fastest, 3.0), middle)] * FAST_SINES)[:, None]
         frequencies = begin * (end / begin) ** frequency_fraction
         # Amplitudes are limited by speed too: a fast sine is small.
         max_amplitude = np.minimum(
-            self.limits.reach / (SLOW_SINES + FAST_SINES), self.limits.speed / (2.0 * np.pi * frequencies)
+            self.options.limits.reach / (SLOW_SINES + FAST_SINES),
+            self.options.limits.speed / (2.0 * np.pi * frequencies),
         )
         path = MultisinePath(
-            self.robot.platform.start, self.duration, _as_rows(amplitude * max_amplitude), _as_rows(frequencies)
+            self.robot.platform.start, self.options.duration, _as_rows(amplitude * max_amplitude), _as_rows(frequencies)
         )
         for _ in range(MAX_SHRINKS):
             if self._is_within_limits(path):
@@ -171,16 +177,19 @@ class _DesignProblem:
         raise _InfeasibleError
 
     def sampled_program(self, path: MultisinePath) -> tuple[Array, Array]:
-        time = np.asarray(self.interval * np.arange(round(self.duration / self.interval) + 1), dtype=np.float64)
+        time = np.asarray(
+            self.options.interval * np.arange(round(self.options.duration / self.options.interval) + 1),
+            dtype=np.float64,
+        )
         return time, ideal_winch_speeds(self.robot, path, time)
 
     def _is_within_limits(self, path: MultisinePath) -> bool:
         _, speed = self.sampled_program(path)
-        if np.max(np.abs(speed)) > self.limits.speed:
+        if np.max(np.abs(speed)) > self.options.limits.speed:
             return False
         tension = self._simulate(path).tension
         min_tension, max_tension = float(np.min(tension)), float(np.max(tension))
-        return bool(self.limits.min_tension <= min_tension and max_tension <= self.limits.max_tension)
+        return bool(self.options.limits.min_tension <= min_tension and max_tension <= self.options.limits.max_tension)
 
     def _simulate(self, path: MultisinePath) -> Recording:
         """Simulated recording of sensors without noise."""
