@@ -66,7 +66,7 @@ class ExcitationLimits:
 
 @dataclass(frozen=True)
 class DesignOptions:
-    """Options of a design: ``duration`` and sample ``interval`` in s; about how many ``programs`` are tried, and seed."""
+    """Options of a design: ``duration`` and sample ``interval`` in s; about how many ``programs`` are tried."""
 
     limits: ExcitationLimits
     duration: float
