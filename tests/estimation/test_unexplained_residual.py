@@ -13,7 +13,8 @@ from tautwire.cosimulation.robot_cosimulation import cosimulate
 from tautwire.estimation import Trace, trace
 from tautwire.fmus.packaging import build_fmus
 from tautwire.reports.report_folder import trace_document
-from tautwire.robot.robot_file_reader import read_robot, write_robot
+from tautwire.robot.robot_file_reader import read_robot
+from tautwire.robot.robot_file_writer import write_robot
 from tests.support.recordings import recorded
 from tests.support.robots import example
 

@@ -17,7 +17,7 @@ from tautwire.cosimulation.robot_cosimulation import RunError, cosimulate
 from tautwire.cosimulation.robot_wiring import wire_robot
 from tautwire.fmus.fmu_slots import SlotError, missing_user_fmu_ports
 from tautwire.fmus.packaging import RobotFmus, build_fmus
-from tautwire.robot.robot_file_reader import write_robot
+from tautwire.robot.robot_file_writer import write_robot
 from tautwire.robot.schema import UserFmu
 from tests.rig import RampProgram, simulate
 from tests.support.own_fmus import LAG, compiler, falling_mass, lag_winch, packed, spring_cable

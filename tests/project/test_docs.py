@@ -21,7 +21,7 @@ from tautwire.materials.material_table import COLUMN_RULES
 from tautwire.recordings.recording_table import known_columns
 from tautwire.reports import trace_document
 from tautwire.robot import robot_file_reader as robots
-from tautwire.robot.robot_file_writer import new_robot_text
+from tautwire.robot.robot_template import new_robot_text
 from tautwire_fmu.laws.effects import BY_NAME
 from tautwire_fmu.laws.formula import VARIABLES_BY_TARGET
 from tests.support.folders import ROOT
@@ -32,7 +32,7 @@ DOCS = ROOT / "docs"
 
 # Of the page about an effect of one's own, run after its example.
 EFFECT_HOLDS = """
-from tautwire.robot.robot_file_reader import write_robot
+from tautwire.robot.robot_file_writer import write_robot
 assert abs(still.position - plain.platform.start).max() < 1e-6
 assert np.allclose(heavier, 1.0 + 15.0 * 5.0 / (300.0 * 9.81))
 assert not np.allclose(swings, linearise(plain).modes.frequencies, rtol=1e-6)

@@ -13,7 +13,8 @@ from scipy.integrate import trapezoid
 from tautwire.control import path_tensions
 from tautwire.errors import RobotFileError, UnreachableError
 from tautwire.linear import linearise
-from tautwire.robot.robot_file_reader import read_robot, robot_text, write_robot
+from tautwire.robot.robot_file_reader import read_robot
+from tautwire.robot.robot_file_writer import robot_text, write_robot
 from tautwire.robot.schema import PER_CABLE_COMPONENTS, EffectSetting, Platform, Robot
 from tautwire.robot.static_equilibrium import cable_routes, static_forces, static_tensions, unit_directions
 from tautwire.robot.symbolic_model import FreeParameter, SymbolicModel, symbolic_model

@@ -8,7 +8,8 @@ from pathlib import Path
 import pytest
 
 from tautwire.errors import RobotFileError
-from tautwire.robot.robot_file_reader import read_robot, robot_text, write_robot
+from tautwire.robot.robot_file_reader import read_robot
+from tautwire.robot.robot_file_writer import robot_text, write_robot
 from tautwire.robot.schema import Formula, Robot
 from tests.support.robots import example
 

@@ -11,7 +11,8 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from tautwire.errors import RobotFileError
-from tautwire.robot.robot_file_reader import read_robot, robot_text, write_robot
+from tautwire.robot.robot_file_reader import read_robot
+from tautwire.robot.robot_file_writer import robot_text, write_robot
 from tautwire.robot.schema import (
     PER_CABLE_COMPONENTS,
     Cable,

@@ -11,7 +11,7 @@ from tautwire.cosimulation.robot_cosimulation import cosimulate
 from tautwire.fmus.packaging import build_fmus
 from tautwire.robot import robot_file_reader as reading
 from tautwire.robot.robot_file_reader import read_robot
-from tautwire.robot.robot_file_writer import MAX_TEMPLATE_CABLES, MIN_TEMPLATE_CABLES, new_robot_text
+from tautwire.robot.robot_template import MAX_TEMPLATE_CABLES, MIN_TEMPLATE_CABLES, new_robot_text
 from tautwire.robot.static_equilibrium import static_tensions
 
 

@@ -29,7 +29,7 @@ def new(
     Example: tautwire new hall --cables 4
     """
     from ..atomic_output import atomic_file
-    from ..robot.robot_file_writer import new_robot_text
+    from ..robot.robot_template import new_robot_text
 
     output = CommandOutput(as_json, quiet)
     target = Path(name if name.endswith(ROBOT_FILE_SUFFIX) else f"{name}{ROBOT_FILE_SUFFIX}")

@@ -1,15 +1,13 @@
-"""Reads robot files with every key checked, and writes files that read back equal."""
+"""Reads robot files, with every key checked."""
 
 import math
 import os
 import re
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from tautwire_fmu.laws.cable import LAWS
-from tautwire_fmu.laws.effects import BY_NAME
 
 from ..errors import RobotFileError, format_value, one_line, raise_error
 from ..input_files import read_bytes, require_utf8_text, validate_path
@@ -18,10 +16,7 @@ from ..toml_text import parse_toml
 from ..validation import NumberRule
 from .checked_table import CheckedTable, ErrorSink
 from .effect_tables import read_cable_list, read_effects, read_formulas
-from .robot_file_writer import robot_text
 from .schema import Cable, Platform, Point, Robot, Sensors, TensionLimits, UserFmu, Winch, fmu_slots
-
-__all__ = ["read_robot", "robot_text", "write_robot"]
 
 TOP_LEVEL_KEYS = ("name", "gravity", "platform", "tension", "sensors", "cable", "effect", "winch", "fmu", "formula")
 MAX_FILE_BYTES = 10_000_000  # bytes
@@ -95,35 +90,16 @@ def robot_from_content(content: dict[str, Any], path: str | Path) -> Robot:
     return _read_robot_table(CheckedTable(str(path), "", content), default_name=one_line(Path(path).stem))
 
 
+def robot_from_text(text: str, path: str | Path, default_name: str) -> Robot:
+    """The robot that a TOML text declares, as if read from ``path``; raises RobotFileError if it declares none."""
+    return _read_robot_table(CheckedTable(str(path), "", _parse_robot_file(text, str(path))), default_name)
+
+
 def robot_file_text(path: str | Path) -> str:
     """The text of a robot file; raises RobotFileError if it is not text."""
     content = read_bytes(path, RobotFileError, MAX_FILE_BYTES)
     require_utf8_text(content, str(path), RobotFileError, "TOML")
     return content.decode("utf-8-sig")
-
-
-def write_robot(robot: Robot, path: str | Path) -> None:
-    """Writes a robot file atomically, such that it reads back equal.
-
-    Raises RobotFileError if no file may declare such a robot, OSError if writing fails.
-    """
-    text = robot_text(robot)
-    written = _read_robot_table(CheckedTable(str(path), "", _parse_robot_file(text, str(path))), robot.name)
-    if written != _with_neutral_values(robot):
-        raise RobotFileError(str(path), "would not read back equal", "build the robot as read_robot does")
-    target = Path(path)
-    temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
-    try:
-        temporary.write_bytes(text.encode("utf-8"))
-        temporary.replace(target)
-    finally:
-        temporary.unlink(missing_ok=True)
-
-
-def _with_neutral_values(robot: Robot) -> Robot:
-    """The robot with the neutral values of its effects filled in."""
-    effects = (replace(s, values=BY_NAME[s.name].completed_values(s.values)) for s in robot.effects)
-    return replace(robot, effects=tuple(effects))
 
 
 def _parse_robot_file(text: str, file: str) -> dict[str, Any]:

@@ -1,14 +1,18 @@
-"""The text of a robot file: of a robot in memory, or a commented template for a new one."""
+"""Writes robot files: commented TOML that reads back as an equal robot."""
 
 from __future__ import annotations
 
 import json
+import os
 from collections.abc import Sequence
-from math import cos, pi, sin
+from dataclasses import replace
+from pathlib import Path
 
 from tautwire_fmu.laws.effects import BY_NAME
 from tautwire_fmu.laws.formula import VARIABLES_BY_TARGET
 
+from ..errors import RobotFileError
+from .robot_file_reader import robot_from_text
 from .schema import (
     PER_CABLE_COMPONENTS,
     Cable,
@@ -46,6 +50,29 @@ def robot_text(robot: Robot) -> str:
         *_formula_blocks(robot),
     ]
     return "\n\n".join("\n".join(block) for block in blocks if block) + "\n"
+
+
+def write_robot(robot: Robot, path: str | Path) -> None:
+    """Writes a robot file atomically, such that it reads back equal.
+
+    Raises RobotFileError if no file may declare such a robot, OSError if writing fails.
+    """
+    text = robot_text(robot)
+    if robot_from_text(text, path, robot.name) != _with_neutral_values(robot):
+        raise RobotFileError(str(path), "would not read back equal", "build the robot as read_robot does")
+    target = Path(path)
+    temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
+    try:
+        temporary.write_bytes(text.encode("utf-8"))
+        temporary.replace(target)
+    finally:
+        temporary.unlink(missing_ok=True)
+
+
+def _with_neutral_values(robot: Robot) -> Robot:
+    """The robot with the neutral values of its effects filled in."""
+    effects = (replace(s, values=BY_NAME[s.name].completed_values(s.values)) for s in robot.effects)
+    return replace(robot, effects=tuple(effects))
 
 
 def _number_line(key: str, value: float, comment: str) -> str:
@@ -150,95 +177,3 @@ def _formula_lines(robot: Robot, group: Sequence[Formula]) -> list[str]:
     lines = [f"{formula.target} = {json.dumps(formula.text)}" for formula in group]
     cables = [formula.cables for formula in group if formula.cables and formula.cables != robot.cable_numbers]
     return [*lines, *(f"cables = {list(some)}" for some in cables)]
-
-
-MIN_TEMPLATE_CABLES, MAX_TEMPLATE_CABLES = 3, 12
-
-TEMPLATE_HEAD = """\
-# A cable-driven robot. SI units throughout; z points up; cables count from 1 in the order of this file.
-# The numbers are an example, of a frame of 8 m: put in yours, then run "tautwire check" on this file.
-
-name = {name}
-gravity = 9.81                    # m/s^2
-
-[platform]
-mass = 50.0                       # kg, a point mass
-start = [0.0, 0.0, 2.0]           # m, where every run starts at rest
-# mass_uncertainty = 0.5          # kg, how far the true mass may be from that; a standard deviation, as all of these
-
-# With more than three cables statics leaves a choice: within these bounds, the start tensions are those nearest to the
-# preferred one. With three they are not used.
-[tension]
-minimum = 50.0                    # N
-maximum = 5000.0                  # N
-preferred = {preferred}                 # N
-# preferred_uncertainty = 50.0    # N, how far true start tensions may be from that
-
-# How much noise one sample has, as a standard deviation; take out what you do not know.
-[sensors]
-position_noise = 2e-4             # m
-tension_noise = 1.0               # N
-winch_speed_noise = 1e-4          # m/s
-# tension_offset_uncertainty = 2.0    # N, what a load cell may show too much all the time
-# position_offset_uncertainty = 1e-3  # m, likewise of the tracker, on each axis
-
-# One table for each cable, three or more. The law of tension is T = E S eps + c S deps/dt + T0.
-"""
-TEMPLATE_CABLE = """
-[[cable]]  # cable {number}
-anchor = [{x}, {y}, {z}]  # m, where the cable leaves the frame
-modulus = 1.0e11                  # Pa, E: steel rope about 1e11, braided polyethylene about 6e10
-area = 3.0e-6                     # m^2, S, the section that the modulus refers to
-damping = 1.0e9                   # Pa s, c; 0 when absent
-law = "logarithmic"               # eps is ln(l/l_u); or "linear", l/l_u - 1
-# modulus_uncertainty = 2e9       # Pa
-# damping_uncertainty = 1e8       # Pa s
-"""
-TEMPLATE_TAIL = """
-# Winches that follow the speed asked of them only so fast; without this table the rope runs exactly at that speed.
-# [winch]
-# drum_radius = 0.1               # m
-# gear = 20.0                     # motor turns for one turn of the drum
-# bandwidth = 10.0                # Hz, natural frequency of the speed loop
-# damping_ratio = 1.0
-# speed_limit = 1.0               # m/s, of the rope
-# acceleration_limit = 5.0        # m/s^2
-
-# Effects that the plain robot lacks; "tautwire trace" finds them from a recording and writes such tables.
-# [effect.payload]
-# mass = 5.0                      # kg
-
-# [effect.modulus]
-# modulus = 0.9e11                # Pa, in place of the declared one
-# cables = [2]                    # all cables without this line
-
-# What no known effect is, as arithmetic.
-# [formula]
-# force_x = "-20*vx"              # N, on the platform
-
-# FMUs of your own in place of the project's, from this file's folder.
-# [fmu]
-# platform = "mine.fmu"
-"""
-
-
-def new_robot_text(name: str, cable_count: int = MIN_TEMPLATE_CABLES) -> str:
-    """The text of a template robot file with 3 to 12 cables, which can be built and run as it is.
-
-    Exit points lie evenly on a circle above the platform; from six cables on, every second one below it.
-    """
-    has_lower_anchors = cable_count >= 6
-    head = TEMPLATE_HEAD.format(
-        name=json.dumps(name, ensure_ascii=False), preferred="600.0" if has_lower_anchors else "250.0"
-    )
-    return (
-        head
-        + "".join(_template_cable(number, cable_count, has_lower_anchors) for number in range(1, cable_count + 1))
-        + TEMPLATE_TAIL
-    )
-
-
-def _template_cable(number: int, cable_count: int, has_lower_anchors: bool) -> str:
-    angle = 2.0 * pi * (number - 1) / cable_count
-    x, y = (round(4.0 * part, 3) + 0.0 for part in (cos(angle), sin(angle)))
-    return TEMPLATE_CABLE.format(number=number, x=x, y=y, z=0.0 if has_lower_anchors and number % 2 == 0 else 5.0)
