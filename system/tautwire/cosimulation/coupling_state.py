@@ -22,7 +22,7 @@ class CouplingState:
     ``outputs`` and ``inputs`` hold the values of all ports of a :class:`CouplingGraph`; instances read and write them
     in place. ``external_values`` are the external inputs as last set, ``held_values`` the discrete outputs as last
     sampled. ``pending_input_time`` is the time (s) at which inputs are still to be updated, if they are. ``diverged``
-    tells of the last step that its iterations went nowhere.
+    tells that the last step was left with a large error after all iterations.
     """
 
     outputs: Array

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -115,16 +115,13 @@ NO_ADDITIONAL_COMPONENTS = AdditionalComponents()
 def instantiate_robot(
     fmus: RobotFmus,
     journal: CallJournal | None = None,
-    external_inputs: Sequence[Port] = (),
     additional: AdditionalComponents = NO_ADDITIONAL_COMPONENTS,
 ) -> Iterator[CouplingGraph]:
     """The coupling graph of a robot in initialization mode; instances and folders are removed when the block ends.
 
-    With a ``journal`` each FMU call is noted in it; ``external_inputs`` are further ones besides those of the winches.
+    With a ``journal`` each FMU call is noted in it; ``additional`` components are coupled to the robot's.
     """
-    wiring = with_connections(
-        wire_fmus(fmus), len(fmus.cables), additional.connections, (*additional.external_inputs, *external_inputs)
-    )
+    wiring = with_connections(wire_fmus(fmus), len(fmus.cables), additional.connections, additional.external_inputs)
     new_component = Component if journal is None else partial(JournalledComponent, journal)
     with ExitStack() as stack:
         components = {

@@ -16,7 +16,7 @@ from tautwire_fmu.laws import formula
 from tautwire_fmu.laws.effects import BY_NAME
 
 from ..cosimulation import Port
-from ..cosimulation.robot_cosimulation import instantiate_robot, wire_fmus
+from ..cosimulation.robot_cosimulation import AdditionalComponents, instantiate_robot, wire_fmus
 from ..cosimulation.robot_wiring import AXES, PLATFORM, cable_name, winch_name
 from ..errors import InputError
 from ..fmus.fmu_archive import read_model_description
@@ -187,10 +187,10 @@ def linearise_robot_fmus(
     Raises InputError where a state is unknown, and what :func:`linearise_fmus` raises.
     """
     signals = robot_signals(fmus)
-    force_ports = [port for port in signals.inputs.values() if port.component == PLATFORM]
+    force_ports = tuple(port for port in signals.inputs.values() if port.component == PLATFORM)
     if states is not None:
         signals = replace(signals, states=_select_states(states, signals.states or {}))
-    make_coupling = partial(instantiate_robot, fmus, external_inputs=force_ports)
+    make_coupling = partial(instantiate_robot, fmus, additional=AdditionalComponents(external_inputs=force_ports))
     return linearise_fmus(make_coupling, signals, step=step, tolerance=tolerance)
 
 
