@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 pytest.importorskip("selenium", reason="the pages are not tried in a browser: selenium is in the dev extra")
 
 from tests.reports.test_page_rendering import themes
+from tests.reports.test_trace_report_page import SECTIONS
 from tests.support.browser.browser import (
     LAPTOP,
     LAPTOP_DARK,
@@ -114,12 +115,14 @@ def test_views_turn_the_robot(browser: Browser, pages: dict[str, Path], view: st
 
 def test_all_controls_can_be_reached_and_used_by_keyboard(browser: Browser, pages: dict[str, Path]) -> None:
     opened(browser, pages["trace"]).see("figure.scene")
-    browser.run("document.body.focus(); scrollTo(0, 0)")
+    browser.run("document.body.tabIndex = -1; document.body.focus(); scrollTo(0, 0)")
     reached: list[str] = []
-    name = "const e = document.activeElement; return e.id || e.dataset.view || e.name || e.className || e.tagName"
+    name = """const e = document.activeElement;
+    return e.closest('.contents')?.className || e.id || e.dataset.view || e.name || e.className || e.tagName"""
     while len(reached) < 80 and (not reached or reached[-1] != "BODY"):
         browser.press("TAB")
         reached.append(browser.run(name))
+    assert reached.count("files contents") == len(SECTIONS)
     wanted = ["skip", "A", "choice", "play", "time", "perspective", "close", "magnify", "scale"]
     assert [each for each in reached if (each in wanted and reached.count(each) == 1) or each == "A"] == wanted
     browser.run("document.getElementById('time').focus()")
