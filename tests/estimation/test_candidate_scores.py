@@ -55,6 +55,12 @@ def test_another_look_at_the_same_changes_nothing() -> None:
     assert shortlist(promised(ONE_OF_EACH), promised(ONE_OF_EACH)) == ONE_OF_EACH[: ScoreTestPolicy.max_fits]
 
 
+def test_the_policy_says_how_many_are_fitted() -> None:
+    policy = ScoreTestPolicy(max_fits=3, max_rough_fits=1, min_predicted_gain=99.5)
+    assert shortlist(promised(ONE_OF_EACH), policy=policy) == ONE_OF_EACH[:1]
+    assert shortlist(promised(ONE_OF_EACH, 1000.0), policy=policy) == ONE_OF_EACH[:3]
+
+
 def test_of_those_alike_the_one_with_fewest_parameters_is_simplest() -> None:
     fit = Fit(ROBOT, (), np.zeros(0), np.zeros((0, 0)))
     relaxation, damping = (Hypothesis(BY_NAME[name], (1,)) for name in ("relaxation", "damping"))

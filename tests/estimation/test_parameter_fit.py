@@ -1,9 +1,13 @@
+import pickle
+
 import pytest
 
 from tautwire.estimation.estimation_data import split_data
 from tautwire.estimation.hypotheses import Hypothesis
+from tautwire.estimation.kalman_filter import Noise
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fitter
+from tautwire.estimation.policy import FitPolicy
 from tautwire.robot.schema import EffectSetting
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.support.recordings import recorded
@@ -34,3 +38,10 @@ def test_a_relaxation_is_found_that_is_quicker_than_where_the_fit_begins() -> No
         for known in (fit.robot, robot.with_effect(true))
     )
     assert at_truth - 0.1 < found < at_truth + 10.0
+
+
+def test_a_fitter_sent_to_a_process_twice_is_one_fitter_there() -> None:
+    sent = pickle.dumps(Fitter(Noise(1e-3, 1.0, 1e-4, 0.0), policy=FitPolicy(max_evaluations=7)))
+    first, second = pickle.loads(sent), pickle.loads(sent)
+    assert first is second
+    assert (first.noise.position, first.policy.max_evaluations) == (1e-3, 7)

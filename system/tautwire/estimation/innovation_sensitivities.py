@@ -42,7 +42,7 @@ Array = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class LinearisedSegment:
-    """Linearised filter segment: Linearised filter segment: K successive samples of a run.
+    """Linearised filter segment: K successive samples of a run.
 
     ``states`` (n, K + 1) as predicted and winch ``speeds`` (cables, K + 1), of the next sample too; ``step`` (K) and
     ``shift`` (m, K) in s. ``transition`` A (K, n, n), ``half_transition`` the same from half a step before the next

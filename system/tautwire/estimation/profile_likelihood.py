@@ -90,7 +90,7 @@ class ProfileLikelihood:
     def rise(self, index: int, value: float) -> float:
         """Rise of the sum of squares with one parameter at a value; 1e4 where the model has no finite output.
 
-        Raises LowerError, TooManyRunsError.
+        Raises LowerMinimumError, TooManyRunsError.
         """
         others = np.arange(len(self.values)) != index
         if not np.any(others):
