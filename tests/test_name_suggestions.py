@@ -42,7 +42,7 @@ def test_a_hint_names_what_is_likely_meant_or_all_that_is_known(name: str, known
             "[fmu]\ncable_9 = 'a.fmu'\n[platform]\n",
             "fmu.cable_9: is not a known key; write one of platform, cable_1 ... ",
         ),
-        ("[effect.rain]\nx = 1\n[platform]\n", "effect.rain: is not an effect that the project knows; write one of "),
+        ("[effect.rain]\nx = 1\n[platform]\n", "effect.rain: is not a known effect; write one of "),
     ],
 )
 def test_a_robot_file_with_an_odd_key_is_told_what_is_known(tmp_path: Path, added: str, told: str) -> None:

@@ -71,7 +71,7 @@ def test_a_value_is_of_its_class_or_has_what_is_asked_of_it() -> None:
         lambda: validate_attributes("a", 3, ("real", "duration"), "path", "give one"), "a", "no path", "no duration"
     )
     refused(lambda: validate_attributes("a", int, ("real",), "number", "give one"), "a", "the class int")
-    refused(lambda: validate_callable("a", 3), "a", "cannot be called")
+    refused(lambda: validate_callable("a", 3), "a", "not a function")
     assert (
         validate_instance("a", 3, int, ""),
         validate_attributes("a", 3, ("real",), "", ""),
@@ -102,7 +102,7 @@ def test_a_folder_may_be_absent_but_nothing_else_may_be_in_its_place(tmp_path: P
     file.touch()
     assert validate_folder("a", str(tmp_path)) == validate_folder("a", tmp_path) == tmp_path
     assert validate_folder("a", tmp_path / "absent" / "inner") == tmp_path / "absent" / "inner"
-    refused(lambda: validate_folder("a", file), "a", "no folder")
+    refused(lambda: validate_folder("a", file), "a", "not a folder")
     refused(lambda: validate_folder("a", 3), "a", "3", "not a path")
     (tmp_path / "loop").symlink_to("loop")
     for nowhere in (file / "inner", tmp_path / "loop"):
@@ -114,7 +114,7 @@ def test_a_file_is_there_and_is_no_folder(tmp_path: Path) -> None:
     file.touch()
     assert validate_file("a", os.fspath(file)) == file
     for wrong in (tmp_path, tmp_path / "absent"):
-        refused(lambda wrong=wrong: validate_file("a", wrong), "a", "where no file is")  # type: ignore[misc]
+        refused(lambda wrong=wrong: validate_file("a", wrong), "a", "but there is no file")  # type: ignore[misc]
 
 
 def test_the_error_keeps_the_value_on_its_way_between_processes() -> None:

@@ -53,7 +53,7 @@ def refuse_overwriting_inputs(inputs: Iterable[Path], outputs: Iterable[Path]) -
     input_paths = {os.path.realpath(path) for path in inputs}
     for output in outputs:
         if os.path.realpath(output) in input_paths:
-            raise InputError(str(output), "is an input, the output would take its place", "choose another --out")
+            raise InputError(str(output), "is an input, and the output would replace it", "choose another --out")
 
 
 def refuse_same_output(out: Path | None, other: Path | None, option: str = "--report") -> None:
@@ -71,7 +71,7 @@ def atomic_file(target: Path) -> Iterator[Path]:
     if target.is_dir():
         raise InputError(str(target), "is a folder", "give the name of a file with --out")
     if target.exists() and not target.is_file():
-        raise InputError(str(target), "is no regular file", "give the name of a file with --out")
+        raise InputError(str(target), "is not a regular file", "give the name of a file with --out")
     with _staging_folder(_nearest_existing_folder(target.parent), target) as scratch:
         yield scratch / target.name
         _publish(scratch, target.parent)
@@ -94,7 +94,7 @@ def _nearest_existing_folder(target: Path) -> Path:
         if ancestor.exists():
             raise InputError(str(ancestor), "is a file", "give the name of a folder with --out")
         if ancestor.is_symlink():
-            raise InputError(str(ancestor), "is a link that leads nowhere", "remove it, or choose another --out")
+            raise InputError(str(ancestor), "is a broken link", "remove it, or choose another --out")
     return Path(target.absolute().anchor)
 
 

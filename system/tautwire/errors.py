@@ -104,7 +104,7 @@ class DiskFullError(TautwireError):
 
     def __init__(self, target: str, reason: str, temporary: str) -> None:
         hint = f"make room there or in {temporary}, or choose another --out"
-        super().__init__(one_line(f"{target}: was not written, the disk refuses more ({reason}); {hint}"))
+        super().__init__(one_line(f"{target}: was not written, no disk space left ({reason}); {hint}"))
         self.target = target
         self.reason = reason
         self.temporary = temporary

@@ -85,7 +85,7 @@ def _refuse_binary(content: bytes, where: str, error_class: type[InputError], ex
     if content.startswith(b"PK\x03\x04"):
         raise error_class(where, "is a zip archive or a spreadsheet, not text", hint)
     if content.startswith(b"\x1f\x8b"):
-        raise error_class(where, "is packed by gzip, not text", "unpack it first")
+        raise error_class(where, "is compressed by gzip, not text", "decompress it first")
     if content.startswith(_UTF_16_MARKS):
         raise error_class(where, "is UTF-16, not UTF-8", hint)
     null_index = content.find(b"\0")

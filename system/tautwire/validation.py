@@ -69,9 +69,7 @@ def validate_callable(where: str, value: Kind) -> Kind:
     """Returns the value if it is callable or None; raises ArgumentError otherwise."""
     if value is None or callable(value):
         return value
-    raise ArgumentError(
-        where, value, f"is {describe_value(value)}, cannot be called", "give a function, or leave it out"
-    )
+    raise ArgumentError(where, value, f"is {describe_value(value)}, not a function", "give a function, or leave it out")
 
 
 def validate_folder(where: str, value: object) -> Path:
@@ -79,7 +77,7 @@ def validate_folder(where: str, value: object) -> Path:
     folder = validate_path(where, value)
     file_mode = _file_mode_of(where, value, folder, "name a folder")
     if file_mode is not None and not S_ISDIR(file_mode):
-        raise ArgumentError(where, value, f"is {format_value(str(folder))}, which is no folder", "name a folder")
+        raise ArgumentError(where, value, f"is {format_value(str(folder))}, not a folder", "name a folder")
     return folder
 
 
@@ -88,7 +86,7 @@ def validate_file(where: str, value: object) -> Path:
     file = validate_path(where, value)
     file_mode = _file_mode_of(where, value, file, "check the path")
     if file_mode is None or not S_ISREG(file_mode):
-        raise ArgumentError(where, value, f"is {format_value(str(file))}, where no file is", "check the path")
+        raise ArgumentError(where, value, f"is {format_value(str(file))}, but there is no file", "check the path")
     return file
 
 

@@ -44,7 +44,7 @@ def sampled(vary: str, method: str = "sobol", count: int = 8, more: str = "") ->
         (f'robot = "robot.toml"\n[vary]\n{NORMAL}', "sample: is missing"),
         (sampled(NORMAL, "sobel"), "write 'sobol'"),
         (sampled(NORMAL, count=9), "must be a power of 2 for sobol; write 8 or 16"),
-        (sampled(NORMAL, "grid"), "lets cable.modulus be normal, a grid takes steps"),
+        (sampled(NORMAL, "grid"), "lets cable.modulus be normal, a grid requires list or linspace"),
         (sampled(NORMAL, count=2**30), "sample.count: is 1073741824"),
         (sampled(NORMAL, "random", 9_999_999).replace("[sample]", 'controllers = ["none", "lqg"]\n[sample]')
          + '[[path]]\nend = [28.86, 0.0, 6.0]\nduration = 4.0', "makes 19999998 runs"),
@@ -63,13 +63,13 @@ def sampled(vary: str, method: str = "sobol", count: int = 8, more: str = "") ->
         (sampled("cable.modulus = {list = [1.0], normal = [1.0, 2.0]}"), "is several, not one distribution"),
         (sampled("cable.modulus = 3.0"), "vary.cable.modulus: is 3.0, not one distribution"),
         (sampled('"cable[4].modulus" = {list = [1e11]}'), "cable has no entry 4; give one from 1 to 3"),
-        (sampled('"platform.start" = {list = [1.0]}'), "start is no number in the robot file; name one entry"),
+        (sampled('"platform.start" = {list = [1.0]}'), "start is not a number in the robot file; name one entry"),
         (sampled('"platform.start[0]" = {list = [1.0]}'), "start has no entry 0"),
-        (sampled('"cable modulus" = {list = [1.0]}'), "is no path of a key; write it as cable.modulus"),
-        (sampled('"platform[*].mass" = {list = [1.0]}'), "platform is no list in the robot file; leave [*] out"),
+        (sampled('"cable modulus" = {list = [1.0]}'), "is not a key path; write it as cable.modulus"),
+        (sampled('"platform[*].mass" = {list = [1.0]}'), "platform is not a list in the robot file; leave [*] out"),
         (sampled('"cable.modulos" = {list = [1e11]}'), "modulos is not a known key; write 'modulus'"),
         (sampled('"platform.mass" = {uniform = [-3.0, -2.0]}'), "platform.mass is -2.5, must be above 0 kg"),
-        (sampled('"effect.dampin.damping" = {list = [1e9]}'), "is not an effect that the project knows"),
+        (sampled('"effect.dampin.damping" = {list = [1e9]}'), "is not a known effect"),
         (sampled(NORMAL, more='[[correlation]]\nbetween = ["a"]\nvalue=0.1'),
          "correlation[1].between: does not name two keys"),
         (sampled(NORMAL, more='[[correlation]]\nbetween = ["cable.modulus", "mass"]\nvalue=0.1'),
@@ -84,10 +84,10 @@ def sampled(vary: str, method: str = "sobol", count: int = 8, more: str = "") ->
         (sampled(NORMAL).replace("[sample]", 'believes = "all"\n[sample]'), 'must be one of "declared", "varied"'),
         (sampled('"platform.start[1]" = {list = [28.0]}',
                  more="[[path]]\nstart = [28.86, 0.0, 5.0]\nend = [28.86, 0.0, 6.0]\nduration = 1.0"),
-         "starts where it says, but platform.start varies"),
+         "has a start of its own, but platform.start varies"),
         (sampled(NORMAL, more='[found]\nreport = "none.json"'), "there is no such file"),
         ('robot = "robot.toml"\n[trace]\nrecordings = "nowhere"', "no folder; name a folder of recordings"),
-        ('robot = "robot.toml"\n[trace]\nrecordings = "."\n[vary]\nx = 1', "vary: has no part in a trace"),
+        ('robot = "robot.toml"\n[trace]\nrecordings = "."\n[vary]\nx = 1', "vary: is not allowed beside [trace]"),
         ('robot = "robot.toml"\n[trace]\nrecordings = "."', "has no recording in"),
     ],
 )  # fmt: skip
@@ -111,7 +111,7 @@ def test_a_key_without_entry_is_of_all_and_each_entry_of_a_star_is_one() -> None
     assert [cable["modulus"] for cable in everywhere["cable"]] == [1e11] * 3
     assert expand_key_path(CONTENT, "cable[*].modulus") == tuple(f"cable[{i}].modulus" for i in (1, 2, 3))
     assert len(expand_key_path(CONTENT, "cable[*].anchor[*]")) == 9
-    with pytest.raises(KeyPathError, match="no list"):
+    with pytest.raises(KeyPathError, match="not a list"):
         with_values(CONTENT, {"platform[1].mass": 1.0})
 
 

@@ -111,7 +111,7 @@ def test_blocks_with_a_failed_run_are_left_out(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize(
     ("changed", "said"),
-    [({"method": "grid"}, "a grid has no distribution"), ({"count": 32}, "32 samples, they take 64 or more")],
+    [({"method": "grid"}, "a grid has no distribution"), ({"count": 32}, "32 samples, 64 or more are required")],
 )
 def test_why_there_are_no_sobol_indices_is_said(changed: dict[str, Any], said: str, tmp_path: Path) -> None:
     plan = replace(read(tmp_path, AT_REST), **changed)

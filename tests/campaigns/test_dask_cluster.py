@@ -101,7 +101,7 @@ def test_a_campaign_that_was_stopped_goes_on_where_it_was(how: signal.Signals, t
     (os.killpg if how == signal.SIGINT else os.kill)(process.pid, how)
     said = process.communicate(timeout=60)[1]
     if how == signal.SIGINT:
-        assert process.returncode == 1 and "the same command goes on where it stopped" in said
+        assert process.returncode == 1 and "the same command resumes it" in said
         assert "Traceback" not in said
     written = {part: part.stat().st_mtime_ns for part in part_files(out)}
     before = sum(pq.read_metadata(part).num_rows for part in written)

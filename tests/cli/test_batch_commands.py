@@ -63,7 +63,7 @@ def test_two_workers_of_the_users_make_what_a_bare_loop_makes(users: Users, tmp_
         *(str(out / name) for name in ("runs", "summary.json", "index.html")),
     ]
     page, rows = out / "index.html", out / "runs"
-    assert told.stderr.splitlines()[-1] == f"next: open {page}; pandas.read_parquet('{rows}') has a row a run"
+    assert told.stderr.splitlines()[-1] == f"next: open {page}; pandas.read_parquet('{rows}') has one row per run"
     assert rows_of(out) == bare_rows(read_plan(file), tmp_path / "bare")
     assert json.loads((out / "summary.json").read_text(encoding="utf-8"))["failed"] == 0
     again = users.campaign(file, out)

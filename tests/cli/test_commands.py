@@ -80,7 +80,7 @@ def test_a_run_that_fails_leaves_what_it_had_computed(
     assert run(["simulate", ROBOT, "--speeds", str(recording), "--out", str(result)]) == 1
     said = capsys.readouterr().err
     assert said.count("\n") == 1
-    assert "FMU " in said and f"the run until then is in {result}" in said
+    assert "FMU " in said and f"the run up to then is in {result}" in said
     frame = pd.read_csv(result) if name.endswith(".csv") else pd.read_parquet(result)
     assert frame["time"].tolist() == [0.0, 0.1, 0.2]
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted([name, "torn.csv"])
@@ -268,7 +268,7 @@ def test_with_winches_speeds_are_commands_and_the_result_has_what_came_of_them(
 ) -> None:
     robot, result = with_tables(tmp_path, WINCH), tmp_path / "result.csv"
     assert run(["simulate", robot, "--speeds", str(short[0]), "--until", "0.5", "--out", str(result)]) == 0
-    assert "winch speeds are what the winches are asked for" in capsys.readouterr().err
+    assert "winch speeds are taken as commands of the winches" in capsys.readouterr().err
     frame, recorded = pd.read_csv(result), pd.read_csv(short[0])
     gap = (frame["winch_speed_2"] - recorded["winch_speed_2"][: len(frame)]).abs()
     assert 0.0 < gap.max() < 0.05
@@ -289,5 +289,5 @@ def test_linearise_says_that_winches_have_no_part_in_it(tmp_path: Path, capsys: 
     assert run(["linearise", ROBOT, "--out", str(plain)]) == 0
     assert "[winch]" not in capsys.readouterr().err
     assert run(["linearise", with_tables(tmp_path, WINCH), "--out", str(place)]) == 0
-    assert capsys.readouterr().err.startswith("[winch]: no part in this")
+    assert capsys.readouterr().err.startswith("[winch]: not used here")
     assert place.read_text() == plain.read_text()

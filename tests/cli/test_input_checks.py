@@ -163,7 +163,7 @@ def test_all_of_a_recording_is_told_with_its_lines(tmp_path: Path) -> None:
     lines[8] = "0.01" + lines[8][lines[8].index(",") :]
     problems = check_files(THREE / "robot.toml", written(tmp_path, "\n".join(lines), "fit.csv")).problems
     assert [problem.line for problem in problems] == [1, 1, 5, 8, 9]
-    words = ("'y' is there twice", "winch_speed_2 is missing", "11 cells", "'fast'", "must rise")
+    words = ("'y' appears twice", "winch_speed_2 is missing", "11 cells", "'fast'", "must rise")
     assert all(word in problem.problem for word, problem in zip(words, problems, strict=True))
 
 

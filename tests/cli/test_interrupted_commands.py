@@ -212,9 +212,7 @@ def test_a_full_disk_is_told_and_nothing_is_half_written(tmp_path: Path, already
     told = process.stderr.splitlines()
     for line, arguments in zip(told, commands, strict=True):
         target = "out/hall.toml" if arguments[0] == "new" else arguments[-1]
-        assert line.startswith(
-            f"tautwire: {target}: was not written, the disk refuses more (File too large); make room"
-        )
+        assert line.startswith(f"tautwire: {target}: was not written, no disk space left (File too large); make room")
     assert not (tmp_path / "out").exists() or names(tmp_path / "out") == ["result.csv"]
     assert not already or (tmp_path / "out" / "result.csv").read_text() == "before"
 
@@ -255,10 +253,10 @@ def test_a_folder_without_permission_is_told(tmp_path: Path, capsys: pytest.Capt
     ("out", "words"),
     [
         ("/proc/tautwire/out.csv", "cannot write there"),
-        ("/dev/null", "is no regular file"),
-        ("pipe", "is no regular file"),
+        ("/dev/null", "is not a regular file"),
+        ("pipe", "is not a regular file"),
         ("file/out.csv", "is a file"),
-        ("nowhere/out.csv", "is a link that leads nowhere"),
+        ("nowhere/out.csv", "is a broken link"),
     ],
 )
 def test_where_no_file_can_be_is_one_line(

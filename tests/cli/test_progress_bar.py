@@ -19,12 +19,12 @@ from tests.support.robots import EXAMPLES
 
 ROBOT, FIT = (str(EXAMPLES / "three" / name) for name in ("robot.toml", "fit.csv"))
 AT_WORK = {
-    "check": ([ROBOT, FIT], "looking at both together"),
+    "check": ([ROBOT, FIT], "checking both together"),
     "build": ([ROBOT, "--out", "out"], "building"),
     "fmus": ([ROBOT], "building"),
     "simulate": ([ROBOT, "--speeds", FIT, "--until", "0.1", "--out", "out.csv"], "co-simulating"),
     "linearise": ([ROBOT, "--out", "out.json"], "linearising"),
-    "workspace": ([ROBOT, "--spacing", "40", "--out", "out.csv"], "looking where the cables hold"),
+    "workspace": ([ROBOT, "--spacing", "40", "--out", "out.csv"], "computing the workspace"),
     "excite": (
         [ROBOT, "--effects", "damping,payload", "--programs", "2", "--duration", "5", "--out", "out.csv"],
         "trying programs",

@@ -129,12 +129,12 @@ def test_check_tells_everything_and_fails(tmp_path: Path, capsys: pytest.Capture
     assert run(["check", str(robot), str(recording)]) == 2
     told = capsys.readouterr()
     assert [line.partition(": line ")[0] for line in told.out.splitlines()] == [str(robot)] * 2 + [str(recording)]
-    assert "mend 3 problems in 2 files" in told.err
+    assert "correct 3 problems in 2 files" in told.err
     assert run(["check", str(robot), str(recording), "--json"]) == 2
     problems = json.loads(capsys.readouterr().out)["problems"]
     assert problems[-1]["line"] == 7
     assert run(["check", ROBOT, str(THREE / "fit.csv")]) == 0
-    assert "nothing is wrong" in capsys.readouterr().out
+    assert "no problems found" in capsys.readouterr().out
 
 
 def test_an_input_is_never_overwritten(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -88,4 +88,6 @@ def test_what_is_wrong_is_to_be_mended_first(tmp_path: Path, capsys: pytest.Capt
     robot = tmp_path / "robot.toml"
     robot.write_text(Path(ROBOT).read_text(encoding="utf-8").replace("mass", "mas", 1), encoding="utf-8")
     assert run(["check", str(robot)]) == 2
-    assert re.search(r"^next: mend \d problems? in 1 file, then run this again$", capsys.readouterr().err, re.MULTILINE)
+    assert re.search(
+        r"^next: correct \d problems? in 1 file, then run this again$", capsys.readouterr().err, re.MULTILINE
+    )

@@ -74,7 +74,7 @@ def test_a_robot_that_its_start_does_not_hold_is_mapped_too(tmp_path: Path) -> N
 
 def test_linearise_says_what_is_near(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["linearise", CAROCA, "--out", str(tmp_path / "model.json")]) == 0
-    assert "cable 3 goes slack at a swing of 0.0023 m" in capsys.readouterr().err
+    assert "cable 3 becomes slack at an amplitude of 0.0023 m" in capsys.readouterr().err
 
 
 def test_help_has_an_example(capsys: pytest.CaptureFixture[str]) -> None:

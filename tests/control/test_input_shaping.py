@@ -80,7 +80,7 @@ def test_shapers_are_as_robust_as_the_textbook_says() -> None:
 
 
 def test_an_unknown_kind_is_refused() -> None:
-    with pytest.raises(InputError, match="'ZVDD' is no shaper; choose among ZV, ZVD, EI"):
+    with pytest.raises(InputError, match="'ZVDD' is not a known shaper; choose among ZV, ZVD, EI"):
         shaper(1.0, 0.0, cast(ShaperKind, "ZVDD"))
 
 

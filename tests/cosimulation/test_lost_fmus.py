@@ -69,7 +69,7 @@ def test_the_run_until_then_is_written(
     said = capsys.readouterr().err
     assert said.count("\n") == 1
     assert said.startswith(f"tautwire: FMU winch_2: fmi2DoStep {fate} at 0.55 s with speed_command=0.0111; it logged: ")
-    assert said.endswith(f"; the run until then is in {out}\n")
+    assert said.endswith(f"; the run up to then is in {out}\n")
     assert pd.read_csv(out)["time"].tolist() == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
     assert sorted(path.name for path in scratch.parent.iterdir()) == ["result.csv", "scratch"]
     assert list(scratch.iterdir()) == []

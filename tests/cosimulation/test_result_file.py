@@ -58,7 +58,7 @@ def test_a_parquet_file_names_the_units(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("name", NAMES)
 def test_a_failure_keeps_the_rows_that_came_and_says_where(tmp_path: Path, name: str) -> None:
-    with pytest.raises(TautwireError, match=r"^cable torn; the run until then is in .*result") as caught:
+    with pytest.raises(TautwireError, match=r"^cable torn; the run up to then is in .*result") as caught:
         write(tmp_path / name, ROWS[:4], TautwireError("cable torn"))
     assert str(caught.value.__cause__) == "cable torn"
     assert np.allclose(read(tmp_path / name).to_numpy(), ROWS[:4], rtol=1e-15, atol=0.0)

@@ -65,7 +65,7 @@ WRONG_RUNS: list[tuple[str, Any, tuple[str, ...]]] = [
     ("tolerance", -1e-6, ("-1e-06", "above 0 m")),
     ("tolerance", np.inf, ("inf", "finite")),
     ("patience", 0.0, ("0.0", "above 0 s")),
-    ("progress", "loud", ("'loud'", "cannot be called")),
+    ("progress", "loud", ("'loud'", "not a function")),
 ]
 
 
@@ -153,7 +153,7 @@ def test_a_closed_loop_refuses_the_reference_of_another_duration(three_fmus: Rob
     ("name", "value", "words"),
     [
         ("fmus", [], ("a list", "build_fmus")),
-        ("controller", "controller.fmu", ("no file is",)),
+        ("controller", "controller.fmu", ("there is no file",)),
         ("time", [0.0, 0.0], ("must rise",)),
         ("step", 0.0, ("above 0 s",)),
         ("external_force", np.zeros((3, 3)), ("(3, 3)", "(4, 3)")),
@@ -175,7 +175,7 @@ def test_a_run_with_a_controllers_fmu_refuses(
         ("controller", 3, ("design_controller",)),
         ("trajectory", 3, ("Line(start, end, duration)",)),
         ("duration", -1.0, ("above 0 s",)),
-        ("folder", THREE / "robot.toml", ("no folder",)),
+        ("folder", THREE / "robot.toml", ("not a folder",)),
         ("reference", 3, ("elastic_reference",)),
     ],
 )

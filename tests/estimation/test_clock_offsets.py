@@ -43,7 +43,7 @@ def milliseconds(note: str) -> float:
 def test_outputs_that_are_late_in_one_recording_only_are_shifted_back(name: str, kind: str) -> None:
     _, notes, noise_is_left = clocks_set(name, recorded(name, 1, LATE[kind]), recorded(name, 2))
     assert noise_is_left
-    assert f"{name}-1.csv: {kind} run" in notes[0] and "behind winch speeds" in notes[0]
+    assert f"{name}-1.csv: {kind} are" in notes[0] and "behind the winch speeds" in notes[0]
     assert milliseconds(notes[0]) == pytest.approx(15.0, abs=0.15)
     assert milliseconds(notes[1]) < 0.1
 
@@ -66,7 +66,7 @@ def test_positions_before_their_motion_are_a_clock_even_in_both() -> None:
     _, notes, noise_is_left = clocks_set("three", *pair)
     assert noise_is_left
     assert [milliseconds(note) for note in notes] == pytest.approx([15.0, 15.0], abs=0.15)
-    assert all("ahead of winch speeds, before the motion" in note for note in notes)
+    assert all("ahead of the winch speeds, so they precede the motion" in note for note in notes)
 
 
 @pytest.mark.validate(but=["friction"])
@@ -111,9 +111,11 @@ def test_a_shift_is_exact_on_what_is_smooth_and_leaves_noise_as_white() -> None:
 def test_samples_that_cannot_be_shifted_are_refused() -> None:
     recording = recorded("three", 1)
     uneven = replace(recording, time=recording.time + 0.004 * np.sin(np.arange(len(recording.time))))
-    with pytest.raises(RecordingError, match=r"positions run 15 ms behind winch speeds, and samples are uneven"):
+    with pytest.raises(
+        RecordingError, match=r"positions are 15 ms behind the winch speeds, and the sampling is not uniform"
+    ):
         shifted(uneven, 0.015, POSITIONS)
     sparse = recording.tension.copy()
     sparse[np.arange(len(sparse)) % 5 > 0] = np.nan
-    with pytest.raises(RecordingError, match="tensions run 15 ms behind winch speeds, and are too sparse"):
+    with pytest.raises(RecordingError, match="tensions are 15 ms behind the winch speeds, and are too sparse"):
         shifted(replace(recording, tension=sparse), 0.015, TENSIONS)

@@ -46,7 +46,7 @@ def test_noise_that_is_declared_wrong_is_measured_and_said(factor: float) -> Non
     assert found.noise.of_outputs(3)[:3] == pytest.approx([3e-4] * 3, rel=0.15)
     assert found.noise.of_outputs(3)[3:] == pytest.approx([2.0] * 3, rel=0.15)
     assert len(found.notes) == 6
-    assert "tension_2: declared noise" in found.notes[4] and "that is used" in found.notes[4]
+    assert "tension_2: declared noise" in found.notes[4] and "the latter is used" in found.notes[4]
 
 
 def test_one_output_may_be_noisier_than_the_others_of_its_kind() -> None:
@@ -91,4 +91,4 @@ def test_a_rest_tells_size_and_colour() -> None:
         resting.append(with_noise(replace(recording, winch_speed=speed, position=position), 0.7, 2e-3, seed))
     found = checked(declared(position_noise=5e-3), tuple(resting))
     assert found.noise.of_outputs(3)[:3] == pytest.approx([2e-3] * 3, rel=0.25)
-    assert all("at rest neighbours are alike by 0." in note for note in found.notes)
+    assert all("at rest neighbouring samples correlate by 0." in note for note in found.notes)

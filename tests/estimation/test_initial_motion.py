@@ -56,7 +56,7 @@ def runs(name: str, *recordings: Recording) -> list[tuple[bool, float, float]]:
     found = []
     for sample in (evidence.estimation, evidence.validation):
         begun = with_initial_state(fitter, robot, sample)
-        assert "the run starts with tensions of" in initial_state_note(begun, sample.recording.path)[0]
+        assert "the estimated initial state has tensions of" in initial_state_note(begun, sample.recording.path)[0]
         error, floor = (
             cosimulation_errors(sample.recording, cosimulate_data_set(begun, sample)),
             noise_floor(fitter, robot, sample),
@@ -108,6 +108,6 @@ def test_a_start_too_far_from_rest_is_refused() -> None:
     wild = replace(recording, position=recording.position + 3.0 * np.sin(20.0 * recording.time)[:, None])
     robot = example("three")
     with pytest.raises(
-        RecordingError, match=r"three-1\.csv: starts in motion, .* m/s, and swings by .*; start the rec"
+        RecordingError, match=r"three-1\.csv: starts in motion, .* m/s, and vibrates by .*; begin the rec"
     ):
         with_motion_at_start(robot, estimate_noise(robot, recording), (wild,))

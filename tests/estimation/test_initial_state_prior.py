@@ -57,7 +57,7 @@ def test_pretension_is_uncertain_where_no_tension_is_measured_or_the_file_says_s
     assert self_stress_deviation(EIGHT, (recorded("eight", 1),)) == (0.0, ())
     unseen, notes = self_stress_deviation(EIGHT, (blind("eight"),))
     assert unseen == pytest.approx(0.25 * np.mean(static_tensions(EIGHT)))
-    assert "no tensions are measured" in notes[0]
+    assert "no tension is measured" in notes[0]
     assert EIGHT.tension is not None
     told = replace(EIGHT, tension=replace(EIGHT.tension, preferred_uncertainty=12.0))
     assert self_stress_deviation(told, (recorded("eight", 1),))[0] == 12.0

@@ -27,7 +27,7 @@ def read(fit: dict[str, Any], check: dict[str, Any]) -> tuple[PreparedData, ...]
 
 
 def told(found: PreparedData) -> bool:
-    return any("a clock, no effect" in note for note in found.notes)
+    return any("a clock offset" in note for note in found.notes)
 
 
 def test_what_is_noise_is_taken_as_it_is() -> None:
@@ -53,7 +53,7 @@ def test_an_effect_that_explains_all_goes_before_a_clock(monkeypatch: pytest.Mon
         fitter: Fitter, robot: Robot, evidence: DataSplit, policy: ClockOffsetPolicy
     ) -> tuple[DataSplit, tuple[str, ...]]:
         late = shifted(evidence.estimation.recording, 0.01, CHANNEL_GROUPS[1])
-        return DataSplit(replace(evidence.estimation, recording=late), evidence.validation, ()), ("a clock, no effect",)
+        return DataSplit(replace(evidence.estimation, recording=late), evidence.validation, ()), ("a clock offset",)
 
     monkeypatch.setattr(preprocessing, "with_clocks_set", always)
     found = trace(THREE, *pair({"damping": {"damping": 9e8}}))
@@ -65,7 +65,7 @@ def test_an_effect_that_explains_all_goes_before_a_clock(monkeypatch: pytest.Mon
 def test_a_clock_beside_an_effect_is_set_once_no_effect_explains_all() -> None:
     found = trace(THREE, recorded("three", 1, {"payload": {"mass": 6.0}, **LATE}), pair({"payload": {"mass": 6.0}})[1])
     assert [effect.name for effect in found.effects] == ["payload"]
-    assert any("a clock, no effect" in note for note in found.notes)
+    assert any("a clock offset" in note for note in found.notes)
 
 
 def pair(effects: dict[str, Any]) -> tuple[Recording, Recording]:

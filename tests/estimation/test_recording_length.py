@@ -22,7 +22,7 @@ def test_each_of_two_is_cut_and_told() -> None:
     assert fit.sample_count == check.sample_count == 301
     np.testing.assert_array_equal(fit.position, FIT.position[:301])
     assert [note.split(":")[0] for note in notes] == [FIT.path, CHECK.path]
-    assert notes[0].endswith("its first 6 s, 301 of 801 samples, were traced; give another part for more")
+    assert notes[0].endswith("its first 6 s, 301 of 801 samples, were traced; to trace another part, cut it out")
 
 
 def test_the_only_one_keeps_twice_as_much_since_it_judges_too() -> None:

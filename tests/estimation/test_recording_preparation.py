@@ -56,7 +56,7 @@ def test_recordings_as_they_should_be_are_not_touched() -> None:
 def test_all_that_is_done_is_said_and_leaves_noise() -> None:
     prepared = prepare_recordings(ROBOT, spoilt(recorded("three", 1)), spoilt(recorded("three", 2)))
     for path in ("three-1.csv", "three-2.csv"):
-        assert f"{path}: tension_2 shows one value all along: not used" in prepared.notes
+        assert f"{path}: tension_2 is constant throughout: not used" in prepared.notes
         assert any(path in note and "3 of tension_1, 2 of tension_3" in note for note in prepared.notes)
         assert any(path in note and "in its gaps (at 8.98 s): only the part from 0" in note for note in prepared.notes)
     assert noise_is_left(prepared)
@@ -92,7 +92,7 @@ def test_a_recording_of_which_nothing_is_alive_is_refused() -> None:
 def test_a_noise_that_was_declared_too_small_leaves_noise() -> None:
     timid = replace(ROBOT, sensors=replace(ROBOT.sensors, tension_noise=0.5))
     prepared = prepare_recordings(timid, recorded("three", 1), recorded("three", 2))
-    assert sum("that is used" in note for note in prepared.notes) == 3
+    assert sum("the latter is used" in note for note in prepared.notes) == 3
     assert noise_is_left(prepared)
 
 
@@ -104,7 +104,7 @@ def test_what_is_hidden_is_found_in_recordings_as_they_are() -> None:
     assert [effect.name for effect in found.effects] == ["payload"]
     low, high = found.effects[0].parameters["mass"].low, found.effects[0].parameters["mass"].high
     assert low - 0.02 < 6.0 < high + 0.02
-    for part in ("one value all along", "come back are taken out", "what winches did in its gaps"):
+    for part in ("constant throughout", "outliers beyond 25 sigma removed", "the winch motion in its gaps"):
         assert sum(part in note for note in found.notes) == 2
 
 
@@ -116,5 +116,5 @@ def test_what_is_refused_is_one_line_and_nothing_is_written(tmp_path: Path, caps
     assert run(["trace", robot, str(tmp_path / "fit.csv"), "--out", str(out)]) == 2
     said = capsys.readouterr().err.splitlines()
     assert len(said) == 1
-    assert "fit.csv: column tension_2: jumps and comes back in" in said[0] and "mend the sensor" in said[0]
+    assert "fit.csv: column tension_2: has outliers in" in said[0] and "repair the sensor" in said[0]
     assert not out.exists()

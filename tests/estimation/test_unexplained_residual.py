@@ -55,4 +55,4 @@ def test_what_swings_is_not_explained_but_said(length: float, frequency: float, 
     assert line["frequency_hz"] == pytest.approx(frequency, rel=accuracy)
     assert line["outputs"] == ["x", "y"]
     assert line["on"] == ["fit", "check"]
-    assert any(f"something swings at {line['frequency_hz']:.2g}" in note for note in found.notes)
+    assert any(f"an oscillation at {line['frequency_hz']:.2g}" in note for note in found.notes)

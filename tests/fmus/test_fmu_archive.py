@@ -173,9 +173,9 @@ HOSTILE: dict[str, tuple[Make, str]] = {
     "parent": (with_entry("../evil"), "'../evil' that leads out of the folder"),
     "deep parent": (with_entry("resources/../../evil"), "leads out of the folder"),
     "absolute": (with_entry("/etc/evil"), "'/etc/evil' that is an absolute path"),
-    "drive": (with_entry("C:evil"), "has a colon, as drives have"),
+    "drive": (with_entry("C:evil"), "has a colon, as in drive letters"),
     "backslash": (with_entry("resources\\..\\..\\evil"), "has a backslash"),
-    "dot": (with_entry("./evil"), "is no plain path"),
+    "dot": (with_entry("./evil"), "is not a plain path"),
     "zero byte": (with_entry("evil\0.txt"), "unprintable"),
     "line break": (with_entry("evil\ntautwire: all is well"), "unprintable"),
     "long name": (with_entry("a" * 300), "longer than file systems take"),
@@ -201,7 +201,7 @@ HOSTILE: dict[str, tuple[Make, str]] = {
     "deep": (described(DEEP), "nested more than 64 deep"),
     "wide": (described(WIDE), "an attribute 'modelName' of 1048577 characters"),
     "long": (described(DESCRIPTION + " " * 2**26), "at most"),
-    "elsewhere": (described(ELSEWHERE), "modelIdentifier '../../../../tmp/evil' is no name"),
+    "elsewhere": (described(ELSEWHERE), "modelIdentifier '../../../../tmp/evil' is not a valid name"),
     "encoding": (described(DESCRIPTION.replace("UTF-8", "UTF-99")), "cannot be read as an FMU"),
     "no XML": (described("<"), "cannot be read as an FMU"),
     "empty description": (described(""), "cannot be read as an FMU"),
@@ -267,7 +267,7 @@ def test_the_master_refuses_it_too(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         with pytest.raises(ArchiveError, match="leads out"):
             refuse(fmu)
     assert list(scratch.iterdir()) == []
-    with pytest.raises(ArchiveError, match="is no file"):
+    with pytest.raises(ArchiveError, match="is not a file"):
         require_valid_archive(tmp_path)
 
 

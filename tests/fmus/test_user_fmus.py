@@ -92,9 +92,9 @@ def test_what_it_goes_on_without_is_said(platform: Path, tmp_path: Path) -> None
     fmus = build_fmus(replace(paper_robot(), fmus=(UserFmu("platform", platform),)), tmp_path)
     motion = cosimulate(fmus, CORNERS[:2], SPEEDS[:2])
     held, fixed, rate = motion.statistics.fallback_notes()
-    assert held == "no input_time, so inputs are held over each step at their mean: FMU platform"
-    assert fixed == "no saved states, so no step is redone or cut at a kink: FMU platform"
-    assert rate.startswith("no rate of velocity, so it is worked out from the past, off by about ")
+    assert held == "no input_time, so inputs are constant over each step, at their mean: FMU platform"
+    assert fixed == "no saved states, so steps are not iterated, nor split at events: FMU platform"
+    assert rate.startswith("no derivative of velocity, so it is estimated from past steps, with an error of about ")
     assert rate.endswith(" m/s2: FMU platform")
     assert motion.statistics.iterations == 0
 
@@ -118,7 +118,7 @@ def test_a_plain_cable_is_told_where_the_run_starts_and_its_lacking_columns_are_
 def test_a_rate_worked_out_is_as_good_as_it_says(winch: Path, tmp_path: Path) -> None:
     fmus = build_fmus(replace(paper_robot(), fmus=all_winches(winch)), tmp_path)
     account = cosimulate(fmus, np.array([0.0, 1.0]), 0.5 * np.ones((2, 3)), 0.01).statistics
-    doubt = float(account.fallback_notes()[1].partition("off by about ")[2].split()[0])
+    doubt = float(account.fallback_notes()[1].partition("with an error of about ")[2].split()[0])
     # The winch jumps to 0.5 m/s with its lag: the rate is exp(-t / lag) 0.5 / lag.
     times = np.arange(0.01, 1.0, 0.01)
     shown = 0.5 * (1.0 - np.exp(-times / LAG))

@@ -224,7 +224,7 @@ def test_states_that_do_not_tell_all_are_refused(damped_fmus: RobotFmus) -> None
 
 
 def test_an_unknown_state_is_refused(damped_fmus: RobotFmus) -> None:
-    with pytest.raises(InputError, match="no FMU shows a state 'speed'; choose among position_x"):
+    with pytest.raises(InputError, match="no FMU outputs a state 'speed'; choose among position_x"):
         linearise_robot_fmus(damped_fmus, states=["speed"])
 
 
@@ -253,9 +253,11 @@ def slipping(slip: float) -> Robot:
 def test_a_small_slope_change_at_rest_is_reported(tmp_path: Path) -> None:
     notes = linearise_robot_fmus(build_fmus(slipping(2e-5), tmp_path)).notes
     assert len(notes) == 1
-    assert notes[0].startswith("a kink at rest: what winch_speed_1 does upward and downward differs by 3%")
+    assert notes[0].startswith("nonsmooth at rest: responses to pulses of winch_speed_1 up and down differ by 3%")
 
 
 def test_a_large_slope_change_at_rest_is_refused(tmp_path: Path) -> None:
-    with pytest.raises(IdentificationError, match=r"at a kink, what cable_1\.winch_speed does .* differs by 32%"):
+    with pytest.raises(
+        IdentificationError, match=r"nonsmooth at rest: .* cable_1\.winch_speed up and down differ by 32%"
+    ):
         linearise_robot_fmus(build_fmus(slipping(2e-4), tmp_path))

@@ -27,7 +27,7 @@ def test_a_smooth_robot_has_no_notes() -> None:
 
 def test_a_slack_cable_is_said_and_pulls_at_nothing() -> None:
     plant = linearise(third_slack(), BELOW)
-    assert plant.notes[0] == "cable 3 hangs slack: it carries nothing, and holds only while it stays so"
+    assert plant.notes[0] == "cable 3 is slack: it carries no tension, and the plant holds only while it stays slack"
     assert plant.tensions[2] == 0.0
     assert np.all(plant.system["tension_3", plant.system.input_labels](1j) == 0.0)
     assert np.all(plant.modes.cable_shares[2] == 0.0)
@@ -53,7 +53,7 @@ def test_a_slack_cable_has_rope_to_spare(law: str) -> None:
 def test_the_swing_that_slackens_a_cable_is_told() -> None:
     plant = linearise(example("caroca"), swing=2.5e-3)
     assert len(plant.notes) == 1
-    assert plant.notes[0].startswith("cable 3 goes slack at a swing of 0.0023 m")
+    assert plant.notes[0].startswith("cable 3 becomes slack at an amplitude of 0.0023 m")
     slopes = plant.tension_slopes[2] @ plant.modes.shapes
     assert np.max(np.abs(slopes)) * 2.3e-3 == pytest.approx(plant.tensions[2], rel=0.03)
 
@@ -87,7 +87,7 @@ def test_smooth_effects_are_not_said() -> None:
 
 def test_late_sensors_are_said() -> None:
     robot = with_effect(paper_robot(), "sensor_delay", tension_delay=0.02)
-    assert linearise(robot).notes[0] == "tension 1: sensors show 0.02 s late, the plant at once"
+    assert linearise(robot).notes[0] == "tension 1: sensors are 0.02 s late, which the plant omits"
 
 
 def test_a_platform_that_cables_hold_in_no_direction_but_one_is_refused() -> None:

@@ -139,7 +139,7 @@ def test_the_document_reads_like_a_trace(measured: MaterialVerdict) -> None:
 
 def test_the_words_hold_the_figures(measured: MaterialVerdict) -> None:
     said = verdict_sentence(measured)
-    assert "refuted" in said
+    assert "rejected" in said
     assert "1828" in said
     assert "relaxation and hysteresis" in said
     text = " ".join(verdict_notes(measured))

@@ -52,7 +52,7 @@ def test_remarks_blank_lines_and_columns_without_uncertainty_are_read(tmp_path: 
         (["# only a remark"], "is empty"),
         ([HEADER.replace("frequency", "freq"), *ROWS], "line 1: the column 'freq' is not known; write 'frequency'"),
         ([HEADER.replace(",", ";"), *ROWS], "separated with semicolons or tabs"),
-        ([HEADER + ",loss_factor", *ROWS], "line 1: the column 'loss_factor' is there twice"),
+        ([HEADER + ",loss_factor", *ROWS], "line 1: the column 'loss_factor' appears twice"),
         ([HEADER + ",phase_uncertainty", *ROWS], "phase_uncertainty stands without phase"),
         ([HEADER + ",phase,phase_degrees", *ROWS], "in rad and in degrees"),
         ([HEADER.removeprefix("frequency,"), *ROWS], "the column frequency is missing"),
@@ -67,7 +67,7 @@ def test_remarks_blank_lines_and_columns_without_uncertainty_are_read(tmp_path: 
         ([HEADER, *ROWS * 126], "has 504 rows, at most 500 are fitted"),
         ([HEADER, *ROWS, "0,,,0.1,0.01"], "line 6: a static row gives no storage_modulus"),
         ([HEADER, *ROWS[:3], "5,1.2e11,3e9,0.1,"], "no pair of columns gives a complex modulus"),
-        ([HEADER, *ROWS[:3], '5,1.2e11,3e9,"' + "1" * 200_000], "line 5: is no CSV"),
+        ([HEADER, *ROWS[:3], '5,1.2e11,3e9,"' + "1" * 200_000], "line 5: is not valid CSV"),
     ],
 )
 def test_what_is_wrong_is_said_in_one_line(tmp_path: Path, lines: list[str], said: str) -> None:

@@ -58,7 +58,7 @@ def test_a_line_takes_arrays_as_points() -> None:
 
 
 def test_a_helix_refuses_what_turns_nothing() -> None:
-    refused(lambda: Helix((0.0, 0.0, 1.0), 1.0, 1.0, 0.0, 4.0), "Helix: angle", "no turn")
+    refused(lambda: Helix((0.0, 0.0, 1.0), 1.0, 1.0, 0.0, 4.0), "Helix: angle", "must turn")
     refused(lambda: Helix((0.0, 0.0, 1.0), -1.0, 1.0, 1.0, 4.0), "Helix: radius", "at least 0 m")
 
 
@@ -117,10 +117,10 @@ def test_ideal_winch_speeds_refuse_a_path_of_the_users_that_is_none(
     [
         ("robot", {}, ("a dict", "read_robot")),
         ("folder", 3, ("3", "pathlib.Path")),
-        ("folder", THREE / "robot.toml", ("robot.toml", "no folder")),
+        ("folder", THREE / "robot.toml", ("robot.toml", "not a folder")),
         pytest.param("folder", "a" * 300, ("cannot be looked up",), id="long name"),
         pytest.param("folder", "\ud800", ("cannot be looked up",), id="lone surrogate"),
-        ("progress", 1, ("cannot be called",)),
+        ("progress", 1, ("not a function",)),
     ],
 )
 def test_building_refuses(tmp_path: Path, name: str, value: Any, words: tuple[str, ...]) -> None:
@@ -247,7 +247,7 @@ def test_an_aim_refuses(changes: dict[str, Any], where: str, words: tuple[str, .
         ({"alpha": 0.0}, "alpha", ("above 0",)),
         ({"alpha": 1.0}, "alpha", ("below 1",)),
         ({"processes": 0}, "processes", ("at least 1",)),
-        ({"progress": 1}, "progress", ("cannot be called",)),
+        ({"progress": 1}, "progress", ("not a function",)),
     ],
 )
 def test_a_trace_refuses(changes: dict[str, Any], where: str, words: tuple[str, ...]) -> None:

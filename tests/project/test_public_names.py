@@ -78,7 +78,7 @@ def test_recordings_go_from_frames_to_frames() -> None:
         (lambda frame: frame.drop(columns="time"), "time is missing"),
         (lambda frame: frame.assign(time=0.0), "row 2, column time"),
         (lambda frame: frame.assign(winch_speed_1=np.nan), "row 1, column winch_speed_1"),
-        (lambda frame: frame.set_axis(["time"] * len(frame.columns), axis="columns"), "there twice"),
+        (lambda frame: frame.set_axis(["time"] * len(frame.columns), axis="columns"), "appears twice"),
     ],
 )
 def test_a_frame_that_is_no_recording_is_refused(change, said: str) -> None:  # type: ignore[no-untyped-def]

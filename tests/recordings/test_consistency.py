@@ -46,7 +46,7 @@ def elsewhere(robot: Robot, offset: list[float]) -> Robot:
 def test_another_robots_recording_is_refused_by_its_ropes() -> None:
     with pytest.raises(RecordingError, match=r"first positions: they begin at .*28\.1 m from .*28\.86, 0, 5\]") as e:
         start_position(THREE, NOISE, of("caroca"))
-    assert "would not be reeled so" in e.value.problem and "correct the robot file" in e.value.hint
+    assert "winch travel does not match the positions" in e.value.problem and "correct the robot file" in e.value.hint
 
 
 def test_a_start_farther_away_than_the_robot_is_large_is_refused() -> None:
@@ -56,7 +56,7 @@ def test_a_start_farther_away_than_the_robot_is_large_is_refused() -> None:
 
 
 def test_a_start_that_cables_cannot_hold_tells_how_far_it_is_from_the_robot_files() -> None:
-    with pytest.raises(UnreachableError, match=r"60 m from where the robot file starts it.*cable \d would need -") as e:
+    with pytest.raises(UnreachableError, match=r"60 m from the start in the robot file.*cable \d would need -") as e:
         start_position(THREE, NOISE, moved(recorded("three", 1), [-60.0, 0.0, 0.0]))
     assert "correct the robot file" in e.value.hint
 
@@ -66,7 +66,7 @@ def test_a_start_far_from_the_robot_files_is_taken_where_the_ropes_fit(name: str
     away = elsewhere(example(name), [0.0, 0.0, -1.5 * MIN_CHECKED_START_SHARE * robot_size(example(name))])
     start, notes = start_position(away, NOISE, of(name))
     assert start == pytest.approx(example(name).platform.start, abs=2e-3)
-    assert "starts where it says" in notes[0]
+    assert "the run starts there too" in notes[0]
 
 
 @pytest.mark.validate(but=["effects4"])
@@ -118,6 +118,6 @@ def test_commands_tell_of_another_robots_recording(
     assert run([command, robot, *arguments[command]]) == 2
     told = capsys.readouterr()
     said = json.loads(told.out)["problems"][0]["problem"] if command == "check" else told.err
-    assert "28.1 m from where the robot file starts it" in said
+    assert "28.1 m from the start in the robot file" in said
     assert list(tmp_path.iterdir()) == []
     assert check_files(EXAMPLES / "three" / "robot.toml", EXAMPLES / "three" / "fit.csv").problems == ()

@@ -188,7 +188,7 @@ def test_refuses_a_wrong_cell_or_column(tmp_path: Path, old: str, new: str, plac
         (PLAIN.encode() + b"0.03\xe9,", ["line 5", "0xe9", "UTF-8"]),
         (PLAIN.encode() + b"\0\0", ["line 5", "zero byte"]),
         (b"PK\x03\x04" + bytes(50), ["zip"]),
-        (b"\x1f\x8b\x08" + bytes(range(256)), ["gzip", "unpack it first"]),
+        (b"\x1f\x8b\x08" + bytes(range(256)), ["gzip", "decompress it first"]),
         (bytes(range(1, 128)), ["line 1"]),
         (HEADER + "\n" + "0," * 200_000, ["line 2", "200001 cells"]),
         ("t" * 200_000 + PLAIN, ["line 1"]),

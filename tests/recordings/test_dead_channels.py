@@ -27,14 +27,14 @@ def test_a_recording_as_it_should_be_stays(name: str) -> None:
 def test_a_load_cell_that_shows_one_value_all_along_is_not_used() -> None:
     cleaned, notes = without_dead_channels(with_tension(1, np.full(801, 1432.0)))
     assert np.isnan(cleaned.tension[:, 1]).all() and np.isfinite(cleaned.tension[:, [0, 2]]).all()
-    assert notes == (f"{WHOLE.path}: tension_2 shows one value all along: not used",)
+    assert notes == (f"{WHOLE.path}: tension_2 is constant throughout: not used",)
 
 
 def test_a_load_cell_that_shows_noise_alone_is_not_used() -> None:
     noise = np.random.default_rng(1).normal(scale=2.0, size=801)
     cleaned, notes = without_dead_channels(with_tension(2, 700.0 + noise))
     assert np.isnan(cleaned.tension[:, 2]).all()
-    assert "tension_3 shows noise alone" in notes[0]
+    assert "tension_3 shows only noise" in notes[0]
 
 
 def test_a_robot_that_rests_all_along_keeps_its_load_cells() -> None:
@@ -48,7 +48,7 @@ def test_a_load_cell_that_dies_on_the_way_is_used_until_then() -> None:
     values[500:] = values[500]
     cleaned, notes = without_dead_channels(with_tension(0, values))
     assert np.isfinite(cleaned.tension[:501, 0]).all() and np.isnan(cleaned.tension[501:, 0]).all()
-    assert "tension_1: stays at one value for 300 samples" in notes[0]
+    assert "tension_1: frozen for 300 samples" in notes[0]
 
 
 def test_a_slower_sensor_whose_values_are_repeated_is_used_once_a_value() -> None:
@@ -63,7 +63,7 @@ def test_a_coordinate_that_never_changes_is_not_used() -> None:
     position[:, 1] = 0.0
     cleaned, notes = without_dead_channels(replace(WHOLE, position=position))
     assert np.isnan(cleaned.position[:, 1]).all() and np.isfinite(cleaned.position[:, 0]).all()
-    assert "y shows one value all along" in notes[0]
+    assert "y is constant throughout" in notes[0]
 
 
 def test_a_coarse_sensor_is_no_slow_one() -> None:

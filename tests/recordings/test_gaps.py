@@ -35,7 +35,7 @@ def test_the_longest_part_between_gaps_is_used() -> None:
     part, notes = without_gaps(gapped, DETECTABLE)
     assert (part.time[0], part.time[-1]) == (WHOLE.time[250], WHOLE.time[649])
     assert np.array_equal(part.tension, WHOLE.tension[250:650])
-    assert "three-1.csv: nobody knows what winches did in its gaps (at 3.98 s, 12.98 s)" in notes[0]
+    assert "three-1.csv: the winch motion in its gaps (at 3.98 s, 12.98 s) is unknown" in notes[0]
 
 
 def test_a_gap_in_which_winches_rest_is_none() -> None:

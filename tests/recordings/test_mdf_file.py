@@ -87,9 +87,9 @@ def test_what_cannot_be_right_is_refused(tmp_path: Path) -> None:
     in_millimetres = written(path, (TIME, SPEEDS | OUTPUTS), units={"x": "mm"})
     assert "channel x: is in 'mm'; convert it to m" in refused(in_millimetres)
     twice = written(path, (TIME, SPEEDS | OUTPUTS), (TIME, {"z": [1.0, 2.0, 3.0]}))
-    assert "channel z: is there more than once" in refused(twice)
+    assert "channel z: appears more than once" in refused(twice)
     words = written(path, (TIME, SPEEDS | {"z": np.array([b"a", b"b", b"c"])}))
-    assert "channel z: holds no numbers" in refused(words)
+    assert "channel z: contains no numbers" in refused(words)
 
 
 def test_a_broken_file_is_refused(tmp_path: Path) -> None:

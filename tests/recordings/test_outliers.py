@@ -64,7 +64,7 @@ def test_a_channel_that_jumps_all_the_time_is_refused() -> None:
     recording = recorded("three", 1)
     tension = recording.tension.copy()
     tension[50::20, 1] += 300.0
-    with pytest.raises(RecordingError, match=r"column tension_2: jumps and comes back in \d+ of 801 samples, more"):
+    with pytest.raises(RecordingError, match=r"column tension_2: has outliers in \d+ of 801 samples, more"):
         without_outliers(replace(recording, tension=tension))
 
 

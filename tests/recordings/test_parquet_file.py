@@ -147,7 +147,7 @@ def test_refuses_a_column_that_is_there_twice(tmp_path: Path) -> None:
     arrays = [pa.array(values) for values in COLUMNS.values()]
     names = [*list(COLUMNS)[:-1], "y"]
     pq.write_table(pa.Table.from_arrays(arrays, names=names), tmp_path / "fit.parquet")
-    assert "'y' is there twice" in str(refused(tmp_path / "fit.parquet"))
+    assert "'y' appears twice" in str(refused(tmp_path / "fit.parquet"))
 
 
 @pytest.mark.parametrize("content", [b"", b"PAR1", b"time,x\n0,1\n1,2\n", b"PAR1" + bytes(100) + b"PAR1"])
@@ -155,7 +155,7 @@ def test_refuses_what_is_no_parquet(tmp_path: Path, content: bytes) -> None:
     (tmp_path / "fit.parquet").write_bytes(content)
     error = refused(tmp_path / "fit.parquet")
     assert "cannot be read as Parquet" in error.problem
-    assert "write it anew" in error.hint
+    assert "export it again" in error.hint
 
 
 @pytest.mark.parametrize(("name", "words"), [("absent.parquet", "no such file"), ("folder.parquet", "folder")])

@@ -28,7 +28,7 @@ def test_a_recording_that_starts_elsewhere_starts_where_it_says() -> None:
     recording = moved([0.0, 0.5, 0.0])
     start, notes = start_position(ROBOT, NOISE, recording)
     assert start == pytest.approx(recording.position[:5].mean(axis=0), abs=1e-12)
-    assert "starts where it says" in notes[0]
+    assert "the run starts there too" in notes[0]
     assert with_start(ROBOT, start).platform.start == start
 
 

@@ -33,7 +33,9 @@ def test_the_worst_comes_first() -> None:
 
 
 def test_what_could_not_be_told_is_said() -> None:
-    blind = FaultLocalisation(np.zeros(0), (), "cannot tell", "Cannot tell which component is off.", ("no positions",))
+    blind = FaultLocalisation(
+        np.zeros(0), (), "cannot tell", "Cannot tell which component is faulty.", ("no positions",)
+    )
     page = localisation(replace(made_trace(samples=200), components=blind))
     assert page.all("table") == []
     assert "Cannot tell" in page.text and "no positions" in page.text
@@ -43,7 +45,7 @@ def test_a_ringing_force_shows_its_frequency() -> None:
     trace = made_trace(samples=200)
     loud = replace(trace.components.residuals[-1], rms=9.0, resonance_frequency=0.4512)
     shown = replace(trace.components, residuals=(*trace.components.residuals[:-1], loud))
-    assert "rings at 0.45 Hz" in localisation(replace(trace, components=shown)).text
+    assert "oscillates at 0.45 Hz" in localisation(replace(trace, components=shown)).text
 
 
 def test_hostile_words_are_escaped() -> None:

@@ -135,7 +135,7 @@ def test_a_run_that_fails_leaves_a_page_that_says_where(tmp_path: Path) -> None:
     arguments = ["simulate", str(THREE / "robot.toml"), "--speeds", str(recording)]
     assert command([*arguments, "--out", str(tmp_path / "result.csv"), "--report", str(page)]) == 1
     found = Page(page.read_text(encoding="utf-8"))
-    assert "Stopped: an FMU failed" in found.text and "the run until then is in" in found.text
+    assert "Stopped: an FMU failed" in found.text and "the run up to then is in" in found.text
     assert unpack_float32(found.data()["choices"][0]["scene"]["time"]) == pytest.approx([0.0, 0.1, 0.2])
 
 

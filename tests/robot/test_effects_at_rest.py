@@ -158,7 +158,7 @@ def test_one_number_alone_switches_an_effect_on_and_none_does_not(tmp_path: Path
     path.write_text(f"{bare}\n[effect.drum]\nradius_ratio = 1.01\n")
     assert read_robot(path).effects[0].values["slip"] == 0.0
     path.write_text(f"{bare}\n[effect.drum]\ncables = [2]\n")
-    with pytest.raises(RobotFileError, match=r"effect\.drum: sets none of its numbers; give true over declared"):
+    with pytest.raises(RobotFileError, match=r"effect\.drum: sets no parameter; give true over declared"):
         read_robot(path)
 
 

@@ -123,7 +123,7 @@ def made_components(cables: tuple[int, ...]) -> FaultLocalisation:
     balance = [
         ComponentResidual("platform", f"force {a}", "N", 0.25 * noise, 0.0, 0.25, 0.25, 1.4, None) for a in "xyz"
     ]
-    sentence = "The tensions of all cables are off; the platform's force balance is within its noise."
+    sentence = "The tensions of all cables deviate; the platform's force balance is within noise."
     return FaultLocalisation(np.linspace(0.0, 40.0, 400), (*tensions, *balance), "cables (rope or winch)", sentence, ())
 
 

@@ -31,7 +31,7 @@ ARROW_TYPES = {"whole": pa.int64(), "number": pa.float64(), "flag": pa.bool_(), 
 def open_dataset(folder: Path, plan: Plan) -> Iterator[None]:
     """Open the folder of a campaign, created if absent, with an exclusive lock until the block ends.
 
-    Raises PlanMismatchError where it holds rows of another plan, InputError where another process writes there.
+    Raises PlanMismatchError where it contains rows of another plan, InputError where another process writes there.
     """
     try:
         (folder / RUNS_FOLDER).mkdir(parents=True, exist_ok=True)
@@ -89,7 +89,7 @@ def _read_part(part: Path, columns: list[str] | None) -> pa.Table:
     try:
         return pq.read_table(part, columns=columns, partitioning=None)
     except (pa.ArrowInvalid, KeyError) as error:
-        raise PlanError(str(part), "is damaged", "delete it; its runs are then made again") from error
+        raise PlanError(str(part), "is damaged", "delete it; its runs are then repeated") from error
 
 
 class PartWriter:
@@ -171,6 +171,6 @@ def _exclusive_lock(folder: Path) -> Iterator[None]:
         try:
             acquire_lock(file)
         except BlockingIOError as error:
-            hint = "wait until it has ended, or choose another --out"
+            hint = "wait until it ends, or choose another --out"
             raise InputError(str(folder), "another process writes there", hint) from error
         yield

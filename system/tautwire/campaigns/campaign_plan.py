@@ -23,11 +23,11 @@ class PlanError(InputError):
 
 
 class PlanMismatchError(InputError):
-    """The folder holds rows of another plan; ``stored_digest`` and ``plan_digest`` are the digests of both."""
+    """The folder contains rows of another plan; ``stored_digest`` and ``plan_digest`` are the digests of both."""
 
     def __init__(self, folder: str, stored_digest: str, plan_digest: str) -> None:
-        hint = "choose another --out, or give the plan and the robot file back what they had"
-        super().__init__(folder, f"holds rows of another plan ({stored_digest}, this one is {plan_digest})", hint)
+        hint = "choose another --out, or restore the plan and the robot file"
+        super().__init__(folder, f"contains rows of another plan ({stored_digest}, this one is {plan_digest})", hint)
         self.stored_digest = stored_digest
         self.plan_digest = plan_digest
 
@@ -45,7 +45,7 @@ class UnfinishedError(TautwireError):
     """A campaign that ended early: ``written_count`` of ``count`` rows are written, and the same command resumes."""
 
     def __init__(self, reason: str, written_count: int, count: int) -> None:
-        super().__init__(f"{reason} after {written_count} of {count} runs; the same command goes on where it stopped")
+        super().__init__(f"{reason} after {written_count} of {count} runs; the same command resumes it")
         self.reason = reason
         self.written_count = written_count
         self.count = count

@@ -235,7 +235,7 @@ def _simulate(fmus: RobotFmus, reference_input: ReferenceInput, plan: Plan, job:
     if reference_input.winch_speeds is not None:
         return cosimulate(fmus, reference_input.time, reference_input.winch_speeds, plan.compute.step)
     if reference_input.design is None or reference_input.trajectory is None:
-        raise ValueError("a drive without speeds needs a controller and its path")
+        raise ValueError("an input without winch speeds needs a controller and its path")
     seed = int(np.random.SeedSequence((plan.seed, job.index)).generate_state(1)[0]) if plan.compute.noise else None
     return cosimulate_closed_loop(
         fmus,

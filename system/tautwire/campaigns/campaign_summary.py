@@ -190,11 +190,11 @@ def _sobol_unavailable_reason(plan: Plan) -> str:
     if plan.method == "saltelli":
         return ""
     if plan.correlations:
-        return 'no Sobol indices: inputs are correlated, which takes method = "saltelli"'
+        return 'no Sobol indices: inputs are correlated, which requires method = "saltelli"'
     if any(each.distribution.discrete_values for each in plan.inputs):
-        return 'no Sobol indices: inputs have steps, which takes method = "saltelli"'
+        return 'no Sobol indices: inputs are discrete, which requires method = "saltelli"'
     too_few = plan.count < MIN_RBD_FAST_SAMPLES
-    return f"no Sobol indices: {plan.count} samples, they take {MIN_RBD_FAST_SAMPLES} or more" if too_few else ""
+    return f"no Sobol indices: {plan.count} samples, {MIN_RBD_FAST_SAMPLES} or more are required" if too_few else ""
 
 
 def _sobol_indices(

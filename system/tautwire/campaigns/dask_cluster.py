@@ -29,7 +29,7 @@ LOW_OVERHEAD_CONFIG = {
     "distributed.admin.system-monitor.interval": "2s",
     "distributed.admin.low-level-log-length": 20,
 }
-WORKER_LOST = "its worker was lost again and again: out of memory, or an FMU ended its process"
+WORKER_LOST = "its worker was lost repeatedly: out of memory, or an FMU ended its process"
 
 
 class SchedulerLostError(TautwireError):

@@ -55,7 +55,7 @@ def identified_inputs(
     Each parameter is normal about its estimate, its 95 % interval being 1.96 standard deviations to both sides; where
     ``correlated``, with the correlations of the report. A parameter without an interval is set to its estimate.
 
-    Raises PlanError where the file is no report of a trace, or found no effect.
+    Raises PlanError where the file is not a report of a trace, or found no effect.
     """
     report = _read_report(report_file)
     tables, effect_paths = _effect_tables(_robot_with_effects(robot_from_content(dict(content), robot_file), report))
@@ -90,9 +90,9 @@ def _read_report(report_file: Path) -> _TraceReport:
         }
         correlations = dict(_correlation_pairs(document))
     except (ArithmeticError, AttributeError, KeyError, RecursionError, TypeError, ValueError) as problem:
-        raise PlanError(str(report_file), "is no report of a trace", REPORT_HINT) from problem
+        raise PlanError(str(report_file), "is not a report of a trace", REPORT_HINT) from problem
     if not estimates:
-        raise PlanError(str(report_file), "found no effect whose numbers could vary", "leave [found] out")
+        raise PlanError(str(report_file), "has no effect whose parameters could vary", "leave [found] out")
     return _TraceReport(estimates, correlations)
 
 

@@ -116,6 +116,6 @@ def _correlation_factor(matrix: Array) -> Array:
     except np.linalg.LinAlgError as error:
         eigenvalues, eigenvectors = np.linalg.eigh(matrix)
         if eigenvalues[0] < -EIGENVALUE_TOLERANCE:
-            problem = "contradict each other: no inputs are correlated like that"
+            problem = "contradict each other: the correlation matrix is not positive definite"
             raise PlanError("correlation", problem, "make them smaller") from error
     return np.asarray(eigenvectors * np.sqrt(np.maximum(eigenvalues, 0.0)))

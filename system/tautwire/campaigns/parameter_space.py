@@ -36,7 +36,7 @@ def parse_key_path(path: str) -> tuple[KeyStep, ...]:
     """The steps of a key path; raises KeyPathError where its syntax is wrong."""
     matches = [KEY_STEP_PATTERN.match(part) for part in path.split(".")]
     if not all(matches):
-        raise KeyPathError("is no path of a key", "write it as cable.modulus, cable[2].modulus or platform.start[1]")
+        raise KeyPathError("is not a key path", "write it as cable.modulus, cable[2].modulus or platform.start[1]")
     return tuple(KeyStep(match["name"], match["entry"] or "") for match in matches if match)
 
 
@@ -47,7 +47,7 @@ def expand_key_path(content: Mapping[str, Any], path: str) -> tuple[str, ...]:
         if step.entry == ALL_ENTRIES:
             entries = _table_at(content, steps[:index]).get(step.name)
             if not isinstance(entries, list):
-                raise KeyPathError(f"{step.name} is no list in the robot file", f"leave [{ALL_ENTRIES}] out")
+                raise KeyPathError(f"{step.name} is not a list in the robot file", f"leave [{ALL_ENTRIES}] out")
             entry_paths = [
                 _format_key_path((*steps[:index], KeyStep(step.name, str(i)), *steps[index + 1 :]))
                 for i in _entry_numbers(entries)
@@ -76,11 +76,11 @@ def _set_value(table: dict[str, Any], steps: Sequence[KeyStep], value: float | s
     tables = inner if isinstance(inner, list) else [inner]
     if step.entry:
         if not isinstance(inner, list):
-            raise KeyPathError(f"{step.name} is no list in the robot file", f"leave [{step.entry}] out")
+            raise KeyPathError(f"{step.name} is not a list in the robot file", f"leave [{step.entry}] out")
         tables = [_entry(inner, step)]
     for each in tables:
         if not isinstance(each, dict):
-            raise KeyPathError(f"{step.name} is no table in the robot file", "name a number of the robot file")
+            raise KeyPathError(f"{step.name} is not a table in the robot file", "name a number of the robot file")
         _set_value(each, remaining, value)
 
 
@@ -88,12 +88,12 @@ def _set_last_value(table: dict[str, Any], step: KeyStep, value: float | str) ->
     current = table.get(step.name)
     if step.entry:
         if not isinstance(current, list):
-            raise KeyPathError(f"{step.name} is no list in the robot file", f"leave [{step.entry}] out")
+            raise KeyPathError(f"{step.name} is not a list in the robot file", f"leave [{step.entry}] out")
         _entry(current, step)
         current[int(step.entry) - 1] = value
     elif isinstance(current, list | dict):
         hint = f"name one entry, as in {step.name}[1]" if isinstance(current, list) else "name a key inside it"
-        raise KeyPathError(f"{step.name} is no number in the robot file", hint)
+        raise KeyPathError(f"{step.name} is not a number in the robot file", hint)
     else:
         table[step.name] = value
 

@@ -92,7 +92,7 @@ def read_paths(table: CheckedTable, cable_count: int, inputs: tuple[Input, ...])
             path_table.refuse("name", f"is {format_value(path.name)} again", "give each path its own name")
         start_varies = any(each.key.startswith("platform.start") for each in inputs)
         if start_varies and (path.kind == "helix" or path.start is not None):
-            path_table.refuse("", "starts where it says, but platform.start varies", "leave start out of a line")
+            path_table.refuse("", "has a start of its own, but platform.start varies", "leave start out of a line")
         paths.append(path)
     return tuple(paths)
 
@@ -146,10 +146,12 @@ RECORDING_SUFFIXES = (".csv", ".parquet", ".mf4", ".mdf")
 SEED_RULE = NumberRule("a seed", "", 0.0, 2.0**53, default=0.0)
 COUNT_RULE = NumberRule("the number of samples", "", 1.0, float(MAX_RUNS))
 CORRELATION_RULE = NumberRule("the correlation", "", -0.999, 0.999)
-ALPHA_RULE = NumberRule("the rate of false alarms allowed", "", 1e-9, 0.5, default=TracePlan.alpha)
+ALPHA_RULE = NumberRule("the false-alarm rate", "", 1e-9, 0.5, default=TracePlan.alpha)
 STEP_RULE = NumberRule("the longest macro step", "s", 1e-4, 1.0, default=Compute.step)
-SETTLE_RULE = NumberRule("how long runs go on after a path", "s", minimum=0.0, maximum=1e4, default=Compute.settle)
-SERIES_RULE = NumberRule("the points of each motion to keep", "", 0.0, 10_000.0, default=float(Compute.series))
+SETTLE_RULE = NumberRule(
+    "the time that runs continue after a path", "s", minimum=0.0, maximum=1e4, default=Compute.settle
+)
+SERIES_RULE = NumberRule("the number of points kept of each motion", "", 0.0, 10_000.0, default=float(Compute.series))
 
 
 def read_plan(path: str | Path) -> Plan:
@@ -245,7 +247,9 @@ def _read_sample(table: CheckedTable, inputs: tuple[Input, ...]) -> tuple[Any, i
         for each in inputs:
             if not each.distribution.discrete_values:
                 hint = "write a list or a linspace, or choose another method"
-                table.refuse("vary", f"lets {each.key} be {each.distribution.kind}, a grid takes steps", hint)
+                table.refuse(
+                    "vary", f"lets {each.key} be {each.distribution.kind}, a grid requires list or linspace", hint
+                )
             count *= len(each.distribution.discrete_values)
     else:
         count = whole_number(sample, "count", COUNT_RULE)
@@ -315,7 +319,7 @@ def _read_compute(table: CheckedTable) -> Compute:
 def _read_trace(table: CheckedTable, cable_count: int) -> TracePlan:
     for key in SIMULATION_KEYS:
         if key in table.content:
-            table.refuse(key, "has no part in a trace of recordings", "remove it, or make two plans")
+            table.refuse(key, "is not allowed beside [trace]", "remove it, or make two plans")
     trace = table.table("trace")
     if trace is None:
         return TracePlan((), ())

@@ -35,11 +35,11 @@ if TYPE_CHECKING:
 def linearise(
     robot_file: RobotFile,
     out: Annotated[
-        Path | None, typer.Option(metavar="MODEL.json", help="Where the model goes; not needed with --json.")
+        Path | None, typer.Option(metavar="MODEL.json", help="Output file of the model; not needed with --json.")
     ] = None,
     at: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Position, m; by default the start.")] = None,
     report: Annotated[
-        Path | None, typer.Option(metavar="PAGE.html", help="Modes in motion and gains, as a page.")
+        Path | None, typer.Option(metavar="PAGE.html", help="Output page: animated modes, and gains.")
     ] = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
@@ -105,19 +105,21 @@ def _write_model(
 def workspace(
     robot_file: RobotFile,
     out: Annotated[
-        Path | None, typer.Option(metavar="WORKSPACE.csv", help="Where the table goes; not needed with --json.")
+        Path | None, typer.Option(metavar="WORKSPACE.csv", help="Output file of the table; not needed with --json.")
     ] = None,
-    plot: Annotated[Path | None, typer.Option(metavar="FIGURE.png", help="Slices as a figure; or .pdf, .svg.")] = None,
+    plot: Annotated[
+        Path | None, typer.Option(metavar="FIGURE.png", help="Output figure of slices; also .pdf, .svg.")
+    ] = None,
     lower: Annotated[
         str | None, typer.Option(metavar="X,Y,Z", help="Lower corner, m; by default of all exit points and the start.")
     ] = None,
     upper: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Upper corner, m.")] = None,
     spacing: Annotated[float | None, typer.Option(help="Grid spacing, m; by default a twentieth of the box.")] = None,
-    acceleration: Annotated[float, typer.Option(help="Required along each axis beside the weight, m/s^2.")] = 0.0,
+    acceleration: Annotated[float, typer.Option(help="Acceleration to provide along each axis, m/s^2.")] = 0.0,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Find where the cables, which only pull, hold the platform.
+    """Compute the wrench-feasible workspace, where the cables can hold the platform.
 
     Margins and static tensions on a grid.
 
@@ -137,7 +139,7 @@ def workspace(
     lower_corner = None if lower is None else parse_position(lower, "--lower")
     upper_corner = None if upper is None else parse_position(upper, "--upper")
     with progress_bar(output) as progress:
-        grid_progress = partial(progress, "looking where the cables hold it")
+        grid_progress = partial(progress, "computing the workspace")
         feasibility = wrench_feasible_workspace(robot, lower_corner, upper_corner, spacing, acceleration, grid_progress)
     written = _write_workspace(feasibility, out, robot, plot)
     counts = {"feasible": int(feasibility.feasible.sum()), "positions": int(feasibility.feasible.size)}

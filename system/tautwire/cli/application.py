@@ -43,7 +43,7 @@ def help_text(command: Callable[..., None]) -> str:
 
 app = typer.Typer(
     name="tautwire",
-    help="Cable-driven parallel robots as FMI components, and a tracer that finds what their model lacks.",
+    help="Co-simulation of cable-driven parallel robots as FMI components, and identification of their models.",
     pretty_exceptions_enable=False,
     rich_markup_mode=None,
 )
@@ -63,7 +63,7 @@ def _options(
         bool, typer.Option("--version", callback=_print_version, is_eager=True, help="Show the version and exit.")
     ] = False,
 ) -> None:
-    """Cable-driven parallel robots as FMI components, and a tracer that finds what their model lacks."""
+    """Co-simulation of cable-driven parallel robots as FMI components, and identification of their models."""
 
 
 def main() -> None:
@@ -92,9 +92,7 @@ def run(arguments: list[str]) -> int:
             EXIT_FAILURE if isinstance(error, BrokenPipeError) else _report_error(_format_os_error(error), EXIT_FAILURE)
         )
     except MemoryError:
-        return _report_error(
-            "this takes more memory than there is: give a shorter recording, or free some", EXIT_FAILURE
-        )
+        return _report_error("not enough memory: give a shorter recording, or free memory", EXIT_FAILURE)
     except (KeyboardInterrupt, typer.Abort):
         status = EXIT_FAILURE
     if status == EXIT_WRONG_INPUT:

@@ -16,20 +16,22 @@ if TYPE_CHECKING:
     from ..campaigns.campaign_plan import Plan
 
 
-SCHEDULER_HELP = "Address of a Dask scheduler; a cluster of this machine's processors without."
-WORKERS_HELP = "Worker processes on this machine; one a processor by default."
+SCHEDULER_HELP = "Address of a Dask scheduler; by default a local cluster."
+WORKERS_HELP = "Worker processes on this machine; by default one per processor."
 
 
 def campaign(
-    plan_file: Annotated[Path, typer.Argument(metavar="PLAN.toml", help="What varies, and what is computed.")],
-    out: Annotated[Path | None, typer.Option(metavar="FOLDER", help="Where rows, summary and page go.")] = None,
+    plan_file: Annotated[
+        Path, typer.Argument(metavar="PLAN.toml", help="The plan: what varies, and what is computed.")
+    ],
+    out: Annotated[Path | None, typer.Option(metavar="FOLDER", help="Output folder of rows, summary and page.")] = None,
     scheduler: Annotated[str | None, typer.Option(metavar="ADDRESS", help=SCHEDULER_HELP)] = None,
     workers: Annotated[int | None, typer.Option(help=WORKERS_HELP, min=1, max=4096)] = None,
-    dry_run: Annotated[bool, typer.Option("--dry-run", help="Print the rows that would be run, and run none.")] = False,
+    dry_run: Annotated[bool, typer.Option("--dry-run", help="List the runs without running them.")] = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Make many runs: samples, sweeps, recordings.
+    """Run a campaign: samples, grids, recordings.
 
     Rows go to FOLDER as they come. Stopped, by whatever, the same command goes on where it was.
 
@@ -59,7 +61,7 @@ def campaign(
             with dask_client(scheduler, workers or processors()) as client, progress_bar(output) as progress:
                 output.note(dashboard_message(client))
                 if not client.nthreads():
-                    output.note("no worker is there yet; runs begin when one comes")
+                    output.note("no worker yet; runs begin when one connects")
                 new_runs = run_campaign(plan, out, client, progress)
         with progress_bar(output) as progress:
             progress("summing up", 0.0)
@@ -67,7 +69,7 @@ def campaign(
     run_counts = f"{run_count(plan)} runs, {new_runs} of them now, {summary['failed']} failed"
     written = {"rows": out / "runs", "summary": out / "summary.json", "page": out / "index.html"}
     output.result([run_counts, *written.values()], {**written, "made": new_runs, **summary})
-    output.suggest_next(f"open {written['page']}; pandas.read_parquet('{written['rows']}') has a row a run")
+    output.suggest_next(f"open {written['page']}; pandas.read_parquet('{written['rows']}') has one row per run")
 
 
 def _print_rows(plan: Plan, output: CommandOutput) -> None:
@@ -102,7 +104,7 @@ def _print_rows(plan: Plan, output: CommandOutput) -> None:
 
 
 def paper(
-    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where claims.html, claims.json and the figures go.")],
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Output folder of claims.html, claims.json and figures.")],
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:

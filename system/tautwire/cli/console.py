@@ -29,7 +29,7 @@ from ..robot.schema import Robot
 
 RobotFile = Annotated[Path, typer.Argument(metavar="ROBOT.toml", help="The robot file.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object, and nothing else.")]
-Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print nothing but what is wrong.")]
+Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
 
 
 @dataclass(frozen=True)
@@ -78,9 +78,7 @@ def note_unused_tables(robot: Robot, output: CommandOutput = DEFAULT_OUTPUT) -> 
     """Notes which tables of the robot file a command does not use."""
     tables = [name for name, content in (("[winch]", robot.winch), ("[fmu]", robot.fmus)) if content]
     if tables:
-        explanation = (
-            "no part in this: winch speeds are those of the drums' encoders, and all components the project's own"
-        )
+        explanation = "not used here: winch speeds are those of the drums' encoders, and all FMUs are the project's own"
         output.note(f"{' and '.join(tables)}: {explanation}")
 
 

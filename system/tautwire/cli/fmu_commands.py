@@ -24,17 +24,15 @@ if TYPE_CHECKING:
 NON_TERMINAL_WIDTH = 160
 PORT_COLUMNS = ("name", "causality", "unit", "start", "description")
 C_HOSTS_HELP = (
-    "Make FMUs that also run in importers that are not Python processes; needs a C compiler, and Python's headers "
+    "Build FMUs that also run in importers that are not Python processes; needs a C compiler, and Python's headers "
     "and shared library (Debian: gcc, python3-dev)."
 )
-OWN_FMU_HELP = (
-    "An FMU of yours in place of ours, such as platform=mine.fmu, cable_2=... or winch_1=...; may be repeated."
-)
+OWN_FMU_HELP = "A user FMU for a slot, such as platform=mine.fmu, cable_2=... or winch_1=...; may be repeated."
 
 
 def build(
     robot_file: RobotFile,
-    out: Annotated[Path, typer.Option(help="Folder for the FMUs.")] = Path("build"),
+    out: Annotated[Path, typer.Option(help="Output folder of the FMUs.")] = Path("build"),
     for_c_hosts: Annotated[bool, typer.Option("--for-c-hosts", help=C_HOSTS_HELP)] = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
@@ -63,7 +61,7 @@ def build(
         if for_c_hosts:
             project_slots = sorted(fmus.by_component.keys() - fmus.user_start_values.keys())
             for index, slot in enumerate(project_slots):
-                progress("making them for C hosts", index / len(project_slots))
+                progress("building for C hosts", index / len(project_slots))
                 make_for_c_hosts(fmus.by_component[slot])
         archive = write_ssp(robot, fmus, scratch / ssp_name(robot))
     paths = [out / path.name for path in (*fmus.paths, archive)]
@@ -76,15 +74,15 @@ def build(
 def simulate(
     robot_file: RobotFile,
     speeds: Annotated[Path, typer.Option(metavar="RECORDING.csv", help="Winch speeds over time; CSV, Parquet or MDF.")],
-    out: Annotated[Path, typer.Option(metavar="RESULT.csv", help="Where the result goes; Parquet if .parquet.")],
+    out: Annotated[Path, typer.Option(metavar="RESULT.csv", help="Output file of the result; Parquet if .parquet.")],
     step: Annotated[float, typer.Option(help="Longest macro step, s.")] = 0.01,
     tolerance: Annotated[
-        float | None, typer.Option(help="Error allowed, m; chooses the steps, in place of --step.")
+        float | None, typer.Option(help="Error tolerance, m; adaptive steps instead of --step.")
     ] = None,
     until: Annotated[float | None, typer.Option(help="Stop at this time, s.")] = None,
-    patience: Annotated[float, typer.Option(help="An FMU in the same call for so long hangs, s.")] = 60.0,
+    patience: Annotated[float, typer.Option(help="Timeout of one FMU call, s.")] = 60.0,
     fmu: Annotated[list[str] | None, typer.Option(metavar="SLOT=FILE", help=OWN_FMU_HELP)] = None,
-    report: Annotated[Path | None, typer.Option(metavar="PAGE.html", help="The run as a page, in 3D.")] = None,
+    report: Annotated[Path | None, typer.Option(metavar="PAGE.html", help="Output page of the run, in 3D.")] = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -128,7 +126,7 @@ def simulate(
         output.note(note)
     error_text = "" if statistics.estimated_error is None else f", estimated error {statistics.estimated_error:.2g} m"
     summary_lines = [
-        f"{out}: {statistics.steps} steps, {statistics.iterations} redos, coupling made "
+        f"{out}: {statistics.steps} steps, {statistics.iterations} iterations, energy residual "
         f"{statistics.energy_residual:.2g} J{error_text}"
     ]
     written = {"result": out} | ({"report": report} if report else {})
@@ -177,7 +175,7 @@ def port_tables(ports: Mapping[str, Sequence[FmuPort]]) -> list[Table]:
         slots_by_port_names.setdefault(tuple(port.name for port in slot_ports), []).append(slot)
     tables = []
     for names in slots_by_port_names.values():
-        title = ", ".join(f"{slot}.fmu" for slot in names) + (", starts of the first" if len(names) > 1 else "")
+        title = ", ".join(f"{slot}.fmu" for slot in names) + (", start values of the first" if len(names) > 1 else "")
         table = Table(*PORT_COLUMNS, title=title, title_justify="left", title_style="bold", box=None)
         for port in group_vectors(ports[names[0]]):
             start = "" if port.start is None else port.start

@@ -14,25 +14,28 @@ from ..errors import InputError
 from ..robot.robot_file_reader import read_robot
 from .console import AsJson, CommandOutput, Quiet, RobotFile, note_unused_tables, progress_bar, read_holdable_robot
 
-DYNAMIC_TEST_HELP = "A dynamic test of the rope; if none, Table 1 of the paper, with the pair that it uses."
+DYNAMIC_TEST_HELP = "A dynamic test of the rope; by default Table 1 of the paper, with its declared pair."
 
 
 def material(
-    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where fit.json and the figure go.")],
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Output folder of fit.json and the figure.")],
     table: Annotated[Path | None, typer.Argument(metavar="TABLE.csv", help=DYNAMIC_TEST_HELP)] = None,
-    at: Annotated[float | None, typer.Option(help="The row, Hz, whose pair of E' and c is in use as constant.")] = None,
-    robot_file: Annotated[
-        Path | None, typer.Option("--robot", metavar="ROBOT.toml", help="A robot with this rope; written anew.")
+    at: Annotated[
+        float | None, typer.Option(help="Frequency, Hz, of the row whose E' and c are the declared pair.")
     ] = None,
-    shared: Annotated[float, typer.Option(help="Share of each variance that all rows have in common.")] = 0.0,
-    coverage: Annotated[float, typer.Option(help="Standard deviations that the table's uncertainties are.")] = 1.0,
-    alpha: Annotated[float, typer.Option(help="Rate of false alarms allowed.")] = 0.01,
+    robot_file: Annotated[
+        Path | None,
+        typer.Option("--robot", metavar="ROBOT.toml", help="A robot with this rope; written with the fitted rope."),
+    ] = None,
+    shared: Annotated[float, typer.Option(help="Share of each variance common to all rows.")] = 0.0,
+    coverage: Annotated[float, typer.Option(help="Coverage factor of the table's uncertainties.")] = 1.0,
+    alpha: Annotated[float, typer.Option(help="False-alarm rate.")] = 0.01,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
     """Fit a rope's constants and relaxation to a dynamic test.
 
-    Judges a constant modulus and damping, and fits what the rope has besides.
+    Tests a constant modulus and damping, and fits viscoelastic models.
 
     Example: tautwire material dma.csv --robot robot.toml --out material/
     """
@@ -112,19 +115,19 @@ def judge_rope_material(table: Path, robot_file: Path, out: Path, alpha: float, 
 def trace(
     robot_file: RobotFile,
     fit: Annotated[Path, typer.Argument(metavar="FIT.csv", help="The recording to fit; CSV, Parquet or MDF.")],
-    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Where the report goes.")],
-    check: Annotated[Path | None, typer.Option(metavar="CHECK.csv", help="A recording to judge on.")] = None,
-    alpha: Annotated[float, typer.Option(help="Rate of false alarms allowed.")] = 0.01,
+    out: Annotated[Path, typer.Option(metavar="FOLDER", help="Output folder of the report.")],
+    check: Annotated[Path | None, typer.Option(metavar="CHECK.csv", help="A recording for validation.")] = None,
+    alpha: Annotated[float, typer.Option(help="False-alarm rate.")] = 0.01,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Find what the model lacks, and add it to the FMUs.
+    """Identify what the model lacks, and add it to the FMUs.
 
     The report shows the error before and after.
 
     FIT may also be a dynamic test of the rope, a table with a column "frequency": see "tautwire material".
 
-    Recorded winch speeds are what the drums' encoders give: [winch] and [fmu] of the robot file have no part in it.
+    Recorded winch speeds are those of the drums' encoders: [winch] and [fmu] of the robot file are not used.
 
     Example: tautwire trace robot.toml fit.csv --check check.csv --out report/
     """
@@ -140,7 +143,7 @@ def trace(
     output = CommandOutput(as_json, quiet)
     if is_material_table(fit):
         if check is not None:
-            raise InputError("--check", f"{fit} is a dynamic test of a rope", "leave it out: its rows judge each other")
+            raise InputError("--check", f"{fit} is a dynamic test of a rope", "omit it: its rows are cross-validated")
         judge_rope_material(fit, robot_file, out, alpha, output)
         return
     robot = read_holdable_robot(robot_file)
@@ -157,26 +160,26 @@ def trace(
         Console().print(trace_table(trace_result))
     output.result([out / "index.html"], {"folder": out, **trace_document(trace_result)})
     output.suggest_next(
-        f"open {out / 'index.html'}; {out / 'robot.toml'} is the robot as found, its FMUs are beside it"
+        f"open {out / 'index.html'}; {out / 'robot.toml'} is the completed robot, with its FMUs beside it"
     )
 
 
 def excite(
     robot_file: RobotFile,
-    out: Annotated[Path, typer.Option(metavar="PROGRAM.csv", help="Where the winch speeds go; a recording's form.")],
-    effects: Annotated[str | None, typer.Option(help="Effects to tell apart, with commas; all when absent.")] = None,
+    out: Annotated[Path, typer.Option(metavar="PROGRAM.csv", help="Output file of the winch speeds, as a recording.")],
+    effects: Annotated[str | None, typer.Option(help="Effects to separate, comma-separated; by default all.")] = None,
     speed: Annotated[float | None, typer.Option(help="Largest winch speed, m/s; [winch] or 0.5.", min=1e-6)] = None,
     reach: Annotated[float | None, typer.Option(help="Farthest from the start along an axis, m.", min=1e-6)] = None,
     duration: Annotated[float, typer.Option(help="s", min=1.0, max=3600.0)] = 30.0,
     rate: Annotated[float, typer.Option(help="Samples per second.", min=1.0, max=1000.0)] = 50.0,
-    programs: Annotated[int, typer.Option(help="About how many programs are tried.", min=1, max=100_000)] = 64,
-    seed: Annotated[int, typer.Option(help="The same seed gives the same program.", min=0)] = 0,
+    programs: Annotated[int, typer.Option(help="Approximate number of programs to try.", min=1, max=100_000)] = 64,
+    seed: Annotated[int, typer.Option(help="Random seed.", min=0)] = 0,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Design a motion after which effects can be told apart.
+    """Design a motion that separates effects.
 
-    The largest smallest separation within the limits, as winch speeds.
+    Maximises the smallest separation between effects, within the limits.
 
     Example: tautwire excite robot.toml --effects damping,relaxation,hysteresis --out program.csv
     """
@@ -193,7 +196,7 @@ def excite(
     with atomic_file(out) as scratch:
         excitation.frame().to_csv(scratch, index=False, float_format="%.10g")
     pairs = [(pair.effect.label(robot), pair.other.label(robot), pair.nats) for pair in excitation.pairs]
-    lines = [f"{effect}, and {other} in its place: {nats:.3g} nats apart" for effect, other, nats in pairs[:5]]
+    lines = [f"{effect} and {other}: separation {nats:.3g} nats" for effect, other, nats in pairs[:5]]
     median_line = f"closest pair of the median program: {excitation.median_separation:.3g} nats"
     pair_records = [{"effect": effect, "other": other, "nats": nats} for effect, other, nats in pairs]
     output.result(

@@ -71,13 +71,13 @@ def check_files(
     if recording_file is None:
         return CheckResult(tuple(problems), tuple(notes))
     if robot is None or robot.cable_count < MIN_CABLE_COUNT:
-        notes.append(f"{recording_file} was not looked at: how many cables there are is not known")
+        notes.append(f"{recording_file} was not checked: the number of cables is unknown")
         return CheckResult(tuple(problems), tuple(notes))
     recording_problems: list[Problem] = []
     progress("reading the recording", 0.0)
     recording = _check_recording(recording_file, robot.cable_count, recording_problems, notes)
     if recording is not None and not problems:
-        progress("looking at both together", 0.0)
+        progress("checking both together", 0.0)
         _check_together(robot, recording, recording_problems, notes)
     return CheckResult((*problems, *recording_problems), tuple(notes))
 
@@ -92,7 +92,7 @@ def _check_robot_file(path: Path, problems: list[Problem], notes: list[str]) -> 
         problems.append(Problem(str(path), error.line, error.where, error.problem, error.hint))
         return None
     except _TooManyProblemsError:
-        notes.append(f"{path}: no more than {MAX_ROBOT_FILE_PROBLEMS} problems are told")
+        notes.append(f"{path}: only the first {MAX_ROBOT_FILE_PROBLEMS} problems are listed")
         robot = None
     problems += sorted((_robot_file_problem(path, text, error) for error in errors), key=_line_order)
     if robot is not None:
@@ -124,7 +124,7 @@ def _check_recording(path: Path, cable_count: int, problems: list[Problem], note
             Problem(str(path), e.line, e.where, e.problem, e.hint) for e in islice(faults, MAX_PROBLEMS_PER_FILE)
         )
         if next(faults, None) is not None:
-            notes.append(f"{path}: no more than {MAX_PROBLEMS_PER_FILE} problems are told")
+            notes.append(f"{path}: only the first {MAX_PROBLEMS_PER_FILE} problems are listed")
         if not problems:
             return read_recording(path, cable_count)
     return None
@@ -135,7 +135,7 @@ def _check_together(robot: Robot, recording: Recording, problems: list[Problem],
     if recording.unknown_columns:
         notes.append(f"{path}: not read: {', '.join(recording.unknown_columns)}")
     if not (recording.has_position or recording.has_tension):
-        notes.append(f"{path}: no tension and no position was measured; simulate takes it, trace does not")
+        notes.append(f"{path}: no tension and no position was measured; simulate accepts it, trace does not")
         return
     with _collecting_problems(problems, path):
         noise = robot.sensors.position_noise or white_noise_deviation(recording.position)

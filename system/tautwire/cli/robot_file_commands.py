@@ -17,12 +17,12 @@ EXIT_WRONG_INPUT = 2
 
 def new(
     name: Annotated[str, typer.Argument(metavar="NAME", help="The robot's name; the file is NAME.toml.")],
-    cables: Annotated[int, typer.Option(help="How many cables.", min=3, max=12)] = 3,
-    overwrite: Annotated[bool, typer.Option("--overwrite", help="Take the place of a file of that name.")] = False,
+    cables: Annotated[int, typer.Option(help="Number of cables.", min=3, max=12)] = 3,
+    overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a file of that name.")] = False,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Write a commented robot file to begin with.
+    """Write a commented robot file to fill in.
 
     It has every key with what it means, and can be run as it stands.
 
@@ -35,13 +35,13 @@ def new(
     target = Path(name if name.endswith(ROBOT_FILE_SUFFIX) else f"{name}{ROBOT_FILE_SUFFIX}")
     robot_name = target.name.removesuffix(ROBOT_FILE_SUFFIX)
     if not robot_name.strip() or not robot_name.isprintable():
-        raise InputError("NAME", f"{robot_name!r} is no name", "give one line of printable text, such as hall")
+        raise InputError("NAME", f"{robot_name!r} is not a valid name", "give one line of printable text, such as hall")
     if target.exists() and not overwrite:
-        raise InputError(str(target), "is there already", "choose another name, or add --overwrite")
+        raise InputError(str(target), "exists already", "choose another name, or add --overwrite")
     with atomic_file(target) as scratch:
         scratch.write_text(new_robot_text(robot_name, cables), encoding="utf-8")
     output.result([target], {"robot": target})
-    output.suggest_next(f"put your robot's numbers into {target}, then tautwire check {target}")
+    output.suggest_next(f"enter your robot's numbers in {target}, then tautwire check {target}")
 
 
 def check(
@@ -52,7 +52,7 @@ def check(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Say all that is wrong with a robot file and a recording.
+    """Check a robot file and a recording, and list every problem.
 
     Each problem is a line, which names the line of the file; the exit status is 2 if there are problems. Otherwise it
     says what a trace would do to the recording before looking at it.
@@ -72,11 +72,11 @@ def check(
     if result.problems:
         file_count = len({problem.file for problem in result.problems})
         output.suggest_next(
-            f"mend {_count_text(len(problems), 'problem')} in {_count_text(file_count, 'file')}, then run this again"
+            f"correct {_count_text(len(problems), 'problem')} in {_count_text(file_count, 'file')}, then run this again"
         )
         raise typer.Exit(EXIT_WRONG_INPUT)
     if not as_json:
-        output.result([f"{file}: nothing is wrong" for file in (robot_file, recording) if file], {})
+        output.result([f"{file}: no problems found" for file in (robot_file, recording) if file], {})
     next_command = f"trace {robot_file} {recording} --out report/" if recording else f"build {robot_file} --out build/"
     output.suggest_next(f"tautwire {next_command}")
 

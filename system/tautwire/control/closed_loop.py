@@ -41,7 +41,7 @@ from .path_controller import PathController, controller_data
 Array = NDArray[np.float64]
 
 CONTROLLER_NAME = "controller"
-RUN_DURATION_RULE = OF_PATH._replace(meaning="how long the run takes")
+RUN_DURATION_RULE = OF_PATH._replace(meaning="the duration of the run")
 DESIGN_ATTRIBUTES = ("aim", "cable_count", "feels", "knots")
 FORCE_PORTS = tuple(
     Port(PLATFORM, f"{name}.{axis}") for axis in AXES for name in ("external_force", "external_force_rate")
@@ -258,4 +258,6 @@ def _require_cables(fmus: RobotFmus, robot: Robot, controller: Design) -> None:
 def _require_tensions(fmus: RobotFmus, robot: Robot) -> None:
     missing = [name for name in wire_fmus(fmus).missing_columns if name.startswith("tension")]
     if missing:
-        raise InputError(robot.name, f"the controller needs {', '.join(missing)}, no FMU shows it", "let one show it")
+        raise InputError(
+            robot.name, f"the controller needs {', '.join(missing)}, which no FMU outputs", "add the output to an FMU"
+        )

@@ -19,7 +19,7 @@ class MarginError(InputError):
     """No controller of a design has the ``required`` disk margin; ``achieved`` is the best one."""
 
     def __init__(self, where: str, required: float, achieved: float, hint: str) -> None:
-        super().__init__(where, f"a disk margin of {required:g} cannot be kept, {achieved:.3g} is the best", hint)
+        super().__init__(where, f"a disk margin of {required:g} cannot be reached, the largest is {achieved:.3g}", hint)
         self.required = required
         self.achieved = achieved
         self.args = (where, required, achieved, hint)
@@ -51,8 +51,8 @@ AIM_RULES = {
     "acceleration_disturbance": NumberRule("a wander of velocity", "m/s^2", positive=True),
     "speed_disturbance": NumberRule("a wander of rope", "m/s", positive=True),
     "acceleration_limit": NumberRule("the largest winch acceleration", "m/s^2", positive=True),
-    "lowest_tension": NumberRule("the least tension", "N", minimum=0.0),
-    "highest_tension": NumberRule("the largest tension", "N", positive=True),
+    "lowest_tension": NumberRule("the minimum tension", "N", minimum=0.0),
+    "highest_tension": NumberRule("the maximum tension", "N", positive=True),
     "yield_time": NumberRule("a time", "s", positive=True),
 }
 UNBOUNDED_KEYS = ("speed_limit", "acceleration_limit", "highest_tension")

@@ -74,7 +74,7 @@ def shaper(
     outer, inner = 1.0 + tolerated_vibration, 2.0 - 2.0 * tolerated_vibration
     patterns = {"ZV": [1.0, 1.0], "ZVD": [1.0, 2.0, 1.0], "EI": [outer, inner, outer]}
     if kind not in patterns:
-        raise InputError("kind", f"{kind!r} is no shaper", f"choose among {', '.join(patterns)}")
+        raise InputError("kind", f"{kind!r} is not a known shaper", f"choose among {', '.join(patterns)}")
     pattern = np.array(patterns[kind])
     indices = np.arange(len(pattern))
     amplitudes = pattern * np.exp(-damping_ratio * np.pi / damped_ratio) ** indices

@@ -68,7 +68,7 @@ def _knot_data(knot: Knot, period: float) -> dict[str, Any]:
     regulator = knot.regulator
     sensors = regulator.ninputs - regulator.noutputs
     if np.any(regulator.D[:, :sensors]):
-        hint = "give it one sample for computing: no direct gain from position or tension"
+        hint = "delay it by one sample: no direct gain from position or tension"
         raise InputError(regulator.name, "acts on the sample just measured", hint)
     return {
         "sample": knot.time / period,

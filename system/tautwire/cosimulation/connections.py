@@ -66,7 +66,8 @@ def check_connections(components: Mapping[str, Component], connections: Sequence
             raise WiringError(f"{connection}: units differ, {source_unit[0]!r} and {target_unit[0]!r}")
         if connection.target in connections_by_target:
             raise WiringError(
-                f"{connection}: {connection.target} is driven by {connections_by_target[connection.target].source} too"
+                f"{connection}: {connection.target} is also connected to "
+                f"{connections_by_target[connection.target].source}"
             )
         connections_by_target[connection.target] = connection
 

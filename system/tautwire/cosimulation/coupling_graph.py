@@ -88,7 +88,7 @@ class CouplingGraph:
 def build_coupling_graph(components: Mapping[str, Component], wiring: Wiring) -> CouplingGraph:
     """Build the graph of these components, by name, with this wiring.
 
-    Raises WiringError where a connection is invalid, or outputs depend on each other without delay.
+    Raises WiringError where a connection is invalid, or outputs form an algebraic loop.
     """
     check_connections(components, wiring.connections)
     check_derivative_connections(components, wiring.derivative_connections)

@@ -114,7 +114,7 @@ class CouplingSolver:
             ):
                 break
         else:
-            raise WiringError(f"outputs at {time:g} s do not settle: they depend on each other without delay")
+            raise WiringError(f"outputs at {time:g} s do not converge: they form an algebraic loop")
         for instance in self._instances:
             instance.read_outputs()
         self.reset_history(time)

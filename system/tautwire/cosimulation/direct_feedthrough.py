@@ -55,7 +55,7 @@ def dependency_groups(components: Mapping[str, Component], connections: Sequence
         return _topological_groups(components, connections, assume_feedthrough=False)
     except CycleError as error:
         loop = " -> ".join(str(port) for port in error.args[1])
-        raise WiringError(f"outputs depend on each other without delay: {loop}") from error
+        raise WiringError(f"outputs form an algebraic loop: {loop}") from error
 
 
 def _topological_groups(

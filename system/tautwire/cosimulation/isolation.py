@@ -160,7 +160,7 @@ class RunAbortedError(TautwireError):
     def __init__(self, status: str, time: float) -> None:
         self.status = status
         self.time = time
-        super().__init__(f"outside any FMU the run {status} at {time:.6g} s: look at what drives it")
+        super().__init__(f"the run {status} outside any FMU at {time:.6g} s: check its external inputs")
 
 
 class RemoteTracebackError(Exception):

@@ -95,10 +95,10 @@ def step_doubling_note(run: Run, time: Array, step: float, positions: Array) -> 
     try:
         run(len(positions), HalvedStep(step), recorder)
     except ComponentError as error:
-        return f"the error is not known: with half the step, {error}"
+        return f"no error estimate: with half the step, {error}"
     position_error = FIRST_ORDER_FACTOR * float(np.max(np.abs(positions - recorder.positions), initial=0.0))
     period = "" if len(positions) == len(time) else f" over the first {time[len(positions) - 1]:g} s"
-    return f"estimated error of the position{period}: {position_error:.2g} m, by a second run with half the step"
+    return f"estimated error of the position{period}: {position_error:.2g} m, from a second run with half the step"
 
 
 def simulate_recording(
@@ -117,7 +117,7 @@ def simulate_recording(
     # The start is known; measurements need not stay in memory through a long run.
     del recording
     if robot.winch_numbers:
-        notes = (*notes, f"{path}: winch speeds are what the winches are asked for")
+        notes = (*notes, f"{path}: winch speeds are taken as commands of the winches")
     notes = (*notes, *notes_on_unstated_units(robot.fmus, robot.cable_count))
     with TemporaryDirectory(prefix="tautwire-simulate-") as folder:
         fmus = build_fmus(with_start(robot, start), Path(folder), partial(progress, "building"))
@@ -164,5 +164,7 @@ def _sample_count(recording: Recording, until: float | None) -> int:
 def missing_column_notes(wiring: RobotWiring) -> tuple[str, ...]:
     """A note on outputs that no FMU provides, so that the result has no column for them."""
     return (
-        (f"not in the result, no FMU shows it: {', '.join(wiring.missing_columns)}",) if wiring.missing_columns else ()
+        (f"not in the result, as no FMU outputs it: {', '.join(wiring.missing_columns)}",)
+        if wiring.missing_columns
+        else ()
     )

@@ -80,7 +80,7 @@ def open_result_file(target: Path, columns: Sequence[Column]) -> Iterator[Result
             failure = error
         result.flush()
     if failure is not None:
-        raise TautwireError(f"{failure}; the run until then is in {target}") from failure
+        raise TautwireError(f"{failure}; the run up to then is in {target}") from failure
 
 
 @contextmanager

@@ -10,9 +10,9 @@ from ..fmus.packaging import RobotFmus
 from ..validation import NumberRule, validate_callable, validate_instance, validate_number
 
 STEP_RULE = NumberRule("the longest macro step", "s", positive=True)
-TOLERANCE_RULE = NumberRule("the error allowed", "m", positive=True)
-UNTIL_RULE = NumberRule("the time at which to stop", "s")
-CALL_TIMEOUT_RULE = NumberRule("how long an FMU may take for one call, or infinity,", "s", positive=True)
+TOLERANCE_RULE = NumberRule("the error tolerance", "m", positive=True)
+UNTIL_RULE = NumberRule("the stop time", "s")
+CALL_TIMEOUT_RULE = NumberRule("the timeout of one FMU call, or infinity,", "s", positive=True)
 
 
 @dataclass(frozen=True)

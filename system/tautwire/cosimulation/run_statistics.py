@@ -32,8 +32,8 @@ class Fallbacks:
             max_errors[quantity] = max(max_errors.get(quantity, 0.0), float(error))
             component_names.setdefault(quantity, {})[port.component] = None
         derivative_notes = (
-            f"no rate of {name}, so it is worked out from the past, off by about {max_error:.2g} {unit}: "
-            f"FMU {', '.join(component_names[name, unit])}"
+            f"no derivative of {name}, so it is estimated from past steps, with an error of about "
+            f"{max_error:.2g} {unit}: FMU {', '.join(component_names[name, unit])}"
             for (name, unit), max_error in max_errors.items()
         )
         return (*self.missing_capabilities, *derivative_notes)
@@ -50,11 +50,11 @@ def find_fallbacks(components: Mapping[str, Component], wiring: Wiring) -> Fallb
     missing_capabilities = []
     if holding:
         missing_capabilities.append(
-            f"no {INPUT_TIME}, so inputs are held over each step at their mean: FMU {', '.join(holding)}"
+            f"no {INPUT_TIME}, so inputs are constant over each step, at their mean: FMU {', '.join(holding)}"
         )
     if without_rollback:
         missing_capabilities.append(
-            f"no saved states, so no step is redone or cut at a kink: FMU {', '.join(without_rollback)}"
+            f"no saved states, so steps are not iterated, nor split at events: FMU {', '.join(without_rollback)}"
         )
     targets = {
         wire.source: components[wire.target.component].variables[wire.target.variable]
@@ -127,13 +127,13 @@ class RunStatistics:
         messages = []
         if self.energy_residual_share > MAX_ENERGY_RESIDUAL_SHARE:
             messages.append(
-                f"the coupling made {self.energy_residual:.3g} J, {100.0 * self.energy_residual_share:.2g} % of "
-                "the energy exchanged: "
-                "take a smaller --step, or FMUs that save their states"
+                f"the energy residual of the coupling is {self.energy_residual:.3g} J, "
+                f"{100.0 * self.energy_residual_share:.2g} % of the energy exchanged: "
+                "choose a smaller --step, or FMUs that save their states"
             )
         if self.unconverged_steps > MAX_UNCONVERGED_SHARE * self.steps:
             messages.append(
-                f"in {self.unconverged_steps} of {self.steps} steps inputs and outputs did not agree after all redos: "
-                "take a smaller --step; where that does not help, some FMU rounds its outputs"
+                f"in {self.unconverged_steps} of {self.steps} steps the iteration did not converge: "
+                "choose a smaller --step; if that does not help, an FMU rounds its outputs"
             )
         return tuple(messages)

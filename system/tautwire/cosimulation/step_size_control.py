@@ -33,7 +33,7 @@ class StepSizeError(TautwireError):
         self.step = step
         self.error = error
         super().__init__(
-            f"at {time:.6g} s a step of {step:.3g} s still errs by {error:.3g} m: give a larger --tolerance"
+            f"at {time:.6g} s even a step of {step:.3g} s has an error of {error:.3g} m: give a larger --tolerance"
         )
 
 

@@ -110,10 +110,10 @@ def _clock_reason(offsets: list[ClockOffset], interval: float, policy: ClockOffs
         abs(offsets[0].seconds - offsets[1].seconds) > min_difference
         and larger.variance_after < policy.max_clock_variance_ratio * larger.variance_before
     ):
-        return "not as in the other recording"
+        return "unlike in the other recording"
     ahead = max(offset.seconds for offset in offsets) < -min_difference
     return (
-        "before the motion"
+        "so they precede the motion"
         if ahead and all(offset.variance_after < policy.max_explained_variance for offset in offsets)
         else None
     )
@@ -122,7 +122,7 @@ def _clock_reason(offsets: list[ClockOffset], interval: float, policy: ClockOffs
 def _offset_note(path: str, offset: ClockOffset, channels: ChannelGroup, reason: str) -> str:
     relation = "behind" if offset.seconds > 0.0 else "ahead of"
     size = f"{1e3 * abs(offset.seconds):.2f} ms"
-    return f"{path}: {channels.name} run {size} {relation} winch speeds, {reason}: a clock, no effect; shifted back"
+    return f"{path}: {channels.name} are {size} {relation} the winch speeds, {reason}: corrected as a clock offset"
 
 
 def _shift_sample(sample: DataSet, offset: ClockOffset, channels: ChannelGroup) -> DataSet:
@@ -210,12 +210,14 @@ def shifted(recording: Recording, seconds: float, channels: ChannelGroup) -> Rec
     interval = float(np.median(np.diff(recording.time)))
     sample_positions = (recording.time - recording.time[0]) / interval
     grid_rows = np.round(sample_positions).astype(int)
-    description = f"{channels.name} run {1e3 * seconds:.3g} ms behind winch speeds"
+    description = f"{channels.name} are {1e3 * seconds:.3g} ms behind the winch speeds"
     if (
         np.max(np.abs(sample_positions - grid_rows))
         > UNIFORM_SAMPLING_TOLERANCE * max(1.0, float(grid_rows[-1])) ** 0.5
     ):
-        raise RecordingError(recording.path, f"{description}, and samples are uneven", "set the clocks right")
+        raise RecordingError(
+            recording.path, f"{description}, and the sampling is not uniform", "synchronise the clocks"
+        )
     measured = recording.measured()
     whole_steps = int(np.round(seconds / interval))
     kernel = np.sinc(np.arange(-TAPS_PER_SIDE, TAPS_PER_SIDE + 1) - (seconds / interval - whole_steps)) * np.kaiser(
@@ -229,5 +231,7 @@ def shifted(recording: Recording, seconds: float, channels: ChannelGroup) -> Rec
             abs(whole_steps) + whole_steps + grid_rows
         ]
     if not np.isfinite(measured[:, channels.columns]).any():
-        raise RecordingError(recording.path, f"{description}, and are too sparse to be shifted", "set the clocks right")
+        raise RecordingError(
+            recording.path, f"{description}, and are too sparse to be resampled", "synchronise the clocks"
+        )
     return replace(recording, position=measured[:, :3], tension=measured[:, 3:])

@@ -36,7 +36,7 @@ def replace_by_confusable_models(context: IdentificationContext, selection: Sele
     log_likelihood = context.fitter.log_likelihood(selection.fit.robot, selection.accepted, validation)
     alternatives = [*_unlisted_alternatives(robot, selection.accepted, is_adequate), *_larger_forms(selection.accepted)]
     for number, chosen in enumerate(alternatives):
-        context.progress(f"rivals: {chosen[-1].label(robot)}", number / len(alternatives))
+        context.progress(f"alternatives: {chosen[-1].label(robot)}", number / len(alternatives))
         fit = _fit_alternative(context, selection, chosen)
         if fit is None or not (is_adequate or _leaves_white_residuals(context, fit.robot, chosen)):
             continue

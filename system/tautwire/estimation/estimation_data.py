@@ -55,5 +55,5 @@ def split_data(robot: Robot, noise: Noise, fit: Recording, check: Recording | No
             notes + check_notes,
         )
     first_half = np.arange(len(fit.time)) < len(fit.time) // 2
-    note = "no check recording: the second half of the recording judged what the first half fitted"
+    note = "no check recording: fitted on the first half of the recording, validated on the second"
     return DataSplit(DataSet(fit, fit_start, first_half), DataSet(fit, fit_start, ~first_half), (*notes, note))

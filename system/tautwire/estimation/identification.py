@@ -32,7 +32,7 @@ from .trace_result import Comparison, Errors, FoundEffect, Identifiability, Trac
 from .verdict import confirmed_formula, verdict_of
 from .worker_pool import PendingResult, WorkerPool
 
-FALSE_ALARM_RATE_RULE = NumberRule("a rate of false alarms below 1, such as 0.01", "", positive=True)
+FALSE_ALARM_RATE_RULE = NumberRule("a false-alarm rate below 1, such as 0.01", "", positive=True)
 
 
 def validate_trace_arguments(
@@ -50,14 +50,14 @@ def validate_trace_arguments(
     validate_robot("trace: robot", robot)
     validate_callable("trace: progress", progress)
     validated_false_alarm_rate("trace: alpha", alpha)
-    validate_integer("trace: processes", processes, 1, "give how many processes may work at a time")
+    validate_integer("trace: processes", processes, 1, "give the number of worker processes")
     recordings = {"fit": fit} | ({} if check is None else {"check": check})
     for name, recording in recordings.items():
         argument = f"trace: {name}"
         validate_instance(argument, recording, Recording, "give what read_recording returns")
         if recording.cable_count != robot.cable_count:
             problem = f"has winch speeds of {recording.cable_count} cables, the robot has {robot.cable_count}"
-            raise ArgumentError(argument, recording, problem, "give robot and recording that belong together")
+            raise ArgumentError(argument, recording, problem, "give a recording of this robot")
         require_outputs(recording)
 
 
@@ -185,7 +185,7 @@ def analyse_detectability(state: Identification) -> Identification:
     """Tell what the recordings could have shown, where the model leaves white noise."""
     if not (state.effects_hold or state.verdict[0] == "none"):
         return state
-    state.context.progress("what these recordings could show", 0.0)
+    state.context.progress("identifiability", 0.0)
     selection = state.selection
     return replace(
         state, identifiability=analyse_identifiability(state.context, selection.fit.robot, selection.accepted)

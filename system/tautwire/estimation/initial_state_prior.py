@@ -71,10 +71,10 @@ def self_stress_deviation(
     deviation = policy.self_stress_ratio * float(np.mean(static_tensions(robot))) if declared is None else declared
     if deviation == 0.0:
         return 0.0, ()
-    reason = "tension.preferred_uncertainty" if declared is not None else "no tensions are measured, so"
+    reason = "tension.preferred_uncertainty" if declared is not None else "no tension is measured"
     return deviation, (
-        f"{reason}: start tensions may differ from the tension rule's by {deviation:.3g} N; they were fitted beside "
-        "every effect, so a wrong pretension is none",
+        f"{reason}: start tensions may differ from the tension rule's by {deviation:.3g} N; they were estimated "
+        "beside every effect, so that a wrong pretension is not taken for one",
     )
 
 
@@ -110,8 +110,8 @@ def with_motion_at_start(
             continue
         shortest_cable = min(float(np.linalg.norm(np.subtract(a, robot.platform.start))) for a in robot.anchors)
         if motion.amplitude > policy.max_amplitude_ratio * shortest_cable:
-            problem = f"starts in motion, {motion.speed:.3g} m/s, and swings by {motion.amplitude:.3g} m"
-            hint = "start the recording at rest: the ropes' reference is the static start"
+            problem = f"starts in motion, {motion.speed:.3g} m/s, and vibrates by {motion.amplitude:.3g} m"
+            hint = "begin the recording at rest: the ropes have their reference length at the static start"
             raise RecordingError(recording.path, problem, hint)
         noise = replace(
             noise,
@@ -119,8 +119,8 @@ def with_motion_at_start(
             start_stretch=max(noise.start_stretch, policy.prior_widening * motion.amplitude),
         )
         notes.append(
-            f"{recording.path} starts in motion, at about {motion.speed:.3g} m/s: where, how fast and under which "
-            "tensions was fitted beside every effect; what ropes remember (relaxation, creep) is taken as at rest"
+            f"{recording.path} starts in motion, at about {motion.speed:.3g} m/s: initial position, velocity and "
+            "tensions were estimated beside every effect; internal states of ropes (relaxation, creep) start at rest"
         )
     return noise, tuple(notes)
 

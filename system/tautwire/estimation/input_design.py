@@ -50,7 +50,7 @@ class ExcitationError(TautwireError):
         self.trial_count = trial_count
         super().__init__(
             f"none of {trial_count} programs keeps the winch speeds and tensions within their limits: "
-            "give more --speed or less --reach, or wider [tension] limits in the robot file"
+            "give a larger --speed or a smaller --reach, or wider [tension] limits in the robot file"
         )
 
 
@@ -262,7 +262,9 @@ def effects_by_name(robot: Robot, names: str | None) -> tuple[Hypothesis, ...]:
     available = sorted({hypothesis.effect.name for hypothesis in candidates})
     for name in requested:
         if name not in available:
-            raise InputError("--effects", f"{name!r} is no effect on all cables", f"take from {', '.join(available)}")
+            raise InputError(
+                "--effects", f"{name!r} is not an effect that acts on all cables", f"choose from {', '.join(available)}"
+            )
     if len(set(requested)) < 2:
-        raise InputError("--effects", "fewer than two effects", "name two at least, such as damping,relaxation")
+        raise InputError("--effects", "names fewer than two effects", "name at least two, as in damping,relaxation")
     return tuple(hypothesis for hypothesis in candidates if hypothesis.effect.name in requested)

@@ -134,13 +134,13 @@ def _check_sensor_kind(checked: CheckedNoise, columns: range, unit: str, policy:
             standstill = _standstill_statistics(recordings, column, checked.noise.winch_speed, policy)
             step, deviations[column], basis = _thinning(declared[column], floor, standstill, policy)
             recordings = tuple(_thinned(recording, column, step) for recording in recordings)
-            description = f"noise is coloured ({basis}; {deviations[column]:.3g} {unit} in all)"
-            notes.append(f"{name}: {description}; one sample of {step} was used")
+            description = f"noise is coloured ({basis}; {deviations[column]:.3g} {unit} in total)"
+            notes.append(f"{name}: {description}; thinned to one sample in {step}")
         else:
             notes.append(
-                f"{name}: its spectrum stays above the declared noise, {declared[column]:.3g} {unit}, and has no "
-                "floor: "
-                "either the noise is larger and coloured, or something fast is not resolved; the declared one is used"
+                f"{name}: its spectrum is above the declared noise, {declared[column]:.3g} {unit}, and has no "
+                "floor: either the noise is larger and coloured, or the sampling misses fast motion; the declared "
+                "noise is used"
             )
     if len(notes) == len(checked.notes):
         return checked
@@ -148,7 +148,9 @@ def _check_sensor_kind(checked: CheckedNoise, columns: range, unit: str, policy:
 
 
 def _replacement_note(name: str, declared: float, measured: float, unit: str) -> str:
-    return f"{name}: declared noise {declared:.3g} {unit}, by its spectrum's floor {measured:.3g} {unit}: that is used"
+    return (
+        f"{name}: declared noise {declared:.3g} {unit}, spectral noise floor {measured:.3g} {unit}: the latter is used"
+    )
 
 
 def _thinning(
@@ -163,11 +165,11 @@ def _thinning(
     correlation, deviation, basis = (
         (1.0 - variance_ratio) / (1.0 + variance_ratio),
         declared,
-        "its spectrum falls up to its end",
+        "the spectrum falls up to the Nyquist frequency",
     )
     if standstill is not None:
         deviation, correlation = standstill
-        basis = f"at rest neighbours are alike by {correlation:.2f}"
+        basis = f"at rest neighbouring samples correlate by {correlation:.2f}"
     if not 0.0 < correlation < 1.0:
         return 1, deviation, basis
     return min(ceil(log(policy.max_correlation) / log(correlation)), policy.max_thinning), deviation, basis

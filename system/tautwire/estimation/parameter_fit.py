@@ -34,7 +34,7 @@ class NoFitError(TautwireError):
 
     def __init__(self, values: Array) -> None:
         self.values = values
-        super().__init__(f"no fit can begin at {values.tolist()}: the model has no finite output there")
+        super().__init__(f"no fit can start at {values.tolist()}: the model has no finite output there")
 
 
 @dataclass(frozen=True)

@@ -174,8 +174,8 @@ def _require_samples(
     least = policy.min_samples
     for residuals, data in zip(innovations, (split.estimation, split.validation), strict=True):
         if not has_enough_samples(residuals, data.rows, policy):
-            hint = f"record at least {least} samples, {2 * least} where there is no check recording"
-            raise RecordingError(data.recording.path, "too few samples to tell noise from more", hint)
+            hint = f"record at least {least} samples, {2 * least} without a check recording"
+            raise RecordingError(data.recording.path, "too few samples to test for white noise", hint)
 
 
 def _notes(split: DataSplit, data_sets: tuple[DataSet, ...]) -> tuple[str, ...]:
@@ -208,8 +208,8 @@ def _truncated(recording: Recording, max_samples: int) -> tuple[Recording, tuple
         return recording, ()
     short = recording.first(max_samples)
     description = (
-        f"its first {short.duration:.4g} s, {max_samples:,} of {count:,} samples, were traced; give "
-        "another part for more"
+        f"its first {short.duration:.4g} s, {max_samples:,} of {count:,} samples, were traced; to "
+        "trace another part, cut it out"
     )
     return short, (f"{recording.path}: {description}",)
 

@@ -44,7 +44,7 @@ class LowerMinimumError(TautwireError):
 
     def __init__(self, values: Array) -> None:
         self.values = values
-        super().__init__(f"the fit is not the best: {values.tolist()} leaves less")
+        super().__init__(f"the fit is not the optimum: {values.tolist()} has a smaller sum of squares")
 
 
 class TooManyRunsError(TautwireError):
@@ -52,7 +52,7 @@ class TooManyRunsError(TautwireError):
 
     def __init__(self, runs: int) -> None:
         self.runs = runs
-        super().__init__(f"{runs} runs have not found where an interval ends")
+        super().__init__(f"{runs} runs have not found the end of an interval")
 
 
 class ProfileLikelihood:

@@ -91,7 +91,7 @@ class Calibration:
             significant.append(f"{parameter.label} {value:.4g} {parameter.unit}, +- {half_width:.2g}")
         if not significant:
             return ()
-        return (f"{path}: within what the robot file says of its own uncertainty, {'; '.join(significant)}",)
+        return (f"{path}: estimated within the robot file's uncertainties: {'; '.join(significant)}",)
 
 
 def calibrate(fitter: Fitter, robot: Robot, sample: DataSet) -> Calibration:
@@ -132,8 +132,8 @@ def initial_state_note(robot: Robot, path: str) -> tuple[str, ...]:
         return ()
     tensions = ", ".join(f"{tension:.4g}" for tension in static_tensions(robot) + np.array(initial_state.tensions))
     speed = float(np.linalg.norm(initial_state.velocity))
-    moving = f", at {speed:.3g} m/s" if speed > 0.0 else ""
-    return (f"{path}: the run starts with tensions of {tensions} N{moving}, as what was measured says",)
+    moving = f" and a speed of {speed:.3g} m/s" if speed > 0.0 else ""
+    return (f"{path}: the estimated initial state has tensions of {tensions} N{moving}",)
 
 
 def _smoothed_initial_state(likelihood: Likelihood, values: list[float], sample: DataSet) -> Array:

@@ -88,7 +88,7 @@ def score_candidates(context: IdentificationContext, search_round: SearchRound) 
     """
     policy, robot, accepted = context.policy, search_round.robot, search_round.accepted
     label = f"round {search_round.number}"
-    context.progress(f"{label}: screening", 0.0)
+    context.progress(f"{label}: score test", 0.0)
     predictions, rough_predictions = _predict_gains(context, search_round)
     shortlisted = shortlist(predictions, rough_predictions, policy.score_test)
     data = context.split.estimation
@@ -109,7 +109,7 @@ def score_candidates(context: IdentificationContext, search_round: SearchRound) 
             tasks = search_round.tasks(search_round.larger_models(), min_log_likelihood, policy.fit)
             scores |= fit_candidates(context, label, tasks, data, baseline)
         tasks = search_round.refits(scores.values(), shortlisted, policy.selection, policy.fit.fine_cost_tolerance)
-        scores |= fit_candidates(context, f"{label}, all of it", tasks, context.split.estimation, baseline)
+        scores |= fit_candidates(context, f"{label}, all samples", tasks, context.split.estimation, baseline)
     context.progress(f"{label}: done", 1.0)
     unfitted = [unfitted_score(robot, h, predictions[h]) for h in predictions if h not in scores]
     return [*scores.values(), *unfitted], not search_round.stops_at_first or scores.keys() >= set(shortlisted)

@@ -150,7 +150,7 @@ class Resonance:
     def sentence(self) -> str:
         """In words."""
         places = ", ".join(self.outputs)
-        return f"something swings at {self.frequency:.2g} Hz that the model does not have: it shows in {places}"
+        return f"an oscillation at {self.frequency:.2g} Hz that the model lacks is visible in {places}"
 
 
 @dataclass(frozen=True)

@@ -31,8 +31,8 @@ class WorkerLostError(TautwireError):
     def __init__(self, processes: int) -> None:
         self.processes = processes
         super().__init__(
-            f"one of {processes} worker processes ended by itself: was it killed, or memory full? Run it again where "
-            "more memory is free, or with fewer processors (taskset on Linux)"
+            f"one of {processes} worker processes ended unexpectedly, killed or out of memory: run again with "
+            "more free memory, or with fewer processors (taskset on Linux)"
         )
 
 

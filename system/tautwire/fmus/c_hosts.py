@@ -100,7 +100,7 @@ def embeddable_python() -> EmbeddablePython:
     """
     if (platform.system(), platform.machine()) != ("Linux", "x86_64"):
         raise CHostError(
-            f"FMUs for C hosts are made on Linux on x86-64 only, and this is {platform.system()} on "
+            f"FMUs for C hosts can be built on Linux on x86-64 only, and this is {platform.system()} on "
             f"{platform.machine()}",
             "build there, or without --for-c-hosts",
         )

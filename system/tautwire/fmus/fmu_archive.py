@@ -37,7 +37,7 @@ MAX_XML_DEPTH = 64
 XML_CHUNK_BYTES = 2**16
 MAX_REASON_LENGTH = 200
 EXPORT_HINT = "name an FMI 2.0 or 3.0 co-simulation FMU"
-TRUST_HINT = "get it from where you trust, or export it anew"
+TRUST_HINT = "get it from a trusted source, or export it again"
 
 
 class ArchiveError(InputError):
@@ -74,7 +74,7 @@ def require_valid_archive(path: Path, check_contents: bool = False) -> None:
         if check_contents:
             damaged = archive.testzip()
             if damaged is not None:
-                raise ArchiveError(str(path), f"has a damaged entry {format_value(damaged)}", "copy it here anew")
+                raise ArchiveError(str(path), f"has a damaged entry {format_value(damaged)}", "copy it here again")
 
 
 class _BoundedReader(BufferedReader):
@@ -89,7 +89,7 @@ class _BoundedReader(BufferedReader):
 @contextmanager
 def _open_archive(path: Path) -> Iterator[ZipFile]:
     if not path.is_file():
-        raise ArchiveError(str(path), "is no file", "check the path")
+        raise ArchiveError(str(path), "is not a file", "check the path")
     try:
         with _BoundedReader(FileIO(path)) as file, ZipFile(file) as archive:
             yield archive
@@ -136,11 +136,11 @@ def _path_problem(name: str) -> str | None:
     if name.startswith("/"):
         return "is an absolute path"
     if ":" in name:
-        return "has a colon, as drives have"
+        return "has a colon, as in drive letters"
     if ".." in parts:
         return "leads out of the folder"
     if "" in parts or "." in parts:
-        return "is no plain path"
+        return "is not a plain path"
     if len(name) > MAX_PATH_LENGTH or any(len(part.encode("utf-8", "replace")) > MAX_NAME_BYTES for part in parts):
         return "is longer than file systems take"
     return None
@@ -155,7 +155,7 @@ def _file_type_problem(entry: ZipInfo) -> str | None:
     if entry.flag_bits & 1:
         return "is encrypted"
     if entry.compress_type not in (ZIP_STORED, ZIP_DEFLATED):
-        return "is neither stored nor deflated, as FMI wants"
+        return "is neither stored nor deflated, as FMI requires"
     return None
 
 
@@ -217,7 +217,7 @@ class _BoundedXmlHandler(ContentHandler):
                     f"with an attribute {format_value(key)} of {len(value)} characters, {MAX_ATTRIBUTE_LENGTH} at most"
                 )
             if key == "modelIdentifier" and (_path_problem(value) or "/" in value):
-                self._refuse(f"whose modelIdentifier {format_value(value)} is no name")
+                self._refuse(f"whose modelIdentifier {format_value(value)} is not a valid name")
 
     def endElement(self, name: str) -> None:  # noqa: N802
         self._depth -= 1

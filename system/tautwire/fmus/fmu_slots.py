@@ -136,7 +136,7 @@ def notes_on_unstated_units(fmus: Iterable[UserFmu], cable_count: int) -> tuple[
         if ports_without_unit:
             first = f"{ports_without_unit[0].name} for {ports_without_unit[0].unit}"
             notes.append(
-                f"{user_fmu.path}: {len(ports_without_unit)} ports state no unit and are taken for ours, such as "
+                f"{user_fmu.path}: {len(ports_without_unit)} ports have no unit and are assumed to have ours, such as "
                 f"{first}"
             )
     return tuple(notes)
@@ -153,7 +153,7 @@ def require_step_support(user_fmus: Mapping[str, Path], adaptive: bool, equidist
             problem = "it cannot save its state, so steps cannot be chosen by a tolerance"
             raise SlotError(path, slot, None, problem, "give a step instead, such as --step 0.001")
         if not (equidistant or capabilities.canHandleVariableCommunicationStepSize):
-            problem = "it takes steps of one length only, these are not"
+            problem = "it supports steps of one length only, and these differ"
             raise SlotError(path, slot, None, problem, "give evenly spaced samples, and a step instead of a tolerance")
 
 
@@ -184,9 +184,7 @@ def check_user_fmus(robot: Robot) -> None:
             occupied_slot = slot_by_single_use_file.setdefault(user_fmu.path.resolve(), user_fmu.slot)
             if occupied_slot != user_fmu.slot:
                 problem = f"it is in slot {occupied_slot} and can be instantiated only once"
-                raise SlotError(
-                    user_fmu.path, user_fmu.slot, None, problem, "copy nothing, export it without that restriction"
-                )
+                raise SlotError(user_fmu.path, user_fmu.slot, None, problem, "export it without that restriction")
         variables = {variable.name: variable for variable in description.modelVariables}
         for port in slot_ports(user_fmu.slot, robot.cable_count):
             _check_port(user_fmu, description, variables.get(port.name), port)

@@ -138,15 +138,13 @@ def _operating_point_notes(
     inputs: Sequence[str], observed_ports: Sequence[Port], responses: Responses
 ) -> tuple[str, ...]:
     notes = [
-        f"a kink at rest: what {name} does upward and downward differs by {evenness:.0%}, however small the push"
+        f"nonsmooth at rest: responses to pulses of {name} up and down differ by {evenness:.0%}, however small"
         for name, evenness in zip(inputs, responses.nonlinearity, strict=True)
         if evenness > NONSMOOTH_NOTE_LEVEL
     ]
     worst = int(np.argmax(responses.drifts))
     if responses.drifts[worst] > DRIFT_NOTE_LEVEL:
-        notes.append(
-            f"not quite at rest: {observed_ports[worst]} moves by itself, and the plant is that about this motion"
-        )
+        notes.append(f"not quite at rest: {observed_ports[worst]} drifts, and the plant is linearised about this drift")
     return tuple(notes)
 
 
@@ -197,7 +195,7 @@ def linearise_robot_fmus(
 def _select_states(names: Sequence[str], known: Mapping[str, Port]) -> dict[str, Port]:
     for name in names:
         if name not in known:
-            raise InputError("states", f"no FMU shows a state {name!r}", f"choose among {', '.join(known)}")
+            raise InputError("states", f"no FMU outputs a state {name!r}", f"choose among {', '.join(known)}")
     return {name: known[name] for name in names}
 
 

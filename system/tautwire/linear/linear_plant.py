@@ -23,7 +23,7 @@ from .operating_point import equilibrium_state, requested_position
 
 Array = NDArray[np.float64]
 
-SWING_RULE = NumberRule("the swing of a mode", "m", minimum=0.0)
+SWING_RULE = NumberRule("the amplitude of a mode", "m", minimum=0.0)
 
 
 @dataclass(frozen=True)

@@ -47,10 +47,13 @@ def validity_notes(
     their delays.
     """
     slack = slack_cables(operating_point.tensions)
-    notes = [f"cable {cable + 1} hangs slack: it carries nothing, and holds only while it stays so" for cable in slack]
+    notes = [
+        f"cable {cable + 1} is slack: it carries no tension, and the plant holds only while it stays slack"
+        for cable in slack
+    ]
     slack_swings = _slack_swings(operating_point.tensions, operating_point.tension_slopes @ modes.shapes)
     notes += [
-        f"cable {cable + 1} goes slack at a swing of {slack_swings[cable]:.2g} m"
+        f"cable {cable + 1} becomes slack at an amplitude of {slack_swings[cable]:.2g} m"
         for cable in np.setdiff1d(np.flatnonzero(slack_swings <= swing), slack)
     ]
     if operating_point.robot.effects and swing > 0.0:
@@ -68,7 +71,7 @@ def _slack_swings(tensions: Array, tension_slopes: Array) -> Array:
 
 def _effect_description(robot: Robot) -> str:
     names = dict.fromkeys(setting.name for setting in robot.effects)
-    return f"an effect ({', '.join(names)}) has a kink or bends near rest"
+    return f"an effect ({', '.join(names)}) is nonsmooth or strongly nonlinear near rest"
 
 
 def _swing_notes(
@@ -84,9 +87,9 @@ def _swing_notes(
         cable = int(np.argmax(deviations))
         if not deviations[cable] <= MAX_RELATIVE_DEVIATION:
             notes.append(
-                f"mode {mode + 1}: in a swing of {amplitude:.2g} m the tension of cable {cable + 1} is off the "
-                "linear plant "
-                f"by {deviations[cable]:.0%} of its swing; {_effect_description(operating_point.robot)}"
+                f"mode {mode + 1}: at an amplitude of {amplitude:.2g} m the tension of cable {cable + 1} deviates from "
+                f"the linear plant by {deviations[cable]:.0%} of its amplitude; "
+                f"{_effect_description(operating_point.robot)}"
             )
     return notes
 
@@ -153,9 +156,9 @@ def _winch_notes(operating_point: OperatingPoint, matrices: Sequence[Array], spe
     if not deviations:
         return []
     return [
-        f"winches {', '.join(map(str, deviations))}: at {speed:.2g} m/s tension or rope of their cables is off "
-        "the linear "
-        f"plant by up to {max(deviations.values()):.0%} of the change; {_effect_description(operating_point.robot)}"
+        f"winches {', '.join(map(str, deviations))}: at {speed:.2g} m/s tension or rope of their cables deviates from "
+        f"the linear plant by up to {max(deviations.values()):.0%} of the change; "
+        f"{_effect_description(operating_point.robot)}"
     ]
 
 
@@ -170,4 +173,4 @@ def _delay_notes(model: SymbolicModel, count: int) -> list[str]:
         ("positions", float(delays[0])),
         *((f"tension {i + 1}", float(delays[3 + i])) for i in range(count)),
     ]
-    return [f"{what}: sensors show {lag:g} s late, the plant at once" for what, lag in sensor_delays if lag > 0.0]
+    return [f"{what}: sensors are {lag:g} s late, which the plant omits" for what, lag in sensor_delays if lag > 0.0]

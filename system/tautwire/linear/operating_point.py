@@ -67,7 +67,7 @@ def equilibrium_state(robot: Robot, model: SymbolicModel, position: Array, tensi
         raise OperatingPointError(
             robot.name,
             position,
-            f"something pulls the platform away with {residual_acceleration:.3g} m/s2 under static tensions",
+            f"the platform accelerates by {residual_acceleration:.3g} m/s2 under static tensions",
         )
     return state
 
@@ -95,7 +95,7 @@ def _solve_equilibrium(
         if np.max(np.abs(residual_value), initial=0.0) <= NEWTON_TOLERANCE:
             return state
         state[6:] -= np.linalg.lstsq(jacobian_value, residual_value.ravel(), rcond=None)[0]
-    raise OperatingPointError(robot.name, position, "no state of rest found; an effect may never settle")
+    raise OperatingPointError(robot.name, position, "no equilibrium found; the states of an effect may never converge")
 
 
 def _initial_lengths(robot: Robot, position: Array, tensions: Array, slack_length: float) -> Array:

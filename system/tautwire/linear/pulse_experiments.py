@@ -100,7 +100,9 @@ class PulseExperiment:
         graph = stack.enter_context(self._make_coupling())
         missing = [str(port) for port in self.inputs if port not in graph.external_inputs]
         if missing:
-            raise IdentificationError(f"{', '.join(missing)} is no driven input", "choose among the coupling's drives")
+            raise IdentificationError(
+                f"{', '.join(missing)} is not an external input", "choose among the coupling's external inputs"
+            )
         coupling = CouplingSolver(graph, SOLVER_OPTIONS)
         coupling.solve_initial_values(0.0, self._rest_values(coupling))
         for component in graph.components.values():
@@ -223,10 +225,9 @@ def _require_smooth(experiment: PulseExperiment, nonlinearity: Array) -> None:
     worst = int(np.argmax(nonlinearity))
     if nonlinearity[worst] > NONSMOOTH_ERROR_LEVEL:
         raise IdentificationError(
-            f"at a kink, what {experiment.inputs[worst]} does upward and downward differs by "
-            f"{nonlinearity[worst]:.0%}, however "
-            "small the push",
-            "start them where no cable is about to slacken and nothing is about to slip",
+            f"nonsmooth at rest: responses to pulses of {experiment.inputs[worst]} up and down differ by "
+            f"{nonlinearity[worst]:.0%}, however small",
+            "start them where no cable is about to become slack and nothing is about to slip",
         )
 
 
@@ -239,6 +240,6 @@ def _relative_drifts(experiment: PulseExperiment, unforced: Array, scales: Array
         raise IdentificationError(
             f"they are not at rest, {experiment.observed_ports[worst]} moves by {drift_sizes[worst]:.3g} without "
             "a push",
-            "start them in equilibrium, and give the drives' values there",
+            "start them in equilibrium, and give the external inputs' values there",
         )
     return drifts

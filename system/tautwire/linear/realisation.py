@@ -130,7 +130,8 @@ def _state_coordinates(scaled: Array) -> tuple[Array, Array]:
             return stacks @ left_vectors, np.ones(order)
         stacks, order = longer, longer_order
     raise IdentificationError(
-        f"{MAX_HANKEL_BLOCKS} steps together still show new states, {order} so far", "name the states, or add outputs"
+        f"{MAX_HANKEL_BLOCKS} steps in the Hankel matrix still reveal new states, {order} so far",
+        "name the states, or add outputs",
     )
 
 
@@ -148,5 +149,6 @@ def _require_controllable(trajectories: Array, names: tuple[str, ...]) -> None:
     if len(values) < len(names) or values[-1] < CONTROLLABILITY_TOLERANCE * values[0]:
         name = names[int(np.argmax(np.abs(right_vectors[-1])))]
         raise IdentificationError(
-            f"the inputs do not reach the state {name} on its own", "add an input that moves it, or leave the state out"
+            f"the inputs do not control the state {name} on its own",
+            "add an input that moves it, or leave the state out",
         )

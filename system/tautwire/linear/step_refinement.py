@@ -98,7 +98,7 @@ def _require_prediction(
     worst = int(np.argmax(relative_deviations))
     if relative_deviations[worst] > MAX_PREDICTION_ERROR:
         raise IdentificationError(
-            f"{observed_ports[output_indices[worst]]} is off the plant of short steps by "
+            f"{observed_ports[output_indices[worst]]} deviates from the plant of short steps by "
             f"{relative_deviations[worst]:.0%} over a longer time",
             "leave outputs with dead time away, or begin with a shorter step",
         )

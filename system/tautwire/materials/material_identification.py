@@ -125,7 +125,7 @@ def trace_material(
     effects = _identified_effects(selection, chosen, declared, options.significance_level)
     verdict_name = _decide(reference, chosen, effects, options.significance_level)
     effects_identified = verdict_name == "effects"
-    progress("reading the errors in other ways", 0.0)
+    progress("fitting under other error assumptions", 0.0)
     return MaterialVerdict(
         verdict=verdict_name,
         table=table,
@@ -182,7 +182,7 @@ def _evaluated_models(
     for index, (role, fit) in enumerate(fits):
         progress(f"leaving out rows: {fit.structure.label}", index / len(fits))
         models.append(evaluate_fit(observations, role, fit, declared, cross_validate(observations, fit.structure)))
-    progress("fitting what a robot file can hold", 0.0)
+    progress("fitting the form of a robot file", 0.0)
     robot_fit = (
         best_linear_fit(observations.with_static_rows(table))
         if table.static_rows

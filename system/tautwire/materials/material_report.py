@@ -36,24 +36,21 @@ def verdict_sentence(verdict: MaterialVerdict) -> str:
     """The verdict in one or two sentences."""
     constant = verdict.model("constant")
     refuted = constant.p_value < verdict.options.significance_level
-    opening = f"A constant pair of modulus and damping is {'refuted' if refuted else 'enough'}: the best one leaves"
+    opening = f"A constant pair of modulus and damping is {'rejected' if refuted else 'adequate'}: the best one has"
     text = f"{opening} {chi_squared_text(constant)}"
     if verdict.reference_model.role == "declared":
         text += f", the declared one {chi_squared_text(verdict.reference_model)}"
     if verdict.verdict == "unexplained":
         return (
-            f"{text}. No model here leaves only noise: {verdict.chosen_model.label} leaves "
+            f"{text}. No model here is adequate: {verdict.chosen_model.label} has "
             f"{chi_squared_text(verdict.chosen_model)}."
         )
     added_effects = sorted((effect.name for effect in verdict.effects if effect.name in ADDED_EFFECTS), reverse=True)
     if added_effects:
-        return (
-            f"{text}. Found: {' and '.join(added_effects)}, with which "
-            f"{chi_squared_text(verdict.chosen_model)} is left."
-        )
+        return f"{text}. Identified: {' and '.join(added_effects)}, with {chi_squared_text(verdict.chosen_model)}."
     if verdict.effects:
         changed = " and ".join(effect.name for effect in verdict.effects)
-        return f"{text}. Found: another {changed}."
+        return f"{text}. Identified: another {changed}."
     return f"{text}."
 
 
@@ -105,7 +102,7 @@ def _consistency_notes(verdict: MaterialVerdict) -> Iterator[str]:
     for column in columns:
         of_column = [check for check in understated_uncertainties(verdict.consistency_checks) if check.column == column]
         rows = ", ".join(dict.fromkeys(f"{check.frequency:g}" for check in of_column))
-        yield f"the uncertainty of {column} is written smaller than its inputs' give, at {rows} Hz"
+        yield f"the uncertainty of {column} is smaller than the uncertainties of its inputs imply, at {rows} Hz"
 
 
 def _amplitude_notes(table: MaterialTable) -> Iterator[str]:
@@ -119,7 +116,7 @@ def _amplitude_notes(table: MaterialTable) -> Iterator[str]:
             direction = "rises" if rank_correlation > 0.0 else "falls"
             yield (
                 f"the strain amplitude {direction} with frequency, {amplitude.min():.2g} to {amplitude.max():.2g}: "
-                "what amplitude does looks here like what frequency does"
+                "effects of amplitude and frequency cannot be separated"
             )
 
 
@@ -129,7 +126,7 @@ def _relaxation_floor_notes(verdict: MaterialVerdict) -> Iterator[str]:
     p_value = float(chi2.sf(verdict.relaxation_floor, degrees_of_freedom))
     if p_value < verdict.options.significance_level:
         yield (
-            f"damping with any number of branches leaves at least chi-squared {verdict.relaxation_floor:.4g} of "
+            f"damping with any number of branches has at least chi-squared {verdict.relaxation_floor:.4g} of "
             f"{degrees_of_freedom} "
             f"({p_value_text(p_value)}): no passive linear solid gives these rows within their uncertainties"
         )
@@ -144,7 +141,7 @@ def _cross_validation_notes(verdict: MaterialVerdict) -> Iterator[str]:
         condition = (
             "whichever row is left out" if max_p_value < verdict.options.significance_level else "only with all rows"
         )
-        yield f"a constant pair is refuted {condition}: at most {p_value_text(max_p_value)} without one"
+        yield f"a constant pair is rejected {condition}: at most {p_value_text(max_p_value)} without one"
     extrapolated = [row for row in range(len(chosen.is_interpolated)) if not chosen.is_interpolated[row]]
     unpredicted = [
         row for row in extrapolated if chosen.chi_squared[row] > float(chi2.isf(verdict.options.significance_level, 2))
@@ -161,7 +158,7 @@ def _confusable_model_notes(verdict: MaterialVerdict) -> Iterator[str]:
         delay = [estimate for estimate in model.estimates if estimate.effect == "sensor_delay"]
         reason = ""
         if delay:
-            reason = f": a delay of {1e3 * delay[0].value:.3g} ms between the test's channels would pass for damping"
+            reason = f": a delay of {1e3 * delay[0].value:.3g} ms between the test's channels would look like damping"
         elif model.material.friction_stress:
             reason = f": dry friction of {model.material.friction_stress / 1e6:.3g} MPa at all amplitudes does as well"
         yield f"as good: {model.label}, {chi_squared_text(model)}{reason}"

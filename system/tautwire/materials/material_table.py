@@ -140,7 +140,9 @@ def _csv_rows(text: str, file: str) -> Iterator[tuple[str, list[str]]]:
             try:
                 yield where, [cell.strip() for cell in next(csv.reader(StringIO(line)))]
             except csv.Error as problem:
-                raise MaterialTableError(where, f"is no CSV ({problem})", "write one number a cell") from problem
+                raise MaterialTableError(
+                    where, f"is not valid CSV ({problem})", "write one number per cell"
+                ) from problem
 
 
 def _require_header(names: Sequence[str], where: str) -> None:
@@ -150,7 +152,7 @@ def _require_header(names: Sequence[str], where: str) -> None:
     ]
     for index, name in enumerate(names):
         if name in names[:index]:
-            raise MaterialTableError(where, f"the column {format_value(name)} is there twice", "keep one of the two")
+            raise MaterialTableError(where, f"the column {format_value(name)} appears twice", "keep one of the two")
         if ";" in name or "\t" in name:
             problem = "the columns are separated with semicolons or tabs"
             raise MaterialTableError(
@@ -163,7 +165,7 @@ def _require_header(names: Sequence[str], where: str) -> None:
         if column not in names:
             raise MaterialTableError(where, f"{name} stands without {column}", f"add the column {column}")
     if "phase" in names and "phase_degrees" in names:
-        raise MaterialTableError(where, "the phase is there in rad and in degrees", "keep one of the two")
+        raise MaterialTableError(where, "the phase is given in rad and in degrees", "keep one of the two")
     if "frequency" not in names:
         raise MaterialTableError(where, "the column frequency is missing", "add it, in Hz")
 

@@ -28,7 +28,7 @@ CONSISTENCY_HINT = (
 def describe_start(robot: Robot, start: Array) -> str:
     """Describe how far a start is from the robot file's."""
     return (
-        f"{_start_distance(robot, start):.3g} m from where the robot file starts it, at "
+        f"{_start_distance(robot, start):.3g} m from the start in the robot file, "
         f"[{_position_text(robot.platform.start)}] m"
     )
 
@@ -52,7 +52,9 @@ def require_matching_reeling(robot: Robot, recording: Recording, start: Array, w
         return
     reeled, mismatch = reeling_mismatch(robot, recording)
     if reeled > MIN_REELED_SHARE * size and mismatch > MAX_REELING_MISMATCH * reeled:
-        mismatch_text = f"ropes there would not be reeled so: {reeled:.2g} m were, {mismatch:.2g} m do not fit (rms)"
+        mismatch_text = (
+            f"winch travel does not match the positions: {reeled:.2g} m reeled, {mismatch:.2g} m rms mismatch"
+        )
         raise RecordingError(where, f"{_start_text(robot, start)}, and {mismatch_text}", CONSISTENCY_HINT)
 
 

@@ -69,7 +69,7 @@ class CsvTable:
         except csv.Error as problem:
             hint = "check the quotation marks from this line on"
             raise RecordingError(
-                f"{self.file}: line {first_line}", f"is no CSV ({problem})", hint, first_line
+                f"{self.file}: line {first_line}", f"is not valid CSV ({problem})", hint, first_line
             ) from problem
 
     def _is_rectangular(self, row_count: int) -> bool:
@@ -116,7 +116,7 @@ def _first_row(content: bytes, file: str) -> list[str]:
     try:
         return [cell.strip() for cell in next(csv.reader(_as_text(content), skipinitialspace=True))]
     except csv.Error as problem:
-        raise RecordingError(f"{file}: line 1", f"is no CSV ({problem})", "write a header line") from problem
+        raise RecordingError(f"{file}: line 1", f"is not valid CSV ({problem})", "write a header line") from problem
 
 
 def _require_header(cells: list[str], where: str) -> None:

@@ -40,9 +40,9 @@ def without_dead_channels(
     notes: list[str] = []
     for kind in (slice(0, 3), slice(3, 3 + recording.cable_count)):
         columns, names = measured[:, kind], recording.channel_names[kind]
-        notes += _clear_channels(columns, names, _constant_channels(columns), "shows one value all along: not used")
+        notes += _clear_channels(columns, names, _constant_channels(columns), "is constant throughout: not used")
         notes += _clear_channels(
-            columns, names, _noise_only_channels(columns, policy), "shows noise alone while others move: not used"
+            columns, names, _noise_only_channels(columns, policy), "shows only noise while others move: not used"
         )
         hold_length = _hold_length(columns, policy)
         if hold_length > 1:
@@ -55,9 +55,7 @@ def without_dead_channels(
             )
         for index, count in enumerate(_clear_frozen(columns, policy)):
             if count:
-                notes.append(
-                    f"{names[index]}: stays at one value for {count} samples while others move: not used there"
-                )
+                notes.append(f"{names[index]}: frozen for {count} samples while others move: not used there")
     if not notes:
         return recording, ()
     messages = tuple(f"{recording.path}: {note}" for note in notes)

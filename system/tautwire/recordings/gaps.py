@@ -32,7 +32,7 @@ def without_gaps(
     gap_times = ", ".join(f"{recording.time[row]:.6g} s" for row in gaps[:5]) + (" ..." if len(gaps) > 5 else "")
     used_part = f"from {part.time[0]:.6g} to {part.time[-1]:.6g} s was used"
     return part, (
-        f"{recording.path}: nobody knows what winches did in its gaps (at {gap_times}): only the part {used_part}",
+        f"{recording.path}: the winch motion in its gaps (at {gap_times}) is unknown: only the part {used_part}",
     )
 
 

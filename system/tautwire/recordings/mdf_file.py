@@ -17,7 +17,7 @@ from .recording_table import AXES, ColumnTable, ErrorSink, Header, parse_header,
 
 MDF_SUFFIXES = (".mf4", ".mdf")
 _MDF_MAGIC = b"MDF     "
-_REWRITE_HINT = "write it anew as MDF 4, or as CSV or Parquet under another name"
+_REWRITE_HINT = "export it again as MDF 4, or as CSV or Parquet under another name"
 _ACCEPTED_UNITS = {"winch_speed": ("", "m/s", "m*s^-1"), "tension": ("", "N"), "position": ("", "m")}
 # s: times of two groups that are closer than this coincide.
 _TIME_TOLERANCE = 1e-9
@@ -96,7 +96,7 @@ def _read_channels(content: Any, file: str, cable_count: int, sink: ErrorSink) -
         if name == "time":
             continue
         if len(locations[name]) > 1:
-            raise RecordingError(f"{file}: channel {name}", "is there more than once", "keep one of them")
+            raise RecordingError(f"{file}: channel {name}", "appears more than once", "keep one of them")
         group, index = locations[name][0]
         channels[name] = _channel(content.get(name, group=group, index=index), f"{file}: channel {name}", name)
     return header, channels
@@ -107,7 +107,7 @@ def _channel(signal: Any, where: str, name: str) -> Channel:
     if signal.unit.strip() not in units:
         raise RecordingError(where, f"is in {format_value(signal.unit)}", f"convert it to {units[1]}")
     if signal.samples.ndim != 1 or signal.samples.dtype.kind not in "iuf":
-        raise RecordingError(where, "holds no numbers", "store it as a number a sample, in SI units")
+        raise RecordingError(where, "contains no numbers", "store one number per sample, in SI units")
     values = signal.samples.astype(np.float64)
     if signal.invalidation_bits is not None:
         values[np.asarray(signal.invalidation_bits, dtype=bool)] = np.nan

@@ -64,8 +64,8 @@ def without_outliers(
         if not len(outlier_rows):
             continue
         if len(outlier_rows) > max(policy.max_ratio * len(measured_rows), policy.allowed_count):
-            problem = f"jumps and comes back in {len(outlier_rows)} of {len(measured_rows)} samples, more than 1 %"
-            hint = "mend the sensor, or leave the column out"
+            problem = f"has outliers in {len(outlier_rows)} of {len(measured_rows)} samples, more than 1 %"
+            hint = "repair the sensor, or omit the column"
             raise RecordingError(f"{recording.path}: column {name}", problem, hint)
         counts[name] = len(outlier_rows)
         column[outlier_rows] = np.nan
@@ -75,10 +75,7 @@ def without_outliers(
         is_missing = ~np.isfinite(column)
         column[is_missing] = np.interp(recording.time[is_missing], recording.time[~is_missing], column[~is_missing])
     description = ", ".join(f"{count} of {name}" for name, count in counts.items())
-    note = (
-        f"{recording.path}: samples that jump by more than {policy.sigmas:g} sigma and come back are taken "
-        f"out: {description}"
-    )
+    note = f"{recording.path}: outliers beyond {policy.sigmas:g} sigma removed: {description}"
     cleaned = replace(recording, position=measured[:, :3], tension=measured[:, 3:], winch_speed=winch_speed)
     return cleaned, (note,)
 

@@ -14,7 +14,7 @@ from .recording_table import ColumnTable, ErrorSink, parse_header, require_sampl
 BATCH_ROWS = 2**16
 
 _PARQUET_MAGIC = b"PAR1"
-_REWRITE_HINT = "write it anew as Parquet, or as CSV under another name"
+_REWRITE_HINT = "export it again as Parquet, or as CSV under another name"
 _NUMERIC_TYPE_CHECKS = (pa.types.is_integer, pa.types.is_floating, pa.types.is_decimal, pa.types.is_null)
 
 

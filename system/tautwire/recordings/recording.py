@@ -152,7 +152,7 @@ def recording_from_frame(frame: pd.DataFrame, cable_count: int, name: str = "fra
     """
     validate_instance("recording_from_frame: frame", frame, pd.DataFrame, "give a pandas frame with a column time")
     validate_integer("recording_from_frame: cable_count", cable_count, 1, CABLE_COUNT_HINT, MAX_CABLES)
-    validate_instance("recording_from_frame: name", name, str, "give what messages shall call it")
+    validate_instance("recording_from_frame: name", name, str, "give a name for use in messages")
     header = parse_header([str(column) for column in frame.columns], name, cable_count)
     numbers = frame.set_axis(list(header.names), axis="columns")
     columns = {column: _float_column(numbers[column], f"{name}: column {column}") for column in header.known_names}

@@ -53,10 +53,10 @@ def parse_header(
     names = tuple(cell or f"(column {index})" for index, cell in enumerate(cells, 1))
     for index, name in enumerate(names):
         if name in names[:index]:
-            sink(RecordingError(where, f"the column {format_value(name)} is there twice", "keep one of the two", line))
+            sink(RecordingError(where, f"the column {format_value(name)} appears twice", "keep one of the two", line))
         cable_match = _CABLE_COLUMN.fullmatch(name)
         if cable_match and not 1 <= int(cable_match.group(1)) <= cable_count:
-            problem = f"the column {name} is of no cable, the robot has cables 1 to {cable_count}"
+            problem = f"the column {name} belongs to no cable, the robot has cables 1 to {cable_count}"
             sink(RecordingError(where, problem, "give the robot file that belongs to this recording", line))
     unknown_names = tuple(name for name in names if name not in allowed_names)
     for required in ("time", *(f"winch_speed_{cable}" for cable in range(1, cable_count + 1))):
@@ -113,7 +113,7 @@ def row_errors(rows: Iterable[Row], header: Header, file: str) -> Iterator[Recor
                     time = value
         if time <= previous_time:
             problem = f"is {time!r} after {previous_time!r}, must rise from sample to sample"
-            yield _cell_error(row, "time", problem, "sort the samples, keep each once")
+            yield _cell_error(row, "time", problem, "sort the samples and remove duplicates")
         previous_time = time if time > previous_time else previous_time
     if count < 2:
         samples = "1 sample" if count else "no samples"
@@ -121,8 +121,8 @@ def row_errors(rows: Iterable[Row], header: Header, file: str) -> Iterator[Recor
 
 
 def not_a_table_error(file: str) -> RecordingError:
-    """The error of a file that is no table of numbers for another reason than the rules name."""
-    return RecordingError(file, "is no table of numbers", "write one line per sample, one number per cell")
+    """The error of a file that is not a table of numbers for another reason than the rules name."""
+    return RecordingError(file, "is not a table of numbers", "write one line per sample, one number per cell")
 
 
 def _width_error(row: Row, width: int) -> RecordingError:

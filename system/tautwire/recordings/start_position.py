@@ -47,7 +47,7 @@ def start_position(
         raise UnreachableError(where, error.position, error.cable, error.tension, reason, CONSISTENCY_HINT) from error
     require_matching_reeling(robot, recording, declared + offset, where)
     coordinates = ", ".join(f"{axis} {value:.6g}" for axis, value in zip(AXES, (x, y, z), strict=True))
-    note = f"{recording.path} starts at {coordinates} m, not at the robot file's start; the run starts where it says"
+    note = f"{recording.path} starts at {coordinates} m, not at the robot file's start; the run starts there too"
     return (x, y, z), (note,)
 
 

@@ -20,9 +20,7 @@ def read_effects(table: CheckedTable, cable_count: int) -> tuple[EffectSetting, 
     settings: list[EffectSetting] = []
     for name in table.content:
         if name not in BY_NAME:
-            table.refuse(
-                name, "is not an effect that the project knows", f"write {suggest_name(name, BY_NAME)}, or remove it"
-            )
+            table.refuse(name, "is not a known effect", f"write {suggest_name(name, BY_NAME)}, or remove it")
             continue
         tables_by_cable: dict[int, str] = {}
         for effect_table in table.table_or_tables(name):
@@ -48,7 +46,7 @@ def _read_effect(table: CheckedTable, effect: Effect, cable_count: int) -> Effec
     # A missing number without a neutral value is reported already.
     if not any(name in table.content for name in names) and all(each.neutral is not None for each in effect.parameters):
         hint = f"give {effect.parameters[0].description}, as in {names[0]} = {effect.parameters[0].start:g}"
-        table.refuse("", "sets none of its numbers", hint)
+        table.refuse("", "sets no parameter", hint)
     return EffectSetting(effect.name, values, read_cable_list(table, cable_count) if per_cable else ())
 
 
@@ -94,12 +92,12 @@ def _read_formula_table(table: CheckedTable, cable_reader: Callable[[CheckedTabl
     table.require_known((*VARIABLES_BY_TARGET, "cables"))
     targets = [target for target in VARIABLES_BY_TARGET if target in table.content]
     if not targets:
-        table.refuse("", "holds no formula", 'write one, as in force_x = "-20 * vx"')
+        table.refuse("", "contains no formula", 'write one, as in force_x = "-20 * vx"')
     elif "cables" in table.content and "tension" not in targets:
-        table.refuse("cables", "only a formula of the tension acts in cables", "remove cables")
+        table.refuse("cables", "only a tension formula acts in cables", "remove cables")
     formulas = []
     for place in targets:
-        text = table.text(place, 'write it as a text, as in "-20 * vx"')
+        text = table.text(place, 'write it as text, as in "-20 * vx"')
         if text is None:
             continue
         for error in expression_errors(text, VARIABLES_BY_TARGET[place]):

@@ -25,9 +25,9 @@ MIN_POINT_DISTANCE = 1e-6  # m; no two exit points can be built closer
 
 GRAVITY_RULE = NumberRule("the gravity along -z", "m/s^2", minimum=0.0, default=9.81)
 MASS_RULE = NumberRule("the platform's mass", "kg", positive=True)
-MIN_TENSION_RULE = NumberRule("the least tension", "N", minimum=0.0)
-MAX_TENSION_RULE = NumberRule("the largest tension", "N", positive=True)
-PREFERRED_TENSION_RULE = NumberRule("the tension to aim at", "N", minimum=0.0)
+MIN_TENSION_RULE = NumberRule("the minimum tension", "N", minimum=0.0)
+MAX_TENSION_RULE = NumberRule("the maximum tension", "N", positive=True)
+PREFERRED_TENSION_RULE = NumberRule("the preferred tension", "N", minimum=0.0)
 PREFERRED_UNCERTAINTY_RULE = NumberRule(
     "the standard deviation of true start tensions from the rule's", "N", minimum=0.0
 )

@@ -118,7 +118,7 @@ def _winch_block(winch: Winch) -> list[str]:
     return [
         "[winch]",
         _number_line("drum_radius", winch.drum_radius, "m"),
-        _number_line("gear", winch.gear, "motor turns a drum turn"),
+        _number_line("gear", winch.gear, "motor turns per drum turn"),
         _number_line("bandwidth", winch.bandwidth, "Hz, natural frequency of the speed loop"),
         _number_line("damping_ratio", winch.damping_ratio, ""),
         *(_number_line(key, value, f"{unit}, of the rope") for key, value, unit in limits if value is not None),
@@ -127,7 +127,7 @@ def _winch_block(winch: Winch) -> list[str]:
 
 def _fmu_block(fmus: Sequence[UserFmu]) -> list[str]:
     lines = [f"{fmu.slot} = {json.dumps(str(fmu.path), ensure_ascii=False)}" for fmu in fmus]
-    return ["[fmu]  # in place of the project's own", *lines] if lines else []
+    return ["[fmu]  # instead of the project's own", *lines] if lines else []
 
 
 def _cable_block(number: int, cable: Cable) -> list[str]:

@@ -27,13 +27,13 @@ maximum = 5000.0                  # N
 preferred = {preferred}                 # N
 # preferred_uncertainty = 50.0    # N, how far true start tensions may be from that
 
-# How much noise one sample has, as a standard deviation; take out what you do not know.
+# Standard deviation of the noise of one sample; remove what you do not know.
 [sensors]
 position_noise = 2e-4             # m
 tension_noise = 1.0               # N
 winch_speed_noise = 1e-4          # m/s
-# tension_offset_uncertainty = 2.0    # N, what a load cell may show too much all the time
-# position_offset_uncertainty = 1e-3  # m, likewise of the tracker, on each axis
+# tension_offset_uncertainty = 2.0    # N, constant error of a load cell
+# position_offset_uncertainty = 1e-3  # m, constant error of the tracker, on each axis
 
 # One table for each cable, three or more. The law of tension is T = E S eps + c S deps/dt + T0.
 """
@@ -48,7 +48,7 @@ law = "logarithmic"               # eps is ln(l/l_u); or "linear", l/l_u - 1
 # damping_uncertainty = 1e8       # Pa s
 """
 TEMPLATE_TAIL = """
-# Winches that follow the speed asked of them only so fast; without this table the rope runs exactly at that speed.
+# Winches that follow a speed command with limited dynamics; without this table the rope runs exactly at that speed.
 # [winch]
 # drum_radius = 0.1               # m
 # gear = 20.0                     # motor turns for one turn of the drum
@@ -57,19 +57,19 @@ TEMPLATE_TAIL = """
 # speed_limit = 1.0               # m/s, of the rope
 # acceleration_limit = 5.0        # m/s^2
 
-# Effects that the plain robot lacks; "tautwire trace" finds them from a recording and writes such tables.
+# Effects that the plain model lacks; "tautwire trace" identifies them from recordings and writes such tables.
 # [effect.payload]
 # mass = 5.0                      # kg
 
 # [effect.modulus]
-# modulus = 0.9e11                # Pa, in place of the declared one
+# modulus = 0.9e11                # Pa, replaces the declared one
 # cables = [2]                    # all cables without this line
 
-# What no known effect is, as arithmetic.
+# A formula for what no known effect explains.
 # [formula]
 # force_x = "-20*vx"              # N, on the platform
 
-# FMUs of your own in place of the project's, from this file's folder.
+# User FMUs instead of the project's, relative to this file.
 # [fmu]
 # platform = "mine.fmu"
 """

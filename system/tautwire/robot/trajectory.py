@@ -18,7 +18,7 @@ from .static_equilibrium import unit_directions as rope_directions
 
 Array = NDArray[np.float64]
 
-DURATION_RULE = NumberRule("how long the path takes", "s", positive=True)
+DURATION_RULE = NumberRule("the duration of the path", "s", positive=True)
 RADIUS_RULE = NumberRule("the radius", "m", minimum=0.0)
 RISE_RULE = NumberRule("the rise over the whole helix", "m")
 ANGLE_RULE = NumberRule("the angle turned", "rad")
@@ -106,7 +106,9 @@ class Helix:
         ):
             object.__setattr__(self, name, validate_number(f"Helix: {name}", getattr(self, name), rule))
         if self.angle == 0.0:
-            raise ArgumentError("Helix: angle", 0.0, "is 0, which is no turn", "give another angle, or take a Line")
+            raise ArgumentError(
+                "Helix: angle", 0.0, "is 0, but a helix must turn", "give another angle, or take a Line"
+            )
 
     def position(self, times: Array) -> Array:
         """Reference position, (N, 3) in m."""

@@ -1,4 +1,4 @@
-"""Cut at its measured ports a robot tells which component is off, on recordings that the rig makes."""
+"""Cut at its measured ports a robot tells which component is faulty, on recordings that the rig makes."""
 
 import json
 from dataclasses import replace
@@ -105,7 +105,7 @@ def test_a_swinging_load_rings_at_the_platform_with_its_frequency() -> None:
     assert components.faulty_component == "platform"
     frequency = part(components, "platform", "force x").resonance_frequency
     assert frequency == pytest.approx(np.sqrt(9.81 / 2.0) / (2.0 * np.pi), rel=0.06)
-    assert "rings at 0.3" in components.sentence
+    assert "oscillates at 0.3" in components.sentence
 
 
 def test_without_positions_nothing_can_be_told() -> None:

@@ -46,7 +46,7 @@ def test_the_sentence_has_the_figures() -> None:
     platform = [part("platform", "force x", 1.3)]
     assert isolation_verdict(cables, platform) == (
         "cable 2 (rope or winch)",
-        "Cable 2's tension is off by 14 N rms (expected 1.3 N); the platform's force balance is within its noise. "
+        "Cable 2's tension deviates by 14 N rms (expected 1.3 N); the platform's force balance is within noise. "
         "In question: cable 2 (rope or winch).",
     )
 
@@ -54,12 +54,12 @@ def test_the_sentence_has_the_figures() -> None:
 def test_the_sentence_tells_what_rings_at_the_platform_alone() -> None:
     cables, wrong = [part("cable 1", "tension", 1.3)], [part("cable 1", "tension", 14.0)]
     platform = [part("platform", "force x", 9.0, 0.451), part("platform", "force z", 2.0, 0.9)]
-    assert "rings at 0.45 Hz" in isolation_verdict(cables, platform)[1]
-    assert "rings" not in isolation_verdict(wrong, platform)[1]
+    assert "oscillates at 0.45 Hz" in isolation_verdict(cables, platform)[1]
+    assert "oscillates" not in isolation_verdict(wrong, platform)[1]
 
 
 def test_where_nothing_was_looked_at_the_sentence_says_so() -> None:
-    assert isolation_verdict((), ()) == ("cannot tell", "Cannot tell which component is off.")
+    assert isolation_verdict((), ()) == ("cannot tell", "Cannot tell which component is faulty.")
 
 
 def test_names_are_counted() -> None:

@@ -84,7 +84,7 @@ def discover_formula(
     sample = evidence.estimation
     best = _with_criterion(fitter, _without_terms(base), accepted, sample)
     for number in range(1, MAX_ROUNDS + 1):
-        progress(f"looking for a formula, round {number}", (number - 1) / MAX_ROUNDS)
+        progress(f"searching for a formula, round {number}", (number - 1) / MAX_ROUNDS)
         previous = best
         try:
             candidate = _select_and_fit(previous, accepted, fitter, sample)
@@ -95,7 +95,7 @@ def discover_formula(
         best = candidate
         if residuals_are_white(fitter.judged(best.fit.robot, accepted, sample), sample.rows):
             break
-    progress("looking for a formula", 1.0)
+    progress("searching for a formula", 1.0)
     return _validate(base, best, accepted, fitter, evidence) if best.terms else None
 
 

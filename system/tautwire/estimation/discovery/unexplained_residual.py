@@ -38,9 +38,9 @@ def explain_residual(context: IdentificationContext, selection: SelectionResult)
     notes = [line.sentence for line in lines]
     if formula is not None:
         description = formula_text(robot, formula.formulas)
-        notes.append(f"a formula explains part of the residual, not all of it: {description}")
+        notes.append(f"a formula explains only part of the residual: {description}")
     if pending is not None:
-        context.progress("looking for a formula beside effects", 0.0)
+        context.progress("searching for a formula beside effects", 0.0)
         joint_formula = pending.result()
     else:
         joint_formula = discover_formula(*beside, context.progress) if selection.accepted else None
@@ -49,7 +49,8 @@ def explain_residual(context: IdentificationContext, selection: SelectionResult)
         names = " and ".join(hypothesis.label(robot) for hypothesis in selection.accepted)
         description = formula_text(robot, joint_formula.formulas)
         notes.append(
-            f"a formula together with {names} leaves noise, but either may stand for something else: {description}"
+            f"with {names} and a formula the residual is white noise, but either may stand for another cause: "
+            f"{description}"
         )
     return UnexplainedResidual(None, lines, tuple(notes))
 

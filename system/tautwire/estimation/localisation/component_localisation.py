@@ -42,7 +42,7 @@ def localise_residual(robot: Robot, sample: DataSet, noise: Noise) -> FaultLocal
     recording = sample.recording.first(MAX_SAMPLES)
     limitations = list(_limitations(robot, recording))
     if recording.sample_count < sample.recording.sample_count:
-        limitations.append(f"only the first {recording.duration:.4g} s were looked at")
+        limitations.append(f"only the first {recording.duration:.4g} s were analysed")
     if not _has_path(robot, recording):
         return FaultLocalisation(recording.time, (), *isolation_verdict((), ()), tuple(limitations))
     robot_at_start = with_start(robot.as_modelled(), sample.start)
@@ -129,12 +129,12 @@ def _has_path(robot: Robot, recording: Recording) -> bool:
 def _limitations(robot: Robot, recording: Recording) -> list[str]:
     """Limitations of a recording, in words."""
     if not _has_path(robot, recording):
-        return ["positions are missing: no cable and not the platform can be looked at alone"]
+        return ["positions are missing: neither the cables nor the platform can be simulated alone"]
     unmeasured = [
         n for n in robot.cable_numbers if np.sum(np.isfinite(recording.tension[:, n - 1])) < MIN_MEASURED_SAMPLES
     ]
     if not unmeasured:
         return []
     if len(unmeasured) == robot.cable_count:
-        return ["no tensions: no cable and not the platform can be looked at alone"]
-    return [f"no tension of {numbered('cable', unmeasured)}: neither that nor the platform can be looked at alone"]
+        return ["no tensions: neither the cables nor the platform can be simulated alone"]
+    return [f"no tension of {numbered('cable', unmeasured)}: neither that nor the platform can be simulated alone"]

@@ -82,9 +82,9 @@ def isolation_verdict(
     oscillating = [part for part in platform if part.is_significant and part.resonance_frequency is not None]
     if faulty_component == PLATFORM and oscillating:
         frequency = max(oscillating, key=lambda part: part.ratio).resonance_frequency
-        facts.append(f"it rings at {frequency:.2f} Hz, as something that swings or shakes by itself does")
+        facts.append(f"it oscillates at {frequency:.2f} Hz, as a swinging load or a shaker does")
     evidence = "; ".join(facts)
-    conclusion = {PLATFORM: "it is at the platform", NO_COMPONENT: "nothing is off"}.get(
+    conclusion = {PLATFORM: "the faulty component is the platform", NO_COMPONENT: "no component deviates"}.get(
         faulty_component, f"in question: {faulty_component}"
     )
     return (
@@ -96,7 +96,7 @@ def isolation_verdict(
 
 
 def _verdict_without_evidence(faulty_component: str) -> str:
-    return f"{faulty_component[:1].upper()}{faulty_component[1:]} which component is off."
+    return f"{faulty_component[:1].upper()}{faulty_component[1:]} which component is faulty."
 
 
 def _cable_facts(cables: Sequence[ComponentResidual]) -> list[str]:
@@ -105,10 +105,10 @@ def _cable_facts(cables: Sequence[ComponentResidual]) -> list[str]:
         subject = "the cables' tensions are" if len(cables) > 1 else "the cable's tension is"
         return [f"{subject} within noise"] if cables else []
     if len(deviating) == 1:
-        return [f"{deviating[0].component}'s tension is {_deviation_text(deviating[0])}"]
+        return [f"{deviating[0].component}'s tension deviates {_deviation_text(deviating[0])}"]
     worst = max(deviating, key=lambda part: part.ratio)
     numbers = numbered("cable", [int(part.component.split()[1]) for part in deviating])
-    return [f"the tensions of {numbers} are off, that of {worst.component} most: {_deviation_text(worst)}"]
+    return [f"the tensions of {numbers} deviate, that of {worst.component} most, {_deviation_text(worst)}"]
 
 
 def _platform_facts(platform: Sequence[ComponentResidual]) -> list[str]:
@@ -116,12 +116,12 @@ def _platform_facts(platform: Sequence[ComponentResidual]) -> list[str]:
         return []
     worst = max(platform, key=lambda part: part.ratio)
     if not worst.is_significant:
-        return ["the platform's force balance is within its noise"]
-    return [f"the platform's {worst.quantity} is {_deviation_text(worst)}"]
+        return ["the platform's force balance is within noise"]
+    return [f"the platform's {worst.quantity} deviates {_deviation_text(worst)}"]
 
 
 def _deviation_text(part: ComponentResidual) -> str:
-    return f"off by {_two_digits(part.rms)} {part.unit} rms (expected {_two_digits(part.expected_rms)} {part.unit})"
+    return f"by {_two_digits(part.rms)} {part.unit} rms (expected {_two_digits(part.expected_rms)} {part.unit})"
 
 
 def _two_digits(value: float) -> str:
