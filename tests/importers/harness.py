@@ -21,11 +21,11 @@ from typing import Any
 
 import numpy as np
 
-from tautwire.cosimulation.robot_wiring import AXES, PLATFORM, cable_name, robot_connections
+from tautwire.cosimulation.robot_wiring import PLATFORM, cable_name, robot_connections
 from tautwire.cosimulation.ssp_archive import COMPONENTS_ONLY, SYSTEM_STRUCTURE, ssp_name, write_ssp
 from tautwire.fmus.packaging import build_fmus
 from tautwire.robot.reference_simulation import integrate
-from tautwire.robot.schema import Robot
+from tautwire.robot.schema import AXES, Robot
 
 from .ramps import LIMIT, RAMP, STOP
 

@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from tautwire.recordings.recording import AXES, Recording
+from tautwire.recordings.recording import Recording
+from tautwire.robot.schema import AXES
 from tests.rig import SampledProgram, load_robot, make_recording, wander
 from tests.support.robots import EXAMPLES
 

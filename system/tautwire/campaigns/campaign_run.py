@@ -26,7 +26,6 @@ from ..control import (
     schedule_controller,
 )
 from ..cosimulation.robot_cosimulation import CosimulationResult, cosimulate
-from ..cosimulation.robot_wiring import AXES
 from ..errors import one_line
 from ..fmus.packaging import RobotFmus
 from ..linear import linearise
@@ -35,7 +34,7 @@ from ..linear.modes import POSITION, VELOCITY
 from ..recordings.recording import Recording
 from ..recordings.start_position import with_start
 from ..robot.robot_file_reader import robot_from_content
-from ..robot.schema import Point, Robot
+from ..robot.schema import AXES, Point, Robot
 from ..robot.static_equilibrium import static_tensions
 from ..robot.trajectory import Helix, Line, Trajectory, ideal_winch_speeds
 from .campaign_plan import OPEN_LOOP, Compute, PathPlan, Plan

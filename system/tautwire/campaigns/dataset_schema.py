@@ -5,7 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Any, Literal
 
-from ..cosimulation.robot_wiring import AXES
+from ..robot.schema import AXES
 from .campaign_plan import Plan
 
 ColumnKind = Literal["whole", "number", "flag", "text"]

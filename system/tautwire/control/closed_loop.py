@@ -19,11 +19,11 @@ from ..cosimulation.robot_cosimulation import (
     run_cosimulation,
     wire_fmus,
 )
-from ..cosimulation.robot_wiring import AXES, PLATFORM, winch_input_ports
+from ..cosimulation.robot_wiring import PLATFORM, winch_input_ports
 from ..cosimulation.run_arguments import validate_fmus, validate_options
 from ..errors import InputError
 from ..fmus.packaging import RobotFmus, package_controller_fmu
-from ..robot.schema import Robot, validate_robot
+from ..robot.schema import AXES, Robot, validate_robot
 from ..robot.trajectory import DURATION_RULE as OF_PATH
 from ..robot.trajectory import Trajectory, require_trajectory
 from ..validation import (

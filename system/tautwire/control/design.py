@@ -9,9 +9,8 @@ import control
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cosimulation.robot_wiring import AXES
 from ..errors import ArgumentError, InputError
-from ..robot.schema import Robot
+from ..robot.schema import AXES, Robot
 from ..validation import NumberRule, validate_number
 
 

@@ -17,9 +17,8 @@ import control
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cosimulation.robot_wiring import AXES
 from ..linear import LinearPlant, linearise
-from ..robot.schema import Robot, validate_robot
+from ..robot.schema import AXES, Robot, validate_robot
 from ..validation import validate_instance
 from .design import ControlAim, Knot, measurement_noise, regulator_signals
 from .sampled_plant import sampled_plant

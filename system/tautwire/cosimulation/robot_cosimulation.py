@@ -17,6 +17,7 @@ from ..errors import TautwireError
 from ..fmus.fmu_slots import SlotError, missing_user_fmu_ports, require_step_support
 from ..fmus.packaging import RobotFmus
 from ..process_signals import defer_interrupts
+from ..robot.schema import AXES
 from . import (
     AdaptiveStep,
     CallJournal,
@@ -40,7 +41,7 @@ from . import (
     simulate,
     simulate_isolated,
 )
-from .robot_wiring import AXES, CABLE_QUANTITIES, PLATFORM, RobotWiring, result_columns, wire_robot, with_connections
+from .robot_wiring import CABLE_QUANTITIES, PLATFORM, RobotWiring, result_columns, wire_robot, with_connections
 from .run_arguments import validate_fmus, validate_options
 
 Array = NDArray[np.float64]

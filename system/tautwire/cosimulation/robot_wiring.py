@@ -6,10 +6,10 @@ from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass, replace
 
 from ..fmus.fmu_variables import Port
+from ..robot.schema import AXES
 from .connections import Connection, PowerBond, Wiring
 from .result_file import Column
 
-AXES = ("x", "y", "z")
 PLATFORM = "platform"
 CABLE_QUANTITIES = {"tension": "N", "length": "m", "elongation": "m", "strain": "1"}
 # Derivative and quantity; derivatives that an FMU does not provide are estimated from past values.

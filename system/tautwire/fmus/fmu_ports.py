@@ -6,11 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from ..robot.schema import AXES
 from .fmi_binding import type_name
 from .fmu_archive import read_model_description
 from .variable_units import unit_of
 
-VECTOR_AXES = ("x", "y", "z")
 LISTED_CAUSALITIES = ("input", "output", "parameter")
 
 
@@ -50,10 +50,8 @@ def group_vectors(ports: Sequence[FmuPort]) -> tuple[FmuPort, ...]:
     vectors: dict[str, list[FmuPort]] = {}
     for port in ports:
         stem, _, axis = port.name.rpartition(".")
-        vectors.setdefault(stem if axis in VECTOR_AXES else port.name, []).append(port)
-    return tuple(
-        _vector_port(stem, parts) if len(parts) == len(VECTOR_AXES) else parts[0] for stem, parts in vectors.items()
-    )
+        vectors.setdefault(stem if axis in AXES else port.name, []).append(port)
+    return tuple(_vector_port(stem, parts) if len(parts) == len(AXES) else parts[0] for stem, parts in vectors.items())
 
 
 def _vector_port(stem: str, parts: Sequence[FmuPort]) -> FmuPort:

@@ -12,14 +12,13 @@ from fmpy.model_description import ModelDescription, ScalarVariable
 from tautwire_fmu.units import UNITS
 
 from ..errors import InputError, format_value
-from ..robot.schema import Robot, UserFmu, fmu_slots
+from ..robot.schema import AXES, Robot, UserFmu, fmu_slots
 from .component import INSTANCE_TYPES
 from .fmi_binding import is_real_scalar, type_name
 from .fmu_archive import ArchiveError, read_model_description
 from .fmu_variables import INPUT_TIME, Port
 from .variable_units import definition_from_exponents, same_unit, unit_definition, unit_of
 
-AXES = ("x", "y", "z")
 MAX_REASON_CHARACTERS = 200
 EXPORT_HINT = "export it as FMI 2.0 or 3.0 co-simulation"
 

@@ -124,7 +124,8 @@ def package_controller_fmu(data: dict[str, Any], folder: Path) -> Path:
 def with_user_fmus_copied(fmus: RobotFmus, folder: Path) -> RobotFmus:
     """The same FMUs with copies of the user FMUs in ``folder``, named as their slots."""
     copies = {
-        slot: _copy_atomically(fmus.by_component[slot], folder / f"{slot}.fmu") for slot in fmus.user_start_values
+        slot: _put_atomically(shutil.copyfile, fmus.by_component[slot], folder / f"{slot}.fmu")
+        for slot in fmus.user_start_values
     }
     return replace(
         fmus,
@@ -214,7 +215,7 @@ def _build_fmu(module: str, base: str, name: str, data: dict[str, Any], folder: 
         patched_fmu = scratch / f"{name}.fmu"
         patch_wrapper_exit(unpatched_fmu, patched_fmu)
         raise_interrupt()
-        return _move_atomically(patched_fmu, folder / f"{name}.fmu")
+        return _put_atomically(shutil.move, patched_fmu, folder / f"{name}.fmu")
 
 
 def _digest(sources: Path) -> str:
@@ -225,15 +226,9 @@ def _digest(sources: Path) -> str:
     return digest.hexdigest()[:12]
 
 
-def _copy_atomically(source: Path, target: Path) -> Path:
+def _put_atomically(transfer: Callable[[Path, Path], object], source: Path, target: Path) -> Path:
+    """Copies or moves a file to ``target``, which is replaced at once."""
     partial_file = target.with_name(f".{target.name}.partial")
-    shutil.copyfile(source, partial_file)
-    partial_file.replace(target)
-    return target
-
-
-def _move_atomically(built: Path, target: Path) -> Path:
-    partial_file = target.with_name(f".{target.name}.partial")
-    shutil.move(built, partial_file)
+    transfer(source, partial_file)
     partial_file.replace(target)
     return target

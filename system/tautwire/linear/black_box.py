@@ -17,10 +17,11 @@ from tautwire_fmu.laws.effects import BY_NAME
 
 from ..cosimulation import Port
 from ..cosimulation.robot_cosimulation import AdditionalComponents, instantiate_robot, wire_fmus
-from ..cosimulation.robot_wiring import AXES, PLATFORM, cable_name, winch_name
+from ..cosimulation.robot_wiring import PLATFORM, cable_name, winch_name
 from ..errors import InputError
 from ..fmus.fmu_archive import read_model_description
 from ..fmus.packaging import RobotFmus
+from ..robot.schema import AXES
 from .pulse_experiments import (
     DRIFT_NOTE_LEVEL,
     NONSMOOTH_NOTE_LEVEL,

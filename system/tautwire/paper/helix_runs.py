@@ -7,8 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cosimulation.robot_wiring import AXES
-from ..robot.schema import Robot
+from ..robot.schema import AXES, Robot
 from .paper_parameters import PaperParameters, with_law
 from .rope_tests import METALLIC_AREA
 from .simulation_records import (

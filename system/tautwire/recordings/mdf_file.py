@@ -13,7 +13,8 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError, format_value, raise_error
 from ..input_files import readable_file
-from .recording_table import AXES, ColumnTable, ErrorSink, Header, parse_header, require_samples
+from ..robot.schema import AXES
+from .recording_table import ColumnTable, ErrorSink, Header, parse_header, require_samples
 
 MDF_SUFFIXES = (".mf4", ".mdf")
 _MDF_MAGIC = b"MDF     "

@@ -11,11 +11,12 @@ from numpy.typing import NDArray
 from ..errors import RecordingError, format_value, raise_error
 from ..input_files import validate_path
 from ..robot.robot_file_reader import MAX_CABLES
+from ..robot.schema import AXES
 from ..validation import validate_instance, validate_integer
 from .csv_file import CsvTable, open_csv
 from .mdf_file import is_mdf, open_mdf
 from .parquet_file import is_parquet, open_parquet
-from .recording_table import AXES, MAX_MAGNITUDE, ColumnTable, ErrorSink, not_a_table_error, parse_header, row_errors
+from .recording_table import MAX_MAGNITUDE, ColumnTable, ErrorSink, not_a_table_error, parse_header, row_errors
 
 CABLE_COUNT_HINT = "give the robot's cable_count"
 

@@ -14,8 +14,7 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError, format_value, raise_error
 from ..name_suggestions import closest_name
-
-AXES = ("x", "y", "z")
+from ..robot.schema import AXES
 
 # A larger file is no recording of a cable robot, or does not fit into memory.
 MAX_COLUMNS = 10_000

@@ -8,10 +8,10 @@ from math import hypot
 import numpy as np
 
 from ..errors import UnreachableError
-from ..robot.schema import Robot
+from ..robot.schema import AXES, Robot
 from ..robot.static_equilibrium import static_tensions
 from .consistency import CONSISTENCY_HINT, describe_start, require_matching_reeling, require_start_within_robot
-from .recording import AXES, Recording
+from .recording import Recording
 
 START_SIGNIFICANCE = 6.0
 # The robot starts at rest: its first samples are of one position.

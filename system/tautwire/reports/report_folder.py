@@ -8,12 +8,12 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
-from ..cosimulation.robot_wiring import AXES
 from ..estimation.localisation.component_residuals import ComponentResidual
 from ..estimation.trace_result import Detectable, Errors, FoundEffect, Trace
 from ..fmus.packaging import RobotFmus, build_fmus, with_user_fmus_copied
 from ..json_document import json_value, write_json
 from ..robot.robot_file_writer import write_robot
+from ..robot.schema import AXES
 from ..validation import validate_folder, validate_instance
 from .trace_report_page import trace_page
 from .trace_texts import ROLES, comparison_by_role

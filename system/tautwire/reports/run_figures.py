@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..cosimulation.robot_wiring import AXES
 from ..number_format import choose_unit, format_significant
+from ..robot.schema import AXES
 from .downsampling import envelope_times, evenly_spaced_indices, min_max_envelope, pack_float32
 from .robot_scene import RobotScene, ScenePath, scene_data
 from .run_overview import ReportedRun

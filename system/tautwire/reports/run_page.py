@@ -12,11 +12,10 @@ import numpy as np
 from ..atomic_output import atomic_file
 from ..cosimulation import RunStatistics
 from ..cosimulation.result_file import Column
-from ..cosimulation.robot_wiring import AXES
 from ..errors import TautwireError
 from ..number_format import format_engineering, format_significant
 from ..recordings.recording import read_recording
-from ..robot.schema import Robot
+from ..robot.schema import AXES, Robot
 from .page_rendering import Number, PageHeader, Row, render_page
 from .run_figures import OutputSeries, output_series, run_data
 from .run_overview import ReportedRun, RunOverview

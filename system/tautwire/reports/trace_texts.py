@@ -9,9 +9,9 @@ from itertools import groupby
 
 from tautwire_fmu.laws.effects import BY_NAME
 
-from ..cosimulation.robot_wiring import AXES
 from ..estimation.trace_result import Candidate, Comparison, Errors, Estimate, Trace
 from ..number_format import ABSENT_TEXT, format_engineering, format_in_common_unit, format_significant
+from ..robot.schema import AXES
 
 ROLES = ("fit", "check")
 VERDICTS = {

@@ -7,6 +7,7 @@ from pathlib import Path
 from ..validation import validate_instance
 
 Point = tuple[float, float, float]
+AXES = ("x", "y", "z")
 
 # Components that exist once per cable: an effect in them may apply to some cables only.
 PER_CABLE_COMPONENTS = ("cable", "winch", "sensor")

@@ -21,9 +21,9 @@ from tautwire_fmu.laws.mathematics import Mathematics
 from tautwire_fmu.laws.vectors import add, scale
 
 from .robot_assembly import RobotAssembly, assemble_robot
-from .schema import EffectSetting, Robot
+from .schema import AXES, EffectSetting, Robot
 from .symbolic_statics import symbolic_start_tensions
-from .uncertain_parameters import AXES, UncertainParameter, perturbed_robot, sensor_offsets
+from .uncertain_parameters import UncertainParameter, perturbed_robot, sensor_offsets
 
 Array = NDArray[np.float64]
 

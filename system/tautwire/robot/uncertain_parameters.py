@@ -9,9 +9,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from .schema import Robot
+from .schema import AXES, Robot
 
-AXES = ("x", "y", "z")
 MODULUS, DAMPING, MASS = "modulus", "damping", "mass"
 TENSION_OFFSET, POSITION_OFFSET = "tension_offset", "position_offset"
 UNITS = {MODULUS: "Pa", DAMPING: "Pa s", MASS: "kg", TENSION_OFFSET: "N", POSITION_OFFSET: "m"}

@@ -10,11 +10,11 @@ from numpy.typing import NDArray
 
 from ...cosimulation import Component
 from ...fmus.fmu_variables import INPUT_TIME
+from ...robot.schema import AXES
 from .path_smoothing import SmoothedPath
 
 Array = NDArray[np.float64]
 
-AXES = ("x", "y", "z")
 MOTION = tuple(f"{name}.{axis}" for name in ("position", "velocity") for axis in AXES)
 INPUT_RATES = (*(f"acceleration.{axis}" for axis in AXES), "winch_acceleration")
 OUTPUTS = ("tension", "length", *(f"force.{axis}" for axis in AXES))

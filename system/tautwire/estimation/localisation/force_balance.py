@@ -21,7 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ...cosimulation import Component
-from .cable_simulation import AXES, CableSimulation
+from ...robot.schema import AXES
+from .cable_simulation import CableSimulation
 from .path_smoothing import MIN_MEASURED_SAMPLES, SmoothedPath, intensity_for_cutoff, smooth_axis
 
 Array = NDArray[np.float64]
