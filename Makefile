@@ -26,8 +26,9 @@ run: $(READY)
 test: lint types
 	$(PYTEST) -m "not validate"
 
-validate: $(READY) floors
+validate: $(READY)
 	$(PYTEST) -m validate
+	$(MAKE) floors
 
 lint: $(READY)
 	$(BIN)/ruff check .
