@@ -55,6 +55,7 @@ def test_both_packages_and_the_examples_are_in_the_wheel(built: Path) -> None:
         "tautwire/cli/identification_commands.py",
         "tautwire/py.typed",
         "tautwire/reports/assets/style.css",
+        "tautwire/reports/templates/base.html.jinja",
         "tautwire/examples/three/robot.toml",
         "tautwire/examples/three/fit.csv",
         "tautwire_fmu/slaves.py",
