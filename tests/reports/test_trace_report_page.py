@@ -22,7 +22,8 @@ from tautwire.reports.downsampling import (
     unpack_float32,
     white_noise_density,
 )
-from tautwire.reports.trace_figures import MAX_CURVE_POINTS, deviation_magnification, trace_page_data
+from tautwire.reports.robot_scene import deviation_magnification
+from tautwire.reports.trace_figures import MAX_CURVE_POINTS, trace_page_data
 from tautwire.robot.robot_file_reader import read_robot
 from tests.support.pages import FETCHING, Page
 from tests.support.traces import HOSTILE, TENSION_NOISE, made_trace, nothing_found, without_positions

@@ -65,40 +65,36 @@ MAX_HISTOGRAM_BINS = 40
 MAX_GRID_POINTS = 2000
 
 
-def figure_data(
-    plan: Plan, columns: Sequence[RowColumn], cable_count: int, summary: Summary, rows: pa.Table, folder: Path
-) -> dict[str, Any]:
+@dataclass(frozen=True)
+class CampaignResults:
+    """Results of a campaign: the ``columns`` of its ``rows``, their ``summary``, and the dataset's ``folder``."""
+
+    columns: Sequence[RowColumn]
+    rows: pa.Table
+    summary: Summary
+    folder: Path
+
+
+def figure_data(plan: Plan, cable_count: int, results: CampaignResults) -> dict[str, Any]:
     """Quantile bands and histograms of each path with each controller, packed for the page."""
-    outputs = numeric_outputs(columns)
+    is_grid = plan.method == "grid"
     variants = []
-    for variant, (path, controller, variant_rows) in enumerate(rows_by_variant(plan, rows)):
-        thinned_rows = (
-            variant_rows.take(pa.array(evenly_spaced_indices(variant_rows.num_rows, MAX_GRID_POINTS)))
-            if variant_rows.num_rows
-            else variant_rows
-        )
-        quantiles = {
-            each.name: each.quantiles for each in summary.spreads if (each.path, each.controller) == (path, controller)
-        }
+    for variant, (path, controller, rows) in enumerate(rows_by_variant(plan, results.rows)):
+        thinned_rows = rows.take(pa.array(evenly_spaced_indices(rows.num_rows, MAX_GRID_POINTS)))
+        spreads = [each for each in results.summary.spreads if (each.path, each.controller) == (path, controller)]
+        quantiles = {each.name: each.quantiles for each in spreads}
         bands: dict[str, Any] = {"time": "", "bands": []}
         if plan.paths and plan.compute.series > 1:
             names = series_columns(cable_count)
-            bands = _band_data(quantile_bands(plan, folder, variant, names), names)
-        variants.append(
-            {
-                "label": variant_label(path, controller),
-                **bands,
-                "spreads": [
-                    _spread_data(variant_rows, thinned_rows, each, quantiles, plan.method == "grid") for each in outputs
-                ],
-                "inputs": [pack_float32(_numeric_values(thinned_rows, each)) for each in plan.inputs]
-                if plan.method == "grid"
-                else [],
-            }
-        )
-    inputs = [{"label": _axis_label(each), "place": place} for place, each in enumerate(plan.inputs)]
+            bands = _band_data(quantile_bands(plan, results.folder, variant, names), names)
+        outputs = [
+            _spread_data(rows, thinned_rows, each, quantiles, is_grid) for each in numeric_outputs(results.columns)
+        ]
+        inputs = [pack_float32(_numeric_values(thinned_rows, each)) for each in plan.inputs] if is_grid else []
+        variants.append({"label": variant_label(path, controller), **bands, "spreads": outputs, "inputs": inputs})
+    axes = [{"label": _axis_label(each), "place": place} for place, each in enumerate(plan.inputs)]
     # The scripts shared by all pages start from choices where there are any; those of campaigns start by themselves.
-    return {"choices": [], "variants": variants, "inputs": inputs}
+    return {"choices": [], "variants": variants, "inputs": axes}
 
 
 def _axis_label(varied: Input) -> str:

@@ -12,7 +12,14 @@ from ..number_format import format_engineering, format_percent, format_significa
 from ..reports import inline_charts as charts
 from ..reports.page_rendering import Number, PageHeader, Row, render_page
 from ..robot.schema import Robot
-from .campaign_figures import channel_description, column_label, figure_data, numeric_outputs, variant_label
+from .campaign_figures import (
+    CampaignResults,
+    channel_description,
+    column_label,
+    figure_data,
+    numeric_outputs,
+    variant_label,
+)
 from .campaign_plan import PARAMETER_NAMES, Distribution, Plan
 from .campaign_summary import FlagProbability, SobolIndices, Spread, Summary
 from .dataset_schema import RowColumn, series_columns
@@ -36,17 +43,9 @@ FLAG_LABELS = {
 }
 
 
-def campaign_page(
-    plan: Plan,
-    robot: Robot,
-    columns: Sequence[RowColumn],
-    summary: Summary,
-    rows: pa.Table,
-    folder: Path,
-    links: Mapping[str, str],
-) -> str:
+def campaign_page(plan: Plan, robot: Robot, results: CampaignResults, links: Mapping[str, str]) -> str:
     """The page of a campaign over samples or a grid; ``links`` maps labels to paths beside the page."""
-    figures = figure_data(plan, columns, robot.cable_count, summary, rows, folder)
+    figures, summary = figure_data(plan, robot.cable_count, results), results.summary
     subject, headline = f"{robot.name}, {robot.cable_count} cables", _headline(plan, summary)
     verdict = ("All runs came to their end", "none")
     if summary.failed:
@@ -60,7 +59,7 @@ def campaign_page(
         probabilities=[_probability_row(each) for each in summary.probabilities],
         inputs=_input_rows(plan),
         band_panels=_band_panels(plan, robot),
-        output_panels=_output_panels(plan, columns),
+        output_panels=_output_panels(plan, results.columns),
         dependences=_sobol_rows(summary.dependences),
         min_sobol_index=f"{MIN_SOBOL_INDEX:g}",
         spreads=_spread_rows(summary.spreads),

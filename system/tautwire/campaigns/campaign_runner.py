@@ -19,6 +19,7 @@ from ..errors import InputError
 from ..recordings.recording import Recording, read_recording
 from ..robot.robot_file_reader import robot_from_content
 from .campaign_dataset import PartWriter, completed_runs, read_rows
+from .campaign_figures import CampaignResults
 from .campaign_page import campaign_page, trace_summary_page
 from .campaign_plan import MissingExtraError, Plan, UnfinishedError
 from .campaign_run import Job, RunResult, failure_reason
@@ -156,7 +157,8 @@ def write_summary(plan: Plan, folder: Path) -> dict[str, Any]:
         robot = robot_from_content(dict(plan.content), plan.file)
         columns = row_columns(plan, robot.cable_count)
         summary = summarise_runs(plan, columns, rows)
-        document, page = summary.document(), campaign_page(plan, robot, columns, summary, rows, folder, PAGE_LINKS)
+        results = CampaignResults(columns, rows, summary, folder)
+        document, page = summary.document(), campaign_page(plan, robot, results, PAGE_LINKS)
     with atomic_folder(folder) as scratch:
         (scratch / "summary.json").write_text(json.dumps(document, indent=1), encoding="utf-8")
         (scratch / "index.html").write_text(page, encoding="utf-8")

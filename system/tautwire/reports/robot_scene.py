@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,6 +15,9 @@ Array = NDArray[np.float64]
 
 # s; a longer run is played faster.
 MAX_PLAYBACK_TIME = 60.0
+MAGNIFICATIONS = (1, 10, 100, 1000)
+# Deviations are magnified until the largest reaches this share of the robot's size, or of the path's extent.
+MAX_SHARE_OF_ROBOT_SIZE, MAX_SHARE_OF_PATH_SIZE = 0.03, 0.15
 
 
 @dataclass(frozen=True)
@@ -70,3 +74,22 @@ def scene_data(scene: RobotScene) -> dict[str, Any]:
         "tensionUnit": "N",
         "magnify": scene.magnification,
     }
+
+
+def deviation_magnification(anchors: Array, path: Array, deviations: Sequence[Array]) -> int:
+    """Magnification at which ``deviations`` (N, 3) from a ``path`` (N, 3) are visible beside the ``anchors``.
+
+    The bound by the path's extent does not hold for a robot at rest, which has no path that they could hide.
+    """
+    distances = np.concatenate([np.linalg.norm(each, axis=1) for each in deviations])
+    largest = float(np.max(distances[np.isfinite(distances)], initial=0.0))
+    finite_path = path[np.isfinite(path).all(axis=1)]
+    max_drawn_deviation = MAX_SHARE_OF_ROBOT_SIZE * float(np.max(np.ptp(np.vstack((anchors, finite_path)), axis=0)))
+    path_extent = float(np.max(np.ptp(finite_path, axis=0))) if len(finite_path) else 0.0
+    if path_extent > largest:
+        max_drawn_deviation = min(max_drawn_deviation, MAX_SHARE_OF_PATH_SIZE * path_extent)
+    return (
+        max((factor for factor in MAGNIFICATIONS if factor * largest <= max_drawn_deviation), default=1)
+        if largest > 0.0
+        else 1
+    )

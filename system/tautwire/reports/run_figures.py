@@ -13,9 +13,8 @@ from numpy.typing import NDArray
 from ..number_format import choose_unit, format_significant
 from ..robot.schema import AXES
 from .downsampling import envelope_times, evenly_spaced_indices, min_max_envelope, pack_float32
-from .robot_scene import RobotScene, ScenePath, scene_data
+from .robot_scene import MAGNIFICATIONS, RobotScene, ScenePath, deviation_magnification, scene_data
 from .run_overview import ReportedRun
-from .trace_figures import MAGNIFICATIONS, deviation_magnification
 
 Array = NDArray[np.float64]
 
@@ -67,13 +66,12 @@ def output_series(run: ReportedRun) -> list[OutputSeries]:
         ("Elongation", "elongation_", cables, "mm", 1e3, {}),
         ("Winch speed", "winch_speed_", cables, "m/s", 1.0, speeds),
     )
-    return [
-        _series_of_column(
-            run, index, title, name if names is AXES else f"cable {name}", unit, scale, recorded.get(name)
-        )
-        for title, prefix, names, unit, scale, recorded in quantities
-        for index, name in run.column_indices(prefix, names).items()
-    ]
+    series = []
+    for title, prefix, names, unit, scale, recorded in quantities:
+        for index, name in run.column_indices(prefix, names).items():
+            label = name if names is AXES else f"cable {name}"
+            series.append(OutputSeries(index, title, label, unit, scale, *_compared(run, index, recorded.get(name))))
+    return series
 
 
 def run_data(run: ReportedRun, series: Sequence[OutputSeries]) -> dict[str, Any]:
@@ -90,14 +88,13 @@ def run_data(run: ReportedRun, series: Sequence[OutputSeries]) -> dict[str, Any]
     }
 
 
-def _series_of_column(
-    run: ReportedRun, column_index: int, title: str, label: str, unit: str, scale: float, recorded: Array | None
-) -> OutputSeries:
+def _compared(run: ReportedRun, column_index: int, recorded: Array | None) -> tuple[Array | None, Array]:
+    """The recorded values of an output, None where there are none, and their difference from the overview's rows."""
     if recorded is None or not np.isfinite(recorded).any():
-        return OutputSeries(column_index, title, label, unit, scale, None, np.zeros(0))
+        return None, np.zeros(0)
     thinned_recording, rows = recorded[:: run.overview.group_size], run.overview.rows[:, column_index]
     count = min(len(thinned_recording), len(rows))
-    return OutputSeries(column_index, title, label, unit, scale, recorded, thinned_recording[:count] - rows[:count])
+    return recorded, thinned_recording[:count] - rows[:count]
 
 
 def _series_data(run: ReportedRun, series: OutputSeries) -> dict[str, Any]:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
@@ -20,7 +19,7 @@ from .downsampling import (
     white_noise_density,
 )
 from .mode_bands import Band, mode_bands, resonance_bands
-from .robot_scene import RobotScene, ScenePath, scene_data
+from .robot_scene import MAGNIFICATIONS, RobotScene, ScenePath, deviation_magnification, scene_data
 from .trace_texts import MeasuredOutput, axis_outputs, cable_outputs
 
 Array = NDArray[np.float64]
@@ -28,9 +27,6 @@ Array = NDArray[np.float64]
 MAX_RESIDUAL_POINTS = 260_000  # in all residual curves of a page, which so stays a few MB
 MAX_CURVE_POINTS, MIN_CURVE_POINTS = 3000, 400  # per curve
 MAX_PATH_POINTS = 900
-MAGNIFICATIONS = (1, 10, 100, 1000)
-# Deviations are magnified until the largest reaches this share of the robot's size, or of the path's extent.
-MAX_SHARE_OF_ROBOT_SIZE, MAX_SHARE_OF_PATH_SIZE = 0.03, 0.15
 ROLE_LABELS = {"fit": "Fit recording", "check": "Check recording"}
 
 
@@ -149,22 +145,3 @@ def _trace_magnification(trace: Trace, comparison: Comparison) -> int:
     if comparison.recording.has_position:
         deviations.append(comparison.recording.position - path)
     return deviation_magnification(np.array(trace.robot_before.anchors), path, deviations)
-
-
-def deviation_magnification(anchors: Array, path: Array, deviations: Sequence[Array]) -> int:
-    """Magnification at which ``deviations`` (N, 3) from a ``path`` (N, 3) are visible beside the ``anchors``.
-
-    The bound by the path's extent does not hold for a robot at rest, which has no path that they could hide.
-    """
-    distances = np.concatenate([np.linalg.norm(each, axis=1) for each in deviations])
-    largest = float(np.max(distances[np.isfinite(distances)], initial=0.0))
-    finite_path = path[np.isfinite(path).all(axis=1)]
-    max_drawn_deviation = MAX_SHARE_OF_ROBOT_SIZE * float(np.max(np.ptp(np.vstack((anchors, finite_path)), axis=0)))
-    path_extent = float(np.max(np.ptp(finite_path, axis=0))) if len(finite_path) else 0.0
-    if path_extent > largest:
-        max_drawn_deviation = min(max_drawn_deviation, MAX_SHARE_OF_PATH_SIZE * path_extent)
-    return (
-        max((factor for factor in MAGNIFICATIONS if factor * largest <= max_drawn_deviation), default=1)
-        if largest > 0.0
-        else 1
-    )
