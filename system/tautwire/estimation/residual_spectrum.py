@@ -6,29 +6,32 @@ from math import log
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import find_peaks
+from scipy.signal import detrend, find_peaks, peak_prominences, welch
 
 from .likelihood import Innovations
+from .policy import DEFAULT_POLICY, ResonancePeakPolicy, SpectralLinePolicy
 
 Array = NDArray[np.float64]
 
 # Zero padding, so that a line between two frequencies is not missed.
 ZERO_PADDING_FACTOR = 4
-# Least power of a line over the median of the frequencies about it.
-MIN_LINE_POWER_RATIO = 12.0
 FLOOR_HALF_WINDOW = 80
-MAX_LINES = 4
 
 
-def spectral_lines(time: Array, innovations: Innovations, rows: NDArray[np.bool_]) -> list[float]:
+def spectral_lines(
+    time: Array,
+    innovations: Innovations,
+    rows: NDArray[np.bool_],
+    policy: SpectralLinePolicy = DEFAULT_POLICY.discovery.spectral_lines,
+) -> list[float]:
     """Angular frequencies (rad/s) of the strongest lines in the innovations, strongest first."""
     frequency, power = _power_spectrum(time[rows], innovations.values[rows], innovations.observed[rows])
     floor = np.array(
         [np.median(power[max(0, k - FLOOR_HALF_WINDOW) : k + FLOOR_HALF_WINDOW]) for k in range(len(power))]
     )
     ratio = power / np.maximum(floor, np.finfo(float).tiny)
-    peaks, _ = find_peaks(ratio, height=MIN_LINE_POWER_RATIO, distance=2 * ZERO_PADDING_FACTOR)
-    strongest = sorted(peaks, key=lambda index: -power[index])[:MAX_LINES]
+    peaks, _ = find_peaks(ratio, height=policy.min_power_ratio, distance=2 * ZERO_PADDING_FACTOR)
+    strongest = sorted(peaks, key=lambda index: -power[index])[: policy.max_count]
     return [2.0 * np.pi * float(frequency[index]) for index in strongest]
 
 
@@ -44,21 +47,20 @@ def _power_spectrum(time: Array, values: Array, observed: NDArray[np.bool_]) -> 
 
 WELCH_SEGMENTS = 3
 MIN_SAMPLES, MIN_FREQUENCIES = 64, 5
-# Prominence of a peak over both its sides, as a ratio of power.
-MIN_PROMINENCE = 30.0
-# Least share of the residual's power within a quarter of the peak's frequency.
-MIN_POWER_RATIO, PEAK_WIDTH_RATIO = 0.3, 0.25
 
 
-def resonance_frequency(time: Array, residual: Array, acceleration: Array, cutoff: float) -> float | None:
+def resonance_frequency(
+    time: Array,
+    residual: Array,
+    acceleration: Array,
+    cutoff: float,
+    policy: ResonancePeakPolicy = DEFAULT_POLICY.localisation.resonance_peaks,
+) -> float | None:
     """Resonance frequency (Hz) of a residual force (N,) below ``cutoff`` (rad/s); None where there is none.
 
     The ratio of its power spectral density to that of the acceleration (N,) along it is that of a mass squared where
     a weight is wrong, falls steadily for a damping force, and has a peak for an attached oscillator.
     """
-    # Imported here: it takes long to import, and only traces need it.
-    from scipy.signal import detrend, find_peaks, peak_prominences, welch
-
     is_finite = np.isfinite(residual)
     if np.sum(is_finite) < MIN_SAMPLES:
         return None
@@ -78,11 +80,11 @@ def resonance_frequency(time: Array, residual: Array, acceleration: Array, cutof
     if len(frequency) < MIN_FREQUENCIES or not (np.all(residual_power > 0.0) and np.all(motion_power > 0.0)):
         return None
     ratio = np.log(residual_power / motion_power)
-    peaks = find_peaks(ratio, prominence=log(MIN_PROMINENCE))[0]
+    peaks = find_peaks(ratio, prominence=log(policy.min_prominence))[0]
     for peak in peaks[np.argsort(-peak_prominences(ratio, peaks)[0])]:
-        is_in_peak = np.abs(frequency - frequency[peak]) <= max(PEAK_WIDTH_RATIO * frequency[peak], 1.5 * frequency[0])
-        if np.sum(residual_power[is_in_peak]) > MIN_POWER_RATIO * np.sum(residual_power):
-            return float(
-                np.sum(frequency[is_in_peak] * residual_power[is_in_peak]) / np.sum(residual_power[is_in_peak])
-            )
+        half_width = max(policy.half_width_ratio * frequency[peak], 1.5 * frequency[0])
+        is_in_peak = np.abs(frequency - frequency[peak]) <= half_width
+        peak_power = np.sum(residual_power[is_in_peak])
+        if peak_power > policy.min_power_ratio * np.sum(residual_power):
+            return float(np.sum(frequency[is_in_peak] * residual_power[is_in_peak]) / peak_power)
     return None

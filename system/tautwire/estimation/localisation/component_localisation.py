@@ -22,92 +22,89 @@ from ...recordings.start_position import with_start
 from ...robot.schema import Robot
 from ..estimation_data import DataSet
 from ..kalman_filter import Noise
+from ..policy import DEFAULT_POLICY, LocalisationPolicy
 from .cable_simulation import CableSimulation, exit_shift, simulate_cable
 from .component_residuals import ComponentResidual, FaultLocalisation, root_mean_square
 from .fault_isolation import isolation_verdict, numbered
 from .force_balance import ForceBalance, force_balance, measured_forces, simulate_platform
-from .path_smoothing import MIN_MEASURED_SAMPLES, SmoothedPath, smooth_path
-from .residual_evaluation import cable_residual, platform_residual
+from .path_smoothing import MIN_MEASURED_SAMPLES, smooth_path
+from .residual_evaluation import MeasuredPorts, cable_residual, platform_residual
 
 Array = NDArray[np.float64]
 
-# Samples that are evaluated: the cost grows with them, and these are enough.
-MAX_SAMPLES = 20_000
-MAX_CLOSURE_RATIO = 0.5
 PLANARITY_TOLERANCE = 1e-6
 
 
-def localise_residual(robot: Robot, sample: DataSet, noise: Noise) -> FaultLocalisation:
+def localise_residual(
+    robot: Robot, sample: DataSet, noise: Noise, policy: LocalisationPolicy = DEFAULT_POLICY.localisation
+) -> FaultLocalisation:
     """Localise the model error of a robot by running each FMU alone along a recording; raises ComponentError."""
-    recording = sample.recording.first(MAX_SAMPLES)
-    limitations = list(_limitations(robot, recording))
+    recording = sample.recording.first(policy.max_samples)
+    limitations = _limitations(robot, recording)
     if recording.sample_count < sample.recording.sample_count:
         limitations.append(f"only the first {recording.duration:.4g} s were analysed")
     if not _has_path(robot, recording):
         return FaultLocalisation(recording.time, (), *isolation_verdict((), ()), tuple(limitations))
     robot_at_start = with_start(robot.as_modelled(), sample.start)
     path = smooth_path(recording, robot_at_start.platform.start, noise.of_outputs(robot.cable_count)[:3])
+    measured = MeasuredPorts(robot_at_start, recording, path, noise)
     with TemporaryDirectory(prefix="tautwire-cut-") as folder:
-        return _evaluate_components(
-            robot_at_start, build_fmus(robot_at_start, FilePath(folder)), recording, path, noise, limitations
-        )
+        fmus = build_fmus(robot_at_start, FilePath(folder))
+        return _evaluate_components(measured, fmus, tuple(limitations), policy)
 
 
 def _evaluate_components(
-    robot: Robot, fmus: RobotFmus, recording: Recording, path: SmoothedPath, noise: Noise, limitations: list[str]
+    measured: MeasuredPorts, fmus: RobotFmus, limitations: tuple[str, ...], policy: LocalisationPolicy
 ) -> FaultLocalisation:
-    columns = recording.winch_speed.T
+    """Residuals of the cables, then of the platform where all tensions are measured, and the verdict on both."""
+    recording, path, numbers = measured.recording, measured.path, measured.robot.cable_numbers
     runs = [
-        simulate_cable(f"cable_{i}", fmu, path, speed)
-        for i, fmu, speed in zip(robot.cable_numbers, fmus.cables, columns, strict=True)
+        simulate_cable(f"cable_{number}", fmu, path, speed)
+        for number, fmu, speed in zip(numbers, fmus.cables, recording.winch_speed.T, strict=True)
     ]
     has_tension = np.sum(np.isfinite(recording.tension), axis=0) >= MIN_MEASURED_SAMPLES
-    cable_residuals = [
-        cable_residual(number, run, recording, path, noise, np.array(robot.cables[number - 1].anchor))
-        for number, run, is_measured in zip(robot.cable_numbers, runs, has_tension, strict=True)
+    cables = [
+        cable_residual(measured, number, run, policy)
+        for number, run, is_measured in zip(numbers, runs, has_tension, strict=True)
         if is_measured
     ]
     if not np.all(has_tension):
-        return FaultLocalisation(
-            path.time, tuple(cable_residuals), *isolation_verdict(cable_residuals, ()), tuple(limitations)
-        )
-
-    sigmas = noise.of_outputs(robot.cable_count)
-
-    def balance_under(tension: Array) -> ForceBalance:
-        forces = measured_forces(runs, tension, np.array(robot.anchors), path.position)
-        accelerations = simulate_platform(fmus.platform, path, forces, robot.platform.mass)
-        return force_balance(path, recording.position, accelerations, forces, robot.platform.mass, sigmas)
-
-    measured_balance = balance_under(recording.tension)
-    measured_axes = np.flatnonzero(np.any(np.isfinite(measured_balance.force), axis=0))
-    platform_residuals = [platform_residual(int(axis), measured_balance, path) for axis in measured_axes]
-    is_deviating = [cable.is_significant for cable in cable_residuals]
+        return FaultLocalisation(path.time, tuple(cables), *isolation_verdict(cables, ()), limitations)
+    balance = _balance_under(recording.tension, measured, fmus, runs)
+    measured_axes = np.flatnonzero(np.any(np.isfinite(balance.force), axis=0))
+    platform = [platform_residual(measured.path, int(axis), balance, policy) for axis in measured_axes]
+    is_deviating = [cable.is_significant for cable in cables]
     balance_closes = False
-    if any(is_deviating) and any(part.is_significant for part in platform_residuals):
+    if any(is_deviating) and any(axis.is_significant for axis in platform):
         simulated_tension = np.column_stack([run.tension for run in runs])
-        balance_closes = _is_balance_closed(
-            balance_under(np.where(is_deviating, simulated_tension, recording.tension)).force, measured_balance.force
-        )
+        mixed_tension = np.where(is_deviating, simulated_tension, recording.tension)
+        force = _balance_under(mixed_tension, measured, fmus, runs).force
+        balance_closes = _is_balance_closed(force, balance.force, policy.max_closure_ratio)
     exit_candidates = [
         number
-        for number, cable, run in zip(robot.cable_numbers, cable_residuals, runs, strict=True)
-        if platform_residuals and cable.is_significant and _may_be_exit_point(cable, run, platform_residuals)
+        for number, cable, run in zip(numbers, cables, runs, strict=True)
+        if platform and cable.is_significant and _may_be_exit_point(cable, run, platform)
     ]
-    residuals = (*cable_residuals, *platform_residuals)
-    return FaultLocalisation(
-        path.time,
-        residuals,
-        *isolation_verdict(cable_residuals, platform_residuals, balance_closes, exit_candidates),
-        tuple(limitations),
-    )
+    verdict = isolation_verdict(cables, platform, balance_closes, exit_candidates)
+    return FaultLocalisation(path.time, (*cables, *platform), *verdict, limitations)
 
 
-def _is_balance_closed(swapped: Array, force: Array) -> bool:
-    """Whether swapped tensions close the balance: the missing force, and its variation, become less than half."""
-    centred = [values - np.nanmean(values, axis=0) for values in (swapped, force)]
-    pairs = ((swapped, force), (centred[0], centred[1]))
-    return all(root_mean_square(after) < MAX_CLOSURE_RATIO * root_mean_square(before) for after, before in pairs)
+def _balance_under(
+    tension: Array, measured: MeasuredPorts, fmus: RobotFmus, runs: Sequence[CableSimulation]
+) -> ForceBalance:
+    """Force balance of the platform FMU under some tensions (N, n)."""
+    robot, path, mass = measured.robot, measured.path, measured.robot.platform.mass
+    forces = measured_forces(runs, tension, np.array(robot.anchors), path.position)
+    accelerations = simulate_platform(fmus.platform, path, forces, mass)
+    sigmas = measured.noise.of_outputs(robot.cable_count)
+    return force_balance(path, measured.recording.position, accelerations, forces, mass, sigmas)
+
+
+def _is_balance_closed(mixed: Array, force: Array, max_ratio: float) -> bool:
+    """Whether simulated tensions close the balance: the missing force, and its variation, become that much less."""
+    centred = [values - np.nanmean(values, axis=0) for values in (mixed, force)]
+    pairs = ((mixed, force), (centred[0], centred[1]))
+    return all(root_mean_square(after) < max_ratio * root_mean_square(before) for after, before in pairs)
 
 
 def _may_be_exit_point(cable: ComponentResidual, run: CableSimulation, platform: Sequence[ComponentResidual]) -> bool:

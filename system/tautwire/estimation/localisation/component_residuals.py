@@ -8,9 +8,10 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from ..policy import DEFAULT_POLICY
+
 Array = NDArray[np.float64]
 
-SIGNIFICANCE_LEVEL = 0.01
 MIN_SAMPLES = 30
 # Autocorrelations count up to a lag of the recording's length over this.
 MAX_LAG_DIVISOR = 4
@@ -25,7 +26,9 @@ class SignalCorrelation:
 
 
 def strongest_correlation(
-    residual: Array, signals: Mapping[str, Array], significance_level: float = SIGNIFICANCE_LEVEL
+    residual: Array,
+    signals: Mapping[str, Array],
+    significance_level: float = DEFAULT_POLICY.localisation.correlation_level,
 ) -> SignalCorrelation | None:
     """Strongest significant correlation of a residual (N,) with any of the signals; None if none is significant.
 

@@ -32,7 +32,7 @@ TRACKING_STEP_RATIO = 0.5
 FREQUENCY_COUNT = 2000
 # Of the cut-off in a recording: an axis perpendicular to all cables would have none.
 MIN_PERIODS = 5
-# A longer step is a gap; in medians of the sample interval.
+# In medians of the sample interval: a longer step is a gap.
 MAX_STEP_INTERVALS = 5.5
 SLACK_TENSION_RATIO = 1e-9
 # Least share of the load cells' variance along an axis, for one perpendicular to all cables.
@@ -51,7 +51,7 @@ class ForceBalance:
     cutoff: Array
 
 
-def measured_forces(runs: list[CableSimulation], tension: Array, anchors: Array, position: Array) -> Array:
+def measured_forces(runs: Sequence[CableSimulation], tension: Array, anchors: Array, position: Array) -> Array:
     """Forces on the platform by measured tensions (N, n) along the directions of the cable FMUs' forces; (N, n, 3)."""
     forces = []
     for run, measured, anchor in zip(runs, tension.T, anchors, strict=True):

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 from numpy.typing import NDArray
 
 from ...recordings.recording import Recording
-from ...robot.schema import AXES
+from ...robot.schema import AXES, Robot
 from ..kalman_filter import Noise
+from ..policy import LocalisationPolicy
 from ..residual_spectrum import resonance_frequency
 from .cable_simulation import CableSimulation, drift_variance, tension_variance
 from .component_residuals import PLATFORM, ComponentResidual, root_mean_square, strongest_correlation
@@ -16,14 +19,22 @@ from .path_smoothing import SmoothedPath
 
 Array = NDArray[np.float64]
 
-SIGNIFICANT_SIGMAS = 5.0
-NEGLIGIBLE_EXCESS = 0.1
 # Relative standard deviation of the mean square of a random walk about its mean.
 RANDOM_WALK_DEVIATION = 0.9
 
 
+@dataclass(frozen=True)
+class MeasuredPorts:
+    """What was measured at the components' ports: the recording of a robot, its smoothed path, and their noise."""
+
+    robot: Robot
+    recording: Recording
+    path: SmoothedPath
+    noise: Noise
+
+
 def cable_residual(
-    number: int, run: CableSimulation, recording: Recording, path: SmoothedPath, noise: Noise, anchor: Array
+    measured: MeasuredPorts, number: int, run: CableSimulation, policy: LocalisationPolicy
 ) -> ComponentResidual:
     """Residual of a cable: its load cell (``number`` from 1) less its FMU, without the mean, that of the start tension.
 
@@ -31,6 +42,8 @@ def cable_residual(
 
         expected^2 = sigma_T^2 + k' P k + kappa^2 sigma_V^2 sum h^2, the last less that of its mean
     """
+    recording, path, noise = measured.recording, measured.path, measured.noise
+    anchor = np.array(measured.robot.cables[number - 1].anchor)
     load_cell_noise = noise.of_outputs(recording.cable_count)[2 + number]
     residual = recording.tension[:, number - 1] - run.tension
     is_measured = np.isfinite(residual)
@@ -49,6 +62,7 @@ def cable_residual(
         path_variance * np.sqrt(2.0 / max(independent_samples, 1.0)),
         RANDOM_WALK_DEVIATION * drift_excess,
     )
+    signals = _cable_signals(run, recording.winch_speed[:, number - 1], path, anchor)
     return ComponentResidual(
         component=f"cable {number}",
         quantity="tension",
@@ -57,14 +71,14 @@ def cable_residual(
         mean=mean,
         rms=root_mean_square(residual),
         expected_rms=float(np.sqrt(expected)),
-        threshold=_threshold(float(np.sqrt(np.sum(np.square(terms)))) / expected),
-        correlated_signal=strongest_correlation(
-            residual, _cable_signals(run, recording.winch_speed[:, number - 1], path, anchor)
-        ),
+        threshold=_threshold(float(np.sqrt(np.sum(np.square(terms)))) / expected, policy),
+        correlated_signal=strongest_correlation(residual, signals, policy.correlation_level),
     )
 
 
-def platform_residual(axis: int, balance: ForceBalance, path: SmoothedPath) -> ComponentResidual:
+def platform_residual(
+    path: SmoothedPath, axis: int, balance: ForceBalance, policy: LocalisationPolicy
+) -> ComponentResidual:
     """Residual of the platform: the missing force along an axis."""
     residual = balance.force[:, axis]
     is_known = np.isfinite(residual)
@@ -79,17 +93,17 @@ def platform_residual(axis: int, balance: ForceBalance, path: SmoothedPath) -> C
         mean=float(np.mean(residual[is_known])) if np.any(is_known) else float("nan"),
         rms=root_mean_square(residual),
         expected_rms=expected,
-        threshold=_threshold(np.sqrt(2.0 / independent_samples)),
-        correlated_signal=strongest_correlation(residual, _platform_signals(path)),
+        threshold=_threshold(np.sqrt(2.0 / independent_samples), policy),
+        correlated_signal=strongest_correlation(residual, _platform_signals(path), policy.correlation_level),
         resonance_frequency=resonance_frequency(
-            path.time, residual, path.acceleration[:, axis], float(balance.cutoff[axis])
+            path.time, residual, path.acceleration[:, axis], float(balance.cutoff[axis]), policy.resonance_peaks
         ),
     )
 
 
-def _threshold(deviation: float) -> float:
+def _threshold(deviation: float, policy: LocalisationPolicy) -> float:
     """Threshold of the ratio that chance does not reach, by the relative standard deviation of the mean square."""
-    return float(np.sqrt(1.0 + SIGNIFICANT_SIGMAS * deviation + NEGLIGIBLE_EXCESS))
+    return float(np.sqrt(1.0 + policy.significant_sigmas * deviation + policy.negligible_excess))
 
 
 def _cable_signals(run: CableSimulation, winch_speed: Array, path: SmoothedPath, anchor: Array) -> dict[str, Array]:
