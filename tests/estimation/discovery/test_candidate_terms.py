@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from tautwire.estimation.discovery.candidate_terms import Term
-from tautwire.estimation.discovery.term_selection import MAX_TERMS, NormalEquations, select_terms
+from tautwire.estimation.discovery.term_selection import NormalEquations, select_terms
+from tautwire.estimation.policy import DEFAULT_POLICY
 
 ROWS, MANY = 2000, 60
 TERMS = tuple(Term("force_x", f"vx**{power % 8}*{power}") for power in range(MANY))
@@ -46,7 +47,7 @@ def test_a_term_that_was_wrong_goes() -> None:
 
 
 def test_no_more_than_a_few_are_chosen() -> None:
-    assert len(chosen(slopes(3, dict.fromkeys(range(12), 0.5)), {})) == MAX_TERMS
+    assert len(chosen(slopes(3, dict.fromkeys(range(12), 0.5)), {})) == DEFAULT_POLICY.discovery.formulas.max_terms
 
 
 def test_a_term_without_slopes_is_left_alone() -> None:

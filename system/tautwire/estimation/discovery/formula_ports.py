@@ -6,7 +6,7 @@ force present at the start changes the static tensions.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import NamedTuple
 
@@ -154,6 +154,46 @@ def series_sensitivities(
         * (segment.transition @ begin + 2.0 * segment.half_transition @ (begin + end) + end)
     )
     return integrated, by_outputs[:-1]
+
+
+@dataclass(frozen=True)
+class RunRows:
+    """A segment of a run, the sensitivities (K, m, p) of its whitened innovations to p series, and which rows count."""
+
+    segment: LinearisedSegment
+    sensitivities: Array
+    rows: NDArray[np.bool_]
+
+
+def sensitivities_along_run(
+    segments: Iterable[LinearisedSegment],
+    ports: FormulaPorts,
+    sites: Sequence[Site],
+    series_in: Callable[[PortSignals, int], Sequence[Array]],
+    is_counted: NDArray[np.bool_],
+) -> Iterator[RunRows]:
+    """Sensitivities of a run's innovations to a series at each of p sites, segment by segment.
+
+    ``series_in`` gives the series of a segment, as in :func:`series_sensitivities`, from its signals and the number of
+    its first sample; ``is_counted`` (N,) tells which samples of the recording count.
+    """
+    state_sensitivities: Array | None = None
+    initial_values: list[Array] = []
+    first_sample, first_recorded = 0, 0
+    for segment in segments:
+        signals = ports.signals(segment)
+        series = series_in(signals, first_sample)
+        if state_sensitivities is None:
+            state_sensitivities = np.zeros((len(segment.states), len(sites)))
+            initial_values = [values[:, 0] for values in series]
+        forcing = series_sensitivities(sites, series, initial_values, ports, segment, signals.platform["time"])
+        state_sensitivities, innovation_sensitivities = segment.propagate_sensitivities(state_sensitivities, *forcing)
+        rows = np.zeros(len(segment.is_recorded), dtype=bool)
+        recorded_count = int(np.sum(segment.is_recorded))
+        rows[segment.is_recorded] = is_counted[first_recorded : first_recorded + recorded_count]
+        yield RunRows(segment, innovation_sensitivities, rows)
+        first_sample += len(segment.step)
+        first_recorded += recorded_count
 
 
 def _site_sensitivity(

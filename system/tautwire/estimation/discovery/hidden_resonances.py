@@ -13,7 +13,7 @@ Source: the tuned absorber, Den Hartog (1956), Mechanical Vibrations, sec. 3.3; 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from typing import NamedTuple
 
 import numpy as np
@@ -28,35 +28,17 @@ from ...linear import linearise
 from ...recordings.start_position import with_start
 from ...robot.schema import Robot
 from ..estimation_data import DataSet, DataSplit
-from ..innovation_sensitivities import linearise_filter
+from ..innovation_sensitivities import LinearisedSegment, linearise_filter
 from ..likelihood import Likelihood
 from ..parameter_fit import Fitter
+from ..policy import DEFAULT_POLICY, ResonancePolicy
 from ..trace_result import Resonance
-from .formula_ports import FormulaPorts, PortSignals, Site, series_sensitivities
+from .formula_ports import FormulaPorts, PortSignals, RunRows, Site, sensitivities_along_run
 
 Array = NDArray[np.float64]
 
-# Only the first so many samples are used.
-MAX_SAMPLES = 10_000
 DAMPING_RATIO = 0.02
-LOG_FREQUENCY_STEP = 0.03
-# Periods of the lowest frequency in the recording; the highest is below this share of the sampling rate.
-MIN_PERIODS, MAX_FREQUENCY_RATIO = 4.0, 0.2
-MAX_FREQUENCIES = 110
-# Of the platform's unknown acceleration, m/s^2 per root hertz; the first is used under which the run follows the data.
-ACCELERATION_NOISE_DENSITIES = (0.01, 0.03, 0.1, 0.3)
-MAX_INNOVATION_VARIANCE = 3.0
-# Gains in nats on both samples together and on each, and their ratio to the gain at any other frequency.
-MIN_TOTAL_GAIN, MIN_SAMPLE_GAIN, MIN_GAIN_RATIO = 20.0, 5.0, 2.5
-# A smaller ratio is enough where both peaks are as close as this share of the frequency.
-SHARP_PEAK_DISTANCE, MIN_GAIN_RATIO_OF_SHARP_PEAKS = 0.035, 1.8
-# Two frequencies within this share, or one over the duration, are equal; beyond twice that they differ.
-FREQUENCY_TOLERANCE = 0.12
-MODE_TOLERANCE = 0.06
-MIN_OUTPUT_GAIN_RATIO = 0.25
-# Least share of the available gain beyond chance that a peak explains.
-MIN_EXPLAINED_RATIO = 0.1
-CHANCE_SIGMAS = 3.0
+LOG_FREQUENCY_STEP, MAX_FREQUENCIES = 0.03, 110
 RANK_TOLERANCE = 1e-9
 
 
@@ -74,36 +56,43 @@ class _GainSpectrum(NamedTuple):
 
 
 @threadpool_limits.wrap(limits=1)
-def find_resonances(robot: Robot, fitter: Fitter, evidence: DataSplit) -> tuple[Resonance, ...]:
+def find_resonances(
+    robot: Robot, fitter: Fitter, split: DataSplit, policy: ResonancePolicy = DEFAULT_POLICY.discovery.resonances
+) -> tuple[Resonance, ...]:
     """Hidden oscillators on the platform or at the exit points, where both samples agree."""
-    samples = [sample.first(MAX_SAMPLES) for sample in (evidence.estimation, evidence.validation)]
-    frequencies = _frequency_grid(samples)
+    data_sets = [data.first(policy.max_samples) for data in (split.estimation, split.validation)]
+    frequencies = _frequency_grid(data_sets, policy)
     modal_frequencies = _modal_frequencies(robot)
-    spectra = [_gain_spectra_of(robot, fitter, sample, frequencies) for sample in samples]
-    names = evidence.estimation.recording.channel_names
+    spectra = [_gain_spectra_of(robot, fitter, data, frequencies, policy) for data in data_sets]
+    names = split.estimation.recording.channel_names
     candidates = []
     for group, outputs in ((0, names[:3]), (1, names[3:])):
-        fit, judge = spectra[0][group], spectra[1][group]
-        if not _peaks_agree(frequencies, fit, judge, MIN_PERIODS / frequencies[0]):
+        pair = (spectra[0][group], spectra[1][group])
+        if not _peaks_agree(frequencies, pair, policy):
             continue
-        peak_indices = [int(np.argmax(spectrum.joint_gains)) for spectrum in (fit, judge)]
-        gains = [float(s.joint_gains[peak]) for s, peak in zip((fit, judge), peak_indices, strict=True)]
+        peak_indices = [int(np.argmax(spectrum.joint_gains)) for spectrum in pair]
+        gains = [float(s.joint_gains[peak]) for s, peak in zip(pair, peak_indices, strict=True)]
         frequency = float(np.average(frequencies[peak_indices], weights=gains))
-        site_gains = fit.site_gains[peak_indices[0]] + judge.site_gains[peak_indices[1]]
+        site_gains = pair[0].site_gains[peak_indices[0]] + pair[1].site_gains[peak_indices[1]]
         affected_outputs = tuple(
-            n for n, gain in zip(outputs, site_gains, strict=True) if gain >= MIN_OUTPUT_GAIN_RATIO * np.max(site_gains)
+            n
+            for n, gain in zip(outputs, site_gains, strict=True)
+            if gain >= policy.min_output_gain_ratio * np.max(site_gains)
         )
-        if not np.any(np.abs(modal_frequencies - frequency) < MODE_TOLERANCE * modal_frequencies):
+        if not np.any(np.abs(modal_frequencies - frequency) < policy.mode_tolerance * modal_frequencies):
             candidates.append((sum(gains), Resonance(frequency, affected_outputs, ("fit", "check"))))
     best = max((gain for gain, _ in candidates), default=0.0)
-    return tuple(resonance for gain, resonance in candidates if gain > best / MIN_GAIN_RATIO)
+    return tuple(resonance for gain, resonance in candidates if gain > best / policy.min_gain_ratio)
 
 
-def _frequency_grid(samples: Sequence[DataSet]) -> Array:
-    duration = min(sample.recording.duration for sample in samples)
-    step = max(float(np.median(np.diff(sample.recording.time))) for sample in samples)
-    slowest = MIN_PERIODS / duration
-    count = min(MAX_FREQUENCIES, int(np.log(max(MAX_FREQUENCY_RATIO / step / slowest, 1.1)) / LOG_FREQUENCY_STEP))
+def _frequency_grid(data_sets: Sequence[DataSet], policy: ResonancePolicy) -> Array:
+    """Frequencies (F,) in Hz, evenly spaced on a logarithmic scale, that all data sets can show."""
+    duration = min(data.recording.duration for data in data_sets)
+    step = max(float(np.median(np.diff(data.recording.time))) for data in data_sets)
+    slowest = policy.min_periods / duration
+    count = min(
+        MAX_FREQUENCIES, int(np.log(max(policy.max_frequency_ratio / step / slowest, 1.1)) / LOG_FREQUENCY_STEP)
+    )
     grid: Array = slowest * np.exp(LOG_FREQUENCY_STEP * np.arange(count + 1))
     return grid
 
@@ -115,16 +104,17 @@ def _modal_frequencies(robot: Robot) -> Array:
         return np.zeros(0)
 
 
-def _peaks_agree(frequencies: Array, fit: _GainSpectrum, judge: _GainSpectrum, duration: float) -> bool:
-    """Whether both samples, of at least ``duration`` seconds, have one clear peak at the same frequency."""
+def _peaks_agree(frequencies: Array, spectra: Sequence[_GainSpectrum], policy: ResonancePolicy) -> bool:
+    """Whether the spectra of both data sets have one clear peak at the same frequency."""
+    duration = policy.min_periods / frequencies[0]
     peaks, other_gain, peak_gain = [], 0.0, 0.0
-    for spectrum in (fit, judge):
+    for spectrum in spectra:
         index = int(np.argmax(spectrum.joint_gains))
         if index in (0, len(frequencies) - 1) or spectrum.joint_gains[index] < max(
-            MIN_SAMPLE_GAIN, MIN_EXPLAINED_RATIO * spectrum.available_gain
+            policy.min_sample_gain, policy.min_explained_ratio * spectrum.available_gain
         ):
             return False
-        tolerance = max(1.0 / duration, FREQUENCY_TOLERANCE * frequencies[index])
+        tolerance = max(1.0 / duration, policy.frequency_tolerance * frequencies[index])
         peaks.append((frequencies[index], tolerance))
         peak_gain += float(spectrum.joint_gains[index])
         other_gain += float(
@@ -132,38 +122,54 @@ def _peaks_agree(frequencies: Array, fit: _GainSpectrum, judge: _GainSpectrum, d
         )
     (first, first_tolerance), (second, second_tolerance) = peaks
     min_gain_ratio = (
-        MIN_GAIN_RATIO_OF_SHARP_PEAKS if abs(first - second) < SHARP_PEAK_DISTANCE * first else MIN_GAIN_RATIO
+        policy.min_gain_ratio_of_sharp_peaks
+        if abs(first - second) < policy.sharp_peak_distance * first
+        else policy.min_gain_ratio
     )
     return bool(
         abs(first - second) < max(first_tolerance, second_tolerance)
-        and peak_gain > MIN_TOTAL_GAIN
+        and peak_gain > policy.min_total_gain
         and peak_gain > min_gain_ratio * other_gain
     )
 
 
 def _gain_spectra_of(
-    robot: Robot, fitter: Fitter, sample: DataSet, frequencies: Array
+    robot: Robot, fitter: Fitter, data: DataSet, frequencies: Array, policy: ResonancePolicy
 ) -> tuple[_GainSpectrum, _GainSpectrum]:
-    """Gain spectra of one sample on the platform, and in the ropes."""
-    likelihood, values = fitter.likelihood(robot, (), sample)
-    acceleration_noise_density = _sufficient_noise_density(likelihood, values, sample)
-    robot_at_start = with_start(robot, sample.start)
-    ports = FormulaPorts(robot_at_start, likelihood.model.state_names)
-    segments = linearise_filter(likelihood, values, sample.recording, acceleration_noise_density)
-    signals = _concatenated([ports.signals(run) for run in segments])
-    step = float(np.median(np.diff(sample.recording.time)))
-    nuisances, oscillators = _nuisance_columns(signals, step), _oscillator_columns(signals, step, frequencies)
-    return _accumulated_gains(
-        robot_at_start, likelihood, values, sample, acceleration_noise_density, nuisances, oscillators, fitter
-    )
+    """Gain spectra of one data set on the platform, and in the ropes."""
+    likelihood, values = fitter.likelihood(robot, (), data)
+    noise_density = _sufficient_noise_density(likelihood, values, data, policy)
+    robot_at_start = with_start(robot, data.start)
+
+    def run() -> tuple[Iterator[LinearisedSegment], FormulaPorts]:
+        segments = linearise_filter(likelihood, values, data.recording, noise_density)
+        return segments, FormulaPorts(robot_at_start, likelihood.model.state_names)
+
+    segments, ports = run()
+    signals = _concatenated([ports.signals(segment) for segment in segments])
+    step = float(np.median(np.diff(data.recording.time)))
+    nuisances = _nuisance_columns(signals, step)
+    columns = [*nuisances, *_oscillator_columns(signals, step, frequencies)]
+
+    def series_in(signals: PortSignals, first_sample: int) -> list[Array]:
+        fitter.poll_interrupts()
+        rows = slice(first_sample, first_sample + len(signals.platform["time"]))
+        return [column.series[None, rows] for column in columns]
+
+    run_rows = sensitivities_along_run(*run(), [column.site for column in columns], series_in, data.rows)
+    equations = _normal_equations(run_rows, len(nuisances), len(frequencies), 3 + robot.cable_count)
+    return _gain_spectra(equations, policy.chance_sigmas)
 
 
-def _sufficient_noise_density(likelihood: Likelihood, values: list[float], sample: DataSet) -> float:
-    for acceleration_noise_density in ACCELERATION_NOISE_DENSITIES:
-        innovations = likelihood.innovations(sample.recording, values, acceleration_noise_density)
-        if float(np.nanmean(innovations.mean_square(sample.rows))) < MAX_INNOVATION_VARIANCE:
+def _sufficient_noise_density(
+    likelihood: Likelihood, values: list[float], data: DataSet, policy: ResonancePolicy
+) -> float:
+    """The smallest acceleration noise density under which the run follows the data; else the largest."""
+    for acceleration_noise_density in policy.acceleration_noise_densities:
+        innovations = likelihood.innovations(data.recording, values, acceleration_noise_density)
+        if float(np.nanmean(innovations.mean_square(data.rows))) < policy.max_innovation_variance:
             return acceleration_noise_density
-    return ACCELERATION_NOISE_DENSITIES[-1]
+    return policy.acceleration_noise_densities[-1]
 
 
 def _concatenated(parts: Sequence[PortSignals]) -> PortSignals:
@@ -212,58 +218,52 @@ def _oscillator_response(carriers: Array, frequency: float, step: float) -> Arra
     return response
 
 
-def _accumulated_gains(
-    robot: Robot,
-    likelihood: Likelihood,
-    values: list[float],
-    sample: DataSet,
-    acceleration_noise_density: float,
-    nuisances: Sequence[_Column],
-    oscillators: Sequence[_Column],
-    fitter: Fitter,
-) -> tuple[_GainSpectrum, _GainSpectrum]:
-    """Gains in nats by frequency beside the nuisances, from one run of the filter."""
-    columns = [*nuisances, *oscillators]
-    sites = [column.site for column in columns]
-    initial_values = [column.series[:1] for column in columns]
-    nuisance_count, width = len(nuisances), 3 + robot.cable_count
-    inner, cross_products = np.zeros((nuisance_count, nuisance_count)), np.zeros((nuisance_count, len(oscillators)))
-    information, score = np.zeros((len(oscillators) // width, width, width)), np.zeros(len(columns))
-    ports = FormulaPorts(robot, likelihood.model.state_names)
-    slopes, first_sample, next_row = np.zeros((len(likelihood.model.state_names), len(columns))), 0, 0
-    squares, observation_count = 0.0, 0
-    for segment in linearise_filter(likelihood, values, sample.recording, acceleration_noise_density):
-        fitter.poll_interrupts()
-        count = len(segment.step)
-        time = ports.signals(segment).platform["time"]
-        series = [column.series[None, first_sample : first_sample + count + 1] for column in columns]
-        slopes, innovation_sensitivities = segment.propagate_sensitivities(
-            slopes, *series_sensitivities(sites, series, initial_values, ports, segment, time)
-        )
-        first_sample += count
-        rows = np.zeros(count, dtype=bool)
-        rows[segment.is_recorded] = sample.rows[next_row : next_row + int(np.sum(segment.is_recorded))]
-        next_row += int(np.sum(segment.is_recorded))
-        is_observed = segment.observed[rows]
-        matrix, residuals = innovation_sensitivities[rows][is_observed], segment.values[rows][is_observed]
-        squares += float(residuals @ residuals)
+class _NormalEquations(NamedTuple):
+    """Sums of slopes of the innovations ``e`` by ``n`` nuisances ``N`` and by the oscillators ``O`` of F frequencies.
+
+    ``nuisance_information`` is ``N' N``, ``cross_products`` ``N' O``; ``information`` (F, sites, sites) are the blocks
+    of ``O' O`` within a frequency; ``score`` is ``(N, O)' e``, ``sum_of_squares`` ``e' e`` of so many observations.
+    """
+
+    nuisance_information: Array
+    cross_products: Array
+    information: Array
+    score: Array
+    sum_of_squares: float
+    observation_count: int
+
+
+def _normal_equations(
+    run: Iterable[RunRows], nuisance_count: int, frequency_count: int, site_count: int
+) -> _NormalEquations:
+    """Normal equations of the nuisances and the oscillators at ``site_count`` sites, from one run of the filter."""
+    oscillator_count = frequency_count * site_count
+    inner, cross_products = np.zeros((nuisance_count, nuisance_count)), np.zeros((nuisance_count, oscillator_count))
+    information = np.zeros((frequency_count, site_count, site_count))
+    score = np.zeros(nuisance_count + oscillator_count)
+    sum_of_squares, observation_count = 0.0, 0
+    for part in run:
+        is_observed = part.segment.observed[part.rows]
+        matrix = part.sensitivities[part.rows][is_observed]
+        residuals = part.segment.values[part.rows][is_observed]
+        sum_of_squares += float(residuals @ residuals)
         observation_count += len(residuals)
         inner += matrix[:, :nuisance_count].T @ matrix[:, :nuisance_count]
         cross_products += matrix[:, :nuisance_count].T @ matrix[:, nuisance_count:]
-        oscillator_slopes = matrix[:, nuisance_count:].reshape(len(matrix), len(information), width)
-        information += np.einsum("rfg,rfh->fgh", oscillator_slopes, oscillator_slopes, optimize=True)
+        slopes = matrix[:, nuisance_count:].reshape(len(matrix), frequency_count, site_count)
+        information += np.einsum("rfg,rfh->fgh", slopes, slopes, optimize=True)
         score += matrix.T @ residuals
-    available_gain = 0.5 * (squares - observation_count) - CHANCE_SIGMAS * np.sqrt(0.5 * observation_count)
-    return _gain_spectra(inner, cross_products, information, score, float(available_gain))
+    return _NormalEquations(inner, cross_products, information, score, sum_of_squares, observation_count)
 
 
-def _gain_spectra(
-    inner: Array, cross_products: Array, information: Array, score: Array, available_gain: float
-) -> tuple[_GainSpectrum, _GainSpectrum]:
-    """Gain spectra with the nuisances projected out; ``available_gain`` is before that."""
+def _gain_spectra(equations: _NormalEquations, chance_sigmas: float) -> tuple[_GainSpectrum, _GainSpectrum]:
+    """Gain spectra with the nuisances projected out; the available gain is what chance does not explain."""
+    inner, cross_products, information, score, sum_of_squares, observation_count = equations
     nuisance_count, width = len(inner), information.shape[1]
+    chance = chance_sigmas * np.sqrt(0.5 * observation_count)
     projection = _solve_scaled(inner, np.column_stack([cross_products, score[:nuisance_count]]))
-    available_gain -= 0.5 * float(score[:nuisance_count] @ projection[:, -1])
+    nuisance_gain = 0.5 * float(score[:nuisance_count] @ projection[:, -1])
+    available_gain = float(0.5 * (sum_of_squares - observation_count) - chance) - nuisance_gain
     residual_score = (score[nuisance_count:] - cross_products.T @ projection[:, -1]).reshape(-1, width)
     shaped, solved = (matrix.reshape(nuisance_count, -1, width) for matrix in (cross_products, projection[:, :-1]))
     residual_information = information - np.einsum("nfg,nfh->fgh", shaped, solved, optimize=True)

@@ -24,15 +24,15 @@ from ..estimation_data import DataSet
 from ..hypotheses import Hypothesis, free_parameters
 from ..innovation_sensitivities import linearise_filter
 from ..parameter_fit import Fitter
+from ..policy import DEFAULT_POLICY, FormulaPolicy
 from .candidate_terms import SignalRanges, Term, signal_ranges
-from .formula_ports import FormulaPorts, PortSignals, series_sensitivities
+from .formula_ports import FormulaPorts, PortSignals, sensitivities_along_run
 
 Array = NDArray[np.float64]
 
-MAX_TERMS = 6
-MAX_EXCHANGES = 12
 # Least share of a term's squared slopes that is linearly independent of the other terms.
 MIN_INDEPENDENT_RATIO = 1e-6
+RANK_TOLERANCE = 1e-12
 
 
 @dataclass(frozen=True)
@@ -67,21 +67,15 @@ def term_normal_equations(
     ports = FormulaPorts(with_start(robot, sample.start), likelihood.model.state_names)
     size = len(nuisance_columns) + len(terms)
     fisher_information, score, count = np.zeros((size, size)), np.zeros(size), 0
-    sites = [term.site for term in terms]
-    state_sensitivities, initial_values, next_row = np.zeros((len(likelihood.model.state_names), len(terms))), None, 0
-    for segment in linearise_filter(likelihood, values, sample.recording):
+    segments = linearise_filter(likelihood, values, sample.recording)
+
+    def series_in(signals: PortSignals, first_sample: int) -> list[Array]:
+        return _term_series(terms, signals)
+
+    for run in sensitivities_along_run(segments, ports, [term.site for term in terms], series_in, sample.rows):
         fitter.poll_interrupts()
-        signals = ports.signals(segment)
-        series = _term_series(terms, signals)
-        initial_values = [values[:, 0] for values in series] if initial_values is None else initial_values
-        state_sensitivities, innovation_sensitivities = segment.propagate_sensitivities(
-            state_sensitivities,
-            *series_sensitivities(sites, series, initial_values, ports, segment, signals.platform["time"]),
-        )
-        rows = np.zeros(len(segment.is_recorded), dtype=bool)
-        rows[segment.is_recorded] = sample.rows[next_row : next_row + int(np.sum(segment.is_recorded))]
-        next_row += int(np.sum(segment.is_recorded))
-        matrix = np.concatenate([segment.sensitivities[:, :, nuisance_columns], innovation_sensitivities], axis=2)[rows]
+        segment, rows = run.segment, run.rows
+        matrix = np.concatenate([segment.sensitivities[:, :, nuisance_columns], run.sensitivities], axis=2)[rows]
         is_observed = segment.observed[rows]
         fisher_information += matrix[is_observed].T @ matrix[is_observed]
         score += matrix[is_observed].T @ segment.values[rows][is_observed]
@@ -104,7 +98,10 @@ def _term_series(terms: Sequence[Term], signals: PortSignals) -> list[Array]:
 
 
 def select_terms(
-    equations: NormalEquations, present: dict[Term, float], poll_interrupts: Callable[[], None]
+    equations: NormalEquations,
+    present: dict[Term, float],
+    poll_interrupts: Callable[[], None],
+    policy: FormulaPolicy = DEFAULT_POLICY.discovery.formulas,
 ) -> dict[Term, float]:
     """Select the few terms that explain most, with coefficients; ``present`` are those that the run had already."""
     present_coefficients = np.array([present.get(term, 0.0) for term in equations.terms])
@@ -112,14 +109,14 @@ def select_terms(
     score = equations.score - equations.fisher_information[:, equations.nuisance_count :] @ present_coefficients
     min_gain = 0.5 * log(max(equations.observation_count, 2)) + log(max(len(equations.terms), 1))
     selected: list[int] = []
-    while len(selected) < MAX_TERMS:
+    while len(selected) < policy.max_terms:
         gains = _gains(equations, score, selected)
         best = int(np.argmax(gains))
         if gains[best] < min_gain:
             break
         selected.append(best)
         poll_interrupts()
-    for number in range(MAX_EXCHANGES if len(selected) > 1 else 0):
+    for number in range(policy.max_exchanges if len(selected) > 1 else 0):
         index = number % len(selected)
         kept_terms = [*selected[:index], *selected[index + 1 :]]
         gains = _gains(equations, score, kept_terms)
@@ -131,24 +128,22 @@ def select_terms(
 
 
 def _column_indices(equations: NormalEquations, selected: Sequence[int]) -> list[int]:
+    """Columns of the nuisances and of the selected terms."""
     return [*range(equations.nuisance_count), *(equations.nuisance_count + term for term in selected)]
 
 
 def _gains(equations: NormalEquations, score: Array, selected: Sequence[int]) -> Array:
     """Predicted gain in nats of each term beside the nuisances and the selected terms (score test)."""
-    columns = _column_indices(equations, selected)
-    diagonal = np.diag(equations.fisher_information)[equations.nuisance_count :]
-    residual_information, residual_score = diagonal.copy(), score[equations.nuisance_count :].copy()
+    columns, nuisance_count = _column_indices(equations, selected), equations.nuisance_count
+    information = equations.fisher_information
+    diagonal = np.diag(information)[nuisance_count:]
+    residual_information, residual_score = diagonal.copy(), score[nuisance_count:].copy()
     if columns:
-        scale = np.sqrt(np.maximum(np.diag(equations.fisher_information)[columns], np.finfo(float).tiny))
-        inner = equations.fisher_information[np.ix_(columns, columns)] / np.outer(scale, scale)
-        cross_products = (
-            equations.fisher_information[
-                np.ix_(columns, range(equations.nuisance_count, len(equations.fisher_information)))
-            ]
-            / scale[:, None]
-        )
-        projection = np.linalg.lstsq(inner, np.column_stack([cross_products, score[columns] / scale]), rcond=1e-12)[0]
+        inner, scale = _scaled_block(information, columns)
+        cross_products = information[np.ix_(columns, range(nuisance_count, len(information)))] / scale[:, None]
+        projection = np.linalg.lstsq(
+            inner, np.column_stack([cross_products, score[columns] / scale]), rcond=RANK_TOLERANCE
+        )[0]
         residual_information = residual_information - np.sum(cross_products * projection[:, :-1], axis=0)
         residual_score = residual_score - cross_products.T @ projection[:, -1]
     is_independent = residual_information > MIN_INDEPENDENT_RATIO * diagonal
@@ -161,7 +156,12 @@ def _gains(equations: NormalEquations, score: Array, selected: Sequence[int]) ->
 def _solve_coefficients(equations: NormalEquations, score: Array, selected: Sequence[int]) -> Array:
     """Coefficients of the selected terms by least squares."""
     columns = _column_indices(equations, selected)
-    scale = np.sqrt(np.maximum(np.diag(equations.fisher_information)[columns], np.finfo(float).tiny))
-    inner = equations.fisher_information[np.ix_(columns, columns)] / np.outer(scale, scale)
-    coefficients: Array = -np.linalg.lstsq(inner, score[columns] / scale, rcond=1e-12)[0] / scale
+    inner, scale = _scaled_block(equations.fisher_information, columns)
+    coefficients: Array = -np.linalg.lstsq(inner, score[columns] / scale, rcond=RANK_TOLERANCE)[0] / scale
     return coefficients[equations.nuisance_count :]
+
+
+def _scaled_block(information: Array, columns: Sequence[int]) -> tuple[Array, Array]:
+    """The information of some columns, scaled to a diagonal of one, and the scale."""
+    scale = np.sqrt(np.maximum(np.diag(information)[columns], np.finfo(float).tiny))
+    return information[np.ix_(columns, columns)] / np.outer(scale, scale), scale
