@@ -116,7 +116,9 @@ def start_side_runs(state: Identification) -> Identification:
     context, prepared = state.context, state.prepared
     runs = start_cosimulations(context.workers, context.fitter, context.robot, prepared.data_sets)
     robot, data = calibrated_estimation_data(prepared, context.robot)
-    localisation = context.workers.submit(localise_residual, robot, data, context.fitter.noise)
+    localisation = context.workers.submit(
+        localise_residual, robot, data, context.fitter.noise, context.policy.localisation
+    )
     return replace(state, pending_runs=tuple(runs), pending_localisation=(localisation,))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..identification_context import IdentificationContext, no_progress
+from ..policy import FormulaPolicy
 from ..stepwise_selection import SelectionResult
 from ..trace_result import Resonance
 from .candidate_terms import formula_text
@@ -24,17 +25,20 @@ class UnexplainedResidual:
 def explain_residual(context: IdentificationContext, selection: SelectionResult) -> UnexplainedResidual:
     """Analyse the residual of a robot that known effects do not explain; ``selection`` are those that come closest."""
     robot, fitter, evidence, workers = context.robot, context.fitter, context.split, context.workers
+    policy = context.policy.discovery
     beside = (selection.fit.robot, selection.accepted, fitter, evidence)
     runs_in_parallel = selection.accepted and workers.processes > 1
-    pending = workers.submit(discover_formula, *beside, no_progress) if runs_in_parallel else None
+    pending = workers.submit(discover_formula, *beside, no_progress, policy) if runs_in_parallel else None
     threshold = context.evidence_threshold(others=1)
-    formula = _if_accepted(discover_formula(robot, (), fitter, evidence, context.progress), threshold)
+    formula = _if_accepted(
+        discover_formula(robot, (), fitter, evidence, context.progress, policy), threshold, policy.formulas
+    )
     if formula is not None and formula.residuals_are_white:
         return UnexplainedResidual(formula)
     # Effects that only come closest may have absorbed the resonance.
-    lines = find_resonances(selection.fit.robot, fitter, evidence)
+    lines = find_resonances(selection.fit.robot, fitter, evidence, policy.resonances)
     if not lines and selection.accepted:
-        lines = find_resonances(robot, fitter, evidence)
+        lines = find_resonances(robot, fitter, evidence, policy.resonances)
     notes = [line.sentence for line in lines]
     if formula is not None:
         description = formula_text(robot, formula.formulas)
@@ -43,8 +47,8 @@ def explain_residual(context: IdentificationContext, selection: SelectionResult)
         context.progress("searching for a formula beside effects", 0.0)
         joint_formula = pending.result()
     else:
-        joint_formula = discover_formula(*beside, context.progress) if selection.accepted else None
-    joint_formula = _if_accepted(joint_formula, threshold)
+        joint_formula = discover_formula(*beside, context.progress, policy) if selection.accepted else None
+    joint_formula = _if_accepted(joint_formula, threshold, policy.formulas)
     if joint_formula is not None and joint_formula.residuals_are_white:
         names = " and ".join(hypothesis.label(robot) for hypothesis in selection.accepted)
         description = formula_text(robot, joint_formula.formulas)
@@ -55,5 +59,5 @@ def explain_residual(context: IdentificationContext, selection: SelectionResult)
     return UnexplainedResidual(None, lines, tuple(notes))
 
 
-def _if_accepted(discovery: Discovery | None, threshold: float) -> Discovery | None:
-    return discovery if discovery is not None and discovery.is_accepted(threshold) else None
+def _if_accepted(discovery: Discovery | None, threshold: float, policy: FormulaPolicy) -> Discovery | None:
+    return discovery if discovery is not None and discovery.is_accepted(threshold, policy) else None
