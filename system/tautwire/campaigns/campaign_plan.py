@@ -53,15 +53,8 @@ class UnfinishedError(TautwireError):
 
 Array = NDArray[np.float64]
 
-NORMAL, UNIFORM, TRIANGULAR, LOGNORMAL, LIST, LINSPACE = (
-    "normal",
-    "uniform",
-    "triangular",
-    "lognormal",
-    "list",
-    "linspace",
-)
-DISCRETE_KINDS = (LIST, LINSPACE)
+NORMAL, UNIFORM, TRIANGULAR, LOGNORMAL = "normal", "uniform", "triangular", "lognormal"
+LIST, LINSPACE = "list", "linspace"
 # Names of each distribution's parameters; a list has any number of values.
 PARAMETER_NAMES: Mapping[str, tuple[str, ...]] = {
     NORMAL: ("mean", "standard deviation"),

@@ -167,11 +167,7 @@ def run_job(context: CampaignContext, job: Job, fmu_folder: Path) -> RunResult:
 
     Raises OSError where the machine fails, not the run.
     """
-    path, controller = context.plan.variants[job.variant]
-    row: Row = {"index": job.index, "sample": job.sample}
-    if path >= 0:
-        row |= {"path": context.plan.paths[path].name, "controller": controller}
-    row |= dict(zip(context.plan.keys, job.values, strict=True))
+    row = identifying_columns(context.plan, job)
     series: Series = {}
     try:
         for outputs, stage_series in _run_stages(context, job, fmu_folder):
@@ -182,6 +178,14 @@ def run_job(context: CampaignContext, job: Job, fmu_folder: Path) -> RunResult:
     except Exception as error:
         row[FAILURE_COLUMN] = failure_reason(error)
     return RunResult(row, series)
+
+
+def identifying_columns(plan: Plan, job: Job) -> Row:
+    """The columns of a row that say which run it is: indices, path, controller and inputs."""
+    path, controller = plan.variants[job.variant]
+    path_columns = {"path": plan.paths[path].name, "controller": controller} if path >= 0 else {}
+    inputs = dict(zip(plan.keys, job.values, strict=True))
+    return {"index": job.index, "sample": job.sample, **path_columns, **inputs}
 
 
 def failure_reason(error: BaseException) -> str:

@@ -13,7 +13,7 @@ from typing import Any
 
 from ..errors import InputError, TautwireError
 from .campaign_plan import MissingExtraError, Plan
-from .campaign_run import CampaignContext, Job, RunResult, build_context, run_job
+from .campaign_run import CampaignContext, Job, RunResult, build_context, identifying_columns, run_job
 from .dataset_schema import FAILURE_COLUMN
 
 CONNECT = 15.0  # s
@@ -112,10 +112,7 @@ def failed_result(plan: Plan, task: Task, job: Job, reason: str) -> RunResult:
     """The row of a failed run, with the ``reason``."""
     if plan.trace is not None:
         return RunResult({"index": job.index, "recording": task.name, FAILURE_COLUMN: reason})
-    path_index, controller = plan.variants[job.variant]
-    path_columns = {"path": plan.paths[path_index].name, "controller": controller} if path_index >= 0 else {}
-    inputs = dict(zip(plan.keys, job.values, strict=True))
-    return RunResult({"index": job.index, "sample": job.sample, **path_columns, **inputs, FAILURE_COLUMN: reason})
+    return RunResult({**identifying_columns(plan, job), FAILURE_COLUMN: reason})
 
 
 def task_results(client: Any, context: Any, plan: Plan, tasks: Iterable[Task]) -> Iterator[list[RunResult]]:

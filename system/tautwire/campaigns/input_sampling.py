@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse.csgraph import connected_components
 from scipy.stats import norm, qmc
 
 from .campaign_plan import Input, MissingExtraError, Plan, PlanError
@@ -53,12 +54,8 @@ def correlation_matrix(plan: Plan) -> Array:
 
 def correlated_groups(plan: Plan) -> tuple[int, ...]:
     """Group number of each input: connected components of the graph of correlations."""
-    groups = list(range(len(plan.inputs)))
-    for each in plan.correlations:
-        old, new = groups[each.second], groups[each.first]
-        groups = [new if group == old else group for group in groups]
-    order = list(dict.fromkeys(groups))
-    return tuple(order.index(group) for group in groups)
+    _, labels = connected_components(correlation_matrix(plan) != 0.0, directed=False)
+    return tuple(labels.tolist())
 
 
 def salib_problem(plan: Plan) -> dict[str, Any]:

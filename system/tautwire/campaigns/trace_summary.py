@@ -11,7 +11,7 @@ from typing import Any
 import pyarrow as pa
 
 from ..estimation import trace
-from ..recordings.recording import Recording, read_recording
+from ..recordings.recording import Recording
 from ..reports.report_folder import trace_document
 from ..robot.robot_file_reader import robot_from_content
 from .campaign_plan import Plan
@@ -25,7 +25,7 @@ def trace_row(plan: Plan, index: int, recording: Recording) -> Row:
     Raises OSError where the machine fails, not the trace.
     """
     alpha = plan.trace.alpha if plan.trace else 0.01
-    row = recording_row(index, recording.path)
+    row: Row = {"index": index, "recording": Path(recording.path).name}
     try:
         document = trace_document(trace(robot_from_content(dict(plan.content), plan.file), recording, alpha=alpha))
     except OSError:
@@ -48,16 +48,6 @@ def trace_row(plan: Plan, index: int, recording: Recording) -> Row:
         "noise_after": document["residual_is_noise"]["after"],
         "report": json.dumps(document),
     }
-
-
-def recording_row(index: int, path: str) -> Row:
-    """A row with the index and the name of its recording."""
-    return {"index": index, "recording": Path(path).name}
-
-
-def read_traced_recording(plan: Plan, index: int, cable_count: int) -> Recording:
-    """The recording of a run; raises RecordingError where the file is none."""
-    return read_recording(plan.trace.recordings[index] if plan.trace else "", cable_count)
 
 
 @dataclass(frozen=True)
