@@ -25,6 +25,9 @@ Array = NDArray[np.float64]
 MAX_BAND_RUNS = 4000
 BAND_QUANTILE_LEVELS = (0.025, 0.5, 0.975)
 
+MAX_HISTOGRAM_BINS = 40
+MAX_GRID_POINTS = 2000
+
 
 @dataclass(frozen=True)
 class QuantileBands:
@@ -59,10 +62,6 @@ def quantile_bands(plan: Plan, folder: Path, variant: int, channels: tuple[str, 
 def _read_channel(part: Path, name: str, run_indices: NDArray[np.int64]) -> Array:
     table = pq.read_table(part, columns=["index", name], partitioning=None)
     return np.asarray(table[name].to_numpy(), dtype=float)[np.isin(table["index"].to_numpy(), run_indices)]
-
-
-MAX_HISTOGRAM_BINS = 40
-MAX_GRID_POINTS = 2000
 
 
 @dataclass(frozen=True)

@@ -17,6 +17,23 @@ from .. import __version__
 from ..errors import InputError, TautwireError
 from ..robot.schema import Point
 
+NORMAL, UNIFORM, TRIANGULAR, LOGNORMAL = "normal", "uniform", "triangular", "lognormal"
+LIST, LINSPACE = "list", "linspace"
+# Names of each distribution's parameters; a list has any number of values.
+PARAMETER_NAMES: Mapping[str, tuple[str, ...]] = {
+    NORMAL: ("mean", "standard deviation"),
+    UNIFORM: ("least", "largest"),
+    TRIANGULAR: ("least", "most probable", "largest"),
+    LOGNORMAL: ("median", "standard deviation of the logarithm"),
+    LINSPACE: ("first", "last", "count"),
+}
+DISTRIBUTION_KINDS = (*PARAMETER_NAMES, LIST)
+Method = Literal["sobol", "latin hypercube", "random", "saltelli", "grid"]
+METHODS: tuple[Method, ...] = ("sobol", "latin hypercube", "random", "saltelli", "grid")
+OPEN_LOOP = "none"
+CONTROLLERS = (OPEN_LOOP, "feedforward", "lqg", "scheduled", "robust")
+BELIEFS = ("declared", "varied")
+
 
 class PlanError(InputError):
     """A plan that cannot be read, or asks for something impossible."""
@@ -52,18 +69,6 @@ class UnfinishedError(TautwireError):
 
 
 Array = NDArray[np.float64]
-
-NORMAL, UNIFORM, TRIANGULAR, LOGNORMAL = "normal", "uniform", "triangular", "lognormal"
-LIST, LINSPACE = "list", "linspace"
-# Names of each distribution's parameters; a list has any number of values.
-PARAMETER_NAMES: Mapping[str, tuple[str, ...]] = {
-    NORMAL: ("mean", "standard deviation"),
-    UNIFORM: ("least", "largest"),
-    TRIANGULAR: ("least", "most probable", "largest"),
-    LOGNORMAL: ("median", "standard deviation of the logarithm"),
-    LINSPACE: ("first", "last", "count"),
-}
-DISTRIBUTION_KINDS = (*PARAMETER_NAMES, LIST)
 
 
 @dataclass(frozen=True)
@@ -127,13 +132,6 @@ def parameter_problem(kind: str, numbers: Sequence[float]) -> str | None:
     if kind == TRIANGULAR and not numbers[0] <= numbers[1] <= numbers[2]:
         return f"has its most probable value {numbers[1]:g} outside {numbers[0]:g} to {numbers[2]:g}"
     return None
-
-
-Method = Literal["sobol", "latin hypercube", "random", "saltelli", "grid"]
-METHODS: tuple[Method, ...] = ("sobol", "latin hypercube", "random", "saltelli", "grid")
-OPEN_LOOP = "none"
-CONTROLLERS = (OPEN_LOOP, "feedforward", "lqg", "scheduled", "robust")
-BELIEFS = ("declared", "varied")
 
 
 @dataclass(frozen=True)

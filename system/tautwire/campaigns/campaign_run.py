@@ -44,6 +44,9 @@ from .parameter_space import with_values
 
 Array = NDArray[np.float64]
 
+Series = dict[str, Array]
+MAX_REASON_LENGTH = 2000
+
 
 @dataclass(frozen=True)
 class ReferenceInput:
@@ -108,11 +111,6 @@ def _path_trajectory(robot: Robot, path: PathPlan) -> Trajectory:
     if path.kind == "helix":
         return Helix(end, numbers["radius"], numbers["rise"], numbers["angle"], numbers["duration"])
     return Line(path.start or robot.platform.start, end, numbers["duration"])
-
-
-Series = dict[str, Array]
-
-MAX_REASON_LENGTH = 2000
 
 
 @dataclass(frozen=True)

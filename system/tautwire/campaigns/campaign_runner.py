@@ -40,6 +40,8 @@ MAX_BUFFERED_ROWS = 5000
 # Errors of the disk that would meet every other worker too.
 DISK_FULL_ERRNOS = (errno.ENOSPC, errno.EDQUOT)
 
+PAGE_LINKS = {"summary.json": "summary.json"}
+
 
 def run_count(plan: Plan) -> int:
     """Number of runs, and so of rows, of a plan."""
@@ -135,9 +137,6 @@ def _write_results(
 
 def _written_count(folder: Path, count: int) -> int:
     return int(completed_runs(folder, count).sum())
-
-
-PAGE_LINKS = {"summary.json": "summary.json"}
 
 
 def require_libraries(plan: Plan) -> None:

@@ -34,6 +34,42 @@ from .identified_inputs import IdentifiedInputs, identified_inputs
 from .input_sampling import correlated_groups, median_value, saltelli_block_size
 from .parameter_space import KeyPathError, read_parameter_space, with_values
 
+# Narrower than for one run: an error in a plan is repeated in many runs.
+DURATION_RULE = OF_PATH._replace(minimum=1e-3, maximum=1e5)
+UNTIL_RULE = NumberRule("where the recording is left", "s", 1e-3, 1e6)
+HELIX_RULES = {
+    "radius": RADIUS_RULE._replace(positive=True),
+    "rise": RISE_RULE,
+    "angle": ANGLE_RULE,
+    "duration": DURATION_RULE,
+}
+PLAN_KEYS = (
+    "robot",
+    "seed",
+    "believes",
+    "controllers",
+    "sample",
+    "vary",
+    "found",
+    "correlation",
+    "path",
+    "compute",
+    "trace",
+)
+SIMULATION_KEYS = ("sample", "vary", "found", "correlation", "path", "controllers", "believes", "compute")
+MAX_PLAN_SIZE = 1_000_000  # bytes
+MAX_RUNS = 10_000_000
+RECORDING_SUFFIXES = (".csv", ".parquet", ".mf4", ".mdf")
+SEED_RULE = NumberRule("a seed", "", 0.0, 2.0**53, default=0.0)
+COUNT_RULE = NumberRule("the number of samples", "", 1.0, float(MAX_RUNS))
+CORRELATION_RULE = NumberRule("the correlation", "", -0.999, 0.999)
+ALPHA_RULE = NumberRule("the false-alarm rate", "", 1e-9, 0.5, default=TracePlan.alpha)
+STEP_RULE = NumberRule("the longest macro step", "s", 1e-4, 1.0, default=Compute.step)
+SETTLE_RULE = NumberRule(
+    "the time that runs continue after a path", "s", minimum=0.0, maximum=1e4, default=Compute.settle
+)
+SERIES_RULE = NumberRule("the number of points kept of each motion", "", 0.0, 10_000.0, default=float(Compute.series))
+
 
 def file_relative_to_plan(table: CheckedTable, name: str | None) -> Path:
     """The absolute path of a file that a plan names relative to itself."""
@@ -70,17 +106,6 @@ def flag(table: CheckedTable, key: str, default: bool) -> bool:
 def file_digest(file: Path) -> str:
     """Digest of a file's content."""
     return hashlib.sha256(read_bytes(file, PlanError)).hexdigest()[:16]
-
-
-# Narrower than for one run: an error in a plan is repeated in many runs.
-DURATION_RULE = OF_PATH._replace(minimum=1e-3, maximum=1e5)
-UNTIL_RULE = NumberRule("where the recording is left", "s", 1e-3, 1e6)
-HELIX_RULES = {
-    "radius": RADIUS_RULE._replace(positive=True),
-    "rise": RISE_RULE,
-    "angle": ANGLE_RULE,
-    "duration": DURATION_RULE,
-}
 
 
 def read_paths(table: CheckedTable, cable_count: int, inputs: tuple[Input, ...]) -> tuple[PathPlan, ...]:
@@ -123,35 +148,6 @@ def _read_path(table: CheckedTable, default: str, cable_count: int) -> PathPlan:
     if until < second_time:
         table.refuse("until", f"is {until!r}, before the recording's second sample", f"write {second_time:g} or more")
     return PathPlan(name, "recording", {"duration": min(until, duration)}, None, None, str(file), file_digest(file))
-
-
-PLAN_KEYS = (
-    "robot",
-    "seed",
-    "believes",
-    "controllers",
-    "sample",
-    "vary",
-    "found",
-    "correlation",
-    "path",
-    "compute",
-    "trace",
-)
-SIMULATION_KEYS = ("sample", "vary", "found", "correlation", "path", "controllers", "believes", "compute")
-MAX_PLAN_SIZE = 1_000_000  # bytes
-MAX_RUNS = 10_000_000
-RECORDING_SUFFIXES = (".csv", ".parquet", ".mf4", ".mdf")
-
-SEED_RULE = NumberRule("a seed", "", 0.0, 2.0**53, default=0.0)
-COUNT_RULE = NumberRule("the number of samples", "", 1.0, float(MAX_RUNS))
-CORRELATION_RULE = NumberRule("the correlation", "", -0.999, 0.999)
-ALPHA_RULE = NumberRule("the false-alarm rate", "", 1e-9, 0.5, default=TracePlan.alpha)
-STEP_RULE = NumberRule("the longest macro step", "s", 1e-4, 1.0, default=Compute.step)
-SETTLE_RULE = NumberRule(
-    "the time that runs continue after a path", "s", minimum=0.0, maximum=1e4, default=Compute.settle
-)
-SERIES_RULE = NumberRule("the number of points kept of each motion", "", 0.0, 10_000.0, default=float(Compute.series))
 
 
 def read_plan(path: str | Path) -> Plan:

@@ -13,6 +13,27 @@ from ..errors import ArgumentError, InputError
 from ..robot.schema import AXES, Robot
 from ..validation import NumberRule, validate_number
 
+# Assumed if the robot file declares no sensors.
+POSITION_NOISE = 1e-4
+TENSION_NOISE = 1.0
+AIM_RULES = {
+    "period": NumberRule("the sample period", "s", positive=True),
+    "position": NumberRule("a deviation of position", "m", positive=True),
+    "tension": NumberRule("a share of the mean static tension", "", positive=True),
+    "winch_speed": NumberRule("a winch speed", "m/s", positive=True),
+    "winch_acceleration": NumberRule("a winch acceleration", "m/s^2", positive=True),
+    "integral_time": NumberRule("a time", "s", positive=True),
+    "speed_limit": NumberRule("the largest winch speed", "m/s", positive=True),
+    "acceleration_disturbance": NumberRule("a wander of velocity", "m/s^2", positive=True),
+    "speed_disturbance": NumberRule("a wander of rope", "m/s", positive=True),
+    "acceleration_limit": NumberRule("the largest winch acceleration", "m/s^2", positive=True),
+    "lowest_tension": NumberRule("the minimum tension", "N", minimum=0.0),
+    "highest_tension": NumberRule("the maximum tension", "N", positive=True),
+    "yield_time": NumberRule("a time", "s", positive=True),
+}
+UNBOUNDED_KEYS = ("speed_limit", "acceleration_limit", "highest_tension")
+OPTIONAL_KEYS = ("lowest_tension", "highest_tension")
+
 
 class MarginError(InputError):
     """No controller of a design has the ``required`` disk margin; ``achieved`` is the best one."""
@@ -34,28 +55,6 @@ class StretchError(InputError):
 
 
 Array = NDArray[np.float64]
-
-# Assumed if the robot file declares no sensors.
-POSITION_NOISE = 1e-4
-TENSION_NOISE = 1.0
-
-AIM_RULES = {
-    "period": NumberRule("the sample period", "s", positive=True),
-    "position": NumberRule("a deviation of position", "m", positive=True),
-    "tension": NumberRule("a share of the mean static tension", "", positive=True),
-    "winch_speed": NumberRule("a winch speed", "m/s", positive=True),
-    "winch_acceleration": NumberRule("a winch acceleration", "m/s^2", positive=True),
-    "integral_time": NumberRule("a time", "s", positive=True),
-    "speed_limit": NumberRule("the largest winch speed", "m/s", positive=True),
-    "acceleration_disturbance": NumberRule("a wander of velocity", "m/s^2", positive=True),
-    "speed_disturbance": NumberRule("a wander of rope", "m/s", positive=True),
-    "acceleration_limit": NumberRule("the largest winch acceleration", "m/s^2", positive=True),
-    "lowest_tension": NumberRule("the minimum tension", "N", minimum=0.0),
-    "highest_tension": NumberRule("the maximum tension", "N", positive=True),
-    "yield_time": NumberRule("a time", "s", positive=True),
-}
-UNBOUNDED_KEYS = ("speed_limit", "acceleration_limit", "highest_tension")
-OPTIONAL_KEYS = ("lowest_tension", "highest_tension")
 
 
 @dataclass(frozen=True)

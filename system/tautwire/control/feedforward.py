@@ -34,6 +34,9 @@ from .design import StretchError
 
 Array = NDArray[np.float64]
 
+# Per sample; even, so that one ends at the sample itself.
+SUBSTEPS = 4
+
 
 @dataclass(frozen=True)
 class Reference:
@@ -85,10 +88,6 @@ def rigid_reference(robot: Robot, trajectory: Trajectory, times: Array) -> Refer
     speeds = ideal_winch_speeds(robot, trajectory, times)
     expected = np.hstack([trajectory.position(times), path_tensions(robot, trajectory, times)])
     return Reference(speeds, speeds, expected, path_tensions(robot, trajectory, times[:1] - 1.0)[0])
-
-
-# Per sample; even, so that one ends at the sample itself.
-SUBSTEPS = 4
 
 
 @dataclass(frozen=True)

@@ -40,6 +40,13 @@ SB10AD_GIVEN_NORM_JOB = 4
 # Shift of the plant's integrators off the imaginary axis, in 1/s.
 INTEGRATOR_LEAK = 1e-5
 
+# Multiples of the lowest mode, from fast to slow.
+RELATIVE_BANDWIDTHS = (1.6, 1.2, 0.9, 0.65, 0.48, 0.35, 0.26, 0.19, 0.14, 0.1)
+# From measurement to the end of the resulting ramp: one sample for computing, one for the ramp.
+LOOP_DELAY_SAMPLES = 2
+# Rate of back-calculation relative to the integral action.
+BACK_CALCULATION_FACTOR = 3.0
+
 
 def synthesise_controller(plant: Any, weights: Any) -> Any:
     """Synthesises the H-infinity controller of a sampled ``plant``, to be closed with positive feedback.
@@ -104,14 +111,6 @@ def to_sampled(system: Any, period: float) -> Any:
         system.D + 0.5 * period * system.C @ inverse @ system.B,
         period,
     )
-
-
-# Multiples of the lowest mode, from fast to slow.
-RELATIVE_BANDWIDTHS = (1.6, 1.2, 0.9, 0.65, 0.48, 0.35, 0.26, 0.19, 0.14, 0.1)
-# From measurement to the end of the resulting ramp: one sample for computing, one for the ramp.
-LOOP_DELAY_SAMPLES = 2
-# Rate of back-calculation relative to the integral action.
-BACK_CALCULATION_FACTOR = 3.0
 
 
 @dataclass(frozen=True)

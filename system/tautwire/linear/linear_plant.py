@@ -25,6 +25,9 @@ Array = NDArray[np.float64]
 
 SWING_RULE = NumberRule("the amplitude of a mode", "m", minimum=0.0)
 
+# Relative to scaled matrices; values from 1e-11 to 1e-6 give the same orders on the shipped robots.
+MINREAL_TOLERANCE = 1e-9
+
 
 @dataclass(frozen=True)
 class LinearPlant:
@@ -107,10 +110,6 @@ def _jacobians(model: SymbolicModel, state: Array) -> tuple[Array, Array, Array,
     values = derivatives(state, np.zeros(model.inputs.numel()))
     a, b, c, d, tension_jacobian = (np.asarray(value, dtype=float) for value in values)
     return a, b, c, d, tension_jacobian
-
-
-# Relative to scaled matrices; values from 1e-11 to 1e-6 give the same orders on the shipped robots.
-MINREAL_TOLERANCE = 1e-9
 
 
 def minimal(

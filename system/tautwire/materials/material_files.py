@@ -28,6 +28,16 @@ from .modulus_observations import ModulusObservations
 from .robot_material import robot_material, with_material
 from .viscoelastic_model import storage_modulus, viscous_damping
 
+CURVE_POINTS = 400
+LINE_STYLES: dict[Role, tuple[str, str]] = {
+    "declared": ("#999999", ":"),
+    "constant": ("#d55e00", "--"),
+    "relaxation": ("#0072b2", "-"),
+    "chosen": ("#009e73", "-"),
+}
+MATERIAL_FILES = ("fit.json", "material.png", "material.svg", "relaxation.toml", "robot.toml")
+DOTS_PER_INCH = 150
+
 
 def material_document(verdict: MaterialVerdict) -> dict[str, Any]:
     """The verdict in plain types, SI units."""
@@ -129,15 +139,6 @@ def _static(check: StaticCheck) -> dict[str, Any]:
     return {"model": check.role, **_fields(check, "role"), "predicted": _estimate(check.predicted)}
 
 
-CURVE_POINTS = 400
-LINE_STYLES: dict[Role, tuple[str, str]] = {
-    "declared": ("#999999", ":"),
-    "constant": ("#d55e00", "--"),
-    "relaxation": ("#0072b2", "-"),
-    "chosen": ("#009e73", "-"),
-}
-
-
 def material_figure(verdict: MaterialVerdict) -> Figure:
     """Plot E' and c against frequency with error bars of one sigma, and below them each model's residuals in sigmas."""
     figure = Figure(figsize=(10.0, 6.4), layout="constrained")
@@ -214,10 +215,6 @@ def _draw_residuals(
     axes.set_yticks([-30, -10, -3, -1, 0, 1, 3, 10, 30], labels=["-30", "-10", "-3", "", "0", "", "3", "10", "30"])
     axes.set_xlabel("frequency (Hz)")
     axes.set_ylabel("model - measured (sigma)")
-
-
-MATERIAL_FILES = ("fit.json", "material.png", "material.svg", "relaxation.toml", "robot.toml")
-DOTS_PER_INCH = 150
 
 
 def write_material(verdict: MaterialVerdict, folder: Path, robot: Robot | None = None) -> None:

@@ -44,6 +44,12 @@ from .viscoelastic_model import Material, ModelStructure
 
 ASSUMED_SHARED_VARIANCE, TWO_SIGMA_COVERAGE = 0.5, 2.0
 
+# Real residuals are never quite white: a root mean square up to this many standard deviations is adequate.
+MAX_ADEQUATE_RMS = 1.5
+# Relative difference up to which a frequency denotes a row.
+FREQUENCY_TOLERANCE = 1e-3
+Progress = Callable[[str, float], None]
+
 
 def error_assumptions(
     table: MaterialTable,
@@ -83,14 +89,6 @@ def _error_readings(
         yield "uncertainties are two standard deviations", read(coverage=TWO_SIGMA_COVERAGE)
     if table.static_rows:
         yield "static rows fitted too", read().with_static_rows(table)
-
-
-# Real residuals are never quite white: a root mean square up to this many standard deviations is adequate.
-MAX_ADEQUATE_RMS = 1.5
-# Relative difference up to which a frequency denotes a row.
-FREQUENCY_TOLERANCE = 1e-3
-
-Progress = Callable[[str, float], None]
 
 
 def pair_of_row(table: MaterialTable, frequency: float) -> Material:

@@ -31,6 +31,9 @@ MODEL_TITLES: dict[Role, str] = {
     "robot": "for robot files",
 }
 
+GIGA = 1e9
+TABULATED_ROLES: tuple[Role, ...] = ("declared", "constant", "relaxation", "chosen")
+
 
 def verdict_sentence(verdict: MaterialVerdict) -> str:
     """The verdict in one or two sentences."""
@@ -180,10 +183,6 @@ def _robot_model_notes(verdict: MaterialVerdict) -> Iterator[str]:
 def _joined(words: Iterable[str]) -> str:
     items: Sequence[str] = tuple(words)
     return items[0] if len(items) == 1 else f"{', '.join(items[:-1])} and {items[-1]}"
-
-
-GIGA = 1e9
-TABULATED_ROLES: tuple[Role, ...] = ("declared", "constant", "relaxation", "chosen")
 
 
 def material_verdict_table(verdict: MaterialVerdict) -> RenderableType:

@@ -28,6 +28,9 @@ STRONG_BIC_DIFFERENCE = 6.0
 # Measured numbers beyond the free parameters: one remains where cross-validation holds out a row of two.
 MIN_DEGREES_OF_FREEDOM = 3
 
+# Leave-one-out up to this number of rows; longer tables are held out in as many interleaved folds.
+MAX_FOLDS = 12
+
 
 @dataclass(frozen=True)
 class ModelSelection:
@@ -134,9 +137,6 @@ def _eliminate_backward(
 
 
 Array = NDArray[np.float64]
-
-# Leave-one-out up to this number of rows; longer tables are held out in as many interleaved folds.
-MAX_FOLDS = 12
 
 
 @dataclass(frozen=True)

@@ -25,6 +25,10 @@ Agreement = Literal["agrees", "agrees if cut off", "disagrees"]
 
 _RELATIVE_STEP = 1e-6
 
+_STRESS = ("stress_amplitude", "strain_amplitude")
+_POLAR = ("dynamic_modulus", "phase")
+_DERIVED = ("storage_modulus", "loss_factor")
+
 
 @dataclass(frozen=True)
 class Relation:
@@ -40,9 +44,6 @@ class Relation:
     has_independent_inputs: bool = True
 
 
-_STRESS = ("stress_amplitude", "strain_amplitude")
-_POLAR = ("dynamic_modulus", "phase")
-_DERIVED = ("storage_modulus", "loss_factor")
 RELATIONS: tuple[Relation, ...] = (
     Relation("dynamic_modulus", "sigma / eps", _STRESS, lambda f, stress, strain: stress / strain),
     Relation("storage_modulus", "|E*| cos phi", _POLAR, lambda f, size, phase: size * math.cos(phase)),

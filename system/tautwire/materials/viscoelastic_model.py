@@ -25,6 +25,10 @@ from numpy.typing import ArrayLike, NDArray
 Array = NDArray[np.float64]
 Complex = NDArray[np.complex128]
 
+MAX_BRANCHES = 3
+# "modulus": friction that grows with amplitude, a constant loss modulus; "stress": one stress at all amplitudes.
+Hysteresis = Literal["none", "modulus", "stress"]
+
 
 class MaxwellBranch(NamedTuple):
     """One Maxwell branch: ``modulus`` E_k in Pa, ``relaxation_time`` tau_k in s."""
@@ -100,11 +104,6 @@ def angular_frequency(frequency: ArrayLike) -> Array:
     """Angular frequency ``omega = 2 pi f``, in rad/s."""
     omega: Array = 2.0 * np.pi * np.asarray(frequency, dtype=float)
     return omega
-
-
-MAX_BRANCHES = 3
-# "modulus": friction that grows with amplitude, a constant loss modulus; "stress": one stress at all amplitudes.
-Hysteresis = Literal["none", "modulus", "stress"]
 
 
 class FreeParameter(NamedTuple):

@@ -22,6 +22,16 @@ ClaimNumber = float | tuple[float, float]
 MAX_AXIS_OVERSHOOT, MIN_AXIS_COVERAGE = 0.02, 0.5
 ROUNDING_TOLERANCE = 1e-9
 
+TABLE_1_SECTION = "3.2"
+# Column: formula from the others, label, unit, scale from SI.
+TABLE_1_COLUMNS = {
+    "dynamic_modulus": ("sigma / eps", "|E*|", "GPa", 1e-9),
+    "storage_modulus": ("|E*| cos phi", "E'", "GPa", 1e-9),
+    "loss_factor": ("tan phi", "loss factor", "1", 1.0),
+    "damping": ("E' eta / (2 pi f)", "c by Eq. 9", "GPa s", 1e-9),
+}
+TOLERANCE_TEXT = "within {:.2g} {} counts: what the digits of both sides leave open"
+
 
 @dataclass(frozen=True)
 class Claim:
@@ -194,18 +204,6 @@ def _rounded(number: ClaimNumber | None) -> float | Sequence[float] | None:
     if number is None:
         return None
     return [float(f"{each:.6g}") for each in number] if isinstance(number, tuple) else float(f"{number:.6g}")
-
-
-TABLE_1_SECTION = "3.2"
-# Column: formula from the others, label, unit, scale from SI.
-TABLE_1_COLUMNS = {
-    "dynamic_modulus": ("sigma / eps", "|E*|", "GPa", 1e-9),
-    "storage_modulus": ("|E*| cos phi", "E'", "GPa", 1e-9),
-    "loss_factor": ("tan phi", "loss factor", "1", 1.0),
-    "damping": ("E' eta / (2 pi f)", "c by Eq. 9", "GPa s", 1e-9),
-}
-
-TOLERANCE_TEXT = "within {:.2g} {} counts: what the digits of both sides leave open"
 
 
 def table_1_entries(

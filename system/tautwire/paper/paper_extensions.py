@@ -31,6 +31,8 @@ QUASI_STATIC_SAMPLES, HELIX_SAMPLES = 400, 500
 BOX_HALF_WIDTH, BOX_HEIGHT = 50.0, 50.0
 TENSION_LIMITS = TensionLimits(minimum=500.0, maximum=5000.0, preferred=1500.0)
 
+REDUNDANT_CABLES = range(1, 9)
+
 
 @dataclass(frozen=True)
 class SizeStudy:
@@ -129,9 +131,6 @@ def _max_distance(path: Array, other: Array) -> float:
 
 def _scaled_point(point: tuple[float, float, float], factor: float) -> tuple[float, float, float]:
     return factor * point[0], factor * point[1], factor * point[2]
-
-
-REDUNDANT_CABLES = range(1, 9)
 
 
 @dataclass(frozen=True)

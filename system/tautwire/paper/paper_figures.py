@@ -37,6 +37,11 @@ from .simulation_records import ClaimValues, Records, SimulationRecord
 TENSILE_AXIS_LIMITS = ((0.0, 1.8), (-500.0, 3500.0))
 LOOP_AXIS_LIMITS = ((-0.2, 0.25), (-600.0, 600.0))
 
+PANEL_COLUMNS = 3
+AXIS_MARGIN = 0.015
+SPACE_FIGURE_SIZE = 4.2
+AXES_ZOOM = 0.88
+
 
 def draw_rope_tests(runs: Mapping[ParameterSetName, RopeTestRuns]) -> Iterator[PaperFigure]:
     """Draw both figures of section 3."""
@@ -80,10 +85,6 @@ def _draw_loops(runs: RopeTestRuns) -> PaperFigure:
         "Loops of load over elongation at six frequencies, about a preload of 1500 N, of a cable FMU with relaxation."
     )
     return PaperFigure("fig_04", "Fig. 4: loops of the dynamic tests", description, figure)
-
-
-PANEL_COLUMNS = 3
-AXIS_MARGIN = 0.015
 
 
 @dataclass(frozen=True)
@@ -227,10 +228,6 @@ def _read_panel(number: str, table: Mapping[str, Any], entry: Mapping[str, Any])
         corrections=tuple(entry.get("corrections", ())),
         reason=entry.get("reason", ""),
     )
-
-
-SPACE_FIGURE_SIZE = 4.2
-AXES_ZOOM = 0.88
 
 
 def draw_space_figures(parameters: PaperParameters, records: Records) -> Iterator[PaperFigure]:

@@ -28,6 +28,20 @@ GRAVITY = 9.81
 # rad, inclination of the three ropes from the vertical, so that statics gives each the same tension.
 ROPE_INCLINATION = math.pi / 4.0
 
+# Sec. 3.1 and 3.2.
+BREAKING_FORCE = 10.29e3  # N
+ROPE_DIAMETER = 4e-3  # m
+ROPE_LENGTH = 0.35  # m, free between the grips
+METALLIC_AREA = 7.1675e-6  # m^2, Ac
+DISC_AREA = math.pi * (0.5 * ROPE_DIAMETER) ** 2  # m^2, Sc
+TENSILE_SPEED = 0.05e-3  # m/s
+FORCE_ERROR, ELONGATION_ERROR = 1.0, 0.03e-3  # N, m
+MIN_FORCE_SHARE, MAX_FORCE_SHARE = 0.1, 0.3  # shares of the breaking force, Eq. 7
+DYNAMIC_PRELOAD = 1500.0  # N
+# Tension of the rope at the start of the tensile test, in N.
+TENSILE_PRELOAD = 1.0
+SAMPLES_PER_PERIOD, TRANSIENT_DURATION = 48, 10.0
+
 
 @dataclass(frozen=True)
 class RopeTest:
@@ -94,22 +108,6 @@ def _run_program(fmu: Path, test: RopeTest, time: Array, speed: Array) -> RopeTe
             component.read(output)
             load[row] = output.values[0]
     return RopeTestRecord(time, np.asarray(cumulative_trapezoid(speed, time, initial=0)), load)
-
-
-# Sec. 3.1 and 3.2.
-BREAKING_FORCE = 10.29e3  # N
-ROPE_DIAMETER = 4e-3  # m
-ROPE_LENGTH = 0.35  # m, free between the grips
-METALLIC_AREA = 7.1675e-6  # m^2, Ac
-DISC_AREA = math.pi * (0.5 * ROPE_DIAMETER) ** 2  # m^2, Sc
-TENSILE_SPEED = 0.05e-3  # m/s
-FORCE_ERROR, ELONGATION_ERROR = 1.0, 0.03e-3  # N, m
-MIN_FORCE_SHARE, MAX_FORCE_SHARE = 0.1, 0.3  # shares of the breaking force, Eq. 7
-DYNAMIC_PRELOAD = 1500.0  # N
-
-# Tension of the rope at the start of the tensile test, in N.
-TENSILE_PRELOAD = 1.0
-SAMPLES_PER_PERIOD, TRANSIENT_DURATION = 48, 10.0
 
 
 @dataclass(frozen=True)

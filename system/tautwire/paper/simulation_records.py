@@ -27,6 +27,14 @@ Progress = Callable[[str, float], None]
 MACRO_STEP = 0.1  # s, macro step; its error on the ramps is micrometres
 NEWTON_TOLERANCE, MAX_NEWTON_ITERATIONS = 1e-12, 30
 
+# Computed values by the ids of the claims, in the claims' units; two numbers are a range.
+ClaimValues = dict[str, float | tuple[float, float] | None]
+# s, within which turning points of two curves belong together.
+TURN_WINDOW = 1.5
+DRIFT_POLYNOMIAL_ORDER = 8
+MIN_PERIODS = 4.0
+ZERO_PADDING_FACTOR = 16
+
 
 @dataclass(frozen=True)
 class SimulationCase:
@@ -138,16 +146,6 @@ def _series(motion: CosimulationResult, case: SimulationCase) -> Iterator[tuple[
         yield f"elongation_{number}", motion.elongation[:, index]
         yield f"strain_{number}", motion.elongation[:, index] / motion.length[:, index]
         yield f"winch_speed_{number}", case.winch_speed[:, index]
-
-
-# Computed values by the ids of the claims, in the claims' units; two numbers are a range.
-ClaimValues = dict[str, float | tuple[float, float] | None]
-
-# s, within which turning points of two curves belong together.
-TURN_WINDOW = 1.5
-DRIFT_POLYNOMIAL_ORDER = 8
-MIN_PERIODS = 4.0
-ZERO_PADDING_FACTOR = 16
 
 
 def max_abs(series: Array) -> float:
