@@ -56,4 +56,4 @@ def test_page_tells_modes_and_what_the_model_does_not_have() -> None:
     assert [band["strange"] for band in check["bands"]].count(True) == 1
     text = Page(trace_page(trace, {})).text
     assert f"Check recording: {resonance_bands([swinging])[0].words}" in text
-    assert "Something swings at 0.45 Hz" in text and "Fit recording: Mode" in text
+    assert "An oscillation at 0.45 Hz" in text and "Fit recording: Mode" in text
