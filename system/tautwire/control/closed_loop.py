@@ -42,7 +42,7 @@ Array = NDArray[np.float64]
 
 CONTROLLER_NAME = "controller"
 RUN_DURATION_RULE = OF_PATH._replace(meaning="the duration of the run")
-DESIGN_ATTRIBUTES = ("aim", "cable_count", "feels", "knots")
+DESIGN_ATTRIBUTES = ("aim", "cable_count", "uses_feedback", "knots")
 FORCE_PORTS = tuple(
     Port(PLATFORM, f"{name}.{axis}") for axis in AXES for name in ("external_force", "external_force_rate")
 )

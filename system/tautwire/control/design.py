@@ -139,7 +139,7 @@ class Design(Protocol):
         ...
 
     @property
-    def feels(self) -> bool:
+    def uses_feedback(self) -> bool:
         """Whether it uses feedback from sensors."""
         ...
 
@@ -156,7 +156,7 @@ class Feedforward:
     aim: ControlAim = field(default_factory=ControlAim)
 
     @property
-    def feels(self) -> bool:
+    def uses_feedback(self) -> bool:
         """See :class:`Design`."""
         return False
 

@@ -47,7 +47,7 @@ class ScheduledController:
         return self.controllers[0].cable_count
 
     @property
-    def feels(self) -> bool:
+    def uses_feedback(self) -> bool:
         """See :class:`tautwire.control.Design`."""
         return True
 

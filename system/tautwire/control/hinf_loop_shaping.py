@@ -147,7 +147,7 @@ class RobustController:
         return int(self.regulator.noutputs)
 
     @property
-    def feels(self) -> bool:
+    def uses_feedback(self) -> bool:
         """See :class:`tautwire.control.Design`."""
         return True
 

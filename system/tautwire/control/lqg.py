@@ -49,7 +49,7 @@ class Controller:
         return len(self.feedback)
 
     @property
-    def feels(self) -> bool:
+    def uses_feedback(self) -> bool:
         """See :class:`tautwire.control.Design`."""
         return True
 

@@ -36,7 +36,7 @@ def controller_data(robot: Robot, design: Design, reference: Reference) -> dict[
         "knots": [_knot_data(knot, period) for knot in design.knots()],
         "compliances": cable_compliances(robot).tolist(),
         "yield_time": design.aim.yield_time,
-        "tares": design.feels and design.aim.tare,
+        "tares": design.uses_feedback and design.aim.tare,
         "limits": control_limits(robot, design)._asdict(),
     }
 
@@ -51,8 +51,8 @@ def control_limits(robot: Robot, design: Design) -> Limits:
     return Limits(
         speed=min(NO_LIMIT, *(value for value in speed if value is not None)),
         acceleration=min(NO_LIMIT, *(value for value in acceleration if value is not None)),
-        lowest_tension=lowest if design.feels else -NO_LIMIT,
-        highest_tension=min(highest, NO_LIMIT) if design.feels else NO_LIMIT,
+        lowest_tension=lowest if design.uses_feedback else -NO_LIMIT,
+        highest_tension=min(highest, NO_LIMIT) if design.uses_feedback else NO_LIMIT,
     )
 
 
