@@ -203,7 +203,7 @@ def _component_rows(trace: Trace) -> list[Row]:
 def _residual_pattern(part: ComponentResidual) -> str:
     """What a component's residual does: the signal that it follows, or the frequency at which it rings."""
     if part.resonance_frequency is not None and part.is_significant:
-        return f"rings at {part.resonance_frequency:.2f} Hz"
+        return f"oscillates at {part.resonance_frequency:.2f} Hz"
     association = part.correlated_signal
     return f"{association.name} ({100.0 * association.correlation:.0f} %)" if association else ABSENT_TEXT
 
