@@ -98,7 +98,7 @@ def test_fmus_reach_each_worker_once(users: Users, tmp_path: Path) -> None:
         campaign("second", 8)
         logs = client.run(lambda dask_worker: [list(each["keys"]) for each in dask_worker.transfer_incoming_log])
     # The worker that built them needs none; the other one takes them once for all its runs.
-    received = sorted(sum(key.startswith("shared_of") for keys in log for key in keys) for log in logs.values())
+    received = sorted(sum(key.startswith("build_context") for keys in log for key in keys) for log in logs.values())
     assert received == [0, 1]
     assert unpacked() == before
 

@@ -115,7 +115,9 @@ def test_trace_finds_the_damping_of_the_shipped_robot(
     assert report["residual_is_noise"] == {"before": False, "after": True}
     told = capsys.readouterr()
     assert "damping" in told.out
-    assert told.err.splitlines()[-1].startswith(f"next: open {out / 'index.html'}; {out / 'robot.toml'} is the robot")
+    assert told.err.splitlines()[-1].startswith(
+        f"next: open {out / 'index.html'}; {out / 'robot.toml'} is the completed robot"
+    )
     assert (out / "index.html").stat().st_size > 10_000
     again = read_robot(out / "robot.toml")
     assert again.effects[0].values["damping"] == found["value"]

@@ -179,7 +179,7 @@ def test_no_more_than_is_read_is_told(tmp_path: Path) -> None:
     text = f"time,winch_speed_1,winch_speed_2,winch_speed_3\n{rows}"
     checked = check_files(THREE / "robot.toml", written(tmp_path, text, "fit.csv"))
     assert len(checked.problems) == MAX_PROBLEMS_PER_FILE
-    assert f"no more than {MAX_PROBLEMS_PER_FILE}" in checked.notes[-1]
+    assert f"only the first {MAX_PROBLEMS_PER_FILE}" in checked.notes[-1]
 
 
 @pytest.mark.parametrize("name", ["three", "caroca", "eight"])

@@ -166,7 +166,7 @@ class Failing:
 
 
 def test_a_source_that_hangs_is_not_taken_for_an_fmu(faulty: Path, numbers: Path) -> None:
-    with pytest.raises(RunAbortedError, match=r"outside any FMU the run did not return for 1 s at 0\.1 s"):
+    with pytest.raises(RunAbortedError, match=r"the run did not return for 1 s outside any FMU at 0\.1 s"):
         run(faulty, Failing(0.1, None), SHORT)
     assert nothing_is_left(numbers)
 

@@ -51,7 +51,7 @@ def test_a_wrong_connection_is_refused(components: dict[str, Component], source:
 
 def test_an_input_has_one_source(components: dict[str, Component]) -> None:
     twice = [wire(f"platform:position.{axis}", "cable_1:position.x") for axis in "xy"]
-    with pytest.raises(WiringError, match="driven by platform"):
+    with pytest.raises(WiringError, match="also connected to platform"):
         check_connections(components, twice)
 
 

@@ -34,7 +34,7 @@ def clocks_set(name: str, fit: Recording, check: Recording) -> tuple[DataSplit, 
 
 
 def milliseconds(note: str) -> float:
-    return float(note.split(" run ")[1].split(" ms")[0])
+    return float(note.split(" are ")[1].split(" ms")[0])
 
 
 @pytest.mark.validate(but=["tensions-three"])

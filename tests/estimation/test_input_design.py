@@ -73,7 +73,7 @@ def test_limits_not_given_come_from_the_robot() -> None:
 
 
 @pytest.mark.parametrize(
-    ("names", "part"), [("damping", "fewer than two"), ("damping,wobble", "'wobble' is no effect")]
+    ("names", "part"), [("damping", "fewer than two"), ("damping,wobble", "'wobble' is not an effect")]
 )
 def test_effects_that_cannot_be_told_apart_are_refused(
     names: str, part: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]

@@ -58,7 +58,10 @@ def test_all_that_is_done_is_said_and_leaves_noise() -> None:
     for path in ("three-1.csv", "three-2.csv"):
         assert f"{path}: tension_2 is constant throughout: not used" in prepared.notes
         assert any(path in note and "3 of tension_1, 2 of tension_3" in note for note in prepared.notes)
-        assert any(path in note and "in its gaps (at 8.98 s): only the part from 0" in note for note in prepared.notes)
+        assert any(
+            path in note and "in its gaps (at 8.98 s) is unknown: only the part from 0" in note
+            for note in prepared.notes
+        )
     assert noise_is_left(prepared)
 
 

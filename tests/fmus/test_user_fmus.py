@@ -139,7 +139,7 @@ def test_the_command_line_says_it_with_the_error(
     arguments = ["simulate", str(tmp_path / "robot.toml"), "--speeds", str(tmp_path / "speeds.csv")]
     assert run([*arguments, "--step", "0.02", "--out", str(tmp_path / "result.csv")]) == 0
     said = capsys.readouterr().err.splitlines()
-    assert any("mine.fmu: 15 ports state no unit" in line for line in said)
+    assert any("mine.fmu: 15 ports have no unit" in line for line in said)
     assert any("no saved states" in line for line in said)
     (estimate,) = [line for line in said if line.startswith("estimated error of the position")]
     told = float(estimate.partition(": ")[2].split()[0])

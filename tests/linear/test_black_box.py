@@ -213,7 +213,7 @@ def test_a_start_that_is_not_at_rest_is_refused(tmp_path: Path) -> None:
 def test_a_port_that_the_master_does_not_drive_is_refused(tmp_path: Path) -> None:
     make, _ = one_winch(tmp_path)
     speed = Port("winch", "winch_speed")
-    with pytest.raises(IdentificationError, match=r"winch\.winch_speed is no driven input"):
+    with pytest.raises(IdentificationError, match=r"winch\.winch_speed is not an external input"):
         linearise_fmus(make, PlantSignals({"v": speed}, {"v": speed}))
 
 

@@ -246,5 +246,5 @@ def test_states_of_effects_have_settled(monkeypatch: pytest.MonkeyPatch) -> None
 
 def test_effect_that_never_settles_is_refused(monkeypatch: pytest.MonkeyPatch) -> None:
     robot = with_branch(monkeypatch, lambda m, v, s, cable, motion: (1.0 + 0.0 * motion.strain,))
-    with pytest.raises(OperatingPointError, match="never settle"):
+    with pytest.raises(OperatingPointError, match="never converge"):
         linearise(robot)

@@ -179,7 +179,7 @@ def test_a_constant_pair_that_is_right_is_left_alone(tmp_path: Path) -> None:
     assert (verdict.verdict, verdict.effects, verdict.confusable_effects) == ("none", (), ())
     assert verdict.adequate_before
     assert verdict.error_after == verdict.error_before
-    assert "enough" in verdict_sentence(verdict)
+    assert "is adequate" in verdict_sentence(verdict)
 
 
 def test_a_wrong_pair_is_told_from_a_wrong_law(tmp_path: Path) -> None:

@@ -183,7 +183,7 @@ def test_refuses_a_wrong_value(tmp_path: Path, old: str, new: str, key: str, wor
 @pytest.mark.parametrize(
     ("effect", "key", "words"),
     [
-        ("[effect.dampin]\ndamping = 1.0", "effect.dampin", ["not an effect", "'damping'"]),
+        ("[effect.dampin]\ndamping = 1.0", "effect.dampin", ["not a known effect", "'damping'"]),
         ("[effect.damping]", "effect.damping.damping", ["missing", "Pa s"]),
         ("[effect.damping]\ndamping = -1.0", "effect.damping.damping", ["-1.0", "at least 0 Pa s"]),
         ("[effect.damping]\ndamping = 1e12", "effect.damping.damping", ["at most 1e+11 Pa s"]),

@@ -119,7 +119,7 @@ def workspace(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Compute the wrench-feasible workspace, where the cables can hold the platform.
+    """Compute the wrench-feasible workspace of a robot.
 
     Margins and static tensions on a grid.
 
