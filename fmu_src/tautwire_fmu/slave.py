@@ -177,8 +177,8 @@ class Slave(Fmi2Slave):
         for reference in vrs:
             if reference >= len(self.real):
                 self._report_unknown_reference(reference)
-        known_indices = [place for place, reference in enumerate(vrs) if reference < len(self.real)]
-        return [vrs[place] for place in known_indices], [values[place] for place in known_indices]
+        known_indices = [index for index, reference in enumerate(vrs) if reference < len(self.real)]
+        return [vrs[index] for index in known_indices], [values[index] for index in known_indices]
 
     def _report_unknown_reference(self, reference: int) -> float:
         self.fault = f"no real variable has the value reference {reference}"
@@ -239,7 +239,7 @@ class Slave(Fmi2Slave):
 def _cache_references(references: Sequence[int], count: int) -> CachedReferences:
     """Whether and how a list of references covers all inputs, which have the lowest references."""
     order = sorted(range(len(references)), key=references.__getitem__)
-    covers_all_inputs = count > 1 and [references[place] for place in order] == list(range(count))
+    covers_all_inputs = count > 1 and [references[index] for index in order] == list(range(count))
     return CachedReferences(list(references), itemgetter(*order) if covers_all_inputs else None)
 
 

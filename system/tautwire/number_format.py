@@ -87,4 +87,4 @@ def _decimal_places(size: float, digits: int) -> int:
 
 def _typeset_unit(unit: str) -> str:
     """A unit as printed: powers as superscripts, and empty for a dimensionless number."""
-    return "" if unit == "1" else UNIT_POWER_PATTERN.sub(lambda found: SUPERSCRIPTS[found[1]], unit)
+    return "" if unit == "1" else UNIT_POWER_PATTERN.sub(lambda match: SUPERSCRIPTS[match[1]], unit)

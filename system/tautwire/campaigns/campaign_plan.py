@@ -219,7 +219,7 @@ class Plan:
         """Each path, by index, with each controller; a single one with index -1 where there are no paths."""
         if not self.paths:
             return ((-1, ""),)
-        return tuple((place, name) for place in range(len(self.paths)) for name in self.controllers)
+        return tuple((path_index, name) for path_index in range(len(self.paths)) for name in self.controllers)
 
     @property
     def keys(self) -> tuple[str, ...]:

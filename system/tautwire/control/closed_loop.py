@@ -209,8 +209,8 @@ def controller_wires(fmus: RobotFmus) -> tuple[Connection, ...]:
             for port, name in zip(measured_ports, input_names, strict=True)
         ),
         *(
-            Connection(Port(CONTROLLER_NAME, output_names[place]), target_ports[place])
-            for place in wiring.external_indices
+            Connection(Port(CONTROLLER_NAME, output_names[index]), target_ports[index])
+            for index in wiring.external_indices
         ),
     )
 

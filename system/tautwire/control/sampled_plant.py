@@ -34,7 +34,7 @@ def sampled_plant(linear: LinearPlant, period: float) -> Any:
         0.0,
         states=[*system.state_labels, *winches],
         inputs=[f"winch_acceleration_{index}" for index in range(1, count + 1)],
-        outputs=[*(system.output_labels[place] for place in sensor_rows), *winches],
+        outputs=[*(system.output_labels[row] for row in sensor_rows), *winches],
     )
     return control.sample_system(driven, period, method="zoh", name="sampled_plant")
 
@@ -49,6 +49,6 @@ def ramp_plant(linear: LinearPlant, period: float) -> Any:
         system.C[sensor_rows],
         system.D[sensor_rows, :count],
         inputs=system.input_labels[:count],
-        outputs=[system.output_labels[place] for place in sensor_rows],
+        outputs=[system.output_labels[row] for row in sensor_rows],
     )
     return control.sample_system(driven, period, method="foh", name="ramp_plant")

@@ -54,7 +54,7 @@ def gauss_seidel_order(
 
     order = sorted(components, key=has_full_feedthrough)
     for name in tuple(order):
-        candidate = [*(kept for kept in order if kept != name), name]
+        candidate = [*(other for other in order if other != name), name]
         if len(tear_variables(candidate, connections, outputs)) < len(tear_variables(order, connections, outputs)):
             order = candidate
     return order

@@ -50,7 +50,7 @@ def analyse_identifiability(
         for other in others
         if (likeness := _confusable_effect(statistics, tested, other, policy.min_confusable_cosine)) is not None
     ]
-    return Identifiability(tuple(detectable), tuple(sorted(confusable, key=lambda found: found.nats)))
+    return Identifiability(tuple(detectable), tuple(sorted(confusable, key=lambda pair: pair.nats)))
 
 
 def separation_nats(statistics: ScoreStatistics, step: Array, other: Hypothesis, nuisance: Sequence[int] = ()) -> float:

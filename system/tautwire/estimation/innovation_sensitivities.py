@@ -172,16 +172,16 @@ class EffectSensitivities:
         ]
         self.columns = tuple(
             SensitivityColumn(effect.name, nominal[i][0], nominal[i][1], number)
-            for number, kept in enumerate(self._moving_indices)
-            for i in kept
+            for number, moving in enumerate(self._moving_indices)
+            for i in moving
         )
-        self.values = np.array([nominal[i][2] for kept in self._moving_indices for i in kept])
+        self.values = np.array([nominal[i][2] for moving in self._moving_indices for i in moving])
         self._nominal_values = np.array([value for _, _, value in nominal])
         self._shape_values = [np.tile(list(trial.values()), len(cable_groups)) for trial in trials]
         self._compile(extended_robot, free, fixed, state_names, robot.cable_count)
         self._effect_states_now = [self._initial_states(number)[0] for number in range(len(trials))]
         self.start_sensitivities = np.hstack(
-            [self._initial_states(number)[1][:, kept] for number, kept in enumerate(self._moving_indices)]
+            [self._initial_states(number)[1][:, moving] for number, moving in enumerate(self._moving_indices)]
         )
 
     def _compile(
@@ -194,7 +194,7 @@ class EffectSensitivities:
     ) -> None:
         model = symbolic_model(extended_robot, [*free, *fixed], uncertain_parameters(extended_robot))
         shared_indices = [model.state_names.index(name) for name in state_names]
-        effect_indices = [place for place in range(len(model.state_names)) if place not in shared_indices]
+        effect_indices = [index for index in range(len(model.state_names)) if index not in shared_indices]
         z, theta, p = model.states[effect_indices], model.parameters, model.parameters[: len(free)]
         next_speed, step, shift = SX.sym("later", cable_count), SX.sym("step"), SX.sym("shift", 3 + cable_count)
         state_sensitivities = SX.sym("slopes", len(effect_indices), len(free))

@@ -88,14 +88,14 @@ def filter_step(model: SymbolicModel, cable_count: int, noise: Noise, substeps: 
     )
     measured, observed, shift = (SX.sym(name, 3 + cable_count) for name in ("measured", "seen", "shift"))
     speed, later = SX.sym("speed", cable_count), SX.sym("later", cable_count)
-    step, drift, roughness = SX.sym("step"), SX.sym("drift"), SX.sym("roughness")
+    step, drift, acceleration_noise_density = SX.sym("step"), SX.sym("drift"), SX.sym("acceleration_noise_density")
     instant = [casadi.vertcat(speed, SX(3, 1)), model.parameters, later, step, shift]
     outputs = measurement_model(model, cable_count).call([predicted.state, *instant])
     filtered = _measurement_update(outputs, noise, predicted, measured, observed)
     state, transition, direct_sensitivity = _time_update(model, substeps, filtered.state, speed, later, step)
     propagated_covariance = _symmetric(casadi.mtimes([transition, filtered.covariance, transition.T]))
     process_noise = SX(size, 1)
-    process_noise[3:6] = roughness**2 * step
+    process_noise[3:6] = acceleration_noise_density**2 * step
     process_noise[6 : 6 + cable_count] = noise.winch_speed**2 * drift
     return Function(
         "filter_sample",
@@ -111,7 +111,7 @@ def filter_step(model: SymbolicModel, cable_count: int, noise: Noise, substeps: 
             later,
             step,
             drift,
-            roughness,
+            acceleration_noise_density,
         ],
         [
             state,

@@ -142,7 +142,7 @@ def _part_assembly(function: Function, first: int) -> Iterator[str]:
                 if index not in values:
                     values[index] = f"%w{k}_{index}"
                     yield _load(values[index], workspace, index)
-            operands = [values[place] for place in sources]
+            operands = [values[index] for index in sources]
             if operation == casadi.OP_OUTPUT:
                 yield _store(operands[0], name, pointers[function.n_in() + targets[0]], targets[1])
                 continue

@@ -120,7 +120,7 @@ def _path_positions(
 def _track_modes(modes_at: Callable[[float], _LocalModes], count: int) -> list[Modes]:
     """Modes at 0 ... count - 1, tracked in both directions from where the frequencies differ most."""
     local_modes = [modes_at(float(index)) for index in range(count)]
-    first = int(np.argmax([_min_relative_gap(place.modes.frequencies) for place in local_modes]))
+    first = int(np.argmax([_min_relative_gap(local.modes.frequencies) for local in local_modes]))
     tracked = {first: local_modes[first].modes}
     for sign, indices in ((1, range(first + 1, count)), (-1, range(first - 1, -1, -1))):
         for index in indices:

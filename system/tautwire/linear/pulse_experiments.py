@@ -154,9 +154,9 @@ class PulseExperiment:
     def _read_outputs(self, coupling: CouplingSolver) -> Array:
         row = np.empty(len(self.observed_ports))
         for name in dict.fromkeys(port.component for port in self.observed_ports):
-            indices = [place for place, port in enumerate(self.observed_ports) if port.component == name]
+            indices = [index for index, port in enumerate(self.observed_ports) if port.component == name]
             component = coupling.graph.components[name]
-            block = component.block([self.observed_ports[place].variable for place in indices])
+            block = component.block([self.observed_ports[index].variable for index in indices])
             component.read(block)
             if not np.all(np.isfinite(block.values)):
                 component.raise_not_finite(block)

@@ -98,7 +98,7 @@ def typeset_number(text: str) -> Markup:
 def typeset_prose(text: str) -> Markup:
     """A sentence with powers of ten and exponents of units as superscripts."""
     typeset = EXPONENT_PATTERN.sub(_typeset_power, one_line(text))
-    typeset = UNIT_EXPONENT_PATTERN.sub(lambda found: found[1].translate(SUPERSCRIPTS), typeset)
+    typeset = UNIT_EXPONENT_PATTERN.sub(lambda match: match[1].translate(SUPERSCRIPTS), typeset)
     return escape(typeset.replace(" %", "\N{NO-BREAK SPACE}%"))
 
 
@@ -112,9 +112,9 @@ def asset(name: str) -> Markup:
     return Markup((files(__package__) / "assets" / name).read_text(encoding="utf-8"))
 
 
-def _typeset_power(found: re.Match[str]) -> str:
+def _typeset_power(match: re.Match[str]) -> str:
     return (
-        f"\N{NO-BREAK SPACE}\N{MULTIPLICATION SIGN}\N{NO-BREAK SPACE}10{(found[1] + found[2]).translate(SUPERSCRIPTS)}"
+        f"\N{NO-BREAK SPACE}\N{MULTIPLICATION SIGN}\N{NO-BREAK SPACE}10{(match[1] + match[2]).translate(SUPERSCRIPTS)}"
     )
 
 

@@ -50,7 +50,7 @@ def cables_have_weight(robot: Robot) -> bool:
 def formula_texts(formulas: Sequence[Formula]) -> dict[str, list[str]]:
     """The texts of some formulas by their targets."""
     return {
-        place: [f.text for f in formulas if f.target == place] for place in dict.fromkeys(f.target for f in formulas)
+        target: [f.text for f in formulas if f.target == target] for target in dict.fromkeys(f.target for f in formulas)
     }
 
 

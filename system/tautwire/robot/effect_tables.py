@@ -96,11 +96,11 @@ def _read_formula_table(table: CheckedTable, cable_reader: Callable[[CheckedTabl
     elif "cables" in table.content and "tension" not in targets:
         table.refuse("cables", "only a tension formula acts in cables", "remove cables")
     formulas = []
-    for place in targets:
-        text = table.text(place, 'write it as text, as in "-20 * vx"')
+    for target in targets:
+        text = table.text(target, 'write it as text, as in "-20 * vx"')
         if text is None:
             continue
-        for error in expression_errors(text, VARIABLES_BY_TARGET[place]):
-            table.refuse(place, f"character {error.position}: {error.problem}", error.hint)
-        formulas.append(Formula(place, text, cable_reader(table) if place == "tension" else ()))
+        for error in expression_errors(text, VARIABLES_BY_TARGET[target]):
+            table.refuse(target, f"character {error.position}: {error.problem}", error.hint)
+        formulas.append(Formula(target, text, cable_reader(table) if target == "tension" else ()))
     return formulas

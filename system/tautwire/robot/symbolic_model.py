@@ -196,7 +196,7 @@ def freeze_drifting_states(model: SymbolicModel) -> SymbolicModel:
     """The model with states that have no equilibrium frozen at their initial values and removed."""
     if not model.drifting:
         return model
-    settling_indices = [place for place in range(model.states.numel()) if place not in model.drifting]
+    settling_indices = [index for index in range(model.states.numel()) if index not in model.drifting]
     frozen_states = model.states[list(model.drifting)]
     expressions = [model.rates[settling_indices], model.outputs, model.span_tensions]
     rates, outputs, tensions = casadi.substitute(expressions, [frozen_states], [SX.zeros(*frozen_states.shape)])
@@ -208,7 +208,7 @@ def freeze_drifting_states(model: SymbolicModel) -> SymbolicModel:
         span_tensions=tensions,
         start=model.start[settling_indices],
         drifting=(),
-        state_names=tuple(model.state_names[place] for place in settling_indices),
+        state_names=tuple(model.state_names[index] for index in settling_indices),
     )
 
 
