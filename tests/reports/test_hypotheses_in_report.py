@@ -1,4 +1,4 @@
-"""What was tried, as the page and the terminal tell it: what was fitted apart from what promised too little."""
+"""Hypotheses on the page and the terminal: those fitted apart from those whose predicted gain was too small."""
 
 from __future__ import annotations
 
@@ -21,8 +21,8 @@ def with_hopeless_round() -> Trace:
 
 def test_page_folds_away_what_was_not_fitted() -> None:
     page = section_of(trace_page(with_hopeless_round(), {}), "candidates")
-    assert "3 not fitted, they promised too little" in page.text
-    assert "Nothing promised enough to be fitted." in page.text
+    assert "3 not fitted, predicted gain too small" in page.text
+    assert "No predicted gain was large enough for a fit." in page.text
     assert "1 not fitted" in page.text  # drag, in the first round
     assert page.text.index("damping") < page.text.index("1 not fitted") < page.text.index("drag")
 
@@ -38,4 +38,4 @@ def test_terminal_leaves_out_what_was_not_fitted() -> None:
         console.print(trace_table(with_hopeless_round()))
     text = " ".join(captured.get().split())
     assert "creep 1" not in text and "drag" not in text
-    assert "promised" in text and "or not fitted" in text
+    assert "no predicted gain" in text and "or not fitted" in text

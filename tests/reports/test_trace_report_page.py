@@ -76,13 +76,13 @@ def test_terms_of_art_are_explained_where_they_first_stand(kind: str) -> None:
     for term, explained in {
         "rms": "Root mean square (rms) of measured minus co-simulated",
         "oise floor": "The noise floor is what noise of the sensors",
-        "xtended model": "with what was found (the extended model)",
+        "xtended model": "by the model with the effects found (the extended model)",
         "xplained": "Explained is the share of the mean square above the floor",
         "vidence": "Evidence tells how much more probable",
         "95 % interval": "In 95 of 100 such recordings the 95 % interval holds the true value",
-        "spectral density": "How strongly the same residuals swing at each frequency: their amplitude spectral density",
-        "correlation": "follows best, with the correlation: 100 % where it does so exactly",
-        "innovations": "off when it predicts each sample from those before it",
+        "mplitude spectral density": "Amplitude spectral density of the same residuals",
+        "correlation": "follows best, with the correlation coefficient",
+        "innovations": "one-step predictions (innovations)",
     }.items():
         place = text.index(explained)
         body = text.index("Before and after")

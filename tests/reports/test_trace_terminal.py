@@ -34,7 +34,7 @@ def rendered(trace: Trace, width: int = 80) -> str:
 def test_verdict_comes_first() -> None:
     text = rendered(made_trace())
     assert text.startswith("Effect found: The cables damp 5.3 times")
-    assert "leaves is noise" in " ".join(text.split())
+    assert "extended model is white noise" in " ".join(text.split())
 
 
 @pytest.mark.parametrize("eight", [False, True])

@@ -42,7 +42,7 @@ class SearchRound:
 
     @property
     def stops_at_first(self) -> bool:
-        """Whether the first candidate that leaves noise is enough: alternatives to all accepted ones come later."""
+        """Whether the first candidate that leaves white noise is enough; alternatives are tested later."""
         return bool(self.accepted) and self.rival is None and not self.is_white
 
     def candidates(self, declared: Robot) -> list[Hypothesis]:

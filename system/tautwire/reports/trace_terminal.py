@@ -118,10 +118,10 @@ def _candidate_table(trace: Trace) -> Table:
     table.add_column("added", overflow="fold")
     table.add_column("cables", overflow="fold")
     table.add_column("evidence", justify="right", no_wrap=True)
-    table.add_column("left", justify="right", no_wrap=True)
+    table.add_column("NIV", justify="right", no_wrap=True)
     table.add_column("", no_wrap=True)
     table.add_column("values", overflow="fold", ratio=1)
-    caption = "left: mean square of the whitened innovations, 1 where only noise is left"
+    caption = "NIV: normalised innovation variance on unseen data, 1 for white noise"
     hidden_count = 0
     for round_number, candidates in candidates_by_round(trace.candidates):
         fitted = [candidate for candidate in candidates if math.isfinite(candidate.mean_square)][:MAX_CANDIDATES_SHOWN]
@@ -129,7 +129,7 @@ def _candidate_table(trace: Trace) -> Table:
             label = str(round_number) if index == 0 else ""
             table.add_row(label, *_candidate_cells(candidate, trace.robot_before.cable_count))
         if not fitted:
-            table.add_row(str(round_number), *["-"] * 5, "nothing promised enough to be fitted")
+            table.add_row(str(round_number), *["-"] * 5, "no predicted gain was large enough for a fit")
         hidden_count += len(candidates) - len(fitted)
     if hidden_count:
         caption += f"\n{hidden_count} more with less evidence, or not fitted: in report.json and on the page"

@@ -129,12 +129,12 @@ def noise_sentence(trace: Trace) -> str:
     """Whether the residual is white noise, before and after, in one sentence."""
     before, after = trace.noise_before, trace.noise_after
     if before and after:
-        return "The declared model already leaves nothing but noise."
+        return "The residual of the declared model is already white noise."
     if after:
-        return "What the extended model leaves is noise; what the declared one leaves is not."
+        return "The residual of the extended model is white noise; that of the declared model is not."
     if before:
-        return "The declared model leaves noise, the final one more than that."
-    return "More than noise is left."
+        return "The residual of the declared model is white noise; that of the final model is not."
+    return "The residual is more than white noise."
 
 
 def format_evidence(evidence: float) -> str:
