@@ -19,10 +19,10 @@ Array = NDArray[np.float64]
 class CouplingState:
     """The state of a coupled system, without that of its FMUs: all that a step changes and a rollback takes back.
 
-    ``outputs`` and ``inputs`` hold the values of all ports of a :class:`CouplingGraph`; instances read and write them
-    in place. ``external_values`` are the external inputs as last set, ``held_values`` the discrete outputs as last
+    ``outputs`` and ``inputs`` hold the values of all ports of a :class:`CouplingGraph`, outputs followed by estimated
+    derivatives; instances read and write them in place. ``external_values`` are the external inputs as last set, ``held_values`` the discrete outputs as last
     sampled. ``pending_input_time`` is the time (s) at which inputs are still to be updated, if they are. ``diverged``
-    tells that the last step was left with a large error after all iterations.
+    tells that the last step kept a large error after all iterations; one with a small error left is accepted.
     """
 
     outputs: Array
@@ -36,16 +36,7 @@ class CouplingState:
 
     def copy(self) -> CouplingState:
         """A copy that later steps do not change."""
-        return CouplingState(
-            self.outputs.copy(),
-            self.inputs.copy(),
-            self.external_values,
-            self.held_values,
-            copy(self.statistics),
-            self.extrapolation_history,
-            self.pending_input_time,
-            self.diverged,
-        )
+        return replace(self, outputs=self.outputs.copy(), inputs=self.inputs.copy(), statistics=copy(self.statistics))
 
     def restore(self, saved: CouplingState) -> None:
         """Roll back to a copy; sweeps made since then still count, and held values count as jumps."""

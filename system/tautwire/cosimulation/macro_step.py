@@ -74,7 +74,8 @@ def step_with_events(coupling: CouplingSolver, time: float, step: float, externa
     """One macro step from ``time``, split at events and where it is rejected, if FMUs support rollback.
 
     ``external_inputs(time, step)`` returns the external inputs at both ends. Two zero crossings of one indicator within
-    a step are not seen. Returns the length of the first substep: ``step`` where it was not split.
+    a step are not seen. The step that lands at an event, and what remains after ``MAX_SUBSTEPS``, are never rejected.
+    Returns the length of the first substep: ``step`` where it was not split.
     """
     if not (coupling.graph.supports_rollback and coupling.graph.supports_variable_step):
         coupling.step(time, step, *external_inputs(time, step))

@@ -181,7 +181,7 @@ def cosimulate(
     given. ``progress`` gets the share that is done. With a ``patience`` (s) an FMU that is in one call for so long, or
     takes its process down, is one that fails. Returns the run at ``time``: arrays (N, 3) and (N, n) in SI units.
 
-    Raises RunError where an FMU fails, StepError where no step meets the tolerance, SlotError where an FMU of the
+    Raises RunError where an FMU fails, StepSizeError where no step meets the tolerance, SlotError where an FMU of the
     user's starts elsewhere or cannot make such steps, ArgumentError where an argument is none of these.
     """
     validate_fmus("cosimulate: fmus", fmus)

@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 ReadLengths = Callable[[], Array]
 
 SAFETY_FACTOR = 0.9
-# Local errors may grow as they propagate; they get a third of the tolerance.
+# Local errors may grow as they propagate, so they get less than a third of the tolerance.
 LOCAL_ERROR_SHARE = 0.3
 MIN_STEP_SHARE = 1e-6
 MIN_STEP_GROWTH, MAX_STEP_FACTOR, MIN_STEP_FACTOR = 1.3, 4.0, 0.1
@@ -62,7 +62,7 @@ class StepSizeControl(Protocol):
 
 @dataclass(frozen=True)
 class FixedStep:
-    """Equal macro steps no longer than ``max_step`` (s)."""
+    """Equal macro steps no longer than ``max_step`` (s); each may still be split at events, or rejected and halved."""
 
     max_step: float
 
@@ -88,10 +88,11 @@ class FixedStep:
 
 @dataclass
 class AdaptiveStep:
-    """Adaptive macro steps: local errors over a run of ``duration`` (s) sum to at most ``tolerance`` (m).
+    """Adaptive macro steps: local errors over a run of ``duration`` (s) sum to at most 0.3 times ``tolerance`` (m).
 
-    Step doubling: each step is made whole and, after a rollback, in two halves, which are accepted; for order p their
-    error is the difference over ``2^p - 1``.
+    A step may err by ``LOCAL_ERROR_SHARE * tolerance * step / duration``; its parts go through the same rejection as
+    fixed steps. Step doubling: each step is made whole and, after a rollback, in two halves, which are accepted; for
+    order p their error is the difference over ``2^p - 1``.
     """
 
     tolerance: float
@@ -111,7 +112,7 @@ class AdaptiveStep:
         external_inputs: ExternalInputs,
         read_lengths: ReadLengths,
     ) -> None:
-        """See :class:`StepSizeControl`; raises StepError where no step is small enough."""
+        """See :class:`StepSizeControl`; raises StepSizeError where no step is small enough."""
         elapsed = 0.0
         while elapsed < span * (1.0 - 1e-12):
             remaining = span - elapsed
