@@ -20,9 +20,10 @@ class CouplingState:
     """The state of a coupled system, without that of its FMUs: all that a step changes and a rollback takes back.
 
     ``outputs`` and ``inputs`` hold the values of all ports of a :class:`CouplingGraph`, outputs followed by estimated
-    derivatives; instances read and write them in place. ``external_values`` are the external inputs as last set, ``held_values`` the discrete outputs as last
-    sampled. ``pending_input_time`` is the time (s) at which inputs are still to be updated, if they are. ``diverged``
-    tells that the last step kept a large error after all iterations; one with a small error left is accepted.
+    derivatives; instances read and write them in place. ``external_values`` are the external inputs as last set,
+    ``held_values`` the discrete outputs as last sampled. ``pending_input_time`` is the time (s) at which inputs are
+    still to be updated, if they are. ``diverged`` tells that the last step kept a large error after all iterations; one
+    with a small error left is accepted.
     """
 
     outputs: Array
