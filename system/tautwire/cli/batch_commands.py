@@ -33,7 +33,7 @@ def campaign(
 ) -> None:
     """Run a campaign: samples, grids, recordings.
 
-    Rows go to FOLDER as they come. Stopped, by whatever, the same command goes on where it was.
+    Rows are written to FOLDER as they come. The same command resumes a campaign that was stopped.
 
     Example: tautwire campaign plan.toml --out campaign/
     """
