@@ -143,7 +143,8 @@ def test_a_scheduler_that_is_lost_leaves_what_came_until_then(tmp_path: Path, mo
             if done > 0.1:
                 scheduler.kill()
 
-        with pytest.raises(UnfinishedError, match=r"scheduler was lost after \d+ of 32 runs; the same command resumes it"):
+        message = r"scheduler was lost after \d+ of 32 runs; the same command resumes it"
+        with pytest.raises(UnfinishedError, match=message):
             run_campaign(plan, out, client, end)
     assert part_files(out)
 
