@@ -117,7 +117,7 @@ def test_ideal_winch_speeds_refuse_a_path_of_the_users_that_is_none(
     [
         ("robot", {}, ("a dict", "read_robot")),
         ("folder", 3, ("3", "pathlib.Path")),
-        ("folder", THREE / "robot.toml", ("robot.toml", "not a folder")),
+        ("folder", THREE / "robot.toml", ("not a folder", "name a folder")),
         pytest.param("folder", "a" * 300, ("cannot be looked up",), id="long name"),
         pytest.param("folder", "\ud800", ("cannot be looked up",), id="lone surrogate"),
         ("progress", 1, ("not a function",)),
