@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -21,7 +19,6 @@ from ..recordings.white_noise_estimate import white_noise_deviation
 from ..robot.schema import Robot
 from . import (
     ComponentError,
-    CouplingSolver,
     Experiment,
     FixedStep,
     PiecewiseLinearInput,
@@ -29,11 +26,9 @@ from . import (
     RunStatistics,
     StepSizeControl,
 )
-from .coupling_solver import DEFAULT_OPTIONS, SolverOptions
 from .robot_cosimulation import record_cosimulation, step_size_control_for, wire_fmus
 from .robot_wiring import RobotWiring
 from .run_arguments import SimulationOptions
-from .step_size_control import ExternalInputs, ReadLengths
 
 Array = NDArray[np.float64]
 Run = Callable[[int, StepSizeControl, Recorder], RunStatistics]
@@ -65,26 +60,6 @@ class FirstPositionsRecorder:
         return self._rows[: self._count]
 
 
-@dataclass(frozen=True)
-class HalvedStep:
-    """Half of each step that a :class:`FixedStep` of this length makes."""
-
-    max_step: float
-    solver_options: SolverOptions = DEFAULT_OPTIONS
-
-    def advance(
-        self,
-        coupling: CouplingSolver,
-        begin: float,
-        span: float,
-        external_inputs: ExternalInputs,
-        read_lengths: ReadLengths,
-    ) -> None:
-        """See :class:`tautwire.cosimulation.StepSizeControl`."""
-        count = max(1, math.ceil(span / self.max_step * (1.0 - 1e-9)))
-        FixedStep(0.5 * span / count).advance(coupling, begin, span, external_inputs, read_lengths)
-
-
 def step_doubling_note(run: Run, time: Array, step: float, positions: Array) -> str:
     """A note on the error of ``positions`` (N, 3), recorded at ``time`` (N or more,) in steps of ``step``.
 
@@ -93,7 +68,7 @@ def step_doubling_note(run: Run, time: Array, step: float, positions: Array) -> 
     """
     recorder = FirstPositionsRecorder(len(positions))
     try:
-        run(len(positions), HalvedStep(step), recorder)
+        run(len(positions), FixedStep(step, subdivision=2), recorder)
     except ComponentError as error:
         return f"no error estimate: with half the step, {error}"
     position_error = FIRST_ORDER_FACTOR * float(np.max(np.abs(positions - recorder.positions), initial=0.0))

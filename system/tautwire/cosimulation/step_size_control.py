@@ -62,9 +62,13 @@ class StepSizeControl(Protocol):
 
 @dataclass(frozen=True)
 class FixedStep:
-    """Equal macro steps no longer than ``max_step`` (s); each may still be split at events, or rejected and halved."""
+    """Equal macro steps no longer than ``max_step`` (s); each may still be split at events, or rejected and halved.
+
+    A ``subdivision`` makes so many steps of each of them, which step doubling compares.
+    """
 
     max_step: float
+    subdivision: int = 1
 
     @property
     def solver_options(self) -> SolverOptions:
@@ -80,7 +84,7 @@ class FixedStep:
         read_lengths: ReadLengths,
     ) -> None:
         """See :class:`StepSizeControl`."""
-        count = max(1, math.ceil(span / self.max_step * (1.0 - 1e-9)))
+        count = self.subdivision * max(1, math.ceil(span / self.max_step * (1.0 - 1e-9)))
         for k in range(count):
             time = begin + k * span / count
             step_with_events(coupling, time, span / count, external_inputs)
