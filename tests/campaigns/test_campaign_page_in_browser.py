@@ -13,7 +13,10 @@ from tests.campaigns.test_campaign_summary import GRID, written
 from tests.support.browser.browser import LAPTOP, MISSING, PHONE_DARK, Browser, Screen, chromium
 from tests.support.campaigns import AT_REST, moving
 
-pytestmark = pytest.mark.skipif(chromium() is None, reason=f"the pages are not tried in a browser: {MISSING}")
+pytestmark = [
+    pytest.mark.validate,
+    pytest.mark.skipif(chromium() is None, reason=f"the pages are not tried in a browser: {MISSING}"),
+]
 
 DRAW_ALL = "window.dispatchEvent(new Event('beforeprint'))"
 INDICES = AT_REST.replace('"sobol"\ncount = 8', '"saltelli"\ncount = 16').replace(

@@ -23,7 +23,10 @@ from tests.support.browser.browser import (
 from tests.support.browser.report_pages import DRAW_ALL, KINDS, near, opened
 from tests.support.folders import SUPPORT
 
-pytestmark = pytest.mark.skipif(chromium() is None, reason=f"the pages are not tried in a browser: {MISSING}")
+pytestmark = [
+    pytest.mark.validate,
+    pytest.mark.skipif(chromium() is None, reason=f"the pages are not tried in a browser: {MISSING}"),
+]
 
 SCREENS = (LAPTOP, LAPTOP_DARK, PHONE, PHONE_DARK)
 CONTRAST = (SUPPORT / "browser" / "contrast.js").read_text(encoding="utf-8")

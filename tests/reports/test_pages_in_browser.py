@@ -41,6 +41,7 @@ def drawn_share(picture: NDArray[np.uint8]) -> float:
     return 1.0 - float(counts.max()) / float(counts.sum())
 
 
+@pytest.mark.validate(but=["trace-laptop"])
 @pytest.mark.parametrize("screen", [LAPTOP, PHONE_DARK], ids=lambda screen: screen.name)
 @pytest.mark.parametrize("kind", KINDS)
 def test_page_loads_in_silence_and_asks_for_nothing_but_itself(
@@ -53,6 +54,7 @@ def test_page_loads_in_silence_and_asks_for_nothing_but_itself(
     assert outside == [pages[kind].resolve().as_uri()]
 
 
+@pytest.mark.validate(but=["trace-laptop"])
 @pytest.mark.parametrize("screen", [LAPTOP, PHONE_DARK], ids=lambda screen: screen.name)
 @pytest.mark.parametrize("kind", KINDS)
 def test_no_plot_is_empty(browser: Browser, pages: dict[str, Path], kind: str, screen: Screen) -> None:
@@ -68,6 +70,7 @@ def test_no_plot_is_empty(browser: Browser, pages: dict[str, Path], kind: str, s
         assert near(picture, accent) > 20, place
 
 
+@pytest.mark.validate(but=["trace"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_slider_moves_the_robot(browser: Browser, pages: dict[str, Path], kind: str) -> None:
     opened(browser, pages[kind]).see("figure.scene")
@@ -82,6 +85,7 @@ def test_slider_moves_the_robot(browser: Browser, pages: dict[str, Path], kind: 
     assert browser.run(PLATFORM) == at_start
 
 
+@pytest.mark.validate
 def test_play_moves_the_robot_until_it_is_pressed_again(browser: Browser, pages: dict[str, Path]) -> None:
     opened(browser, pages["trace"]).see("figure.scene")
     at_start = browser.run(PLATFORM)
@@ -94,6 +98,7 @@ def test_play_moves_the_robot_until_it_is_pressed_again(browser: Browser, pages:
     assert browser.run(PLATFORM) == stopped
 
 
+@pytest.mark.validate
 def test_a_mode_goes_round(browser: Browser, pages: dict[str, Path]) -> None:
     opened(browser, pages["modes"]).see("figure.scene")
     browser.run(SLIDE, 0.97)
@@ -103,6 +108,7 @@ def test_a_mode_goes_round(browser: Browser, pages: dict[str, Path]) -> None:
     assert browser.run("return document.getElementById('play').textContent") == "Pause"
 
 
+@pytest.mark.validate
 @pytest.mark.parametrize("view", ["top", "close"])
 def test_views_turn_the_robot(browser: Browser, pages: dict[str, Path], view: str) -> None:
     opened(browser, pages["trace"]).see("figure.scene")
@@ -113,6 +119,7 @@ def test_views_turn_the_robot(browser: Browser, pages: dict[str, Path], view: st
     assert near(after, themes()["light"]["accent"]) > 20
 
 
+@pytest.mark.validate
 def test_all_controls_can_be_reached_and_used_by_keyboard(browser: Browser, pages: dict[str, Path]) -> None:
     opened(browser, pages["trace"]).see("figure.scene")
     browser.run("document.body.tabIndex = -1; document.body.focus(); scrollTo(0, 0)")
@@ -135,6 +142,7 @@ def test_all_controls_can_be_reached_and_used_by_keyboard(browser: Browser, page
     assert browser.run("return [chosen().role, state.place]") == ["check", 0]
 
 
+@pytest.mark.validate
 @pytest.mark.parametrize("kind", KINDS)
 def test_every_control_of_every_page_is_reached_by_tab_and_has_a_name(
     browser: Browser, pages: dict[str, Path], kind: str
@@ -157,11 +165,13 @@ def test_every_control_of_every_page_is_reached_by_tab_and_has_a_name(
     assert set(range(count)) - reached == set()
 
 
+@pytest.mark.validate
 def test_skip_link_leads_to_the_results(browser: Browser, pages: dict[str, Path]) -> None:
     opened(browser, pages["trace"]).press("TAB", "ENTER")
     assert browser.run("return document.activeElement.id") == "main"
 
 
+@pytest.mark.validate
 @pytest.mark.parametrize("kind", KINDS)
 def test_page_is_light_or_dark_as_asked_and_turns_with_it(browser: Browser, pages: dict[str, Path], kind: str) -> None:
     opened(browser, pages[kind]).see("figure.scene")
@@ -179,6 +189,7 @@ def drawn_in(browser: Browser, theme: str) -> bool:
     return bool(colour == themes()[theme]["accent"])
 
 
+@pytest.mark.validate
 def test_gains_follow_the_chosen_input(browser: Browser, pages: dict[str, Path]) -> None:
     opened(browser, pages["modes"]).see("figure[data-kind=gain]")
     label = "return document.querySelector('figure[data-kind=gain] > .plot').getAttribute('aria-label')"
@@ -187,6 +198,7 @@ def test_gains_follow_the_chosen_input(browser: Browser, pages: dict[str, Path])
     assert "by external force y" in browser.run(label)
 
 
+@pytest.mark.validate
 def test_hostile_names_are_shown_as_text(browser: Browser, pages: dict[str, Path]) -> None:
     opened(browser, pages["hostile"]).see("figure.scene")
     assert HOSTILE in browser.run("return document.querySelector('h1').textContent")
@@ -195,6 +207,7 @@ def test_hostile_names_are_shown_as_text(browser: Browser, pages: dict[str, Path
     assert browser.heard() == []
 
 
+@pytest.mark.validate
 def test_robot_is_drawn_flat_where_there_is_no_3d(pages: dict[str, Path]) -> None:
     found = chromium()
     assert found is not None
