@@ -55,6 +55,7 @@ def test_no_name_is_given_where_the_rebuilt_fmus_miss_the_recording(monkeypatch:
     found = traced()
     assert len(runs) == 4
     assert found.verdict == "unexplained"
+    assert found.sentence.endswith("damping comes closest, but not close enough.")
     assert found.effects == ()
     assert found.robot_after == found.robot_before
     assert all(np.array_equal(c.after.position, c.before.position) for c in found.comparisons)

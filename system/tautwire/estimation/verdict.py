@@ -34,7 +34,9 @@ def verdict_of(
         return "discovered", f"{sentence} With it, {IS_WHITE}."
     if not selection.accepted and white_before:
         return "none", f"{IS_WHITE.capitalize()}: this recording shows nothing that the model lacks."
-    closest = f"; {names} comes closest but does not make it white" if selection.accepted else ""
+    # Either the filter or the FMUs refused the selection: what it leaves is not always coloured.
+    verb = "comes" if len(selection.accepted) == 1 else "come"
+    closest = f"; {names} {verb} closest, but not close enough" if selection.accepted else ""
     return "unexplained", f"The residual is not white noise, and no known effect explains it{closest}."
 
 
