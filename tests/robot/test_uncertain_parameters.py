@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from math import dist
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
-from casadi import DM
+from casadi import DM, Function
 
 from tautwire.estimation import Trace, trace
 from tautwire.recordings.recording import Recording
@@ -16,7 +17,7 @@ from tautwire.robot.robot_file_reader import read_robot
 from tautwire.robot.robot_file_writer import robot_text
 from tautwire.robot.schema import Robot
 from tautwire.robot.symbolic_model import symbolic_model
-from tautwire.robot.uncertain_parameters import perturbed_robot, sensor_offsets, uncertain_parameters
+from tautwire.robot.uncertain_parameters import perturbed_robot, sensor_errors, uncertain_parameters
 from tests.support.recordings import recorded
 from tests.support.robots import example
 
@@ -43,10 +44,12 @@ def with_offsets(recording: Recording, off: tuple[float, ...]) -> Recording:
 
 def test_a_robot_file_states_them_and_reads_back(tmp_path: Path) -> None:
     robot = unsure(2e9, 1e8, 3.0, 5.0)
-    robot = replace(robot, sensors=replace(robot.sensors, position_offset_uncertainty=1e-3))
+    sensors = replace(robot.sensors, position_offset_uncertainty=1e-3, tension_gain_uncertainty=0.01)
+    cables = tuple(replace(cable, anchor_uncertainty=0.002) for cable in robot.cables)
+    robot = replace(robot, sensors=sensors, cables=cables)
     (tmp_path / "robot.toml").write_text(robot_text(robot), encoding="utf-8")
     assert read_robot(tmp_path / "robot.toml") == robot
-    assert len(uncertain_parameters(robot)) == 1 + 3 * 3 + 3
+    assert len(uncertain_parameters(robot)) == 1 + 3 * (2 + 3 + 2) + 3
 
 
 def test_nothing_is_uncertain_that_is_not_stated() -> None:
@@ -62,9 +65,51 @@ def test_numbers_move_by_their_own_standard_deviations() -> None:
     assert moved.platform.mass == robot.platform.mass + 3.0 * by_label["mass"]
     assert moved.cables[1].modulus == robot.cables[1].modulus + 2e9 * by_label["modulus of cable 2"]
     assert moved.cables[1].damping == robot.cables[1].damping
-    assert sensor_offsets(numbers, moves, 3)[3:] == [
+    assert sensor_errors(numbers, moves, 3).offsets[3:] == tuple(
         5.0 * by_label[f"offset of tension {cable}"] for cable in (1, 2, 3)
-    ]
+    )
+
+
+def surveyed_roughly(anchor: float, gain: float) -> Robot:
+    """The three-cable robot with uncertain exit points and load-cell gains."""
+    robot = example("three")
+    cables = tuple(replace(cable, anchor_uncertainty=anchor) for cable in robot.cables)
+    return replace(robot, cables=cables, sensors=replace(robot.sensors, tension_gain_uncertainty=gain))
+
+
+def test_anchors_move_by_coordinate_and_gains_about_one() -> None:
+    robot = surveyed_roughly(0.004, 0.01)
+    numbers = uncertain_parameters(robot)
+    moves = [float(index) for index in range(len(numbers))]
+    by_label = {number.label: move for number, move in zip(numbers, moves, strict=True)}
+    moved = perturbed_robot(robot, numbers, moves)
+    assert moved.cables[2].anchor == pytest.approx(
+        [
+            value + 0.004 * by_label[f"anchor {axis} of cable 3"]
+            for axis, value in zip("xyz", robot.anchors[2], strict=True)
+        ]
+    )
+    assert sensor_errors(numbers, moves, 3).gains == (
+        *(1.0, 1.0, 1.0),
+        *(1.0 + 0.01 * by_label[f"gain of tension {cable}"] for cable in (1, 2, 3)),
+    )
+
+
+def test_a_robot_with_other_anchors_still_starts_in_equilibrium_at_its_reference_lengths() -> None:
+    robot = surveyed_roughly(0.05, 0.01)
+    numbers = uncertain_parameters(robot)
+    model = symbolic_model(robot, (), numbers)
+    start = np.array(Function("start", [], [model.start])()["o0"]).ravel()
+    assert start[6:9] == pytest.approx([dist(anchor, robot.platform.start) for anchor in robot.anchors])
+    start[-len(numbers) :] = np.random.default_rng(1).normal(size=len(numbers))
+    of_state = Function("f", [model.states, model.inputs], [model.rates, model.outputs])
+    rates, outputs = of_state(start, np.zeros(6))
+    assert np.array(rates).ravel() == pytest.approx(np.zeros(len(start)), abs=1e-9)
+    moved = perturbed_robot(robot, numbers, start[-len(numbers) :].tolist())
+    gains = sensor_errors(numbers, start[-len(numbers) :].tolist(), 3).gains[3:]
+    directions = np.array([np.subtract(anchor, robot.platform.start) for anchor in moved.anchors]).T
+    tensions = np.linalg.solve(directions / np.linalg.norm(directions, axis=0), [0.0, 0.0, 9.81 * robot.platform.mass])
+    assert np.array(outputs).ravel()[6:9] == pytest.approx(gains * tensions)
 
 
 def test_they_are_states_that_never_move_and_start_as_declared() -> None:

@@ -73,7 +73,7 @@ def compare_cosimulations(
 
     Recordings are corrected for the constant errors that their sensors may have, as far as those are stated.
     """
-    recordings = [calibrate(fitter, robot, sample).without_sensor_offsets(sample.recording) for sample in data_sets]
+    recordings = [calibrate(fitter, robot, sample).without_sensor_errors(sample.recording) for sample in data_sets]
     comparisons = tuple(
         Comparison(role, recording, b, a, cosimulation_errors(recording, b), cosimulation_errors(recording, a))
         for role, recording, b, a in zip(ROLES, recordings, runs_before, runs_after, strict=False)

@@ -164,7 +164,7 @@ def calibrated_estimation_data(prepared: PreparedData, robot: Robot) -> tuple[Ro
     data = prepared.split.estimation
     calibration = calibrate(prepared.fitter, robot, data)
     return calibration.calibrated_robot(robot), replace(
-        data, recording=calibration.without_sensor_offsets(data.recording)
+        data, recording=calibration.without_sensor_errors(data.recording)
     )
 
 

@@ -24,12 +24,13 @@ from ..robot.schema import InitialState, Robot
 from ..robot.static_equilibrium import static_tensions
 from ..robot.symbolic_model import SymbolicModel
 from ..robot.uncertain_parameters import (
+    ANCHOR,
     DAMPING,
     MASS,
     MODULUS,
     UncertainParameter,
     perturbed_robot,
-    sensor_offsets,
+    sensor_errors,
     uncertain_parameters,
 )
 from .estimation_data import DataSet
@@ -63,17 +64,31 @@ class Calibration:
             if parameter.kind == MASS:
                 platform = replace(platform, mass_uncertainty=parameter.standard_deviation * deviation)
             elif parameter.kind in (MODULUS, DAMPING):
-                key, index = f"{parameter.kind}_uncertainty", parameter.index - 1
+                key, index = f"{parameter.kind}_uncertainty", parameter.cable - 1
                 cables[index] = replace(cables[index], **{key: parameter.standard_deviation * deviation})
+        for number, deviations in self._anchor_deviations().items():
+            cables[number - 1] = replace(cables[number - 1], anchor_uncertainty=float(np.sqrt(np.mean(deviations**2))))
         return replace(updated, platform=platform, cables=tuple(cables))
 
-    def without_sensor_offsets(self, recording: Recording) -> Recording:
+    def _anchor_deviations(self) -> dict[int, Array]:
+        """Posterior standard deviations (3,) of the coordinates of each uncertain anchor, by cable."""
+        deviations: dict[int, Array] = {}
+        for parameter, deviation in zip(self.parameters, self.standard_deviations.tolist(), strict=True):
+            if parameter.kind == ANCHOR:
+                of_cable = deviations.setdefault(parameter.cable, np.zeros(3))
+                of_cable[parameter.axis] = parameter.standard_deviation * deviation
+        return deviations
+
+    def without_sensor_errors(self, recording: Recording) -> Recording:
         """The recording without the estimated constant errors of its sensors."""
-        offset_vector = np.array(sensor_offsets(self.parameters, self.estimates.tolist(), recording.tension.shape[1]))
-        if not np.any(offset_vector):
+        errors = sensor_errors(self.parameters, self.estimates.tolist(), recording.tension.shape[1])
+        gains, offsets = np.array(errors.gains), np.array(errors.offsets)
+        if np.all(gains == 1.0) and not np.any(offsets):
             return recording
         return replace(
-            recording, position=recording.position - offset_vector[:3], tension=recording.tension - offset_vector[3:]
+            recording,
+            position=(recording.position - offsets[:3]) / gains[:3],
+            tension=(recording.tension - offsets[3:]) / gains[3:],
         )
 
     def notes(self, robot: Robot, path: str) -> tuple[str, ...]:

@@ -43,10 +43,18 @@ OFFSET_RULES = {
     "position_offset_uncertainty": NumberRule(
         "the standard deviation of the tracker's constant error", "m", minimum=0.0, default=0.0
     ),
+    "tension_gain_uncertainty": NumberRule(
+        "the standard deviation of a load cell's gain about 1", "", minimum=0.0, default=0.0
+    ),
 }
 MASS_UNCERTAINTY_RULE = NumberRule("the standard deviation of the true mass", "kg", minimum=0.0, default=0.0)
-MODULUS_UNCERTAINTY_RULE = NumberRule("the standard deviation of the true modulus", "Pa", minimum=0.0, default=0.0)
-DAMPING_UNCERTAINTY_RULE = NumberRule("the standard deviation of the true damping", "Pa s", minimum=0.0, default=0.0)
+CABLE_UNCERTAINTY_RULES = {
+    "modulus_uncertainty": NumberRule("the standard deviation of the true modulus", "Pa", minimum=0.0, default=0.0),
+    "damping_uncertainty": NumberRule("the standard deviation of the true damping", "Pa s", minimum=0.0, default=0.0),
+    "anchor_uncertainty": NumberRule(
+        "the standard deviation of each coordinate of the true exit point", "m", minimum=0.0, default=0.0
+    ),
+}
 MODULUS_RULE = NumberRule("the modulus of elasticity", "Pa", positive=True)
 AREA_RULE = NumberRule("the area of the rope's cross-section", "m^2", positive=True)
 DAMPING_RULE = NumberRule("the damping", "Pa s", minimum=0.0, default=0.0)
@@ -187,6 +195,7 @@ def _read_sensors(table: CheckedTable) -> Sensors:
         noises["winch_speed_noise"],
         offsets["tension_offset_uncertainty"],
         offsets["position_offset_uncertainty"],
+        offsets["tension_gain_uncertainty"],
     )
 
 
@@ -212,7 +221,7 @@ def _read_cables(root: CheckedTable, start: Point) -> tuple[Cable, ...]:
 
 
 def _read_cable(table: CheckedTable) -> Cable:
-    table.require_known(("anchor", "modulus", "area", "damping", "law", "modulus_uncertainty", "damping_uncertainty"))
+    table.require_known(("anchor", "modulus", "area", "damping", "law", *CABLE_UNCERTAINTY_RULES))
     laws = " or ".join(f'"{law}"' for law in LAWS)
     law = table.text("law", f"write law = {laws}")
     if law is not None and law not in LAWS:
@@ -223,8 +232,7 @@ def _read_cable(table: CheckedTable) -> Cable:
         area=table.number("area", AREA_RULE),
         damping=table.number("damping", DAMPING_RULE),
         law=law or "",
-        modulus_uncertainty=table.number("modulus_uncertainty", MODULUS_UNCERTAINTY_RULE),
-        damping_uncertainty=table.number("damping_uncertainty", DAMPING_UNCERTAINTY_RULE),
+        **{key: table.number(key, rule) for key, rule in CABLE_UNCERTAINTY_RULES.items()},
     )
 
 

@@ -110,6 +110,7 @@ def _sensor_block(sensors: Sensors) -> list[str]:
     lines = [_number_line(key, value, unit) for key, value, unit in noises if value is not None]
     lines += _deviation_line("tension_offset_uncertainty", sensors.tension_offset_uncertainty, "N")
     lines += _deviation_line("position_offset_uncertainty", sensors.position_offset_uncertainty, "m")
+    lines += _deviation_line("tension_gain_uncertainty", sensors.tension_gain_uncertainty, "of 1")
     return ["[sensors]  # standard deviation of one sample", *lines] if lines else []
 
 
@@ -140,6 +141,7 @@ def _cable_block(number: int, cable: Cable) -> list[str]:
         f"law = {json.dumps(cable.law, ensure_ascii=False)}",
         *_deviation_line("modulus_uncertainty", cable.modulus_uncertainty, "Pa"),
         *_deviation_line("damping_uncertainty", cable.damping_uncertainty, "Pa s"),
+        *_deviation_line("anchor_uncertainty", cable.anchor_uncertainty, "m, of each coordinate"),
     ]
 
 

@@ -33,6 +33,7 @@ position_noise = 2e-4             # m
 tension_noise = 1.0               # N
 winch_speed_noise = 1e-4          # m/s
 # tension_offset_uncertainty = 2.0    # N, constant error of a load cell
+# tension_gain_uncertainty = 0.004    # of a load cell's gain about 1
 # position_offset_uncertainty = 1e-3  # m, constant error of the tracker, on each axis
 
 # One table for each cable, three or more. The law of tension is T = E S eps + c S deps/dt + T0.
@@ -46,6 +47,7 @@ damping = 1.0e9                   # Pa s, c; 0 when absent
 law = "logarithmic"               # eps is ln(l/l_u); or "linear", l/l_u - 1
 # modulus_uncertainty = 2e9       # Pa
 # damping_uncertainty = 1e8       # Pa s
+# anchor_uncertainty = 2e-3       # m, of each coordinate
 """
 TEMPLATE_TAIL = """
 # Winches that follow a speed command with limited dynamics; without this table the rope runs exactly at that speed.

@@ -70,7 +70,8 @@ class Sensors:
     """Sensor noise, standard deviation of a sample: position in m, tension in N, winch speed in m/s; None if unknown.
 
     ``tension_offset_uncertainty`` (N) and ``position_offset_uncertainty`` (m): standard deviations of the constant
-    offset of each load cell, and of the tracker on each axis.
+    offset of each load cell, and of the tracker on each axis; ``tension_gain_uncertainty``, that of each load cell's
+    gain about 1.
     """
 
     position_noise: float | None = None
@@ -78,13 +79,15 @@ class Sensors:
     winch_speed_noise: float | None = None
     tension_offset_uncertainty: float = 0.0
     position_offset_uncertainty: float = 0.0
+    tension_gain_uncertainty: float = 0.0
 
 
 @dataclass(frozen=True)
 class Cable:
     """One cable: ``anchor`` in m, ``modulus`` in Pa, ``area`` in m^2, ``damping`` in Pa s; ``law``.
 
-    ``modulus_uncertainty`` and ``damping_uncertainty``: standard deviations of the true values, in the same units.
+    ``modulus_uncertainty``, ``damping_uncertainty`` and, for each coordinate, ``anchor_uncertainty``: standard
+    deviations of the true values, in the same units.
     """
 
     anchor: Point
@@ -94,6 +97,7 @@ class Cable:
     law: str
     modulus_uncertainty: float = 0.0
     damping_uncertainty: float = 0.0
+    anchor_uncertainty: float = 0.0
 
 
 @dataclass(frozen=True)

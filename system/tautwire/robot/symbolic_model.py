@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import casadi
@@ -23,7 +23,7 @@ from tautwire_fmu.laws.vectors import add, scale
 from .robot_assembly import RobotAssembly, assemble_robot
 from .schema import AXES, EffectSetting, Robot
 from .symbolic_statics import symbolic_start_tensions
-from .uncertain_parameters import UncertainParameter, perturbed_robot, sensor_offsets
+from .uncertain_parameters import SensorErrors, UncertainParameter, perturbed_robot, sensor_errors
 
 Array = NDArray[np.float64]
 
@@ -82,13 +82,18 @@ class SymbolicModel:
 
 @dataclass(frozen=True)
 class _Variables:
-    """The mechanical states, and the inputs, as symbols."""
+    """The mechanical states, and the inputs, as symbols.
+
+    ``length_shifts`` (n) are what unstrained lengths are longer than their states: a state starts at the length that
+    the declared anchors give, whatever the uncertain ones are.
+    """
 
     position: SX
     velocity: SX
     unstrained_lengths: SX
     winch_speeds: SX
     external_force: SX
+    length_shifts: SX = field(default_factory=SX)
 
     @property
     def states(self) -> SX:
@@ -147,16 +152,16 @@ def symbolic_model(
         winch_speeds=SX.sym("winch_speed", count),
         external_force=SX.sym("external_force", 3),
     )
+    variables = replace(variables, length_shifts=_length_shifts(assembly, perturbations))
     effect_states, equations = _minimal_equations(assembly, variables)
     constant = SX(len(perturbations), 1)
-    sensor_offset = casadi.vertcat(*map(SX, sensor_offsets(uncertain_parameters, perturbations, count)))
     first_effect_state = variables.states.numel()
     return SymbolicModel(
         states=casadi.vertcat(variables.states, *(each.symbol for each in effect_states), *perturbations),
         inputs=variables.inputs,
         parameters=casadi.vertcat(*symbols) if symbols else SX(0, 1),
         rates=casadi.vertcat(equations.rates, constant),
-        outputs=equations.outputs + casadi.vertcat(sensor_offset[:3], SX(3, 1), sensor_offset[3:], SX(count, 1)),
+        outputs=_shown(equations.outputs, sensor_errors(uncertain_parameters, perturbations, count)),
         span_tensions=equations.span_tensions,
         sensor_delays=_sensor_delays(assembly),
         start=casadi.vertcat(_nominal_start(_initial_state(assembly, len(effect_states)), perturbations), constant),
@@ -178,9 +183,26 @@ def symbolic_model(
     )
 
 
+def _shown(outputs: SX, errors: SensorErrors) -> SX:
+    """The outputs as sensors with constant errors show them; velocities and lengths are not measured."""
+    shown = casadi.vertsplit(outputs)
+    measured_rows = [*range(3), *range(6, 3 + len(errors.gains))]
+    for row, gain, offset in zip(measured_rows, errors.gains, errors.offsets, strict=True):
+        shown[row] = (shown[row] if isinstance(gain, float) else gain * shown[row]) + offset
+    return casadi.vertcat(*shown)
+
+
 def _initial_state(assembly: RobotAssembly, effect_state_count: int) -> SX:
     lengths = [SX(component.constants.start_length) for component in assembly.cables]
     return casadi.vertcat(SX(list(assembly.start)), SX(list(assembly.velocity)), *lengths, SX(effect_state_count, 1))
+
+
+def _length_shifts(assembly: RobotAssembly, perturbations: Sequence[SX]) -> SX:
+    """How much longer the cables are at the start (n,) than at the declared values of the uncertain parameters."""
+    lengths = casadi.vertcat(*(SX(component.constants.start_length) for component in assembly.cables))
+    if not perturbations or not casadi.depends_on(lengths, casadi.vertcat(*perturbations)):
+        return SX(lengths.shape[0], 1)
+    return lengths - _nominal_start(lengths, perturbations)
 
 
 def _nominal_start(start: SX, perturbations: Sequence[SX]) -> SX:
@@ -290,7 +312,8 @@ def _equations(assembly: RobotAssembly, variables: _Variables, effect_states: li
     symbols = iter(effect_states)
     for index, component in enumerate(assembly.cables):
         states = tuple(tuple(next(symbols) for _ in a.effect.states) for a in component.effects)
-        state = cable_law.CableState(variables.unstrained_lengths[index], 0.0, states)
+        unstrained_length = variables.unstrained_lengths[index] + variables.length_shifts[index]
+        state = cable_law.CableState(unstrained_length, 0.0, states)
         inputs = cable_law.CableInputs(position, velocity, variables.winch_speeds[index])
         arguments = (CASADI_MATHEMATICS, component.constants, component.effects, state)
         span = cable_law.span(CASADI_MATHEMATICS, component.constants, inputs, component.effects)

@@ -12,17 +12,27 @@ from typing import Any
 from .schema import AXES, Robot
 
 MODULUS, DAMPING, MASS = "modulus", "damping", "mass"
-TENSION_OFFSET, POSITION_OFFSET = "tension_offset", "position_offset"
-UNITS = {MODULUS: "Pa", DAMPING: "Pa s", MASS: "kg", TENSION_OFFSET: "N", POSITION_OFFSET: "m"}
+ANCHOR = "anchor"
+TENSION_OFFSET, TENSION_GAIN, POSITION_OFFSET = "tension_offset", "tension_gain", "position_offset"
+UNITS = {
+    MODULUS: "Pa",
+    DAMPING: "Pa s",
+    MASS: "kg",
+    ANCHOR: "m",
+    TENSION_OFFSET: "N",
+    TENSION_GAIN: "",
+    POSITION_OFFSET: "m",
+}
 
 
 @dataclass(frozen=True)
 class UncertainParameter:
-    """An uncertain parameter: kind, cable or axis (from 1, 0 for the platform), and standard deviation in SI units."""
+    """An uncertain parameter: its kind, cable (from 1, 0 for none), standard deviation in SI units, axis (from 0)."""
 
     kind: str
-    index: int
+    cable: int
     standard_deviation: float
+    axis: int = 0
 
     @property
     def unit(self) -> str:
@@ -30,12 +40,14 @@ class UncertainParameter:
         return UNITS[self.kind]
 
     def declared(self, robot: Robot) -> float:
-        """Declared value; zero for a sensor offset, of which nothing is declared."""
+        """Declared value; zero for a sensor's offset and one for its gain, of which nothing is declared."""
         if self.kind == MASS:
             return robot.platform.mass
         if self.kind in (MODULUS, DAMPING):
-            return float(getattr(robot.cables[self.index - 1], self.kind))
-        return 0.0
+            return float(getattr(robot.cables[self.cable - 1], self.kind))
+        if self.kind == ANCHOR:
+            return robot.cables[self.cable - 1].anchor[self.axis]
+        return 1.0 if self.kind == TENSION_GAIN else 0.0
 
     @property
     def label(self) -> str:
@@ -43,8 +55,11 @@ class UncertainParameter:
         if self.kind == MASS:
             return MASS
         if self.kind == POSITION_OFFSET:
-            return f"offset of {AXES[self.index - 1]}"
-        return f"{'offset of tension' if self.kind == TENSION_OFFSET else f'{self.kind} of cable'} {self.index}"
+            return f"offset of {AXES[self.axis]}"
+        if self.kind == ANCHOR:
+            return f"anchor {AXES[self.axis]} of cable {self.cable}"
+        names = {TENSION_OFFSET: "offset of tension", TENSION_GAIN: "gain of tension"}
+        return f"{names.get(self.kind, f'{self.kind} of cable')} {self.cable}"
 
 
 def uncertain_parameters(robot: Robot) -> tuple[UncertainParameter, ...]:
@@ -54,32 +69,52 @@ def uncertain_parameters(robot: Robot) -> tuple[UncertainParameter, ...]:
     for index, cable in enumerate(robot.cables, start=1):
         parameters.append(UncertainParameter(MODULUS, index, cable.modulus_uncertainty))
         parameters.append(UncertainParameter(DAMPING, index, cable.damping_uncertainty))
+        parameters += [UncertainParameter(ANCHOR, index, cable.anchor_uncertainty, axis) for axis in range(3)]
         parameters.append(UncertainParameter(TENSION_OFFSET, index, sensors.tension_offset_uncertainty))
-    parameters += [UncertainParameter(POSITION_OFFSET, axis, sensors.position_offset_uncertainty) for axis in (1, 2, 3)]
+        parameters.append(UncertainParameter(TENSION_GAIN, index, sensors.tension_gain_uncertainty))
+    parameters += [
+        UncertainParameter(POSITION_OFFSET, 0, sensors.position_offset_uncertainty, axis) for axis in range(3)
+    ]
     return tuple(number for number in parameters if number.standard_deviation > 0.0)
 
 
 def perturbed_robot(robot: Robot, parameters: Sequence[UncertainParameter], perturbations: Sequence[Any]) -> Robot:
-    """The robot with each parameter perturbed by a multiple of its standard deviation, except sensor offsets."""
+    """The robot with each parameter perturbed by a multiple of its standard deviation, except those of sensors."""
     platform, cables = robot.platform, list(robot.cables)
     for parameter, perturbation in zip(parameters, perturbations, strict=True):
         change = parameter.standard_deviation * perturbation
         if parameter.kind == MASS:
             platform = replace(platform, mass=platform.mass + change)
         elif parameter.kind in (MODULUS, DAMPING):
-            cable = cables[parameter.index - 1]
-            cables[parameter.index - 1] = replace(cable, **{parameter.kind: getattr(cable, parameter.kind) + change})
+            cable = cables[parameter.cable - 1]
+            cables[parameter.cable - 1] = replace(cable, **{parameter.kind: getattr(cable, parameter.kind) + change})
+        elif parameter.kind == ANCHOR:
+            cable = cables[parameter.cable - 1]
+            x, y, z = (value + change if axis == parameter.axis else value for axis, value in enumerate(cable.anchor))
+            cables[parameter.cable - 1] = replace(cable, anchor=(x, y, z))
     return replace(robot, platform=platform, cables=tuple(cables))
 
 
-def sensor_offsets(
+@dataclass(frozen=True)
+class SensorErrors:
+    """Constant errors of x, y, z (m) and of each tension (N): an output is shown as ``gains * value + offsets``."""
+
+    gains: tuple[Any, ...]
+    offsets: tuple[Any, ...]
+
+
+def sensor_errors(
     parameters: Sequence[UncertainParameter], perturbations: Sequence[Any], cable_count: int
-) -> list[Any]:
-    """Sensor offsets of x, y, z (m) and of each tension (N), for multiples of the standard deviations."""
-    offset_values: list[Any] = [0.0] * (3 + cable_count)
+) -> SensorErrors:
+    """Constant errors of the sensors, for multiples of the standard deviations."""
+    gains: list[Any] = [1.0] * (3 + cable_count)
+    offsets: list[Any] = [0.0] * (3 + cable_count)
     for parameter, perturbation in zip(parameters, perturbations, strict=True):
+        error = parameter.standard_deviation * perturbation
         if parameter.kind == POSITION_OFFSET:
-            offset_values[parameter.index - 1] = parameter.standard_deviation * perturbation
+            offsets[parameter.axis] = error
         elif parameter.kind == TENSION_OFFSET:
-            offset_values[2 + parameter.index] = parameter.standard_deviation * perturbation
-    return offset_values
+            offsets[2 + parameter.cable] = error
+        elif parameter.kind == TENSION_GAIN:
+            gains[2 + parameter.cable] = 1.0 + error
+    return SensorErrors(tuple(gains), tuple(offsets))
