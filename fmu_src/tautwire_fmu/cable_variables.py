@@ -1,6 +1,6 @@
 """FMI variables of a cable, in the order in which the slave keeps their values."""
 
-from typing import Any, Dict, Tuple
+from typing import Any, Dict, Optional, Tuple
 
 from .effect_variables import effect_state_variables, effect_variables
 from .model_description import Variable, axis_names, vector_variables
@@ -52,6 +52,12 @@ def _outputs(data: Dict[str, Any]) -> Tuple[Variable, ...]:
         Variable("elongation", "output", "m", elongation_text, depends_on=position_inputs),
         Variable("strain", "output", "1", "strain by the tension law", nominal=1e-3, depends_on=position_inputs),
         Variable("pull", "output", "N", pull_text, nominal=tension, depends_on=MOTION_INPUTS),
+        *_rate_and_middle_outputs(tension),
+    )
+
+
+def _rate_and_middle_outputs(tension: Optional[float]) -> Tuple[Variable, ...]:
+    return (
         *vector_variables(
             Variable(
                 "force_rate",

@@ -17,7 +17,7 @@ import sys
 import tempfile
 import traceback
 import warnings
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import AbstractContextManager, closing, contextmanager, suppress
 from dataclasses import dataclass, replace
 from multiprocessing.connection import Connection
@@ -184,31 +184,40 @@ def simulate_isolated(
     Raises CallAbortedError where an FMU hangs or ends its process, RunAbortedError where the source does, and whatever
     the run raises; the recorder has the rows until then. No process and no temporary file remains.
     """
-    job, times = Job(build_system, experiment, tuple(observed_outputs)), experiment.times
+    job = Job(build_system, experiment, tuple(observed_outputs))
     with (
         defer_interrupts() as raise_interrupt,
         TemporaryDirectory(prefix="tautwire-run-", ignore_cleanup_errors=True) as folder,
         closing(CallJournal(Path(folder))) as journal,
         _worker_process(job, Path(folder), journal) as (process, receiver),
     ):
-        statistics, row_count = None, 0
-        for message in _receive_messages(process, receiver, journal, call_timeout, raise_interrupt):
-            content, kind = message[:-1], message[-1:]
-            if kind == ROW_MESSAGE:
-                recorder.add(float(times[row_count]), np.frombuffer(content))
-                row_count += 1
-                if progress is not None and row_count > 1:
-                    progress((row_count - 1) / (len(times) - 1))
-            elif kind == ERROR_MESSAGE:
-                error, text = pickle.loads(content)
-                raise error from RemoteTracebackError(text)
-            else:
-                statistics = pickle.loads(content)
+        messages = _receive_messages(process, receiver, journal, call_timeout, raise_interrupt)
+        statistics = _record_rows(messages, experiment.times, recorder, progress)
         last_entry = journal.last_entry()
         process.join(SHUTDOWN_TIMEOUT)
         if statistics is None or (process.exitcode != 0 and last_entry.component is not None):
             raise _aborted_error(last_entry, _exit_reason(process.exitcode))
         return statistics
+
+
+def _record_rows(
+    messages: Iterable[bytes], times: Array, recorder: Recorder, progress: Progress | None
+) -> RunStatistics | None:
+    """Passes rows on to the recorder; returns the run statistics, None without any, or raises the worker's error."""
+    statistics, row_count = None, 0
+    for message in messages:
+        content, kind = message[:-1], message[-1:]
+        if kind == ROW_MESSAGE:
+            recorder.add(float(times[row_count]), np.frombuffer(content))
+            row_count += 1
+            if progress is not None and row_count > 1:
+                progress((row_count - 1) / (len(times) - 1))
+        elif kind == ERROR_MESSAGE:
+            error, text = pickle.loads(content)
+            raise error from RemoteTracebackError(text)
+        else:
+            statistics = pickle.loads(content)
+    return statistics
 
 
 def start_method() -> Literal["fork", "spawn"]:

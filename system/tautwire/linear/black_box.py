@@ -30,7 +30,7 @@ from .pulse_experiments import (
     Responses,
     pulse_experiment,
 )
-from .realisation import SignalIndices
+from .realisation import SignalIndices, StateSpaceMatrices
 from .step_refinement import MAX_RELATIVE_ERROR, refine_step
 
 Array = NDArray[np.float64]
@@ -102,13 +102,7 @@ def linearise_fmus(
     Raises IdentificationError where the system is not at rest, or is not smooth there, the named states are
     incomplete, or no step is short enough; ComponentError where an FMU fails.
     """
-    states, inputs = signals.states or {}, list(signals.inputs)
-    observed_ports = list(dict.fromkeys([*signals.outputs.values(), *states.values()]))
-    indices = SignalIndices(
-        outputs=tuple(observed_ports.index(port) for port in signals.outputs.values()),
-        states=tuple(observed_ports.index(port) for port in states.values()) or None,
-        state_names=tuple(states),
-    )
+    observed_ports, indices = _observed_signals(signals)
     input_ports = list(signals.inputs.values())
     with pulse_experiment(make_coupling, rest_inputs or {}, input_ports, observed_ports) as experiment:
         refined = refine_step(experiment, indices, step, tolerance)
@@ -118,20 +112,35 @@ def linearise_fmus(
             f"the states leave {matrices.residual:.2g} of the responses unexplained",
             "name all states, or none, so that they are found",
         )
-    system = control.ss(
-        *(getattr(matrices, name) for name in "ABCD"),
-        states=list(states) or [f"x_{k}" for k in range(1, len(matrices.A) + 1)],
-        inputs=inputs,
-        outputs=list(signals.outputs),
-        name="black_box",
-    )
     return BlackBoxPlant(
-        system,
+        _state_space(matrices, signals),
         refined.step,
         refined.error,
         matrices.state_scales,
         refined.responses.amplitudes,
-        _operating_point_notes(inputs, observed_ports, refined.responses),
+        _operating_point_notes(list(signals.inputs), observed_ports, refined.responses),
+    )
+
+
+def _observed_signals(signals: PlantSignals) -> tuple[list[Port], SignalIndices]:
+    """The ports to record, each once, and where the plant's outputs and states are among them."""
+    states = signals.states or {}
+    observed_ports = list(dict.fromkeys([*signals.outputs.values(), *states.values()]))
+    return observed_ports, SignalIndices(
+        outputs=tuple(observed_ports.index(port) for port in signals.outputs.values()),
+        states=tuple(observed_ports.index(port) for port in states.values()) or None,
+        state_names=tuple(states),
+    )
+
+
+def _state_space(matrices: StateSpaceMatrices, signals: PlantSignals) -> Any:
+    """The plant as ``control.StateSpace`` with named signals; unnamed states are ``x_1`` ..."""
+    return control.ss(
+        *(getattr(matrices, name) for name in "ABCD"),
+        states=list(signals.states or {}) or [f"x_{k}" for k in range(1, len(matrices.A) + 1)],
+        inputs=list(signals.inputs),
+        outputs=list(signals.outputs),
+        name="black_box",
     )
 
 

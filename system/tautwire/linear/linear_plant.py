@@ -73,25 +73,25 @@ def linearise(robot: Robot, at: Sequence[float] | Array | None = None, swing: fl
     A, B, C, D, tension_jacobian = _jacobians(model, state)
     tension_slopes = tension_jacobian[:, POSITION]
     modes = modes_of(robot, position, tensions, tension_slopes, A, B)
-    system = control.ss(
-        A,
-        B,
-        C,
-        D,
-        states=signal_names(model.state_names),
-        inputs=signal_names(model.input_names),
-        outputs=signal_names(model.output_names),
-        name="plant",
-    )
     operating_point = OperatingPoint(robot, model, state, tensions, tension_slopes)
     return LinearPlant(
-        system,
+        _state_space(model, (A, B, C, D)),
         position,
         tensions,
         tension_slopes,
         state,
         modes,
         validity_notes(operating_point, (A, B, C, D), modes, swing),
+    )
+
+
+def _state_space(model: SymbolicModel, matrices: tuple[Array, Array, Array, Array]) -> Any:
+    return control.ss(
+        *matrices,
+        states=signal_names(model.state_names),
+        inputs=signal_names(model.input_names),
+        outputs=signal_names(model.output_names),
+        name="plant",
     )
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -63,10 +63,7 @@ def refine_step(experiment: PulseExperiment, signals: SignalIndices, step: float
         }
         if not previous_tables:
             continue
-        norm = _ScaledNorm(responses, signals)
-        changes = {order: norm.distance(row[-1], previous_tables[order][-1]) for order, row in tables.items()}
-        order = min(changes, key=changes.__getitem__)
-        change = changes[order]
+        order, change = _most_converged_order(_ScaledNorm(responses, signals), tables, previous_tables)
         if best is None or change < best.error:
             best = RefinedMatrices(tables[order][-1], step_size, change, responses)
         if change <= tolerance or change > DIVERGENCE_FACTOR * best.error:
@@ -75,6 +72,17 @@ def refine_step(experiment: PulseExperiment, signals: SignalIndices, step: float
         raise _divergence(step, best)
     _require_prediction(best.matrices, first, signals, experiment.observed_ports)
     return best
+
+
+def _most_converged_order(
+    norm: _ScaledNorm,
+    tables: Mapping[int, Sequence[StateSpaceMatrices]],
+    previous_tables: Mapping[int, Sequence[StateSpaceMatrices]],
+) -> tuple[int, float]:
+    """The order whose extrapolated matrices changed least since the previous step, and that relative change."""
+    changes = {order: norm.distance(row[-1], previous_tables[order][-1]) for order, row in tables.items()}
+    order = min(changes, key=changes.__getitem__)
+    return order, changes[order]
 
 
 def _divergence(step: float, best: RefinedMatrices | None) -> IdentificationError:

@@ -91,13 +91,19 @@ def wrench_feasible_workspace(
             if progress is not None:
                 progress(count / margin.size)
             position = np.array([axis[k] for axis, k in zip(axes, index, strict=True)])
-            try:
-                margin[index] = wrench_margin(robot, position, acceleration)
-                tensions = static_tensions(robot, position)
-            except UnreachableError:
-                continue
-            min_tension[index], max_tension[index] = np.min(tensions), np.max(tensions)
+            margin[index], min_tension[index], max_tension[index] = _evaluate_position(robot, position, acceleration)
     return Workspace(axes, margin, min_tension, max_tension)
+
+
+def _evaluate_position(robot: Robot, position: Array, acceleration: float) -> tuple[float, float, float]:
+    """Margin, lowest and highest static tension at a position in m, all in N; NaN as in :class:`Workspace`."""
+    margin = np.nan
+    try:
+        margin = wrench_margin(robot, position, acceleration)
+        tensions = static_tensions(robot, position)
+    except UnreachableError:
+        return margin, np.nan, np.nan
+    return margin, float(np.min(tensions)), float(np.max(tensions))
 
 
 def wrench_margin(robot: Robot, position: Array, acceleration: float = 0.0) -> float:

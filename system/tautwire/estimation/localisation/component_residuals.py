@@ -39,9 +39,6 @@ def strongest_correlation(
 
     Source: Bartlett (1935), J. R. Stat. Soc. 98, 536; Holm (1979), Scand. J. Stat. 6, 65.
     """
-    # Imported here: it takes long to import, and only traces need it.
-    from scipy.stats import t as student
-
     is_finite = np.isfinite(residual)
     if np.sum(is_finite) < MIN_SAMPLES:
         return None
@@ -54,11 +51,9 @@ def strongest_correlation(
             continue
         correlation = float(np.clip(np.mean(standardised * other), -1.0 + 1e-12, 1.0 - 1e-12))
         variance_inflation = 1.0 + 2.0 * float(np.sum(autocorrelation * _autocorrelation(other)))
-        degrees_of_freedom = len(standardised) / max(variance_inflation, 1.0) - 2.0
-        t_statistic = abs(correlation) * np.sqrt(max(degrees_of_freedom, 0.0) / (1.0 - correlation**2))
         names.append(name)
         correlations.append(correlation)
-        p_values.append(2.0 * float(student.sf(t_statistic, degrees_of_freedom)) if degrees_of_freedom > 1.0 else 1.0)
+        p_values.append(_correlation_p_value(correlation, len(standardised) / max(variance_inflation, 1.0)))
     is_significant = _holm_correction(np.array(p_values), significance_level)
     candidates = [
         SignalCorrelation(name, correlation)
@@ -66,6 +61,16 @@ def strongest_correlation(
         if significant
     ]
     return max(candidates, key=lambda candidate: abs(candidate.correlation), default=None)
+
+
+def _correlation_p_value(correlation: float, sample_count: float) -> float:
+    """Two-sided p-value of a correlation of so many independent samples, by Student's distribution."""
+    # Imported here: it takes long to import, and only traces need it.
+    from scipy.stats import t as student
+
+    degrees_of_freedom = sample_count - 2.0
+    t_statistic = abs(correlation) * np.sqrt(max(degrees_of_freedom, 0.0) / (1.0 - correlation**2))
+    return 2.0 * float(student.sf(t_statistic, degrees_of_freedom)) if degrees_of_freedom > 1.0 else 1.0
 
 
 def _holm_correction(p_values: Array, significance_level: float) -> NDArray[np.bool_]:

@@ -39,29 +39,23 @@ def isolate_fault(
     Where all of several cables deviate the position sensor is in question as well.
     """
     deviating_cables = [number for number, deviates in deviating_by_cable.items() if deviates]
-    position_sensor = ["the position sensor"] if len(deviating_cables) == len(deviating_by_cable) > 1 else []
     if platform_deviates is None:
         return _without_balance(deviating_by_cable, deviating_cables)
     if not deviating_cables:
         return PLATFORM if platform_deviates else NO_COMPONENT
+    position_sensor = ["the position sensor"] if len(deviating_cables) == len(deviating_by_cable) > 1 else []
     if not platform_deviates:
         cable_parts = "rope, winch or exit point" if set(deviating_cables) <= set(exit_candidates) else "rope or winch"
         return alternatives([f"{numbered('cable', deviating_cables)} ({cable_parts})", *position_sensor])
+    return _load_cells_in_question(deviating_cables, balance_closes, position_sensor)
+
+
+def _load_cells_in_question(cables: Sequence[int], balance_closes: bool, position_sensor: Sequence[str]) -> str:
+    """The components in question where the tensions of cables and the platform's balance deviate."""
+    load_cells = numbered("load cell", cables)
     if balance_closes:
-        return alternatives(
-            [
-                numbered("load cell", deviating_cables),
-                "friction before it" if len(deviating_cables) == 1 else "friction before them",
-            ]
-        )
-    return alternatives(
-        [
-            numbered("load cell", deviating_cables),
-            numbered("exit point", deviating_cables),
-            *position_sensor,
-            "several components",
-        ]
-    )
+        return alternatives([load_cells, "friction before it" if len(cables) == 1 else "friction before them"])
+    return alternatives([load_cells, numbered("exit point", cables), *position_sensor, "several components"])
 
 
 def isolation_verdict(

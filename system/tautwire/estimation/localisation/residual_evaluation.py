@@ -42,13 +42,33 @@ def cable_residual(
 
         expected^2 = sigma_T^2 + k' P k + kappa^2 sigma_V^2 sum h^2, the last less that of its mean
     """
-    recording, path, noise = measured.recording, measured.path, measured.noise
-    anchor = np.array(measured.robot.cables[number - 1].anchor)
-    load_cell_noise = noise.of_outputs(recording.cable_count)[2 + number]
+    recording = measured.recording
     residual = recording.tension[:, number - 1] - run.tension
     is_measured = np.isfinite(residual)
     mean = float(np.mean(residual[is_measured]))
     residual = residual - mean
+    expected, relative_deviation = _expected_variance(measured, number, run, is_measured)
+    anchor = np.array(measured.robot.cables[number - 1].anchor)
+    signals = _cable_signals(run, recording.winch_speed[:, number - 1], measured.path, anchor)
+    return ComponentResidual(
+        component=f"cable {number}",
+        quantity="tension",
+        unit="N",
+        residual=residual,
+        mean=mean,
+        rms=root_mean_square(residual),
+        expected_rms=float(np.sqrt(expected)),
+        threshold=_threshold(relative_deviation, policy),
+        correlated_signal=strongest_correlation(residual, signals, policy.correlation_level),
+    )
+
+
+def _expected_variance(
+    measured: MeasuredPorts, number: int, run: CableSimulation, is_measured: NDArray[np.bool_]
+) -> tuple[float, float]:
+    """Expected variance (N^2) of a cable's residual, and the relative standard deviation of its mean square."""
+    path, noise = measured.path, measured.noise
+    load_cell_noise = noise.of_outputs(measured.recording.cable_count)[2 + number]
     drift, drift_of_mean = drift_variance(run, path.time, noise.winch_speed)
     steady_variance = float(np.mean(tension_variance(run, path, load_cell_noise, noise.winch_speed)[is_measured]))
     drift_excess = max(float(np.mean(drift[is_measured])) - drift_of_mean, 0.0)
@@ -62,18 +82,7 @@ def cable_residual(
         path_variance * np.sqrt(2.0 / max(independent_samples, 1.0)),
         RANDOM_WALK_DEVIATION * drift_excess,
     )
-    signals = _cable_signals(run, recording.winch_speed[:, number - 1], path, anchor)
-    return ComponentResidual(
-        component=f"cable {number}",
-        quantity="tension",
-        unit="N",
-        residual=residual,
-        mean=mean,
-        rms=root_mean_square(residual),
-        expected_rms=float(np.sqrt(expected)),
-        threshold=_threshold(float(np.sqrt(np.sum(np.square(terms)))) / expected, policy),
-        correlated_signal=strongest_correlation(residual, signals, policy.correlation_level),
-    )
+    return expected, float(np.sqrt(np.sum(np.square(terms)))) / expected
 
 
 def platform_residual(
