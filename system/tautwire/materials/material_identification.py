@@ -54,14 +54,13 @@ Progress = Callable[[str, float], None]
 def error_assumptions(
     table: MaterialTable,
     pair: tuple[str, str],
-    shared_variance: float,
-    coverage_factor: float,
+    options: MaterialOptions,
     structures: Mapping[Role, ModelStructure],
 ) -> tuple[ErrorAssumption, ...]:
     """Goodness of fit of each model under each reading of the errors, that in use first."""
     return tuple(
         ErrorAssumption(label, {role: _fit_outcome(observations, each) for role, each in structures.items()})
-        for label, observations in _error_readings(table, pair, shared_variance, coverage_factor)
+        for label, observations in _error_readings(table, pair, options)
     )
 
 
@@ -71,10 +70,12 @@ def _fit_outcome(observations: ModulusObservations, structure: ModelStructure) -
 
 
 def _error_readings(
-    table: MaterialTable, pair: tuple[str, str], shared_variance: float, coverage_factor: float
+    table: MaterialTable, pair: tuple[str, str], options: MaterialOptions
 ) -> Iterator[tuple[str, ModulusObservations]]:
     def read(
-        read_pair: tuple[str, str] = pair, shared: float = shared_variance, coverage: float = coverage_factor
+        read_pair: tuple[str, str] = pair,
+        shared: float = options.shared_variance,
+        coverage: float = options.coverage_factor,
     ) -> ModulusObservations:
         return observations_from_table(table, read_pair, shared, coverage)
 
@@ -83,9 +84,9 @@ def _error_readings(
         if other != pair:
             yield f"from {other[0]} and {other[1]}", read(other)
     for assumed_share in (0.0, ASSUMED_SHARED_VARIANCE):
-        if assumed_share != shared_variance:
+        if assumed_share != options.shared_variance:
             yield f"{assumed_share:.0%} of each variance common to all rows", read(shared=assumed_share)
-    if coverage_factor != TWO_SIGMA_COVERAGE:
+    if options.coverage_factor != TWO_SIGMA_COVERAGE:
         yield "uncertainties are two standard deviations", read(coverage=TWO_SIGMA_COVERAGE)
     if table.static_rows:
         yield "static rows fitted too", read().with_static_rows(table)
@@ -123,6 +124,7 @@ def trace_material(
     effects = _identified_effects(selection, chosen, declared, options.significance_level)
     verdict_name = _decide(reference, chosen, effects, options.significance_level)
     effects_identified = verdict_name == "effects"
+    accepted = chosen if effects_identified else reference
     progress("fitting under other error assumptions", 0.0)
     return MaterialVerdict(
         verdict=verdict_name,
@@ -134,14 +136,12 @@ def trace_material(
         effects=effects if effects_identified else (),
         confusable_effects=_confusable_effects(selection, options.significance_level) if effects_identified else (),
         error_before=_errors_by_use(observations, reference),
-        error_after=_errors_by_use(observations, chosen if effects_identified else reference),
+        error_after=_errors_by_use(observations, accepted),
         noise_floor=noise_floor(observations),
         adequate_before=reference.p_value >= options.significance_level,
-        adequate_after=(chosen if effects_identified else reference).p_value >= options.significance_level,
+        adequate_after=accepted.p_value >= options.significance_level,
         consistency_checks=consistency_checks(table),
-        error_assumptions=error_assumptions(
-            table, pair, options.shared_variance, options.coverage_factor, _compared_structures(selection)
-        ),
+        error_assumptions=error_assumptions(table, pair, options, _compared_structures(selection)),
         static_checks=tuple(_static_checks(table, by_role)),
         relaxation_floor=relaxation_floor(observations),
         seconds=time.perf_counter() - start_time,
