@@ -38,9 +38,7 @@ def campaign(
     Example: tautwire campaign plan.toml --out campaign/
     """
     from ..atomic_output import refuse_overwriting_inputs
-    from ..campaigns.campaign_dataset import completed_runs, open_dataset
-    from ..campaigns.campaign_runner import require_libraries, run_campaign, run_count, write_summary
-    from ..campaigns.dask_cluster import dashboard_message, dask_client
+    from ..campaigns.campaign_runner import require_libraries
     from ..campaigns.plan_file import read_plan
     from ..estimation import processors
 
@@ -55,10 +53,19 @@ def campaign(
         raise InputError("--out", "is missing", "name a folder, as in --out campaign/, or add --dry-run")
     require_libraries(plan)
     refuse_overwriting_inputs([plan_file, Path(plan.file)], [out / name for name in ("campaign.json", "summary.json")])
+    _run_and_summarise(plan, out, scheduler, workers or processors(), output)
+
+
+def _run_and_summarise(plan: Plan, out: Path, scheduler: str | None, workers: int, output: CommandOutput) -> None:
+    """Runs what the dataset lacks, writes the summary and prints it."""
+    from ..campaigns.campaign_dataset import completed_runs, open_dataset
+    from ..campaigns.campaign_runner import run_campaign, run_count, write_summary
+    from ..campaigns.dask_cluster import dashboard_message, dask_client
+
     new_runs = 0
     with open_dataset(out, plan):
         if not completed_runs(out, run_count(plan)).all():
-            with dask_client(scheduler, workers or processors()) as client, progress_bar(output) as progress:
+            with dask_client(scheduler, workers) as client, progress_bar(output) as progress:
                 output.note(dashboard_message(client))
                 if not client.nthreads():
                     output.note("no worker yet; runs begin when one connects")
@@ -97,8 +104,8 @@ def _print_rows(plan: Plan, output: CommandOutput) -> None:
         output.result((), {"rows": list(rows)})
         return
     writer = csv.writer(sys.stdout, lineterminator="\n")
-    for place, row in enumerate(rows):
-        if place == 0:
+    for index, row in enumerate(rows):
+        if index == 0:
             writer.writerow(row)
         writer.writerow(f"{value:.10g}" if isinstance(value, float) else value for value in row.values())
 

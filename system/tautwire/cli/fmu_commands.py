@@ -15,10 +15,12 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
-from ..robot.schema import fmu_slots
+from ..robot.schema import Robot, fmu_slots
 from .console import AsJson, CommandOutput, Quiet, RobotFile, progress_bar, read_holdable_robot, relative_links
 
 if TYPE_CHECKING:
+    from ..cosimulation.robot_wiring import Column
+    from ..cosimulation.run_statistics import RunStatistics
     from ..fmus.fmu_ports import FmuPort
 
 NON_TERMINAL_WIDTH = 160
@@ -95,9 +97,8 @@ def simulate(
     from ..atomic_output import refuse_overwriting_inputs, refuse_same_output
     from ..cosimulation.recording_simulation import simulate_recording
     from ..cosimulation.result_file import open_result_file
-    from ..cosimulation.robot_wiring import result_columns
     from ..cosimulation.run_arguments import SimulationOptions, validate_numbers
-    from ..fmus.fmu_slots import check_user_fmus, missing_user_fmu_ports, parse_user_fmus
+    from ..fmus.fmu_slots import check_user_fmus, parse_user_fmus
     from ..reports.run_overview import RecorderPair, RunOverview
     from ..reports.run_page import atomic_run_page
 
@@ -110,8 +111,7 @@ def simulate(
     )
     refuse_same_output(out, report)
     check_user_fmus(robot)
-    missing_ports = missing_user_fmu_ports({own.slot: own.path for own in robot.fmus}, robot.cable_count)
-    columns = result_columns(robot.cable_count, robot.winch_numbers, missing_ports)
+    columns = _result_columns(robot)
     overview, links = RunOverview(), {} if report is None else relative_links(report, robot_file, out)
     with (
         atomic_run_page(report, robot, columns, overview, speeds, links) as write_page,
@@ -124,22 +124,37 @@ def simulate(
         write_page(statistics, notes)
     for note in notes:
         output.note(note)
+    _print_statistics(statistics, notes, {"result": out} | ({"report": report} if report else {}), output)
+    output.suggest_next(
+        f"tautwire trace {robot_file} {speeds} --out report/, if positions or tensions were measured too"
+    )
+
+
+def _result_columns(robot: Robot) -> list[Column]:
+    """Columns of the result file, without those of ports that user FMUs lack."""
+    from ..cosimulation.robot_wiring import result_columns
+    from ..fmus.fmu_slots import missing_user_fmu_ports
+
+    missing_ports = missing_user_fmu_ports({own.slot: own.path for own in robot.fmus}, robot.cable_count)
+    return result_columns(robot.cable_count, robot.winch_numbers, missing_ports)
+
+
+def _print_statistics(
+    statistics: RunStatistics, notes: Sequence[str], written: Mapping[str, Path], output: CommandOutput
+) -> None:
     error_text = "" if statistics.estimated_error is None else f", estimated error {statistics.estimated_error:.2g} m"
     summary_lines = [
-        f"{out}: {statistics.steps} steps, {statistics.iterations} iterations, energy residual "
+        f"{written['result']}: {statistics.steps} steps, {statistics.iterations} iterations, energy residual "
         f"{statistics.energy_residual:.2g} J{error_text}"
     ]
-    written = {"result": out} | ({"report": report} if report else {})
     statistics_record = {
         "steps": statistics.steps,
         "redos": statistics.iterations,
         "energy_made": statistics.energy_residual,
         "error": statistics.estimated_error,
     }
-    output.result([*summary_lines, *([report] if report else [])], {**written, **statistics_record, "notes": notes})
-    output.suggest_next(
-        f"tautwire trace {robot_file} {speeds} --out report/, if positions or tensions were measured too"
-    )
+    pages = [written["report"]] if "report" in written else []
+    output.result([*summary_lines, *pages], {**written, **statistics_record, "notes": notes})
 
 
 def fmus(robot_file: RobotFile, as_json: AsJson = False, quiet: Quiet = False) -> None:

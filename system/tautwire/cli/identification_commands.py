@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import shutil
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 from rich.console import Console
@@ -13,6 +13,13 @@ from rich.console import Console
 from ..errors import InputError
 from ..robot.robot_file_reader import read_robot
 from .console import AsJson, CommandOutput, Quiet, RobotFile, note_unused_tables, progress_bar, read_holdable_robot
+
+if TYPE_CHECKING:
+    from ..estimation import Trace
+    from ..materials import MaterialOptions, MaterialVerdict
+    from ..materials.material_table import MaterialTable
+    from ..materials.viscoelastic_model import Material
+    from ..robot.schema import Robot
 
 DYNAMIC_TEST_HELP = "A dynamic test of the rope; by default Table 1 of the paper, with its declared pair."
 
@@ -40,23 +47,11 @@ def material(
     Example: tautwire material dma.csv --robot robot.toml --out material/
     """
     from ..atomic_output import atomic_folder, refuse_overwriting_inputs
-    from ..materials import (
-        PAPER_PAIR_FREQUENCY,
-        PAPER_TABLE,
-        MaterialOptions,
-        pair_of_row,
-        read_material_table,
-        trace_material,
-    )
-    from ..materials.material_files import MATERIAL_FILES, material_document, write_material
-    from ..materials.material_report import material_verdict_table
+    from ..materials import PAPER_PAIR_FREQUENCY, PAPER_TABLE, MaterialOptions, pair_of_row, read_material_table
+    from ..materials.material_files import MATERIAL_FILES
     from ..materials.robot_material import declared_material
 
-    for name, value, minimum in (("--shared", shared, 0.0), ("--alpha", alpha, math.nextafter(0.0, 1.0))):
-        if not minimum <= value < 1.0:
-            raise InputError(name, f"{value:g} is not a share below 1", "give a number such as 0.01")
-    if not 0.0 < coverage < math.inf:
-        raise InputError("--coverage", f"{coverage:g} is not positive", "give 1, or 2 for intervals of 95 %")
+    _validate_material_options(shared, alpha, coverage)
     if at is not None and robot_file:
         raise InputError("--at", "the pair in use is the robot's", "give either --at or --robot")
     output = CommandOutput(as_json, quiet)
@@ -68,22 +63,49 @@ def material(
         at = PAPER_PAIR_FREQUENCY
     if at is not None:
         declared = pair_of_row(measurements, at)
+    options = MaterialOptions(shared_variance=shared, coverage_factor=coverage, significance_level=alpha)
     with atomic_folder(out) as scratch:
-        with progress_bar(output) as progress:
-            verdict = trace_material(
-                measurements,
-                declared,
-                MaterialOptions(shared_variance=shared, coverage_factor=coverage, significance_level=alpha),
-                progress,
-            )
-        write_material(verdict, scratch, robot)
-    if not (quiet or as_json):
-        Console().print(material_verdict_table(verdict))
-    output.result([out / "fit.json"], {"folder": out, **material_document(verdict)})
+        verdict = _fit_material(measurements, declared, options, robot, scratch, output)
+    _print_material(verdict, out / "fit.json", output)
     if robot is not None:
         output.suggest_next(
             f"tautwire check {out / 'robot.toml'} RECORDING.csv, and trace: does the robot move like that?"
         )
+
+
+def _validate_material_options(shared: float, alpha: float, coverage: float) -> None:
+    for name, value, minimum in (("--shared", shared, 0.0), ("--alpha", alpha, math.nextafter(0.0, 1.0))):
+        if not minimum <= value < 1.0:
+            raise InputError(name, f"{value:g} is not a share below 1", "give a number such as 0.01")
+    if not 0.0 < coverage < math.inf:
+        raise InputError("--coverage", f"{coverage:g} is not positive", "give 1, or 2 for intervals of 95 %")
+
+
+def _fit_material(
+    measurements: MaterialTable,
+    declared: Material | None,
+    options: MaterialOptions,
+    robot: Robot | None,
+    folder: Path,
+    output: CommandOutput,
+) -> MaterialVerdict:
+    """Fits models to a dynamic test and writes the fit, and a robot with the fitted rope, into a folder."""
+    from ..materials import trace_material
+    from ..materials.material_files import write_material
+
+    with progress_bar(output) as progress:
+        verdict = trace_material(measurements, declared, options, progress)
+    write_material(verdict, folder, robot)
+    return verdict
+
+
+def _print_material(verdict: MaterialVerdict, path: Path, output: CommandOutput) -> None:
+    from ..materials.material_files import material_document
+    from ..materials.material_report import material_verdict_table
+
+    if not (output.quiet or output.as_json):
+        Console().print(material_verdict_table(verdict))
+    output.result([path], {"folder": path.parent, **material_document(verdict)})
 
 
 def judge_rope_material(table: Path, robot_file: Path, out: Path, alpha: float, output: CommandOutput) -> None:
@@ -93,23 +115,19 @@ def judge_rope_material(table: Path, robot_file: Path, out: Path, alpha: float, 
     """
     from ..atomic_output import atomic_folder, refuse_overwriting_inputs
     from ..fmus.packaging import build_fmus
-    from ..materials import MaterialOptions, read_material_table, trace_material
-    from ..materials.material_files import MATERIAL_FILES, material_document, write_material
-    from ..materials.material_report import material_verdict_table
+    from ..materials import MaterialOptions, read_material_table
+    from ..materials.material_files import MATERIAL_FILES
     from ..materials.robot_material import declared_material
 
     measurements, robot = read_material_table(table), read_holdable_robot(robot_file)
     refuse_overwriting_inputs([table, robot_file], [out / name for name in (*MATERIAL_FILES, "report.json")])
     declared = declared_material(robot, str(robot_file))
     with atomic_folder(out) as scratch:
-        with progress_bar(output) as progress:
-            verdict = trace_material(measurements, declared, MaterialOptions(significance_level=alpha), progress)
-        write_material(verdict, scratch, robot)
+        options = MaterialOptions(significance_level=alpha)
+        verdict = _fit_material(measurements, declared, options, robot, scratch, output)
         shutil.copyfile(scratch / "fit.json", scratch / "report.json")
         build_fmus(read_robot(scratch / "robot.toml"), scratch)
-    if not (output.quiet or output.as_json):
-        Console().print(material_verdict_table(verdict))
-    output.result([out / "report.json"], {"folder": out, **material_document(verdict)})
+    _print_material(verdict, out / "report.json", output)
 
 
 def trace(
@@ -137,7 +155,7 @@ def trace(
     from ..estimation.identification import validated_false_alarm_rate
     from ..materials.material_table import is_material_table
     from ..recordings.recording import read_recording
-    from ..reports import trace_document, trace_table, write_report
+    from ..reports import write_report
 
     validated_false_alarm_rate("--alpha", alpha)
     output = CommandOutput(as_json, quiet)
@@ -156,7 +174,13 @@ def trace(
         progress("writing the report", 0.0)
         write_report(trace_result, scratch)
     note_unused_tables(robot, output)
-    if not (quiet or as_json):
+    _print_trace(trace_result, out, output)
+
+
+def _print_trace(trace_result: Trace, out: Path, output: CommandOutput) -> None:
+    from ..reports import trace_document, trace_table
+
+    if not (output.quiet or output.as_json):
         Console().print(trace_table(trace_result))
     output.result([out / "index.html"], {"folder": out, **trace_document(trace_result)})
     output.suggest_next(
