@@ -1,14 +1,11 @@
-"""Steps that are too long for what couples the FMUs, and FMUs that discard a step."""
+"""Macro steps that are too long for the coupling of a light platform on stiff cables."""
 
 from __future__ import annotations
-
-from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from tautwire.cosimulation import (
-    ComponentError,
     CouplingSolver,
     Experiment,
     FixedStep,
@@ -16,8 +13,6 @@ from tautwire.cosimulation import (
     PiecewiseLinearInput,
     simulate,
 )
-from tautwire.cosimulation.coupling_state import Checkpoint
-from tautwire.cosimulation.macro_step import MAX_HALVINGS, step_with_rejection
 from tautwire.cosimulation.robot_cosimulation import instantiate_robot
 from tautwire.cosimulation.robot_wiring import recorded_ports
 from tautwire.fmus.packaging import RobotFmus, build_fmus
@@ -73,52 +68,3 @@ def test_steps_that_converge_stay_whole(planar: tuple[RobotFmus, RigRobot]) -> N
     error, coupling = errors(planar, 0.01)
     assert error < 1e-7
     assert coupling.statistics.steps < 1.1 * 1200
-
-
-class Given:
-    """A solver of which only steps up to ``longest`` (s) do not diverge; an FMU fails with ``status`` in the others."""
-
-    def __init__(self, longest: float, status: str | None = None) -> None:
-        self.longest, self.status = longest, status
-        self.state = SimpleNamespace(diverged=False)
-        self.tried: list[float] = []
-        self.released = 0
-
-    def attempt_step(self, time: float, step: float, start: np.ndarray, end: np.ndarray) -> Checkpoint | None:
-        self.tried.append(step)
-        self.state.diverged = step > self.longest
-        if self.state.diverged and self.status is not None:
-            raise ComponentError("cable_1", "fmi2DoStep", self.status, time, {}, ())
-        return Checkpoint((), None)  # type: ignore[arg-type]
-
-    def restore(self, checkpoint: Checkpoint) -> None:
-        pass
-
-    def release(self, checkpoint: Checkpoint) -> None:
-        self.released += 1
-
-
-def held(given: Given) -> float:
-    return step_with_rejection(given, 0.0, 0.16, lambda time, step: (np.zeros(0), np.zeros(0)))[0]  # type: ignore[arg-type]
-
-
-@pytest.mark.parametrize("status", [None, "discard", "error"])
-def test_a_step_is_halved_until_it_holds(status: str | None) -> None:
-    given = Given(0.05, status)
-    assert held(given) == pytest.approx(0.04)
-    assert given.tried == pytest.approx([0.16, 0.08, 0.04])
-    assert given.released == (2 if status is None else 0)
-
-
-def test_the_shortest_step_is_accepted_even_if_it_diverges() -> None:
-    given = Given(0.0)
-    assert held(given) == pytest.approx(0.16 / 2**MAX_HALVINGS)
-    assert given.state.diverged
-
-
-@pytest.mark.parametrize(("status", "tries"), [("discard", MAX_HALVINGS + 1), ("fatal", 1)])
-def test_an_fmu_that_fails_however_short_the_step_is_told(status: str, tries: int) -> None:
-    given = Given(0.0, status)
-    with pytest.raises(ComponentError, match=status):
-        held(given)
-    assert len(given.tried) == tries
