@@ -55,7 +55,7 @@ def test_a_robot_file_with_an_odd_key_is_told_what_is_known(tmp_path: Path, adde
 
 
 @pytest.mark.parametrize(
-    ("cells", "mend"),
+    ("cells", "hint"),
     [
         (["Time", "winch_speed_1"], "add it, or rename 'Time'"),
         (["time", "winch_speed1"], "add it, or rename 'winch_speed1'"),
@@ -63,7 +63,7 @@ def test_a_robot_file_with_an_odd_key_is_told_what_is_known(tmp_path: Path, adde
         (["time", f"winch_speed_{'9' * 5000}"], "add it"),
     ],
 )
-def test_a_missing_column_is_not_taken_for_one_of_another_cable(cells: list[str], mend: str) -> None:
+def test_a_missing_column_is_not_taken_for_one_of_another_cable(cells: list[str], hint: str) -> None:
     faults: list[str] = []
     parse_header(cells, "here", 1, lambda error: faults.append(error.hint))
-    assert faults == [mend]
+    assert faults == [hint]

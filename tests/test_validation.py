@@ -1,4 +1,4 @@
-"""The rules that single values keep: each names what it was given, the bound and the mend."""
+"""Rules of single values: each error names the value, the bound and a hint."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Plans: what they refuse, in one line that says how to mend it, and which numbers they make."""
+"""Plans: errors of one line with a hint, and the values that are drawn."""
 
 from __future__ import annotations
 

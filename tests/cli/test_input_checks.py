@@ -84,7 +84,7 @@ def about(problem: Problem) -> tuple[int | None, str]:
     """The line and the key of a problem, after checking that its text names both."""
     before, _, key = problem.where.rpartition(", ")
     assert before == f"{problem.file}: line {problem.line}"
-    assert problem.problem and problem.mend
+    assert problem.problem and problem.hint
     return problem.line, key
 
 

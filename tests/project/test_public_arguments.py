@@ -1,4 +1,4 @@
-"""What the library's other names refuse: arguments are told with value, bound and mend."""
+"""Invalid arguments of the library's other names raise errors with value, bound and hint."""
 
 from __future__ import annotations
 

@@ -303,8 +303,8 @@ def test_refuses_a_path_that_is_no_file(tmp_path: Path, name: str, words: str) -
 
 def test_every_message_names_its_file_first(tmp_path: Path) -> None:
     error = refused(tmp_path, HALL.replace("mass = 80.0", "mass = -1"))
-    mend = "give the platform's mass in kg"
-    assert str(error) == f"{tmp_path / 'robot.toml'}: platform.mass: is -1.0, must be above 0 kg; {mend}"
+    hint = "give the platform's mass in kg"
+    assert str(error) == f"{tmp_path / 'robot.toml'}: platform.mass: is -1.0, must be above 0 kg; {hint}"
 
 
 @settings(max_examples=200, deadline=None)

@@ -37,10 +37,10 @@ class Problem:
     line: int | None
     where: str
     problem: str
-    mend: str
+    hint: str
 
     def __str__(self) -> str:
-        return one_line(f"{self.where}: {self.problem}; {self.mend}")
+        return one_line(f"{self.where}: {self.problem}; {self.hint}")
 
 
 @dataclass(frozen=True)
