@@ -66,7 +66,8 @@ STEP_SIZE_RTOL = 1e-6
 class ConvergenceCriterion:
     """Convergence criterion: the iteration error against a tolerance or a share of the interpolation error.
 
-    ``tolerance`` is relative to nominal values; with an ``interpolation_error_share`` of zero it alone decides.
+    ``tolerance`` is the convergence tolerance, relative to nominal values; with an ``interpolation_error_share`` of
+    zero it alone decides.
 
     The interpolation error is not evaluated where the iteration error is far above what the step before was allowed,
     unless no iteration is left. Iterating further is not worth while: the step itself has the interpolation error.

@@ -3,8 +3,8 @@
 The tear variables, outputs that a sweep uses before it computes them, are extrapolated to the end of the step. Then
 each instance in turn steps over ``[t, t + h]`` on inputs that run from their values at ``t`` to those last known at
 ``t + h`` (value and derivative at both ends and at the midpoint, a Hermite polynomial), and its outputs are read
-there. While the error exceeds the tolerance, all instances roll back and step again. Converged, the step is symmetric
-in time: the coupling neither creates nor dissipates energy.
+there. While the error exceeds the convergence tolerance, all instances roll back and step again. Converged, the step is
+symmetric in time: the coupling neither creates nor dissipates energy.
 
 Source: Kuebler and Schiehlen (2000), Mathematical and Computer Modelling of Dynamical Systems 6(2), 93-113, on
 iterated coupling; the polynomial through value and derivative at both ends is the Hermite form.
@@ -41,7 +41,7 @@ DIVERGENCE_THRESHOLD = 1e-3
 class SolverOptions:
     """Options of the iteration within a macro step.
 
-    ``tolerance`` is relative to the nominal values of the connected outputs; an error below
+    ``tolerance`` is the convergence tolerance, relative to the nominal values of the connected outputs; an error below
     ``interpolation_error_share`` of the interpolation error at mid-step is enough as well, see
     :class:`ConvergenceCriterion`. ``max_iterations`` bounds the iterations of a step, each a rollback and a new sweep,
     accelerated by :class:`QuasiNewton`.
@@ -185,7 +185,8 @@ class CouplingSolver:
     def update_inputs(self) -> None:
         """Update the inputs that the last step took from extrapolated or iterated tear variables.
 
-        In a converged step that changes outputs by no more than the tolerance, so it waits until they are read.
+        In a converged step that changes outputs by no more than the convergence tolerance: it waits until they are
+        read.
         """
         if self.state.pending_input_time is not None:
             self._propagate(self.state.pending_input_time, self._tear_readers)

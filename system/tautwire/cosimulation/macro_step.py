@@ -63,7 +63,7 @@ def _attempt_step(coupling: CouplingSolver, time: float, step: float, external_i
 
 # An event nearer than this (s) is stepped over; the error is of second order in it.
 EVENT_WIDTH = 1e-6
-EVENT_TOLERANCE = 0.2 * EVENT_WIDTH
+EVENT_LOCATION_TOLERANCE = 0.2 * EVENT_WIDTH
 MAX_SUBSTEPS = 40
 # Relative to the remaining step: no substep leaves less.
 MIN_REMAINING_SHARE = 1e-6
@@ -138,14 +138,14 @@ def _land_before_event(
         return 0.0
     step_end, retreat = step, 0.0
     while True:
-        tolerance = max(LANDING_RTOL * step_end, EVENT_TOLERANCE)
-        if step_end - EVENT_WIDTH <= tolerance:
+        xtol = max(LANDING_RTOL * step_end, EVENT_LOCATION_TOLERANCE)
+        if step_end - EVENT_WIDTH <= xtol:
             indicators_after(EVENT_WIDTH)
             return 0.0
         known_indicators = {EVENT_WIDTH: begin_indicators, step_end: end_indicators}
-        crossing = min(_zero_crossing(indicators_after, known_indicators, int(index), tolerance) for index in changed)
+        crossing = min(_zero_crossing(indicators_after, known_indicators, int(index), xtol) for index in changed)
         # Never further back than half of the remaining span, so that the loop terminates.
-        retreat = max(tolerance, 4.0 * retreat)
+        retreat = max(xtol, 4.0 * retreat)
         step_end = max(crossing - retreat, 0.5 * (EVENT_WIDTH + crossing))
         end_indicators = indicators_after(step_end)
         changed = np.flatnonzero(np.sign(end_indicators) != signs)
@@ -154,11 +154,11 @@ def _land_before_event(
 
 
 def _zero_crossing(
-    indicators_after: Callable[[float], Array], known_indicators: Mapping[float, Array], index: int, tolerance: float
+    indicators_after: Callable[[float], Array], known_indicators: Mapping[float, Array], index: int, xtol: float
 ) -> float:
-    """The zero crossing of the indicator at ``index``, between two spans at which it is known already."""
+    """Locates a zero crossing of the indicator at ``index`` to ``xtol`` (s), between two spans at which it is known."""
 
     def indicator(span: float) -> float:
         return float((known_indicators[span] if span in known_indicators else indicators_after(span))[index])
 
-    return float(brentq(indicator, min(known_indicators), max(known_indicators), xtol=tolerance))
+    return float(brentq(indicator, min(known_indicators), max(known_indicators), xtol=xtol))

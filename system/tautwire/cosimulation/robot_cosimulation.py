@@ -177,9 +177,9 @@ def cosimulate(
 
     ``time`` (N,) in s, rising, and ``winch_speed`` (N, n) in m/s, positive reels in, are arrays or columns of a frame.
     Speeds are those of the rope, or the commands of the winches where the robot has such. Macro steps are no longer
-    than ``step`` (s); or such that their estimated errors of all lengths sum to at most ``tolerance`` (m), where one is
-    given. ``progress`` gets the share that is done. With a ``patience`` (s) an FMU that is in one call for so long, or
-    takes its process down, is one that fails. Returns the run at ``time``: arrays (N, 3) and (N, n) in SI units.
+    than ``step`` (s), or adaptive where a ``tolerance`` (m) is given, a bound on the sum of their local errors in all
+    lengths. ``progress`` gets the completed fraction. With a ``patience`` (s) an FMU fails that takes so long in
+    one call, or ends its process. Returns the run at ``time``: arrays (N, 3) and (N, n) in SI units.
 
     Raises RunError where an FMU fails, StepSizeError where no step meets the tolerance, SlotError where an FMU of the
     user's starts elsewhere or cannot make such steps, ArgumentError where an argument is none of these.
@@ -197,7 +197,7 @@ def cosimulate(
 
 
 def step_size_control_for(step: float, tolerance: float | None, time: Array) -> StepSizeControl:
-    """Steps no longer than ``step`` (s), or by a ``tolerance`` (m) for a run over ``time`` where one is given."""
+    """Steps no longer than ``step`` (s); or adaptive where a global error ``tolerance`` (m) is given."""
     return FixedStep(step) if tolerance is None else AdaptiveStep(tolerance, float(time[-1] - time[0]))
 
 

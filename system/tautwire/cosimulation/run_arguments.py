@@ -17,9 +17,9 @@ CALL_TIMEOUT_RULE = NumberRule("the timeout of one FMU call, or infinity,", "s",
 
 @dataclass(frozen=True)
 class SimulationOptions:
-    """Options of a run: the longest macro ``step`` (s), or a ``tolerance`` (m) that chooses the steps; times in s.
+    """Options of a run: the longest macro ``step`` (s), or the global error ``tolerance`` (m) of adaptive steps.
 
-    The run ends at ``until`` where one is given; with a ``call_timeout`` an FMU that is in one call for so long fails.
+    The run ends at ``until`` (s) where one is given; an FMU call that takes ``call_timeout`` (s) fails.
     """
 
     step: float

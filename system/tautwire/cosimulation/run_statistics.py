@@ -76,8 +76,8 @@ class RunStatistics:
     Over a step h, a bond sends ``effort sent x flow received`` and gets ``effort received x flow sent``; half of h
     times their difference at its end is the energy residual (J), which no component has produced. It is zero where
     inputs equal outputs at both ends; interpolation errors between them do not show. ``estimated_error`` is the sum of
-    the steps' estimated errors (m), where steps were chosen by a tolerance. ``unconverged_steps`` did not converge
-    within all iterations. ``squared_derivative_errors`` sums the squared error estimates of estimated derivatives.
+    the local errors (m) that adaptive steps estimate. ``unconverged_steps`` did not converge within all iterations.
+    ``squared_derivative_errors`` sums the squared error estimates of estimated derivatives.
 
     Source: Sadjina, Kyllingstad, Skjong and Pedersen (2017), Energy conservation and power bonds in co-simulations,
     Engineering with Computers 33(3), 607-620.
@@ -106,7 +106,7 @@ class RunStatistics:
         self.energy_exchanged += step * float(np.sum(np.abs(effort_sent * flow_sent)))
 
     def add_estimated_error(self, error: float) -> None:
-        """Add the estimated error (m) of a step that was chosen by a tolerance."""
+        """Add the estimated local error (m) of an accepted adaptive step."""
         self.estimated_error = (self.estimated_error or 0.0) + error
 
     def add_derivative_errors(self, errors: Array) -> None:

@@ -1,4 +1,4 @@
-"""Step-size control: macro steps bounded by a length, or chosen by an error tolerance."""
+"""Step-size control: macro steps bounded by a length, or chosen by an error estimate."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ Array = NDArray[np.float64]
 ReadLengths = Callable[[], Array]
 
 SAFETY_FACTOR = 0.9
-# Local errors may grow as they propagate, so they get less than a third of the tolerance.
+# Local errors may grow as they propagate, so they get less than a third of the global error tolerance.
 LOCAL_ERROR_SHARE = 0.3
 MIN_STEP_SHARE = 1e-6
 MIN_STEP_GROWTH, MAX_STEP_FACTOR, MIN_STEP_FACTOR = 1.3, 4.0, 0.1
@@ -26,7 +26,7 @@ MIN_COUPLING_TOLERANCE, MAX_COUPLING_TOLERANCE = 1e-12, 1e-7
 
 
 class StepSizeError(TautwireError):
-    """The tolerance requires a step below the smallest one; carries time (s), step (s) and the error estimated (m)."""
+    """The error tolerance requires a step below the smallest one; carries time (s), step (s) and the estimate (m)."""
 
     def __init__(self, time: float, step: float, error: float) -> None:
         self.time = time
@@ -92,11 +92,12 @@ class FixedStep:
 
 @dataclass
 class AdaptiveStep:
-    """Adaptive macro steps: local errors over a run of ``duration`` (s) sum to at most 0.3 times ``tolerance`` (m).
+    """Adaptive macro steps for a global error tolerance ``tolerance`` (m) over a run of ``duration`` (s).
 
-    A step may err by ``LOCAL_ERROR_SHARE * tolerance * step / duration``; its parts go through the same rejection as
-    fixed steps. Step doubling: each step is made whole and, after a rollback, in two halves, which are accepted; for
-    order p their error is the difference over ``2^p - 1``.
+    The local error tolerance of a step is ``LOCAL_ERROR_SHARE * tolerance * step / duration``, so that local errors
+    sum to at most 0.3 times ``tolerance``; its substeps are rejected as those of fixed steps are. Step doubling: each
+    step is made whole and, after a rollback, in two halves, which are accepted; for order p their error is the
+    difference over ``2^p - 1``.
     """
 
     tolerance: float
@@ -105,7 +106,7 @@ class AdaptiveStep:
 
     @property
     def solver_options(self) -> SolverOptions:
-        """A tenth of the tolerance, of outputs whose nominal values are taken for metres."""
+        """A convergence tolerance of a tenth of the global error tolerance, as if nominal values were metres."""
         return SolverOptions(min(max(0.1 * self.tolerance, MIN_COUPLING_TOLERANCE), MAX_COUPLING_TOLERANCE))
 
     def advance(
