@@ -12,6 +12,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from math import log10
 
 import numpy as np
@@ -118,7 +119,8 @@ def design_excitation(
     declared = robot.sensors
     noise = Noise(declared.position_noise or 0.0, declared.tension_noise or 0.0, declared.winch_speed_noise or 0.0, 0.0)
     likelihood = Likelihood(robot, (), noise, options.interval)
-    design = _DesignProblem(robot, tuple(effects), options, likelihood)
+    # Declared noise is the same for all programs: they share what one fitter has compiled.
+    design = _DesignProblem(robot, tuple(effects), options, likelihood, lru_cache(maxsize=1)(Fitter))
     count = 6 * (SLOW_SINES + FAST_SINES)
     bounds = Bounds(np.zeros(count), np.ones(count))
     generations = max(1, options.programs // count - 1)
@@ -146,6 +148,7 @@ class _DesignProblem:
     effects: tuple[Hypothesis, ...]
     options: DesignOptions
     likelihood: Likelihood
+    fitter_for: Callable[[Noise], Fitter]
 
     def score(self, decision_variables: Array) -> float:
         """Log10 of the smallest separation in nats."""
@@ -202,7 +205,7 @@ class _DesignProblem:
     def separations(self, path: MultisinePath) -> list[EffectSeparation]:
         """Separations of each effect from each other, the closest first."""
         recording = self._simulate(path)
-        fitter = Fitter(estimate_noise(self.robot, recording))
+        fitter = self.fitter_for(estimate_noise(self.robot, recording))
         sample = DataSet(recording, self.robot.platform.start, np.ones(len(recording.time), dtype=bool))
         signatures = score_statistics(self.robot, (), self.effects, fitter, sample)
         start_directions = {one: start_steps(signatures, self.robot, one) for one in self.effects}
