@@ -28,7 +28,7 @@ def test_page_says_how_long_how_far_and_under_what() -> None:
     for words in (
         "Complete",
         "20.0 s along",
-        "2000 steps of the master, and 17 repeats",
+        "2000 macro steps and 17 iterations",
         "The winches were slow.",
         "cable 3",
     ):
@@ -134,9 +134,9 @@ def test_a_run_that_fails_leaves_a_page_that_says_where(tmp_path: Path) -> None:
     pd.DataFrame(speeds).to_csv(recording, index=False)
     arguments = ["simulate", str(THREE / "robot.toml"), "--speeds", str(recording)]
     assert command([*arguments, "--out", str(tmp_path / "result.csv"), "--report", str(page)]) == 1
-    found = Page(page.read_text(encoding="utf-8"))
-    assert "Stopped: an FMU failed" in found.text and "the run up to then is in" in found.text
-    assert unpack_float32(found.data()["choices"][0]["scene"]["time"]) == pytest.approx([0.0, 0.1, 0.2])
+    result = Page(page.read_text(encoding="utf-8"))
+    assert "Stopped: an FMU failed" in result.text and "the run up to then is in" in result.text
+    assert unpack_float32(result.data()["choices"][0]["scene"]["time"]) == pytest.approx([0.0, 0.1, 0.2])
 
 
 def test_a_run_that_cannot_begin_leaves_no_page(tmp_path: Path) -> None:

@@ -32,14 +32,14 @@ OUTPUT_GROUPS = {
     "frequency": "Frequency",
     "damping_ratio": "Damping ratio",
     "stiffness": "Stiffness",
-    "end": "Where it ends",
-    "path_error": "Error of the path",
+    "end": "End position",
+    "path_error": "Path error",
     "tension": "Tension",
 }
 FLAG_LABELS = {
-    "held": "The cables hold it at rest",
+    "held": "Static equilibrium exists",
     "slack": "A cable goes slack",
-    "limit_broken": "A tension limit is broken",
+    "limit_broken": "A tension limit is violated",
 }
 
 
@@ -47,7 +47,7 @@ def campaign_page(plan: Plan, robot: Robot, results: CampaignResults, links: Map
     """The page of a campaign over samples or a grid; ``links`` maps labels to paths beside the page."""
     figures, summary = figure_data(plan, robot.cable_count, results), results.summary
     subject, headline = f"{robot.name}, {robot.cable_count} cables", _headline(plan, summary)
-    verdict = ("All runs came to their end", "none")
+    verdict = ("All runs completed", "none")
     if summary.failed:
         verdict = (f"{summary.failed} of {summary.count} runs failed", "unexplained")
     return render_page(
@@ -72,7 +72,7 @@ def _headline(plan: Plan, summary: Summary) -> str:
     """The headline: number of runs, and the 95 % range of the path error or of the lowest frequency."""
     run_count_text = f"{summary.count} runs"
     for name, description in (
-        ("path_error_largest", "the largest error of the path"),
+        ("path_error_largest", "the largest path error"),
         ("frequency_1", "the lowest frequency"),
     ):
         matching = [each for each in summary.spreads if each.name == name]

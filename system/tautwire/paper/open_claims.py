@@ -108,8 +108,8 @@ def _law_readings(records: Records) -> OpenClaim:
         rows.append((label, tuple(cells)))
     return OpenClaim(
         "The laws on the helix",
-        "The first reading is the paper's Eqs 1 and 3, and that of all figures here. Its differences are largest where "
-        "the ropes turn from reeling in to paying out; the text's moments are those at which the curves of r turn. The "
+        "The first reading is the paper's Eqs 1 and 3, which all figures here use. Its differences are largest where "
+        "the ropes change from reeling in to paying out; the times in the text are those of the extrema of r. The "
         "second reading has its largest difference of r2 there too, but hardly any in r1; the last has none.",
         ("Readings", "r1 at 27.5 s, mm", "Largest at, s", "r2 at 39 s, mm", "Largest at, s"),
         tuple(rows),
@@ -130,11 +130,11 @@ def _reading_times(records: Records) -> OpenClaim:
             cells += [f"{scale * gap:.2g}", *(f"{100.0 * gap / abs(value):.1f}" for value in values)]
         rows.append((f"{moment:.1f} s", tuple(cells)))
     return OpenClaim(
-        "The moment of the 2.4 mm",
-        "Elongation and strain of a cable part by the same share, so 14 and 12 % are of different laws or of different "
-        "moments. At the text's moment they are those of either law; the 2.4 mm come a second later, and are 14 % of "
-        "the logarithmic law there, while the strain's numbers are those of 27.5 s.",
-        ("Moment", "Gap of r1, mm", "% of logarithmic", "% of linear", "Gap of strain 1, %", "% of log.", "% of lin."),
+        "The time of the 2.4 mm",
+        "Elongation and strain of a cable differ by the same percentage, so 14 and 12 % refer to different laws or "
+        "different times. At the time in the text they are relative to one law each. The difference reaches 2.4 mm a "
+        "second later, 14 % of the logarithmic law's elongation, whereas the text's strains are those at 27.5 s.",
+        ("Time", "Gap of r1, mm", "% of logarithmic", "% of linear", "Gap of strain 1, %", "% of log.", "% of lin."),
         tuple(rows),
     )
 
@@ -150,9 +150,9 @@ def _rope_areas(records: Records) -> OpenClaim:
         rows.append((label, _caroca_row(records, key)))
     return OpenClaim(
         "CAROCA's rope",
-        "The elongations and errors of Figs 10 and 11, and the path of the ramp, ask for E S = 2.8e6 N, a rope 2.2 "
-        "times as stiff as the disc of 4 mm; the disc of 6 mm is within 3 %. The frequency asks for the disc of 4 mm. "
-        "Along y the ramps part more than along x on every rope.",
+        "The elongations and errors of Figs 10 and 11 and the path of the ramp require E S = 2.8e6 N, a rope 2.2 times "
+        "as stiff as the disc of 4 mm; the disc of 6 mm is within 3 %. The frequency requires the disc of 4 mm. With "
+        "every rope the ramps differ more along y than along x.",
         (
             "Area and modulus",
             "Gap of r2 at 4 s, mm",
@@ -198,8 +198,8 @@ def _error_readings(records: Records) -> OpenClaim:
         rows.append((label, tuple(cells)))
     return OpenClaim(
         "The RMS of Fig. 11",
-        "CAROCA's axis and 0.06 mm are those of the distance, so read in all figures here. FAST's axis would be met by "
-        "either RMS, its 21.52 mm by none.",
+        "CAROCA's axis and its 0.06 mm agree with the distance, which all figures here use. FAST's axis agrees with "
+        "either RMS, its 21.52 mm with neither.",
         ("Reading", "CAROCA: axis, mm", "Gap at 4 s, mm", "FAST: axis, m", "Gap at 40 s, mm"),
         tuple(rows),
     )
@@ -213,23 +213,24 @@ def _desired_paths(parameters: PaperParameters, records: Records) -> OpenClaim:
     start = np.array(parameters.ramps["three"].start)
     share = np.linalg.norm(inelastic_path - start, axis=1) / np.linalg.norm(inelastic_path[-1] - start)
     references = {
-        "Where inelastic ropes lead": inelastic_path,
-        "That, moved to end at P3 as printed": inelastic_path + (printed - inelastic_path[-1]),
+        "Path with inelastic ropes": inelastic_path,
+        "The same, shifted to end at P3 as printed": inelastic_path + (printed - inelastic_path[-1]),
         "Straight line from P1 to P3 as printed": start + np.outer(share, printed - start),
     }
     undamped = ("three/static", "three/dynamic")
     rows: list[ReadingRow] = [("Fig. 14's axes", ("-10 to 25", "-4 to 3", "-10 to 70"))]
     for label, reference in references.items():
-        for sign, sign_text in ((1.0, "real less desired"), (-1.0, "desired less real")):
+        for sign, sign_text in ((1.0, "actual minus desired"), (-1.0, "desired minus actual")):
             rows.append((f"{label}; {sign_text}", _error_ranges(records, undamped, reference, sign)))
     with_damping = ("three/static damped", "three/damped")
-    rows.append(("As the first, damping in both", _error_ranges(records, with_damping, inelastic_path, 1.0)))
+    rows.append(("As the first, with damping in both", _error_ranges(records, with_damping, inelastic_path, 1.0)))
     rows.append(("Gaps between the moduli, undamped", _max_gaps(records, undamped)))
     rows.append(("Gaps between the moduli, damped", _max_gaps(records, with_damping)))
     return OpenClaim(
         "The desired path of Fig. 14",
-        "Along y the axis fits the first reading with the sign turned. An error of 60 mm along z is only had from P3 "
-        "as the text rounds it. No one reading gives all three axes, nor the 8, 4.5 and 9 mm between the moduli.",
+        "Along y the axis agrees with the first reading with the opposite sign. An error of 60 mm along z results only "
+        "from P3 as rounded in the text. No single reading gives all three axes, nor the 8, 4.5 and 9 mm between the "
+        "moduli.",
         ("Desired path", "x, mm", "y, mm", "z, mm"),
         tuple(rows),
     )
@@ -272,10 +273,10 @@ def _frequency_variants(parameters: PaperParameters) -> OpenClaim:
         rows.append((label, tuple(f"{frequency:.2f}" for frequency in frequencies)))
     return OpenClaim(
         "The frequencies of Fig. 15",
-        "P1 is the middle of three equal cables, so two modes share a frequency there whatever mass, area and "
-        "modulus are: Fig. 15 cannot be at P1. A mass of 100 kg (CAROCA's) with the disc and 102.2 GPa gives the sum "
-        "of the squares; the three values then belong to a place some 21 m from P1. The ratio of both moduli comes "
-        "out in any case.",
+        "P1 is equidistant from three equal cables, so two modes share a frequency there for any mass, area and "
+        "modulus: Fig. 15 cannot be at P1. A mass of 100 kg (CAROCA's) with the disc and 102.2 GPa gives the sum of "
+        "the squares; the three values then belong to a position some 21 m from P1. The ratio of the frequencies for "
+        "the two moduli is reproduced in any case.",
         ("Robot", "f1, Hz", "f2, Hz", "f3, Hz"),
         tuple(rows),
     )

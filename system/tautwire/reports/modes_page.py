@@ -129,7 +129,7 @@ def modes_page(robot: Robot, plant: LinearPlant, links: Mapping[str, str]) -> st
     """The page of a robot linearised about rest; ``links`` maps labels to paths beside the page."""
     figures, headline = modes_data(robot, plant), _modes_sentence(plant)
     subject, title = f"{robot.name}, {robot.cable_count} cables", f"{robot.name}: {headline}"
-    verdict = ("See the notes", "unexplained") if plant.notes else ("Small motions are linear here", "none")
+    verdict = ("See the notes", "unexplained") if plant.notes else ("Linear for small motions", "none")
     return render_page(
         "modes",
         PageHeader("Tautwire linear plant", subject, headline, title, *verdict, links),

@@ -6,7 +6,7 @@ const againstInput = document.getElementById("against");
 panelKinds.band = (_, place) => {
   const channel = variant().bands[place];
   const what = `${channel.title} over time, ${channel.label}`;
-  if (channel.middle === null) return { numbers: "", words: `${what}: no run has it.`, empty: "No run has it" };
+  if (channel.middle === null) return { numbers: "", words: `${what}: no values.`, empty: "No values" };
   const colour = colours();
   const time = variant().time;
   const hover = { hovertemplate: `%{y:.5~g} ${channel.unit}` };
@@ -18,13 +18,13 @@ panelKinds.band = (_, place) => {
   ];
   const axes = { xaxis: axis(colour, "Time (s)", { hoverformat: ".4~g" }), yaxis: axis(colour, channel.unit) };
   const numbers = `band up to ${channel.width} ${channel.unit} wide`;
-  return { numbers, words: `${what}: median and the middle 95 % of runs, ${numbers}.`, traces, layout: layout(colour, axes) };
+  return { numbers, words: `${what}: median and central 95 % of runs, ${numbers}.`, traces, layout: layout(colour, axes) };
 };
 
 panelKinds.spread = (_, place) => {
   const output = variant().spreads[place];
-  const what = `How often ${output.label} lies where`;
-  if (output.edges === null) return { numbers: "", words: `${what}: no run has it.`, empty: "No run has it" };
+  const what = `Histogram of ${output.label}`;
+  if (output.edges === null) return { numbers: "", words: `${what}: no values.`, empty: "No values" };
   const colour = colours();
   const edges = series(output.edges), counts = series(output.counts);
   const x = counts.map((_, k) => 0.5 * (edges[k] + edges[k + 1]));
@@ -37,14 +37,14 @@ panelKinds.spread = (_, place) => {
     type: "line", yref: "paper", y0: 0, y1: 1, x0: value, x1: value, line: { color: colour.text, width: 1, dash: "dot" },
   }));
   const axes = { xaxis: axis(colour, output.unit, { hoverformat: ".5~g" }), yaxis: axis(colour, "Runs"), bargap: 0, shapes };
-  return { numbers: output.words, words: `${what}: 95 % of runs from ${output.words}.`, traces, layout: layout(colour, axes) };
+  return { numbers: output.words, words: `${what}: 95 % of runs lie within ${output.words}.`, traces, layout: layout(colour, axes) };
 };
 
 panelKinds.against = (_, place) => {
   const output = variant().spreads[place];
   const input = report.inputs[Number(againstInput ? againstInput.value : 0)];
   const what = `${output.label} over ${input.label}`;
-  if (output.values === null) return { numbers: "", words: `${what}: no run has it.`, empty: "No run has it" };
+  if (output.values === null) return { numbers: "", words: `${what}: no values.`, empty: "No values" };
   const colour = colours();
   const traces = [{
     type: "scatter", mode: "markers", name: output.label, x: series(variant().inputs[input.place]),

@@ -13,7 +13,7 @@ panelKinds.gain = (choice, place) => {
   const output = report.gains[place];
   const { gain, phase, peak, unit, by } = output.from[Number(source.value)];
   const what = `Gain and phase over frequency, ${output.label} by ${by}`;
-  if (gain === null) return { numbers: "", words: `${what}: none.`, empty: "This input does not act here" };
+  if (gain === null) return { numbers: "", words: `${what}: none.`, empty: "This input has no effect here" };
   const colour = colours();
   const frequencies = series(report.frequency);
   const { shapes, ...room } = frequencyBands(report.bands, frequencies, colour);
