@@ -95,9 +95,9 @@ def browser() -> Iterator[Browser]:
     """One browser for all tests of a file, which skips itself where there is none."""
     from tests.support.browser.browser import browser_at, chromium
 
-    found = chromium()
-    assert found is not None
-    with browser_at(found) as opened:
+    browser_path = chromium()
+    assert browser_path is not None
+    with browser_at(browser_path) as opened:
         yield opened
 
 

@@ -50,15 +50,15 @@ def imported_modules(file: Path, root: Path) -> Iterator[tuple[int, tuple[str, .
 
 def upward_imports(system: Path) -> list[str]:
     """The imports of a module in a higher layer, or in another one of the same layer."""
-    found = []
+    results = []
     for file in sorted((system / "tautwire").rglob("*.py")):
         room = file.relative_to(system / "tautwire").with_suffix("").parts[0]
         for line, imported in imported_modules(file, system):
             if room == "__init__" or imported[0] != "tautwire" or imported[1] in ("__version__", room):
                 continue
             if LAYER_OF[imported[1]] >= LAYER_OF[room]:
-                found.append(f"{file.relative_to(system)}:{line} imports {'.'.join(imported)}")
-    return found
+                results.append(f"{file.relative_to(system)}:{line} imports {'.'.join(imported)}")
+    return results
 
 
 def test_every_module_and_package_of_the_root_has_a_layer():

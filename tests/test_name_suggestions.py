@@ -32,7 +32,7 @@ def test_a_hint_names_what_is_likely_meant_or_all_that_is_known(name: str, known
 
 
 @pytest.mark.parametrize(
-    ("added", "told"),
+    ("added", "message"),
     [
         (
             "[platform]\ncolour = 3\n",
@@ -45,13 +45,13 @@ def test_a_hint_names_what_is_likely_meant_or_all_that_is_known(name: str, known
         ("[effect.rain]\nx = 1\n[platform]\n", "effect.rain: is not a known effect; write one of "),
     ],
 )
-def test_a_robot_file_with_an_odd_key_is_told_what_is_known(tmp_path: Path, added: str, told: str) -> None:
+def test_a_robot_file_with_an_odd_key_is_told_what_is_known(tmp_path: Path, added: str, message: str) -> None:
     text = (EXAMPLES / "three" / "robot.toml").read_text(encoding="utf-8")
     place = tmp_path / "robot.toml"
     place.write_text(text.replace("[platform]\n", added), encoding="utf-8")
     with pytest.raises(RobotFileError) as caught:
         read_robot(place)
-    assert told in str(caught.value)
+    assert message in str(caught.value)
 
 
 @pytest.mark.parametrize(

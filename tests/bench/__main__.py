@@ -21,8 +21,8 @@ def main(target: Path | None) -> None:
         show(curves)
         ratios(ours, memory, theirs)
         for tolerance in (1e-6, 3e-6):
-            found = turn_about(Path(name) / f"turns-{tolerance:g}", 0.145, tolerance)
-            print(f"145 ms, in turn with DOP853 at rtol {tolerance:g}: {found:.2f} times its processor time")
+            result = turn_about(Path(name) / f"turns-{tolerance:g}", 0.145, tolerance)
+            print(f"145 ms, in turn with DOP853 at rtol {tolerance:g}: {result:.2f} times its processor time")
         if target is not None:
             picture(curves).savefig(target)
         print("\n| cables | time per macro step | per cable |\n| --- | --- | --- |")

@@ -93,18 +93,20 @@ def speed(folder: Path, runs: int) -> None:
         "1 worker": lambda place: over_workers(plan, place, 1),
         "2 workers": lambda place: over_workers(plan, place, 2),
     }
-    found: dict[str, list[float]] = {way: [] for way in ways}
+    results: dict[str, list[float]] = {way: [] for way in ways}
     for round_ in range(ROUNDS):
         for way, timed in ways.items():
-            found[way].append(timed(folder / f"{way} {round_}"))
+            results[way].append(timed(folder / f"{way} {round_}"))
     print(f"{runs} runs, medians of {ROUNDS} rounds\n\n| | s a run | runs a minute | against the bare loop |")
     print("| --- | --- | --- | --- |")
-    loop = median(found["bare loop"])
-    for way, seconds in found.items():
+    loop = median(results["bare loop"])
+    for way, seconds in results.items():
         took = median(seconds)
-        ratios = [a / b for a, b in zip(seconds, found["bare loop"], strict=True)]
+        ratios = [a / b for a, b in zip(seconds, results["bare loop"], strict=True)]
         print(f"| {way} | {took / runs:.3f} | {60.0 * runs / took:.0f} | {median(ratios):.3f} |")
-    print(f"\noverhead of one worker: {100.0 * (median(found['1 worker']) / loop - 1.0):.1f} % of the bare loop's time")
+    print(
+        f"\noverhead of one worker: {100.0 * (median(results['1 worker']) / loop - 1.0):.1f} % of the bare loop's time"
+    )
 
 
 def busy(seconds: float) -> float:

@@ -44,12 +44,12 @@ def compared(move: Move, feedback: dict[str, Design], folder: Path) -> tuple[Pai
     for declared, fmus in robots(move, folder):
         for name, controller in controllers.items():
             motion = run(move, controller, fmus)
-            found = measured(move, controller, motion)
-            print(f"{move.name}: {name}, {'declared' if declared else 'off'}: {found}", file=sys.stderr, flush=True)
+            result = measured(move, controller, motion)
+            print(f"{move.name}: {name}, {'declared' if declared else 'off'}: {result}", file=sys.stderr, flush=True)
             if declared:
-                nominal[name], runs[name] = found, (controller, motion)
+                nominal[name], runs[name] = result, (controller, motion)
             else:
-                worst[name] = found.worst(worst.get(name, found))
+                worst[name] = result.worst(worst.get(name, result))
     return {name: (nominal[name], worst[name]) for name in controllers}, runs
 
 
@@ -63,11 +63,11 @@ def distances(runs: Runs) -> Curves:
 
 def swings(runs: Runs, begin: float) -> Curves:
     """Swing in height after a time."""
-    found = {}
+    results = {}
     for name, (controller, motion) in runs.items():
         away = motion.position - controller.path.position(motion.time)
-        found[name] = motion.time[motion.time >= begin], about_smooth(motion.time, away, begin)[:, 2]
-    return found
+        results[name] = motion.time[motion.time >= begin], about_smooth(motion.time, away, begin)[:, 2]
+    return results
 
 
 def main(docs: Path | None) -> None:

@@ -71,9 +71,9 @@ def _margins(axes: Axes, robot: Robot, feedback: Mapping[str, Design]) -> None:
     for name in ("LQG", "robust"):
         knot = feedback[name].knots()[0]
         for payload, style in PAYLOADS.items():
-            found = [margins_of(linearise(robot_with(robot, float(E), payload)), knot).winch_disk for E in MODULI]
+            margins = [margins_of(linearise(robot_with(robot, float(E), payload)), knot).winch_disk for E in MODULI]
             label = f"{name}, payload {payload:g}"
-            axes.plot(1e-9 * MODULI, found, style, color=COLOURS[name], label=label)
+            axes.plot(1e-9 * MODULI, margins, style, color=COLOURS[name], label=label)
     axes.axhline(2.0 / 3.0, color="k", lw=0.7)
     axes.set(title="Disk margin of all winches at once", xlabel="modulus, GPa")
     axes.set_ylim(bottom=0.0)

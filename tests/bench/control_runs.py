@@ -85,8 +85,8 @@ class Measured:
 
     def worst(self, other: Measured) -> Measured:
         """Of two runs, number by number."""
-        found = {name: max(value, vars(other)[name]) for name, value in vars(self).items()}
-        return replace(Measured(**found), lowest=min(self.lowest, other.lowest))
+        results = {name: max(value, vars(other)[name]) for name, value in vars(self).items()}
+        return replace(Measured(**results), lowest=min(self.lowest, other.lowest))
 
 
 def moves() -> list[Move]:
@@ -105,11 +105,11 @@ def moves() -> list[Move]:
 
 def designs(move: Move) -> dict[str, Design]:
     """The feedback designs for a move."""
-    found: dict[str, Design] = {LQG: design_controller(move.robot), ROBUST: design_robust(move.robot)}
+    results: dict[str, Design] = {LQG: design_controller(move.robot), ROBUST: design_robust(move.robot)}
     if move.push is None:
-        found[f"{LQG}, scheduled"] = schedule_controller(move.robot, move.path)
-        found[f"{ROBUST}, scheduled"] = schedule_robust(move.robot, move.path)
-    return found
+        results[f"{LQG}, scheduled"] = schedule_controller(move.robot, move.path)
+        results[f"{ROBUST}, scheduled"] = schedule_robust(move.robot, move.path)
+    return results
 
 
 def controlled(move: Move, feedback: dict[str, Design]) -> dict[str, Controlled]:
@@ -117,16 +117,16 @@ def controlled(move: Move, feedback: dict[str, Design]) -> dict[str, Controlled]
     robot, times = move.robot, move.times
     blind = Feedforward(robot.cable_count)
     rigid = rigid_reference(robot, move.path, times)
-    found = {OPEN: Controlled(blind, move.path, rigid)}
+    results = {OPEN: Controlled(blind, move.path, rigid)}
     if move.push is None:
         elastic = elastic_reference(robot, move.path, times)
-        found[FORWARD] = Controlled(blind, move.path, elastic)
+        results[FORWARD] = Controlled(blind, move.path, elastic)
         for name, kind in SHAPED.items():
             path = shape_along(robot, move.path, kind)  # type: ignore[arg-type]
-            found[name] = Controlled(blind, path, rigid_reference(robot, path, times))
+            results[name] = Controlled(blind, path, rigid_reference(robot, path, times))
     else:
         elastic = rigid
-    return found | {name: Controlled(design, move.path, elastic) for name, design in feedback.items()}
+    return results | {name: Controlled(design, move.path, elastic) for name, design in feedback.items()}
 
 
 def robots(move: Move, folder: Path) -> Iterator[tuple[bool, RobotFmus]]:

@@ -66,8 +66,8 @@ def margin_table(robot: Robot, path: Trajectory, feedback: Mapping[str, Design])
     rows = []
     for name, design in feedback.items():
         for label, places, uncertain in cases(robot, path, design):
-            found = margins_over(robot, *places, uncertain)
-            rows.append([name if label == "declared" else "", label, *_margin_cells(found)])
+            margins = margins_over(robot, *places, uncertain)
+            rows.append([name if label == "declared" else "", label, *_margin_cells(margins)])
         rows[-3].append(f"{100.0 * damping(design, linearise(robot)):.0f} %")
         rows[-2].append("")
         rows[-1].append("")

@@ -98,9 +98,9 @@ def test_visibility_is_that_of_the_dense_formula() -> None:
     drift = random.normal(size=(30, 4, 5))
     columns = np.column_stack([drift.reshape(120, 5), 1e4 * free.ravel(), 1e4 * np.tile(np.eye(4), (30, 1))])
     expected = 0.5 * change.ravel() @ np.linalg.solve(np.eye(120) + columns @ columns.T, change.ravel())
-    found = hiding(drift, [free])
-    assert found.nats(change) == pytest.approx(expected, rel=1e-6)
-    assert found.nats(3.0 * free + 5.0) == pytest.approx(0.0, abs=1e-5)
+    result = hiding(drift, [free])
+    assert result.nats(change) == pytest.approx(expected, rel=1e-6)
+    assert result.nats(3.0 * free + 5.0) == pytest.approx(0.0, abs=1e-5)
 
 
 def test_drift_columns_are_what_longer_ropes_do() -> None:
@@ -124,17 +124,17 @@ def test_what_changed_makes_recordings_anew() -> None:
 
 @pytest.mark.parametrize("one", CASES, ids=str)
 def test_values_of_the_rig_become_those_of_the_laws(one: EffectCase) -> None:
-    found = {name: Interval(value, value, value) for name, value in law_values(one.name, one.rig).items()}
+    results = {name: Interval(value, value, value) for name, value in law_values(one.name, one.rig).items()}
     expected = in_one_way(one.name, {name: Interval(value, value, value) for name, value in one.law.items()})
-    assert {k: v.value for k, v in found.items()} == pytest.approx({k: v.value for k, v in expected.items()})
+    assert {k: v.value for k, v in results.items()} == pytest.approx({k: v.value for k, v in expected.items()})
 
 
 def test_an_eccentricity_below_zero_is_one_above_it_half_a_turn_on() -> None:
-    found = in_one_way("drum", {"eccentricity": Interval(-0.02, -0.03, -0.01), "phase": Interval(-2.1, -2.2, -2.0)})
-    assert found["eccentricity"] == (0.02, 0.01, 0.03)
-    assert holds("drum", "phase", 1.0, found["phase"])
-    assert holds("drum", "phase", 1.0 + 4 * np.pi, found["phase"])
-    assert not holds("drum", "phase", 1.2, found["phase"])
+    result = in_one_way("drum", {"eccentricity": Interval(-0.02, -0.03, -0.01), "phase": Interval(-2.1, -2.2, -2.0)})
+    assert result["eccentricity"] == (0.02, 0.01, 0.03)
+    assert holds("drum", "phase", 1.0, result["phase"])
+    assert holds("drum", "phase", 1.0 + 4 * np.pi, result["phase"])
+    assert not holds("drum", "phase", 1.2, result["phase"])
 
 
 @pytest.mark.parametrize(
@@ -238,9 +238,9 @@ def test_a_second_call_goes_on_where_the_first_stopped(tmp_path: Path, monkeypat
     monkeypatch.setattr(runner, "_alone", alone)
     runner.run(cases[:2], tmp_path, "one", 1, lambda case, line: None)
     (tmp_path / "results.jsonl").open("a", encoding="utf-8").write('{"key": "cut')
-    found = runner.run(cases, tmp_path, "one", 2, lambda case, line: None)
+    result = runner.run(cases, tmp_path, "one", 2, lambda case, line: None)
     assert sorted(asked) == [case.key for case in cases]
-    assert sorted(found) == [case.key for case in cases]
+    assert sorted(result) == [case.key for case in cases]
     assert len(read_lines(tmp_path / "results.jsonl")) == 3
     runner.run(cases, tmp_path, "another tracer", 1, lambda case, line: None)
     assert len(asked) == 6

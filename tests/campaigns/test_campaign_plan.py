@@ -166,9 +166,9 @@ def test_correlations_are_those_asked_for(tmp_path: Path) -> None:
     more = '[[correlation]]\nbetween = ["cable.modulus", "platform.mass"]\nvalue = -0.8'
     vary = f'{NORMAL}\nplatform.mass = {{normal = [300.0, 5.0]}}\n"cable.damping" = {{uniform = [1e8, 4e8]}}'
     plan = read(tmp_path, sampled(vary, "sobol", 2048, more))
-    found = np.corrcoef(draw_samples(plan).T)
-    assert found[0, 1] == pytest.approx(-0.8, abs=0.02)
-    assert np.abs(found[2, :2]).max() < 0.05
+    result = np.corrcoef(draw_samples(plan).T)
+    assert result[0, 1] == pytest.approx(-0.8, abs=0.02)
+    assert np.abs(result[2, :2]).max() < 0.05
     assert correlated_groups(plan) == (0, 0, 1)
     assert read(tmp_path, sampled(vary, "saltelli", 8, more)).count == 8 * 4
 

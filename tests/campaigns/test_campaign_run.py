@@ -50,17 +50,17 @@ def test_statics_and_modes_are_those_of_the_varied_robot(tmp_path: Path) -> None
 def test_a_motion_is_that_of_fmus_built_for_the_varied_robot(tmp_path: Path) -> None:
     plan = read(tmp_path, moving())
     shared = build_context(plan, {})
-    found = run_job(shared, Job(0, 0, 0, VALUES), tmp_path / "kept")
+    result = run_job(shared, Job(0, 0, 0, VALUES), tmp_path / "kept")
     drive = shared.reference_inputs[0]
     assert drive.winch_speeds is not None and drive.desired_position is not None
     motion = cosimulate(build_fmus(varied(plan), tmp_path / "built"), drive.time, drive.winch_speeds)
-    assert [found.row[f"end_{axis}"] for axis in "xyz"] == motion.position[-1].tolist()
-    assert found.row["tension_2_largest"] == motion.tension[:, 1].max()
+    assert [result.row[f"end_{axis}"] for axis in "xyz"] == motion.position[-1].tolist()
+    assert result.row["tension_2_largest"] == motion.tension[:, 1].max()
     apart = np.linalg.norm(motion.position - drive.desired_position, axis=1)
-    assert found.row["path_error_largest"] == apart.max() > 0.0
-    assert found.row["slack"] is False and "limit_broken" not in found.row
-    assert found.series["time"].tolist() == pytest.approx(np.linspace(0.0, 0.15, 5).tolist())
-    assert found.series["z"][-1] == motion.position[-1, 2]
+    assert result.row["path_error_largest"] == apart.max() > 0.0
+    assert result.row["slack"] is False and "limit_broken" not in result.row
+    assert result.series["time"].tolist() == pytest.approx(np.linspace(0.0, 0.15, 5).tolist())
+    assert result.series["z"][-1] == motion.position[-1, 2]
 
 
 def test_controllers_believe_the_declared_robot_unless_told_otherwise(tmp_path: Path) -> None:
@@ -115,11 +115,11 @@ def test_numbers_set_in_fmus_do_what_numbers_built_into_them_do(changed: str, tm
     time = np.linspace(0.0, 0.2, 21)
     speeds = 0.05 * np.sin(20.0 * time)[:, None] * np.ones(base.cable_count)
     bundle = build_bundle(base)
-    found = cosimulate(cached_fmus(other, bundle, tmp_path / "kept"), time, speeds)
+    result = cosimulate(cached_fmus(other, bundle, tmp_path / "kept"), time, speeds)
     built = cosimulate(build_fmus(other, tmp_path / "built"), time, speeds)
     # Not to the bit: nominal values, which scale what the coupling calls agreement, stay those built in.
-    assert np.allclose(found.position, built.position, rtol=1e-12, atol=0.0)
-    assert np.allclose(found.tension, built.tension, rtol=1e-9, atol=0.0)
+    assert np.allclose(result.position, built.position, rtol=1e-12, atol=0.0)
+    assert np.allclose(result.tension, built.tension, rtol=1e-9, atol=0.0)
 
 
 def test_a_law_may_vary_and_has_fmus_of_its_own(tmp_path: Path) -> None:

@@ -72,10 +72,10 @@ def test_sobol_indices_are_the_shares_of_the_variance(
     method: str, count: int, precision: float, tmp_path: Path
 ) -> None:
     _, summary = summed(tmp_path, method, count)
-    found = {each.input: each for each in summary.dependences if each.output == "out"}
-    assert found["cable.modulus"].first == pytest.approx(9.0 / 25.0, abs=precision)
-    assert found["platform.mass"].first == pytest.approx(16.0 / 25.0, abs=precision)
-    totals = [found[key].total for key in ("cable.modulus", "platform.mass")]
+    results = {each.input: each for each in summary.dependences if each.output == "out"}
+    assert results["cable.modulus"].first == pytest.approx(9.0 / 25.0, abs=precision)
+    assert results["platform.mass"].first == pytest.approx(16.0 / 25.0, abs=precision)
+    totals = [results[key].total for key in ("cable.modulus", "platform.mass")]
     assert totals == (
         [pytest.approx(0.36, abs=0.02), pytest.approx(0.64, abs=0.02)] if method == "saltelli" else [None] * 2
     )
@@ -88,9 +88,11 @@ def test_correlated_inputs_share_one_index(tmp_path: Path) -> None:
     values = draw_samples(plan)
     rows = made_up(replace(plan, inputs=plan.inputs[:2], correlations=()), values=values[:, :2])
     rows = rows.append_column("gravity", pa.array(values[:, 2]))
-    found = {each.input: each.first for each in summarise_runs(plan, COLUMNS, rows).dependences if each.output == "out"}
-    assert found["cable.modulus and gravity"] == pytest.approx(9.0 / 25.0, abs=0.02)
-    assert found["platform.mass"] == pytest.approx(16.0 / 25.0, abs=0.02)
+    results = {
+        each.input: each.first for each in summarise_runs(plan, COLUMNS, rows).dependences if each.output == "out"
+    }
+    assert results["cable.modulus and gravity"] == pytest.approx(9.0 / 25.0, abs=0.02)
+    assert results["platform.mass"] == pytest.approx(16.0 / 25.0, abs=0.02)
 
 
 def test_inputs_that_would_all_share_one_index_are_refused(tmp_path: Path) -> None:
@@ -212,9 +214,9 @@ def test_texts_of_a_grid_stand_on_an_axis_by_their_places(tmp_path: Path) -> Non
 
 def test_the_page_names_the_inputs_that_make_much_of_an_output(tmp_path: Path) -> None:
     plan, out = written(tmp_path, AT_REST.replace('"sobol"\ncount = 8', '"saltelli"\ncount = 64'))
-    found = write_summary(plan, out)["dependences"]
-    shown = [each for each in found if max(each["first"], each["total"]) >= 0.05]
-    assert 0 < len(shown) < len(found)
+    result = write_summary(plan, out)["dependences"]
+    shown = [each for each in result if max(each["first"], each["total"]) >= 0.05]
+    assert 0 < len(shown) < len(result)
     page = (out / "index.html").read_text(encoding="utf-8")
     section = page[page.index('id="dependences"') :].split("</section>")[0]
     assert section.count("<tr") - 1 == len(shown)

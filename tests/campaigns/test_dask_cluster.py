@@ -69,14 +69,14 @@ def test_the_dashboard_of_ours_needs_a_library_here_that_of_others_there(monkeyp
 @pytest.mark.validate
 def test_the_same_rows_come_from_one_worker_and_from_two(tmp_path: Path) -> None:
     plan = read(tmp_path, AT_REST)
-    found = []
+    results = []
     for count in (1, 2):
         out = tmp_path / f"out_{count}"
         with dask_client(None, count) as client, open_dataset(out, plan):
             assert len(client.nthreads()) == count
             run_campaign(plan, out, client, silently)
-        found.append(rows_of(out))
-    assert found[0] == found[1] == bare_rows(plan, tmp_path / "bare")
+        results.append(rows_of(out))
+    assert results[0] == results[1] == bare_rows(plan, tmp_path / "bare")
 
 
 @pytest.mark.validate

@@ -66,37 +66,37 @@ def test_a_number_without_interval_stays(tmp_path: Path) -> None:
 
 
 def test_numbers_vary_together_as_the_report_says(tmp_path: Path) -> None:
-    found = [effect("damping", ALL, DAMPING), effect("payload", [], MASS), effect("modulus", [2], MODULUS)]
+    effects = [effect("damping", ALL, DAMPING), effect("payload", [], MASS), effect("modulus", [2], MODULUS)]
     pairs = [(0, 1, 0.9), (0, 2, -0.3), (1, 2, -0.6)]
-    plan = planned(tmp_path, found, [together(found[k], found[i], value) for i, k, value in pairs])
+    plan = planned(tmp_path, effects, [together(effects[k], effects[i], value) for i, k, value in pairs])
     expected = np.array([[1.0, 0.9, -0.3], [0.9, 1.0, -0.6], [-0.3, -0.6, 1.0]])
     assert plan.notes == () and np.allclose(np.corrcoef(draw_samples(plan).T), expected, atol=0.02)
-    apart = planned(tmp_path, found, [together(found[0], found[1], 0.9)], "correlated = false")
+    apart = planned(tmp_path, effects, [together(effects[0], effects[1], 0.9)], "correlated = false")
     assert apart.notes == () and np.allclose(np.corrcoef(draw_samples(apart).T), np.eye(3), atol=0.02)
     assert apart.digest() != plan.digest()
 
 
 def test_correlations_that_a_report_does_not_hold_are_told(tmp_path: Path) -> None:
-    found = [effect("damping", ALL, DAMPING), effect("payload", [], MASS), effect("modulus", [2], MODULUS)]
-    (note,) = planned(tmp_path, found).notes
+    effects = [effect("damping", ALL, DAMPING), effect("payload", [], MASS), effect("modulus", [2], MODULUS)]
+    (note,) = planned(tmp_path, effects).notes
     assert note == "report.json gives no correlation of 3 of 3 pairs of its numbers: taken as independent"
-    some = [together(found[0], found[1], 0.9), together(found[0], found[2], None)]
-    plan = planned(tmp_path, found, some)
+    some = [together(effects[0], effects[1], 0.9), together(effects[0], effects[2], None)]
+    plan = planned(tmp_path, effects, some)
     assert "no correlation of 2 of 3 pairs" in plan.notes[0]
     assert [(each.first, each.second, each.value) for each in plan.correlations] == [(0, 1, 0.9)]
 
 
 def test_the_plan_has_the_last_word_on_correlations(tmp_path: Path) -> None:
-    found = [effect("damping", ALL, DAMPING), effect("payload", [], MASS)]
+    effects = [effect("damping", ALL, DAMPING), effect("payload", [], MASS)]
     more = '[[correlation]]\nbetween = ["effect.payload.mass", "effect.damping.damping"]\nvalue = {}\n'
     for value, expected in ((0.5, [0.5]), (0.0, [])):
-        plan = planned(tmp_path, found, [together(*found, 0.9)], more.format(value))
+        plan = planned(tmp_path, effects, [together(*effects, 0.9)], more.format(value))
         assert [each.value for each in plan.correlations] == expected
 
 
 def test_numbers_of_which_one_tells_the_other_are_sampled(tmp_path: Path) -> None:
-    found = [effect("damping", ALL, DAMPING), effect("payload", [], MASS)]
-    values = draw_samples(planned(tmp_path, found, [together(*found, -1.0)]))
+    effects = [effect("damping", ALL, DAMPING), effect("payload", [], MASS)]
+    values = draw_samples(planned(tmp_path, effects, [together(*effects, -1.0)]))
     scaled = (values - [2e9, 1.5]) / [1e8, 0.1]
     assert np.allclose(scaled[:, 0], -scaled[:, 1], atol=1e-6) and np.ptp(scaled[:, 0]) > 2.0
 
@@ -145,9 +145,9 @@ def test_what_is_no_report_is_refused(document: dict[str, Any], said: str, tmp_p
 
 def test_samples_spread_as_the_fit_of_a_recording_does(tmp_path: Path) -> None:
     fitter, chosen, sample, fit = fitted(3)
-    found = SelectionResult(tuple(chosen), (1.0, 1.0), fit, (), ())
+    result = SelectionResult(tuple(chosen), (1.0, 1.0), fit, (), ())
     context = IdentificationContext(fit.robot, fitter, DataSplit(sample, sample, ()))
-    effects = estimated_effects(context, found)
+    effects = estimated_effects(context, result)
     trace = replace(made_trace(), effects=effects, correlations=parameter_correlations(fit, effects))
     (tmp_path / "report.json").write_text(json.dumps(trace_document(trace)), encoding="utf-8")
     plan = read(tmp_path, SAMPLED)

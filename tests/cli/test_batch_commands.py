@@ -56,14 +56,14 @@ def users(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Users]:
 @pytest.mark.validate
 def test_two_workers_of_the_users_make_what_a_bare_loop_makes(users: Users, tmp_path: Path) -> None:
     file, out = plan_file(tmp_path, moving(8)), tmp_path / "out"
-    told = users.campaign(file, out)
-    assert told.returncode == 0, told.stderr
-    assert told.stdout.splitlines() == [
+    completed = users.campaign(file, out)
+    assert completed.returncode == 0, completed.stderr
+    assert completed.stdout.splitlines() == [
         "16 runs, 16 of them now, 0 failed",
         *(str(out / name) for name in ("runs", "summary.json", "index.html")),
     ]
     page, rows = out / "index.html", out / "runs"
-    assert told.stderr.splitlines()[-1] == f"next: open {page}; pandas.read_parquet('{rows}') has one row per run"
+    assert completed.stderr.splitlines()[-1] == f"next: open {page}; pandas.read_parquet('{rows}') has one row per run"
     assert rows_of(out) == bare_rows(read_plan(file), tmp_path / "bare")
     assert json.loads((out / "summary.json").read_text(encoding="utf-8"))["failed"] == 0
     again = users.campaign(file, out)
@@ -73,8 +73,8 @@ def test_two_workers_of_the_users_make_what_a_bare_loop_makes(users: Users, tmp_
 @pytest.mark.validate
 def test_the_dashboard_is_where_the_command_says(users: Users, tmp_path: Path) -> None:
     pytest.importorskip("bokeh", reason="the dashboard needs bokeh")
-    told = users.campaign(plan_file(tmp_path, moving(1)), tmp_path / "out")
-    (link,) = re.findall(r"^Dask's dashboard: (http://127\.0\.0\.1:[0-9]+/status)$", told.stderr, re.MULTILINE)
+    completed = users.campaign(plan_file(tmp_path, moving(1)), tmp_path / "out")
+    (link,) = re.findall(r"^Dask's dashboard: (http://127\.0\.0\.1:[0-9]+/status)$", completed.stderr, re.MULTILINE)
     with urlopen(link, timeout=30) as page:
         assert page.status == 200 and b"Dask" in page.read()
 

@@ -78,9 +78,9 @@ def test_a_run_that_fails_leaves_what_it_had_computed(
     )
     speeds.to_csv(recording, index=False)
     assert run(["simulate", ROBOT, "--speeds", str(recording), "--out", str(result)]) == 1
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1
-    assert "FMU " in said and f"the run up to then is in {result}" in said
+    stderr = capsys.readouterr().err
+    assert stderr.count("\n") == 1
+    assert "FMU " in stderr and f"the run up to then is in {result}" in stderr
     frame = pd.read_csv(result) if name.endswith(".csv") else pd.read_parquet(result)
     assert frame["time"].tolist() == [0.0, 0.1, 0.2]
     assert sorted(path.name for path in tmp_path.iterdir()) == sorted([name, "torn.csv"])
@@ -113,9 +113,9 @@ def test_trace_finds_the_damping_of_the_shipped_robot(
         assert after["position_rms"] < 1.2 * floor["position_rms"]
         assert after["tension_rms"] < 1.2 * floor["tension_rms"] < report["error_before"][role]["tension_rms"]
     assert report["residual_is_noise"] == {"before": False, "after": True}
-    told = capsys.readouterr()
-    assert "damping" in told.out
-    assert told.err.splitlines()[-1].startswith(
+    captured = capsys.readouterr()
+    assert "damping" in captured.out
+    assert captured.err.splitlines()[-1].startswith(
         f"next: open {out / 'index.html'}; {out / 'robot.toml'} is the completed robot"
     )
     assert (out / "index.html").stat().st_size > 10_000
@@ -133,9 +133,9 @@ def test_trace_without_a_check_recording_judges_on_the_second_half(
 ) -> None:
     assert run(["trace", ROBOT, str(short[0]), "--out", str(tmp_path / "report"), "--json", "--quiet"]) == 0
     report = json.loads((tmp_path / "report" / "report.json").read_text())
-    told = capsys.readouterr()
-    assert json.loads(told.out) == {"folder": str(tmp_path / "report"), **report}
-    assert told.err == ""
+    captured = capsys.readouterr()
+    assert json.loads(captured.out) == {"folder": str(tmp_path / "report"), **report}
+    assert captured.err == ""
     assert report["effects"][0]["name"] == "damping"
     assert report["error_after"]["check"]["position_rms"] is None
     assert any("no check recording" in note for note in report["notes"])
@@ -147,18 +147,18 @@ COMMANDS = [str(command.callback.__name__) for command in app.registered_command
 @pytest.mark.parametrize("command", COMMANDS)
 def test_every_command_has_help_with_an_example(command: str, capsys: pytest.CaptureFixture[str]) -> None:
     assert run([command, "--help"]) == 0
-    shown = capsys.readouterr().out
-    assert f"Usage: tautwire {command} " in shown
-    (example,) = [line for line in shown.splitlines() if "Example:" in line]
+    stdout = capsys.readouterr().out
+    assert f"Usage: tautwire {command} " in stdout
+    (example,) = [line for line in stdout.splitlines() if "Example:" in line]
     assert example.startswith(f"  Example: tautwire {command}")
-    assert "--json" in shown and "--quiet" in shown
+    assert "--json" in stdout and "--quiet" in stdout
 
 
 def test_help_is_shown_when_nothing_is_asked_for(capsys: pytest.CaptureFixture[str]) -> None:
     assert run([]) == 0
-    shown = capsys.readouterr().out
-    assert all(f"\n  {command} " in shown for command in COMMANDS)
-    assert "..." not in shown.partition("Commands:")[2]
+    stdout = capsys.readouterr().out
+    assert all(f"\n  {command} " in stdout for command in COMMANDS)
+    assert "..." not in stdout.partition("Commands:")[2]
 
 
 def test_the_version_is_shown(capsys: pytest.CaptureFixture[str]) -> None:
@@ -199,10 +199,10 @@ def test_json_is_one_object_and_quiet_is_silent(
 ) -> None:
     place = str(tmp_path / out)
     assert run([*arguments, "--out", place, "--json", "--quiet"]) == 0
-    told = capsys.readouterr()
-    assert keys <= set(json.loads(told.out))
-    assert place in told.out
-    assert told.err == ""
+    captured = capsys.readouterr()
+    assert keys <= set(json.loads(captured.out))
+    assert place in captured.out
+    assert captured.err == ""
     assert run([*arguments, "--out", place, "--quiet"]) == 0
     assert tuple(capsys.readouterr()) == ("", "")
 
@@ -246,11 +246,11 @@ def test_ctrl_c_leaves_nothing_behind(tmp_path: Path, command: str, delay: float
         time.sleep(0.05)
     time.sleep(delay)
     process.send_signal(signal.SIGINT)
-    shown, said = process.communicate(timeout=60)
+    stdout, stderr = process.communicate(timeout=60)
     # Python lets the signal end a process in which it was caught within some exec, as dataclasses do.
     assert process.returncode in (1, -signal.SIGINT)
-    assert said == "tautwire: interrupted; nothing was written\n"
-    assert shown == ""
+    assert stderr == "tautwire: interrupted; nothing was written\n"
+    assert stdout == ""
     assert [path.name for path in tmp_path.iterdir()] == ["scratch"]
     assert list(scratch.iterdir()) == []
 

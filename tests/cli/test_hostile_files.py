@@ -66,25 +66,25 @@ def refused(arguments: list[str], place: Path, capsys: pytest.CaptureFixture[str
     before = sorted(path.name for path in place.parent.iterdir())
     capsys.readouterr()
     assert run(arguments) == 2, arguments[0]
-    told = capsys.readouterr()
-    assert told.out == ""
-    assert told.err.count("\n") == 1 and told.err.endswith("\n"), told.err
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1 and captured.err.endswith("\n"), captured.err
     # A robot file may also name a file beside it that is wrong.
-    assert told.err.startswith(f"tautwire: {place.parent}{os.sep}"), told.err
-    assert told.err[:-1].isprintable() and len(told.err) < ONE_LINE
+    assert captured.err.startswith(f"tautwire: {place.parent}{os.sep}"), captured.err
+    assert captured.err[:-1].isprintable() and len(captured.err) < ONE_LINE
     assert sorted(path.name for path in place.parent.iterdir()) == before
-    return told.err
+    return captured.err
 
 
 def told_by_check(arguments: list[str], place: Path, capsys: pytest.CaptureFixture[str], expected: int | None) -> None:
     """All lines name the file, and the status says whether something is wrong."""
     capsys.readouterr()
     status = run(["check", *arguments])
-    told = capsys.readouterr()
-    assert status in ((0, 2) if expected is None else (expected,)), told.out
+    captured = capsys.readouterr()
+    assert status in ((0, 2) if expected is None else (expected,)), captured.out
     if status == 2:
-        assert told.out and all(line.startswith(f"{place}") for line in told.out.splitlines()), told.out
-    assert all(line.isprintable() and len(line) < ONE_LINE for line in (told.out + told.err).splitlines())
+        assert captured.out and all(line.startswith(f"{place}") for line in captured.out.splitlines()), captured.out
+    assert all(line.isprintable() and len(line) < ONE_LINE for line in (captured.out + captured.err).splitlines())
 
 
 ROBOT_COMMANDS = {
@@ -279,11 +279,11 @@ def test_what_claims_to_be_vast_is_refused_soon_and_in_little_memory(tmp_path: P
     place = tmp_path / ("given.parquet" if make is many_rows else "given.csv")
     make(place)
     arguments = filled(READERS[reader], ROBOT=place, OUT=tmp_path / "out")
-    told = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-c", IN_LITTLE_MEMORY, *arguments], capture_output=True, text=True, timeout=60, check=False
     )
-    assert told.returncode == 2, told.stderr[-2000:]
-    said = told.stdout if reader == "check" else told.stderr
+    assert completed.returncode == 2, completed.stderr[-2000:]
+    said = completed.stdout if reader == "check" else completed.stderr
     assert said.count("\n") == 1 and words in said
     assert said.removeprefix("tautwire: ").startswith(str(place))
     assert [path.name for path in tmp_path.iterdir()] == [place.name]
@@ -317,13 +317,13 @@ def test_in_a_process_of_its_own_there_is_no_more_to_see(tmp_path: Path, content
             "noise": bytes(range(256)),
         }[content]
     )
-    told = subprocess.run(
+    completed = subprocess.run(
         [sys.executable, "-m", "tautwire.cli", *filled(READERS[reader], ROBOT=place, OUT=tmp_path / "out")],
         capture_output=True,
         text=True,
         timeout=60,
         check=False,
     )
-    assert (told.returncode, told.stdout) == (2, "")
-    assert told.stderr.count("\n") == 1 and told.stderr.startswith(f"tautwire: {place}: ")
+    assert (completed.returncode, completed.stdout) == (2, "")
+    assert completed.stderr.count("\n") == 1 and completed.stderr.startswith(f"tautwire: {place}: ")
     assert [path.name for path in tmp_path.iterdir()] == [place.name]

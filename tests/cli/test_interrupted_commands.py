@@ -47,15 +47,15 @@ def until(true: object, seconds: float = 60.0) -> bool:
 
 def parents() -> dict[int, int]:
     """The parent of each process that has not ended."""
-    found = {}
+    results = {}
     for place in Path("/proc").glob("[0-9]*/stat"):
         try:
             state, parent = place.read_text().rpartition(")")[2].split()[:2]
         except OSError:
             continue
         if state != "Z":
-            found[int(place.parent.name)] = int(parent)
-    return found
+            results[int(place.parent.name)] = int(parent)
+    return results
 
 
 def descendants(number: int) -> set[int]:
@@ -123,8 +123,8 @@ def test_a_request_to_end_is_like_ctrl_c(tmp_path: Path, case: str, number: int)
         assert sys.platform != "linux" or until(lambda: len(descendants(process.pid)) >= helpers)
         others = descendants(process.pid) if sys.platform == "linux" else set()
         process.send_signal(number)
-        shown, said = process.communicate(timeout=60)
-    assert (said, shown) == (INTERRUPTED, "")
+        stdout, stderr = process.communicate(timeout=60)
+    assert (stderr, stdout) == (INTERRUPTED, "")
     # Python lets SIGINT's own handler end a process by that signal where it was caught within some exec.
     assert process.returncode in (1, -signal.SIGINT)
     assert not others or until(lambda: not others & parents().keys(), 20.0)
@@ -137,9 +137,9 @@ def test_a_second_run_to_the_same_target_is_refused(tmp_path: Path, capsys: pyte
     out = tmp_path / "out.csv"
     with begun(tmp_path, [*LONG, "--until", "0.5"], out) as process:
         assert run([*QUICK, "--out", str(out)]) == 2
-        said = capsys.readouterr().err
+        stderr = capsys.readouterr().err
         assert (
-            said == f"tautwire: {out}: another run is writing there; wait until it is done, or choose another --out\n"
+            stderr == f"tautwire: {out}: another run is writing there; wait until it is done, or choose another --out\n"
         )
         assert run([*QUICK, "--out", str(tmp_path / "other.csv"), "--quiet"]) == 0
         process.communicate(timeout=120)
@@ -235,8 +235,8 @@ def test_no_permission_is_one_line(
     out = tmp_path / "out"
     monkeypatch.setattr(Path, "mkdir", refused)
     assert run([*command, "--out", str(out)]) == 2
-    said = capsys.readouterr().err
-    assert said == f"tautwire: {out}: cannot write there: Permission denied; choose another --out\n"
+    stderr = capsys.readouterr().err
+    assert stderr == f"tautwire: {out}: cannot write there: Permission denied; choose another --out\n"
     assert names(tmp_path) == []
 
 
@@ -267,10 +267,10 @@ def test_where_no_file_can_be_is_one_line(
     Path("file").touch()
     Path("nowhere").symlink_to("absent")
     assert run([*QUICK, "--out", out]) == 2
-    told = capsys.readouterr()
-    assert told.err.count("\n") == 1
-    assert told.err.startswith(f"tautwire: {out.partition('/out')[0] if out[0] != '/' else out}: ")
-    assert words in told.err
+    captured = capsys.readouterr()
+    assert captured.err.count("\n") == 1
+    assert captured.err.startswith(f"tautwire: {out.partition('/out')[0] if out[0] != '/' else out}: ")
+    assert words in captured.err
     assert names(tmp_path) == ["file", "nowhere", "pipe"]
     assert not Path("/dev/null").is_file()
 
@@ -292,15 +292,15 @@ def test_streams_that_nobody_reads_cost_no_result(tmp_path: Path, case: str) -> 
     form, status, words = SHELL[case]
     out = tmp_path / "workspace.csv"
     command = " ".join([*COMMAND, *QUICK, "--out", str(out)])
-    told = subprocess.run(
+    completed = subprocess.run(
         ["bash", "-c", form.format(command) + '; echo "status ${PIPESTATUS[0]}"'],
         capture_output=True,
         text=True,
         timeout=60,
         check=True,
     )
-    assert told.stdout == f"status {status}\n"
-    assert told.stderr.startswith(words) and told.stderr.count("\n") == bool(words)
+    assert completed.stdout == f"status {status}\n"
+    assert completed.stderr.startswith(words) and completed.stderr.count("\n") == bool(words)
     assert len(pd.read_csv(out)) == 12
     assert names(tmp_path) == ["workspace.csv"]
 
@@ -308,8 +308,10 @@ def test_streams_that_nobody_reads_cost_no_result(tmp_path: Path, case: str) -> 
 @linux
 def test_what_is_wrong_does_not_end_up_in_the_result(tmp_path: Path) -> None:
     command = " ".join([*COMMAND, "linearise", str(tmp_path / "absent.toml"), "--json", "--out", "a.json"])
-    told = subprocess.run(["bash", "-c", f"{command} 2>&-"], capture_output=True, text=True, timeout=60, check=False)
-    assert (told.returncode, told.stdout) == (2, "")
+    completed = subprocess.run(
+        ["bash", "-c", f"{command} 2>&-"], capture_output=True, text=True, timeout=60, check=False
+    )
+    assert (completed.returncode, completed.stdout) == (2, "")
 
 
 def test_a_locked_folder_is_not_taken_for_a_leftover(tmp_path: Path) -> None:

@@ -25,9 +25,9 @@ def test_the_papers_table_is_judged_without_arguments(tmp_path: Path, capsys: py
     document = json.loads((tmp_path / "out" / "fit.json").read_text(encoding="utf-8"))
     assert document["verdict"] == "effects"
     assert document["models"][0]["modulus"] == 134.8e9
-    said = capsys.readouterr().out
-    assert "A constant pair of modulus and damping is rejected" in said
-    assert max(len(line) for line in said.splitlines()) <= 80 + len(str(tmp_path))
+    stdout = capsys.readouterr().out
+    assert "A constant pair of modulus and damping is rejected" in stdout
+    assert max(len(line) for line in stdout.splitlines()) <= 80 + len(str(tmp_path))
     assert "[effect.relaxation]" in (tmp_path / "out" / "relaxation.toml").read_text(encoding="utf-8")
 
 

@@ -127,9 +127,9 @@ def test_check_tells_everything_and_fails(tmp_path: Path, capsys: pytest.Capture
     robot = edited(tmp_path, "mass = 300.0", "mas = 300.0")
     recording = with_cell(tmp_path, 5, "x", "12m")
     assert run(["check", str(robot), str(recording)]) == 2
-    told = capsys.readouterr()
-    assert [line.partition(": line ")[0] for line in told.out.splitlines()] == [str(robot)] * 2 + [str(recording)]
-    assert "correct 3 problems in 2 files" in told.err
+    captured = capsys.readouterr()
+    assert [line.partition(": line ")[0] for line in captured.out.splitlines()] == [str(robot)] * 2 + [str(recording)]
+    assert "correct 3 problems in 2 files" in captured.err
     assert run(["check", str(robot), str(recording), "--json"]) == 2
     problems = json.loads(capsys.readouterr().out)["problems"]
     assert problems[-1]["line"] == 7
@@ -187,8 +187,8 @@ def test_a_port_that_is_missing_is_named_before_anything_runs(
     capsys.readouterr()
     arguments = ["simulate", ROBOT, "--speeds", str(THREE / "fit.csv"), "--out", str(tmp_path / "out.csv")]
     assert run([*arguments, "--fmu", f"platform={tmp_path / 'cable_1.fmu'}"]) == 2
-    said = capsys.readouterr().err
-    assert "cable_1.fmu: cannot be the FMU platform: position.x is a Real input; make it a Real output in m" in said
+    stderr = capsys.readouterr().err
+    assert "cable_1.fmu: cannot be the FMU platform: position.x is a Real input; make it a Real output in m" in stderr
     assert not (tmp_path / "out.csv").exists()
 
 

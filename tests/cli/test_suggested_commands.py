@@ -38,9 +38,9 @@ def test_the_last_line_names_a_command_that_is_one(
     arguments, expected = CASES[case]
     monkeypatch.chdir(tmp_path)
     assert run(arguments) == 0
-    told = capsys.readouterr()
-    assert "next: " not in told.out
-    *before, last = told.err.splitlines()
+    captured = capsys.readouterr()
+    assert "next: " not in captured.out
+    *before, last = captured.err.splitlines()
     assert last.startswith("next: ") and not [line for line in before if line.startswith("next: ")]
     (named,) = re.findall(r"tautwire (.+?)(?:,|;|$)", last)
     assert named == expected
@@ -56,8 +56,8 @@ def test_nothing_of_it_is_for_machines(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert run([*CASES[case][0], how]) == 0
-    told = capsys.readouterr()
-    assert "next: " not in told.out + told.err
+    captured = capsys.readouterr()
+    assert "next: " not in captured.out + captured.err
 
 
 def test_from_a_new_robot_on_each_line_leads_to_the_next(
@@ -77,8 +77,8 @@ def test_from_a_new_robot_on_each_line_leads_to_the_next(
 def test_the_papers_page_is_to_be_opened(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    found = SimpleNamespace(counts={"reproduced": 1}, entries=(1,))
-    monkeypatch.setattr("tautwire.paper.write_paper", lambda folder, tell: found)
+    result = SimpleNamespace(counts={"reproduced": 1}, entries=(1,))
+    monkeypatch.setattr("tautwire.paper.write_paper", lambda folder, tell: result)
     out = tmp_path / "paper"
     assert run(["paper", "--out", str(out)]) == 0
     assert capsys.readouterr().err.splitlines() == ["1 reproduced", f"next: open {out / 'claims.html'} in a browser"]

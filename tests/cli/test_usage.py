@@ -50,9 +50,9 @@ def test_wrong_usage_ends_with_an_example(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     assert run(arguments) == 2
-    told = capsys.readouterr()
-    assert told.out == "" and told.err.count("\n") == 1
-    said, _, example = told.err.rstrip("\n").rpartition("; example: ")
+    captured = capsys.readouterr()
+    assert captured.out == "" and captured.err.count("\n") == 1
+    said, _, example = captured.err.rstrip("\n").rpartition("; example: ")
     assert said and example.startswith(EXAMPLES_OF[arguments[0]])
     assert list(tmp_path.iterdir()) == []
 

@@ -24,7 +24,7 @@ def test_it_writes_the_table_and_the_figure(tmp_path: Path, capsys: pytest.Captu
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         (["--lower", "here"], "--lower: 'here' is not a position"),
         (["--spacing", "-1"], "not positive"),
@@ -33,18 +33,18 @@ def test_it_writes_the_table_and_the_figure(tmp_path: Path, capsys: pytest.Captu
     ],
 )
 def test_what_is_wrong_is_one_line_and_nothing_written(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], told: str
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
 ) -> None:
     assert run(["workspace", CAROCA, "--out", str(tmp_path / "w.csv"), *arguments]) == 2
     captured = capsys.readouterr()
-    assert told in captured.err and captured.err.count("\n") == 1
+    assert message in captured.err and captured.err.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
 
 
 def test_table_and_figure_are_not_written_to_one_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     one = str(tmp_path / "w.png")
     assert run(["workspace", CAROCA, "--out", one, "--plot", one]) == 2
-    assert "--plot: " in (told := capsys.readouterr().err) and "is what --out writes; choose another --plot" in told
+    assert "--plot: " in (stderr := capsys.readouterr().err) and "is what --out writes; choose another --plot" in stderr
     assert list(tmp_path.iterdir()) == []
 
 

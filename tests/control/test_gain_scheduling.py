@@ -42,12 +42,12 @@ def asked(robot: Robot, design: Design, samples: int) -> Array:
     times = sample_times(0.01, 0.01 * samples)
     source = PathController(robot, design, RISE, times)
     expected, count = np.array(source.plan.expected), robot.cable_count
-    found = []
+    results = []
     for k in range(samples):
         shown = np.concatenate([expected[k, :3] + 1e-3, np.zeros(3), expected[k, 3:]])
-        found.append(source.interval(k, times[k], 0.01, shown)[0][1 : 2 * count : 2])
+        results.append(source.interval(k, times[k], 0.01, shown)[0][1 : 2 * count : 2])
     speeds = np.array(source.plan.speeds)
-    return np.array(found) - np.diff(speeds[: samples + 1], axis=0) / 0.01
+    return np.array(results) - np.diff(speeds[: samples + 1], axis=0) / 0.01
 
 
 def test_one_design_at_all_places_is_that_design(three: Robot) -> None:

@@ -61,11 +61,11 @@ def errors(position: Array, time: Array) -> Array:
 
 def test_margins_hold_on_a_finer_grid_than_that_of_the_design(three: Robot, design: RobustController) -> None:
     start = np.array([three.platform.start])
-    found = margins_over(three, design.knots(), start, Range(), points=4)
-    assert min(found.winch_disk, found.sensor_disk) > 2.0 / 3.0
-    assert found.gain_margin > 2.0 and found.phase_margin > 37.0 and found.spectral_radius < 0.99
+    margins = margins_over(three, design.knots(), start, Range(), points=4)
+    assert min(margins.winch_disk, margins.sensor_disk) > 2.0 / 3.0
+    assert margins.gain_margin > 2.0 and margins.phase_margin > 37.0 and margins.spectral_radius < 0.99
     lqg = margins_over(three, design_controller(three).knots(), start, Range(), points=2)
-    assert lqg.winch_disk < 0.8 * found.winch_disk
+    assert lqg.winch_disk < 0.8 * margins.winch_disk
 
 
 @pytest.mark.validate
@@ -86,8 +86,8 @@ def test_scheduled_loop_keeps_the_margin_along_the_path_and_between_its_places(t
         gains = law.gains_at(plan, sample)
         through = np.hstack([np.zeros((3, 6)), gains.D])
         knot = Knot(0.0, control.ss(gains.A, gains.B, gains.C, through, 0.01), np.array(gains.M))
-        found = margins_over(three, (knot,), rise.position(np.array([0.01 * sample])), Range(), points=2)
-        assert found.min_disk > 0.97 * 2.0 / 3.0
+        margins = margins_over(three, (knot,), rise.position(np.array([0.01 * sample])), Range(), points=2)
+        assert margins.min_disk > 0.97 * 2.0 / 3.0
 
 
 @pytest.mark.validate

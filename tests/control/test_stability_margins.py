@@ -51,19 +51,19 @@ def test_speed_controller_closes_the_same_loop_as_the_regulator(design: Controll
 
 
 def test_margins_agree_with_the_sensitivity(design: Controller) -> None:
-    found = margins_of(design.linear, design.knots()[0])
+    margins = margins_of(design.linear, design.knots()[0])
     plant, feedback = ramp_plant(design.linear, 0.01), speed_controller(design.regulator)
     omega = np.geomspace(1.0, 0.999 * np.pi / 0.01, 3000)
     z = np.exp(1j * omega * 0.01)
     loop = -np.einsum("aik,akj->aij", at(plant, z), at(feedback, z))
     sensitivity = np.linalg.inv(np.eye(6) + loop)
     one = 1.0 / np.max(np.abs(np.diagonal(sensitivity, axis1=1, axis2=2) - 0.5))
-    assert found.sensor_disk == pytest.approx(one, rel=5e-3)
+    assert margins.sensor_disk == pytest.approx(one, rel=5e-3)
     # Of all winches at once: between the norm, which knows of no structure, and that of the worst one alone.
     inner = np.linalg.inv(np.eye(3) - np.einsum("aik,akj->aij", at(feedback, z), at(plant, z)))
     whole = 1.0 / np.max(np.linalg.norm(inner - 0.5 * np.eye(3), ord=2, axis=(1, 2)))
     single = 1.0 / np.max(np.abs(np.diagonal(inner, axis1=1, axis2=2) - 0.5))
-    assert whole * 0.99 < found.winch_disk < single * 1.01
+    assert whole * 0.99 < margins.winch_disk < single * 1.01
 
 
 def at(system: Any, z: Array) -> Array:
@@ -72,25 +72,25 @@ def at(system: Any, z: Array) -> Array:
 
 
 def test_a_winch_may_gain_or_lose_what_the_gain_margin_says(design: Controller) -> None:
-    found = margins_of(design.linear, design.knots()[0])
+    margins = margins_of(design.linear, design.knots()[0])
     plant, feedback = ramp_plant(design.linear, 0.01), speed_controller(design.regulator)
 
     def worst(factor: float) -> float:
         trials = [np.where(np.arange(3) == k, f, 1.0) for k in range(3) for f in (factor, 1.0 / factor)]
         return max(radius(plant, feedback, trial) for trial in trials)
 
-    assert worst(0.99 * found.gain_margin) < 1.0 < worst(1.01 * found.gain_margin)
+    assert worst(0.99 * margins.gain_margin) < 1.0 < worst(1.01 * margins.gain_margin)
 
 
 def test_all_winches_may_change_at_once_by_what_the_disk_margin_says(design: Controller) -> None:
-    found = margins_of(design.linear, design.knots()[0])
+    margins = margins_of(design.linear, design.knots()[0])
     plant, feedback = ramp_plant(design.linear, 0.01), speed_controller(design.regulator)
-    assert found.disk_gain == pytest.approx((2.0 + found.winch_disk) / (2.0 - found.winch_disk))
+    assert margins.disk_gain == pytest.approx((2.0 + margins.winch_disk) / (2.0 - margins.winch_disk))
     random = np.random.default_rng(4)
     for _ in range(50):
-        factors = found.disk_gain ** random.uniform(-1.0, 1.0, 3)
+        factors = margins.disk_gain ** random.uniform(-1.0, 1.0, 3)
         assert radius(plant, feedback, factors) < 1.0
-    assert found.disk_gain < found.gain_margin and found.disk_phase < found.phase_margin
+    assert margins.disk_gain < margins.gain_margin and margins.disk_phase < margins.phase_margin
 
 
 def test_range_is_that_of_the_papers_rope_or_as_wide_about_another_one(caroca: Robot) -> None:
@@ -101,15 +101,15 @@ def test_range_is_that_of_the_papers_rope_or_as_wide_about_another_one(caroca: R
 
 
 def test_each_sample_of_delay_costs_margin_until_the_loop_breaks(design: Controller) -> None:
-    found = [margins_of(design.linear, late(design.knots()[0], samples)) for samples in range(6)]
-    for before, after in pairwise(found[:3]):
+    margins = [margins_of(design.linear, late(design.knots()[0], samples)) for samples in range(6)]
+    for before, after in pairwise(margins[:3]):
         assert (
             after.phase_margin < before.phase_margin - 2.0
             and after.winch_disk < before.winch_disk
             and after.gain_margin < before.gain_margin
         )
-    assert found[2].spectral_radius < 1.0 < found[5].spectral_radius
-    assert found[5].winch_disk == found[5].sensor_disk == found[5].gain_margin == found[5].phase_margin == 0.0
+    assert margins[2].spectral_radius < 1.0 < margins[5].spectral_radius
+    assert margins[5].winch_disk == margins[5].sensor_disk == margins[5].gain_margin == margins[5].phase_margin == 0.0
 
 
 def late(knot: Knot, samples: int) -> Knot:
@@ -125,8 +125,8 @@ def late(knot: Knot, samples: int) -> Knot:
 
 
 def test_no_loop_has_no_margin_to_lose(design: Controller) -> None:
-    found = margins_of(design.linear, Feedforward(3).knots()[0])
-    assert found.winch_disk == found.sensor_disk == found.gain_margin == found.phase_margin == np.inf
+    margins = margins_of(design.linear, Feedforward(3).knots()[0])
+    assert margins.winch_disk == margins.sensor_disk == margins.gain_margin == margins.phase_margin == np.inf
     assert Margins(0.5, 2.0, 1.0, 1.0, 1.0).disk_gain == np.inf
 
 

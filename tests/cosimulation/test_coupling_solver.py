@@ -45,9 +45,9 @@ def test_without_saved_states_it_goes_on_with_one_pass(three_fmus: RobotFmus) ->
 
 def test_the_statistics_show_the_energy_of_a_coupling_without_iteration(three_fmus: RobotFmus) -> None:
     shares = []
-    for can_redo in (True, False):
+    for supports_rollback in (True, False):
         with instantiate_robot(three_fmus) as graph:
-            coupling = CouplingSolver(replace(graph, supports_rollback=can_redo))
+            coupling = CouplingSolver(replace(graph, supports_rollback=supports_rollback))
             end_error(coupling, 0.05)
             shares.append(coupling.statistics.energy_residual_share)
     assert shares[1] > 100.0 * shares[0]
@@ -116,13 +116,13 @@ def test_what_is_recorded_follows_from_the_place_that_is_recorded(three_fmus: Ro
         assert parted(coupling) == 0.0
 
 
-@pytest.mark.parametrize("can_redo", [True, False])
-def test_inputs_that_agree_wait_until_outputs_are_read(can_redo: bool, three_fmus: RobotFmus) -> None:
+@pytest.mark.parametrize("supports_rollback", [True, False])
+def test_inputs_that_agree_wait_until_outputs_are_read(supports_rollback: bool, three_fmus: RobotFmus) -> None:
     with instantiate_robot(three_fmus) as graph:
-        coupling = CouplingSolver(replace(graph, supports_rollback=can_redo))
+        coupling = CouplingSolver(replace(graph, supports_rollback=supports_rollback))
         simulate(coupling, Experiment(RAMPS, CORNERS[:2], FixedStep(0.1)), recorded_ports(3), MemoryRecorder(2, 18))
         checkpoint = coupling.attempt_step(CORNERS[1], 0.1, *RAMPS.interval(1, CORNERS[1], 0.1, np.zeros(0)))
-        assert (parted(coupling) > 0.0) is can_redo
+        assert (parted(coupling) > 0.0) is supports_rollback
         coupling.update_inputs()
         assert parted(coupling) == 0.0
         if checkpoint is not None:

@@ -30,14 +30,14 @@ def misses(motion: Callable[[float], list[float]], steps: int, chain: Derivative
     places = np.array([*chain.ends, *(chain.midpoints or ())])
     prediction = Extrapolator([chain], places, np.array([1.0, 10.0, 100.0] * 2)[:count])
     history = restart_history(0.0, shown(motion, 0.0))
-    found = []
+    results = []
     for number in range(1, steps + 1):
         time = number * STEP
         expected, true = shown(motion, time - STEP), shown(motion, time)
         history = prediction.begin_step(history, time, expected)
-        found.append(float(np.max(np.abs(expected - true)[places] / np.array([1.0, 10.0, 100.0] * 2)[:count])))
+        results.append(float(np.max(np.abs(expected - true)[places] / np.array([1.0, 10.0, 100.0] * 2)[:count])))
         history = prediction.end_step(history, time, true)
-    return found
+    return results
 
 
 def test_a_parabola_is_known_from_one_point() -> None:
@@ -45,20 +45,20 @@ def test_a_parabola_is_known_from_one_point() -> None:
 
 
 def test_a_value_alone_is_extrapolated_from_three_points() -> None:
-    found = misses(lambda time: [3.0 + time - 2.0 * time**2, 0.0, 0.0], 6, VALUE_ONLY)
-    assert found[0] > 1e-3
-    assert max(found[4:]) < 1e-12
+    result = misses(lambda time: [3.0 + time - 2.0 * time**2, 0.0, 0.0], 6, VALUE_ONLY)
+    assert result[0] > 1e-3
+    assert max(result[4:]) < 1e-12
 
 
 def test_a_swing_is_known_better_the_longer_its_past_is() -> None:
-    found = misses(swing, 20)
-    assert found[0] > 0.05
-    assert found[3] < 0.02 * found[0]
+    result = misses(swing, 20)
+    assert result[0] > 0.05
+    assert result[3] < 0.02 * result[0]
 
 
 def test_what_the_polynomial_misses_of_a_swing_is_learnt() -> None:
-    found = misses(swing, 20)
-    assert max(found[12:]) < 1e-3 * found[3]
+    result = misses(swing, 20)
+    assert max(result[12:]) < 1e-3 * result[3]
 
 
 def test_what_rests_is_known_to_rest() -> None:
@@ -70,9 +70,9 @@ def test_after_a_corner_only_what_follows_it_counts() -> None:
         late = max(time - 1.0, 0.0)
         return [a + b for a, b in zip(swing(time), [1e3 * late**3, 3e3 * late**2, 6e3 * late], strict=True)]
 
-    found = misses(cornered, 20)
-    assert found[10] > 1.0
-    assert max(found[11:]) < 0.03 * found[10]
+    result = misses(cornered, 20)
+    assert result[10] > 1.0
+    assert max(result[11:]) < 0.03 * result[10]
 
 
 def test_a_corner_in_a_short_step_tells_nothing_about_a_time_far_ahead() -> None:

@@ -24,8 +24,8 @@ def test_a_polynomial_is_continued_exactly() -> None:
         return [polynomial.deriv(k)(unit * time) for k in range(2)]
 
     weights = scale_weights(hermite_weights(times, 2, at), unit).reshape(4, 6)
-    found = weights @ np.concatenate([known(time) for time in times])
-    assert found == pytest.approx(np.concatenate([known(time) for time in at]), rel=1e-11)
+    result = weights @ np.concatenate([known(time) for time in times])
+    assert result == pytest.approx(np.concatenate([known(time) for time in at]), rel=1e-11)
 
 
 def test_fmus_tell_which_output_is_the_rate_of_which(three_fmus: RobotFmus) -> None:

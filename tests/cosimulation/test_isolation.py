@@ -273,9 +273,9 @@ def test_ending_the_parent_process_ends_the_isolated_run(
         time.sleep(0.05)
     time.sleep(0.5)
     process.send_signal(ending)
-    _, said = process.communicate(timeout=20)
+    _, stderr = process.communicate(timeout=20)
     assert process.returncode == -ending
-    assert ("KeyboardInterrupt" in said) == (ending == signal.SIGINT)
+    assert ("KeyboardInterrupt" in stderr) == (ending == signal.SIGINT)
     while not nothing_is_left(numbers) and time.monotonic() - begun < 40.0:
         time.sleep(0.05)
     assert nothing_is_left(numbers)

@@ -66,10 +66,12 @@ def test_the_run_until_then_is_written(
     out = scratch.parent / "result.csv"
     monkeypatch.setenv(FAULT, f"winch_2:step:{how}:0.55")
     assert run(arguments(robot, out, *(["--patience", "1"] if how == "hang" else []))) == 1
-    said = capsys.readouterr().err
-    assert said.count("\n") == 1
-    assert said.startswith(f"tautwire: FMU winch_2: fmi2DoStep {fate} at 0.55 s with speed_command=0.0111; it logged: ")
-    assert said.endswith(f"; the run up to then is in {out}\n")
+    stderr = capsys.readouterr().err
+    assert stderr.count("\n") == 1
+    assert stderr.startswith(
+        f"tautwire: FMU winch_2: fmi2DoStep {fate} at 0.55 s with speed_command=0.0111; it logged: "
+    )
+    assert stderr.endswith(f"; the run up to then is in {out}\n")
     assert pd.read_csv(out)["time"].tolist() == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
     assert sorted(path.name for path in scratch.parent.iterdir()) == ["result.csv", "scratch"]
     assert list(scratch.iterdir()) == []
@@ -80,8 +82,8 @@ def test_nothing_is_written_where_nothing_was_computed(
 ) -> None:
     monkeypatch.setenv(FAULT, "winch_2:enter:crash:0")
     assert run(arguments(robot, scratch.parent / "result.csv")) == 1
-    said = capsys.readouterr().err
-    assert said == "tautwire: FMU winch_2: fmi2EnterInitializationMode ended its process by SIGSEGV at 0 s\n"
+    stderr = capsys.readouterr().err
+    assert stderr == "tautwire: FMU winch_2: fmi2EnterInitializationMode ended its process by SIGSEGV at 0 s\n"
     assert [path.name for path in scratch.parent.iterdir()] == ["scratch"]
     assert list(scratch.iterdir()) == []
 
@@ -101,9 +103,9 @@ def test_ctrl_c_ends_a_run_that_hangs(robot: Path, scratch: Path, monkeypatch: p
         time.sleep(0.05)
     time.sleep(1.5)
     os.killpg(process.pid, signal.SIGINT)
-    shown, said = process.communicate(timeout=20)
-    assert (process.returncode, shown) == (1, "")
-    assert said == "tautwire: interrupted; nothing was written\n"
+    stdout, stderr = process.communicate(timeout=20)
+    assert (process.returncode, stdout) == (1, "")
+    assert stderr == "tautwire: interrupted; nothing was written\n"
     assert sorted(path.name for path in scratch.parent.iterdir()) == ["numbers", "scratch"]
     assert list(scratch.iterdir()) == []
     for number in numbers.read_text().split():

@@ -107,8 +107,8 @@ def test_the_command_refuses_what_the_library_refuses(
         tautwire.cosimulate(three_fmus, **arguments)
     asked = ["--speeds", str(THREE / "fit.csv"), "--out", str(tmp_path / "out.csv"), f"--{name}={value}"]
     assert run(["simulate", str(THREE / "robot.toml"), *asked]) == 2
-    said = capsys.readouterr().err
-    assert said.startswith(f"tautwire: --{name}: {caught.value.problem}; {caught.value.hint}; example: ")
+    stderr = capsys.readouterr().err
+    assert stderr.startswith(f"tautwire: --{name}: {caught.value.problem}; {caught.value.hint}; example: ")
     assert list(tmp_path.iterdir()) == []
 
 

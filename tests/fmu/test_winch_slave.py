@@ -95,9 +95,9 @@ def test_one_long_step_meets_all_limits_on_its_way(limited: Path) -> None:
         winch.set(input_time=1.0)
         winch.set(speed_command=wide(1.0), speed_command_rate=-12.0)
         winch.step(0.0, 1.0)
-        found = winch.get("winch_speed", "winch_acceleration")
+        result = winch.get("winch_speed", "winch_acceleration")
     exact = drive_of(LIMITED).run(wide, np.array([1.0]))
-    assert found == pytest.approx(exact[0, :2], abs=2e-6)
+    assert result == pytest.approx(exact[0, :2], abs=2e-6)
 
 
 @pytest.mark.parametrize("seconds", [2.0, 20.0])

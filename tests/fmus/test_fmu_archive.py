@@ -233,11 +233,11 @@ def test_a_hostile_fmu_is_refused_before_it_is_unpacked(
     begun = time.perf_counter()
     arguments = ["simulate", str(ROBOT), "--speeds", str(SPEEDS), "--out", str(tmp_path / "out.csv")]
     assert run([*arguments, "--fmu", f"winch_2={fmu}"]) == 2
-    told = capsys.readouterr()
-    assert told.out == ""
-    assert told.err.count("\n") == 1
-    assert told.err.startswith(f"tautwire: {fmu}: cannot be the FMU winch_2: it ")
-    assert words in told.err
+    captured = capsys.readouterr()
+    assert captured.out == ""
+    assert captured.err.count("\n") == 1
+    assert captured.err.startswith(f"tautwire: {fmu}: cannot be the FMU winch_2: it ")
+    assert words in captured.err
     assert time.perf_counter() - begun < 60.0
     assert sorted(path.name for path in tmp_path.iterdir()) == ["hostile.fmu", "scratch"]
     assert list(scratch.iterdir()) == []
@@ -252,9 +252,9 @@ def test_so_is_one_that_the_robot_file_names(
     robot.write_text(ROBOT.read_text(encoding="utf-8") + '\n[fmu]\nplatform = "hostile.fmu"\n', encoding="utf-8")
     forbid_fmpy(monkeypatch)
     assert run([command, str(robot), *(["--out", str(tmp_path / "out")] if command == "build" else [])]) == 2
-    told = capsys.readouterr()
-    assert "hostile.fmu" in told.out + told.err
-    assert "leads out of the folder" in told.out + told.err
+    captured = capsys.readouterr()
+    assert "hostile.fmu" in captured.out + captured.err
+    assert "leads out of the folder" in captured.out + captured.err
     assert sorted(path.name for path in tmp_path.iterdir()) == ["hostile.fmu", "robot.toml"]
 
 

@@ -32,9 +32,9 @@ def test_vectors_stand_as_one(three_fmus: RobotFmus) -> None:
 
 def test_the_command_lists_them(capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["fmus", ROBOT]) == 0
-    shown = capsys.readouterr().out
-    assert "cable_1.fmu, cable_2.fmu, cable_3.fmu" in shown and "platform.fmu" in shown
-    assert any(line.split()[:4] == ["winch_speed", "input", "m/s", "0.0"] for line in shown.splitlines())
+    stdout = capsys.readouterr().out
+    assert "cable_1.fmu, cable_2.fmu, cable_3.fmu" in stdout and "platform.fmu" in stdout
+    assert any(line.split()[:4] == ["winch_speed", "input", "m/s", "0.0"] for line in stdout.splitlines())
     assert run(["fmus", ROBOT, "--json"]) == 0
     listed = json.loads(capsys.readouterr().out)
     assert [each["fmu"] for each in listed["fmus"]] == ["platform", "cable_1", "cable_2", "cable_3"]

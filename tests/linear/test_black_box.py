@@ -61,13 +61,13 @@ def swings(system: Any) -> NDArray[np.complex128]:
 def test_it_is_the_plant_of_the_laws(name: str, tmp_path: Path) -> None:
     robot = example(name)
     exact = linearise(robot).system
-    found = linearise_robot_fmus(build_fmus(robot, tmp_path))
-    assert found.system.state_labels == exact.state_labels
-    assert found.system.input_labels == exact.input_labels
-    assert found.system.output_labels == exact.output_labels
-    assert max(distances(found, exact).values()) < AGREES
-    assert swings(found.system) == pytest.approx(swings(exact), rel=AGREES)
-    assert found.error < 1e-6 and found.notes == ()
+    plant = linearise_robot_fmus(build_fmus(robot, tmp_path))
+    assert plant.system.state_labels == exact.state_labels
+    assert plant.system.input_labels == exact.input_labels
+    assert plant.system.output_labels == exact.output_labels
+    assert max(distances(plant, exact).values()) < AGREES
+    assert swings(plant.system) == pytest.approx(swings(exact), rel=AGREES)
+    assert plant.error < 1e-6 and plant.notes == ()
 
 
 def smooth(case: Case) -> bool:
@@ -81,9 +81,9 @@ def test_it_is_the_plant_of_the_laws_with_each_effect(case: Case, tmp_path: Path
     robot = with_effects(paper_robot(damping=4e8), case)
     exact = linearise(robot).system
     # FMUs also show branches of relaxation that are not in use.
-    found = linearise_robot_fmus(build_fmus(robot, tmp_path), states=exact.state_labels)
-    assert found.system.state_labels == exact.state_labels
-    assert max(distances(found, exact).values()) < AGREES
+    plant = linearise_robot_fmus(build_fmus(robot, tmp_path), states=exact.state_labels)
+    assert plant.system.state_labels == exact.state_labels
+    assert max(distances(plant, exact).values()) < AGREES
 
 
 @pytest.mark.validate
@@ -98,37 +98,37 @@ def test_effects_are_found_with_their_states(tmp_path: Path) -> None:
     for name, values in effects.items():
         robot = robot.with_effect(EffectSetting(name, values, robot.cable_numbers))
     exact = linearise(robot).system
-    found = linearise_robot_fmus(build_fmus(robot, tmp_path), states=exact.state_labels)
-    assert found.system.state_labels == exact.state_labels
-    assert max(distances(found, exact).values()) < AGREES
+    plant = linearise_robot_fmus(build_fmus(robot, tmp_path), states=exact.state_labels)
+    assert plant.system.state_labels == exact.state_labels
+    assert max(distances(plant, exact).values()) < AGREES
 
 
 def test_states_that_are_not_named_are_found(damped_fmus: RobotFmus) -> None:
     exact = linearise(paper_robot(damping=2.08e9)).system
-    found = linearise_robot_fmus(damped_fmus, states=()).system
-    assert found.state_labels == [f"x_{k}" for k in range(1, 10)]
+    plant = linearise_robot_fmus(damped_fmus, states=()).system
+    assert plant.state_labels == [f"x_{k}" for k in range(1, 10)]
     frequencies = 2j * np.pi * np.geomspace(0.1, 10.0, 20)
-    response, expected = found(frequencies), exact(frequencies)
+    response, expected = plant(frequencies), exact(frequencies)
     largest = np.abs(expected).max(axis=(1, 2), keepdims=True)
     assert np.max(np.abs(response - expected) / largest) < AGREES
-    assert swings(found) == pytest.approx(swings(exact), rel=AGREES)
+    assert swings(plant) == pytest.approx(swings(exact), rel=AGREES)
 
 
 @pytest.mark.validate
 def test_winches_add_their_speed_loops(tmp_path: Path) -> None:
     winch = Winch(drum_radius=0.2, bandwidth=8.0, damping_ratio=0.7)
     plain = paper_robot(damping=2.08e9)
-    found = linearise_robot_fmus(build_fmus(with_winch(plain, winch), tmp_path)).system
-    assert found.input_labels[:3] == ["speed_command_1", "speed_command_2", "speed_command_3"]
-    assert found.nstates == 15
+    plant = linearise_robot_fmus(build_fmus(with_winch(plain, winch), tmp_path)).system
+    assert plant.input_labels[:3] == ["speed_command_1", "speed_command_2", "speed_command_3"]
+    assert plant.nstates == 15
     # A PI loop on an integrator: (2 zeta w s + w^2) / (s^2 + 2 zeta w s + w^2).
     s, w = 2j * np.pi * np.geomspace(0.2, 20.0, 15), 2.0 * np.pi * 8.0
     loop = (1.4 * w * s + w**2) / (s**2 + 1.4 * w * s + w**2)
     exact = linearise(plain).system
     for output in ("position_x", "tension_1"):
         expected = exact[output, "winch_speed_1"](s) * loop
-        assert found[output, "speed_command_1"](s) == pytest.approx(expected, rel=1e-4)
-    assert found["winch_speed_1", "speed_command_1"](s) == pytest.approx(loop, rel=1e-5)
+        assert plant[output, "speed_command_1"](s) == pytest.approx(expected, rel=1e-4)
+    assert plant["winch_speed_1", "speed_command_1"](s) == pytest.approx(loop, rel=1e-5)
 
 
 def own_robot(robot: Robot, slot: str, path: Path, folder: Path) -> RobotFmus:
@@ -139,26 +139,26 @@ def own_robot(robot: Robot, slot: str, path: Path, folder: Path) -> RobotFmus:
 @needs_compiler
 def test_a_robot_with_a_users_winch(tmp_path: Path) -> None:
     robot = paper_robot(damping=2.08e9)
-    found = linearise_robot_fmus(own_robot(robot, "winch_1", lag_winch(tmp_path), tmp_path / "built"))
+    plant = linearise_robot_fmus(own_robot(robot, "winch_1", lag_winch(tmp_path), tmp_path / "built"))
     exact = linearise(robot).system
     s = 2j * np.pi * np.geomspace(0.3, 5.0, 9)
     for output in ("position_x", "tension_1"):
         expected = exact[output, "winch_speed_1"](s) / (1.0 + LAG * s)
-        assert found.system[output, "speed_command_1"](s) == pytest.approx(expected, rel=AGREES)
-    assert swings(found.system) == pytest.approx(swings(exact), rel=AGREES)
+        assert plant.system[output, "speed_command_1"](s) == pytest.approx(expected, rel=AGREES)
+    assert swings(plant.system) == pytest.approx(swings(exact), rel=AGREES)
 
 
 @pytest.mark.validate
 def test_a_robot_with_a_users_platform_that_cannot_save_its_state(tmp_path: Path) -> None:
     robot = paper_robot(damping=2.08e9)
-    found = linearise_robot_fmus(own_robot(robot, "platform", falling_mass(tmp_path), tmp_path / "built"))
+    plant = linearise_robot_fmus(own_robot(robot, "platform", falling_mass(tmp_path), tmp_path / "built"))
     exact = linearise(robot).system
-    assert found.system.input_labels == ["winch_speed_1", "winch_speed_2", "winch_speed_3"]
-    assert swings(found.system) == pytest.approx(swings(exact), rel=AGREES)
+    assert plant.system.input_labels == ["winch_speed_1", "winch_speed_2", "winch_speed_3"]
+    assert swings(plant.system) == pytest.approx(swings(exact), rel=AGREES)
     s = 2j * np.pi * np.geomspace(0.3, 5.0, 9)
     for output in ("position_x", "tension_1"):
         expected = exact[output, "winch_speed_1"](s)
-        assert found.system[output, "winch_speed_1"](s) == pytest.approx(expected, rel=AGREES)
+        assert plant.system[output, "winch_speed_1"](s) == pytest.approx(expected, rel=AGREES)
 
 
 @contextmanager
@@ -178,11 +178,11 @@ def test_a_chain_of_a_users_fmus_that_is_no_robot(tmp_path: Path) -> None:
     command, speed = Port("first", "speed_command"), Port("second", "winch_speed")
     chain = [Connection(Port("first", "winch_speed"), Port("second", "speed_command"))]
     make = partial(wired, {"first": path, "second": path}, chain, [command], lag=0.1)
-    found = linearise_fmus(make, PlantSignals({"command": command}, {"speed": speed}))
-    assert found.system.nstates == 2
-    assert found.system.poles().real == pytest.approx([-10.0, -10.0], rel=1e-3)
+    plant = linearise_fmus(make, PlantSignals({"command": command}, {"speed": speed}))
+    assert plant.system.nstates == 2
+    assert plant.system.poles().real == pytest.approx([-10.0, -10.0], rel=1e-3)
     s = 1j * np.geomspace(0.1, 100.0, 10)
-    assert found.system(s) == pytest.approx(1.0 / (1.0 + 0.1 * s) ** 2, rel=1e-4)
+    assert plant.system(s) == pytest.approx(1.0 / (1.0 + 0.1 * s) ** 2, rel=1e-4)
 
 
 @needs_compiler
@@ -238,9 +238,9 @@ def test_dead_time_is_refused(tmp_path: Path) -> None:
 def test_drift_is_said(tmp_path: Path) -> None:
     setting = EffectSetting("thermal", {"rise": 10.0, "time": 20.0, "expansion": 1.2e-5}, (1, 2, 3))
     robot = paper_robot(damping=4e8).with_effect(setting)
-    found = linearise_robot_fmus(build_fmus(robot, tmp_path))
-    assert len(found.notes) == 1 and found.notes[0].startswith("not quite at rest: platform.velocity.z")
-    assert max(distances(found, linearise(robot).system).values()) < AGREES
+    plant = linearise_robot_fmus(build_fmus(robot, tmp_path))
+    assert len(plant.notes) == 1 and plant.notes[0].startswith("not quite at rest: platform.velocity.z")
+    assert max(distances(plant, linearise(robot).system).values()) < AGREES
 
 
 def slipping(slip: float) -> Robot:

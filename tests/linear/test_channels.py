@@ -69,17 +69,17 @@ def test_the_transfer_function_of_a_vertical_force_by_hand() -> None:
     plant = linearise(example("eight"))
     mode = int(np.argmax(np.abs(plant.modes.shapes[2])))
     omega, ratio = 2 * np.pi * plant.modes.frequencies[mode], plant.modes.damping_ratios[mode]
-    found = transfer_function(plant.system, "external_force_z", "position_z")
-    assert isinstance(found, control.TransferFunction)
-    numerator, denominator = found.num_array[0, 0], found.den_array[0, 0]
+    result = transfer_function(plant.system, "external_force_z", "position_z")
+    assert isinstance(result, control.TransferFunction)
+    numerator, denominator = result.num_array[0, 0], result.den_array[0, 0]
     assert denominator / denominator[0] == pytest.approx([1.0, 2.0 * ratio * omega, omega**2], rel=1e-9)
     assert numerator[-1] / denominator[0] == pytest.approx(1.0 / 60.0, rel=1e-9)
 
 
 def test_a_transfer_function_keeps_its_names_and_integrates_the_winch() -> None:
-    found = transfer_function(linearise(paper_robot(damping=4e8)).system, "winch_speed_1", "position_x")
-    assert (found.input_labels, found.output_labels) == (["winch_speed_1"], ["position_x"])
-    assert np.sum(np.abs(found.poles()) < 1e-6) == 1
+    result = transfer_function(linearise(paper_robot(damping=4e8)).system, "winch_speed_1", "position_x")
+    assert (result.input_labels, result.output_labels) == (["winch_speed_1"], ["position_x"])
+    assert np.sum(np.abs(result.poles()) < 1e-6) == 1
 
 
 def test_an_unknown_signal_is_refused() -> None:

@@ -105,8 +105,8 @@ def compare(robot: Robot, at: tuple[float, float, float] | None) -> None:
     states = plant.system.nstates
     expected = {"A": by_state[:states], "B": by_input[:states], "C": by_state[states:], "D": by_input[states:]}
     for name, matrix in expected.items():
-        found = getattr(plant.system, name)
-        assert np.allclose(found, matrix, rtol=1e-6, atol=1e-7 * np.abs(matrix).max()), name
+        result = getattr(plant.system, name)
+        assert np.allclose(result, matrix, rtol=1e-6, atol=1e-7 * np.abs(matrix).max()), name
 
 
 @pytest.mark.parametrize("law", ["logarithmic", "linear"])

@@ -82,7 +82,7 @@ def test_the_papers_ratio_of_dynamic_to_quasi_static_frequencies() -> None:
 
 
 @pytest.mark.parametrize(
-    ("path", "times", "told"),
+    ("path", "times", "message"),
     [
         (np.zeros((4, 2)), None, "shape"),
         (np.array([[28.0, 0.0, 5.0]]), None, "two or more"),
@@ -90,8 +90,8 @@ def test_the_papers_ratio_of_dynamic_to_quasi_static_frequencies() -> None:
         (np.array([[28.0, 0.0, 5.0], [np.nan, 0.0, 5.0]]), None, "finite"),
     ],
 )
-def test_a_path_that_is_none_is_refused(path: np.ndarray, times: np.ndarray | None, told: str) -> None:
-    with pytest.raises(InputError, match=told):
+def test_a_path_that_is_none_is_refused(path: np.ndarray, times: np.ndarray | None, message: str) -> None:
+    with pytest.raises(InputError, match=message):
         modes_along(paper_robot(), path, times)
 
 

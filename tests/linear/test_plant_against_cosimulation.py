@@ -70,13 +70,13 @@ def test_a_swept_sine_has_gain_and_phase_of_the_transfer_functions(robot: Robot,
     shown = outputs(cosimulate(fmus, time, speeds, step=1.0))
     # Ten frequencies about all modes; the sweep begins and ends at rest, so its spectra tell the gains.
     frequencies = np.linspace(0.85 * plant.modes.frequencies[0], 1.15 * plant.modes.frequencies[-1], 10)
-    found = spectra(time, shown - shown[0], frequencies)
+    result = spectra(time, shown - shown[0], frequencies)
     given = spectra(time, speed[:, None], frequencies) * np.sinc(frequencies * (time[1] - time[0]))[:, None] ** 2
     system = plant.system
     expected = system[system.output_labels, "winch_speed_1"](2j * pi * frequencies).reshape(
         len(system.output_labels), -1
     )
-    likeness = found.T / given.T / expected
+    likeness = result.T / given.T / expected
     assert np.abs(np.abs(likeness) - 1.0).max() < 0.002
     assert np.degrees(np.abs(np.angle(likeness))).max() < 0.2
 
@@ -99,5 +99,5 @@ def outputs(motion: CosimulationResult) -> Array:
 def spectra(time: Array, values: Array, frequencies: Array) -> NDArray[np.complex128]:
     """Fourier integrals of what is zero at both ends, (number of frequencies, number of columns)."""
     waves = np.exp(-2j * pi * np.outer(frequencies, time))
-    found: NDArray[np.complex128] = (time[1] - time[0]) * waves @ values
-    return found
+    result: NDArray[np.complex128] = (time[1] - time[0]) * waves @ values
+    return result

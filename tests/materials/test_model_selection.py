@@ -34,17 +34,17 @@ def test_terms_that_are_there_are_found(material: Material, effects: set[str]) -
 
 def test_the_number_of_branches_is_found() -> None:
     two = Material(100e9, 0.05e9, (MaxwellBranch(25e9, 0.03), MaxwellBranch(25e9, 1.0)))
-    found = select_model(observed(two, np.geomspace(0.05, 50.0, 16), 0.01, seed=1), 0.01)
-    assert found.fit.structure == ModelStructure(damping=True, branches=2)
-    assert found.evidence("relaxation") > 100.0
+    result = select_model(observed(two, np.geomspace(0.05, 50.0, 16), 0.01, seed=1), 0.01)
+    assert result.fit.structure == ModelStructure(damping=True, branches=2)
+    assert result.evidence("relaxation") > 100.0
 
 
 def test_a_delay_of_the_channels_is_a_rival_of_damping() -> None:
     # Below the rope's own frequencies the two differ only in a storage modulus that falls by a cosine.
     late = Material(100e9, delay=1e-3)
-    found = select_model(observed(late, FREQUENCY, 0.02, seed=2), 0.01)
-    assert found.chosen == PAIR
-    assert ModelStructure(delay=True) in found.confusable_models(0.01)
+    result = select_model(observed(late, FREQUENCY, 0.02, seed=2), 0.01)
+    assert result.chosen == PAIR
+    assert ModelStructure(delay=True) in result.confusable_models(0.01)
 
 
 def test_amplitudes_let_friction_of_one_stress_be_told() -> None:

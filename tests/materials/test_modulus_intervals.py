@@ -54,8 +54,8 @@ def test_intervals_of_a_branch_hold_the_truth_as_often_as_they_say() -> None:
     held = np.zeros(4)
     for seed in range(30):
         fit = fit_structure(observed(true, FREQUENCY, 0.03, seed), terms)
-        found = confidence_intervals(fit)
-        held += [each.low <= value <= each.high for each, value in zip(found, (100e9, 0.3e9, 30e9, 0.5), strict=True)]
+        result = confidence_intervals(fit)
+        held += [each.low <= value <= each.high for each, value in zip(result, (100e9, 0.3e9, 30e9, 0.5), strict=True)]
     assert np.all(held >= 24)
 
 

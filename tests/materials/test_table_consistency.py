@@ -24,15 +24,15 @@ GOOD = "1,100.000e9,1e9,86.603e9,1e9,30.000,1,0.57735,7.958e9"
 def of_row(path: Path, row: str, column: str) -> dict[str, ConsistencyCheck]:
     rows = [row, *(GOOD.replace("1,", f"{f},", 1) for f in (2, 3, 4))]
     path.write_text("\n".join([HEADER, *rows]) + "\n", encoding="utf-8")
-    found = consistency_checks(read_material_table(path))
-    return {check.formula: check for check in found if check.frequency == 1.0 and check.column == column}
+    result = consistency_checks(read_material_table(path))
+    return {check.formula: check for check in result if check.frequency == 1.0 and check.column == column}
 
 
 def test_rounded_columns_agree(tmp_path: Path) -> None:
     for column in ("storage_modulus", "dynamic_modulus", "loss_factor", "damping"):
-        found = of_row(tmp_path / "t.csv", GOOD, column)
-        assert found
-        assert all(check.agreement == "agrees" and check.range_gap == 0.0 for check in found.values())
+        result = of_row(tmp_path / "t.csv", GOOD, column)
+        assert result
+        assert all(check.agreement == "agrees" and check.range_gap == 0.0 for check in result.values())
 
 
 def test_digits_that_were_cut_off_are_told_from_wrong_ones(tmp_path: Path) -> None:
@@ -56,8 +56,8 @@ def test_uncertainty_is_propagated_from_both_inputs(tmp_path: Path) -> None:
 
 
 def test_the_papers_table_disagrees_with_itself_in_three_rows() -> None:
-    found = disagreements(consistency_checks(read_material_table(PAPER_TABLE)))
-    named = {(check.frequency, check.column, check.formula): check.agreement for check in found}
+    result = disagreements(consistency_checks(read_material_table(PAPER_TABLE)))
+    named = {(check.frequency, check.column, check.formula): check.agreement for check in result}
     assert named == {
         (2.0, "storage_modulus", "|E*| cos phi"): "disagrees",
         (5.0, "storage_modulus", "|E*| cos phi"): "disagrees",

@@ -203,9 +203,9 @@ def test_folder_holds_ledger_page_and_every_figure_twice(paper: PaperReproductio
     assert page.count("</tr>") > len(paper.entries) and page.count("<figure") == len(FIGURE_NAMES)
     assert "nan" not in re.sub(r"<[^>]*>", " ", page).lower().split()
     names = {f"{name}.{kind}" for name in FIGURE_NAMES for kind in ("png", "svg")}
-    found = {path.name: path.stat().st_size for path in folder.iterdir()}
-    assert set(found) == names | {"claims.json", "claims.html"}
-    assert min(found.values()) > 5000
+    results = {path.name: path.stat().st_size for path in folder.iterdir()}
+    assert set(results) == names | {"claims.json", "claims.html"}
+    assert min(results.values()) > 5000
 
 
 def test_time_figures_have_the_printed_panels_and_axes(records: Records) -> None:

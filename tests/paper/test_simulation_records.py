@@ -39,9 +39,9 @@ def test_differences_are_shares_of_the_base() -> None:
 def test_curves_that_turn_together_are_compared_where_each_turns() -> None:
     first = SimulationRecord(TIME, {"r": np.sin(2.0 * TIME), "line": TIME})
     second = SimulationRecord(TIME, {"r": 0.9 * np.sin(2.0 * (TIME - 0.1)), "line": 1.1 * TIME})
-    found = turning_points(first, second, "r", prominence=0.5)
+    result = turning_points(first, second, "r", prominence=0.5)
     tops = (np.arange(4) + 0.5) * np.pi / 2.0
-    assert [turn.time for turn in found] == pytest.approx(tops + 0.05, abs=0.005)
-    assert [turn.gap for turn in found] == pytest.approx([0.1] * 4, abs=1e-4)
+    assert [turn.time for turn in result] == pytest.approx(tops + 0.05, abs=0.005)
+    assert [turn.gap for turn in result] == pytest.approx([0.1] * 4, abs=1e-4)
     (end,) = turning_points(first, second, "line", prominence=0.5)
     assert (end.time, end.gap) == pytest.approx((7.0, 0.7)), "a curve without turns at its end"

@@ -62,9 +62,9 @@ def test_examples_of_a_page_run(page: str, tmp_path: Path, monkeypatch: pytest.M
 def test_example_of_the_controllers_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     (example,) = code_of("control.md").values()
-    found: dict[str, object] = {}
-    exec(compile(example, "control.md", "exec"), found)
-    difference = found["motion"].position - found["same"].position  # type: ignore[attr-defined]
+    results: dict[str, object] = {}
+    exec(compile(example, "control.md", "exec"), results)
+    difference = results["motion"].position - results["same"].position  # type: ignore[attr-defined]
     assert abs(difference).max() < 1e-9
 
 

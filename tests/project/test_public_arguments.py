@@ -257,8 +257,8 @@ def test_a_trace_refuses(changes: dict[str, Any], where: str, words: tuple[str, 
 
 def test_signatures_show_nothing_of_the_inside() -> None:
     for name in tautwire.__all__:
-        found = inspect.signature(getattr(tautwire, name))
-        assert "<function" not in str(found) and "object at" not in str(found), name
+        result = inspect.signature(getattr(tautwire, name))
+        assert "<function" not in str(result) and "object at" not in str(result), name
     assert list(inspect.signature(tautwire.read_robot).parameters) == ["path"]
 
 

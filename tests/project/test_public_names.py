@@ -23,8 +23,8 @@ SLOW = ("casadi", "control", "plotly", "pandas", "fmpy", "scipy", "numpy", "matp
 
 def test_every_name_is_there_and_described() -> None:
     for name in tautwire.__all__:
-        found = getattr(tautwire, name)
-        assert inspect.getdoc(found), name
+        result = getattr(tautwire, name)
+        assert inspect.getdoc(result), name
         assert name in dir(tautwire)
     assert set(tautwire.__all__) == set(tautwire._MODULES)
     with pytest.raises(AttributeError, match="flies"):
@@ -48,14 +48,14 @@ def test_a_type_checker_refuses_names_that_are_not_ours(tmp_path: Path) -> None:
     paths = f"{root}{os.pathsep}{root.parent / 'fmu_src'}"
     call = [sys.executable, "-m", "mypy", "--config-file", os.devnull, "--follow-imports", "silent", "user.py"]
     environment = {**os.environ, "MYPYPATH": paths}
-    shown = subprocess.run(call, capture_output=True, text=True, check=False, cwd=tmp_path, env=environment).stdout
-    assert 'Module "tautwire" has no attribute "tracee"' in shown
+    completed = subprocess.run(call, capture_output=True, text=True, check=False, cwd=tmp_path, env=environment).stdout
+    assert 'Module "tautwire" has no attribute "tracee"' in completed
 
 
 def test_the_package_and_its_command_line_import_nothing_slow() -> None:
     code = f"import sys, tautwire.cli.application; print([name for name in {SLOW!r} if name in sys.modules])"
-    shown = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
-    assert shown.strip() == "[]"
+    completed = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True).stdout
+    assert completed.strip() == "[]"
 
 
 def test_docstrings_name_what_is_raised() -> None:

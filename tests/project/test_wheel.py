@@ -20,22 +20,22 @@ SUPPORTED = ("3.10", "3.11", "3.12", "3.13")
 
 def interpreters() -> dict[str, str]:
     """The Pythons of this machine that are supported, by version: this one, those on the path, and pyenv's."""
-    found = {f"{sys.version_info.major}.{sys.version_info.minor}": sys.executable}
+    results = {f"{sys.version_info.major}.{sys.version_info.minor}": sys.executable}
     pyenv = Path(os.environ.get("PYENV_ROOT", Path.home() / ".pyenv")) / "versions"
     for version in SUPPORTED:
         installed = sorted(pyenv.glob(f"{version}.*/bin/python"))
         places = [shutil.which(f"python{version}"), *map(str, installed)]
         for place in places:
-            if place and version not in found and _runs(place, version):
-                found[version] = place
-    return found
+            if place and version not in results and _runs(place, version):
+                results[version] = place
+    return results
 
 
 def _runs(python: str, version: str) -> bool:
     """Whether it is that Python and can make environments; a shim may be on the path without its Python."""
     ask = "import ensurepip, sys, venv; print('%d.%d' % sys.version_info[:2])"
-    told = subprocess.run([python, "-c", ask], capture_output=True, text=True, timeout=60)
-    return told.returncode == 0 and told.stdout.strip() == version
+    completed = subprocess.run([python, "-c", ask], capture_output=True, text=True, timeout=60)
+    return completed.returncode == 0 and completed.stdout.strip() == version
 
 
 @pytest.fixture(scope="module")

@@ -116,8 +116,8 @@ def test_commands_tell_of_another_robots_recording(
     out = ["--out", str(tmp_path / "out")]
     arguments = {"check": [recording, "--json"], "trace": [recording, *out], "simulate": ["--speeds", recording, *out]}
     assert run([command, robot, *arguments[command]]) == 2
-    told = capsys.readouterr()
-    said = json.loads(told.out)["problems"][0]["problem"] if command == "check" else told.err
+    captured = capsys.readouterr()
+    said = json.loads(captured.out)["problems"][0]["problem"] if command == "check" else captured.err
     assert "28.1 m from the start in the robot file" in said
     assert list(tmp_path.iterdir()) == []
     assert check_files(EXAMPLES / "three" / "robot.toml", EXAMPLES / "three" / "fit.csv").problems == ()

@@ -209,9 +209,9 @@ def test_hostile_names_are_shown_as_text(browser: Browser, pages: dict[str, Path
 
 @pytest.mark.validate
 def test_robot_is_drawn_flat_where_there_is_no_3d(pages: dict[str, Path]) -> None:
-    found = chromium()
-    assert found is not None
-    with browser_at(found, "--disable-3d-apis") as flat:
+    browser_path = chromium()
+    assert browser_path is not None
+    with browser_at(browser_path, "--disable-3d-apis") as flat:
         opened(flat, pages["trace"]).see("figure.scene")
         assert "drawn flat" in flat.run("return document.getElementById('flat').innerText")
         pictures = [flat.pixels("#scene")]

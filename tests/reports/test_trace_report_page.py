@@ -62,12 +62,12 @@ KINDS = ("three", "eight", "hostile", "none", "tensions only")
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_page_is_well_formed_with_all_sections(kind: str) -> None:
-    found = page(kind)
-    assert found.open == []
-    assert tuple(each["id"] for each in found.all("section")) == SECTIONS
-    identities = [attributes["id"] for _, attributes in found.elements if "id" in attributes]
+    result = page(kind)
+    assert result.open == []
+    assert tuple(each["id"] for each in result.all("section")) == SECTIONS
+    identities = [attributes["id"] for _, attributes in result.elements if "id" in attributes]
     assert len(identities) == len(set(identities))
-    assert [len(found.all(tag)) for tag in ("h1", "main", "title")] == [1, 1, 1]
+    assert [len(result.all(tag)) for tag in ("h1", "main", "title")] == [1, 1, 1]
 
 
 @pytest.mark.parametrize("kind", ["three", "eight"])
@@ -98,8 +98,8 @@ def test_page_says_what_effects_were_judged_on() -> None:
 
 
 def test_numbers_of_the_page_have_four_digits_at_most_but_where_an_interval_asks() -> None:
-    found = made_trace(samples=400)
-    loud = replace(found, candidates=(replace(found.candidates[0], evidence=163595.3645), *found.candidates[1:]))
+    result = made_trace(samples=400)
+    loud = replace(result, candidates=(replace(result.candidates[0], evidence=163595.3645), *result.candidates[1:]))
     text = Page(trace_page(loud, {})).text
     assert "163600" in text and "163595" not in text
     assert "13.3\u00b0" in text and "0.973" not in text  # how like relaxation is to damping
@@ -156,10 +156,10 @@ def test_page_stays_small_for_long_recordings(eight: bool) -> None:
 
 
 def test_verdict_numbers_and_links_are_written_without_scripts() -> None:
-    found = page("three")
+    result = page("three")
     for words in ("The cables damp 5.3 times", "2.103", "2.050 to 2.160", "812.4", "creep + thermal", "drum effects"):
-        assert words in found.text
-    assert found.links() == ["robot.toml", "fmus/cable%201.fmu"]
+        assert words in result.text
+    assert result.links() == ["robot.toml", "fmus/cable%201.fmu"]
 
 
 def test_hostile_names_are_shown_and_do_nothing() -> None:
@@ -229,13 +229,15 @@ def test_what_was_not_measured_is_null_not_nan() -> None:
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_controls_and_figures_have_names(kind: str) -> None:
-    found = page(kind)
-    assert all(each.get("aria-label") for tag, each in found.elements if each.get("role") in ("img", "region", "group"))
-    assert found.all("html")[0]["lang"] == "en"
-    labelled = [tag for tag, _ in found.elements].count("label")
-    assert labelled == len(found.all("input")) + len(found.all("select"))
-    assert all(each["aria-hidden"] == "true" for each in found.all("svg"))
-    assert len(found.all("caption")) == len(found.all("table"))
+    result = page(kind)
+    assert all(
+        each.get("aria-label") for tag, each in result.elements if each.get("role") in ("img", "region", "group")
+    )
+    assert result.all("html")[0]["lang"] == "en"
+    labelled = [tag for tag, _ in result.elements].count("label")
+    assert labelled == len(result.all("input")) + len(result.all("select"))
+    assert all(each["aria-hidden"] == "true" for each in result.all("svg"))
+    assert len(result.all("caption")) == len(result.all("table"))
 
 
 def test_page_follows_light_and_dark() -> None:
@@ -274,12 +276,12 @@ def test_envelope_keeps_peaks_order_and_gaps() -> None:
 def test_spectrum_of_noise_lies_on_the_noise_line_and_a_tone_above() -> None:
     random, time = np.random.default_rng(3), np.linspace(0.0, 399.99, 40_000)
     noise = random.normal(0.0, 2.0, time.size)
-    found = residual_spectra(time, noise + np.sin(2 * np.pi * 5.0 * time), noise)
-    assert found is not None
+    result = residual_spectra(time, noise + np.sin(2 * np.pi * 5.0 * time), noise)
+    assert result is not None
     level = white_noise_density(2.0, time)
-    assert np.median(found.after) == pytest.approx(level, rel=0.05)
-    assert found.frequency[np.argmax(found.before)] == pytest.approx(5.0, rel=0.03)
-    assert found.before.max() > 3.0 * level
+    assert np.median(result.after) == pytest.approx(level, rel=0.05)
+    assert result.frequency[np.argmax(result.before)] == pytest.approx(5.0, rel=0.03)
+    assert result.before.max() > 3.0 * level
 
 
 def test_packing_keeps_numbers_and_turns_the_infinite_into_gaps() -> None:

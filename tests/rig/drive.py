@@ -77,8 +77,8 @@ class Drive:
             )
             state = solution.y[:, -1]
             rows[wanted] = solution.y.T[: len(wanted)]
-        found = [
+        results = [
             (r[0] / self.turn, self.torque(command(t), r)[0] / self.turn, r[2])
             for t, r in zip(times, rows, strict=True)
         ]
-        return np.array(found)
+        return np.array(results)

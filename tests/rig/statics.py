@@ -41,7 +41,7 @@ def nearest_to_preferred(directions: Vector, load: Vector, limits: TensionLimits
     # Cables in one plane leave the multiplier across it open.
     guess = -np.linalg.lstsq(directions.T @ directions, missing, rcond=None)[0]
     scale = np.linalg.norm(load) + 1.0
-    found = optimize.least_squares(imbalance, guess, jacobian, xtol=1e-15, ftol=1e-15, gtol=1e-15)
-    if np.linalg.norm(imbalance(found.x)) > 1e-9 * scale:
+    result = optimize.least_squares(imbalance, guess, jacobian, xtol=1e-15, ftol=1e-15, gtol=1e-15)
+    if np.linalg.norm(imbalance(result.x)) > 1e-9 * scale:
         raise ValueError("no tensions within the limits hold the platform at its start")
-    return tensions(found.x)
+    return tensions(result.x)

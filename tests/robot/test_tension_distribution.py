@@ -20,7 +20,7 @@ def unit_of(sketch: np.ndarray) -> np.ndarray:
 def test_the_least_breach_of_limits_is_that_of_a_plain_optimiser(sketch: np.ndarray, maximum: float) -> None:
     unit, load = unit_of(sketch), np.array([4000.0, -2000.0, 1000.0])
     limits, count = TensionLimits(50.0, maximum, 500.0), sketch.shape[1]
-    found = least_limit_violations(unit, load, limits)
+    result = least_limit_violations(unit, load, limits)
     other = minimize(
         lambda x: float(np.sum(x[count:] ** 2)) / 1e6,
         np.concatenate([np.full(count, 500.0), np.zeros(count)]),
@@ -28,10 +28,10 @@ def test_the_least_breach_of_limits_is_that_of_a_plain_optimiser(sketch: np.ndar
         constraints={"type": "eq", "fun": lambda x: (unit @ (x[:count] + x[count:]) - load) / 1e3},
         options={"maxiter": 2000, "ftol": 1e-14},
     )
-    assert np.sum(found**2) / 1e6 == pytest.approx(other.fun, rel=1e-3, abs=1e-6)
+    assert np.sum(result**2) / 1e6 == pytest.approx(other.fun, rel=1e-3, abs=1e-6)
     # With what is missing given, the limits do.
-    assert distribute_tensions(unit, load - unit @ found, limits) is not None
-    assert (distribute_tensions(unit, load, limits) is None) == (np.max(np.abs(found)) > 1e-6)
+    assert distribute_tensions(unit, load - unit @ result, limits) is not None
+    assert (distribute_tensions(unit, load, limits) is None) == (np.max(np.abs(result)) > 1e-6)
 
 
 def test_what_cables_can_hold_breaks_no_limit() -> None:

@@ -100,7 +100,7 @@ def test_at_an_exit_point_there_is_nothing() -> None:
 
 
 @pytest.mark.parametrize(
-    ("arguments", "told"),
+    ("arguments", "message"),
     [
         ({"spacing": 0.0}, "not positive"),
         ({"spacing": 0.01}, "points, more than"),
@@ -109,6 +109,6 @@ def test_at_an_exit_point_there_is_nothing() -> None:
         ({"lower": (1.0, 0.0)}, "three finite coordinates"),
     ],
 )
-def test_what_makes_no_grid_is_refused(arguments: dict[str, Any], told: str) -> None:
-    with pytest.raises(InputError, match=told):
+def test_what_makes_no_grid_is_refused(arguments: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
         wrench_feasible_workspace(paper_robot(), **arguments)

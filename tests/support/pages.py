@@ -52,8 +52,8 @@ class Page(HTMLParser):
 
     def data(self) -> dict[str, Any]:
         """What the figures draw."""
-        found: dict[str, Any] = json.loads(self.scripts[0])
-        return found
+        result: dict[str, Any] = json.loads(self.scripts[0])
+        return result
 
 
 def section_of(content: str, identity: str) -> Page:

@@ -137,7 +137,9 @@ def made_trace(
     """A trace that found too little damping declared."""
     robot = made_robot(eight, name)
     cables = robot.cable_numbers
-    found = FoundEffect("damping", "cable", cables, {"damping": Estimate(2.1034e9, "Pa s", 2.05e9, 2.16e9, 4e8)}, 812.4)
+    result = FoundEffect(
+        "damping", "cable", cables, {"damping": Estimate(2.1034e9, "Pa s", 2.05e9, 2.16e9, 4e8)}, 812.4
+    )
     comparisons = [made_comparison("fit", robot, path, samples, 1)]
     if check:
         comparisons.append(made_comparison("check", robot, "data/check.csv", samples, 2))
@@ -147,7 +149,7 @@ def made_trace(
         sentence="The cables damp 5.3 times as strongly as declared: 2.10 GPa s instead of 0.400 GPa s.",
         robot_before=robot,
         robot_after=robot.with_effect(EffectSetting("damping", {"damping": 2.1034e9}, cables)),
-        effects=(found,),
+        effects=(result,),
         correlations=(),
         also_possible=(("relaxation",), ("creep", "thermal")),
         candidates=made_candidates(cables),

@@ -133,12 +133,12 @@ def read_lines(path: Path) -> tuple[Line, ...]:
 
 def _best(trace: Trace) -> tuple[Rival, ...]:
     """The best of each round, best first."""
-    found: list[Rival] = []
+    results: list[Rival] = []
     for number in dict.fromkeys(candidate.round for candidate in trace.candidates):
         fitted = [c for c in trace.candidates if c.round == number and isfinite(c.mean_square)]
         ranked = sorted(fitted, key=lambda candidate: -candidate.evidence)[:MOST_RIVALS]
-        found += [Rival(c.round, c.name, c.cables, c.evidence, c.mean_square, c.accepted) for c in ranked]
-    return tuple(found)
+        results += [Rival(c.round, c.name, c.cables, c.evidence, c.mean_square, c.accepted) for c in ranked]
+    return tuple(results)
 
 
 def _both(errors: Errors) -> tuple[float, float]:

@@ -23,11 +23,11 @@ def traced(case: Case, folder: Path, code: str) -> Line:
     fit, check = recordings(case, folder)
     begun = processor_time()
     try:
-        found = trace(example(case.robot), fit, check, lambda what, done: None)
+        trace_result = trace(example(case.robot), fit, check, lambda what, done: None)
     except Exception:
         return Line(case.key, fingerprint, code, failure=traceback.format_exc())
     used = Used(processor_time() - begun, getrusage(RUSAGE_SELF).ru_maxrss / 1e3)
-    return line_of(case.key, fingerprint, code, found, used)
+    return line_of(case.key, fingerprint, code, trace_result, used)
 
 
 def processor_time() -> float:

@@ -99,20 +99,20 @@ def _excused(truth: frozenset[str], line: Line) -> bool:
 def _places(case: Case) -> dict[str, frozenset[int]]:
     """The cables on which each hidden effect acts; none where cables do not matter."""
     count = declared(case.robot).count
-    found = {}
+    results = {}
     for name, values in case.effects({part.form.key: part.form.start for part in case.parts}).items():
         anywhere = values.get("outputs") == "position" or BY_NAME[name].component == "platform"
-        found[name] = frozenset() if anywhere else frozenset(values.get("cables", range(1, count + 1)))
-    return found
+        results[name] = frozenset() if anywhere else frozenset(values.get("cables", range(1, count + 1)))
+    return results
 
 
 def _named_places(line: Line) -> dict[str, frozenset[int]]:
-    found: dict[str, frozenset[int]] = {}
+    results: dict[str, frozenset[int]] = {}
     for effect in line.effects:
         on_platform = BY_NAME[effect.name].component == "platform" or _of_position(effect.parameters)
         places = frozenset() if on_platform else frozenset(effect.cables)
-        found[effect.name] = found.get(effect.name, frozenset()) | places
-    return found
+        results[effect.name] = results.get(effect.name, frozenset()) | places
+    return results
 
 
 def _of_position(parameters: Mapping[str, tuple[float, float, float]]) -> bool:
@@ -123,7 +123,7 @@ def _of_position(parameters: Mapping[str, tuple[float, float, float]]) -> bool:
 
 def held(answers: Iterable[Scored]) -> tuple[Held, ...]:
     """Every fitted interval of a rightly named effect, against the truth."""
-    found: list[Held] = []
+    results: list[Held] = []
     for answer in answers:
         if answer.line.verdict != "effects" or answer.case.kind not in ("listed", "pair"):
             continue
@@ -140,8 +140,8 @@ def held(answers: Iterable[Scored]) -> tuple[Held, ...]:
                 true = truth.get(name, neutral.get(name))
                 if true is not None and _is_fitted(estimate):
                     inside = holds(effect.name, name, true, estimate)
-                    found.append(Held(answer.case.key, effect.name, name, true, estimate, inside))
-    return tuple(found)
+                    results.append(Held(answer.case.key, effect.name, name, true, estimate, inside))
+    return tuple(results)
 
 
 def _is_fitted(estimate: Interval) -> bool:

@@ -88,11 +88,11 @@ class Stage:
     @cached_property
     def _slopes(self) -> dict[str, np.ndarray]:
         """What a little more of each nuisance changes, in standard deviations of the sensors."""
-        found = {}
+        results = {}
         for name, share in NUISANCES.items():
             value = float(getattr(self.robot, name)[0]) * (1.0 + share)
-            found[name] = (self._outputs({name: {name: value}}) - self.plain) / self.sigma
-        return found
+            results[name] = (self._outputs({name: {name: value}}) - self.plain) / self.sigma
+        return results
 
 
 def sized(stage: Stage, part: Part) -> Sized:
@@ -139,11 +139,11 @@ def stored() -> Mapping[str, Mapping[str, Sized]]:
 
 def strengths(case: Case) -> dict[str, float]:
     """The stored strengths of a case; none where it hides nothing."""
-    found = stored().get(case.key, {})
-    missing = [part.form.key for part in case.parts if part.form.key not in found]
+    result = stored().get(case.key, {})
+    missing = [part.form.key for part in case.parts if part.form.key not in result]
     if missing:
         raise KeyError(f"{case.key}: no size of {missing[0]} in {FILE}; run python -m tests.bench.trace.sizes")
-    return {part.form.key: found[part.form.key].strength for part in case.parts}
+    return {part.form.key: result[part.form.key].strength for part in case.parts}
 
 
 def main() -> None:

@@ -22,13 +22,13 @@ def table(head: Sequence[str], rows: Iterable[Sequence[object]]) -> str:
 def outcomes(answers: Sequence[Scored]) -> str:
     """How many answers of each kind of case had each outcome."""
     kinds = list(dict.fromkeys(answer.case.kind for answer in answers))
-    found = [answer.outcome for answer in answers]
-    used = [outcome for outcome in MEANINGS if outcome in found]
+    results = [answer.outcome for answer in answers]
+    used = [outcome for outcome in MEANINGS if outcome in results]
     rows = [
         [kind, len(mine := [a.outcome for a in answers if a.case.kind == kind]), *(mine.count(o) for o in used)]
         for kind in kinds
     ]
-    return table(["hidden", "cases", *used], [*rows, ["all", len(found), *(found.count(o) for o in used)]])
+    return table(["hidden", "cases", *used], [*rows, ["all", len(results), *(results.count(o) for o in used)]])
 
 
 def meanings(answers: Sequence[Scored]) -> str:
@@ -46,14 +46,14 @@ def confusions(answers: Sequence[Scored]) -> str:
 
 def coverage(answers: Sequence[Scored]) -> str:
     """How many of the 95 % intervals hold the true value, by effect and in all."""
-    found = held(answers)
+    result = held(answers)
     rows = []
-    for name in dict.fromkeys(one.name for one in found):
-        mine = [one for one in found if one.name == name]
+    for name in dict.fromkeys(one.name for one in result):
+        mine = [one for one in result if one.name == name]
         parameters = ", ".join(dict.fromkeys(one.parameter for one in mine))
         outside = ", ".join(f"{one.case} ({one.parameter})" for one in mine if not one.inside)
         rows.append([name, parameters, f"{sum(one.inside for one in mine)} of {len(mine)}", outside])
-    whole = rate(sum(one.inside for one in found), len(found))
+    whole = rate(sum(one.inside for one in result), len(result))
     return table(["effect", "parameters", "held", "not held in"], [*rows, ["all", "", shown_rate(whole), ""]])
 
 

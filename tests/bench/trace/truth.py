@@ -44,19 +44,19 @@ def law_values(name: str, rig: Mapping[str, Any]) -> dict[str, float]:
 
 def in_one_way(name: str, estimates: Mapping[str, Interval]) -> dict[str, Interval]:
     """The same estimates as :func:`law_values` would write them: eccentricity above zero, branches by rising time."""
-    found = dict(estimates)
-    if name == "drum" and "eccentricity" in found and found["eccentricity"].value < 0.0:
-        value, low, high = found["eccentricity"]
-        found["eccentricity"] = Interval(-value, -high, -low)
-        if "phase" in found:
-            found["phase"] = Interval(*(end + pi for end in found["phase"]))
+    result = dict(estimates)
+    if name == "drum" and "eccentricity" in result and result["eccentricity"].value < 0.0:
+        value, low, high = result["eccentricity"]
+        result["eccentricity"] = Interval(-value, -high, -low)
+        if "phase" in result:
+            result["phase"] = Interval(*(end + pi for end in result["phase"]))
     if name == "relaxation":
-        numbers = [number for number in ("", "_2", "_3") if f"time{number}" in found and f"modulus{number}" in found]
-        acting = [number for number in numbers if found[f"modulus{number}"].value > 0.0]
-        rising = sorted(acting, key=lambda number: found[f"time{number}"].value)
+        numbers = [number for number in ("", "_2", "_3") if f"time{number}" in result and f"modulus{number}" in result]
+        acting = [number for number in numbers if result[f"modulus{number}"].value > 0.0]
+        rising = sorted(acting, key=lambda number: result[f"time{number}"].value)
         for number, old in zip(numbers, rising, strict=False):
-            found[f"modulus{number}"], found[f"time{number}"] = estimates[f"modulus{old}"], estimates[f"time{old}"]
-    return found
+            result[f"modulus{number}"], result[f"time{number}"] = estimates[f"modulus{old}"], estimates[f"time{old}"]
+    return result
 
 
 def holds(name: str, parameter: str, truth: float, estimate: Interval) -> bool:
@@ -68,9 +68,9 @@ def holds(name: str, parameter: str, truth: float, estimate: Interval) -> bool:
 
 def _branches(values: Mapping[str, Any]) -> dict[str, float]:
     moduli, times = np.atleast_1d(values["modulus"]), np.atleast_1d(values["time"])
-    found = {}
+    results = {}
     for index, place in enumerate(np.argsort(times)):
         number = f"_{index + 1}" if index else ""
-        found[f"modulus{number}"] = float(moduli[place])
-        found[f"time{number}"] = float(times[place])
-    return found
+        results[f"modulus{number}"] = float(moduli[place])
+        results[f"time{number}"] = float(times[place])
+    return results

@@ -27,9 +27,9 @@ def chosen(found: NormalEquations, present: dict[Term, float]) -> dict[Term, flo
 
 @pytest.mark.parametrize("seed", range(5))
 def test_the_terms_that_act_are_chosen_with_their_coefficients(seed: int) -> None:
-    found = chosen(slopes(seed, {3: 0.4, 17: -0.2, 40: 0.1}, nuisance=2.0), {})
-    assert set(found) == {TERMS[3], TERMS[17], TERMS[40]}
-    assert [found[TERMS[i]] for i in (3, 17, 40)] == pytest.approx([0.4, -0.2, 0.1], abs=0.05)
+    result = chosen(slopes(seed, {3: 0.4, 17: -0.2, 40: 0.1}, nuisance=2.0), {})
+    assert set(result) == {TERMS[3], TERMS[17], TERMS[40]}
+    assert [result[TERMS[i]] for i in (3, 17, 40)] == pytest.approx([0.4, -0.2, 0.1], abs=0.05)
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -38,8 +38,8 @@ def test_of_noise_nothing_is_chosen(seed: int) -> None:
 
 
 def test_what_is_there_already_is_chosen_again_at_its_whole_value() -> None:
-    found = chosen(slopes(1, {3: 0.1}), {TERMS[3]: 1.0})
-    assert found == pytest.approx({TERMS[3]: 1.1}, abs=0.05)
+    result = chosen(slopes(1, {3: 0.1}), {TERMS[3]: 1.0})
+    assert result == pytest.approx({TERMS[3]: 1.1}, abs=0.05)
 
 
 def test_a_term_that_was_wrong_goes() -> None:
@@ -51,6 +51,6 @@ def test_no_more_than_a_few_are_chosen() -> None:
 
 
 def test_a_term_without_slopes_is_left_alone() -> None:
-    found = slopes(4, {3: 0.5})
-    found.fisher_information[8, :] = found.fisher_information[:, 8] = found.score[8] = 0.0
-    assert set(chosen(found, {})) == {TERMS[3]}
+    result = slopes(4, {3: 0.5})
+    result.fisher_information[8, :] = result.fisher_information[:, 8] = result.score[8] = 0.0
+    assert set(chosen(result, {})) == {TERMS[3]}

@@ -31,12 +31,12 @@ def discovered(effects: dict[str, Any], seed: int = 3, robot: Robot = ROBOT) -> 
 
 def found_in(effects: dict[str, Any], pattern: str) -> list[float]:
     """The numbers in a formula of this form, which has to be good enough for a verdict."""
-    found = discovered(effects)
-    assert found is not None
-    assert found.residuals_are_white
-    assert found.is_accepted(THRESHOLD)
-    numbers = re.fullmatch(pattern.replace("#", r"(-?[0-9.e-]+)"), formula_text(found.robot, found.formulas))
-    assert numbers is not None, formula_text(found.robot, found.formulas)
+    result = discovered(effects)
+    assert result is not None
+    assert result.residuals_are_white
+    assert result.is_accepted(THRESHOLD)
+    numbers = re.fullmatch(pattern.replace("#", r"(-?[0-9.e-]+)"), formula_text(result.robot, result.formulas))
+    assert numbers is not None, formula_text(result.robot, result.formulas)
     return [float(number) for number in numbers.groups()]
 
 
@@ -67,16 +67,16 @@ def test_a_machine_that_shakes() -> None:
 
 def test_a_formula_of_the_robot_file_stays() -> None:
     half = replace(ROBOT, formulas=(Formula("force_x", "-30*vy"),))
-    found = discovered({"unlisted_sideways": {"constant": 30.0}}, robot=half)
-    assert found is not None
-    assert found.residuals_are_white
-    assert [formula.target for formula in found.formulas] == ["force_y"]
-    assert found.robot.formulas == (*half.formulas, *found.formulas)
+    result = discovered({"unlisted_sideways": {"constant": 30.0}}, robot=half)
+    assert result is not None
+    assert result.residuals_are_white
+    assert [formula.target for formula in result.formulas] == ["force_y"]
+    assert result.robot.formulas == (*half.formulas, *result.formulas)
 
 
 def test_nothing_is_found_where_nothing_is_hidden() -> None:
-    found = [discovered({}, seed) for seed in (5, 6)]
-    assert not any(each is not None and each.is_accepted(THRESHOLD) for each in found)
+    results = [discovered({}, seed) for seed in (5, 6)]
+    assert not any(each is not None and each.is_accepted(THRESHOLD) for each in results)
 
 
 @pytest.mark.validate
@@ -89,13 +89,13 @@ def test_nothing_is_found_where_nothing_is_hidden() -> None:
     ids=["modulus", "drum"],
 )
 def test_a_known_effect_by_another_name_earns_no_place(effects: dict[str, Any]) -> None:
-    found = discovered(effects)
-    assert found is not None
-    assert found.log_likelihood_gain > THRESHOLD
-    assert not found.is_accepted(THRESHOLD)
+    result = discovered(effects)
+    assert result is not None
+    assert result.log_likelihood_gain > THRESHOLD
+    assert not result.is_accepted(THRESHOLD)
 
 
 @pytest.mark.validate
 def test_what_swings_has_no_formula() -> None:
-    found = discovered({"unlisted_swing": {"mass": 20.0, "length": 2.0}})
-    assert found is None or not found.residuals_are_white
+    result = discovered({"unlisted_swing": {"mass": 20.0, "length": 2.0}})
+    assert result is None or not result.residuals_are_white

@@ -56,8 +56,8 @@ def test_positions_are_counted_from_the_start() -> None:
 
 
 def test_rhythms_come_as_sine_and_cosine() -> None:
-    found = [term for term in TERMS if term.family == "time" and term.target == "force_z"]
-    assert [(term.text, term.shape) for term in found] == [
+    results = [term for term in TERMS if term.family == "time" and term.target == "force_z"]
+    assert [(term.text, term.shape) for term in results] == [
         (f"{f}({SHAPE_PARAMETER}*time)", 10.7) for f in ("sin", "cos")
     ]
 

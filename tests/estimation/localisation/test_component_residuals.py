@@ -20,17 +20,17 @@ def coloured(seed: int, memory: float = 0.98, count: int = 4000) -> Array:
 def test_the_signal_that_a_residual_follows_is_named() -> None:
     speed, place = coloured(1), coloured(2)
     residual = 0.3 * speed + coloured(3, 0.5)
-    found = strongest_correlation(residual, {"place": place, "speed": speed})
-    assert found is not None and found.name == "speed"
-    assert found.correlation == pytest.approx(np.corrcoef(residual, speed)[0, 1])
+    correlation = strongest_correlation(residual, {"place": place, "speed": speed})
+    assert correlation is not None and correlation.name == "speed"
+    assert correlation.correlation == pytest.approx(np.corrcoef(residual, speed)[0, 1])
 
 
 def test_of_several_the_strongest_is_named() -> None:
     one = coloured(4)
     other = one + 0.5 * coloured(5)
-    found = strongest_correlation(-one + 0.1 * coloured(6), {"other": other, "one": one})
-    assert found is not None and found.name == "one"
-    assert found.correlation < -0.9
+    correlation = strongest_correlation(-one + 0.1 * coloured(6), {"other": other, "one": one})
+    assert correlation is not None and correlation.name == "one"
+    assert correlation.correlation < -0.9
 
 
 def test_slow_signals_that_have_nothing_to_do_with_each_other_are_rarely_named() -> None:
@@ -45,7 +45,7 @@ def test_signals_that_stand_still_and_gaps_do_no_harm() -> None:
     speed = coloured(8)
     residual = speed.copy()
     residual[100:900] = np.nan
-    found = strongest_correlation(residual, {"still": np.full(len(speed), 3.7), "speed": speed})
-    assert found is not None and found.name == "speed"
+    correlation = strongest_correlation(residual, {"still": np.full(len(speed), 3.7), "speed": speed})
+    assert correlation is not None and correlation.name == "speed"
     assert strongest_correlation(residual, {"still": np.zeros(len(speed))}) is None
     assert strongest_correlation(np.full(4000, np.nan), {"speed": speed}) is None

@@ -67,18 +67,18 @@ def test_what_depends_on_the_motion_is_felt_along_the_path() -> None:
     braked = example("three").with_effect(EffectSetting("drag", {"drag_area": 30.0}))
     speed = np.linalg.norm(path().velocity, axis=1)[:, None]
     drag = -0.5 * 1.225 * 30.0 * speed * path().velocity
-    found = MASS * (shown(braked, needed()) - path().acceleration)
-    assert np.max(np.abs(found - drag)[100:]) < 0.02 * np.max(np.abs(drag))
+    result = MASS * (shown(braked, needed()) - path().acceleration)
+    assert np.max(np.abs(result - drag)[100:]) < 0.02 * np.max(np.abs(drag))
 
 
 def test_a_missing_tension_leaves_a_gap_and_no_more() -> None:
     forces = needed()
     forces[400:410, 1] = np.nan
-    found = shown(example("three"), forces)
-    assert np.all(np.isnan(found[400:410]))
+    result = shown(example("three"), forces)
+    assert np.all(np.isnan(result[400:410]))
     rest = np.delete(np.arange(len(TIME)), range(400, 410))
-    assert found[rest] == pytest.approx(path().acceleration[rest], abs=1e-9)
-    force = force_balance(path(), noisy(1), found, forces, MASS, SIGMAS).force
+    assert result[rest] == pytest.approx(path().acceleration[rest], abs=1e-9)
+    force = force_balance(path(), noisy(1), result, forces, MASS, SIGMAS).force
     assert np.all(np.isnan(force[405]))
     assert np.mean(np.isfinite(force)) == pytest.approx(1.0 - 10 / len(TIME))
     assert np.nanmax(np.abs(force)) < 5.0
@@ -91,9 +91,9 @@ def test_noise_of_positions_and_load_cells_leaves_what_is_expected() -> None:
     for seed in range(12):
         cells = random.normal(0.0, SIGMAS[3], (len(TIME), 3, 1)) * directions
         accelerations = path().acceleration + np.sum(cells, axis=1) / MASS
-        found = force_balance(path(), noisy(seed), accelerations, needed(), MASS, SIGMAS)
-        squares += np.mean(found.force**2, axis=0)
-        expected += np.mean(found.expected_deviation**2, axis=0)
+        balance = force_balance(path(), noisy(seed), accelerations, needed(), MASS, SIGMAS)
+        squares += np.mean(balance.force**2, axis=0)
+        expected += np.mean(balance.expected_deviation**2, axis=0)
     assert squares / expected == pytest.approx(np.ones(3), abs=0.3)
 
 
@@ -108,12 +108,12 @@ def test_a_missing_force_is_found_where_it_acts() -> None:
 def test_forces_follow_measured_tensions_along_the_fmus_direction() -> None:
     force = np.array([[3.0, 0.0, 4.0], [0.0, 0.0, 0.0]])
     run = CableSimulation(np.array([5.0, 0.0]), np.ones(2), force, np.zeros((2, 7)))
-    found = measured_forces([run], np.array([[10.0], [2.0]]), np.array([[0.0, 0.0, 9.0]]), np.zeros((2, 3)))
-    assert found[:, 0] == pytest.approx(np.array([[6.0, 0.0, 8.0], [0.0, 0.0, 2.0]]))
+    result = measured_forces([run], np.array([[10.0], [2.0]]), np.array([[0.0, 0.0, 9.0]]), np.zeros((2, 3)))
+    assert result[:, 0] == pytest.approx(np.array([[6.0, 0.0, 8.0], [0.0, 0.0, 2.0]]))
 
 
 def test_an_axis_that_was_not_measured_is_left_out() -> None:
     flat = replace(path(), measured=np.array([True, False, True]))
-    found = force_balance(flat, noisy(4), path().acceleration, needed(), MASS, SIGMAS)
-    assert np.isfinite(found.cutoff).tolist() == [True, False, True]
-    assert np.all(np.isnan(found.force[:, 1]))
+    balance = force_balance(flat, noisy(4), path().acceleration, needed(), MASS, SIGMAS)
+    assert np.isfinite(balance.cutoff).tolist() == [True, False, True]
+    assert np.all(np.isnan(balance.force[:, 1]))

@@ -38,9 +38,9 @@ def recording(time: Array, hidden: NDArray[np.bool_] | None = None) -> Recording
 
 def deviations(path: SmoothedPath, axis: int) -> Array:
     """Mean squares of errors over their standard deviations: position, velocity, acceleration."""
-    found = np.column_stack([path.position[:, axis], path.velocity[:, axis], path.acceleration[:, axis]])
+    result = np.column_stack([path.position[:, axis], path.velocity[:, axis], path.acceleration[:, axis]])
     spread = np.sqrt(np.diagonal(path.covariance[:, axis], axis1=1, axis2=2))
-    ratios: Array = np.mean(((found - np.column_stack(truth(path.time))) / spread) ** 2, axis=0)
+    ratios: Array = np.mean(((result - np.column_stack(truth(path.time))) / spread) ** 2, axis=0)
     return ratios
 
 
@@ -78,8 +78,8 @@ def test_the_intensity_of_a_random_jerk_is_found() -> None:
     position = np.cumsum(np.cumsum(acceleration)) * step**2
     values = position + np.random.default_rng(6).normal(0.0, 1e-3, count)
     time = step * np.arange(count)
-    found = maximum_likelihood_intensity(time, values, 1e-3)
-    assert found == pytest.approx(intensity, rel=0.5)
-    smoothed = smooth_axis(time, values, 1e-3, found)
+    result = maximum_likelihood_intensity(time, values, 1e-3)
+    assert result == pytest.approx(intensity, rel=0.5)
+    smoothed = smooth_axis(time, values, 1e-3, result)
     error = (smoothed.state[:, 2] - acceleration)[50:-50]
     assert np.mean(error**2 / smoothed.covariance[50:-50, 2, 2]) == pytest.approx(1.0, abs=0.25)

@@ -38,8 +38,8 @@ def stretched(position: np.ndarray, radius: float) -> tuple[np.ndarray, float]:
     angles = np.linspace(-0.5 * np.pi, np.pi, 4001)
     tangents = [a for a in angles if leaves_outward(position, point(a), centre)]
     best = tangents[int(np.argmin([misfit(a) for a in tangents]))]
-    found = minimize_scalar(misfit, bounds=(best - 1e-2, best + 1e-2), method="bounded", options={"xatol": 1e-13}).x
-    return point(found), float(np.linalg.norm(position - point(found)) + radius * (np.pi - found))
+    result = minimize_scalar(misfit, bounds=(best - 1e-2, best + 1e-2), method="bounded", options={"xatol": 1e-13}).x
+    return point(result), float(np.linalg.norm(position - point(result)) + radius * (np.pi - result))
 
 
 def leaves_outward(position: np.ndarray, point: np.ndarray, centre: np.ndarray) -> bool:

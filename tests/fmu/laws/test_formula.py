@@ -117,14 +117,14 @@ def test_an_fmu_with_a_formula_goes_back_to_saved_states(tmp_path: Path) -> None
         hand.run()
         hand.step(0.0, 0.01)
         state = hand.fmu.getFMUState()
-        found = []
+        results = []
         for _ in range(2):
             hand.fmu.setFMUState(state)
             hand.step(0.01, 0.01)
-            found.append(hand.get("position.x", "velocity.x", "acceleration.x", "effect.formula.time"))
+            results.append(hand.get("position.x", "velocity.x", "acceleration.x", "effect.formula.time"))
         hand.fmu.freeFMUState(state)
-    assert found[0] == found[1]
-    assert found[0][3] == 0.02
+    assert results[0] == results[1]
+    assert results[0][3] == 0.02
 
 
 def test_a_formula_without_a_value_stops_the_fmu_with_its_reason(tmp_path: Path) -> None:

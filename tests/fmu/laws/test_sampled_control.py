@@ -59,14 +59,14 @@ def some_plan(samples: int = 60, knots: int = 1) -> ControlPlan:
 def walked(plan: ControlPlan, limits: Limits, seen: Array) -> list[ControllerState]:
     """The memory at each sample, under deviations seen from what is expected."""
     memory = initial_controller_state(plan, limits)
-    found = [memory]
+    results = [memory]
     for k, away in enumerate(seen):
         expected = plan.expected[min(k, len(plan.expected) - 1)]
         memory = next_controller_state(
             plan, limits, memory, [e + float(a) for e, a in zip(expected, away, strict=True)]
         )
-        found.append(memory)
-    return found
+        results.append(memory)
+    return results
 
 
 def noise(samples: int, size: float) -> Array:

@@ -22,10 +22,10 @@ def slopes(state: DriveState, command: complex) -> list[float]:
 def test_without_limits_it_is_the_transfer_function_of_a_proportional_integral_loop() -> None:
     A = np.array([slopes(DriveState(with_rate(0.0, v), with_rate(0.0, z)), 0.0) for v, z in ((1.0, 0.0), (0.0, 1.0))]).T
     B = np.array([slopes(DriveState(0.0, 0.0), with_rate(0.0, 1.0))]).T
-    found = control.ss(A, B, [[1.0, 0.0]], 0.0)
+    result = control.ss(A, B, [[1.0, 0.0]], 0.0)
     expected = control.tf([2.0 * 0.6 * 40.0, 40.0**2], [1.0, 2.0 * 0.6 * 40.0, 40.0**2])
     frequencies = np.array([0.3, 5.0, 40.0, 300.0])
-    assert found(1j * frequencies) == pytest.approx(expected(1j * frequencies), rel=1e-12)
+    assert result(1j * frequencies) == pytest.approx(expected(1j * frequencies), rel=1e-12)
 
 
 def test_it_stays_where_it_is_asked_to_be() -> None:

@@ -96,8 +96,8 @@ class Browser:
         """What ``done`` gives once it is true; raises AssertionError where it stays false."""
         until = time.monotonic() + WAIT
         while time.monotonic() < until:
-            if found := done():
-                return found
+            if result := done():
+                return result
             time.sleep(0.05)
         raise AssertionError(f"waited {WAIT:g} s for {what}")
 

@@ -49,12 +49,12 @@ def lag_winch_3(folder: Path, fault: str = "SOUND") -> Path:
 
 
 def _compiled(folder: Path, source: str, *options: str) -> bytes:
-    found = compiler()
-    assert found is not None
+    result = compiler()
+    assert result is not None
     library = folder / "lag_winch.so"
     headers = Path(fmpy.__file__).parent / "c-code"
     given = [str(HERE / source), f"-I{headers}", "-lm", *options]
-    subprocess.run([found, "-shared", "-fPIC", "-O2", "-o", str(library), *given], check=True, timeout=120)
+    subprocess.run([result, "-shared", "-fPIC", "-O2", "-o", str(library), *given], check=True, timeout=120)
     return library.read_bytes()
 
 
