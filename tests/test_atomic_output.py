@@ -36,13 +36,13 @@ def test_other_files_in_the_folder_stay(tmp_path: Path) -> None:
     assert (tmp_path / "mine").read_text() == "mine"
 
 
-def test_a_file_in_the_way_of_a_folder_is_said(tmp_path: Path) -> None:
+def test_a_file_at_the_path_of_a_folder_is_an_error(tmp_path: Path) -> None:
     (tmp_path / "a").write_text("")
     with pytest.raises(InputError, match="is a file"), atomic_folder(tmp_path / "a" / "b"):
         pass
 
 
-def test_a_folder_in_the_way_of_a_file_is_said(tmp_path: Path) -> None:
+def test_a_folder_at_the_path_of_a_file_is_an_error(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="is a folder"), atomic_file(tmp_path):
         pass
 

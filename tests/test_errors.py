@@ -16,7 +16,7 @@ from tautwire.errors import (
 
 
 @pytest.mark.parametrize("kind", [InputError, RobotFileError, RecordingError])
-def test_input_error_says_where_what_and_how_to_mend(kind: type[InputError]) -> None:
+def test_input_error_has_location_problem_and_hint(kind: type[InputError]) -> None:
     error = kind("hall.toml: cable[2].modulus", "is -1.0, must be above 0 Pa", "give the modulus")
     assert str(error) == "hall.toml: cable[2].modulus: is -1.0, must be above 0 Pa; give the modulus"
     assert (error.where, error.problem) == ("hall.toml: cable[2].modulus", "is -1.0, must be above 0 Pa")

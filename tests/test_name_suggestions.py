@@ -45,7 +45,7 @@ def test_a_hint_names_what_is_likely_meant_or_all_that_is_known(name: str, known
         ("[effect.rain]\nx = 1\n[platform]\n", "effect.rain: is not a known effect; write one of "),
     ],
 )
-def test_a_robot_file_with_an_odd_key_is_told_what_is_known(tmp_path: Path, added: str, message: str) -> None:
+def test_a_robot_file_with_an_unknown_key_gets_a_suggestion(tmp_path: Path, added: str, message: str) -> None:
     text = (EXAMPLES / "three" / "robot.toml").read_text(encoding="utf-8")
     place = tmp_path / "robot.toml"
     place.write_text(text.replace("[platform]\n", added), encoding="utf-8")

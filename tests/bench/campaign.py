@@ -3,7 +3,7 @@
 ``python -m tests.bench.campaign [RUNS] [CHEAP]``; Linux only. A run is the paper's robot along a line, about a second
 of computing. The bare loop makes the same runs in one process, which has their FMUs and its libraries already, as
 workers have once they are prepared; rounds alternate, and each figure is the median of its rounds. What a task costs
-beside its run is told as processor time too, which other processes disturb less.
+beside its run is given as processor time too, which other processes affect less.
 """
 
 from __future__ import annotations

@@ -51,7 +51,7 @@ def run(folder: Path, steps: int) -> None:
         )
     content = pq.ParquetFile(result).metadata
     print(
-        f"\n{account.steps} steps, {account.iterations} redos; {content.num_rows} rows of {content.num_columns} "
+        f"\n{account.steps} steps, {account.iterations} iterations; {content.num_rows} rows of {content.num_columns} "
         "numbers in "
         f"{content.num_row_groups} row groups, {result.stat().st_size / 1e6:.0f} MB on disk"
     )

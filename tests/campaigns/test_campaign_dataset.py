@@ -1,4 +1,4 @@
-"""Rows on disk: whole parts or none, what is done stays done, other plans and full disks are told."""
+"""Rows on disk: atomic parts, resumed campaigns, and errors for other plans and full disks."""
 
 from __future__ import annotations
 

@@ -91,7 +91,7 @@ def sampled(vary: str, method: str = "sobol", count: int = 8, more: str = "") ->
         ('robot = "robot.toml"\n[trace]\nrecordings = "."', "has no recording in"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_said_in_one_line(text: str, said: str, tmp_path: Path) -> None:
+def test_invalid_input_is_an_error_of_one_line(text: str, said: str, tmp_path: Path) -> None:
     with pytest.raises(InputError) as caught:
         read(tmp_path, text)
     assert said in str(caught.value)

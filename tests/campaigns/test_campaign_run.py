@@ -63,7 +63,7 @@ def test_a_motion_is_that_of_fmus_built_for_the_varied_robot(tmp_path: Path) -> 
     assert result.series["z"][-1] == motion.position[-1, 2]
 
 
-def test_controllers_believe_the_declared_robot_unless_told_otherwise(tmp_path: Path) -> None:
+def test_controllers_are_designed_for_the_declared_robot_by_default(tmp_path: Path) -> None:
     plan = read(tmp_path, moving().replace("5.001", "5.02").replace("duration = 0.1", "duration = 0.8"))
     row = run_job(build_context(plan, {}), Job(1, 0, 1, VALUES), tmp_path / "kept").row
     assert row["controller"] == "feedforward"

@@ -115,7 +115,7 @@ def test_blocks_with_a_failed_run_are_left_out(tmp_path: Path) -> None:
     ("changed", "said"),
     [({"method": "grid"}, "a grid has no distribution"), ({"count": 32}, "32 samples, 64 or more are required")],
 )
-def test_why_there_are_no_sobol_indices_is_said(changed: dict[str, Any], said: str, tmp_path: Path) -> None:
+def test_the_reason_for_missing_sobol_indices_is_reported(changed: dict[str, Any], said: str, tmp_path: Path) -> None:
     plan = replace(read(tmp_path, AT_REST), **changed)
     rows = made_up(read(tmp_path, AT_REST))
     summary = summarise_runs(plan, COLUMNS, rows)

@@ -166,7 +166,7 @@ def test_recordings_are_traced_each_to_a_row(tmp_path: Path, capsys: pytest.Capt
     assert "monday.csv" in (out / "index.html").read_text(encoding="utf-8")
 
 
-def test_an_address_where_nothing_answers_is_told(
+def test_an_address_where_nothing_answers_is_reported(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     file = plan_file(tmp_path, AT_REST)

@@ -76,7 +76,7 @@ def test_numbers_vary_together_as_the_report_says(tmp_path: Path) -> None:
     assert apart.digest() != plan.digest()
 
 
-def test_correlations_that_a_report_does_not_hold_are_told(tmp_path: Path) -> None:
+def test_correlations_missing_from_a_report_are_noted(tmp_path: Path) -> None:
     effects = [effect("damping", ALL, DAMPING), effect("payload", [], MASS), effect("modulus", [2], MODULUS)]
     (note,) = planned(tmp_path, effects).notes
     assert note == "report.json gives no correlation of 3 of 3 pairs of its numbers: taken as independent"

@@ -76,7 +76,9 @@ def refused(arguments: list[str], place: Path, capsys: pytest.CaptureFixture[str
     return captured.err
 
 
-def told_by_check(arguments: list[str], place: Path, capsys: pytest.CaptureFixture[str], expected: int | None) -> None:
+def reported_by_check(
+    arguments: list[str], place: Path, capsys: pytest.CaptureFixture[str], expected: int | None
+) -> None:
     """All lines name the file, and the status says whether something is wrong."""
     capsys.readouterr()
     status = run(["check", *arguments])
@@ -125,7 +127,7 @@ def test_any_robot_file_is_read_or_refused(
 ) -> None:
     with place_for(tmp_path, content, "robot.toml") as place:
         sound = robot_is_sound(place)
-        told_by_check([str(place)], place, capsys, 0 if sound else 2)
+        reported_by_check([str(place)], place, capsys, 0 if sound else 2)
         if sound is False or (sound is None and command in OF_FMUS):
             refused(filled(ROBOT_COMMANDS[command], ROBOT=place, OUT=place.parent / "out"), place, capsys)
 
@@ -137,7 +139,7 @@ def test_the_same_robot_otherwise_written_is_the_same(
 ) -> None:
     with place_for(tmp_path, content, "robot.toml") as place:
         assert read_robot(place) == read_robot(ROBOT)
-        told_by_check([str(place)], place, capsys, 0)
+        reported_by_check([str(place)], place, capsys, 0)
 
 
 RECORDING_COMMANDS = {
@@ -163,11 +165,11 @@ def test_any_recording_is_read_or_refused(
         try:
             assert read_recording(place, 3).sample_count >= 2
         except InputError:
-            told_by_check([str(ROBOT), str(place)], place, capsys, 2)
+            reported_by_check([str(ROBOT), str(place)], place, capsys, 2)
             refused(filled(RECORDING_COMMANDS[command], RECORDING=place, OUT=out), place, capsys)
         else:
             # Six samples are too few for a trace, or tell of a start that is out of reach.
-            told_by_check([str(ROBOT), str(place)], place, capsys, None)
+            reported_by_check([str(ROBOT), str(place)], place, capsys, None)
 
 
 @settings(HOSTILE, max_examples=40)
@@ -224,7 +226,7 @@ def test_what_is_no_file_is_refused_at_once(
     make(place)
     arguments = filled(READERS[reader], ROBOT=place, OUT=tmp_path / "out")
     if reader == "check":
-        told_by_check([str(place)], place, capsys, 2)
+        reported_by_check([str(place)], place, capsys, 2)
     else:
         refused(arguments, place, capsys)
 

@@ -1,4 +1,4 @@
-"""Everything that is wrong with a robot file and a recording is told at once, each with its line."""
+"""All problems of a robot file and a recording are listed at once, each with its line."""
 
 from pathlib import Path
 
@@ -88,7 +88,7 @@ def about(problem: Problem) -> tuple[int | None, str]:
     return problem.line, key
 
 
-def test_all_of_a_robot_file_is_told_with_its_lines(tmp_path: Path) -> None:
+def test_all_problems_of_a_robot_file_are_listed_with_their_lines(tmp_path: Path) -> None:
     checked = check_files(written(tmp_path, WRONG))
     assert {about(problem) for problem in checked.problems} == ABOUT
     lines = [problem.line for problem in checked.problems]
@@ -122,31 +122,31 @@ def test_a_start_that_cables_cannot_hold_has_its_line(tmp_path: Path) -> None:
     assert "cannot be held" in problem.problem
 
 
-def test_each_fmu_that_does_not_fit_is_told(tmp_path: Path) -> None:
+def test_each_fmu_that_does_not_fit_is_listed(tmp_path: Path) -> None:
     text = (THREE / "robot.toml").read_text(encoding="utf-8") + "\n[fmu]\nplatform = 'a.fmu'\ncable_2 = 'b.fmu'\n"
     problems = check_files(written(tmp_path, text)).problems
     assert [text.split("\n")[int(problem.line or 0) - 1][:8] for problem in problems] == ["platform", "cable_2 "]
 
 
-def test_fmus_and_formulas_are_told_beside_all_else(tmp_path: Path) -> None:
+def test_problems_of_fmus_and_formulas_are_listed_with_all_others(tmp_path: Path) -> None:
     text = (THREE / "robot.toml").read_text(encoding="utf-8").replace("mass = 300.0", "mass = -300.0")
     text += "\n[fmu]\nplatform = 'a.fmu'\ncable_9 = 'b.fmu'\n\n[formula]\nforce_x = '-20*q + foo(p)**2.5'\nmass = 'w'\n"
     problems = check_files(written(tmp_path, text)).problems
     lines = text.split("\n")
-    told = [(lines[int(problem.line or 0) - 1].partition(" ")[0], problem.problem) for problem in problems]
+    listed = [(lines[int(problem.line or 0) - 1].partition(" ")[0], problem.problem) for problem in problems]
     words = ["-300.0", "a.fmu", "not a known key", "'q'", "function", "'p'", "no small whole power", "'w'"]
-    assert [key for key, _ in told] == ["mass", "platform", "cable_9", *["force_x"] * 4, "mass"]
+    assert [key for key, _ in listed] == ["mass", "platform", "cable_9", *["force_x"] * 4, "mass"]
     for problem, word in zip(problems, words, strict=True):
         assert word in str(problem)
 
 
-def test_a_start_that_cables_cannot_hold_is_told_beside_what_has_no_part_in_it(tmp_path: Path) -> None:
+def test_a_start_without_equilibrium_is_listed_beside_unrelated_problems(tmp_path: Path) -> None:
     text = (THREE / "robot.toml").read_text(encoding="utf-8").replace("[28.86, 0.0, 5.0]", "[-30.0, 0.0, 5.0]")
     problems = check_files(written(tmp_path, f"{text}\n[winch]\ndrum_radius = -1.0\n")).problems
     assert ["cannot be held" in problem.problem for problem in problems] == [True, False]
 
 
-def test_one_fmu_in_two_slots_that_runs_only_once_is_told(tmp_path: Path) -> None:
+def test_an_fmu_of_one_instance_in_two_slots_is_listed(tmp_path: Path) -> None:
     single = {'canGetAndSetFMUstate="true"': 'canBeInstantiatedOnlyOncePerProcess="true"'}
     packed(tmp_path / "once.fmu", b"", single)
     text = (THREE / "robot.toml").read_text(encoding="utf-8") + "\n[fmu]\nwinch_1 = 'once.fmu'\nwinch_2 = 'once.fmu'\n"
@@ -155,7 +155,7 @@ def test_one_fmu_in_two_slots_that_runs_only_once_is_told(tmp_path: Path) -> Non
     assert text.split("\n")[int(problem.line or 0) - 1] == "[fmu]"
 
 
-def test_all_of_a_recording_is_told_with_its_lines(tmp_path: Path) -> None:
+def test_all_problems_of_a_recording_are_listed_with_their_lines(tmp_path: Path) -> None:
     lines = (THREE / "fit.csv").read_text(encoding="utf-8").split("\n")[:30]
     lines[0] = lines[0].replace("winch_speed_2", "winch_2").replace(",x,", ",y,")
     lines[4] += ",7"
@@ -167,14 +167,14 @@ def test_all_of_a_recording_is_told_with_its_lines(tmp_path: Path) -> None:
     assert all(word in problem.problem for word, problem in zip(words, problems, strict=True))
 
 
-def test_robot_and_recording_are_both_told(tmp_path: Path) -> None:
+def test_problems_of_robot_file_and_recording_are_listed_together(tmp_path: Path) -> None:
     robot = written(tmp_path, (THREE / "robot.toml").read_text(encoding="utf-8").replace("mass = 300", "mass = -300"))
     recording = written(tmp_path, "time,winch_speed_1\n0,0\n1,1\n", "fit.csv")
     files = [problem.file for problem in check_files(robot, recording).problems]
     assert files == [str(robot)] + [str(recording)] * 2
 
 
-def test_no_more_than_is_read_is_told(tmp_path: Path) -> None:
+def test_the_number_of_listed_problems_is_bounded(tmp_path: Path) -> None:
     rows = "".join(f"{k},a,b,c\n" for k in range(MAX_PROBLEMS_PER_FILE))
     text = f"time,winch_speed_1,winch_speed_2,winch_speed_3\n{rows}"
     checked = check_files(THREE / "robot.toml", written(tmp_path, text, "fit.csv"))

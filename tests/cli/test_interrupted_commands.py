@@ -194,7 +194,7 @@ WRITING = [
 @pytest.mark.validate(but=["False"])
 @pytest.mark.skipif(sys.platform == "win32", reason="there are no such limits")
 @pytest.mark.parametrize("already", [False, True])
-def test_a_full_disk_is_told_and_nothing_is_half_written(tmp_path: Path, already: bool) -> None:
+def test_a_full_disk_is_reported_and_nothing_is_half_written(tmp_path: Path, already: bool) -> None:
     if already:
         (tmp_path / "out").mkdir()
         (tmp_path / "out" / "result.csv").write_text("before")
@@ -209,8 +209,8 @@ def test_a_full_disk_is_told_and_nothing_is_half_written(tmp_path: Path, already
         check=True,
     )
     assert json.loads(process.stdout) == [1] * len(commands)
-    told = process.stderr.splitlines()
-    for line, arguments in zip(told, commands, strict=True):
+    error_lines = process.stderr.splitlines()
+    for line, arguments in zip(error_lines, commands, strict=True):
         target = "out/hall.toml" if arguments[0] == "new" else arguments[-1]
         assert line.startswith(f"tautwire: {target}: was not written, no disk space left (File too large); make room")
     assert not (tmp_path / "out").exists() or names(tmp_path / "out") == ["result.csv"]
@@ -241,7 +241,7 @@ def test_no_permission_is_one_line(
 
 
 @pytest.mark.skipif(not hasattr(os, "geteuid") or os.geteuid() == 0, reason="root may write anywhere")
-def test_a_folder_without_permission_is_told(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_folder_without_permission_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     closed = tmp_path / "closed"
     closed.mkdir(mode=0o500)
     assert run([*QUICK, "--out", str(closed / "workspace.csv")]) == 2

@@ -54,7 +54,7 @@ def test_a_robot_is_written_with_the_rope_and_reads_back(tmp_path: Path) -> None
         (["--coverage", "nan"], "--coverage: nan is not positive"),
     ],
 )
-def test_wrong_input_is_said_in_one_line(
+def test_invalid_input_is_an_error_of_one_line(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], said: str
 ) -> None:
     assert run(["material", *arguments, "--out", str(tmp_path / "out")]) == 2

@@ -35,8 +35,8 @@ def test_a_pretension_that_is_not_the_preferred_one_is_no_effect(tmp_path: Path,
     assert report["verdict"] == "none"
     assert_reached(report)
     assert any("a wrong pretension is not taken for one" in note for note in report["notes"])
-    told = next(note for note in report["notes"] if "fit.csv: the estimated initial state has tensions of" in note)
-    tensions = [float(value) for value in told.split(" tensions of ")[1].split(" N")[0].split(", ")]
+    note_text = next(note for note in report["notes"] if "fit.csv: the estimated initial state has tensions of" in note)
+    tensions = [float(value) for value in note_text.split(" tensions of ")[1].split(" N")[0].split(", ")]
     assert sum(tensions) / 4 == pytest.approx(60.0, rel=0.1)
 
 

@@ -1,4 +1,4 @@
-"""What the terminal is told while something long goes on."""
+"""The progress bar on a terminal."""
 
 from __future__ import annotations
 
@@ -92,7 +92,7 @@ def test_a_long_command_hands_its_bar_on(
     assert "the first word" in heard.getvalue()
 
 
-def test_time_left_is_told_of_work_whose_parts_come_minutes_apart(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_remaining_time_is_estimated_where_parts_come_minutes_apart(monkeypatch: pytest.MonkeyPatch) -> None:
     now, heard = [0.0], StringIO()
     console = Console(file=heard, force_terminal=True, width=120, get_time=lambda: now[0])
     monkeypatch.setattr(shared, "Console", lambda **options: console)

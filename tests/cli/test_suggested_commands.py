@@ -84,7 +84,7 @@ def test_the_papers_page_is_to_be_opened(
     assert capsys.readouterr().err.splitlines() == ["1 reproduced", f"next: open {out / 'claims.html'} in a browser"]
 
 
-def test_what_is_wrong_is_to_be_mended_first(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_the_next_step_after_an_error_is_to_correct_it(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     robot = tmp_path / "robot.toml"
     robot.write_text(Path(ROBOT).read_text(encoding="utf-8").replace("mass", "mas", 1), encoding="utf-8")
     assert run(["check", str(robot)]) == 2

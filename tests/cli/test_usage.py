@@ -57,7 +57,7 @@ def test_wrong_usage_ends_with_an_example(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_wrong_file_is_told_without_an_example(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_wrong_file_is_reported_without_an_example(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert run(["linearise", str(tmp_path / "none.toml"), "--out", str(tmp_path / "m.json")]) == 2
     assert "example:" not in capsys.readouterr().err
 

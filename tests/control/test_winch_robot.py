@@ -94,7 +94,7 @@ def test_winches_go_first(winch_fmus: RobotFmus) -> None:
             *["cable"] * 3,
             "platf",
         ]
-        # What winches do in the middle of a step nobody is told.
+        # The motion of winches in the middle of a step is not an output.
         assert graph.convergence_order == 4
 
 

@@ -1,4 +1,4 @@
-"""Redos end with the tolerance, or with a share of what the polynomials of a step miss."""
+"""The iteration ends below the convergence tolerance, or below a share of the interpolation error."""
 
 import numpy as np
 import pytest
@@ -7,11 +7,11 @@ from tautwire.cosimulation.convergence import MAX_TOLERANCE_GROWTH, ConvergenceC
 from tautwire.cosimulation.hermite_interpolation import DerivativeChain
 
 STEP, TOLERANCE, SHARE = 0.1, 1e-13, 0.1
-MISSED = 720.0 * STEP**6 / 46080.0
+INTERPOLATION_ERROR = 720.0 * STEP**6 / 46080.0
 
 
 class CountedEstimate(InterpolationErrorEstimate):
-    """An estimate that counts how often it is asked for."""
+    """An estimate that counts its evaluations."""
 
     count = 0
 
@@ -26,7 +26,7 @@ def estimate() -> CountedEstimate:
 
 
 def sixth_power(time: float) -> np.ndarray:
-    """Value and rates at a time, and at half of it."""
+    """Value and derivatives at a time and at half of it."""
     return np.array([k for at in (time, 0.5 * time) for k in (at**6, 6.0 * at**5, 30.0 * at**4)])
 
 
@@ -45,51 +45,55 @@ def test_without_a_share_the_tolerance_decides(estimate: CountedEstimate) -> Non
     assert estimate.count == 0
 
 
-def test_a_share_of_what_the_polynomials_miss_is_enough(estimate: CountedEstimate) -> None:
+def test_a_share_of_the_interpolation_error_is_enough(estimate: CountedEstimate) -> None:
     convergence = criterion(estimate)
-    assert is_unconverged(convergence, 1.01 * SHARE * MISSED)
-    assert not is_unconverged(convergence, 0.99 * SHARE * MISSED)
+    assert is_unconverged(convergence, 1.01 * SHARE * INTERPOLATION_ERROR)
+    assert not is_unconverged(convergence, 0.99 * SHARE * INTERPOLATION_ERROR)
 
 
-def test_what_is_far_off_is_not_evaluated(estimate: CountedEstimate) -> None:
+def test_the_interpolation_error_is_not_evaluated_far_from_convergence(estimate: CountedEstimate) -> None:
     convergence = criterion(estimate)
-    is_unconverged(convergence, SHARE * MISSED)
-    assert is_unconverged(convergence, 1.01 * MAX_TOLERANCE_GROWTH * SHARE * MISSED)
+    is_unconverged(convergence, SHARE * INTERPOLATION_ERROR)
+    assert is_unconverged(convergence, 1.01 * MAX_TOLERANCE_GROWTH * SHARE * INTERPOLATION_ERROR)
     assert estimate.count == 1
-    assert is_unconverged(convergence, 0.99 * MAX_TOLERANCE_GROWTH * SHARE * MISSED)
+    assert is_unconverged(convergence, 0.99 * MAX_TOLERANCE_GROWTH * SHARE * INTERPOLATION_ERROR)
     assert estimate.count == 2
 
 
-def test_a_step_of_another_size_is_evaluated(estimate: CountedEstimate) -> None:
+def test_the_interpolation_error_is_evaluated_for_a_step_of_another_size(estimate: CountedEstimate) -> None:
     convergence = criterion(estimate)
-    is_unconverged(convergence, SHARE * MISSED)
-    assert not is_unconverged(convergence, 20.0 * SHARE * MISSED, step=2.0 * STEP)
+    is_unconverged(convergence, SHARE * INTERPOLATION_ERROR)
+    assert not is_unconverged(convergence, 20.0 * SHARE * INTERPOLATION_ERROR, step=2.0 * STEP)
 
 
 def test_an_error_that_is_no_number_ends_the_iteration(estimate: CountedEstimate) -> None:
-    """It is refused where outputs are recorded, with the name of the FMU."""
+    """The recorder raises the error, with the name of the FMU."""
     assert not is_unconverged(criterion(estimate), np.nan)
 
 
-def test_what_is_far_off_is_evaluated_in_the_last_iteration(estimate: CountedEstimate) -> None:
-    """Else a step at rest would hold those of a motion to what itself was allowed."""
+def test_the_interpolation_error_is_evaluated_in_the_last_iteration(estimate: CountedEstimate) -> None:
+    """Otherwise steps of a motion would have to meet the error that a step at rest was allowed."""
     convergence = criterion(estimate)
     convergence.is_unconverged(1e-6, np.zeros(6), np.zeros(6), STEP)
-    few = 0.5 * SHARE * MISSED
-    assert is_unconverged(convergence, few)
-    assert not convergence.is_unconverged(few, sixth_power(0.0), sixth_power(STEP), STEP, is_last_iteration=True)
-    assert not is_unconverged(convergence, few)
+    small_error = 0.5 * SHARE * INTERPOLATION_ERROR
+    assert is_unconverged(convergence, small_error)
+    assert not convergence.is_unconverged(
+        small_error, sixth_power(0.0), sixth_power(STEP), STEP, is_last_iteration=True
+    )
+    assert not is_unconverged(convergence, small_error)
 
 
 def test_behind_an_event_the_allowed_error_is_reset(estimate: CountedEstimate) -> None:
     convergence = criterion(estimate)
     convergence.is_unconverged(1e-6, np.zeros(6), np.zeros(6), STEP)
     convergence.reset()
-    assert not is_unconverged(convergence, 0.5 * SHARE * MISSED)
+    assert not is_unconverged(convergence, 0.5 * SHARE * INTERPOLATION_ERROR)
 
 
 def test_steps_that_differ_by_rounding_are_of_one_length(estimate: CountedEstimate) -> None:
     convergence = criterion(estimate)
-    is_unconverged(convergence, SHARE * MISSED)
-    assert is_unconverged(convergence, 1.01 * MAX_TOLERANCE_GROWTH * SHARE * MISSED, step=STEP * (1.0 + 1e-12))
+    is_unconverged(convergence, SHARE * INTERPOLATION_ERROR)
+    assert is_unconverged(
+        convergence, 1.01 * MAX_TOLERANCE_GROWTH * SHARE * INTERPOLATION_ERROR, step=STEP * (1.0 + 1e-12)
+    )
     assert estimate.count == 1

@@ -1,4 +1,4 @@
-"""FMUs by FMI 3.0 in slots: they do what their twins by FMI 2.0 do, and what goes wrong in them is told alike."""
+"""FMUs by FMI 3.0 in slots: results and errors as of the same FMUs by FMI 2.0."""
 
 from __future__ import annotations
 

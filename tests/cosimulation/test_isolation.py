@@ -1,4 +1,4 @@
-"""Runs in a watched process: what is told and kept of FMUs that hang or die, and that nothing else changes."""
+"""Isolated runs: errors and rows of FMUs that hang or crash, and results equal to those of other runs."""
 
 from __future__ import annotations
 
@@ -204,12 +204,12 @@ def same(motion: CosimulationResult, other: CosimulationResult) -> bool:
 def test_an_isolated_run_is_the_same_to_the_last_bit(three_fmus: RobotFmus, tolerance: float | None) -> None:
     times = np.linspace(0.0, 2.0, 41)
     speeds = np.sin(times)[:, None] * np.array([0.3, 0.25, -0.25])
-    told: list[float] = []
+    fractions: list[float] = []
     here = cosimulate(three_fmus, times, speeds, tolerance=tolerance)
-    apart = cosimulate(three_fmus, times, speeds, tolerance=tolerance, progress=told.append, patience=60.0)
+    apart = cosimulate(three_fmus, times, speeds, tolerance=tolerance, progress=fractions.append, patience=60.0)
     assert same(here, apart)
     assert here.statistics == apart.statistics
-    assert told == pytest.approx(np.arange(1, 41) / 40)
+    assert fractions == pytest.approx(np.arange(1, 41) / 40)
 
 
 def test_so_is_a_run_with_a_controller(damped_fmus: RobotFmus) -> None:

@@ -110,9 +110,9 @@ def test_the_frame_has_the_columns_of_a_result_file(three_fmus: RobotFmus) -> No
 
 
 def test_progress_ends_at_one(three_fmus: RobotFmus) -> None:
-    told: list[float] = []
-    cosimulate(three_fmus, np.linspace(0.0, 0.1, 11), np.zeros((11, 3)), progress=told.append)
-    assert told == pytest.approx(np.arange(1, 11) / 10)
+    fractions: list[float] = []
+    cosimulate(three_fmus, np.linspace(0.0, 0.1, 11), np.zeros((11, 3)), progress=fractions.append)
+    assert fractions == pytest.approx(np.arange(1, 11) / 10)
 
 
 def test_a_cable_may_go_slack_and_tight_again(tmp_path: Path) -> None:

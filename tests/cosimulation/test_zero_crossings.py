@@ -43,9 +43,9 @@ def run(fmus: RobotFmus, step: float, locate_events: bool = True) -> tuple[np.nd
     experiment = Experiment(PiecewiseLinearInput(TIME, SPEED), TIME, FixedStep(step))
     with instantiate_robot(fmus) as graph:
         coupling = CouplingSolver(replace(graph, supports_variable_step=locate_events))
-        kept = MemoryRecorder(len(TIME), len(recorded_ports(3)))
-        simulate(coupling, experiment, recorded_ports(3), kept)
-        return kept.rows[:, :3].copy(), coupling.statistics
+        recorder = MemoryRecorder(len(TIME), len(recorded_ports(3)))
+        simulate(coupling, experiment, recorded_ports(3), recorder)
+        return recorder.rows[:, :3].copy(), coupling.statistics
 
 
 def test_steps_keep_their_order_over_a_cable_that_goes_slack(fmus: RobotFmus, exact: np.ndarray) -> None:

@@ -256,15 +256,15 @@ def test_python_finds_nothing_but_its_standard_library_and_the_fmu(
     script = resources / ((resources / "slavemodule.txt").read_text().strip() + ".py")
     seen = "[*sys.path, 'site' in sys.modules, sys.flags.isolated]"
     script.write_text(script.read_text() + f"import sys\nprint(*{seen}, sep='\\n', file=sys.stderr)\n")
-    told = host(cable_plan([folder]).text()).stderr.splitlines()
+    output_lines = host(cable_plan([folder]).text()).stderr.splitlines()
     # pythonfmu runs the script twice at every instantiation.
-    first, *library, site, isolated = told[: len(told) // 2]
+    first, *library, site, isolated = output_lines[: len(output_lines) // 2]
     assert (first, site, isolated) == (str(resources), "False", "1")
     assert len(library) == 3 and all(Path(path).is_relative_to(home) for path in library)
     assert not list(folder.rglob("__pycache__"))
 
 
-def test_an_importer_without_that_python_is_told_and_a_python_process_needs_none(
+def test_a_missing_python_is_an_error_in_a_c_program_but_not_in_a_python_process(
     monkeypatch: pytest.MonkeyPatch, host: Host, three_fmus: RobotFmus, tmp_path: Path
 ) -> None:
     headers = c_hosts.embeddable_python().headers
@@ -358,7 +358,7 @@ def platform(ready: tuple[str, ...], three_fmus: RobotFmus, tmp_path: Path) -> I
     assert list(tmp_path.iterdir()) == [fmu]
 
 
-def test_a_missing_compiler_is_named_with_the_mend(monkeypatch: pytest.MonkeyPatch, platform: Path) -> None:
+def test_a_missing_compiler_is_named_with_a_hint(monkeypatch: pytest.MonkeyPatch, platform: Path) -> None:
     monkeypatch.setenv("CC", "no-such-compiler -m64")
     with pytest.raises(CHostError, match=r"no no-such-compiler -m64 \(from CC\); install a C compiler") as caught:
         make_for_c_hosts(platform)
@@ -371,7 +371,7 @@ def test_a_compiler_that_fails_is_quoted(monkeypatch: pytest.MonkeyPatch, platfo
         make_for_c_hosts(platform)
 
 
-def test_a_python_without_libpython_is_refused_with_the_mend(
+def test_a_python_without_libpython_is_refused_with_a_hint(
     monkeypatch: pytest.MonkeyPatch, platform: Path, tmp_path: Path
 ) -> None:
     settings = {"INSTSONAME": "libpython3.x.a", "Py_ENABLE_SHARED": 0, "LIBDIR": "/gone", "LDVERSION": "9.9"}

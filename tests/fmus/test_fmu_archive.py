@@ -67,7 +67,7 @@ def having(content: bytes) -> Make:
 
 
 def patched(old: bytes, new: bytes, which: int = -1) -> Make:
-    """A sound FMU with bytes replaced, the last occurrence unless told otherwise."""
+    """A sound FMU with bytes replaced, by default the last occurrence."""
 
     def make(path: Path) -> Path:
         content = packed(path, b"library").read_bytes()

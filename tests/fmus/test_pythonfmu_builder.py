@@ -79,7 +79,7 @@ if __name__ == "__main__":
     run(str(script))
 
 
-def test_a_library_without_binaries_is_told(tmp_path: Path) -> None:
+def test_a_library_without_binaries_is_an_error(tmp_path: Path) -> None:
     code = f"""
 import shutil, sys
 from pathlib import Path

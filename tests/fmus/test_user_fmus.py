@@ -88,7 +88,7 @@ def test_winches_from_a_c_compiler_are_of_second_order(winch: Path, tmp_path: Pa
     assert coarse / fine == pytest.approx(100.0, rel=0.1)
 
 
-def test_what_it_goes_on_without_is_said(platform: Path, tmp_path: Path) -> None:
+def test_missing_optional_features_are_noted(platform: Path, tmp_path: Path) -> None:
     fmus = build_fmus(replace(paper_robot(), fmus=(UserFmu("platform", platform),)), tmp_path)
     motion = cosimulate(fmus, CORNERS[:2], SPEEDS[:2])
     held, fixed, rate = motion.statistics.fallback_notes()
@@ -99,7 +99,7 @@ def test_what_it_goes_on_without_is_said(platform: Path, tmp_path: Path) -> None
     assert motion.statistics.iterations == 0
 
 
-def test_a_plain_cable_is_told_where_the_run_starts_and_its_lacking_columns_are_left_out(tmp_path: Path) -> None:
+def test_a_minimal_cable_gets_the_start_position_and_its_missing_columns_are_omitted(tmp_path: Path) -> None:
     robot, own = paper_robot(), (UserFmu("cable_2", spring_cable(tmp_path)),)
     linear = [replace(cable, law="linear") if place == 1 else cable for place, cable in enumerate(robot.cables)]
     rig = rig_of(replace(robot, cables=tuple(linear)))
@@ -142,10 +142,10 @@ def test_the_command_line_says_it_with_the_error(
     assert any("mine.fmu: 15 ports have no unit" in line for line in said)
     assert any("no saved states" in line for line in said)
     (estimate,) = [line for line in said if line.startswith("estimated error of the position")]
-    told = float(estimate.partition(": ")[2].split()[0])
+    estimated = float(estimate.partition(": ")[2].split()[0])
     exact = simulate(rig_of(paper_robot()), None, RampProgram(RAMP, 1.0), times)
     error = np.max(np.abs(pd.read_csv(tmp_path / "result.csv")[["x", "y", "z"]].to_numpy() - exact.position))
-    assert error < told < 2.0 * error
+    assert error < estimated < 2.0 * error
 
 
 def test_a_platform_that_starts_elsewhere_is_refused(platform: Path, tmp_path: Path) -> None:

@@ -36,7 +36,7 @@ def test_other_libraries_stay_as_they_are(content: bytes) -> None:
     assert with_immediate_return(content) == content
 
 
-def test_built_fmus_have_the_mended_wrapper(three_fmus: RobotFmus) -> None:
+def test_built_fmus_have_the_corrected_wrapper(three_fmus: RobotFmus) -> None:
     with zipfile.ZipFile(three_fmus.platform) as packed:
         library = packed.read("binaries/linux64/platform.so")
     assert with_immediate_return(library) == library

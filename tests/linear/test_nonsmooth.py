@@ -25,7 +25,7 @@ def test_a_smooth_robot_has_no_notes() -> None:
     assert linearise(paper_robot()).notes == ()
 
 
-def test_a_slack_cable_is_said_and_pulls_at_nothing() -> None:
+def test_a_slack_cable_is_noted_and_exerts_no_force() -> None:
     plant = linearise(third_slack(), BELOW)
     assert plant.notes[0] == "cable 3 is slack: it carries no tension, and the plant holds only while it stays slack"
     assert plant.tensions[2] == 0.0
@@ -50,7 +50,7 @@ def test_a_slack_cable_has_rope_to_spare(law: str) -> None:
     assert taut < plant.state[8] < 1.01 * taut
 
 
-def test_the_swing_that_slackens_a_cable_is_told() -> None:
+def test_the_amplitude_that_slackens_a_cable_is_noted() -> None:
     plant = linearise(example("caroca"), swing=2.5e-3)
     assert len(plant.notes) == 1
     assert plant.notes[0].startswith("cable 3 becomes slack at an amplitude of 0.0023 m")
@@ -58,7 +58,7 @@ def test_the_swing_that_slackens_a_cable_is_told() -> None:
     assert np.max(np.abs(slopes)) * 2.3e-3 == pytest.approx(plant.tensions[2], rel=0.03)
 
 
-def test_friction_is_said_with_what_the_plant_misses() -> None:
+def test_friction_is_noted_with_the_error_of_its_linearisation() -> None:
     robot = with_effect(paper_robot(), "friction", coefficient=0.05, smoothing=0.005)
     (note,) = linearise(robot).notes
     assert note.startswith("winches 1, 2, 3: at ")
@@ -69,23 +69,23 @@ def test_friction_is_said_with_what_the_plant_misses() -> None:
     assert missed == pytest.approx(1.0 - np.tanh(speed) / speed, abs=0.02)
 
 
-def test_friction_too_small_to_matter_is_not_said() -> None:
+def test_negligible_friction_is_not_noted() -> None:
     assert linearise(with_effect(paper_robot(), "friction", coefficient=1e-7)).notes == ()
 
 
-def test_hysteresis_is_said_for_the_modes_that_meet_it() -> None:
+def test_hysteresis_is_noted_for_the_modes_that_excite_it() -> None:
     robot = with_effect(with_damping(example("eight"), 3e8), "hysteresis", force=60.0, yield_strain=1e-4)
     notes = linearise(robot).notes
     assert [note.partition(":")[0] for note in notes] == ["mode 1", "mode 2", "mode 3"]
     assert all("hysteresis" in note for note in notes)
 
 
-def test_smooth_effects_are_not_said() -> None:
+def test_smooth_effects_are_not_noted() -> None:
     robot = with_effect(paper_robot(damping=4e8), "relaxation", modulus=3e10, time=0.5)
     assert linearise(robot).notes == ()
 
 
-def test_late_sensors_are_said() -> None:
+def test_sensor_delays_are_noted() -> None:
     robot = with_effect(paper_robot(), "sensor_delay", tension_delay=0.02)
     assert linearise(robot).notes[0] == "tension 1: sensors are 0.02 s late, which the plant omits"
 

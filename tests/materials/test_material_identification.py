@@ -182,7 +182,7 @@ def test_a_constant_pair_that_is_right_is_left_alone(tmp_path: Path) -> None:
     assert "is adequate" in verdict_sentence(verdict)
 
 
-def test_a_wrong_pair_is_told_from_a_wrong_law(tmp_path: Path) -> None:
+def test_a_wrong_pair_is_distinguished_from_a_wrong_law(tmp_path: Path) -> None:
     table = read_material_table(written(tmp_path / "t.csv", observed(CONSTANT, FREQUENCY, 0.02, seed=1)))
     verdict = trace_material(table, replace(CONSTANT, damping=0.8e9))
     assert verdict.verdict == "effects"

@@ -70,7 +70,7 @@ def test_remarks_blank_lines_and_columns_without_uncertainty_are_read(tmp_path: 
         ([HEADER, *ROWS[:3], '5,1.2e11,3e9,"' + "1" * 200_000], "line 5: is not valid CSV"),
     ],
 )
-def test_what_is_wrong_is_said_in_one_line(tmp_path: Path, lines: list[str], said: str) -> None:
+def test_invalid_input_is_an_error_of_one_line(tmp_path: Path, lines: list[str], said: str) -> None:
     with pytest.raises(MaterialTableError) as caught:
         read_material_table(table(tmp_path / "t.csv", *lines))
     assert said in str(caught.value)

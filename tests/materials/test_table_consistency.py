@@ -35,7 +35,7 @@ def test_rounded_columns_agree(tmp_path: Path) -> None:
         assert all(check.agreement == "agrees" and check.range_gap == 0.0 for check in result.values())
 
 
-def test_digits_that_were_cut_off_are_told_from_wrong_ones(tmp_path: Path) -> None:
+def test_truncated_digits_are_distinguished_from_wrong_ones(tmp_path: Path) -> None:
     cut = of_row(tmp_path / "t.csv", GOOD.replace("86.603e9", "86.602e9"), "storage_modulus")["|E*| cos phi"]
     assert cut.agreement == "agrees"  # the digits of |E*| and phi leave that much room
     sharp = GOOD.replace("100.000e9", "100.0000000e9").replace("30.000", "30.0000000")

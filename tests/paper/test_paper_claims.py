@@ -54,7 +54,7 @@ def test_printed_parameters_count_only_where_their_motion_is_the_papers() -> Non
     assert LedgerEntry(CLAIM, printed=2.4, corrected=3.0, same_motion=False).verdict == "not reproducible"
 
 
-def test_claims_are_told_apart_and_need_claims_that_there_are() -> None:
+def test_claims_have_unique_ids_and_need_existing_claims() -> None:
     claims = text_claims()
     ids = [claim.id for claim in claims]
     assert len(set(ids)) == len(ids) > 80

@@ -27,7 +27,7 @@ def test_page_folds_away_what_was_not_fitted() -> None:
     assert page.text.index("damping") < page.text.index("1 not fitted") < page.text.index("drag")
 
 
-def test_effects_on_no_cable_are_said_to_be_on_the_platform() -> None:
+def test_effects_on_no_cable_are_on_the_platform() -> None:
     page = section_of(trace_page(made_trace(samples=200), {}), "candidates")
     assert "payloadplatform" in page.text
 

@@ -32,7 +32,7 @@ def test_the_worst_comes_first() -> None:
     assert text.index("cable 1") < text.index("force x")
 
 
-def test_what_could_not_be_told_is_said() -> None:
+def test_what_could_not_be_localised_is_stated() -> None:
     blind = FaultLocalisation(
         np.zeros(0), (), "cannot tell", "Cannot tell which component is faulty.", ("no positions",)
     )

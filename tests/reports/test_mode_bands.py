@@ -36,7 +36,7 @@ def test_modes_that_lie_apart_have_bands_of_their_own_and_others_share_one() -> 
     assert still[0].words == "Mode 1 lies at 2.000 Hz" and still[0].low < 2.0 < still[0].high
 
 
-def test_three_close_modes_are_told_from_first_to_last_and_drawn_each() -> None:
+def test_three_close_modes_share_a_label_and_are_drawn_each() -> None:
     (band,) = merge_mode_bands(np.array([[1.1773, 1.1774, 1.2973]]))
     assert band.label == "1 to 3" and len(band.spans) == 3
     assert band.words.endswith("mode 1 at 1.177 Hz, mode 2 at 1.177 Hz, mode 3 at 1.297 Hz")

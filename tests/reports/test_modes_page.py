@@ -51,7 +51,7 @@ def test_tensions_change_as_the_plant_says_for_a_millimetre() -> None:
     assert change == pytest.approx(stiffness * stretch, rel=0.02)
 
 
-def test_gains_are_those_of_the_plant_in_the_units_told() -> None:
+def test_gains_are_those_of_the_plant_in_the_stated_units() -> None:
     robot, plant = plant_of("three")
     data = modes_data(robot, plant)
     frequency = unpack_float32(data["frequency"])
@@ -87,7 +87,7 @@ def test_page_tells_modes_tensions_and_shares_without_scripts() -> None:
         assert not re.match(r"(?i)\s*([a-z]+:|//)", attributes.get("href", ""))
 
 
-def test_notes_of_the_plant_are_told_at_the_top_and_in_full() -> None:
+def test_notes_of_the_plant_stand_at_the_top_and_in_full() -> None:
     robot, plant = plant_of("three")
     page = Page(modes_page(replace(robot, name=HOSTILE), replace(plant, notes=(HOSTILE,)), {}))
     assert "See the notes" in page.text and page.text.count("onerror") >= 2

@@ -160,7 +160,7 @@ def test_keys_come_in_the_same_order_each_time() -> None:
     assert one == other
 
 
-def test_nothing_found_is_said_with_empty_lists() -> None:
+def test_a_verdict_without_effects_has_empty_lists() -> None:
     document = trace_document(nothing_found(made_trace()))
     assert (document["verdict"], document["effects"], document["also_possible"]) == ("none", [], [])
     assert document["residual_is_noise"] == {"before": True, "after": True}

@@ -300,7 +300,7 @@ def test_folder_holds_robot_fmus_report_and_page_that_links_them(tmp_path: Path)
     assert {path.name for path in (*fmus.cables, fmus.platform)} < set(links)
 
 
-def test_estimates_that_err_together_are_told() -> None:
+def test_correlated_estimates_are_listed() -> None:
     strong = (FittedParameter("damping", (1, 2, 3), "damping"), FittedParameter("payload", (), "mass"))
     weak = (FittedParameter("damping", (1, 2, 3), "damping"), FittedParameter("sag", (2,), "linear_density"))
     correlations = (Correlation(strong, -0.954), Correlation(weak, 0.2))

@@ -111,7 +111,7 @@ def test_a_model_has_only_states_that_are_felt() -> None:
     assert free.state_names[9:] == ("drum.travel_1", "relaxation.strain_1_2", "drum.travel_2", "drum.travel_3")
 
 
-def test_lags_and_drifts_are_told_apart() -> None:
+def test_lags_and_drifts_are_distinguished() -> None:
     late = {"tension_delay": 0.02, "position_delay": 0.05}
     robot = with_effects(example("three"), Case("sensor_delay", {}, late, (2,)), same("creep", 1, compliance=1e-12))
     model = symbolic_model(robot)

@@ -53,7 +53,7 @@ def test_every_table_is_in_it() -> None:
         assert re.search(rf"^(# )?{key} = ", text, re.MULTILINE), key
 
 
-def test_the_command_never_overwrites_unless_told(
+def test_the_command_never_overwrites_without_the_option(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)

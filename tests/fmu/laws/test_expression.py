@@ -60,7 +60,7 @@ def test_one_tree_serves_every_mathematics() -> None:
         ("x" * (MAX_CHARACTERS + 1), [MAX_CHARACTERS]),
     ],
 )
-def test_all_that_is_wrong_is_told_from_left_to_right(text: str, places: list[int]) -> None:
+def test_all_problems_are_listed_from_left_to_right(text: str, places: list[int]) -> None:
     faults = expression_errors(text, NAMES)
     assert [fault.position for fault in faults] == places
     if places:

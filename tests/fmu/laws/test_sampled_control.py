@@ -113,13 +113,13 @@ def test_what_a_limit_took_away_reaches_the_state_through_m() -> None:
     plan, seen = some_plan(), noise(2, 0.3)
     limits = Limits(1e15, 0.5, -1e15, 1e15)
     deaf = plan._replace(gains=[plan.gains[0]._replace(M=[[0.0] * CABLES] * STATES)])
-    told, untold = walked(plan, limits, seen)[2], walked(deaf, limits, seen)[2]
+    informed, uninformed = walked(plan, limits, seen)[2], walked(deaf, limits, seen)[2]
     memory, gains = walked(plan, limits, seen)[1], plan.gains[0]
     away = np.array(memory.begin) - plan.speeds[1]
     asked = np.array(gains.C) @ memory.state + np.array(gains.D) @ away
     given = (np.array(memory.end) - plan.speeds[2] - away) / PERIOD
     assert np.max(np.abs(asked - given)) > 0.1
-    assert np.array(told.state) - untold.state == pytest.approx(np.array(gains.M) @ (given - asked))
+    assert np.array(informed.state) - uninformed.state == pytest.approx(np.array(gains.M) @ (given - asked))
 
 
 def test_cable_at_its_highest_tension_is_let_out_and_at_its_lowest_reeled_in() -> None:

@@ -9,7 +9,7 @@ STIFFNESS = 134.8e9 * 3.141592653589793 * 0.002**2
 
 
 class SpringCable(Fmi2Slave):
-    """A spring whose rest length the winch takes up; it is told where the run starts."""
+    """A spring whose rest length the winch changes, with the start position as a parameter."""
 
     def __init__(self, **kwargs):
         super().__init__(**kwargs)
