@@ -9,10 +9,19 @@ from typing import Any
 import pandas as pd
 import pytest
 
+from tautwire import estimation
 from tautwire.cli import run
 from tests.support.planar import HORIZONTAL, VERTICAL, Plane, planar_case
 
 pytestmark = pytest.mark.validate
+
+DURATION = 6.0  # s
+
+
+@pytest.fixture(autouse=True)
+def in_this_process(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Workers of its own would compile the same again beside the other tests."""
+    monkeypatch.setattr(estimation, "processors", lambda: 1)
 
 
 def traced(paths: list[Path]) -> dict[str, Any]:
@@ -31,7 +40,7 @@ def assert_reached(report: dict[str, Any]) -> None:
 
 @pytest.mark.parametrize("plane", [VERTICAL, HORIZONTAL], ids=["vertical", "horizontal"])
 def test_a_pretension_that_is_not_the_preferred_one_is_no_effect(tmp_path: Path, plane: Plane) -> None:
-    report = traced(planar_case(tmp_path, plane, {}, 1, preferred=60.0))
+    report = traced(planar_case(tmp_path, plane, {}, 1, preferred=60.0, duration=DURATION))
     assert report["verdict"] == "none"
     assert_reached(report)
     assert any("a wrong pretension is not taken for one" in note for note in report["notes"])
@@ -52,7 +61,7 @@ HIDDEN = [
 def test_a_hidden_effect_is_named_and_measured(
     tmp_path: Path, plane: Plane, effects: dict[str, dict[str, float]], preferred: float
 ) -> None:
-    report = traced(planar_case(tmp_path, plane, effects, 1, preferred=preferred))
+    report = traced(planar_case(tmp_path, plane, effects, 1, preferred=preferred, duration=DURATION))
     ((name, values),) = effects.items()
     assert [effect["name"] for effect in report["effects"]] == [name]
     for parameter, value in values.items():
@@ -61,13 +70,14 @@ def test_a_hidden_effect_is_named_and_measured(
 
 
 def test_an_unlisted_effect_gets_no_listed_name(tmp_path: Path) -> None:
-    report = traced(planar_case(tmp_path, VERTICAL, {"unlisted_swing": {"mass": 0.5, "length": 0.3}}, 1))
+    swing = {"unlisted_swing": {"mass": 0.5, "length": 0.3}}
+    report = traced(planar_case(tmp_path, VERTICAL, swing, 1, duration=DURATION))
     assert report["verdict"] in ("unexplained", "discovered")
     assert report["effects"] == []
 
 
 def test_one_coordinate_is_enough(tmp_path: Path) -> None:
-    paths = planar_case(tmp_path, VERTICAL, {"payload": {"mass": 1.0}}, 1)
+    paths = planar_case(tmp_path, VERTICAL, {"payload": {"mass": 1.0}}, 1, duration=DURATION)
     for path in paths[1:]:
         pd.read_csv(path).drop(columns="x").to_csv(path, index=False)
     report = traced(paths)

@@ -93,14 +93,14 @@ def planar_recording(
 
 
 def planar_case(
-    folder: Path, plane: Plane, effects: dict[str, Any], seed: int, preferred: float = 80.0, beside: str = ""
+    folder: Path, plane: Plane, effects: dict[str, Any], seed: int, preferred: float = 80.0, duration: float = 12.0
 ) -> list[Path]:
     """Robot file, FIT and CHECK, in the order of the command's arguments."""
     robot = folder / "robot.toml"
-    robot.write_text(robot_text(plane, beside=beside))
+    robot.write_text(robot_text(plane))
     paths = [robot]
     for role, own in (("fit", seed), ("check", seed + 50)):
         path = folder / f"{role}.csv"
-        write_recording(planar_recording(folder, plane, effects, own, preferred=preferred), path)
+        write_recording(planar_recording(folder, plane, effects, own, duration, preferred), path)
         paths.append(path)
     return paths
