@@ -33,7 +33,7 @@ def interpreters() -> dict[str, str]:
 
 def _runs(python: str, version: str) -> bool:
     """Whether it is that Python and can make environments; a shim may be on the path without its Python."""
-    ask = "import ensurepip, sys, venv; print('%d.%d' % sys.version_info[:2])"
+    ask = "import sys, venv; print('%d.%d' % sys.version_info[:2])"
     completed = subprocess.run([python, "-c", ask], capture_output=True, text=True, timeout=60)
     return completed.returncode == 0 and completed.stdout.strip() == version
 
@@ -83,12 +83,14 @@ def environment_with(package: Path, python: str, version: str) -> Path:
         declared = [line for line in archive.read(metadata).splitlines() if line.startswith(b"Requires-Dist")]
     digest = hashlib.sha256(b"\n".join((python.encode(), *declared))).hexdigest()[:8]
     environment = ENVIRONMENTS / f"{version}-{digest}"
-    install = [environment / "bin" / "python", "-m", "pip", "install", "--quiet"]
+    # This Python's pip serves all environments. What they never import need not be compiled.
+    pip = [sys.executable, "-m", "pip", "--python", environment / "bin" / "python"]
+    install = [*pip, "install", "--quiet", "--no-compile"]
     ready = environment / ".ready"
     if ready.exists():
         install += ["--no-deps", "--force-reinstall"]
     else:
-        subprocess.run([python, "-m", "venv", "--clear", str(environment)], check=True, timeout=120)
+        subprocess.run([python, "-m", "venv", "--clear", "--without-pip", str(environment)], check=True, timeout=120)
     subprocess.run([*install, str(package)], check=True, timeout=1800)
     ready.touch()
     return environment
