@@ -1,4 +1,4 @@
-"""Cut at its measured ports a robot tells which component is faulty, on recordings that the rig makes."""
+"""Localisation of the faulty component by residuals at the measured ports, on recordings that the rig makes."""
 
 import json
 from dataclasses import replace
@@ -39,33 +39,33 @@ HIDDEN: list[tuple[dict[str, Any], str]] = [
 ]
 
 
-def cut(robot: Robot, recording: Recording) -> FaultLocalisation:
+def localise(robot: Robot, recording: Recording) -> FaultLocalisation:
     noise = estimate_noise(robot, recording)
     return localise_residual(robot, split_data(robot, noise, recording, recording).estimation, noise)
 
 
 @cache
-def _found(text: str) -> FaultLocalisation:
-    return cut(example("three"), recorded("three", 3, json.loads(text)))
+def _localised(text: str) -> FaultLocalisation:
+    return localise(example("three"), recorded("three", 3, json.loads(text)))
 
 
-def found(effects: dict[str, Any]) -> FaultLocalisation:
-    """The components of the three-cable robot with an effect hidden in it; made once."""
-    return _found(json.dumps(effects))
+def localised(effects: dict[str, Any]) -> FaultLocalisation:
+    """The localisation for the three-cable robot with hidden effects; computed once."""
+    return _localised(json.dumps(effects))
 
 
-def part(components: FaultLocalisation, component: str, quantity: str = "tension") -> ComponentResidual:
+def residual_of(components: FaultLocalisation, component: str, quantity: str = "tension") -> ComponentResidual:
     return next(p for p in components.residuals if (p.component, p.quantity) == (component, quantity))
 
 
 @pytest.mark.validate(but=["6.0}}-platform", "friction'"])
-@pytest.mark.parametrize(("effects", "blamed"), HIDDEN, ids=str)
-def test_the_component_in_question_is_named(effects: dict[str, Any], blamed: str) -> None:
-    assert found(effects).faulty_component == blamed
+@pytest.mark.parametrize(("effects", "component"), HIDDEN, ids=str)
+def test_the_component_in_question_is_named(effects: dict[str, Any], component: str) -> None:
+    assert localised(effects).faulty_component == component
 
 
 def test_where_nothing_is_hidden_residuals_are_as_large_as_expected() -> None:
-    components = found({})
+    components = localised({})
     assert [p.component for p in components.residuals] == ["cable 1", "cable 2", "cable 3", *["platform"] * 3]
     for each in components.residuals:
         assert 0.8 < each.ratio < 1.2
@@ -84,53 +84,53 @@ def test_where_nothing_is_hidden_residuals_are_as_large_as_expected() -> None:
         ({"payload": {"mass": 6.0}}, "platform", "force z", "acceleration z", -1),
     ],
 )
-def test_what_a_residual_moves_with_is_named(
+def test_the_signal_correlated_with_a_residual_is_named(
     effects: dict[str, Any], component: str, quantity: str, signal: str, sign: int
 ) -> None:
-    moved = part(found(effects), component, quantity).correlated_signal
-    assert moved is not None and moved.name == signal
-    assert sign * moved.correlation > 0.8
+    correlation = residual_of(localised(effects), component, quantity).correlated_signal
+    assert correlation is not None and correlation.name == signal
+    assert sign * correlation.correlation > 0.8
 
 
 def test_a_payload_shows_by_its_weight_and_not_at_the_cables() -> None:
-    components = found({"payload": {"mass": 6.0}})
-    assert part(components, "platform", "force z").mean == pytest.approx(-6.0 * 9.81, rel=0.02)
+    components = localised({"payload": {"mass": 6.0}})
+    assert residual_of(components, "platform", "force z").mean == pytest.approx(-6.0 * 9.81, rel=0.02)
     assert not any(p.is_significant for p in components.residuals if p.component != "platform")
     assert components.ranking[0].quantity == "force z"
 
 
 @pytest.mark.validate
-def test_a_swinging_load_rings_at_the_platform_with_its_frequency() -> None:
-    components = found({"unlisted_swing": {"mass": 20.0, "length": 2.0}})
+def test_a_swinging_load_shows_as_a_resonance_of_the_platform() -> None:
+    components = localised({"unlisted_swing": {"mass": 20.0, "length": 2.0}})
     assert components.faulty_component == "platform"
-    frequency = part(components, "platform", "force x").resonance_frequency
+    frequency = residual_of(components, "platform", "force x").resonance_frequency
     assert frequency == pytest.approx(np.sqrt(9.81 / 2.0) / (2.0 * np.pi), rel=0.06)
     assert "oscillates at 0.3" in components.sentence
 
 
-def test_without_positions_nothing_can_be_told() -> None:
+def test_without_positions_no_component_is_localised() -> None:
     recording = recorded("three", 3)
     blind = replace(recording, position=np.full_like(recording.position, np.nan))
-    components = cut(example("three"), blind)
+    components = localise(example("three"), blind)
     assert (components.residuals, components.faulty_component) == ((), "cannot tell")
     assert "positions are missing" in components.limitations[0]
     one_axis = recording.position.copy()
     one_axis[:, 1] = np.nan
-    assert cut(example("three"), replace(recording, position=one_axis)).faulty_component == "cannot tell"
+    assert localise(example("three"), replace(recording, position=one_axis)).faulty_component == "cannot tell"
 
 
-def test_without_tensions_nothing_can_be_told() -> None:
+def test_without_tensions_no_component_is_localised() -> None:
     recording = recorded("three", 3)
-    components = cut(example("three"), replace(recording, tension=np.full_like(recording.tension, np.nan)))
+    components = localise(example("three"), replace(recording, tension=np.full_like(recording.tension, np.nan)))
     assert (components.residuals, components.faulty_component) == ((), "cannot tell")
     assert "no tensions" in components.limitations[0]
 
 
-def test_without_one_load_cell_the_other_cables_are_still_told() -> None:
+def test_without_one_load_cell_the_other_cables_are_still_localised() -> None:
     recording = recorded("three", 3, {"modulus": {"modulus": 0.95e11, "cables": [2]}})
     tension = recording.tension.copy()
     tension[:, 2] = np.nan
-    components = cut(example("three"), replace(recording, tension=tension))
+    components = localise(example("three"), replace(recording, tension=tension))
     assert [p.component for p in components.residuals] == ["cable 1", "cable 2"]
     assert components.faulty_component == "cable 2 (rope, winch, load cell or exit point)"
     assert "cable 3" in components.limitations[0]
@@ -141,9 +141,9 @@ def test_dropouts_do_no_harm() -> None:
     position, tension = recording.position.copy(), recording.tension.copy()
     position[np.arange(len(position)) % 5 != 0] = np.nan
     tension[300:330, 1] = np.nan
-    components = cut(example("three"), replace(recording, position=position, tension=tension))
+    components = localise(example("three"), replace(recording, position=position, tension=tension))
     assert components.faulty_component == "nothing"
-    assert np.all(np.isnan(part(components, "cable 2").residual[300:330]))
+    assert np.all(np.isnan(residual_of(components, "cable 2").residual[300:330]))
 
 
 def test_a_flat_robot_needs_no_positions_across_it() -> None:
@@ -156,16 +156,17 @@ def test_a_flat_robot_needs_no_positions_across_it() -> None:
     place = np.array(robot.platform.start) + random.normal(0.0, 3e-4, (len(time), 3))
     place[:, 1] = np.nan
     tension = static_tensions(robot) + random.normal(0.0, 2.0, still.shape)
-    components = cut(robot, Recording("flat", time, still, tension, place))
+    components = localise(robot, Recording("flat", time, still, tension, place))
     assert {p.quantity for p in components.residuals} == {"tension", "force x", "force z"}
     assert components.faulty_component == "nothing"
 
 
 @pytest.mark.validate
 @pytest.mark.parametrize("name", ["caroca", "eight"])
-def test_other_robots_are_cut_as_well(name: str) -> None:
+def test_faults_of_other_robots_are_localised(name: str) -> None:
     robot = example(name)
-    assert cut(robot, recorded(name, 3)).faulty_component == "nothing"
+    assert localise(robot, recorded(name, 3)).faulty_component == "nothing"
     assert (
-        cut(robot, recorded(name, 3, {"payload": {"mass": 0.02 * robot.platform.mass}})).faulty_component == "platform"
+        localise(robot, recorded(name, 3, {"payload": {"mass": 0.02 * robot.platform.mass}})).faulty_component
+        == "platform"
     )
