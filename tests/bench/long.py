@@ -46,13 +46,13 @@ def run(folder: Path, steps: int) -> None:
 
     print("| done | resident memory | of the FMUs' process | wall time |\n| --- | --- | --- | --- |")
     with open_result_file(result, result_columns(robot.cable_count)) as rows:
-        account, _ = simulate_recording(
+        statistics, _ = simulate_recording(
             robot, recording, rows, SimulationOptions(STEP, call_timeout=CALL_TIMEOUT), tell
         )
     content = pq.ParquetFile(result).metadata
     print(
-        f"\n{account.steps} steps, {account.iterations} iterations; {content.num_rows} rows of {content.num_columns} "
-        "numbers in "
+        f"\n{statistics.steps} steps, {statistics.iterations} iterations; "
+        f"{content.num_rows} rows of {content.num_columns} numbers in "
         f"{content.num_row_groups} row groups, {result.stat().st_size / 1e6:.0f} MB on disk"
     )
 

@@ -82,15 +82,15 @@ def run(
     """A run of two coupled winches, asked for 2 m/s^2."""
     kept = MemoryRecorder(len(TIMES), 2) if recorder is None else recorder
     ramp = PiecewiseLinearInput(TIMES, 2.0 * TIMES[:, None])
-    account = simulate_isolated(
+    statistics = simulate_isolated(
         partial(coupled, fmu), Experiment(source or ramp, TIMES, FixedStep(0.01)), SHOWN, kept, call_timeout=patience
     )
-    return account, kept
+    return statistics, kept
 
 
 def test_a_run_without_faults_is_whole_and_leaves_nothing(faulty: Path, numbers: Path) -> None:
-    account, kept = run(faulty)
-    assert account.steps == 20
+    statistics, kept = run(faulty)
+    assert statistics.steps == 20
     assert kept.count == len(TIMES)
     assert kept.rows == pytest.approx(np.column_stack([2.0 * TIMES, 2.0 * TIMES]))
     assert nothing_is_left(numbers)
@@ -241,8 +241,8 @@ def test_a_failing_robot_keeps_its_run(three_fmus: RobotFmus) -> None:
 
 def test_a_fresh_process_does_as_well_as_a_fork(faulty: Path, numbers: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(watch, "start_method", lambda: "spawn")
-    account, kept = run(faulty)
-    assert (account.steps, kept.count) == (20, len(TIMES))
+    statistics, kept = run(faulty)
+    assert (statistics.steps, kept.count) == (20, len(TIMES))
     monkeypatch.setenv(FAULT, "right:step:crash:0.09")
     with pytest.raises(CallAbortedError, match="FMU right: fmi2DoStep ended its process by SIGSEGV"):
         run(faulty)

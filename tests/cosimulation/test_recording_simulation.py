@@ -30,13 +30,13 @@ class Rows(list[tuple[float, np.ndarray]]):
 def test_the_recorder_gets_a_row_for_every_sample_until_the_end(tmp_path: Path) -> None:
     write_recording(tmp_path / "recording.parquet", 50)
     rows, robot = Rows(), example("three")
-    account, notes = simulate_recording(
+    statistics, notes = simulate_recording(
         robot, tmp_path / "recording.parquet", rows, SimulationOptions(0.5 * STEP, until=0.02), lambda what, done: None
     )
     assert [time for time, _ in rows] == pytest.approx(np.arange(21) * STEP)
     assert {row.shape for _, row in rows} == {(len(result_columns(3)) - 1,)}
     assert rows[0][1][:3].tolist() == list(robot.platform.start)
-    assert account.steps == 40
+    assert statistics.steps == 40
     assert notes == ()
 
 

@@ -117,8 +117,8 @@ def test_a_minimal_cable_gets_the_start_position_and_its_missing_columns_are_omi
 @needs_compiler
 def test_a_rate_worked_out_is_as_good_as_it_says(winch: Path, tmp_path: Path) -> None:
     fmus = build_fmus(replace(paper_robot(), fmus=all_winches(winch)), tmp_path)
-    account = cosimulate(fmus, np.array([0.0, 1.0]), 0.5 * np.ones((2, 3)), 0.01).statistics
-    doubt = float(account.fallback_notes()[1].partition("with an error of about ")[2].split()[0])
+    statistics = cosimulate(fmus, np.array([0.0, 1.0]), 0.5 * np.ones((2, 3)), 0.01).statistics
+    doubt = float(statistics.fallback_notes()[1].partition("with an error of about ")[2].split()[0])
     # The winch jumps to 0.5 m/s with its lag: the rate is exp(-t / lag) 0.5 / lag.
     times = np.arange(0.01, 1.0, 0.01)
     shown = 0.5 * (1.0 - np.exp(-times / LAG))

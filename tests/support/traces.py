@@ -178,8 +178,8 @@ def made_run(name: str = "three", samples: int = 801, eight: bool = False) -> Re
     for row in frame.to_numpy():
         overview.add(float(row[0]), row[1:])
     recording = made_recording("run.csv", motion, np.random.default_rng(4))
-    account = RunStatistics(steps=2000, iterations=17, energy_residual=1e-7, energy_exchanged=250.0)
-    return ReportedRun(robot, tuple(frame.columns[1:]), overview, recording, account, ("The winches were slow.",))
+    statistics = RunStatistics(steps=2000, iterations=17, energy_residual=1e-7, energy_exchanged=250.0)
+    return ReportedRun(robot, tuple(frame.columns[1:]), overview, recording, statistics, ("The winches were slow.",))
 
 
 def nothing_found(trace: Trace) -> Trace:

@@ -64,7 +64,8 @@ def step_doubling_note(run: Run, time: Array, step: float, positions: Array) -> 
     """A note on the error of ``positions`` (N, 3), recorded at ``time`` (N or more,) in steps of ``step``.
 
     ``run(count, step_size_control, recorder)`` repeats the run, up to ``count`` of its times. The error is twice the
-    difference of the two, as for a method of first order. For second order it is 4/3 of it, so half too large is told.
+    difference of the two, as for a method of first order; for one of second order, where the error is 4/3 of the
+    difference, this estimate is 50 % too large.
     """
     recorder = FirstPositionsRecorder(len(positions))
     try:

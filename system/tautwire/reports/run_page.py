@@ -141,7 +141,7 @@ def atomic_run_page(
     failure: TautwireError | None = None
     with nullcontext() if target is None else atomic_file(target) as scratch:
         try:
-            yield lambda account, notes: outcomes.append((account, notes))
+            yield lambda statistics, notes: outcomes.append((statistics, notes))
         except TautwireError as error:
             if overview.row_count < MIN_ROWS:
                 raise
