@@ -26,7 +26,7 @@ AT_WORK = {
     "linearise": ([ROBOT, "--out", "out.json"], "linearising"),
     "workspace": ([ROBOT, "--spacing", "40", "--out", "out.csv"], "computing the workspace"),
     "excite": (
-        [ROBOT, "--effects", "damping,payload", "--programs", "2", "--duration", "5", "--out", "out.csv"],
+        [ROBOT, "--effects", "damping,payload", "--programs", "2", "--duration", "1", "--out", "out.csv"],
         "trying programs",
     ),
     "material": (["--out", "out"], "fitting"),

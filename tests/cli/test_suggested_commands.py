@@ -14,7 +14,7 @@ from tests.support.robots import EXAMPLES
 
 THREE = EXAMPLES / "three"
 ROBOT, FIT = str(THREE / "robot.toml"), str(THREE / "fit.csv")
-PROGRAMS = ["--effects", "damping,payload", "--programs", "2", "--duration", "5"]
+PROGRAMS = ["--effects", "damping,payload", "--programs", "2", "--duration", "1", "--rate", "20"]
 
 CASES = {
     "new": (["new", "hall"], "check hall.toml"),
