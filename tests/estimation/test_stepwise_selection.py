@@ -19,7 +19,8 @@ from tests.support.robots import example
 
 
 def pair(name: str, seed: int, effects: dict[str, Any]) -> tuple[Recording, Recording]:
-    return recorded(name, seed, effects), recorded(name, seed + 50, effects)
+    """Recordings of eight seconds at most, with the same effects."""
+    return recorded(name, seed, effects).first(401), recorded(name, seed + 50, effects).first(401)
 
 
 def found_in(robot: Robot, fit: Recording, check: Recording) -> SelectionResult:
