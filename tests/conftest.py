@@ -16,10 +16,10 @@ if TYPE_CHECKING:
 # Modules by the time they take, so that none is left to one worker at the end.
 SLOWEST_FIRST = (
     "unexplained_residual",
-    "planar_robots",
-    "uncertain_parameters",
     "wheel",
+    "planar_robots",
     "stepwise_selection",
+    "uncertain_parameters",
     "effects_in_fmus",
     "commands",
     "dask_cluster",
