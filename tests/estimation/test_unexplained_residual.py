@@ -25,7 +25,7 @@ def traced(effects: dict[str, Any], samples: int) -> Trace:
 
 
 def test_a_formula_that_is_discovered_runs_in_the_fmus(tmp_path: Path) -> None:
-    found = traced({"unlisted_sideways": {"constant": 30.0}}, 401)
+    found = traced({"unlisted_sideways": {"constant": 30.0}}, 201)
     assert found.verdict == "discovered"
     assert found.effects == ()
     assert found.formula is not None
