@@ -9,7 +9,7 @@ PYTHON ?= python3
 VENV := .venv
 BIN := $(VENV)/bin
 READY := $(VENV)/.ready
-PYTEST := $(BIN)/python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
+PYTEST := python -m pytest -n 2 --dist loadfile --no-loadscope-reorder
 EXAMPLE := system/tautwire/examples/three
 FLOORS := .venv-floors
 FLOOR_TESTS := $(addprefix tests/,$(addsuffix .py,cli/test_commands cli/test_input_checks cli/test_material_command \
@@ -24,10 +24,10 @@ run: $(READY)
 	$(BIN)/tautwire trace $(EXAMPLE)/robot.toml $(EXAMPLE)/fit.csv --check $(EXAMPLE)/check.csv --out build/three
 
 test: lint types
-	$(PYTEST) -m "not validate"
+	$(BIN)/$(PYTEST) -m "not validate"
 
 validate: $(READY)
-	$(PYTEST) -m validate
+	$(BIN)/$(PYTEST) -m validate
 	$(MAKE) floors
 
 lint: $(READY)
@@ -52,8 +52,9 @@ pictures: $(READY)
 floors: $(READY)
 	$(BIN)/python -m tests.floors > build/floors.txt
 	$(PYTHON) -m venv --clear $(FLOORS)
-	$(FLOORS)/bin/python -m pip install --quiet --constraint build/floors.txt --editable ".[mdf]" pytest hypothesis
-	$(FLOORS)/bin/python -m pytest -m "not validate" $(FLOOR_TESTS)
+	$(FLOORS)/bin/python -m pip install --quiet --no-compile --constraint build/floors.txt --editable ".[mdf]" \
+		pytest-xdist hypothesis
+	$(FLOORS)/bin/$(PYTEST) -m "not validate" $(FLOOR_TESTS)
 
 bench: $(READY)
 	$(BIN)/python -m tests.bench
