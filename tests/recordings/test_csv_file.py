@@ -284,3 +284,34 @@ def test_damaged_files_are_read_or_refused(
         assert np.isfinite(recording.winch_speed).all()
         assert (np.diff(recording.time) > 0.0).all()
         assert not np.isinf(recording.measured()).any()
+
+
+LENGTHS = """time,rope_length_1,winch_speed_2,rope_length_2,winch_speed_3,x
+0,5.0,0.1,2.00,0.3,1.5
+0.1,4.9,0.1,2.02,0.3,1.6
+0.2,4.7,0.1,2.06,0.3,1.7
+"""
+
+
+def test_the_rate_of_a_rope_length_goes_before_a_winch_speed(tmp_path: Path) -> None:
+    recording = read(tmp_path, LENGTHS)
+    assert recording.winch_speed[:, 0] == pytest.approx([1.0, 1.5, 2.0])
+    assert recording.winch_speed[:, 1] == pytest.approx([-0.2, -0.3, -0.4])
+    assert np.array_equal(recording.winch_speed[:, 2], [0.3, 0.3, 0.3])
+    assert recording.unknown_columns == ()
+
+
+def test_winch_speeds_from_lengths_do_not_drift_from_them(tmp_path: Path) -> None:
+    time = np.arange(0.0, 20.0, 0.01)
+    length = np.round(3.0 - 0.4 * np.sin(time), 4)
+    frame = pd.DataFrame({"time": time, "rope_length_1": length, "winch_speed_2": 0.0, "winch_speed_3": 0.0, "x": 1.0})
+    recording = read(tmp_path, frame.to_csv(index=False))
+    speed = recording.winch_speed[:, 0]
+    reeled_in = np.append(0.0, np.cumsum(0.5 * (speed[1:] + speed[:-1]) * np.diff(time)))
+    assert np.max(np.abs(length[0] - reeled_in - length)) < 2e-4
+
+
+def test_a_rope_length_must_be_there_at_every_sample(tmp_path: Path) -> None:
+    error = refused(tmp_path, LENGTHS.replace("0.1,4.9", "0.1,"))
+    assert place_of(error) == "line 3, column rope_length_1"
+    assert "must be a number" in error.problem

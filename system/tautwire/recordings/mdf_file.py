@@ -19,7 +19,13 @@ from .recording_table import ColumnTable, ErrorSink, Header, parse_header, requi
 MDF_SUFFIXES = (".mf4", ".mdf")
 _MDF_MAGIC = b"MDF     "
 _REWRITE_HINT = "export it again as MDF 4, or as CSV or Parquet under another name"
-_ACCEPTED_UNITS = {"winch_speed": ("", "m/s", "m*s^-1"), "tension": ("", "N"), "position": ("", "m")}
+_ACCEPTED_UNITS = {
+    "winch_speed": ("", "m/s", "m*s^-1"),
+    "rope_length": ("", "m"),
+    "tension": ("", "N"),
+    "position": ("", "m"),
+}
+_INPUTS = ("winch_speed_", "rope_length_")
 # s: times of two groups that are closer than this coincide.
 _TIME_TOLERANCE = 1e-9
 
@@ -117,7 +123,7 @@ def _channel(signal: Any, where: str, name: str) -> Channel:
 
 def _align_on_common_time(channels: Mapping[str, Channel], file: str) -> dict[str, NDArray[np.float64]]:
     """Align all channels as columns on one time base, the union of their sample times."""
-    inputs = [channel for name, channel in channels.items() if name.startswith("winch_speed_")]
+    inputs = [channel for name, channel in channels.items() if name.startswith(_INPUTS)]
     if not all(len(channel.time) for channel in inputs):
         raise RecordingError(file, "some winch speed has no samples", "record all of them")
     time = _merged_times([channel.time for channel in channels.values()])
@@ -125,7 +131,7 @@ def _align_on_common_time(channels: Mapping[str, Channel], file: str) -> dict[st
     time = time[(time >= first - _TIME_TOLERANCE) & (time <= last + _TIME_TOLERANCE)]
     columns = {"time": time}
     for name, channel in channels.items():
-        if name.startswith("winch_speed_"):
+        if name.startswith(_INPUTS):
             columns[name] = np.interp(time, channel.time, channel.values)
             continue
         columns[name] = np.full(len(time), np.nan)

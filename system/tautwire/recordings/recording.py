@@ -1,6 +1,6 @@
 """Recordings: measured winch speeds, tensions and positions, sample by sample."""
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -95,7 +95,8 @@ class Recording:
 def read_recording(path: str | Path, cable_count: int) -> Recording:
     """Read a recording from a CSV, Parquet or MDF file, of a robot with n = ``cable_count`` cables, N samples.
 
-    Columns are ``time`` (s), ``winch_speed_1`` ... (m/s), ``tension_1`` ... (N), ``x``, ``y``, ``z`` (m).
+    Columns are ``time`` (s), ``winch_speed_1`` ... (m/s), ``tension_1`` ... (N), ``x``, ``y``, ``z`` (m); where the
+    length of a rope is recorded, ``rope_length_1`` ... (m, any zero, smaller as it reels in), its rate is the speed.
 
     Raises RecordingError, which names the line or row, where the file is not a valid recording; ArgumentError where
     ``path`` is no path or ``cable_count`` no whole number from 1 to 100.
@@ -113,7 +114,7 @@ def _validated_recording(table: CsvTable | ColumnTable, cable_count: int) -> Rec
     recording = Recording(
         path=table.file,
         time=_stacked_columns(numbers, ["time"])[:, 0],
-        winch_speed=_stacked_columns(numbers, [f"winch_speed_{cable}" for cable in cables]),
+        winch_speed=_winch_speeds(numbers, cables),
         tension=_stacked_columns(numbers, [f"tension_{cable}" for cable in cables]),
         position=_stacked_columns(numbers, AXES),
         unknown_columns=table.header.unknown_names,
@@ -121,6 +122,16 @@ def _validated_recording(table: CsvTable | ColumnTable, cable_count: int) -> Rec
     if not _is_valid(recording):
         raise _first_error(table)
     return recording
+
+
+def _winch_speeds(numbers: Mapping[str, NDArray[np.float64]], cables: Iterable[int]) -> NDArray[np.float64]:
+    """Winch speeds (N, n); of a rope whose length was recorded its rate, by central differences, which do not drift."""
+    speeds = dict(numbers)
+    for cable in cables:
+        length = numbers.get(f"rope_length_{cable}")
+        if length is not None and len(length) > 1 and np.all(np.diff(numbers["time"]) > 0.0):
+            speeds[f"winch_speed_{cable}"] = -np.gradient(length, numbers["time"])
+    return _stacked_columns(speeds, [f"winch_speed_{cable}" for cable in cables])
 
 
 def recording_errors(path: str | Path, cable_count: int) -> Iterator[RecordingError]:

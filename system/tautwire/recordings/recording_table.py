@@ -22,7 +22,7 @@ MAX_SAMPLES = 20_000_000
 
 ErrorSink = Callable[[RecordingError], None]
 
-_CABLE_COLUMN = re.compile(r"(?:winch_speed|tension)_(0|[1-9][0-9]{0,5})")
+_CABLE_COLUMN = re.compile(r"(?:winch_speed|rope_length|tension)_(0|[1-9][0-9]{0,5})")
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,9 @@ class Header:
 def parse_header(
     cells: Sequence[str], where: str, cable_count: int, sink: ErrorSink = raise_error, line: int | None = None
 ) -> Header:
-    """Parse the header in these cells; raises RecordingError unless time and every winch speed have a column.
+    """Parse the header in these cells; raises RecordingError unless time and every winch have a column.
+
+    A winch has its speed, or the length of its rope.
 
     Errors go to the ``sink``; where it does not raise, so do those that follow.
     """
@@ -59,7 +61,7 @@ def parse_header(
             sink(RecordingError(where, problem, "give the robot file that belongs to this recording", line))
     unknown_names = tuple(name for name in names if name not in allowed_names)
     for required in ("time", *(f"winch_speed_{cable}" for cable in range(1, cable_count + 1))):
-        if required not in names:
+        if required not in names and required.replace("winch_speed", "rope_length") not in names:
             similar = closest_name(required, unknown_names)
             hint = "add it" if similar is None else f"add it, or rename {format_value(similar)}"
             sink(RecordingError(where, f"the column {required} is missing", hint, line))
@@ -76,7 +78,7 @@ def require_samples(count: int, where: str) -> None:
 def known_columns(cable_count: int) -> frozenset[str]:
     """Names of all columns that a recording may have."""
     cables = range(1, cable_count + 1)
-    cable_columns = (f"{kind}_{cable}" for kind in ("winch_speed", "tension") for cable in cables)
+    cable_columns = (f"{kind}_{cable}" for kind in ("winch_speed", "rope_length", "tension") for cable in cables)
     return frozenset(("time", *AXES, *cable_columns))
 
 
@@ -134,7 +136,7 @@ def _width_error(row: Row, width: int) -> RecordingError:
 def _parse_cell(row: Row, name: str, cell: str) -> float | RecordingError:
     """The number in a cell, NaN where an output is missing; or what is wrong with it."""
     if cell in MISSING_CELLS:
-        if name == "time" or name.startswith("winch_speed_"):
+        if name == "time" or name.startswith(("winch_speed_", "rope_length_")):
             problem = f"is {format_value(cell) if cell else 'empty'}, must be a number"
             return _cell_error(row, name, problem, "write a number, or cut the recording before this sample")
         return math.nan
