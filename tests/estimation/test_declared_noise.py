@@ -37,7 +37,7 @@ def test_noise_that_is_declared_right_is_kept(name: str, effects: dict[str, dict
     found = checked(robot, (recording,))
     assert found.notes == ()
     assert found.noise == estimate_noise(robot, recording)
-    assert found.recordings == (recording,)
+    assert not found.is_coloured
 
 
 @pytest.mark.parametrize("factor", [0.3, 3.0])
@@ -69,17 +69,14 @@ def test_a_noise_that_nobody_declared_is_not_checked() -> None:
     assert checked(robot, PAIR).notes == ()
 
 
-@pytest.mark.parametrize(("alike", "steps"), [(0.6, range(3, 7)), (0.9, range(12, 21))])
-def test_samples_of_coloured_noise_are_left_out_until_they_are_independent(alike: float, steps: range) -> None:
+@pytest.mark.parametrize("alike", [0.6, 0.9])
+def test_coloured_noise_is_noticed_and_left_to_the_disturbance(alike: float) -> None:
     pair = tuple(with_noise(r, alike, 3e-3, seed) for seed, r in enumerate(PAIR))
     found = checked(declared(position_noise=3e-3), pair)
+    assert found.is_coloured
     assert len(found.notes) == 3
     assert all("noise is coloured" in note for note in found.notes)
-    for axis in range(3):
-        kept = np.flatnonzero(np.isfinite(found.recordings[0].position[:, axis]))
-        assert set(np.diff(kept)) <= set(steps) and len(set(np.diff(kept))) == 1
     assert found.noise.of_outputs(3)[:3] == (3e-3, 3e-3, 3e-3)
-    assert np.isfinite(found.recordings[0].tension).all()
 
 
 def test_a_rest_tells_size_and_colour() -> None:

@@ -8,7 +8,8 @@ import pytest
 from casadi import SX, Function
 
 from tautwire.estimation.initial_state_prior import initial_covariance
-from tautwire.estimation.kalman_filter import Substeps, filter_step
+from tautwire.estimation.integration_steps import Substeps
+from tautwire.estimation.kalman_filter import filter_step
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.native_functions import CompiledFunction, by_sample
 from tautwire.robot.symbolic_model import FreeParameter, symbolic_model
@@ -119,6 +120,7 @@ def test_the_filter_of_every_effect_is_casadis_to_the_last_bit(case: Case) -> No
         np.diff(recording.time[: count + 1])[None, :],
         np.full((1, count), 1e-4),
         np.zeros((1, count)),
+        np.zeros((0, count)),
     )
     ours = CompiledFunction(function, carried=3)(count, *carried, theta, *columns)
     theirs = function.mapaccum("run", count, 3)(*carried, np.repeat(theta, count, axis=1), *columns)

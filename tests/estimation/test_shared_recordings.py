@@ -29,3 +29,18 @@ def test_a_lacks_damping() -> None:
 
 def test_d_lacks_nothing() -> None:
     assert traced("d").verdict == "none"
+
+
+@pytest.mark.parametrize(
+    ("name", "effects"), [("p1", []), ("p2", ["pulley"]), ("p3", ["hysteresis"]), ("p6", ["friction"])]
+)
+def test_on_robots_as_they_are_what_is_hidden_is_named_alone(name: str, effects: list[str]) -> None:
+    found = traced(f"lifelike/{name}")
+    assert found.verdict == ("effects" if effects else "none")
+    assert [effect.name for effect in found.effects] == effects
+
+
+def test_a_swinging_load_on_a_robot_as_it_is_gets_no_listed_name() -> None:
+    found = traced("lifelike/p4")
+    assert found.verdict == "unexplained"
+    assert found.effects == ()

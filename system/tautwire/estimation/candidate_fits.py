@@ -13,6 +13,7 @@ from ..errors import UnreachableError
 from ..robot.schema import Robot
 from .candidate_proposals import FitTask
 from .candidate_scores import CandidateScore, setting_of
+from .disturbance_fit import with_fitted_disturbance, with_improved_disturbance
 from .estimation_data import DataSet
 from .hypotheses import Hypothesis
 from .identification_context import IdentificationContext
@@ -32,6 +33,7 @@ def fit_and_validate(fitter: Fitter, task: FitTask, data: DataSet, validation: D
     """Fit and validate a task; None where the cables cannot hold the platform, or nothing finite comes out."""
     try:
         fit = fitter.fit_from(task.starts, task.chosen, data, task.min_log_likelihood, task.cost_tolerance)
+        fitter = with_improved_disturbance(fitter, fit.robot, task.chosen, data)
         innovations = fitter.judged(fit.robot, task.chosen, validation)
     except (UnreachableError, NoFitError):
         return None
@@ -90,12 +92,15 @@ def maximised_validation_likelihood(
 ) -> float:
     """Maximised log-likelihood of the validation data, as the denominator of an e-value must be.
 
+    Over the disturbance too, in favour of the model: an effect has to beat the best disturbance, not noise alone.
     Coarse where it stays below ``reference`` by more than the fit's cost tolerance can be wrong.
     """
     fitter, validation, policy = context.fitter, context.split.validation, context.policy
-    if not chosen:
+    if not chosen and not fitter.has_disturbance:
         return fitter.log_likelihood(robot, chosen, validation)
     for tolerance in (policy.fit.coarse_cost_tolerance, policy.fit.fine_cost_tolerance):
+        is_coarse = tolerance == policy.fit.coarse_cost_tolerance
+        fitter = with_fitted_disturbance(fitter, robot, chosen, validation, is_coarse)
         robot = fitter.fit_from([robot], chosen, validation, -inf, tolerance).robot
         log_likelihood = fitter.log_likelihood(robot, chosen, validation)
         if reference - log_likelihood > policy.selection.coarse_tie(log_likelihood):

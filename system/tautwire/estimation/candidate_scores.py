@@ -53,10 +53,12 @@ def setting_of(robot: Robot, hypothesis: Hypothesis) -> EffectSetting:
     return next(setting for setting in robot.effects if (setting.name, setting.cables) == wanted)
 
 
-def most_parsimonious(scores: Sequence[CandidateScore], policy: SelectionPolicy) -> CandidateScore | None:
+def most_parsimonious(
+    scores: Sequence[CandidateScore], policy: SelectionPolicy, has_disturbance: bool = False
+) -> CandidateScore | None:
     """Most parsimonious candidate: of those whose evidence ties with the best, the one with fewest parameters."""
     top = max((trial.evidence for trial in scores), default=0.0)
-    tied = [trial for trial in scores if top - trial.evidence < policy.tie_nats]
+    tied = [trial for trial in scores if top - trial.evidence < policy.tie(top, has_disturbance)]
     return min(tied, key=lambda trial: (trial.parameter_count, -trial.evidence), default=None)
 
 

@@ -56,7 +56,7 @@ def validate_by_cosimulation(
     runs_after = [run.result() for run in start_cosimulations(workers, fitter, identified, data_sets)]
     comparisons, noise_floors = compare_cosimulations(identified, fitter, data_sets, runs_before, runs_after)
     all_near_floor = all(
-        _is_near_noise_floor(c.errors_after, floor, policy.max_error_ratio)
+        is_near_noise_floor(c.errors_after, floor, policy.max_error_ratio)
         for c, floor in zip(comparisons, noise_floors, strict=True)
     )
     return (comparisons, noise_floors) if all_near_floor else None
@@ -92,7 +92,7 @@ def noise_floor(fitter: Fitter, robot: Robot, data: DataSet) -> Errors:
     return _root_mean_squares(np.where(np.isfinite(data.recording.measured()), variances, np.nan))
 
 
-def _is_near_noise_floor(after: Errors, noise_floor_errors: Errors, max_ratio: float) -> bool:
+def is_near_noise_floor(after: Errors, noise_floor_errors: Errors, max_ratio: float) -> bool:
     """Whether the errors of a co-simulation are at most a multiple of the noise floor."""
     pairs = ((after.position_rms, noise_floor_errors.position_rms), (after.tension_rms, noise_floor_errors.tension_rms))
     return all(not error > max_ratio * least for error, least in pairs)

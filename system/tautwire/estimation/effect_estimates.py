@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from itertools import combinations
 
 from tautwire_fmu.laws.effects import UNLISTED
 
 from ..robot.symbolic_model import FORMULA_INDEX
+from .explained_shares import ExplainedShares
 from .hypotheses import declared_value
 from .identification_context import IdentificationContext
 from .parameter_fit import Fit
+from .policy import SizePolicy
 from .profile_likelihood import profile_intervals
 from .stepwise_selection import SelectionResult
 from .trace_result import Correlation, Estimate, FittedParameter, FoundEffect
@@ -43,6 +46,22 @@ def estimated_effects(context: IdentificationContext, selection: SelectionResult
             FoundEffect(hypothesis.effect.name, hypothesis.effect.component, hypothesis.cables, estimates, evidence)
         )
     return tuple(effects)
+
+
+def effects_by_size(
+    effects: Sequence[FoundEffect], shares: ExplainedShares, policy: SizePolicy
+) -> tuple[tuple[FoundEffect, ...], tuple[FoundEffect, ...]]:
+    """The effects with their shares, the largest first: those that matter, and those too small to matter."""
+    with_shares = [replace(effect, share=share) for effect, share in zip(effects, shares.effects, strict=True)]
+    ranked = sorted(range(len(effects)), key=lambda index: -shares.effects[index])
+    large = [index for index in ranked if is_substantial(shares, index, policy)]
+    small = [index for index in ranked if index not in large]
+    return tuple(with_shares[i] for i in large), tuple(with_shares[i] for i in small)
+
+
+def is_substantial(shares: ExplainedShares, index: int, policy: SizePolicy) -> bool:
+    """Whether an effect explains a share that matters, and shows beside the noise of one sample."""
+    return shares.effects[index] >= policy.min_share and shares.sizes[index] >= policy.min_size
 
 
 def parameter_correlations(fit: Fit, effects: Sequence[FoundEffect]) -> tuple[Correlation, ...]:

@@ -3,12 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from time import perf_counter
 
 from threadpoolctl import threadpool_limits
 
-from ..cosimulation.robot_cosimulation import CosimulationResult
 from ..errors import ArgumentError
 from ..process_signals import defer_interrupts
 from ..recordings.recording import Recording, require_outputs
@@ -16,21 +15,27 @@ from ..robot.schema import Robot, validate_robot
 from ..robot.uncertain_parameters import uncertain_parameters
 from ..validation import NumberRule, validate_callable, validate_instance, validate_integer, validate_number
 from .confusable_models import replace_by_confusable_models
-from .cosimulation_validation import compare_cosimulations, start_cosimulations, validate_by_cosimulation
-from .discovery.formula_discovery import Discovery
-from .discovery.unexplained_residual import UnexplainedResidual, explain_residual
-from .effect_estimates import estimated_effects, parameter_correlations
+from .cosimulation_validation import (
+    compare_cosimulations,
+    start_cosimulations,
+    validate_by_cosimulation,
+)
+from .discovery.unexplained_residual import explain_residual
+from .effect_estimates import effects_by_size, estimated_effects, parameter_correlations
+from .explained_shares import ExplainedShares, explained_shares, remaining_error, sensor_noise_floor
 from .identifiability import analyse_identifiability
 from .identification_context import IdentificationContext, Progress, no_progress
-from .localisation.component_localisation import FaultLocalisation, localise_residual
+from .identification_state import Identification
+from .localisation.component_localisation import localise_residual
+from .parameter_fit import Fitter
 from .policy import DEFAULT_POLICY
-from .preprocessing import PreparedData, all_residuals_white, calibrated_estimation_data, innovations_of, prepare_data
+from .preprocessing import calibrated_estimation_data, prepare_data
 from .residual_analysis import largest_autocorrelations
 from .smoothed_states import calibrate, initial_state_note, with_initial_state
-from .stepwise_selection import SelectionResult, nothing_selected, select_effects
-from .trace_result import Comparison, Errors, FoundEffect, Identifiability, Trace, Verdict
-from .verdict import confirmed_formula, verdict_of
-from .worker_pool import PendingResult, WorkerPool
+from .stepwise_selection import nothing_selected, select_effects
+from .trace_result import Trace
+from .verdict import confirmed_formula, verdict_beside_disturbance, verdict_of
+from .worker_pool import WorkerPool
 
 FALSE_ALARM_RATE_RULE = NumberRule("a false-alarm rate below 1, such as 0.01", "", positive=True)
 
@@ -69,48 +74,6 @@ def validated_false_alarm_rate(argument: str, value: object) -> float:
     return rate
 
 
-@dataclass(frozen=True)
-class Identification:
-    """State of an identification: what its stages have found so far.
-
-    ``clock_corrected`` are the data to take where no effects explain those as recorded. ``final_robot`` is the best
-    model that the FMUs confirm, with uncertain numbers as FIT has them, the declared one until then. ``effects_hold``
-    tells whether the FMUs confirm the selection, ``discovery`` is a formula that they confirm.
-    """
-
-    context: IdentificationContext
-    prepared: PreparedData
-    clock_corrected: tuple[PreparedData, ...]
-    selection: SelectionResult
-    final_robot: Robot
-    pending_runs: tuple[PendingResult[CosimulationResult], ...] = ()
-    pending_localisation: tuple[PendingResult[FaultLocalisation], ...] = ()
-    runs_before: tuple[CosimulationResult, ...] = ()
-    comparisons: tuple[Comparison, ...] = ()
-    noise_floors: tuple[Errors, ...] = ()
-    effects_hold: bool = False
-    discovery: Discovery | None = None
-    unexplained: UnexplainedResidual = field(default_factory=UnexplainedResidual)
-    verdict: tuple[Verdict, str] = ("unexplained", "")
-    effects: tuple[FoundEffect, ...] = ()
-    identifiability: Identifiability = field(default_factory=Identifiability)
-
-    @property
-    def is_white_before(self) -> bool:
-        """Whether the declared model leaves white noise."""
-        policy = self.context.policy.residual_analysis
-        return all_residuals_white(self.prepared.innovations, self.prepared.split, policy)
-
-    @property
-    def selection_explains(self) -> bool:
-        """Whether effects were selected that leave white noise."""
-        if not self.selection.accepted:
-            return False
-        context, policy = self.context, self.context.policy.residual_analysis
-        innovations = innovations_of(context.fitter, self.selection.fit.robot, context.split)
-        return all_residuals_white(innovations, context.split, policy)
-
-
 def start_side_runs(state: Identification) -> Identification:
     """Co-simulate the declared robot, and localise its error in a component, beside all that follows."""
     context, prepared = state.context, state.prepared
@@ -125,6 +88,9 @@ def start_side_runs(state: Identification) -> Identification:
 def select(state: Identification) -> Identification:
     """Select effects in the recordings as they are; with clocks corrected where no effects explain those."""
     state = replace(state, selection=select_effects(state.context))
+    if state.selection.disturbance:
+        fitter = state.context.fitter.with_disturbance(state.selection.disturbance)
+        state = replace(state, context=replace(state.context, fitter=fitter))
     for prepared in state.clock_corrected:
         if not state.selection_explains:
             context = replace(state.context, fitter=prepared.fitter, split=prepared.split)
@@ -151,6 +117,8 @@ def confirm_effects(state: Identification) -> Identification:
     """Confirm by co-simulation the effects that leave white noise, or the calibrated robot where nothing is lacking."""
     robot = state.context.robot
     state.context.progress("co-simulating after", 0.0)
+    if state.context.fitter.has_disturbance:
+        return _explained_beside_disturbance(state)
     if state.selection_explains:
         confirmed = _confirmed(state, state.selection.fit.robot)
         return state if confirmed is None else replace(confirmed, effects_hold=True)
@@ -161,7 +129,7 @@ def confirm_effects(state: Identification) -> Identification:
 
 def explain_by_formula(state: Identification) -> Identification:
     """Look for a formula, confirmed by co-simulation, or resonances, where effects do not explain the residual."""
-    if state.effects_hold or _nothing_lacks(state):
+    if state.effects_hold or _nothing_lacks(state) or state.shares:
         return state
     unexplained = explain_residual(state.context, state.selection)
     state = replace(state, unexplained=unexplained)
@@ -171,6 +139,8 @@ def explain_by_formula(state: Identification) -> Identification:
 
 def judge(state: Identification) -> Identification:
     """Put the verdict in words."""
+    if state.shares:
+        return _judged_beside_disturbance(state, state.shares)
     verdict = verdict_of(
         state.context.robot, state.selection, state.effects_hold, state.discovery, state.is_white_before
     )
@@ -180,7 +150,13 @@ def judge(state: Identification) -> Identification:
 def estimate_intervals(state: Identification) -> Identification:
     """Estimate the confirmed effects' parameters with intervals."""
     state.context.progress("intervals", 0.0)
-    return replace(state, effects=estimated_effects(state.context, state.selection)) if state.effects_hold else state
+    if not state.effects_hold and not (state.shares and state.selection.accepted):
+        return state
+    effects = estimated_effects(state.context, state.selection)
+    if state.shares is None:
+        return replace(state, effects=effects)
+    large, small = effects_by_size(effects, state.shares, state.context.policy.size)
+    return replace(state, effects=large if state.effects_hold else (), small_effects=small)
 
 
 def analyse_detectability(state: Identification) -> Identification:
@@ -244,6 +220,42 @@ def trace(
         return _result(state, perf_counter() - start_time)
 
 
+def _explained_beside_disturbance(state: Identification) -> Identification:
+    """The state with the shares of the selected effects, and what the robot with them leaves in co-simulation."""
+    context, selection = state.context, state.selection
+    identified = calibrate(context.fitter, selection.fit.robot, context.split.estimation).calibrated_robot(
+        selection.fit.robot
+    )
+    state = _with_final_robot(state, context.fitter, identified)
+    data = state.prepared.data_sets[-1]
+    return replace(state, shares=explained_shares(context, state.prepared.fitter, identified, selection.accepted, data))
+
+
+def _with_final_robot(state: Identification, fitter: Fitter, robot: Robot) -> Identification:
+    """The state with a robot as the final one, and what its co-simulations leave, near noise or not."""
+    context, data_sets = state.context, state.prepared.data_sets
+    runs = [run.result() for run in start_cosimulations(context.workers, fitter, robot, data_sets)]
+    comparisons, _ = compare_cosimulations(robot, fitter, data_sets, state.runs_before, runs)
+    floors = tuple(sensor_noise_floor(fitter, robot, data) for data in data_sets)
+    return replace(state, final_robot=robot, comparisons=comparisons, noise_floors=floors)
+
+
+def _judged_beside_disturbance(state: Identification, shares: ExplainedShares) -> Identification:
+    """The state with its verdict; without an effect that matters, with the declared robot as the final one."""
+    context, declared = state.context, state.prepared.fitter
+    remaining = remaining_error(state.comparisons[-1].recording, state.comparisons[-1].after, state.noise_floors[-1])
+    verdict = verdict_beside_disturbance(context, state.selection.accepted, shares, remaining.sentence)
+    state = replace(state, verdict=verdict, effects_hold=verdict[0] == "effects")
+    if verdict[0] == "none":
+        max_sigmas = context.policy.size.max_calibration_sigmas
+        calibration = calibrate(declared, context.robot, context.split.estimation).clipped(max_sigmas)
+        return _with_final_robot(state, declared, calibration.calibrated_robot(context.robot))
+    if verdict[0] == "unexplained":
+        comparisons = tuple(replace(c, after=c.before, errors_after=c.errors_before) for c in state.comparisons)
+        return replace(state, final_robot=context.robot, comparisons=comparisons)
+    return state
+
+
 def _nothing_lacks(state: Identification) -> bool:
     return not state.selection.accepted and state.is_white_before
 
@@ -265,7 +277,7 @@ def _confirmed(state: Identification, robot: Robot) -> Identification | None:
 def _result(state: Identification, seconds: float) -> Trace:
     context, prepared, final, effects = state.context, state.prepared, state.final_robot, state.effects
     validation = prepared.split.validation
-    innovations = prepared.fitter.innovations(final, validation)
+    innovations = context.fitter.innovations(final, validation)
     verdict, sentence = state.verdict
     calibration_notes = [] if verdict == "unexplained" else _calibration_notes(state)
     (localisation,) = state.pending_localisation
@@ -283,16 +295,34 @@ def _result(state: Identification, seconds: float) -> Trace:
         comparisons=state.comparisons,
         noise_floor=state.noise_floors[-1],
         noise_before=white_before,
-        noise_after=state.effects_hold or state.discovery is not None or white_before,
+        noise_after=state.is_white_after,
         normalised_innovation_variance=innovations.mean_square(validation.rows),
         autocorrelations=largest_autocorrelations(innovations, validation.rows, context.policy.residual_analysis),
         identifiability=state.identifiability,
         components=localisation.result(),
         resonances=state.unexplained.resonances,
         alpha=context.alpha,
-        notes=(*prepared.notes, *state.unexplained.notes, *_initial_state_notes(state), *calibration_notes),
+        notes=(
+            *prepared.notes,
+            *state.unexplained.notes,
+            *_disturbance_notes(state),
+            *_initial_state_notes(state),
+            *calibration_notes,
+        ),
         seconds=seconds,
+        disturbance=context.fitter.noise.disturbance,
+        left_share=state.shares.left if state.shares else None,
+        small_effects=state.small_effects,
     )
+
+
+def _disturbance_notes(state: Identification) -> list[str]:
+    """Notes on the disturbance that was assumed, and on effects too small to matter."""
+    disturbance = state.context.fitter.noise.disturbance
+    if disturbance is None:
+        return []
+    small = [f"{each.name} ({each.share or 0.0:.1%} of what is missed)" for each in state.small_effects]
+    return [disturbance.sentence, *([f"established, but too small to matter: {', '.join(small)}"] if small else [])]
 
 
 def _calibration_notes(state: Identification) -> list[str]:
@@ -301,14 +331,14 @@ def _calibration_notes(state: Identification) -> list[str]:
     return [
         note
         for data in state.prepared.data_sets
-        for note in calibrate(state.prepared.fitter, final_robot, data).notes(final_robot, data.recording.path)
+        for note in calibrate(state.context.fitter, final_robot, data).notes(final_robot, data.recording.path)
     ]
 
 
 def _initial_state_notes(state: Identification) -> list[str]:
     """Notes on the smoothed initial state of each recording under the final model."""
     starts = [
-        (with_initial_state(state.prepared.fitter, state.final_robot, data), data.recording.path)
+        (with_initial_state(state.context.fitter, state.final_robot, data), data.recording.path)
         for data in state.prepared.data_sets
     ]
     return [note for start, path in starts for note in initial_state_note(start, path)]

@@ -32,6 +32,7 @@ from ..recordings.recording import Recording
 from ..robot.schema import PER_CABLE_COMPONENTS, Robot
 from ..robot.symbolic_model import FreeParameter, symbolic_model
 from ..robot.uncertain_parameters import uncertain_parameters
+from .disturbance import with_error_columns
 from .hypotheses import Hypothesis
 from .likelihood import Likelihood
 from .measurement_model import delayed_outputs
@@ -47,8 +48,9 @@ class LinearisedSegment:
     ``states`` (n, K + 1) as predicted and winch ``speeds`` (cables, K + 1), of the next sample too; ``step`` (K) and
     ``shift`` (m, K) in s. ``transition`` A (K, n, n), ``half_transition`` the same from half a step before the next
     sample, ``output_matrix`` C (K, m, n), ``gain`` K (K, n, m); ``whitening`` (K, m, m) makes innovations independent
-    with unit variance and is zero where nothing was ``observed`` (K, m). ``is_recorded``, ``values`` and
-    ``sensitivities`` as for FilterSegment, values and sensitivities zero where nothing was observed.
+    with unit variance and is zero where nothing was ``observed`` (K, m). ``transition``, ``output_matrix`` and ``gain``
+    have the states of a disturbance behind the model's n. ``is_recorded``, ``values`` and ``sensitivities`` as for
+    FilterSegment, values and sensitivities zero where nothing was observed.
     """
 
     states: Array
@@ -73,7 +75,10 @@ class LinearisedSegment:
         ``state_forcing`` is B (K, n, p), ``output_forcing`` D (K, m, p).
         """
         output_changes = np.empty_like(output_forcing)
-        sensitivities = state_sensitivities
+        # Nothing acts on the states of a disturbance.
+        unforced = self.transition.shape[1] - state_forcing.shape[1]
+        state_forcing = np.pad(state_forcing, ((0, 0), (0, unforced), (0, 0)))
+        sensitivities = np.pad(state_sensitivities, ((0, self.transition.shape[1] - len(state_sensitivities)), (0, 0)))
         for k in range(len(output_forcing)):
             output_changes[k] = self.output_matrix[k] @ sensitivities + output_forcing[k]
             sensitivities = self.transition[k] @ (sensitivities - self.gain[k] @ output_changes[k]) + state_forcing[k]
@@ -89,17 +94,22 @@ def linearise_filter(
     not.
     """
     theta = np.array(values, dtype=float)[:, None]
-    noise = likelihood.noise
-    variances = np.square(noise.of_outputs(likelihood.cable_count))
+    size = likelihood.model.states.numel()
+    disturbance, cable_count = likelihood.noise.disturbance, likelihood.cable_count
+    variances = likelihood.noise.white_variances(cable_count)
+    no_force = np.zeros((3, 1))
     for segment in likelihood.segments(recording, values, acceleration_noise_density):
         measured, observed, shift, speed, later, step, _ = segment.columns
         count = measured.shape[1]
         predicted = segment.states[:, :-1]
         is_observed = observed.T[:, :, None] > 0.0
         innovations = np.where(is_observed[:, :, 0], segment.values, 0.0)
+        columns = (theta, shift, speed, later, step)
         output_matrix = by_sample(
-            likelihood.jacobians(count, predicted, predicted, theta, shift, speed, later, step)[0], count
+            likelihood.jacobians(count, predicted[:size], predicted[:size], *columns, no_force)[0], count
         )
+        if disturbance:
+            output_matrix = with_error_columns(output_matrix)
         cross_covariance = segment.covariances @ np.where(is_observed, output_matrix, 0.0).swapaxes(1, 2)
         covariance = np.where(is_observed, output_matrix, 0.0) @ cross_covariance + np.diag(variances)
         cholesky_factor = np.linalg.cholesky(covariance)
@@ -107,10 +117,13 @@ def linearise_filter(
         gain = cross_covariance @ np.linalg.inv(covariance)
         corrections = np.einsum("kij,kjl,kl->ki", gain, cholesky_factor, innovations)
         updated = predicted + corrections.T
-        _, *jacobians = likelihood.jacobians(count, predicted, updated, theta, shift, speed, later, step)
-        transition, half_transition = (by_sample(matrix, count) for matrix in jacobians)
+        force = disturbance.mean_force(updated[size:], step[0]) if disturbance else no_force
+        jacobians = likelihood.jacobians(count, predicted[:size], updated[:size], *columns, force)[1:]
+        transition, half_transition, by_force = (by_sample(matrix, count) for matrix in jacobians)
+        if disturbance:
+            transition = disturbance.augmented_transition(transition, by_force, step[0], cable_count)
         yield LinearisedSegment(
-            segment.states,
+            segment.states[:size],
             np.hstack([speed, later[:, -1:]]),
             step[0],
             shift,
@@ -254,8 +267,9 @@ class EffectSensitivities:
             by_sample(part, count)[:, :, self._moving_indices[trial]] for part in derivatives
         )
         begin, end = rate_sensitivities[:-1], rate_sensitivities[1:]
+        transition = run.transition[:, : begin.shape[1], : begin.shape[1]]
         state_forcing = (
-            run.step[:, None, None] / 6.0 * (run.transition @ begin + 2.0 * run.half_transition @ (begin + end) + end)
+            run.step[:, None, None] / 6.0 * (transition @ begin + 2.0 * run.half_transition @ (begin + end) + end)
         )
         return state_forcing, output_sensitivities[:-1]
 

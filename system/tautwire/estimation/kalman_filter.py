@@ -1,4 +1,4 @@
-"""Extended Kalman filter: one sample as a CasADi function, and the integration steps that it takes.
+"""Extended Kalman filter: one sample as a CasADi function.
 
 Scalar measurements are processed one by one (their noise is independent), which needs no matrix inverse and skips a
 missing one. Sensitivities to the free parameters are propagated with the gain held fixed.
@@ -9,17 +9,17 @@ Source: Bierman (1977), Factorization Methods for Discrete Sequential Estimation
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
-from math import ceil, factorial
 
 import casadi
 import numpy as np
 from casadi import SX, Function
 from numpy.typing import NDArray
 
-from ..robot.schema import Robot
-from ..robot.symbolic_model import SymbolicModel, symbolic_model
+from ..robot.symbolic_model import SymbolicModel
+from .disturbance import Disturbance, disturbance_state_count
+from .integration_steps import Substeps
 from .measurement_model import measurement_model
 
 
@@ -28,7 +28,8 @@ class Noise:
     """Noise levels as standard deviations: position (m), tension (N), winch speed (m/s), and start position (m).
 
     Of a start that is not known at rest: its velocity (m/s), how far it is from equilibrium (m), and tensions that hold
-    nothing (N). ``own`` are those of single outputs (3 + n) where they differ from the others of their kind.
+    nothing (N). ``own`` are those of single outputs (3 + n) where they differ from the others of their kind. With a
+    ``disturbance``, which has a white noise of its own, those of outputs are not used by the filter.
     """
 
     position: float
@@ -39,23 +40,17 @@ class Noise:
     start_stretch: float = 0.0
     self_stress: float = 0.0
     own: tuple[float, ...] = ()
+    disturbance: Disturbance | None = None
 
     def of_outputs(self, cable_count: int) -> tuple[float, ...]:
         """Of x, y, z and each tension."""
         return self.own or (*[self.position] * 3, *[self.tension] * cable_count)
 
-
-@dataclass(frozen=True)
-class Substeps:
-    """Integration steps between two samples: of the state itself, and of its derivatives.
-
-    The latter use a series of some order over a part so small that ``doublings`` make it a whole step.
-    """
-
-    state: int
-    slope: int
-    order: int = 4
-    doublings: int = 0
+    def white_variances(self, cable_count: int) -> NDArray[np.float64]:
+        """Variances (3 + n,) of the white noise of x, y, z and each tension."""
+        if self.disturbance:
+            return self.disturbance.white_variances(cable_count)
+        return np.square(self.of_outputs(cable_count))
 
 
 @dataclass(frozen=True)
@@ -72,31 +67,33 @@ def filter_step(model: SymbolicModel, cable_count: int, noise: Noise, substeps: 
     """One step of the filter: measurement update, time update, and the sensitivities of both.
 
     Arguments: state, covariance, sensitivities, parameters, measured, observed, shift, speed, next speed, time step,
-    drift, acceleration noise density. Results: the first three at the next sample, then whitened innovations (m,), log
-    of their variances (m,), and the innovations' derivatives by the parameters (m, p), whitened. Measured is x, y, z
-    and the tensions, each as shown ``shift`` (s) later; drift (s^2) times the variance of a winch speed is what its
-    noise adds to the variance of each unstrained length.
+    drift, acceleration noise density, disturbance. Results: the first three at the next sample, then whitened
+    innovations (m,), log of their variances (m,), and the innovations' derivatives by the parameters (m, p), whitened.
+    Measured is x, y, z and the tensions, each as shown ``shift`` (s) later; drift (s^2) times the variance of a winch
+    speed is what its noise adds to the variance of each unstrained length. The disturbance is that of
+    :meth:`Disturbance.filter_arguments`, and empty where the noise has none; its states follow those of the model.
     """
-    size, count = model.states.numel(), model.parameters.numel()
+    disturbance = _DisturbanceSymbols(cable_count if noise.disturbance else None)
+    size, count = model.states.numel() + disturbance.count, model.parameters.numel()
     predicted = _Filtered(
-        SX.sym("state", size),
-        SX.sym("covariance", size, size),
-        SX.sym("slopes", size, count),
-        SX(),
-        SX(),
-        SX(),
+        SX.sym("state", size), SX.sym("covariance", size, size), SX.sym("slopes", size, count), SX(), SX(), SX()
     )
     measured, observed, shift = (SX.sym(name, 3 + cable_count) for name in ("measured", "seen", "shift"))
     speed, later = SX.sym("speed", cable_count), SX.sym("later", cable_count)
     step, drift, acceleration_noise_density = SX.sym("step"), SX.sym("drift"), SX.sym("acceleration_noise_density")
     instant = [casadi.vertcat(speed, SX(3, 1)), model.parameters, later, step, shift]
-    outputs = measurement_model(model, cable_count).call([predicted.state, *instant])
-    filtered = _measurement_update(outputs, noise, predicted, measured, observed)
-    state, transition, direct_sensitivity = _time_update(model, substeps, filtered.state, speed, later, step)
-    propagated_covariance = _symmetric(casadi.mtimes([transition, filtered.covariance, transition.T]))
+    outputs = measurement_model(model, cable_count).call([predicted.state[: model.states.numel()], *instant])
+    declared_variances = [deviation**2 for deviation in noise.of_outputs(cable_count)]
+    variances = disturbance.white_variances or declared_variances
+    filtered = _measurement_update(
+        disturbance.added_to(outputs, predicted.state), variances, predicted, measured, observed
+    )
+    state, transition, direct_sensitivity = disturbance.time_update(model, substeps, filtered.state, speed, later, step)
     process_noise = SX(size, 1)
     process_noise[3:6] = acceleration_noise_density**2 * step
     process_noise[6 : 6 + cable_count] = noise.winch_speed**2 * drift
+    process_noise[model.states.numel() :] = disturbance.process_noise(step)
+    propagated_covariance = _symmetric(casadi.mtimes([transition, filtered.covariance, transition.T]))
     return Function(
         "filter_sample",
         [
@@ -112,6 +109,7 @@ def filter_step(model: SymbolicModel, cable_count: int, noise: Noise, substeps: 
             step,
             drift,
             acceleration_noise_density,
+            disturbance.arguments,
         ],
         [
             state,
@@ -124,43 +122,105 @@ def filter_step(model: SymbolicModel, cable_count: int, noise: Noise, substeps: 
     )
 
 
+class _DisturbanceSymbols:
+    """The disturbance states behind those of a model, and their numbers as symbols; none without a disturbance."""
+
+    def __init__(self, cable_count: int | None) -> None:
+        self.count = 0 if cable_count is None else disturbance_state_count(cable_count)
+        output_count = max(self.count - 3, 0)
+        self.decay_rates, self._variances = SX.sym("decay_rate", self.count), SX.sym("variance", self.count)
+        white = SX.sym("white_variance", output_count)
+        self.white_variances: list[SX] = casadi.vertsplit(white) if self.count else []
+        self.arguments = casadi.vertcat(self.decay_rates, self._variances, white)
+
+    def added_to(self, outputs: Sequence[SX], state: SX) -> Sequence[SX]:
+        """The outputs with their errors, and the derivatives of these by the states."""
+        if not self.count:
+            return outputs
+        expected, by_state, by_parameters = outputs
+        count = expected.numel()
+        by_errors = casadi.horzcat(SX(count, 3), SX.eye(count))
+        return expected + state[state.numel() - count :], casadi.horzcat(by_state, by_errors), by_parameters
+
+    def process_noise(self, step: SX) -> SX:
+        """Variances that a step adds to the disturbance states."""
+        return self._variances * (1.0 - casadi.exp(-2.0 * self.decay_rates * step))
+
+    def time_update(
+        self, model: SymbolicModel, substeps: Substeps, state: SX, speed: SX, next_speed: SX, step: SX
+    ) -> tuple[SX, SX, SX]:
+        """As :func:`_time_update` of the model, with the force that its mean over the step leaves on the platform."""
+        if not self.count:
+            return _time_update(model, substeps, state, speed, next_speed, step)
+        size, parameters = model.states.numel(), model.parameters.numel()
+        force, decay = SX.sym("force", 3), casadi.exp(-self.decay_rates * step)
+        mean_decay = casadi.exp(-0.5 * self.decay_rates[:3] * step)
+        next_state, transition, sensitivities = casadi.substitute(
+            list(_time_update(_with_force(model, force), substeps, state[:size], speed, next_speed, step)),
+            [force],
+            [mean_decay * state[size : size + 3]],
+        )
+        by_force = casadi.mtimes(sensitivities[:, parameters:], casadi.diag(mean_decay))
+        errors = self.count - 3
+        return (
+            casadi.vertcat(next_state, decay * state[size:]),
+            casadi.vertcat(
+                casadi.horzcat(transition, by_force, SX(size, errors)),
+                casadi.horzcat(SX(self.count, size), casadi.diag(decay)),
+            ),
+            casadi.vertcat(sensitivities[:, :parameters], SX(self.count, parameters)),
+        )
+
+
+def _with_force(model: SymbolicModel, force: SX) -> SymbolicModel:
+    """The model with a constant force on the platform as three more parameters."""
+    external_force = model.inputs[model.inputs.numel() - 3 :]
+    (rates,) = casadi.substitute([model.rates], [external_force], [external_force + force])
+    return replace(model, rates=rates, parameters=casadi.vertcat(model.parameters, force))
+
+
 def filter_jacobians(model: SymbolicModel, cable_count: int, substeps: Substeps) -> Function:
     """Jacobians of a filter step: of the outputs by the predicted state, of the next state by the updated one.
 
-    Arguments: state before and after the measurement update, parameters, shift, speed, next speed, time step.
-    Results: derivatives of the outputs (m, n), of the state at the next sample (n, n), and of that state by the
-    one half a step before it (n, n), from the cubic through both ends.
+    Arguments: state before and after the measurement update, parameters, shift, speed, next speed, time step, force on
+    the platform. Results: derivatives of the outputs (m, n), of the state at the next sample (n, n), of that state by
+    the one half a step before it (n, n), from the cubic through both ends, and by the force (n, 3).
     """
     predicted, updated = SX.sym("before", model.states.numel()), SX.sym("after", model.states.numel())
-    shift = SX.sym("shift", 3 + cable_count)
+    shift, force = SX.sym("shift", 3 + cable_count), SX.sym("force", 3)
     speed, later, step = SX.sym("speed", cable_count), SX.sym("later", cable_count), SX.sym("step")
-    instant = [casadi.vertcat(speed, SX(3, 1)), model.parameters, later, step, shift]
-    _, by_state, _ = measurement_model(model, cable_count).call([predicted, *instant])
-    _, transition, _ = _time_update(model, substeps, updated, speed, later, step)
-    rate_jacobian = Function(
-        "bending", [model.states, model.inputs, model.parameters], [casadi.jacobian(model.rates, model.states)]
+    inputs = casadi.vertcat(speed, SX(3, 1))
+    _, by_state, _ = measurement_model(model, cable_count).call(
+        [predicted, inputs, model.parameters, later, step, shift]
     )
-    jacobian_at_update = rate_jacobian(updated, casadi.vertcat(speed, SX(3, 1)), model.parameters)
+    forced = _with_force(model, force)
+    _, transition, sensitivities = _time_update(forced, substeps, updated, speed, later, step)
+    rate_jacobian = Function(
+        "bending", [model.states, model.inputs, forced.parameters], [casadi.jacobian(forced.rates, model.states)]
+    )
+    jacobian_at_update = rate_jacobian(updated, inputs, forced.parameters)
     identity = SX.eye(updated.numel())
     half_transition = 0.5 * (transition + identity) + step / 8.0 * casadi.mtimes(
         identity - transition, jacobian_at_update
     )
-    arguments = [predicted, updated, model.parameters, shift, speed, later, step]
-    return Function("filter_slopes", arguments, [casadi.densify(f) for f in (by_state, transition, half_transition)])
+    arguments = [predicted, updated, model.parameters, shift, speed, later, step, force]
+    by_force = sensitivities[:, model.parameters.numel() :]
+    results = [by_state, transition, half_transition, by_force]
+    return Function("filter_slopes", arguments, [casadi.densify(result) for result in results])
 
 
 def _measurement_update(
-    outputs: Sequence[SX], noise: Noise, predicted: _Filtered, measured: SX, observed: SX
+    outputs: Sequence[SX], variances: Sequence[SX | float], predicted: _Filtered, measured: SX, observed: SX
 ) -> _Filtered:
     expected, by_state, by_parameters = outputs
     covariance = predicted.covariance
     correction = SX(predicted.state.numel(), 1)
     sensitivities = predicted.sensitivities
     rows: list[tuple[SX, SX, SX]] = []
-    for index, sensor_deviation in enumerate(noise.of_outputs(expected.numel() - 3)):
+    for index, sensor_variance in enumerate(variances):
         output_row = by_state[index, :]
         cross_covariance = casadi.mtimes(covariance, output_row.T)
-        innovation_variance = casadi.mtimes(output_row, cross_covariance) + sensor_deviation**2
+        innovation_variance = casadi.mtimes(output_row, cross_covariance) + sensor_variance
         innovation = measured[index] - expected[index] - casadi.mtimes(output_row, correction)
         innovation_sensitivity = -(casadi.mtimes(output_row, sensitivities) + by_parameters[index, :])
         gain = cross_covariance * (observed[index] / innovation_variance)
@@ -259,48 +319,3 @@ def _runge_kutta_step(model: SymbolicModel, cable_count: int) -> Function:
     k4 = rates(model.states + step * k3, at_end, model.parameters)
     next_state = model.states + step / 6.0 * (k1 + 2.0 * (k2 + k3) + k4)
     return Function("runge_kutta_step", [model.states, model.parameters, begin, end, step], [next_state])
-
-
-Eigenvalues = NDArray[np.complex128]
-
-# Radians of the fastest vibration in one step of the state, and of its derivatives.
-MAX_STATE_ANGLE, MAX_SLOPE_ANGLE = 0.05, 0.7
-# Time constants of the fastest decay likewise: what has died away causes no more error.
-MAX_STATE_DECAY, MAX_SLOPE_DECAY = 0.5, 2.0
-# Up to so many steps of the state, a decay is resolved as finely as a vibration.
-MAX_FINE_STEPS = 40
-# Truncation error allowed to the series of the derivatives, for a vibration and for a decay.
-VIBRATION_TRUNCATION_ERROR, DECAY_TRUNCATION_ERROR, MIN_SERIES_ORDER = 2e-5, 1e-3, 2
-# For effects with states, which may be quicker under way than at rest, and in a fit than at its start. With many
-# states each doubling costs more than everything else.
-DOUBLINGS, MANY_STATES_COUNT, DOUBLINGS_OF_MANY_STATES = 4, 24, 2
-
-
-def substeps_of_robot(robot: Robot, sample_time: float, state_count: int, has_effect_states: bool) -> Substeps:
-    """Integration steps for samples ``sample_time`` (s) apart; ``has_effect_states`` if effects add states."""
-    doublings = DOUBLINGS_OF_MANY_STATES if state_count > MANY_STATES_COUNT else DOUBLINGS
-    return substeps_of_eigenvalues(eigenvalues_at_start(robot) * sample_time, doublings if has_effect_states else 0)
-
-
-def substeps_of_eigenvalues(exponents: Eigenvalues, doublings: int = 0) -> Substeps:
-    """Integration steps between samples over which the modes change by ``exp(exponents)``."""
-    vibration, decay = float(np.max(np.abs(exponents.imag))), float(np.max(np.abs(exponents)))
-    fine_steps = min(ceil(decay / MAX_STATE_ANGLE), MAX_FINE_STEPS)
-    state = max(1, ceil(vibration / MAX_STATE_ANGLE), ceil(decay / MAX_STATE_DECAY), fine_steps)
-    slope = max(1, ceil(vibration / MAX_SLOPE_ANGLE), ceil(decay / MAX_SLOPE_DECAY))
-    parts, order = slope * 2**doublings, MIN_SERIES_ORDER
-    while any(
-        2**doublings * (turn / parts) ** (order + 1) / factorial(order + 1) > left
-        for turn, left in ((vibration, VIBRATION_TRUNCATION_ERROR), (decay, DECAY_TRUNCATION_ERROR))
-    ):
-        order += 1
-    return Substeps(state, slope, order, doublings)
-
-
-def eigenvalues_at_start(robot: Robot) -> Eigenvalues:
-    """Eigenvalues of the model linearised at the start, in rad/s."""
-    model = symbolic_model(robot)
-    jacobian = casadi.Function("a", [model.states, model.inputs], [casadi.jacobian(model.rates, model.states)])
-    start_state = casadi.Function("start", [], [model.start])
-    matrix = np.array(jacobian(start_state()["o0"], 0.0))
-    return np.linalg.eigvals(matrix).astype(complex)

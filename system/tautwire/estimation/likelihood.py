@@ -12,7 +12,8 @@ Source: Ljung (1999), System Identification, sec. 7.4.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from copy import copy
+from dataclasses import dataclass, replace
 from functools import cached_property
 from math import log, pi
 
@@ -24,8 +25,10 @@ from ..recordings.recording import Recording
 from ..robot.schema import Robot
 from ..robot.symbolic_model import FreeParameter, symbolic_model
 from ..robot.uncertain_parameters import uncertain_parameters
+from .disturbance import Disturbance, disturbance_state_count
 from .initial_state_prior import initial_covariance
-from .kalman_filter import Noise, filter_jacobians, filter_step, substeps_of_robot
+from .integration_steps import substeps_of_robot
+from .kalman_filter import Noise, filter_jacobians, filter_step
 from .native_functions import CompiledFunction, by_sample
 
 Array = NDArray[np.float64]
@@ -67,8 +70,8 @@ class FilterSegment:
 
     ``columns`` are measured, observed and shift (m, K), speed and next speed (cables, K), time step and drift (1, K);
     ``is_recorded`` tells which samples are the recording's, the others fill gaps. ``states`` (n, K + 1) and
-    ``covariances`` (K, n, n) are those predicted; ``values``, ``log_variances`` (K, m) and ``sensitivities`` (K, m, p)
-    as in Innovations.
+    ``covariances`` (K, n, n) are those predicted, with a disturbance's behind the model's; ``values``,
+    ``log_variances`` (K, m) and ``sensitivities`` (K, m, p) as in Innovations.
     """
 
     columns: tuple[Array, ...]
@@ -128,9 +131,15 @@ class Likelihood:
         return CompiledFunction(filter_jacobians(self.model, self.cable_count, self.substeps))
 
     def start(self, parameters: Sequence[float] | Array) -> tuple[Array, Array]:
-        """Initial state (n,) and covariance (n, n) of the filter."""
-        state, _ = self._start_function(np.asarray(parameters, dtype=float))
-        return np.array(state).ravel(), self._start_covariance()
+        """Initial state (n,) and covariance (n, n) of the filter, disturbance included."""
+        state, _ = self._start(np.asarray(parameters, dtype=float))
+        return state.ravel(), self._start_covariance()
+
+    def with_disturbance(self, disturbance: Disturbance) -> Likelihood:
+        """The same likelihood under another disturbance; it has to have one."""
+        other = copy(self)
+        other.noise = replace(self.noise, disturbance=disturbance)
+        return other
 
     def segments(
         self, recording: Recording, parameters: Sequence[float] | Array, acceleration_noise_density: float = 0.0
@@ -154,7 +163,8 @@ class Likelihood:
         for segment in self._filter(
             recording, no_measurements, np.zeros_like(no_measurements), parameters, self._start_covariance(), 0.0
         ):
-            states, speeds = segment.states[:, :-1][:, segment.is_recorded], segment.columns[3][:, segment.is_recorded]
+            states = segment.states[: self.model.states.numel(), :-1][:, segment.is_recorded]
+            speeds = segment.columns[3][:, segment.is_recorded]
             count = states.shape[1]
             inputs = np.vstack([speeds, np.repeat(no_force[:, None], count, axis=1)])
             theta = np.repeat(np.asarray(parameters, dtype=float)[:, None], count, axis=1)
@@ -171,8 +181,7 @@ class Likelihood:
         Noise of the sensors, and of the recorded winch speeds as it integrates.
         """
         no_measurements = np.full(recording.measured().shape, np.nan)
-        state_count = self.model.states.numel()
-        zero_covariance = np.zeros((state_count, state_count))
+        zero_covariance = np.zeros_like(self._start_covariance())
         filter_segments = self._filter(
             recording, no_measurements, np.zeros_like(no_measurements), parameters, zero_covariance, 0.0
         )
@@ -191,14 +200,21 @@ class Likelihood:
     ) -> Iterator[FilterSegment]:
         theta = np.asarray(parameters, dtype=float)
         columns, is_recorded = _filter_columns(recording, measured, shift)
-        state, sensitivities = self._start_function(theta)
-        filter_state = (np.array(state), start_covariance, np.array(sensitivities))
+        state, sensitivities = self._start(theta)
+        filter_state = (state, start_covariance, sensitivities)
+        disturbance = self.noise.disturbance
+        numbers = np.zeros(0) if disturbance is None else disturbance.filter_arguments(self.cable_count)
         state_count, parameter_count = len(start_covariance), len(theta)
         for begin in range(0, len(is_recorded), CHUNK_SAMPLES):
             chunk = tuple(column[:, begin : begin + CHUNK_SAMPLES] for column in columns)
             count = chunk[0].shape[1]
             results = self._filter_function(
-                count, *filter_state, theta[:, None], *chunk, np.full((1, 1), acceleration_noise_density)
+                count,
+                *filter_state,
+                theta[:, None],
+                *chunk,
+                np.full((1, 1), acceleration_noise_density),
+                numbers[:, None],
             )
             states, covariances, state_slopes, values, log_variances, innovation_sensitivities = results
             yield FilterSegment(
@@ -216,8 +232,24 @@ class Likelihood:
                 state_slopes[:, parameter_count * count :],
             )
 
+    def _start(self, parameters: Array) -> tuple[Array, Array]:
+        """Initial state (n, 1) and its sensitivities (n, p); disturbances start at zero."""
+        state, sensitivities = (np.array(part) for part in self._start_function(parameters))
+        zeros = np.zeros((self._disturbance_state_count, 1 + len(parameters)))
+        return np.vstack([state, zeros[:, :1]]), np.vstack([sensitivities, zeros[:, 1:]])
+
+    @property
+    def _disturbance_state_count(self) -> int:
+        return disturbance_state_count(self.cable_count) if self.noise.disturbance else 0
+
     def _start_covariance(self) -> Array:
-        return initial_covariance(self.robot, self.noise, self.model.states.numel(), len(self.uncertain))
+        size = self.model.states.numel()
+        of_model = initial_covariance(self.robot, self.noise, size, len(self.uncertain))
+        if self.noise.disturbance is None:
+            return of_model
+        covariance = np.diag(np.append(np.zeros(size), self.noise.disturbance.variances(self.cable_count)))
+        covariance[:size, :size] = of_model
+        return covariance
 
 
 def _concatenated(segments: Iterable[FilterSegment]) -> tuple[Array, Array, Array]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import ceil, log
+from math import log
 
 import numpy as np
 from numpy.typing import NDArray
@@ -74,11 +74,11 @@ def estimate_noise(robot: Robot, recording: Recording) -> Noise:
 
 @dataclass(frozen=True)
 class CheckedNoise:
-    """Noise after the test, the recordings with coloured channels thinned, and notes."""
+    """Noise after the test, whether some output's noise ``is_coloured``, and notes."""
 
     noise: Noise
-    recordings: tuple[Recording, ...]
-    notes: tuple[str, ...]
+    is_coloured: bool = False
+    notes: tuple[str, ...] = ()
 
 
 def check_noise(
@@ -90,15 +90,15 @@ def check_noise(
     """Test each output's declared noise against the white floor of its spectrum, or against a standstill.
 
     A floor 1.5 times the declared standard deviation or more, or less than 1 / 1.5 of it, replaces the declared one.
-    Where the spectrum falls to its end below the declared level, the noise is coloured: it is thinned to independent
-    samples. Winch speeds may be declared noisier than they are.
+    Where the spectrum falls to its end below the declared level, the noise is coloured, and a disturbance has to be
+    estimated. Winch speeds may be declared noisier than they are.
     """
-    checked = CheckedNoise(noise, recordings, ())
+    checked = CheckedNoise(noise)
     positions, tensions = range(3), range(3, 3 + robot.cable_count)
     if robot.sensors.position_noise is not None:
-        checked = _check_sensor_kind(checked, positions, "m", policy)
+        checked = _check_sensor_kind(checked, recordings, positions, "m", policy)
     if robot.sensors.tension_noise is not None:
-        checked = _check_sensor_kind(checked, tensions, "N", policy)
+        checked = _check_sensor_kind(checked, recordings, tensions, "N", policy)
     speed_levels = [level for r in recordings for c in r.winch_speed.T if (level := noise_levels(c)) is not None]
     if not robot.sensors.winch_speed_noise or not speed_levels:
         return checked
@@ -106,12 +106,14 @@ def check_noise(
     if not is_flat(speed_levels, policy.max_band_ratio) or measured <= policy.max_noise_ratio * noise.winch_speed:
         return checked
     note = _replacement_note("winch speeds", noise.winch_speed, measured, "m/s")
-    return CheckedNoise(replace(checked.noise, winch_speed=measured), checked.recordings, (*checked.notes, note))
+    return replace(checked, noise=replace(checked.noise, winch_speed=measured), notes=(*checked.notes, note))
 
 
-def _check_sensor_kind(checked: CheckedNoise, columns: range, unit: str, policy: NoiseCheckPolicy) -> CheckedNoise:
+def _check_sensor_kind(
+    checked: CheckedNoise, recordings: tuple[Recording, ...], columns: range, unit: str, policy: NoiseCheckPolicy
+) -> CheckedNoise:
     """Test the outputs of one kind of sensor, whose noise has one colour."""
-    recordings, notes = checked.recordings, list(checked.notes)
+    notes, is_coloured = list(checked.notes), checked.is_coloured
     declared = checked.noise.of_outputs(recordings[0].cable_count)
     deviations = list(declared)
     levels = {}
@@ -125,17 +127,22 @@ def _check_sensor_kind(checked: CheckedNoise, columns: range, unit: str, policy:
     for column, level in levels.items():
         name = recordings[0].channel_names[column]
         floor = float(np.sqrt(np.mean(level) if flat else np.min(level)))
-        if declared[column] / policy.max_noise_ratio <= floor <= declared[column] * policy.max_noise_ratio:
+        if not flat and floor < declared[column] / policy.min_colour_ratio:
+            standstill = _standstill_statistics(recordings, column, checked.noise.winch_speed, policy)
+            deviations[column] = standstill[0] if standstill else declared[column]
+            basis = (
+                f"at rest neighbouring samples correlate by {standstill[1]:.2f}"
+                if standstill
+                else "the spectrum falls up to the Nyquist frequency"
+            )
+            description = f"noise is coloured ({basis}; {deviations[column]:.3g} {unit} in total)"
+            notes.append(f"{name}: {description}; its memory was estimated with the disturbance")
+            is_coloured = True
+        elif declared[column] / policy.max_noise_ratio <= floor <= declared[column] * policy.max_noise_ratio:
             continue
-        if flat:
+        elif flat:
             notes.append(_replacement_note(name, declared[column], floor, unit))
             deviations[column] = floor
-        elif floor < declared[column]:
-            standstill = _standstill_statistics(recordings, column, checked.noise.winch_speed, policy)
-            step, deviations[column], basis = _thinning(declared[column], floor, standstill, policy)
-            recordings = tuple(_thinned(recording, column, step) for recording in recordings)
-            description = f"noise is coloured ({basis}; {deviations[column]:.3g} {unit} in total)"
-            notes.append(f"{name}: {description}; thinned to one sample in {step}")
         else:
             notes.append(
                 f"{name}: its spectrum is above the declared noise, {declared[column]:.3g} {unit}, and has no "
@@ -144,42 +151,13 @@ def _check_sensor_kind(checked: CheckedNoise, columns: range, unit: str, policy:
             )
     if len(notes) == len(checked.notes):
         return checked
-    return CheckedNoise(replace(checked.noise, own=tuple(deviations)), recordings, tuple(notes))
+    return CheckedNoise(replace(checked.noise, own=tuple(deviations)), is_coloured, tuple(notes))
 
 
 def _replacement_note(name: str, declared: float, measured: float, unit: str) -> str:
     return (
         f"{name}: declared noise {declared:.3g} {unit}, spectral noise floor {measured:.3g} {unit}: the latter is used"
     )
-
-
-def _thinning(
-    declared: float, floor: float, standstill: tuple[float, float] | None, policy: NoiseCheckPolicy
-) -> tuple[int, float, str]:
-    """Thinning factor of coloured noise, its standard deviation, and the basis of both.
-
-    The correlation ``a`` of neighbours is that at standstill; without one, that of first-order filtered noise, whose
-    spectrum ends at ``(1 - a) / (1 + a)`` of its mean.
-    """
-    variance_ratio = (floor / declared) ** 2
-    correlation, deviation, basis = (
-        (1.0 - variance_ratio) / (1.0 + variance_ratio),
-        declared,
-        "the spectrum falls up to the Nyquist frequency",
-    )
-    if standstill is not None:
-        deviation, correlation = standstill
-        basis = f"at rest neighbouring samples correlate by {correlation:.2f}"
-    if not 0.0 < correlation < 1.0:
-        return 1, deviation, basis
-    return min(ceil(log(policy.max_correlation) / log(correlation)), policy.max_thinning), deviation, basis
-
-
-def _thinned(recording: Recording, column: int, step: int) -> Recording:
-    measured = recording.measured()
-    measured_rows = np.flatnonzero(np.isfinite(measured[:, column]))
-    measured[np.setdiff1d(measured_rows, measured_rows[::step]), column] = np.nan
-    return replace(recording, position=measured[:, :3], tension=measured[:, 3:])
 
 
 def _standstill_statistics(

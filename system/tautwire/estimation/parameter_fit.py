@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 
 import numpy as np
@@ -16,6 +16,7 @@ from ..errors import TautwireError, UnreachableError
 from ..recordings.start_position import with_start
 from ..robot.schema import Robot
 from ..robot.symbolic_model import FORMULA_INDEX, FreeParameter
+from .disturbance import NEUTRAL, Disturbance
 from .estimation_data import DataSet
 from .hypotheses import Hypothesis, free_parameters, value_of, with_values
 from .kalman_filter import Noise
@@ -83,7 +84,18 @@ class Fitter:
         self._compiled: dict[tuple[object, ...], Likelihood] = {}
 
     def __reduce__(self) -> tuple[Callable[[Noise, FitPolicy], Fitter], tuple[Noise, FitPolicy]]:
-        return _fitter_of_process, (self.noise, self.policy)
+        return _fitter_in_worker, (self.noise, self.policy)
+
+    def with_disturbance(self, disturbance: Disturbance) -> Fitter:
+        """The fitter under another disturbance, with the same compiled likelihoods; it has to have one."""
+        fitter = Fitter(replace(self.noise, disturbance=disturbance), self.poll_interrupts, self.policy)
+        fitter._compiled = self._compiled
+        return fitter
+
+    @property
+    def has_disturbance(self) -> bool:
+        """Whether a disturbance is a part of the model."""
+        return self.noise.disturbance is not None
 
     def fit_from(
         self,
@@ -178,7 +190,8 @@ class Fitter:
             if len(self._compiled) >= MAX_COMPILED_LIKELIHOODS:
                 self._compiled.pop(next(iter(self._compiled)))
             self._compiled[key] = Likelihood(robot, free, self.noise, interval)
-        return self._compiled[key]
+        compiled, disturbance = self._compiled[key], self.noise.disturbance
+        return compiled.with_disturbance(disturbance) if disturbance else compiled
 
 
 def _scaled_back(robot: Robot, free: tuple[FreeParameter, ...], scaled: Array, jacobian: Array) -> Fit:
@@ -257,6 +270,14 @@ class _Residual:
             self._cached = (residuals, sensitivities * self.scale)
             self._evaluated_at = scaled.copy()
         return self._cached
+
+
+def _fitter_in_worker(noise: Noise, policy: FitPolicy) -> Fitter:
+    """The fitter of this worker process, under the disturbance of the one that was sent."""
+    if noise.disturbance is None:
+        return _fitter_of_process(noise, policy)
+    # Whatever the disturbance, the compiled likelihoods are the same.
+    return _fitter_of_process(replace(noise, disturbance=NEUTRAL), policy).with_disturbance(noise.disturbance)
 
 
 @lru_cache(maxsize=1)

@@ -20,10 +20,9 @@ class NoiseCheckPolicy:
     max_noise_ratio: float = 1.5
     # Largest ratio of the spectrum's bands for white noise, whose estimates differ by chance. Chosen, not calibrated.
     max_band_ratio: float = 1.7
-    # Autocorrelation at which samples of coloured noise count as independent. Chosen, not calibrated.
-    max_correlation: float = 0.15
-    # Largest thinning factor, so that a recording is not emptied. Chosen, not calibrated.
-    max_thinning: int = 20
+    # Ratio of the declared standard deviation to the spectrum's lowest band from which noise is coloured: 1.6 to 2.4
+    # on load cells of six lifelike recordings, 1.1 by chance on a short one with outliers removed.
+    min_colour_ratio: float = 1.25
     # Standstill: winch speeds within so many sigma of zero, for so many samples that a correlation of 0.15 is
     # significant. Chosen, not calibrated.
     standstill_sigmas: float = 5.0
@@ -86,6 +85,33 @@ class PreprocessingPolicy:
     noise_check: NoiseCheckPolicy = field(default_factory=NoiseCheckPolicy)
     initial_state: InitialStatePolicy = field(default_factory=InitialStatePolicy)
     clock_offsets: ClockOffsetPolicy = field(default_factory=ClockOffsetPolicy)
+
+
+@dataclass(frozen=True)
+class DisturbancePolicy:
+    """What disturbance is likely before a recording is seen, and how exactly it is fitted. All chosen."""
+
+    # Medians: a force of a thousandth of the weight, half of the sensors' noise with a memory, both with 1 Hz.
+    force_to_weight: float = 1e-3
+    coloured_noise_share: float = 0.7
+    bandwidth: float = 1.0
+    # Factors of one standard deviation about these: sizes are hardly known, bandwidths a little, data sheets better.
+    size_factor: float = 100.0
+    bandwidth_factor: float = 5.0
+    noise_factor: float = 3.0
+    # Factors by which sizes are larger where a fit may begin as well.
+    start_factors: tuple[float, ...] = (30.0, 1000.0)
+    # Levenberg's damping at first and at most, the longest step of a log, and the gain in nats that ends the fit.
+    first_damping: float = 1e-2
+    max_damping: float = 1e4
+    max_log_step: float = 2.0
+    min_gain: float = 0.5
+    max_iterations: int = 12
+    # Samples of a first fit, from which the one to all samples begins, and iterations of the latter where it is coarse.
+    coarse_samples: int = 1_000
+    coarse_iterations: int = 2
+    # Iterations over these first samples for each candidate that is ranked.
+    ranking_iterations: int = 4
 
 
 @dataclass(frozen=True)
@@ -179,6 +205,18 @@ class SelectionPolicy:
     # took 69 s of processor time where fits to more of it took 118 s, with the same answer.
     coarse_samples: int = 600
 
+    # Share of the best evidence within which hypotheses explain as much beside a disturbance: no effect of the list has
+    # quite the form of nature's. A modulus of 1.25 beside a little relaxation had 759 nats, relaxation alone 838.
+    form_tie_ratio: float = 0.1
+
+    # Share of the first effect's evidence that a further one needs beside a disturbance: less may be what the first
+    # one's form leaves. After a modulus (842 nats) and damping (346), relaxation of one cable had 18.
+    min_evidence_ratio: float = 0.05
+
+    def tie(self, evidence: float, has_disturbance: bool) -> float:
+        """The nats within which a hypothesis ties with the best one, which has that evidence."""
+        return max(self.tie_nats, self.form_tie_ratio * evidence) if has_disturbance else self.tie_nats
+
     def coarse_tie(self, log_likelihood: float) -> float:
         """The nats within which a fit to a part of the data ties with one of that log-likelihood."""
         return self.coarse_tie_nats + self.coarse_tie_ratio * abs(log_likelihood)
@@ -223,6 +261,23 @@ class CosimulationPolicy:
 
     # Errors over what noise alone would leave; rightly named effects left at most 1.2 in 55 of 55 blind recordings.
     max_error_ratio: float = 1.5
+
+
+@dataclass(frozen=True)
+class SizePolicy:
+    """When an effect is small, and when what is left is, beside a disturbance. All chosen on a few recordings."""
+
+    # Least share of what was missed, and least size in standard deviations of one sample's noise: below, an effect is
+    # listed apart.
+    min_share: float = 0.02
+    min_size: float = 1.0
+    # Least share that all effects together explain, where much is left: below, nothing on the list explains it.
+    min_explained_share: float = 0.25
+    # Standard deviations within which an uncertain number of the robot without effects is taken at its best.
+    max_calibration_sigmas: float = 3.0
+    # Size of what is missed in co-simulation, in standard deviations of one sample's noise, that passes for a random
+    # force that the sensors hardly show: 4 on the one lifelike recording with nothing hidden, 20 to 120 on others.
+    max_size_of_disturbance: float = 8.0
 
 
 @dataclass(frozen=True)
@@ -333,6 +388,7 @@ class IdentificationPolicy:
     """Policy of an identification, by theme."""
 
     preprocessing: PreprocessingPolicy = field(default_factory=PreprocessingPolicy)
+    disturbance: DisturbancePolicy = field(default_factory=DisturbancePolicy)
     residual_analysis: ResidualAnalysisPolicy = field(default_factory=ResidualAnalysisPolicy)
     fit: FitPolicy = field(default_factory=FitPolicy)
     score_test: ScoreTestPolicy = field(default_factory=ScoreTestPolicy)
@@ -341,6 +397,7 @@ class IdentificationPolicy:
     profile_likelihood: ProfileLikelihoodPolicy = field(default_factory=ProfileLikelihoodPolicy)
     identifiability: IdentifiabilityPolicy = field(default_factory=IdentifiabilityPolicy)
     cosimulation: CosimulationPolicy = field(default_factory=CosimulationPolicy)
+    size: SizePolicy = field(default_factory=SizePolicy)
     localisation: LocalisationPolicy = field(default_factory=LocalisationPolicy)
     discovery: DiscoveryPolicy = field(default_factory=DiscoveryPolicy)
 

@@ -21,6 +21,7 @@ from ..recordings.outliers import without_outliers
 from ..recordings.recording import Recording, require_outputs
 from ..robot.schema import Robot
 from .clock_offsets import with_clocks_set
+from .disturbance_fit import disturbance_prior, with_fitted_disturbance
 from .estimation_data import DataSet, DataSplit, split_data
 from .initial_state_prior import self_stress_deviation, with_motion_at_start
 from .kalman_filter import Noise
@@ -82,12 +83,14 @@ def prepare_recordings(
             cleaned[-1], step_notes = step(robot, cleaned[-1], policy)
             notes += step_notes
     checked = check_noise(robot, estimate_noise(robot, cleaned[0]), tuple(cleaned), policy.noise_check)
-    self_stress, self_stress_notes = self_stress_deviation(robot, checked.recordings, policy.initial_state)
+    self_stress, self_stress_notes = self_stress_deviation(robot, tuple(cleaned), policy.initial_state)
     noise = replace(checked.noise, self_stress=self_stress)
-    noise, motion_notes = with_motion_at_start(robot, noise, checked.recordings, policy.initial_state)
+    noise, motion_notes = with_motion_at_start(robot, noise, cleaned, policy.initial_state)
+    if checked.is_coloured:
+        noise = replace(noise, disturbance=disturbance_prior(robot, noise).median)
     return PreparedRecordings(
-        fit=checked.recordings[0],
-        check=None if check is None else checked.recordings[1],
+        fit=cleaned[0],
+        check=None if check is None else cleaned[1],
         noise=noise,
         notes=(*notes, *checked.notes, *self_stress_notes, *motion_notes),
     )
@@ -119,6 +122,7 @@ def prepare_data(
     prepared = prepare_recordings(robot, fit, check, policy.preprocessing)
     data_split = split_data(robot, prepared.noise, prepared.fit, prepared.check)
     fitter = Fitter(prepared.noise, workers.poll_interrupts, policy.fit)
+    fitter = with_fitted_disturbance(fitter, robot, (), data_split.estimation)
     innovations = innovations_of(fitter, robot, data_split)
     _require_samples(innovations, data_split, policy.residual_analysis)
 
@@ -130,7 +134,8 @@ def prepare_data(
         return PreparedData(data_split, data_sets, fitter, innovations, all_notes)
 
     as_recorded = assembled(data_split, innovations, ())
-    if all_residuals_white(innovations, data_split, policy.residual_analysis):
+    # A disturbance would take up what clocks that are apart leave.
+    if fitter.has_disturbance or all_residuals_white(innovations, data_split, policy.residual_analysis):
         return (as_recorded,)
     data_split, clock_notes = with_clocks_set(fitter, robot, data_split, policy.preprocessing.clock_offsets)
     if not clock_notes:

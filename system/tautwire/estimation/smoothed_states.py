@@ -56,6 +56,10 @@ class Calibration:
     estimates: Array
     standard_deviations: Array
 
+    def clipped(self, max_sigmas: float) -> Calibration:
+        """The same with estimates at most so many declared standard deviations from the declared values."""
+        return replace(self, estimates=np.clip(self.estimates, -max_sigmas, max_sigmas))
+
     def calibrated_robot(self, robot: Robot) -> Robot:
         """The robot with its constants as estimated, each with its posterior uncertainty."""
         updated = perturbed_robot(robot, self.parameters, self.estimates.tolist())
@@ -116,9 +120,10 @@ def calibrate(fitter: Fitter, robot: Robot, sample: DataSet) -> Calibration:
         return Calibration((), np.zeros(0), np.zeros(0))
     likelihood, values = fitter.likelihood(robot, (), sample)
     *_, last_segment = likelihood.segments(sample.recording, values)
-    count = len(parameters)
-    deviations = np.sqrt(np.maximum(np.diag(last_segment.covariances[-1])[-count:], 0.0))
-    return Calibration(parameters, last_segment.states[-count:, -1], deviations)
+    end = likelihood.model.states.numel()
+    rows = slice(end - len(parameters), end)
+    deviations = np.sqrt(np.maximum(np.diag(last_segment.covariances[-1])[rows], 0.0))
+    return Calibration(parameters, last_segment.states[rows, -1], deviations)
 
 
 def is_initial_state_uncertain(noise: Noise) -> bool:
@@ -169,7 +174,7 @@ def _smoothed_initial_state(likelihood: Likelihood, values: list[float], sample:
 
 def _static_tensions_of(model: SymbolicModel, state: Array, cable_count: int) -> Array:
     """Static tensions of the ropes (n,) in N with platform and winches held at a state's position."""
-    static_state = state.copy()
+    static_state = state[: model.states.numel()].copy()
     static_state[3:6] = 0.0
     tensions = casadi.Function("tensions", [model.states, model.inputs], [model.span_tensions])
     result: Array = np.array(tensions(static_state, np.zeros(cable_count + 3))).ravel()

@@ -10,13 +10,15 @@ Source: Wasserman, Ramdas and Balakrishnan (2020), Universal inference, PNAS 117
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import inf
 
 from ..robot.schema import Robot
 from .candidate_fits import fit_candidates, fit_model, leaves_noise, maximised_validation_likelihood
 from .candidate_proposals import SearchRound, shortlist, starting_robots
 from .candidate_scores import CandidateScore, most_parsimonious, unfitted_score
+from .disturbance import Disturbance
+from .disturbance_fit import with_fitted_disturbance
 from .grid_search import grid_search, zero_slope_predictions
 from .hypotheses import Hypothesis, with_hypothesis
 from .identification_context import IdentificationContext
@@ -30,13 +32,17 @@ Predictions = dict[Hypothesis, PredictedGain]
 
 @dataclass(frozen=True)
 class SelectionResult:
-    """Result of a selection: the accepted hypotheses in order, evidence of each, their joint fit, all candidates."""
+    """Result of a selection: the accepted hypotheses in order, evidence of each, their joint fit, all candidates.
+
+    ``disturbance`` is the one beside them, None where none was assumed.
+    """
 
     accepted: tuple[Hypothesis, ...]
     evidence: tuple[float, ...]
     fit: Fit
     candidates: tuple[Candidate, ...]
     confusable: tuple[tuple[str, ...], ...]
+    disturbance: Disturbance | None = None
 
 
 def nothing_selected(robot: Robot) -> SelectionResult:
@@ -53,18 +59,37 @@ def select_effects(context: IdentificationContext) -> SelectionResult:
     current = fit_model(context, accepted)
     candidates: list[Candidate] = []
     complete_rounds: dict[tuple[Hypothesis, ...], list[CandidateScore]] = {}
+    first_evidence = 0.0
     for number in range(1, context.policy.selection.max_rounds + 1):
         scores, is_complete = score_candidates(context, _search_round(context, number, current.robot, accepted))
         if is_complete:
             complete_rounds[tuple(accepted)] = scores
-        best = most_parsimonious(scores, context.policy.selection)
-        significant = best is not None and best.evidence > context.evidence_threshold()
+        best = most_parsimonious(scores, context.policy.selection, context.fitter.has_disturbance)
+        significant = best is not None and best.evidence > _required_evidence(context, first_evidence)
         candidates += [trial.candidate(number, significant and trial is best) for trial in scores]
         if best is None or not significant:
             break
+        first_evidence = first_evidence or best.evidence
         accepted = with_hypothesis(accepted, best.hypothesis)
-        current = best.fit
+        context, current = with_disturbance_beside(context, accepted, best.fit)
     return _BackwardElimination(context, accepted, current, candidates, complete_rounds).run()
+
+
+def _required_evidence(context: IdentificationContext, first_evidence: float) -> float:
+    """Evidence that a further effect needs: more than chance, and more than what the first one's form may leave."""
+    ratio = context.policy.selection.min_evidence_ratio if context.fitter.has_disturbance else 0.0
+    return max(context.evidence_threshold(), ratio * first_evidence)
+
+
+def with_disturbance_beside(
+    context: IdentificationContext, accepted: Sequence[Hypothesis], fit: Fit
+) -> tuple[IdentificationContext, Fit]:
+    """The context with the disturbance fitted beside the accepted hypotheses, and their fit under it."""
+    if not context.fitter.has_disturbance:
+        return context, fit
+    fitter = with_fitted_disturbance(context.fitter, fit.robot, accepted, context.split.estimation)
+    context = replace(context, fitter=fitter)
+    return context, fit_model(context, accepted, fit.robot)
 
 
 def _search_round(
@@ -74,7 +99,8 @@ def _search_round(
     accepted: Sequence[Hypothesis],
     rival: CandidateScore | None = None,
 ) -> SearchRound:
-    is_white = all(
+    # A disturbance takes up what is not white.
+    is_white = context.fitter.has_disturbance or all(
         residuals_are_white(context.fitter.innovations(robot, data), data.rows, context.policy.residual_analysis)
         for data in (context.split.validation, context.split.estimation)
     )
@@ -100,7 +126,8 @@ def score_candidates(context: IdentificationContext, search_round: SearchRound) 
         h: starting_robots(robot, h, [p[h] for p in (predictions, rough_predictions) if h in p]) for h in shortlisted
     }
     # Far from noise the candidates need only be ranked against each other.
-    baseline = maximised_validation_likelihood(context, robot, accepted, -inf if search_round.is_white else inf)
+    is_exact = search_round.is_white and not context.fitter.has_disturbance
+    baseline = maximised_validation_likelihood(context, robot, accepted, -inf if is_exact else inf)
     min_log_likelihood = context.fitter.log_likelihood(robot, accepted, data)
     tasks = search_round.tasks(starts, min_log_likelihood, policy.fit)
     scores = fit_candidates(context, label, tasks, data, baseline, search_round.stops_at_first)
@@ -110,9 +137,25 @@ def score_candidates(context: IdentificationContext, search_round: SearchRound) 
             scores |= fit_candidates(context, label, tasks, data, baseline)
         tasks = search_round.refits(scores.values(), shortlisted, policy.selection, policy.fit.fine_cost_tolerance)
         scores |= fit_candidates(context, f"{label}, all samples", tasks, context.split.estimation, baseline)
+    if context.fitter.has_disturbance:
+        scores = _with_exact_baseline(context, search_round, baseline, scores)
     context.progress(f"{label}: done", 1.0)
     unfitted = [unfitted_score(robot, h, predictions[h]) for h in predictions if h not in scores]
     return [*scores.values(), *unfitted], not search_round.stops_at_first or scores.keys() >= set(shortlisted)
+
+
+def _with_exact_baseline(
+    context: IdentificationContext,
+    search_round: SearchRound,
+    baseline: float,
+    scores: dict[Hypothesis, CandidateScore],
+) -> dict[Hypothesis, CandidateScore]:
+    """The scores against the exact maximum of the model without them, where a coarse one does not decide."""
+    margin = max((score.evidence for score in scores.values()), default=0.0) - context.evidence_threshold()
+    if not 0.0 < margin < context.policy.selection.coarse_tie(baseline):
+        return scores
+    exact = maximised_validation_likelihood(context, search_round.robot, search_round.accepted, -inf)
+    return {h: replace(score, evidence=score.evidence - (exact - baseline)) for h, score in scores.items()}
 
 
 def _predict_gains(context: IdentificationContext, search_round: SearchRound) -> tuple[Predictions, Predictions]:
@@ -157,11 +200,12 @@ class _BackwardElimination:
             score = CandidateScore(tested, self.current, self._evidence(without, others), float("nan"))
             if score.evidence < self.context.evidence_threshold():
                 self.accepted, self.current = others, fit_model(self.context, others, without.robot)
+                self.context, self.current = with_disturbance_beside(self.context, others, self.current)
                 pending = list(others)
                 continue
             number = policy.max_rounds + 1 + len(self.evidences) + self.swaps
             alternatives = self._alternatives(number, without.robot, others, score)
-            best = most_parsimonious([score, *alternatives], policy)
+            best = most_parsimonious([score, *alternatives], policy, self.context.fitter.has_disturbance)
             if tuple(others) not in reported:
                 self.candidates += [t.candidate(number, t is best) for t in alternatives]
             reported.add(tuple(others))
@@ -178,6 +222,7 @@ class _BackwardElimination:
             self.current,
             tuple(self.candidates),
             tuple((a.effect.name, other) for a in self.accepted for other in self.confusable[a]),
+            self.context.fitter.noise.disturbance,
         )
 
     def _alternatives(

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from ..cosimulation.robot_cosimulation import CosimulationResult
 from ..recordings.recording import Recording
 from ..robot.schema import Robot
+from .disturbance import Disturbance
 from .localisation.component_residuals import FaultLocalisation
 
 Array = NDArray[np.float64]
@@ -31,13 +32,17 @@ class Estimate:
 
 @dataclass(frozen=True)
 class FoundEffect:
-    """An effect that was accepted; ``evidence`` is the natural log of its likelihood ratio on unseen data."""
+    """An effect that was accepted; ``evidence`` is the natural log of its likelihood ratio on unseen data.
+
+    ``share`` is the part of what was missed that it explains, where a disturbance was assumed.
+    """
 
     name: str
     component: str
     cables: tuple[int, ...]
     parameters: Mapping[str, Estimate]
     evidence: float
+    share: float | None = None
 
 
 @dataclass(frozen=True)
@@ -163,7 +168,9 @@ class Trace:
     residual is white noise, and ``autocorrelations`` the largest correlation of each with itself, and what noise stays
     below, as :func:`residual_analysis.largest_autocorrelations` gives them. ``identifiability`` is what those data
     could have shown beside the effects; empty where the model leaves more than noise. ``components`` tells where the
-    fit recording errs, before any effect is fitted.
+    fit recording errs, before any effect is fitted. ``disturbance`` is what had to be assumed beside white noise; with
+    one, ``left_share`` is the part of what was missed that no effect explains, and ``small_effects`` are those that
+    explain too little to matter.
     """
 
     verdict: Verdict
@@ -187,3 +194,6 @@ class Trace:
     alpha: float
     notes: tuple[str, ...]
     seconds: float
+    disturbance: Disturbance | None = None
+    left_share: float | None = None
+    small_effects: tuple[FoundEffect, ...] = ()

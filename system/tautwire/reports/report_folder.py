@@ -8,6 +8,7 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+from ..estimation.disturbance import Disturbance
 from ..estimation.localisation.component_residuals import ComponentResidual
 from ..estimation.trace_result import Detectable, Errors, FoundEffect, Trace
 from ..fmus.packaging import RobotFmus, build_fmus, with_user_fmus_copied
@@ -27,6 +28,9 @@ def trace_document(trace: Trace) -> dict[str, Any]:
         "sentence": trace.sentence,
         "robot": trace.robot_before.name,
         "effects": [_effect(effect) for effect in trace.effects],
+        "small_effects": [_effect(effect) for effect in trace.small_effects],
+        "left_share": trace.left_share,
+        "disturbance": _disturbance(trace.disturbance),
         "correlations": [asdict(each) for each in trace.correlations],
         "also_possible": trace.also_possible,
         "formula": trace.formula,
@@ -64,7 +68,20 @@ def _effect(effect: FoundEffect) -> dict[str, Any]:
         "parameters": {name: asdict(estimate) for name, estimate in effect.parameters.items()},
         "component": effect.component,
         "evidence": effect.evidence,
+        "share": effect.share,
     }
+
+
+def _disturbance(disturbance: Disturbance | None) -> dict[str, Any]:
+    """What had to be assumed beside noise; all None where nothing had."""
+    processes = (
+        {"force": disturbance.force, "tension": disturbance.tension, "position": disturbance.position}
+        if disturbance
+        else dict.fromkeys(("force", "tension", "position"))
+    )
+    sizes = {f"{name}_rms": process.rms if process else None for name, process in processes.items()}
+    force, *others = ((name, process.bandwidth if process else None) for name, process in processes.items())
+    return {**sizes, "bandwidth_hz": force[1], **{f"{name}_bandwidth_hz": bandwidth for name, bandwidth in others}}
 
 
 def _component(part: ComponentResidual) -> dict[str, Any]:

@@ -5,7 +5,12 @@ from math import factorial
 import numpy as np
 import pytest
 
-from tautwire.estimation.kalman_filter import Substeps, eigenvalues_at_start, substeps_of_eigenvalues, substeps_of_robot
+from tautwire.estimation.integration_steps import (
+    Substeps,
+    eigenvalues_at_start,
+    substeps_of_eigenvalues,
+    substeps_of_robot,
+)
 from tests.support.effect_cases import same
 from tests.support.robots import example
 

@@ -1,0 +1,114 @@
+"""Disturbance: what acts on every robot beside white noise, as Ornstein-Uhlenbeck processes.
+
+A random force on the platform along each axis, and errors with a memory of each tracker axis and each load cell. Each
+is a state d of the filter, with standard deviation ``s`` and bandwidth ``f``:
+
+    d(t + h) = e^(-a h) d(t) + w        var w = s^2 (1 - e^(-2 a h))        a = 2 pi f
+
+Source: Gelb (1974), Applied Optimal Estimation, sec. 2.4 and 4.5, on exponentially correlated noise.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from math import pi
+
+import numpy as np
+from numpy.typing import NDArray
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class OrnsteinUhlenbeck:
+    """Ornstein-Uhlenbeck process: standard deviation ``rms``, in the unit of what it disturbs, and bandwidth in Hz."""
+
+    rms: float
+    bandwidth: float
+
+
+@dataclass(frozen=True)
+class Disturbance:
+    """Disturbance of a robot: force on each axis (N), errors with a memory of each position (m) and each tension (N).
+
+    ``position_noise`` (m) and ``tension_noise`` (N) are the standard deviations of the white noise beside them.
+    """
+
+    force: OrnsteinUhlenbeck
+    position: OrnsteinUhlenbeck
+    tension: OrnsteinUhlenbeck
+    position_noise: float
+    tension_noise: float
+
+    @property
+    def sentence(self) -> str:
+        """In words."""
+        parts = (
+            f"a random force of {_described(self.force, 'N')} on the platform",
+            f"errors with a memory of {_described(self.position, 'm')} in positions",
+            f"and of {_described(self.tension, 'N')} in tensions",
+        )
+        return f"beside white noise the model has {', '.join(parts)}, as the fit recording shows them (rms)"
+
+    def processes(self, cable_count: int) -> tuple[OrnsteinUhlenbeck, ...]:
+        """One for each disturbance state: three forces, then one for each output."""
+        return (*[self.force] * 3, *[self.position] * 3, *[self.tension] * cable_count)
+
+    def variances(self, cable_count: int) -> Array:
+        """Stationary variances of the disturbance states (6 + n,)."""
+        return np.array([process.rms**2 for process in self.processes(cable_count)])
+
+    def white_variances(self, cable_count: int) -> Array:
+        """Variances of the white noise of x, y, z and each tension (3 + n,)."""
+        return np.array([self.position_noise**2] * 3 + [self.tension_noise**2] * cable_count)
+
+    def filter_arguments(self, cable_count: int) -> Array:
+        """What :func:`filter_step` takes: decay rates (1/s) and variances of the states, variances of white noise."""
+        rates = [2.0 * pi * process.bandwidth for process in self.processes(cable_count)]
+        return np.array([*rates, *self.variances(cable_count), *self.white_variances(cable_count)])
+
+    def mean_force(self, states: Array, step: Array) -> Array:
+        """Mean force (3, K) over steps (K,) that begin with these disturbance states (6 + n, K)."""
+        mean: Array = np.exp(-pi * self.force.bandwidth * step) * states[:3]
+        return mean
+
+    def augmented_transition(self, transition: Array, by_force: Array, step: Array, cable_count: int) -> Array:
+        """Transition matrices with those of the disturbance, from a model's (K, n, n) and its response (K, n, 3)."""
+        count, size, _ = transition.shape
+        rates = np.array([2.0 * pi * process.bandwidth for process in self.processes(cable_count)])
+        augmented = np.zeros((count, size + len(rates), size + len(rates)))
+        augmented[:, :size, :size] = transition
+        augmented[:, :size, size : size + 3] = by_force * np.exp(-0.5 * rates[:3] * step[:, None])[:, None, :]
+        index = np.arange(size, size + len(rates))
+        augmented[:, index, index] = np.exp(-rates * step[:, None])
+        return augmented
+
+
+def sensor_noise_only(disturbance: Disturbance, position_noise: float, tension_noise: float) -> Disturbance:
+    """The disturbance without its force on the platform, its errors no larger than the sensors' noise (m, N).
+
+    What exceeds that is no error of a sensor, but an error of the model that passes for one.
+    """
+    limits = ((disturbance.force, 0.0), (disturbance.position, position_noise), (disturbance.tension, tension_noise))
+    force, position, tension = (replace(process, rms=min(process.rms, limit)) for process, limit in limits)
+    return replace(disturbance, force=force, position=position, tension=tension)
+
+
+ABSENT = OrnsteinUhlenbeck(0.0, 1.0)
+NEUTRAL = Disturbance(ABSENT, ABSENT, ABSENT, position_noise=1.0, tension_noise=1.0)
+
+
+def _described(process: OrnsteinUhlenbeck, unit: str) -> str:
+    return f"{process.rms:.2g} {unit} (below {process.bandwidth:.2g} Hz)"
+
+
+def disturbance_state_count(cable_count: int) -> int:
+    """Number of disturbance states: three forces, and an error of each output."""
+    return 6 + cable_count
+
+
+def with_error_columns(output_matrix: Array) -> Array:
+    """Derivatives of the outputs (K, m, n) with those by the disturbance states: forces do not show, errors as such."""
+    count, outputs, _ = output_matrix.shape
+    columns = np.hstack([np.zeros((outputs, 3)), np.eye(outputs)])
+    return np.concatenate([output_matrix, np.broadcast_to(columns, (count, *columns.shape))], axis=2)

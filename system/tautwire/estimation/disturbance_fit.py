@@ -1,0 +1,191 @@
+"""Fit of a disturbance: maximum likelihood of its numbers under weak priors, by Fisher scoring.
+
+With whitened innovations v and their variances s, of a model whose parameters are held, and x the logs of the numbers,
+
+    dL/dx = -sum v (v' + v l' / 2) + sum (v^2 - 1) l' / 2        l = log s
+    E[-d2L/dx2] = sum (v' + v l' / 2)(v' + v l' / 2)^T + l' l'^T / 2
+
+Source: Gupta and Mehra (1974), IEEE Transactions on Automatic Control 19(6), 774-783.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass, replace
+from math import log
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..robot.schema import Robot
+from .disturbance import Disturbance, OrnsteinUhlenbeck
+from .estimation_data import DataSet
+from .hypotheses import Hypothesis
+from .kalman_filter import Noise
+from .likelihood import Likelihood
+from .parameter_fit import Fitter
+from .policy import DEFAULT_POLICY, DisturbancePolicy
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class DisturbancePrior:
+    """Weak prior of a disturbance: its median, and standard deviations of the logs of its numbers (8,)."""
+
+    median: Disturbance
+    log_deviations: tuple[float, ...]
+
+    def penalty(self, logs: Array) -> Array:
+        """Deviations from the median in standard deviations (8,)."""
+        deviations: Array = (logs - logs_of(self.median)) / np.array(self.log_deviations)
+        return deviations
+
+
+def logs_of(disturbance: Disturbance) -> Array:
+    """Logs of a disturbance's numbers (8,)."""
+    pairs = [(each.rms, each.bandwidth) for each in (disturbance.force, disturbance.position, disturbance.tension)]
+    numbers = [number for pair in pairs for number in pair]
+    return np.log([*numbers, disturbance.position_noise, disturbance.tension_noise])
+
+
+def disturbance_of(logs: Array) -> Disturbance:
+    """The disturbance whose numbers have these logs (8,)."""
+    numbers = np.exp(logs).tolist()
+    force, position, tension = (OrnsteinUhlenbeck(*numbers[k : k + 2]) for k in (0, 2, 4))
+    return Disturbance(force, position, tension, numbers[6], numbers[7])
+
+
+def disturbance_prior(
+    robot: Robot, noise: Noise, policy: DisturbancePolicy = DEFAULT_POLICY.disturbance
+) -> DisturbancePrior:
+    """Prior of a robot with these sensors: a force in proportion to its weight, and half of the noise coloured."""
+    share, weight = policy.coloured_noise_share, robot.platform.mass * max(robot.gravity, 1.0)
+    white = (1.0 - share**2) ** 0.5
+    median = Disturbance(
+        OrnsteinUhlenbeck(policy.force_to_weight * weight, policy.bandwidth),
+        OrnsteinUhlenbeck(share * noise.position, policy.bandwidth),
+        OrnsteinUhlenbeck(share * noise.tension, policy.bandwidth),
+        white * noise.position,
+        white * noise.tension,
+    )
+    size, bandwidth, sensor = (log(f) for f in (policy.size_factor, policy.bandwidth_factor, policy.noise_factor))
+    return DisturbancePrior(median, (*[size, bandwidth] * 3, sensor, sensor))
+
+
+def with_fitted_disturbance(
+    fitter: Fitter,
+    robot: Robot,
+    chosen: Collection[Hypothesis],
+    data: DataSet,
+    coarse: bool = True,
+) -> Fitter:
+    """The fitter under the most probable disturbance of some data; the same fitter where it has none.
+
+    The chosen hypotheses are those that it is compiled for; their parameters stay as the robot has them. A coarse fit
+    ends some nats below the maximum, which may serve for a numerator of an e-value, and not for its denominator.
+    """
+    if not fitter.has_disturbance:
+        return fitter
+    policy = DEFAULT_POLICY.disturbance
+    prior = disturbance_prior(robot, fitter.noise, policy)
+    last_policy = replace(policy, max_iterations=policy.coarse_iterations) if coarse else policy
+    for part, part_policy in ((data.first(policy.coarse_samples), policy), (data, last_policy)):
+        likelihood, values = fitter.likelihood(robot, chosen, part)
+        fitter = fitter.with_disturbance(fit_disturbance(likelihood, values, part, prior, part_policy))
+    return fitter
+
+
+def with_improved_disturbance(fitter: Fitter, robot: Robot, chosen: Collection[Hypothesis], data: DataSet) -> Fitter:
+    """As :func:`with_fitted_disturbance`, by a few iterations over the first samples: for candidates to be ranked."""
+    if not fitter.has_disturbance:
+        return fitter
+    policy = DEFAULT_POLICY.disturbance
+    prior, part = disturbance_prior(robot, fitter.noise, policy), data.first(policy.coarse_samples)
+    likelihood, values = fitter.likelihood(robot, chosen, part)
+    few = replace(policy, max_iterations=policy.ranking_iterations)
+    return fitter.with_disturbance(fit_disturbance(likelihood, values, part, prior, few))
+
+
+def fit_disturbance(
+    likelihood: Likelihood,
+    values: Sequence[float],
+    data: DataSet,
+    prior: DisturbancePrior,
+    policy: DisturbancePolicy = DEFAULT_POLICY.disturbance,
+) -> Disturbance:
+    """Maximise the likelihood of some data, at these values of the free parameters, over the disturbance.
+
+    Begins at the likelihood's own; Levenberg's damping keeps each step an ascent.
+    """
+    current = max(
+        (_Evaluation.at(likelihood, values, data, prior, logs) for logs in _starts(likelihood, prior, policy)),
+        key=lambda evaluation: evaluation.value,
+    )
+    damping = policy.first_damping
+    for _ in range(policy.max_iterations):
+        gradient, information = current.score(likelihood, values, data, prior)
+        while damping < policy.max_damping:
+            scaled = information + damping * np.diag(np.diag(information))
+            step = np.clip(np.linalg.solve(scaled, gradient), -policy.max_log_step, policy.max_log_step)
+            trial = _Evaluation.at(likelihood, values, data, prior, current.logs + step)
+            if trial.value > current.value:
+                break
+            damping *= 10.0
+        else:
+            break
+        gain, current, damping = trial.value - current.value, trial, 0.1 * damping
+        if gain < policy.min_gain:
+            break
+    return disturbance_of(current.logs)
+
+
+def _starts(likelihood: Likelihood, prior: DisturbancePrior, policy: DisturbancePolicy) -> list[Array]:
+    """Logs to begin at: the likelihood's own, and from the prior's median larger ones, which follow a model far off."""
+    own = likelihood.noise.disturbance
+    if own is not None and own != prior.median:
+        return [logs_of(own)]
+    starts = [logs_of(prior.median)]
+    for factor in policy.start_factors:
+        logs = starts[0].copy()
+        logs[[0, 2, 4]] += log(factor)
+        starts.append(logs)
+    return starts
+
+
+@dataclass(frozen=True)
+class _Evaluation:
+    """Posterior log-density at some logs, with what it is made of: whitened innovations and logs of variances."""
+
+    logs: Array
+    value: float
+    innovations: Array
+    log_variances: Array
+
+    @classmethod
+    def at(
+        cls, likelihood: Likelihood, values: Sequence[float], data: DataSet, prior: DisturbancePrior, logs: Array
+    ) -> _Evaluation:
+        innovations = likelihood.with_disturbance(disturbance_of(logs)).innovations(data.recording, values)
+        mask = innovations.observed & data.rows[:, None]
+        value = innovations.log_likelihood(data.rows) - 0.5 * float(np.sum(prior.penalty(logs) ** 2))
+        return cls(
+            logs, value if np.isfinite(value) else -np.inf, innovations.values[mask], innovations.log_variances[mask]
+        )
+
+    def score(
+        self, likelihood: Likelihood, values: Sequence[float], data: DataSet, prior: DisturbancePrior
+    ) -> tuple[Array, Array]:
+        """Gradient (8,) and Fisher information (8, 8), by finite differences of the innovations."""
+        step = 1e-3
+        derivatives = []
+        for index in range(len(self.logs)):
+            moved = _Evaluation.at(likelihood, values, data, prior, self.logs + step * np.eye(len(self.logs))[index])
+            by_log = (moved.log_variances - self.log_variances) / step
+            by_value = (moved.innovations - self.innovations) / step
+            derivatives.append((by_value + 0.5 * self.innovations * by_log, by_log))
+        changes, logs = (np.array(part) for part in zip(*derivatives, strict=True))
+        deviations = np.array(prior.log_deviations)
+        gradient = -changes @ self.innovations + 0.5 * logs @ (self.innovations**2 - 1.0)
+        information = changes @ changes.T + 0.5 * logs @ logs.T + np.diag(deviations**-2)
+        return gradient - prior.penalty(self.logs) / deviations, information

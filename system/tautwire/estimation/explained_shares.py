@@ -1,0 +1,136 @@
+"""Shares of what the declared robot misses: how much each effect explains, and how much is left.
+
+Misses are those of co-simulations on unseen data, beyond what the sensors' noise leaves. With the mean squares ``e^2``
+of an error and ``s^2`` of noise, of positions and tensions,
+
+    M = sum over both of max(e^2 / s^2 - 1, 0)        share = (M without the effect - M) / (M without any effect)
+
+so that shares need not sum to one: what two effects explain together counts for both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.signal import periodogram
+
+from ..cosimulation.robot_cosimulation import CosimulationResult
+from ..recordings.recording import Recording
+from ..robot.schema import Robot
+from .cosimulation_validation import cosimulation_errors, noise_floor, start_cosimulations
+from .disturbance import sensor_noise_only
+from .estimation_data import DataSet
+from .hypotheses import Hypothesis
+from .identification_context import IdentificationContext
+from .parameter_fit import Fitter
+from .smoothed_states import calibrate
+from .trace_result import Errors
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class ExplainedShares:
+    """Shares of the effects and of what is left, from 0 to 1, and sizes in standard deviations of one sample's noise.
+
+    ``sizes`` are those of what each effect changes in the outputs; ``size_missed`` is that of what the robot without
+    effects misses beside noise, its uncertain numbers at their best, ``size_left`` that of what is left.
+    """
+
+    effects: tuple[float, ...]
+    sizes: tuple[float, ...]
+    left: float
+    size_missed: float
+    size_left: float
+
+
+def explained_shares(
+    context: IdentificationContext, declared: Fitter, robot: Robot, accepted: Sequence[Hypothesis], data: DataSet
+) -> ExplainedShares:
+    """Shares of the accepted effects of a robot, on some data; ``declared`` fits the robot without effects."""
+    floor = sensor_noise_floor(context.fitter, robot, data)
+    estimation = context.split.estimation
+    max_sigmas = context.policy.size.max_calibration_sigmas
+    unimproved = calibrate(declared, context.robot, estimation).clipped(max_sigmas).calibrated_robot(context.robot)
+    reduced = [_without_effect(robot, hypothesis) for hypothesis in accepted]
+    fitters = [declared, *[context.fitter] * (1 + len(reduced))]
+    pending = [
+        run
+        for fitter, each in zip(fitters, [unimproved, robot, *reduced], strict=True)
+        for run in start_cosimulations(context.workers, fitter, each, [data])
+    ]
+    before, after, *without = (run.result() for run in pending)
+    of_declared = calibrate(declared, unimproved, data).clipped(max_sigmas).without_sensor_errors(data.recording)
+    recording = calibrate(context.fitter, robot, data).without_sensor_errors(data.recording)
+    missed = _missed(of_declared, before, floor)
+    left = _missed(recording, after, floor)
+    total = max(missed, left, np.finfo(float).tiny)
+    return ExplainedShares(
+        tuple(float(np.clip((_missed(recording, run, floor) - left) / total, 0.0, 1.0)) for run in without),
+        tuple(_size(run.measured() - after.measured(), recording, floor) for run in without),
+        float(np.clip(left / total, 0.0, 1.0)),
+        missed**0.5,
+        left**0.5,
+    )
+
+
+def sensor_noise_floor(fitter: Fitter, robot: Robot, data: DataSet) -> Errors:
+    """Errors that noise of the sensors and winch speeds alone would leave, without a force on the platform."""
+    noise = fitter.noise
+    if noise.disturbance:
+        limited = sensor_noise_only(noise.disturbance, noise.position, noise.tension)
+        fitter = fitter.with_disturbance(limited)
+    return noise_floor(fitter, robot, data)
+
+
+def _without_effect(robot: Robot, hypothesis: Hypothesis) -> Robot:
+    removed = (hypothesis.effect.name, hypothesis.cables)
+    return replace(robot, effects=tuple(s for s in robot.effects if (s.name, s.cables) != removed))
+
+
+def _missed(recording: Recording, motion: CosimulationResult, floor: Errors) -> float:
+    errors = cosimulation_errors(recording, motion)
+    pairs = ((errors.position_rms, floor.position_rms), (errors.tension_rms, floor.tension_rms))
+    return float(sum(max((error / least) ** 2 - 1.0, 0.0) for error, least in pairs if error == error))
+
+
+def _size(change: Array, recording: Recording, floor: Errors) -> float:
+    """Size of a change of the outputs (N, m), where they were measured, over the noise of one sample."""
+    squares = np.where(np.isfinite(recording.measured()), change, np.nan) ** 2
+    parts = ((squares[:, :3], floor.position_rms), (squares[:, 3:], floor.tension_rms))
+    means = [float(np.nanmean(part)) / least**2 for part, least in parts if np.isfinite(part).any()]
+    return float(sum(means) ** 0.5)
+
+
+@dataclass(frozen=True)
+class RemainingError:
+    """Error that is left: of which output it is largest over noise, its root mean square, unit and main frequency."""
+
+    output: str
+    rms: float
+    unit: str
+    frequency: float
+
+    @property
+    def sentence(self) -> str:
+        """In words."""
+        return f"{self.rms:.3g} {self.unit} in {self.output}, strongest at {self.frequency:.2g} Hz"
+
+
+def remaining_error(recording: Recording, motion: CosimulationResult, floor: Errors) -> RemainingError:
+    """The output whose error exceeds its noise most, with the strongest line of the error's spectrum."""
+    residual = recording.measured() - motion.measured()
+    noise = np.append(floor.axes, floor.cables)
+    rms = np.array([np.sqrt(np.mean(c[np.isfinite(c)] ** 2)) if np.isfinite(c).any() else 0.0 for c in residual.T])
+    index = int(np.argmax(np.nan_to_num(rms / noise)))
+    is_measured = np.isfinite(residual[:, index])
+    time = recording.time
+    grid = np.linspace(time[0], time[-1], len(time))
+    evenly_sampled = np.interp(grid, time[is_measured], residual[is_measured, index])
+    frequency, power = periodogram(evenly_sampled, fs=1.0 / (grid[1] - grid[0]), window="hann")
+    strongest = float(frequency[1 + int(np.argmax(power[1:]))])
+    scale, unit = (1e3, "mm") if index < 3 else (1.0, "N")
+    return RemainingError(recording.channel_names[index], scale * float(rms[index]), unit, strongest)

@@ -1,0 +1,71 @@
+"""Integration steps that the filter takes between two samples, from the eigenvalues of the robot at its start."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import ceil, factorial
+
+import casadi
+import numpy as np
+from numpy.typing import NDArray
+
+from ..robot.schema import Robot
+from ..robot.symbolic_model import symbolic_model
+
+Eigenvalues = NDArray[np.complex128]
+
+
+@dataclass(frozen=True)
+class Substeps:
+    """Integration steps between two samples: of the state itself, and of its derivatives.
+
+    The latter use a series of some order over a part so small that ``doublings`` make it a whole step.
+    """
+
+    state: int
+    slope: int
+    order: int = 4
+    doublings: int = 0
+
+
+# Radians of the fastest vibration in one step of the state, and of its derivatives.
+MAX_STATE_ANGLE, MAX_SLOPE_ANGLE = 0.05, 0.7
+# Time constants of the fastest decay likewise: what has died away causes no more error.
+MAX_STATE_DECAY, MAX_SLOPE_DECAY = 0.5, 2.0
+# Up to so many steps of the state, a decay is resolved as finely as a vibration.
+MAX_FINE_STEPS = 40
+# Truncation error allowed to the series of the derivatives, for a vibration and for a decay.
+VIBRATION_TRUNCATION_ERROR, DECAY_TRUNCATION_ERROR, MIN_SERIES_ORDER = 2e-5, 1e-3, 2
+# For effects with states, which may be quicker under way than at rest, and in a fit than at its start. With many
+# states each doubling costs more than everything else.
+DOUBLINGS, MANY_STATES_COUNT, DOUBLINGS_OF_MANY_STATES = 4, 24, 2
+
+
+def substeps_of_robot(robot: Robot, sample_time: float, state_count: int, has_effect_states: bool) -> Substeps:
+    """Integration steps for samples ``sample_time`` (s) apart; ``has_effect_states`` if effects add states."""
+    doublings = DOUBLINGS_OF_MANY_STATES if state_count > MANY_STATES_COUNT else DOUBLINGS
+    return substeps_of_eigenvalues(eigenvalues_at_start(robot) * sample_time, doublings if has_effect_states else 0)
+
+
+def substeps_of_eigenvalues(exponents: Eigenvalues, doublings: int = 0) -> Substeps:
+    """Integration steps between samples over which the modes change by ``exp(exponents)``."""
+    vibration, decay = float(np.max(np.abs(exponents.imag))), float(np.max(np.abs(exponents)))
+    fine_steps = min(ceil(decay / MAX_STATE_ANGLE), MAX_FINE_STEPS)
+    state = max(1, ceil(vibration / MAX_STATE_ANGLE), ceil(decay / MAX_STATE_DECAY), fine_steps)
+    slope = max(1, ceil(vibration / MAX_SLOPE_ANGLE), ceil(decay / MAX_SLOPE_DECAY))
+    parts, order = slope * 2**doublings, MIN_SERIES_ORDER
+    while any(
+        2**doublings * (turn / parts) ** (order + 1) / factorial(order + 1) > left
+        for turn, left in ((vibration, VIBRATION_TRUNCATION_ERROR), (decay, DECAY_TRUNCATION_ERROR))
+    ):
+        order += 1
+    return Substeps(state, slope, order, doublings)
+
+
+def eigenvalues_at_start(robot: Robot) -> Eigenvalues:
+    """Eigenvalues of the model linearised at the start, in rad/s."""
+    model = symbolic_model(robot)
+    jacobian = casadi.Function("a", [model.states, model.inputs], [casadi.jacobian(model.rates, model.states)])
+    start_state = casadi.Function("start", [], [model.start])
+    matrix = np.array(jacobian(start_state()["o0"], 0.0))
+    return np.linalg.eigvals(matrix).astype(complex)

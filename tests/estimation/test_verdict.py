@@ -1,0 +1,74 @@
+"""The verdict beside a disturbance: sizes decide, and the largest effect is named first."""
+
+from __future__ import annotations
+
+import pytest
+
+from tautwire.estimation.effect_estimates import effects_by_size
+from tautwire.estimation.estimation_data import split_data
+from tautwire.estimation.explained_shares import ExplainedShares
+from tautwire.estimation.hypotheses import Hypothesis, hypotheses
+from tautwire.estimation.identification_context import IdentificationContext
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.estimation.parameter_fit import Fitter
+from tautwire.estimation.trace_result import FoundEffect
+from tautwire.estimation.verdict import verdict_beside_disturbance
+from tests.support.recordings import recorded
+from tests.support.robots import example
+
+ROBOT, RECORDING = example("three"), recorded("three", 1)
+NOISE = estimate_noise(ROBOT, RECORDING)
+CONTEXT = IdentificationContext(ROBOT, Fitter(NOISE), split_data(ROBOT, NOISE, RECORDING, None))
+REMAINING = "40 N in tension_2, strongest at 1.2 Hz"
+
+
+def hypothesis(name: str) -> Hypothesis:
+    return next(each for each in hypotheses(ROBOT) if each.effect.name == name)
+
+
+def shares(left: float, missed: float, **of_effects: tuple[float, float]) -> ExplainedShares:
+    """Shares with (share, size) of each effect; what is left has its part of the mean square of what is missed."""
+    parts, sizes = ([pair[k] for pair in of_effects.values()] for k in (0, 1))
+    return ExplainedShares(tuple(parts), tuple(sizes), left, missed, missed * left**0.5)
+
+
+def verdict(of: ExplainedShares, *names: str) -> tuple[str, str]:
+    return verdict_beside_disturbance(CONTEXT, [hypothesis(name) for name in names], of, REMAINING)
+
+
+def test_what_a_small_random_force_would_leave_lacks_nothing() -> None:
+    word, sentence = verdict(shares(0.7, 4.0, drag=(0.3, 2.0)), "drag")
+    assert word == "none"
+    assert "Drag may act, too small to matter." in sentence
+
+
+def test_the_largest_effect_is_named_first_with_its_share() -> None:
+    both = shares(0.05, 60.0, damping=(0.2, 20.0), friction=(0.8, 50.0))
+    word, sentence = verdict(both, "damping", "friction")
+    assert word == "effects"
+    assert sentence.index("friction (80% of what is missed)") < sentence.index("damping (20% of what is missed)")
+
+
+def test_an_effect_is_named_although_more_than_noise_remains_and_that_is_said() -> None:
+    word, sentence = verdict(shares(0.4, 60.0, friction=(0.6, 50.0)), "friction")
+    assert word == "effects"
+    assert f"40% remains, {REMAINING}" in sentence
+
+
+@pytest.mark.parametrize("names", [(), ("modulus",)])
+def test_a_listed_effect_gets_no_credit_for_what_is_not_on_the_list(names: tuple[str, ...]) -> None:
+    word, sentence = verdict(shares(0.9, 120.0, **dict.fromkeys(names, (0.1, 40.0))), *names)
+    assert word == "unexplained"
+    assert REMAINING in sentence
+    assert all(name in sentence for name in names)
+
+
+@pytest.mark.parametrize(("share", "size"), [(0.01, 9.0), (0.3, 0.5)])
+def test_effects_of_a_small_share_or_below_noise_are_listed_apart(share: float, size: float) -> None:
+    effects = [FoundEffect(name, "cable", (), {}, 50.0) for name in ("damping", "friction")]
+    of = shares(0.05, 60.0, damping=(share, size), friction=(0.9, 50.0))
+    large, small = effects_by_size(effects, of, CONTEXT.policy.size)
+    assert [(each.name, each.share) for each in large] == [("friction", 0.9)]
+    assert [(each.name, each.share) for each in small] == [("damping", share)]
+    word, sentence = verdict(of, "damping", "friction")
+    assert word == "effects" and "damping" not in sentence
