@@ -100,7 +100,12 @@ def select(state: Identification) -> Identification:
 
 
 def try_confusable_models(state: Identification) -> Identification:
-    """Replace the selection by a model that is easily confused with it, where that explains more."""
+    """Replace the selection by a model that is easily confused with it, where that explains more.
+
+    Not beside a disturbance, which would make up for the form of any of them.
+    """
+    if state.context.fitter.has_disturbance:
+        return state
     return replace(state, selection=replace_by_confusable_models(state.context, state.selection))
 
 
