@@ -109,10 +109,11 @@ def test_the_transition_of_a_sample_is_the_derivative_of_the_next_state(effect: 
         size = len(begun)
         carried = (begun, np.eye(size), np.zeros((size, 0)), np.zeros((0, 1)))
         return likelihood._filter_function(
-            1, *carried, unseen, unseen, unseen, *moment, np.zeros((1, 1)), np.zeros((1, 1))
+            1, *carried, unseen, unseen, unseen, *moment, np.zeros((1, 1)), np.zeros((1, 1)), np.zeros((0, 1))
         )[0][:, 1]
 
-    _, transition, _ = likelihood.jacobians(1, state, state, np.zeros((0, 1)), unseen, *moment)
+    columns = (np.zeros((0, 1)), unseen, *moment, np.zeros((3, 1)))
+    _, transition, _, _ = likelihood.jacobians(1, state, state, *columns)
     for place, width in ((0, 1e-7), (4, 1e-5), (6, 1e-7), (len(state) - 1, 1e-7)):
         step = np.zeros_like(state)
         step[place] = width
