@@ -63,25 +63,9 @@ class Disturbance:
         return np.array([self.position_noise**2] * 3 + [self.tension_noise**2] * cable_count)
 
     def filter_arguments(self, cable_count: int) -> Array:
-        """What :func:`filter_step` takes: decay rates (1/s) and variances of the states, variances of white noise."""
+        """What the filter takes (15 + 3 n,): decay rates (1/s) and variances of states, variances of white noise."""
         rates = [2.0 * pi * process.bandwidth for process in self.processes(cable_count)]
         return np.array([*rates, *self.variances(cable_count), *self.white_variances(cable_count)])
-
-    def mean_force(self, states: Array, step: Array) -> Array:
-        """Mean force (3, K) over steps (K,) that begin with these disturbance states (6 + n, K)."""
-        mean: Array = np.exp(-pi * self.force.bandwidth * step) * states[:3]
-        return mean
-
-    def augmented_transition(self, transition: Array, by_force: Array, step: Array, cable_count: int) -> Array:
-        """Transition matrices with those of the disturbance, from a model's (K, n, n) and its response (K, n, 3)."""
-        count, size, _ = transition.shape
-        rates = np.array([2.0 * pi * process.bandwidth for process in self.processes(cable_count)])
-        augmented = np.zeros((count, size + len(rates), size + len(rates)))
-        augmented[:, :size, :size] = transition
-        augmented[:, :size, size : size + 3] = by_force * np.exp(-0.5 * rates[:3] * step[:, None])[:, None, :]
-        index = np.arange(size, size + len(rates))
-        augmented[:, index, index] = np.exp(-rates * step[:, None])
-        return augmented
 
 
 def sensor_noise_only(disturbance: Disturbance, position_noise: float, tension_noise: float) -> Disturbance:
@@ -105,10 +89,3 @@ def _described(process: OrnsteinUhlenbeck, unit: str) -> str:
 def disturbance_state_count(cable_count: int) -> int:
     """Number of disturbance states: three forces, and an error of each output."""
     return 6 + cable_count
-
-
-def with_error_columns(output_matrix: Array) -> Array:
-    """Derivatives of the outputs (K, m, n) with those by the disturbance states: forces do not show, errors as such."""
-    count, outputs, _ = output_matrix.shape
-    columns = np.hstack([np.zeros((outputs, 3)), np.eye(outputs)])
-    return np.concatenate([output_matrix, np.broadcast_to(columns, (count, *columns.shape))], axis=2)

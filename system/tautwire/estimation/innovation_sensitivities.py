@@ -32,7 +32,6 @@ from ..recordings.recording import Recording
 from ..robot.schema import PER_CABLE_COMPONENTS, Robot
 from ..robot.symbolic_model import FreeParameter, symbolic_model
 from ..robot.uncertain_parameters import uncertain_parameters
-from .disturbance import with_error_columns
 from .hypotheses import Hypothesis
 from .likelihood import Likelihood
 from .measurement_model import delayed_outputs
@@ -95,21 +94,15 @@ def linearise_filter(
     """
     theta = np.array(values, dtype=float)[:, None]
     size = likelihood.model.states.numel()
-    disturbance, cable_count = likelihood.noise.disturbance, likelihood.cable_count
-    variances = likelihood.noise.white_variances(cable_count)
-    no_force = np.zeros((3, 1))
+    variances = likelihood.noise.white_variances(likelihood.cable_count)
     for segment in likelihood.segments(recording, values, acceleration_noise_density):
         measured, observed, shift, speed, later, step, _ = segment.columns
         count = measured.shape[1]
         predicted = segment.states[:, :-1]
         is_observed = observed.T[:, :, None] > 0.0
         innovations = np.where(is_observed[:, :, 0], segment.values, 0.0)
-        columns = (theta, shift, speed, later, step)
-        output_matrix = by_sample(
-            likelihood.jacobians(count, predicted[:size], predicted[:size], *columns, no_force)[0], count
-        )
-        if disturbance:
-            output_matrix = with_error_columns(output_matrix)
+        columns = (theta, shift, speed, later, step, likelihood.disturbance_arguments)
+        output_matrix = by_sample(likelihood.jacobians(count, predicted, predicted, *columns)[0], count)
         cross_covariance = segment.covariances @ np.where(is_observed, output_matrix, 0.0).swapaxes(1, 2)
         covariance = np.where(is_observed, output_matrix, 0.0) @ cross_covariance + np.diag(variances)
         cholesky_factor = np.linalg.cholesky(covariance)
@@ -117,11 +110,8 @@ def linearise_filter(
         gain = cross_covariance @ np.linalg.inv(covariance)
         corrections = np.einsum("kij,kjl,kl->ki", gain, cholesky_factor, innovations)
         updated = predicted + corrections.T
-        force = disturbance.mean_force(updated[size:], step[0]) if disturbance else no_force
-        jacobians = likelihood.jacobians(count, predicted[:size], updated[:size], *columns, force)[1:]
-        transition, half_transition, by_force = (by_sample(matrix, count) for matrix in jacobians)
-        if disturbance:
-            transition = disturbance.augmented_transition(transition, by_force, step[0], cable_count)
+        _, *jacobians = likelihood.jacobians(count, predicted, updated, *columns)
+        transition, half_transition = (by_sample(matrix, count) for matrix in jacobians)
         yield LinearisedSegment(
             segment.states[:size],
             np.hstack([speed, later[:, -1:]]),

@@ -179,34 +179,31 @@ def _with_force(model: SymbolicModel, force: SX) -> SymbolicModel:
     return replace(model, rates=rates, parameters=casadi.vertcat(model.parameters, force))
 
 
-def filter_jacobians(model: SymbolicModel, cable_count: int, substeps: Substeps) -> Function:
+def filter_jacobians(model: SymbolicModel, cable_count: int, noise: Noise, substeps: Substeps) -> Function:
     """Jacobians of a filter step: of the outputs by the predicted state, of the next state by the updated one.
 
-    Arguments: state before and after the measurement update, parameters, shift, speed, next speed, time step, force on
-    the platform. Results: derivatives of the outputs (m, n), of the state at the next sample (n, n), of that state by
-    the one half a step before it (n, n), from the cubic through both ends, and by the force (n, 3).
+    Arguments: state before and after the measurement update, parameters, shift, speed, next speed, time step,
+    disturbance, as for :func:`filter_step`. Results: derivatives of the outputs (m, n), of the state at the next sample
+    (n, n), and of the model's states in it by those half a step before it, from the cubic through both ends.
     """
-    predicted, updated = SX.sym("before", model.states.numel()), SX.sym("after", model.states.numel())
-    shift, force = SX.sym("shift", 3 + cable_count), SX.sym("force", 3)
+    disturbance = _DisturbanceSymbols(cable_count if noise.disturbance else None)
+    model_size = model.states.numel()
+    predicted, updated = (SX.sym(name, model_size + disturbance.count) for name in ("before", "after"))
+    shift = SX.sym("shift", 3 + cable_count)
     speed, later, step = SX.sym("speed", cable_count), SX.sym("later", cable_count), SX.sym("step")
     inputs = casadi.vertcat(speed, SX(3, 1))
-    _, by_state, _ = measurement_model(model, cable_count).call(
-        [predicted, inputs, model.parameters, later, step, shift]
-    )
-    forced = _with_force(model, force)
-    _, transition, sensitivities = _time_update(forced, substeps, updated, speed, later, step)
+    instant = [inputs, model.parameters, later, step, shift]
+    outputs = measurement_model(model, cable_count).call([predicted[:model_size], *instant])
+    _, by_state, _ = disturbance.added_to(outputs, predicted)
+    _, transition, _ = disturbance.time_update(model, substeps, updated, speed, later, step)
     rate_jacobian = Function(
-        "bending", [model.states, model.inputs, forced.parameters], [casadi.jacobian(forced.rates, model.states)]
+        "bending", [model.states, model.inputs, model.parameters], [casadi.jacobian(model.rates, model.states)]
     )
-    jacobian_at_update = rate_jacobian(updated, inputs, forced.parameters)
-    identity = SX.eye(updated.numel())
-    half_transition = 0.5 * (transition + identity) + step / 8.0 * casadi.mtimes(
-        identity - transition, jacobian_at_update
-    )
-    arguments = [predicted, updated, model.parameters, shift, speed, later, step, force]
-    by_force = sensitivities[:, model.parameters.numel() :]
-    results = [by_state, transition, half_transition, by_force]
-    return Function("filter_slopes", arguments, [casadi.densify(result) for result in results])
+    jacobian_at_update = rate_jacobian(updated[:model_size], inputs, model.parameters)
+    identity, of_model = SX.eye(model_size), transition[:model_size, :model_size]
+    half_transition = 0.5 * (of_model + identity) + step / 8.0 * casadi.mtimes(identity - of_model, jacobian_at_update)
+    arguments = [predicted, updated, model.parameters, shift, speed, later, step, disturbance.arguments]
+    return Function("filter_slopes", arguments, [casadi.densify(f) for f in (by_state, transition, half_transition)])
 
 
 def _measurement_update(

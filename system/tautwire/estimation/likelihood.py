@@ -128,7 +128,7 @@ class Likelihood:
     @cached_property
     def jacobians(self) -> CompiledFunction:
         """See :func:`tautwire.estimation.kalman_filter.filter_jacobians`; compiled at first use."""
-        return CompiledFunction(filter_jacobians(self.model, self.cable_count, self.substeps))
+        return CompiledFunction(filter_jacobians(self.model, self.cable_count, self.noise, self.substeps))
 
     def start(self, parameters: Sequence[float] | Array) -> tuple[Array, Array]:
         """Initial state (n,) and covariance (n, n) of the filter, disturbance included."""
@@ -202,8 +202,6 @@ class Likelihood:
         columns, is_recorded = _filter_columns(recording, measured, shift)
         state, sensitivities = self._start(theta)
         filter_state = (state, start_covariance, sensitivities)
-        disturbance = self.noise.disturbance
-        numbers = np.zeros(0) if disturbance is None else disturbance.filter_arguments(self.cable_count)
         state_count, parameter_count = len(start_covariance), len(theta)
         for begin in range(0, len(is_recorded), CHUNK_SAMPLES):
             chunk = tuple(column[:, begin : begin + CHUNK_SAMPLES] for column in columns)
@@ -214,7 +212,7 @@ class Likelihood:
                 theta[:, None],
                 *chunk,
                 np.full((1, 1), acceleration_noise_density),
-                numbers[:, None],
+                self.disturbance_arguments,
             )
             states, covariances, state_slopes, values, log_variances, innovation_sensitivities = results
             yield FilterSegment(
@@ -237,6 +235,12 @@ class Likelihood:
         state, sensitivities = (np.array(part) for part in self._start_function(parameters))
         zeros = np.zeros((self._disturbance_state_count, 1 + len(parameters)))
         return np.vstack([state, zeros[:, :1]]), np.vstack([sensitivities, zeros[:, 1:]])
+
+    @property
+    def disturbance_arguments(self) -> Array:
+        """What the filter takes of the disturbance, a column; empty without one."""
+        disturbance = self.noise.disturbance
+        return (np.zeros(0) if disturbance is None else disturbance.filter_arguments(self.cable_count))[:, None]
 
     @property
     def _disturbance_state_count(self) -> int:
