@@ -70,3 +70,13 @@ def test_of_those_alike_the_one_with_fewest_parameters_is_simplest() -> None:
     assert most_parsimonious([better, near], policy) is near
     assert most_parsimonious([better, far], policy) is better
     assert most_parsimonious([], policy) is None
+
+
+def test_beside_a_disturbance_no_form_is_exact_so_that_a_tenth_of_the_evidence_ties() -> None:
+    fit = Fit(ROBOT, (), np.zeros(0), np.zeros((0, 0)))
+    relaxation, damping = (Hypothesis(BY_NAME[name], (1,)) for name in ("relaxation", "damping"))
+    better = CandidateScore(relaxation, fit, 1000.0, 1.0)
+    near, far = (CandidateScore(damping, fit, evidence, 1.0) for evidence in (910.0, 890.0))
+    assert most_parsimonious([better, near], SelectionPolicy(), has_disturbance=True) is near
+    assert most_parsimonious([better, far], SelectionPolicy(), has_disturbance=True) is better
+    assert most_parsimonious([better, near], SelectionPolicy()) is better

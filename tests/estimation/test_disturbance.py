@@ -9,9 +9,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tautwire.estimation.candidate_fits import maximised_validation_likelihood
 from tautwire.estimation.disturbance import Disturbance, OrnsteinUhlenbeck, sensor_noise_only
-from tautwire.estimation.disturbance_fit import disturbance_prior, with_fitted_disturbance
-from tautwire.estimation.estimation_data import DataSet
+from tautwire.estimation.disturbance_fit import _Evaluation, disturbance_prior, logs_of, with_fitted_disturbance
+from tautwire.estimation.estimation_data import DataSet, DataSplit
+from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.innovation_sensitivities import linearise_filter
 from tautwire.estimation.kalman_filter import Noise
 from tautwire.estimation.likelihood import Likelihood
@@ -125,3 +127,43 @@ def test_noise_of_the_sensors_has_no_force_and_no_errors_beyond_the_declared_one
     sensors = sensor_noise_only(noise.disturbance, 3e-4, 2.0)
     assert (sensors.force.rms, sensors.position.rms, sensors.tension.rms) == (0.0, 2e-4, 2.0)
     assert sensors.tension.bandwidth == noise.disturbance.tension.bandwidth
+
+
+def test_the_score_of_a_disturbance_is_the_derivative_of_its_posterior() -> None:
+    recording = PAIR[0].first(200)
+    data, likelihood = data_of(recording), likelihood_of(disturbed(force=5.0, position=2e-4, tension=3.0))
+    prior = disturbance_prior(ROBOT, NOISE)
+    logs = logs_of(prior.median) + np.linspace(-0.3, 0.4, 8)
+
+    def posterior(at: NDArray[np.float64]) -> _Evaluation:
+        return _Evaluation.at(likelihood, (), data, prior, at)
+
+    gradient, information = posterior(logs).score(likelihood, (), data, prior)
+    width = 1e-4
+    moves = width * np.eye(8)
+    expected = [(posterior(logs + move).value - posterior(logs - move).value) / (2.0 * width) for move in moves]
+    # Forward differences over 1e-3 err by half of that times the curvature.
+    assert np.all(np.abs(gradient - expected) < 1e-3 * np.diag(information) + 0.02)
+    assert np.all(np.linalg.eigvalsh(information) > 0.0)
+
+
+def test_a_fit_may_begin_where_the_model_is_far_off() -> None:
+    """The tracker errs by 0.1 m, a hundred times its noise and more, as where a model misses centimetres."""
+    recording = PAIR[0].first(400)
+    recording = replace(recording, position=recording.position + process(0.1, 0.3, recording, 4))
+    fitter = Fitter(replace(NOISE, disturbance=disturbance_prior(ROBOT, NOISE).median))
+    fitted = with_fitted_disturbance(fitter, ROBOT, (), data_of(recording), coarse=False)
+    policy = replace(fitter.policy, disturbance=replace(fitter.policy.disturbance, start_factors=()))
+    without = with_fitted_disturbance(Fitter(fitter.noise, policy=policy), ROBOT, (), data_of(recording), coarse=False)
+    log_likelihoods = [each.log_likelihood(ROBOT, (), data_of(recording)) for each in (fitted, without)]
+    assert log_likelihoods[0] > log_likelihoods[1] + 5.0
+
+
+def test_a_rival_is_judged_under_the_best_disturbance_of_the_unseen_data() -> None:
+    check = replace(PAIR[1], tension=PAIR[1].tension + process(8.0, 2.0, PAIR[1], 5)).first(400)
+    fitter = Fitter(replace(NOISE, disturbance=disturbance_prior(ROBOT, NOISE).median))
+    estimation, validation = data_of(PAIR[0].first(400)), data_of(check)
+    fitter = with_fitted_disturbance(fitter, ROBOT, (), estimation)
+    context = IdentificationContext(ROBOT, fitter, DataSplit(estimation, validation, ()))
+    of_fit = fitter.log_likelihood(ROBOT, (), validation)
+    assert maximised_validation_likelihood(context, ROBOT, (), -np.inf) > of_fit + 100.0

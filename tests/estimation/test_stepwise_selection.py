@@ -6,14 +6,20 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tautwire.estimation import stepwise_selection
+from tautwire.estimation.candidate_proposals import SearchRound
+from tautwire.estimation.candidate_scores import CandidateScore
+from tautwire.estimation.disturbance_fit import disturbance_prior
 from tautwire.estimation.estimation_data import split_data
+from tautwire.estimation.hypotheses import Hypothesis
 from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.measurement_noise import estimate_noise
-from tautwire.estimation.parameter_fit import Fitter
+from tautwire.estimation.parameter_fit import Fit, Fitter
 from tautwire.estimation.residual_analysis import residuals_are_white
 from tautwire.estimation.stepwise_selection import SelectionResult, select_effects
 from tautwire.recordings.recording import Recording
 from tautwire.robot.schema import EffectSetting, Robot
+from tautwire_fmu.laws.effects import BY_NAME
 from tests.support.recordings import recorded
 from tests.support.robots import example
 
@@ -37,6 +43,51 @@ def searched(name: str, seed: int, effects: dict[str, Any]) -> tuple[SelectionRe
     found = select_effects(IdentificationContext(robot, fitter, evidence))
     samples = (evidence.estimation, evidence.validation)
     return found, all(residuals_are_white(fitter.innovations(found.fit.robot, s), s.rows) for s in samples)
+
+
+@pytest.mark.parametrize(("has_disturbance", "names"), [(False, ["damping", "payload"]), (True, ["damping"])])
+def test_beside_a_disturbance_a_further_effect_needs_a_share_of_the_first_ones_evidence(
+    has_disturbance: bool, names: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot, recording = example("three"), recorded("three", 1)
+    noise = estimate_noise(robot, recording)
+    if has_disturbance:
+        noise = replace(noise, disturbance=disturbance_prior(robot, noise).median)
+    context = IdentificationContext(robot, Fitter(noise), split_data(robot, noise, recording, None))
+    fit = Fit.without_parameters(robot)
+    rounds = iter([("damping", 1000.0), ("payload", 40.0), ("drag", 0.0)])
+
+    def scored(*_: object) -> tuple[list[CandidateScore], bool]:
+        name, evidence = next(rounds)
+        hypothesis = Hypothesis(BY_NAME[name], (1, 2, 3) if name == "damping" else ())
+        extended = Fit.without_parameters(robot.with_effect(hypothesis.setting(robot)))
+        return [CandidateScore(hypothesis, extended, evidence, 1.0)], True
+
+    accepted: list[Hypothesis] = []
+    monkeypatch.setattr(stepwise_selection, "score_candidates", scored)
+    monkeypatch.setattr(stepwise_selection, "_search_round", lambda *_: None)
+    monkeypatch.setattr(stepwise_selection, "fit_model", lambda *_, **__: fit)
+    monkeypatch.setattr(stepwise_selection, "with_disturbance_beside", lambda context, chosen, fit: (context, fit))
+    monkeypatch.setattr(
+        stepwise_selection._BackwardElimination, "run", lambda self: accepted.extend(self.accepted) or None
+    )
+    select_effects(context)
+    assert [hypothesis.effect.name for hypothesis in accepted] == names
+
+
+@pytest.mark.parametrize(("evidence", "expected"), [(5.0, 5.0), (50.0, 10.0), (5000.0, 5000.0)])
+def test_a_coarse_baseline_is_made_exact_where_it_decides(
+    evidence: float, expected: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot, recording = example("three"), recorded("three", 1)
+    noise = estimate_noise(robot, recording)
+    context = IdentificationContext(robot, Fitter(noise), split_data(robot, noise, recording, None))
+    hypothesis = Hypothesis(BY_NAME["drag"], ())
+    score = CandidateScore(hypothesis, Fit.without_parameters(robot), evidence, 1.0)
+    monkeypatch.setattr(stepwise_selection, "maximised_validation_likelihood", lambda *_: 1040.0)
+    search_round = SearchRound(1, robot, (), None, True)
+    scores = stepwise_selection._with_exact_baseline(context, search_round, 1000.0, {hypothesis: score})
+    assert scores[hypothesis].evidence == expected
 
 
 HIDDEN: list[tuple[str, dict[str, Any]]] = [

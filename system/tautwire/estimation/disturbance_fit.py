@@ -2,7 +2,7 @@
 
 With whitened innovations v and their variances s, of a model whose parameters are held, and x the logs of the numbers,
 
-    dL/dx = -sum v (v' + v l' / 2) + sum (v^2 - 1) l' / 2        l = log s
+    dL/dx = -sum (v v' + l' / 2)        l = log s
     E[-d2L/dx2] = sum (v' + v l' / 2)(v' + v l' / 2)^T + l' l'^T / 2
 
 Source: Gupta and Mehra (1974), IEEE Transactions on Automatic Control 19(6), 774-783.
@@ -57,7 +57,7 @@ def disturbance_of(logs: Array) -> Disturbance:
 
 
 def disturbance_prior(
-    robot: Robot, noise: Noise, policy: DisturbancePolicy = DEFAULT_POLICY.disturbance
+    robot: Robot, noise: Noise, policy: DisturbancePolicy = DEFAULT_POLICY.fit.disturbance
 ) -> DisturbancePrior:
     """Prior of a robot with these sensors: a force in proportion to its weight, and half of the noise coloured."""
     share, weight = policy.coloured_noise_share, robot.platform.mass * max(robot.gravity, 1.0)
@@ -74,37 +74,34 @@ def disturbance_prior(
 
 
 def with_fitted_disturbance(
-    fitter: Fitter,
-    robot: Robot,
-    chosen: Collection[Hypothesis],
-    data: DataSet,
-    coarse: bool = True,
+    fitter: Fitter, robot: Robot, chosen: Collection[Hypothesis], data: DataSet, coarse: bool = True
 ) -> Fitter:
     """The fitter under the most probable disturbance of some data; the same fitter where it has none.
 
     The chosen hypotheses are those that it is compiled for; their parameters stay as the robot has them. A coarse fit
     ends some nats below the maximum, which may serve for a numerator of an e-value, and not for its denominator.
     """
-    if not fitter.has_disturbance:
-        return fitter
-    policy = DEFAULT_POLICY.disturbance
-    prior = disturbance_prior(robot, fitter.noise, policy)
-    last_policy = replace(policy, max_iterations=policy.coarse_iterations) if coarse else policy
-    for part, part_policy in ((data.first(policy.coarse_samples), policy), (data, last_policy)):
-        likelihood, values = fitter.likelihood(robot, chosen, part)
-        fitter = fitter.with_disturbance(fit_disturbance(likelihood, values, part, prior, part_policy))
-    return fitter
+    policy = fitter.policy.disturbance
+    iterations = policy.coarse_iterations if coarse else policy.max_iterations
+    fitter = _refitted(fitter, robot, chosen, data.first(policy.coarse_samples), policy.max_iterations)
+    return _refitted(fitter, robot, chosen, data, iterations)
 
 
 def with_improved_disturbance(fitter: Fitter, robot: Robot, chosen: Collection[Hypothesis], data: DataSet) -> Fitter:
     """As :func:`with_fitted_disturbance`, by a few iterations over the first samples: for candidates to be ranked."""
+    policy = fitter.policy.disturbance
+    return _refitted(fitter, robot, chosen, data.first(policy.coarse_samples), policy.ranking_iterations)
+
+
+def _refitted(
+    fitter: Fitter, robot: Robot, chosen: Collection[Hypothesis], data: DataSet, max_iterations: int
+) -> Fitter:
     if not fitter.has_disturbance:
         return fitter
-    policy = DEFAULT_POLICY.disturbance
-    prior, part = disturbance_prior(robot, fitter.noise, policy), data.first(policy.coarse_samples)
-    likelihood, values = fitter.likelihood(robot, chosen, part)
-    few = replace(policy, max_iterations=policy.ranking_iterations)
-    return fitter.with_disturbance(fit_disturbance(likelihood, values, part, prior, few))
+    policy = replace(fitter.policy.disturbance, max_iterations=max_iterations)
+    prior = disturbance_prior(robot, fitter.noise, policy)
+    likelihood, values = fitter.likelihood(robot, chosen, data)
+    return fitter.with_disturbance(fit_disturbance(likelihood, values, data, prior, policy))
 
 
 def fit_disturbance(
@@ -112,7 +109,7 @@ def fit_disturbance(
     values: Sequence[float],
     data: DataSet,
     prior: DisturbancePrior,
-    policy: DisturbancePolicy = DEFAULT_POLICY.disturbance,
+    policy: DisturbancePolicy = DEFAULT_POLICY.fit.disturbance,
 ) -> Disturbance:
     """Maximise the likelihood of some data, at these values of the free parameters, over the disturbance.
 
@@ -178,14 +175,14 @@ class _Evaluation:
     ) -> tuple[Array, Array]:
         """Gradient (8,) and Fisher information (8, 8), by finite differences of the innovations."""
         step = 1e-3
-        derivatives = []
+        by_value, by_log = [], []
         for index in range(len(self.logs)):
             moved = _Evaluation.at(likelihood, values, data, prior, self.logs + step * np.eye(len(self.logs))[index])
-            by_log = (moved.log_variances - self.log_variances) / step
-            by_value = (moved.innovations - self.innovations) / step
-            derivatives.append((by_value + 0.5 * self.innovations * by_log, by_log))
-        changes, logs = (np.array(part) for part in zip(*derivatives, strict=True))
+            by_value.append((moved.innovations - self.innovations) / step)
+            by_log.append((moved.log_variances - self.log_variances) / step)
+        values_by_number, logs_by_number = np.array(by_value), np.array(by_log)
+        gradient = -values_by_number @ self.innovations - 0.5 * np.sum(logs_by_number, axis=1)
+        unscaled = values_by_number + 0.5 * self.innovations * logs_by_number
         deviations = np.array(prior.log_deviations)
-        gradient = -changes @ self.innovations + 0.5 * logs @ (self.innovations**2 - 1.0)
-        information = changes @ changes.T + 0.5 * logs @ logs.T + np.diag(deviations**-2)
+        information = unscaled @ unscaled.T + 0.5 * logs_by_number @ logs_by_number.T + np.diag(deviations**-2)
         return gradient - prior.penalty(self.logs) / deviations, information

@@ -136,7 +136,7 @@ def _check_sensor_kind(
                 else "the spectrum falls up to the Nyquist frequency"
             )
             description = f"noise is coloured ({basis}; {deviations[column]:.3g} {unit} in total)"
-            notes.append(f"{name}: {description}; its memory was estimated with the disturbance")
+            notes.append(f"{name}: {description}; its memory is estimated with the disturbance")
             is_coloured = True
         elif declared[column] / policy.max_noise_ratio <= floor <= declared[column] * policy.max_noise_ratio:
             continue

@@ -147,6 +147,7 @@ class FitPolicy:
     head_divisor: int = 3
     min_head_samples: int = 800
     max_head_samples: int = 20_000
+    disturbance: DisturbancePolicy = field(default_factory=DisturbancePolicy)
 
 
 @dataclass(frozen=True)
@@ -212,6 +213,10 @@ class SelectionPolicy:
     # Share of the first effect's evidence that a further one needs beside a disturbance: less may be what the first
     # one's form leaves. After a modulus (842 nats) and damping (346), relaxation of one cable had 18.
     min_evidence_ratio: float = 0.05
+
+    def required_evidence(self, threshold: float, first_evidence: float, has_disturbance: bool) -> float:
+        """The evidence that a further effect needs: more than chance, and than what the first one's form may leave."""
+        return max(threshold, self.min_evidence_ratio * first_evidence) if has_disturbance else threshold
 
     def tie(self, evidence: float, has_disturbance: bool) -> float:
         """The nats within which a hypothesis ties with the best one, which has that evidence."""
@@ -388,7 +393,6 @@ class IdentificationPolicy:
     """Policy of an identification, by theme."""
 
     preprocessing: PreprocessingPolicy = field(default_factory=PreprocessingPolicy)
-    disturbance: DisturbancePolicy = field(default_factory=DisturbancePolicy)
     residual_analysis: ResidualAnalysisPolicy = field(default_factory=ResidualAnalysisPolicy)
     fit: FitPolicy = field(default_factory=FitPolicy)
     score_test: ScoreTestPolicy = field(default_factory=ScoreTestPolicy)

@@ -64,8 +64,10 @@ def select_effects(context: IdentificationContext) -> SelectionResult:
         scores, is_complete = score_candidates(context, _search_round(context, number, current.robot, accepted))
         if is_complete:
             complete_rounds[tuple(accepted)] = scores
-        best = most_parsimonious(scores, context.policy.selection, context.fitter.has_disturbance)
-        significant = best is not None and best.evidence > _required_evidence(context, first_evidence)
+        policy, has_disturbance = context.policy.selection, context.fitter.has_disturbance
+        best = most_parsimonious(scores, policy, has_disturbance)
+        required_evidence = policy.required_evidence(context.evidence_threshold(), first_evidence, has_disturbance)
+        significant = best is not None and best.evidence > required_evidence
         candidates += [trial.candidate(number, significant and trial is best) for trial in scores]
         if best is None or not significant:
             break
@@ -73,12 +75,6 @@ def select_effects(context: IdentificationContext) -> SelectionResult:
         accepted = with_hypothesis(accepted, best.hypothesis)
         context, current = with_disturbance_beside(context, accepted, best.fit)
     return _BackwardElimination(context, accepted, current, candidates, complete_rounds).run()
-
-
-def _required_evidence(context: IdentificationContext, first_evidence: float) -> float:
-    """Evidence that a further effect needs: more than chance, and more than what the first one's form may leave."""
-    ratio = context.policy.selection.min_evidence_ratio if context.fitter.has_disturbance else 0.0
-    return max(context.evidence_threshold(), ratio * first_evidence)
 
 
 def with_disturbance_beside(
