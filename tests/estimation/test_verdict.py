@@ -46,13 +46,13 @@ def test_the_largest_effect_is_named_first_with_its_share() -> None:
     both = shares(0.05, 60.0, damping=(0.2, 20.0), friction=(0.8, 50.0))
     word, sentence = verdict(both, "damping", "friction")
     assert word == "effects"
-    assert sentence.index("friction (80% of what is missed)") < sentence.index("damping (20% of what is missed)")
+    assert sentence.index("friction (80 % of what is missed)") < sentence.index("damping (20 % of what is missed)")
 
 
 def test_an_effect_is_named_although_more_than_noise_remains_and_that_is_said() -> None:
     word, sentence = verdict(shares(0.4, 60.0, friction=(0.6, 50.0)), "friction")
     assert word == "effects"
-    assert f"40% remains, {REMAINING}" in sentence
+    assert f"40 % remains, {REMAINING}" in sentence
 
 
 @pytest.mark.parametrize("names", [(), ("modulus",)])

@@ -53,15 +53,8 @@ def effects_by_size(
 ) -> tuple[tuple[FoundEffect, ...], tuple[FoundEffect, ...]]:
     """The effects with their shares, the largest first: those that matter, and those too small to matter."""
     with_shares = [replace(effect, share=share) for effect, share in zip(effects, shares.effects, strict=True)]
-    ranked = sorted(range(len(effects)), key=lambda index: -shares.effects[index])
-    large = [index for index in ranked if is_substantial(shares, index, policy)]
-    small = [index for index in ranked if index not in large]
-    return tuple(with_shares[i] for i in large), tuple(with_shares[i] for i in small)
-
-
-def is_substantial(shares: ExplainedShares, index: int, policy: SizePolicy) -> bool:
-    """Whether an effect explains a share that matters, and shows beside the noise of one sample."""
-    return shares.effects[index] >= policy.min_share and shares.sizes[index] >= policy.min_size
+    large = shares.substantial(policy)
+    return tuple(with_shares[i] for i in large), tuple(e for i, e in enumerate(with_shares) if i not in large)
 
 
 def parameter_correlations(fit: Fit, effects: Sequence[FoundEffect]) -> tuple[Correlation, ...]:

@@ -26,8 +26,9 @@ from .estimation_data import DataSet
 from .hypotheses import Hypothesis
 from .identification_context import IdentificationContext
 from .parameter_fit import Fitter
+from .policy import SizePolicy
 from .smoothed_states import calibrate
-from .trace_result import Errors
+from .trace_result import Comparison, Errors
 
 Array = NDArray[np.float64]
 
@@ -46,31 +47,44 @@ class ExplainedShares:
     size_missed: float
     size_left: float
 
+    def substantial(self, policy: SizePolicy) -> list[int]:
+        """Indices of the effects that matter, the largest first: a share worth a name, and more than noise."""
+        ranked = sorted(range(len(self.effects)), key=lambda index: -self.effects[index])
+        return [i for i in ranked if self.effects[i] >= policy.min_share and self.sizes[i] >= policy.min_size]
+
 
 def explained_shares(
-    context: IdentificationContext, declared: Fitter, robot: Robot, accepted: Sequence[Hypothesis], data: DataSet
+    context: IdentificationContext,
+    declared: Fitter,
+    robot: Robot,
+    accepted: Sequence[Hypothesis],
+    data: DataSet,
+    after: Comparison,
 ) -> ExplainedShares:
-    """Shares of the accepted effects of a robot, on some data; ``declared`` fits the robot without effects."""
+    """Shares of the accepted effects of a robot, on some data.
+
+    ``declared`` fits the robot without effects, ``after`` compares the robot with them.
+    """
     floor = sensor_noise_floor(context.fitter, robot, data)
     estimation = context.split.estimation
     max_sigmas = context.policy.size.max_calibration_sigmas
     unimproved = calibrate(declared, context.robot, estimation).clipped(max_sigmas).calibrated_robot(context.robot)
     reduced = [_without_effect(robot, hypothesis) for hypothesis in accepted]
-    fitters = [declared, *[context.fitter] * (1 + len(reduced))]
+    fitters = [declared, *[context.fitter] * len(reduced)]
     pending = [
         run
-        for fitter, each in zip(fitters, [unimproved, robot, *reduced], strict=True)
+        for fitter, each in zip(fitters, [unimproved, *reduced], strict=True)
         for run in start_cosimulations(context.workers, fitter, each, [data])
     ]
-    before, after, *without = (run.result() for run in pending)
+    before, *without = (run.result() for run in pending)
     of_declared = calibrate(declared, unimproved, data).clipped(max_sigmas).without_sensor_errors(data.recording)
-    recording = calibrate(context.fitter, robot, data).without_sensor_errors(data.recording)
+    recording = after.recording
     missed = _missed(of_declared, before, floor)
-    left = _missed(recording, after, floor)
+    left = _missed(recording, after.after, floor)
     total = max(missed, left, np.finfo(float).tiny)
     return ExplainedShares(
         tuple(float(np.clip((_missed(recording, run, floor) - left) / total, 0.0, 1.0)) for run in without),
-        tuple(_size(run.measured() - after.measured(), recording, floor) for run in without),
+        tuple(_size(run.measured() - after.after.measured(), recording, floor) for run in without),
         float(np.clip(left / total, 0.0, 1.0)),
         missed**0.5,
         left**0.5,

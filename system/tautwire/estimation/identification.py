@@ -161,7 +161,9 @@ def estimate_intervals(state: Identification) -> Identification:
     if state.shares is None:
         return replace(state, effects=effects)
     large, small = effects_by_size(effects, state.shares, state.context.policy.size)
-    return replace(state, effects=large if state.effects_hold else (), small_effects=small)
+    if not state.effects_hold:
+        large, small = (), (*large, *small)
+    return replace(state, effects=large, small_effects=small)
 
 
 def analyse_detectability(state: Identification) -> Identification:
@@ -232,8 +234,9 @@ def _explained_beside_disturbance(state: Identification) -> Identification:
         selection.fit.robot
     )
     state = _with_final_robot(state, context.fitter, identified)
-    data = state.prepared.data_sets[-1]
-    return replace(state, shares=explained_shares(context, state.prepared.fitter, identified, selection.accepted, data))
+    data, after = state.prepared.data_sets[-1], state.comparisons[-1]
+    shares = explained_shares(context, state.prepared.fitter, identified, selection.accepted, data, after)
+    return replace(state, shares=shares)
 
 
 def _with_final_robot(state: Identification, fitter: Fitter, robot: Robot) -> Identification:
@@ -326,7 +329,7 @@ def _disturbance_notes(state: Identification) -> list[str]:
     disturbance = state.context.fitter.noise.disturbance
     if disturbance is None:
         return []
-    small = [f"{each.name} ({each.share or 0.0:.1%} of what is missed)" for each in state.small_effects]
+    small = [f"{each.name} ({100.0 * (each.share or 0.0):.1f} % of what is missed)" for each in state.small_effects]
     return [disturbance.sentence, *([f"established, but too small to matter: {', '.join(small)}"] if small else [])]
 
 

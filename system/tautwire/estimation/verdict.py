@@ -10,7 +10,6 @@ from ..robot.schema import Robot
 from .candidate_scores import setting_of
 from .discovery.candidate_terms import effects_text, formula_text
 from .discovery.formula_discovery import Discovery
-from .effect_estimates import is_substantial
 from .explained_shares import ExplainedShares
 from .hypotheses import Hypothesis
 from .identification_context import IdentificationContext
@@ -50,20 +49,22 @@ def verdict_beside_disturbance(
 ) -> tuple[Verdict, str]:
     """Verdict and its sentence beside a disturbance; ``remaining`` says in words what error remains."""
     policy = context.policy.size
-    ranked = sorted(range(len(accepted)), key=lambda index: -shares.effects[index])
-    large = [index for index in ranked if is_substantial(shares, index, policy)]
-    names = {index: accepted[index].label(context.robot) for index in ranked}
+    large, names = shares.substantial(policy), [hypothesis.label(context.robot) for hypothesis in accepted]
     if shares.size_missed <= policy.max_size_of_disturbance:
-        small = f" {_sum_up(list(names.values())).capitalize()} may act, too small to matter." if names else ""
+        small = f" {_sum_up(names).capitalize()} may act, too small to matter." if names else ""
         sentence = "What the model misses lies within stated uncertainties, noise and a small random force."
         return "none", sentence + small
     is_disturbance = shares.size_left <= policy.max_size_of_disturbance
     if large and (is_disturbance or 1.0 - shares.left >= policy.min_explained_share):
-        named = _sum_up([f"{names[index]} ({shares.effects[index]:.0%} of what is missed)" for index in large])
+        named = _sum_up([f"{names[index]} ({_per_cent(shares.effects[index])} of what is missed)" for index in large])
         kind = "which is no more than a small random force" if is_disturbance else remaining
-        return "effects", f"The model lacks {named}; {shares.left:.0%} remains, {kind}."
-    closest = f" Of it {1.0 - shares.left:.0%} would go to {_sum_up(list(names.values()))}." if names else ""
+        return "effects", f"The model lacks {named}; {_per_cent(shares.left)} remains, {kind}."
+    closest = f" Of it {_per_cent(1.0 - shares.left)} would go to {_sum_up(names)}." if names else ""
     return "unexplained", f"No known effect explains a substantial share of the residual: {remaining}.{closest}"
+
+
+def _per_cent(share: float) -> str:
+    return f"{100.0 * share:.0f} %"
 
 
 def _sum_up(names: Sequence[str]) -> str:
