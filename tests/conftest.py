@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+import os
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -53,6 +54,11 @@ SLOWEST_FIRST = (
     "batch_commands",
     "c_hosts",
 )
+
+
+def pytest_configure() -> None:
+    """Keep machine code in build/, not among the user's files."""
+    os.environ["TAUTWIRE_CACHE"] = str(Path(__file__).resolve().parent.parent / "build" / "cache")
 
 
 @pytest.hookimpl(tryfirst=True)

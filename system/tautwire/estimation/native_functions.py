@@ -7,7 +7,8 @@ Source: LLVM Language Reference Manual; Andersson et al. (2019), CasADi, Mathema
 
 With ten thousand instructions it is ten times as fast as CasADi's interpreter, and compiled in a tenth of a second;
 with a hundred thousand four times as fast, and compiled in one. Optimising it would take longer than most fits do. Far
-larger functions leave the processor's caches, and are interpreted.
+larger functions leave the processor's caches, and are interpreted. Constants are data, not code: functions that differ
+in nothing else share theirs, which :mod:`tautwire.estimation.machine_code_cache` keeps on disk.
 """
 
 from __future__ import annotations
@@ -17,12 +18,14 @@ from collections.abc import Iterator, Sequence
 from functools import cache
 
 import casadi
+import llvmlite
 import llvmlite.binding as llvm
 import numpy as np
 from casadi import Function
 from numpy.typing import NDArray
 
 from ..errors import TautwireError
+from .machine_code_cache import cached_machine_code
 
 # Instructions of one part.
 MAX_PART_INSTRUCTIONS = 4_000
@@ -99,16 +102,16 @@ class UntranslatableError(TautwireError):
         super().__init__(f"function {function}: CasADi's operation {operation} has no assembly; write it in this table")
 
 
-def llvm_assembly(function: Function) -> str:
-    """LLVM assembly that defines ``run(count, places, strides)``: the function, ``count`` times.
+def llvm_assembly(function: Function) -> tuple[str, list[float]]:
+    """LLVM assembly that defines ``run(count, places, strides)``: the function, ``count`` times; and its constants.
 
-    ``places`` has a pointer to the first number of each argument, then of each result, and to room for
-    ``function.sz_w()`` numbers; ``strides`` by how many numbers each moves from one time to the next. Arguments and
+    ``places`` has a pointer to the first number of each argument, then of each result, to the constants, and to room
+    for ``function.sz_w()`` numbers; ``strides`` by how many numbers each moves from one time to the next. Arguments and
     results are dense, column after column.
 
     Raises UntranslatableError.
     """
-    pointers = range(function.n_in() + function.n_out() + 1)
+    pointers = range(function.n_in() + function.n_out() + 2)
     declarations = [
         f"declare double @{name}({', '.join(['double'] * n)})" for name, n in sorted(set(LIBRARY_CALLS.values()))
     ]
@@ -118,15 +121,15 @@ def llvm_assembly(function: Function) -> str:
         places="\n".join(POINTER_TEMPLATE.format(j) for j in pointers),
         calls="\n".join(f"call void @part{first}({arguments})" for first in parts),
     )
-    return "\n".join(
-        [*declarations, *(line for first in parts for line in _part_assembly(function, first)), run_definition]
-    )
+    constants: list[float] = []
+    definitions = [line for first in parts for line in _part_assembly(function, first, constants)]
+    return "\n".join([*declarations, *definitions, run_definition]), constants
 
 
-def _part_assembly(function: Function, first: int) -> Iterator[str]:
-    """Assembly of one part; it exchanges values with the other parts through the workspace."""
-    pointers = [f"%p{j}" for j in range(function.n_in() + function.n_out() + 1)]
-    *_, workspace = pointers
+def _part_assembly(function: Function, first: int, constants: list[float]) -> Iterator[str]:
+    """Assembly of one part, whose constants are appended; parts exchange values through the workspace."""
+    pointers = [f"%p{j}" for j in range(function.n_in() + function.n_out() + 2)]
+    *_, constant_table, workspace = pointers
     values: dict[int, str] = {}
     written: list[int] = []
     yield f"define void @part{first}({', '.join(f'ptr {name}' for name in pointers)}) {{"
@@ -136,7 +139,8 @@ def _part_assembly(function: Function, first: int) -> Iterator[str]:
         if operation == casadi.OP_INPUT:
             yield _load(name, pointers[sources[0]], sources[1])
         elif operation == casadi.OP_CONST:
-            name = _constant(function.instruction_constant(k))
+            yield _load(name, constant_table, len(constants))
+            constants.append(function.instruction_constant(k))
         else:
             for index in sources:
                 if index not in values:
@@ -171,11 +175,6 @@ def _operation(function: Function, operation: int, name: str, sources: list[str]
     raise UntranslatableError(function.name(), operation)
 
 
-def _constant(value: float) -> str:
-    """A constant with all 64 bits, as LLVM reads them."""
-    return f"0x{int(np.float64(value).view(np.uint64)):016X}"
-
-
 Array = NDArray[np.float64]
 
 RUN_PROTOTYPE = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_void_p, ctypes.c_void_p)
@@ -200,7 +199,9 @@ class CompiledFunction:
         self._is_compiled = dense.n_instructions() <= max_compiled
         if self._is_compiled:
             # The machine code lives as long as its engine.
-            self._engine = _engine(llvm_assembly(dense))
+            text, constants = llvm_assembly(dense)
+            self._engine = _engine(text)
+            self._constants = np.array(constants)
             self._native_run = RUN_PROTOTYPE(self._engine.get_function_address("run"))
 
     def __call__(self, count: int, *arguments: Array) -> list[Array]:
@@ -233,9 +234,10 @@ class CompiledFunction:
         pointers = [
             *(array.ctypes.data for array in sources),
             *(array.ctypes.data + offset for array, offset in zip(results, result_offsets, strict=True)),
+            self._constants.ctypes.data,
             workspace.ctypes.data,
         ]
-        strides = [*argument_strides, *result_sizes, 0]
+        strides = [*argument_strides, *result_sizes, 0, 0]
         self._native_run(count, (ctypes.c_void_p * len(pointers))(*pointers), (ctypes.c_int64 * len(strides))(*strides))
         return results
 
@@ -283,9 +285,14 @@ def _engine(text: str) -> llvm.ExecutionEngine:
     """The assembly as machine code. LLVM's own form of it is some thirty times as large, and freed at once."""
     processor, features = _processor()
     machine = llvm.Target.from_default_triple().create_target_machine(opt=0, cpu=processor, features=features)
-    # Constants would stay in the global context.
-    with llvm.parse_assembly(text, llvm.create_context()) as module:
-        code = machine.emit_object(module)
+
+    def compile_text() -> bytes:
+        # Constants would stay in the global context.
+        with llvm.parse_assembly(text, llvm.create_context()) as module:
+            return bytes(machine.emit_object(module))
+
+    versions = [llvmlite.__version__, ".".join(map(str, llvm.llvm_version_info)), machine.triple, processor, features]
+    code = cached_machine_code("\n".join([*versions, text]).encode(), compile_text)
     engine = llvm.create_mcjit_compiler(llvm.parse_assembly(""), machine)
     engine.add_object_file(llvm.ObjectFileRef.from_data(code))
     engine.finalize_object()
