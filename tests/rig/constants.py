@@ -6,19 +6,35 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from tests.rig.effect import Effect
+from tests.rig.effect import Effect, Moment
 from tests.rig.robot import Robot
 
 
 @dataclass(kw_only=True)
 class Damping(Effect):
-    """The cable's total viscosity c in T = E S eps + c S deps/dt + T0, Pa s."""
+    """The cable's total viscosity c in T = E S eps + c S deps/dt + T0, Pa s.
+
+    With another exponent p than 1, what it has more than the declared viscosity c_0 acts as
+    (c - c_0) S r sign(deps/dt) |deps/dt / r|^p, r `reference` in 1/s.
+    """
 
     damping: float
+    exponent: float = 1.0
+    reference: float = 1e-3
 
     def declare(self, robot: Robot) -> Robot:
         """Put it in the place of the declared one."""
+        self.declared = robot.damping
+        if self.exponent != 1.0:
+            return robot
         return replace(robot, damping=np.where(self.on, self.damping, robot.damping))
+
+    def viscous(self, moment: Moment) -> None:
+        """Add what is not linear."""
+        if self.exponent != 1.0:
+            more = self.mask * (self.damping - self.declared) * self.rig.robot.area * self.reference
+            power = np.abs(moment.strain_rate / self.reference) ** self.exponent
+            moment.tension = moment.tension + more * np.sign(moment.strain_rate) * power
 
 
 @dataclass(kw_only=True)

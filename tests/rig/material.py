@@ -15,6 +15,10 @@ if TYPE_CHECKING:
     from tests.rig.mechanics import Rig
 
 
+# Exponent of 1 + t/tau by which creep slows down.
+SLOWING = {"logarithmic": 1.0, "power": 0.5, "viscous": 0.0}
+
+
 @dataclass(kw_only=True)
 class Relaxation(Effect):
     """Standard linear solid: Maxwell branches beside the declared spring, which stays as the long-term one.
@@ -40,9 +44,9 @@ class Relaxation(Effect):
 
 @dataclass(kw_only=True)
 class Hysteresis(Effect):
-    """Rate-independent friction between the strands, after Bouc and Wen with beta = gamma = 1/2.
+    """Rate-independent friction between the strands, after Bouc and Wen with gamma = 1 - beta.
 
-    T += F h, dh/dt = (deps/dt / eps_y) (1 - |h|^n (1 + sign(h deps/dt))/2); F `force` in N, eps_y
+    T += F h, dh/dt = (deps/dt / eps_y) (1 - |h|^n (beta sign(h deps/dt) + gamma)); F `force` in N, eps_y
     `yield_strain`, n `exponent`; h = 0 at the start. Wen, J. Eng. Mech. 102 (1976).
     """
 
@@ -51,6 +55,7 @@ class Hysteresis(Effect):
     force: float
     yield_strain: float
     exponent: float = 1.0
+    beta: float = 0.5
 
     def size(self) -> int:
         """One memory per cable."""
@@ -59,7 +64,7 @@ class Hysteresis(Effect):
     def viscous(self, moment: Moment) -> None:
         """Add the strands' friction."""
         memory = moment.state[self.part]
-        closing = 0.5 * (1.0 + np.sign(memory * moment.strain_rate))
+        closing = 1.0 - self.beta + self.beta * np.sign(memory * moment.strain_rate)
         slope = 1.0 - np.abs(memory) ** self.exponent * closing
         moment.rates[self.part] = moment.strain_rate / self.yield_strain * slope
         moment.tension = moment.tension + self.mask * self.force * memory
@@ -70,7 +75,8 @@ class Creep(Effect):
     """Strain that grows under load and carries none of it.
 
     logarithmic: de/dt = C sigma/(tau + t), so e = C sigma ln(1 + t/tau) under constant stress;
-    viscous: de/dt = C sigma/tau; sigma = T/S. `compliance` C in 1/Pa, `time` tau in s, t since the start.
+    viscous: de/dt = C sigma/tau; power: de/dt = C sigma/tau (1 + t/tau)^(-1/2); sigma = T/S. `compliance` C in
+    1/Pa, `time` tau in s, t since the start.
     Findley, Lai and Onaran, Creep and Relaxation of Nonlinear Viscoelastic Materials (1976).
     """
 
@@ -87,7 +93,7 @@ class Creep(Effect):
         moment.strain = moment.strain - moment.state[self.part]
         robot, rig = self.rig.robot, self.rig
         stress = np.maximum(rig.axial * moment.strain + rig.start_tension, 0.0) / robot.area
-        age = self.time + (moment.time if self.form == "logarithmic" else 0.0)
+        age = self.time * (1.0 + moment.time / self.time) ** SLOWING[self.form]
         rate = self.mask * self.compliance * stress / age
         moment.rates[self.part] = rate
         moment.free_rate = moment.free_rate + rate
@@ -95,7 +101,7 @@ class Creep(Effect):
 
 @dataclass(kw_only=True)
 class Thermal(Effect):
-    """Rope that grows with heat: e = alpha dT, dT = rise (1 - exp(-t/tau)) + rate t.
+    """Rope that grows with heat: e = alpha dT, dT = rise (1 - exp(-t/tau)) + rate t; hyperbolic: rise t/(t + tau).
 
     `expansion` alpha in 1/K, `rise` in K, `time` tau in s, `rate` in K/s, t since the start.
     """
@@ -104,12 +110,14 @@ class Thermal(Effect):
     rise: float = 0.0
     time: float = 1.0
     rate: float = 0.0
+    form: str = "exponential"
 
     def strains(self, moment: Moment) -> None:
         """Take the heat's strain off the one that carries load."""
-        left = np.exp(-moment.time / self.time)
+        hyperbolic = self.form == "hyperbolic"
+        left = self.time / (moment.time + self.time) if hyperbolic else np.exp(-moment.time / self.time)
         warmth = self.rise * (1.0 - left) + self.rate * moment.time
-        warming = self.rise * left / self.time + self.rate
+        warming = self.rise * left ** (2 if hyperbolic else 1) / self.time + self.rate
         moment.strain = moment.strain - self.mask * self.expansion * warmth
         moment.free_rate = moment.free_rate + self.mask * self.expansion * warming
 
@@ -118,13 +126,19 @@ class Thermal(Effect):
 class Slack(Effect):
     """A soft passage into slackness: T = s ln(1 + exp(x/s)) in place of max(T, 0); s `softness` in N.
 
-    x is the law's tension, shifted so that T is still T0 at the start.
+    x is the law's tension, shifted so that T is still T0 at the start. Root: T = (x + sqrt(x^2 + 4 s^2))/2.
     """
 
     softness: float
+    form: str = "logarithm"
 
     def viscous(self, moment: Moment) -> None:
         """Round the corner at zero tension."""
+        if self.form == "root":
+            x = moment.tension - self.softness**2 / self.rig.start_tension
+            soft = 0.5 * (x + np.sqrt(x**2 + 4.0 * self.softness**2))
+            moment.tension = np.where(self.on, soft, moment.tension)
+            return
         shift = self.softness * np.log1p(-np.exp(-self.rig.start_tension / self.softness))
         soft = self.softness * np.logaddexp(0.0, (moment.tension + shift) / self.softness)
         moment.tension = np.where(self.on, soft, moment.tension)

@@ -38,12 +38,14 @@ def make_effects(settings: Settings) -> list[Effect]:
 class Rig:
     """A robot with effects, driven by a winch program."""
 
-    def __init__(self, robot: Robot, effects: Settings | None, program: Program) -> None:
+    def __init__(
+        self, robot: Robot, effects: Settings | None, program: Program, surroundings: Sequence[Effect] = ()
+    ) -> None:
         self.program = program
         self.declared = robot
         self.robot = robot
         self.floor = np.zeros(robot.count)
-        self.effects = make_effects(effects or {})
+        self.effects = [*make_effects(effects or {}), *surroundings]
         for effect in self.effects:
             effect.attach(self)
             self.robot = effect.declare(self.robot)

@@ -15,30 +15,53 @@ from tests.rig.robot import Vector
 class Drag(Effect):
     """Air drag F = -rho/2 (C A) |v - w| (v - w), N; the start is in equilibrium with a steady wind.
 
-    `drag_area` C A in m^2, `density` rho in kg/m^3, `wind` w in m/s.
+    `drag_area` C A in m^2, `density` rho in kg/m^3, `wind` w in m/s; `exponent` p other than 2: |v - w|^(p - 1), v in
+    m/s.
     """
 
     drag_area: float
     density: float = 1.225
     wind: Sequence[float] = (0.0, 0.0, 0.0)
+    exponent: float = 2.0
 
     def load(self, moment: Moment) -> None:
         """Brake the platform."""
         relative = moment.velocity - np.asarray(self.wind, float)
-        speed = np.sqrt(relative @ relative)
+        speed = np.sqrt(relative @ relative) ** (self.exponent - 1.0)
         moment.force = moment.force - 0.5 * self.density * self.drag_area * speed * relative
 
 
 @dataclass(kw_only=True)
 class SensorDelay(Effect):
-    """Outputs that come `seconds` late; `outputs` is "tension", "position" or "all"."""
+    """Outputs that come `seconds` late; `outputs` is "tension", "position" or "all".
+
+    With form "lag" load cells follow as dy/dt = (T - y)/seconds instead.
+    """
 
     seconds: float
     outputs: str = "tension"
+    form: str = "delay"
+
+    def size(self) -> int:
+        """What each lagging load cell shows."""
+        return self.rig.robot.count if self.form == "lag" else 0
+
+    def begin(self) -> Vector:
+        """The start tensions."""
+        return self.rig.start_tension.copy() if self.form == "lag" else np.zeros(0)
+
+    def transmit(self, moment: Moment) -> None:
+        """Show what lags."""
+        if self.form == "lag":
+            shown = moment.state[self.part]
+            moment.rates[self.part] = (moment.cell - shown) / self.seconds
+            moment.cell = np.where(self.on, shown, moment.cell)
 
     def delay(self) -> dict[str, Vector]:
         """Lag of each output, s."""
         lags: dict[str, Vector] = {}
+        if self.form == "lag":
+            return lags
         if self.outputs in ("tension", "all"):
             lags["tension"] = self.seconds * self.mask
         if self.outputs in ("position", "all"):
@@ -48,13 +71,30 @@ class SensorDelay(Effect):
 
 @dataclass(kw_only=True)
 class SensorGain(Effect):
-    """Outputs multiplied by `gain`; `outputs` is "tension" (of the named cables) or "position"."""
+    """Outputs multiplied by `gain`; `outputs` is "tension" (of the named cables) or "position".
+
+    A load cell may bend: T (gain + `bend` (T/T0 - 1)), T0 the start tension.
+    """
 
     gain: float
     outputs: str = "tension"
+    bend: float = 0.0
 
     def sense(self, tension: Vector, position: Vector) -> tuple[Vector, Vector]:
         """Scale them."""
         if self.outputs == "tension":
-            return tension * np.where(self.on, self.gain, 1.0), position
+            gain = self.gain + self.bend * (tension / self.rig.start_tension - 1.0)
+            return tension * np.where(self.on, gain, 1.0), position
         return tension, position * self.gain
+
+
+@dataclass(kw_only=True)
+class SensorOffset(Effect):
+    """Zeros that are off: `tension` in N on the named load cells, `position` in m along x, y, z."""
+
+    tension: float = 0.0
+    position: Sequence[float] = (0.0, 0.0, 0.0)
+
+    def sense(self, tension: Vector, position: Vector) -> tuple[Vector, Vector]:
+        """Add them."""
+        return tension + self.tension * self.mask, position + np.asarray(self.position, float)

@@ -57,10 +57,7 @@ def make_recording(
 
 def outputs(rig: Rig, times: Vector, accuracy: Accuracy | None = None) -> tuple[Vector, Vector]:
     """What perfect sensors give: load cells (samples, n) in N and position (samples, 3) in m."""
-    lags = {"position": np.zeros(3), "tension": np.zeros(rig.robot.count)}
-    for effect in rig.effects:
-        for name, lag in effect.delay().items():
-            lags[name] = lags[name] + lag
+    lags = lags_of(rig)
     # A lagging sensor shows the start until its lag has passed.
     asked = {lag: np.maximum(times - lag, 0.0) for lag in np.unique(np.concatenate(list(lags.values())))}
     instants = np.unique(np.concatenate(list(asked.values())))
@@ -79,6 +76,15 @@ def outputs(rig: Rig, times: Vector, accuracy: Accuracy | None = None) -> tuple[
     for effect in rig.effects:
         tension, position = effect.sense(tension, position)
     return tension, position
+
+
+def lags_of(rig: Rig) -> dict[str, Vector]:
+    """By how many seconds `position` (3) and `tension` (n) lag, all effects together."""
+    lags = {"position": np.zeros(3), "tension": np.zeros(rig.robot.count)}
+    for effect in rig.effects:
+        for name, lag in effect.delay().items():
+            lags[name] = lags[name] + lag
+    return lags
 
 
 def write_recording(recording: pd.DataFrame, path: str | Path) -> None:

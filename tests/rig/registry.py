@@ -5,9 +5,9 @@ from __future__ import annotations
 from tests.rig.constants import Damping, Modulus, Payload
 from tests.rig.effect import Effect
 from tests.rig.material import Creep, Hysteresis, Pushing, Relaxation, Slack, Stiffening, Thermal
-from tests.rig.outside import Drag, SensorDelay, SensorGain
+from tests.rig.outside import Drag, SensorDelay, SensorGain, SensorOffset
 from tests.rig.route import Anchor, Frame, Pulley, Sag
-from tests.rig.unlisted import Bungee, Filling, Magnet, Shaker, Sideways, Swing, Wave
+from tests.rig.unlisted import Bungee, Filling, Gusts, Magnet, Shaker, Sideways, Slipping, Swing, Wave
 from tests.rig.winch import Drum, Friction
 
 EFFECTS: dict[str, type[Effect]] = {
@@ -27,13 +27,16 @@ EFFECTS: dict[str, type[Effect]] = {
     "slack": Slack,
     "sensor_delay": SensorDelay,
     "sensor_gain": SensorGain,
+    "sensor_offset": SensorOffset,
     "unlisted_bungee": Bungee,
     "unlisted_filling": Filling,
     "unlisted_frame": Frame,
+    "unlisted_gusts": Gusts,
     "unlisted_magnet": Magnet,
     "unlisted_pushing": Pushing,
     "unlisted_shaker": Shaker,
     "unlisted_sideways": Sideways,
+    "unlisted_slipping": Slipping,
     "unlisted_stiffening": Stiffening,
     "unlisted_swing": Swing,
     "unlisted_wave": Wave,

@@ -21,11 +21,11 @@ Vector = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class TensionLimits:
-    """Where the start tensions of a robot with more than three cables may lie, N."""
+    """Where the start tensions of a robot with more than three cables may lie, N; `preferred` also one per cable."""
 
     minimum: float = 0.0
     maximum: float = float("inf")
-    preferred: float = 0.0
+    preferred: float | Vector = 0.0
 
 
 @dataclass(frozen=True)
@@ -39,7 +39,7 @@ class Noise:
 
 @dataclass(frozen=True)
 class Robot:
-    """A point mass on n >= 3 cables; one row or entry per cable, SI units, z up."""
+    """A point mass on n cables; one row or entry per cable, SI units, z up."""
 
     gravity: float
     mass: float
@@ -60,6 +60,7 @@ class Robot:
 
 
 LIMITS = ("minimum", "maximum", "preferred")
+NOISES = ("position_noise", "tension_noise", "winch_speed_noise")
 
 
 def robot_from(content: Mapping[str, Any]) -> Robot:
@@ -82,7 +83,7 @@ def robot_from(content: Mapping[str, Any]) -> Robot:
         damping=column("damping", 0.0),
         linear=np.array([cable.get("law", "logarithmic") == "linear" for cable in cables]),
         tension=TensionLimits(**{key: float(limits[key]) for key in LIMITS if key in limits}),
-        noise=Noise(**{key.removesuffix("_noise"): float(value) for key, value in sensors.items()}),
+        noise=Noise(**{key.removesuffix("_noise"): float(value) for key, value in sensors.items() if key in NOISES}),
     )
 
 

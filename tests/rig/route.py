@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.spatial.transform import Rotation
 
 from tests.rig.effect import Effect, Moment
 from tests.rig.robot import Vector
@@ -31,13 +32,16 @@ class Pulley(Effect):
     at (r, 0) and the platform at (d, -h). The rope comes up at the origin, wraps over the top by pi - theta
     and leaves on a tangent: theta = atan2(-h, d - r) + arccos(r/q), q^2 = (d - r)^2 + h^2,
     l = sqrt(q^2 - r^2) + r (pi - theta). Pott, Cable-Driven Parallel Robots (2018).
+    `tilt` (rad) leans the swivel axis from the vertical toward -y.
     """
 
     radius: float
+    tilt: float = 0.0
 
     def geometry(self, moment: Moment) -> None:
         """Rope length with its wrapped part; directions along the tangents."""
-        away = moment.position - moment.exits
+        upright = Rotation.from_rotvec([-self.tilt, 0.0, 0.0]).as_matrix()
+        away = (moment.position - moment.exits) @ upright.T
         flat = np.hypot(away[:, 0], away[:, 1])
         outward = away[:, :2] / flat[:, None]
         across = flat - self.radius
@@ -48,7 +52,7 @@ class Pulley(Effect):
         # Toward the pulley: minus the way a rope running clockwise leaves it.
         back = np.column_stack([-np.sin(leaving)[:, None] * outward, np.cos(leaving)])
         moment.length = np.where(self.on, length, moment.length)
-        moment.direction = np.where(self.on[:, None], back, moment.direction)
+        moment.direction = np.where(self.on[:, None], back @ upright, moment.direction)
 
 
 @dataclass(kw_only=True)
@@ -58,10 +62,11 @@ class Sag(Effect):
     Chord l, horizontal span d, chord tension T: arc = l (1 + (w d)^2/(24 T^2)), and the elastic law acts on
     the arc, so T follows from T = E S (ln(arc/arc_0) + w_in) + T0. Half the weight, w l/2, hangs on the
     platform, half on the exit: the cell feels |T u + (w l/2) z|. Viscosity stays with the chord.
-    Irvine, Cable Structures (1981).
+    Irvine, Cable Structures (1981). Steep: arc = l (1 + (w l)^2/(24 T^2)), as if every rope were level.
     """
 
     linear_density: float  # kg/m
+    form: str = "inclined"
 
     def settle(self) -> None:
         """Note how far the start arc is longer than its chord."""
@@ -79,7 +84,8 @@ class Sag(Effect):
 
     def _bow(self, length: Vector, direction: Vector) -> Vector:
         """(w d)^2/24, N^2."""
-        span = length * np.hypot(direction[:, 0], direction[:, 1])
+        level = 1.0 if self.form == "steep" else np.hypot(direction[:, 0], direction[:, 1])
+        span = length * level
         return self.mask * (self.linear_density * self.rig.robot.gravity * span) ** 2 / 24.0
 
     def _tension(self, base: Vector, bow: Vector) -> Vector:

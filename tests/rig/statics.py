@@ -9,11 +9,18 @@ from tests.rig.robot import TensionLimits, Vector
 
 
 def start_tensions(directions: Vector, load: Vector, limits: TensionLimits) -> Vector:
-    """Tensions T with sum T_i u_i = -load, N; `directions` holds u_i by rows, `load` in N."""
-    if len(directions) == 3:
-        tensions = np.linalg.solve(directions.T, -load)
+    """Tensions T with sum T_i u_i = -load, N; `directions` holds u_i by rows, `load` in N.
+
+    Ropes in one plane hold a load in that plane.
+    """
+    basis = span_of(directions)
+    if np.linalg.norm(load - basis.T @ (basis @ load)) > 1e-9 * np.linalg.norm(load):
+        raise ValueError("the ropes lie in a plane and the load does not")
+    within, wanted = directions @ basis.T, basis @ load
+    if len(directions) == len(basis):
+        tensions = np.linalg.solve(within.T, -wanted)
     else:
-        tensions = nearest_to_preferred(directions, load, limits)
+        tensions = nearest_to_preferred(within, wanted, limits)
     if np.any(tensions <= 0):
         raise ValueError(f"not every cable pulls at the start: {tensions} N")
     return tensions
@@ -22,7 +29,7 @@ def start_tensions(directions: Vector, load: Vector, limits: TensionLimits) -> V
 def nearest_to_preferred(directions: Vector, load: Vector, limits: TensionLimits) -> Vector:
     """Minimise sum (T_i - preferred)^2 under equilibrium and minimum <= T_i <= maximum.
 
-    Optimality gives T = clip(preferred + u_i . m, minimum, maximum); the three multipliers m (N)
+    Optimality gives T = clip(preferred + u_i . m, minimum, maximum); the multipliers m (N)
     follow from equilibrium, as the minimum of the convex dual.
     """
 
@@ -37,11 +44,17 @@ def nearest_to_preferred(directions: Vector, load: Vector, limits: TensionLimits
         free = (raw > limits.minimum) & (raw < limits.maximum)
         return (directions * free[:, None]).T @ directions
 
-    missing = load + limits.preferred * directions.sum(axis=0)
-    # Cables in one plane leave the multiplier across it open.
+    missing = load + directions.T @ (limits.preferred * np.ones(len(directions)))
     guess = -np.linalg.lstsq(directions.T @ directions, missing, rcond=None)[0]
     scale = np.linalg.norm(load) + 1.0
     result = optimize.least_squares(imbalance, guess, jacobian, xtol=1e-15, ftol=1e-15, gtol=1e-15)
     if np.linalg.norm(imbalance(result.x)) > 1e-9 * scale:
         raise ValueError("no tensions within the limits hold the platform at its start")
     return tensions(result.x)
+
+
+def span_of(directions: Vector) -> Vector:
+    """Unit vectors, by rows, of the directions in which cables can pull: all three, or two of a plane of cables."""
+    _, sizes, rows = np.linalg.svd(directions)
+    rank = int(np.sum(sizes > 1e-6 * sizes[0]))
+    return np.eye(rank) if rank == directions.shape[1] else np.asarray(rows[:rank], float)

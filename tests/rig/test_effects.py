@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
+from scipy.spatial.transform import Rotation
 
 from tests.rig import (
     EFFECTS,
@@ -45,6 +46,21 @@ CASES: list[tuple[str, dict[str, Any], dict[str, Any]]] = [
     ("slack", {"softness": 500.0}, {"softness": 1e-3}),
     ("sensor_delay", {"seconds": 0.02}, {"seconds": 0.0}),
     ("sensor_gain", {"gain": 1.02, "cables": [3]}, {"gain": 1.0}),
+    ("sensor_offset", {"tension": 5.0, "cables": [3]}, {"position": [0.0, 0.0, 0.0]}),
+    ("damping", {"damping": 2e9, "exponent": 0.7}, {"damping": 4e8, "exponent": 0.7}),
+    ("hysteresis", {"force": 60.0, "yield_strain": 1e-4, "beta": 0.6}, {"force": 0.0, "yield_strain": 1e-4}),
+    ("creep", {"compliance": 1e-12, "time": 5.0, "form": "power"}, {"compliance": 0.0, "time": 5.0, "form": "power"}),
+    ("thermal", {"expansion": 1.2e-5, "rise": 10.0, "form": "hyperbolic"}, {"expansion": 0.0, "form": "hyperbolic"}),
+    ("sag", {"linear_density": 0.1, "form": "steep"}, {"linear_density": 0.0, "form": "steep"}),
+    ("pulley", {"radius": 0.15, "tilt": 0.1}, {"radius": 1e-9, "tilt": 0.1}),
+    ("drum", {"build_up": 0.01}, {"build_up": 0.0}),
+    ("drum", {"second_harmonic": 0.02}, {"second_harmonic": 0.0}),
+    ("friction", {"coefficient": 0.05, "form": "linear"}, {"coefficient": 0.0, "form": "linear"}),
+    ("friction", {"coefficient": 0.05, "form": "stribeck"}, {"coefficient": 0.0, "form": "stribeck"}),
+    ("drag", {"drag_area": 5.0, "exponent": 1.0}, {"drag_area": 0.0, "exponent": 1.0}),
+    ("slack", {"softness": 500.0, "form": "root"}, {"softness": 1e-3, "form": "root"}),
+    ("sensor_delay", {"seconds": 0.02, "form": "lag"}, {"seconds": 1e-6, "form": "delay"}),
+    ("sensor_gain", {"gain": 1.0, "bend": 0.05}, {"gain": 1.0, "bend": 0.0}),
     (
         "unlisted_bungee",
         {"stiffness_constant": 20.0, "point": [28, 2, 0]},
@@ -56,6 +72,8 @@ CASES: list[tuple[str, dict[str, Any], dict[str, Any]]] = [
         {"stiffness_constant": 3e5, "viscosity": 2e3},
         {"stiffness_constant": 1e9, "viscosity": 1e6, "mass": 1e9},
     ),
+    ("unlisted_gusts", {"amplitude": [[30, 0, 0]], "times": [1.0]}, {"amplitude": [[0, 0, 0]], "times": [1.0]}),
+    ("unlisted_slipping", {"slip": 0.01, "times": [1.0]}, {"slip": 0.0, "times": [1.0]}),
     ("unlisted_magnet", {"strength": 500.0, "centre": [26, 1, 7]}, {"strength": 0.0, "centre": [0, 0, 0]}),
     (
         "unlisted_shaker",
@@ -111,6 +129,29 @@ def test_start_is_in_static_equilibrium_with_the_effect(name: str, strong: dict[
 def test_same_effect_acts_on_two_cables_with_two_settings() -> None:
     settings = [{"modulus": 9e10, "cables": [1]}, {"modulus": 8e10, "cables": [3]}]
     assert Rig(paper_robot(), {"modulus": settings}, STILL).robot.modulus == pytest.approx([9e10, 1.348e11, 8e10])
+
+
+def test_a_power_of_one_is_the_damping_of_the_list() -> None:
+    times = np.arange(0, 5, 0.1)
+    one = simulate(damped(), {"damping": {"damping": 2e9, "exponent": 1.0 + 1e-9}}, RAMP, times)
+    other = simulate(damped(), {"damping": {"damping": 2e9}}, RAMP, times)
+    assert np.abs(one.position - other.position).max() < 1e-7
+
+
+def test_a_slipping_rope_loses_what_it_slips_by() -> None:
+    robot = with_law(damped(), "linear")
+    run = simulate(robot, {"unlisted_slipping": {"slip": 0.01, "times": [1.0, 3.0], "cables": [2]}}, STILL, [0.0, 5.0])
+    assert run.state[-1, 6:9] == pytest.approx([0.0, -0.02, 0.0], abs=1e-8)
+
+
+def test_a_tilted_pulley_turns_the_way_round_with_it() -> None:
+    tilt = 0.3
+    turn = Rotation.from_rotvec([tilt, 0.0, 0.0]).as_matrix()
+    robot = replace(symmetric_robot(), anchors=symmetric_robot().anchors @ turn.T)
+    plain = Rig(symmetric_robot(), {"pulley": {"radius": 0.2}}, STILL)
+    leant = Rig(robot, {"pulley": {"radius": 0.2, "tilt": tilt}}, STILL)
+    assert leant.start_length == pytest.approx(plain.start_length, rel=1e-12)
+    assert leant.start_direction == pytest.approx(plain.start_direction @ turn.T, abs=1e-12)
 
 
 def test_fast_relaxation_is_damping() -> None:

@@ -85,6 +85,42 @@ class Shaker(Effect):
 
 
 @dataclass(kw_only=True)
+class Gusts(Effect):
+    """Blows of wind: at each of `times` (s) a force `amplitude` (vectors, N) comes and goes as a raised cosine.
+
+    F = a (1 - cos(2 pi (t - t_i)/d))/2 for t_i < t < t_i + d, d `duration` in s.
+    """
+
+    amplitude: Sequence[Sequence[float]]
+    times: Sequence[float]
+    duration: float = 2.0
+
+    def load(self, moment: Moment) -> None:
+        """Blow."""
+        share = (moment.time - np.asarray(self.times, float)) / self.duration
+        wave = np.where((share > 0.0) & (share < 1.0), 0.5 - 0.5 * np.cos(2.0 * np.pi * share), 0.0)
+        moment.force = moment.force + wave @ np.asarray(self.amplitude, float)
+
+
+@dataclass(kw_only=True)
+class Slipping(Effect):
+    """Rope that slips on its drum: at each of `times` (s) `slip` m run off within `duration` s, smoothly.
+
+    V -= slip/d (1 - cos(2 pi (t - t_i)/d)) for t_i < t < t_i + d.
+    """
+
+    slip: float
+    times: Sequence[float]
+    duration: float = 0.3
+
+    def winding(self, moment: Moment) -> None:
+        """Lose rope."""
+        share = (moment.time - np.asarray(self.times, float)) / self.duration
+        wave = np.where((share > 0.0) & (share < 1.0), 1.0 - np.cos(2.0 * np.pi * share), 0.0)
+        moment.speed = moment.speed - self.mask * self.slip / self.duration * wave.sum()
+
+
+@dataclass(kw_only=True)
 class Swing(Effect):
     """A load of `mass` m_s (kg) on a string of `length` b (m) under the platform, which swings freely.
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from tests.rig.program import PathProgram
 from tests.rig.robot import Robot, Vector
-from tests.rig.statics import start_tensions
+from tests.rig.statics import span_of, start_tensions
 
 
 def natural_frequencies(robot: Robot) -> Vector:
@@ -37,12 +37,14 @@ def wander(
     The reach shrinks until stiff ropes would stay tight along the whole way.
     """
     random = np.random.default_rng(seed)
-    modes = natural_frequencies(robot)
+    basis = span_of(robot.anchors - robot.start)
+    plane = basis.T @ basis
+    modes = natural_frequencies(robot)[3 - len(basis) :]
     slow_angular = 2 * np.pi / random.uniform(*slow, size=4)
-    slow_amplitudes = _spread(random, 4) * reach * 0.5
+    slow_amplitudes = _spread(random, 4) @ plane * reach * 0.5
     ratios = np.array([0.3, 0.5, 0.75, 1.35, 1.9]) * random.uniform(0.95, 1.05, 5)
     fast_angular = 2 * np.pi * ratios * np.exp(np.log(modes).mean())
-    fast_amplitudes = _spread(random, 5) * (shake / fast_angular**2)[:, None]
+    fast_amplitudes = _spread(random, 5) @ plane * (shake / fast_angular**2)[:, None]
     phases = random.uniform(0, 2 * np.pi, (9, 3))
     middle = robot.start if centre is None else np.asarray(centre, float)
     for _ in range(30):

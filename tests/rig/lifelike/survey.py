@@ -1,0 +1,117 @@
+"""How well a robot's owner knows it: uncertainties that the robot file states, and a true robot within them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from tests.rig.lifelike.design import Design
+from tests.rig.robot import Robot, Vector
+
+# Nothing is off by more than this many of its standard deviations.
+FURTHEST = 2.0
+
+
+@dataclass(frozen=True)
+class Survey:
+    """Standard deviations: anchors and tracker's zero in m, tensions in N, all others relative."""
+
+    anchor: float
+    mass: float
+    modulus: float
+    damping: float
+    tension_gain: float
+    tension_offset: float
+    position_offset: float
+    preferred: float
+
+
+@dataclass(frozen=True)
+class Truth:
+    """The robot as it is, and its sensors' gains (n), zeros (n) in N, and tracker's zero (3) in m."""
+
+    robot: Robot
+    gain: Vector
+    offset: Vector
+    position: Vector
+
+    def document(self, declared: Robot) -> dict[str, Any]:
+        """By how much everything is off."""
+        return {
+            "anchor": (self.robot.anchors - declared.anchors).tolist(),
+            "mass": self.robot.mass / declared.mass,
+            "modulus": (self.robot.modulus / declared.modulus).tolist(),
+            "damping": (self.robot.damping / declared.damping).tolist(),
+            "gain": self.gain.tolist(),
+            "offset": self.offset.tolist(),
+            "position": self.position.tolist(),
+        }
+
+
+def survey_of(random: np.random.Generator, design: Design) -> Survey:
+    """What is known of a design, by lot about what is usual for its size."""
+    size, lots = design.width**0.5, np.exp(random.normal(scale=0.3, size=8))
+    usual = design.usual_tension
+    return Survey(
+        anchor=_short(4e-4 * size * lots[0]),
+        mass=_short(0.003 * lots[1] * design.robot.mass) / design.robot.mass,
+        modulus=_short(0.01 * lots[2]),
+        damping=_short(0.15 * lots[3]),
+        tension_gain=_short(0.004 * lots[4]),
+        tension_offset=_short(2.5e-3 * usual * lots[5]),
+        position_offset=_short(2e-4 * size * lots[6]),
+        preferred=_short(0.03 * usual * lots[7]),
+    )
+
+
+def true_robot(random: np.random.Generator, design: Design, survey: Survey) -> Truth:
+    """One of the robots that the survey could have met; anchors of a planar robot stay in its plane."""
+    robot, count = design.robot, design.robot.count
+
+    def off(shape: int | tuple[int, ...], deviation: float) -> Vector:
+        return deviation * np.clip(random.normal(size=shape), -FURTHEST, FURTHEST)
+
+    moved = off((count, 3), survey.anchor)
+    if design.planar:
+        moved[:, 1] = 0.0
+    preferred = robot.tension.preferred + off(count, survey.preferred)
+    made = replace(
+        robot,
+        anchors=robot.anchors + moved,
+        mass=robot.mass * float(1.0 + off(1, survey.mass)[0]),
+        modulus=robot.modulus * (1.0 + off(count, survey.modulus)),
+        # One batch of rope: the dampings differ little from each other.
+        damping=robot.damping * (1.0 + off(1, survey.damping) + off(count, 0.1 * survey.damping)),
+        tension=replace(robot.tension, preferred=preferred),
+    )
+    return Truth(
+        made, 1.0 + off(count, survey.tension_gain), off(count, survey.tension_offset), off(3, survey.position_offset)
+    )
+
+
+def robot_file(design: Design, survey: Survey, name: str) -> str:
+    """The robot as its owner declares it."""
+    robot = design.robot
+    lines = [f'name = "{name}"', f"gravity = {robot.gravity}", "", "[platform]", f"mass = {robot.mass}"]
+    lines += [f"mass_uncertainty = {survey.mass * robot.mass:.3g}", f"start = {robot.start.tolist()}", ""]
+    if robot.count > 3 or design.planar:
+        limits = robot.tension
+        lines += ["[tension]", f"minimum = {limits.minimum:.4g}", f"maximum = {limits.maximum:.4g}"]
+        lines += [f"preferred = {limits.preferred}", f"preferred_uncertainty = {survey.preferred}", ""]
+    noise = robot.noise
+    lines += ["[sensors]", f"position_noise = {noise.position}", f"tension_noise = {noise.tension}"]
+    lines += [f"winch_speed_noise = {noise.winch_speed}", f"tension_offset_uncertainty = {survey.tension_offset}"]
+    lines += [f"tension_gain_uncertainty = {survey.tension_gain}"]
+    lines += [f"position_offset_uncertainty = {survey.position_offset}"]
+    for anchor, modulus, area, damping in zip(robot.anchors, robot.modulus, robot.area, robot.damping, strict=True):
+        lines += ["", "[[cable]]", f"anchor = {anchor.tolist()}", f"anchor_uncertainty = {survey.anchor}"]
+        lines += [f"modulus = {modulus:.6g}", f"modulus_uncertainty = {survey.modulus * modulus:.4g}"]
+        lines += [f"area = {area}", f"damping = {damping:.6g}"]
+        lines += [f"damping_uncertainty = {survey.damping * damping:.4g}", 'law = "logarithmic"']
+    return "\n".join(lines) + "\n"
+
+
+def _short(value: float) -> float:
+    return float(f"{value:.2g}")
