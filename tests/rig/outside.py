@@ -1,4 +1,4 @@
-"""Air around the platform, and sensors that lag or scale."""
+"""Air around the platform, and sensors that lag, scale or have a wrong zero."""
 
 from __future__ import annotations
 
@@ -90,11 +90,14 @@ class SensorGain(Effect):
 
 @dataclass(kw_only=True)
 class SensorOffset(Effect):
-    """Zeros that are off: `tension` in N on the named load cells, `position` in m along x, y, z."""
+    """Sensors that show a value where there is none: load cells of the named cables `force` (N), the tracker `place`.
 
-    tension: float = 0.0
-    position: Sequence[float] = (0.0, 0.0, 0.0)
+    `place` is what it shows of the origin (x, y, z), m.
+    """
+
+    force: float = 0.0
+    place: Sequence[float] = (0.0, 0.0, 0.0)
 
     def sense(self, tension: Vector, position: Vector) -> tuple[Vector, Vector]:
-        """Add them."""
-        return tension + self.tension * self.mask, position + np.asarray(self.position, float)
+        """Shift them."""
+        return tension + np.outer(np.ones(len(tension)), self.force * self.mask), position + np.asarray(self.place)

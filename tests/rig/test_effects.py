@@ -46,7 +46,7 @@ CASES: list[tuple[str, dict[str, Any], dict[str, Any]]] = [
     ("slack", {"softness": 500.0}, {"softness": 1e-3}),
     ("sensor_delay", {"seconds": 0.02}, {"seconds": 0.0}),
     ("sensor_gain", {"gain": 1.02, "cables": [3]}, {"gain": 1.0}),
-    ("sensor_offset", {"tension": 5.0, "cables": [3]}, {"position": [0.0, 0.0, 0.0]}),
+    ("sensor_offset", {"force": 5.0, "cables": [3]}, {"place": [0.0, 0.0, 0.0]}),
     ("damping", {"damping": 2e9, "exponent": 0.7}, {"damping": 4e8, "exponent": 0.7}),
     ("hysteresis", {"force": 60.0, "yield_strain": 1e-4, "beta": 0.6}, {"force": 0.0, "yield_strain": 1e-4}),
     ("creep", {"compliance": 1e-12, "time": 5.0, "form": "power"}, {"compliance": 0.0, "time": 5.0, "form": "power"}),

@@ -185,7 +185,7 @@ RIGHT = (
         "right",
         8.0,
         60.0,
-        lambda s, w: {"tension": w.sign * s * w.survey.tension_offset, "cables": [w.cable]},
+        lambda s, w: {"force": w.sign * s * w.survey.tension_offset, "cables": [w.cable]},
     ),
 )
 
