@@ -43,6 +43,7 @@ SLOWEST_FIRST = (
     "fmi3",
     "robust_design",
     "lost_fmus",
+    "overdue_interrupt",
     "campaign_run",
     "input_design",
     "profile_likelihood",

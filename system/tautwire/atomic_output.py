@@ -121,7 +121,7 @@ def _staging_folder(parent: Path, target: Path) -> Iterator[Path]:
     with ExitStack() as stack:
         if lock is not None:
             stack.enter_context(lock)
-        stack.callback(_remove_staging, staging)
+        stack.callback(remove_staging, staging)
         shutil.rmtree(staging / SCRATCH_NAME, ignore_errors=True)
         (staging / SCRATCH_NAME).mkdir()
         try:
@@ -171,10 +171,10 @@ def _remove_stale_staging(parent: Path) -> None:
     for lock_file in parent.glob(f"{STAGING_PREFIX}*/{LOCK_NAME}") if CAN_LOCK_FILES else ():
         with suppress(OSError), lock_file.open("rb") as lock:
             if acquire_lock(lock):
-                _remove_staging(lock_file.parent)
+                remove_staging(lock_file.parent)
 
 
-def _remove_staging(staging: Path) -> None:
+def remove_staging(staging: Path) -> None:
     """Removes a staging folder that this process has locked; the lock file goes last, to exclude others until then."""
     shutil.rmtree(staging / SCRATCH_NAME, ignore_errors=True)
     with suppress(OSError):

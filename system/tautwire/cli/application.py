@@ -15,7 +15,7 @@ from ..errors import InputError, TautwireError
 from ..process_signals import raise_interrupt_on_termination
 from .analysis_commands import linearise, workspace
 from .batch_commands import campaign, paper
-from .console import flush_or_discard, open_closed_streams, print_error
+from .console import INTERRUPTED, flush_or_discard, open_closed_streams, print_error
 from .fmu_commands import build, fmus, simulate
 from .identification_commands import excite, material, trace
 from .robot_file_commands import check, new
@@ -98,7 +98,7 @@ def run(arguments: list[str]) -> int:
     if status == EXIT_WRONG_INPUT:
         return EXIT_WRONG_INPUT
     # Newer typer returns a status for Ctrl-C.
-    return _report_error("interrupted; nothing was written", EXIT_FAILURE) if status else EXIT_SUCCESS
+    return _report_error(INTERRUPTED, EXIT_FAILURE) if status else EXIT_SUCCESS
 
 
 def _is_usage_error(error: InputError) -> bool:

@@ -59,6 +59,7 @@ class CommandOutput:
 
 
 DEFAULT_OUTPUT = CommandOutput()
+INTERRUPTED = "interrupted; nothing was written"
 
 
 def read_holdable_robot(path: Path) -> Robot:

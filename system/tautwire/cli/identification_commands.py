@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import shutil
+import sys
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -11,8 +12,19 @@ import typer
 from rich.console import Console
 
 from ..errors import InputError
+from ..process_signals import exit_on_overdue_interrupt, own_temporary_folder
 from ..robot.robot_file_reader import read_robot
-from .console import AsJson, CommandOutput, Quiet, RobotFile, note_unused_tables, progress_bar, read_holdable_robot
+from .console import (
+    INTERRUPTED,
+    AsJson,
+    CommandOutput,
+    Quiet,
+    RobotFile,
+    note_unused_tables,
+    print_error,
+    progress_bar,
+    read_holdable_robot,
+)
 
 if TYPE_CHECKING:
     from ..estimation import Trace
@@ -169,12 +181,29 @@ def trace(
     check_recording = None if check is None else read_recording(check, robot.cable_count)
     file_names = ["robot.toml", "report.json", "index.html"]
     refuse_overwriting_inputs([robot_file, fit, *([check] if check else [])], [out / name for name in file_names])
-    with atomic_folder(out) as scratch, progress_bar(output) as progress:
+    with (
+        own_temporary_folder() as temporary,
+        atomic_folder(out) as scratch,
+        exit_on_overdue_interrupt(lambda: _end_interrupted(temporary, scratch)),
+        progress_bar(output) as progress,
+    ):
         trace_result = traced(robot, recording, check_recording, progress, alpha, processors())
         progress("writing the report", 0.0)
         write_report(trace_result, scratch)
     note_unused_tables(robot, output)
     _print_trace(trace_result, out, output)
+
+
+def _end_interrupted(temporary: Path, scratch: Path) -> None:
+    """Ends a trace whose main thread does not return."""
+    from ..atomic_output import remove_staging
+
+    shutil.rmtree(temporary, ignore_errors=True)
+    remove_staging(scratch.parent)
+    if sys.stderr.isatty():
+        # The progress bar has hidden it.
+        Console(stderr=True).show_cursor()
+    print_error(f"tautwire: {INTERRUPTED}")
 
 
 def _print_trace(trace_result: Trace, out: Path, output: CommandOutput) -> None:

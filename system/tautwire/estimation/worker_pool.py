@@ -17,7 +17,7 @@ from typing import Any, Generic, TypeVar
 from threadpoolctl import threadpool_limits
 
 from ..errors import TautwireError
-from ..process_signals import TERMINATION_SIGNALS, exit_with_parent
+from ..process_signals import TERMINATION_SIGNALS, exit_with_parent, restore_default_signals
 
 Result = TypeVar("Result")
 
@@ -64,7 +64,7 @@ class PendingResult(Generic[Result]):
             return self._compute()
         while not wait([self._future], POLL_INTERVAL).done:
             self._poll_interrupts()
-        with _worker_loss_raised(self._processes):
+        with _worker_loss_raised(self._processes, self._poll_interrupts):
             return self._future.result()
 
 
@@ -125,7 +125,7 @@ class WorkerPool:
                 self.poll_interrupts()
                 done, waiting = wait(waiting, POLL_INTERVAL, FIRST_COMPLETED)
                 for future in sorted(done, key=futures.__getitem__):
-                    with _worker_loss_raised(self.processes):
+                    with _worker_loss_raised(self.processes, self.poll_interrupts):
                         result = future.result()
                     yield futures[future], result
         finally:
@@ -133,7 +133,7 @@ class WorkerPool:
                 future.cancel()
 
     def _submit(self, function: Callable[..., Result], *arguments: Any) -> Future[Result]:
-        with _interrupts_blocked(), _worker_loss_raised(self.processes):
+        with _interrupts_blocked(), _worker_loss_raised(self.processes, self.poll_interrupts):
             future: Future[Result] = self._started_executor().submit(function, *arguments)
             return future
 
@@ -147,16 +147,18 @@ class WorkerPool:
 
 
 @contextmanager
-def _worker_loss_raised(processes: int) -> Iterator[None]:
+def _worker_loss_raised(processes: int, poll_interrupts: Callable[[], None]) -> Iterator[None]:
     try:
         yield
     except BrokenProcessPool as error:
+        # A signal to all processes of a group ends the workers first.
+        poll_interrupts()
         raise WorkerLostError(processes) from error
 
 
 @contextmanager
 def _interrupts_blocked() -> Iterator[None]:
-    """Processes started in the block do not receive Ctrl-C and the like; here it is only delayed."""
+    """Processes started in the block receive no Ctrl-C and the like while they start; here it is only delayed."""
     if not hasattr(signal, "pthread_sigmask"):
         yield
         return
@@ -172,9 +174,8 @@ def _no_operation() -> None:
 
 
 def _initialise_worker(folder: str) -> None:
-    """Ignore signals that the parent handles; make temporary folders where the parent removes them."""
-    for number in TERMINATION_SIGNALS:
-        signal.signal(number, signal.SIG_IGN)
+    """Leave Ctrl-C to the parent; make temporary folders where the parent removes them."""
+    restore_default_signals()
     exit_with_parent(Path(folder))
     tempfile.tempdir = folder
     threadpool_limits(1)
