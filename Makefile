@@ -1,9 +1,9 @@
 # make run: the main job on a shipped recording. make test: lint, types and a test of everything, in minutes. make
 # validate: all tests that take longer. make bench: the co-simulation's speed; make bench-long: memory over a million
-# steps; make bench-trace: the tracer on blind recordings, goes on where it was stopped; make bench-control: the
-# controllers; make bench-campaign: many runs. make docs: the pages in docs/, into build/docs; make pictures: those of
-# README and docs that come from runs. make floors: tests with the lowest versions that pyproject.toml declares, on a
-# Python of at most 3.12. Each sets up what it needs.
+# steps; make bench-trace: the tracer on blind recordings, exact and lifelike, goes on where it was stopped; make
+# bench-control: the controllers; make bench-campaign: many runs. make docs: the pages in docs/, into build/docs; make
+# pictures: those of README and docs that come from runs. make floors: tests with the lowest versions that
+# pyproject.toml declares, on a Python of at most 3.12. Each sets up what it needs.
 
 PYTHON ?= python3
 VENV := .venv
@@ -65,6 +65,8 @@ bench-long: $(READY)
 bench-trace: $(READY)
 	$(BIN)/python -m tests.bench.trace --jobs 2
 	$(BIN)/python -m tests.bench.trace --jobs 2 --empty 200
+	$(BIN)/python -m tests.bench.trace --jobs 2 --lifelike
+	$(BIN)/python -m tests.bench.trace --jobs 2 --lifelike --empty 200
 
 bench-control: $(READY)
 	$(BIN)/python -m tests.bench.control docs

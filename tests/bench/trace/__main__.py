@@ -12,10 +12,12 @@ from . import tables
 from .cases import Case, main_cases, quick_cases
 from .document import page
 from .figure import confusion_figure, save
+from .lifelike_cases import ALARM as LIFELIKE_ALARM
+from .lifelike_cases import lifelike_cases
 from .line import Line, read_lines
 from .run import finished, run
 from .score import Scored, outcome, scored
-from .selection import alarm_cases, chosen, code_version
+from .selection import ALARM, alarm_cases, chosen, code_version, lifelike_alarm_cases
 
 ROOT = EXAMPLES.parents[2]
 FEWEST_EMPTY = 200
@@ -29,6 +31,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--jobs", type=int, default=1, help="processes at once")
     parser.add_argument("--quick", action="store_true", help="a look: robot three, middle size")
     parser.add_argument("--empty", type=int, default=0, metavar="N", help="false alarms on N empty recordings instead")
+    parser.add_argument("--lifelike", action="store_true", help="robots as they are, also with --empty")
     parser.add_argument("--list", action="store_true", help="name the cases and stop")
     parser.add_argument("--show", action="store_true", help="trace nothing; show the answers of the last tracer asked")
     parser.add_argument("--folder", type=Path, default=ROOT / "build" / "bench-trace", help="where answers are kept")
@@ -37,8 +40,7 @@ def arguments() -> argparse.Namespace:
 
 def main() -> None:
     asked = arguments()
-    whole = alarm_cases(asked.empty) if asked.empty else quick_cases() if asked.quick else main_cases()
-    cases = chosen(whole, asked.only)
+    cases = chosen(cases_of(asked), asked.only)
     if asked.list:
         print("\n".join(case.key for case in cases))
         return
@@ -47,6 +49,13 @@ def main() -> None:
     lines = finished(cases, old, code) if asked.show else run(cases, asked.folder, code, asked.jobs, tell)
     show(scored(cases, lines))
     write(asked.folder, code)
+
+
+def cases_of(asked: argparse.Namespace) -> Sequence[Case]:
+    """All that the call is about."""
+    if asked.empty:
+        return lifelike_alarm_cases(asked.empty) if asked.lifelike else alarm_cases(asked.empty)
+    return lifelike_cases() if asked.lifelike else quick_cases() if asked.quick else main_cases()
 
 
 def tell(case: Case, line: Line) -> None:
@@ -58,26 +67,36 @@ def tell(case: Case, line: Line) -> None:
 
 def show(answers: Sequence[Scored]) -> None:
     """All tables."""
-    for text in (tables.outcomes, tables.confusions, tables.coverage, tables.times, tables.errors):
+    for text in (tables.outcomes, tables.names, tables.confusions, tables.coverage, tables.times, tables.errors):
         print(f"\n{text(answers)}")
 
 
 def write(folder: Path, code: str) -> None:
     """The page and its picture into docs, if every case has an answer; else into the folder, as far as it goes."""
-    lines = read_lines(folder / "results.jsonl")
-    cases = main_cases()
-    keys = [line.key for line in lines if line.key.startswith("alarm-") and line.code == code]
-    alarms = alarm_cases(max((int(key.removeprefix("alarm-")) + 1 for key in keys), default=0))
-    answers = scored(cases, finished(cases, lines, code))
-    empty = scored(alarms, finished(alarms, lines, code))
+    lines = [line for line in read_lines(folder / "results.jsonl") if line.code == code]
+
+    def answered(cases: Sequence[Case]) -> tuple[Scored, ...]:
+        return scored(cases, finished(cases, lines, code))
+
+    answers, lifelike = answered(main_cases()), answered(lifelike_cases())
+    empty = answered(alarm_cases(_alarms_in(lines, f"{ALARM}-")))
+    lifelike_empty = answered(lifelike_alarm_cases(_alarms_in(lines, LIFELIKE_ALARM)))
     if not answers:
         return
-    done = len(answers) == len(cases) and len(empty) >= FEWEST_EMPTY
+    whole = len(answers) == len(main_cases()) and len(lifelike) == len(lifelike_cases())
+    done = whole and min(len(empty), len(lifelike_empty)) >= FEWEST_EMPTY
     place = ROOT / "docs" if done else folder
     place.mkdir(exist_ok=True)
     save(confusion_figure(answers), str(place / PICTURE))
-    (place / "tracer.md").write_text(page(answers, empty, code, PICTURE), encoding="utf-8")
-    print(f"\n{place / 'tracer.md'}: {len(answers)} of {len(cases)} cases, {len(empty)} empty recordings")
+    (place / "tracer.md").write_text(page(answers, empty, code, PICTURE, lifelike, lifelike_empty), encoding="utf-8")
+    counts = f"{len(answers)} cases, {len(empty)} empty recordings"
+    counts += f"; lifelike: {len(lifelike)} cases, {len(lifelike_empty)} empty recordings"
+    print(f"\n{place / 'tracer.md'}: {counts}")
+
+
+def _alarms_in(lines: Sequence[Line], prefix: str) -> int:
+    numbers = [int(line.key.removeprefix(prefix)) for line in lines if line.key.startswith(prefix)]
+    return max(numbers, default=-1) + 1
 
 
 if __name__ == "__main__":

@@ -15,7 +15,7 @@ from .forms import FORMS, LISTED, UNLISTED, Form, forms_of
 from .motion import MOTIONS, Motion, declared
 
 Size = Literal["small", "middle", "large"]
-Kind = Literal["listed", "pair", "unlisted", "empty"]
+Kind = Literal["listed", "form", "pair", "unlisted", "empty"]
 
 SIZES: tuple[Size, ...] = ("small", "middle", "large")
 EMPTY_EACH = 2
@@ -77,6 +77,11 @@ class Case:
     def names(self) -> frozenset[str]:
         """What it hides, by the names of effects."""
         return frozenset(part.form.name for part in self.parts)
+
+    @property
+    def exact_names(self) -> frozenset[str]:
+        """Those whose form is that of the list."""
+        return self.names
 
     @property
     def label(self) -> str:

@@ -4,7 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from tests.rig.lifelike.case import LEAST_RATIO
+
 from . import tables
+from .line import MINOR_SHARE
 from .motion import MOTIONS
 from .score import Scored, rate
 from .sizes import NATS
@@ -13,7 +16,14 @@ COMMAND = "make bench-trace"
 ALPHA = 0.01
 
 
-def page(answers: Sequence[Scored], empty: Sequence[Scored], code: str, picture: str) -> str:
+def page(
+    answers: Sequence[Scored],
+    empty: Sequence[Scored],
+    code: str,
+    picture: str,
+    lifelike: Sequence[Scored] = (),
+    lifelike_empty: Sequence[Scored] = (),
+) -> str:
     """All of it as Markdown; ``picture`` is the file of the confusion matrix beside it."""
     return (
         "\n\n".join(
@@ -36,6 +46,7 @@ def page(answers: Sequence[Scored], empty: Sequence[Scored], code: str, picture:
                 _errors(answers),
                 tables.times([*answers, *empty]),
                 tables.errors(answers),
+                *(_lifelike(lifelike, lifelike_empty) if lifelike else ()),
             ]
         )
         + "\n"
@@ -57,6 +68,36 @@ def _how() -> str:
         f"{sizes}; less where the largest plausible strength shows less. The strengths stand in "
         "`tests/bench/trace/sizes.json`; `python -m tests.bench.trace.sizes` makes it."
     )
+
+
+def _lifelike(answers: Sequence[Scored], empty: Sequence[Scored]) -> list[str]:
+    return [
+        "## Robots as they are",
+        "No robot is quite what its file says. `tests/rig/lifelike` draws robots of 1 m and 1 kg to 100 m and hundreds "
+        "of kg on 3 to 8 cables, each recorded twice for 40 s at 100 Hz. Anchors, mass, moduli, dampings, and gains "
+        "and zeros of the sensors are off within the uncertainties that the file states. Beside white noise there is "
+        "noise that remembers, a random force on the platform, random tensions in the ropes, and by lot: little drag, "
+        "friction, relaxation, an eccentric drum, backlash, belts, a frame that sways, a tracker that drops out and "
+        "jumps, winch speeds from counts, drifting load cells, ropes that warm up. What is hidden changes positions or "
+        f"tensions by {LEAST_RATIO:.0f} times or more of what all these do: an effect of the list in its own form "
+        "(listed) or in another (form), two effects, what is on no list, or nothing. Right are exactly the names that "
+        f"are hidden; a little thing may be named beside them with a share below {100 * MINOR_SHARE:.0f} %.",
+        "### Outcomes of lifelike recordings",
+        tables.outcomes(answers),
+        tables.meanings([*answers, *empty]),
+        "### False alarms of lifelike recordings",
+        _alarms(empty) if empty else "None tried.",
+        "### Named, missed, and named elsewhere",
+        tables.names(answers),
+        tables.confusions(answers),
+        "### Do the 95 % intervals hold the truth there",
+        "Of rightly named effects whose form is that of the list.",
+        tables.coverage(answers),
+        "### Error, and time, of lifelike recordings",
+        "Size is by how many times as much as the little things the hidden one changes CHECK: positions, tensions.",
+        tables.times([*answers, *empty]),
+        tables.errors(answers),
+    ]
 
 
 def _alarms(empty: Sequence[Scored]) -> str:

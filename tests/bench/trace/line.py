@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -12,15 +12,18 @@ from tautwire.estimation import Trace
 from tautwire.estimation.trace_result import Errors
 
 MOST_RIVALS = 6
+# Below it, the name of a little thing that a lifelike robot has is no wrong name.
+MINOR_SHARE = 0.05
 
 
 @dataclass(frozen=True)
 class NamedEffect:
-    """An effect that the tracer named; of each parameter (value, low, high)."""
+    """An effect that the tracer named; of each parameter (value, low, high), and its share of what was missed."""
 
     name: str
     cables: tuple[int, ...]
     parameters: dict[str, tuple[float, float, float]]
+    share: float | None = None
 
 
 @dataclass(frozen=True)
@@ -49,8 +52,9 @@ class Line:
 
     Errors are (position in m, tension in N) on CHECK, root mean squares; ``fingerprint`` is of the recordings, ``code``
     of the tracer. ``left`` is the mean square of what is left of each output, ``rivals`` are each round's best
-    hypotheses. ``seconds`` is wall time, ``processor`` that of the cores, which other work does not lengthen;
-    ``memory`` is the peak in MB.
+    hypotheses. ``small`` are names that were listed apart, ``left_share`` what no effect explains; ``truth`` is what
+    the rig says of a lifelike case. ``seconds`` is wall time, ``processor`` that of the cores, which other work does
+    not lengthen; ``memory`` is the peak in MB.
     """
 
     key: str
@@ -68,12 +72,18 @@ class Line:
     memory: float = 0.0
     left: tuple[float, ...] = ()
     rivals: tuple[Rival, ...] = ()
+    small: tuple[str, ...] = ()
+    left_share: float | None = None
+    truth: dict[str, Any] = field(default_factory=dict)
     failure: str = ""
 
     @property
     def names(self) -> frozenset[str]:
-        """The effects that it named."""
-        return frozenset(effect.name for effect in self.effects)
+        """The effects that it named, but for what is there in small and was said to be small."""
+        minor = self.truth.get("minor", ())
+        return frozenset(
+            e.name for e in self.effects if e.name not in minor or e.share is None or e.share >= MINOR_SHARE
+        )
 
     def text(self) -> str:
         """As one line of JSON."""
@@ -83,8 +93,8 @@ class Line:
 def line_from(text: str) -> Line:
     """The line that :meth:`Line.text` wrote."""
     content: dict[str, Any] = json.loads(text)
-    for key in ("before", "after", "floor", "left"):
-        content[key] = tuple(content[key])
+    for key in ("before", "after", "floor", "left", "small"):
+        content[key] = tuple(content.get(key, ()))
     content["rivals"] = tuple(Rival(**{**rival, "cables": tuple(rival["cables"])}) for rival in content["rivals"])
     content["also_possible"] = tuple(tuple(names) for names in content["also_possible"])
     content["effects"] = tuple(
@@ -92,6 +102,7 @@ def line_from(text: str) -> Line:
             effect["name"],
             tuple(effect["cables"]),
             {key: (v[0], v[1], v[2]) for key, v in effect["parameters"].items()},
+            effect.get("share"),
         )
         for effect in content["effects"]
     )
@@ -108,7 +119,7 @@ def line_of(key: str, fingerprint: str, code: str, trace: Trace, used: Used) -> 
         verdict=trace.verdict,
         sentence=trace.sentence,
         effects=tuple(
-            NamedEffect(e.name, e.cables, {k: (p.value, p.low, p.high) for k, p in e.parameters.items()})
+            NamedEffect(e.name, e.cables, {k: (p.value, p.low, p.high) for k, p in e.parameters.items()}, e.share)
             for e in trace.effects
         ),
         also_possible=trace.also_possible,
@@ -120,6 +131,8 @@ def line_of(key: str, fingerprint: str, code: str, trace: Trace, used: Used) -> 
         memory=used.memory,
         left=tuple(float(square) for square in trace.normalised_innovation_variance),
         rivals=_best(trace),
+        small=tuple(effect.name for effect in trace.small_effects),
+        left_share=trace.left_share,
     )
 
 

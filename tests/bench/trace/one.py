@@ -4,15 +4,15 @@ from __future__ import annotations
 
 import sys
 import traceback
+from dataclasses import replace
 from pathlib import Path
 from resource import RUSAGE_CHILDREN, RUSAGE_SELF, getrusage
 
 from tautwire.estimation import trace
-from tests.support.robots import example
 
 from .cases import Case
 from .line import Line, Used, line_of
-from .recordings import recordings
+from .recordings import material
 from .selection import case_called
 from .sizes import strengths
 
@@ -20,14 +20,14 @@ from .sizes import strengths
 def traced(case: Case, folder: Path, code: str) -> Line:
     """What the tracer says of a case; it gets the robot's file and two recordings, nothing else."""
     fingerprint = case.fingerprint(case.effects(strengths(case)))
-    fit, check = recordings(case, folder)
+    robot, fit, check, truth = material(case, folder)
     begun = processor_time()
     try:
-        trace_result = trace(example(case.robot), fit, check, lambda what, done: None)
+        trace_result = trace(robot, fit, check, lambda what, done: None)
     except Exception:
-        return Line(case.key, fingerprint, code, failure=traceback.format_exc())
+        return Line(case.key, fingerprint, code, truth=truth, failure=traceback.format_exc())
     used = Used(processor_time() - begun, getrusage(RUSAGE_SELF).ru_maxrss / 1e3)
-    return line_of(case.key, fingerprint, code, trace_result, used)
+    return replace(line_of(case.key, fingerprint, code, trace_result, used), truth=truth)
 
 
 def processor_time() -> float:

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from math import isfinite
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 from scipy.stats import binomtest
@@ -30,6 +30,10 @@ MEANINGS: Mapping[Outcome, str] = {
     "wrong": "a name that is not hidden",
     "failed": "no answer",
 }
+
+
+# Kinds of cases in which a name is the answer.
+NAMED = ("listed", "form", "pair")
 
 
 @dataclass(frozen=True)
@@ -73,7 +77,7 @@ def outcome(case: Case, line: Line) -> Outcome:
     if line.failure:
         return "failed"
     if line.verdict == "effects":
-        return _of_names(case, line) if case.kind in ("listed", "pair") else "wrong"
+        return _of_names(case, line) if case.kind in NAMED else "wrong"
     if line.verdict == "none":
         return "right" if case.kind == "empty" else "missed"
     if case.kind == "unlisted":
@@ -83,9 +87,9 @@ def outcome(case: Case, line: Line) -> Outcome:
 
 def _of_names(case: Case, line: Line) -> Outcome:
     if line.names == case.names:
-        return "right" if _places(case) == _named_places(line) else "place"
+        return "right" if line.truth or _places(case) == _named_places(line) else "place"
     if line.names < case.names:
-        return "part"
+        return "part" if line.names else "missed"
     return "ambiguous" if _excused(case.names, line) else "wrong"
 
 
@@ -98,9 +102,13 @@ def _excused(truth: frozenset[str], line: Line) -> bool:
 
 def _places(case: Case) -> dict[str, frozenset[int]]:
     """The cables on which each hidden effect acts; none where cables do not matter."""
-    count = declared(case.robot).count
+    starts = {part.form.key: part.form.start for part in case.parts}
+    return _places_of(case.effects(starts), declared(case.robot).count)
+
+
+def _places_of(effects: Mapping[str, Any], count: int) -> dict[str, frozenset[int]]:
     results = {}
-    for name, values in case.effects({part.form.key: part.form.start for part in case.parts}).items():
+    for name, values in effects.items():
         anywhere = values.get("outputs") == "position" or BY_NAME[name].component == "platform"
         results[name] = frozenset() if anywhere else frozenset(values.get("cables", range(1, count + 1)))
     return results
@@ -125,19 +133,21 @@ def held(answers: Iterable[Scored]) -> tuple[Held, ...]:
     """Every fitted interval of a rightly named effect, against the truth."""
     results: list[Held] = []
     for answer in answers:
-        if answer.line.verdict != "effects" or answer.case.kind not in ("listed", "pair"):
+        if answer.line.verdict != "effects" or answer.case.kind not in NAMED:
             continue
-        rig = answer.case.effects(strengths(answer.case))
-        places = _places(answer.case)
+        truth = answer.line.truth
+        hidden = truth["parameters"] if truth else answer.case.effects(strengths(answer.case))
+        rig = {name: hidden[name] for name in answer.case.exact_names & answer.line.names}
+        places = _places_of(rig, truth["cables"] if truth else declared(answer.case.robot).count)
         for effect in answer.line.effects:
             here = frozenset(effect.cables)
             if effect.name not in rig or (places[effect.name] and not here <= places[effect.name]):
                 continue
-            truth = law_values(effect.name, rig[effect.name])
+            values = law_values(effect.name, rig[effect.name])
             neutral = {p.name: p.neutral for p in BY_NAME[effect.name].parameters}
             estimates = {name: Interval(*ends) for name, ends in effect.parameters.items()}
             for name, estimate in in_one_way(effect.name, estimates).items():
-                true = truth.get(name, neutral.get(name))
+                true = values.get(name, neutral.get(name))
                 if true is not None and _is_fitted(estimate):
                     inside = holds(effect.name, name, true, estimate)
                     results.append(Held(answer.case.key, effect.name, name, true, estimate, inside))
@@ -146,6 +156,30 @@ def held(answers: Iterable[Scored]) -> tuple[Held, ...]:
 
 def _is_fitted(estimate: Interval) -> bool:
     return all(isfinite(end) for end in estimate) and estimate.high > estimate.low
+
+
+@dataclass(frozen=True)
+class Named:
+    """In how many cases an effect hides, is named, is not named; and in how many others its name is given."""
+
+    name: str
+    hidden: int
+    named: int
+    missed: int
+    wrong: int
+
+
+def named(answers: Iterable[Scored]) -> tuple[Named, ...]:
+    """For each name that is hidden or given, in the order of the list."""
+    answered = [(answer.case.names, answer.line.names) for answer in answers if not answer.line.failure]
+    results = []
+    for name in (effect.name for effect in ALL):
+        hidden = [said for truth, said in answered if name in truth]
+        wrong = sum(name in said and name not in truth for truth, said in answered)
+        count = sum(name in said for said in hidden)
+        if hidden or wrong:
+            results.append(Named(name, len(hidden), count, len(hidden) - count, wrong))
+    return tuple(results)
 
 
 def rate(count: int, of: int) -> Rate:

@@ -9,6 +9,8 @@ from fnmatch import fnmatchcase
 from tests.support.robots import EXAMPLES
 
 from .cases import Case, empty_cases, main_cases, quick_cases
+from .lifelike_cases import ALARM as LIFELIKE_ALARM
+from .lifelike_cases import lifelike_cases, lifelike_empty_cases
 
 ALARM = "alarm"
 MOST_EMPTY = 100_000
@@ -24,11 +26,18 @@ def alarm_cases(count: int) -> tuple[Case, ...]:
     return empty_cases(ALARM, count)
 
 
+def lifelike_alarm_cases(count: int) -> tuple[Case, ...]:
+    """Lifelike recordings with nothing but the little things that count false alarms."""
+    return lifelike_empty_cases(LIFELIKE_ALARM, count)
+
+
 def case_called(key: str) -> Case:
     """The case of a name. Raises KeyError where there is none."""
+    if key.startswith(LIFELIKE_ALARM):
+        return lifelike_alarm_cases(int(key.removeprefix(LIFELIKE_ALARM)) + 1)[-1]
     if key.startswith(f"{ALARM}-"):
         return alarm_cases(int(key.removeprefix(f"{ALARM}-")) + 1)[-1]
-    return {case.key: case for case in (*main_cases(), *quick_cases())}[key]
+    return {case.key: case for case in (*main_cases(), *quick_cases(), *lifelike_cases())}[key]
 
 
 def chosen(cases: Sequence[Case], only: Sequence[str]) -> tuple[Case, ...]:

@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from math import isfinite
+from typing import Any
 
 import numpy as np
 
 from .cases import Part
 from .line import Line
-from .score import MEANINGS, Rate, Scored, confusion, held, rate
+from .score import MEANINGS, Rate, Scored, confusion, held, named, rate
 from .sizes import stored
 
 
@@ -44,6 +45,13 @@ def confusions(answers: Sequence[Scored]) -> str:
     return table(["hidden \\ said", *columns], body)
 
 
+def names(answers: Sequence[Scored]) -> str:
+    """Each effect of the list: how often it hides, is named, is missed, and is named where it does not hide."""
+    rows = [[one.name, one.hidden, one.named, one.missed, one.wrong] for one in named(answers)]
+    sums = [sum(int(row[place]) for row in rows) for place in range(1, 5)]
+    return table(["effect", "hidden in", "named", "missed", "named elsewhere"], [*rows, ["all", *sums]])
+
+
 def coverage(answers: Sequence[Scored]) -> str:
     """How many of the 95 % intervals hold the true value, by effect and in all."""
     result = held(answers)
@@ -63,7 +71,7 @@ def errors(answers: Sequence[Scored]) -> str:
     for answer in answers:
         line, case = answer.line, answer.case
         said = " + ".join(sorted(line.names)) or line.verdict or "failed"
-        sizes = ", ".join(_size(case.key, part) for part in case.parts)
+        sizes = _beside_little(line.truth) if line.truth else ", ".join(_size(case.key, part) for part in case.parts)
         ratios = [_over(line.before, line.floor), _over(line.after, line.floor)]
         rows.append([case.key, sizes, said, answer.outcome, *ratios, f"{line.processor:.0f} s"])
     return table(["case", "size", "said", "outcome", "before", "after", "time"], rows)
@@ -99,6 +107,12 @@ def shown_rate(found: Rate) -> str:
 def _size(case: str, part: Part) -> str:
     size = stored()[case][part.form.key]
     return f"{part.form.key} {size.strength:.3g} ({size.nats:.2g} nats)"
+
+
+def _beside_little(truth: Mapping[str, Any]) -> str:
+    """How much more than the little things the hidden one changes CHECK: positions, tensions."""
+    sizes = (truth[f"size_of_{which}_rms"]["check"] for which in ("hidden", "little"))
+    return ", ".join(f"{hidden / little:.2g}" for hidden, little in zip(*sizes, strict=True))
 
 
 def _worst(line: Line) -> float:

@@ -130,6 +130,7 @@ def _case(
         "strengths": list(hiding.strengths),
         "little": _document(lot),
         "robot": lot.truth.document(made.robot),
+        "cables": made.robot.count,
         "seed": seed,
         "size_of_hidden_rms": sizes,
         "size_of_little_rms": littles,
