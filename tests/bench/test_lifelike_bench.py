@@ -18,6 +18,7 @@ from tests.bench.trace.document import page
 from tests.bench.trace.lifelike_cases import NEVER_PLANAR, LifelikeCase, lifelike_cases
 from tests.bench.trace.line import Line, NamedEffect, line_from
 from tests.bench.trace.recordings import material
+from tests.bench.trace.run import finished
 from tests.bench.trace.score import held, named, outcome, scored
 from tests.bench.trace.selection import case_called, lifelike_alarm_cases
 from tests.rig.lifelike.case import lifelike
@@ -67,6 +68,12 @@ def test_the_cases_hide_everything_that_the_rig_can_hide() -> None:
 def test_a_lifelike_case_is_found_by_its_name() -> None:
     assert case_called("lifelike-alarm-012") == lifelike_alarm_cases(13)[12]
     assert case_called("lifelike-swing-3") == SWING
+
+
+def test_an_answer_serves_again_while_the_rig_is_the_same() -> None:
+    line = replace(answer(SWING, verdict="discovered"), fingerprint=SWING.fingerprint({}), code="one")
+    assert finished([SWING, DAMPING], [line], "one") == {SWING.key: line}
+    assert finished([SWING], [replace(line, fingerprint="other")], "one") == {}
 
 
 def test_another_rig_makes_lifelike_recordings_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -46,6 +46,10 @@ class LifelikeCase(Case):
         """Of the robot and all that happens to it; the same on every machine."""
         return crc32(self.key.encode()) % 1_000_000
 
+    def effects(self, strengths: Mapping[str, float]) -> dict[str, Any]:
+        """None before the recordings are made; the rig finds the strengths."""
+        return {}
+
     def fingerprint(self, effects: Mapping[str, Any]) -> str:
         """Of all that makes its recordings."""
         return hashlib.sha256(f"{self.key} {_rig_version()}".encode()).hexdigest()[:16]
