@@ -17,7 +17,12 @@ from tautwire.robot.robot_file_reader import read_robot
 from tautwire.robot.robot_file_writer import robot_text
 from tautwire.robot.schema import Robot
 from tautwire.robot.symbolic_model import symbolic_model
-from tautwire.robot.uncertain_parameters import perturbed_robot, sensor_errors, uncertain_parameters
+from tautwire.robot.uncertain_parameters import (
+    limited_perturbation,
+    perturbed_robot,
+    sensor_errors,
+    uncertain_parameters,
+)
 from tests.support.recordings import recorded
 from tests.support.robots import example
 
@@ -125,6 +130,21 @@ def test_they_are_states_that_never_move_and_start_as_declared() -> None:
 
 
 @pytest.mark.validate
+def test_beyond_three_standard_deviations_only_a_tenth_counts() -> None:
+    states = np.array([-13.0, -3.0, -1.0, 0.0, 0.1, 2.999, 3.0, 4.0])
+    expected = [-4.0, -3.0, -1.0, 0.0, 0.1, 2.999, 3.0, 3.1]
+    assert limited_perturbation(states, np.minimum, np.maximum) == pytest.approx(expected, rel=1e-15)
+    robot = unsure(mass=9.0)
+    model = symbolic_model(robot, (), uncertain_parameters(robot))
+    at_start = Function("start", [], [model.start])()["o0"]
+    far, at_four, declared = (DM(at_start) for _ in range(3))
+    far[-1], at_four[-1] = 13.0, 3.0
+    rates = Function("rates", [model.states, model.inputs], [model.rates])
+    gravity = [float(rates(state, 0.0)[5]) for state in (declared, at_four, far)]
+    # Ropes hold the declared weight: what is more falls with its share of gravity.
+    assert gravity == pytest.approx([0.0, -9.81 * 27.0 / 327.0, -9.81 * 36.0 / 336.0], abs=1e-9)
+
+
 def test_a_stiffness_within_what_is_stated_is_no_effect_and_is_put_right() -> None:
     found = traced(unsure(modulus=3e9), STIFFER)
     assert found.verdict == "none"

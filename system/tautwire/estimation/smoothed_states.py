@@ -29,6 +29,7 @@ from ..robot.uncertain_parameters import (
     MASS,
     MODULUS,
     UncertainParameter,
+    limited_perturbation,
     perturbed_robot,
     sensor_errors,
     uncertain_parameters,
@@ -123,7 +124,8 @@ def calibrate(fitter: Fitter, robot: Robot, sample: DataSet) -> Calibration:
     end = likelihood.model.states.numel()
     rows = slice(end - len(parameters), end)
     deviations = np.sqrt(np.maximum(np.diag(last_segment.covariances[-1])[rows], 0.0))
-    return Calibration(parameters, last_segment.states[rows, -1], deviations)
+    estimates = limited_perturbation(last_segment.states[rows, -1], np.minimum, np.maximum)
+    return Calibration(parameters, estimates, deviations)
 
 
 def is_initial_state_uncertain(noise: Noise) -> bool:

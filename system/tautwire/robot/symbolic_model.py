@@ -23,7 +23,7 @@ from tautwire_fmu.laws.vectors import add, scale
 from .robot_assembly import RobotAssembly, assemble_robot
 from .schema import AXES, EffectSetting, Robot
 from .symbolic_statics import symbolic_start_tensions
-from .uncertain_parameters import SensorErrors, UncertainParameter, perturbed_robot, sensor_errors
+from .uncertain_parameters import SensorErrors, UncertainParameter, limited_perturbation, perturbed_robot, sensor_errors
 
 Array = NDArray[np.float64]
 
@@ -137,7 +137,8 @@ def symbolic_model(
     Not valid across a change of which cables are at a limit.
     """
     symbols = [SX.sym(f"{_owner_name(robot, f)}.{f.name}") for f in free_parameters]
-    perturbations = [SX.sym(number.label) for number in uncertain_parameters]
+    constants = [SX.sym(number.label) for number in uncertain_parameters]
+    perturbations = [limited_perturbation(constant, casadi.fmin, casadi.fmax) for constant in constants]
     symbolic_robot = _with_symbols(
         perturbed_robot(robot, uncertain_parameters, perturbations), free_parameters, symbols
     )
@@ -152,19 +153,19 @@ def symbolic_model(
         winch_speeds=SX.sym("winch_speed", count),
         external_force=SX.sym("external_force", 3),
     )
-    variables = replace(variables, length_shifts=_length_shifts(assembly, perturbations))
+    variables = replace(variables, length_shifts=_length_shifts(assembly, constants))
     effect_states, equations = _minimal_equations(assembly, variables)
-    constant = SX(len(perturbations), 1)
+    no_rates = SX(len(constants), 1)
     first_effect_state = variables.states.numel()
     return SymbolicModel(
-        states=casadi.vertcat(variables.states, *(each.symbol for each in effect_states), *perturbations),
+        states=casadi.vertcat(variables.states, *(each.symbol for each in effect_states), *constants),
         inputs=variables.inputs,
         parameters=casadi.vertcat(*symbols) if symbols else SX(0, 1),
-        rates=casadi.vertcat(equations.rates, constant),
+        rates=casadi.vertcat(equations.rates, no_rates),
         outputs=_shown(equations.outputs, sensor_errors(uncertain_parameters, perturbations, count)),
         span_tensions=equations.span_tensions,
         sensor_delays=_sensor_delays(assembly),
-        start=casadi.vertcat(_nominal_start(_initial_state(assembly, len(effect_states)), perturbations), constant),
+        start=casadi.vertcat(_nominal_start(_initial_state(assembly, len(effect_states)), constants), no_rates),
         drifting=tuple(first_effect_state + i for i, each in enumerate(effect_states) if each.state.drifts),
         state_names=(
             *_axis_names("position"),
@@ -197,21 +198,17 @@ def _initial_state(assembly: RobotAssembly, effect_state_count: int) -> SX:
     return casadi.vertcat(SX(list(assembly.start)), SX(list(assembly.velocity)), *lengths, SX(effect_state_count, 1))
 
 
-def _length_shifts(assembly: RobotAssembly, perturbations: Sequence[SX]) -> SX:
+def _length_shifts(assembly: RobotAssembly, constants: Sequence[SX]) -> SX:
     """How much longer the cables are at the start (n,) than at the declared values of the uncertain parameters."""
     lengths = casadi.vertcat(*(SX(component.constants.start_length) for component in assembly.cables))
-    if not perturbations or not casadi.depends_on(lengths, casadi.vertcat(*perturbations)):
+    if not constants or not casadi.depends_on(lengths, casadi.vertcat(*constants)):
         return SX(lengths.shape[0], 1)
-    return lengths - _nominal_start(lengths, perturbations)
+    return lengths - _nominal_start(lengths, constants)
 
 
-def _nominal_start(start: SX, perturbations: Sequence[SX]) -> SX:
+def _nominal_start(start: SX, constants: Sequence[SX]) -> SX:
     """The initial state at the declared values, independent of the uncertain parameters."""
-    return (
-        casadi.substitute(start, casadi.vertcat(*perturbations), SX.zeros(len(perturbations), 1))
-        if perturbations
-        else start
-    )
+    return casadi.substitute(start, casadi.vertcat(*constants), SX.zeros(len(constants), 1)) if constants else start
 
 
 def freeze_drifting_states(model: SymbolicModel) -> SymbolicModel:

@@ -1,11 +1,13 @@
 """Declared parameters with a stated uncertainty, as constant states.
 
-Such a state d is normalised by the declared standard deviation ``s``: the true value is ``declared + s d``.
+Such a state d is normalised by the declared standard deviation ``s``: the true value is ``declared + s d``, where d
+is at most three; what exceeds that counts a tenth. Data sheets and surveys have no tails: an error of ten standard
+deviations is not unlikely but another kind of error, and a long recording would buy it from a normal distribution.
 """
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -23,6 +25,18 @@ UNITS = {
     TENSION_GAIN: "",
     POSITION_OFFSET: "m",
 }
+
+# Standard deviations up to which a perturbation counts in full, and what share of the excess counts.
+MAX_FULL_PERTURBATION, EXCESS_SHARE = 3.0, 0.1
+
+
+def limited_perturbation(state: Any, minimum: Callable[..., Any], maximum: Callable[..., Any]) -> Any:
+    """Perturbation in standard deviations of a parameter whose state is given; with ``minimum`` and ``maximum`` of two.
+
+    The slope never vanishes, so that a filter which went too far at first returns.
+    """
+    full = maximum(minimum(state, MAX_FULL_PERTURBATION), -MAX_FULL_PERTURBATION)
+    return full + EXCESS_SHARE * (state - full)
 
 
 @dataclass(frozen=True)
