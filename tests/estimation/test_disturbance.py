@@ -11,7 +11,13 @@ from numpy.typing import NDArray
 
 from tautwire.estimation.candidate_fits import maximised_validation_likelihood
 from tautwire.estimation.disturbance import Disturbance, OrnsteinUhlenbeck, sensor_noise_only
-from tautwire.estimation.disturbance_fit import _Evaluation, disturbance_prior, logs_of, with_fitted_disturbance
+from tautwire.estimation.disturbance_fit import (
+    _Evaluation,
+    disturbance_prior,
+    logs_of,
+    marginal_log_likelihood,
+    with_fitted_disturbance,
+)
 from tautwire.estimation.estimation_data import DataSet, DataSplit
 from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.innovation_sensitivities import linearise_filter
@@ -167,3 +173,14 @@ def test_a_rival_is_judged_under_the_best_disturbance_of_the_unseen_data() -> No
     context = IdentificationContext(ROBOT, fitter, DataSplit(estimation, validation, ()))
     of_fit = fitter.log_likelihood(ROBOT, (), validation)
     assert maximised_validation_likelihood(context, ROBOT, (), -np.inf) > of_fit + 100.0
+
+
+def test_a_hypothesis_may_have_another_disturbance_on_unseen_data_at_the_price_of_its_numbers() -> None:
+    check = replace(PAIR[1], tension=PAIR[1].tension + process(8.0, 2.0, PAIR[1], 5)).first(400)
+    fitter = Fitter(replace(NOISE, disturbance=disturbance_prior(ROBOT, NOISE).median))
+    fitter = with_fitted_disturbance(fitter, ROBOT, (), data_of(PAIR[0].first(400)))
+    validation = data_of(check)
+    best = with_fitted_disturbance(fitter, ROBOT, (), validation).log_likelihood(ROBOT, (), validation)
+    marginal = marginal_log_likelihood(fitter, ROBOT, (), validation)
+    assert marginal > fitter.log_likelihood(ROBOT, (), validation) + 100.0
+    assert marginal == pytest.approx(best - 4.0 * np.log(400 * 6), abs=1.0)

@@ -13,7 +13,7 @@ from ..errors import UnreachableError
 from ..robot.schema import Robot
 from .candidate_proposals import FitTask
 from .candidate_scores import CandidateScore, setting_of
-from .disturbance_fit import with_fitted_disturbance, with_improved_disturbance
+from .disturbance_fit import marginal_log_likelihood, with_fitted_disturbance, with_improved_disturbance
 from .estimation_data import DataSet
 from .hypotheses import Hypothesis
 from .identification_context import IdentificationContext
@@ -35,9 +35,11 @@ def fit_and_validate(fitter: Fitter, task: FitTask, data: DataSet, validation: D
         fit = fitter.fit_from(task.starts, task.chosen, data, task.min_log_likelihood, task.cost_tolerance)
         fitter = with_improved_disturbance(fitter, fit.robot, task.chosen, data)
         innovations = fitter.judged(fit.robot, task.chosen, validation)
+        log_likelihood = innovations.log_likelihood(validation.rows)
+        if fitter.has_disturbance:
+            log_likelihood = max(log_likelihood, marginal_log_likelihood(fitter, fit.robot, task.chosen, validation))
     except (UnreachableError, NoFitError):
         return None
-    log_likelihood = innovations.log_likelihood(validation.rows)
     mean_square = float(np.nanmean(innovations.mean_square(validation.rows)))
     return ValidatedFit(fit, log_likelihood, mean_square) if np.isfinite(log_likelihood) else None
 

@@ -18,7 +18,7 @@ from .candidate_fits import fit_candidates, fit_model, leaves_noise, maximised_v
 from .candidate_proposals import SearchRound, shortlist, starting_robots
 from .candidate_scores import CandidateScore, most_parsimonious, unfitted_score
 from .disturbance import Disturbance
-from .disturbance_fit import with_fitted_disturbance
+from .disturbance_fit import marginal_log_likelihood, with_fitted_disturbance
 from .grid_search import grid_search, zero_slope_predictions
 from .hypotheses import Hypothesis, with_hypothesis
 from .identification_context import IdentificationContext
@@ -235,7 +235,10 @@ class _BackwardElimination:
     def _evidence(self, without: Fit, others: Sequence[Hypothesis]) -> float:
         """Log-likelihood ratio on validation data of all accepted hypotheses against the others at their best there."""
         validation = self.context.split.validation
-        log_likelihood = self.context.fitter.log_likelihood(self.current.robot, self.accepted, validation)
+        fitter, robot = self.context.fitter, self.current.robot
+        log_likelihood = fitter.log_likelihood(robot, self.accepted, validation)
+        if fitter.has_disturbance:
+            log_likelihood = max(log_likelihood, marginal_log_likelihood(fitter, robot, self.accepted, validation))
         return log_likelihood - maximised_validation_likelihood(
             self.context, without.robot, others, log_likelihood - self.context.evidence_threshold()
         )
