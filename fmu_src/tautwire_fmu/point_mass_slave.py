@@ -57,8 +57,9 @@ class PointMass(Slave):
         self.effects = active_effects(self.listed_effects, parameter_values[5:])
         self.constants = law.PointMassConstants(mass=parameter_values[0], gravity=parameter_values[1])
         self.has_time_state = any(active.effect.states for active in self.effects)
-        self.position_gain, self.position_delay = (
+        self.position_gain, self.position_offset, self.position_delay = (
             stages.sensor_gains(REAL, self.effects)[1],
+            stages.sensor_offsets(REAL, self.effects)[1],
             stages.sensor_delays(REAL, self.effects)[1],
         )
         if not self.started:
@@ -116,8 +117,9 @@ class PointMass(Slave):
                 if self.position_delay > 0.0
                 else []
             )
+            shown_position = delayed_position or self.real[first : first + 3]
             self.real[first + 18 : first + 21] = [
-                self.position_gain * x for x in delayed_position or self.real[first : first + 3]
+                self.position_gain * x + offset for x, offset in zip(shown_position, self.position_offset)
             ]
 
     def _present_acceleration(self) -> Vector:
@@ -225,7 +227,7 @@ class PointMass(Slave):
 
 def _has_position_sensor(effects: Sequence[Effect]) -> bool:
     """Whether some effect makes the measured position differ from the true one."""
-    return any(effect.gain is not None or effect.delay is not None for effect in effects)
+    return any(effect.component == "sensor" for effect in effects)
 
 
 def _variables(data: Dict[str, Any]) -> Tuple[Variable, ...]:

@@ -28,7 +28,7 @@ from tests.support.robots import NAMES
 from tests.support.traces import made_trace
 
 # Effects of the rig that only lifelike recordings hide.
-LIFELIKE_ALONE = {"sensor_offset", "unlisted_gusts", "unlisted_slipping"}
+LIFELIKE_ALONE = {"unlisted_gusts", "unlisted_slipping"}
 BY_KEY = {case.key: case for case in (*main_cases(), *quick_cases())}
 DAMPING = BY_KEY["quick-damping"]
 TRUE_DAMPING = 4e8 * (1 + strengths(DAMPING)["damping"])

@@ -59,6 +59,7 @@ def exact(name: str, parameter: str, trial: dict[str, float]) -> np.ndarray:
         ("drag", "drag_area", {}),
         ("pulley", "radius", {}),
         ("sensor_gain", "tension_gain", {}),
+        ("sensor_offset", "tension_offset", {}),
         ("sensor_delay", "tension_delay", {}),
     ],
 )

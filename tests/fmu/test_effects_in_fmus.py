@@ -94,6 +94,7 @@ def test_neutral_values_run_as_the_plain_robot(tmp_path: Path) -> None:
     neutral = [same("pulley", radius=0.0), same("anchor", x=0.0), same("sag", linear_density=0.0)]
     neutral += [same("friction", coefficient=0.0), same("slack", softness=0.0), same("drag", drag_area=0.0)]
     neutral += [same("sensor_gain", tension_gain=1.0), same("sensor_delay", tension_delay=0.0)]
+    neutral += [same("sensor_offset", tension_offset=0.0)]
     motion = cosimulate(build_fmus(with_effects(robot, *neutral), tmp_path), time, speed)
     assert np.array_equal(motion.tension, plain.tension)
     assert np.max(np.abs(motion.position - plain.position)) < 1e-14
@@ -133,6 +134,17 @@ def test_a_sensor_of_position_is_shown_beside_the_true_one(tmp_path: Path) -> No
         assert shown[0] == pytest.approx(1.5 * shown[1], rel=1e-15)
     with in_hand(build_fmus(example("three"), tmp_path).platform) as platform:
         assert "measured_position.x" not in platform.references
+
+
+def test_load_cells_with_zeros_of_their_own_leave_the_platform_one_offset(tmp_path: Path) -> None:
+    cells = [same("sensor_offset", k, tension_offset=4.0 * k) for k in (1, 2)]
+    robot = with_effects(example("three"), *cells, same("sensor_offset", 3, position_offset_z=0.02))
+    fmus = build_fmus(robot, tmp_path)
+    assert validate_fmu(str(fmus.platform)) == []
+    with in_hand(fmus.platform) as platform:
+        platform.run()
+        shown, true = platform.get("measured_position.z", "position.z")
+        assert shown - true == pytest.approx(0.02, abs=1e-14)
 
 
 def test_nothing_is_wrong_with_fmus_that_have_every_effect(tmp_path: Path) -> None:

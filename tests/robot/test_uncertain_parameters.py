@@ -206,7 +206,9 @@ def test_load_cells_off_zero_are_none_where_that_is_stated() -> None:
 
 
 @pytest.mark.validate
-def test_load_cells_off_zero_are_no_listed_effect_where_that_is_not_stated() -> None:
-    found = traced(example("three"), {}, (8.0, -5.0, 12.0), samples=201)
-    assert found.effects == ()
+def test_load_cells_off_zero_are_an_effect_each_where_that_is_not_stated() -> None:
+    found = traced(example("three"), {}, (8.0, -5.0, 12.0))
+    assert {(effect.name, effect.cables) for effect in found.effects} == {("sensor_offset", (k,)) for k in (1, 2, 3)}
+    estimates = {effect.cables[0]: effect.parameters["tension_offset"].value for effect in found.effects}
+    assert [estimates[k] for k in (1, 2, 3)] == pytest.approx([8.0, -5.0, 12.0], abs=0.5)
     assert found.components.faulty_component != "nothing"

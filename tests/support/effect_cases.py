@@ -69,6 +69,12 @@ CASES = (
     same("slack", softness=300.0),
     Case("sensor_gain", {"gain": 1.02}, {"tension_gain": 1.02}, (3,)),
     Case("sensor_gain", {"gain": 1.001, "outputs": "position"}, {"position_gain": 1.001}),
+    Case("sensor_offset", {"force": -20.0}, {"tension_offset": -20.0}, (2,)),
+    Case(
+        "sensor_offset",
+        {"place": [0.02, -0.03, 0.01]},
+        {"position_offset_x": 0.02, "position_offset_y": -0.03, "position_offset_z": 0.01},
+    ),
     Case("sensor_delay", {"seconds": 0.023}, {"tension_delay": 0.023}),
     Case("sensor_delay", {"seconds": 0.05, "outputs": "position"}, {"position_delay": 0.05}),
 )

@@ -227,7 +227,8 @@ def cable_outputs(
         log_platform_ratio, log_cell_ratio = stages.transmission(m, effects, motion)
         end_force, end_tension = stages.end_forces(m, effects, cable.gravity, line, tension)
         force = add(scale(tension * m.exp(log_platform_ratio), line.direction), end_force)
-        measured_tension = (tension + end_tension) * m.exp(log_cell_ratio) * stages.sensor_gains(m, effects)[0]
+        cell_tension = (tension + end_tension) * m.exp(log_cell_ratio)
+        measured_tension = cell_tension * stages.sensor_gains(m, effects)[0] + stages.sensor_offsets(m, effects)[0]
     else:
         law_tension = motion.elastic_tension + cable.area * (cable.damping * motion.strain_rate)
         measured_tension = tension = m.maximum(law_tension, 0.0)

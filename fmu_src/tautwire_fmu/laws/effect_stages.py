@@ -148,6 +148,18 @@ def sensor_gains(m: Mathematics, effects: Effects) -> Tuple[Any, Any]:
     return tension, position
 
 
+def sensor_offsets(m: Mathematics, effects: Effects) -> Tuple[Any, Vector]:
+    """Sensor offsets of measured tension, in N, and of measured position, in m; they add to what the gains give."""
+    tension: Any = 0.0
+    position: Vector = (0.0, 0.0, 0.0)
+    for active in effects:
+        if active.effect.offset is not None:
+            first, second = active.effect.offset(m, active.values)
+            tension = tension + first
+            position = add(position, second)
+    return tension, position
+
+
 def sensor_delays(m: Mathematics, effects: Effects) -> Tuple[Any, Any]:
     """Sensor delays of measured tension and measured position, in s."""
     tension: Any = 0.0

@@ -14,8 +14,9 @@ from ..errors import RecordingError
 from ..fmus.fmu_slots import notes_on_unstated_units
 from ..fmus.packaging import RobotFmus, build_fmus
 from ..recordings.recording import Recording, read_recording
-from ..recordings.start_position import start_position, with_start
+from ..recordings.start_position import start_position
 from ..recordings.white_noise_estimate import white_noise_deviation
+from ..robot.measured_start import with_measured_start, with_true_start
 from ..robot.schema import Robot
 from . import (
     ComponentError,
@@ -96,7 +97,8 @@ def simulate_recording(
         notes = (*notes, f"{path}: winch speeds are taken as commands of the winches")
     notes = (*notes, *notes_on_unstated_units(robot.fmus, robot.cable_count))
     with TemporaryDirectory(prefix="tautwire-simulate-") as folder:
-        fmus = build_fmus(with_start(robot, start), Path(folder), partial(progress, "building"))
+        robot_at_start = with_true_start(with_measured_start(robot, start))
+        fmus = build_fmus(robot_at_start, Path(folder), partial(progress, "building"))
         statistics, run_notes = _run_with_error_estimate(fmus, inputs, recorder, options, progress)
     return statistics, (*notes, *run_notes, *statistics.warnings())
 

@@ -13,7 +13,11 @@ from ..robot.symbolic_model import FORMULA_INDEX, FreeParameter
 # All exit points moved alike are the platform's start and its sensor moved, the other way.
 SINGLE_CABLE_EFFECTS = (ANCHOR,)
 # Forms of the platform's position sensors, whichever cables are named.
-PLATFORM_SENSOR_FORMS = (("position_gain",), ("position_delay",))
+PLATFORM_SENSOR_FORMS = (
+    ("position_gain",),
+    ("position_delay",),
+    ("position_offset_x", "position_offset_y", "position_offset_z"),
+)
 
 
 @dataclass(frozen=True)

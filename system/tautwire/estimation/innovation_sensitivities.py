@@ -32,7 +32,7 @@ from ..recordings.recording import Recording
 from ..robot.schema import PER_CABLE_COMPONENTS, Robot
 from ..robot.symbolic_model import FreeParameter, symbolic_model
 from ..robot.uncertain_parameters import uncertain_parameters
-from .hypotheses import Hypothesis
+from .hypotheses import PLATFORM_SENSOR_FORMS, Hypothesis
 from .likelihood import Likelihood
 from .measurement_model import delayed_outputs
 from .native_functions import CompiledFunction, by_sample
@@ -165,7 +165,9 @@ class EffectSensitivities:
             setting = Hypothesis(effect, group).neutral(robot, group)
             extended_robot = extended_robot.with_effect(setting)
             index = next(i for i, s in enumerate(extended_robot.effects) if (s.name, s.cables) == (effect.name, group))
-            names = list(dict.fromkeys(name for form in forms for name in form if name not in trials[0]))
+            # What all cables share of a sensor effect is the platform's: the first one stands for it.
+            moving = (form for form in forms if group == cable_groups[0] or form not in PLATFORM_SENSOR_FORMS)
+            names = list(dict.fromkeys(name for form in moving for name in form if name not in trials[0]))
             free += [FreeParameter(index, name) for name in names]
             nominal += [(group, name, float(setting.values[name])) for name in names]
             fixed += [FreeParameter(index, name) for name in trials[0]]

@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 from tautwire_fmu.laws.effects import BY_NAME, Parameter
 
 from ..errors import TautwireError, UnreachableError
-from ..recordings.start_position import with_start
+from ..robot.measured_start import with_measured_start
 from ..robot.schema import Robot
 from ..robot.symbolic_model import FORMULA_INDEX, FreeParameter
 from .disturbance import NEUTRAL, Disturbance
@@ -121,7 +121,7 @@ class Fitter:
             return Fit.without_parameters(robot)
         scale = parameter_scales(robot, free)
         lower, upper = (bounds / scale for bounds in parameter_bounds(robot, free))
-        likelihood = self._compiled_likelihood(with_start(robot, data.start), free, data)
+        likelihood = self._compiled_likelihood(robot, free, data)
         scaled_start = scaled = np.array([value_of(robot, f) for f in free]) / scale
         for noise_density, stage_tolerance in stages:
             residual = _Residual(likelihood, data, scale, noise_density, self.poll_interrupts)
@@ -158,7 +158,7 @@ class Fitter:
 
     def innovations(self, robot: Robot, data: DataSet) -> Innovations:
         """Innovations of all samples of a recording under a robot as it is."""
-        return self._compiled_likelihood(with_start(robot, data.start), (), data).innovations(data.recording, ())
+        return self._compiled_likelihood(robot, (), data).innovations(data.recording, ())
 
     def judged(self, robot: Robot, chosen: Collection[Hypothesis], data: DataSet) -> Innovations:
         """As :meth:`innovations`, with the likelihood that was compiled for fitting the chosen hypotheses."""
@@ -173,17 +173,16 @@ class Fitter:
         """The likelihood compiled for fitting the chosen hypotheses, and the robot's values of their parameters."""
         free = free_parameters(robot, chosen)
         values = [value_of(robot, f) for f in free]
-        return self._compiled_likelihood(with_start(robot, data.start), free, data), values
+        return self._compiled_likelihood(robot, free, data), values
 
     def open_loop_variances(self, robot: Robot, data: DataSet) -> Array:
         """See :meth:`tautwire.estimation.likelihood.Likelihood.open_loop_variances`."""
-        return self._compiled_likelihood(with_start(robot, data.start), (), data).open_loop_variances(
-            data.recording, ()
-        )
+        return self._compiled_likelihood(robot, (), data).open_loop_variances(data.recording, ())
 
     def _compiled_likelihood(self, robot: Robot, free: Sequence[FreeParameter], data: DataSet) -> Likelihood:
         self.poll_interrupts()
         interval = float(np.median(np.diff(data.recording.time)))
+        robot = with_measured_start(robot, data.start)
         structure = with_values(robot, free, dict.fromkeys(free, 0.0))
         key = (structure, tuple(free), round(interval, 9))
         if key not in self._compiled:

@@ -19,7 +19,7 @@ from numpy.typing import NDArray
 
 from tautwire_fmu.laws.effects import Effect
 
-from ..recordings.start_position import with_start
+from ..robot.measured_start import with_measured_start
 from ..robot.schema import Robot
 from .estimation_data import DataSet
 from .hypotheses import PLATFORM_SENSOR_FORMS, Hypothesis, free_parameters
@@ -111,7 +111,8 @@ def score_statistics(
     free = free_parameters(robot, accepted)
     settings = [robot.effects[f.effect_index] for f in free]
     columns = [SensitivityColumn(s.name, s.cables, f.name, 0) for s, f in zip(settings, free, strict=True)]
-    sensitivities = list(_effect_sensitivities(with_start(robot, data.start), hypotheses, likelihood.model.state_names))
+    robot_at_start = with_measured_start(robot, data.start)
+    sensitivities = list(_effect_sensitivities(robot_at_start, hypotheses, likelihood.model.state_names))
     columns += [column for direction in sensitivities for column in direction.columns]
     nominal_values = np.concatenate([np.array(values), *(direction.values for direction in sensitivities)])
     fisher_information, score = np.zeros((len(nominal_values), len(nominal_values))), np.zeros(len(nominal_values))

@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 
 from ..recordings.recording import Recording
 from ..recordings.start_position import with_start
+from ..robot.measured_start import with_measured_start, with_true_start
 from ..robot.schema import InitialState, Robot
 from ..robot.static_equilibrium import static_tensions
 from ..robot.symbolic_model import SymbolicModel
@@ -135,7 +136,7 @@ def is_initial_state_uncertain(noise: Noise) -> bool:
 
 def with_initial_state(fitter: Fitter, robot: Robot, sample: DataSet) -> Robot:
     """The robot with the smoothed initial state of a recording; at rest where the recording starts at rest."""
-    robot_at_start = with_start(robot, sample.start)
+    robot_at_start = with_true_start(with_measured_start(robot, sample.start))
     if not is_initial_state_uncertain(fitter.noise):
         return robot_at_start
     likelihood, values = fitter.likelihood(robot, (), sample)

@@ -18,7 +18,7 @@ from tautwire_fmu.laws.effects import BY_NAME
 from tautwire_fmu.laws.winch_drive import NO_LIMIT
 
 from ..process_signals import defer_interrupts
-from ..robot.active_effects import formula_texts, has_sensor_effects, platform_settings
+from ..robot.active_effects import formula_texts, has_sensor_effects, platform_fmu_settings
 from ..robot.robot_assembly import assemble_robot
 from ..robot.schema import EffectSetting, Robot, validate_robot
 from ..robot.static_equilibrium import static_forces, static_tensions
@@ -178,7 +178,7 @@ def platform_resource(robot: Robot) -> dict[str, Any]:
         "start": list(robot.platform.start),
         "start_velocity": list(assemble_robot(robot).velocity),
         "start_forces": forces.tolist(),
-        "effects": [_effect_resource(s) for s in platform_settings(robot)],
+        "effects": [_effect_resource(s) for s in platform_fmu_settings(robot)],
         "formulas": formula_texts(robot.formulas_on()),
     }
 

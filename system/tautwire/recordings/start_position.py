@@ -8,6 +8,7 @@ from math import hypot
 import numpy as np
 
 from ..errors import UnreachableError
+from ..robot.measured_start import shown_position
 from ..robot.schema import AXES, Robot
 from ..robot.static_equilibrium import static_tensions
 from .consistency import CONSISTENCY_HINT, describe_start, require_matching_reeling, require_start_within_robot
@@ -23,31 +24,38 @@ def start_position(
 ) -> tuple[tuple[float, float, float], tuple[str, ...]]:
     """The start position of a recording, and a note if it differs significantly from the robot file's start.
 
+    It is the robot file's, or one as the position sensor shows it, with the sensor's errors; an axis without positions
+    starts as declared.
+
     Raises RecordingError where the recording cannot be this robot's, UnreachableError where the cables cannot hold the
     platform there; both name the recording.
     """
-    declared = np.array(robot.platform.start)
+    expected = np.array(shown_position(robot, robot.platform.start), dtype=float)
     offset, uncertainty = np.zeros(3), np.full(3, np.inf)
     for axis, column in enumerate(recording.position[:START_ROWS].T):
         valid_samples = column[np.isfinite(column)][:MAX_START_SAMPLES]
         if len(valid_samples):
-            offset[axis] = float(np.mean(valid_samples)) - declared[axis]
+            offset[axis] = float(np.mean(valid_samples)) - expected[axis]
             uncertainty[axis] = hypot(
                 position_noise / len(valid_samples) ** 0.5, robot.sensors.position_offset_uncertainty
             )
     if np.all(np.abs(offset) <= START_SIGNIFICANCE * uncertainty):
         return robot.platform.start, ()
-    x, y, z = (declared + offset).tolist()
+    start = np.where(np.isfinite(uncertainty), expected + offset, robot.platform.start)
+    x, y, z = start.tolist()
     where = f"{recording.path}: first positions"
-    require_start_within_robot(robot, declared + offset, where)
+    require_start_within_robot(robot, start, where)
     try:
         static_tensions(with_start(robot, (x, y, z)))
     except UnreachableError as error:
-        reason = f"it is {describe_start(robot, declared + offset)}; {error.reason}"
+        reason = f"it is {describe_start(robot, start)}; {error.reason}"
         raise UnreachableError(where, error.position, error.cable, error.tension, reason, CONSISTENCY_HINT) from error
-    require_matching_reeling(robot, recording, declared + offset, where)
+    require_matching_reeling(robot, recording, start, where)
     coordinates = ", ".join(f"{axis} {value:.6g}" for axis, value in zip(AXES, (x, y, z), strict=True))
-    note = f"{recording.path} starts at {coordinates} m, not at the robot file's start; the run starts there too"
+    note = (
+        f"{recording.path} starts at {coordinates} m, not at the robot file's start; the run starts there too, unless "
+        "the zero of the position sensor is wrong"
+    )
     return (x, y, z), (note,)
 
 

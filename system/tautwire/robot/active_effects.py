@@ -4,8 +4,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from tautwire_fmu.laws import effect_stages as stages
 from tautwire_fmu.laws.effects import BY_NAME, ActiveEffect
 from tautwire_fmu.laws.formula import formula_effect
+from tautwire_fmu.laws.mathematics import REAL
 
 from .schema import EffectSetting, Formula, Robot
 
@@ -29,6 +31,21 @@ def platform_effects(robot: Robot) -> tuple[ActiveEffect, ...]:
 def platform_settings(robot: Robot) -> tuple[EffectSetting, ...]:
     """The effect settings that act on the platform or on its position sensor."""
     return tuple(s for s in robot.effects if not s.cables or BY_NAME[s.name].component == "sensor")
+
+
+def platform_fmu_settings(robot: Robot) -> tuple[EffectSetting, ...]:
+    """Those of :func:`platform_settings`, each effect once: load cells may have several of one, positions have not."""
+    settings = platform_settings(robot)
+    acting = [s for s in settings if not s.cables or _shifts_position(s)]
+    idle = {s.name: s for s in reversed(settings) if s.name not in [each.name for each in acting]}
+    return tuple(s for s in settings if s in acting or s is idle.get(s.name))
+
+
+def _shifts_position(setting: EffectSetting) -> bool:
+    """Whether a sensor effect changes the measured position, and not load cells alone."""
+    effects = (active_effect(setting),)
+    stage_results = (f(REAL, effects)[1] for f in (stages.sensor_gains, stages.sensor_offsets, stages.sensor_delays))
+    return tuple(stage_results) != (1.0, (0.0, 0.0, 0.0), 0.0)
 
 
 def has_sensor_effects(robot: Robot) -> bool:

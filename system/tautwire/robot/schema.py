@@ -177,7 +177,8 @@ class Robot:
     """A cable-driven parallel robot as declared; ``gravity`` in m/s^2.
 
     Without a ``winch`` the rope runs at the commanded speed. Settings of one effect are adjacent in ``effects``, as
-    in a file; otherwise their order is kept. An ``initial_state`` belongs to a run, no file has one.
+    in a file; otherwise their order is kept. An ``initial_state`` belongs to a run, no file has one; nor a start
+    that ``start_is_measured``, by axis, which is as the position sensor shows it.
     """
 
     name: str
@@ -191,6 +192,7 @@ class Robot:
     fmus: tuple[UserFmu, ...] = ()
     formulas: tuple[Formula, ...] = ()
     initial_state: InitialState | None = None
+    start_is_measured: tuple[bool, bool, bool] = (False, False, False)
 
     def __post_init__(self) -> None:
         names = list(dict.fromkeys(setting.name for setting in self.effects))

@@ -20,6 +20,7 @@ from tautwire_fmu.laws.formula import FORMULA_EFFECT_NAME as FORMULA_NAME
 from tautwire_fmu.laws.mathematics import Mathematics
 from tautwire_fmu.laws.vectors import add, scale
 
+from .measured_start import with_true_start
 from .robot_assembly import RobotAssembly, assemble_robot
 from .schema import AXES, EffectSetting, Robot
 from .symbolic_statics import symbolic_start_tensions
@@ -142,9 +143,9 @@ def symbolic_model(
     symbolic_robot = _with_symbols(
         perturbed_robot(robot, uncertain_parameters, perturbations), free_parameters, symbols
     )
-    assembly = assemble_robot(
-        symbolic_robot, symbolic_start_tensions(robot, symbolic_robot, CASADI_MATHEMATICS), CASADI_MATHEMATICS
-    )
+    symbolic_robot = with_true_start(symbolic_robot, CASADI_MATHEMATICS)
+    start_tensions = symbolic_start_tensions(with_true_start(robot), symbolic_robot, CASADI_MATHEMATICS)
+    assembly = assemble_robot(symbolic_robot, start_tensions, CASADI_MATHEMATICS)
     count = len(assembly.cables)
     variables = _Variables(
         position=SX.sym("position", 3),
@@ -195,7 +196,8 @@ def _shown(outputs: SX, errors: SensorErrors) -> SX:
 
 def _initial_state(assembly: RobotAssembly, effect_state_count: int) -> SX:
     lengths = [SX(component.constants.start_length) for component in assembly.cables]
-    return casadi.vertcat(SX(list(assembly.start)), SX(list(assembly.velocity)), *lengths, SX(effect_state_count, 1))
+    start = casadi.vertcat(*map(SX, assembly.start))
+    return casadi.vertcat(start, SX(list(assembly.velocity)), *lengths, SX(effect_state_count, 1))
 
 
 def _length_shifts(assembly: RobotAssembly, constants: Sequence[SX]) -> SX:
@@ -328,6 +330,7 @@ def _equations(assembly: RobotAssembly, variables: _Variables, effect_states: li
     force = add(force, platform_law.wrench(CASADI_MATHEMATICS, effects, platform_states, position, velocity))
     acceleration = platform_law.acceleration(CASADI_MATHEMATICS, assembly.platform, effects, platform_states, force)
     measured = scale(stages.sensor_gains(CASADI_MATHEMATICS, effects)[1], position)
+    measured = add(measured, stages.sensor_offsets(CASADI_MATHEMATICS, effects)[1])
     return _Equations(
         rates=casadi.vertcat(variables.velocity, *acceleration, *cable_rates, *effect_rates),
         outputs=casadi.vertcat(

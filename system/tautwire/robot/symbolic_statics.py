@@ -39,7 +39,7 @@ def symbolic_start_tensions(nominal: Robot, symbolic_robot: Robot, mathematics: 
     at_limit = np.zeros(len(tensions), dtype=bool)
     if len(tensions) > 3:
         at_limit = (tensions - limits.minimum < limit_distance) | (limits.maximum - tensions < limit_distance)
-    start = nominal.platform.start
+    start = symbolic_robot.platform.start
     routes = cable_routes(mathematics, symbolic_robot, start)
     basis = SX(_wrench_basis(unit_directions(nominal))).T
     directions_in_basis = casadi.mtimes(basis, casadi.horzcat(*(casadi.vertcat(*route.direction) for route in routes)))

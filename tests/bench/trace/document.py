@@ -63,8 +63,9 @@ def _how() -> str:
         "says.\n\n"
         "How strong an effect is, is chosen by how well it shows, from the rig alone: the mean log-likelihood ratio, "
         "in nats, that separates the truth from the best model without the effect, where the change is linear, a "
-        "constant of each output and another modulus or damping of all cables are free, and noise of the winch "
-        "speeds lets ropes drift (`tests/bench/trace/visible.py`). No method could have more. Sizes: "
+        "constant of each output (but for a sensor that is off zero) and another modulus or damping of all cables are "
+        "free, and noise of the winch speeds lets ropes drift (`tests/bench/trace/visible.py`). No method could have "
+        "more. Sizes: "
         f"{sizes}; less where the largest plausible strength shows less. The strengths stand in "
         "`tests/bench/trace/sizes.json`; `python -m tests.bench.trace.sizes` makes it."
     )

@@ -92,6 +92,9 @@ LISTED = (
     Form("sensor_delay-position", "sensor_delay", lambda s, r: {"seconds": s, "outputs": "position"}, 1e-3, 0.3),
     Form("sensor_gain", "sensor_gain", lambda s, r: {"gain": 1 + s, "cables": [3]}, 1e-3, 0.5),
     Form("sensor_gain-position", "sensor_gain", lambda s, r: {"gain": 1 + s, "outputs": "position"}, 1e-4, 0.2),
+    Form("sensor_offset", "sensor_offset", lambda s, r: {"force": s, "cables": [2]}, 1.0, 300.0),
+    Form("sensor_offset-all", "sensor_offset", lambda s, r: {"force": s}, 1.0, 300.0),
+    Form("sensor_offset-position", "sensor_offset", lambda s, r: {"place": [0.5 * s, -0.4 * s, 0.77 * s]}, 1e-3, 0.1),
 )
 
 UNLISTED = (

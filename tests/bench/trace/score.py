@@ -109,7 +109,8 @@ def _places(case: Case) -> dict[str, frozenset[int]]:
 def _places_of(effects: Mapping[str, Any], count: int) -> dict[str, frozenset[int]]:
     results = {}
     for name, values in effects.items():
-        anywhere = values.get("outputs") == "position" or BY_NAME[name].component == "platform"
+        of_position = values.get("outputs") == "position" or "place" in values
+        anywhere = of_position or BY_NAME[name].component == "platform"
         results[name] = frozenset() if anywhere else frozenset(values.get("cables", range(1, count + 1)))
     return results
 
@@ -126,7 +127,7 @@ def _named_places(line: Line) -> dict[str, frozenset[int]]:
 def _of_position(parameters: Mapping[str, tuple[float, float, float]]) -> bool:
     """Whether only what is fitted of the measured position counts."""
     fitted = {name for name, (_, low, high) in parameters.items() if high > low}
-    return bool(fitted) and fitted <= {"position_gain", "position_delay"}
+    return bool(fitted) and all(name.startswith("position_") for name in fitted)
 
 
 def held(answers: Iterable[Scored]) -> tuple[Held, ...]:

@@ -1,7 +1,8 @@
 """How strong each hidden effect is, by how well it shows: ``python -m tests.bench.trace.sizes [CASE...]`` finds it.
 
 The rig alone tells it, by what an effect changes in the outputs of the FIT program without noise. What may hide it are
-noise of sensors and winch speeds, a constant of each output, and another modulus or damping of all cables.
+noise of sensors and winch speeds, a constant of each output (but not of a sensor's offset), and another modulus or
+damping of all cables.
 """
 
 from __future__ import annotations
@@ -30,6 +31,8 @@ TRIES = 12
 LARGEST_STEP = 30.0
 EXPONENTS = (0.5, 12.0)
 NUISANCES = {"modulus": 1e-4, "damping": 1e-2}
+# Forms that are a constant themselves: beside them no other one is free.
+CONSTANT = "sensor_offset"
 
 
 @dataclass(frozen=True)
@@ -58,7 +61,8 @@ class Stage:
             change = self._outputs({form.name: form.settings(strength, self.robot)}) - self.plain
         except (ValueError, RuntimeError):
             return 0.0
-        return self._hidden_by(tuple(name for name in NUISANCES if name != form.name)).nats(change / self.sigma)
+        names = tuple(name for name in (*NUISANCES, CONSTANT) if name != form.name)
+        return self._hidden_by(names).nats(change / self.sigma)
 
     def _outputs(self, effects: dict[str, Settings]) -> np.ndarray:
         """Tensions and positions, (samples, cables + 3)."""
@@ -81,8 +85,8 @@ class Stage:
                 self.plain[:, self.robot.count :],
                 self.plain[:, : self.robot.count],
             )
-            free = [self._slopes[name] for name in names]
-            self._hiding[names] = hiding(drift / self.sigma[:, None], free)
+            free = [self._slopes[name] for name in names if name != CONSTANT]
+            self._hiding[names] = hiding(drift / self.sigma[:, None], free, CONSTANT in names)
         return self._hiding[names]
 
     @cached_property

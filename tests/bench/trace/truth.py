@@ -36,6 +36,8 @@ def law_values(name: str, rig: Mapping[str, Any]) -> dict[str, float]:
         values["coefficient_at_cell"] = values.pop("coefficient")
     if name == "drag" and "wind" in values:
         values |= {f"wind_{axis}": speed for axis, speed in zip("xyz", values.pop("wind"), strict=True)}
+    if name == "sensor_offset":
+        return _offsets(values)
     if name in ("sensor_gain", "sensor_delay"):
         new = NEW_NAMES[name, values.pop("outputs", "tension")]
         values = {new[key]: value for key, value in values.items()}
@@ -64,6 +66,12 @@ def holds(name: str, parameter: str, truth: float, estimate: Interval) -> bool:
     if (name, parameter) == ("drum", "phase"):
         truth += 2.0 * pi * round((estimate.value - truth) / (2.0 * pi))
     return estimate.low <= truth <= estimate.high
+
+
+def _offsets(values: Mapping[str, Any]) -> dict[str, float]:
+    if "force" in values:
+        return {"tension_offset": float(values["force"])}
+    return {f"position_offset_{axis}": float(part) for axis, part in zip("xyz", values["place"], strict=True)}
 
 
 def _branches(values: Mapping[str, Any]) -> dict[str, float]:

@@ -38,10 +38,10 @@ class Hiding:
         return max(0.0, 0.5 * float(flat @ flat - seen @ cho_solve(self.factor, seen)))
 
 
-def hiding(drift: np.ndarray, free: Iterable[np.ndarray]) -> Hiding:
+def hiding(drift: np.ndarray, free: Iterable[np.ndarray], constant: bool = True) -> Hiding:
     """Drift columns as they are, free ones (samples, outputs) of any size, and a free constant of each output."""
     samples, outputs = drift.shape[:2]
-    constants = [np.tile(row, (samples, 1)) for row in np.eye(outputs)]
+    constants = [np.tile(row, (samples, 1)) for row in np.eye(outputs)] if constant else []
     loose = [FREE * column.ravel() / np.linalg.norm(column) for column in (*constants, *free)]
     columns = np.column_stack([drift.reshape(samples * outputs, -1), *loose])
     return Hiding(columns, cho_factor(np.eye(columns.shape[1]) + columns.T @ columns))

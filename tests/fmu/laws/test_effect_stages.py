@@ -90,9 +90,14 @@ def test_straight_under_the_exit_point_the_pulley_hangs_no_way_at_all() -> None:
     assert none == stages.route(REAL, (), ANCHOR, below)
 
 
-def test_gains_multiply_and_delays_add() -> None:
+def test_gains_multiply_and_offsets_and_delays_add() -> None:
     twice = (active("sensor_gain", tension_gain=1.5), active("sensor_gain", tension_gain=2.0, position_gain=0.5))
     assert stages.sensor_gains(REAL, twice) == (3.0, 0.5)
+    low = (
+        active("sensor_offset", tension_offset=-3.0, position_offset_y=0.5),
+        active("sensor_offset", tension_offset=1.0),
+    )
+    assert stages.sensor_offsets(REAL, low) == (-2.0, (0.0, 0.5, 0.0))
     late = (active("sensor_delay", tension_delay=0.1), active("sensor_delay", tension_delay=0.2, position_delay=0.4))
     assert stages.sensor_delays(REAL, late) == pytest.approx((0.3, 0.4))
 

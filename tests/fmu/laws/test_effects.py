@@ -62,6 +62,7 @@ def shown(effects: tuple[ActiveEffect, ...], inner: float = 0.0) -> tuple[Any, .
         state_rates(REAL, CABLE, effects, state, moving)[:2],
         acceleration(REAL, PLATFORM, effects, none, force),
         stages.sensor_gains(REAL, effects),
+        stages.sensor_offsets(REAL, effects),
         stages.sensor_delays(REAL, effects),
     )
 

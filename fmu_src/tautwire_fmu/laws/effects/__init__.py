@@ -18,6 +18,7 @@ from .relaxation import RELAXATION
 from .sag import SAG
 from .sensor_delay import SENSOR_DELAY
 from .sensor_gain import SENSOR_GAIN
+from .sensor_offset import SENSOR_OFFSET
 from .slack import SLACK
 from .thermal import THERMAL
 
@@ -38,6 +39,7 @@ ALL: Tuple[Effect, ...] = (
     SLACK,
     SENSOR_DELAY,
     SENSOR_GAIN,
+    SENSOR_OFFSET,
 )
 
 # Effects outside the list: a trace that selects one has discovered it.

@@ -66,6 +66,7 @@ class Effect(NamedTuple):
     ``inertia``          ``states``                                     kg, added on the platform
     ``wrench``           ``states, position, velocity``                 N, vector on the platform
     ``gain``                                                            factors of measured tension and position
+    ``offset``                                                          N and m, added to these: a number, a vector
     ``delay``                                                           s, of measured tension and position
     ==================== ============================================== ==============================================
 
@@ -98,6 +99,7 @@ class Effect(NamedTuple):
     inertia: Optional[Callable[..., Any]] = None
     wrench: Optional[Callable[..., Any]] = None
     gain: Optional[Callable[..., Any]] = None
+    offset: Optional[Callable[..., Any]] = None
     delay: Optional[Callable[..., Any]] = None
 
     @property

@@ -1,0 +1,46 @@
+"""The start of a run as the position sensor shows it, and the true one: they differ by the sensor's gain and offset."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from tautwire_fmu.laws import effect_stages as stages
+from tautwire_fmu.laws.mathematics import REAL, Mathematics
+from tautwire_fmu.laws.vectors import Vector, add, scale
+
+from .active_effects import platform_effects
+from .schema import Point, Robot
+
+
+def shown_position(robot: Robot, position: Vector, mathematics: Mathematics = REAL) -> Vector:
+    """A position ``p`` in m as the position sensor shows it, ``k p + o`` with its gain and offset.
+
+    ``mathematics`` are the functions for the effects' parameters.
+    """
+    effects = platform_effects(robot)
+    _, gain = stages.sensor_gains(mathematics, effects)
+    _, offset = stages.sensor_offsets(mathematics, effects)
+    return add(scale(gain, position), offset)
+
+
+def with_measured_start(robot: Robot, start: Point) -> Robot:
+    """The robot at the start of a recording, in m: by axis as declared, or another one, as the sensor shows it."""
+    if start == robot.platform.start:
+        return robot
+    x, y, z = (measured != declared for measured, declared in zip(start, robot.platform.start, strict=True))
+    return replace(robot, platform=replace(robot.platform, start=start), start_is_measured=(x, y, z))
+
+
+def with_true_start(robot: Robot, mathematics: Mathematics = REAL) -> Robot:
+    """The robot at its true start, ``(y - o) / k`` along each axis on which the start is a measured one, ``y``."""
+    if not any(robot.start_is_measured):
+        return robot
+    effects = platform_effects(robot)
+    _, gain = stages.sensor_gains(mathematics, effects)
+    _, offsets = stages.sensor_offsets(mathematics, effects)
+    x, y, z = (
+        (coordinate - offset) / gain if is_measured else coordinate
+        for coordinate, offset, is_measured in zip(robot.platform.start, offsets, robot.start_is_measured, strict=True)
+    )
+    true_platform = replace(robot.platform, start=(x, y, z))
+    return replace(robot, platform=true_platform, start_is_measured=(False, False, False))
