@@ -20,6 +20,7 @@ from .cosimulation_validation import (
     start_cosimulations,
     validate_by_cosimulation,
 )
+from .declared_start import with_declared_start
 from .discovery.unexplained_residual import explain_residual
 from .effect_estimates import effects_by_size, estimated_effects, parameter_correlations
 from .explained_shares import ExplainedShares, explained_shares, remaining_error, sensor_noise_floor
@@ -109,6 +110,17 @@ def try_confusable_models(state: Identification) -> Identification:
     return replace(state, selection=replace_by_confusable_models(state.context, state.selection))
 
 
+def try_declared_start(state: Identification) -> Identification:
+    """Replace the selection by a sensor offset that explains as much of recordings that seem to start elsewhere."""
+    context, selection = with_declared_start(state.context, state.selection)
+    if selection is state.selection:
+        return state
+    split = context.split
+    data_sets = (split.estimation, split.validation)[: len(state.prepared.data_sets)]
+    prepared = replace(state.prepared, split=split, data_sets=data_sets)
+    return replace(state, context=context, prepared=prepared, selection=selection)
+
+
 def cosimulate_before(state: Identification) -> Identification:
     """Compare the declared robot's co-simulations with the recordings."""
     context = state.context
@@ -181,6 +193,7 @@ STAGES: tuple[Callable[[Identification], Identification], ...] = (
     start_side_runs,
     select,
     try_confusable_models,
+    try_declared_start,
     cosimulate_before,
     confirm_effects,
     explain_by_formula,
