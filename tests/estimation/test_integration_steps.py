@@ -62,3 +62,12 @@ def test_modes_have_those_of_an_effect() -> None:
     relaxing = robot.with_effect(same("relaxation", modulus=1e9, time=0.001).setting(robot))
     assert np.abs(eigenvalues_at_start(robot)).max() < 100.0
     assert np.abs(eigenvalues_at_start(relaxing)).max() == pytest.approx(1000.0, rel=0.05)
+
+
+def test_an_effect_far_stiffer_than_its_rope_asks_for_no_more_than_three_times_the_steps() -> None:
+    robot = example("three")
+    stiff = robot.with_effect(same("hysteresis", force=1e5, yield_strain=1e-7).setting(robot))
+    plain, capped = (substeps_of_robot(each, 0.02, 9, has_effect_states=False) for each in (robot, stiff))
+    uncapped = substeps_of_eigenvalues(eigenvalues_at_start(stiff) * 0.02)
+    assert plain.state < capped.state <= 3 * plain.state + 40
+    assert uncapped.state > 3 * capped.state
