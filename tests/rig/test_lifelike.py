@@ -45,7 +45,7 @@ def lot_of(seed: int, **others: Any) -> Lot:
 
 @pytest.fixture(scope="module")
 def short() -> Case:
-    return lifelike(3, ["friction-linear"], cables=3, planar=False, duration=16.0, rate=50.0)
+    return lifelike(3, ["friction-linear"], cables=3, planar=False, duration=6.0, rate=50.0)
 
 
 def test_a_process_has_its_deviation_and_its_memory() -> None:
@@ -211,7 +211,7 @@ def test_the_hidden_thing_shows_clearly_beside_the_little_ones(short: Case) -> N
 
 
 def test_the_truth_is_what_the_recordings_differ_by(short: Case) -> None:
-    empty = lifelike(3, cables=3, planar=False, duration=16.0, rate=50.0)
+    empty = lifelike(3, cables=3, planar=False, duration=6.0, rate=50.0)
     assert "friction" not in empty.truth["minor"]
     for role in ("fit", "check"):
         apart = short.recordings[role] - empty.recordings[role]

@@ -108,7 +108,7 @@ def _case(
     seeds = {role: int(random.integers(2**31)) for role in ROLES}
     cable, signs = int(random.integers(made.robot.count)) + 1, tuple(random.choice([-1.0, 1.0], len(parts)).tolist())
     hiding = _Hiding(parts, tuple(part.least for part in parts), lot, cable, signs)
-    hiding = _sized(random, hiding, Session(lot, seeds["fit"], SIZING, rate))
+    hiding = _sized(random, hiding, Session(lot, seeds["fit"], min(SIZING, duration), rate))
     recordings, sizes, littles = {}, {}, {}
     for role in ROLES:
         session = Session(lot, seeds[role], duration, rate)
