@@ -38,6 +38,7 @@ SLOWEST_FIRST = (
     "isolation",
     "readme",
     "formula_discovery",
+    "time_limit",
     "clock_offsets",
     "lqg",
     "fmi3",

@@ -63,16 +63,12 @@ def test_beside_a_disturbance_a_further_effect_needs_a_share_of_the_first_ones_e
         extended = Fit.without_parameters(robot.with_effect(hypothesis.setting(robot)))
         return [CandidateScore(hypothesis, extended, evidence, 1.0)], True
 
-    accepted: list[Hypothesis] = []
     monkeypatch.setattr(stepwise_selection, "score_candidates", scored)
     monkeypatch.setattr(stepwise_selection, "_search_round", lambda *_: None)
     monkeypatch.setattr(stepwise_selection, "fit_model", lambda *_, **__: fit)
     monkeypatch.setattr(stepwise_selection, "with_disturbance_beside", lambda context, chosen, fit: (context, fit))
-    monkeypatch.setattr(
-        stepwise_selection._BackwardElimination, "run", lambda self: accepted.extend(self.accepted) or None
-    )
-    select_effects(context)
-    assert [hypothesis.effect.name for hypothesis in accepted] == names
+    monkeypatch.setattr(stepwise_selection._StepwiseSelection, "eliminate", lambda self: None)
+    assert [hypothesis.effect.name for hypothesis in select_effects(context).accepted] == names
 
 
 @pytest.mark.parametrize(("evidence", "expected"), [(5.0, 5.0), (50.0, 10.0), (5000.0, 5000.0)])

@@ -148,6 +148,7 @@ def trace(
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Output folder of the report.")],
     check: Annotated[Path | None, typer.Option(metavar="CHECK.csv", help="A recording for validation.")] = None,
     alpha: Annotated[float, typer.Option(help="False-alarm rate.")] = 0.01,
+    time_limit: Annotated[float, typer.Option(metavar="SECONDS", help="Time for the best answer.", min=1.0)] = 600.0,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -165,11 +166,13 @@ def trace(
     from ..estimation import processors
     from ..estimation import trace as traced
     from ..estimation.identification import validated_false_alarm_rate
+    from ..estimation.time_limit import TimeLimit
     from ..materials.material_table import is_material_table
     from ..recordings.recording import read_recording
     from ..reports import write_report
 
     validated_false_alarm_rate("--alpha", alpha)
+    limit = TimeLimit(time_limit)
     output = CommandOutput(as_json, quiet)
     if is_material_table(fit):
         if check is not None:
@@ -187,7 +190,7 @@ def trace(
         exit_on_overdue_interrupt(lambda: _end_interrupted(temporary, scratch)),
         progress_bar(output) as progress,
     ):
-        trace_result = traced(robot, recording, check_recording, progress, alpha, processors())
+        trace_result = traced(robot, recording, check_recording, progress, alpha, processors(), limit)
         progress("writing the report", 0.0)
         write_report(trace_result, scratch)
     note_unused_tables(robot, output)

@@ -18,6 +18,7 @@ from .estimation_data import DataSet
 from .hypotheses import Hypothesis
 from .identification_context import IdentificationContext
 from .parameter_fit import Fit, Fitter, NoFitError
+from .time_limit import OutOfTimeError
 
 
 @dataclass(frozen=True)
@@ -55,20 +56,26 @@ def fit_candidates(
     """Scores of the hypotheses of some tasks, in their order, without those that the cables cannot hold.
 
     ``baseline`` is the log-likelihood of the validation data without them. With ``stop_at_first`` only until one
-    leaves noise.
+    leaves noise. Where time is up, only those that were fitted until then.
     """
     order, scores = list(tasks), {}
+    remaining = dict.fromkeys(order)
     calls = [(context.fitter, task, data, context.split.validation) for task in tasks.values()]
-    with closing(context.workers.map_unordered(fit_and_validate, calls)) as attempts:
-        for done, (index, validated) in enumerate(attempts, start=1):
-            hypothesis = order[index]
-            context.progress(f"{label}: {hypothesis.label(context.robot)}", done / len(order))
-            if validated is None:
-                continue
-            gain = validated.log_likelihood - baseline
-            scores[hypothesis] = CandidateScore(hypothesis, validated.fit, gain, validated.mean_square)
-            if stop_at_first and leaves_noise(context, scores[hypothesis]):
-                break
+    try:
+        with closing(context.workers.map_unordered(fit_and_validate, calls)) as attempts:
+            for done, (index, validated) in enumerate(attempts, start=1):
+                hypothesis = order[index]
+                del remaining[hypothesis]
+                context.progress(f"{label}: {hypothesis.label(context.robot)}", done / len(order))
+                if validated is None:
+                    continue
+                gain = validated.log_likelihood - baseline
+                scores[hypothesis] = CandidateScore(hypothesis, validated.fit, gain, validated.mean_square)
+                if stop_at_first and leaves_noise(context, scores[hypothesis]):
+                    break
+    except OutOfTimeError:
+        names = ", ".join(hypothesis.label(context.robot) for hypothesis in remaining)
+        context.leave_untried(f"fits of {names} ({label})")
     return {hypothesis: scores[hypothesis] for hypothesis in order if hypothesis in scores}
 
 

@@ -16,20 +16,14 @@ from .parameter_fit import Fit
 from .policy import SizePolicy
 from .profile_likelihood import profile_intervals
 from .stepwise_selection import SelectionResult
+from .time_limit import OutOfTimeError
 from .trace_result import Correlation, Estimate, FittedParameter, FoundEffect
 
 
 def estimated_effects(context: IdentificationContext, selection: SelectionResult) -> tuple[FoundEffect, ...]:
     """Estimates of the accepted effects of the list, in order, on the estimation data that they were fitted to."""
     indices = _parameter_indices(selection.fit)
-    interval_ends = profile_intervals(
-        context.fitter,
-        selection.fit,
-        selection.accepted,
-        context.split.estimation,
-        context.workers,
-        context.policy.profile_likelihood,
-    )
+    interval_ends = _interval_ends(context, selection)
     effects = []
     for hypothesis, evidence in zip(selection.accepted, selection.evidence, strict=True):
         if hypothesis.effect in UNLISTED:
@@ -46,6 +40,23 @@ def estimated_effects(context: IdentificationContext, selection: SelectionResult
             FoundEffect(hypothesis.effect.name, hypothesis.effect.component, hypothesis.cables, estimates, evidence)
         )
     return tuple(effects)
+
+
+def _interval_ends(context: IdentificationContext, selection: SelectionResult) -> Sequence[tuple[float, float]]:
+    """Ends of the interval of each fitted parameter; from the curvature alone where there is no time for more."""
+    fit = selection.fit
+    try:
+        return profile_intervals(
+            context.fitter,
+            fit,
+            selection.accepted,
+            context.split.estimation,
+            context.workers,
+            context.policy.profile_likelihood,
+        )
+    except OutOfTimeError:
+        context.leave_untried("intervals by profile likelihood: those given are from the likelihood's curvature")
+        return [fit.interval(index) for index in range(len(fit.values))]
 
 
 def effects_by_size(

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
-from time import perf_counter
+from operator import attrgetter
 
+import numpy as np
 from threadpoolctl import threadpool_limits
 
 from ..errors import ArgumentError
@@ -28,14 +29,16 @@ from .identifiability import analyse_identifiability
 from .identification_context import IdentificationContext, Progress, no_progress
 from .identification_state import Identification
 from .localisation.component_localisation import localise_residual
+from .localisation.component_residuals import FaultLocalisation
 from .parameter_fit import Fitter
-from .policy import DEFAULT_POLICY
+from .policy import DEFAULT_POLICY, IdentificationPolicy, TimeLimitPolicy
 from .preprocessing import calibrated_estimation_data, prepare_data
 from .residual_analysis import largest_autocorrelations
 from .smoothed_states import calibrate, initial_state_note, with_initial_state
 from .stepwise_selection import nothing_selected, select_effects
+from .time_limit import OutOfTimeError, TimeLimit
 from .trace_result import Trace
-from .verdict import confirmed_formula, verdict_beside_disturbance, verdict_of
+from .verdict import confirmed_formula, verdict_beside_disturbance, verdict_of, verdict_of_ended_search
 from .worker_pool import WorkerPool
 
 FALSE_ALARM_RATE_RULE = NumberRule("a false-alarm rate below 1, such as 0.01", "", positive=True)
@@ -87,13 +90,19 @@ def start_side_runs(state: Identification) -> Identification:
 
 
 def select(state: Identification) -> Identification:
-    """Select effects in the recordings as they are; with clocks corrected where no effects explain those."""
+    """Select effects in the recordings as they are."""
     state = replace(state, selection=select_effects(state.context))
     if state.selection.disturbance:
         fitter = state.context.fitter.with_disturbance(state.selection.disturbance)
         state = replace(state, context=replace(state.context, fitter=fitter))
+    return state
+
+
+def select_with_clocks_corrected(state: Identification) -> Identification:
+    """Select effects in the recordings with their clocks corrected, where none explain them as recorded."""
     for prepared in state.clock_corrected:
         if not state.selection_explains:
+            state.context.time_limit.check()
             context = replace(state.context, fitter=prepared.fitter, split=prepared.split)
             state = start_side_runs(replace(state, context=context, prepared=prepared))
             state = replace(state, selection=select_effects(context))
@@ -161,7 +170,7 @@ def judge(state: Identification) -> Identification:
     verdict = verdict_of(
         state.context.robot, state.selection, state.effects_hold, state.discovery, state.is_white_before
     )
-    return replace(state, verdict=verdict)
+    return replace(state, verdict=verdict_of_ended_search(verdict, state.context.time_limit))
 
 
 def estimate_intervals(state: Identification) -> Identification:
@@ -192,6 +201,7 @@ def analyse_detectability(state: Identification) -> Identification:
 STAGES: tuple[Callable[[Identification], Identification], ...] = (
     start_side_runs,
     select,
+    select_with_clocks_corrected,
     try_confusable_models,
     try_declared_start,
     cosimulate_before,
@@ -202,6 +212,36 @@ STAGES: tuple[Callable[[Identification], Identification], ...] = (
     analyse_detectability,
 )
 
+# Stages that are searches, with what is left untried where one has no time left.
+SEARCHES: Mapping[Callable[[Identification], Identification], tuple[Callable[[TimeLimitPolicy], float], str]] = {
+    select: (attrgetter("selection"), "effects"),
+    select_with_clocks_corrected: (attrgetter("selection"), "correcting clocks that seem to be apart"),
+    try_confusable_models: (attrgetter("selection"), "models that are easily confused with the effects found"),
+    explain_by_formula: (attrgetter("discovery"), "formulas and resonances"),
+    estimate_intervals: (attrgetter("refinement"), "estimates of the parameters"),
+    analyse_detectability: (attrgetter("refinement"), "telling what the recordings could have shown"),
+}
+
+
+def policy_within(seconds: float, policy: IdentificationPolicy = DEFAULT_POLICY) -> IdentificationPolicy:
+    """The policy with as many samples as a time limit (s) allows."""
+    limits = policy.time_limit
+    count = min(policy.preprocessing.max_samples, max(limits.min_samples, int(limits.samples_per_second * seconds)))
+    return replace(policy, preprocessing=replace(policy.preprocessing, max_samples=count))
+
+
+def run_stage(stage: Callable[[Identification], Identification], state: Identification) -> Identification:
+    """Run a stage; a search that is out of time leaves the state as it is."""
+    if stage not in SEARCHES:
+        return stage(state)
+    (share_of, untried), context = SEARCHES[stage], state.context
+    try:
+        with context.time_limit.searching(share_of(context.policy.time_limit)):
+            return stage(state)
+    except OutOfTimeError:
+        context.leave_untried(untried)
+        return state
+
 
 def trace(
     robot: Robot,
@@ -210,34 +250,49 @@ def trace(
     progress: Progress | None = None,
     alpha: float = DEFAULT_POLICY.selection.false_alarm_rate,
     processes: int = 1,
+    time_limit: TimeLimit | None = None,
 ) -> Trace:
     """Identify what a robot's model lacks, and show by co-simulating its FMUs what adding it does to the error.
 
     What fits ``fit`` is judged on ``check``; without one, on the second half of ``fit``. Of recordings of more than
-    100,000 samples (200,000 of the only one) the beginning is traced, and a note says so. ``progress`` gets what is
-    being done, and the share of it that is done. ``alpha`` bounds the probability of naming an effect where there is
-    none. For more ``processes`` than one the calling program's main module has to be guarded, see
-    :class:`tautwire.estimation.worker_pool.WorkerPool`.
+    100,000 samples (200,000 of the only one) the beginning is traced, and a note says so; of fewer where ``time_limit``
+    is short. Searches end within it, by default ten minutes, and ``untried`` of the result tells what they left.
+    ``progress`` gets what is being done, and the share of it that is done. ``alpha`` bounds the probability of naming
+    an effect where there is none. For more ``processes`` than one the calling program's main module has to be guarded,
+    see :class:`tautwire.estimation.worker_pool.WorkerPool`.
 
     Raises RecordingError where a recording has no measured output, is too short or cannot be this robot's,
     UnreachableError where the cables cannot hold the platform where a recording starts, ArgumentError where an
     argument is none of these.
     """
     validate_trace_arguments(robot, fit, check, progress, alpha, processes)
-    start_time = perf_counter()
+    limit = time_limit or TimeLimit()
     # BLAS rounds differently with several threads, which the worker processes could not reproduce.
     with (
         defer_interrupts() as raise_interrupt,
         threadpool_limits(1, "blas"),
-        WorkerPool(processes, raise_interrupt) as workers,
+        WorkerPool(processes, _calling(raise_interrupt, limit.check)) as workers,
     ):
         workers.warm_up()
-        prepared, *clock_corrected = prepare_data(robot, fit, check, workers)
-        context = IdentificationContext(robot, prepared.fitter, prepared.split, alpha, progress or no_progress, workers)
+        policy = policy_within(limit.seconds)
+        prepared, *clock_corrected = prepare_data(robot, fit, check, workers, policy)
+        context = IdentificationContext(
+            robot, prepared.fitter, prepared.split, alpha, progress or no_progress, workers, policy, limit
+        )
         state = Identification(context, prepared, tuple(clock_corrected), nothing_selected(robot), robot)
         for stage in STAGES:
-            state = stage(state)
-        return _result(state, perf_counter() - start_time)
+            state = run_stage(stage, state)
+        return _result(state)
+
+
+def _calling(*functions: Callable[[], None]) -> Callable[[], None]:
+    """A function that calls some functions in turn."""
+
+    def call_all() -> None:
+        for function in functions:
+            function()
+
+    return call_all
 
 
 def _explained_beside_disturbance(state: Identification) -> Identification:
@@ -266,6 +321,7 @@ def _judged_beside_disturbance(state: Identification, shares: ExplainedShares) -
     context, declared = state.context, state.prepared.fitter
     remaining = remaining_error(state.comparisons[-1].recording, state.comparisons[-1].after, state.noise_floors[-1])
     verdict = verdict_beside_disturbance(context, state.selection.accepted, shares, remaining.sentence)
+    verdict = verdict_of_ended_search(verdict, context.time_limit)
     state = replace(state, verdict=verdict, effects_hold=verdict[0] == "effects")
     if verdict[0] == "none":
         max_sigmas = context.policy.size.max_calibration_sigmas
@@ -295,13 +351,13 @@ def _confirmed(state: Identification, robot: Robot) -> Identification | None:
     return replace(state, final_robot=calibrated_robot, comparisons=comparisons, noise_floors=tuple(floors))
 
 
-def _result(state: Identification, seconds: float) -> Trace:
+def _result(state: Identification) -> Trace:
     context, prepared, final, effects = state.context, state.prepared, state.final_robot, state.effects
     validation = prepared.split.validation
     innovations = context.fitter.innovations(final, validation)
     verdict, sentence = state.verdict
     calibration_notes = [] if verdict == "unexplained" else _calibration_notes(state)
-    (localisation,) = state.pending_localisation
+    localisation = _localisation(state)
     white_before = state.is_white_before
     return Trace(
         verdict=verdict,
@@ -320,7 +376,7 @@ def _result(state: Identification, seconds: float) -> Trace:
         normalised_innovation_variance=innovations.mean_square(validation.rows),
         autocorrelations=largest_autocorrelations(innovations, validation.rows, context.policy.residual_analysis),
         identifiability=state.identifiability,
-        components=localisation.result(),
+        components=localisation,
         resonances=state.unexplained.resonances,
         alpha=context.alpha,
         notes=(
@@ -330,11 +386,23 @@ def _result(state: Identification, seconds: float) -> Trace:
             *_initial_state_notes(state),
             *calibration_notes,
         ),
-        seconds=seconds,
+        seconds=context.time_limit.elapsed,
         disturbance=context.fitter.noise.disturbance,
         left_share=state.shares.left if state.shares else None,
         small_effects=state.small_effects,
+        untried=context.time_limit.untried,
     )
+
+
+def _localisation(state: Identification) -> FaultLocalisation:
+    (pending,), context = state.pending_localisation, state.context
+    try:
+        with context.time_limit.searching(context.policy.time_limit.refinement):
+            context.time_limit.check()
+            return pending.result()
+    except OutOfTimeError:
+        context.leave_untried("telling which component errs")
+        return FaultLocalisation(np.zeros(0), (), "", "There was no time to test the components one by one.", ())
 
 
 def _disturbance_notes(state: Identification) -> list[str]:

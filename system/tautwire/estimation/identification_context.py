@@ -12,6 +12,7 @@ from .estimation_data import DataSet, DataSplit
 from .hypotheses import hypotheses
 from .parameter_fit import Fitter
 from .policy import DEFAULT_POLICY, IdentificationPolicy
+from .time_limit import TimeLimit
 from .worker_pool import WorkerPool
 
 Progress = Callable[[str, float], None]
@@ -26,7 +27,7 @@ class IdentificationContext:
     """Context of an identification.
 
     ``robot`` is as declared, ``alpha`` the false-alarm rate; ``progress`` gets what is being done, and the share of it
-    that is done.
+    that is done. ``time_limit`` ends its searches.
     """
 
     robot: Robot
@@ -36,6 +37,12 @@ class IdentificationContext:
     progress: Progress = no_progress
     workers: WorkerPool = field(default_factory=partial(WorkerPool, 1))
     policy: IdentificationPolicy = DEFAULT_POLICY
+    time_limit: TimeLimit = field(default_factory=TimeLimit)
+
+    def leave_untried(self, what: str) -> None:
+        """Tell what a search that is out of time leaves untried, and end what the worker processes still do for it."""
+        self.workers.abandon_calls()
+        self.time_limit.leave_untried(f"There was no time for {what}.")
 
     @property
     def head(self) -> DataSet:

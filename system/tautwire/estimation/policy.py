@@ -389,6 +389,22 @@ class DiscoveryPolicy:
 
 
 @dataclass(frozen=True)
+class TimeLimitPolicy:
+    """Shares of the time limit at which searches end; the rest is for co-simulations and the report. Chosen."""
+
+    # Effects: three rounds of co-simulations follow, which take as long as a third of a whole trace.
+    selection: float = 0.6
+    # Formulas and resonances, which one more co-simulation confirms.
+    discovery: float = 0.75
+    # Intervals, what could have been seen, and the component in question.
+    refinement: float = 0.9
+    # Samples for each second of the limit at most, but no fewer than the second number: co-simulations take their time
+    # for each sample.
+    samples_per_second: float = 200.0
+    min_samples: int = 6_000
+
+
+@dataclass(frozen=True)
 class IdentificationPolicy:
     """Policy of an identification, by theme."""
 
@@ -404,6 +420,7 @@ class IdentificationPolicy:
     size: SizePolicy = field(default_factory=SizePolicy)
     localisation: LocalisationPolicy = field(default_factory=LocalisationPolicy)
     discovery: DiscoveryPolicy = field(default_factory=DiscoveryPolicy)
+    time_limit: TimeLimitPolicy = field(default_factory=TimeLimitPolicy)
 
 
 DEFAULT_POLICY = IdentificationPolicy()

@@ -9,7 +9,7 @@ Source: Wasserman, Ramdas and Balakrishnan (2020), Universal inference, PNAS 117
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import inf
 
@@ -25,6 +25,7 @@ from .identification_context import IdentificationContext
 from .parameter_fit import Fit
 from .residual_analysis import residuals_are_white
 from .score_test import PredictedGain, score_test_in_workers
+from .time_limit import OutOfTimeError
 from .trace_result import Candidate
 
 Predictions = dict[Hypothesis, PredictedGain]
@@ -53,28 +54,16 @@ def nothing_selected(robot: Robot) -> SelectionResult:
 def select_effects(context: IdentificationContext) -> SelectionResult:
     """Select the effects that a model lacks: forward while one is significant, then backward.
 
-    What the robot file declares, effects included, stays as it is until a hypothesis replaces it.
+    What the robot file declares, effects included, stays as it is until a hypothesis replaces it. Where time is up, it
+    is what was selected until then.
     """
-    accepted: list[Hypothesis] = []
-    current = fit_model(context, accepted)
-    candidates: list[Candidate] = []
-    complete_rounds: dict[tuple[Hypothesis, ...], list[CandidateScore]] = {}
-    first_evidence = 0.0
-    for number in range(1, context.policy.selection.max_rounds + 1):
-        scores, is_complete = score_candidates(context, _search_round(context, number, current.robot, accepted))
-        if is_complete:
-            complete_rounds[tuple(accepted)] = scores
-        policy, has_disturbance = context.policy.selection, context.fitter.has_disturbance
-        best = most_parsimonious(scores, policy, has_disturbance)
-        required_evidence = policy.required_evidence(context.evidence_threshold(), first_evidence, has_disturbance)
-        significant = best is not None and best.evidence > required_evidence
-        candidates += [trial.candidate(number, significant and trial is best) for trial in scores]
-        if best is None or not significant:
-            break
-        first_evidence = first_evidence or best.evidence
-        accepted = with_hypothesis(accepted, best.hypothesis)
-        context, current = with_disturbance_beside(context, accepted, best.fit)
-    return _BackwardElimination(context, accepted, current, candidates, complete_rounds).run()
+    selection = _StepwiseSelection(context, Fit.without_parameters(context.robot))
+    try:
+        selection.add()
+        selection.eliminate()
+    except OutOfTimeError:
+        context.leave_untried("effects beyond those found, and alternatives to them")
+    return selection.result()
 
 
 def with_disturbance_beside(
@@ -127,14 +116,18 @@ def score_candidates(context: IdentificationContext, search_round: SearchRound) 
     min_log_likelihood = context.fitter.log_likelihood(robot, accepted, data)
     tasks = search_round.tasks(starts, min_log_likelihood, policy.fit)
     scores = fit_candidates(context, label, tasks, data, baseline, search_round.stops_at_first)
-    if not search_round.is_white:
-        if search_round.rival is None and not any(leaves_noise(context, score) for score in scores.values()):
-            tasks = search_round.tasks(search_round.larger_models(), min_log_likelihood, policy.fit)
-            scores |= fit_candidates(context, label, tasks, data, baseline)
-        tasks = search_round.refits(scores.values(), shortlisted, policy.selection, policy.fit.fine_cost_tolerance)
-        scores |= fit_candidates(context, f"{label}, all samples", tasks, context.split.estimation, baseline)
-    if context.fitter.has_disturbance:
-        scores = _with_exact_baseline(context, search_round, baseline, scores)
+    try:
+        context.time_limit.check()
+        if not search_round.is_white:
+            if search_round.rival is None and not any(leaves_noise(context, score) for score in scores.values()):
+                tasks = search_round.tasks(search_round.larger_models(), min_log_likelihood, policy.fit)
+                scores |= fit_candidates(context, label, tasks, data, baseline)
+            tasks = search_round.refits(scores.values(), shortlisted, policy.selection, policy.fit.fine_cost_tolerance)
+            scores |= fit_candidates(context, f"{label}, all samples", tasks, context.split.estimation, baseline)
+        if context.fitter.has_disturbance:
+            scores = _with_exact_baseline(context, search_round, baseline, scores)
+    except OutOfTimeError:
+        scores = scores if is_exact else _below_exact_baseline(context, baseline, scores)
     context.progress(f"{label}: done", 1.0)
     unfitted = [unfitted_score(robot, h, predictions[h]) for h in predictions if h not in scores]
     return [*scores.values(), *unfitted], not search_round.stops_at_first or scores.keys() >= set(shortlisted)
@@ -154,6 +147,14 @@ def _with_exact_baseline(
     return {h: replace(score, evidence=score.evidence - (exact - baseline)) for h, score in scores.items()}
 
 
+def _below_exact_baseline(
+    context: IdentificationContext, baseline: float, scores: Mapping[Hypothesis, CandidateScore]
+) -> dict[Hypothesis, CandidateScore]:
+    """The scores less what a coarse baseline may be too low by: there is no time for an exact one."""
+    margin = context.policy.selection.coarse_tie(baseline)
+    return {h: replace(score, evidence=score.evidence - margin) for h, score in scores.items()}
+
+
 def _predict_gains(context: IdentificationContext, search_round: SearchRound) -> tuple[Predictions, Predictions]:
     """Predicted gains of a round's candidates, and with process noise, where the model is far from noise."""
     robot, accepted = search_round.robot, search_round.accepted
@@ -169,23 +170,52 @@ def _predict_gains(context: IdentificationContext, search_round: SearchRound) ->
 
 
 @dataclass
-class _BackwardElimination:
-    """Backward elimination: each accepted hypothesis against its best alternatives, and against its absence.
+class _StepwiseSelection:
+    """A selection in progress; at any time its accepted hypotheses and their fit belong together.
 
-    It is dropped where it is not needed, and replaced by an alternative that explains more, or as much with fewer
-    parameters.
+    ``evidences`` are those of the hypotheses that passed the backward elimination, ``forward_evidences`` those with
+    which they were accepted.
     """
 
     context: IdentificationContext
-    accepted: list[Hypothesis]
     current: Fit
-    candidates: list[Candidate]
-    complete_rounds: dict[tuple[Hypothesis, ...], list[CandidateScore]]
+    accepted: list[Hypothesis] = field(default_factory=list)
+    candidates: list[Candidate] = field(default_factory=list)
+    complete_rounds: dict[tuple[Hypothesis, ...], list[CandidateScore]] = field(default_factory=dict)
+    forward_evidences: dict[Hypothesis, float] = field(default_factory=dict)
     confusable: dict[Hypothesis, list[str]] = field(default_factory=dict)
     evidences: dict[Hypothesis, float] = field(default_factory=dict)
     swaps: int = 0
 
-    def run(self) -> SelectionResult:
+    def add(self) -> None:
+        """Forward selection: the best hypothesis of each round, while it is significant."""
+        self.current = fit_model(self.context, self.accepted)
+        for number in range(1, self.context.policy.selection.max_rounds + 1):
+            search_round = _search_round(self.context, number, self.current.robot, self.accepted)
+            scores, is_complete = score_candidates(self.context, search_round)
+            if is_complete:
+                self.complete_rounds[tuple(self.accepted)] = scores
+            policy, has_disturbance = self.context.policy.selection, self.context.fitter.has_disturbance
+            best = most_parsimonious(scores, policy, has_disturbance)
+            first_evidence = next(iter(self.forward_evidences.values()), 0.0)
+            threshold = self.context.evidence_threshold()
+            required_evidence = policy.required_evidence(threshold, first_evidence, has_disturbance)
+            significant = best is not None and best.evidence > required_evidence
+            self.candidates += [trial.candidate(number, significant and trial is best) for trial in scores]
+            if best is None or not significant:
+                break
+            self.accepted, self.current = with_hypothesis(self.accepted, best.hypothesis), best.fit
+            # One that loses cables to another keeps its evidence.
+            last = {h: e for h in self.accepted for old, e in self.forward_evidences.items() if h.overlaps(old)}
+            self.forward_evidences |= {**last, best.hypothesis: best.evidence}
+            self.context, self.current = with_disturbance_beside(self.context, self.accepted, best.fit)
+
+    def eliminate(self) -> None:
+        """Backward elimination: each accepted hypothesis against its best alternatives, and against its absence.
+
+        It is dropped where it is not needed, and replaced by an alternative that explains more, or as much with fewer
+        parameters.
+        """
         policy = self.context.policy.selection
         pending = list(self.accepted)
         reported = set(self.complete_rounds)
@@ -212,12 +242,16 @@ class _BackwardElimination:
             self.evidences[tested] = score.evidence
             names = {t.hypothesis.effect.name for t in alternatives if score.is_confusable_with(t, policy)}
             self.confusable[tested] = sorted(names - {tested.effect.name})
+
+    def result(self) -> SelectionResult:
+        """What is selected so far."""
+        evidences = self.forward_evidences | self.evidences
         return SelectionResult(
             tuple(self.accepted),
-            tuple(self.evidences[a] for a in self.accepted),
+            tuple(evidences[a] for a in self.accepted),
             self.current,
             tuple(self.candidates),
-            tuple((a.effect.name, other) for a in self.accepted for other in self.confusable[a]),
+            tuple((a.effect.name, other) for a in self.accepted for other in self.confusable.get(a, ())),
             self.context.fitter.noise.disturbance,
         )
 

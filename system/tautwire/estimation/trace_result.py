@@ -170,7 +170,7 @@ class Trace:
     could have shown beside the effects; empty where the model leaves more than noise. ``components`` tells where the
     fit recording errs, before any effect is fitted. ``disturbance`` is what had to be assumed beside white noise; with
     one, ``left_share`` is the part of what was missed that no effect explains, and ``small_effects`` are those that
-    explain too little to matter.
+    explain too little to matter. ``untried`` are sentences on what there was no time for.
     """
 
     verdict: Verdict
@@ -197,3 +197,4 @@ class Trace:
     disturbance: Disturbance | None = None
     left_share: float | None = None
     small_effects: tuple[FoundEffect, ...] = ()
+    untried: tuple[str, ...] = ()

@@ -14,6 +14,7 @@ from .explained_shares import ExplainedShares
 from .hypotheses import Hypothesis
 from .identification_context import IdentificationContext
 from .stepwise_selection import SelectionResult
+from .time_limit import TimeLimit
 from .trace_result import Verdict
 
 IS_WHITE = "the residual is white noise"
@@ -61,6 +62,19 @@ def verdict_beside_disturbance(
         return "effects", f"The model lacks {named}; {_per_cent(shares.left)} remains, {kind}."
     closest = f" Of it {_per_cent(1.0 - shares.left)} would go to {_sum_up(names)}." if names else ""
     return "unexplained", f"No known effect explains a substantial share of the residual: {remaining}.{closest}"
+
+
+def verdict_of_ended_search(verdict: tuple[Verdict, str], limit: TimeLimit) -> tuple[Verdict, str]:
+    """The verdict of a search that had to leave something untried: never that nothing is missing."""
+    word, sentence = verdict
+    if not limit.untried:
+        return verdict
+    ended = f"The search ended at its time limit of {limit.seconds:g} s"
+    if word == "none":
+        return "unexplained", f"{ended}; until then nothing was found that the model lacks."
+    if word == "unexplained":
+        return "unexplained", f"{ended}. Until then: {sentence[0].lower()}{sentence[1:]}"
+    return word, f"{sentence} {ended}, before all was tried."
 
 
 def _per_cent(share: float) -> str:

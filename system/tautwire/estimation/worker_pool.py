@@ -9,6 +9,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
+from functools import partial
 from multiprocessing import get_context
 from pathlib import Path
 from types import TracebackType
@@ -46,17 +47,24 @@ class PendingResult(Generic[Result]):
 
     def __init__(
         self,
-        future: Future[Result] | None,
+        start: Callable[[], Future[Result]] | None,
         compute: Callable[[], Result],
         poll_interrupts: Callable[[], None],
         processes: int,
     ) -> None:
-        self._future, self._compute, self._poll_interrupts, self._processes = (
-            future,
-            compute,
-            poll_interrupts,
-            processes,
-        )
+        self._start, self._compute = start, compute
+        self._poll_interrupts, self._processes = poll_interrupts, processes
+        self._future = start() if start else None
+
+    @property
+    def is_done(self) -> bool:
+        """Whether the result is there, or need not be waited for."""
+        return self._future is None or self._future.done()
+
+    def restart(self) -> None:
+        """Start the work anew, in another process."""
+        if self._start is not None:
+            self._future = self._start()
 
     def result(self) -> Result:
         """The result, or what the work raised. Without a process of its own it is done here."""
@@ -81,6 +89,8 @@ class WorkerPool:
         self.poll_interrupts = poll_interrupts
         self._folder = tempfile.TemporaryDirectory(prefix="tautwire-workers-") if processes > 1 else None
         self._executor: ProcessPoolExecutor | None = None
+        self._pending: list[PendingResult[Any]] = []
+        self._dropped: list[Future[Any]] = []
 
     def __enter__(self) -> WorkerPool:
         return self
@@ -88,16 +98,31 @@ class WorkerPool:
     def __exit__(
         self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None
     ) -> None:
-        if self._executor is not None:
-            # The executor has no public way to end work that has begun.
-            running = list((getattr(self._executor, "_processes", None) or {}).values())
-            self._executor.shutdown(wait=False, cancel_futures=True)
-            for process in running:
-                process.kill()
-            for process in running:
-                process.join()
+        self._end_processes()
         if self._folder is not None:
             self._folder.cleanup()
+
+    def _end_processes(self) -> None:
+        if self._executor is None:
+            return
+        # The executor has no public way to end work that has begun.
+        running = list((getattr(self._executor, "_processes", None) or {}).values())
+        self._executor.shutdown(wait=False, cancel_futures=True)
+        for process in running:
+            process.kill()
+        for process in running:
+            process.join()
+        self._executor = None
+
+    def abandon_calls(self) -> None:
+        """End dropped calls that are still in progress; those that were submitted for a result begin anew."""
+        if all(future.done() for future in self._dropped):
+            return
+        self._dropped = []
+        unfinished = [pending for pending in self._pending if not pending.is_done]
+        self._end_processes()
+        for pending in unfinished:
+            pending.restart()
 
     def warm_up(self) -> None:
         """Start the processes, which takes a while; else the first call does."""
@@ -107,8 +132,10 @@ class WorkerPool:
 
     def submit(self, function: Callable[..., Result], *arguments: Any) -> PendingResult[Result]:
         """Start a call; its result may be fetched once."""
-        future = None if self._started_executor() is None else self._submit(function, *arguments)
-        return PendingResult(future, lambda: function(*arguments), self.poll_interrupts, self.processes)
+        start = None if self.processes == 1 else partial(self._submit, function, *arguments)
+        pending = PendingResult(start, partial(function, *arguments), self.poll_interrupts, self.processes)
+        self._pending.append(pending)
+        return pending
 
     def map_unordered(
         self, function: Callable[..., Result], calls: Sequence[tuple[Any, ...]]
@@ -129,8 +156,7 @@ class WorkerPool:
                         result = future.result()
                     yield futures[future], result
         finally:
-            for future in waiting:
-                future.cancel()
+            self._dropped += [future for future in waiting if not future.cancel()]
 
     def _submit(self, function: Callable[..., Result], *arguments: Any) -> Future[Result]:
         with _interrupts_blocked(), _worker_loss_raised(self.processes, self.poll_interrupts):

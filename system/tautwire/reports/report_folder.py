@@ -55,6 +55,7 @@ def trace_document(trace: Trace) -> dict[str, Any]:
         "alpha": trace.alpha,
         "candidates": [asdict(candidate) for candidate in trace.candidates],
         "unknown_columns": {each.role: each.recording.unknown_columns for each in trace.comparisons},
+        "untried": trace.untried,
         "notes": trace.notes,
         "seconds": trace.seconds,
     }

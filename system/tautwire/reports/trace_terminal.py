@@ -50,6 +50,8 @@ def trace_table(trace: Trace) -> RenderableType:
         blocks.append(_paragraph("The data fit these as well", [" + ".join(s) for s in trace.also_possible]))
     if trace.candidates:
         blocks.append(_candidate_table(trace))
+    if trace.untried:
+        blocks.append(_paragraph("Untried", list(trace.untried)))
     if notes := [*trace.notes, *_unread_columns(trace)]:
         blocks.append(_paragraph("Notes", notes))
     return Group(*blocks)

@@ -1,0 +1,135 @@
+"""A trace that runs out of time: what it found until then, what it left, and no verdict that it has not earned."""
+
+from __future__ import annotations
+
+import json
+import time
+from io import StringIO
+from pathlib import Path
+
+import pytest
+from rich.console import Console
+
+from tautwire.estimation import Trace, trace
+from tautwire.estimation.identification import policy_within
+from tautwire.estimation.time_limit import OutOfTimeError, TimeLimit
+from tautwire.estimation.worker_pool import WorkerPool
+from tautwire.recordings.recording import Recording
+from tautwire.reports import trace_table, write_report
+from tests.support.recordings import recorded
+from tests.support.robots import example
+
+
+class Clock:
+    """A clock that stands until it is set."""
+
+    now = 0.0
+
+    def __call__(self) -> float:
+        return self.now
+
+
+def test_only_a_search_is_ended_and_only_when_its_share_is_used_up() -> None:
+    clock = Clock()
+    limit = TimeLimit(100.0, clock)
+    with limit.searching(0.6):
+        clock.now = 59.0
+        limit.check()
+        clock.now = 61.0
+        with pytest.raises(OutOfTimeError, match="time limit of 100 s"):
+            limit.check()
+    limit.check()
+    with limit.searching(0.9):
+        limit.check()
+    assert limit.elapsed == 61.0
+
+
+def test_what_is_left_untried_is_told_once() -> None:
+    limit = TimeLimit()
+    for sentence in ("this", "that", "this"):
+        limit.leave_untried(sentence)
+    assert limit.untried == ("this", "that")
+
+
+def test_a_short_limit_allows_fewer_samples_down_to_a_least_number() -> None:
+    counts = [policy_within(seconds).preprocessing.max_samples for seconds in (1.0, 60.0, 600.0, 6000.0)]
+    assert counts == [6_000, 12_000, 100_000, 100_000]
+
+
+def test_calls_that_were_dropped_are_ended_and_awaited_ones_begin_anew() -> None:
+    begin = time.monotonic()
+    with WorkerPool(2) as workers:
+        calls = workers.map_unordered(time.sleep, [(0.0,), (1000.0,), (1000.0,)])
+        assert next(calls)[0] == 0
+        calls.close()
+        awaited = workers.submit(sum, [1, 2])
+        workers.abandon_calls()
+        assert awaited.result() == 3
+        assert workers.submit(sum, [3, 4]).result() == 7
+    assert time.monotonic() - begin < 100.0
+
+
+HIDDEN = {"damping": {"damping": 9e8}}
+
+
+def traced_until(activity: str, fit: Recording, check: Recording) -> Trace:
+    """A trace whose clock jumps beyond its limit at some activity."""
+    clock = Clock()
+
+    def progress(current: str, fraction: float) -> None:
+        if current.startswith(activity):
+            clock.now = 601.0
+
+    return trace(example("three"), fit, check, progress, time_limit=TimeLimit(600.0, clock))
+
+
+@pytest.fixture(scope="module")
+def recordings() -> tuple[Recording, Recording]:
+    fit, check = (recorded("three", seed, HIDDEN).first(401) for seed in (3, 53))
+    return fit, check
+
+
+def test_a_trace_without_time_for_effects_is_unexplained(recordings: tuple[Recording, Recording]) -> None:
+    found = traced_until("round 1: score test", *recordings)
+    assert found.verdict == "unexplained"
+    assert found.sentence.startswith("The search ended at its time limit of 600 s. Until then: the residual is not")
+    assert found.effects == ()
+    assert any("effects" in sentence for sentence in found.untried)
+    assert found.robot_after == found.robot_before
+    assert found.seconds == 601.0
+
+
+def test_effects_found_before_time_was_up_are_reported(recordings: tuple[Recording, Recording]) -> None:
+    found = traced_until("intervals", *recordings)
+    (effect,) = found.effects
+    estimate = effect.parameters["damping"]
+    assert estimate.low < estimate.value < estimate.high
+    assert estimate.value == pytest.approx(9e8, rel=0.02)
+    assert [sentence for sentence in found.untried if "intervals by profile likelihood" in sentence]
+    assert found.identifiability.detectable == ()
+
+
+def test_candidates_fitted_before_time_was_up_count(recordings: tuple[Recording, Recording]) -> None:
+    found = traced_until("round 1: damping", *recordings)
+    assert any(sentence.startswith("There was no time for fits of") for sentence in found.untried)
+    assert [effect.name for effect in found.effects] == ["damping"]
+    assert found.sentence.endswith("The search ended at its time limit of 600 s, before all was tried.")
+
+
+def test_nothing_missing_is_never_said_for_lack_of_time() -> None:
+    fit, check = (recorded("three", seed, {}).first(401) for seed in (3, 53))
+    found = traced_until("round 1", fit, check)
+    assert found.verdict == "unexplained"
+    assert found.sentence == (
+        "The search ended at its time limit of 600 s; until then nothing was found that the model lacks."
+    )
+
+
+def test_the_report_tells_what_was_left(recordings: tuple[Recording, Recording], tmp_path: Path) -> None:
+    found = traced_until("round 1: score test", *recordings)
+    write_report(found, tmp_path)
+    assert tuple(json.loads((tmp_path / "report.json").read_text())["untried"]) == found.untried
+    assert found.untried[0] in (tmp_path / "index.html").read_text()
+    shown = StringIO()
+    Console(file=shown, width=400).print(trace_table(found))
+    assert found.untried[0] in shown.getvalue()
