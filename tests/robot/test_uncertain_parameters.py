@@ -212,3 +212,11 @@ def test_load_cells_off_zero_are_an_effect_each_where_that_is_not_stated() -> No
     estimates = {effect.cables[0]: effect.parameters["tension_offset"].value for effect in found.effects}
     assert [estimates[k] for k in (1, 2, 3)] == pytest.approx([8.0, -5.0, 12.0], abs=0.5)
     assert found.components.faulty_component != "nothing"
+
+
+def test_a_robot_is_surveyed_whose_exit_points_or_load_cells_are_known_to_some_accuracy() -> None:
+    robot = example("three")
+    cables = tuple(replace(cable, anchor_uncertainty=0.002) for cable in robot.cables)
+    assert not is_surveyed(unsure(modulus=1e9, mass=1.0, tension=2.0))
+    assert is_surveyed(replace(robot, cables=cables))
+    assert is_surveyed(replace(robot, sensors=replace(robot.sensors, tension_gain_uncertainty=0.004)))

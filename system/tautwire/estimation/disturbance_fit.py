@@ -106,7 +106,7 @@ def marginal_log_likelihood(fitter: Fitter, robot: Robot, chosen: Collection[Hyp
     """
     fitter = with_improved_disturbance(fitter, robot, chosen, data)
     numbers = disturbance_prior(robot, fitter.noise, fitter.policy.disturbance).log_deviations
-    value_count = np.count_nonzero(np.isfinite(data.recording.measured()[data.rows]))
+    value_count = int(np.count_nonzero(np.isfinite(data.recording.measured()[data.rows])))
     return fitter.log_likelihood(robot, chosen, data) - 0.5 * len(numbers) * log(max(value_count, 1))
 
 

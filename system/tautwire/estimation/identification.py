@@ -274,15 +274,30 @@ def trace(
         WorkerPool(processes, _calling(raise_interrupt, limit.check)) as workers,
     ):
         workers.warm_up()
+
+        def identified(policy: IdentificationPolicy) -> Identification:
+            prepared, *clock_corrected = prepare_data(robot, fit, check, workers, policy)
+            context = IdentificationContext(
+                robot, prepared.fitter, prepared.split, alpha, progress or no_progress, workers, policy, limit
+            )
+            state = Identification(context, prepared, tuple(clock_corrected), nothing_selected(robot), robot)
+            for stage in STAGES:
+                state = run_stage(stage, state)
+            return state
+
         policy = policy_within(limit.seconds)
-        prepared, *clock_corrected = prepare_data(robot, fit, check, workers, policy)
-        context = IdentificationContext(
-            robot, prepared.fitter, prepared.split, alpha, progress or no_progress, workers, policy, limit
-        )
-        state = Identification(context, prepared, tuple(clock_corrected), nothing_selected(robot), robot)
-        for stage in STAGES:
-            state = run_stage(stage, state)
+        state = identified(policy)
+        if is_unexplained_without_disturbance(state):
+            disturbed = identified(replace(policy, preprocessing=replace(policy.preprocessing, always_disturbed=True)))
+            state = disturbed if disturbed.effects_hold else state
         return _result(state)
+
+
+def is_unexplained_without_disturbance(state: Identification) -> bool:
+    """Whether neither effects nor a formula nor a resonance explain the residual, and no disturbance was assumed."""
+    if state.context.fitter.has_disturbance or state.context.time_limit.untried:
+        return False
+    return state.verdict[0] == "unexplained" and not state.unexplained.resonances
 
 
 def _calling(*functions: Callable[[], None]) -> Callable[[], None]:

@@ -80,6 +80,8 @@ class PreprocessingPolicy:
     max_step_intervals: float = 1.5
     # Error of rope length in a gap, in standard deviations of the best sensor: a smaller one does not show.
     max_length_error_sigmas: float = 1.0
+    # Whether a disturbance is a part of the model even if noise is white and the robot is not surveyed.
+    always_disturbed: bool = False
     dead_channels: DeadChannelPolicy = field(default_factory=DeadChannelPolicy)
     outliers: OutlierPolicy = field(default_factory=OutlierPolicy)
     noise_check: NoiseCheckPolicy = field(default_factory=NoiseCheckPolicy)

@@ -20,6 +20,7 @@ from ..recordings.gaps import without_gaps
 from ..recordings.outliers import without_outliers
 from ..recordings.recording import Recording, require_outputs
 from ..robot.schema import Robot
+from ..robot.uncertain_parameters import is_surveyed
 from .clock_offsets import with_clocks_set
 from .disturbance_fit import disturbance_prior, with_fitted_disturbance
 from .estimation_data import DataSet, DataSplit, split_data
@@ -86,7 +87,7 @@ def prepare_recordings(
     self_stress, self_stress_notes = self_stress_deviation(robot, tuple(cleaned), policy.initial_state)
     noise = replace(checked.noise, self_stress=self_stress)
     noise, motion_notes = with_motion_at_start(robot, noise, cleaned, policy.initial_state)
-    if checked.is_coloured:
+    if checked.is_coloured or is_surveyed(robot) or policy.always_disturbed:
         noise = replace(noise, disturbance=disturbance_prior(robot, noise).median)
     return PreparedRecordings(
         fit=cleaned[0],

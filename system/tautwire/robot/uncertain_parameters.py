@@ -132,3 +132,8 @@ def sensor_errors(
         elif parameter.kind == TENSION_GAIN:
             gains[2 + parameter.cable] = 1.0 + error
     return SensorErrors(tuple(gains), tuple(offsets))
+
+
+def is_surveyed(robot: Robot) -> bool:
+    """Whether the robot file states how well a survey knows exit points or load cells: a real robot's does."""
+    return any(parameter.kind in (ANCHOR, TENSION_GAIN) for parameter in uncertain_parameters(robot))
