@@ -18,6 +18,7 @@ from tautwire.robot.robot_file_writer import robot_text
 from tautwire.robot.schema import Robot
 from tautwire.robot.symbolic_model import symbolic_model
 from tautwire.robot.uncertain_parameters import (
+    is_surveyed,
     limited_perturbation,
     perturbed_robot,
     sensor_errors,
