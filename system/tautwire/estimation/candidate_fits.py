@@ -96,6 +96,13 @@ def fit_model(
     return context.fitter.fit_from([robot], chosen, data, -inf, tolerance)
 
 
+def coarse_validation_likelihood(
+    fitter: Fitter, robot: Robot, chosen: Sequence[Hypothesis], validation: DataSet
+) -> float:
+    """As :func:`maximised_validation_likelihood`, by coarse fits: some nats below the maximum."""
+    return _maximised(fitter, robot, chosen, validation, is_coarse=True)[0]
+
+
 def maximised_validation_likelihood(
     context: IdentificationContext, robot: Robot, chosen: Sequence[Hypothesis], reference: float
 ) -> float:
@@ -107,11 +114,17 @@ def maximised_validation_likelihood(
     fitter, validation, policy = context.fitter, context.split.validation, context.policy
     if not chosen and not fitter.has_disturbance:
         return fitter.log_likelihood(robot, chosen, validation)
-    for tolerance in (policy.fit.coarse_cost_tolerance, policy.fit.fine_cost_tolerance):
-        is_coarse = tolerance == policy.fit.coarse_cost_tolerance
-        fitter = with_fitted_disturbance(fitter, robot, chosen, validation, is_coarse)
-        robot = fitter.fit_from([robot], chosen, validation, -inf, tolerance).robot
-        log_likelihood = fitter.log_likelihood(robot, chosen, validation)
-        if reference - log_likelihood > policy.selection.coarse_tie(log_likelihood):
-            break
-    return log_likelihood
+    log_likelihood, fitter, robot = _maximised(fitter, robot, chosen, validation, is_coarse=True)
+    if reference - log_likelihood > policy.selection.coarse_tie(log_likelihood):
+        return log_likelihood
+    return _maximised(fitter, robot, chosen, validation, is_coarse=False)[0]
+
+
+def _maximised(
+    fitter: Fitter, robot: Robot, chosen: Sequence[Hypothesis], data: DataSet, is_coarse: bool
+) -> tuple[float, Fitter, Robot]:
+    """Log-likelihood of some data, maximised over the disturbance and the chosen hypotheses, with both as fitted."""
+    fitter = with_fitted_disturbance(fitter, robot, chosen, data, is_coarse)
+    tolerance = fitter.policy.coarse_cost_tolerance if is_coarse else fitter.policy.fine_cost_tolerance
+    robot = fitter.fit_from([robot], chosen, data, -inf, tolerance).robot
+    return fitter.log_likelihood(robot, chosen, data), fitter, robot
