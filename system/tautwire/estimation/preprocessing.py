@@ -19,6 +19,7 @@ from ..recordings.dead_channels import without_dead_channels
 from ..recordings.gaps import without_gaps
 from ..recordings.outliers import without_outliers
 from ..recordings.recording import Recording, require_outputs
+from ..recordings.standing_winches import without_noise_of_standing_winches
 from ..robot.schema import Robot
 from ..robot.uncertain_parameters import is_surveyed
 from .clock_offsets import with_clocks_set
@@ -63,6 +64,7 @@ CLEANING_STEPS: tuple[CleaningStep, ...] = (
     lambda robot, recording, policy: without_outliers(recording, policy.outliers),
     _with_outputs,
     _without_gaps,
+    lambda robot, recording, policy: without_noise_of_standing_winches(robot, recording),
 )
 
 
@@ -86,6 +88,8 @@ def prepare_recordings(
     checked = check_noise(robot, estimate_noise(robot, cleaned[0]), tuple(cleaned), policy.noise_check)
     self_stress, self_stress_notes = self_stress_deviation(robot, tuple(cleaned), policy.initial_state)
     noise = replace(checked.noise, self_stress=self_stress)
+    if not any(np.any(recording.winch_speed) for recording in cleaned):
+        noise = replace(noise, winch_speed=0.0)
     noise, motion_notes = with_motion_at_start(robot, noise, cleaned, policy.initial_state)
     if checked.is_coloured or is_surveyed(robot) or policy.always_disturbed:
         noise = replace(noise, disturbance=disturbance_prior(robot, noise).median)
