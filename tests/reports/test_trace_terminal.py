@@ -96,8 +96,24 @@ def test_without_check_or_positions_there_are_dashes() -> None:
 
 def test_nothing_found_needs_no_table_of_effects() -> None:
     text = rendered(nothing_found(made_trace()))
-    assert text.startswith("Nothing is missing:")
+    assert text.startswith("Nothing is visible:")
     assert "95 %" not in text
+
+
+def test_nothing_visible_says_what_would_have_been() -> None:
+    text = rendered(nothing_found(made_trace()))
+    visible = text[text.index("Visible would have been") :]
+    assert "payload: mass 0.0195 kg" in visible and "relaxation: modulus " in visible
+    assert "slack" not in visible[: visible.index("Never")] and "slack" in visible[visible.index("Never") :]
+    assert "Visible would have been" not in rendered(made_trace())
+
+
+def test_what_is_confusable_comes_with_the_motion_that_would_tell() -> None:
+    text = rendered(replace(made_trace(), also_possible=(("damping", "relaxation"), ("creep", "thermal"))))
+    assert "relaxation in place of damping" in text and "creep + thermal" in text
+    joined = " ".join(text.split())
+    assert "tautwire excite robot.toml --effects damping,relaxation --out" in joined
+    assert "--effects damping,creep,thermal --out" in joined
 
 
 def test_markup_and_control_characters_in_texts_do_nothing() -> None:

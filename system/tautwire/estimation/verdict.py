@@ -38,7 +38,7 @@ def verdict_of(
         sentence = f"No known effect explains the residual; a formula does: {formula}."
         return "discovered", f"{sentence} With it, {IS_WHITE}."
     if not selection.accepted and white_before:
-        return "none", f"{IS_WHITE.capitalize()}: this recording shows nothing that the model lacks."
+        return "none", f"{IS_WHITE.capitalize()}: nothing that the model lacks is visible in this recording."
     # Either the filter or the FMUs refused the selection: what it leaves is not always coloured.
     verb = "comes" if len(selection.accepted) == 1 else "come"
     closest = f"; {names} {verb} closest, but not close enough" if selection.accepted else ""

@@ -19,15 +19,19 @@ from .trace_texts import (
     TENSION,
     VERDICTS,
     MeasuredOutput,
+    alternative_texts,
     axis_outputs,
     cable_outputs,
     cables_text,
     candidates_by_round,
     comparison_by_role,
+    detectable_texts,
     explained_share,
     format_estimate,
     format_evidence,
     noise_sentence,
+    separating_commands,
+    undetectable_effects,
     values_text,
 )
 
@@ -47,7 +51,14 @@ def trace_table(trace: Trace) -> RenderableType:
     if trace.formula:
         blocks.append(_paragraph("Formula", [trace.formula]))
     if trace.also_possible:
-        blocks.append(_paragraph("The data fit these as well", [" + ".join(s) for s in trace.also_possible]))
+        blocks.append(_paragraph("The data fit these as well", alternative_texts(trace)))
+    if commands := separating_commands(trace):
+        blocks.append(_paragraph("A motion that would tell them apart", commands))
+    if trace.verdict == "none" and trace.identifiability.detectable:
+        never = undetectable_effects(trace)
+        sizes = [*detectable_texts(trace), *([f"Never, whatever the size: {', '.join(never)}"] if never else [])]
+        sizes += ["More shows in a motion by: tautwire excite robot.toml --out program.csv"]
+        blocks.append(_paragraph("Visible would have been, nine times out of ten, at least", sizes))
     if trace.candidates:
         blocks.append(_candidate_table(trace))
     if trace.untried:

@@ -9,14 +9,15 @@ from itertools import groupby
 
 from tautwire_fmu.laws.effects import BY_NAME
 
-from ..estimation.trace_result import Candidate, Comparison, Errors, Estimate, Trace
+from ..estimation.hypotheses import hypotheses
+from ..estimation.trace_result import Candidate, Comparison, Detectable, Errors, Estimate, Trace
 from ..number_format import ABSENT_TEXT, format_engineering, format_in_common_unit, format_significant
 from ..robot.schema import AXES
 
 ROLES = ("fit", "check")
 VERDICTS = {
     "effects": "Effect found",
-    "none": "Nothing is missing",
+    "none": "Nothing is visible",
     "discovered": "New effect, formula found",
     "unexplained": "Not explained",
 }
@@ -123,6 +124,49 @@ def candidates_by_round(candidates: Sequence[Candidate]) -> list[tuple[int, list
 
     ordered = sorted(candidates, key=sort_key)
     return [(number, list(group)) for number, group in groupby(ordered, key=lambda each: each.round)]
+
+
+def detectable_texts(trace: Trace) -> list[str]:
+    """Smallest sizes that would have been detected, as in "payload: mass 1.2 kg"; where cables differ, on any."""
+    largest: dict[tuple[str, str], Detectable] = {}
+    for each in trace.identifiability.detectable:
+        known = largest.setdefault((each.name, each.parameter), each)
+        if known.size < each.size:
+            largest[each.name, each.parameter] = each
+    return [
+        f"{each.name}: {each.parameter} {format_engineering(each.size, each.unit)}"
+        for each in largest.values()
+        if math.isfinite(each.size)
+    ]
+
+
+def undetectable_effects(trace: Trace) -> list[str]:
+    """Effects of which these recordings would have shown no size."""
+    sizes: dict[str, list[float]] = {}
+    for each in trace.identifiability.detectable:
+        sizes.setdefault(each.name, []).append(each.size)
+    return [name for name, of_effect in sizes.items() if not any(map(math.isfinite, of_effect))]
+
+
+def alternative_texts(trace: Trace) -> list[str]:
+    """What the data cannot tell from the effects, as in "pulley in place of sensor_offset"."""
+    found = {effect.name for effect in trace.effects}
+    texts = []
+    for names in trace.also_possible:
+        replaced, others = [n for n in names if n in found], [n for n in names if n not in found]
+        texts.append(
+            " + ".join(others or names) + (f" in place of {' + '.join(replaced)}" if replaced and others else "")
+        )
+    return texts
+
+
+def separating_commands(trace: Trace) -> list[str]:
+    """Commands that design a motion for effects that these recordings cannot tell apart, one for each set of them."""
+    robot, found = trace.robot_before, [effect.name for effect in trace.effects]
+    designable = {each.effect.name for each in hypotheses(robot) if each.cables in ((), robot.cable_numbers)}
+    sets = [dict.fromkeys(names if set(names) & set(found) else (*found, *names)) for names in trace.also_possible]
+    lists = dict.fromkeys(",".join(names) for names in sets if len(names) > 1 and set(names) <= designable)
+    return [f"tautwire excite robot.toml --effects {names} --out program.csv" for names in lists]
 
 
 def noise_sentence(trace: Trace) -> str:
