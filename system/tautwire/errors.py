@@ -70,6 +70,16 @@ class RecordingError(InputError):
         self.line = line
 
 
+class NumericalError(TautwireError):
+    """A trace has no finite numbers to go on with; carries what linear algebra says of them."""
+
+    def __init__(self, reason: str) -> None:
+        self.reason = reason
+        super().__init__(
+            f"the model cannot follow this recording ({reason}): compare the units of the robot file and the recording"
+        )
+
+
 class MaterialTableError(InputError):
     """A table of a dynamic test cannot be read or declares something impossible."""
 

@@ -5,9 +5,11 @@ from math import factorial
 import numpy as np
 import pytest
 
+from tautwire.errors import RecordingError
 from tautwire.estimation.integration_steps import (
     Substeps,
     eigenvalues_at_start,
+    require_followable,
     substeps_of_eigenvalues,
     substeps_of_robot,
 )
@@ -71,3 +73,9 @@ def test_an_effect_far_stiffer_than_its_rope_asks_for_no_more_than_three_times_t
     uncapped = substeps_of_eigenvalues(eigenvalues_at_start(stiff) * 0.02)
     assert plain.state < capped.state <= 3 * plain.state + 40
     assert uncapped.state > 3 * capped.state
+
+
+def test_a_time_in_ms_is_refused_before_it_fills_the_memory() -> None:
+    require_followable(example("caroca"), "fit.csv", 0.1)
+    with pytest.raises(RecordingError, match=r"fit\.csv: samples are 20 s apart, .* at up to .* Hz; is the time in ms"):
+        require_followable(example("caroca"), "fit.csv", 20.0)

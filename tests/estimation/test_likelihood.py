@@ -119,3 +119,16 @@ def test_the_transition_of_a_sample_is_the_derivative_of_the_next_state(effect: 
         step[place] = width
         difference = (moved(state + step) - moved(state - step)) / (2.0 * width)
         assert np.max(np.abs(difference - transition[:, place])) < within * np.max(np.abs(difference))
+
+
+def test_a_run_can_be_ended_at_each_of_its_segments() -> None:
+    polls = iter([None, KeyboardInterrupt])
+
+    def poll() -> None:
+        if next(polls):
+            raise KeyboardInterrupt
+
+    segments = Likelihood(ROBOT, (), NOISE, 0.02, poll).segments(RECORDING, [])
+    assert len(next(segments).values) == 500
+    with pytest.raises(KeyboardInterrupt):
+        next(segments)

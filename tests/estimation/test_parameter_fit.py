@@ -2,6 +2,7 @@ import pickle
 
 import pytest
 
+from tautwire.estimation import parameter_fit
 from tautwire.estimation.estimation_data import split_data
 from tautwire.estimation.hypotheses import Hypothesis
 from tautwire.estimation.kalman_filter import Noise
@@ -45,3 +46,21 @@ def test_a_fitter_sent_to_a_process_twice_is_one_fitter_there() -> None:
     first, second = pickle.loads(sent), pickle.loads(sent)
     assert first is second
     assert (first.noise.position, first.policy.max_evaluations) == (1e-3, 7)
+
+
+def test_likelihoods_are_forgotten_where_they_take_too_much_memory(monkeypatch: pytest.MonkeyPatch) -> None:
+    robot, recording = example("three"), recorded("three", 1).first(50)
+    noise = estimate_noise(robot, recording)
+    sample = split_data(robot, noise, recording, None).estimation
+    fitter = Fitter(noise)
+    robots = [robot.with_effect(EffectSetting("payload", {"mass": mass})) for mass in (1.0, 2.0, 3.0)]
+    for each in robots:
+        fitter.innovations(each, sample)
+    assert len(fitter._compiled) == 3
+    size = next(iter(fitter._compiled.values())).instruction_count
+    monkeypatch.setattr(parameter_fit, "MAX_KEPT_INSTRUCTIONS", 2 * size + 1)
+    fitter.innovations(robot, sample)
+    assert len(fitter._compiled) == 2
+    monkeypatch.setattr(parameter_fit, "MAX_KEPT_INSTRUCTIONS", 1)
+    fitter.innovations(robots[0], sample)
+    assert len(fitter._compiled) == 1

@@ -7,10 +7,12 @@ import time
 from io import StringIO
 from pathlib import Path
 
+import numpy as np
 import pytest
 from rich.console import Console
 
-from tautwire.estimation import Trace, trace
+from tautwire.errors import NumericalError
+from tautwire.estimation import Trace, identification, trace
 from tautwire.estimation.identification import policy_within
 from tautwire.estimation.time_limit import OutOfTimeError, TimeLimit
 from tautwire.estimation.worker_pool import WorkerPool
@@ -39,6 +41,8 @@ def test_only_a_search_is_ended_and_only_when_its_share_is_used_up() -> None:
         with pytest.raises(OutOfTimeError, match="time limit of 100 s"):
             limit.check()
     limit.check()
+    assert limit.has_time(0.62)
+    assert not limit.has_time(0.6)
     with limit.searching(0.9):
         limit.check()
     assert limit.elapsed == 61.0
@@ -52,7 +56,7 @@ def test_what_is_left_untried_is_told_once() -> None:
 
 
 def test_a_short_limit_allows_fewer_samples_down_to_a_least_number() -> None:
-    counts = [policy_within(seconds).preprocessing.max_samples for seconds in (1.0, 60.0, 600.0, 6000.0)]
+    counts = [policy_within(seconds).preprocessing.max_samples for seconds in (1.0, 60.0, 600.0, np.inf)]
     assert counts == [6_000, 12_000, 100_000, 100_000]
 
 
@@ -123,6 +127,17 @@ def test_nothing_missing_is_never_said_for_lack_of_time() -> None:
     assert found.sentence == (
         "The search ended at its time limit of 600 s; until then nothing was found that the model lacks."
     )
+
+
+def test_numbers_without_a_solution_end_in_an_error_that_can_be_read(
+    recordings: tuple[Recording, Recording], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fail(*_: object) -> None:
+        raise np.linalg.LinAlgError("Singular matrix")
+
+    monkeypatch.setattr(identification, "prepare_data", fail)
+    with pytest.raises(NumericalError, match=r"cannot follow this recording \(Singular matrix\)"):
+        trace(example("three"), *recordings)
 
 
 def test_the_report_tells_what_was_left(recordings: tuple[Recording, Recording], tmp_path: Path) -> None:

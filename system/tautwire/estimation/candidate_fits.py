@@ -39,7 +39,7 @@ def fit_and_validate(fitter: Fitter, task: FitTask, data: DataSet, validation: D
         log_likelihood = innovations.log_likelihood(validation.rows)
         if fitter.has_disturbance:
             log_likelihood = max(log_likelihood, marginal_log_likelihood(fitter, fit.robot, task.chosen, validation))
-    except (UnreachableError, NoFitError):
+    except (UnreachableError, NoFitError, np.linalg.LinAlgError):
         return None
     mean_square = float(np.nanmean(innovations.mean_square(validation.rows)))
     return ValidatedFit(fit, log_likelihood, mean_square) if np.isfinite(log_likelihood) else None

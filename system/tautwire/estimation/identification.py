@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
 from dataclasses import replace
 from operator import attrgetter
 
 import numpy as np
 from threadpoolctl import threadpool_limits
 
-from ..errors import ArgumentError
+from ..errors import ArgumentError, NumericalError
 from ..process_signals import defer_interrupts
 from ..recordings.recording import Recording, require_outputs
 from ..robot.schema import Robot, validate_robot
@@ -217,6 +218,7 @@ SEARCHES: Mapping[Callable[[Identification], Identification], tuple[Callable[[Ti
     select: (attrgetter("selection"), "effects"),
     select_with_clocks_corrected: (attrgetter("selection"), "correcting clocks that seem to be apart"),
     try_confusable_models: (attrgetter("selection"), "models that are easily confused with the effects found"),
+    try_declared_start: (attrgetter("selection"), "trying a sensor's offset in place of another start"),
     explain_by_formula: (attrgetter("discovery"), "formulas and resonances"),
     estimate_intervals: (attrgetter("refinement"), "estimates of the parameters"),
     analyse_detectability: (attrgetter("refinement"), "telling what the recordings could have shown"),
@@ -226,7 +228,7 @@ SEARCHES: Mapping[Callable[[Identification], Identification], tuple[Callable[[Ti
 def policy_within(seconds: float, policy: IdentificationPolicy = DEFAULT_POLICY) -> IdentificationPolicy:
     """The policy with as many samples as a time limit (s) allows."""
     limits = policy.time_limit
-    count = min(policy.preprocessing.max_samples, max(limits.min_samples, int(limits.samples_per_second * seconds)))
+    count = int(min(policy.preprocessing.max_samples, max(limits.min_samples, limits.samples_per_second * seconds)))
     return replace(policy, preprocessing=replace(policy.preprocessing, max_samples=count))
 
 
@@ -262,13 +264,14 @@ def trace(
     see :class:`tautwire.estimation.worker_pool.WorkerPool`.
 
     Raises RecordingError where a recording has no measured output, is too short or cannot be this robot's,
-    UnreachableError where the cables cannot hold the platform where a recording starts, ArgumentError where an
-    argument is none of these.
+    UnreachableError where the cables cannot hold the platform where a recording starts, NumericalError where the model
+    has no finite numbers, ArgumentError where an argument is none of these.
     """
     validate_trace_arguments(robot, fit, check, progress, alpha, processes)
     limit = time_limit or TimeLimit()
     # BLAS rounds differently with several threads, which the worker processes could not reproduce.
     with (
+        _numerical_errors_raised(),
         defer_interrupts() as raise_interrupt,
         threadpool_limits(1, "blas"),
         WorkerPool(processes, _calling(raise_interrupt, limit.check)) as workers,
@@ -294,10 +297,27 @@ def trace(
 
 
 def is_unexplained_without_disturbance(state: Identification) -> bool:
-    """Whether neither effects nor a formula nor a resonance explain the residual, and no disturbance was assumed."""
-    if state.context.fitter.has_disturbance or state.context.time_limit.untried:
+    """Whether neither effects nor a formula nor a resonance explain the residual, and no disturbance was assumed.
+
+    False where there is no time left to assume one.
+    """
+    context = state.context
+    if context.fitter.has_disturbance or context.time_limit.untried:
         return False
-    return state.verdict[0] == "unexplained" and not state.unexplained.resonances
+    if state.verdict[0] != "unexplained" or state.unexplained.resonances:
+        return False
+    has_time = context.time_limit.has_time(context.policy.time_limit.second_search)
+    if not has_time:
+        context.leave_untried("a search beside a disturbance")
+    return has_time
+
+
+@contextmanager
+def _numerical_errors_raised() -> Iterator[None]:
+    try:
+        yield
+    except np.linalg.LinAlgError as error:
+        raise NumericalError(str(error)) from error
 
 
 def _calling(*functions: Callable[[], None]) -> Callable[[], None]:

@@ -105,7 +105,7 @@ def linearise_filter(
         output_matrix = by_sample(likelihood.jacobians(count, predicted, predicted, *columns)[0], count)
         cross_covariance = segment.covariances @ np.where(is_observed, output_matrix, 0.0).swapaxes(1, 2)
         covariance = np.where(is_observed, output_matrix, 0.0) @ cross_covariance + np.diag(variances)
-        cholesky_factor = np.linalg.cholesky(covariance)
+        covariance, cholesky_factor = factorised(covariance)
         whitening = np.where(is_observed, np.linalg.inv(cholesky_factor), 0.0)
         gain = cross_covariance @ np.linalg.inv(covariance)
         corrections = np.einsum("kij,kjl,kl->ki", gain, cholesky_factor, innovations)
@@ -131,6 +131,8 @@ def linearise_filter(
 
 # Integration steps of an effect's states in a sample; they can be stiffer than the robot.
 EFFECT_SUBSTEPS = 4
+# Of the innovations' correlation matrix: less is rounding.
+MIN_RELATIVE_EIGENVALUE = 1e-12
 
 
 @dataclass(frozen=True)
@@ -276,6 +278,24 @@ class EffectSensitivities:
         )
         self._effect_states_now[trial] = (effect_states[:, -1:], sensitivities[:, parameter_count * count :])
         return effect_states, sensitivities
+
+
+def factorised(covariance: Array) -> tuple[Array, Array]:
+    """Covariances (K, m, m) and their Cholesky factors.
+
+    Where rounding has left one not positive definite, its eigenvalues are raised; NaN where one is not finite.
+    """
+    try:
+        return covariance, np.asarray(np.linalg.cholesky(covariance), dtype=float)
+    except np.linalg.LinAlgError:
+        is_finite = np.all(np.isfinite(covariance), axis=(1, 2), keepdims=True)
+        deviations = np.sqrt(np.maximum(np.abs(np.diagonal(covariance, axis1=1, axis2=2)), np.finfo(float).tiny))
+        scale = deviations[:, :, None] * deviations[:, None, :]
+        eigenvalues, vectors = np.linalg.eigh(np.where(is_finite, covariance / scale, np.eye(covariance.shape[1])))
+        raised = np.maximum(eigenvalues, MIN_RELATIVE_EIGENVALUE)[:, None, :]
+        definite = np.where(is_finite, scale, 1.0) * ((vectors * raised) @ vectors.swapaxes(1, 2))
+        factors = np.asarray(np.linalg.cholesky(definite), dtype=float)
+        return np.where(is_finite, definite, np.nan), np.where(is_finite, factors, np.nan)
 
 
 def _with_last_column_repeated(columns: Array) -> Array:

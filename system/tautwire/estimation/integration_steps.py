@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import ceil, factorial
+from math import ceil, factorial, pi
 
 import casadi
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import RecordingError
 from ..robot.schema import Robot
 from ..robot.symbolic_model import symbolic_model
 
@@ -34,6 +35,9 @@ MAX_STATE_ANGLE, MAX_SLOPE_ANGLE = 0.05, 0.7
 MAX_STATE_DECAY, MAX_SLOPE_DECAY = 0.5, 2.0
 # Up to so many steps of the state, a decay is resolved as finely as a vibration.
 MAX_FINE_STEPS = 40
+# Steps of the state beyond which a sample is too far from the one before: the filter would fill gigabytes. Some five
+# periods of the fastest vibration.
+MAX_STATE_STEPS = 600
 # Truncation error allowed to the series of the derivatives, for a vibration and for a decay.
 VIBRATION_TRUNCATION_ERROR, DECAY_TRUNCATION_ERROR, MIN_SERIES_ORDER = 2e-5, 1e-3, 2
 # How much faster than without its effects a robot may vibrate for the steps to follow it: nine times as stiff. A rope's
@@ -51,6 +55,14 @@ def substeps_of_robot(robot: Robot, sample_time: float, state_count: int, has_ef
     limit = MAX_EFFECT_SPEED_UP * float(np.max(np.abs(own)))
     followed = exponents.real + 1j * np.clip(exponents.imag, -limit, limit)
     return substeps_of_eigenvalues(followed, doublings if has_effect_states else 0)
+
+
+def require_followable(robot: Robot, path: str, sample_time: float) -> None:
+    """Raises RecordingError where the samples of a recording are too far apart for the filter to follow the robot."""
+    if substeps_of_robot(robot, sample_time, 0, False).state > MAX_STATE_STEPS:
+        frequency = float(np.max(np.abs(eigenvalues_at_start(robot)))) / (2.0 * pi)
+        problem = f"samples are {sample_time:.4g} s apart, and the robot moves at up to {frequency:.3g} Hz"
+        raise RecordingError(path, problem, "is the time in ms? It has to be in s; else record faster")
 
 
 def substeps_of_eigenvalues(exponents: Eigenvalues, doublings: int = 0) -> Substeps:

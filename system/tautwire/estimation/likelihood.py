@@ -11,7 +11,7 @@ Source: Ljung (1999), System Identification, sec. 7.4.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from copy import copy
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -84,9 +84,20 @@ class FilterSegment:
 
 
 class Likelihood:
-    """Innovations of recordings under a robot whose free parameters vary; compiled once."""
+    """Innovations of recordings under a robot whose free parameters vary; compiled once.
 
-    def __init__(self, robot: Robot, free: Sequence[FreeParameter], noise: Noise, sample_time: float) -> None:
+    ``poll_interrupts`` is called before each segment of a run.
+    """
+
+    def __init__(
+        self,
+        robot: Robot,
+        free: Sequence[FreeParameter],
+        noise: Noise,
+        sample_time: float,
+        poll_interrupts: Callable[[], None] = lambda: None,
+    ) -> None:
+        self.poll_interrupts = poll_interrupts
         self.uncertain = uncertain_parameters(robot)
         self.model = symbolic_model(robot, free, self.uncertain)
         self.robot = robot
@@ -124,6 +135,11 @@ class Likelihood:
         log_variances[~recorded] = np.nan
         _fill_unaligned(values, log_variances, sensitivities, recorded & ~observed)
         return Innovations(recorded, values, sensitivities, log_variances)
+
+    @property
+    def instruction_count(self) -> int:
+        """Instructions of the filter, in proportion to which this takes memory."""
+        return self._filter_function.instruction_count
 
     @cached_property
     def jacobians(self) -> CompiledFunction:
@@ -204,6 +220,7 @@ class Likelihood:
         filter_state = (state, start_covariance, sensitivities)
         state_count, parameter_count = len(start_covariance), len(theta)
         for begin in range(0, len(is_recorded), CHUNK_SAMPLES):
+            self.poll_interrupts()
             chunk = tuple(column[:, begin : begin + CHUNK_SAMPLES] for column in columns)
             count = chunk[0].shape[1]
             results = self._filter_function(

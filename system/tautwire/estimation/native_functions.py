@@ -189,15 +189,16 @@ class CompiledFunction:
     """
 
     def __init__(self, function: Function, carried: int = 0, max_compiled: int = MAX_COMPILED_INSTRUCTIONS) -> None:
-        self._function = dense = _dense(function)
+        dense = _dense(function)
         self._carried = carried
         self._argument_shapes = [dense.size_in(index) for index in range(dense.n_in())]
         self._result_shapes = [dense.size_out(index) for index in range(dense.n_out())]
         if self._argument_shapes[:carried] != self._result_shapes[:carried]:
             raise ValueError(f"{carried} results of {function.name()} are to be carried: not as its first arguments")
         self._workspace_size = dense.sz_w()
-        self._is_compiled = dense.n_instructions() <= max_compiled
-        if self._is_compiled:
+        self.instruction_count = dense.n_instructions()
+        self._interpreted_function = None if self.instruction_count <= max_compiled else dense
+        if self._interpreted_function is None:
             # The machine code lives as long as its engine.
             text, constants = llvm_assembly(dense)
             self._engine = _engine(text)
@@ -214,8 +215,8 @@ class CompiledFunction:
         inputs = [
             _column_major(argument, size, 1 if k < carried else count) for k, (argument, size) in enumerate(sizes)
         ]
-        if not self._is_compiled:
-            return self._interpreted(count, inputs)
+        if self._interpreted_function is not None:
+            return self._interpreted(self._interpreted_function, count, inputs)
         results = [
             np.empty((rows, columns * (count + (number < carried))), order="F")
             for number, (rows, columns) in enumerate(self._result_shapes)
@@ -241,9 +242,9 @@ class CompiledFunction:
         self._native_run(count, (ctypes.c_void_p * len(pointers))(*pointers), (ctypes.c_int64 * len(strides))(*strides))
         return results
 
-    def _interpreted(self, count: int, inputs: Sequence[Array]) -> list[Array]:
+    def _interpreted(self, function: Function, count: int, inputs: Sequence[Array]) -> list[Array]:
         """Evaluate with CasADi's interpreter."""
-        carried, function = self._carried, self._function
+        carried = self._carried
         if count == 0:
             empty = [np.empty((rows, 0)) for rows, _ in self._result_shapes[carried:]]
             return [*inputs[:carried], *empty]

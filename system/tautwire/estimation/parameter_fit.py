@@ -27,6 +27,8 @@ from .policy import DEFAULT_POLICY, FitPolicy
 Array = NDArray[np.float64]
 
 MAX_COMPILED_LIKELIHOODS = 40
+# Instructions of all of them, each of which takes 100 to 200 bytes in each process.
+MAX_KEPT_INSTRUCTIONS = 5_000_000
 NORMAL_QUANTILE_95 = 1.959964
 
 
@@ -186,11 +188,17 @@ class Fitter:
         structure = with_values(robot, free, dict.fromkeys(free, 0.0))
         key = (structure, tuple(free), round(interval, 9))
         if key not in self._compiled:
-            if len(self._compiled) >= MAX_COMPILED_LIKELIHOODS:
-                self._compiled.pop(next(iter(self._compiled)))
-            self._compiled[key] = Likelihood(robot, free, self.noise, interval)
+            likelihood = Likelihood(robot, free, self.noise, interval, self.poll_interrupts)
+            self._make_room(likelihood.instruction_count)
+            self._compiled[key] = likelihood
         compiled, disturbance = self._compiled[key], self.noise.disturbance
         return compiled.with_disturbance(disturbance) if disturbance else compiled
+
+    def _make_room(self, instruction_count: int) -> None:
+        """Forget the oldest likelihoods until one of that size may be kept beside the others."""
+        kept = instruction_count + sum(likelihood.instruction_count for likelihood in self._compiled.values())
+        while self._compiled and (len(self._compiled) >= MAX_COMPILED_LIKELIHOODS or kept > MAX_KEPT_INSTRUCTIONS):
+            kept -= self._compiled.pop(next(iter(self._compiled))).instruction_count
 
 
 def _scaled_back(robot: Robot, free: tuple[FreeParameter, ...], scaled: Array, jacobian: Array) -> Fit:

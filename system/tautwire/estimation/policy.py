@@ -396,6 +396,8 @@ class TimeLimitPolicy:
 
     # Effects: three rounds of co-simulations follow, which take as long as a third of a whole trace.
     selection: float = 0.6
+    # A search beside a disturbance begins, where one without has explained nothing.
+    second_search: float = 0.4
     # Formulas and resonances, which one more co-simulation confirms.
     discovery: float = 0.75
     # Intervals, what could have been seen, and the component in question.

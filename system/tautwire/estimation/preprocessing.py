@@ -26,6 +26,7 @@ from .clock_offsets import with_clocks_set
 from .disturbance_fit import disturbance_prior, with_fitted_disturbance
 from .estimation_data import DataSet, DataSplit, split_data
 from .initial_state_prior import self_stress_deviation, with_motion_at_start
+from .integration_steps import require_followable
 from .kalman_filter import Noise
 from .likelihood import Innovations
 from .measurement_noise import check_noise, estimate_noise
@@ -76,7 +77,8 @@ def prepare_recordings(
 ) -> PreparedRecordings:
     """Clean both recordings, test the declared noise against them, and widen the prior of the initial state.
 
-    Raises RecordingError where a recording has no output that carries information, or is not to be trusted.
+    Raises RecordingError where a recording has no output that carries information, has samples that are too far apart,
+    or is not to be trusted.
     """
     cleaned: list[Recording] = []
     notes: tuple[str, ...] = ()
@@ -85,6 +87,7 @@ def prepare_recordings(
         for step in CLEANING_STEPS:
             cleaned[-1], step_notes = step(robot, cleaned[-1], policy)
             notes += step_notes
+        require_followable(robot, recording.path, float(np.median(np.diff(recording.time))))
     checked = check_noise(robot, estimate_noise(robot, cleaned[0]), tuple(cleaned), policy.noise_check)
     self_stress, self_stress_notes = self_stress_deviation(robot, tuple(cleaned), policy.initial_state)
     noise = replace(checked.noise, self_stress=self_stress)
