@@ -6,18 +6,28 @@ import json
 import time
 from io import StringIO
 from pathlib import Path
+from types import SimpleNamespace
+from typing import Any
 
 import numpy as np
 import pytest
 from rich.console import Console
 
 from tautwire.errors import NumericalError
-from tautwire.estimation import Trace, identification, trace
+from tautwire.estimation import Trace, identification, stepwise_selection, trace
+from tautwire.estimation.candidate_proposals import SearchRound
+from tautwire.estimation.candidate_scores import CandidateScore
+from tautwire.estimation.estimation_data import split_data
+from tautwire.estimation.hypotheses import Hypothesis
 from tautwire.estimation.identification import policy_within
+from tautwire.estimation.identification_context import IdentificationContext
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.estimation.parameter_fit import Fit, Fitter
 from tautwire.estimation.time_limit import OutOfTimeError, TimeLimit
 from tautwire.estimation.worker_pool import WorkerPool
 from tautwire.recordings.recording import Recording
 from tautwire.reports import trace_table, write_report
+from tautwire_fmu.laws.effects import BY_NAME
 from tests.support.recordings import recorded
 from tests.support.robots import example
 
@@ -71,6 +81,33 @@ def test_calls_that_were_dropped_are_ended_and_awaited_ones_begin_anew() -> None
         assert awaited.result() == 3
         assert workers.submit(sum, [3, 4]).result() == 7
     assert time.monotonic() - begin < 100.0
+
+
+def test_what_was_fitted_in_time_gets_its_baseline_after_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    clock, robot, recording = Clock(), example("three"), recorded("three", 1)
+    limit = TimeLimit(100.0, clock)
+    hypothesis = Hypothesis(BY_NAME["drag"], ())
+    score = CandidateScore(hypothesis, Fit.without_parameters(robot), 130.0, 1.0)
+
+    def fit_until_time_is_up(*_: object) -> dict[Hypothesis, CandidateScore]:
+        clock.now = 99.0
+        return {hypothesis: score}
+
+    def awaited() -> float:
+        limit.check()
+        return 100.0
+
+    noise = estimate_noise(robot, recording)
+    workers: Any = SimpleNamespace(submit=lambda *_: SimpleNamespace(result=awaited))
+    split = split_data(robot, noise, recording, None)
+    context = IdentificationContext(robot, Fitter(noise), split, workers=workers, time_limit=limit)
+    monkeypatch.setattr(stepwise_selection, "fit_candidates", fit_until_time_is_up)
+    with limit.searching(0.6):
+        search_round = SearchRound(1, robot, (), None, True)
+        baseline, scores = stepwise_selection._fitted_beside_baseline(context, "round 1", search_round, {})
+        with pytest.raises(OutOfTimeError):
+            limit.check()
+    assert (baseline, scores[hypothesis].evidence) == (100.0, 30.0)
 
 
 HIDDEN = {"damping": {"damping": 9e8}}

@@ -149,7 +149,8 @@ def _fitted_beside_baseline(
     split, robot, accepted = context.split, search_round.robot, search_round.accepted
     pending = context.workers.submit(coarse_validation_likelihood, context.fitter, robot, accepted, split.validation)
     scores = fit_candidates(context, label, tasks, split.estimation, 0.0)
-    baseline = pending.result()
+    with context.time_limit.suspended():
+        baseline = pending.result()
     return baseline, {h: replace(score, evidence=score.evidence - baseline) for h, score in scores.items()}
 
 

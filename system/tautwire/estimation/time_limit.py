@@ -55,6 +55,15 @@ class TimeLimit:
         finally:
             self._end_of_search = inf
 
+    @contextmanager
+    def suspended(self) -> Iterator[None]:
+        """Context manager for what a search needs to judge what it has found, whatever the time."""
+        end, self._end_of_search = self._end_of_search, inf
+        try:
+            yield
+        finally:
+            self._end_of_search = end
+
     def has_time(self, share: float) -> bool:
         """Whether this share of the time is not used up yet."""
         return self.elapsed <= share * self.seconds
