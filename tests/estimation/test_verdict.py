@@ -37,9 +37,15 @@ def verdict(of: ExplainedShares, *names: str) -> tuple[str, str]:
 
 
 def test_what_a_small_random_force_would_leave_lacks_nothing() -> None:
-    word, sentence = verdict(shares(0.7, 4.0, drag=(0.3, 2.0)), "drag")
+    word, sentence = verdict(shares(0.9, 4.0, drag=(0.1, 2.0)), "drag")
     assert word == "none"
     assert "Drag may act, too small to matter." in sentence
+
+
+def test_an_effect_is_named_that_explains_a_good_part_of_little() -> None:
+    word, sentence = verdict(shares(0.12, 6.0, drum=(0.27, 5.0)), "drum")
+    assert word == "effects"
+    assert "drum (27 % of what is missed); 12 % remains, which is no more than a small random force" in sentence
 
 
 def test_the_largest_effect_is_named_first_with_its_share() -> None:

@@ -252,11 +252,12 @@ class _StepwiseSelection:
                 continue
             number = policy.max_rounds + 1 + len(self.evidences) + self.swaps
             alternatives = self._alternatives(number, without.robot, others, score)
-            best = most_parsimonious([score, *alternatives], policy, self.context.fitter.has_disturbance)
+            contender = self._comparable(score, others)
+            best = most_parsimonious([contender, *alternatives], policy, self.context.fitter.has_disturbance)
             if tuple(others) not in reported:
                 self.candidates += [t.candidate(number, t is best) for t in alternatives]
             reported.add(tuple(others))
-            if best is not None and best is not score and self.swaps < policy.max_swaps:
+            if best is not None and best is not contender and self.swaps < policy.max_swaps:
                 self.accepted, self.current = with_hypothesis(others, best.hypothesis), best.fit
                 pending = [a for a in self.accepted if a is not self.accepted[-1]]
                 tested, score, self.swaps = self.accepted[-1], best, self.swaps + 1
@@ -275,6 +276,14 @@ class _StepwiseSelection:
             tuple((a.effect.name, other) for a in self.accepted for other in self.confusable.get(a, ())),
             self.context.fitter.noise.disturbance,
         )
+
+    def _comparable(self, score: CandidateScore, others: Sequence[Hypothesis]) -> CandidateScore:
+        """The score to hold against alternatives: beside a disturbance that of the round in which these were scored.
+
+        The disturbance has been fitted anew beside the accepted hypotheses since.
+        """
+        known = self.complete_rounds.get(tuple(others), []) if self.context.fitter.has_disturbance else []
+        return next((each for each in known if each.hypothesis == score.hypothesis), score)
 
     def _alternatives(
         self, number: int, robot: Robot, others: Sequence[Hypothesis], tested: CandidateScore

@@ -51,12 +51,14 @@ def verdict_beside_disturbance(
     """Verdict and its sentence beside a disturbance; ``remaining`` says in words what error remains."""
     policy = context.policy.size
     large, names = shares.substantial(policy), [hypothesis.label(context.robot) for hypothesis in accepted]
-    if shares.size_missed <= policy.max_size_of_disturbance:
+    explained = max((1.0 - shares.left, *(shares.effects[index] for index in large))) if large else 0.0
+    is_explained = explained >= policy.min_explained_share
+    if shares.size_missed <= policy.max_size_of_disturbance and not is_explained:
         small = f" {_sum_up(names).capitalize()} may act, too small to matter." if names else ""
         sentence = "What the model misses lies within stated uncertainties, noise and a small random force."
         return "none", sentence + small
     is_disturbance = shares.size_left <= policy.max_size_of_disturbance
-    if large and (is_disturbance or 1.0 - shares.left >= policy.min_explained_share):
+    if large and (is_disturbance or is_explained):
         named = _sum_up([f"{names[index]} ({_per_cent(shares.effects[index])} of what is missed)" for index in large])
         kind = "which is no more than a small random force" if is_disturbance else remaining
         return "effects", f"The model lacks {named}; {_per_cent(shares.left)} remains, {kind}."
