@@ -268,3 +268,10 @@ def test_a_design_says_what_it_carries() -> None:
     direction = made.robot.anchors - made.robot.start
     direction /= np.linalg.norm(direction, axis=1, keepdims=True)
     assert made.tension @ direction == pytest.approx([0.0, 0.0, made.weight], abs=1e-9 * made.weight)
+
+
+def test_drums_behind_a_backlash_do_not_stop_where_the_recording_does() -> None:
+    session = Session(lot_of(1, backlash=1e-6), 1, 4.0, 100.0)
+    ends = session.drum.speeds[-1], session.motor.speeds[-1]
+    assert np.abs(ends[1]).max() > 0.02
+    assert ends[0] == pytest.approx(ends[1], abs=0.05 * np.abs(ends[1]).max())

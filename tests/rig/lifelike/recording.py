@@ -95,7 +95,11 @@ class Session:
         gap = self.lot.little.backlash
         if not gap:
             return self.motor
-        followed = gaussian_filter1d(played(self.motor.travels, gap), MEETING / self.half_step, axis=0)
+        width = MEETING / self.half_step
+        beyond = int(np.ceil(4.0 * width))
+        # Mirrored in their ends, so that drums do not stop where the recording does.
+        longer = np.pad(played(self.motor.travels, gap), ((beyond, beyond), (0, 0)), "reflect", reflect_type="odd")
+        followed = gaussian_filter1d(longer, width, axis=0)[beyond:-beyond]
         return TabulatedProgram(self.half_step, np.gradient(followed, self.half_step, axis=0), followed)
 
     def random(self, stream: int) -> np.random.Generator:
