@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tautwire.estimation.candidate_fits import maximised_validation_likelihood
+from tautwire.estimation.candidate_fits import fit_and_validate, maximised_validation_likelihood
+from tautwire.estimation.candidate_proposals import FitTask
 from tautwire.estimation.disturbance import Disturbance, OrnsteinUhlenbeck, sensor_noise_only
 from tautwire.estimation.disturbance_fit import (
     _Evaluation,
@@ -19,6 +20,7 @@ from tautwire.estimation.disturbance_fit import (
     with_fitted_disturbance,
 )
 from tautwire.estimation.estimation_data import DataSet, DataSplit
+from tautwire.estimation.hypotheses import hypotheses
 from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.innovation_sensitivities import linearise_filter
 from tautwire.estimation.kalman_filter import Noise
@@ -184,3 +186,19 @@ def test_a_hypothesis_may_have_another_disturbance_on_unseen_data_at_the_price_o
     marginal = marginal_log_likelihood(fitter, ROBOT, (), validation)
     assert marginal > fitter.log_likelihood(ROBOT, (), validation) + 100.0
     assert best - 4.0 * np.log(400 * 6) - 30.0 < marginal < best - 4.0 * np.log(400 * 6) + 1.0
+
+
+def test_a_candidate_is_fitted_better_beside_a_disturbance_of_its_own() -> None:
+    """Under the large one that a model without it needed, nearly anything fits."""
+    data, validation = (data_of(recorded("three", seed, {"damping": {"damping": 9e8}}).first(400)) for seed in (3, 53))
+    needed = replace(disturbance_prior(ROBOT, NOISE).median, force=OrnsteinUhlenbeck(500.0, 5.0))
+    fitter = Fitter(replace(NOISE, disturbance=needed))
+    damping = next(h for h in hypotheses(ROBOT) if h.effect.name == "damping" and len(h.cables) == 3)
+    task = FitTask((damping,), (ROBOT.with_effect(damping.setting(ROBOT)),), -np.inf, 1e-7)
+    once, refitted = (
+        fit_and_validate(fitter, replace(task, disturbance_refits=count), data, validation) for count in (0, 2)
+    )
+    assert once and refitted
+    errors = [abs(float(each.fit.values[0]) / 9e8 - 1.0) for each in (once, refitted)]
+    assert errors[1] < 0.5 * errors[0]
+    assert refitted.log_likelihood > once.log_likelihood + 5.0

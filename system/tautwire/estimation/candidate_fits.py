@@ -34,11 +34,16 @@ def fit_and_validate(fitter: Fitter, task: FitTask, data: DataSet, validation: D
     """Fit and validate a task; None where the cables cannot hold the platform, or nothing finite comes out."""
     try:
         fit = fitter.fit_from(task.starts, task.chosen, data, task.min_log_likelihood, task.cost_tolerance)
+        for _ in range(task.disturbance_refits):
+            fitter = with_fitted_disturbance(fitter, fit.robot, task.chosen, data)
+            fit = fitter.fit_from([fit.robot], task.chosen, data, -inf, task.cost_tolerance)
         fitter = with_improved_disturbance(fitter, fit.robot, task.chosen, data)
         innovations = fitter.judged(fit.robot, task.chosen, validation)
         log_likelihood = innovations.log_likelihood(validation.rows)
         if fitter.has_disturbance:
-            log_likelihood = max(log_likelihood, marginal_log_likelihood(fitter, fit.robot, task.chosen, validation))
+            is_coarse = task.disturbance_refits == 0
+            marginal = marginal_log_likelihood(fitter, fit.robot, task.chosen, validation, is_coarse)
+            log_likelihood = max(log_likelihood, marginal)
     except (UnreachableError, NoFitError, np.linalg.LinAlgError):
         return None
     mean_square = float(np.nanmean(innovations.mean_square(validation.rows)))

@@ -18,13 +18,15 @@ class FitTask:
     """Fit of the chosen hypotheses to estimation data, from starts that are tried in turn; validated on other data.
 
     ``min_log_likelihood`` is that of the data without the last of them; for ``cost_tolerance`` see
-    :meth:`tautwire.estimation.parameter_fit.Fitter.fit_from`.
+    :meth:`tautwire.estimation.parameter_fit.Fitter.fit_from`. ``disturbance_refits`` counts how often the disturbance
+    is fitted anew beside them, and they under it.
     """
 
     chosen: tuple[Hypothesis, ...]
     starts: tuple[Robot, ...]
     min_log_likelihood: float
     cost_tolerance: float
+    disturbance_refits: int = 0
 
 
 @dataclass(frozen=True)

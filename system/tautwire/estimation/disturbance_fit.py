@@ -96,15 +96,19 @@ def with_improved_disturbance(fitter: Fitter, robot: Robot, chosen: Collection[H
     return _refitted(fitter, robot, chosen, data.first(policy.coarse_samples), policy.ranking_iterations)
 
 
-def marginal_log_likelihood(fitter: Fitter, robot: Robot, chosen: Collection[Hypothesis], data: DataSet) -> float:
+def marginal_log_likelihood(
+    fitter: Fitter, robot: Robot, chosen: Collection[Hypothesis], data: DataSet, is_coarse: bool = True
+) -> float:
     """Log-likelihood of some data that knows no disturbance: over all of them, by Schwarz's approximation.
 
     With N measured values and k numbers of the disturbance ``max log L - k/2 log N``. A disturbance of other data may
-    fit these badly; that must not count against a hypothesis whose rival has the best one.
+    fit these badly; that must not count against a hypothesis whose rival has the best one. A coarse maximum is from the
+    first samples alone.
 
     Source: Schwarz (1978), Annals of Statistics 6(2), 461-464.
     """
-    fitter = with_improved_disturbance(fitter, robot, chosen, data)
+    maximised = with_improved_disturbance if is_coarse else with_fitted_disturbance
+    fitter = maximised(fitter, robot, chosen, data)
     numbers = disturbance_prior(robot, fitter.noise, fitter.policy.disturbance).log_deviations
     value_count = int(np.count_nonzero(np.isfinite(data.recording.measured()[data.rows])))
     return fitter.log_likelihood(robot, chosen, data) - 0.5 * len(numbers) * log(max(value_count, 1))

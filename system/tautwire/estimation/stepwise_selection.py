@@ -151,7 +151,35 @@ def _fitted_beside_baseline(
     scores = fit_candidates(context, label, tasks, split.estimation, 0.0)
     with context.time_limit.suspended():
         baseline = pending.result()
-    return baseline, {h: replace(score, evidence=score.evidence - baseline) for h, score in scores.items()}
+    scores = {h: replace(score, evidence=score.evidence - baseline) for h, score in scores.items()}
+    return baseline, scores | _refitted_beside_own_disturbance(context, label, accepted, scores, baseline)
+
+
+def _refitted_beside_own_disturbance(
+    context: IdentificationContext,
+    label: str,
+    accepted: Sequence[Hypothesis],
+    scores: Mapping[Hypothesis, CandidateScore],
+    baseline: float,
+) -> dict[Hypothesis, CandidateScore]:
+    """Better scores of the candidates that explain FIT best, each beside a disturbance of its own.
+
+    Only where the best of them is not established: under the disturbance of a model without it, which had to be large,
+    an effect that explains nearly all may be fitted badly.
+    """
+    estimation, tolerance = context.split.estimation, context.policy.fit.fine_cost_tolerance
+    models = {h: tuple(with_hypothesis(accepted, h)) for h in scores}
+    explained = {h: context.fitter.log_likelihood(scores[h].fit.robot, models[h], estimation) for h in scores}
+    ranked = sorted(scores, key=lambda h: -explained[h])
+    required = max((context.evidence_threshold(), *(score.evidence for score in scores.values())))
+    if not ranked or scores[ranked[0]].evidence >= required:
+        return {}
+    tasks = {
+        h: FitTask(models[h], (scores[h].fit.robot,), -inf, tolerance, disturbance_refits=2)
+        for h in ranked[: context.policy.selection.always_refitted]
+    }
+    refits = fit_candidates(context, f"{label}, own disturbance", tasks, estimation, baseline)
+    return {h: score for h, score in refits.items() if score.evidence > scores[h].evidence}
 
 
 def _with_exact_baseline(
