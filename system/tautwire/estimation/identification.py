@@ -232,17 +232,18 @@ def policy_within(seconds: float, policy: IdentificationPolicy = DEFAULT_POLICY)
     return replace(policy, preprocessing=replace(policy.preprocessing, max_samples=count))
 
 
-def run_stage(stage: Callable[[Identification], Identification], state: Identification) -> Identification:
-    """Run a stage; a search that is out of time leaves the state as it is."""
+@contextmanager
+def limited_search(stage: Callable[[Identification], Identification], context: IdentificationContext) -> Iterator[None]:
+    """Context manager for a stage; a search that is out of time ends, and what it leaves untried is told."""
     if stage not in SEARCHES:
-        return stage(state)
-    (share_of, untried), context = SEARCHES[stage], state.context
+        yield
+        return
+    share_of, untried = SEARCHES[stage]
     try:
         with context.time_limit.searching(share_of(context.policy.time_limit)):
-            return stage(state)
+            yield
     except OutOfTimeError:
         context.leave_untried(untried)
-        return state
 
 
 def trace(
@@ -278,22 +279,22 @@ def trace(
     ):
         workers.warm_up()
 
-        def identified(policy: IdentificationPolicy) -> Identification:
+        usual = policy_within(limit.seconds)
+        disturbed = replace(usual, preprocessing=replace(usual.preprocessing, always_disturbed=True))
+        states: list[Identification] = []
+        for policy in (usual, disturbed):
             prepared, *clock_corrected = prepare_data(robot, fit, check, workers, policy)
             context = IdentificationContext(
                 robot, prepared.fitter, prepared.split, alpha, progress or no_progress, workers, policy, limit
             )
             state = Identification(context, prepared, tuple(clock_corrected), nothing_selected(robot), robot)
             for stage in STAGES:
-                state = run_stage(stage, state)
-            return state
-
-        policy = policy_within(limit.seconds)
-        state = identified(policy)
-        if is_unexplained_without_disturbance(state):
-            disturbed = identified(replace(policy, preprocessing=replace(policy.preprocessing, always_disturbed=True)))
-            state = disturbed if disturbed.effects_hold else state
-        return _result(state)
+                with limited_search(stage, state.context):
+                    state = stage(state)
+            states.append(state)
+            if not is_unexplained_without_disturbance(state):
+                break
+        return _result(states[-1] if states[-1].effects_hold else states[0])
 
 
 def is_unexplained_without_disturbance(state: Identification) -> bool:
