@@ -51,8 +51,6 @@ def test_only_a_search_is_ended_and_only_when_its_share_is_used_up() -> None:
         with pytest.raises(OutOfTimeError, match="time limit of 100 s"):
             limit.check()
     limit.check()
-    assert limit.has_time(0.62)
-    assert not limit.has_time(0.6)
     with limit.searching(0.9):
         limit.check()
     assert limit.elapsed == 61.0

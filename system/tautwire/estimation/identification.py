@@ -279,38 +279,16 @@ def trace(
     ):
         workers.warm_up()
 
-        usual = policy_within(limit.seconds)
-        disturbed = replace(usual, preprocessing=replace(usual.preprocessing, always_disturbed=True))
-        states: list[Identification] = []
-        for policy in (usual, disturbed):
-            prepared, *clock_corrected = prepare_data(robot, fit, check, workers, policy)
-            context = IdentificationContext(
-                robot, prepared.fitter, prepared.split, alpha, progress or no_progress, workers, policy, limit
-            )
-            state = Identification(context, prepared, tuple(clock_corrected), nothing_selected(robot), robot)
-            for stage in STAGES:
-                with limited_search(stage, state.context):
-                    state = stage(state)
-            states.append(state)
-            if not is_unexplained_without_disturbance(state):
-                break
-        return _result(states[-1] if states[-1].effects_hold else states[0])
-
-
-def is_unexplained_without_disturbance(state: Identification) -> bool:
-    """Whether neither effects nor a formula nor a resonance explain the residual, and no disturbance was assumed.
-
-    False where there is no time left to assume one.
-    """
-    context = state.context
-    if context.fitter.has_disturbance or context.time_limit.untried:
-        return False
-    if state.verdict[0] != "unexplained" or state.unexplained.resonances:
-        return False
-    has_time = context.time_limit.has_time(context.policy.time_limit.second_search)
-    if not has_time:
-        context.leave_untried("a search beside a disturbance")
-    return has_time
+        policy = policy_within(limit.seconds)
+        prepared, *clock_corrected = prepare_data(robot, fit, check, workers, policy)
+        context = IdentificationContext(
+            robot, prepared.fitter, prepared.split, alpha, progress or no_progress, workers, policy, limit
+        )
+        state = Identification(context, prepared, tuple(clock_corrected), nothing_selected(robot), robot)
+        for stage in STAGES:
+            with limited_search(stage, state.context):
+                state = stage(state)
+        return _result(state)
 
 
 @contextmanager

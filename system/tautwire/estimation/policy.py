@@ -80,8 +80,6 @@ class PreprocessingPolicy:
     max_step_intervals: float = 1.5
     # Error of rope length in a gap, in standard deviations of the best sensor: a smaller one does not show.
     max_length_error_sigmas: float = 1.0
-    # Whether a disturbance is a part of the model even if noise is white and the robot is not surveyed.
-    always_disturbed: bool = False
     dead_channels: DeadChannelPolicy = field(default_factory=DeadChannelPolicy)
     outliers: OutlierPolicy = field(default_factory=OutlierPolicy)
     noise_check: NoiseCheckPolicy = field(default_factory=NoiseCheckPolicy)
@@ -396,8 +394,6 @@ class TimeLimitPolicy:
 
     # Effects: three rounds of co-simulations follow, which take as long as a third of a whole trace.
     selection: float = 0.6
-    # A search beside a disturbance begins, where one without has explained nothing.
-    second_search: float = 0.4
     # Formulas and resonances, which one more co-simulation confirms.
     discovery: float = 0.75
     # Intervals, what could have been seen, and the component in question.

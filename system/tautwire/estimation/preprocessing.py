@@ -94,7 +94,7 @@ def prepare_recordings(
     if not any(np.any(recording.winch_speed) for recording in cleaned):
         noise = replace(noise, winch_speed=0.0)
     noise, motion_notes = with_motion_at_start(robot, noise, cleaned, policy.initial_state)
-    if checked.is_coloured or is_surveyed(robot) or policy.always_disturbed:
+    if checked.is_coloured or is_surveyed(robot):
         noise = replace(noise, disturbance=disturbance_prior(robot, noise).median)
     return PreparedRecordings(
         fit=cleaned[0],

@@ -64,10 +64,6 @@ class TimeLimit:
         finally:
             self._end_of_search = end
 
-    def has_time(self, share: float) -> bool:
-        """Whether this share of the time is not used up yet."""
-        return self.elapsed <= share * self.seconds
-
     def check(self) -> None:
         """Raises OutOfTimeError in a search whose time is used up."""
         if self.elapsed > self._end_of_search:
