@@ -103,6 +103,14 @@ def test_anchors_move_by_coordinate_and_gains_about_one() -> None:
     )
 
 
+def test_anchors_of_a_planar_robot_are_not_uncertain_across_its_plane() -> None:
+    robot = example("three")
+    cables = tuple(replace(c, anchor=(c.anchor[0], 0.5, c.anchor[2]), anchor_uncertainty=0.004) for c in robot.cables)
+    x, _, z = robot.platform.start
+    planar = replace(robot, platform=replace(robot.platform, start=(x, 0.5, z)), cables=cables)
+    assert [each.axis for each in uncertain_parameters(planar)] == [0, 2] * 3
+
+
 def test_a_robot_with_other_anchors_still_starts_in_equilibrium_at_its_reference_lengths() -> None:
     robot = surveyed_roughly(0.05, 0.01)
     numbers = uncertain_parameters(robot)

@@ -73,16 +73,16 @@ class Calibration:
                 key, index = f"{parameter.kind}_uncertainty", parameter.cable - 1
                 cables[index] = replace(cables[index], **{key: parameter.standard_deviation * deviation})
         for number, deviations in self._anchor_deviations().items():
-            cables[number - 1] = replace(cables[number - 1], anchor_uncertainty=float(np.sqrt(np.mean(deviations**2))))
+            uncertainty = float(np.sqrt(np.mean(np.square(deviations))))
+            cables[number - 1] = replace(cables[number - 1], anchor_uncertainty=uncertainty)
         return replace(updated, platform=platform, cables=tuple(cables))
 
-    def _anchor_deviations(self) -> dict[int, Array]:
-        """Posterior standard deviations (3,) of the coordinates of each uncertain anchor, by cable."""
-        deviations: dict[int, Array] = {}
+    def _anchor_deviations(self) -> dict[int, list[float]]:
+        """Posterior standard deviations of the uncertain coordinates of each anchor, by cable."""
+        deviations: dict[int, list[float]] = {}
         for parameter, deviation in zip(self.parameters, self.standard_deviations.tolist(), strict=True):
             if parameter.kind == ANCHOR:
-                of_cable = deviations.setdefault(parameter.cable, np.zeros(3))
-                of_cable[parameter.axis] = parameter.standard_deviation * deviation
+                deviations.setdefault(parameter.cable, []).append(parameter.standard_deviation * deviation)
         return deviations
 
     def without_sensor_errors(self, recording: Recording) -> Recording:
