@@ -13,7 +13,7 @@ from tautwire.estimation.candidate_fits import fit_and_validate, maximised_valid
 from tautwire.estimation.candidate_proposals import FitTask
 from tautwire.estimation.disturbance import Disturbance, OrnsteinUhlenbeck, sensor_noise_only
 from tautwire.estimation.disturbance_fit import (
-    _Evaluation,
+    Posterior,
     disturbance_prior,
     logs_of,
     marginal_log_likelihood,
@@ -140,16 +140,13 @@ def test_noise_of_the_sensors_has_no_force_and_no_errors_beyond_the_declared_one
 def test_the_score_of_a_disturbance_is_the_derivative_of_its_posterior() -> None:
     recording = PAIR[0].first(200)
     data, likelihood = data_of(recording), likelihood_of(disturbed(force=5.0, position=2e-4, tension=3.0))
-    prior = disturbance_prior(ROBOT, NOISE)
-    logs = logs_of(prior.median) + np.linspace(-0.3, 0.4, 8)
-
-    def posterior(at: NDArray[np.float64]) -> _Evaluation:
-        return _Evaluation.at(likelihood, (), data, prior, at)
-
-    gradient, information = posterior(logs).score(likelihood, (), data, prior)
+    posterior = Posterior(likelihood, (), data, disturbance_prior(ROBOT, NOISE))
+    logs = logs_of(posterior.prior.median) + np.linspace(-0.3, 0.4, 8)
+    gradient, information = posterior.score(posterior.evaluation(logs))
     width = 1e-4
     moves = width * np.eye(8)
-    expected = [(posterior(logs + move).value - posterior(logs - move).value) / (2.0 * width) for move in moves]
+    values = [[posterior.evaluation(logs + sign * move).value for sign in (1.0, -1.0)] for move in moves]
+    expected = [(later - earlier) / (2.0 * width) for later, earlier in values]
     # Forward differences over 1e-3 err by half of that times the curvature.
     assert np.all(np.abs(gradient - expected) < 1e-3 * np.diag(information) + 0.02)
     assert np.all(np.linalg.eigvalsh(information) > 0.0)

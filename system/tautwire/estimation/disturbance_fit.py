@@ -5,6 +5,9 @@ With whitened innovations v and their variances s, of a model whose parameters a
     dL/dx = -sum (v v' + l' / 2)        l = log s
     E[-d2L/dx2] = sum (v' + v l' / 2)(v' + v l' / 2)^T + l' l'^T / 2
 
+Uncertain parameters and disturbance are fitted in turn: given the former a filter has far fewer states. That leaves the
+maximum's neighbourhood; where some nats matter, ascent under the likelihood itself follows.
+
 Source: Gupta and Mehra (1974), IEEE Transactions on Automatic Control 19(6), 774-783.
 """
 
@@ -85,15 +88,17 @@ def with_fitted_disturbance(
     ends some nats below the maximum, which may serve for a numerator of an e-value, and not for its denominator.
     """
     policy = fitter.policy.disturbance
+    first = data.first(policy.coarse_samples)
+    fitter = _refitted(fitter, robot, chosen, first, Effort(policy.max_iterations, is_exact=False))
     iterations = policy.coarse_iterations if coarse else policy.max_iterations
-    fitter = _refitted(fitter, robot, chosen, data.first(policy.coarse_samples), policy.max_iterations)
-    return _refitted(fitter, robot, chosen, data, iterations)
+    return _refitted(fitter, robot, chosen, data, Effort(iterations, is_exact=not coarse))
 
 
 def with_improved_disturbance(fitter: Fitter, robot: Robot, chosen: Collection[Hypothesis], data: DataSet) -> Fitter:
     """As :func:`with_fitted_disturbance`, by a few iterations over the first samples: for candidates to be ranked."""
     policy = fitter.policy.disturbance
-    return _refitted(fitter, robot, chosen, data.first(policy.coarse_samples), policy.ranking_iterations)
+    first = data.first(policy.coarse_samples)
+    return _refitted(fitter, robot, chosen, first, Effort(policy.ranking_iterations, is_exact=False))
 
 
 def marginal_log_likelihood(
@@ -114,37 +119,55 @@ def marginal_log_likelihood(
     return fitter.log_likelihood(robot, chosen, data) - 0.5 * len(numbers) * log(max(value_count, 1))
 
 
-def _refitted(
-    fitter: Fitter, robot: Robot, chosen: Collection[Hypothesis], data: DataSet, max_iterations: int
-) -> Fitter:
+@dataclass(frozen=True)
+class Effort:
+    """How far a fit goes: ``max_iterations`` at most, and whether it ends near a maximum or at it."""
+
+    max_iterations: int
+    is_exact: bool
+
+
+def _refitted(fitter: Fitter, robot: Robot, chosen: Collection[Hypothesis], data: DataSet, effort: Effort) -> Fitter:
     if not fitter.has_disturbance:
         return fitter
-    policy = replace(fitter.policy.disturbance, max_iterations=max_iterations)
+    policy = fitter.policy.disturbance
     prior = disturbance_prior(robot, fitter.noise, policy)
     likelihood, values = fitter.likelihood(robot, chosen, data)
-    return fitter.with_disturbance(fit_disturbance(likelihood, values, data, prior, policy))
+    return fitter.with_disturbance(fit_disturbance(Posterior(likelihood, values, data, prior), policy, effort))
 
 
 def fit_disturbance(
-    likelihood: Likelihood,
-    values: Sequence[float],
-    data: DataSet,
-    prior: DisturbancePrior,
+    posterior: Posterior,
     policy: DisturbancePolicy = DEFAULT_POLICY.fit.disturbance,
+    effort: Effort | None = None,
 ) -> Disturbance:
-    """Maximise the likelihood of some data, at these values of the free parameters, over the disturbance.
+    """Maximise the posterior density over the disturbance; by default exactly.
 
-    Begins at the likelihood's own; Levenberg's damping keeps each step an ascent.
+    Begins at the likelihood's own disturbance.
     """
-    evaluations = _evaluations(likelihood, values, data, prior, _starts(likelihood, prior, policy))
-    current = max(evaluations, key=lambda evaluation: evaluation.value)
-    damping = policy.first_damping
-    for _ in range(policy.max_iterations):
-        gradient, information = current.score(likelihood, values, data, prior)
+    effort = effort or Effort(policy.max_iterations, is_exact=True)
+    current = max(posterior.evaluations(_starts(posterior, policy)), key=lambda evaluation: evaluation.value)
+    has_constants = len(current.constants) > 0
+    for _ in range(policy.max_alternations if has_constants else 0):
+        conditional = posterior.given_constants(current.constants)
+        logs = _ascended(conditional, conditional.evaluation(current.logs), policy, policy.max_iterations).logs
+        previous, current = current, max(current, posterior.evaluation(logs), key=lambda evaluation: evaluation.value)
+        if current.value - previous.value < policy.min_gain:
+            break
+    if effort.is_exact or not has_constants:
+        current = _ascended(posterior, current, policy, effort.max_iterations)
+    return disturbance_of(current.logs)
+
+
+def _ascended(posterior: Posterior, start: Evaluation, policy: DisturbancePolicy, max_iterations: int) -> Evaluation:
+    """The end of an ascent; Levenberg's damping lets no step descend."""
+    current, damping = start, policy.first_damping
+    for _ in range(max_iterations):
+        gradient, information = posterior.score(current)
         while damping < policy.max_damping:
             scaled = information + damping * np.diag(np.diag(information))
             step = np.clip(np.linalg.solve(scaled, gradient), -policy.max_log_step, policy.max_log_step)
-            trial = _Evaluation.at(likelihood, values, data, prior, current.logs + step)
+            trial = posterior.evaluation(current.logs + step)
             if trial.value > current.value:
                 break
             damping *= 10.0
@@ -153,23 +176,15 @@ def fit_disturbance(
         gain, current, damping = trial.value - current.value, trial, 0.1 * damping
         if gain < policy.min_gain:
             break
-    return disturbance_of(current.logs)
+    return current
 
 
-def _evaluations(
-    likelihood: Likelihood, values: Sequence[float], data: DataSet, prior: DisturbancePrior, points: Iterable[Array]
-) -> list[_Evaluation]:
-    """Evaluations at several logs, two at once: a compiled filter runs without Python's lock."""
-    with ThreadPoolExecutor(CONCURRENT_EVALUATIONS) as threads:
-        return list(threads.map(lambda logs: _Evaluation.at(likelihood, values, data, prior, logs), points))
-
-
-def _starts(likelihood: Likelihood, prior: DisturbancePrior, policy: DisturbancePolicy) -> list[Array]:
+def _starts(posterior: Posterior, policy: DisturbancePolicy) -> list[Array]:
     """Logs to begin at: the likelihood's own, and from the prior's median larger ones, which follow a model far off."""
-    own = likelihood.noise.disturbance
-    if own is not None and own != prior.median:
+    own, median = posterior.likelihood.noise.disturbance, posterior.prior.median
+    if own is not None and own != median:
         return [logs_of(own)]
-    starts = [logs_of(prior.median)]
+    starts = [logs_of(median)]
     for factor in policy.start_factors:
         logs = starts[0].copy()
         logs[[0, 2, 4]] += log(factor)
@@ -178,35 +193,54 @@ def _starts(likelihood: Likelihood, prior: DisturbancePrior, policy: Disturbance
 
 
 @dataclass(frozen=True)
-class _Evaluation:
-    """Posterior log-density at some logs, with what it is made of: whitened innovations and logs of variances."""
+class Evaluation:
+    """Posterior log-density at some logs, with what it is made of: whitened innovations and logs of variances.
+
+    ``constants`` (c) are the uncertain parameters there, in standard deviations.
+    """
 
     logs: Array
     value: float
     innovations: Array
     log_variances: Array
+    constants: Array
 
-    @classmethod
-    def at(
-        cls, likelihood: Likelihood, values: Sequence[float], data: DataSet, prior: DisturbancePrior, logs: Array
-    ) -> _Evaluation:
-        innovations = likelihood.with_disturbance(disturbance_of(logs)).innovations(data.recording, values)
-        mask = innovations.observed & data.rows[:, None]
-        value = innovations.log_likelihood(data.rows) - 0.5 * float(np.sum(prior.penalty(logs) ** 2))
-        return cls(
-            logs, value if np.isfinite(value) else -np.inf, innovations.values[mask], innovations.log_variances[mask]
-        )
 
-    def score(
-        self, likelihood: Likelihood, values: Sequence[float], data: DataSet, prior: DisturbancePrior
-    ) -> tuple[Array, Array]:
+@dataclass(frozen=True)
+class Posterior:
+    """Posterior density of a disturbance under some data, with the free parameters held at their ``values``."""
+
+    likelihood: Likelihood
+    values: Sequence[float]
+    data: DataSet
+    prior: DisturbancePrior
+
+    def given_constants(self, constants: Array) -> Posterior:
+        """The posterior density given the uncertain parameters."""
+        return replace(self, likelihood=self.likelihood.given_constants(constants))
+
+    def evaluation(self, logs: Array) -> Evaluation:
+        """Its evaluation at some logs (8,)."""
+        likelihood = self.likelihood.with_disturbance(disturbance_of(logs))
+        innovations = likelihood.innovations(self.data.recording, self.values)
+        mask = innovations.observed & self.data.rows[:, None]
+        value = innovations.log_likelihood(self.data.rows) - 0.5 * float(np.sum(self.prior.penalty(logs) ** 2))
+        value = value if np.isfinite(value) else -np.inf
+        return Evaluation(logs, value, innovations.values[mask], innovations.log_variances[mask], innovations.constants)
+
+    def evaluations(self, points: Iterable[Array]) -> list[Evaluation]:
+        """Evaluations at several logs, two at once: a compiled filter runs without Python's lock."""
+        with ThreadPoolExecutor(CONCURRENT_EVALUATIONS) as threads:
+            return list(threads.map(self.evaluation, points))
+
+    def score(self, evaluation: Evaluation) -> tuple[Array, Array]:
         """Gradient (8,) and Fisher information (8, 8), by finite differences of the innovations."""
         step = 1e-3
-        moved = _evaluations(likelihood, values, data, prior, self.logs + step * np.eye(len(self.logs)))
-        values_by_number = np.array([each.innovations - self.innovations for each in moved]) / step
-        logs_by_number = np.array([each.log_variances - self.log_variances for each in moved]) / step
-        gradient = -values_by_number @ self.innovations - 0.5 * np.sum(logs_by_number, axis=1)
-        unscaled = values_by_number + 0.5 * self.innovations * logs_by_number
-        deviations = np.array(prior.log_deviations)
+        moved = self.evaluations(evaluation.logs + step * np.eye(len(evaluation.logs)))
+        values_by_number = np.array([each.innovations - evaluation.innovations for each in moved]) / step
+        logs_by_number = np.array([each.log_variances - evaluation.log_variances for each in moved]) / step
+        gradient = -values_by_number @ evaluation.innovations - 0.5 * np.sum(logs_by_number, axis=1)
+        unscaled = values_by_number + 0.5 * evaluation.innovations * logs_by_number
+        deviations = np.array(self.prior.log_deviations)
         information = unscaled @ unscaled.T + 0.5 * logs_by_number @ logs_by_number.T + np.diag(deviations**-2)
-        return gradient - prior.penalty(self.logs) / deviations, information
+        return gradient - self.prior.penalty(evaluation.logs) / deviations, information

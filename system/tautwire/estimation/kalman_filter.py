@@ -63,7 +63,9 @@ class _Filtered:
     innovation_sensitivities: SX
 
 
-def filter_step(model: SymbolicModel, cable_count: int, noise: Noise, substeps: Substeps) -> Function:
+def filter_step(
+    model: SymbolicModel, cable_count: int, noise: Noise, substeps: Substeps, has_sensitivities: bool = True
+) -> Function:
     """One step of the filter: measurement update, time update, and the sensitivities of both.
 
     Arguments: state, covariance, sensitivities, parameters, measured, observed, shift, speed, next speed, time step,
@@ -72,9 +74,10 @@ def filter_step(model: SymbolicModel, cable_count: int, noise: Noise, substeps: 
     Measured is x, y, z and the tensions, each as shown ``shift`` (s) later; drift (s^2) times the variance of a winch
     speed is what its noise adds to the variance of each unstrained length. The disturbance is that of
     :meth:`Disturbance.filter_arguments`, and empty where the noise has none; its states follow those of the model.
+    Without sensitivities p is 0, whatever parameters the model has.
     """
     disturbance = _DisturbanceSymbols(cable_count if noise.disturbance else None)
-    size, count = model.states.numel() + disturbance.count, model.parameters.numel()
+    size, count = model.states.numel() + disturbance.count, model.parameters.numel() if has_sensitivities else 0
     predicted = _Filtered(
         SX.sym("state", size), SX.sym("covariance", size, size), SX.sym("slopes", size, count), SX(), SX(), SX()
     )
@@ -82,7 +85,10 @@ def filter_step(model: SymbolicModel, cable_count: int, noise: Noise, substeps: 
     speed, later = SX.sym("speed", cable_count), SX.sym("later", cable_count)
     step, drift, acceleration_noise_density = SX.sym("step"), SX.sym("drift"), SX.sym("acceleration_noise_density")
     instant = [casadi.vertcat(speed, SX(3, 1)), model.parameters, later, step, shift]
-    outputs = measurement_model(model, cable_count).call([predicted.state[: model.states.numel()], *instant])
+    expected, by_state, by_parameters = measurement_model(model, cable_count).call(
+        [predicted.state[: model.states.numel()], *instant]
+    )
+    outputs = (expected, by_state, by_parameters[:, :count])
     declared_variances = [deviation**2 for deviation in noise.of_outputs(cable_count)]
     variances = disturbance.white_variances or declared_variances
     filtered = _measurement_update(
@@ -114,7 +120,7 @@ def filter_step(model: SymbolicModel, cable_count: int, noise: Noise, substeps: 
         [
             state,
             propagated_covariance + casadi.diag(process_noise),
-            casadi.mtimes(transition, filtered.sensitivities) + direct_sensitivity,
+            casadi.mtimes(transition, filtered.sensitivities) + direct_sensitivity[:, :count],
             filtered.innovations,
             filtered.log_variances,
             filtered.innovation_sensitivities,

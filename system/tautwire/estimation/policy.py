@@ -107,6 +107,8 @@ class DisturbancePolicy:
     max_log_step: float = 2.0
     min_gain: float = 0.5
     max_iterations: int = 12
+    # Fits of uncertain parameters and disturbance in turn.
+    max_alternations: int = 3
     # Samples of a first fit, from which the one to all samples begins, and iterations of the latter where it is coarse.
     coarse_samples: int = 1_000
     coarse_iterations: int = 2

@@ -213,6 +213,19 @@ def _nominal_start(start: SX, constants: Sequence[SX]) -> SX:
     return casadi.substitute(start, casadi.vertcat(*constants), SX.zeros(len(constants), 1)) if constants else start
 
 
+def constants_as_parameters(model: SymbolicModel, count: int) -> SymbolicModel:
+    """The model with its last ``count`` states, which are constant, as parameters behind its own."""
+    first = model.states.numel() - count
+    return replace(
+        model,
+        states=model.states[:first],
+        parameters=casadi.vertcat(model.parameters, model.states[first:]),
+        rates=model.rates[:first],
+        start=model.start[:first],
+        state_names=model.state_names[:first],
+    )
+
+
 def freeze_drifting_states(model: SymbolicModel) -> SymbolicModel:
     """The model with states that have no equilibrium frozen at their initial values and removed."""
     if not model.drifting:
