@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from tautwire.estimation.compiled_filter import FilterInputs, FilterState
 from tautwire.estimation.likelihood import Likelihood
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.robot.schema import EffectSetting
@@ -107,10 +108,10 @@ def test_the_transition_of_a_sample_is_the_derivative_of_the_next_state(effect: 
 
     def moved(begun: np.ndarray) -> np.ndarray:
         size = len(begun)
-        carried = (begun, np.eye(size), np.zeros((size, 0)), np.zeros((0, 1)))
-        return likelihood._filter_function(
-            1, *carried, unseen, unseen, unseen, *moment, np.zeros((1, 1)), np.zeros((1, 1)), np.zeros((0, 1))
-        )[0][:, 1]
+        columns = (unseen, unseen, unseen, *moment, np.zeros((1, 1)))
+        inputs = FilterInputs(columns, np.zeros((0, 1)), np.zeros((0, 1)), np.ones(11), 0.0)
+        before = FilterState(begun.ravel(), np.eye(size), np.zeros((size, 0)))
+        return likelihood._filter_functions.run(before, inputs, keeps_covariances=False).end.state
 
     columns = (np.zeros((0, 1)), unseen, *moment, np.zeros((0, 1)))
     _, transition, _ = likelihood.jacobians(1, state, state, *columns)

@@ -7,9 +7,8 @@ import numpy as np
 import pytest
 from casadi import SX, Function
 
-from tautwire.estimation.initial_state_prior import initial_covariance
 from tautwire.estimation.integration_steps import Substeps
-from tautwire.estimation.kalman_filter import filter_step
+from tautwire.estimation.kalman_filter import output_function, time_update_function
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.native_functions import CompiledFunction, by_sample
 from tautwire.robot.symbolic_model import FreeParameter, symbolic_model
@@ -99,32 +98,26 @@ def test_functions_that_are_kept_take_little_memory() -> None:
 
 
 @pytest.mark.parametrize("case", CASES, ids=str)
-def test_the_filter_of_every_effect_is_casadis_to_the_last_bit(case: Case) -> None:
+def test_the_filter_functions_of_every_effect_are_casadis_to_the_last_bit(case: Case) -> None:
     robot, recording = example("three"), recorded("three", 1)
     noise, count = estimate_noise(robot, recording), 50
     model = symbolic_model(
         replace(robot, effects=(case.setting(robot),)), [FreeParameter(0, name) for name in case.law]
     )
-    function = filter_step(model, robot.cable_count, noise, Substeps(5, 1))
     theta = np.array(list(case.law.values()))[:, None]
-    start = Function("start", [model.parameters], [model.start, casadi.jacobian(model.start, model.parameters)])
-    size = model.states.numel()
-    carried = (*map(np.array, start(theta)), initial_covariance(robot, noise, size, 0))
-    carried = (carried[0], carried[2], carried[1])
-    columns = (
-        recording.measured()[:count].T,
-        np.ones((6, count)),
-        np.zeros((6, count)),
-        recording.winch_speed[:count].T,
-        recording.winch_speed[1 : count + 1].T,
-        np.diff(recording.time[: count + 1])[None, :],
-        np.full((1, count), 1e-4),
-        np.zeros((1, count)),
-        np.zeros((0, count)),
-    )
-    ours = CompiledFunction(function, carried=3)(count, *carried, theta, *columns)
-    theirs = function.mapaccum("run", count, 3)(*carried, np.repeat(theta, count, axis=1), *columns)
-    for index, (a, b) in enumerate(zip(ours, theirs, strict=True)):
-        first = carried[index].shape[1] if index < 3 else 0
-        np.testing.assert_array_equal(a[:, first:], np.array(b))
-        assert index >= 3 or np.all(np.isfinite(a))
+    start = np.array(Function("start", [model.parameters], [model.start])(theta))
+    speeds = (recording.winch_speed[:count].T, recording.winch_speed[1 : count + 1].T)
+    step = np.diff(recording.time[: count + 1])[None, :]
+    first = (start, theta)
+    for function, columns in (
+        (output_function(model, 3, noise), (np.zeros((6, 1)), *speeds, step)),
+        (
+            time_update_function(model, 3, noise, Substeps(5, 1)),
+            (*speeds, step, np.full((1, 1), 1e-4), np.zeros((1, 1)), np.zeros((0, 1))),
+        ),
+    ):
+        arguments = [np.tile(a, count) if a.shape[1] == 1 else a for a in (*first, *columns)]
+        ours = CompiledFunction(function)(count, *first, *columns)
+        for a, b in zip(ours, function.map(count).call(arguments), strict=True):
+            np.testing.assert_array_equal(a, np.array(b))
+            assert np.all(np.isfinite(a))

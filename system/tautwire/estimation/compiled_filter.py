@@ -1,24 +1,72 @@
-"""Compiled filter: the functions of one model's Kalman filter as machine code, each compiled at its first use.
+"""Compiled filter: a model's Kalman filter as machine code, each of its functions compiled at first use.
 
 Likelihoods that differ in numbers alone share it.
 """
 
 from __future__ import annotations
 
+import sys
+from dataclasses import dataclass
 from functools import cached_property
 
 import casadi
+import numpy as np
+from numpy.typing import NDArray
 
 from ..robot.symbolic_model import SymbolicModel, constants_as_parameters
+from .covariance_recursion import run_recursion
 from .integration_steps import Substeps
-from .kalman_filter import Noise, filter_jacobians, filter_step
+from .kalman_filter import Noise, filter_jacobians, output_function, time_update_function
 from .native_functions import CompiledFunction
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class FilterInputs:
+    """Inputs of a filter over K samples.
+
+    ``measured``, ``observed`` and ``shift`` (m, K), speed and next speed (cables, K), time step and drift (1, K) as
+    ``columns``; the same for all samples are ``parameters`` (p, 1), ``disturbance`` (see
+    :meth:`tautwire.estimation.disturbance.Disturbance.filter_arguments`), variances of white noise (m,), and the
+    density of acceleration noise.
+    """
+
+    columns: tuple[Array, ...]
+    parameters: Array
+    disturbance: Array
+    white_variances: Array
+    acceleration_noise_density: float
+
+
+@dataclass(frozen=True)
+class FilterState:
+    """State (n,), covariance (n, n), and sensitivities (n, p) of a filter before a sample."""
+
+    state: Array
+    covariance: Array
+    sensitivities: Array
+
+
+@dataclass(frozen=True)
+class FilterResults:
+    """Predicted ``states`` (n, K + 1) and ``covariances`` (K, n, n), none unless they are kept; whitened innovations.
+
+    ``values`` and ``log_variances`` (K, m), ``sensitivities`` (K, m, p); ``end`` is the state after the last sample.
+    """
+
+    states: Array
+    covariances: Array
+    values: Array
+    log_variances: Array
+    sensitivities: Array
+    end: FilterState
 
 
 class CompiledFilter:
-    """Functions of a model's filter; the last ``constant_count`` states of the model are uncertain parameters.
+    """Filter of a model whose last ``constant_count`` states are uncertain parameters.
 
-    Of the noise only whether it has a disturbance matters, and without one its levels.
+    Of the noise only whether it has a disturbance matters, and that of the winch speeds.
     """
 
     def __init__(
@@ -38,11 +86,10 @@ class CompiledFilter:
         self.start = casadi.Function("start", [model.parameters], [model.start, start_sensitivities])
         self.lags = casadi.Function("lags", [model.parameters], [model.sensor_delays])
 
-    @cached_property
-    def step(self) -> CompiledFunction:
-        """See :func:`tautwire.estimation.kalman_filter.filter_step`."""
-        function = filter_step(self.model, self._cable_count, self._noise, self._substeps, self._has_sensitivities)
-        return CompiledFunction(function, carried=3)
+    @property
+    def instruction_count(self) -> int:
+        """Instructions of its functions, in proportion to which it takes memory."""
+        return self._outputs.instruction_count + self._time_update.instruction_count
 
     @cached_property
     def jacobians(self) -> CompiledFunction:
@@ -54,3 +101,64 @@ class CompiledFilter:
         """The filter of the other states, without sensitivities; its parameters are the model's, then the constants."""
         model = constants_as_parameters(self.model, self._constant_count)
         return CompiledFilter(model, 0, self._cable_count, self._noise, self._substeps, has_sensitivities=False)
+
+    def run(self, start: FilterState, inputs: FilterInputs, keeps_covariances: bool) -> FilterResults:
+        """Run over K samples."""
+        measured, observed, shift, speed, later, step, drift = inputs.columns
+        output_count, count = measured.shape
+        state, covariance = start.state.copy(), start.covariance.copy()
+        sensitivities = np.ascontiguousarray(start.sensitivities.T).copy()
+        theta, density = inputs.parameters, np.full((1, 1), inputs.acceleration_noise_density)
+        outputs = self._outputs.bind(count, state[:, None], theta, shift, speed, later, step)
+        time_update = self._time_update.bind(
+            count, state[:, None], theta, speed, later, step, drift, density, inputs.disturbance
+        )
+        expected, by_state, by_parameters = outputs.results
+        moved, transition, direct, decay, process_noise = time_update.results
+        size, parameter_count = start.sensitivities.shape
+        states = np.empty((count + 1, size))
+        covariances = np.empty((count if keeps_covariances else 0, size, size))
+        values, log_variances = np.empty((2, count, output_count))
+        innovation_sensitivities = np.empty((count, parameter_count, output_count))
+        run_recursion(
+            outputs.address,
+            outputs.places,
+            outputs.strides,
+            time_update.address,
+            time_update.places,
+            time_update.strides,
+            state,
+            covariance,
+            sensitivities,
+            expected[0],
+            by_state,
+            by_parameters,
+            moved[0],
+            transition,
+            direct,
+            decay[0],
+            process_noise[0],
+            np.ascontiguousarray(measured.T),
+            np.ascontiguousarray(observed.T),
+            inputs.white_variances,
+            states,
+            covariances,
+            values,
+            log_variances,
+            innovation_sensitivities,
+        )
+        end = FilterState(state, covariance, sensitivities.T)
+        slopes = innovation_sensitivities.swapaxes(1, 2)
+        return FilterResults(states.T, covariances, values, log_variances, slopes, end)
+
+    @cached_property
+    def _outputs(self) -> CompiledFunction:
+        function = output_function(self.model, self._cable_count, self._noise, self._has_sensitivities)
+        return CompiledFunction(function, max_compiled=sys.maxsize)
+
+    @cached_property
+    def _time_update(self) -> CompiledFunction:
+        function = time_update_function(
+            self.model, self._cable_count, self._noise, self._substeps, self._constant_count, self._has_sensitivities
+        )
+        return CompiledFunction(function, max_compiled=sys.maxsize)

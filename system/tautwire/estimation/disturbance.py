@@ -63,9 +63,9 @@ class Disturbance:
         return np.array([self.position_noise**2] * 3 + [self.tension_noise**2] * cable_count)
 
     def filter_arguments(self, cable_count: int) -> Array:
-        """What the filter takes (15 + 3 n,): decay rates (1/s) and variances of states, variances of white noise."""
+        """What the filter takes (12 + 2 n,): decay rates (1/s) and variances of the states."""
         rates = [2.0 * pi * process.bandwidth for process in self.processes(cable_count)]
-        return np.array([*rates, *self.variances(cable_count), *self.white_variances(cable_count)])
+        return np.array([*rates, *self.variances(cable_count)])
 
 
 def sensor_noise_only(disturbance: Disturbance, position_noise: float, tension_noise: float) -> Disturbance:

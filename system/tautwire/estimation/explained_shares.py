@@ -79,7 +79,8 @@ def explained_shares(
     before, *without = (run.result() for run in pending)
     of_declared = calibrate(declared, unimproved, data).clipped(max_sigmas).without_sensor_errors(data.recording)
     recording = after.recording
-    missed = _missed(of_declared, before, floor)
+    # Numbers that a wrong model fitted to one recording may be worse on another than those declared.
+    missed = min(_missed(of_declared, before, floor), _missed(data.recording, after.before, floor))
     left = _missed(recording, after.after, floor)
     total = max(missed, left, np.finfo(float).tiny)
     return ExplainedShares(

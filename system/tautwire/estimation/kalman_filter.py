@@ -1,9 +1,6 @@
-"""Extended Kalman filter: one sample as a CasADi function.
+"""Extended Kalman filter: outputs and time update of a robot's model as CasADi functions, with their derivatives.
 
-Scalar measurements are processed one by one (their noise is independent), which needs no matrix inverse and skips a
-missing one. Sensitivities to the free parameters are propagated with the gain held fixed.
-
-Source: Bierman (1977), Factorization Methods for Discrete Sequential Estimation, ch. 2; Ljung (1999), ch. 11.
+:mod:`tautwire.estimation.covariance_recursion` runs them over a recording.
 """
 
 from __future__ import annotations
@@ -53,79 +50,63 @@ class Noise:
         return np.square(self.of_outputs(cable_count))
 
 
-@dataclass(frozen=True)
-class _Filtered:
-    state: SX
-    covariance: SX
-    sensitivities: SX
-    innovations: SX
-    log_variances: SX
-    innovation_sensitivities: SX
+def output_function(model: SymbolicModel, cable_count: int, noise: Noise, has_sensitivities: bool = True) -> Function:
+    """Outputs of a predicted state, of disturbance states behind the model's too, with their derivatives.
 
-
-def filter_step(
-    model: SymbolicModel, cable_count: int, noise: Noise, substeps: Substeps, has_sensitivities: bool = True
-) -> Function:
-    """One step of the filter: measurement update, time update, and the sensitivities of both.
-
-    Arguments: state, covariance, sensitivities, parameters, measured, observed, shift, speed, next speed, time step,
-    drift, acceleration noise density, disturbance. Results: the first three at the next sample, then whitened
-    innovations (m,), log of their variances (m,), and the innovations' derivatives by the parameters (m, p), whitened.
-    Measured is x, y, z and the tensions, each as shown ``shift`` (s) later; drift (s^2) times the variance of a winch
-    speed is what its noise adds to the variance of each unstrained length. The disturbance is that of
-    :meth:`Disturbance.filter_arguments`, and empty where the noise has none; its states follow those of the model.
-    Without sensitivities p is 0, whatever parameters the model has.
+    Arguments: state, parameters, shift, speed, next speed, time step. Results: x, y, z and the tensions as shown
+    ``shift`` (s) later (m,), and their derivatives by the state (m, n) and by the parameters (m, p). Without
+    sensitivities p is 0, whatever parameters the model has.
     """
     disturbance = _DisturbanceSymbols(cable_count if noise.disturbance else None)
-    size, count = model.states.numel() + disturbance.count, model.parameters.numel() if has_sensitivities else 0
-    predicted = _Filtered(
-        SX.sym("state", size), SX.sym("covariance", size, size), SX.sym("slopes", size, count), SX(), SX(), SX()
-    )
-    measured, observed, shift = (SX.sym(name, 3 + cable_count) for name in ("measured", "seen", "shift"))
-    speed, later = SX.sym("speed", cable_count), SX.sym("later", cable_count)
-    step, drift, acceleration_noise_density = SX.sym("step"), SX.sym("drift"), SX.sym("acceleration_noise_density")
+    state, shift = SX.sym("state", model.states.numel() + disturbance.count), SX.sym("shift", 3 + cable_count)
+    speed, later, step = SX.sym("speed", cable_count), SX.sym("later", cable_count), SX.sym("step")
     instant = [casadi.vertcat(speed, SX(3, 1)), model.parameters, later, step, shift]
-    expected, by_state, by_parameters = measurement_model(model, cable_count).call(
-        [predicted.state[: model.states.numel()], *instant]
-    )
-    outputs = (expected, by_state, by_parameters[:, :count])
-    declared_variances = [deviation**2 for deviation in noise.of_outputs(cable_count)]
-    variances = disturbance.white_variances or declared_variances
-    filtered = _measurement_update(
-        disturbance.added_to(outputs, predicted.state), variances, predicted, measured, observed
-    )
-    state, transition, direct_sensitivity = disturbance.time_update(model, substeps, filtered.state, speed, later, step)
-    process_noise = SX(size, 1)
+    outputs = measurement_model(model, cable_count).call([state[: model.states.numel()], *instant])
+    expected, by_state, by_parameters = disturbance.added_to(outputs, state)
+    count = model.parameters.numel() if has_sensitivities else 0
+    arguments = [state, model.parameters, shift, speed, later, step]
+    return Function("outputs", arguments, [expected, by_state, by_parameters[:, :count]])
+
+
+def time_update_function(
+    model: SymbolicModel,
+    cable_count: int,
+    noise: Noise,
+    substeps: Substeps,
+    constant_count: int = 0,
+    has_sensitivities: bool = True,
+) -> Function:
+    """Time update of a filter: the state at the next sample, its derivatives, and process noise.
+
+    Arguments: state, parameters, speed, next speed, time step, drift, acceleration noise density, disturbance. Drift
+    (s^2) times the variance of a winch speed is what its noise adds to the variance of each unstrained length; the
+    disturbance is that of :meth:`Disturbance.filter_arguments`, and empty where the noise has none.
+
+    Results: the next state (n,); the derivatives of those d states that do not only decay, by the first c states (d, c)
+    and by the parameters (d, p); the factors by which states decay, and the variances that are added to them (n,). The
+    model's last ``constant_count`` states are constant.
+    """
+    disturbance = _DisturbanceSymbols(cable_count if noise.disturbance else None)
+    model_size = model.states.numel()
+    state = SX.sym("state", model_size + disturbance.count)
+    speed, later, step = SX.sym("speed", cable_count), SX.sym("later", cable_count), SX.sym("step")
+    drift, acceleration_noise_density = SX.sym("drift"), SX.sym("acceleration_noise_density")
+    moved, transition, direct_sensitivity = disturbance.time_update(model, substeps, state, speed, later, step)
+    process_noise = SX(state.numel(), 1)
     process_noise[3:6] = acceleration_noise_density**2 * step
     process_noise[6 : 6 + cable_count] = noise.winch_speed**2 * drift
-    process_noise[model.states.numel() :] = disturbance.process_noise(step)
-    propagated_covariance = _symmetric(casadi.mtimes([transition, filtered.covariance, transition.T]))
-    return Function(
-        "filter_sample",
-        [
-            predicted.state,
-            predicted.covariance,
-            predicted.sensitivities,
-            model.parameters,
-            measured,
-            observed,
-            shift,
-            speed,
-            later,
-            step,
-            drift,
-            acceleration_noise_density,
-            disturbance.arguments,
-        ],
-        [
-            state,
-            propagated_covariance + casadi.diag(process_noise),
-            casadi.mtimes(transition, filtered.sensitivities) + direct_sensitivity[:, :count],
-            filtered.innovations,
-            filtered.log_variances,
-            filtered.innovation_sensitivities,
-        ],
-    )
+    process_noise[model_size:] = disturbance.process_noise(step)
+    moving = model_size - constant_count
+    count = model.parameters.numel() if has_sensitivities else 0
+    arguments = [state, model.parameters, speed, later, step, drift, acceleration_noise_density, disturbance.arguments]
+    results = [
+        moved,
+        transition[:moving, : model_size + (3 if disturbance.count else 0)],
+        direct_sensitivity[:moving, :count],
+        casadi.vertcat(SX.ones(model_size), disturbance.decay(step)),
+        process_noise,
+    ]
+    return Function("time_update", arguments, results)
 
 
 class _DisturbanceSymbols:
@@ -133,11 +114,8 @@ class _DisturbanceSymbols:
 
     def __init__(self, cable_count: int | None) -> None:
         self.count = 0 if cable_count is None else disturbance_state_count(cable_count)
-        output_count = max(self.count - 3, 0)
         self.decay_rates, self._variances = SX.sym("decay_rate", self.count), SX.sym("variance", self.count)
-        white = SX.sym("white_variance", output_count)
-        self.white_variances: list[SX] = casadi.vertsplit(white) if self.count else []
-        self.arguments = casadi.vertcat(self.decay_rates, self._variances, white)
+        self.arguments = casadi.vertcat(self.decay_rates, self._variances)
 
     def added_to(self, outputs: Sequence[SX], state: SX) -> Sequence[SX]:
         """The outputs with their errors, and the derivatives of these by the states."""
@@ -147,6 +125,10 @@ class _DisturbanceSymbols:
         count = expected.numel()
         by_errors = casadi.horzcat(SX(count, 3), SX.eye(count))
         return expected + state[state.numel() - count :], casadi.horzcat(by_state, by_errors), by_parameters
+
+    def decay(self, step: SX) -> SX:
+        """Factors by which the disturbance states decay in a step."""
+        return casadi.exp(-self.decay_rates * step)
 
     def process_noise(self, step: SX) -> SX:
         """Variances that a step adds to the disturbance states."""
@@ -159,7 +141,7 @@ class _DisturbanceSymbols:
         if not self.count:
             return _time_update(model, substeps, state, speed, next_speed, step)
         size, parameters = model.states.numel(), model.parameters.numel()
-        force, decay = SX.sym("force", 3), casadi.exp(-self.decay_rates * step)
+        force, decay = SX.sym("force", 3), self.decay(step)
         mean_decay = casadi.exp(-0.5 * self.decay_rates[:3] * step)
         next_state, transition, sensitivities = casadi.substitute(
             list(_time_update(_with_force(model, force), substeps, state[:size], speed, next_speed, step)),
@@ -189,8 +171,9 @@ def filter_jacobians(model: SymbolicModel, cable_count: int, noise: Noise, subst
     """Jacobians of a filter step: of the outputs by the predicted state, of the next state by the updated one.
 
     Arguments: state before and after the measurement update, parameters, shift, speed, next speed, time step,
-    disturbance, as for :func:`filter_step`. Results: derivatives of the outputs (m, n), of the state at the next sample
-    (n, n), and of the model's states in it by those half a step before it, from the cubic through both ends.
+    disturbance, as for :func:`output_function` and :func:`time_update_function`. Results: derivatives of the outputs
+    (m, n), of the state at the next sample (n, n), and of the model's states in it by those half a step before it, from
+    the cubic through both ends.
     """
     disturbance = _DisturbanceSymbols(cable_count if noise.disturbance else None)
     model_size = model.states.numel()
@@ -210,39 +193,6 @@ def filter_jacobians(model: SymbolicModel, cable_count: int, noise: Noise, subst
     half_transition = 0.5 * (of_model + identity) + step / 8.0 * casadi.mtimes(identity - of_model, jacobian_at_update)
     arguments = [predicted, updated, model.parameters, shift, speed, later, step, disturbance.arguments]
     return Function("filter_slopes", arguments, [casadi.densify(f) for f in (by_state, transition, half_transition)])
-
-
-def _measurement_update(
-    outputs: Sequence[SX], variances: Sequence[SX | float], predicted: _Filtered, measured: SX, observed: SX
-) -> _Filtered:
-    expected, by_state, by_parameters = outputs
-    covariance = predicted.covariance
-    correction = SX(predicted.state.numel(), 1)
-    sensitivities = predicted.sensitivities
-    rows: list[tuple[SX, SX, SX]] = []
-    for index, sensor_variance in enumerate(variances):
-        output_row = by_state[index, :]
-        cross_covariance = casadi.mtimes(covariance, output_row.T)
-        innovation_variance = casadi.mtimes(output_row, cross_covariance) + sensor_variance
-        innovation = measured[index] - expected[index] - casadi.mtimes(output_row, correction)
-        innovation_sensitivity = -(casadi.mtimes(output_row, sensitivities) + by_parameters[index, :])
-        gain = cross_covariance * (observed[index] / innovation_variance)
-        correction = correction + gain * innovation
-        sensitivities = sensitivities + casadi.mtimes(gain, innovation_sensitivity)
-        covariance = _symmetric(covariance - casadi.mtimes(gain, cross_covariance.T))
-        deviation = casadi.sqrt(innovation_variance)
-        rows.append((innovation / deviation, casadi.log(innovation_variance), innovation_sensitivity / deviation))
-    whitened_innovations, log_variances, whitened_sensitivities = (
-        casadi.vertcat(*column) for column in zip(*rows, strict=True)
-    )
-    return _Filtered(
-        predicted.state + correction,
-        covariance,
-        sensitivities,
-        whitened_innovations,
-        log_variances,
-        whitened_sensitivities,
-    )
 
 
 def _time_update(
@@ -297,11 +247,6 @@ def _integrated_exponential(rate_jacobian: SX, step: SX, order: int) -> SX:
     for term in range(order, 1, -1):
         series = identity + (step / term) * casadi.mtimes(rate_jacobian, series)
     return step * series
-
-
-def _symmetric(matrix: SX) -> SX:
-    """The matrix made symmetric from its upper half alone: the lower one is not computed."""
-    return casadi.triu2symm(casadi.triu(matrix))
 
 
 def _speed_intervals(speed: SX, next_speed: SX, count: int) -> list[tuple[SX, SX]]:

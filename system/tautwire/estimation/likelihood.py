@@ -24,12 +24,12 @@ from ..recordings.recording import Recording
 from ..robot.schema import Robot
 from ..robot.symbolic_model import FreeParameter, SymbolicModel, symbolic_model
 from ..robot.uncertain_parameters import uncertain_parameters
-from .compiled_filter import CompiledFilter
+from .compiled_filter import CompiledFilter, FilterInputs, FilterState
 from .disturbance import Disturbance, disturbance_state_count
 from .initial_state_prior import initial_covariance
 from .integration_steps import substeps_of_robot
 from .kalman_filter import Noise
-from .native_functions import CompiledFunction, by_sample
+from .native_functions import CompiledFunction
 
 Array = NDArray[np.float64]
 
@@ -72,8 +72,8 @@ class FilterSegment:
 
     ``columns`` are measured, observed and shift (m, K), speed and next speed (cables, K), time step and drift (1, K);
     ``is_recorded`` tells which samples are the recording's, the others fill gaps. ``states`` (n, K + 1) and
-    ``covariances`` (K, n, n) are those predicted, with a disturbance's behind the model's; ``values``,
-    ``log_variances`` (K, m) and ``sensitivities`` (K, m, p) as in Innovations.
+    ``covariances`` (K, n, n), none unless they are kept, are those predicted, with a disturbance's behind the model's;
+    ``values``, ``log_variances`` (K, m) and ``sensitivities`` (K, m, p) as in Innovations.
     """
 
     columns: tuple[Array, ...]
@@ -127,7 +127,7 @@ class Likelihood:
         measured, shift = self._aligned_outputs(recording, parameters)
         observed = np.isfinite(measured)
         filter_segments = self._filter(
-            recording, measured, shift, parameters, self._start_covariance(), acceleration_noise_density
+            recording, (measured, shift), parameters, self._start_covariance(), acceleration_noise_density
         )
         values, log_variances, sensitivities, last_state = _concatenated(filter_segments)
         recorded = np.isfinite(recording.measured())
@@ -141,7 +141,7 @@ class Likelihood:
     @property
     def instruction_count(self) -> int:
         """Instructions of the filter, in proportion to which this takes memory."""
-        return self._filter_functions.step.instruction_count
+        return self._filter_functions.instruction_count
 
     @property
     def jacobians(self) -> CompiledFunction:
@@ -171,15 +171,20 @@ class Likelihood:
         return other
 
     def segments(
-        self, recording: Recording, parameters: Sequence[float] | Array, acceleration_noise_density: float = 0.0
+        self,
+        recording: Recording,
+        parameters: Sequence[float] | Array,
+        acceleration_noise_density: float = 0.0,
+        keeps_covariances: bool = True,
     ) -> Iterator[FilterSegment]:
         """The filter's run over a recording, segment by segment: memory does not grow with its length.
 
         For ``acceleration_noise_density`` see :meth:`innovations`.
         """
-        measured, shift = self._aligned_outputs(recording, parameters)
+        outputs = self._aligned_outputs(recording, parameters)
+        covariance = self._start_covariance()
         yield from self._filter(
-            recording, measured, shift, parameters, self._start_covariance(), acceleration_noise_density
+            recording, outputs, parameters, covariance, acceleration_noise_density, keeps_covariances
         )
 
     def simulated_outputs(self, recording: Recording, parameters: Sequence[float] | Array) -> Array:
@@ -190,7 +195,7 @@ class Likelihood:
         no_force = np.zeros(self.model.inputs.numel() - self.cable_count)
         parts = []
         for segment in self._filter(
-            recording, no_measurements, np.zeros_like(no_measurements), parameters, self._start_covariance(), 0.0
+            recording, (no_measurements, np.zeros_like(no_measurements)), parameters, self._start_covariance(), 0.0
         ):
             states = segment.states[: self.model.states.numel(), :-1][:, segment.is_recorded]
             speeds = segment.columns[3][:, segment.is_recorded]
@@ -212,7 +217,7 @@ class Likelihood:
         no_measurements = np.full(recording.measured().shape, np.nan)
         zero_covariance = np.zeros_like(self._start_covariance())
         filter_segments = self._filter(
-            recording, no_measurements, np.zeros_like(no_measurements), parameters, zero_covariance, 0.0
+            recording, (no_measurements, np.zeros_like(no_measurements)), parameters, zero_covariance, 0.0
         )
         _, log_variances, *_ = _concatenated(filter_segments)
         variances: Array = np.exp(log_variances)
@@ -221,44 +226,37 @@ class Likelihood:
     def _filter(
         self,
         recording: Recording,
-        measured: Array,
-        shift: Array,
+        outputs: tuple[Array, Array],
         parameters: Sequence[float] | Array,
         start_covariance: Array,
         acceleration_noise_density: float,
+        keeps_covariances: bool = False,
     ) -> Iterator[FilterSegment]:
+        columns, is_recorded = _filter_columns(recording, *outputs)
         theta = self._arguments(parameters)
-        columns, is_recorded = _filter_columns(recording, measured, shift)
         state, sensitivities = self._start(theta)
-        filter_state = (state, start_covariance, sensitivities)
-        state_count, parameter_count = sensitivities.shape
+        now = FilterState(state.ravel(), start_covariance, sensitivities)
         for begin in range(0, len(is_recorded), CHUNK_SAMPLES):
             self.poll_interrupts()
             chunk = tuple(column[:, begin : begin + CHUNK_SAMPLES] for column in columns)
-            count = chunk[0].shape[1]
-            results = self._filter_functions.step(
-                count,
-                *filter_state,
+            inputs = FilterInputs(
+                chunk,
                 theta[:, None],
-                *chunk,
-                np.full((1, 1), acceleration_noise_density),
                 self.disturbance_arguments,
+                self.noise.white_variances(self.cable_count),
+                acceleration_noise_density,
             )
-            states, covariances, state_slopes, values, log_variances, innovation_sensitivities = results
+            results = self._filter_functions.run(now, inputs, keeps_covariances)
             yield FilterSegment(
                 chunk,
                 is_recorded[begin : begin + CHUNK_SAMPLES],
-                states,
-                by_sample(covariances, count + 1)[:-1],
-                values.T,
-                log_variances.T,
-                by_sample(innovation_sensitivities, count),
+                results.states,
+                results.covariances,
+                results.values,
+                results.log_variances,
+                results.sensitivities,
             )
-            filter_state = (
-                states[:, -1:],
-                covariances[:, state_count * count :],
-                state_slopes[:, parameter_count * count :],
-            )
+            now = results.end
 
     def _arguments(self, parameters: Sequence[float] | Array) -> Array:
         """The free parameters, then the constants that are held."""

@@ -15,6 +15,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 from functools import cache
 
 import casadi
@@ -182,6 +183,22 @@ RUN_PROTOTYPE = ctypes.CFUNCTYPE(None, ctypes.c_int64, ctypes.c_void_p, ctypes.c
 MAX_COMPILED_INSTRUCTIONS = 800_000
 
 
+@dataclass(frozen=True)
+class BoundFunction:
+    """A compiled function bound to arguments of K samples and results of one: what ``run`` at its address takes.
+
+    ``places`` are addresses of the first sample's numbers, ``strides`` how many numbers each moves from one sample to
+    the next. ``results`` (columns, rows) are those of the sample that was evaluated last. What the addresses belong
+    to is ``owners``: it has to live as long.
+    """
+
+    address: int
+    places: NDArray[np.int64]
+    strides: NDArray[np.int64]
+    results: tuple[Array, ...]
+    owners: tuple[object, ...]
+
+
 class CompiledFunction:
     """Compiled function over K samples; its first ``carried`` arguments are its first results of the sample before.
 
@@ -224,10 +241,6 @@ class CompiledFunction:
         for result, first in zip(results, inputs[:carried], strict=False):
             result[:, : first.shape[1]] = first
         sources = [*results[:carried], *inputs[carried:]]
-        argument_strides = [
-            rows * columns if k < carried or array.shape[1] != columns else 0
-            for k, (array, (rows, columns)) in enumerate(zip(sources, self._argument_shapes, strict=True))
-        ]
         result_sizes = [rows * columns for rows, columns in self._result_shapes]
         result_offsets = [size * array.itemsize for size, array in zip(result_sizes[:carried], results, strict=False)]
         result_offsets += [0] * (len(results) - carried)
@@ -238,9 +251,29 @@ class CompiledFunction:
             self._constants.ctypes.data,
             workspace.ctypes.data,
         ]
-        strides = [*argument_strides, *result_sizes, 0, 0]
+        strides = [*self._argument_strides(sources), *result_sizes, 0, 0]
         self._native_run(count, (ctypes.c_void_p * len(pointers))(*pointers), (ctypes.c_int64 * len(strides))(*strides))
         return results
+
+    def bind(self, count: int, *arguments: Array) -> BoundFunction:
+        """Bind the function to arguments as for a call."""
+        inputs = [
+            _column_major(argument, size, count)
+            for argument, size in zip(arguments, self._argument_shapes, strict=True)
+        ]
+        results = [np.empty((columns, rows)) for rows, columns in self._result_shapes]
+        arrays = (*inputs, *results, self._constants, np.empty(self._workspace_size))
+        strides = [*self._argument_strides(inputs), *[0] * (len(arrays) - len(inputs))]
+        places = np.array([array.ctypes.data for array in arrays], dtype=np.int64)
+        address = self._engine.get_function_address("run")
+        return BoundFunction(address, places, np.array(strides, dtype=np.int64), tuple(results), (self, *arrays))
+
+    def _argument_strides(self, arrays: Sequence[Array]) -> list[int]:
+        """By how many numbers each argument moves from one sample to the next."""
+        return [
+            rows * columns if k < self._carried or array.shape[1] != columns else 0
+            for k, (array, (rows, columns)) in enumerate(zip(arrays, self._argument_shapes, strict=True))
+        ]
 
     def _interpreted(self, function: Function, count: int, inputs: Sequence[Array]) -> list[Array]:
         """Evaluate with CasADi's interpreter."""

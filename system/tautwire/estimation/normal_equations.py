@@ -32,7 +32,7 @@ def compressed_residuals(
     count = len(values)
     fisher_information, score, sum_of_squares = np.zeros((count, count)), np.zeros(count), 0.0
     next_row = 0
-    for segment in likelihood.segments(sample.recording, values, acceleration_noise_density):
+    for segment in likelihood.segments(sample.recording, values, acceleration_noise_density, keeps_covariances=False):
         segment_rows = slice(next_row, next_row + int(np.sum(segment.is_recorded)))
         next_row = segment_rows.stop
         rows = sample.rows[segment_rows, None]

@@ -1,0 +1,106 @@
+"""The covariance recursion against the Kalman filter of textbooks, which updates with all outputs at once."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from casadi import SX, Function, mtimes
+from numpy.typing import NDArray
+
+from tautwire.estimation.covariance_recursion import run_recursion
+from tautwire.estimation.native_functions import BoundFunction, CompiledFunction
+
+Array = NDArray[np.float64]
+
+GENERATOR = np.random.default_rng(5)
+# Two states that move by the first four, a constant, and two that decay; two parameters act on states and outputs.
+SIZE, MOVING, FROM, OUTPUTS, PARAMETERS, COUNT = 5, 2, 4, 3, 2, 40
+TRANSITION = GENERATOR.normal(size=(MOVING, FROM)) * 0.6
+DIRECT = GENERATOR.normal(size=(MOVING, PARAMETERS))
+DECAY = np.array([1.0, 1.0, 1.0, 0.7, 0.9])
+PROCESS_NOISE = np.array([0.01, 0.02, 0.0, 0.3, 0.1])
+BY_STATE = GENERATOR.normal(size=(OUTPUTS, SIZE)) * (GENERATOR.random((OUTPUTS, SIZE)) < 0.7)
+BY_PARAMETERS = GENERATOR.normal(size=(OUTPUTS, PARAMETERS))
+WHITE_VARIANCES = np.array([0.2, 0.5, 1.0])
+MEASURED = GENERATOR.normal(size=(COUNT, OUTPUTS))
+OBSERVED = (GENERATOR.random((COUNT, OUTPUTS)) < 0.8).astype(float)
+FULL_TRANSITION = np.diag(DECAY)
+FULL_TRANSITION[:MOVING] = 0.0
+FULL_TRANSITION[:MOVING, :FROM] = TRANSITION
+START, START_COVARIANCE = GENERATOR.normal(size=SIZE), np.diag([1.0, 2.0, 0.5, 0.1, 0.3])
+
+
+def bound(count: int, state: Array) -> tuple[BoundFunction, BoundFunction]:
+    x = SX.sym("x", SIZE)
+    outputs = Function("outputs", [x], [mtimes(SX(BY_STATE), x), SX(BY_STATE), SX(BY_PARAMETERS)])
+    update = Function(
+        "update",
+        [x],
+        [mtimes(SX(FULL_TRANSITION), x), SX(TRANSITION), SX(DIRECT), SX(DECAY), SX(PROCESS_NOISE)],
+    )
+    return CompiledFunction(outputs).bind(count, state[:, None]), CompiledFunction(update).bind(count, state[:, None])
+
+
+def recursion(keeps_covariances: bool) -> list[Array]:
+    """The end state, covariance and sensitivities, then states, covariances, and what is known of innovations."""
+    state, covariance, sensitivities = START.copy(), START_COVARIANCE.copy(), np.zeros((PARAMETERS, SIZE))
+    outputs, update = bound(COUNT, state)
+    (expected, by_state, by_parameters), (moved, transition, direct, decay, noise) = outputs.results, update.results
+    states, values, log_variances = np.empty((COUNT + 1, SIZE)), *np.empty((2, COUNT, OUTPUTS))
+    covariances = np.empty((COUNT * keeps_covariances, SIZE, SIZE))
+    slopes = np.empty((COUNT, PARAMETERS, OUTPUTS))
+    functions = [part for each in (outputs, update) for part in (each.address, each.places, each.strides)]
+    of_outputs, of_update = (expected[0], by_state, by_parameters), (moved[0], transition, direct, decay[0], noise[0])
+    filled = [states, covariances, values, log_variances, slopes]
+    run_recursion(
+        *functions,
+        state,
+        covariance,
+        sensitivities,
+        *of_outputs,
+        *of_update,
+        MEASURED,
+        OBSERVED,
+        WHITE_VARIANCES,
+        *filled,
+    )
+    return [state, covariance, sensitivities, *filled]
+
+
+def test_states_covariances_and_likelihood_are_those_of_the_joint_update() -> None:
+    state, covariance, _, states, covariances, values, log_variances, _ = recursion(keeps_covariances=True)
+    expected_state, expected_covariance = START.copy(), START_COVARIANCE.copy()
+    for k in range(COUNT):
+        assert states[k] == pytest.approx(expected_state, rel=1e-10, abs=1e-12)
+        assert covariances[k] == pytest.approx(expected_covariance, rel=1e-10, abs=1e-12)
+        seen = OBSERVED[k] > 0.0
+        rows, noise = BY_STATE[seen], np.diag(WHITE_VARIANCES[seen])
+        variance = rows @ expected_covariance @ rows.T + noise
+        gain = expected_covariance @ rows.T @ np.linalg.inv(variance)
+        error = MEASURED[k, seen] - rows @ expected_state
+        assert np.sum(values[k, seen] ** 2) == pytest.approx(error @ np.linalg.solve(variance, error))
+        assert np.sum(log_variances[k, seen]) == pytest.approx(np.linalg.slogdet(variance)[1])
+        expected_state = FULL_TRANSITION @ (expected_state + gain @ error)
+        updated = expected_covariance - gain @ rows @ expected_covariance
+        expected_covariance = FULL_TRANSITION @ updated @ FULL_TRANSITION.T + np.diag(PROCESS_NOISE)
+    assert state == pytest.approx(expected_state)
+    assert covariance == pytest.approx(expected_covariance)
+    assert states[-1] == pytest.approx(expected_state)
+
+
+def test_sensitivities_are_derivatives_by_a_parameter_of_a_linear_model() -> None:
+    """Of a linear model the gain does not depend on parameters, so that differences are exact."""
+    _, _, sensitivities, _, _, _, _, slopes = recursion(keeps_covariances=False)
+    for parameter in range(PARAMETERS):
+        state, change = START_COVARIANCE.copy(), np.zeros(SIZE)
+        for k in range(COUNT):
+            seen = OBSERVED[k] > 0.0
+            rows = BY_STATE[seen]
+            variance = rows @ state @ rows.T + np.diag(WHITE_VARIANCES[seen])
+            gain = state @ rows.T @ np.linalg.inv(variance)
+            moved = -(rows @ change + BY_PARAMETERS[seen, parameter])
+            assert np.sum(slopes[k, parameter, seen] ** 2) == pytest.approx(moved @ np.linalg.solve(variance, moved))
+            change = FULL_TRANSITION @ (change + gain @ moved)
+            change[:MOVING] += DIRECT[:, parameter]
+            state = FULL_TRANSITION @ (state - gain @ rows @ state) @ FULL_TRANSITION.T + np.diag(PROCESS_NOISE)
+        assert sensitivities[parameter] == pytest.approx(change)
