@@ -81,7 +81,7 @@ def test_a_coarse_baseline_is_made_exact_where_it_decides(
     hypothesis = Hypothesis(BY_NAME["drag"], ())
     score = CandidateScore(hypothesis, Fit.without_parameters(robot), evidence, 1.0)
     monkeypatch.setattr(stepwise_selection, "maximised_validation_likelihood", lambda *_: 1040.0)
-    search_round = SearchRound(1, robot, (), None, True)
+    search_round = SearchRound(1, robot, (), None, is_white=True, is_ranking=False)
     scores = stepwise_selection._with_exact_baseline(context, search_round, 1000.0, {hypothesis: score})
     assert scores[hypothesis].evidence == expected
 

@@ -33,7 +33,8 @@ class FitTask:
 class SearchRound:
     """Round of a selection: every hypothesis beside the accepted ones, which ``robot`` has, is to be scored.
 
-    With a ``rival`` its alternatives are. ``is_white`` tells whether the robot's residual is white noise already.
+    With a ``rival`` its alternatives are. ``is_white`` tells whether the robot's residual is white noise already,
+    ``is_ranking`` whether the one that is selected is fitted once more.
     """
 
     number: int
@@ -41,6 +42,7 @@ class SearchRound:
     accepted: tuple[Hypothesis, ...]
     rival: CandidateScore | None
     is_white: bool
+    is_ranking: bool
 
     @property
     def stops_at_first(self) -> bool:
@@ -55,8 +57,8 @@ class SearchRound:
     def tasks(
         self, starts: Mapping[Hypothesis, tuple[Robot, ...]], min_log_likelihood: float, policy: FitPolicy
     ) -> dict[Hypothesis, FitTask]:
-        """Fits beside the accepted hypotheses; where the residual is not white they need only be ranked."""
-        tolerance = policy.fine_cost_tolerance if self.is_white else policy.coarse_cost_tolerance
+        """Fits beside the accepted hypotheses; where they need only be ranked, coarse ones."""
+        tolerance = policy.coarse_cost_tolerance if self.is_ranking else policy.fine_cost_tolerance
         return {
             h: FitTask(tuple(with_hypothesis(self.accepted, h)), robots, min_log_likelihood, tolerance)
             for h, robots in starts.items()

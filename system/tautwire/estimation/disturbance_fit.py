@@ -150,9 +150,10 @@ def fit_disturbance(
     has_constants = len(current.constants) > 0
     for _ in range(policy.max_alternations if has_constants else 0):
         conditional = posterior.given_constants(current.constants)
-        logs = _ascended(conditional, conditional.evaluation(current.logs), policy, policy.max_iterations).logs
+        coarse = replace(policy, min_gain=policy.min_coarse_gain)
+        logs = _ascended(conditional, conditional.evaluation(current.logs), coarse, policy.max_iterations).logs
         previous, current = current, max(current, posterior.evaluation(logs), key=lambda evaluation: evaluation.value)
-        if current.value - previous.value < policy.min_gain:
+        if current.value - previous.value < policy.min_coarse_gain:
             break
     if effort.is_exact or not has_constants:
         current = _ascended(posterior, current, policy, effort.max_iterations)

@@ -345,4 +345,5 @@ def _filter_columns(recording: Recording, measured: Array, shift: Array) -> tupl
     speeds = (speed, np.hstack([speed[:, 1:], speed[:, -1:]]))
     is_recorded = np.zeros(len(time), dtype=bool)
     is_recorded[rows] = True
-    return (measured_columns, observed_columns, shift_columns, *speeds, step[None, :], drift[None, :]), is_recorded
+    columns = (measured_columns, observed_columns, shift_columns, *speeds, step[None, :], drift[None, :])
+    return tuple(np.asfortranarray(column) for column in columns), is_recorded

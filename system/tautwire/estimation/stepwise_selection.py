@@ -90,12 +90,13 @@ def _search_round(
     accepted: Sequence[Hypothesis],
     rival: CandidateScore | None = None,
 ) -> SearchRound:
+    has_disturbance = context.fitter.has_disturbance
     # A disturbance takes up what is not white.
-    is_white = context.fitter.has_disturbance or all(
+    is_white = has_disturbance or all(
         residuals_are_white(context.fitter.innovations(robot, data), data.rows, context.policy.residual_analysis)
         for data in (context.split.validation, context.split.estimation)
     )
-    return SearchRound(number, robot, tuple(accepted), rival, is_white)
+    return SearchRound(number, robot, tuple(accepted), rival, is_white, has_disturbance or not is_white)
 
 
 def score_candidates(context: IdentificationContext, search_round: SearchRound) -> tuple[list[CandidateScore], bool]:
@@ -167,7 +168,7 @@ def _refitted_beside_own_disturbance(
     Only where the best of them is not established: under the disturbance of a model without it, which had to be large,
     an effect that explains nearly all may be fitted badly.
     """
-    estimation, tolerance = context.split.estimation, context.policy.fit.fine_cost_tolerance
+    estimation, tolerance = context.split.estimation, context.policy.fit.coarse_cost_tolerance
     models = {h: tuple(with_hypothesis(accepted, h)) for h in scores}
     explained = {h: context.fitter.log_likelihood(scores[h].fit.robot, models[h], estimation) for h in scores}
     ranked = sorted(scores, key=lambda h: -explained[h])
