@@ -101,8 +101,8 @@ class DisturbancePolicy:
     noise_factor: float = 3.0
     # Factors by which sizes are larger where a fit may begin as well.
     start_factors: tuple[float, ...] = (30.0, 1000.0)
-    # Levenberg's damping at first and at most, the longest step of a log, and the gain in nats that ends the fit, or the
-    # one given the uncertain parameters.
+    # Levenberg's damping at first and at most, the longest step of a log, and the gain in nats that ends a fit, or one
+    # given the uncertain parameters.
     first_damping: float = 1e-2
     max_damping: float = 1e4
     max_log_step: float = 2.0
