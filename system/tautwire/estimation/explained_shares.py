@@ -5,7 +5,8 @@ of an error and ``s^2`` of noise, of positions and tensions,
 
     M = sum over both of max(e^2 / s^2 - 1, 0)        share = (M without the effect - M) / (M without any effect)
 
-so that shares need not sum to one: what two effects explain together counts for both.
+so that shares need not sum to one: what two effects explain together counts for both. An effect that acts on several
+cables with a value each is one effect.
 """
 
 from __future__ import annotations
@@ -69,7 +70,8 @@ def explained_shares(
     estimation = context.split.estimation
     max_sigmas = context.policy.size.max_calibration_sigmas
     unimproved = calibrate(declared, context.robot, estimation).clipped(max_sigmas).calibrated_robot(context.robot)
-    reduced = [_without_effect(robot, hypothesis) for hypothesis in accepted]
+    names = list(dict.fromkeys(hypothesis.effect.name for hypothesis in accepted))
+    reduced = [_without_effect(robot, name, accepted) for name in names]
     fitters = [declared, *[context.fitter] * len(reduced)]
     pending = [
         run
@@ -83,9 +85,11 @@ def explained_shares(
     missed = min(_missed(of_declared, before, floor), _missed(data.recording, after.before, floor))
     left = _missed(recording, after.after, floor)
     total = max(missed, left, np.finfo(float).tiny)
+    run_without = dict(zip(names, without, strict=True))
+    runs = [run_without[hypothesis.effect.name] for hypothesis in accepted]
     return ExplainedShares(
-        tuple(float(np.clip((_missed(recording, run, floor) - left) / total, 0.0, 1.0)) for run in without),
-        tuple(_size(run.measured() - after.after.measured(), recording, floor) for run in without),
+        tuple(float(np.clip((_missed(recording, run, floor) - left) / total, 0.0, 1.0)) for run in runs),
+        tuple(_size(run.measured() - after.after.measured(), recording, floor) for run in runs),
         float(np.clip(left / total, 0.0, 1.0)),
         missed**0.5,
         left**0.5,
@@ -101,9 +105,9 @@ def sensor_noise_floor(fitter: Fitter, robot: Robot, data: DataSet) -> Errors:
     return noise_floor(fitter, robot, data)
 
 
-def _without_effect(robot: Robot, hypothesis: Hypothesis) -> Robot:
-    removed = (hypothesis.effect.name, hypothesis.cables)
-    return replace(robot, effects=tuple(s for s in robot.effects if (s.name, s.cables) != removed))
+def _without_effect(robot: Robot, name: str, accepted: Sequence[Hypothesis]) -> Robot:
+    removed = [(name, hypothesis.cables) for hypothesis in accepted if hypothesis.effect.name == name]
+    return replace(robot, effects=tuple(s for s in robot.effects if (s.name, s.cables) not in removed))
 
 
 def _missed(recording: Recording, motion: CosimulationResult, floor: Errors) -> float:

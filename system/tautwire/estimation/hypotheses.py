@@ -37,9 +37,7 @@ class Hypothesis:
 
     def label(self, robot: Robot) -> str:
         """The effect and, where it does not act on all cables, which it acts on."""
-        if self.cables in ((), robot.cable_numbers):
-            return self.effect.name
-        return f"{self.effect.name} of cable {', '.join(map(str, self.cables))}"
+        return _label(self.effect, self.cables, robot)
 
     @property
     def parameters(self) -> tuple[Parameter, ...]:
@@ -108,9 +106,23 @@ def with_larger_forms(accepted: Sequence[Hypothesis]) -> list[Hypothesis]:
     return list(dict.fromkeys(larger))
 
 
+def labels_by_effect(accepted: Sequence[Hypothesis], robot: Robot) -> list[str]:
+    """Label of each hypothesis, with the cables of all that have its effect: with a value each they are one effect."""
+    cables: dict[Effect, set[int]] = {}
+    for hypothesis in accepted:
+        cables.setdefault(hypothesis.effect, set()).update(hypothesis.cables)
+    return [_label(each.effect, tuple(sorted(cables[each.effect])), robot) for each in accepted]
+
+
 def split_by_cable(accepted: Sequence[Hypothesis]) -> list[Hypothesis]:
     """Single-cable versions of each hypothesis whose cables share one value."""
     return [Hypothesis(a.effect, (cable,), a.form) for a in accepted if len(a.cables) > 1 for cable in a.cables]
+
+
+def _label(effect: Effect, cables: tuple[int, ...], robot: Robot) -> str:
+    if cables in ((), robot.cable_numbers):
+        return effect.name
+    return f"{effect.name} of cable {', '.join(map(str, cables))}"
 
 
 def _minimal_forms(forms: Sequence[tuple[str, ...]]) -> list[tuple[str, ...]]:

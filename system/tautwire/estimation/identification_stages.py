@@ -8,6 +8,7 @@ from operator import attrgetter
 
 from ..robot.schema import Robot
 from ..robot.uncertain_parameters import uncertain_parameters
+from .cable_values import with_values_of_cables
 from .confusable_models import replace_by_confusable_models
 from .cosimulation_validation import (
     compare_cosimulations,
@@ -79,6 +80,17 @@ def try_declared_start(state: Identification) -> Identification:
     data_sets = (split.estimation, split.validation)[: len(state.prepared.data_sets)]
     prepared = replace(state.prepared, split=split, data_sets=data_sets)
     return replace(state, context=context, prepared=prepared, selection=selection)
+
+
+def separate_cables(state: Identification) -> Identification:
+    """Give each cable a value of its own where the selected effects differ by cable.
+
+    Only beside a disturbance: without one a model that leaves white noise needs no more numbers.
+    """
+    if not state.context.fitter.has_disturbance:
+        return state
+    state.context.progress("values of single cables", 0.0)
+    return replace(state, selection=with_values_of_cables(state.context, state.selection))
 
 
 def cosimulate_before(state: Identification) -> Identification:
@@ -155,6 +167,7 @@ STAGES: tuple[Callable[[Identification], Identification], ...] = (
     select_with_clocks_corrected,
     try_confusable_models,
     try_declared_start,
+    separate_cables,
     cosimulate_before,
     confirm_effects,
     explain_by_formula,
@@ -170,6 +183,7 @@ SEARCHES: Mapping[Callable[[Identification], Identification], tuple[Callable[[Ti
     select_with_clocks_corrected: (attrgetter("selection"), "correcting clocks that seem to be apart"),
     try_confusable_models: (attrgetter("selection"), "models that are easily confused with the effects found"),
     try_declared_start: (attrgetter("selection"), "trying a sensor's offset in place of another start"),
+    separate_cables: (attrgetter("selection"), "values of single cables"),
     explain_by_formula: (attrgetter("discovery"), "formulas and resonances"),
     estimate_intervals: (attrgetter("refinement"), "estimates of the parameters"),
     analyse_detectability: (attrgetter("refinement"), "telling what the recordings could have shown"),

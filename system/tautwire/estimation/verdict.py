@@ -11,7 +11,7 @@ from .candidate_scores import setting_of
 from .discovery.candidate_terms import effects_text, formula_text
 from .discovery.formula_discovery import Discovery
 from .explained_shares import ExplainedShares
-from .hypotheses import Hypothesis
+from .hypotheses import Hypothesis, labels_by_effect
 from .identification_context import IdentificationContext
 from .stepwise_selection import SelectionResult
 from .time_limit import TimeLimit
@@ -50,7 +50,8 @@ def verdict_beside_disturbance(
 ) -> tuple[Verdict, str]:
     """Verdict and its sentence beside a disturbance; ``remaining`` says in words what error remains."""
     policy = context.policy.size
-    large, names = shares.substantial(policy), [hypothesis.label(context.robot) for hypothesis in accepted]
+    large, labels = shares.substantial(policy), labels_by_effect(accepted, context.robot)
+    names = list(dict.fromkeys(labels))
     explained = max((1.0 - shares.left, *(shares.effects[index] for index in large))) if large else 0.0
     is_explained = explained >= policy.min_explained_share
     if shares.size_missed <= policy.max_size_of_disturbance and not is_explained:
@@ -59,7 +60,8 @@ def verdict_beside_disturbance(
         return "none", sentence + small
     is_disturbance = shares.size_left <= policy.max_size_of_disturbance
     if large and (is_disturbance or is_explained):
-        named = _sum_up([f"{names[index]} ({_per_cent(shares.effects[index])} of what is missed)" for index in large])
+        share_of = {labels[index]: shares.effects[index] for index in large}
+        named = _sum_up([f"{name} ({_per_cent(share)} of what is missed)" for name, share in share_of.items()])
         kind = "which is no more than a small random force" if is_disturbance else remaining
         return "effects", f"The model lacks {named}; {_per_cent(shares.left)} remains, {kind}."
     closest = f" Of it {_per_cent(1.0 - shares.left)} would go to {_sum_up(names)}." if names else ""

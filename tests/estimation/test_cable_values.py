@@ -1,0 +1,60 @@
+"""Values of single cables: drums whose radii differ, and drums whose radii do not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tautwire.estimation.cable_values import with_values_of_cables
+from tautwire.estimation.disturbance_fit import disturbance_prior
+from tautwire.estimation.estimation_data import DataSet, DataSplit
+from tautwire.estimation.hypotheses import Hypothesis, hypotheses, labels_by_effect
+from tautwire.estimation.identification_context import IdentificationContext
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.estimation.parameter_fit import Fitter
+from tautwire.estimation.stepwise_selection import SelectionResult
+from tests.support.recordings import recorded
+from tests.support.robots import example
+
+ROBOT = example("three")
+NOISE = estimate_noise(ROBOT, recorded("three", 1))
+DRUM = next(h for h in hypotheses(ROBOT) if h.effect.name == "drum" and h.cables == ROBOT.cable_numbers)
+
+
+def selected(ratios: tuple[float, float, float]) -> tuple[IdentificationContext, SelectionResult]:
+    """A drum that all cables share, fitted to recordings whose ropes move by these ratios of what encoders say."""
+    data_sets = []
+    for seed in (1, 2):
+        recording = recorded("three", seed).first(400)
+        recording = replace(recording, winch_speed=recording.winch_speed / np.array(ratios))
+        data_sets.append(DataSet(recording, ROBOT.platform.start, np.ones(len(recording.time), dtype=bool)))
+    fitter = Fitter(replace(NOISE, disturbance=disturbance_prior(ROBOT, NOISE).median))
+    fit = fitter.fit_from([ROBOT.with_effect(DRUM.setting(ROBOT))], (DRUM,), data_sets[0])
+    context = IdentificationContext(ROBOT, fitter, DataSplit(data_sets[0], data_sets[1], ()))
+    return context, SelectionResult((DRUM,), (100.0,), fit, (), ())
+
+
+def test_cables_that_differ_get_values_of_their_own() -> None:
+    ratios = (0.95, 0.97, 0.96)
+    context, shared = selected(ratios)
+    separate = with_values_of_cables(context, shared)
+    assert [hypothesis.cables for hypothesis in separate.accepted] == [(1,), (2,), (3,)]
+    assert separate.evidence == (100.0,) * 3
+    assert separate.fit.values == pytest.approx(ratios, abs=2e-3)
+    assert {each.cables: each.values["radius_ratio"] for each in separate.fit.robot.effects} == {
+        (cable,): value for cable, value in zip((1, 2, 3), separate.fit.values, strict=True)
+    }
+    assert labels_by_effect(separate.accepted, ROBOT) == ["drum"] * 3
+
+
+def test_cables_that_do_not_differ_share_a_value() -> None:
+    context, shared = selected((0.96, 0.96, 0.96))
+    assert shared.fit.values == pytest.approx([0.96], abs=2e-3)
+    assert with_values_of_cables(context, shared) is shared
+
+
+def test_an_effect_on_some_cables_is_labelled_with_them() -> None:
+    first, third = (Hypothesis(DRUM.effect, (cable,), DRUM.form) for cable in (3, 1))
+    assert labels_by_effect([first, third], ROBOT) == ["drum of cable 1, 3"] * 2
