@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from tautwire.estimation import stepwise_selection
-from tautwire.estimation.candidate_proposals import SearchRound
 from tautwire.estimation.candidate_scores import CandidateScore
 from tautwire.estimation.disturbance_fit import disturbance_prior
 from tautwire.estimation.estimation_data import split_data
@@ -69,21 +68,6 @@ def test_beside_a_disturbance_a_further_effect_needs_a_share_of_the_first_ones_e
     monkeypatch.setattr(stepwise_selection, "with_disturbance_beside", lambda context, chosen, fit: (context, fit))
     monkeypatch.setattr(stepwise_selection._StepwiseSelection, "eliminate", lambda self: None)
     assert [hypothesis.effect.name for hypothesis in select_effects(context).accepted] == names
-
-
-@pytest.mark.parametrize(("evidence", "expected"), [(5.0, 5.0), (50.0, 10.0), (5000.0, 5000.0)])
-def test_a_coarse_baseline_is_made_exact_where_it_decides(
-    evidence: float, expected: float, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    robot, recording = example("three"), recorded("three", 1)
-    noise = estimate_noise(robot, recording)
-    context = IdentificationContext(robot, Fitter(noise), split_data(robot, noise, recording, None))
-    hypothesis = Hypothesis(BY_NAME["drag"], ())
-    score = CandidateScore(hypothesis, Fit.without_parameters(robot), evidence, 1.0)
-    monkeypatch.setattr(stepwise_selection, "maximised_validation_likelihood", lambda *_: 1040.0)
-    search_round = SearchRound(1, robot, (), None, is_white=True, is_ranking=False)
-    scores = stepwise_selection._with_exact_baseline(context, search_round, 1000.0, {hypothesis: score})
-    assert scores[hypothesis].evidence == expected
 
 
 HIDDEN: list[tuple[str, dict[str, Any]]] = [

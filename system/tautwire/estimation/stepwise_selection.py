@@ -9,32 +9,25 @@ Source: Wasserman, Ramdas and Balakrishnan (2020), Universal inference, PNAS 117
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
-from math import inf
 
 from ..robot.schema import Robot
 from .candidate_fits import (
-    coarse_validation_likelihood,
-    fit_candidates,
     fit_model,
-    leaves_noise,
     maximised_validation_likelihood,
 )
-from .candidate_proposals import FitTask, SearchRound, shortlist, starting_robots
-from .candidate_scores import CandidateScore, most_parsimonious, unfitted_score
+from .candidate_proposals import SearchRound
+from .candidate_scores import CandidateScore, most_parsimonious
+from .candidate_scoring import score_candidates
 from .disturbance import Disturbance
 from .disturbance_fit import marginal_log_likelihood, with_fitted_disturbance
-from .grid_search import grid_search, zero_slope_predictions
 from .hypotheses import Hypothesis, with_hypothesis
 from .identification_context import IdentificationContext
 from .parameter_fit import Fit
 from .residual_analysis import residuals_are_white
-from .score_test import PredictedGain, score_test_in_workers
 from .time_limit import OutOfTimeError
 from .trace_result import Candidate
-
-Predictions = dict[Hypothesis, PredictedGain]
 
 
 @dataclass(frozen=True)
@@ -97,126 +90,6 @@ def _search_round(
         for data in (context.split.validation, context.split.estimation)
     )
     return SearchRound(number, robot, tuple(accepted), rival, is_white, has_disturbance or not is_white)
-
-
-def score_candidates(context: IdentificationContext, search_round: SearchRound) -> tuple[list[CandidateScore], bool]:
-    """Score every hypothesis of a round, and tell whether all of the shortlist were fitted.
-
-    Those with a large enough predicted gain are fitted; with a rival only what comes near it to all samples.
-    """
-    policy, robot, accepted = context.policy, search_round.robot, search_round.accepted
-    label = f"round {search_round.number}"
-    context.progress(f"{label}: score test", 0.0)
-    predictions, rough_predictions = _predict_gains(context, search_round)
-    shortlisted = shortlist(predictions, rough_predictions, policy.score_test)
-    data = context.split.estimation
-    if not search_round.is_white:
-        coarse_data = data.first(policy.selection.coarse_samples)
-        predictions |= grid_search(context, robot, accepted, coarse_data, {h: predictions[h] for h in shortlisted})
-        data = coarse_data if search_round.rival else context.head
-    starts = {
-        h: starting_robots(robot, h, [p[h] for p in (predictions, rough_predictions) if h in p]) for h in shortlisted
-    }
-    min_log_likelihood = context.fitter.log_likelihood(robot, accepted, data)
-    tasks = search_round.tasks(starts, min_log_likelihood, policy.fit)
-    # Far from noise the candidates need only be ranked against each other.
-    is_exact = search_round.is_white and not context.fitter.has_disturbance
-    if context.fitter.has_disturbance:
-        baseline, scores = _fitted_beside_baseline(context, label, search_round, tasks)
-    else:
-        baseline = maximised_validation_likelihood(context, robot, accepted, -inf if is_exact else inf)
-        scores = fit_candidates(context, label, tasks, data, baseline, search_round.stops_at_first)
-    try:
-        context.time_limit.check()
-        if not search_round.is_white:
-            if search_round.rival is None and not any(leaves_noise(context, score) for score in scores.values()):
-                tasks = search_round.tasks(search_round.larger_models(), min_log_likelihood, policy.fit)
-                scores |= fit_candidates(context, label, tasks, data, baseline)
-            tasks = search_round.refits(scores.values(), shortlisted, policy.selection, policy.fit.fine_cost_tolerance)
-            scores |= fit_candidates(context, f"{label}, all samples", tasks, context.split.estimation, baseline)
-        if context.fitter.has_disturbance:
-            scores = _with_exact_baseline(context, search_round, baseline, scores)
-    except OutOfTimeError:
-        scores = scores if is_exact else _below_exact_baseline(context, baseline, scores)
-    context.progress(f"{label}: done", 1.0)
-    unfitted = [unfitted_score(robot, h, predictions[h]) for h in predictions if h not in scores]
-    return [*scores.values(), *unfitted], not search_round.stops_at_first or scores.keys() >= set(shortlisted)
-
-
-def _fitted_beside_baseline(
-    context: IdentificationContext, label: str, search_round: SearchRound, tasks: Mapping[Hypothesis, FitTask]
-) -> tuple[float, dict[Hypothesis, CandidateScore]]:
-    """Baseline and scores of a round beside a disturbance, whose fit takes as long as a candidate's: side by side."""
-    split, robot, accepted = context.split, search_round.robot, search_round.accepted
-    pending = context.workers.submit(coarse_validation_likelihood, context.fitter, robot, accepted, split.validation)
-    scores = fit_candidates(context, label, tasks, split.estimation, 0.0)
-    with context.time_limit.suspended():
-        baseline = pending.result()
-    scores = {h: replace(score, evidence=score.evidence - baseline) for h, score in scores.items()}
-    return baseline, scores | _refitted_beside_own_disturbance(context, label, accepted, scores, baseline)
-
-
-def _refitted_beside_own_disturbance(
-    context: IdentificationContext,
-    label: str,
-    accepted: Sequence[Hypothesis],
-    scores: Mapping[Hypothesis, CandidateScore],
-    baseline: float,
-) -> dict[Hypothesis, CandidateScore]:
-    """Better scores of the candidates that explain FIT best, each beside a disturbance of its own.
-
-    Only where the best of them is not established: under the disturbance of a model without it, which had to be large,
-    an effect that explains nearly all may be fitted badly.
-    """
-    estimation, tolerance = context.split.estimation, context.policy.fit.coarse_cost_tolerance
-    models = {h: tuple(with_hypothesis(accepted, h)) for h in scores}
-    explained = {h: context.fitter.log_likelihood(scores[h].fit.robot, models[h], estimation) for h in scores}
-    ranked = sorted(scores, key=lambda h: -explained[h])
-    required = max((context.evidence_threshold(), *(score.evidence for score in scores.values())))
-    if not ranked or scores[ranked[0]].evidence >= required:
-        return {}
-    tasks = {
-        h: FitTask(models[h], (scores[h].fit.robot,), -inf, tolerance, disturbance_refits=2)
-        for h in ranked[: context.policy.selection.always_refitted]
-    }
-    refits = fit_candidates(context, f"{label}, own disturbance", tasks, estimation, baseline)
-    return {h: score for h, score in refits.items() if score.evidence > scores[h].evidence}
-
-
-def _with_exact_baseline(
-    context: IdentificationContext,
-    search_round: SearchRound,
-    baseline: float,
-    scores: dict[Hypothesis, CandidateScore],
-) -> dict[Hypothesis, CandidateScore]:
-    """The scores against the exact maximum of the model without them, where a coarse one does not decide."""
-    margin = max((score.evidence for score in scores.values()), default=0.0) - context.evidence_threshold()
-    if not 0.0 < margin < context.policy.selection.coarse_tie(baseline):
-        return scores
-    exact = maximised_validation_likelihood(context, search_round.robot, search_round.accepted, -inf)
-    return {h: replace(score, evidence=score.evidence - (exact - baseline)) for h, score in scores.items()}
-
-
-def _below_exact_baseline(
-    context: IdentificationContext, baseline: float, scores: Mapping[Hypothesis, CandidateScore]
-) -> dict[Hypothesis, CandidateScore]:
-    """The scores less what a coarse baseline may be too low by: there is no time for an exact one."""
-    margin = context.policy.selection.coarse_tie(baseline)
-    return {h: replace(score, evidence=score.evidence - margin) for h, score in scores.items()}
-
-
-def _predict_gains(context: IdentificationContext, search_round: SearchRound) -> tuple[Predictions, Predictions]:
-    """Predicted gains of a round's candidates, and with process noise, where the model is far from noise."""
-    robot, accepted = search_round.robot, search_round.accepted
-    candidates = search_round.candidates(context.robot)
-    # A model far from noise shows it in a part of the recording; a model near noise needs all of it.
-    data = context.split.estimation if search_round.is_white else context.head
-    predictions = score_test_in_workers(context, robot, accepted, candidates, data)
-    predictions |= grid_search(context, robot, accepted, data, zero_slope_predictions(predictions))
-    if search_round.is_white:
-        return predictions, {}
-    density = context.policy.score_test.rough_noise_density
-    return predictions, score_test_in_workers(context, robot, accepted, candidates, data, density)
 
 
 @dataclass

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 from tautwire_fmu.laws import effect_stages as stages
 from tautwire_fmu.laws.mathematics import REAL, Mathematics
@@ -17,9 +18,7 @@ def shown_position(robot: Robot, position: Vector, mathematics: Mathematics = RE
 
     ``mathematics`` are the functions for the effects' parameters.
     """
-    effects = platform_effects(robot)
-    _, gain = stages.sensor_gains(mathematics, effects)
-    _, offset = stages.sensor_offsets(mathematics, effects)
+    gain, offset = _gain_and_offset(robot, mathematics)
     return add(scale(gain, position), offset)
 
 
@@ -35,12 +34,18 @@ def with_true_start(robot: Robot, mathematics: Mathematics = REAL) -> Robot:
     """The robot at its true start, ``(y - o) / k`` along each axis on which the start is a measured one, ``y``."""
     if not any(robot.start_is_measured):
         return robot
-    effects = platform_effects(robot)
-    _, gain = stages.sensor_gains(mathematics, effects)
-    _, offsets = stages.sensor_offsets(mathematics, effects)
+    gain, offset = _gain_and_offset(robot, mathematics)
     x, y, z = (
-        (coordinate - offset) / gain if is_measured else coordinate
-        for coordinate, offset, is_measured in zip(robot.platform.start, offsets, robot.start_is_measured, strict=True)
+        (coordinate - error) / gain if is_measured else coordinate
+        for coordinate, error, is_measured in zip(robot.platform.start, offset, robot.start_is_measured, strict=True)
     )
     true_platform = replace(robot.platform, start=(x, y, z))
     return replace(robot, platform=true_platform, start_is_measured=(False, False, False))
+
+
+def _gain_and_offset(robot: Robot, mathematics: Mathematics) -> tuple[Any, Vector]:
+    """Gain and offset of the position sensor."""
+    effects = platform_effects(robot)
+    _, gain = stages.sensor_gains(mathematics, effects)
+    _, offset = stages.sensor_offsets(mathematics, effects)
+    return gain, offset

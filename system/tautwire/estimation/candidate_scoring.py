@@ -1,0 +1,157 @@
+"""Scoring of the candidates of a search round: predicted, fitted to estimation data, judged on validation data."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from math import inf
+
+from ..robot.schema import Robot
+from .candidate_fits import (
+    coarse_validation_likelihood,
+    fit_candidates,
+    leaves_noise,
+    maximised_validation_likelihood,
+)
+from .candidate_proposals import FitTask, SearchRound, shortlist, starting_robots
+from .candidate_scores import CandidateScore, unfitted_score
+from .grid_search import grid_search, zero_slope_predictions
+from .hypotheses import Hypothesis, with_hypothesis
+from .identification_context import IdentificationContext
+from .score_test import PredictedGain, score_test_in_workers
+from .time_limit import OutOfTimeError
+
+Predictions = dict[Hypothesis, PredictedGain]
+Starts = Mapping[Hypothesis, tuple[Robot, ...]]
+
+
+def score_candidates(context: IdentificationContext, search_round: SearchRound) -> tuple[list[CandidateScore], bool]:
+    """Score every hypothesis of a round, and tell whether all of the shortlist were fitted.
+
+    Those with a large enough predicted gain are fitted; with a rival only what comes near it to all samples.
+    """
+    policy, robot, accepted = context.policy, search_round.robot, search_round.accepted
+    label = f"round {search_round.number}"
+    context.progress(f"{label}: score test", 0.0)
+    predictions, rough_predictions = _predict_gains(context, search_round)
+    shortlisted = shortlist(predictions, rough_predictions, policy.score_test)
+    if not search_round.is_white:
+        coarse_data = context.split.estimation.first(policy.selection.coarse_samples)
+        predictions |= grid_search(context, robot, accepted, coarse_data, {h: predictions[h] for h in shortlisted})
+    starts = {
+        h: starting_robots(robot, h, [p[h] for p in (predictions, rough_predictions) if h in p]) for h in shortlisted
+    }
+    score = _scores_beside_disturbance if context.fitter.has_disturbance else _scores_beside_noise
+    scores = score(context, label, search_round, starts)
+    context.progress(f"{label}: done", 1.0)
+    unfitted = [unfitted_score(robot, h, predictions[h]) for h in predictions if h not in scores]
+    return [*scores.values(), *unfitted], not search_round.stops_at_first or scores.keys() >= set(shortlisted)
+
+
+def _scores_beside_noise(
+    context: IdentificationContext, label: str, search_round: SearchRound, starts: Starts
+) -> dict[Hypothesis, CandidateScore]:
+    """Scores of a round whose model has no disturbance; far from noise candidates are ranked on a part of the data."""
+    policy, estimation = context.policy, context.split.estimation
+    robot, accepted = search_round.robot, search_round.accepted
+    is_exact, data = search_round.is_white, estimation
+    if not is_exact:
+        data = estimation.first(policy.selection.coarse_samples) if search_round.rival else context.head
+    min_log_likelihood = context.fitter.log_likelihood(robot, accepted, data)
+    tasks = search_round.tasks(starts, min_log_likelihood, policy.fit)
+    baseline = maximised_validation_likelihood(context, robot, accepted, -inf if is_exact else inf)
+    scores = fit_candidates(context, label, tasks, data, baseline, search_round.stops_at_first)
+    if is_exact:
+        return scores
+    try:
+        context.time_limit.check()
+        if search_round.rival is None and not any(leaves_noise(context, score) for score in scores.values()):
+            tasks = search_round.tasks(search_round.larger_models(), min_log_likelihood, policy.fit)
+            scores |= fit_candidates(context, label, tasks, data, baseline)
+        tasks = search_round.refits(scores.values(), list(starts), policy.selection, policy.fit.fine_cost_tolerance)
+        return scores | fit_candidates(context, f"{label}, all samples", tasks, estimation, baseline)
+    except OutOfTimeError:
+        return _below_exact_baseline(context, baseline, scores)
+
+
+def _scores_beside_disturbance(
+    context: IdentificationContext, label: str, search_round: SearchRound, starts: Starts
+) -> dict[Hypothesis, CandidateScore]:
+    """Scores of a round beside a disturbance; the fit of the baseline takes as long as a candidate's: side by side."""
+    split, robot, accepted = context.split, search_round.robot, search_round.accepted
+    pending = context.workers.submit(coarse_validation_likelihood, context.fitter, robot, accepted, split.validation)
+    min_log_likelihood = context.fitter.log_likelihood(robot, accepted, split.estimation)
+    tasks = search_round.tasks(starts, min_log_likelihood, context.policy.fit)
+    scores = fit_candidates(context, label, tasks, split.estimation, 0.0)
+    with context.time_limit.suspended():
+        baseline = pending.result()
+    scores = {h: replace(score, evidence=score.evidence - baseline) for h, score in scores.items()}
+    scores |= _refitted_beside_own_disturbance(context, label, accepted, scores, baseline)
+    try:
+        context.time_limit.check()
+        return _with_exact_baseline(context, search_round, baseline, scores)
+    except OutOfTimeError:
+        return _below_exact_baseline(context, baseline, scores)
+
+
+def _refitted_beside_own_disturbance(
+    context: IdentificationContext,
+    label: str,
+    accepted: Sequence[Hypothesis],
+    scores: Mapping[Hypothesis, CandidateScore],
+    baseline: float,
+) -> dict[Hypothesis, CandidateScore]:
+    """Better scores of the candidates that explain FIT best, each beside a disturbance of its own.
+
+    Only where the best of them is not established: under the disturbance of a model without it, which had to be large,
+    an effect that explains nearly all may be fitted badly.
+    """
+    estimation, tolerance = context.split.estimation, context.policy.fit.coarse_cost_tolerance
+    models = {h: tuple(with_hypothesis(accepted, h)) for h in scores}
+    explained = {h: context.fitter.log_likelihood(scores[h].fit.robot, models[h], estimation) for h in scores}
+    ranked = sorted(scores, key=lambda h: -explained[h])
+    required = max((context.evidence_threshold(), *(score.evidence for score in scores.values())))
+    if not ranked or scores[ranked[0]].evidence >= required:
+        return {}
+    tasks = {
+        h: FitTask(models[h], (scores[h].fit.robot,), -inf, tolerance, disturbance_refits=2)
+        for h in ranked[: context.policy.selection.always_refitted]
+    }
+    refits = fit_candidates(context, f"{label}, own disturbance", tasks, estimation, baseline)
+    return {h: score for h, score in refits.items() if score.evidence > scores[h].evidence}
+
+
+def _with_exact_baseline(
+    context: IdentificationContext,
+    search_round: SearchRound,
+    baseline: float,
+    scores: dict[Hypothesis, CandidateScore],
+) -> dict[Hypothesis, CandidateScore]:
+    """The scores against the exact maximum of the model without them, where a coarse one does not decide."""
+    margin = max((score.evidence for score in scores.values()), default=0.0) - context.evidence_threshold()
+    if not 0.0 < margin < context.policy.selection.coarse_tie(baseline):
+        return scores
+    exact = maximised_validation_likelihood(context, search_round.robot, search_round.accepted, -inf)
+    return {h: replace(score, evidence=score.evidence - (exact - baseline)) for h, score in scores.items()}
+
+
+def _below_exact_baseline(
+    context: IdentificationContext, baseline: float, scores: Mapping[Hypothesis, CandidateScore]
+) -> dict[Hypothesis, CandidateScore]:
+    """The scores less what a coarse baseline may be too low by: there is no time for an exact one."""
+    margin = context.policy.selection.coarse_tie(baseline)
+    return {h: replace(score, evidence=score.evidence - margin) for h, score in scores.items()}
+
+
+def _predict_gains(context: IdentificationContext, search_round: SearchRound) -> tuple[Predictions, Predictions]:
+    """Predicted gains of a round's candidates, and with process noise, where the model is far from noise."""
+    robot, accepted = search_round.robot, search_round.accepted
+    candidates = search_round.candidates(context.robot)
+    # A model far from noise shows it in a part of the recording; a model near noise needs all of it.
+    data = context.split.estimation if search_round.is_white else context.head
+    predictions = score_test_in_workers(context, robot, accepted, candidates, data)
+    predictions |= grid_search(context, robot, accepted, data, zero_slope_predictions(predictions))
+    if search_round.is_white:
+        return predictions, {}
+    density = context.policy.score_test.rough_noise_density
+    return predictions, score_test_in_workers(context, robot, accepted, candidates, data, density)

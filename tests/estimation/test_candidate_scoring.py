@@ -1,0 +1,32 @@
+"""Scores of a round against its baseline."""
+
+from __future__ import annotations
+
+import pytest
+
+from tautwire.estimation import candidate_scoring
+from tautwire.estimation.candidate_proposals import SearchRound
+from tautwire.estimation.candidate_scores import CandidateScore
+from tautwire.estimation.hypotheses import Hypothesis
+from tautwire.estimation.identification_context import IdentificationContext
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.estimation.parameter_fit import Fit, Fitter
+from tautwire.estimation.preprocessing import split_data
+from tautwire_fmu.laws.effects import BY_NAME
+from tests.support.recordings import recorded
+from tests.support.robots import example
+
+
+@pytest.mark.parametrize(("evidence", "expected"), [(5.0, 5.0), (50.0, 10.0), (5000.0, 5000.0)])
+def test_a_coarse_baseline_is_made_exact_where_it_decides(
+    evidence: float, expected: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot, recording = example("three"), recorded("three", 1)
+    noise = estimate_noise(robot, recording)
+    context = IdentificationContext(robot, Fitter(noise), split_data(robot, noise, recording, None))
+    hypothesis = Hypothesis(BY_NAME["drag"], ())
+    score = CandidateScore(hypothesis, Fit.without_parameters(robot), evidence, 1.0)
+    monkeypatch.setattr(candidate_scoring, "maximised_validation_likelihood", lambda *_: 1040.0)
+    search_round = SearchRound(1, robot, (), None, is_white=True, is_ranking=False)
+    scores = candidate_scoring._with_exact_baseline(context, search_round, 1000.0, {hypothesis: score})
+    assert scores[hypothesis].evidence == expected
