@@ -7,11 +7,11 @@ import pytest
 from tautwire.estimation import candidate_scoring
 from tautwire.estimation.candidate_proposals import SearchRound
 from tautwire.estimation.candidate_scores import CandidateScore
+from tautwire.estimation.estimation_data import split_data
 from tautwire.estimation.hypotheses import Hypothesis
 from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fit, Fitter
-from tautwire.estimation.preprocessing import split_data
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.support.recordings import recorded
 from tests.support.robots import example
