@@ -41,3 +41,10 @@ def test_gains_and_offsets_of_load_cells_are_taken_out_of_a_recording() -> None:
     corrected = calibration(2.0).without_sensor_errors(recording)
     assert corrected.tension == pytest.approx((recording.tension - 4.0) / 1.02)
     assert np.array_equal(corrected.position, recording.position)
+
+
+def test_a_note_says_by_how_many_standard_deviations_a_number_moved() -> None:
+    (note,) = calibration(-2.0).notes(example("three"), "fit.csv")
+    assert "gain of tension 2 0.98, +- 0.002 (-2.0 declared standard deviations)" in note
+    assert "offset of tension 1 -4 N, +- 0.39 (-2.0 declared standard deviations)" in note
+    assert calibration(0.1).notes(example("three"), "fit.csv") == ()

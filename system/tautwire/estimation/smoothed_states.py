@@ -109,7 +109,8 @@ class Calibration:
                 parameter.declared(robot) + parameter.standard_deviation * estimate,
                 1.96 * parameter.standard_deviation * deviation,
             )
-            significant.append(f"{parameter.label} {value:.4g} {parameter.unit}, +- {half_width:.2g}")
+            quantity = f"{parameter.label} {value:.4g} {parameter.unit}".rstrip()
+            significant.append(f"{quantity}, +- {half_width:.2g} ({estimate:+.1f} declared standard deviations)")
         if not significant:
             return ()
         return (f"{path}: estimated within the robot file's uncertainties: {'; '.join(significant)}",)
