@@ -89,9 +89,10 @@ def with_fitted_disturbance(
     """
     policy = fitter.policy.disturbance
     first = data.first(policy.coarse_samples)
-    fitter = _refitted(fitter, robot, chosen, first, Effort(policy.max_iterations, is_exact=False))
+    of_first = _refitted(fitter, robot, chosen, first, Effort(policy.max_iterations, is_exact=False))
     iterations = policy.coarse_iterations if coarse else policy.max_iterations
-    return _refitted(fitter, robot, chosen, data, Effort(iterations, is_exact=not coarse))
+    effort = Effort(iterations, is_exact=not coarse)
+    return _refitted(of_first, robot, chosen, data, effort, other=fitter.noise.disturbance)
 
 
 def with_improved_disturbance(fitter: Fitter, robot: Robot, chosen: Collection[Hypothesis], data: DataSet) -> Fitter:
@@ -127,37 +128,60 @@ class Effort:
     is_exact: bool
 
 
-def _refitted(fitter: Fitter, robot: Robot, chosen: Collection[Hypothesis], data: DataSet, effort: Effort) -> Fitter:
+def _refitted(
+    fitter: Fitter,
+    robot: Robot,
+    chosen: Collection[Hypothesis],
+    data: DataSet,
+    effort: Effort,
+    other: Disturbance | None = None,
+) -> Fitter:
+    """The fitter refitted to some data; ``other`` is a disturbance that it may begin at as well."""
     if not fitter.has_disturbance:
         return fitter
     policy = fitter.policy.disturbance
     prior = disturbance_prior(robot, fitter.noise, policy)
     likelihood, values = fitter.likelihood(robot, chosen, data)
-    return fitter.with_disturbance(fit_disturbance(Posterior(likelihood, values, data, prior), policy, effort))
+    posterior = Posterior(likelihood, values, data, prior)
+    return fitter.with_disturbance(fit_disturbance(posterior, policy, effort, other))
 
 
 def fit_disturbance(
     posterior: Posterior,
     policy: DisturbancePolicy = DEFAULT_POLICY.fit.disturbance,
     effort: Effort | None = None,
+    other: Disturbance | None = None,
 ) -> Disturbance:
     """Maximise the posterior density over the disturbance; by default exactly.
 
-    Begins at the likelihood's own disturbance.
+    Begins at the likelihood's own disturbance or at the ``other``, where it is denser; without another one, where that
+    is denser, at the prior's median or at a larger one, which follows a model far off.
     """
     effort = effort or Effort(policy.max_iterations, is_exact=True)
-    current = max(posterior.evaluations(_starts(posterior, policy)), key=lambda evaluation: evaluation.value)
-    has_constants = len(current.constants) > 0
-    for _ in range(policy.max_alternations if has_constants else 0):
-        conditional = posterior.given_constants(current.constants)
-        coarse = replace(policy, min_gain=policy.min_coarse_gain)
-        logs = _ascended(conditional, conditional.evaluation(current.logs), coarse, policy.max_iterations).logs
-        previous, current = current, max(current, posterior.evaluation(logs), key=lambda evaluation: evaluation.value)
-        if current.value - previous.value < policy.min_coarse_gain:
+    starts = _starts(posterior, policy) if other is None else [logs_of(other)]
+    own = posterior.likelihood.noise.disturbance
+    starts += [logs_of(own)] if own is not None else []
+    current = max(posterior.evaluations(starts), key=lambda evaluation: evaluation.value)
+    is_near = len(current.constants) > 0
+    for _ in range(policy.max_alternations if is_near else 0):
+        reached = _alternated(posterior, current, policy)
+        gain, current = reached.value - current.value, max(current, reached, key=lambda evaluation: evaluation.value)
+        # A step that would lead down says that parameters and disturbance cannot be told apart in turn.
+        is_near = gain > -policy.min_coarse_gain
+        if gain < policy.min_coarse_gain:
             break
-    if effort.is_exact or not has_constants:
+    if effort.is_exact or not is_near:
         current = _ascended(posterior, current, policy, effort.max_iterations)
     return disturbance_of(current.logs)
+
+
+def _alternated(posterior: Posterior, current: Evaluation, policy: DisturbancePolicy) -> Evaluation:
+    """Evaluation at the disturbance that is most probable given the uncertain parameters as they are."""
+    conditional = posterior.given_constants(current.constants)
+    coarse = replace(policy, min_gain=policy.min_coarse_gain)
+    return posterior.evaluation(
+        _ascended(conditional, conditional.evaluation(current.logs), coarse, policy.max_iterations).logs
+    )
 
 
 def _ascended(posterior: Posterior, start: Evaluation, policy: DisturbancePolicy, max_iterations: int) -> Evaluation:
@@ -181,11 +205,8 @@ def _ascended(posterior: Posterior, start: Evaluation, policy: DisturbancePolicy
 
 
 def _starts(posterior: Posterior, policy: DisturbancePolicy) -> list[Array]:
-    """Logs to begin at: the likelihood's own, and from the prior's median larger ones, which follow a model far off."""
-    own, median = posterior.likelihood.noise.disturbance, posterior.prior.median
-    if own is not None and own != median:
-        return [logs_of(own)]
-    starts = [logs_of(median)]
+    """Logs of the prior's median, and of larger disturbances."""
+    starts = [logs_of(posterior.prior.median)]
     for factor in policy.start_factors:
         logs = starts[0].copy()
         logs[[0, 2, 4]] += log(factor)
