@@ -2,9 +2,9 @@
 
 Names are established on unseen data. How many numbers a named effect has is less: cables get one each where the
 likelihood of FIT is worth these by Schwarz's criterion, half a log of the number of values N for each of k numbers, and
-CHECK does not speak against it.
+more than the effect's form may leave, a share of its evidence; and where CHECK does not speak against it.
 
-    log L(each its own) - log L(shared) > k/2 log N
+    log L(each its own) - log L(shared) > max(k/2 log N, share evidence)
 
 Source: Schwarz (1978), Annals of Statistics 6(2), 461-464.
 """
@@ -42,25 +42,32 @@ def _with_values_of(context: IdentificationContext, selection: SelectionResult, 
     robot = replace(robot, effects=tuple(effects))
     try:
         fit = context.fitter.fit_from([robot], chosen, context.split.estimation, -inf)
-        is_worth_it = _is_worth_its_numbers(context, selection, fit, chosen)
+        gain, unseen_gain = _gains(context, selection, fit, chosen)
     except (UnreachableError, NoFitError):
         return selection
-    if not is_worth_it:
-        return selection
     evidence = dict(zip(selection.accepted, selection.evidence, strict=True))
+    price = _schwarz_price(context, len(fit.values) - len(selection.fit.values))
+    policy = context.policy.selection
+    if gain <= max(price, policy.min_evidence_ratio * evidence[shared]) or unseen_gain < -policy.tie_nats:
+        return selection
     evidence |= dict.fromkeys(separate, evidence[shared])
     return replace(selection, accepted=tuple(chosen), evidence=tuple(evidence[h] for h in chosen), fit=fit)
 
 
-def _is_worth_its_numbers(
+def _gains(
     context: IdentificationContext, selection: SelectionResult, fit: Fit, chosen: Sequence[Hypothesis]
-) -> bool:
+) -> tuple[float, float]:
+    """Gains of log-likelihood by a fit over the selection's, on estimation and on validation data."""
     fitter, split = context.fitter, context.split
     gain, unseen_gain = (
         fitter.log_likelihood(fit.robot, chosen, data)
         - fitter.log_likelihood(selection.fit.robot, selection.accepted, data)
         for data in (split.estimation, split.validation)
     )
-    value_count = int(np.count_nonzero(np.isfinite(split.estimation.recording.measured()[split.estimation.rows])))
-    added = len(fit.values) - len(selection.fit.values)
-    return gain > 0.5 * added * log(value_count) and unseen_gain > -context.policy.selection.tie_nats
+    return gain, unseen_gain
+
+
+def _schwarz_price(context: IdentificationContext, parameter_count: int) -> float:
+    data = context.split.estimation
+    value_count = int(np.count_nonzero(np.isfinite(data.recording.measured()[data.rows])))
+    return 0.5 * parameter_count * log(value_count)
