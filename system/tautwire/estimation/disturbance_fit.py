@@ -154,13 +154,10 @@ def fit_disturbance(
 ) -> Disturbance:
     """Maximise the posterior density over the disturbance; by default exactly.
 
-    Begins at the likelihood's own disturbance or at the ``other``, where it is denser; without another one, where that
-    is denser, at the prior's median or at a larger one, which follows a model far off.
+    Begins at the likelihood's own disturbance, or at the ``other`` where that is more probable.
     """
     effort = effort or Effort(policy.max_iterations, is_exact=True)
-    starts = _starts(posterior, policy) if other is None else [logs_of(other)]
-    own = posterior.likelihood.noise.disturbance
-    starts += [logs_of(own)] if own is not None else []
+    starts = [*_starts(posterior, policy), *([] if other is None else [logs_of(other)])]
     current = max(posterior.evaluations(starts), key=lambda evaluation: evaluation.value)
     is_near = len(current.constants) > 0
     for _ in range(policy.max_alternations if is_near else 0):
@@ -205,8 +202,11 @@ def _ascended(posterior: Posterior, start: Evaluation, policy: DisturbancePolicy
 
 
 def _starts(posterior: Posterior, policy: DisturbancePolicy) -> list[Array]:
-    """Logs of the prior's median, and of larger disturbances."""
-    starts = [logs_of(posterior.prior.median)]
+    """Logs to begin at: the likelihood's own, and from the prior's median larger ones, which follow a model far off."""
+    own, median = posterior.likelihood.noise.disturbance, posterior.prior.median
+    if own is not None and own != median:
+        return [logs_of(own)]
+    starts = [logs_of(median)]
     for factor in policy.start_factors:
         logs = starts[0].copy()
         logs[[0, 2, 4]] += log(factor)
