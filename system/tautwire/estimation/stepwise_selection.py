@@ -148,12 +148,16 @@ class _StepwiseSelection:
             without = fit_model(self.context, others, self.current.robot, coarse=True)
             score = CandidateScore(tested, self.current, self._evidence(without, others), float("nan"))
             if score.evidence < self.context.evidence_threshold():
-                self.accepted, self.current = others, fit_model(self.context, others, without.robot)
-                self.context, self.current = with_disturbance_beside(self.context, others, self.current)
+                self._drop(others, without)
                 pending = list(others)
                 continue
             number = policy.max_rounds + 1 + len(self.evidences) + self.swaps
-            alternatives = self._alternatives(number, without.robot, others, score)
+            scores = self.complete_rounds.get(tuple(others))
+            if scores is None:
+                search_round = _search_round(self.context, number, without.robot, others, score)
+                scores, _ = score_candidates(self.context, search_round)
+                self.complete_rounds[tuple(others)] = scores
+            alternatives = [trial for trial in scores if not trial.hypothesis.overlaps(tested)]
             contender = self._comparable(score, others)
             best = most_parsimonious([contender, *alternatives], policy, self.context.fitter.has_disturbance)
             if tuple(others) not in reported:
@@ -179,6 +183,11 @@ class _StepwiseSelection:
             self.context.fitter.noise.disturbance,
         )
 
+    def _drop(self, others: list[Hypothesis], without: Fit) -> None:
+        """Keep only the other hypotheses, fitted from where they fit without it."""
+        self.accepted, self.current = others, fit_model(self.context, others, without.robot)
+        self.context, self.current = with_disturbance_beside(self.context, others, self.current)
+
     def _comparable(self, score: CandidateScore, others: Sequence[Hypothesis]) -> CandidateScore:
         """The score to hold against alternatives: beside a disturbance that of the round in which these were scored.
 
@@ -186,17 +195,6 @@ class _StepwiseSelection:
         """
         known = self.complete_rounds.get(tuple(others), []) if self.context.fitter.has_disturbance else []
         return next((each for each in known if each.hypothesis == score.hypothesis), score)
-
-    def _alternatives(
-        self, number: int, robot: Robot, others: Sequence[Hypothesis], tested: CandidateScore
-    ) -> list[CandidateScore]:
-        """Scores of the alternatives to one hypothesis beside the others."""
-        known = self.complete_rounds.get(tuple(others))
-        if known is not None:
-            return [score for score in known if not score.hypothesis.overlaps(tested.hypothesis)]
-        scores, _ = score_candidates(self.context, _search_round(self.context, number, robot, others, tested))
-        self.complete_rounds[tuple(others)] = scores
-        return scores
 
     def _evidence(self, without: Fit, others: Sequence[Hypothesis]) -> float:
         """Log-likelihood ratio on validation data of all accepted hypotheses against the others at their best there."""
