@@ -91,7 +91,7 @@ def with_fitted_disturbance(
     first = data.first(policy.coarse_samples)
     of_first = _refitted(fitter, robot, chosen, first, Effort(policy.max_iterations, is_exact=False))
     iterations = policy.coarse_iterations if coarse else policy.max_iterations
-    effort = Effort(iterations, is_exact=not coarse)
+    effort = Effort(iterations, is_exact=not coarse, searches=False)
     return _refitted(of_first, robot, chosen, data, effort, other=fitter.noise.disturbance)
 
 
@@ -99,7 +99,7 @@ def with_improved_disturbance(fitter: Fitter, robot: Robot, chosen: Collection[H
     """As :func:`with_fitted_disturbance`, by a few iterations over the first samples: for candidates to be ranked."""
     policy = fitter.policy.disturbance
     first = data.first(policy.coarse_samples)
-    return _refitted(fitter, robot, chosen, first, Effort(policy.ranking_iterations, is_exact=False))
+    return _refitted(fitter, robot, chosen, first, Effort(policy.ranking_iterations, is_exact=False, searches=False))
 
 
 def marginal_log_likelihood(
@@ -122,10 +122,15 @@ def marginal_log_likelihood(
 
 @dataclass(frozen=True)
 class Effort:
-    """How far a fit goes: ``max_iterations`` at most, and whether it ends near a maximum or at it."""
+    """How far a fit goes: ``max_iterations`` at most, and whether it ends near a maximum or at it.
+
+    One that ``searches`` begins at the prior's median too: what was fitted beside another model may be a maximum here
+    that is not the highest, a slow and large force for a load that is accounted for now.
+    """
 
     max_iterations: int
     is_exact: bool
+    searches: bool = True
 
 
 def _refitted(
@@ -154,22 +159,30 @@ def fit_disturbance(
 ) -> Disturbance:
     """Maximise the posterior density over the disturbance; by default exactly.
 
-    Begins at the likelihood's own disturbance, or at the ``other`` where that is more probable.
+    Begins at the likelihood's own disturbance, or at the ``other`` where that is more probable; and at the prior's
+    median, or a larger one, where the effort is to search.
     """
     effort = effort or Effort(policy.max_iterations, is_exact=True)
-    starts = [*_starts(posterior, policy), *([] if other is None else [logs_of(other)])]
-    current = max(posterior.evaluations(starts), key=lambda evaluation: evaluation.value)
+    own, median = posterior.likelihood.noise.disturbance, posterior.prior.median
+    known = [logs_of(each) for each in (own, other) if each not in (None, median)]
+    fresh = _fresh_starts(posterior.prior, policy) if effort.searches or not known else []
+    best = [max(posterior.evaluations(starts), key=_value) for starts in (known, fresh) if starts]
+    return disturbance_of(max((_maximised(posterior, start, policy, effort) for start in best), key=_value).logs)
+
+
+def _maximised(posterior: Posterior, current: Evaluation, policy: DisturbancePolicy, effort: Effort) -> Evaluation:
+    """The maximum, or what is near it, that is reached from an evaluation."""
     is_near = len(current.constants) > 0
     for _ in range(policy.max_alternations if is_near else 0):
         reached = _alternated(posterior, current, policy)
-        gain, current = reached.value - current.value, max(current, reached, key=lambda evaluation: evaluation.value)
+        gain, current = reached.value - current.value, max(current, reached, key=_value)
         # A step that would lead down says that parameters and disturbance cannot be told apart in turn.
         is_near = gain > -policy.min_coarse_gain
         if gain < policy.min_coarse_gain:
             break
     if effort.is_exact or not is_near:
         current = _ascended(posterior, current, policy, effort.max_iterations)
-    return disturbance_of(current.logs)
+    return current
 
 
 def _alternated(posterior: Posterior, current: Evaluation, policy: DisturbancePolicy) -> Evaluation:
@@ -201,12 +214,9 @@ def _ascended(posterior: Posterior, start: Evaluation, policy: DisturbancePolicy
     return current
 
 
-def _starts(posterior: Posterior, policy: DisturbancePolicy) -> list[Array]:
-    """Logs to begin at: the likelihood's own, and from the prior's median larger ones, which follow a model far off."""
-    own, median = posterior.likelihood.noise.disturbance, posterior.prior.median
-    if own is not None and own != median:
-        return [logs_of(own)]
-    starts = [logs_of(median)]
+def _fresh_starts(prior: DisturbancePrior, policy: DisturbancePolicy) -> list[Array]:
+    """Logs of the prior's median, and of larger ones, which follow a model far off."""
+    starts = [logs_of(prior.median)]
     for factor in policy.start_factors:
         logs = starts[0].copy()
         logs[[0, 2, 4]] += log(factor)
@@ -226,6 +236,10 @@ class Evaluation:
     innovations: Array
     log_variances: Array
     constants: Array
+
+
+def _value(evaluation: Evaluation) -> float:
+    return evaluation.value
 
 
 @dataclass(frozen=True)
