@@ -8,7 +8,7 @@ import pytest
 
 from tautwire.cosimulation.robot_cosimulation import CosimulationResult, cosimulate
 from tautwire.estimation import Trace, trace
-from tautwire.estimation.cosimulation_validation import cosimulation_errors
+from tautwire.estimation.cosimulation_validation import output_errors
 from tests.support.recordings import recorded
 from tests.support.robots import example
 
@@ -26,7 +26,7 @@ def test_the_rebuilt_fmus_give_the_error_after() -> None:
     found = traced()
     assert found.verdict == "effects"
     for comparison in found.comparisons:
-        again = cosimulation_errors(comparison.recording, comparison.after)
+        again = output_errors(comparison.recording, comparison.after.measured())
         assert again.tension_rms == comparison.errors_after.tension_rms
         assert again.tension_rms < 1.2 * found.noise_floor.tension_rms < comparison.errors_before.tension_rms
     assert found.robot_after.effects[0].name == "damping"

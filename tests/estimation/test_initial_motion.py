@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from tautwire.errors import RecordingError
-from tautwire.estimation.cosimulation_validation import cosimulate_data_set, cosimulation_errors, noise_floor
+from tautwire.estimation.cosimulation_validation import cosimulate_data_set, noise_floor, output_errors
 from tautwire.estimation.estimation_data import split_data
 from tautwire.estimation.initial_state_prior import initial_motion, with_motion_at_start
 from tautwire.estimation.measurement_noise import estimate_noise
@@ -58,7 +58,7 @@ def runs(name: str, *recordings: Recording) -> list[tuple[bool, float, float]]:
         begun = with_initial_state(fitter, robot, sample)
         assert "the estimated initial state has tensions of" in initial_state_note(begun, sample.recording.path)[0]
         error, floor = (
-            cosimulation_errors(sample.recording, cosimulate_data_set(begun, sample)),
+            output_errors(sample.recording, cosimulate_data_set(begun, sample).measured()),
             noise_floor(fitter, robot, sample),
         )
         quiet = residuals_are_white(fitter.innovations(robot, sample), sample.rows)

@@ -75,15 +75,17 @@ def compare_cosimulations(
     """
     recordings = [calibrate(fitter, robot, sample).without_sensor_errors(sample.recording) for sample in data_sets]
     comparisons = tuple(
-        Comparison(role, recording, b, a, cosimulation_errors(recording, b), cosimulation_errors(recording, a))
+        Comparison(
+            role, recording, b, a, output_errors(recording, b.measured()), output_errors(recording, a.measured())
+        )
         for role, recording, b, a in zip(ROLES, recordings, runs_before, runs_after, strict=False)
     )
     return comparisons, [noise_floor(fitter, robot, sample) for sample in data_sets]
 
 
-def cosimulation_errors(recording: Recording, motion: CosimulationResult) -> Errors:
-    """Root-mean-square errors: measured less co-simulated."""
-    return _root_mean_squares((recording.measured() - motion.measured()) ** 2)
+def output_errors(recording: Recording, outputs: Array) -> Errors:
+    """Root-mean-square errors: measured less simulated ``outputs`` (N, m)."""
+    return _root_mean_squares((recording.measured() - outputs) ** 2)
 
 
 def noise_floor(fitter: Fitter, robot: Robot, data: DataSet) -> Errors:

@@ -188,7 +188,7 @@ class Likelihood:
         )
 
     def simulated_outputs(self, recording: Recording, parameters: Sequence[float] | Array) -> Array:
-        """Simulated outputs without noise or lag over a recording's winch speeds, shape (N, m)."""
+        """Simulated outputs without noise, as late as the sensors show them, over a recording's winch speeds (N, m)."""
         no_measurements = np.full(recording.measured().shape, np.nan)
         outputs = casadi.vertcat(self.model.outputs[:3], self.model.outputs[6 : 6 + self.cable_count])
         function = casadi.Function("shown", [self.model.states, self.model.inputs, self.model.parameters], [outputs])
@@ -203,7 +203,9 @@ class Likelihood:
             inputs = np.vstack([speeds, np.repeat(no_force[:, None], count, axis=1)])
             theta = np.repeat(self._arguments(parameters)[:, None], count, axis=1)
             parts.append(np.array(function.map(count)(states, inputs, theta)).T)
-        return np.vstack(parts)
+        lags = np.array(self._filter_functions.lags(self._arguments(parameters))).ravel()
+        time, columns = recording.time, np.vstack(parts).T
+        return np.array([np.interp(time - lag, time, column) for lag, column in zip(lags, columns, strict=True)]).T
 
     def _aligned_outputs(self, recording: Recording, parameters: Sequence[float] | Array) -> tuple[Array, Array]:
         lags = np.array(self._filter_functions.lags(self._arguments(parameters))).ravel()

@@ -22,10 +22,12 @@ from .candidate_scores import CandidateScore, most_parsimonious
 from .candidate_scoring import score_candidates
 from .disturbance import Disturbance
 from .disturbance_fit import marginal_log_likelihood, with_fitted_disturbance
+from .explained_shares import missed_with_effects, missed_without_effects, sensor_noise_floor
 from .hypotheses import Hypothesis, with_hypothesis
 from .identification_context import IdentificationContext
-from .parameter_fit import Fit
+from .parameter_fit import Fit, Fitter
 from .residual_analysis import residuals_are_white
+from .smoothed_states import calibrate
 from .time_limit import OutOfTimeError
 from .trace_result import Candidate
 
@@ -56,7 +58,7 @@ def select_effects(context: IdentificationContext) -> SelectionResult:
     What the robot file declares, effects included, stays as it is until a hypothesis replaces it. Where time is up, it
     is what was selected until then.
     """
-    selection = _StepwiseSelection(context, Fit.without_parameters(context.robot))
+    selection = _StepwiseSelection(context, Fit.without_parameters(context.robot), context.fitter)
     try:
         selection.add()
         selection.eliminate()
@@ -97,11 +99,12 @@ class _StepwiseSelection:
     """A selection in progress; at any time its accepted hypotheses and their fit belong together.
 
     ``evidences`` are those of the hypotheses that passed the backward elimination, ``forward_evidences`` those with
-    which they were accepted.
+    which they were accepted. ``without_effects`` fits the robot without any.
     """
 
     context: IdentificationContext
     current: Fit
+    without_effects: Fitter
     accepted: list[Hypothesis] = field(default_factory=list)
     candidates: list[Candidate] = field(default_factory=list)
     complete_rounds: dict[tuple[Hypothesis, ...], list[CandidateScore]] = field(default_factory=dict)
@@ -114,6 +117,8 @@ class _StepwiseSelection:
         """Forward selection: the best hypothesis of each round, while it is significant."""
         self.current = fit_model(self.context, self.accepted)
         for number in range(1, self.context.policy.selection.max_rounds + 1):
+            if self.accepted and self.context.fitter.has_disturbance and self._leaves_little():
+                break
             search_round = _search_round(self.context, number, self.current.robot, self.accepted)
             scores, is_complete = score_candidates(self.context, search_round)
             if is_complete:
@@ -132,6 +137,19 @@ class _StepwiseSelection:
             last = {h: e for h in self.accepted for old, e in self.forward_evidences.items() if h.overlaps(old)}
             self.forward_evidences |= {**last, best.hypothesis: best.evidence}
             self.context, self.current = with_disturbance_beside(self.context, self.accepted, best.fit)
+
+    def _leaves_little(self) -> bool:
+        """Whether nothing that matters can be missing beside the accepted hypotheses, or was missing before.
+
+        What they leave is less than an effect's least share, or without them it was no more than a small random force.
+        """
+        context, policy, validation = self.context, self.context.policy.size, self.context.split.validation
+        calibration = calibrate(context.fitter, self.current.robot, context.split.estimation)
+        robot = calibration.calibrated_robot(self.current.robot)
+        floor = sensor_noise_floor(context.fitter, robot, validation)
+        missed = missed_without_effects(context, self.without_effects, validation, floor)
+        left = missed_with_effects(context.fitter, robot, validation, floor)
+        return left < policy.min_share * missed or missed < policy.max_size_of_disturbance**2
 
     def eliminate(self) -> None:
         """Backward elimination: each accepted hypothesis against its best alternatives, and against its absence.
