@@ -13,8 +13,10 @@ from tautwire.estimation.candidate_fits import fit_and_validate, maximised_valid
 from tautwire.estimation.candidate_proposals import FitTask
 from tautwire.estimation.disturbance import Disturbance, OrnsteinUhlenbeck, sensor_noise_only
 from tautwire.estimation.disturbance_fit import (
+    Effort,
     Posterior,
     disturbance_prior,
+    fit_disturbance,
     logs_of,
     marginal_log_likelihood,
     with_fitted_disturbance,
@@ -162,6 +164,16 @@ def test_a_fit_may_begin_where_the_model_is_far_off() -> None:
     without = with_fitted_disturbance(Fitter(fitter.noise, policy=policy), ROBOT, (), data_of(recording), coarse=False)
     log_likelihoods = [each.log_likelihood(ROBOT, (), data_of(recording)) for each in (fitted, without)]
     assert log_likelihoods[0] > log_likelihoods[1] + 5.0
+
+
+@pytest.mark.parametrize("searches", [True, False])
+def test_a_fit_that_searches_begins_at_the_priors_median_as_well(searches: bool) -> None:
+    data, prior = data_of(PAIR[0].first(200)), disturbance_prior(ROBOT, NOISE)
+    far_off = replace(prior.median, force=OrnsteinUhlenbeck(3000.0, 20.0))
+    likelihood = likelihood_of(replace(NOISE, disturbance=far_off))
+    effort = Effort(max_iterations=0, is_exact=True, searches=searches)
+    reached = fit_disturbance(Posterior(likelihood, (), data, prior), effort=effort)
+    assert logs_of(reached) == pytest.approx(logs_of(prior.median if searches else far_off))
 
 
 def test_a_rival_is_judged_under_the_best_disturbance_of_the_unseen_data() -> None:

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from tautwire.estimation import stepwise_selection
+from tautwire.estimation.candidate_proposals import SearchRound
 from tautwire.estimation.candidate_scores import CandidateScore
 from tautwire.estimation.disturbance_fit import disturbance_prior
 from tautwire.estimation.estimation_data import split_data
@@ -14,6 +15,7 @@ from tautwire.estimation.hypotheses import Hypothesis
 from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fit, Fitter
+from tautwire.estimation.policy import DEFAULT_POLICY
 from tautwire.estimation.residual_analysis import residuals_are_white
 from tautwire.estimation.stepwise_selection import SelectionResult, select_effects
 from tautwire.recordings.recording import Recording
@@ -68,6 +70,34 @@ def test_beside_a_disturbance_a_further_effect_needs_a_share_of_the_first_ones_e
     monkeypatch.setattr(stepwise_selection, "with_disturbance_beside", lambda context, chosen, fit: (context, fit))
     monkeypatch.setattr(stepwise_selection._StepwiseSelection, "eliminate", lambda self: None)
     assert [hypothesis.effect.name for hypothesis in select_effects(context).accepted] == names
+
+
+@pytest.mark.parametrize(("min_share", "max_size", "rounds"), [(0.02, 0.0, 1), (1e-9, 0.0, 2), (1e-9, 1e6, 1)])
+def test_beside_a_disturbance_the_search_ends_where_what_is_left_could_not_matter(
+    min_share: float, max_size: float, rounds: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot = example("three")
+    fit, check = pair("three", 5, {"payload": {"mass": 6.0}})
+    noise = estimate_noise(robot, fit)
+    noise = replace(noise, disturbance=disturbance_prior(robot, noise).median)
+    size = replace(DEFAULT_POLICY.size, min_share=min_share, max_size_of_disturbance=max_size)
+    policy = replace(DEFAULT_POLICY, size=size)
+    context = IdentificationContext(robot, Fitter(noise), split_data(robot, noise, fit, check), policy=policy)
+    payload = Hypothesis(BY_NAME["payload"], ())
+    with_payload = robot.with_effect(EffectSetting("payload", {"mass": 6.0}))
+    scored = [CandidateScore(payload, Fit.without_parameters(with_payload), 1000.0, 1.0)]
+    numbers: list[int] = []
+
+    def score_candidates(_: object, search_round: SearchRound) -> tuple[list[CandidateScore], bool]:
+        numbers.append(search_round.number)
+        return (scored if search_round.number == 1 else []), True
+
+    monkeypatch.setattr(stepwise_selection, "score_candidates", score_candidates)
+    monkeypatch.setattr(stepwise_selection, "fit_model", lambda *_, **__: Fit.without_parameters(robot))
+    monkeypatch.setattr(stepwise_selection, "with_disturbance_beside", lambda context, chosen, fit: (context, fit))
+    monkeypatch.setattr(stepwise_selection._StepwiseSelection, "eliminate", lambda self: None)
+    select_effects(context)
+    assert len(numbers) == rounds
 
 
 HIDDEN: list[tuple[str, dict[str, Any]]] = [

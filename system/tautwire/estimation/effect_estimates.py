@@ -6,47 +6,67 @@ from collections.abc import Sequence
 from dataclasses import replace
 from itertools import combinations
 
+import numpy as np
+from numpy.typing import NDArray
+
 from tautwire_fmu.laws.effects import UNLISTED
 
+from ..robot.schema import Robot
 from ..robot.symbolic_model import FORMULA_INDEX
 from .explained_shares import ExplainedShares
 from .hypotheses import declared_value
 from .identification_context import IdentificationContext
 from .parameter_fit import Fit
+from .parameter_stability import stable_intervals
 from .policy import SizePolicy
 from .profile_likelihood import profile_intervals
 from .stepwise_selection import SelectionResult
 from .time_limit import OutOfTimeError
 from .trace_result import Correlation, Estimate, FittedParameter, FoundEffect
 
+Array = NDArray[np.float64]
+
 
 def estimated_effects(context: IdentificationContext, selection: SelectionResult) -> tuple[FoundEffect, ...]:
     """Estimates of the accepted effects of the list, in order, on the estimation data that they were fitted to."""
     indices = _parameter_indices(selection.fit)
-    interval_ends = _interval_ends(context, selection)
+    interval_ends, disagree = _interval_ends(context, selection)
     effects = []
     for hypothesis, evidence in zip(selection.accepted, selection.evidence, strict=True):
         if hypothesis.effect in UNLISTED:
             continue
-        estimates = {}
+        estimates, unstable = {}, []
         for parameter in hypothesis.parameters:
             index = indices[FittedParameter(hypothesis.effect.name, hypothesis.cables, parameter.name)]
             low, high = interval_ends[index]
             declared = declared_value(context.robot, parameter, hypothesis.cables)
+            unstable += [parameter.name] if disagree[index] else []
             estimates[parameter.name] = Estimate(
                 float(selection.fit.values[index]), parameter.unit, low, high, declared
             )
-        effects.append(
-            FoundEffect(hypothesis.effect.name, hypothesis.effect.component, hypothesis.cables, estimates, evidence)
-        )
+        name, component = hypothesis.effect.name, hypothesis.effect.component
+        effect = FoundEffect(name, component, hypothesis.cables, estimates, evidence, unstable=tuple(unstable))
+        effects.append(effect)
     return tuple(effects)
 
 
-def _interval_ends(context: IdentificationContext, selection: SelectionResult) -> Sequence[tuple[float, float]]:
-    """Ends of the interval of each fitted parameter; from the curvature alone where there is no time for more."""
+def _interval_ends(
+    context: IdentificationContext, selection: SelectionResult
+) -> tuple[Sequence[tuple[float, float]], Sequence[bool]]:
+    """Ends of the interval of each fitted parameter, and whether the recordings disagree on it.
+
+    Beside a disturbance they are by the spread over stretches and recordings, else by profile likelihood; from the
+    curvature alone where there is no time for more.
+    """
     fit = selection.fit
+    agree = [False] * len(fit.values)
     try:
-        return profile_intervals(
+        context.time_limit.check()
+        if context.fitter.has_disturbance:
+            neutral_values = _neutral_values(context.robot, selection)
+            stable, disagree = stable_intervals(context, fit, selection.accepted, neutral_values)
+            return list(zip(stable.low.tolist(), stable.high.tolist(), strict=True)), disagree.tolist()
+        ends = profile_intervals(
             context.fitter,
             fit,
             selection.accepted,
@@ -55,8 +75,21 @@ def _interval_ends(context: IdentificationContext, selection: SelectionResult) -
             context.policy.profile_likelihood,
         )
     except OutOfTimeError:
-        context.leave_untried("intervals by profile likelihood: those given are from the likelihood's curvature")
-        return [fit.interval(index) for index in range(len(fit.values))]
+        context.leave_untried("intervals of the parameters: those given are from the likelihood's curvature")
+        return [fit.interval(index) for index in range(len(fit.values))], agree
+    return ends, agree
+
+
+def _neutral_values(declared: Robot, selection: SelectionResult) -> Array:
+    """Values (p,) of the fitted parameters without their effects: neutral, or as the robot file declares."""
+    indices, values = _parameter_indices(selection.fit), selection.fit.values.copy()
+    for hypothesis in selection.accepted:
+        for parameter in hypothesis.parameters:
+            neutral = parameter.neutral
+            if neutral is None:
+                neutral = declared_value(declared, parameter, hypothesis.cables) or 0.0
+            values[indices[FittedParameter(hypothesis.effect.name, hypothesis.cables, parameter.name)]] = neutral
+    return values
 
 
 def effects_by_size(

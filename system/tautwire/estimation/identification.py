@@ -204,12 +204,17 @@ def _localisation(state: Identification) -> FaultLocalisation:
 
 
 def _disturbance_notes(state: Identification) -> list[str]:
-    """Notes on the disturbance that was assumed, and on effects too small to matter."""
+    """Notes on the disturbance that was assumed, on effects too small to matter, and on values that differ."""
     disturbance = state.context.fitter.noise.disturbance
     if disturbance is None:
         return []
     small = [f"{each.name} ({100.0 * (each.share or 0.0):.1f} % of what is missed)" for each in state.small_effects]
-    return [disturbance.sentence, *([f"established, but too small to matter: {', '.join(small)}"] if small else [])]
+    unstable = [f"{name} of {each.name}" for each in state.effects for name in each.unstable]
+    return [
+        disturbance.sentence,
+        *([f"established, but too small to matter: {', '.join(small)}"] if small else []),
+        *([f"the two recordings do not agree on {', '.join(unstable)}: its interval holds both"] if unstable else []),
+    ]
 
 
 def _calibration_notes(state: Identification) -> list[str]:

@@ -34,7 +34,8 @@ class Estimate:
 class FoundEffect:
     """An effect that was accepted; ``evidence`` is the natural log of its likelihood ratio on unseen data.
 
-    ``share`` is the part of what was missed that it explains, where a disturbance was assumed.
+    ``share`` is the part of what was missed that it explains, where a disturbance was assumed; ``unstable`` are names
+    of parameters on which both recordings, each by itself, do not agree.
     """
 
     name: str
@@ -43,6 +44,7 @@ class FoundEffect:
     parameters: Mapping[str, Estimate]
     evidence: float
     share: float | None = None
+    unstable: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,127 @@
+"""Stability of estimates beside a disturbance: 95 % intervals that hold what stretches and recordings disagree on.
+
+The likelihood's curvature tells how well noise lets a parameter be known where the model is right. No robot's model is:
+its gradients by stretch then differ by more. With the score ``g_b`` of each of B stretches at the estimate, and the
+Fisher information ``H`` of all,
+
+    V = B / (B - 1) H^-1 (sum_b g_b g_b') H^-1        half-width w = t sqrt V, t Student's with B - 1 degrees
+
+What an effect's formula lacks beside nature's is the same in all stretches; a share of the parameter's distance from
+neutral is added for it. The random force is fitted to what an effect leaves, and may take up a part of the effect:
+intervals hold the estimates under a smaller force too, and those of the other recording by itself.
+
+Source: White (1982), Econometrica 50(1), 1-25; Liang and Zeger (1986), Biometrika 73(1), 13-22, on scores by cluster.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.stats import t as students_t
+
+from ..errors import UnreachableError
+from .disturbance_fit import with_fitted_disturbance
+from .estimation_data import DataSet
+from .hypotheses import Hypothesis
+from .identification_context import IdentificationContext
+from .parameter_fit import NORMAL_QUANTILE_95, Fit, Fitter, NoFitError, parameter_bounds, parameter_scales
+from .policy import DEFAULT_POLICY, StabilityPolicy
+
+Array = NDArray[np.float64]
+
+
+@dataclass(frozen=True)
+class Intervals:
+    """Intervals of p parameters from ``low`` to ``high``, (p,) each."""
+
+    low: Array
+    high: Array
+
+    def hull(self, other: Intervals) -> Intervals:
+        """The smallest intervals that hold both."""
+        return Intervals(np.minimum(self.low, other.low), np.maximum(self.high, other.high))
+
+    def is_apart(self, other: Intervals) -> NDArray[np.bool_]:
+        """Whether they have nothing in common with another's (p,)."""
+        apart: NDArray[np.bool_] = (self.low > other.high) | (other.low > self.high)
+        return apart
+
+
+def stable_intervals(
+    context: IdentificationContext, fit: Fit, chosen: Sequence[Hypothesis], neutral_values: Array
+) -> tuple[Intervals, NDArray[np.bool_]]:
+    """Intervals of a fit's parameters, and on which (p,) of them the recordings do not agree.
+
+    ``neutral_values`` (p,) are those without the effects.
+    """
+    split, at_fit = context.split, Intervals(fit.values, fit.values)
+    fitter_of_other = with_fitted_disturbance(context.fitter, fit.robot, chosen, split.validation)
+    own, other = (
+        _intervals_of_recording(context.policy.stability, fitter, fit, chosen, data, neutral_values)
+        for fitter, data in ((context.fitter, split.estimation), (fitter_of_other, split.validation))
+    )
+    if own is None or other is None:
+        return at_fit.hull(own or other or at_fit), np.zeros(len(fit.values), dtype=bool)
+    return at_fit.hull(own).hull(other), own.is_apart(other)
+
+
+def _intervals_of_recording(
+    policy: StabilityPolicy,
+    fitter: Fitter,
+    start: Fit,
+    chosen: Sequence[Hypothesis],
+    data: DataSet,
+    neutral_values: Array,
+) -> Intervals | None:
+    """Intervals under its disturbance and under less of its force; None where nothing can be fitted."""
+    intervals: Intervals | None = None
+    for each in (fitter, _with_smaller_force(fitter, policy.smaller_force_ratio)):
+        try:
+            fit = each.fit_from([start.robot], chosen, data, -np.inf)
+        except (UnreachableError, NoFitError):
+            continue
+        half_widths = half_widths_of_stretches(each, fit, chosen, data, policy)
+        half_widths = np.hypot(half_widths, policy.form_tolerance * np.abs(fit.values - neutral_values))
+        lower, upper = parameter_bounds(fit.robot, fit.free)
+        new = Intervals(np.maximum(fit.values - half_widths, lower), np.minimum(fit.values + half_widths, upper))
+        intervals = new if intervals is None else intervals.hull(new)
+    return intervals
+
+
+def _with_smaller_force(fitter: Fitter, ratio: float) -> Fitter:
+    disturbance = fitter.noise.disturbance
+    if disturbance is None:
+        return fitter
+    force = replace(disturbance.force, rms=ratio * disturbance.force.rms)
+    return fitter.with_disturbance(replace(disturbance, force=force))
+
+
+def half_widths_of_stretches(
+    fitter: Fitter,
+    fit: Fit,
+    chosen: Sequence[Hypothesis],
+    data: DataSet,
+    policy: StabilityPolicy = DEFAULT_POLICY.stability,
+) -> Array:
+    """Half-widths (p,) by the scores of stretches, and no less than by the curvature."""
+    innovations = fitter.judged(fit.robot, chosen, data)
+    is_counted = innovations.observed & data.rows[:, None]
+    values = np.where(is_counted, innovations.values, 0.0)
+    units = parameter_scales(fit.robot, fit.free)
+    slopes = np.where(is_counted[:, :, None], innovations.sensitivities, 0.0) * units
+    covariance = np.linalg.pinv(np.einsum("kmi,kmj->ij", slopes, slopes))
+    scores = np.einsum("km,kmi->ki", values, slopes)
+    ends = np.searchsorted(np.cumsum(data.rows), np.sum(data.rows) * np.arange(1, policy.stretches) / policy.stretches)
+    by_stretch = np.array([part.sum(axis=0) for part in np.split(scores, ends)])
+    by_stretch -= by_stretch.mean(axis=0)
+    freedom = policy.stretches - 1
+    spread = policy.stretches / freedom * covariance @ (by_stretch.T @ by_stretch) @ covariance
+    quantile = float(students_t.ppf(0.975, freedom))
+    half_widths: Array = units * np.maximum(
+        quantile * np.sqrt(np.maximum(np.diag(spread), 0.0)),
+        NORMAL_QUANTILE_95 * np.sqrt(np.maximum(np.diag(covariance), 0.0)),
+    )
+    return half_widths

@@ -1,0 +1,108 @@
+"""Intervals that hold what stretches of a recording, both recordings, and disturbances of other sizes disagree on."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tautwire.estimation.disturbance import Disturbance, OrnsteinUhlenbeck
+from tautwire.estimation.estimation_data import DataSet, DataSplit
+from tautwire.estimation.hypotheses import hypotheses
+from tautwire.estimation.identification_context import IdentificationContext
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.estimation.parameter_fit import NORMAL_QUANTILE_95, Fit, Fitter
+from tautwire.estimation.parameter_stability import half_widths_of_stretches, stable_intervals
+from tautwire.estimation.policy import DEFAULT_POLICY
+from tests.support.recordings import recorded
+from tests.support.robots import example
+
+ROBOT = example("three")
+NOISE = estimate_noise(ROBOT, recorded("three", 1))
+FITTER = Fitter(
+    replace(
+        NOISE,
+        disturbance=Disturbance(
+            OrnsteinUhlenbeck(0.5, 1.0),
+            OrnsteinUhlenbeck(0.3 * NOISE.position, 1.0),
+            OrnsteinUhlenbeck(0.3 * NOISE.tension, 1.0),
+            NOISE.position,
+            NOISE.tension,
+        ),
+    )
+)
+DRUM = next(h for h in hypotheses(ROBOT) if h.effect.name == "drum" and h.cables == ROBOT.cable_numbers)
+NEUTRAL = np.ones(1)
+
+
+def turned(seed: int, *ratios: float) -> DataSet:
+    """A recording whose ropes move by these ratios of what encoders say, one after the other."""
+    recording = recorded("three", seed).first(600)
+    by_sample = np.repeat(ratios, int(np.ceil(600 / len(ratios))))[: len(recording.time)]
+    recording = replace(recording, winch_speed=recording.winch_speed / by_sample[:, None])
+    return DataSet(recording, ROBOT.platform.start, np.ones(len(recording.time), dtype=bool))
+
+
+def fit_to(data: DataSet, fitter: Fitter = FITTER) -> Fit:
+    return fitter.fit_from([ROBOT.with_effect(DRUM.setting(ROBOT))], (DRUM,), data)
+
+
+def intervals(form_tolerance: float, *data_sets: DataSet) -> tuple[float, float, bool]:
+    stability = replace(DEFAULT_POLICY.stability, form_tolerance=form_tolerance)
+    policy = replace(DEFAULT_POLICY, stability=stability)
+    context = IdentificationContext(ROBOT, FITTER, DataSplit(data_sets[0], data_sets[1], ()), policy=policy)
+    found, disagree = stable_intervals(context, fit_to(data_sets[0]), (DRUM,), NEUTRAL)
+    return float(found.low[0]), float(found.high[0]), bool(disagree[0])
+
+
+def test_stretches_that_agree_leave_about_the_interval_of_the_curvature() -> None:
+    data = turned(1, 0.97)
+    fit = fit_to(data)
+    by_curvature = NORMAL_QUANTILE_95 * fit.standard_deviations
+    (ratio,) = half_widths_of_stretches(FITTER, fit, (DRUM,), data) / by_curvature
+    assert 0.999 < ratio < 2.5
+
+
+def test_stretches_that_disagree_widen_the_interval_far_beyond_the_curvatures() -> None:
+    data = turned(1, 0.97, 0.975)
+    fit = fit_to(data)
+    assert 0.969 < fit.values[0] < 0.976
+    (half_width,) = half_widths_of_stretches(FITTER, fit, (DRUM,), data)
+    assert half_width > 5.0 * NORMAL_QUANTILE_95 * fit.standard_deviations[0]
+
+
+def test_an_interval_holds_what_either_recording_shows_by_itself() -> None:
+    low, high, disagree = intervals(0.0, turned(1, 0.96), turned(2, 0.97))
+    assert low < 0.96 and high > 0.97
+    assert disagree
+
+
+def test_recordings_that_agree_are_not_said_to_disagree() -> None:
+    low, high, disagree = intervals(0.0, turned(1, 0.97), turned(2, 0.97))
+    assert 0.968 < low < 0.97 < high < 0.972
+    assert not disagree
+
+
+def test_an_effects_form_is_trusted_no_better_than_stated() -> None:
+    low, high, _ = intervals(0.1, turned(1, 0.97), turned(2, 0.97))
+    assert high - low == pytest.approx(2.0 * 0.1 * 0.03, rel=0.25)
+
+
+def test_an_interval_holds_the_estimate_under_a_random_force_of_another_size() -> None:
+    """A weight is a load or a random force that hardly changes: how large that may be decides."""
+    payload = next(h for h in hypotheses(ROBOT) if h.effect.name == "payload")
+    recordings = [recorded("three", seed, {"payload": {"mass": 3.0}}).first(400) for seed in (1, 2)]
+    data_sets = [DataSet(recording, ROBOT.platform.start, np.ones(400, dtype=bool)) for recording in recordings]
+    assert FITTER.noise.disturbance is not None
+    fitter = FITTER.with_disturbance(replace(FITTER.noise.disturbance, force=OrnsteinUhlenbeck(3.0, 1e-3)))
+    fit = fitter.fit_from([ROBOT.with_effect(payload.setting(ROBOT))], (payload,), data_sets[0])
+    widths = []
+    for ratio in (1.0, 10.0):
+        stability = replace(DEFAULT_POLICY.stability, smaller_force_ratio=ratio, form_tolerance=0.0)
+        policy = replace(DEFAULT_POLICY, stability=stability)
+        context = IdentificationContext(ROBOT, fitter, DataSplit(data_sets[0], data_sets[1], ()), policy=policy)
+        found, _ = stable_intervals(context, fit, (payload,), np.zeros(1))
+        assert found.low[0] < 3.0 < found.high[0]
+        widths.append(float(found.high[0] - found.low[0]))
+    assert widths[1] > 2.0 * widths[0]
