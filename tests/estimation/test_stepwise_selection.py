@@ -72,15 +72,15 @@ def test_beside_a_disturbance_a_further_effect_needs_a_share_of_the_first_ones_e
     assert [hypothesis.effect.name for hypothesis in select_effects(context).accepted] == names
 
 
-@pytest.mark.parametrize(("min_share", "max_size", "rounds"), [(0.02, 0.0, 1), (1e-9, 0.0, 2), (1e-9, 1e6, 1)])
+@pytest.mark.parametrize(("max_left_share", "max_size", "rounds"), [(0.04, 0.0, 1), (1e-9, 0.0, 2), (1e-9, 1e6, 1)])
 def test_beside_a_disturbance_the_search_ends_where_what_is_left_could_not_matter(
-    min_share: float, max_size: float, rounds: int, monkeypatch: pytest.MonkeyPatch
+    max_left_share: float, max_size: float, rounds: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     robot = example("three")
     fit, check = pair("three", 5, {"payload": {"mass": 6.0}})
     noise = estimate_noise(robot, fit)
     noise = replace(noise, disturbance=disturbance_prior(robot, noise).median)
-    size = replace(DEFAULT_POLICY.size, min_share=min_share, max_size_of_disturbance=max_size)
+    size = replace(DEFAULT_POLICY.size, max_left_share=max_left_share, max_size_of_disturbance=max_size)
     policy = replace(DEFAULT_POLICY, size=size)
     context = IdentificationContext(robot, Fitter(noise), split_data(robot, noise, fit, check), policy=policy)
     payload = Hypothesis(BY_NAME["payload"], ())

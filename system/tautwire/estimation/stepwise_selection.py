@@ -139,17 +139,14 @@ class _StepwiseSelection:
             self.context, self.current = with_disturbance_beside(self.context, self.accepted, best.fit)
 
     def _leaves_little(self) -> bool:
-        """Whether nothing that matters can be missing beside the accepted hypotheses, or was missing before.
-
-        What they leave is less than an effect's least share, or without them it was no more than a small random force.
-        """
+        """Whether the accepted hypotheses leave little, or no more than a small random force was missing before."""
         context, policy, validation = self.context, self.context.policy.size, self.context.split.validation
         calibration = calibrate(context.fitter, self.current.robot, context.split.estimation)
         robot = calibration.calibrated_robot(self.current.robot)
         floor = sensor_noise_floor(context.fitter, robot, validation)
         missed = missed_without_effects(context, self.without_effects, validation, floor)
         left = missed_with_effects(context.fitter, robot, validation, floor)
-        return left < policy.min_share * missed or missed < policy.max_size_of_disturbance**2
+        return left < policy.max_left_share * missed or missed < policy.max_size_of_disturbance**2
 
     def eliminate(self) -> None:
         """Backward elimination: each accepted hypothesis against its best alternatives, and against its absence.
