@@ -39,7 +39,7 @@ def selected(ratios: tuple[float, float, float]) -> tuple[IdentificationContext,
 def test_cables_that_differ_get_values_of_their_own() -> None:
     ratios = (0.95, 0.97, 0.96)
     context, shared = selected(ratios)
-    separate = with_values_of_cables(context, shared)
+    _, separate = with_values_of_cables(context, shared)
     assert [hypothesis.cables for hypothesis in separate.accepted] == [(1,), (2,), (3,)]
     assert separate.evidence == (100.0,) * 3
     assert separate.fit.values == pytest.approx(ratios, abs=2e-3)
@@ -52,7 +52,7 @@ def test_cables_that_differ_get_values_of_their_own() -> None:
 def test_cables_that_do_not_differ_share_a_value() -> None:
     context, shared = selected((0.96, 0.96, 0.96))
     assert shared.fit.values == pytest.approx([0.96], abs=2e-3)
-    assert with_values_of_cables(context, shared) is shared
+    assert with_values_of_cables(context, shared) == (context, shared)
 
 
 def test_an_effect_on_some_cables_is_labelled_with_them() -> None:

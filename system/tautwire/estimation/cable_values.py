@@ -1,10 +1,12 @@
 """Values of single cables in place of those that an effect's cables share.
 
 Names are established on unseen data. How many numbers a named effect has is less: cables get one each where the
-likelihood of FIT is worth these by Schwarz's criterion, half a log of the number of values N for each of k numbers, and
-more than the effect's form may leave, a share of its evidence; and where CHECK does not speak against it.
+likelihood of FIT is worth these by Schwarz's criterion, half a log of the number of values N for each of k numbers, FIT
+or CHECK gains more than the effect's form may leave, a share of its evidence, and CHECK does not speak against it.
 
-    log L(each its own) - log L(shared) > max(k/2 log N, share evidence)
+    log L(each its own) - log L(shared) > k/2 log N on FIT, and on either > share evidence
+
+Both are taken beside the best disturbance of each recording.
 
 Source: Schwarz (1978), Annals of Statistics 6(2), 461-464.
 """
@@ -12,59 +14,69 @@ Source: Schwarz (1978), Annals of Statistics 6(2), 461-464.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from contextlib import suppress
 from dataclasses import replace
 from math import inf, log
 
 import numpy as np
 
 from ..errors import UnreachableError
+from ..robot.schema import Robot
 from .candidate_scores import setting_of
+from .disturbance_fit import with_fitted_disturbance
+from .estimation_data import DataSet
 from .hypotheses import PLATFORM_SENSOR_FORMS, Hypothesis, split_by_cable
 from .identification_context import IdentificationContext
-from .parameter_fit import Fit, NoFitError
+from .parameter_fit import Fitter, NoFitError
 from .stepwise_selection import SelectionResult
 
 
-def with_values_of_cables(context: IdentificationContext, selection: SelectionResult) -> SelectionResult:
-    """The selection with a value for each cable of those effects whose cables differ."""
+def with_values_of_cables(
+    context: IdentificationContext, selection: SelectionResult
+) -> tuple[IdentificationContext, SelectionResult]:
+    """The selection with a value for each cable of those effects whose cables differ, and its disturbance's context."""
     for shared in selection.accepted:
         if shared.form not in PLATFORM_SENSOR_FORMS and len(shared.cables) > 1:
-            selection = _with_values_of(context, selection, shared)
-    return selection
+            with suppress(UnreachableError, NoFitError):
+                context, selection = _with_values_of(context, selection, shared)
+    return context, selection
 
 
-def _with_values_of(context: IdentificationContext, selection: SelectionResult, shared: Hypothesis) -> SelectionResult:
-    separate = split_by_cable([shared])
+def _with_values_of(
+    context: IdentificationContext, selection: SelectionResult, shared: Hypothesis
+) -> tuple[IdentificationContext, SelectionResult]:
+    separate, split = split_by_cable([shared]), context.split
     chosen = [each for old in selection.accepted for each in (separate if old is shared else [old])]
     robot, setting = selection.fit.robot, setting_of(selection.fit.robot, shared)
     settings = [replace(setting, cables=hypothesis.cables) for hypothesis in separate]
     effects = [each for old in robot.effects for each in (settings if old is setting else [old])]
-    robot = replace(robot, effects=tuple(effects))
-    try:
-        fit = context.fitter.fit_from([robot], chosen, context.split.estimation, -inf)
-        gain, unseen_gain = _gains(context, selection, fit, chosen)
-    except (UnreachableError, NoFitError):
-        return selection
-    evidence = dict(zip(selection.accepted, selection.evidence, strict=True))
-    price = _schwarz_price(context, len(fit.values) - len(selection.fit.values))
+    fit = context.fitter.fit_from([replace(robot, effects=tuple(effects))], chosen, split.estimation, -inf)
+    fitter = with_fitted_disturbance(context.fitter, fit.robot, chosen, split.estimation)
+    fit = fitter.fit_from([fit.robot], chosen, split.estimation, -inf)
+    accepted, evidence = selection.accepted, dict(zip(selection.accepted, selection.evidence, strict=True))
+    gain = fitter.log_likelihood(fit.robot, chosen, split.estimation)
+    gain -= context.fitter.log_likelihood(robot, accepted, split.estimation)
+    unseen_gain = _maximised(fitter, fit.robot, chosen, split.validation)
+    unseen_gain -= _maximised(context.fitter, robot, accepted, split.validation)
     policy = context.policy.selection
-    if gain <= max(price, policy.min_evidence_ratio * evidence[shared]) or unseen_gain < -policy.tie_nats:
-        return selection
+    left_by_form = policy.min_evidence_ratio * evidence[shared]
+    is_worth_its_price = gain > _schwarz_price(context, len(fit.values) - len(selection.fit.values))
+    if not is_worth_its_price or max(gain, unseen_gain) <= left_by_form or unseen_gain < -policy.tie_nats:
+        return context, selection
     evidence |= dict.fromkeys(separate, evidence[shared])
-    return replace(selection, accepted=tuple(chosen), evidence=tuple(evidence[h] for h in chosen), fit=fit)
-
-
-def _gains(
-    context: IdentificationContext, selection: SelectionResult, fit: Fit, chosen: Sequence[Hypothesis]
-) -> tuple[float, float]:
-    """Gains of log-likelihood by a fit over the selection's, on estimation and on validation data."""
-    fitter, split = context.fitter, context.split
-    gain, unseen_gain = (
-        fitter.log_likelihood(fit.robot, chosen, data)
-        - fitter.log_likelihood(selection.fit.robot, selection.accepted, data)
-        for data in (split.estimation, split.validation)
+    separated = replace(
+        selection,
+        accepted=tuple(chosen),
+        evidence=tuple(evidence[h] for h in chosen),
+        fit=fit,
+        disturbance=fitter.noise.disturbance,
     )
-    return gain, unseen_gain
+    return replace(context, fitter=fitter), separated
+
+
+def _maximised(fitter: Fitter, robot: Robot, chosen: Sequence[Hypothesis], data: DataSet) -> float:
+    """Log-likelihood of some data beside its best disturbance."""
+    return with_fitted_disturbance(fitter, robot, chosen, data).log_likelihood(robot, chosen, data)
 
 
 def _schwarz_price(context: IdentificationContext, parameter_count: int) -> float:

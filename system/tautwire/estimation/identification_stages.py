@@ -90,7 +90,8 @@ def separate_cables(state: Identification) -> Identification:
     if not state.context.fitter.has_disturbance:
         return state
     state.context.progress("values of single cables", 0.0)
-    return replace(state, selection=with_values_of_cables(state.context, state.selection))
+    context, selection = with_values_of_cables(state.context, state.selection)
+    return replace(state, context=context, selection=selection)
 
 
 def cosimulate_before(state: Identification) -> Identification:

@@ -1,0 +1,57 @@
+"""Shares of what is missed: simulations as the FMUs run, and what each effect takes away."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tautwire.estimation.cosimulation_validation import cosimulate_data_set, noise_floor
+from tautwire.estimation.disturbance_fit import disturbance_prior
+from tautwire.estimation.estimation_data import DataSplit, split_data
+from tautwire.estimation.explained_shares import missed_with_effects, missed_without_effects, simulated_outputs
+from tautwire.estimation.identification_context import IdentificationContext
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.estimation.parameter_fit import Fitter
+from tautwire.estimation.smoothed_states import with_initial_state
+from tautwire.robot.schema import EffectSetting
+from tests.support.recordings import recorded
+from tests.support.robots import example
+
+ROBOT = example("three")
+RECORDING = recorded("three", 1, {"payload": {"mass": 12.0}}).first(301)
+NOISE = estimate_noise(ROBOT, RECORDING)
+SPLIT: DataSplit = split_data(ROBOT, NOISE, RECORDING, recorded("three", 51, {"payload": {"mass": 12.0}}).first(301))
+FITTER = Fitter(replace(NOISE, disturbance=disturbance_prior(ROBOT, NOISE).median))
+LOADED = ROBOT.with_effect(EffectSetting("payload", {"mass": 12.0}))
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "max_position_error"),
+    [
+        ("payload", {"mass": 12.0}, 1e-5),
+        ("friction", {"coefficient": 0.05}, 1e-5),
+        ("sensor_gain", {"tension_gain": 1.1, "position_gain": 1.0}, 1e-5),
+        # Between samples 20 ms apart a line stands for the motion.
+        ("sensor_delay", {"tension_delay": 0.035, "position_delay": 0.05}, 5e-4),
+    ],
+)
+def test_simulated_outputs_are_those_of_the_fmus(
+    effect: str, values: dict[str, float], max_position_error: float
+) -> None:
+    cables = () if effect == "payload" else ROBOT.cable_numbers
+    robot = with_initial_state(FITTER, ROBOT.with_effect(EffectSetting(effect, values, cables)), SPLIT.validation)
+    simulated = simulated_outputs(FITTER, robot, SPLIT.validation)
+    by_fmus = cosimulate_data_set(robot, SPLIT.validation).measured()
+    assert np.max(np.abs(simulated[:, :3] - by_fmus[:, :3])) < max_position_error
+    assert np.max(np.abs(simulated[:, 3:] - by_fmus[:, 3:])) < 2e4 * max_position_error
+
+
+def test_the_effect_that_is_there_leaves_little_of_what_the_robot_without_it_misses() -> None:
+    context = IdentificationContext(ROBOT, FITTER, SPLIT)
+    floor = noise_floor(FITTER, LOADED, SPLIT.validation)
+    missed = missed_without_effects(context, FITTER, SPLIT.validation, floor)
+    left = missed_with_effects(FITTER, LOADED, SPLIT.validation, floor)
+    assert missed > 50.0
+    assert left < 0.02 * missed
