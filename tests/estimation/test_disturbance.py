@@ -155,9 +155,9 @@ def test_the_score_of_a_disturbance_is_the_derivative_of_its_posterior() -> None
 
 
 def test_a_fit_may_begin_where_the_model_is_far_off() -> None:
-    """The tracker errs by 0.1 m, a hundred times its noise and more, as where a model misses centimetres."""
+    """The tracker errs by 1 m, a thousand times its noise and more, as where a model misses decimetres."""
     recording = PAIR[0].first(400)
-    recording = replace(recording, position=recording.position + process(0.1, 0.3, recording, 4))
+    recording = replace(recording, position=recording.position + process(1.0, 3.0, recording, 4))
     fitter = Fitter(replace(NOISE, disturbance=disturbance_prior(ROBOT, NOISE).median))
     fitted = with_fitted_disturbance(fitter, ROBOT, (), data_of(recording), coarse=False)
     policy = replace(fitter.policy, disturbance=replace(fitter.policy.disturbance, start_factors=()))
@@ -211,3 +211,15 @@ def test_a_candidate_is_fitted_better_beside_a_disturbance_of_its_own() -> None:
     errors = [abs(float(each.fit.values[0]) / 9e8 - 1.0) for each in (once, refitted)]
     assert errors[1] < 0.5 * errors[0]
     assert refitted.log_likelihood > once.log_likelihood + 5.0
+
+
+def test_what_hardly_changes_while_a_recording_lasts_is_no_disturbance() -> None:
+    """A load cell 30 N off zero, which noise with a memory of hours would explain as well as an offset does."""
+    recording = PAIR[0].first(400)
+    recording = replace(recording, tension=recording.tension + np.array([30.0, 0.0, 0.0]))
+    fitter = Fitter(replace(NOISE, disturbance=disturbance_prior(ROBOT, NOISE).median))
+    fitted = with_fitted_disturbance(fitter, ROBOT, (), data_of(recording), coarse=False).noise.disturbance
+    assert fitted is not None
+    duration = recording.time[-1] - recording.time[0]
+    bandwidths = [each.bandwidth for each in (fitted.force, fitted.position, fitted.tension)]
+    assert min(bandwidths) == pytest.approx(1.0 / duration)

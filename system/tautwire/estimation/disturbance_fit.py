@@ -16,6 +16,7 @@ from __future__ import annotations
 from collections.abc import Collection, Iterable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
+from functools import cached_property
 from math import log
 
 import numpy as np
@@ -33,6 +34,8 @@ from .policy import DEFAULT_POLICY, DisturbancePolicy
 Array = NDArray[np.float64]
 
 CONCURRENT_EVALUATIONS = 2
+# Indices of the processes' bandwidths among the logs of a disturbance's numbers.
+BANDWIDTHS = [1, 3, 5]
 
 
 @dataclass(frozen=True)
@@ -199,6 +202,9 @@ def _ascended(posterior: Posterior, start: Evaluation, policy: DisturbancePolicy
     current, damping = start, policy.first_damping
     for _ in range(max_iterations):
         gradient, information = posterior.score(current)
+        is_held = (current.logs <= posterior.least_logs) & (gradient < 0.0)
+        gradient, information = np.where(is_held, 0.0, gradient), np.where(is_held[:, None] | is_held, 0.0, information)
+        information[is_held, is_held] = 1.0
         while damping < policy.max_damping:
             scaled = information + damping * np.diag(np.diag(information))
             step = np.clip(np.linalg.solve(scaled, gradient), -policy.max_log_step, policy.max_log_step)
@@ -255,8 +261,17 @@ class Posterior:
         """The posterior density given the uncertain parameters."""
         return replace(self, likelihood=self.likelihood.given_constants(constants))
 
+    @cached_property
+    def least_logs(self) -> Array:
+        """Least logs (8,): what hardly changes while a recording lasts is no disturbance, but an offset or a weight."""
+        least = np.full(len(self.prior.log_deviations), -np.inf)
+        time = self.data.recording.time
+        least[BANDWIDTHS] = -log(float(time[-1] - time[0]))
+        return least
+
     def evaluation(self, logs: Array) -> Evaluation:
-        """Its evaluation at some logs (8,)."""
+        """Its evaluation at some logs (8,), or at the least ones where these are less."""
+        logs = np.maximum(logs, self.least_logs)
         likelihood = self.likelihood.with_disturbance(disturbance_of(logs))
         innovations = likelihood.innovations(self.data.recording, self.values)
         mask = innovations.observed & self.data.rows[:, None]
