@@ -76,12 +76,14 @@ def _intervals_of_recording(
     data: DataSet,
     neutral_values: Array,
 ) -> Intervals | None:
-    """Intervals under its disturbance and under less of its force; None where nothing can be fitted."""
+    """Intervals under its disturbance, and under less of its force if that can be; None where nothing can be fitted."""
     intervals: Intervals | None = None
     for each in (fitter, _with_smaller_force(fitter, policy.smaller_force_ratio)):
         try:
             fit = each.fit_from([start.robot], chosen, data, -np.inf)
         except (UnreachableError, NoFitError):
+            continue
+        if each is not fitter and _mean_square(each, fit, chosen, data) > policy.max_mean_square:
             continue
         half_widths = half_widths_of_stretches(each, fit, chosen, data, policy)
         half_widths = np.hypot(half_widths, policy.form_tolerance * np.abs(fit.values - neutral_values))
@@ -89,6 +91,11 @@ def _intervals_of_recording(
         new = Intervals(np.maximum(fit.values - half_widths, lower), np.minimum(fit.values + half_widths, upper))
         intervals = new if intervals is None else intervals.hull(new)
     return intervals
+
+
+def _mean_square(fitter: Fitter, fit: Fit, chosen: Sequence[Hypothesis], data: DataSet) -> float:
+    """Mean square of the whitened innovations: one where the disturbance explains what the model leaves."""
+    return float(np.nanmean(fitter.judged(fit.robot, chosen, data).mean_square(data.rows)))
 
 
 def _with_smaller_force(fitter: Fitter, ratio: float) -> Fitter:

@@ -263,6 +263,9 @@ class StabilityPolicy:
     # Of the fitted random force's size: estimates under the smaller one are held as well. Two frictions of 0.0231 came
     # out as 0.0215 and 0.0199 to 0.0218 under the fitted force, and as 0.0231 and 0.0223 to 0.0234 under a tenth of it.
     smaller_force_ratio: float = 0.1
+    # Mean square of whitened innovations above which a smaller force cannot be: 1.5 with these frictions, 24 on a real
+    # robot whose drums alone are known.
+    max_mean_square: float = 2.0
 
 
 @dataclass(frozen=True)
