@@ -209,15 +209,11 @@ def _disturbance_notes(state: Identification) -> list[str]:
     if disturbance is None:
         return []
     small = [f"{each.name} ({100.0 * (each.share or 0.0):.1f} % of what is missed)" for each in state.small_effects]
-    unstable = dict.fromkeys(f"{name} of {each.name}" for each in state.effects for name in each.unstable)
+    unstable = ", ".join(dict.fromkeys(f"{name} of {each.name}" for each in state.effects for name in each.unstable))
     return [
         disturbance.sentence,
         *([f"established, but too small to matter: {', '.join(small)}"] if small else []),
-        *(
-            [f"the two recordings do not agree on {', '.join(unstable)}; intervals hold what both show"]
-            if unstable
-            else []
-        ),
+        *([f"the two recordings do not agree on {unstable}; intervals hold what both show"] if unstable else []),
     ]
 
 
