@@ -145,7 +145,7 @@ def test_effects_found_before_time_was_up_are_reported(recordings: tuple[Recordi
     estimate = effect.parameters["damping"]
     assert estimate.low < estimate.value < estimate.high
     assert estimate.value == pytest.approx(9e8, rel=0.02)
-    assert [sentence for sentence in found.untried if "intervals by profile likelihood" in sentence]
+    assert [sentence for sentence in found.untried if "intervals of the parameters" in sentence]
     assert found.identifiability.detectable == ()
 
 
