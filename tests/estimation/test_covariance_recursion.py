@@ -7,7 +7,7 @@ import pytest
 from casadi import SX, Function, mtimes
 from numpy.typing import NDArray
 
-from tautwire.estimation.covariance_recursion import run_recursion
+from tautwire.estimation.covariance_recursion import Moments, Record, Samples, Step, run_recursion
 from tautwire.estimation.native_functions import BoundFunction, CompiledFunction
 
 Array = NDArray[np.float64]
@@ -41,56 +41,50 @@ def bound(count: int, state: Array) -> tuple[BoundFunction, BoundFunction]:
     return CompiledFunction(outputs).bind(count, state[:, None]), CompiledFunction(update).bind(count, state[:, None])
 
 
-def recursion(keeps_covariances: bool) -> list[Array]:
-    """The end state, covariance and sensitivities, then states, covariances, and what is known of innovations."""
-    state, covariance, sensitivities = START.copy(), START_COVARIANCE.copy(), np.zeros((PARAMETERS, SIZE))
-    outputs, update = bound(COUNT, state)
-    (expected, by_state, by_parameters), (moved, transition, direct, decay, noise) = outputs.results, update.results
-    states, values, log_variances = np.empty((COUNT + 1, SIZE)), *np.empty((2, COUNT, OUTPUTS))
-    covariances = np.empty((COUNT * keeps_covariances, SIZE, SIZE))
-    slopes = np.empty((COUNT, PARAMETERS, OUTPUTS))
-    functions = [part for each in (outputs, update) for part in (each.address, each.places, each.strides)]
-    of_outputs, of_update = (expected[0], by_state, by_parameters), (moved[0], transition, direct, decay[0], noise[0])
-    filled = [states, covariances, values, log_variances, slopes]
-    run_recursion(
-        *functions,
-        state,
-        covariance,
-        sensitivities,
-        *of_outputs,
-        *of_update,
-        MEASURED,
-        OBSERVED,
-        WHITE_VARIANCES,
-        *filled,
+def step(function: BoundFunction) -> Step:
+    return Step(function.address, function.places, function.strides, function.results)
+
+
+def recursion(keeps_covariances: bool) -> tuple[Moments, Record]:
+    """The moments after the last sample, and the record of a run."""
+    moments = Moments(START.copy(), START_COVARIANCE.copy(), np.zeros((PARAMETERS, SIZE)))
+    record = Record(
+        np.empty((COUNT + 1, SIZE)),
+        np.empty((COUNT * keeps_covariances, SIZE, SIZE)),
+        *np.empty((2, COUNT, OUTPUTS)),
+        np.empty((COUNT, PARAMETERS, OUTPUTS)),
     )
-    return [state, covariance, sensitivities, *filled]
+    outputs, update = bound(COUNT, moments.state)
+    samples = Samples(MEASURED, OBSERVED, WHITE_VARIANCES)
+    run_recursion(step(outputs), step(update), moments, samples, record)
+    return moments, record
 
 
 def test_states_covariances_and_likelihood_are_those_of_the_joint_update() -> None:
-    state, covariance, _, states, covariances, values, log_variances, _ = recursion(keeps_covariances=True)
+    moments, record = recursion(keeps_covariances=True)
     expected_state, expected_covariance = START.copy(), START_COVARIANCE.copy()
     for k in range(COUNT):
-        assert states[k] == pytest.approx(expected_state, rel=1e-10, abs=1e-12)
-        assert covariances[k] == pytest.approx(expected_covariance, rel=1e-10, abs=1e-12)
+        assert record.states[k] == pytest.approx(expected_state, rel=1e-10, abs=1e-12)
+        assert record.covariances[k] == pytest.approx(expected_covariance, rel=1e-10, abs=1e-12)
         seen = OBSERVED[k] > 0.0
         rows, noise = BY_STATE[seen], np.diag(WHITE_VARIANCES[seen])
         variance = rows @ expected_covariance @ rows.T + noise
         gain = expected_covariance @ rows.T @ np.linalg.inv(variance)
         error = MEASURED[k, seen] - rows @ expected_state
-        assert np.sum(values[k, seen] ** 2) == pytest.approx(error @ np.linalg.solve(variance, error))
-        assert np.sum(log_variances[k, seen]) == pytest.approx(np.linalg.slogdet(variance)[1])
+        assert np.sum(record.values[k, seen] ** 2) == pytest.approx(error @ np.linalg.solve(variance, error))
+        assert np.sum(record.log_variances[k, seen]) == pytest.approx(np.linalg.slogdet(variance)[1])
         expected_state = FULL_TRANSITION @ (expected_state + gain @ error)
         updated = expected_covariance - gain @ rows @ expected_covariance
         expected_covariance = FULL_TRANSITION @ updated @ FULL_TRANSITION.T + np.diag(PROCESS_NOISE)
-    assert state == pytest.approx(expected_state)
-    assert covariance == pytest.approx(expected_covariance)
-    assert states[-1] == pytest.approx(expected_state)
+    assert moments.state == pytest.approx(expected_state)
+    assert moments.covariance == pytest.approx(expected_covariance)
+    assert record.states[-1] == pytest.approx(expected_state)
 
 
 def test_sensitivities_are_derivatives_by_a_parameter_of_a_linear_model() -> None:
     """Of a linear model the gain does not depend on parameters, so that differences are exact."""
-    _, _, sensitivities, _, _, _, _, slopes = recursion(keeps_covariances=False)
+    moments, record = recursion(keeps_covariances=False)
+    slopes = record.sensitivities
     for parameter in range(PARAMETERS):
         state, change = START_COVARIANCE.copy(), np.zeros(SIZE)
         for k in range(COUNT):
@@ -103,4 +97,4 @@ def test_sensitivities_are_derivatives_by_a_parameter_of_a_linear_model() -> Non
             change = FULL_TRANSITION @ (change + gain @ moved)
             change[:MOVING] += DIRECT[:, parameter]
             state = FULL_TRANSITION @ (state - gain @ rows @ state) @ FULL_TRANSITION.T + np.diag(PROCESS_NOISE)
-        assert sensitivities[parameter] == pytest.approx(change)
+        assert moments.sensitivities[parameter] == pytest.approx(change)

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..robot.symbolic_model import SymbolicModel, constants_as_parameters
-from .covariance_recursion import run_recursion
+from .covariance_recursion import Moments, Record, Samples, Step, run_recursion
 from .integration_steps import Substeps
 from .kalman_filter import Noise, filter_jacobians, output_function, time_update_function
-from .native_functions import CompiledFunction
+from .native_functions import BoundFunction, CompiledFunction
 
 Array = NDArray[np.float64]
 
@@ -113,43 +113,25 @@ class CompiledFilter:
         time_update = self._time_update.bind(
             count, state[:, None], theta, speed, later, step, drift, density, inputs.disturbance
         )
-        expected, by_state, by_parameters = outputs.results
-        moved, transition, direct, decay, process_noise = time_update.results
         size, parameter_count = start.sensitivities.shape
-        states = np.empty((count + 1, size))
-        covariances = np.empty((count if keeps_covariances else 0, size, size))
-        values, log_variances = np.empty((2, count, output_count))
-        innovation_sensitivities = np.empty((count, parameter_count, output_count))
-        run_recursion(
-            outputs.address,
-            outputs.places,
-            outputs.strides,
-            time_update.address,
-            time_update.places,
-            time_update.strides,
-            state,
-            covariance,
-            sensitivities,
-            expected[0],
-            by_state,
-            by_parameters,
-            moved[0],
-            transition,
-            direct,
-            decay[0],
-            process_noise[0],
-            np.ascontiguousarray(measured.T),
-            np.ascontiguousarray(observed.T),
-            inputs.white_variances,
-            states,
-            covariances,
-            values,
-            log_variances,
-            innovation_sensitivities,
+        record = Record(
+            np.empty((count + 1, size)),
+            np.empty((count if keeps_covariances else 0, size, size)),
+            np.empty((count, output_count)),
+            np.empty((count, output_count)),
+            np.empty((count, parameter_count, output_count)),
         )
-        end = FilterState(state, covariance, sensitivities.T)
-        slopes = innovation_sensitivities.swapaxes(1, 2)
-        return FilterResults(states.T, covariances, values, log_variances, slopes, end)
+        moments = Moments(state, covariance, sensitivities)
+        samples = Samples(np.ascontiguousarray(measured.T), np.ascontiguousarray(observed.T), inputs.white_variances)
+        run_recursion(_step(outputs), _step(time_update), moments, samples, record)
+        return FilterResults(
+            record.states.T,
+            record.covariances,
+            record.values,
+            record.log_variances,
+            record.sensitivities.swapaxes(1, 2),
+            FilterState(state, covariance, sensitivities.T),
+        )
 
     @cached_property
     def _outputs(self) -> CompiledFunction:
@@ -162,3 +144,7 @@ class CompiledFilter:
             self.model, self._cable_count, self._noise, self._substeps, self._constant_count, self._has_sensitivities
         )
         return CompiledFunction(function, max_compiled=sys.maxsize)
+
+
+def _step(function: BoundFunction) -> Step:
+    return Step(function.address, function.places, function.strides, function.results)

@@ -18,12 +18,14 @@ Source: Bierman (1977), Factorization Methods for Discrete Sequential Estimation
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any
+from typing import Any, NamedTuple, TypeVar, cast
 
 import numpy as np
 from llvmlite import ir
 from numba import njit, types
 from numba.extending import intrinsic
+
+AnyFunction = TypeVar("AnyFunction", bound=Callable[..., Any])
 
 
 def _type_call(_: Any, address: Any, places: Any, strides: Any) -> Any:
@@ -42,128 +44,178 @@ def _type_call(_: Any, address: Any, places: Any, strides: Any) -> Any:
 _call: Any = intrinsic(_type_call)
 
 
-def _compiled(function: Callable[..., None]) -> Callable[..., None]:
+def _compiled(function: AnyFunction) -> AnyFunction:
     """The function compiled at its first call; kept on disk where there is a folder that can be written."""
     try:
-        compiled: Callable[..., None] = njit(nogil=True, cache=True, error_model="numpy")(function)
+        compiled: Any = njit(nogil=True, cache=True, error_model="numpy")(function)
     except RuntimeError:
         compiled = njit(nogil=True, error_model="numpy")(function)
-    return compiled
+    return cast(AnyFunction, compiled)
+
+
+class Step(NamedTuple):
+    """Compiled function of a sample, as :class:`tautwire.estimation.native_functions.BoundFunction` has it.
+
+    That one has to live as long as this.
+    """
+
+    address: int
+    places: Any
+    strides: Any
+    results: tuple[Any, ...]
+
+
+class Moments(NamedTuple):
+    """Moments of the state, changed in place: ``state`` (n), ``covariance`` (n, n), ``sensitivities`` (p, n)."""
+
+    state: Any
+    covariance: Any
+    sensitivities: Any
+
+
+class Samples(NamedTuple):
+    """Samples of the outputs: ``measured`` and ``observed`` (K, m); ``white_variances`` (m) of the noise."""
+
+    measured: Any
+    observed: Any
+    white_variances: Any
+
+
+class Record(NamedTuple):
+    """Predicted states and innovations that a run fills in.
+
+    ``states`` (K + 1, n), ``covariances`` (K, n, n) unless it is empty, ``values`` and ``log_variances`` (K, m) of the
+    innovations, and ``sensitivities`` (K, p, m) of these.
+    """
+
+    states: Any
+    covariances: Any
+    values: Any
+    log_variances: Any
+    sensitivities: Any
 
 
 @_compiled
-def run_recursion(
-    outputs_at: int,
-    output_places: Any,
-    output_strides: Any,
-    update_at: int,
-    update_places: Any,
-    update_strides: Any,
-    state: Any,
-    covariance: Any,
-    sensitivities: Any,
-    expected: Any,
-    by_state: Any,
-    by_parameters: Any,
-    moved: Any,
-    transition: Any,
-    direct: Any,
-    decay: Any,
-    process_noise: Any,
-    measured: Any,
-    observed: Any,
-    white_variances: Any,
-    states: Any,
-    covariances: Any,
-    values: Any,
-    log_variances: Any,
-    innovation_sensitivities: Any,
-) -> None:
-    """Run over the K samples of ``measured`` (K, m); all arrays are in C order.
+def run_recursion(outputs: Step, update: Step, moments: Moments, samples: Samples, record: Record) -> None:
+    """Run over the K samples; all arrays are in C order.
 
-    ``state`` (n), ``covariance`` (n, n) and ``sensitivities`` (p, n) are changed in place; ``states`` (K + 1, n),
-    ``values``, ``log_variances`` (K, m), ``innovation_sensitivities`` (K, p, m) and, unless it is empty,
-    ``covariances`` (K, n, n) are filled. The function of the outputs fills ``expected`` (m), ``by_state`` (n, m) and
-    ``by_parameters`` (p, m) for ``state``; that of the time update ``moved`` (n), ``transition`` (c, d),
-    ``direct`` (p, d), ``decay`` and ``process_noise`` (n): the first d states move by the first c.
+    For the state, ``outputs`` has the results expected (1, m), by state (n, m) and by parameters (p, m); ``update``
+    moved (1, n), transition (c, d), direct (p, d), decay and process noise (1, n): the first d states move by the
+    first c.
     """
-    size, parameter_count = len(state), len(sensitivities)
+    output_places, update_places = np.empty_like(outputs.places), np.empty_like(update.places)
+    for k in range(len(samples.measured)):
+        record.states[k] = moments.state
+        if len(record.covariances):
+            record.covariances[k] = moments.covariance
+        _evaluate(outputs, k, output_places)
+        _update_by_measurements(outputs.results, moments, samples, record, k)
+        _evaluate(update, k, update_places)
+        _update_covariance_over_step(update.results, moments.covariance)
+        _update_sensitivities_over_step(update.results, moments.sensitivities)
+        moments.state[:] = update.results[0][0]
+    record.states[len(samples.measured)] = moments.state
+
+
+@_compiled
+def _evaluate(step: Step, k: int, places: Any) -> None:
+    """Evaluate at sample k; ``places`` belong to the caller, so that they live as long as the call."""
+    places[:] = step.places + 8 * k * step.strides
+    _call(step.address, places.ctypes.data, step.strides.ctypes.data)
+
+
+@_compiled
+def _update_by_measurements(
+    results: tuple[Any, ...], moments: Moments, samples: Samples, record: Record, k: int
+) -> None:
+    """Update by the outputs of sample k, one after the other."""
+    expected, by_state = results[0][0], results[1]
+    correction = np.zeros_like(moments.state)
+    for i in range(len(expected)):
+        cross_covariance = _cross_covariance(moments.covariance, by_state, i)
+        variance, innovation = samples.white_variances[i], samples.measured[k, i] - expected[i]
+        for j in range(len(correction)):
+            variance += by_state[j, i] * cross_covariance[j]
+            innovation -= by_state[j, i] * correction[j]
+        deviation = np.sqrt(variance)
+        record.values[k, i], record.log_variances[k, i] = innovation / deviation, np.log(variance)
+        slopes = _innovation_sensitivities(moments.sensitivities, results, i)
+        record.sensitivities[k, :, i] = slopes / deviation
+        if samples.observed[k, i] == 0.0:
+            continue
+        for r in range(len(correction)):
+            gain = cross_covariance[r] / variance
+            correction[r] += gain * innovation
+            for a in range(len(slopes)):
+                moments.sensitivities[a, r] += gain * slopes[a]
+        cross_covariance /= deviation
+        for r in range(len(correction)):
+            factor = cross_covariance[r]
+            for j in range(len(correction)):
+                moments.covariance[r, j] -= factor * cross_covariance[j]
+    moments.state[:] += correction
+
+
+@_compiled
+def _cross_covariance(covariance: Any, by_state: Any, i: int) -> Any:
+    """Covariance of the state with output i, ``P h'`` (n); most slopes of an output are zero."""
+    products = np.zeros(len(covariance))
+    for j in range(len(covariance)):
+        slope = by_state[j, i]
+        if slope != 0.0:
+            for r in range(len(covariance)):
+                products[r] += slope * covariance[j, r]
+    return products
+
+
+@_compiled
+def _innovation_sensitivities(sensitivities: Any, results: tuple[Any, ...], i: int) -> Any:
+    """Derivatives (p) of the innovation of output i by the parameters."""
+    by_state, by_parameters = results[1], results[2]
+    slopes = np.empty(len(sensitivities))
+    for a in range(len(sensitivities)):
+        total = by_parameters[a, i]
+        for j in range(len(by_state)):
+            total += by_state[j, i] * sensitivities[a, j]
+        slopes[a] = -total
+    return slopes
+
+
+@_compiled
+def _update_covariance_over_step(results: tuple[Any, ...], covariance: Any) -> None:
+    transition, decay, process_noise = results[1], results[3][0], results[4][0]
     from_count, moving_count = transition.shape
-    output_now, update_now = np.empty_like(output_places), np.empty_like(update_places)
-    cross_covariance, correction = np.empty(size), np.empty(size)
-    innovation_sensitivity = np.empty(parameter_count)
-    propagated = np.empty((moving_count, size))
-    for k in range(len(measured)):
-        states[k] = state
-        if len(covariances):
-            covariances[k] = covariance
-        output_now[:] = output_places + 8 * k * output_strides
-        _call(outputs_at, output_now.ctypes.data, output_strides.ctypes.data)
-        correction[:] = 0.0
-        for i in range(len(expected)):
-            cross_covariance[:] = 0.0
-            for j in range(size):
-                slope = by_state[j, i]
-                if slope != 0.0:
-                    for r in range(size):
-                        cross_covariance[r] += slope * covariance[j, r]
-            variance, innovation = white_variances[i], measured[k, i] - expected[i]
-            for j in range(size):
-                variance += by_state[j, i] * cross_covariance[j]
-                innovation -= by_state[j, i] * correction[j]
-            deviation = np.sqrt(variance)
-            values[k, i], log_variances[k, i] = innovation / deviation, np.log(variance)
-            for a in range(parameter_count):
-                total = by_parameters[a, i]
-                for j in range(size):
-                    total += by_state[j, i] * sensitivities[a, j]
-                innovation_sensitivity[a] = -total
-                innovation_sensitivities[k, a, i] = -total / deviation
-            if observed[k, i] == 0.0:
-                continue
-            for r in range(size):
-                gain = cross_covariance[r] / variance
-                correction[r] += gain * innovation
-                for a in range(parameter_count):
-                    sensitivities[a, r] += gain * innovation_sensitivity[a]
-            for r in range(size):
-                cross_covariance[r] /= deviation
-            for r in range(size):
-                factor = cross_covariance[r]
-                for j in range(size):
-                    covariance[r, j] -= factor * cross_covariance[j]
-        state += correction
-        update_now[:] = update_places + 8 * k * update_strides
-        _call(update_at, update_now.ctypes.data, update_strides.ctypes.data)
-        state[:] = moved
-        propagated[:] = 0.0
+    size = len(covariance)
+    propagated = np.zeros((moving_count, size))
+    for r in range(moving_count):
+        for j in range(from_count):
+            slope = transition[j, r]
+            if slope != 0.0:
+                for t in range(size):
+                    propagated[r, t] += slope * covariance[j, t]
+    for r in range(moving_count, size):
+        for j in range(moving_count, size):
+            covariance[r, j] *= decay[r] * decay[j]
+    for r in range(moving_count):
+        for j in range(moving_count, size):
+            covariance[r, j] = covariance[j, r] = propagated[r, j] * decay[j]
+        for j in range(r, moving_count):
+            total = 0.0
+            for c in range(from_count):
+                total += transition[c, j] * propagated[r, c]
+            covariance[r, j] = covariance[j, r] = total
+    for r in range(size):
+        covariance[r, r] += process_noise[r]
+
+
+@_compiled
+def _update_sensitivities_over_step(results: tuple[Any, ...], sensitivities: Any) -> None:
+    transition, direct, decay = results[1], results[2], results[3][0]
+    from_count, moving_count = transition.shape
+    for a in range(len(sensitivities)):
+        moved = direct[a].copy()
         for r in range(moving_count):
             for j in range(from_count):
-                slope = transition[j, r]
-                if slope != 0.0:
-                    for t in range(size):
-                        propagated[r, t] += slope * covariance[j, t]
-        for r in range(moving_count, size):
-            for j in range(moving_count, size):
-                covariance[r, j] *= decay[r] * decay[j]
-        for r in range(moving_count):
-            for j in range(moving_count, size):
-                covariance[r, j] = covariance[j, r] = propagated[r, j] * decay[j]
-            for j in range(r, moving_count):
-                total = 0.0
-                for c in range(from_count):
-                    total += transition[c, j] * propagated[r, c]
-                covariance[r, j] = covariance[j, r] = total
-        for r in range(size):
-            covariance[r, r] += process_noise[r]
-        for a in range(parameter_count):
-            for r in range(moving_count):
-                total = direct[a, r]
-                for j in range(from_count):
-                    total += transition[j, r] * sensitivities[a, j]
-                correction[r] = total
-            for r in range(moving_count):
-                sensitivities[a, r] = correction[r]
-            for r in range(moving_count, size):
-                sensitivities[a, r] *= decay[r]
-    states[len(measured)] = state
+                moved[r] += transition[j, r] * sensitivities[a, j]
+        sensitivities[a, :moving_count] = moved
+        sensitivities[a, moving_count:] *= decay[moving_count:]
