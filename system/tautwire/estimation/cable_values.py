@@ -13,7 +13,6 @@ Source: Schwarz (1978), Annals of Statistics 6(2), 461-464.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from contextlib import suppress
 from dataclasses import replace
 from math import inf, log
@@ -21,13 +20,11 @@ from math import inf, log
 import numpy as np
 
 from ..errors import UnreachableError
-from ..robot.schema import Robot
 from .candidate_scores import setting_of
-from .disturbance_fit import with_fitted_disturbance
-from .estimation_data import DataSet
+from .disturbance_fit import marginal_log_likelihood, with_fitted_disturbance
 from .hypotheses import PLATFORM_SENSOR_FORMS, Hypothesis, split_by_cable
 from .identification_context import IdentificationContext
-from .parameter_fit import Fitter, NoFitError
+from .parameter_fit import NoFitError
 from .stepwise_selection import SelectionResult
 
 
@@ -56,8 +53,8 @@ def _with_values_of(
     accepted, evidence = selection.accepted, dict(zip(selection.accepted, selection.evidence, strict=True))
     gain = fitter.log_likelihood(fit.robot, chosen, split.estimation)
     gain -= context.fitter.log_likelihood(robot, accepted, split.estimation)
-    unseen_gain = _maximised(fitter, fit.robot, chosen, split.validation)
-    unseen_gain -= _maximised(context.fitter, robot, accepted, split.validation)
+    unseen_gain = marginal_log_likelihood(fitter, fit.robot, chosen, split.validation, is_coarse=False)
+    unseen_gain -= marginal_log_likelihood(context.fitter, robot, accepted, split.validation, is_coarse=False)
     policy = context.policy.selection
     left_by_form = policy.min_evidence_ratio * evidence[shared]
     is_worth_its_price = gain > _schwarz_price(context, len(fit.values) - len(selection.fit.values))
@@ -72,11 +69,6 @@ def _with_values_of(
         disturbance=fitter.noise.disturbance,
     )
     return replace(context, fitter=fitter), separated
-
-
-def _maximised(fitter: Fitter, robot: Robot, chosen: Sequence[Hypothesis], data: DataSet) -> float:
-    """Log-likelihood of some data beside its best disturbance."""
-    return with_fitted_disturbance(fitter, robot, chosen, data).log_likelihood(robot, chosen, data)
 
 
 def _schwarz_price(context: IdentificationContext, parameter_count: int) -> float:

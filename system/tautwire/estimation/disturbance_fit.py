@@ -202,6 +202,7 @@ def _ascended(posterior: Posterior, start: Evaluation, policy: DisturbancePolicy
     current, damping = start, policy.first_damping
     for _ in range(max_iterations):
         gradient, information = posterior.score(current)
+        # At its bound, and pushed beyond it: such a log stays, and the others move as if it were no number.
         is_held = (current.logs <= posterior.least_logs) & (gradient < 0.0)
         gradient, information = np.where(is_held, 0.0, gradient), np.where(is_held[:, None] | is_held, 0.0, information)
         information[is_held, is_held] = 1.0

@@ -25,7 +25,7 @@ from .localisation.component_localisation import localise_residual
 from .parameter_fit import Fitter
 from .policy import TimeLimitPolicy
 from .preprocessing import calibrated_estimation_data
-from .smoothed_states import calibrate
+from .smoothed_states import calibrate, calibrated_robot
 from .stepwise_selection import select_effects
 from .verdict import verdict_beside_disturbance, verdict_of, verdict_of_ended_search
 
@@ -194,9 +194,7 @@ SEARCHES: Mapping[Callable[[Identification], Identification], tuple[Callable[[Ti
 def _explained_beside_disturbance(state: Identification) -> Identification:
     """The state with the shares of the selected effects, and what the robot with them leaves in co-simulation."""
     context, selection = state.context, state.selection
-    identified = calibrate(context.fitter, selection.fit.robot, context.split.estimation).calibrated_robot(
-        selection.fit.robot
-    )
+    identified = calibrated_robot(context.fitter, selection.fit.robot, context.split.estimation)
     state = _with_final_robot(state, context.fitter, identified)
     data, after = state.prepared.data_sets[-1], state.comparisons[-1]
     shares = explained_shares(context, state.prepared.fitter, identified, selection.accepted, data, after)
@@ -236,12 +234,11 @@ def _nothing_lacks(state: Identification) -> bool:
 def _confirmed(state: Identification, robot: Robot) -> Identification | None:
     """The state with a better robot whose co-simulations leave no more than noise; None where they do."""
     context, data_sets = state.context, state.prepared.data_sets
-    calibrated_robot = calibrate(context.fitter, robot, context.split.estimation).calibrated_robot(robot)
-    policy = context.policy.cosimulation
+    final_robot = calibrated_robot(context.fitter, robot, context.split.estimation)
     validation = validate_by_cosimulation(
-        calibrated_robot, context.fitter, data_sets, state.runs_before, context.workers, policy
+        final_robot, context.fitter, data_sets, state.runs_before, context.workers, context.policy.cosimulation
     )
     if validation is None:
         return None
     comparisons, floors = validation
-    return replace(state, final_robot=calibrated_robot, comparisons=comparisons, noise_floors=tuple(floors))
+    return replace(state, final_robot=final_robot, comparisons=comparisons, noise_floors=tuple(floors))

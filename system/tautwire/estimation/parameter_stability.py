@@ -27,10 +27,12 @@ from .disturbance_fit import with_fitted_disturbance
 from .estimation_data import DataSet
 from .hypotheses import Hypothesis
 from .identification_context import IdentificationContext
+from .likelihood import Innovations
 from .parameter_fit import NORMAL_QUANTILE_95, Fit, Fitter, NoFitError, parameter_bounds, parameter_scales
-from .policy import DEFAULT_POLICY, StabilityPolicy
+from .policy import StabilityPolicy
 
 Array = NDArray[np.float64]
+BooleanArray = NDArray[np.bool_]
 
 
 @dataclass(frozen=True)
@@ -44,15 +46,15 @@ class Intervals:
         """The smallest intervals that hold both."""
         return Intervals(np.minimum(self.low, other.low), np.maximum(self.high, other.high))
 
-    def is_apart(self, other: Intervals) -> NDArray[np.bool_]:
+    def is_apart(self, other: Intervals) -> BooleanArray:
         """Whether they have nothing in common with another's (p,)."""
-        apart: NDArray[np.bool_] = (self.low > other.high) | (other.low > self.high)
+        apart: BooleanArray = (self.low > other.high) | (other.low > self.high)
         return apart
 
 
 def stable_intervals(
     context: IdentificationContext, fit: Fit, chosen: Sequence[Hypothesis], neutral_values: Array
-) -> tuple[Intervals, NDArray[np.bool_]]:
+) -> tuple[Intervals, BooleanArray]:
     """Intervals of a fit's parameters, and on which (p,) of them the recordings do not agree.
 
     ``neutral_values`` (p,) are those without the effects.
@@ -83,19 +85,16 @@ def _intervals_of_recording(
             fit = each.fit_from([start.robot], chosen, data, -np.inf)
         except (UnreachableError, NoFitError):
             continue
-        if each is not fitter and _mean_square(each, fit, chosen, data) > policy.max_mean_square:
+        innovations = each.judged(fit.robot, chosen, data)
+        if each is not fitter and np.nanmean(innovations.mean_square(data.rows)) > policy.max_mean_square:
             continue
-        half_widths = half_widths_of_stretches(each, fit, chosen, data, policy)
+        units = parameter_scales(fit.robot, fit.free)
+        half_widths = half_widths_of_stretches(innovations, data.rows, units, policy.stretches)
         half_widths = np.hypot(half_widths, policy.form_tolerance * np.abs(fit.values - neutral_values))
         lower, upper = parameter_bounds(fit.robot, fit.free)
         new = Intervals(np.maximum(fit.values - half_widths, lower), np.minimum(fit.values + half_widths, upper))
         intervals = new if intervals is None else intervals.hull(new)
     return intervals
-
-
-def _mean_square(fitter: Fitter, fit: Fit, chosen: Sequence[Hypothesis], data: DataSet) -> float:
-    """Mean square of the whitened innovations: one where the disturbance explains what the model leaves."""
-    return float(np.nanmean(fitter.judged(fit.robot, chosen, data).mean_square(data.rows)))
 
 
 def _with_smaller_force(fitter: Fitter, ratio: float) -> Fitter:
@@ -106,26 +105,21 @@ def _with_smaller_force(fitter: Fitter, ratio: float) -> Fitter:
     return fitter.with_disturbance(replace(disturbance, force=force))
 
 
-def half_widths_of_stretches(
-    fitter: Fitter,
-    fit: Fit,
-    chosen: Sequence[Hypothesis],
-    data: DataSet,
-    policy: StabilityPolicy = DEFAULT_POLICY.stability,
-) -> Array:
-    """Half-widths (p,) by the scores of stretches, and no less than by the curvature."""
-    innovations = fitter.judged(fit.robot, chosen, data)
-    is_counted = innovations.observed & data.rows[:, None]
+def half_widths_of_stretches(innovations: Innovations, rows: BooleanArray, units: Array, stretch_count: int) -> Array:
+    """Half-widths (p,) by the scores of stretches, and no less than by the curvature.
+
+    Innovations count where ``rows`` (K,) says so; ``units`` (p,) are sizes of the parameters.
+    """
+    is_counted = innovations.observed & rows[:, None]
     values = np.where(is_counted, innovations.values, 0.0)
-    units = parameter_scales(fit.robot, fit.free)
     slopes = np.where(is_counted[:, :, None], innovations.sensitivities, 0.0) * units
     covariance = np.linalg.pinv(np.einsum("kmi,kmj->ij", slopes, slopes))
     scores = np.einsum("km,kmi->ki", values, slopes)
-    ends = np.searchsorted(np.cumsum(data.rows), np.sum(data.rows) * np.arange(1, policy.stretches) / policy.stretches)
+    ends = np.searchsorted(np.cumsum(rows), np.sum(rows) * np.arange(1, stretch_count) / stretch_count)
     by_stretch = np.array([part.sum(axis=0) for part in np.split(scores, ends)])
     by_stretch -= by_stretch.mean(axis=0)
-    freedom = policy.stretches - 1
-    spread = policy.stretches / freedom * covariance @ (by_stretch.T @ by_stretch) @ covariance
+    freedom = stretch_count - 1
+    spread = stretch_count / freedom * covariance @ (by_stretch.T @ by_stretch) @ covariance
     quantile = float(students_t.ppf(0.975, freedom))
     half_widths: Array = units * np.maximum(
         quantile * np.sqrt(np.maximum(np.diag(spread), 0.0)),

@@ -8,8 +8,10 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import detrend, find_peaks, peak_prominences, welch
 
+from .discovery.policy import SpectralLinePolicy
 from .likelihood import Innovations
-from .policy import DEFAULT_POLICY, ResonancePeakPolicy, SpectralLinePolicy
+from .localisation.policy import ResonancePeakPolicy
+from .policy import DEFAULT_POLICY
 
 Array = NDArray[np.float64]
 

@@ -130,6 +130,11 @@ def calibrate(fitter: Fitter, robot: Robot, sample: DataSet) -> Calibration:
     return Calibration(parameters, estimates, deviations)
 
 
+def calibrated_robot(fitter: Fitter, robot: Robot, sample: DataSet) -> Robot:
+    """The robot with its uncertain constants as estimated from a recording, see :func:`calibrate`."""
+    return calibrate(fitter, robot, sample).calibrated_robot(robot)
+
+
 def is_initial_state_uncertain(noise: Noise) -> bool:
     """Whether the initial state is uncertain beyond the sensors' noise."""
     return max(noise.start_velocity, noise.start_stretch, noise.self_stress) > 0.0

@@ -27,7 +27,7 @@ from .hypotheses import Hypothesis, with_hypothesis
 from .identification_context import IdentificationContext
 from .parameter_fit import Fit, Fitter
 from .residual_analysis import residuals_are_white
-from .smoothed_states import calibrate
+from .smoothed_states import calibrated_robot
 from .time_limit import OutOfTimeError
 from .trace_result import Candidate
 
@@ -141,8 +141,7 @@ class _StepwiseSelection:
     def _leaves_little(self) -> bool:
         """Whether the accepted hypotheses leave little, or no more than a small random force was missing before."""
         context, policy, validation = self.context, self.context.policy.size, self.context.split.validation
-        calibration = calibrate(context.fitter, self.current.robot, context.split.estimation)
-        robot = calibration.calibrated_robot(self.current.robot)
+        robot = calibrated_robot(context.fitter, self.current.robot, context.split.estimation)
         floor = sensor_noise_floor(context.fitter, robot, validation)
         missed = missed_without_effects(context, self.without_effects, validation, floor)
         left = missed_with_effects(context.fitter, robot, validation, floor)

@@ -23,10 +23,11 @@ from ..estimation_data import DataSet, DataSplit
 from ..hypotheses import Hypothesis
 from ..likelihood import Innovations
 from ..parameter_fit import Fit, Fitter, NoFitError
-from ..policy import DEFAULT_POLICY, DiscoveryPolicy, FormulaPolicy
+from ..policy import DEFAULT_POLICY
 from ..residual_analysis import residuals_are_white
 from ..residual_spectrum import spectral_lines
 from .candidate_terms import Term, candidate_terms, numeric_formulas, parametrised_formulas, shape_names
+from .policy import DiscoveryPolicy, FormulaPolicy
 from .term_selection import run_signal_ranges, select_terms, term_normal_equations
 
 Array = NDArray[np.float64]

@@ -31,9 +31,10 @@ from ..estimation_data import DataSet, DataSplit
 from ..innovation_sensitivities import LinearisedSegment, linearise_filter
 from ..likelihood import Likelihood
 from ..parameter_fit import Fitter
-from ..policy import DEFAULT_POLICY, ResonancePolicy
+from ..policy import DEFAULT_POLICY
 from ..trace_result import Resonance
 from .formula_ports import FormulaPorts, PortSignals, RunRows, Site, sensitivities_along_run
+from .policy import ResonancePolicy
 
 Array = NDArray[np.float64]
 

@@ -24,9 +24,10 @@ from ..estimation_data import DataSet
 from ..hypotheses import Hypothesis, free_parameters
 from ..innovation_sensitivities import linearise_filter
 from ..parameter_fit import Fitter
-from ..policy import DEFAULT_POLICY, FormulaPolicy
+from ..policy import DEFAULT_POLICY
 from .candidate_terms import SignalRanges, Term, signal_ranges
 from .formula_ports import FormulaPorts, PortSignals, sensitivities_along_run
+from .policy import FormulaPolicy
 
 Array = NDArray[np.float64]
 

@@ -5,12 +5,12 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 from ..identification_context import IdentificationContext, no_progress
-from ..policy import FormulaPolicy
 from ..stepwise_selection import SelectionResult
 from ..trace_result import Resonance
 from .candidate_terms import formula_text
 from .formula_discovery import Discovery, discover_formula
 from .hidden_resonances import find_resonances
+from .policy import FormulaPolicy
 
 
 @dataclass(frozen=True)

@@ -22,12 +22,13 @@ from ...recordings.start_position import with_start
 from ...robot.schema import Robot
 from ..estimation_data import DataSet
 from ..kalman_filter import Noise
-from ..policy import DEFAULT_POLICY, LocalisationPolicy
+from ..policy import DEFAULT_POLICY
 from .cable_simulation import CableSimulation, exit_shift, simulate_cable
 from .component_residuals import ComponentResidual, FaultLocalisation, root_mean_square
 from .fault_isolation import isolation_verdict, numbered
 from .force_balance import ForceBalance, force_balance, measured_forces, simulate_platform
 from .path_smoothing import MIN_MEASURED_SAMPLES, smooth_path
+from .policy import LocalisationPolicy
 from .residual_evaluation import MeasuredPorts, cable_residual, platform_residual
 
 Array = NDArray[np.float64]

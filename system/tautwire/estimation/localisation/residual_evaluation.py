@@ -10,12 +10,12 @@ from numpy.typing import NDArray
 from ...recordings.recording import Recording
 from ...robot.schema import AXES, Robot
 from ..kalman_filter import Noise
-from ..policy import LocalisationPolicy
 from ..residual_spectrum import resonance_frequency
 from .cable_simulation import CableSimulation, drift_variance, tension_variance
 from .component_residuals import PLATFORM, ComponentResidual, root_mean_square, strongest_correlation
 from .force_balance import ForceBalance
 from .path_smoothing import SmoothedPath
+from .policy import LocalisationPolicy
 
 Array = NDArray[np.float64]
 
