@@ -23,7 +23,9 @@ NOISE = estimate_noise(ROBOT, recorded("three", 1))
 DRUM = next(h for h in hypotheses(ROBOT) if h.effect.name == "drum" and h.cables == ROBOT.cable_numbers)
 
 
-def selected(ratios: tuple[float, float, float]) -> tuple[IdentificationContext, SelectionResult]:
+def selected(
+    ratios: tuple[float, float, float], evidence: float = 100.0
+) -> tuple[IdentificationContext, SelectionResult]:
     """A drum that all cables share, fitted to recordings whose ropes move by these ratios of what encoders say."""
     data_sets = []
     for seed in (1, 2):
@@ -33,7 +35,7 @@ def selected(ratios: tuple[float, float, float]) -> tuple[IdentificationContext,
     fitter = Fitter(replace(NOISE, disturbance=disturbance_prior(ROBOT, NOISE).median))
     fit = fitter.fit_from([ROBOT.with_effect(DRUM.setting(ROBOT))], (DRUM,), data_sets[0])
     context = IdentificationContext(ROBOT, fitter, DataSplit(data_sets[0], data_sets[1], ()))
-    return context, SelectionResult((DRUM,), (100.0,), fit, (), ())
+    return context, SelectionResult((DRUM,), (evidence,), fit, (), ())
 
 
 def test_cables_that_differ_get_values_of_their_own() -> None:
@@ -52,6 +54,11 @@ def test_cables_that_differ_get_values_of_their_own() -> None:
 def test_cables_that_do_not_differ_share_a_value() -> None:
     context, shared = selected((0.96, 0.96, 0.96))
     assert shared.fit.values == pytest.approx([0.96], abs=2e-3)
+    assert with_values_of_cables(context, shared) == (context, shared)
+
+
+def test_differences_that_the_effects_form_may_leave_are_none_of_the_cables() -> None:
+    context, shared = selected((0.95, 0.97, 0.96), evidence=1e7)
     assert with_values_of_cables(context, shared) == (context, shared)
 
 
