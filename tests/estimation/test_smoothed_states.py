@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
-from tautwire.estimation.smoothed_states import Calibration
+from tautwire import read_recording, read_robot
+from tautwire.estimation.estimation_data import DataSet
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.estimation.parameter_fit import Fitter
+from tautwire.estimation.smoothed_states import Calibration, with_initial_state
 from tautwire.robot.uncertain_parameters import uncertain_parameters
+from tests.support.planar import VERTICAL, planar_case
 from tests.support.recordings import recorded
 from tests.support.robots import example
 
@@ -48,3 +54,18 @@ def test_a_note_says_by_how_many_standard_deviations_a_number_moved() -> None:
     assert "gain of tension 2 0.98, +- 0.002 (-2.0 declared standard deviations)" in note
     assert "offset of tension 1 -4 N, +- 0.39 (-2.0 declared standard deviations)" in note
     assert calibration(0.1).notes(example("three"), "fit.csv") == ()
+
+
+def test_a_planar_robot_starts_in_its_plane_beside_an_uncertain_pretension(tmp_path: Path) -> None:
+    robot_file, fit, _ = planar_case(tmp_path, VERTICAL, {}, 1, duration=3.0)
+    robot, recording = read_robot(robot_file), read_recording(fit, 4)
+    across = np.random.default_rng(1).normal(scale=1e-4, size=len(recording.time))
+    recording = replace(
+        recording, position=np.column_stack([recording.position[:, 0], across, recording.position[:, 2]])
+    )
+    noise = replace(estimate_noise(robot, recording), self_stress=8.0)
+    data = DataSet(recording, robot.platform.start, np.ones(len(recording.time), dtype=bool))
+    started = with_initial_state(Fitter(noise), robot, data)
+    assert started.initial_state is not None
+    assert started.platform.start[1] == 0.0
+    assert started.platform.start != robot.platform.start

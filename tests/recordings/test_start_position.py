@@ -46,6 +46,18 @@ def test_a_first_row_that_dropped_out_does_not_hide_the_start() -> None:
     assert start[1] == pytest.approx(0.5, abs=1e-3)
 
 
+def test_a_planar_robot_starts_in_its_plane_wherever_noise_shows_it() -> None:
+    cables = tuple(
+        replace(cable, anchor=(x, 0.0, cable.anchor[2]))
+        for cable, x in zip(ROBOT.cables, (-9.0, 0.0, 9.0), strict=True)
+    )
+    x, _, z = ROBOT.platform.start
+    planar = replace(ROBOT, cables=cables, platform=replace(ROBOT.platform, start=(x, 0.0, z)))
+    assert planar.axes_in_plane == (0, 2)
+    recording = replace(FIT, position=np.tile([x, 0.5, z], (len(FIT.time), 1)))
+    assert start_position(planar, NOISE, recording)[0] == (x, 0.0, z)
+
+
 def test_a_start_that_the_cables_cannot_hold_names_the_recording() -> None:
     with pytest.raises(UnreachableError, match=r"three-1\.csv: first positions: .*cable \d would need -"):
         start_position(ROBOT, NOISE, moved([-60.0, 0.0, 0.0]))

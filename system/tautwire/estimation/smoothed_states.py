@@ -147,7 +147,10 @@ def with_initial_state(fitter: Fitter, robot: Robot, sample: DataSet) -> Robot:
         return robot_at_start
     likelihood, values = fitter.likelihood(robot, (), sample)
     state = _smoothed_initial_state(likelihood, values, sample)
-    x, y, z, vx, vy, vz = state[:6].tolist()
+    in_plane, start = robot.axes_in_plane, robot_at_start.platform.start
+    # Ropes in a plane cannot hold the platform beside it, where noise shows it.
+    x, y, z = (float(state[axis]) if axis in in_plane else start[axis] for axis in range(3))
+    vx, vy, vz = state[3:6].tolist()
     smoothed_robot = with_start(robot_at_start, (x, y, z))
     velocity = (vx, vy, vz) if fitter.noise.start_velocity > 0.0 else (0.0, 0.0, 0.0)
     extra_tensions = _static_tensions_of(likelihood.model, state, robot.cable_count) - static_tensions(smoothed_robot)

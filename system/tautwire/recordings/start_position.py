@@ -25,14 +25,15 @@ def start_position(
     """The start position of a recording, and a note if it differs significantly from the robot file's start.
 
     It is the robot file's, or one as the position sensor shows it, with the sensor's errors; an axis without positions
-    starts as declared.
+    starts as declared, and so does the one across the plane of a planar robot.
 
     Raises RecordingError where the recording cannot be this robot's, UnreachableError where the cables cannot hold the
     platform there; both name the recording.
     """
     expected = np.array(shown_position(robot, robot.platform.start), dtype=float)
     offset, uncertainty = np.zeros(3), np.full(3, np.inf)
-    for axis, column in enumerate(recording.position[:START_ROWS].T):
+    for axis in robot.axes_in_plane:
+        column = recording.position[:START_ROWS, axis]
         valid_samples = column[np.isfinite(column)][:MAX_START_SAMPLES]
         if len(valid_samples):
             offset[axis] = float(np.mean(valid_samples)) - expected[axis]

@@ -220,6 +220,12 @@ class Robot:
         """Exit points of all cables, in m."""
         return tuple(cable.anchor for cable in self.cables)
 
+    @property
+    def axes_in_plane(self) -> tuple[int, ...]:
+        """Axes along which not all anchors and the start have one coordinate: two where the robot lies in a plane."""
+        points = [self.platform.start, *self.anchors]
+        return tuple(axis for axis in range(len(AXES)) if len({point[axis] for point in points}) > 1)
+
     def effects_on_cable(self, cable: int) -> tuple[EffectSetting, ...]:
         """The settings that act on one cable, or on its winch; ``cable`` counts from 1."""
         return tuple(setting for setting in self.effects if cable in setting.cables)

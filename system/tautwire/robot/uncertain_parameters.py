@@ -82,7 +82,7 @@ def uncertain_parameters(robot: Robot) -> tuple[UncertainParameter, ...]:
     Without the coordinates of anchors across a plane in which the robot lies: a first-order error there moves nothing
     in the plane, and could push the platform out of it.
     """
-    sensors, in_plane = robot.sensors, _axes_in_plane(robot)
+    sensors, in_plane = robot.sensors, robot.axes_in_plane
     parameters = [UncertainParameter(MASS, 0, robot.platform.mass_uncertainty)]
     for index, cable in enumerate(robot.cables, start=1):
         parameters.append(UncertainParameter(MODULUS, index, cable.modulus_uncertainty))
@@ -94,12 +94,6 @@ def uncertain_parameters(robot: Robot) -> tuple[UncertainParameter, ...]:
         UncertainParameter(POSITION_OFFSET, 0, sensors.position_offset_uncertainty, axis) for axis in range(3)
     ]
     return tuple(number for number in parameters if number.standard_deviation > 0.0)
-
-
-def _axes_in_plane(robot: Robot) -> list[int]:
-    """Axes along which not all anchors and the start have one coordinate."""
-    points = [robot.platform.start, *(cable.anchor for cable in robot.cables)]
-    return [axis for axis in range(len(AXES)) if len({point[axis] for point in points}) > 1]
 
 
 def perturbed_robot(robot: Robot, parameters: Sequence[UncertainParameter], perturbations: Sequence[Any]) -> Robot:
