@@ -126,7 +126,7 @@ def calibrate(fitter: Fitter, robot: Robot, sample: DataSet) -> Calibration:
     end = likelihood.model.states.numel()
     rows = slice(end - len(parameters), end)
     deviations = np.sqrt(np.maximum(np.diag(last_segment.covariances[-1])[rows], 0.0))
-    estimates = limited_perturbation(last_segment.states[rows, -1], np.minimum, np.maximum)
+    estimates = limited_perturbation(last_segment.states[rows, -1], np.sqrt)
     return Calibration(parameters, estimates, deviations)
 
 

@@ -139,7 +139,7 @@ def symbolic_model(
     """
     symbols = [SX.sym(f"{_owner_name(robot, f)}.{f.name}") for f in free_parameters]
     constants = [SX.sym(number.label) for number in uncertain_parameters]
-    perturbations = [limited_perturbation(constant, casadi.fmin, casadi.fmax) for constant in constants]
+    perturbations = [limited_perturbation(constant, casadi.sqrt) for constant in constants]
     symbolic_robot = _with_symbols(
         perturbed_robot(robot, uncertain_parameters, perturbations), free_parameters, symbols
     )

@@ -26,16 +26,24 @@ UNITS = {
     POSITION_OFFSET: "m",
 }
 
-# Standard deviations up to which a perturbation counts in full, and what share of the excess counts.
-MAX_FULL_PERTURBATION, EXCESS_SHARE = 3.0, 0.1
+# Standard deviations up to which a perturbation counts in full, within which that ends, and what share of the excess
+# counts.
+MAX_FULL_PERTURBATION, TRANSITION, EXCESS_SHARE = 3.0, 0.5, 0.1
 
 
-def limited_perturbation(state: Any, minimum: Callable[..., Any], maximum: Callable[..., Any]) -> Any:
-    """Perturbation in standard deviations of a parameter whose state is given; with ``minimum`` and ``maximum`` of two.
+def limited_perturbation(state: Any, square_root: Callable[[Any], Any]) -> Any:
+    """Perturbation in standard deviations of a parameter whose state d is given, with the ``square_root`` handed in.
 
-    The slope never vanishes, so that a filter which went too far at first returns.
+    With the limit L and the transition w
+
+        c = sqrt(1 + w^2 / L^2) (sqrt((d + L)^2 + w^2) - sqrt((d - L)^2 + w^2)) / 2        c + 0.1 (d - c)
+
+    The slope never vanishes, so that a filter which went too far at first returns; and it has no jump, where gains and
+    so the likelihood would have one.
     """
-    full = maximum(minimum(state, MAX_FULL_PERTURBATION), -MAX_FULL_PERTURBATION)
+    limit, width = MAX_FULL_PERTURBATION, TRANSITION
+    above, below = (square_root((state + bound) ** 2 + width**2) for bound in (limit, -limit))
+    full = 0.5 * (1.0 + (width / limit) ** 2) ** 0.5 * (above - below)
     return full + EXCESS_SHARE * (state - full)
 
 
