@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tautwire.estimation.cable_values import with_values_of_cables
-from tautwire.estimation.disturbance_fit import disturbance_prior
+from tautwire.estimation.disturbance_posterior import disturbance_prior
 from tautwire.estimation.estimation_data import DataSet, DataSplit
 from tautwire.estimation.hypotheses import Hypothesis, hypotheses, labels_by_effect
 from tautwire.estimation.identification_context import IdentificationContext

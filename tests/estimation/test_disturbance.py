@@ -14,13 +14,12 @@ from tautwire.estimation.candidate_proposals import FitTask
 from tautwire.estimation.disturbance import Disturbance, OrnsteinUhlenbeck, sensor_noise_only
 from tautwire.estimation.disturbance_fit import (
     Effort,
-    Posterior,
-    disturbance_prior,
     fit_disturbance,
-    logs_of,
+    joint_fit,
     marginal_log_likelihood,
     with_fitted_disturbance,
 )
+from tautwire.estimation.disturbance_posterior import ParameterBox, Posterior, disturbance_prior, logs_of
 from tautwire.estimation.estimation_data import DataSet, DataSplit
 from tautwire.estimation.hypotheses import hypotheses
 from tautwire.estimation.identification_context import IdentificationContext
@@ -142,7 +141,7 @@ def test_noise_of_the_sensors_has_no_force_and_no_errors_beyond_the_declared_one
 def test_the_score_of_a_disturbance_is_the_derivative_of_its_posterior() -> None:
     recording = PAIR[0].first(200)
     data, likelihood = data_of(recording), likelihood_of(disturbed(force=5.0, position=2e-4, tension=3.0))
-    posterior = Posterior(likelihood, (), data, disturbance_prior(ROBOT, NOISE))
+    posterior = Posterior(likelihood, np.zeros(0), data, disturbance_prior(ROBOT, NOISE))
     logs = logs_of(posterior.prior.median) + np.linspace(-0.3, 0.4, 8)
     gradient, information = posterior.score(posterior.evaluation(logs))
     width = 1e-4
@@ -152,6 +151,40 @@ def test_the_score_of_a_disturbance_is_the_derivative_of_its_posterior() -> None
     # Forward differences over 1e-3 err by half of that times the curvature.
     assert np.all(np.abs(gradient - expected) < 1e-3 * np.diag(information) + 0.02)
     assert np.all(np.linalg.eigvalsh(information) > 0.0)
+
+
+def test_the_score_by_a_free_parameter_is_its_whole_derivative() -> None:
+    """Of a mass and the disturbance together, with the filter's gain moving too; at a bound the mass stays."""
+    recording = PAIR[0].first(200)
+    payload = next(h for h in hypotheses(ROBOT) if h.effect.name == "payload")
+    robot = ROBOT.with_effect(payload.setting(ROBOT))
+    fitter = Fitter(replace(NOISE, disturbance=disturbance_prior(ROBOT, NOISE).median))
+    data, (likelihood, values) = data_of(recording), fitter.likelihood(robot, (payload,), data_of(recording))
+    box = ParameterBox(np.array([0.5]), np.array([-3.0]), np.array([values[0] + 1.0]))
+    posterior = Posterior(likelihood, np.array(values), data, disturbance_prior(ROBOT, NOISE), box)
+    at = np.append(logs_of(posterior.prior.median), 1.0)
+    gradient, information = posterior.score(posterior.evaluation(at))
+    width = 1e-4 * np.eye(9)[8]
+    expected = (posterior.evaluation(at + width).value - posterior.evaluation(at - width).value) / 2e-4
+    assert gradient[8] == pytest.approx(expected, abs=1e-3 * information[8, 8] + 0.02)
+    assert posterior.values_at(posterior.evaluation(at + 5.0).coordinates) == pytest.approx(box.upper)
+
+
+def test_parameters_and_disturbance_that_make_up_for_each_other_are_fitted_together() -> None:
+    """A weight, and a slow force that the fits in turn leave too large."""
+    payload = next(h for h in hypotheses(ROBOT) if h.effect.name == "payload")
+    data = data_of(recorded("three", 1, {"payload": {"mass": 3.0}}).first(400))
+    slow = replace(disturbance_prior(ROBOT, NOISE).median, force=OrnsteinUhlenbeck(3.0, 0.2))
+    fitter = Fitter(replace(NOISE, disturbance=slow))
+    fit = fitter.fit_from([ROBOT.with_effect(payload.setting(ROBOT))], (payload,), data)
+    joint_fitter, joint = joint_fit(fitter, fit, (payload,), data)
+    gain = joint_fitter.log_likelihood(joint.robot, (payload,), data)
+    gain -= fitter.log_likelihood(fit.robot, (payload,), data)
+    assert gain > 5.0
+    assert abs(joint.values[0] - 3.0) < abs(fit.values[0] - 3.0)
+    assert joint.robot.effects[0].values["mass"] == joint.values[0]
+    _, again = joint_fit(joint_fitter, joint, (payload,), data)
+    assert again.values == pytest.approx(joint.values, abs=joint.standard_deviations[0])
 
 
 def test_a_fit_may_begin_where_the_model_is_far_off() -> None:
@@ -172,7 +205,7 @@ def test_a_fit_that_searches_begins_at_the_priors_median_as_well(searches: bool)
     far_off = replace(prior.median, force=OrnsteinUhlenbeck(3000.0, 20.0))
     likelihood = likelihood_of(replace(NOISE, disturbance=far_off))
     effort = Effort(max_iterations=0, is_exact=True, searches=searches)
-    reached = fit_disturbance(Posterior(likelihood, (), data, prior), effort=effort)
+    reached = fit_disturbance(Posterior(likelihood, np.zeros(0), data, prior), effort=effort)
     assert logs_of(reached) == pytest.approx(logs_of(prior.median if searches else far_off))
 
 

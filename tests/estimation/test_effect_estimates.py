@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tautwire.estimation.disturbance_fit import disturbance_prior
+from tautwire.estimation.disturbance_posterior import disturbance_prior
 from tautwire.estimation.effect_estimates import estimated_effects, parameter_correlations
 from tautwire.estimation.estimation_data import DataSet, DataSplit
 from tautwire.estimation.hypotheses import hypotheses, with_values

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from tautwire.estimation.cosimulation_validation import cosimulate_data_set, noise_floor
-from tautwire.estimation.disturbance_fit import disturbance_prior
+from tautwire.estimation.disturbance_posterior import disturbance_prior
 from tautwire.estimation.estimation_data import DataSplit, split_data
 from tautwire.estimation.explained_shares import missed_with_effects, missed_without_effects, simulated_outputs
 from tautwire.estimation.identification_context import IdentificationContext

@@ -9,7 +9,7 @@ import pytest
 from tautwire.estimation import stepwise_selection
 from tautwire.estimation.candidate_proposals import SearchRound
 from tautwire.estimation.candidate_scores import CandidateScore
-from tautwire.estimation.disturbance_fit import disturbance_prior
+from tautwire.estimation.disturbance_posterior import disturbance_prior
 from tautwire.estimation.estimation_data import split_data
 from tautwire.estimation.hypotheses import Hypothesis
 from tautwire.estimation.identification_context import IdentificationContext

@@ -21,7 +21,7 @@ import numpy as np
 
 from ..errors import UnreachableError
 from .candidate_scores import setting_of
-from .disturbance_fit import marginal_log_likelihood, with_fitted_disturbance
+from .disturbance_fit import joint_fit, marginal_log_likelihood, with_fitted_disturbance
 from .hypotheses import PLATFORM_SENSOR_FORMS, Hypothesis, split_by_cable
 from .identification_context import IdentificationContext
 from .parameter_fit import NoFitError
@@ -50,6 +50,7 @@ def _with_values_of(
     fit = context.fitter.fit_from([replace(robot, effects=tuple(effects))], chosen, split.estimation, -inf)
     fitter = with_fitted_disturbance(context.fitter, fit.robot, chosen, split.estimation)
     fit = fitter.fit_from([fit.robot], chosen, split.estimation, -inf)
+    fitter, fit = joint_fit(fitter, fit, chosen, split.estimation)
     accepted, evidence = selection.accepted, dict(zip(selection.accepted, selection.evidence, strict=True))
     gain = fitter.log_likelihood(fit.robot, chosen, split.estimation)
     gain -= context.fitter.log_likelihood(robot, accepted, split.estimation)

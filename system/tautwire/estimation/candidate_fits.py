@@ -13,7 +13,7 @@ from ..errors import UnreachableError
 from ..robot.schema import Robot
 from .candidate_proposals import FitTask
 from .candidate_scores import CandidateScore, setting_of
-from .disturbance_fit import marginal_log_likelihood, with_fitted_disturbance, with_improved_disturbance
+from .disturbance_fit import joint_fit, marginal_log_likelihood, with_fitted_disturbance, with_improved_disturbance
 from .estimation_data import DataSet
 from .hypotheses import Hypothesis
 from .identification_context import IdentificationContext
@@ -131,5 +131,7 @@ def _maximised(
     """Log-likelihood of some data, maximised over the disturbance and the chosen hypotheses, with both as fitted."""
     fitter = with_fitted_disturbance(fitter, robot, chosen, data, is_coarse)
     tolerance = fitter.policy.coarse_cost_tolerance if is_coarse else fitter.policy.fine_cost_tolerance
-    robot = fitter.fit_from([robot], chosen, data, -inf, tolerance).robot
+    fit = fitter.fit_from([robot], chosen, data, -inf, tolerance)
+    fitter, fit = (fitter, fit) if is_coarse else joint_fit(fitter, fit, chosen, data)
+    robot = fit.robot
     return fitter.log_likelihood(robot, chosen, data), fitter, robot

@@ -1,85 +1,40 @@
-"""Fit of a disturbance: maximum likelihood of its numbers under weak priors, by Fisher scoring.
+"""Fit of a disturbance: maximum likelihood of its numbers under weak priors, by itself or with a model's parameters.
 
-With whitened innovations v and their variances s, of a model whose parameters are held, and x the logs of the numbers,
-
-    dL/dx = -sum (v v' + l' / 2)        l = log s
-    E[-d2L/dx2] = sum (v' + v l' / 2)(v' + v l' / 2)^T + l' l'^T / 2
-
-Uncertain parameters and disturbance are fitted in turn: given the former a filter has far fewer states. That leaves the
+Uncertain constants and disturbance are fitted in turn: given the former a filter has far fewer states. That leaves the
 maximum's neighbourhood; where some nats matter, ascent under the likelihood itself follows.
-
-Source: Gupta and Mehra (1974), IEEE Transactions on Automatic Control 19(6), 774-783.
 """
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Sequence
-from concurrent.futures import ThreadPoolExecutor
+from collections.abc import Collection
 from dataclasses import dataclass, replace
-from functools import cached_property
 from math import log
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..robot.schema import Robot
-from .disturbance import Disturbance, OrnsteinUhlenbeck
+from .disturbance import Disturbance
+from .disturbance_posterior import (
+    NUMBER_COUNT,
+    DisturbancePrior,
+    Evaluation,
+    ParameterBox,
+    Posterior,
+    ascended,
+    disturbance_of,
+    disturbance_prior,
+    logs_of,
+)
 from .estimation_data import DataSet
-from .hypotheses import Hypothesis
-from .kalman_filter import Noise
-from .likelihood import Likelihood
-from .parameter_fit import Fitter
+from .hypotheses import Hypothesis, with_values
+from .parameter_fit import Fit, Fitter, parameter_bounds
 from .policy import DEFAULT_POLICY, DisturbancePolicy
 
 Array = NDArray[np.float64]
 
-CONCURRENT_EVALUATIONS = 2
-# Indices of the processes' bandwidths among the logs of a disturbance's numbers.
-BANDWIDTHS = [1, 3, 5]
-
-
-@dataclass(frozen=True)
-class DisturbancePrior:
-    """Weak prior of a disturbance: its median, and standard deviations of the logs of its numbers (8,)."""
-
-    median: Disturbance
-    log_deviations: tuple[float, ...]
-
-    def penalty(self, logs: Array) -> Array:
-        """Deviations from the median in standard deviations (8,)."""
-        deviations: Array = (logs - logs_of(self.median)) / np.array(self.log_deviations)
-        return deviations
-
-
-def logs_of(disturbance: Disturbance) -> Array:
-    """Logs of a disturbance's numbers (8,)."""
-    pairs = [(each.rms, each.bandwidth) for each in (disturbance.force, disturbance.position, disturbance.tension)]
-    numbers = [number for pair in pairs for number in pair]
-    return np.log([*numbers, disturbance.position_noise, disturbance.tension_noise])
-
-
-def disturbance_of(logs: Array) -> Disturbance:
-    """The disturbance whose numbers have these logs (8,)."""
-    numbers = np.exp(logs).tolist()
-    force, position, tension = (OrnsteinUhlenbeck(*numbers[k : k + 2]) for k in (0, 2, 4))
-    return Disturbance(force, position, tension, numbers[6], numbers[7])
-
-
-def disturbance_prior(
-    robot: Robot, noise: Noise, policy: DisturbancePolicy = DEFAULT_POLICY.fit.disturbance
-) -> DisturbancePrior:
-    """Prior of a robot with these sensors: a force in proportion to its weight, and half of the noise coloured."""
-    share, weight = policy.coloured_noise_share, robot.platform.mass * max(robot.gravity, 1.0)
-    white = (1.0 - share**2) ** 0.5
-    median = Disturbance(
-        OrnsteinUhlenbeck(policy.force_to_weight * weight, policy.bandwidth),
-        OrnsteinUhlenbeck(share * noise.position, policy.bandwidth),
-        OrnsteinUhlenbeck(share * noise.tension, policy.bandwidth),
-        white * noise.position,
-        white * noise.tension,
-    )
-    size, bandwidth, sensor = (log(f) for f in (policy.size_factor, policy.bandwidth_factor, policy.noise_factor))
-    return DisturbancePrior(median, (*[size, bandwidth] * 3, sensor, sensor))
+# A parameter's unit in an ascent, in its standard deviations: differences over a thousandth of it, steps of up to two.
+DEVIATIONS_PER_UNIT = 10.0
 
 
 def with_fitted_disturbance(
@@ -96,6 +51,29 @@ def with_fitted_disturbance(
     iterations = policy.coarse_iterations if coarse else policy.max_iterations
     effort = Effort(iterations, is_exact=not coarse, searches=False)
     return _refitted(of_first, robot, chosen, data, effort, other=fitter.noise.disturbance)
+
+
+def joint_fit(fitter: Fitter, fit: Fit, chosen: Collection[Hypothesis], data: DataSet) -> tuple[Fitter, Fit]:
+    """Joint maximum-likelihood fit of a model's parameters and the disturbance, from where both were fitted in turn.
+
+    Each in turn stops short of it where they make up for each other: nats below, and standard deviations away. The
+    covariance is then that beside an unknown disturbance. As it is where there is none, or too many parameters.
+    """
+    policy, count = fitter.policy.disturbance, len(fit.values)
+    if fitter.noise.disturbance is None or not 0 < count <= policy.max_joint_parameters:
+        return fitter, fit
+    lower, upper = parameter_bounds(fit.robot, fit.free)
+    units = DEVIATIONS_PER_UNIT * np.maximum(fit.standard_deviations, np.finfo(float).tiny)
+    likelihood, _ = fitter.likelihood(fit.robot, chosen, data)
+    prior = disturbance_prior(fit.robot, fitter.noise, policy)
+    posterior = Posterior(likelihood, fit.values, data, prior, ParameterBox(units, lower, upper))
+    start = posterior.evaluation(np.append(logs_of(fitter.noise.disturbance), np.zeros(count)))
+    best = ascended(posterior, start, policy, policy.max_iterations)
+    values = posterior.values_at(best.coordinates)
+    _, information = posterior.score(best)
+    covariance = np.linalg.pinv(information)[NUMBER_COUNT:, NUMBER_COUNT:] * np.outer(units, units)
+    robot = with_values(fit.robot, fit.free, dict(zip(fit.free, values.tolist(), strict=True)))
+    return fitter.with_disturbance(disturbance_of(best.logs)), Fit(robot, fit.free, values, covariance)
 
 
 def with_improved_disturbance(fitter: Fitter, robot: Robot, chosen: Collection[Hypothesis], data: DataSet) -> Fitter:
@@ -121,6 +99,10 @@ def marginal_log_likelihood(
     numbers = disturbance_prior(robot, fitter.noise, fitter.policy.disturbance).log_deviations
     value_count = int(np.count_nonzero(np.isfinite(data.recording.measured()[data.rows])))
     return fitter.log_likelihood(robot, chosen, data) - 0.5 * len(numbers) * log(max(value_count, 1))
+
+
+def _value(evaluation: Evaluation) -> float:
+    return evaluation.value
 
 
 @dataclass(frozen=True)
@@ -150,7 +132,7 @@ def _refitted(
     policy = fitter.policy.disturbance
     prior = disturbance_prior(robot, fitter.noise, policy)
     likelihood, values = fitter.likelihood(robot, chosen, data)
-    posterior = Posterior(likelihood, values, data, prior)
+    posterior = Posterior(likelihood, np.array(values), data, prior)
     return fitter.with_disturbance(fit_disturbance(posterior, policy, effort, other))
 
 
@@ -184,7 +166,7 @@ def _maximised(posterior: Posterior, current: Evaluation, policy: DisturbancePol
         if gain < policy.min_coarse_gain:
             break
     if effort.is_exact or not is_near:
-        current = _ascended(posterior, current, policy, effort.max_iterations)
+        current = ascended(posterior, current, policy, effort.max_iterations)
     return current
 
 
@@ -193,32 +175,8 @@ def _alternated(posterior: Posterior, current: Evaluation, policy: DisturbancePo
     conditional = posterior.given_constants(current.constants)
     coarse = replace(policy, min_gain=policy.min_coarse_gain)
     return posterior.evaluation(
-        _ascended(conditional, conditional.evaluation(current.logs), coarse, policy.max_iterations).logs
+        ascended(conditional, conditional.evaluation(current.logs), coarse, policy.max_iterations).logs
     )
-
-
-def _ascended(posterior: Posterior, start: Evaluation, policy: DisturbancePolicy, max_iterations: int) -> Evaluation:
-    """The end of an ascent; Levenberg's damping lets no step descend."""
-    current, damping = start, policy.first_damping
-    for _ in range(max_iterations):
-        gradient, information = posterior.score(current)
-        # At its bound, and pushed beyond it: such a log stays, and the others move as if it were no number.
-        is_held = (current.logs <= posterior.least_logs) & (gradient < 0.0)
-        gradient, information = np.where(is_held, 0.0, gradient), np.where(is_held[:, None] | is_held, 0.0, information)
-        information[is_held, is_held] = 1.0
-        while damping < policy.max_damping:
-            scaled = information + damping * np.diag(np.diag(information))
-            step = np.clip(np.linalg.solve(scaled, gradient), -policy.max_log_step, policy.max_log_step)
-            trial = posterior.evaluation(current.logs + step)
-            if trial.value > current.value:
-                break
-            damping *= 10.0
-        else:
-            break
-        gain, current, damping = trial.value - current.value, trial, 0.1 * damping
-        if gain < policy.min_gain:
-            break
-    return current
 
 
 def _fresh_starts(prior: DisturbancePrior, policy: DisturbancePolicy) -> list[Array]:
@@ -229,70 +187,3 @@ def _fresh_starts(prior: DisturbancePrior, policy: DisturbancePolicy) -> list[Ar
         logs[[0, 2, 4]] += log(factor)
         starts.append(logs)
     return starts
-
-
-@dataclass(frozen=True)
-class Evaluation:
-    """Posterior log-density at some logs, with what it is made of: whitened innovations and logs of variances.
-
-    ``constants`` (c) are the uncertain parameters there, in standard deviations.
-    """
-
-    logs: Array
-    value: float
-    innovations: Array
-    log_variances: Array
-    constants: Array
-
-
-def _value(evaluation: Evaluation) -> float:
-    return evaluation.value
-
-
-@dataclass(frozen=True)
-class Posterior:
-    """Posterior density of a disturbance under some data, with the free parameters held at their ``values``."""
-
-    likelihood: Likelihood
-    values: Sequence[float]
-    data: DataSet
-    prior: DisturbancePrior
-
-    def given_constants(self, constants: Array) -> Posterior:
-        """The posterior density given the uncertain parameters."""
-        return replace(self, likelihood=self.likelihood.given_constants(constants))
-
-    @cached_property
-    def least_logs(self) -> Array:
-        """Least logs (8,): what hardly changes while a recording lasts is no disturbance, but an offset or a weight."""
-        least = np.full(len(self.prior.log_deviations), -np.inf)
-        time = self.data.recording.time
-        least[BANDWIDTHS] = -log(float(time[-1] - time[0]))
-        return least
-
-    def evaluation(self, logs: Array) -> Evaluation:
-        """Its evaluation at some logs (8,), or at the least ones where these are less."""
-        logs = np.maximum(logs, self.least_logs)
-        likelihood = self.likelihood.with_disturbance(disturbance_of(logs))
-        innovations = likelihood.innovations(self.data.recording, self.values)
-        mask = innovations.observed & self.data.rows[:, None]
-        value = innovations.log_likelihood(self.data.rows) - 0.5 * float(np.sum(self.prior.penalty(logs) ** 2))
-        value = value if np.isfinite(value) else -np.inf
-        return Evaluation(logs, value, innovations.values[mask], innovations.log_variances[mask], innovations.constants)
-
-    def evaluations(self, points: Iterable[Array]) -> list[Evaluation]:
-        """Evaluations at several logs, two at once: a compiled filter runs without Python's lock."""
-        with ThreadPoolExecutor(CONCURRENT_EVALUATIONS) as threads:
-            return list(threads.map(self.evaluation, points))
-
-    def score(self, evaluation: Evaluation) -> tuple[Array, Array]:
-        """Gradient (8,) and Fisher information (8, 8), by finite differences of the innovations."""
-        step = 1e-3
-        moved = self.evaluations(evaluation.logs + step * np.eye(len(evaluation.logs)))
-        values_by_number = np.array([each.innovations - evaluation.innovations for each in moved]) / step
-        logs_by_number = np.array([each.log_variances - evaluation.log_variances for each in moved]) / step
-        gradient = -values_by_number @ evaluation.innovations - 0.5 * np.sum(logs_by_number, axis=1)
-        unscaled = values_by_number + 0.5 * evaluation.innovations * logs_by_number
-        deviations = np.array(self.prior.log_deviations)
-        information = unscaled @ unscaled.T + 0.5 * logs_by_number @ logs_by_number.T + np.diag(deviations**-2)
-        return gradient - self.prior.penalty(evaluation.logs) / deviations, information

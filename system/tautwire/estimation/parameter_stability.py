@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from scipy.stats import t as students_t
 
 from ..errors import UnreachableError
-from .disturbance_fit import with_fitted_disturbance
+from .disturbance_fit import joint_fit, with_fitted_disturbance
 from .estimation_data import DataSet
 from .hypotheses import Hypothesis
 from .identification_context import IdentificationContext
@@ -60,41 +60,53 @@ def stable_intervals(
     ``neutral_values`` (p,) are those without the effects.
     """
     split, at_fit = context.split, Intervals(fit.values, fit.values)
-    fitter_of_other = with_fitted_disturbance(context.fitter, fit.robot, chosen, split.validation)
-    own, other = (
-        _intervals_of_recording(context.policy.stability, fitter, fit, chosen, data, neutral_values)
-        for fitter, data in ((context.fitter, split.estimation), (fitter_of_other, split.validation))
+    own = _intervals_of_recording(
+        context.policy.stability, context.fitter, fit, chosen, split.estimation, neutral_values
     )
-    if own is None or other is None:
-        return at_fit.hull(own or other or at_fit), np.zeros(len(fit.values), dtype=bool)
+    fitter = with_fitted_disturbance(context.fitter, fit.robot, chosen, split.validation)
+    try:
+        other_fit = fitter.fit_from([fit.robot], chosen, split.validation, -np.inf)
+    except (UnreachableError, NoFitError):
+        return at_fit.hull(own), np.zeros(len(fit.values), dtype=bool)
+    fitter, other_fit = joint_fit(fitter, other_fit, chosen, split.validation)
+    other = _intervals_of_recording(
+        context.policy.stability, fitter, other_fit, chosen, split.validation, neutral_values
+    )
     return at_fit.hull(own).hull(other), own.is_apart(other)
 
 
 def _intervals_of_recording(
     policy: StabilityPolicy,
     fitter: Fitter,
-    start: Fit,
+    fit: Fit,
     chosen: Sequence[Hypothesis],
     data: DataSet,
     neutral_values: Array,
-) -> Intervals | None:
-    """Intervals under its disturbance, and under less of its force if that can be; None where nothing can be fitted."""
-    intervals: Intervals | None = None
-    for each in (fitter, _with_smaller_force(fitter, policy.smaller_force_ratio)):
-        try:
-            fit = each.fit_from([start.robot], chosen, data, -np.inf)
-        except (UnreachableError, NoFitError):
-            continue
-        innovations = each.judged(fit.robot, chosen, data)
-        if each is not fitter and np.nanmean(innovations.mean_square(data.rows)) > policy.max_mean_square:
-            continue
-        units = parameter_scales(fit.robot, fit.free)
-        half_widths = half_widths_of_stretches(innovations, data.rows, units, policy.stretches)
-        half_widths = np.hypot(half_widths, policy.form_tolerance * np.abs(fit.values - neutral_values))
-        lower, upper = parameter_bounds(fit.robot, fit.free)
-        new = Intervals(np.maximum(fit.values - half_widths, lower), np.minimum(fit.values + half_widths, upper))
-        intervals = new if intervals is None else intervals.hull(new)
-    return intervals
+) -> Intervals:
+    """Intervals about a fit under its disturbance, and about one under less of its force if that can be."""
+    innovations = fitter.judged(fit.robot, chosen, data)
+    intervals = _intervals_about(policy, fit, innovations, data, neutral_values)
+    limited = _with_smaller_force(fitter, policy.smaller_force_ratio)
+    try:
+        fit = limited.fit_from([fit.robot], chosen, data, -np.inf)
+    except (UnreachableError, NoFitError):
+        return intervals
+    innovations = limited.judged(fit.robot, chosen, data)
+    if np.nanmean(innovations.mean_square(data.rows)) > policy.max_mean_square:
+        return intervals
+    return intervals.hull(_intervals_about(policy, fit, innovations, data, neutral_values))
+
+
+def _intervals_about(
+    policy: StabilityPolicy, fit: Fit, innovations: Innovations, data: DataSet, neutral_values: Array
+) -> Intervals:
+    """Intervals by stretches and curvature, and by what the effect's form may lack."""
+    units = parameter_scales(fit.robot, fit.free)
+    half_widths = half_widths_of_stretches(innovations, data.rows, units, policy.stretches)
+    half_widths = np.maximum(half_widths, NORMAL_QUANTILE_95 * fit.standard_deviations)
+    half_widths = np.hypot(half_widths, policy.form_tolerance * np.abs(fit.values - neutral_values))
+    lower, upper = parameter_bounds(fit.robot, fit.free)
+    return Intervals(np.maximum(fit.values - half_widths, lower), np.minimum(fit.values + half_widths, upper))
 
 
 def _with_smaller_force(fitter: Fitter, ratio: float) -> Fitter:
@@ -106,7 +118,7 @@ def _with_smaller_force(fitter: Fitter, ratio: float) -> Fitter:
 
 
 def half_widths_of_stretches(innovations: Innovations, rows: BooleanArray, units: Array, stretch_count: int) -> Array:
-    """Half-widths (p,) by the scores of stretches, and no less than by the curvature.
+    """Half-widths (p,) by the scores of stretches, and no less than by the curvature with the gain held.
 
     Innovations count where ``rows`` (K,) says so; ``units`` (p,) are sizes of the parameters.
     """

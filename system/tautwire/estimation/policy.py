@@ -111,6 +111,8 @@ class DisturbancePolicy:
     min_gain: float = 0.5
     min_coarse_gain: float = 2.0
     max_iterations: int = 12
+    # Parameters at most that are fitted jointly with a disturbance: each takes a run for each iteration.
+    max_joint_parameters: int = 8
     # Fits of uncertain parameters and disturbance in turn.
     max_alternations: int = 3
     # Samples of a first fit, from which the one to all samples begins, and iterations of the latter where it is coarse.

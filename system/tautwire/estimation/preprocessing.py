@@ -23,7 +23,8 @@ from ..recordings.standing_winches import without_noise_of_standing_winches
 from ..robot.schema import Robot
 from ..robot.uncertain_parameters import is_surveyed
 from .clock_offsets import with_clocks_set
-from .disturbance_fit import disturbance_prior, with_fitted_disturbance
+from .disturbance_fit import with_fitted_disturbance
+from .disturbance_posterior import disturbance_prior
 from .estimation_data import DataSet, DataSplit, split_data
 from .initial_state_prior import self_stress_deviation, with_motion_at_start
 from .integration_steps import require_followable

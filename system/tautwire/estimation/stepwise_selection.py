@@ -21,7 +21,7 @@ from .candidate_proposals import SearchRound
 from .candidate_scores import CandidateScore, most_parsimonious
 from .candidate_scoring import score_candidates
 from .disturbance import Disturbance
-from .disturbance_fit import marginal_log_likelihood, with_fitted_disturbance
+from .disturbance_fit import joint_fit, marginal_log_likelihood, with_fitted_disturbance
 from .explained_shares import missed_with_effects, missed_without_effects, sensor_noise_floor
 from .hypotheses import Hypothesis, with_hypothesis
 from .identification_context import IdentificationContext
@@ -70,12 +70,13 @@ def select_effects(context: IdentificationContext) -> SelectionResult:
 def with_disturbance_beside(
     context: IdentificationContext, accepted: Sequence[Hypothesis], fit: Fit
 ) -> tuple[IdentificationContext, Fit]:
-    """The context with the disturbance fitted beside the accepted hypotheses, and their fit under it."""
+    """The context with the disturbance fitted with the accepted hypotheses, and their fit."""
     if not context.fitter.has_disturbance:
         return context, fit
     fitter = with_fitted_disturbance(context.fitter, fit.robot, accepted, context.split.estimation)
     context = replace(context, fitter=fitter)
-    return context, fit_model(context, accepted, fit.robot)
+    fitter, fit = joint_fit(fitter, fit_model(context, accepted, fit.robot), accepted, context.split.estimation)
+    return replace(context, fitter=fitter), fit
 
 
 def _search_round(

@@ -1,0 +1,211 @@
+"""Posterior density of a disturbance, and of a model's free parameters with it, and its ascent by Fisher scoring.
+
+Coordinates x are the logs of the disturbance's numbers and, where parameters are free, their distances from some values
+in some units. With whitened innovations v and the logs l of their variances,
+
+    dL/dx = -sum (v v' + l' / 2)
+    E[-d2L/dx2] = sum (v' + v l' / 2)(v' + v l' / 2)^T + l' l'^T / 2
+
+Derivatives by parameters are whole ones here: the filter's gain moves too.
+
+Source: Gupta and Mehra (1974), IEEE Transactions on Automatic Control 19(6), 774-783.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from math import log
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..robot.schema import Robot
+from .disturbance import Disturbance, OrnsteinUhlenbeck
+from .estimation_data import DataSet
+from .kalman_filter import Noise
+from .likelihood import Likelihood
+from .policy import DEFAULT_POLICY, DisturbancePolicy
+
+Array = NDArray[np.float64]
+
+CONCURRENT_EVALUATIONS = 2
+# Indices of the processes' bandwidths among the logs of a disturbance's numbers.
+BANDWIDTHS = [1, 3, 5]
+NUMBER_COUNT = 8
+# Of a log, and of a parameter's unit.
+DIFFERENCE_STEP = 1e-3
+
+
+@dataclass(frozen=True)
+class DisturbancePrior:
+    """Weak prior of a disturbance: its median, and standard deviations of the logs of its numbers (8,)."""
+
+    median: Disturbance
+    log_deviations: tuple[float, ...]
+
+    def penalty(self, logs: Array) -> Array:
+        """Deviations from the median in standard deviations (8,)."""
+        deviations: Array = (logs - logs_of(self.median)) / np.array(self.log_deviations)
+        return deviations
+
+
+def logs_of(disturbance: Disturbance) -> Array:
+    """Logs of a disturbance's numbers (8,)."""
+    pairs = [(each.rms, each.bandwidth) for each in (disturbance.force, disturbance.position, disturbance.tension)]
+    numbers = [number for pair in pairs for number in pair]
+    return np.log([*numbers, disturbance.position_noise, disturbance.tension_noise])
+
+
+def disturbance_of(logs: Array) -> Disturbance:
+    """The disturbance whose numbers have these logs (8,)."""
+    numbers = np.exp(logs).tolist()
+    force, position, tension = (OrnsteinUhlenbeck(*numbers[k : k + 2]) for k in (0, 2, 4))
+    return Disturbance(force, position, tension, numbers[6], numbers[7])
+
+
+def disturbance_prior(
+    robot: Robot, noise: Noise, policy: DisturbancePolicy = DEFAULT_POLICY.fit.disturbance
+) -> DisturbancePrior:
+    """Prior of a robot with these sensors: a force in proportion to its weight, and half of the noise coloured."""
+    share, weight = policy.coloured_noise_share, robot.platform.mass * max(robot.gravity, 1.0)
+    white = (1.0 - share**2) ** 0.5
+    median = Disturbance(
+        OrnsteinUhlenbeck(policy.force_to_weight * weight, policy.bandwidth),
+        OrnsteinUhlenbeck(share * noise.position, policy.bandwidth),
+        OrnsteinUhlenbeck(share * noise.tension, policy.bandwidth),
+        white * noise.position,
+        white * noise.tension,
+    )
+    size, bandwidth, sensor = (log(f) for f in (policy.size_factor, policy.bandwidth_factor, policy.noise_factor))
+    return DisturbancePrior(median, (*[size, bandwidth] * 3, sensor, sensor))
+
+
+@dataclass(frozen=True)
+class ParameterBox:
+    """Free parameters beside a disturbance: ``units`` (p,) in which they move, and bounds ``lower`` and ``upper``."""
+
+    units: Array = field(default_factory=lambda: np.zeros(0))
+    lower: Array = field(default_factory=lambda: np.zeros(0))
+    upper: Array = field(default_factory=lambda: np.zeros(0))
+
+
+@dataclass(frozen=True)
+class Evaluation:
+    """Posterior log-density at some coordinates, with what it is made of: whitened innovations, logs of variances.
+
+    ``constants`` (c) are the uncertain parameters there, in standard deviations.
+    """
+
+    coordinates: Array
+    value: float
+    innovations: Array
+    log_variances: Array
+    constants: Array
+
+    @property
+    def logs(self) -> Array:
+        """Logs of the disturbance's numbers (8,)."""
+        return self.coordinates[:NUMBER_COUNT]
+
+
+@dataclass(frozen=True)
+class Posterior:
+    """Posterior density of a disturbance under some data.
+
+    The parameters are held at their ``values`` (p,), or move from there where they have a ``box``.
+    """
+
+    likelihood: Likelihood
+    values: Array
+    data: DataSet
+    prior: DisturbancePrior
+    box: ParameterBox = field(default_factory=ParameterBox)
+
+    def given_constants(self, constants: Array) -> Posterior:
+        """The posterior density given the uncertain parameters."""
+        return replace(self, likelihood=self.likelihood.given_constants(constants))
+
+    @cached_property
+    def bounds(self) -> tuple[Array, Array]:
+        """Lower and upper bounds of the coordinates.
+
+        What hardly changes while a recording lasts is no disturbance, but an offset or a weight.
+        """
+        lower, upper = np.full(NUMBER_COUNT, -np.inf), np.full(NUMBER_COUNT, np.inf)
+        time = self.data.recording.time
+        lower[BANDWIDTHS] = -log(float(time[-1] - time[0]))
+        values = self.values[: len(self.box.units)]
+        of_parameters = ((bound - values) / self.box.units for bound in (self.box.lower, self.box.upper))
+        low, high = (np.append(bound, own) for bound, own in zip((lower, upper), of_parameters, strict=True))
+        return low, high
+
+    def values_at(self, coordinates: Array) -> Array:
+        """The parameters (p,) at some coordinates."""
+        if not len(self.box.units):
+            return self.values
+        moved = self.values + self.box.units * coordinates[NUMBER_COUNT:]
+        return np.clip(moved, self.box.lower, self.box.upper)
+
+    def evaluation(self, coordinates: Array) -> Evaluation:
+        """Its evaluation at some coordinates, or at the bounds that these exceed."""
+        coordinates = np.clip(coordinates, *self.bounds)
+        logs = coordinates[:NUMBER_COUNT]
+        likelihood = self.likelihood.with_disturbance(disturbance_of(logs))
+        innovations = likelihood.innovations(self.data.recording, self.values_at(coordinates))
+        mask = innovations.observed & self.data.rows[:, None]
+        value = innovations.log_likelihood(self.data.rows) - 0.5 * float(np.sum(self.prior.penalty(logs) ** 2))
+        value = value if np.isfinite(value) else -np.inf
+        values, log_variances = innovations.values[mask], innovations.log_variances[mask]
+        return Evaluation(coordinates, value, values, log_variances, innovations.constants)
+
+    def evaluations(self, points: Iterable[Array]) -> list[Evaluation]:
+        """Evaluations at several coordinates, two at once: a compiled filter runs without Python's lock."""
+        with ThreadPoolExecutor(CONCURRENT_EVALUATIONS) as threads:
+            return list(threads.map(self.evaluation, points))
+
+    def score(self, evaluation: Evaluation) -> tuple[Array, Array]:
+        """Gradient and Fisher information by the coordinates, by finite differences of the innovations."""
+        at = evaluation.coordinates
+        # At an upper bound backwards.
+        steps = np.where(at + DIFFERENCE_STEP > self.bounds[1], -DIFFERENCE_STEP, DIFFERENCE_STEP)
+        moved = self.evaluations(at + np.diag(steps))
+        slopes = np.array([each.innovations - evaluation.innovations for each in moved]) / steps[:, None]
+        log_slopes = np.array([each.log_variances - evaluation.log_variances for each in moved]) / steps[:, None]
+        gradient = -slopes @ evaluation.innovations - 0.5 * np.sum(log_slopes, axis=1)
+        unscaled = slopes + 0.5 * evaluation.innovations * log_slopes
+        information = unscaled @ unscaled.T + 0.5 * log_slopes @ log_slopes.T
+        deviations, numbers = np.array(self.prior.log_deviations), np.arange(NUMBER_COUNT)
+        information[numbers, numbers] += deviations**-2
+        gradient[numbers] -= self.prior.penalty(evaluation.logs) / deviations
+        return gradient, information
+
+
+def ascended(posterior: Posterior, start: Evaluation, policy: DisturbancePolicy, max_iterations: int) -> Evaluation:
+    """The end of an ascent; Levenberg's damping lets no step descend."""
+    current, damping = start, policy.first_damping
+    lower, upper = posterior.bounds
+    for _ in range(max_iterations):
+        gradient, information = posterior.score(current)
+        # At its bound and pushed beyond it, or without effect: such a coordinate stays, the others move without it.
+        is_held = ((current.coordinates <= lower) & (gradient < 0.0)) | (
+            (current.coordinates >= upper) & (gradient > 0.0)
+        )
+        is_held |= np.diag(information) <= 0.0
+        gradient, information = np.where(is_held, 0.0, gradient), np.where(is_held[:, None] | is_held, 0.0, information)
+        information[is_held, is_held] = 1.0
+        while damping < policy.max_damping:
+            scaled = information + damping * np.diag(np.diag(information))
+            step = np.clip(np.linalg.solve(scaled, gradient), -policy.max_log_step, policy.max_log_step)
+            trial = posterior.evaluation(current.coordinates + step)
+            if trial.value > current.value:
+                break
+            damping *= 10.0
+        else:
+            break
+        gain, current, damping = trial.value - current.value, trial, 0.1 * damping
+        if gain < policy.min_gain:
+            break
+    return current
