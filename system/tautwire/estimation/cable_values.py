@@ -1,10 +1,11 @@
 """Values of single cables in place of those that an effect's cables share.
 
 Names are established on unseen data. How many numbers a named effect has is less: cables get one each where the
-likelihood of FIT is worth these by Schwarz's criterion, half a log of the number of values N for each of k numbers, FIT
-or CHECK gains more than the effect's form may leave, a share of its evidence, and CHECK does not speak against it.
+likelihood of FIT is worth these by Schwarz's criterion, half a log of the number of values N for each of k numbers, and
+FIT and CHECK together, the latter at the values of FIT, gain more than the effect's form may leave, a share of its
+evidence.
 
-    log L(each its own) - log L(shared) > k/2 log N on FIT, and on either > share evidence
+    log L(each its own) - log L(shared) > k/2 log N on FIT, and > share evidence on both
 
 Both are taken beside the best disturbance of each recording.
 
@@ -59,7 +60,7 @@ def _with_values_of(
     policy = context.policy.selection
     left_by_form = policy.min_evidence_ratio * evidence[shared]
     is_worth_its_price = gain > _schwarz_price(context, len(fit.values) - len(selection.fit.values))
-    if not is_worth_its_price or max(gain, unseen_gain) <= left_by_form or unseen_gain < -policy.tie_nats:
+    if not is_worth_its_price or gain + unseen_gain <= left_by_form:
         return context, selection
     evidence |= dict.fromkeys(separate, evidence[shared])
     separated = replace(

@@ -33,7 +33,7 @@ from .policy import DEFAULT_POLICY, DisturbancePolicy
 
 Array = NDArray[np.float64]
 
-# A parameter's unit in an ascent, in its standard deviations: differences over a thousandth of it, steps of up to two.
+# A parameter's unit in an ascent, in its standard deviations: steps are of up to two.
 DEVIATIONS_PER_UNIT = 10.0
 
 
@@ -57,10 +57,10 @@ def joint_fit(fitter: Fitter, fit: Fit, chosen: Collection[Hypothesis], data: Da
     """Joint maximum-likelihood fit of a model's parameters and the disturbance, from where both were fitted in turn.
 
     Each in turn stops short of it where they make up for each other: nats below, and standard deviations away. The
-    covariance is then that beside an unknown disturbance. As it is where there is none, or too many parameters.
+    covariance is then that beside an unknown disturbance. As it is where there is none, or nothing to fit.
     """
     policy, count = fitter.policy.disturbance, len(fit.values)
-    if fitter.noise.disturbance is None or not 0 < count <= policy.max_joint_parameters:
+    if fitter.noise.disturbance is None or count == 0:
         return fitter, fit
     lower, upper = parameter_bounds(fit.robot, fit.free)
     units = DEVIATIONS_PER_UNIT * np.maximum(fit.standard_deviations, np.finfo(float).tiny)

@@ -6,7 +6,8 @@ in some units. With whitened innovations v and the logs l of their variances,
     dL/dx = -sum (v v' + l' / 2)
     E[-d2L/dx2] = sum (v' + v l' / 2)(v' + v l' / 2)^T + l' l'^T / 2
 
-Derivatives by parameters are whole ones here: the filter's gain moves too.
+Derivatives by parameters are those of the filter with its gain held, which lose little: where a rope goes slack gains
+jump, and differences over a small step with them.
 
 Source: Gupta and Mehra (1974), IEEE Transactions on Automatic Control 19(6), 774-783.
 """
@@ -35,7 +36,6 @@ CONCURRENT_EVALUATIONS = 2
 # Indices of the processes' bandwidths among the logs of a disturbance's numbers.
 BANDWIDTHS = [1, 3, 5]
 NUMBER_COUNT = 8
-# Of a log, and of a parameter's unit.
 DIFFERENCE_STEP = 1e-3
 
 
@@ -96,13 +96,15 @@ class ParameterBox:
 class Evaluation:
     """Posterior log-density at some coordinates, with what it is made of: whitened innovations, logs of variances.
 
-    ``constants`` (c) are the uncertain parameters there, in standard deviations.
+    ``slopes_by_parameters`` (p, N) are those of the innovations by the units of free parameters; ``constants`` (c) the
+    uncertain parameters there, in standard deviations.
     """
 
     coordinates: Array
     value: float
     innovations: Array
     log_variances: Array
+    slopes_by_parameters: Array
     constants: Array
 
     @property
@@ -159,7 +161,8 @@ class Posterior:
         value = innovations.log_likelihood(self.data.rows) - 0.5 * float(np.sum(self.prior.penalty(logs) ** 2))
         value = value if np.isfinite(value) else -np.inf
         values, log_variances = innovations.values[mask], innovations.log_variances[mask]
-        return Evaluation(coordinates, value, values, log_variances, innovations.constants)
+        slopes = innovations.sensitivities[mask].T[: len(self.box.units)] * self.box.units[:, None]
+        return Evaluation(coordinates, value, values, log_variances, slopes, innovations.constants)
 
     def evaluations(self, points: Iterable[Array]) -> list[Evaluation]:
         """Evaluations at several coordinates, two at once: a compiled filter runs without Python's lock."""
@@ -167,13 +170,13 @@ class Posterior:
             return list(threads.map(self.evaluation, points))
 
     def score(self, evaluation: Evaluation) -> tuple[Array, Array]:
-        """Gradient and Fisher information by the coordinates, by finite differences of the innovations."""
-        at = evaluation.coordinates
-        # At an upper bound backwards.
-        steps = np.where(at + DIFFERENCE_STEP > self.bounds[1], -DIFFERENCE_STEP, DIFFERENCE_STEP)
-        moved = self.evaluations(at + np.diag(steps))
-        slopes = np.array([each.innovations - evaluation.innovations for each in moved]) / steps[:, None]
-        log_slopes = np.array([each.log_variances - evaluation.log_variances for each in moved]) / steps[:, None]
+        """Gradient and Fisher information by the coordinates; by logs from finite differences."""
+        moves = DIFFERENCE_STEP * np.eye(NUMBER_COUNT, len(evaluation.coordinates))
+        moved = self.evaluations(evaluation.coordinates + moves)
+        slopes = np.array([each.innovations - evaluation.innovations for each in moved]) / DIFFERENCE_STEP
+        log_slopes = np.array([each.log_variances - evaluation.log_variances for each in moved]) / DIFFERENCE_STEP
+        slopes = np.vstack([slopes, evaluation.slopes_by_parameters])
+        log_slopes = np.vstack([log_slopes, np.zeros_like(evaluation.slopes_by_parameters)])
         gradient = -slopes @ evaluation.innovations - 0.5 * np.sum(log_slopes, axis=1)
         unscaled = slopes + 0.5 * evaluation.innovations * log_slopes
         information = unscaled @ unscaled.T + 0.5 * log_slopes @ log_slopes.T

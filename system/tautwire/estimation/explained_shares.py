@@ -73,7 +73,8 @@ def explained_shares(
     robots = [at_start, *(_without_effect(at_start, name, accepted) for name in names)]
     complete, *without = (simulated_outputs(context.fitter, each, data) for each in robots)
     recording, outputs_without = after.recording, dict(zip(names, without, strict=True))
-    missed = missed_without_effects(context, declared, data, floor)
+    # Numbers that a wrong model fitted to one recording may be worse on another than those declared.
+    missed = min(missed_without_effects(context, declared, data, floor))
     left = _missed(recording, after.after.measured(), floor)
     total = max(missed, left, np.finfo(float).tiny)
     outputs = [outputs_without[hypothesis.effect.name] for hypothesis in accepted]
@@ -86,8 +87,10 @@ def explained_shares(
     )
 
 
-def missed_without_effects(context: IdentificationContext, declared: Fitter, data: DataSet, floor: Errors) -> float:
-    """What the robot without effects misses: as declared, or with its uncertain numbers at their best."""
+def missed_without_effects(
+    context: IdentificationContext, declared: Fitter, data: DataSet, floor: Errors
+) -> tuple[float, float]:
+    """What the robot without effects misses: with its uncertain numbers at their best on FIT, and as declared."""
     max_sigmas = context.policy.size.max_calibration_sigmas
     calibration = calibrate(declared, context.robot, context.split.estimation).clipped(max_sigmas)
     calibrated = calibration.calibrated_robot(context.robot)
@@ -96,8 +99,7 @@ def missed_without_effects(context: IdentificationContext, declared: Fitter, dat
         simulated_outputs(declared, with_initial_state(declared, each, data), data)
         for each in (calibrated, context.robot)
     )
-    # Numbers that a wrong model fitted to one recording may be worse on another than those declared.
-    return min(_missed(recording, outputs, floor), _missed(data.recording, outputs_as_declared, floor))
+    return _missed(recording, outputs, floor), _missed(data.recording, outputs_as_declared, floor)
 
 
 def missed_with_effects(fitter: Fitter, robot: Robot, data: DataSet, floor: Errors) -> float:

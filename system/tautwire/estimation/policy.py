@@ -111,8 +111,6 @@ class DisturbancePolicy:
     min_gain: float = 0.5
     min_coarse_gain: float = 2.0
     max_iterations: int = 12
-    # Parameters at most that are fitted jointly with a disturbance: each takes a run for each iteration.
-    max_joint_parameters: int = 8
     # Fits of uncertain parameters and disturbance in turn.
     max_alternations: int = 3
     # Samples of a first fit, from which the one to all samples begins, and iterations of the latter where it is coarse.
@@ -300,7 +298,8 @@ class SizePolicy:
     # listed apart.
     min_share: float = 0.02
     min_size: float = 1.0
-    # Share of what was missed below which no further effect is looked for: what is left is seldom one effect's.
+    # Share of what the robot as declared misses below which no further effect is looked for: what is left then is
+    # seldom one effect's.
     max_left_share: float = 0.04
     # Least share that all effects together explain, where much is left: below, nothing on the list explains it.
     min_explained_share: float = 0.25
