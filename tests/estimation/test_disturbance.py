@@ -153,8 +153,8 @@ def test_the_score_of_a_disturbance_is_the_derivative_of_its_posterior() -> None
     assert np.all(np.linalg.eigvalsh(information) > 0.0)
 
 
-def test_the_score_by_a_free_parameter_is_its_whole_derivative() -> None:
-    """Of a mass and the disturbance together, with the filter's gain moving too; at a bound the mass stays."""
+def test_the_score_by_a_free_parameter_is_its_derivative_but_for_the_gains() -> None:
+    """Of a mass beside the disturbance; at a bound it stays."""
     recording = PAIR[0].first(200)
     payload = next(h for h in hypotheses(ROBOT) if h.effect.name == "payload")
     robot = ROBOT.with_effect(payload.setting(ROBOT))
@@ -166,7 +166,9 @@ def test_the_score_by_a_free_parameter_is_its_whole_derivative() -> None:
     gradient, information = posterior.score(posterior.evaluation(at))
     width = 1e-4 * np.eye(9)[8]
     expected = (posterior.evaluation(at + width).value - posterior.evaluation(at - width).value) / 2e-4
-    assert gradient[8] == pytest.approx(expected, abs=1e-3 * information[8, 8] + 0.02)
+    assert abs(expected) > 10.0
+    assert gradient[8] == pytest.approx(expected, rel=0.01)
+    assert information[8, 8] > 0.0
     assert posterior.values_at(posterior.evaluation(at + 5.0).coordinates) == pytest.approx(box.upper)
 
 

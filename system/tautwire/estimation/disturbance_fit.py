@@ -28,7 +28,7 @@ from .disturbance_posterior import (
 )
 from .estimation_data import DataSet
 from .hypotheses import Hypothesis, with_values
-from .parameter_fit import Fit, Fitter, parameter_bounds
+from .parameter_fit import Fit, Fitter, parameter_bounds, parameter_scales
 from .policy import DEFAULT_POLICY, DisturbancePolicy
 
 Array = NDArray[np.float64]
@@ -63,7 +63,8 @@ def joint_fit(fitter: Fitter, fit: Fit, chosen: Collection[Hypothesis], data: Da
     if fitter.noise.disturbance is None or count == 0:
         return fitter, fit
     lower, upper = parameter_bounds(fit.robot, fit.free)
-    units = DEVIATIONS_PER_UNIT * np.maximum(fit.standard_deviations, np.finfo(float).tiny)
+    deviations = fit.standard_deviations
+    units = DEVIATIONS_PER_UNIT * np.where(deviations > 0.0, deviations, parameter_scales(fit.robot, fit.free))
     likelihood, _ = fitter.likelihood(fit.robot, chosen, data)
     prior = disturbance_prior(fit.robot, fitter.noise, policy)
     posterior = Posterior(likelihood, fit.values, data, prior, ParameterBox(units, lower, upper))
