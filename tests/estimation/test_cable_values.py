@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from tautwire.estimation.cable_values import with_values_of_cables
+from tautwire.estimation.disturbance_fit import joint_fit, with_fitted_disturbance
 from tautwire.estimation.disturbance_posterior import disturbance_prior
 from tautwire.estimation.estimation_data import DataSet, DataSplit
 from tautwire.estimation.hypotheses import Hypothesis, hypotheses, labels_by_effect
@@ -34,6 +35,9 @@ def selected(
         data_sets.append(DataSet(recording, ROBOT.platform.start, np.ones(len(recording.time), dtype=bool)))
     fitter = Fitter(replace(NOISE, disturbance=disturbance_prior(ROBOT, NOISE).median))
     fit = fitter.fit_from([ROBOT.with_effect(DRUM.setting(ROBOT))], (DRUM,), data_sets[0])
+    fitter, fit = joint_fit(
+        with_fitted_disturbance(fitter, fit.robot, (DRUM,), data_sets[0]), fit, (DRUM,), data_sets[0]
+    )
     context = IdentificationContext(ROBOT, fitter, DataSplit(data_sets[0], data_sets[1], ()))
     return context, SelectionResult((DRUM,), (evidence,), fit, (), ())
 
