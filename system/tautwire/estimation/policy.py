@@ -298,9 +298,9 @@ class SizePolicy:
     # listed apart.
     min_share: float = 0.02
     min_size: float = 1.0
-    # Share of what the robot as declared misses below which no further effect is looked for: what is left then is
-    # seldom one effect's.
-    max_left_share: float = 0.04
+    # Share of what was missed below which no further effect is looked for: what is left is seldom one effect's. Damping
+    # and a modulus left 4 % to relaxation, which was replaced by both then.
+    max_left_share: float = 0.02
     # Least share that all effects together explain, where much is left: below, nothing on the list explains it.
     min_explained_share: float = 0.25
     # Standard deviations within which an uncertain number of the robot without effects is taken at its best.
