@@ -73,8 +73,7 @@ def explained_shares(
     robots = [at_start, *(_without_effect(at_start, name, accepted) for name in names)]
     complete, *without = (simulated_outputs(context.fitter, each, data) for each in robots)
     recording, outputs_without = after.recording, dict(zip(names, without, strict=True))
-    # Numbers that a wrong model fitted to one recording may be worse on another than those declared.
-    missed = min(missed_without_effects(context, declared, data, floor))
+    missed = missed_without_effects(context, declared, data, floor)
     left = _missed(recording, after.after.measured(), floor)
     total = max(missed, left, np.finfo(float).tiny)
     outputs = [outputs_without[hypothesis.effect.name] for hypothesis in accepted]
@@ -87,10 +86,8 @@ def explained_shares(
     )
 
 
-def missed_without_effects(
-    context: IdentificationContext, declared: Fitter, data: DataSet, floor: Errors
-) -> tuple[float, float]:
-    """What the robot without effects misses: with its uncertain numbers at their best on FIT, and as declared."""
+def missed_without_effects(context: IdentificationContext, declared: Fitter, data: DataSet, floor: Errors) -> float:
+    """What the robot without effects misses: the less of as declared and with its uncertain numbers as FIT has them."""
     max_sigmas = context.policy.size.max_calibration_sigmas
     calibration = calibrate(declared, context.robot, context.split.estimation).clipped(max_sigmas)
     calibrated = calibration.calibrated_robot(context.robot)
@@ -99,7 +96,8 @@ def missed_without_effects(
         simulated_outputs(declared, with_initial_state(declared, each, data), data)
         for each in (calibrated, context.robot)
     )
-    return _missed(recording, outputs, floor), _missed(data.recording, outputs_as_declared, floor)
+    # Numbers that a wrong model fitted to one recording may be worse on another than those declared.
+    return min(_missed(recording, outputs, floor), _missed(data.recording, outputs_as_declared, floor))
 
 
 def missed_with_effects(fitter: Fitter, robot: Robot, data: DataSet, floor: Errors) -> float:

@@ -144,7 +144,7 @@ class _StepwiseSelection:
         context, policy, validation = self.context, self.context.policy.size, self.context.split.validation
         robot = calibrated_robot(context.fitter, self.current.robot, context.split.estimation)
         floor = sensor_noise_floor(context.fitter, robot, validation)
-        missed = min(missed_without_effects(context, self.without_effects, validation, floor))
+        missed = missed_without_effects(context, self.without_effects, validation, floor)
         left = missed_with_effects(context.fitter, robot, validation, floor)
         return left < policy.max_left_share * missed or missed < policy.max_size_of_disturbance**2
 
