@@ -13,10 +13,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
 from ..robot.schema import Robot
-from .candidate_fits import (
-    fit_model,
-    maximised_validation_likelihood,
-)
+from .candidate_fits import fit_model, maximised_validation_likelihood
 from .candidate_proposals import SearchRound
 from .candidate_scores import CandidateScore, most_parsimonious
 from .candidate_scoring import score_candidates
@@ -133,11 +130,10 @@ class _StepwiseSelection:
             self.candidates += [trial.candidate(number, significant and trial is best) for trial in scores]
             if best is None or not significant:
                 break
-            self.accepted, self.current = with_hypothesis(self.accepted, best.hypothesis), best.fit
+            self._accept(with_hypothesis(self.accepted, best.hypothesis), best.fit)
             # One that loses cables to another keeps its evidence.
             last = {h: e for h in self.accepted for old, e in self.forward_evidences.items() if h.overlaps(old)}
             self.forward_evidences |= {**last, best.hypothesis: best.evidence}
-            self.context, self.current = with_disturbance_beside(self.context, self.accepted, best.fit)
 
     def _leaves_little(self) -> bool:
         """Whether the accepted hypotheses leave little, or no more than a small random force was missing before."""
@@ -163,7 +159,7 @@ class _StepwiseSelection:
             without = fit_model(self.context, others, self.current.robot, coarse=True)
             score = CandidateScore(tested, self.current, self._evidence(without, others), float("nan"))
             if score.evidence < self.context.evidence_threshold():
-                self._drop(others, without)
+                self._accept(others, fit_model(self.context, others, without.robot))
                 pending = list(others)
                 continue
             number = policy.max_rounds + 1 + len(self.evidences) + self.swaps
@@ -179,7 +175,7 @@ class _StepwiseSelection:
                 self.candidates += [t.candidate(number, t is best) for t in alternatives]
             reported.add(tuple(others))
             if best is not None and best is not contender and self.swaps < policy.max_swaps:
-                self.accepted, self.current = with_hypothesis(others, best.hypothesis), best.fit
+                self._accept(with_hypothesis(others, best.hypothesis), best.fit)
                 pending = [a for a in self.accepted if a is not self.accepted[-1]]
                 tested, score, self.swaps = self.accepted[-1], best, self.swaps + 1
             self.evidences[tested] = score.evidence
@@ -198,10 +194,10 @@ class _StepwiseSelection:
             self.context.fitter.noise.disturbance,
         )
 
-    def _drop(self, others: list[Hypothesis], without: Fit) -> None:
-        """Keep only the other hypotheses, fitted from where they fit without it."""
-        self.accepted, self.current = others, fit_model(self.context, others, without.robot)
-        self.context, self.current = with_disturbance_beside(self.context, others, self.current)
+    def _accept(self, hypotheses: list[Hypothesis], fit: Fit) -> None:
+        """Take these hypotheses in place of those accepted so far, with the disturbance fitted beside them."""
+        self.accepted = hypotheses
+        self.context, self.current = with_disturbance_beside(self.context, hypotheses, fit)
 
     def _comparable(self, score: CandidateScore, others: Sequence[Hypothesis]) -> CandidateScore:
         """The score to hold against alternatives: beside a disturbance that of the round in which these were scored.
