@@ -53,11 +53,10 @@ def _with_values_of(
     fit = fitter.fit_from([fit.robot], chosen, split.estimation, -inf)
     fitter, fit = joint_fit(fitter, fit, chosen, split.estimation)
     accepted, evidence = selection.accepted, dict(zip(selection.accepted, selection.evidence, strict=True))
-    shared_fitter, shared_fit = joint_fit(context.fitter, selection.fit, accepted, split.estimation)
     gain = fitter.log_likelihood(fit.robot, chosen, split.estimation)
-    gain -= shared_fitter.log_likelihood(shared_fit.robot, accepted, split.estimation)
+    gain -= context.fitter.log_likelihood(robot, accepted, split.estimation)
     unseen_gain = marginal_log_likelihood(fitter, fit.robot, chosen, split.validation, is_coarse=False)
-    unseen_gain -= marginal_log_likelihood(shared_fitter, shared_fit.robot, accepted, split.validation, is_coarse=False)
+    unseen_gain -= marginal_log_likelihood(context.fitter, robot, accepted, split.validation, is_coarse=False)
     policy = context.policy.selection
     left_by_form = policy.min_evidence_ratio * evidence[shared]
     is_worth_its_price = gain > _schwarz_price(context, len(fit.values) - len(selection.fit.values))
