@@ -2,26 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tautwire.estimation.disturbance_posterior import disturbance_prior
-from tautwire.estimation.effect_estimates import estimated_effects, parameter_correlations
-from tautwire.estimation.estimation_data import DataSet, DataSplit
-from tautwire.estimation.hypotheses import hypotheses, with_values
-from tautwire.estimation.identification_context import IdentificationContext
-from tautwire.estimation.measurement_noise import estimate_noise
-from tautwire.estimation.parameter_fit import Fit, Fitter
-from tautwire.estimation.stepwise_selection import SelectionResult
+from tautwire.estimation.effect_estimates import parameter_correlations
+from tautwire.estimation.hypotheses import with_values
+from tautwire.estimation.parameter_fit import Fit
 from tautwire.estimation.trace_result import Estimate, FittedParameter, FoundEffect
 from tautwire.robot.schema import EffectSetting, Robot
 from tautwire.robot.symbolic_model import FORMULA_INDEX, FreeParameter
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.support.fits import fitted
-from tests.support.recordings import recorded
 from tests.support.robots import example
 
 Array = NDArray[np.float64]
@@ -101,23 +93,3 @@ def test_a_correlation_is_that_of_fits_to_many_recordings() -> None:
     # By both together: a sum of squares of 2 per recording, which correlated errors weighed apart would not give.
     squares = sum(float(e @ np.linalg.inv(fit.covariance) @ e) for fit in fits for e in [fit.values - VALUES])
     assert 0.35 < squares / (2 * SEEDS) < 2.2
-
-
-@pytest.mark.parametrize("ratio_of_check, unstable", [(0.96, ()), (0.98, ("radius_ratio",))])
-def test_a_parameter_on_which_recordings_disagree_is_unstable(ratio_of_check: float, unstable: tuple[str, ...]) -> None:
-    robot = example("three")
-    drum = next(h for h in hypotheses(robot) if h.effect.name == "drum" and h.cables == robot.cable_numbers)
-    noise = estimate_noise(robot, recorded("three", 1))
-    fitter = Fitter(replace(noise, disturbance=disturbance_prior(robot, noise).median))
-    data_sets = []
-    for seed, ratio in ((1, 0.96), (2, ratio_of_check)):
-        recording = recorded("three", seed).first(400)
-        recording = replace(recording, winch_speed=recording.winch_speed / ratio)
-        data_sets.append(DataSet(recording, robot.platform.start, np.ones(400, dtype=bool)))
-    fit = fitter.fit_from([robot.with_effect(drum.setting(robot))], (drum,), data_sets[0])
-    context = IdentificationContext(robot, fitter, DataSplit(data_sets[0], data_sets[1], ()))
-    (effect,) = estimated_effects(context, SelectionResult((drum,), (100.0,), fit, (), ()))
-    low, high = effect.parameters["radius_ratio"].low, effect.parameters["radius_ratio"].high
-    assert effect.unstable == unstable
-    assert low is not None and low < min(0.96, ratio_of_check)
-    assert high is not None and high > max(0.96, ratio_of_check)

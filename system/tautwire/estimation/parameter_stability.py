@@ -59,7 +59,7 @@ def stable_intervals(
 
     ``neutral_values`` (p,) are those without the effects.
     """
-    split, at_fit = context.split, Intervals(fit.values, fit.values)
+    split = context.split
     own = _intervals_of_recording(
         context.policy.stability, context.fitter, fit, chosen, split.estimation, neutral_values
     )
@@ -67,12 +67,12 @@ def stable_intervals(
     try:
         other_fit = fitter.fit_from([fit.robot], chosen, split.validation, -np.inf)
     except (UnreachableError, NoFitError):
-        return at_fit.hull(own), np.zeros(len(fit.values), dtype=bool)
+        return own, np.zeros(len(fit.values), dtype=bool)
     fitter, other_fit = joint_fit(fitter, other_fit, chosen, split.validation)
     other = _intervals_of_recording(
         context.policy.stability, fitter, other_fit, chosen, split.validation, neutral_values
     )
-    return at_fit.hull(own).hull(other), own.is_apart(other)
+    return own.hull(other), own.is_apart(other)
 
 
 def _intervals_of_recording(
@@ -118,7 +118,7 @@ def _with_smaller_force(fitter: Fitter, ratio: float) -> Fitter:
 
 
 def half_widths_of_stretches(innovations: Innovations, rows: BooleanArray, units: Array, stretch_count: int) -> Array:
-    """Half-widths (p,) by the scores of stretches, and no less than by the curvature with the gain held.
+    """Half-widths (p,) by the scores of stretches.
 
     Innovations count where ``rows`` (K,) says so; ``units`` (p,) are sizes of the parameters.
     """
@@ -133,8 +133,5 @@ def half_widths_of_stretches(innovations: Innovations, rows: BooleanArray, units
     freedom = stretch_count - 1
     spread = stretch_count / freedom * covariance @ (by_stretch.T @ by_stretch) @ covariance
     quantile = float(students_t.ppf(0.975, freedom))
-    half_widths: Array = units * np.maximum(
-        quantile * np.sqrt(np.maximum(np.diag(spread), 0.0)),
-        NORMAL_QUANTILE_95 * np.sqrt(np.maximum(np.diag(covariance), 0.0)),
-    )
+    half_widths: Array = units * quantile * np.sqrt(np.maximum(np.diag(spread), 0.0))
     return half_widths
