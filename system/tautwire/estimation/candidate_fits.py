@@ -132,6 +132,6 @@ def _maximised(
     fitter = with_fitted_disturbance(fitter, robot, chosen, data, is_coarse)
     tolerance = fitter.policy.coarse_cost_tolerance if is_coarse else fitter.policy.fine_cost_tolerance
     fit = fitter.fit_from([robot], chosen, data, -inf, tolerance)
-    fitter, fit = (fitter, fit) if is_coarse else joint_fit(fitter, fit, chosen, data)
-    robot = fit.robot
-    return fitter.log_likelihood(robot, chosen, data), fitter, robot
+    if not is_coarse:
+        fitter, fit = joint_fit(fitter, fit, chosen, data)
+    return fitter.log_likelihood(fit.robot, chosen, data), fitter, fit.robot

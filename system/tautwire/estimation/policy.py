@@ -298,8 +298,8 @@ class SizePolicy:
     # listed apart.
     min_share: float = 0.02
     min_size: float = 1.0
-    # Share of what was missed below which no further effect is looked for: what is left is seldom one effect's. Damping
-    # and a modulus left 4 % to relaxation, which was replaced by both then.
+    # Share of what was missed below which no further effect is looked for: what is left is seldom one effect's. At 4 %
+    # the search ended with relaxation where damping and a modulus were hidden.
     max_left_share: float = 0.02
     # Least share that all effects together explain, where much is left: below, nothing on the list explains it.
     min_explained_share: float = 0.25
