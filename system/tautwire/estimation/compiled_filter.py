@@ -94,7 +94,8 @@ class CompiledFilter:
     @cached_property
     def jacobians(self) -> CompiledFunction:
         """See :func:`tautwire.estimation.kalman_filter.filter_jacobians`."""
-        return CompiledFunction(filter_jacobians(self.model, self._cable_count, self._noise, self._substeps))
+        function = filter_jacobians(self.model, self._cable_count, self._noise, self._substeps, self._constant_count)
+        return CompiledFunction(function)
 
     @cached_property
     def given_constants(self) -> CompiledFilter:

@@ -14,7 +14,7 @@ import numpy as np
 from casadi import SX, Function
 from numpy.typing import NDArray
 
-from ..robot.symbolic_model import SymbolicModel
+from ..robot.symbolic_model import SymbolicModel, constants_as_parameters
 from .disturbance import Disturbance, disturbance_state_count
 from .integration_steps import Substeps
 from .measurement_model import measurement_model
@@ -91,7 +91,8 @@ def time_update_function(
     state = SX.sym("state", model_size + disturbance.count)
     speed, later, step = SX.sym("speed", cable_count), SX.sym("later", cable_count), SX.sym("step")
     drift, acceleration_noise_density = SX.sym("drift"), SX.sym("acceleration_noise_density")
-    moved, transition, direct_sensitivity = disturbance.time_update(model, substeps, state, speed, later, step)
+    interval = _Interval(speed, later, step, substeps)
+    moved, transition, direct_sensitivity = disturbance.time_update(model, constant_count, state, interval)
     process_noise = SX(state.numel(), 1)
     process_noise[3:6] = acceleration_noise_density**2 * step
     process_noise[6 : 6 + cable_count] = noise.winch_speed**2 * drift
@@ -135,16 +136,16 @@ class _DisturbanceSymbols:
         return self._variances * (1.0 - casadi.exp(-2.0 * self.decay_rates * step))
 
     def time_update(
-        self, model: SymbolicModel, substeps: Substeps, state: SX, speed: SX, next_speed: SX, step: SX
+        self, model: SymbolicModel, constant_count: int, state: SX, interval: _Interval
     ) -> tuple[SX, SX, SX]:
         """As :func:`_time_update` of the model, with the force that its mean over the step leaves on the platform."""
         if not self.count:
-            return _time_update(model, substeps, state, speed, next_speed, step)
+            return _time_update(model, constant_count, state, interval)
         size, parameters = model.states.numel(), model.parameters.numel()
-        force, decay = SX.sym("force", 3), self.decay(step)
-        mean_decay = casadi.exp(-0.5 * self.decay_rates[:3] * step)
+        force, decay = SX.sym("force", 3), self.decay(interval.step)
+        mean_decay = casadi.exp(-0.5 * self.decay_rates[:3] * interval.step)
         next_state, transition, sensitivities = casadi.substitute(
-            list(_time_update(_with_force(model, force), substeps, state[:size], speed, next_speed, step)),
+            list(_time_update(_with_force(model, force), constant_count, state[:size], interval)),
             [force],
             [mean_decay * state[size : size + 3]],
         )
@@ -167,7 +168,9 @@ def _with_force(model: SymbolicModel, force: SX) -> SymbolicModel:
     return replace(model, rates=rates, parameters=casadi.vertcat(model.parameters, force))
 
 
-def filter_jacobians(model: SymbolicModel, cable_count: int, noise: Noise, substeps: Substeps) -> Function:
+def filter_jacobians(
+    model: SymbolicModel, cable_count: int, noise: Noise, substeps: Substeps, constant_count: int = 0
+) -> Function:
     """Jacobians of a filter step: of the outputs by the predicted state, of the next state by the updated one.
 
     Arguments: state before and after the measurement update, parameters, shift, speed, next speed, time step,
@@ -184,7 +187,8 @@ def filter_jacobians(model: SymbolicModel, cable_count: int, noise: Noise, subst
     instant = [inputs, model.parameters, later, step, shift]
     outputs = measurement_model(model, cable_count).call([predicted[:model_size], *instant])
     _, by_state, _ = disturbance.added_to(outputs, predicted)
-    _, transition, _ = disturbance.time_update(model, substeps, updated, speed, later, step)
+    interval = _Interval(speed, later, step, substeps)
+    _, transition, _ = disturbance.time_update(model, constant_count, updated, interval)
     rate_jacobian = Function(
         "bending", [model.states, model.inputs, model.parameters], [casadi.jacobian(model.rates, model.states)]
     )
@@ -195,9 +199,22 @@ def filter_jacobians(model: SymbolicModel, cable_count: int, noise: Noise, subst
     return Function("filter_slopes", arguments, [casadi.densify(f) for f in (by_state, transition, half_transition)])
 
 
-def _time_update(
-    model: SymbolicModel, substeps: Substeps, state: SX, speed: SX, next_speed: SX, step: SX
-) -> tuple[SX, SX, SX]:
+@dataclass(frozen=True)
+class _Interval:
+    """Interval between two samples: winch speeds at both ends, its length, and how it is divided."""
+
+    speed: SX
+    next_speed: SX
+    step: SX
+    substeps: Substeps
+
+    def parts(self, count: int) -> list[tuple[SX, SX]]:
+        """Winch speeds at both ends of each of some equal parts."""
+        points = [self.speed + (k / count) * (self.next_speed - self.speed) for k in range(count + 1)]
+        return list(pairwise(points))
+
+
+def _time_update(model: SymbolicModel, constant_count: int, state: SX, interval: _Interval) -> tuple[SX, SX, SX]:
     """State after one sample, and its derivatives by the state before and by the parameters.
 
     The derivatives weigh errors and may be coarser than the state, whose own error would pose as an effect: with the
@@ -206,31 +223,42 @@ def _time_update(
         Gamma = h (I + h F / 2 (I + h F / 3 (I + h F / 4)))        A = I + F Gamma        B = Gamma f_p
 
     Over twice the time that is ``Gamma + A Gamma``: decays which are far quicker than the step then die, where the
-    series would blow up.
+    series would blow up. The last ``constant_count`` states are parameters to that: series of the others take half the
+    operations.
     """
-    runge_kutta_step = _runge_kutta_step(model, speed.numel())
-    trajectory = [state]
-    for begin, end in _speed_intervals(speed, next_speed, substeps.state):
-        trajectory.append(runge_kutta_step(trajectory[-1], model.parameters, begin, end, step / substeps.state))
+    moving, parameter_count = model.states.numel() - constant_count, model.parameters.numel()
+    reduced = constants_as_parameters(model, constant_count)
+    theta = casadi.vertcat(model.parameters, state[moving:])
+    runge_kutta_step = _runge_kutta_step(reduced, interval.speed.numel())
+    trajectory = [state[:moving]]
+    substeps = interval.substeps
+    for begin, end in interval.parts(substeps.state):
+        trajectory.append(runge_kutta_step(trajectory[-1], theta, begin, end, interval.step / substeps.state))
     rate_jacobians = Function(
         "slope",
-        [model.states, model.inputs, model.parameters],
-        [casadi.jacobian(model.rates, symbol) for symbol in (model.states, model.parameters)],
+        [reduced.states, reduced.inputs, reduced.parameters],
+        [casadi.jacobian(reduced.rates, symbol) for symbol in (reduced.states, reduced.parameters)],
     )
-    transition = SX.eye(state.numel())
-    direct_sensitivity = SX(state.numel(), model.parameters.numel())
-    substep = step / substeps.slope
-    for index, (begin, end) in enumerate(_speed_intervals(speed, next_speed, substeps.slope)):
+    transition, sensitivities = SX.eye(moving), SX(moving, theta.numel())
+    substep = interval.step / substeps.slope
+    for index, (begin, end) in enumerate(interval.parts(substeps.slope)):
         middle = _interpolated(trajectory, (index + 0.5) / substeps.slope)
         inputs = casadi.vertcat(0.5 * (begin + end), SX(3, 1))
-        by_state, by_parameters = rate_jacobians(middle, inputs, model.parameters)
+        by_state, by_parameters = rate_jacobians(middle, inputs, theta)
         gamma = _integrated_exponential(by_state, substep / 2**substeps.doublings, substeps.order)
         for _ in range(substeps.doublings):
             gamma = 2.0 * gamma + casadi.mtimes(casadi.mtimes(by_state, gamma), gamma)
-        substep_transition = SX.eye(state.numel()) + casadi.mtimes(by_state, gamma)
+        substep_transition = SX.eye(moving) + casadi.mtimes(by_state, gamma)
         transition = casadi.mtimes(substep_transition, transition)
-        direct_sensitivity = casadi.mtimes(substep_transition, direct_sensitivity) + casadi.mtimes(gamma, by_parameters)
-    return trajectory[-1], transition, direct_sensitivity
+        sensitivities = casadi.mtimes(substep_transition, sensitivities) + casadi.mtimes(gamma, by_parameters)
+    return (
+        casadi.vertcat(trajectory[-1], state[moving:]),
+        casadi.vertcat(
+            casadi.horzcat(transition, sensitivities[:, parameter_count:]),
+            casadi.horzcat(SX(constant_count, moving), SX.eye(constant_count)),
+        ),
+        casadi.vertcat(sensitivities[:, :parameter_count], SX(constant_count, parameter_count)),
+    )
 
 
 def _interpolated(trajectory: list[SX], fraction: float) -> SX:
@@ -247,12 +275,6 @@ def _integrated_exponential(rate_jacobian: SX, step: SX, order: int) -> SX:
     for term in range(order, 1, -1):
         series = identity + (step / term) * casadi.mtimes(rate_jacobian, series)
     return step * series
-
-
-def _speed_intervals(speed: SX, next_speed: SX, count: int) -> list[tuple[SX, SX]]:
-    """Winch speeds at both ends of each equal part of a sample interval."""
-    points = [speed + (k / count) * (next_speed - speed) for k in range(count + 1)]
-    return list(pairwise(points))
 
 
 def _runge_kutta_step(model: SymbolicModel, cable_count: int) -> Function:
