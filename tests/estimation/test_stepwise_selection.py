@@ -72,6 +72,29 @@ def test_beside_a_disturbance_a_further_effect_needs_a_share_of_the_first_ones_e
     assert [hypothesis.effect.name for hypothesis in select_effects(context).accepted] == names
 
 
+@pytest.mark.parametrize(("has_disturbance", "names"), [(False, ["slack", "sag"]), (True, ["sag"])])
+def test_beside_a_disturbance_what_came_first_needs_as_much_evidence_beside_what_came_later(
+    has_disturbance: bool, names: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot, recording = example("three"), recorded("three", 1)
+    noise = estimate_noise(robot, recording)
+    if has_disturbance:
+        noise = replace(noise, disturbance=disturbance_prior(robot, noise).median)
+    context = IdentificationContext(robot, Fitter(noise), split_data(robot, noise, recording, None))
+    slack, sag = (Hypothesis(BY_NAME[name], (1, 2, 3)) for name in ("slack", "sag"))
+    fit = Fit.without_parameters(robot.with_effect(slack.setting(robot)).with_effect(sag.setting(robot)))
+    selection = stepwise_selection._StepwiseSelection(context, fit, context.fitter, [slack, sag])
+    selection.forward_evidences = {slack: 3000.0, sag: 400.0}
+    beside = {(sag,): 200.0, (slack,): 2000.0, (): 3000.0}
+    monkeypatch.setattr(selection, "_evidence", lambda without, others: beside[tuple(others)])
+    monkeypatch.setattr(stepwise_selection, "score_candidates", lambda *_: ([], True))
+    monkeypatch.setattr(stepwise_selection, "_search_round", lambda *_: None)
+    monkeypatch.setattr(stepwise_selection, "fit_model", lambda *_, **__: fit)
+    monkeypatch.setattr(stepwise_selection, "with_disturbance_beside", lambda context, chosen, fit: (context, fit))
+    selection.eliminate()
+    assert [hypothesis.effect.name for hypothesis in selection.result().accepted] == names
+
+
 @pytest.mark.parametrize(("max_left_share", "max_size", "rounds"), [(0.04, 0.0, 1), (1e-9, 0.0, 2), (1e-9, 1e6, 1)])
 def test_beside_a_disturbance_the_search_ends_where_what_is_left_could_not_matter(
     max_left_share: float, max_size: float, rounds: int, monkeypatch: pytest.MonkeyPatch

@@ -216,9 +216,10 @@ class SelectionPolicy:
     # quite the form of nature's. A modulus of 1.25 beside a little relaxation had 759 nats, relaxation alone 838.
     form_tie_ratio: float = 0.1
 
-    # Share of the first effect's evidence that a further one needs beside a disturbance: less may be what the first
-    # one's form leaves. After a modulus (842 nats) and damping (346), relaxation of one cable had 18.
-    min_evidence_ratio: float = 0.05
+    # Share of the first effect's evidence that a further one needs beside a disturbance, and another one after it: less
+    # may be what the first one's form leaves. After a modulus (842 nats) and damping (346), relaxation of one cable had
+    # 18; beside a drum in layers (830 nats) relaxation had 59.
+    min_evidence_ratio: float = 0.1
 
     def required_evidence(self, threshold: float, first_evidence: float, has_disturbance: bool) -> float:
         """The evidence that a further effect needs: more than chance, and than what the first one's form may leave."""

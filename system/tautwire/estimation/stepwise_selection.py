@@ -123,10 +123,7 @@ class _StepwiseSelection:
                 self.complete_rounds[tuple(self.accepted)] = scores
             policy, has_disturbance = self.context.policy.selection, self.context.fitter.has_disturbance
             best = most_parsimonious(scores, policy, has_disturbance)
-            first_evidence = next(iter(self.forward_evidences.values()), 0.0)
-            threshold = self.context.evidence_threshold()
-            required_evidence = policy.required_evidence(threshold, first_evidence, has_disturbance)
-            significant = best is not None and best.evidence > required_evidence
+            significant = best is not None and best.evidence > self._required_evidence()
             self.candidates += [trial.candidate(number, significant and trial is best) for trial in scores]
             if best is None or not significant:
                 break
@@ -134,6 +131,13 @@ class _StepwiseSelection:
             # One that loses cables to another keeps its evidence.
             last = {h: e for h in self.accepted for old, e in self.forward_evidences.items() if h.overlaps(old)}
             self.forward_evidences |= {**last, best.hypothesis: best.evidence}
+
+    def _required_evidence(self) -> float:
+        """Evidence that a hypothesis needs beside others."""
+        first_evidence = next(iter(self.forward_evidences.values()), 0.0)
+        has_disturbance = self.context.fitter.has_disturbance
+        threshold = self.context.evidence_threshold()
+        return self.context.policy.selection.required_evidence(threshold, first_evidence, has_disturbance)
 
     def _leaves_little(self) -> bool:
         """Whether the accepted hypotheses leave little, or no more than a small random force was missing before."""
@@ -158,7 +162,7 @@ class _StepwiseSelection:
             others = [a for a in self.accepted if a is not tested]
             without = fit_model(self.context, others, self.current.robot, coarse=True)
             score = CandidateScore(tested, self.current, self._evidence(without, others), float("nan"))
-            if score.evidence < self.context.evidence_threshold():
+            if score.evidence < (self._required_evidence() if others else self.context.evidence_threshold()):
                 self._accept(others, fit_model(self.context, others, without.robot))
                 pending = list(others)
                 continue
