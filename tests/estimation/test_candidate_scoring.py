@@ -1,12 +1,16 @@
-"""Scores of a round against its baseline."""
+"""Scores of a round against its baseline, and which candidates it fits."""
 
 from __future__ import annotations
+
+from dataclasses import replace
 
 import pytest
 
 from tautwire.estimation import candidate_scoring
 from tautwire.estimation.candidate_proposals import SearchRound
 from tautwire.estimation.candidate_scores import CandidateScore
+from tautwire.estimation.disturbance import OrnsteinUhlenbeck
+from tautwire.estimation.disturbance_posterior import disturbance_prior
 from tautwire.estimation.estimation_data import split_data
 from tautwire.estimation.hypotheses import Hypothesis
 from tautwire.estimation.identification_context import IdentificationContext
@@ -30,3 +34,18 @@ def test_a_coarse_baseline_is_made_exact_where_it_decides(
     search_round = SearchRound(1, robot, (), None, is_white=True, is_ranking=False)
     scores = candidate_scoring._with_exact_baseline(context, search_round, 1000.0, {hypothesis: score})
     assert scores[hypothesis].evidence == expected
+
+
+def test_an_effect_that_a_large_disturbance_takes_up_is_a_candidate() -> None:
+    """A slow force as large as the load leaves nothing of it to the score test."""
+    robot, recording = example("three"), recorded("three", 1, {"payload": {"mass": 3.0}}).first(400)
+    noise = estimate_noise(robot, recording)
+    small = disturbance_prior(robot, noise).median
+    large = replace(small, force=OrnsteinUhlenbeck(100.0, 0.05))
+    fitter = Fitter(replace(noise, disturbance=large))
+    context = IdentificationContext(robot, fitter, split_data(robot, noise, recording, None))
+    payload = Hypothesis(BY_NAME["payload"], ())
+    search_round = SearchRound(1, robot, (), None, is_white=True, is_ranking=True)
+    under_large, under_small = candidate_scoring._predict_gains(context, search_round)
+    assert under_small[payload].gain > 10.0 * max(under_large[payload].gain, 1.0)
+    assert under_small[payload].values["mass"] == pytest.approx(3.0, rel=0.2)

@@ -15,6 +15,7 @@ from .candidate_fits import (
 )
 from .candidate_proposals import FitTask, SearchRound, shortlist, starting_robots
 from .candidate_scores import CandidateScore, unfitted_score
+from .disturbance_posterior import disturbance_prior
 from .grid_search import grid_search, zero_slope_predictions
 from .hypotheses import Hypothesis, with_hypothesis
 from .identification_context import IdentificationContext
@@ -144,13 +145,24 @@ def _below_exact_baseline(
 
 
 def _predict_gains(context: IdentificationContext, search_round: SearchRound) -> tuple[Predictions, Predictions]:
-    """Predicted gains of a round's candidates, and with process noise, where the model is far from noise."""
+    """Predicted gains of a round's candidates, and others where these may miss a large effect.
+
+    Those are with process noise where the model is far from noise, and under a small disturbance where it has one: the
+    fitted one may have taken up what is slow.
+    """
     robot, accepted = search_round.robot, search_round.accepted
     candidates = search_round.candidates(context.robot)
     # A model far from noise shows it in a part of the recording; a model near noise needs all of it.
     data = context.split.estimation if search_round.is_white else context.head
     predictions = score_test_in_workers(context, robot, accepted, candidates, data)
     predictions |= grid_search(context, robot, accepted, data, zero_slope_predictions(predictions))
+    if context.fitter.has_disturbance:
+        prior = disturbance_prior(robot, context.fitter.noise, context.policy.fit.disturbance)
+        under_median = replace(context, fitter=context.fitter.with_disturbance(prior.median))
+        others = score_test_in_workers(under_median, robot, accepted, candidates, context.head)
+        return predictions, others | grid_search(
+            under_median, robot, accepted, context.head, zero_slope_predictions(others)
+        )
     if search_round.is_white:
         return predictions, {}
     density = context.policy.score_test.rough_noise_density
