@@ -10,9 +10,10 @@ from tautwire.estimation.explained_shares import ExplainedShares
 from tautwire.estimation.hypotheses import Hypothesis, hypotheses
 from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.measurement_noise import estimate_noise
-from tautwire.estimation.parameter_fit import Fitter
+from tautwire.estimation.parameter_fit import Fit, Fitter
+from tautwire.estimation.stepwise_selection import SelectionResult
 from tautwire.estimation.trace_result import FoundEffect
-from tautwire.estimation.verdict import verdict_beside_disturbance
+from tautwire.estimation.verdict import verdict_beside_disturbance, verdict_of
 from tests.support.recordings import recorded
 from tests.support.robots import example
 
@@ -70,7 +71,7 @@ def test_a_listed_effect_gets_no_credit_for_what_is_not_on_the_list(names: tuple
     assert all(name in sentence for name in names)
 
 
-@pytest.mark.parametrize(("share", "size"), [(0.01, 9.0), (0.3, 0.5)])
+@pytest.mark.parametrize(("share", "size"), [(0.01, 9.0), (0.04, 9.0), (0.3, 0.5)])
 def test_effects_of_a_small_share_or_below_noise_are_listed_apart(share: float, size: float) -> None:
     effects = [FoundEffect(name, "cable", (), {}, 50.0) for name in ("damping", "friction")]
     of = shares(0.05, 60.0, damping=(share, size), friction=(0.9, 50.0))
@@ -79,3 +80,16 @@ def test_effects_of_a_small_share_or_below_noise_are_listed_apart(share: float, 
     assert [(each.name, each.share) for each in small] == [("damping", share)]
     word, sentence = verdict(of, "damping", "friction")
     assert word == "effects" and "damping" not in sentence
+
+
+@pytest.mark.parametrize(("evidence", "is_small"), [(5_000.0, True), (20_000.0, False)])
+def test_without_a_disturbance_an_effect_of_little_evidence_is_what_the_form_of_another_leaves(
+    evidence: float, is_small: bool
+) -> None:
+    accepted = (hypothesis("friction"), hypothesis("sensor_gain"))
+    selection = SelectionResult(accepted, (1e6, evidence), Fit.without_parameters(ROBOT), (), ())
+    large = selection.substantial(CONTEXT.policy.selection)
+    word, sentence = verdict_of(ROBOT, selection, large, True, None, False)
+    assert word == "effects"
+    assert ("The model lacks friction; with it and sensor_gain, too small to matter" in sentence) == is_small
+    assert ("friction and sensor_gain; with them, the residual" in sentence) == (not is_small)

@@ -50,9 +50,13 @@ class ExplainedShares:
     size_left: float
 
     def substantial(self, policy: SizePolicy) -> list[int]:
-        """Indices of the effects that matter, the largest first: a share worth a name, and more than noise."""
+        """Indices of the effects that matter, the largest first: a share worth a name, and more than noise.
+
+        And more than what the form of the largest may leave.
+        """
         ranked = sorted(range(len(self.effects)), key=lambda index: -self.effects[index])
-        return [i for i in ranked if self.effects[i] >= policy.min_share and self.sizes[i] >= policy.min_size]
+        least = max(policy.min_share, policy.max_left_share_of_form * max(self.effects, default=0.0))
+        return [i for i in ranked if self.effects[i] >= least and self.sizes[i] >= policy.min_size]
 
 
 def explained_shares(

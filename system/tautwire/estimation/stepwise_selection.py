@@ -23,6 +23,7 @@ from .explained_shares import missed_with_effects, missed_without_effects, senso
 from .hypotheses import Hypothesis, with_hypothesis
 from .identification_context import IdentificationContext
 from .parameter_fit import Fit, Fitter
+from .policy import SelectionPolicy
 from .residual_analysis import residuals_are_white
 from .smoothed_states import calibrated_robot
 from .time_limit import OutOfTimeError
@@ -42,6 +43,11 @@ class SelectionResult:
     candidates: tuple[Candidate, ...]
     confusable: tuple[tuple[str, ...], ...]
     disturbance: Disturbance | None = None
+
+    def substantial(self, policy: SelectionPolicy) -> list[int]:
+        """Indices of the accepted hypotheses with more evidence than what the strongest one's form may leave."""
+        least = policy.min_exact_evidence_ratio * max(self.evidence, default=0.0)
+        return [index for index, evidence in enumerate(self.evidence) if evidence >= least]
 
 
 def nothing_selected(robot: Robot) -> SelectionResult:

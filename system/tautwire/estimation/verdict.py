@@ -21,14 +21,24 @@ IS_WHITE = "the residual is white noise"
 
 
 def verdict_of(
-    robot: Robot, selection: SelectionResult, effects_hold: bool, discovery: Discovery | None, white_before: bool
+    robot: Robot,
+    selection: SelectionResult,
+    large: Sequence[int],
+    effects_hold: bool,
+    discovery: Discovery | None,
+    white_before: bool,
 ) -> tuple[Verdict, str]:
     """Verdict and its sentence on a declared robot, whose residual was white ``white_before``.
 
-    ``effects_hold`` tells whether the FMUs confirm the selection; ``discovery`` is a formula that they confirm.
+    ``large`` are indices of the accepted hypotheses that matter; ``effects_hold`` tells whether the FMUs confirm the
+    selection; ``discovery`` is a formula that they confirm.
     """
-    names = " and ".join(h.label(robot) for h in selection.accepted)
-    lacks = f"The model lacks {names}; with {'it' if len(selection.accepted) == 1 else 'them'}, {IS_WHITE}."
+    labels = [hypothesis.label(robot) for hypothesis in selection.accepted]
+    names, small = " and ".join(labels), [label for index, label in enumerate(labels) if index not in large]
+    lacking = " and ".join(labels[index] for index in large)
+    with_small = f" and {_sum_up(small)}, too small to matter" if small else ""
+    pronoun = "it" if len(large) == 1 else "them"
+    lacks = f"The model lacks {lacking}; with {pronoun}{with_small}, {IS_WHITE}."
     formula = confirmed_formula(robot, selection, effects_hold, discovery)
     if effects_hold and formula:
         return "discovered", f"{lacks} This effect is not on the list of known ones: {formula}."
