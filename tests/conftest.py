@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 
 # Modules by the time they take, so that none is left to one worker at the end.
 SLOWEST_FIRST = (
+    "inexact_forms",
     "unexplained_residual",
     "trace_beside_disturbance",
     "wheel",

@@ -79,6 +79,7 @@ def test_the_dashboard_is_where_the_command_says(users: Users, tmp_path: Path) -
         assert page.status == 200 and b"Dask" in page.read()
 
 
+@pytest.mark.validate
 def test_fmus_reach_each_worker_once(users: Users, tmp_path: Path) -> None:
     def unpacked() -> dict[Path, tuple[int, int]]:
         """All that each worker keeps of FMUs, with the folder that changes where something is unpacked into it."""

@@ -47,6 +47,7 @@ def paths(monkeypatch: pytest.MonkeyPatch) -> set[Calls]:
     return noted
 
 
+@pytest.mark.validate
 def test_the_optimiser_is_at_most_twelve_calls_from_the_command(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, paths: set[Calls]
 ) -> None:

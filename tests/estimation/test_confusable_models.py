@@ -56,6 +56,7 @@ def test_softer_ropes_with_damping_make_room_for_the_frame_that_they_stood_for()
     assert found.confusable == ()
 
 
+@pytest.mark.validate
 def test_a_frame_without_which_nothing_can_be_run_has_evidence_beyond_measure(monkeypatch: pytest.MonkeyPatch) -> None:
     as_it_is = Fitter.judged
 

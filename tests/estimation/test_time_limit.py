@@ -139,6 +139,7 @@ def test_a_trace_without_time_for_effects_is_unexplained(recordings: tuple[Recor
     assert found.seconds == 601.0
 
 
+@pytest.mark.validate
 def test_effects_found_before_time_was_up_are_reported(recordings: tuple[Recording, Recording]) -> None:
     found = traced_until("intervals", *recordings)
     (effect,) = found.effects
@@ -149,6 +150,7 @@ def test_effects_found_before_time_was_up_are_reported(recordings: tuple[Recordi
     assert found.identifiability.detectable == ()
 
 
+@pytest.mark.validate
 def test_candidates_fitted_before_time_was_up_count(recordings: tuple[Recording, Recording]) -> None:
     found = traced_until("round 1: damping", *recordings)
     assert any(sentence.startswith("There was no time for fits of") for sentence in found.untried)

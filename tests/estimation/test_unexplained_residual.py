@@ -24,6 +24,7 @@ def traced(effects: dict[str, Any], samples: int) -> Trace:
     return trace(example("three"), fit, check, lambda what, done: None)
 
 
+@pytest.mark.validate
 def test_a_formula_that_is_discovered_runs_in_the_fmus(tmp_path: Path) -> None:
     found = traced({"unlisted_sideways": {"constant": 30.0}}, 201)
     assert found.verdict == "discovered"
