@@ -58,7 +58,7 @@ def _with_values_of(
     unseen_gain = marginal_log_likelihood(fitter, fit.robot, chosen, split.validation, is_coarse=False)
     unseen_gain -= marginal_log_likelihood(context.fitter, robot, accepted, split.validation, is_coarse=False)
     policy = context.policy.selection
-    left_by_form = policy.min_evidence_ratio * evidence[shared]
+    left_by_form = policy.min_cable_evidence_ratio * evidence[shared]
     is_worth_its_price = gain > _schwarz_price(context, len(fit.values) - len(selection.fit.values))
     if not is_worth_its_price or gain + unseen_gain <= left_by_form:
         return context, selection
