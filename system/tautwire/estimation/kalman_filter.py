@@ -230,27 +230,10 @@ def _time_update(model: SymbolicModel, constant_count: int, state: SX, interval:
     reduced = constants_as_parameters(model, constant_count)
     theta = casadi.vertcat(model.parameters, state[moving:])
     runge_kutta_step = _runge_kutta_step(reduced, interval.speed.numel())
-    trajectory = [state[:moving]]
-    substeps = interval.substeps
-    for begin, end in interval.parts(substeps.state):
-        trajectory.append(runge_kutta_step(trajectory[-1], theta, begin, end, interval.step / substeps.state))
-    rate_jacobians = Function(
-        "slope",
-        [reduced.states, reduced.inputs, reduced.parameters],
-        [casadi.jacobian(reduced.rates, symbol) for symbol in (reduced.states, reduced.parameters)],
-    )
-    transition, sensitivities = SX.eye(moving), SX(moving, theta.numel())
-    substep = interval.step / substeps.slope
-    for index, (begin, end) in enumerate(interval.parts(substeps.slope)):
-        middle = _interpolated(trajectory, (index + 0.5) / substeps.slope)
-        inputs = casadi.vertcat(0.5 * (begin + end), SX(3, 1))
-        by_state, by_parameters = rate_jacobians(middle, inputs, theta)
-        gamma = _integrated_exponential(by_state, substep / 2**substeps.doublings, substeps.order)
-        for _ in range(substeps.doublings):
-            gamma = 2.0 * gamma + casadi.mtimes(casadi.mtimes(by_state, gamma), gamma)
-        substep_transition = SX.eye(moving) + casadi.mtimes(by_state, gamma)
-        transition = casadi.mtimes(substep_transition, transition)
-        sensitivities = casadi.mtimes(substep_transition, sensitivities) + casadi.mtimes(gamma, by_parameters)
+    trajectory, steps = [state[:moving]], interval.substeps.state
+    for begin, end in interval.parts(steps):
+        trajectory.append(runge_kutta_step(trajectory[-1], theta, begin, end, interval.step / steps))
+    transition, sensitivities = _sensitivities(reduced, theta, trajectory, interval)
     return (
         casadi.vertcat(trajectory[-1], state[moving:]),
         casadi.vertcat(
@@ -259,6 +242,29 @@ def _time_update(model: SymbolicModel, constant_count: int, state: SX, interval:
         ),
         casadi.vertcat(sensitivities[:, :parameter_count], SX(constant_count, parameter_count)),
     )
+
+
+def _sensitivities(model: SymbolicModel, theta: SX, trajectory: list[SX], interval: _Interval) -> tuple[SX, SX]:
+    """Derivatives of the end of a trajectory by its begin and by the parameters, whose values are ``theta``."""
+    rate_jacobians = Function(
+        "slope",
+        [model.states, model.inputs, model.parameters],
+        [casadi.jacobian(model.rates, symbol) for symbol in (model.states, model.parameters)],
+    )
+    count, substeps = trajectory[0].numel(), interval.substeps
+    transition, sensitivities = SX.eye(count), SX(count, theta.numel())
+    substep = interval.step / substeps.slope
+    for index, (begin, end) in enumerate(interval.parts(substeps.slope)):
+        middle = _interpolated(trajectory, (index + 0.5) / substeps.slope)
+        inputs = casadi.vertcat(0.5 * (begin + end), SX(3, 1))
+        by_state, by_parameters = rate_jacobians(middle, inputs, theta)
+        gamma = _integrated_exponential(by_state, substep / 2**substeps.doublings, substeps.order)
+        for _ in range(substeps.doublings):
+            gamma = 2.0 * gamma + casadi.mtimes(casadi.mtimes(by_state, gamma), gamma)
+        substep_transition = SX.eye(count) + casadi.mtimes(by_state, gamma)
+        transition = casadi.mtimes(substep_transition, transition)
+        sensitivities = casadi.mtimes(substep_transition, sensitivities) + casadi.mtimes(gamma, by_parameters)
+    return transition, sensitivities
 
 
 def _interpolated(trajectory: list[SX], fraction: float) -> SX:
