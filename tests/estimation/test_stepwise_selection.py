@@ -46,15 +46,20 @@ def searched(name: str, seed: int, effects: dict[str, Any]) -> tuple[SelectionRe
     return found, all(residuals_are_white(fitter.innovations(found.fit.robot, s), s.rows) for s in samples)
 
 
-@pytest.mark.parametrize(("has_disturbance", "names"), [(False, ["damping", "payload"]), (True, ["damping"])])
-def test_beside_a_disturbance_a_further_effect_needs_a_share_of_the_first_ones_evidence(
-    has_disturbance: bool, names: list[str], monkeypatch: pytest.MonkeyPatch
-) -> None:
+def context_with(has_disturbance: bool) -> IdentificationContext:
     robot, recording = example("three"), recorded("three", 1)
     noise = estimate_noise(robot, recording)
     if has_disturbance:
         noise = replace(noise, disturbance=disturbance_prior(robot, noise).median)
-    context = IdentificationContext(robot, Fitter(noise), split_data(robot, noise, recording, None))
+    return IdentificationContext(robot, Fitter(noise), split_data(robot, noise, recording, None))
+
+
+@pytest.mark.parametrize(("has_disturbance", "names"), [(False, ["damping", "payload"]), (True, ["damping"])])
+def test_beside_a_disturbance_a_further_effect_needs_a_share_of_the_first_ones_evidence(
+    has_disturbance: bool, names: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    context = context_with(has_disturbance)
+    robot = context.robot
     fit = Fit.without_parameters(robot)
     rounds = iter([("damping", 1000.0), ("payload", 40.0), ("drag", 0.0)])
 
@@ -76,11 +81,8 @@ def test_beside_a_disturbance_a_further_effect_needs_a_share_of_the_first_ones_e
 def test_beside_a_disturbance_what_came_first_needs_as_much_evidence_beside_what_came_later(
     has_disturbance: bool, names: list[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    robot, recording = example("three"), recorded("three", 1)
-    noise = estimate_noise(robot, recording)
-    if has_disturbance:
-        noise = replace(noise, disturbance=disturbance_prior(robot, noise).median)
-    context = IdentificationContext(robot, Fitter(noise), split_data(robot, noise, recording, None))
+    context = context_with(has_disturbance)
+    robot = context.robot
     slack, sag = (Hypothesis(BY_NAME[name], (1, 2, 3)) for name in ("slack", "sag"))
     fit = Fit.without_parameters(robot.with_effect(slack.setting(robot)).with_effect(sag.setting(robot)))
     selection = stepwise_selection._StepwiseSelection(context, fit, context.fitter, [slack, sag])
