@@ -28,12 +28,7 @@ LENGTH = float(np.linalg.norm(ROBOT.anchors[0] - ROBOT.start))
 
 FORMS: dict[str, dict[str, Any]] = {
     "damping by a power": {"damping": {"damping": 3.0 * DAMPING, "exponent": 0.7, "reference": 0.1 * STRAIN}},
-    "relaxation by a spectrum": {
-        "relaxation": {"modulus": [0.03 * MODULUS] * 6, "time": np.geomspace(0.03, 10.0, 6).tolist()}
-    },
     "hysteresis with beta 0.6": {"hysteresis": {"force": 0.01 * TENSION, "yield_strain": 0.05 * STRAIN, "beta": 0.6}},
-    "creep by a power": {"creep": {"compliance": 0.05 / MODULUS, "time": 4.0, "form": "power"}},
-    "thermal hyperbola": {"thermal": {"expansion": 1.2e-5, "rise": 20.0, "time": 8.0, "form": "hyperbolic"}},
     "sag by another parabola": {"sag": {"linear_density": 0.05 * TENSION / (9.81 * LENGTH), "form": "steep"}},
     "tilted pulley": {"pulley": {"radius": 0.1, "tilt": 0.12}},
     "drum in layers": {"drum": {"radius_ratio": 1.01, "build_up": 1e-4}},
