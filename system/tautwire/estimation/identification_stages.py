@@ -16,7 +16,7 @@ from .cosimulation_validation import (
     validate_by_cosimulation,
 )
 from .declared_start import with_declared_start
-from .discovery.unexplained_residual import UnexplainedResidual, explain_residual
+from .discovery.unexplained_residual import explain_residual
 from .effect_estimates import effects_by_size, estimated_effects
 from .explained_shares import ExplainedShares, explained_shares, remaining_error, sensor_noise_floor
 from .identifiability import analyse_identifiability
@@ -24,7 +24,7 @@ from .identification_state import Identification
 from .localisation.component_localisation import localise_residual
 from .parameter_fit import Fitter
 from .policy import TimeLimitPolicy
-from .preprocessing import calibrated_estimation_data, with_disturbance
+from .preprocessing import calibrated_estimation_data
 from .smoothed_states import calibrate, calibrated_robot
 from .stepwise_selection import select_effects
 from .verdict import verdict_beside_disturbance, verdict_of, verdict_of_ended_search
@@ -127,26 +127,6 @@ def explain_by_formula(state: Identification) -> Identification:
     return state if confirmed is None else replace(confirmed, discovery=unexplained.discovery)
 
 
-def select_beside_disturbance(state: Identification) -> Identification:
-    """Select effects beside a disturbance, where neither a formula nor a few effects leave white noise.
-
-    An effect whose form is not quite nature's leaves a little, which then passes for a random force. What leaves more
-    is none of the list.
-    """
-    policy = state.context.policy.size
-    has_few = state.effects_hold and len(state.selection.accepted) < policy.min_suspicious_effects
-    if has_few or state.discovery or _nothing_lacks(state) or state.context.fitter.has_disturbance:
-        return state
-    prepared = with_disturbance(state.prepared, state.context.robot)
-    context = replace(state.context, fitter=prepared.fitter, split=prepared.split)
-    beside = replace(state, context=context, prepared=prepared, unexplained=UnexplainedResidual())
-    for stage in (select, separate_cables, confirm_effects):
-        beside = stage(beside)
-    has_fewer = not state.effects_hold or len(beside.selection.accepted) < len(state.selection.accepted)
-    is_explained = beside.selection.accepted and beside.shares and beside.shares.left <= policy.max_left_share_of_form
-    return beside if is_explained and has_fewer else state
-
-
 def judge(state: Identification) -> Identification:
     """Put the verdict in words."""
     if state.shares:
@@ -195,7 +175,6 @@ STAGES: tuple[Callable[[Identification], Identification], ...] = (
     cosimulate_before,
     confirm_effects,
     explain_by_formula,
-    select_beside_disturbance,
     judge,
     estimate_intervals,
     analyse_detectability,
@@ -208,9 +187,8 @@ SEARCHES: Mapping[Callable[[Identification], Identification], tuple[Callable[[Ti
     select_with_clocks_corrected: (attrgetter("selection"), "correcting clocks that seem to be apart"),
     try_confusable_models: (attrgetter("selection"), "models that are easily confused with the effects found"),
     try_declared_start: (attrgetter("selection"), "trying a sensor's offset in place of another start"),
-    separate_cables: (attrgetter("second_search"), "values of single cables"),
+    separate_cables: (attrgetter("values_of_cables"), "values of single cables"),
     explain_by_formula: (attrgetter("discovery"), "formulas and resonances"),
-    select_beside_disturbance: (attrgetter("second_search"), "effects beside a disturbance"),
     estimate_intervals: (attrgetter("refinement"), "estimates of the parameters"),
     analyse_detectability: (attrgetter("refinement"), "telling what the recordings could have shown"),
 }

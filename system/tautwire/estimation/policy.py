@@ -308,12 +308,9 @@ class SizePolicy:
     # Share of what was missed below which no further effect is looked for: what is left is seldom one effect's. At 4 %
     # and at 2 % searches ended with relaxation where damping and a modulus were hidden.
     max_left_share: float = 0.01
-    # Share of what an effect explains that its form may leave: a further one is small below it, and where there was no
-    # disturbance at first, what leaves more of what was missed is not on the list. Sag by another parabola left 3 % to
-    # an offset.
+    # Share of what the largest effect explains that its form may leave: a further one is small below it. Sag by another
+    # parabola left 3 % to an offset.
     max_left_share_of_form: float = 0.05
-    # Effects that are needed together to leave white noise, from which one whose form is not exact may be all there is.
-    min_suspicious_effects: int = 3
     # Least share that all effects together explain, where much is left: below, nothing on the list explains it.
     min_explained_share: float = 0.25
     # Standard deviations within which an uncertain number of the robot without effects is taken at its best.
@@ -329,10 +326,10 @@ class TimeLimitPolicy:
 
     # Effects: three rounds of co-simulations follow, which take as long as a third of a whole trace.
     selection: float = 0.6
-    # Formulas and resonances, which one more co-simulation confirms; a search beside a disturbance may follow.
-    discovery: float = 0.5
-    # That search, and values of single cables: what they tell is worth more than another alternative.
-    second_search: float = 0.8
+    # Values of single cables: what they tell is worth more than another alternative.
+    values_of_cables: float = 0.75
+    # Formulas and resonances, which one more co-simulation confirms.
+    discovery: float = 0.75
     # Intervals, what could have been seen, and the component in question.
     refinement: float = 0.9
     # Samples for each second of the limit at most, but no fewer than the second number: co-simulations take their time
