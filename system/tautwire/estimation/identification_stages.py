@@ -145,9 +145,11 @@ def estimate_intervals(state: Identification) -> Identification:
         return state
     effects = estimated_effects(state.context, state.selection)
     if state.shares is None:
+        accepted = state.selection.accepted
         indices = state.selection.substantial(state.context.policy.selection)
-        small = tuple(effect for index, effect in enumerate(effects) if index not in indices)
-        return replace(state, effects=tuple(effects[index] for index in indices), small_effects=small)
+        names = {(accepted[index].effect.name, accepted[index].cables) for index in indices}
+        small = tuple(effect for effect in effects if (effect.name, effect.cables) not in names)
+        return replace(state, effects=tuple(each for each in effects if each not in small), small_effects=small)
     large, small = effects_by_size(effects, state.shares, state.context.policy.size)
     if not state.effects_hold:
         large, small = (), (*large, *small)
