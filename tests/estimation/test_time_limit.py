@@ -21,8 +21,10 @@ from tautwire.estimation.estimation_data import split_data
 from tautwire.estimation.hypotheses import Hypothesis
 from tautwire.estimation.identification import policy_within
 from tautwire.estimation.identification_context import IdentificationContext
+from tautwire.estimation.identification_stages import SEARCHES, select, separate_cables
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fit, Fitter
+from tautwire.estimation.policy import DEFAULT_POLICY
 from tautwire.estimation.time_limit import OutOfTimeError, TimeLimit
 from tautwire.estimation.worker_pool import WorkerPool
 from tautwire.recordings.recording import Recording
@@ -54,6 +56,20 @@ def test_only_a_search_is_ended_and_only_when_its_share_is_used_up() -> None:
     with limit.searching(0.9):
         limit.check()
     assert limit.elapsed == 61.0
+
+
+def test_values_of_cables_have_time_where_the_search_used_all_of_its_own() -> None:
+    clock = Clock()
+    limit = TimeLimit(100.0, clock)
+    share_of_selection, share_of_cables = (
+        SEARCHES[stage][0](DEFAULT_POLICY.time_limit) for stage in (select, separate_cables)
+    )
+    with limit.searching(share_of_selection):
+        clock.now = 1.001 * limit.seconds * share_of_selection
+        with pytest.raises(OutOfTimeError):
+            limit.check()
+    with limit.searching(share_of_cables):
+        limit.check()
 
 
 def test_what_is_left_untried_is_told_once() -> None:

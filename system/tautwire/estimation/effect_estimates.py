@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from itertools import combinations
 
@@ -14,7 +14,7 @@ from tautwire_fmu.laws.effects import UNLISTED
 from ..robot.schema import Robot
 from ..robot.symbolic_model import FORMULA_INDEX
 from .explained_shares import ExplainedShares
-from .hypotheses import declared_value
+from .hypotheses import Hypothesis, declared_value
 from .identification_context import IdentificationContext
 from .parameter_fit import Fit
 from .parameter_stability import stable_intervals
@@ -99,6 +99,15 @@ def effects_by_size(
     with_shares = [replace(effect, share=share) for effect, share in zip(effects, shares.effects, strict=True)]
     large = shares.substantial(policy)
     return tuple(with_shares[i] for i in large), tuple(e for i, e in enumerate(with_shares) if i not in large)
+
+
+def effects_by_evidence(
+    effects: Sequence[FoundEffect], substantial: Collection[Hypothesis]
+) -> tuple[tuple[FoundEffect, ...], tuple[FoundEffect, ...]]:
+    """The effects of the substantial hypotheses, and the others, both in order."""
+    keys = {(hypothesis.effect.name, hypothesis.cables) for hypothesis in substantial}
+    large = tuple(effect for effect in effects if (effect.name, effect.cables) in keys)
+    return large, tuple(effect for effect in effects if effect not in large)
 
 
 def parameter_correlations(fit: Fit, effects: Sequence[FoundEffect]) -> tuple[Correlation, ...]:

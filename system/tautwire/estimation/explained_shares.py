@@ -50,9 +50,9 @@ class ExplainedShares:
     size_left: float
 
     def substantial(self, policy: SizePolicy) -> list[int]:
-        """Indices of the effects that matter, the largest first: a share worth a name, and more than noise.
+        """Indices of the effects that matter, the largest first.
 
-        And more than what the form of the largest may leave.
+        Their shares are worth a name, and more than the form of the largest may leave; their sizes are beyond noise.
         """
         ranked = sorted(range(len(self.effects)), key=lambda index: -self.effects[index])
         least = max(policy.min_share, policy.max_left_share_of_form * max(self.effects, default=0.0))

@@ -17,7 +17,7 @@ from .cosimulation_validation import (
 )
 from .declared_start import with_declared_start
 from .discovery.unexplained_residual import explain_residual
-from .effect_estimates import effects_by_size, estimated_effects
+from .effect_estimates import effects_by_evidence, effects_by_size, estimated_effects
 from .explained_shares import ExplainedShares, explained_shares, remaining_error, sensor_noise_floor
 from .identifiability import analyse_identifiability
 from .identification_state import Identification
@@ -131,9 +131,9 @@ def judge(state: Identification) -> Identification:
     """Put the verdict in words."""
     if state.shares:
         return _judged_beside_disturbance(state, state.shares)
-    large = state.selection.substantial(state.context.policy.selection)
+    substantial = state.selection.substantial(state.context.policy.selection)
     verdict = verdict_of(
-        state.context.robot, state.selection, large, state.effects_hold, state.discovery, state.is_white_before
+        state.context.robot, state.selection, substantial, state.effects_hold, state.discovery, state.is_white_before
     )
     return replace(state, verdict=verdict_of_ended_search(verdict, state.context.time_limit))
 
@@ -145,11 +145,8 @@ def estimate_intervals(state: Identification) -> Identification:
         return state
     effects = estimated_effects(state.context, state.selection)
     if state.shares is None:
-        accepted = state.selection.accepted
-        indices = state.selection.substantial(state.context.policy.selection)
-        names = {(accepted[index].effect.name, accepted[index].cables) for index in indices}
-        small = tuple(effect for effect in effects if (effect.name, effect.cables) not in names)
-        return replace(state, effects=tuple(each for each in effects if each not in small), small_effects=small)
+        large, small = effects_by_evidence(effects, state.selection.substantial(state.context.policy.selection))
+        return replace(state, effects=large, small_effects=small)
     large, small = effects_by_size(effects, state.shares, state.context.policy.size)
     if not state.effects_hold:
         large, small = (), (*large, *small)

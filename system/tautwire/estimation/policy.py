@@ -216,9 +216,8 @@ class SelectionPolicy:
     # quite the form of nature's. A modulus of 1.25 beside a little relaxation had 759 nats, relaxation alone 838.
     form_tie_ratio: float = 0.1
 
-    # Share of the first effect's evidence that a further one needs beside a disturbance, and another one after it: less
-    # may be what the first one's form leaves. After a modulus (842 nats) and damping (346), relaxation of one cable had
-    # 18; beside a drum in layers (830 nats) relaxation had 59.
+    # Share of the first effect's evidence that a further one needs beside a disturbance: less may be what the first
+    # one's form leaves. Relaxation had 18 nats after a modulus with 842, and 59 beside a drum in layers with 830.
     min_evidence_ratio: float = 0.1
     # Share of an effect's evidence that values of single cables have to gain: they add no name. Drums of a real robot,
     # 0.93 to 0.97, gained more than 18 and less than 36 nats of 357.

@@ -44,10 +44,10 @@ class SelectionResult:
     confusable: tuple[tuple[str, ...], ...]
     disturbance: Disturbance | None = None
 
-    def substantial(self, policy: SelectionPolicy) -> list[int]:
-        """Indices of the accepted hypotheses with more evidence than what the strongest one's form may leave."""
+    def substantial(self, policy: SelectionPolicy) -> tuple[Hypothesis, ...]:
+        """The accepted hypotheses with more evidence than what the strongest one's form may leave."""
         least = policy.min_exact_evidence_ratio * max(self.evidence, default=0.0)
-        return [index for index, evidence in enumerate(self.evidence) if evidence >= least]
+        return tuple(h for h, evidence in zip(self.accepted, self.evidence, strict=True) if evidence >= least)
 
 
 def nothing_selected(robot: Robot) -> SelectionResult:
@@ -129,7 +129,7 @@ class _StepwiseSelection:
                 self.complete_rounds[tuple(self.accepted)] = scores
             policy, has_disturbance = self.context.policy.selection, self.context.fitter.has_disturbance
             best = most_parsimonious(scores, policy, has_disturbance)
-            significant = best is not None and best.evidence > self._required_evidence()
+            significant = best is not None and best.evidence > self._required_evidence(self.accepted)
             self.candidates += [trial.candidate(number, significant and trial is best) for trial in scores]
             if best is None or not significant:
                 break
@@ -138,9 +138,9 @@ class _StepwiseSelection:
             last = {h: e for h in self.accepted for old, e in self.forward_evidences.items() if h.overlaps(old)}
             self.forward_evidences |= {**last, best.hypothesis: best.evidence}
 
-    def _required_evidence(self) -> float:
-        """Evidence that a hypothesis needs beside others."""
-        first_evidence = next(iter(self.forward_evidences.values()), 0.0)
+    def _required_evidence(self, others: Sequence[Hypothesis]) -> float:
+        """Evidence that a hypothesis needs beside the others."""
+        first_evidence = next(iter(self.forward_evidences.values()), 0.0) if others else 0.0
         has_disturbance = self.context.fitter.has_disturbance
         threshold = self.context.evidence_threshold()
         return self.context.policy.selection.required_evidence(threshold, first_evidence, has_disturbance)
@@ -168,7 +168,7 @@ class _StepwiseSelection:
             others = [a for a in self.accepted if a is not tested]
             without = fit_model(self.context, others, self.current.robot, coarse=True)
             score = CandidateScore(tested, self.current, self._evidence(without, others), float("nan"))
-            if score.evidence < (self._required_evidence() if others else self.context.evidence_threshold()):
+            if score.evidence < self._required_evidence(others):
                 self._accept(others, fit_model(self.context, others, without.robot))
                 pending = list(others)
                 continue

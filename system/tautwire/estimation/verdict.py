@@ -23,21 +23,21 @@ IS_WHITE = "the residual is white noise"
 def verdict_of(
     robot: Robot,
     selection: SelectionResult,
-    large: Sequence[int],
+    substantial: Sequence[Hypothesis],
     effects_hold: bool,
     discovery: Discovery | None,
     white_before: bool,
 ) -> tuple[Verdict, str]:
     """Verdict and its sentence on a declared robot, whose residual was white ``white_before``.
 
-    ``large`` are indices of the accepted hypotheses that matter; ``effects_hold`` tells whether the FMUs confirm the
+    ``substantial`` are the accepted hypotheses that matter; ``effects_hold`` tells whether the FMUs confirm the
     selection; ``discovery`` is a formula that they confirm.
     """
-    labels = [hypothesis.label(robot) for hypothesis in selection.accepted]
-    names, small = " and ".join(labels), [label for index, label in enumerate(labels) if index not in large]
-    lacking = " and ".join(labels[index] for index in large)
+    names = " and ".join(hypothesis.label(robot) for hypothesis in selection.accepted)
+    lacking = " and ".join(hypothesis.label(robot) for hypothesis in substantial)
+    small = [hypothesis.label(robot) for hypothesis in selection.accepted if hypothesis not in substantial]
     with_small = f" and {_sum_up(small)}, too small to matter" if small else ""
-    pronoun = "it" if len(large) == 1 else "them"
+    pronoun = "it" if len(substantial) == 1 else "them"
     lacks = f"The model lacks {lacking}; with {pronoun}{with_small}, {IS_WHITE}."
     formula = confirmed_formula(robot, selection, effects_hold, discovery)
     if effects_hold and formula:
