@@ -9,8 +9,8 @@ from tautwire.estimation import preprocessing, trace
 from tautwire.estimation.clock_offsets import CHANNEL_GROUPS, shifted
 from tautwire.estimation.estimation_data import DataSplit
 from tautwire.estimation.parameter_fit import Fitter
-from tautwire.estimation.policy import ClockOffsetPolicy
 from tautwire.estimation.preprocessing import PreparedData, prepare_data
+from tautwire.estimation.preprocessing_policy import ClockOffsetPolicy
 from tautwire.estimation.worker_pool import WorkerPool
 from tautwire.recordings.recording import Recording
 from tautwire.robot.schema import Robot

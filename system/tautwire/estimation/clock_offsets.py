@@ -21,7 +21,8 @@ from .estimation_data import DataSet, DataSplit
 from .innovation_sensitivities import LinearisedSegment, linearise_filter
 from .likelihood import Likelihood
 from .parameter_fit import Fitter
-from .policy import DEFAULT_POLICY, ClockOffsetPolicy
+from .policy import DEFAULT_POLICY
+from .preprocessing_policy import ClockOffsetPolicy
 
 Array = NDArray[np.float64]
 

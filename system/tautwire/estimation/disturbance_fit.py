@@ -29,7 +29,8 @@ from .disturbance_posterior import (
 from .estimation_data import DataSet
 from .hypotheses import Hypothesis, with_values
 from .parameter_fit import Fit, Fitter, parameter_bounds, parameter_scales
-from .policy import DEFAULT_POLICY, DisturbancePolicy
+from .policy import DEFAULT_POLICY
+from .preprocessing_policy import DisturbancePolicy
 
 Array = NDArray[np.float64]
 

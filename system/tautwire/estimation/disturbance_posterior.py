@@ -28,7 +28,8 @@ from .disturbance import Disturbance, OrnsteinUhlenbeck
 from .estimation_data import DataSet
 from .kalman_filter import Noise
 from .likelihood import Likelihood
-from .policy import DEFAULT_POLICY, DisturbancePolicy
+from .policy import DEFAULT_POLICY
+from .preprocessing_policy import DisturbancePolicy
 
 Array = NDArray[np.float64]
 

@@ -14,7 +14,8 @@ from ..recordings.start_position import start_position, with_start
 from ..robot.schema import Robot
 from ..robot.static_equilibrium import static_tensions, unit_directions
 from .kalman_filter import Noise
-from .policy import DEFAULT_POLICY, InitialStatePolicy
+from .policy import DEFAULT_POLICY
+from .preprocessing_policy import InitialStatePolicy
 
 Array = NDArray[np.float64]
 

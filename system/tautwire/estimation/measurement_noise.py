@@ -14,7 +14,8 @@ from ..recordings.recording import Recording
 from ..recordings.white_noise_estimate import white_noise_deviation
 from ..robot.schema import Robot
 from .kalman_filter import Noise
-from .policy import DEFAULT_POLICY, NoiseCheckPolicy
+from .policy import DEFAULT_POLICY
+from .preprocessing_policy import NoiseCheckPolicy
 
 Array = NDArray[np.float64]
 

@@ -32,7 +32,8 @@ from .kalman_filter import Noise
 from .likelihood import Innovations
 from .measurement_noise import check_noise, estimate_noise
 from .parameter_fit import Fitter
-from .policy import DEFAULT_POLICY, IdentificationPolicy, PreprocessingPolicy, ResidualAnalysisPolicy
+from .policy import DEFAULT_POLICY, IdentificationPolicy, ResidualAnalysisPolicy
+from .preprocessing_policy import PreprocessingPolicy
 from .residual_analysis import has_enough_samples, residuals_are_white
 from .smoothed_states import calibrate
 from .worker_pool import WorkerPool
