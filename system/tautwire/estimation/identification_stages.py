@@ -16,7 +16,7 @@ from .cosimulation_validation import (
     validate_by_cosimulation,
 )
 from .declared_start import with_declared_start
-from .discovery.unexplained_residual import explain_residual
+from .discovery.unexplained_residual import UnexplainedResidual, explain_residual
 from .effect_estimates import effects_by_evidence, effects_by_size, estimated_effects
 from .explained_shares import ExplainedShares, explained_shares, remaining_error, sensor_noise_floor
 from .identifiability import analyse_identifiability
@@ -24,7 +24,7 @@ from .identification_state import Identification
 from .localisation.component_localisation import localise_residual
 from .parameter_fit import Fitter
 from .policy import TimeLimitPolicy
-from .preprocessing import calibrated_estimation_data
+from .preprocessing import calibrated_estimation_data, with_disturbance
 from .smoothed_states import calibrate, calibrated_robot
 from .stepwise_selection import select_effects
 from .verdict import verdict_beside_disturbance, verdict_of, verdict_of_ended_search
@@ -127,6 +127,28 @@ def explain_by_formula(state: Identification) -> Identification:
     return state if confirmed is None else replace(confirmed, discovery=unexplained.discovery)
 
 
+def select_beside_disturbance(state: Identification) -> Identification:
+    """Select effects beside a disturbance, for which what an inexact form leaves may pass.
+
+    Where neither a formula nor a few effects leave white noise. Not where an oscillator is hidden: that is no form.
+    """
+    if state.discovery or state.unexplained.resonances or _is_explained_by_few_effects(state):
+        return state
+    policy = state.context.policy.size
+    prepared = with_disturbance(state.prepared, state.context.robot)
+    context = replace(state.context, fitter=prepared.fitter, split=prepared.split)
+    note = "few effects leave more than white noise: the forms of those named are not quite nature's"
+    beside = replace(state, context=context, prepared=prepared, unexplained=UnexplainedResidual(notes=(note,)))
+    for stage in (select, separate_cables, confirm_effects):
+        beside = stage(beside)
+    shares = beside.shares
+    if shares is None or not beside.selection.accepted:
+        return state
+    is_form = shares.left <= policy.max_left_share_of_form and shares.size_missed > policy.max_size_of_disturbance
+    has_fewer = not state.effects_hold or len(beside.selection.accepted) < len(state.selection.accepted)
+    return beside if is_form and has_fewer else state
+
+
 def judge(state: Identification) -> Identification:
     """Put the verdict in words."""
     if state.shares:
@@ -174,6 +196,7 @@ STAGES: tuple[Callable[[Identification], Identification], ...] = (
     cosimulate_before,
     confirm_effects,
     explain_by_formula,
+    select_beside_disturbance,
     judge,
     estimate_intervals,
     analyse_detectability,
@@ -188,6 +211,7 @@ SEARCHES: Mapping[Callable[[Identification], Identification], tuple[Callable[[Ti
     try_declared_start: (attrgetter("selection"), "trying a sensor's offset in place of another start"),
     separate_cables: (attrgetter("values_of_cables"), "values of single cables"),
     explain_by_formula: (attrgetter("discovery"), "formulas and resonances"),
+    select_beside_disturbance: (attrgetter("second_search"), "effects whose form is not quite nature's"),
     estimate_intervals: (attrgetter("refinement"), "estimates of the parameters"),
     analyse_detectability: (attrgetter("refinement"), "telling what the recordings could have shown"),
 }
@@ -227,6 +251,14 @@ def _judged_beside_disturbance(state: Identification, shares: ExplainedShares) -
         comparisons = tuple(replace(c, after=c.before, errors_after=c.errors_before) for c in state.comparisons)
         return replace(state, final_robot=context.robot, comparisons=comparisons)
     return state
+
+
+def _is_explained_by_few_effects(state: Identification) -> bool:
+    """Whether effects of exact form are the answer: a few that leave white noise, or none where nothing lacks."""
+    if state.context.fitter.has_disturbance or _nothing_lacks(state):
+        return True
+    few = len(state.selection.accepted) < state.context.policy.selection.min_suspicious_effects
+    return few and state.selection_explains
 
 
 def _nothing_lacks(state: Identification) -> bool:

@@ -105,6 +105,10 @@ class SelectionPolicy:
     # took 69 s of processor time where fits to more of it took 118 s, with the same answer.
     coarse_samples: int = 600
 
+    # Effects that leave white noise together, from which one whose form is not exact may be all there is: a tilted
+    # pulley was three anchors.
+    min_suspicious_effects: int = 3
+
     # Share of the best evidence within which hypotheses explain as much beside a disturbance: no effect of the list has
     # quite the form of nature's. A modulus of 1.25 beside a little relaxation had 759 nats, relaxation alone 838.
     form_tie_ratio: float = 0.1
@@ -200,8 +204,8 @@ class SizePolicy:
     # Share of what was missed below which no further effect is looked for: what is left is seldom one effect's. At 4 %
     # and at 2 % searches ended with relaxation where damping and a modulus were hidden.
     max_left_share: float = 0.01
-    # Share of what the largest effect explains that its form may leave: a further one is small below it. Sag by another
-    # parabola left 3 % to an offset.
+    # Share of what the largest effect explains that its form may leave: a further one is small below it, and exact
+    # sensors that miss more are not explained. Sag by another parabola left 3 % to an offset, a bungee 44 %.
     max_left_share_of_form: float = 0.05
     # Least share that all effects together explain, where much is left: below, nothing on the list explains it.
     min_explained_share: float = 0.25
@@ -221,7 +225,9 @@ class TimeLimitPolicy:
     # Values of single cables: what they tell is worth more than another alternative.
     values_of_cables: float = 0.75
     # Formulas and resonances, which one more co-simulation confirms.
-    discovery: float = 0.75
+    discovery: float = 0.6
+    # Effects beside a disturbance, where exact sensors show that no form is exact.
+    second_search: float = 0.85
     # Intervals, what could have been seen, and the component in question.
     refinement: float = 0.9
     # Samples for each second of the limit at most, but no fewer than the second number: co-simulations take their time

@@ -156,6 +156,14 @@ def prepare_data(
     return (clock_corrected,) if explained else (as_recorded, clock_corrected)
 
 
+def with_disturbance(prepared: PreparedData, robot: Robot) -> PreparedData:
+    """The same data with a disturbance in the model, fitted to FIT beside the declared robot."""
+    fitter, estimation = prepared.fitter, prepared.split.estimation
+    noise = replace(fitter.noise, disturbance=disturbance_prior(robot, fitter.noise).median)
+    fitter = with_fitted_disturbance(Fitter(noise, fitter.poll_interrupts, fitter.policy), robot, (), estimation)
+    return replace(prepared, fitter=fitter)
+
+
 def innovations_of(fitter: Fitter, robot: Robot, split: DataSplit) -> tuple[Innovations, Innovations]:
     """Innovations of a robot as it is, on estimation and on validation data."""
     return fitter.innovations(robot, split.estimation), fitter.innovations(robot, split.validation)
