@@ -258,3 +258,13 @@ def test_what_hardly_changes_while_a_recording_lasts_is_no_disturbance() -> None
     duration = recording.time[-1] - recording.time[0]
     bandwidths = [each.bandwidth for each in (fitted.force, fitted.position, fitted.tension)]
     assert min(bandwidths) == pytest.approx(1.0 / duration)
+
+
+def test_a_robot_without_load_cells_has_no_errors_of_them() -> None:
+    disturbance = Disturbance(
+        OrnsteinUhlenbeck(2.0, 1.0), OrnsteinUhlenbeck(3e-4, 0.5), OrnsteinUhlenbeck(0.7, 1.0), 1e-4, 1.0
+    )
+    sentence = disturbance.sentence(has_position=True, has_tension=False)
+    assert "a random force of 2 N (below 1 Hz) on the platform, and errors with a memory of 0.0003 m" in sentence
+    assert "tensions" not in sentence
+    assert "tensions" in disturbance.sentence(has_position=True, has_tension=True)

@@ -63,6 +63,7 @@ def test_a_listed_effect_is_named_with_its_share(of_friction: Trace) -> None:
     assert coefficient.low < 0.05 < coefficient.high
     assert effect.share is not None and effect.share > 0.9
     assert of_friction.left_share is not None and of_friction.left_share < 0.05
+    assert effect.share <= 1.0 - of_friction.left_share
 
 
 def test_the_report_tells_what_disturbance_was_assumed(of_friction: Trace) -> None:

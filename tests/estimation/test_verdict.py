@@ -46,8 +46,8 @@ def test_what_a_small_random_force_would_leave_lacks_nothing() -> None:
 def test_an_effect_is_named_that_explains_a_good_part_of_little() -> None:
     word, sentence = verdict(shares(0.12, 6.0, drum=(0.27, 5.0)), "drum")
     assert word == "effects"
-    assert "drum (27 % of what is missed); 12 % remains, 40 N in tension_2, strongest at 1.2 Hz" in sentence
-    assert "which is no more than a small random force" in sentence
+    assert "drum (27 % of what is missed); 12 % remains, which is no more than a small random force" in sentence
+    assert sentence.endswith("The error is then 40 N in tension_2, strongest at 1.2 Hz.")
 
 
 def test_the_largest_effect_is_named_first_with_its_share() -> None:
@@ -60,7 +60,7 @@ def test_the_largest_effect_is_named_first_with_its_share() -> None:
 def test_an_effect_is_named_although_more_than_noise_remains_and_that_is_said() -> None:
     word, sentence = verdict(shares(0.4, 60.0, friction=(0.6, 50.0)), "friction")
     assert word == "effects"
-    assert f"40 % remains, {REMAINING}" in sentence
+    assert f"40 % remains. The error is then {REMAINING}." in sentence
 
 
 @pytest.mark.parametrize("names", [(), ("modulus",)])

@@ -40,15 +40,13 @@ class Disturbance:
     position_noise: float
     tension_noise: float
 
-    @property
-    def sentence(self) -> str:
-        """In words."""
-        parts = (
-            f"a random force of {_described(self.force, 'N')} on the platform",
-            f"errors with a memory of {_described(self.position, 'm')} in positions",
-            f"and of {_described(self.tension, 'N')} in tensions",
-        )
-        return f"beside white noise the model has {', '.join(parts)}, as the fit recording shows them (rms)"
+    def sentence(self, has_position: bool, has_tension: bool) -> str:
+        """In words, without the errors of sensors that the robot does not have."""
+        errors = [f"{_described(self.position, 'm')} in positions"] if has_position else []
+        errors += [f"{_described(self.tension, 'N')} in tensions"] if has_tension else []
+        force = f"a random force of {_described(self.force, 'N')} on the platform"
+        sizes = f"{force}, and errors with a memory of {' and of '.join(errors)}"
+        return f"beside white noise the model has {sizes}, as the fit recording shows them (rms)"
 
     def processes(self, cable_count: int) -> tuple[OrnsteinUhlenbeck, ...]:
         """One for each disturbance state: three forces, then one for each output."""

@@ -5,7 +5,8 @@ an error and ``s^2`` of noise, of positions and tensions,
 
     M = sum over both of max(e^2 / s^2 - 1, 0)        share = (M without the effect - M) / (M without any effect)
 
-so that shares need not sum to one: what two effects explain together counts for both. Without an effect all else stays
+at most what all effects explain together. Shares need not sum to one: what two effects explain together counts for
+both. Without an effect all else stays
 as it is, the initial state included. An effect that acts on several cables with a value each is one effect.
 """
 
@@ -81,8 +82,10 @@ def explained_shares(
     left = _missed(recording, after.after.measured(), floor)
     total = max(missed, left, np.finfo(float).tiny)
     outputs = [outputs_without[hypothesis.effect.name] for hypothesis in accepted]
+    # Without one effect the others may miss more than the robot without any.
+    explained = 1.0 - left / total
     return ExplainedShares(
-        tuple(float(np.clip((_missed(recording, each, floor) - left) / total, 0.0, 1.0)) for each in outputs),
+        tuple(float(np.clip((_missed(recording, each, floor) - left) / total, 0.0, explained)) for each in outputs),
         tuple(_size(each - complete, recording, floor) for each in outputs),
         float(np.clip(left / total, 0.0, 1.0)),
         missed**0.5,

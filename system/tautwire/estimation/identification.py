@@ -205,14 +205,14 @@ def _localisation(state: Identification) -> FaultLocalisation:
 
 def _disturbance_notes(state: Identification) -> list[str]:
     """Notes on the disturbance that was assumed, on effects too small to matter, and on values that differ."""
-    disturbance = state.context.fitter.noise.disturbance
+    disturbance, fit = state.context.fitter.noise.disturbance, state.context.split.estimation.recording
     if disturbance is None:
         names = ", ".join(f"{each.name} ({each.evidence:.0f} nats)" for each in state.small_effects)
         return [f"established, but no more than what the form of a larger effect may leave: {names}"] if names else []
     small = [f"{each.name} ({100.0 * (each.share or 0.0):.1f} % of what is missed)" for each in state.small_effects]
     unstable = ", ".join(dict.fromkeys(f"{name} of {each.name}" for each in state.effects for name in each.unstable))
     return [
-        disturbance.sentence,
+        disturbance.sentence(fit.has_position, fit.has_tension),
         *([f"established, but too small to matter: {', '.join(small)}"] if small else []),
         *([f"the two recordings do not agree on {unstable}; intervals hold what both show"] if unstable else []),
     ]

@@ -74,7 +74,7 @@ def self_stress_deviation(
         return 0.0, ()
     reason = "tension.preferred_uncertainty" if declared is not None else "no tension is measured"
     return deviation, (
-        f"{reason}: start tensions may differ from the tension rule's by {deviation:.3g} N; they were estimated "
+        f"{reason}: start tensions may differ from the tension rule's by {deviation:.3g} N; they are estimated "
         "beside every effect, so that a wrong pretension is not taken for one",
     )
 

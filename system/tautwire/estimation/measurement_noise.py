@@ -136,7 +136,8 @@ def _check_sensor_kind(
                 if standstill
                 else "the spectrum falls up to the Nyquist frequency"
             )
-            description = f"noise is coloured ({basis}; {deviations[column]:.3g} {unit} in total)"
+            origin = "at rest" if standstill else "as declared"
+            description = f"noise is coloured ({basis}; {deviations[column]:.3g} {unit} {origin})"
             notes.append(f"{name}: {description}; its memory is estimated with the disturbance")
             is_coloured = True
         elif declared[column] / policy.max_noise_ratio <= floor <= declared[column] * policy.max_noise_ratio:

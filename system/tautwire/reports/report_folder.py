@@ -13,6 +13,7 @@ from ..estimation.localisation.component_residuals import ComponentResidual
 from ..estimation.trace_result import Detectable, Errors, FoundEffect, Trace
 from ..fmus.packaging import RobotFmus, build_fmus, with_user_fmus_copied
 from ..json_document import json_value, write_json
+from ..recordings.recording import Recording
 from ..robot.robot_file_writer import write_robot
 from ..robot.schema import AXES
 from ..validation import validate_folder, validate_instance
@@ -30,7 +31,7 @@ def trace_document(trace: Trace) -> dict[str, Any]:
         "effects": [_effect(effect) for effect in trace.effects],
         "small_effects": [_effect(effect) for effect in trace.small_effects],
         "left_share": trace.left_share,
-        "disturbance": _disturbance(trace.disturbance),
+        "disturbance": _disturbance(trace.disturbance, trace.comparisons[0].recording),
         "correlations": [asdict(each) for each in trace.correlations],
         "also_possible": trace.also_possible,
         "formula": trace.formula,
@@ -73,13 +74,13 @@ def _effect(effect: FoundEffect) -> dict[str, Any]:
     }
 
 
-def _disturbance(disturbance: Disturbance | None) -> dict[str, Any]:
-    """What had to be assumed beside noise; all None where nothing had."""
-    processes = (
-        {"force": disturbance.force, "tension": disturbance.tension, "position": disturbance.position}
-        if disturbance
-        else dict.fromkeys(("force", "tension", "position"))
-    )
+def _disturbance(disturbance: Disturbance | None, recording: Recording) -> dict[str, Any]:
+    """What had to be assumed beside noise; None where nothing had, and of sensors that the robot does not have."""
+    processes = {
+        "force": disturbance.force if disturbance else None,
+        "tension": disturbance.tension if disturbance and recording.has_tension else None,
+        "position": disturbance.position if disturbance and recording.has_position else None,
+    }
     sizes = {f"{name}_rms": process.rms if process else None for name, process in processes.items()}
     force, *others = ((name, process.bandwidth if process else None) for name, process in processes.items())
     return {**sizes, "bandwidth_hz": force[1], **{f"{name}_bandwidth_hz": bandwidth for name, bandwidth in others}}
