@@ -219,6 +219,13 @@ def test_every_figure_has_data_for_both_recordings(kind: str, cables: int) -> No
     assert len(data["anchors"]) == cables
 
 
+def test_what_no_recording_has_gets_no_panel_and_no_row() -> None:
+    labels = re.findall(r"<figcaption><strong>([^<]*)</strong>", trace_page(without_positions(made_trace()), LINKS))
+    assert "cable 1" in labels
+    assert not {"x", "y", "z"} & set(labels)
+    assert "Fit, position" not in trace_page(without_positions(made_trace()), LINKS)
+
+
 def test_what_was_not_measured_is_null_not_nan() -> None:
     recording = page("tensions only").data()["choices"][0]
     assert recording["channels"][0]["before"] is None and recording["channels"][0]["sigma"] is None

@@ -97,15 +97,20 @@ def trace_page(trace: Trace, links: Mapping[str, str]) -> str:
 
 def _total_error_rows(trace: Trace) -> list[Row]:
     """Errors before and after over all axes and all cables, for each recording."""
-    return [
-        row for role in ROLES for row in _error_rows(trace, role, [POSITION, TENSION], f"{role.capitalize()}, ")
-    ]  # fmt: skip
+    outputs = [output for output in (POSITION, TENSION) if _is_measured(trace, output)]
+    return [row for role in ROLES for row in _error_rows(trace, role, outputs, f"{role.capitalize()}, ")]
 
 
 def _output_error_rows(trace: Trace) -> dict[str, list[Row]]:
     """Errors before and after of each output, by recording."""
     roles = [role for role in ROLES if comparison_by_role(trace, role)]
-    return {ROLE_LABELS[role]: _error_rows(trace, role, measured_outputs(trace)) for role in roles}
+    outputs = [output for output in measured_outputs(trace) if _is_measured(trace, output)]
+    return {ROLE_LABELS[role]: _error_rows(trace, role, outputs) for role in roles}
+
+
+def _is_measured(trace: Trace, output: MeasuredOutput) -> bool:
+    """Whether any recording has the output."""
+    return any(math.isfinite(output.error_of(each.errors_before)) for each in trace.comparisons)
 
 
 def _error_rows(trace: Trace, role: str, outputs: Sequence[MeasuredOutput], prefix: str = "") -> list[Row]:
@@ -278,8 +283,8 @@ def _detection_limit_rows(trace: Trace) -> list[Row]:
 
 
 def _panels_by_quantity(trace: Trace) -> dict[str, list[tuple[int, str]]]:
-    """Channel indices and labels of all outputs, positions and tensions in groups of their own."""
-    outputs = list(enumerate(measured_outputs(trace)))
+    """Channel indices and labels of the outputs that a recording has, positions and tensions in groups of their own."""
+    outputs = [(index, output) for index, output in enumerate(measured_outputs(trace)) if _is_measured(trace, output)]
     return {
         title: [(index, output.label) for index, output in outputs if output.errors_key[0] == field]
         for title, field in (("Position", "axes"), ("Tension", "cables"))
