@@ -37,7 +37,6 @@ FORMS: dict[str, dict[str, Any]] = {
     "linear friction": {"friction": {"coefficient": 0.03, "smoothing": 0.005, "form": "linear"}},
     "Stribeck friction": {"friction": {"coefficient": 0.03, "smoothing": 0.005, "form": "stribeck"}},
     "slack by a root": {"slack": {"softness": 0.5 * TENSION, "form": "root"}},
-    "bent gain": {"sensor_gain": {"gain": 1.05, "bend": 0.015, "cables": [2]}},
 }
 
 
