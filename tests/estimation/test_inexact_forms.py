@@ -21,7 +21,6 @@ AIR_DENSITY = 1.225
 TENSION = 0.45 * ROBOT.mass * ROBOT.gravity
 MODULUS, DAMPING = float(ROBOT.modulus[0]), float(ROBOT.damping[0])
 STRAIN = TENSION / (MODULUS * float(ROBOT.area[0]))
-LENGTH = float(np.linalg.norm(ROBOT.anchors[0] - ROBOT.start))
 
 FORMS: dict[str, dict[str, Any]] = {
     "hysteresis with beta 0.6": {"hysteresis": {"force": 0.01 * TENSION, "yield_strain": 0.05 * STRAIN, "beta": 0.6}},
@@ -31,7 +30,6 @@ FORMS: dict[str, dict[str, Any]] = {
     },
     "creep by a power": {"creep": {"compliance": 0.05 / MODULUS, "time": 4.0, "form": "power"}},
     "thermal hyperbola": {"thermal": {"expansion": 1.2e-5, "rise": 20.0, "time": 8.0, "form": "hyperbolic"}},
-    "sag by another parabola": {"sag": {"linear_density": 0.05 * TENSION / (9.81 * LENGTH), "form": "steep"}},
     "tilted pulley": {"pulley": {"radius": 0.1, "tilt": 0.12}},
     "drum in layers": {"drum": {"radius_ratio": 1.01, "build_up": 1e-4}},
     "linear friction": {"friction": {"coefficient": 0.03, "smoothing": 0.005, "form": "linear"}},
