@@ -30,10 +30,8 @@ FORMS: dict[str, dict[str, Any]] = {
     },
     "creep by a power": {"creep": {"compliance": 0.05 / MODULUS, "time": 4.0, "form": "power"}},
     "thermal hyperbola": {"thermal": {"expansion": 1.2e-5, "rise": 20.0, "time": 8.0, "form": "hyperbolic"}},
-    "tilted pulley": {"pulley": {"radius": 0.1, "tilt": 0.12}},
     "drum in layers": {"drum": {"radius_ratio": 1.01, "build_up": 1e-4}},
     "linear friction": {"friction": {"coefficient": 0.03, "smoothing": 0.005, "form": "linear"}},
-    "Stribeck friction": {"friction": {"coefficient": 0.03, "smoothing": 0.005, "form": "stribeck"}},
     "slack by a root": {"slack": {"softness": 0.5 * TENSION, "form": "root"}},
 }
 
