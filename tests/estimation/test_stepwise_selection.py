@@ -18,6 +18,7 @@ from tautwire.estimation.parameter_fit import Fit, Fitter
 from tautwire.estimation.policy import DEFAULT_POLICY
 from tautwire.estimation.residual_analysis import residuals_are_white
 from tautwire.estimation.stepwise_selection import SelectionResult, select_effects
+from tautwire.estimation.time_limit import OutOfTimeError
 from tautwire.recordings.recording import Recording
 from tautwire.robot.schema import EffectSetting, Robot
 from tautwire_fmu.laws.effects import BY_NAME
@@ -123,6 +124,34 @@ def test_beside_a_disturbance_the_search_ends_where_what_is_left_could_not_matte
     monkeypatch.setattr(stepwise_selection._StepwiseSelection, "eliminate", lambda self: None)
     select_effects(context)
     assert len(numbers) == rounds
+
+
+@pytest.mark.parametrize("swapped", [False, True])
+def test_an_effect_stands_with_its_fit_where_time_ends_while_its_disturbance_is_fitted(
+    swapped: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    context = context_with(has_disturbance=True)
+    robot = context.robot
+    damping, relaxation = (Hypothesis(BY_NAME[name], (1, 2, 3)) for name in ("damping", "relaxation"))
+    fits = {h: Fit.without_parameters(robot.with_effect(h.setting(robot))) for h in (damping, relaxation)}
+
+    def out_of_time(*_: object) -> None:
+        raise OutOfTimeError(600.0)
+
+    scores = [CandidateScore(relaxation, fits[relaxation], 1000.0, 1.0)]
+    monkeypatch.setattr(stepwise_selection, "score_candidates", lambda *_: (scores, True))
+    monkeypatch.setattr(stepwise_selection, "_search_round", lambda *_: None)
+    monkeypatch.setattr(stepwise_selection, "fit_model", lambda *_, **__: Fit.without_parameters(robot))
+    monkeypatch.setattr(stepwise_selection, "with_disturbance_beside", out_of_time)
+    selection = stepwise_selection._StepwiseSelection(context, Fit.without_parameters(robot), context.fitter)
+    if swapped:
+        selection.accepted, selection.current = [damping], fits[damping]
+        selection.forward_evidences = {damping: 900.0}
+        monkeypatch.setattr(selection, "_evidence", lambda without, others: 500.0)
+    with pytest.raises(OutOfTimeError):
+        (selection.eliminate if swapped else selection.add)()
+    result = selection.result()
+    assert (result.accepted, result.evidence, result.fit) == ((relaxation,), (1000.0,), fits[relaxation])
 
 
 HIDDEN: list[tuple[str, dict[str, Any]]] = [

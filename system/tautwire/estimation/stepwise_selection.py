@@ -133,10 +133,7 @@ class _StepwiseSelection:
             self.candidates += [trial.candidate(number, significant and trial is best) for trial in scores]
             if best is None or not significant:
                 break
-            self._accept(with_hypothesis(self.accepted, best.hypothesis), best.fit)
-            # One that loses cables to another keeps its evidence.
-            last = {h: e for h in self.accepted for old, e in self.forward_evidences.items() if h.overlaps(old)}
-            self.forward_evidences |= {**last, best.hypothesis: best.evidence}
+            self._accept_beside(self.accepted, best)
 
     def _required_evidence(self, others: Sequence[Hypothesis]) -> float:
         """Evidence that a hypothesis needs beside the others."""
@@ -185,7 +182,7 @@ class _StepwiseSelection:
                 self.candidates += [t.candidate(number, t is best) for t in alternatives]
             reported.add(tuple(others))
             if best is not None and best is not contender and self.swaps < policy.max_swaps:
-                self._accept(with_hypothesis(others, best.hypothesis), best.fit)
+                self._accept_beside(others, best)
                 pending = [a for a in self.accepted if a is not self.accepted[-1]]
                 tested, score, self.swaps = self.accepted[-1], best, self.swaps + 1
             self.evidences[tested] = score.evidence
@@ -204,9 +201,20 @@ class _StepwiseSelection:
             self.context.fitter.noise.disturbance,
         )
 
+    def _accept_beside(self, others: Sequence[Hypothesis], best: CandidateScore) -> None:
+        """Take the best hypothesis and others in place of those accepted so far."""
+        hypotheses = with_hypothesis(others, best.hypothesis)
+        # One that loses cables to another keeps its evidence.
+        last = {h: e for h in hypotheses for old, e in self.forward_evidences.items() if h.overlaps(old)}
+        self.forward_evidences |= {**last, best.hypothesis: best.evidence}
+        self._accept(hypotheses, best.fit)
+
     def _accept(self, hypotheses: list[Hypothesis], fit: Fit) -> None:
-        """Take these hypotheses in place of those accepted so far, with the disturbance fitted beside them."""
-        self.accepted = hypotheses
+        """Take hypotheses with their fit in place of those accepted so far, then fit the disturbance beside them.
+
+        They stand as they are where time ends meanwhile.
+        """
+        self.accepted, self.current = hypotheses, fit
         self.context, self.current = with_disturbance_beside(self.context, hypotheses, fit)
 
     def _comparable(self, score: CandidateScore, others: Sequence[Hypothesis]) -> CandidateScore:
