@@ -10,9 +10,11 @@ import pytest
 
 from tautwire import read_recording, read_robot
 from tautwire.estimation.estimation_data import DataSet
+from tautwire.estimation.hypotheses import hypotheses
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fitter
-from tautwire.estimation.smoothed_states import Calibration, with_initial_state
+from tautwire.estimation.smoothed_states import Calibration, calibrate_beside_effects, with_initial_state
+from tautwire.estimation.trace_result import Estimate, FoundEffect
 from tautwire.robot.uncertain_parameters import uncertain_parameters
 from tests.support.planar import VERTICAL, planar_case
 from tests.support.recordings import recorded
@@ -47,6 +49,36 @@ def test_gains_and_offsets_of_load_cells_are_taken_out_of_a_recording() -> None:
     corrected = calibration(2.0).without_sensor_errors(recording)
     assert corrected.tension == pytest.approx((recording.tension - 4.0) / 1.02)
     assert np.array_equal(corrected.position, recording.position)
+
+
+def test_shifts_widen_deviations_up_to_what_is_declared() -> None:
+    count = len(calibration(0.0).parameters)
+    widened = calibration(2.0).widened(np.array([np.full(count, 0.4), np.full(count, -0.3)]))
+    assert widened.standard_deviations == pytest.approx(np.full(count, (0.1**2 + 0.4**2 + 0.3**2) ** 0.5))
+    assert np.array_equal(widened.estimates, calibration(2.0).estimates)
+    assert np.array_equal(calibration(2.0).widened(np.full((1, count), 5.0)).standard_deviations, np.ones(count))
+
+
+def test_uncertain_numbers_are_no_better_known_than_the_interval_of_an_effect_beside_them_lets_them() -> None:
+    """A weight is the platform's mass or a payload; stiffness has nothing to do with it."""
+    robot = example("three")
+    cables = tuple(replace(cable, modulus_uncertainty=0.02 * cable.modulus) for cable in robot.cables)
+    robot = replace(robot, cables=cables, platform=replace(robot.platform, mass_uncertainty=1.0))
+    payload = next(h for h in hypotheses(robot) if h.effect.name == "payload")
+    loaded = robot.with_effect(payload.setting(robot, {"mass": 3.0}))
+    recording = recorded("three", 1, {"payload": {"mass": 3.0}}).first(400)
+    data = DataSet(recording, robot.platform.start, np.ones(400, dtype=bool))
+    fitter = Fitter(estimate_noise(robot, recording))
+
+    def deviations(half_width: float) -> dict[str, float]:
+        estimate = Estimate(3.0, "kg", 3.0 - half_width, 3.0 + half_width, None)
+        effect = FoundEffect("payload", "platform", (), {"mass": estimate}, 100.0)
+        found = calibrate_beside_effects(fitter, loaded, (payload,), [effect], data)
+        return {p.label: d for p, d in zip(found.parameters, found.standard_deviations.tolist(), strict=True)}
+
+    exact, wide = deviations(0.0), deviations(0.98)
+    assert wide["mass"] == pytest.approx(np.hypot(exact["mass"], 0.5), rel=0.05)
+    assert wide["modulus of cable 1"] == pytest.approx(exact["modulus of cable 1"], rel=0.2)
 
 
 def test_a_note_says_by_how_many_standard_deviations_a_number_moved() -> None:

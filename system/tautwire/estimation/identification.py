@@ -220,11 +220,13 @@ def _disturbance_notes(state: Identification) -> list[str]:
 
 def _calibration_notes(state: Identification) -> list[str]:
     """Notes on declared numbers that the robot file calls uncertain, as the recordings have them."""
-    final_robot = state.selection.fit.robot if state.discovery is None else state.discovery.robot
+    data_sets = state.prepared.data_sets
+    robot = state.selection.fit.robot if state.discovery is None else state.discovery.robot
+    calibrations = state.calibrations or [calibrate(state.context.fitter, robot, data) for data in data_sets]
     return [
         note
-        for data in state.prepared.data_sets
-        for note in calibrate(state.context.fitter, final_robot, data).notes(final_robot, data.recording.path)
+        for data, calibration in zip(data_sets, calibrations, strict=True)
+        for note in calibration.notes(robot, data.recording.path)
     ]
 
 

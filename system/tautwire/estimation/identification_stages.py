@@ -25,7 +25,7 @@ from .localisation.component_localisation import localise_residual
 from .parameter_fit import Fitter
 from .policy import TimeLimitPolicy
 from .preprocessing import calibrated_estimation_data, with_disturbance
-from .smoothed_states import calibrate, calibrated_robot
+from .smoothed_states import calibrate, calibrate_beside_effects, calibrated_robot
 from .stepwise_selection import select_effects
 from .verdict import verdict_beside_disturbance, verdict_of, verdict_of_ended_search
 
@@ -161,18 +161,18 @@ def judge(state: Identification) -> Identification:
 
 
 def estimate_intervals(state: Identification) -> Identification:
-    """Estimate the confirmed effects' parameters with intervals."""
+    """Estimate the confirmed effects' parameters with intervals, and the uncertain numbers beside them."""
     state.context.progress("intervals", 0.0)
     if not state.effects_hold and not (state.shares and state.selection.accepted):
         return state
     effects = estimated_effects(state.context, state.selection)
     if state.shares is None:
         large, small = effects_by_evidence(effects, state.selection.substantial(state.context.policy.selection))
-        return replace(state, effects=large, small_effects=small)
-    large, small = effects_by_size(effects, state.shares, state.context.policy.size)
+    else:
+        large, small = effects_by_size(effects, state.shares, state.context.policy.size)
     if not state.effects_hold:
-        large, small = (), (*large, *small)
-    return replace(state, effects=large, small_effects=small)
+        return replace(state, effects=(), small_effects=(*large, *small))
+    return _with_calibrations(replace(state, effects=large, small_effects=small))
 
 
 def analyse_detectability(state: Identification) -> Identification:
@@ -251,6 +251,17 @@ def _judged_beside_disturbance(state: Identification, shares: ExplainedShares) -
         comparisons = tuple(replace(c, after=c.before, errors_after=c.errors_before) for c in state.comparisons)
         return replace(state, final_robot=context.robot, comparisons=comparisons)
     return state
+
+
+def _with_calibrations(state: Identification) -> Identification:
+    """The state with its effects, and the uncertain numbers of its final robot no better known than these let them."""
+    context, selection = state.context, state.selection
+    robot, effects = selection.fit.robot, (*state.effects, *state.small_effects)
+    calibrations = [
+        calibrate_beside_effects(context.fitter, robot, selection.accepted, effects, data)
+        for data in state.prepared.data_sets
+    ]
+    return replace(state, final_robot=calibrations[0].calibrated_robot(robot), calibrations=tuple(calibrations))
 
 
 def _is_explained_by_few_effects(state: Identification) -> bool:

@@ -13,6 +13,7 @@ from .explained_shares import ExplainedShares
 from .identification_context import IdentificationContext
 from .localisation.component_localisation import FaultLocalisation
 from .preprocessing import PreparedData, all_residuals_white, innovations_of
+from .smoothed_states import Calibration
 from .stepwise_selection import SelectionResult
 from .trace_result import Comparison, Errors, FoundEffect, Identifiability, Verdict
 from .worker_pool import PendingResult
@@ -25,7 +26,7 @@ class Identification:
     ``clock_corrected`` are the data to take where no effects explain those as recorded. ``final_robot`` is the best
     model that the FMUs confirm, with uncertain numbers as FIT has them, the declared one until then. ``effects_hold``
     tells whether the FMUs confirm the selection, ``discovery`` is a formula that they confirm. ``shares`` are there
-    where a disturbance is a part of the model.
+    where a disturbance is a part of the model, ``calibrations`` by recording where effects have intervals.
     """
 
     context: IdentificationContext
@@ -46,6 +47,7 @@ class Identification:
     identifiability: Identifiability = field(default_factory=Identifiability)
     small_effects: tuple[FoundEffect, ...] = ()
     shares: ExplainedShares | None = None
+    calibrations: tuple[Calibration, ...] = ()
 
     @property
     def is_white_before(self) -> bool:

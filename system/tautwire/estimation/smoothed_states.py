@@ -12,12 +12,14 @@ Source: Anderson and Moore (1979), Optimal Filtering, sec. 7.2.
 
 from __future__ import annotations
 
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 
 import casadi
 import numpy as np
 from numpy.typing import NDArray
 
+from ..errors import UnreachableError
 from ..recordings.recording import Recording
 from ..recordings.start_position import with_start
 from ..robot.measured_start import with_measured_start, with_true_start
@@ -36,10 +38,12 @@ from ..robot.uncertain_parameters import (
     uncertain_parameters,
 )
 from .estimation_data import DataSet
+from .hypotheses import Hypothesis
 from .innovation_sensitivities import linearise_filter
 from .kalman_filter import Noise
 from .likelihood import Likelihood
-from .parameter_fit import Fitter
+from .parameter_fit import NORMAL_QUANTILE_95, Fitter
+from .trace_result import FoundEffect
 
 Array = NDArray[np.float64]
 
@@ -61,6 +65,14 @@ class Calibration:
     def clipped(self, max_sigmas: float) -> Calibration:
         """The same with estimates at most so many declared standard deviations from the declared values."""
         return replace(self, estimates=np.clip(self.estimates, -max_sigmas, max_sigmas))
+
+    def widened(self, shifts: Array) -> Calibration:
+        """The same with deviations that hold independent shifts (s, k) of the estimates, one deviation each.
+
+        No number is less well known than declared.
+        """
+        variances = self.standard_deviations**2 + np.sum(np.square(shifts), axis=0)
+        return replace(self, standard_deviations=np.fmin(np.sqrt(variances), 1.0))
 
     def calibrated_robot(self, robot: Robot) -> Robot:
         """The robot with its constants as estimated, each with its posterior uncertainty."""
@@ -116,18 +128,51 @@ class Calibration:
         return (f"{path}: estimated within the robot file's uncertainties: {'; '.join(significant)}",)
 
 
-def calibrate(fitter: Fitter, robot: Robot, sample: DataSet) -> Calibration:
-    """Estimate the uncertain constants of a robot with its effects from a recording."""
+def calibrate(fitter: Fitter, robot: Robot, sample: DataSet, chosen: Collection[Hypothesis] = ()) -> Calibration:
+    """Estimate the uncertain constants of a robot with its effects from a recording.
+
+    The effects are taken as exact; robots that differ in those of ``chosen`` share a compiled likelihood.
+    """
     parameters = uncertain_parameters(robot)
     if not parameters:
         return Calibration((), np.zeros(0), np.zeros(0))
-    likelihood, values = fitter.likelihood(robot, (), sample)
+    likelihood, values = fitter.likelihood(robot, chosen, sample)
     *_, last_segment = likelihood.segments(sample.recording, values)
     end = likelihood.model.states.numel()
     rows = slice(end - len(parameters), end)
     deviations = np.sqrt(np.maximum(np.diag(last_segment.covariances[-1])[rows], 0.0))
     estimates = limited_perturbation(last_segment.states[rows, -1], np.sqrt)
     return Calibration(parameters, estimates, deviations)
+
+
+def calibrate_beside_effects(
+    fitter: Fitter, robot: Robot, chosen: Collection[Hypothesis], effects: Sequence[FoundEffect], sample: DataSet
+) -> Calibration:
+    """Estimate the uncertain constants; their deviations hold the intervals of the effects' parameters.
+
+    With half-widths ``w_j`` of the parameters ``theta_j``, each to the farther end, and estimates ``d``
+
+        s^2 = s_exact^2 + sum_j ((d(theta_j + w_j) - d(theta_j)) / 1.96)^2
+
+    What an effect's formula lacks beside nature's is in its intervals, and so moves what is estimated beside it.
+    """
+    calibration = calibrate(fitter, robot, sample, chosen)
+    shifts = []
+    for moved in (each for effect in effects for each in _robots_at_interval_ends(robot, effect)):
+        try:
+            estimates = calibrate(fitter, moved, sample, chosen).estimates
+        except UnreachableError:
+            continue
+        shifts.append((estimates - calibration.estimates) / NORMAL_QUANTILE_95)
+    return calibration.widened(np.array(shifts)) if shifts else calibration
+
+
+def _robots_at_interval_ends(robot: Robot, effect: FoundEffect) -> Iterator[Robot]:
+    """The robot with one parameter of the effect after the other at the farther end of its interval."""
+    setting = next(each for each in robot.effects if (each.name, each.cables) == (effect.name, effect.cables))
+    for name, estimate in effect.parameters.items():
+        farther = max(estimate.low, estimate.high, key=lambda end: abs(end - estimate.value))
+        yield robot.with_effect(replace(setting, values={**setting.values, name: farther}))
 
 
 def calibrated_robot(fitter: Fitter, robot: Robot, sample: DataSet) -> Robot:
