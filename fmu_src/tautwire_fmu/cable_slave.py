@@ -4,7 +4,12 @@ from typing import Any, List, NamedTuple, Optional, Sequence, Tuple
 
 from .cable_variables import cable_variables
 from .delay_line import SignalSample, append_segment, delayed_value
-from .dormand_prince import integrate_dormand_prince
+from .dormand_prince import (
+    MAX_RELATIVE_TOLERANCE,
+    MIN_RELATIVE_TOLERANCE,
+    RELATIVE_TOLERANCE,
+    integrate_dormand_prince,
+)
 from .effect_variables import active_effects, effects_from_resource
 from .hermite_quadrature import cubic_hermite, quintic_hermite, taylor_extrapolate
 from .laws import cable as law
@@ -43,11 +48,17 @@ class Cable(Slave):
         self.state_end = FIRST_STATE + 2 + sum(len(effect.states) for effect in self.listed_effects)
         effect_scales = (state.scale for effect in self.listed_effects for state in effect.states)
         self.scales = (LENGTH_SCALE, LENGTH_SCALE, *effect_scales)
+        self.relative_tolerance = RELATIVE_TOLERANCE
         self.end_span: Optional[law.Span] = None
         # Keyed by the inputs at the start of a step, from which iterations after a rollback start too.
         self.start_length_cache: Tuple[Optional[Sequence[float]], float] = (None, 0.0)
         super().__init__(data, cable_variables(data), slice(FIRST_STATE, self.state_end), **kwargs)
         self.parameters_changed()
+
+    def setup_experiment(self, start_time: float, stop_time: Optional[float], tolerance: Optional[float]) -> None:
+        """Take the experiment's relative tolerance for the adaptive integration of effects' states."""
+        if tolerance is not None and tolerance > 0.0:
+            self.relative_tolerance = min(max(tolerance, MIN_RELATIVE_TOLERANCE), MAX_RELATIVE_TOLERANCE)
 
     def parameters_changed(self) -> None:
         self.start_length_cache = (None, 0.0)
@@ -138,7 +149,7 @@ class Cable(Slave):
             motion_now = start if fraction == 0.0 else self._motion_at(step, fraction, inputs_at_end)
             return self._rates(states, self._span(motion_now), motion_now.winch_speed)
 
-        return integrate_dormand_prince(rates, state, self.scales, step)
+        return integrate_dormand_prince(rates, state, self.scales, step, self.relative_tolerance)
 
     def _record_tension(
         self,

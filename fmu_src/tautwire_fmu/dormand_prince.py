@@ -24,20 +24,25 @@ STAGE_WEIGHTS = (
 SOLUTION_WEIGHTS = (35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84)
 ERROR_WEIGHTS = (71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40)
 
-# RELATIVE_TOLERANCE is in units of a state's scale, MIN_STEP_FRACTION in macro steps.
+# RELATIVE_TOLERANCE and the bounds of one are in units of a state's scale, MIN_STEP_FRACTION in macro steps.
 RELATIVE_TOLERANCE = 1e-9
+MIN_RELATIVE_TOLERANCE, MAX_RELATIVE_TOLERANCE = 1e-12, 1e-4
 MIN_STEP_FRACTION = 1e-6
 SAFETY_FACTOR, MIN_STEP_FACTOR, MAX_STEP_FACTOR = 0.9, 0.1, 5.0
 
 
 def integrate_dormand_prince(
-    rates: StateDerivative, start: Sequence[float], scales: Sequence[float], step: float
+    rates: StateDerivative,
+    start: Sequence[float],
+    scales: Sequence[float],
+    step: float,
+    relative_tolerance: float = RELATIVE_TOLERANCE,
 ) -> Tuple[List[float], List[float]]:
     """Integrate over a macro step; returns the states in the middle of the step and at its end.
 
     ``rates(fraction, states)`` gives the rates after a fraction of the step, in 1/s of each state's unit; ``scales``
-    are sizes of the states: the estimated error of an inner step is less than a billionth of them, except in inner
-    steps of a millionth of ``step`` (s). The middle is interpolated by the Hermite cubic of its inner step.
+    are sizes of the states: the estimated error of an inner step is less than ``relative_tolerance`` times them, except
+    in inner steps of a millionth of ``step`` (s). The middle is interpolated by the Hermite cubic of its inner step.
     """
     state, slope = list(start), rates(0.0, list(start))
     middle = state
@@ -45,7 +50,7 @@ def integrate_dormand_prince(
     while completed_fraction < 1.0:
         step_fraction = min(step_fraction, 1.0 - completed_fraction)
         next_state, next_slope, errors = _trial_step(rates, state, slope, step, completed_fraction, step_fraction)
-        error = max(abs(e) / scale for e, scale in zip(errors, scales)) / RELATIVE_TOLERANCE
+        error = max(abs(e) / scale for e, scale in zip(errors, scales)) / relative_tolerance
         if error > 1.0 and step_fraction > MIN_STEP_FRACTION:
             step_fraction = max(MIN_STEP_FRACTION, step_fraction * max(MIN_STEP_FACTOR, SAFETY_FACTOR * error**-0.2))
             continue

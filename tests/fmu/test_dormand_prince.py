@@ -24,6 +24,23 @@ def test_a_fast_state_follows_its_input(time: float) -> None:
         assert found[0] == pytest.approx(at + time * math.expm1(-at / time), abs=3e-7)
 
 
+def test_a_larger_tolerance_takes_fewer_inner_steps() -> None:
+    def error_and_calls(relative_tolerance: float) -> tuple[float, int]:
+        calls = []
+
+        def rates(fraction: float, states: list[float]) -> list[float]:
+            calls.append(fraction)
+            return [-20.0 * states[0]]
+
+        _, end = integrate_dormand_prince(rates, [1.0], [1.0], 1.0, relative_tolerance)
+        return abs(end[0] - math.exp(-20.0)), len(calls)
+
+    fine, coarse = error_and_calls(1e-9), error_and_calls(1e-5)
+    assert fine[0] < 1e-8
+    assert coarse[0] < 1e-4
+    assert coarse[1] < 0.5 * fine[1]
+
+
 @pytest.mark.parametrize("corner", [0.1, 0.3, 0.5, 0.77])
 def test_a_bend_inside_the_step_costs_no_accuracy(corner: float) -> None:
     calls = []

@@ -74,6 +74,19 @@ def test_fast_states_need_no_short_macro_steps(case: Case, tmp_path: Path) -> No
     assert tension < 1e-2
 
 
+def test_the_experiments_relative_tolerance_is_that_of_effects_states(tmp_path: Path) -> None:
+    robot, case = example("three"), same("hysteresis", force=50.0, yield_strain=1e-6)
+    time, speed = gentle_speeds(robot, 0.3, 0.02)
+    fmus = build_fmus(with_effects(robot, case), tmp_path)
+    exact = by_the_rig(robot, time, speed, case)
+    own, tight, loose = (
+        cosimulate(replace(fmus, relative_tolerance=tolerance), time, speed) for tolerance in (None, 1e-9, 1e-5)
+    )
+    assert np.array_equal(own.tension, tight.tension)
+    assert errors(own, *exact)[1] < 0.2 * errors(loose, *exact)[1] < 0.02
+    assert errors(loose, *exact)[0] < 1e-6
+
+
 def at_rest(robot: Robot, folder: Path) -> CosimulationResult:
     time = np.linspace(0.0, 0.5, 11)
     return cosimulate(build_fmus(robot, folder), time, np.zeros((11, robot.cable_count)))

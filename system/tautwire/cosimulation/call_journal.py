@@ -5,7 +5,7 @@ from __future__ import annotations
 import ctypes
 import json
 import mmap
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -163,10 +163,12 @@ class JournalledComponent(Component):
         if status >= FMI_WARNING:
             self._journal.write_messages(self.name, self.messages)
 
-    def initialize(self, start: float, parameters: dict[str, float]) -> None:
+    def initialize(
+        self, start: float, parameters: Mapping[str, float], relative_tolerance: float | None = None
+    ) -> None:
         """See :meth:`Component.initialize`."""
         self._journal_state[CALL_TIME] = start
-        super().initialize(start, parameters)
+        super().initialize(start, parameters, relative_tolerance)
 
     def read(self, block: VariableBlock) -> None:
         """See :meth:`Component.read`."""

@@ -131,7 +131,8 @@ def instantiate_robot(
         }
         for name, component in components.items():
             start = {**fmus.user_start_values.get(name, {}), **fmus.start_settings.get(name, {})}
-            component.initialize(0.0, {key: value for key, value in start.items() if _is_parameter(component, key)})
+            parameters = {key: value for key, value in start.items() if _is_parameter(component, key)}
+            component.initialize(0.0, parameters, fmus.relative_tolerance)
         _require_platform_start(fmus, components[PLATFORM])
         yield build_coupling_graph(components, wiring)
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -15,7 +16,7 @@ from ..recordings.recording import Recording
 from ..robot.schema import Robot
 from .estimation_data import DataSet
 from .parameter_fit import Fitter
-from .policy import CosimulationPolicy
+from .policy import DEFAULT_POLICY, CosimulationPolicy
 from .smoothed_states import calibrate, with_initial_state
 from .trace_result import Comparison, Errors
 from .worker_pool import PendingResult, WorkerPool
@@ -38,6 +39,7 @@ def cosimulate_data_set(robot: Robot, data: DataSet) -> CosimulationResult:
     """Co-simulate a robot placed where a recording starts."""
     with TemporaryDirectory(prefix="tautwire-trace-") as folder:
         fmus = build_fmus(robot.as_modelled(), Path(folder))
+        fmus = replace(fmus, relative_tolerance=DEFAULT_POLICY.cosimulation.relative_tolerance)
         return cosimulate(fmus, data.recording.time, data.recording.winch_speed)
 
 

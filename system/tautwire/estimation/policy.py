@@ -191,6 +191,9 @@ class CosimulationPolicy:
 
     # Errors over what noise alone would leave; rightly named effects left at most 1.2 in 55 of 55 blind recordings.
     max_error_ratio: float = 1.5
+    # Of the FMUs' own integration of effects' states, far below any sensor's noise: a hysteresis on three steel ropes
+    # differed by 0.07 um and 0.014 N from 1e-9, in less than half its time.
+    relative_tolerance: float = 1e-5
 
 
 @dataclass(frozen=True)

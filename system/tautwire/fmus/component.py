@@ -156,16 +156,22 @@ class Component:
             tuple(names), values, (reference_array, ctypes.c_size_t(len(names)), values.ctypes.data_as(ctypes.c_void_p))
         )
 
-    def initialize(self, start: float, parameters: dict[str, float]) -> None:
-        """Set parameters and enter initialization mode."""
+    def initialize(
+        self, start: float, parameters: Mapping[str, float], relative_tolerance: float | None = None
+    ) -> None:
+        """Set parameters and enter initialization mode.
+
+        ``relative_tolerance`` is that of the FMU's own integration; None leaves it to the FMU.
+        """
         self.time = start
+        experiment = {"start": start, "relative_tolerance": relative_tolerance}
         if self._call_names.setup_experiment is not None:
-            self._call(self._call_names.setup_experiment, self._instance.setup_experiment, start=start)
+            self._call(self._call_names.setup_experiment, self._instance.setup_experiment, **experiment)
         for name, value in parameters.items():
             block = self.block([name])
             block.values[0] = value
             self.write(block)
-        self._call(self._call_names.enter_initialization, self._instance.enter_initialization, start=start)
+        self._call(self._call_names.enter_initialization, self._instance.enter_initialization, **experiment)
 
     def run(self) -> None:
         """Leave initialization mode."""

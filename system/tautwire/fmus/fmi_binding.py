@@ -101,11 +101,14 @@ class FmuInstance(Protocol):
         """Instantiate the FMU; ``log`` gets status and message, ``fail`` a call and its outcome."""
         ...
 
-    def setup_experiment(self, start: float) -> None:
-        """Set up the experiment from the start time (s), before parameters are set."""
+    def setup_experiment(self, start: float, relative_tolerance: float | None) -> None:
+        """Set up the experiment from the start time (s), before parameters are set.
+
+        The tolerance is that of the FMU's own integration; None leaves it to the FMU.
+        """
         ...
 
-    def enter_initialization(self, start: float) -> None:
+    def enter_initialization(self, start: float, relative_tolerance: float | None) -> None:
         """Enter initialization mode."""
         ...
 
@@ -162,11 +165,11 @@ class Fmi2Instance:
             library.fmi2FreeFMUstate,
         )
 
-    def setup_experiment(self, start: float) -> None:
+    def setup_experiment(self, start: float, relative_tolerance: float | None) -> None:
         """See :meth:`FmuInstance.setup_experiment`."""
-        self._slave.setupExperiment(startTime=start)
+        self._slave.setupExperiment(tolerance=relative_tolerance, startTime=start)
 
-    def enter_initialization(self, start: float) -> None:
+    def enter_initialization(self, start: float, relative_tolerance: float | None) -> None:
         """See :meth:`FmuInstance.enter_initialization`."""
         self._slave.enterInitializationMode()
 
@@ -206,12 +209,12 @@ class Fmi3Instance:
             library.fmi3FreeFMUState,
         )
 
-    def setup_experiment(self, start: float) -> None:
-        """Nothing: FMI 3.0 takes the start time with initialization mode."""
+    def setup_experiment(self, start: float, relative_tolerance: float | None) -> None:
+        """Nothing: FMI 3.0 takes the start time and the tolerance with initialization mode."""
 
-    def enter_initialization(self, start: float) -> None:
+    def enter_initialization(self, start: float, relative_tolerance: float | None) -> None:
         """See :meth:`FmuInstance.enter_initialization`."""
-        self._slave.enterInitializationMode(startTime=start)
+        self._slave.enterInitializationMode(tolerance=relative_tolerance, startTime=start)
 
     def exit_initialization(self) -> None:
         """See :meth:`FmuInstance.exit_initialization`."""

@@ -49,7 +49,8 @@ class RobotFmus:
     A winch is None where rope runs at the commanded speed. ``user_start_values`` are the slots with user FMUs; each
     is to start with these values, by the names of our parameters. ``has_position_sensor`` tells that the platform also
     outputs its measured position. ``start_settings`` are parameters that our own FMUs start with in place of their
-    stored values, by component; names that are no parameter of it are ignored.
+    stored values, by component; names that are no parameter of it are ignored. ``relative_tolerance`` is that of the
+    FMUs' own integration, None for each one's own: a billionth of its states' scales for ours.
     """
 
     cables: tuple[Path, ...]
@@ -58,6 +59,7 @@ class RobotFmus:
     user_start_values: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     has_position_sensor: bool = False
     start_settings: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
+    relative_tolerance: float | None = None
 
     @property
     def by_component(self) -> dict[str, Path]:
