@@ -298,6 +298,8 @@ def test_the_rate_of_a_rope_length_goes_before_a_winch_speed(tmp_path: Path) -> 
     assert recording.winch_speed[:, 0] == pytest.approx([1.0, 1.5, 2.0])
     assert recording.winch_speed[:, 1] == pytest.approx([-0.2, -0.3, -0.4])
     assert np.array_equal(recording.winch_speed[:, 2], [0.3, 0.3, 0.3])
+    (note,) = recording.notes
+    assert note.endswith(": winch speeds are the rates of the recorded rope lengths, of cables 1, 2")
     assert recording.unknown_columns == ()
 
 

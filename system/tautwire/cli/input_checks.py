@@ -132,8 +132,7 @@ def _check_recording(path: Path, cable_count: int, problems: list[Problem], note
 
 def _check_together(robot: Robot, recording: Recording, problems: list[Problem], notes: list[str]) -> None:
     path = Path(recording.path)
-    if recording.unknown_columns:
-        notes.append(f"{path}: not read: {', '.join(recording.unknown_columns)}")
+    notes.extend(recording.notes)
     if not (recording.has_position or recording.has_tension):
         notes.append(f"{path}: no tension and no position was measured; simulate accepts it, trace does not")
         return

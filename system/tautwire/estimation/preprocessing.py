@@ -140,7 +140,8 @@ def prepare_data(
         data_split: DataSplit, innovations: tuple[Innovations, Innovations], clock_notes: tuple[str, ...]
     ) -> PreparedData:
         data_sets = (data_split.estimation,) if check is None else (data_split.estimation, data_split.validation)
-        all_notes = (*truncation_notes, *prepared.notes, *clock_notes, *_notes(data_split, data_sets))
+        of_recordings = (note for data in data_sets for note in data.recording.notes)
+        all_notes = (*truncation_notes, *prepared.notes, *clock_notes, *data_split.notes, *of_recordings)
         return PreparedData(data_split, data_sets, fitter, innovations, all_notes)
 
     as_recorded = assembled(data_split, innovations, ())
@@ -199,15 +200,6 @@ def _require_samples(
         if not has_enough_samples(residuals, data.rows, policy):
             hint = f"record at least {least} samples, {2 * least} without a check recording"
             raise RecordingError(data.recording.path, "too few samples to test for white noise", hint)
-
-
-def _notes(split: DataSplit, data_sets: tuple[DataSet, ...]) -> tuple[str, ...]:
-    unknown = tuple(
-        f"{s.recording.path}: columns not used: {', '.join(s.recording.unknown_columns)}"
-        for s in data_sets
-        if s.recording.unknown_columns
-    )
-    return (*split.notes, *unknown)
 
 
 def shortened(

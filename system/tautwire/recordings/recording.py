@@ -26,7 +26,8 @@ class Recording:
     """N samples of a robot with n cables; the arrays are float64 and read-only where a file was read.
 
     ``time`` (N,) in s, strictly rising; ``winch_speed`` (N, n) in m/s, positive reels in; ``tension`` (N, n)
-    in N and ``position`` (N, 3) in m, NaN where a cell or a column is missing. ``unknown_columns`` by name.
+    in N and ``position`` (N, 3) in m, NaN where a cell or a column is missing. ``unknown_columns`` by name;
+    ``rope_lengths`` are the numbers of the cables whose winch speed is the rate of a recorded rope length.
     """
 
     path: str
@@ -35,6 +36,7 @@ class Recording:
     tension: NDArray[np.float64]
     position: NDArray[np.float64]
     unknown_columns: tuple[str, ...] = ()
+    rope_lengths: tuple[int, ...] = ()
 
     @property
     def cable_count(self) -> int:
@@ -60,6 +62,15 @@ class Recording:
     def has_tension(self) -> bool:
         """Whether any tension of any sample was measured."""
         return bool(np.isfinite(self.tension).any())
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """Remarks on what was read: columns that nobody knows, and speeds that are rates of rope lengths."""
+        notes = [f"not read: {', '.join(self.unknown_columns)}"] if self.unknown_columns else []
+        if self.rope_lengths:
+            cables = ", ".join(map(str, self.rope_lengths))
+            notes.append(f"winch speeds are the rates of the recorded rope lengths, of cables {cables}")
+        return tuple(f"{self.path}: {note}" for note in notes)
 
     @property
     def channel_names(self) -> tuple[str, ...]:
@@ -118,6 +129,7 @@ def _validated_recording(table: CsvTable | ColumnTable, cable_count: int) -> Rec
         tension=_stacked_columns(numbers, [f"tension_{cable}" for cable in cables]),
         position=_stacked_columns(numbers, AXES),
         unknown_columns=table.header.unknown_names,
+        rope_lengths=tuple(cable for cable in cables if numbers.get(f"rope_length_{cable}") is not None),
     )
     if not _is_valid(recording):
         raise _first_error(table)
