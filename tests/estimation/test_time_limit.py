@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import time
+from dataclasses import replace
 from io import StringIO
 from pathlib import Path
 from types import SimpleNamespace
@@ -14,7 +15,7 @@ import pytest
 from rich.console import Console
 
 from tautwire.errors import NumericalError
-from tautwire.estimation import Trace, candidate_scoring, identification, trace
+from tautwire.estimation import Trace, candidate_scoring, identification, identification_stages, trace
 from tautwire.estimation.candidate_proposals import SearchRound
 from tautwire.estimation.candidate_scores import CandidateScore
 from tautwire.estimation.estimation_data import split_data
@@ -164,6 +165,23 @@ def test_effects_found_before_time_was_up_are_reported(recordings: tuple[Recordi
     assert estimate.value == pytest.approx(9e8, rel=0.02)
     assert [sentence for sentence in found.untried if "intervals of the parameters" in sentence]
     assert found.identifiability.detectable == ()
+
+
+@pytest.mark.validate
+def test_effects_keep_their_intervals_where_time_ends_at_the_numbers_beside_them(
+    recordings: tuple[Recording, Recording], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def out_of_time(*_: object) -> None:
+        raise OutOfTimeError(600.0)
+
+    monkeypatch.setattr(identification_stages, "calibrate_beside_effects", out_of_time)
+    robot = example("three")
+    robot = replace(robot, platform=replace(robot.platform, mass_uncertainty=0.1))
+    found = trace(robot, *recordings)
+    (effect,) = found.effects
+    assert effect.parameters["damping"].value == pytest.approx(9e8, rel=0.02)
+    assert 0.0 < found.robot_after.platform.mass_uncertainty < 0.1
+    assert any("uncertain numbers" in sentence for sentence in found.untried)
 
 
 @pytest.mark.validate

@@ -27,6 +27,7 @@ from .policy import TimeLimitPolicy
 from .preprocessing import calibrated_estimation_data, with_disturbance
 from .smoothed_states import calibrate, calibrate_beside_effects, calibrated_robot
 from .stepwise_selection import select_effects
+from .time_limit import OutOfTimeError
 from .verdict import verdict_beside_disturbance, verdict_of, verdict_of_ended_search
 
 
@@ -257,10 +258,14 @@ def _with_calibrations(state: Identification) -> Identification:
     """The state with its effects, and the uncertain numbers of its final robot no better known than these let them."""
     context, selection = state.context, state.selection
     robot, effects = selection.fit.robot, (*state.effects, *state.small_effects)
-    calibrations = [
-        calibrate_beside_effects(context.fitter, robot, selection.accepted, effects, data)
-        for data in state.prepared.data_sets
-    ]
+    try:
+        calibrations = [
+            calibrate_beside_effects(context.fitter, robot, selection.accepted, effects, data)
+            for data in state.prepared.data_sets
+        ]
+    except OutOfTimeError:
+        context.leave_untried("what the effects' intervals mean for uncertain numbers: their deviations are too small")
+        return state
     return replace(state, final_robot=calibrations[0].calibrated_robot(robot), calibrations=tuple(calibrations))
 
 
