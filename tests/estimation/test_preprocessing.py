@@ -3,6 +3,7 @@
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from tautwire.estimation import preprocessing, trace
@@ -14,8 +15,9 @@ from tautwire.estimation.preprocessing_policy import ClockOffsetPolicy
 from tautwire.estimation.worker_pool import WorkerPool
 from tautwire.recordings.recording import Recording
 from tautwire.robot.schema import Robot
-from tests.support.recordings import recorded
-from tests.support.robots import example
+from tests.rig import load_robot, wander
+from tests.support.recordings import REACH, recorded
+from tests.support.robots import EXAMPLES, example
 
 THREE = example("three")
 LATE: dict[str, Any] = {"sensor_delay": {"seconds": 0.015, "outputs": "position"}}
@@ -70,3 +72,43 @@ def test_a_clock_beside_an_effect_is_set_once_no_effect_explains_all() -> None:
 
 def pair(effects: dict[str, Any]) -> tuple[Recording, Recording]:
     return recorded("three", 1, effects), recorded("three", 2, effects)
+
+
+def counted(seed: int, count: float) -> Recording:
+    """A recording whose encoders count the rope in so many metres."""
+    recording, rig_robot = recorded("three", seed), load_robot(EXAMPLES / "three" / "robot.toml")
+    program = wander(rig_robot, seed, REACH["three"], slow=(5.0, 12.0), shake=0.6)
+    speeds = np.array([program.speed(float(time)) for time in recording.time])
+    moved = 0.5 * (speeds[1:] + speeds[:-1]) * np.diff(recording.time)[:, None]
+    travel = count * np.round(np.vstack([np.zeros(3), np.cumsum(moved, axis=0)]) / count)
+    speeds = np.gradient(travel, recording.time, axis=0)
+    return replace(recording, winch_speed=speeds, rope_lengths=(1, 2, 3))
+
+
+def mean_squares(found: PreparedData) -> list[float]:
+    return [float(np.mean(each.values[each.observed] ** 2)) for each in found.innovations]
+
+
+def test_speeds_between_counts_leave_noise(monkeypatch: pytest.MonkeyPatch) -> None:
+    recordings = counted(1, 1e-6), counted(2, 1e-6)
+    (found,) = prepare_data(THREE, *recordings, WorkerPool(1))
+    monkeypatch.setattr(preprocessing, "may_be_central_differences", lambda recording: False)
+    (as_recorded,) = prepare_data(THREE, *recordings, WorkerPool(1))
+    assert max(mean_squares(found)) < 1.03 < 1.08 < min(mean_squares(as_recorded))
+    assert [note for note in found.notes if "central differences" in note] == [
+        "three-1.csv and three-2.csv: winch speeds are central differences of counts; those between samples, which "
+        "differ by 0.00061 m/s (rms), were used"
+    ]
+
+
+def test_coarse_counts_stay_as_they_are() -> None:
+    recordings = counted(1, 1e-3), counted(2, 1e-3)
+    (found,) = prepare_data(THREE, *recordings, WorkerPool(1))
+    assert found.split.estimation.recording is recordings[0]
+    assert not any("central differences" in note for note in found.notes)
+
+
+def test_a_recording_that_also_validates_has_the_same_speeds_in_both() -> None:
+    (found,) = prepare_data(THREE, counted(1, 1e-6), None, WorkerPool(1))
+    assert found.split.estimation.recording is found.split.validation.recording
+    assert any(note.startswith("three-1.csv: winch speeds are central differences") for note in found.notes)

@@ -4,7 +4,8 @@
 2. Each alone loses dead channels and outliers, and is cut at gaps (:data:`CLEANING_STEPS`).
 3. The declared noise is tested against all of them; self-stress and motion at the start widen the prior of the initial
    state (:func:`prepare_recordings`).
-4. They are split into estimation and validation data, and clock offsets are corrected (:func:`prepare_data`).
+4. They are split into estimation and validation data; winch speeds that are central differences, and clock offsets,
+   are corrected (:func:`prepare_data`).
 """
 
 from __future__ import annotations
@@ -15,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import RecordingError
+from ..recordings.central_differences import may_be_central_differences, with_speeds_between_samples
 from ..recordings.dead_channels import without_dead_channels
 from ..recordings.gaps import without_gaps
 from ..recordings.outliers import without_outliers
@@ -133,6 +135,7 @@ def prepare_data(
     data_split = split_data(robot, prepared.noise, prepared.fit, prepared.check)
     fitter = Fitter(prepared.noise, workers.poll_interrupts, policy.fit)
     fitter = with_fitted_disturbance(fitter, robot, (), data_split.estimation)
+    fitter, data_split, speed_notes = _with_likelier_speeds(fitter, robot, data_split, policy.preprocessing)
     innovations = innovations_of(fitter, robot, data_split)
     _require_samples(innovations, data_split, policy.residual_analysis)
 
@@ -141,7 +144,7 @@ def prepare_data(
     ) -> PreparedData:
         data_sets = (data_split.estimation,) if check is None else (data_split.estimation, data_split.validation)
         of_recordings = (note for data in data_sets for note in data.recording.notes)
-        all_notes = (*truncation_notes, *prepared.notes, *clock_notes, *data_split.notes, *of_recordings)
+        all_notes = (*truncation_notes, *prepared.notes, *speed_notes, *clock_notes, *data_split.notes, *of_recordings)
         return PreparedData(data_split, data_sets, fitter, innovations, all_notes)
 
     as_recorded = assembled(data_split, innovations, ())
@@ -155,6 +158,30 @@ def prepare_data(
     clock_corrected = assembled(data_split, innovations, clock_notes)
     explained = all_residuals_white(innovations, data_split, policy.residual_analysis)
     return (clock_corrected,) if explained else (as_recorded, clock_corrected)
+
+
+def _with_likelier_speeds(
+    fitter: Fitter, robot: Robot, split: DataSplit, policy: PreprocessingPolicy
+) -> tuple[Fitter, DataSplit, tuple[str, ...]]:
+    """The data with winch speeds as recorded, or taken as central differences where FIT is far likelier so; and a note.
+
+    Each under its own disturbance. Counts that are coarse add more noise than the motion that is taken back.
+    """
+    recorded, check = split.estimation.recording, split.validation.recording
+    if not may_be_central_differences(recorded):
+        return fitter, split, ()
+    corrected = with_speeds_between_samples(recorded)
+    estimation = replace(split.estimation, recording=corrected)
+    other = with_fitted_disturbance(fitter, robot, (), estimation)
+    gain = other.log_likelihood(robot, (), estimation) - fitter.log_likelihood(robot, (), split.estimation)
+    if gain < policy.min_speed_gain:
+        return fitter, split, ()
+    is_shared = check is recorded
+    validation = replace(split.validation, recording=corrected if is_shared else with_speeds_between_samples(check))
+    size = float(np.max(np.std(corrected.winch_speed - recorded.winch_speed, axis=0)))
+    paths = recorded.path if is_shared else f"{recorded.path} and {check.path}"
+    note = f"{paths}: winch speeds are central differences of counts; those between samples, which differ by"
+    return other, DataSplit(estimation, validation, split.notes), (f"{note} {size:.2g} m/s (rms), were used",)
 
 
 def with_disturbance(prepared: PreparedData, robot: Robot) -> PreparedData:
