@@ -74,6 +74,15 @@ def test_from_a_new_robot_on_each_line_leads_to_the_next(
     assert (tmp_path / "build" / "hall.ssp").exists()
 
 
+def test_a_checked_recording_is_traced_against_a_second_one(capsys: pytest.CaptureFixture[str]) -> None:
+    assert run(["check", ROBOT, FIT]) == 0
+    assert (
+        capsys.readouterr()
+        .err.splitlines()[-1]
+        .endswith("; with a second recording of the robot add --check SECOND.csv")
+    )
+
+
 def test_the_papers_page_is_to_be_opened(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

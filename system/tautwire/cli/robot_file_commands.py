@@ -77,8 +77,11 @@ def check(
         raise typer.Exit(EXIT_WRONG_INPUT)
     if not as_json:
         output.result([f"{file}: no problems found" for file in (robot_file, recording) if file], {})
-    next_command = f"trace {robot_file} {recording} --out report/" if recording else f"build {robot_file} --out build/"
-    output.suggest_next(f"tautwire {next_command}")
+    if recording is None:
+        output.suggest_next(f"tautwire build {robot_file} --out build/")
+    else:
+        trace_command = f"tautwire trace {robot_file} {recording} --out report/"
+        output.suggest_next(f"{trace_command}; with a second recording of the robot add --check SECOND.csv")
 
 
 def _count_text(count: int, noun: str) -> str:
