@@ -13,6 +13,7 @@ from tautwire.estimation.parameter_fit import Fitter
 from tautwire.estimation.preprocessing import PreparedData, prepare_data
 from tautwire.estimation.preprocessing_policy import ClockOffsetPolicy
 from tautwire.estimation.worker_pool import WorkerPool
+from tautwire.recordings.central_differences import may_be_central_differences
 from tautwire.recordings.recording import Recording
 from tautwire.robot.schema import Robot
 from tests.rig import load_robot, wander
@@ -74,9 +75,9 @@ def pair(effects: dict[str, Any]) -> tuple[Recording, Recording]:
     return recorded("three", 1, effects), recorded("three", 2, effects)
 
 
-def counted(seed: int, count: float) -> Recording:
+def counted(seed: int, count: float, effects: dict[str, Any] | None = None) -> Recording:
     """A recording whose encoders count the rope in so many metres."""
-    recording, rig_robot = recorded("three", seed), load_robot(EXAMPLES / "three" / "robot.toml")
+    recording, rig_robot = recorded("three", seed, effects), load_robot(EXAMPLES / "three" / "robot.toml")
     program = wander(rig_robot, seed, REACH["three"], slow=(5.0, 12.0), shake=0.6)
     speeds = np.array([program.speed(float(time)) for time in recording.time])
     moved = 0.5 * (speeds[1:] + speeds[:-1]) * np.diff(recording.time)[:, None]
@@ -101,9 +102,9 @@ def test_speeds_between_counts_leave_noise(monkeypatch: pytest.MonkeyPatch) -> N
     ]
 
 
-def test_coarse_counts_stay_as_they_are() -> None:
+def test_coarse_counts_are_taken_as_they_are_first() -> None:
     recordings = counted(1, 1e-3), counted(2, 1e-3)
-    (found,) = prepare_data(THREE, *recordings, WorkerPool(1))
+    found, *_ = prepare_data(THREE, *recordings, WorkerPool(1))
     assert found.split.estimation.recording is recordings[0]
     assert not any("central differences" in note for note in found.notes)
 
@@ -112,3 +113,31 @@ def test_a_recording_that_also_validates_has_the_same_speeds_in_both() -> None:
     (found,) = prepare_data(THREE, counted(1, 1e-6), None, WorkerPool(1))
     assert found.split.estimation.recording is found.split.validation.recording
     assert any(note.startswith("three-1.csv: winch speeds are central differences") for note in found.notes)
+
+
+def test_a_model_far_off_decides_on_no_speeds() -> None:
+    recordings = counted(1, 1e-6, PAYLOAD), counted(2, 1e-6, PAYLOAD)
+    as_recorded, corrected = prepare_data(THREE, *recordings, WorkerPool(1))
+    assert as_recorded.split.estimation.recording is recordings[0]
+    assert any("central differences" in note for note in corrected.notes)
+    # What speeds with few values are is nobody's knowledge, unlike what the reader makes of lengths.
+    unknown = [replace(recording, rope_lengths=(), winch_speed=few_valued(recording)) for recording in recordings]
+    assert may_be_central_differences(unknown[0])
+    (alone,) = prepare_data(THREE, unknown[0], unknown[1], WorkerPool(1))
+    assert alone.split.estimation.recording is unknown[0]
+
+
+def few_valued(recording: Recording) -> np.ndarray:
+    step = 5e-4
+    return step * np.round(recording.winch_speed / step)
+
+
+@pytest.mark.validate
+def test_an_effect_is_named_beside_speeds_that_are_central_differences() -> None:
+    found = trace(
+        THREE, counted(1, 1e-6, {"drum": {"radius_ratio": 1.01}}), counted(2, 1e-6, {"drum": {"radius_ratio": 1.01}})
+    )
+    (drum,) = found.effects
+    assert found.verdict == "effects" and drum.name == "drum"
+    assert drum.parameters["radius_ratio"].value == pytest.approx(1.01, abs=1e-5)
+    assert found.noise_after and any("central differences" in note for note in found.notes)

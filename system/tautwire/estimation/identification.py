@@ -120,11 +120,11 @@ def trace(
     ):
         workers.warm_up()
         policy = policy_within(limit.seconds)
-        prepared, *clock_corrected = prepare_data(robot, fit, check, workers, policy)
+        prepared, *corrected = prepare_data(robot, fit, check, workers, policy)
         context = IdentificationContext(
             robot, prepared.fitter, prepared.split, alpha, progress or no_progress, workers, policy, limit
         )
-        state = Identification(context, prepared, tuple(clock_corrected), nothing_selected(robot), robot)
+        state = Identification(context, prepared, tuple(corrected), nothing_selected(robot), robot)
         for stage in STAGES:
             with limited_search(stage, state.context):
                 state = stage(state)

@@ -51,9 +51,9 @@ def select(state: Identification) -> Identification:
     return state
 
 
-def select_with_clocks_corrected(state: Identification) -> Identification:
-    """Select effects in the recordings with their clocks corrected, where none explain them as recorded."""
-    for prepared in state.clock_corrected:
+def select_in_corrected_recordings(state: Identification) -> Identification:
+    """Select effects in the recordings with clocks or winch speeds corrected, where none explain them as recorded."""
+    for prepared in state.corrected:
         if not state.selection_explains:
             state.context.time_limit.check()
             context = replace(state.context, fitter=prepared.fitter, split=prepared.split)
@@ -190,7 +190,7 @@ def analyse_detectability(state: Identification) -> Identification:
 STAGES: tuple[Callable[[Identification], Identification], ...] = (
     start_side_runs,
     select,
-    select_with_clocks_corrected,
+    select_in_corrected_recordings,
     try_confusable_models,
     try_declared_start,
     separate_cables,
@@ -207,7 +207,7 @@ STAGES: tuple[Callable[[Identification], Identification], ...] = (
 # Stages that are searches, with what is left untried where one has no time left.
 SEARCHES: Mapping[Callable[[Identification], Identification], tuple[Callable[[TimeLimitPolicy], float], str]] = {
     select: (attrgetter("selection"), "effects"),
-    select_with_clocks_corrected: (attrgetter("selection"), "correcting clocks that seem to be apart"),
+    select_in_corrected_recordings: (attrgetter("selection"), "correcting clocks or winch speeds"),
     try_confusable_models: (attrgetter("selection"), "models that are easily confused with the effects found"),
     try_declared_start: (attrgetter("selection"), "trying a sensor's offset in place of another start"),
     separate_cables: (attrgetter("values_of_cables"), "values of single cables"),

@@ -23,7 +23,7 @@ from .worker_pool import PendingResult
 class Identification:
     """State of an identification: what its stages have found so far.
 
-    ``clock_corrected`` are the data to take where no effects explain those as recorded. ``final_robot`` is the best
+    ``corrected`` are the data to take where no effects explain those as recorded. ``final_robot`` is the best
     model that the FMUs confirm, with uncertain numbers as FIT has them, the declared one until then. ``effects_hold``
     tells whether the FMUs confirm the selection, ``discovery`` is a formula that they confirm. ``shares`` are there
     where a disturbance is a part of the model, ``calibrations`` by recording where effects have intervals.
@@ -31,7 +31,7 @@ class Identification:
 
     context: IdentificationContext
     prepared: PreparedData
-    clock_corrected: tuple[PreparedData, ...]
+    corrected: tuple[PreparedData, ...]
     selection: SelectionResult
     final_robot: Robot
     pending_runs: tuple[PendingResult[CosimulationResult], ...] = ()

@@ -126,7 +126,7 @@ def prepare_data(
     workers: WorkerPool,
     policy: IdentificationPolicy = DEFAULT_POLICY,
 ) -> tuple[PreparedData, ...]:
-    """Preprocess the recordings; in two versions where clocks seem to be apart but more is wrong.
+    """Preprocess the recordings; in several versions where clocks or winch speeds seem to be wrong, and more with them.
 
     The first is as recorded then: an effect that explains all of it goes before a clock that explains a part.
     """
@@ -135,53 +135,58 @@ def prepare_data(
     data_split = split_data(robot, prepared.noise, prepared.fit, prepared.check)
     fitter = Fitter(prepared.noise, workers.poll_interrupts, policy.fit)
     fitter = with_fitted_disturbance(fitter, robot, (), data_split.estimation)
-    fitter, data_split, speed_notes = _with_likelier_speeds(fitter, robot, data_split, policy.preprocessing)
-    innovations = innovations_of(fitter, robot, data_split)
-    _require_samples(innovations, data_split, policy.residual_analysis)
+    _require_samples(innovations_of(fitter, robot, data_split), data_split, policy.residual_analysis)
 
-    def assembled(
-        data_split: DataSplit, innovations: tuple[Innovations, Innovations], clock_notes: tuple[str, ...]
-    ) -> PreparedData:
+    def assembled(fitter: Fitter, data_split: DataSplit, notes: tuple[str, ...]) -> PreparedData:
         data_sets = (data_split.estimation,) if check is None else (data_split.estimation, data_split.validation)
         of_recordings = (note for data in data_sets for note in data.recording.notes)
-        all_notes = (*truncation_notes, *prepared.notes, *speed_notes, *clock_notes, *data_split.notes, *of_recordings)
-        return PreparedData(data_split, data_sets, fitter, innovations, all_notes)
+        all_notes = (*truncation_notes, *prepared.notes, *notes, *data_split.notes, *of_recordings)
+        return PreparedData(data_split, data_sets, fitter, innovations_of(fitter, robot, data_split), all_notes)
 
-    as_recorded = assembled(data_split, innovations, ())
+    versions = _speed_versions(fitter, robot, data_split, policy.preprocessing)
+    first, *others = (assembled(*version) for version in versions)
     # A disturbance would take up what clocks that are apart leave.
-    if fitter.has_disturbance or all_residuals_white(innovations, data_split, policy.residual_analysis):
-        return (as_recorded,)
+    if fitter.has_disturbance or all_residuals_white(first.innovations, first.split, policy.residual_analysis):
+        return (first, *others)
+    fitter, data_split, notes = versions[0]
     data_split, clock_notes = with_clocks_set(fitter, robot, data_split, policy.preprocessing.clock_offsets)
     if not clock_notes:
-        return (as_recorded,)
-    innovations = innovations_of(fitter, robot, data_split)
-    clock_corrected = assembled(data_split, innovations, clock_notes)
-    explained = all_residuals_white(innovations, data_split, policy.residual_analysis)
-    return (clock_corrected,) if explained else (as_recorded, clock_corrected)
+        return (first, *others)
+    clock_corrected = assembled(fitter, data_split, (*notes, *clock_notes))
+    explained = all_residuals_white(clock_corrected.innovations, data_split, policy.residual_analysis)
+    return (clock_corrected,) if explained else (first, *others, clock_corrected)
 
 
-def _with_likelier_speeds(
+def _speed_versions(
     fitter: Fitter, robot: Robot, split: DataSplit, policy: PreprocessingPolicy
-) -> tuple[Fitter, DataSplit, tuple[str, ...]]:
-    """The data with winch speeds as recorded, or taken as central differences where FIT is far likelier so; and a note.
+) -> list[tuple[Fitter, DataSplit, tuple[str, ...]]]:
+    """The data with winch speeds as recorded or, where FIT is far likelier so, as taken from central differences.
 
-    Each under its own disturbance. Counts that are coarse add more noise than the motion that is taken back.
+    Each under its own disturbance, with notes. Counts that are coarse add more noise than the motion that is taken
+    back. Where the model is far off, its errors decide on the likelihood: unless speeds explain a share of them, those
+    of rope lengths come in both versions.
     """
+    as_recorded = (fitter, split, ())
     recorded, check = split.estimation.recording, split.validation.recording
     if not may_be_central_differences(recorded):
-        return fitter, split, ()
-    corrected = with_speeds_between_samples(recorded)
-    estimation = replace(split.estimation, recording=corrected)
+        return [as_recorded]
+    speeds = with_speeds_between_samples(recorded)
+    estimation = replace(split.estimation, recording=speeds)
     other = with_fitted_disturbance(fitter, robot, (), estimation)
-    gain = other.log_likelihood(robot, (), estimation) - fitter.log_likelihood(robot, (), split.estimation)
-    if gain < policy.min_speed_gain:
-        return fitter, split, ()
+    rows, before = split.estimation.rows, fitter.innovations(robot, split.estimation)
+    gain = other.log_likelihood(robot, (), estimation) - before.log_likelihood(rows)
+    misfit = 0.5 * float(np.sum(before.values[before.observed & rows[:, None]] ** 2 - 1.0))
+    decisive_gain = max(policy.min_speed_gain, policy.min_speed_gain_to_misfit * misfit)
+    is_undecided = decisive_gain > policy.min_speed_gain and not fitter.has_disturbance and recorded.rope_lengths
+    if gain < decisive_gain and not is_undecided:
+        return [as_recorded]
     is_shared = check is recorded
-    validation = replace(split.validation, recording=corrected if is_shared else with_speeds_between_samples(check))
-    size = float(np.max(np.std(corrected.winch_speed - recorded.winch_speed, axis=0)))
+    validation = replace(split.validation, recording=speeds if is_shared else with_speeds_between_samples(check))
+    size = float(np.max(np.std(speeds.winch_speed - recorded.winch_speed, axis=0)))
     paths = recorded.path if is_shared else f"{recorded.path} and {check.path}"
     note = f"{paths}: winch speeds are central differences of counts; those between samples, which differ by"
-    return other, DataSplit(estimation, validation, split.notes), (f"{note} {size:.2g} m/s (rms), were used",)
+    corrected = (other, DataSplit(estimation, validation, split.notes), (f"{note} {size:.2g} m/s (rms), were used",))
+    return [corrected] if gain >= decisive_gain else [as_recorded, corrected]
 
 
 def with_disturbance(prepared: PreparedData, robot: Robot) -> PreparedData:

@@ -82,6 +82,9 @@ class PreprocessingPolicy:
     # Nats on FIT from which winch speeds are central differences of counts. Of seven lifelike recordings from counts
     # three gained 110, 190 and 3,200; the others nothing, or lost up to 1,600 where counts are coarse.
     min_speed_gain: float = 20.0
+    # The same as a share of what squared innovations exceed white noise by, in nats: beside a disturbance next to
+    # nothing, without one much where an effect is hidden. Chosen, not calibrated.
+    min_speed_gain_to_misfit: float = 0.1
     dead_channels: DeadChannelPolicy = field(default_factory=DeadChannelPolicy)
     outliers: OutlierPolicy = field(default_factory=OutlierPolicy)
     noise_check: NoiseCheckPolicy = field(default_factory=NoiseCheckPolicy)
