@@ -156,6 +156,12 @@ def test_a_trace_without_time_for_effects_is_unexplained(recordings: tuple[Recor
     assert found.seconds == 601.0
 
 
+def test_a_trace_without_time_for_effects_tells_where_the_error_sits(recordings: tuple[Recording, Recording]) -> None:
+    found = traced_until("round 1: score test", *recordings)
+    assert "tensions of cables 1, 2, 3 deviate" in found.components.sentence
+    assert not [sentence for sentence in found.untried if "component" in sentence]
+
+
 @pytest.mark.validate
 def test_effects_found_before_time_was_up_are_reported(recordings: tuple[Recording, Recording]) -> None:
     found = traced_until("intervals", *recordings)

@@ -194,6 +194,8 @@ def _result(state: Identification) -> Trace:
 
 def _localisation(state: Identification) -> FaultLocalisation:
     (pending,), context = state.pending_localisation, state.context
+    if pending.is_done:
+        return pending.result()
     try:
         with context.time_limit.searching(context.policy.time_limit.refinement):
             context.time_limit.check()

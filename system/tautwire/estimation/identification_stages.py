@@ -39,6 +39,8 @@ def start_side_runs(state: Identification) -> Identification:
     localisation = context.workers.submit(
         localise_residual, robot, data, context.fitter.noise, context.policy.localisation
     )
+    # A search that takes all the time must not take this one's.
+    localisation.begin()
     return replace(state, pending_runs=tuple(runs), pending_localisation=(localisation,))
 
 

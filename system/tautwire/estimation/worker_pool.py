@@ -55,11 +55,17 @@ class PendingResult(Generic[Result]):
         self._start, self._compute = start, compute
         self._poll_interrupts, self._processes = poll_interrupts, processes
         self._future = start() if start else None
+        self._kept: tuple[Result, ...] = ()
 
     @property
     def is_done(self) -> bool:
         """Whether the result is there, or need not be waited for."""
         return self._future is None or self._future.done()
+
+    def begin(self) -> None:
+        """Do the work here and now, and keep its result, unless a process does it already."""
+        if self._future is None:
+            self._kept = (self._compute(),)
 
     def restart(self) -> None:
         """Start the work anew, in another process."""
@@ -68,6 +74,8 @@ class PendingResult(Generic[Result]):
 
     def result(self) -> Result:
         """The result, or what the work raised. Without a process of its own it is done here."""
+        if self._kept:
+            return self._kept[0]
         if self._future is None:
             return self._compute()
         while not wait([self._future], POLL_INTERVAL).done:
