@@ -80,3 +80,14 @@ def test_beside_a_disturbance_no_form_is_exact_so_that_a_tenth_of_the_evidence_t
     assert most_parsimonious([better, near], SelectionPolicy(), has_disturbance=True) is near
     assert most_parsimonious([better, far], SelectionPolicy(), has_disturbance=True) is better
     assert most_parsimonious([better, near], SelectionPolicy()) is better
+
+
+def test_an_effect_is_confusable_with_what_explains_as_much_or_with_more_parameters_more() -> None:
+    fit = Fit(ROBOT, (), np.zeros(0), np.zeros((0, 0)))
+    relaxation, damping = (Hypothesis(BY_NAME[name], (1,)) for name in ("relaxation", "damping"))
+    simple, policy = CandidateScore(damping, fit, 100.0, 1.0), SelectionPolicy()
+    margins = (-2.0 * policy.tie_nats, -0.5 * policy.tie_nats, 0.5 * policy.tie_nats, 2.0 * policy.tie_nats)
+    alike = [CandidateScore(damping, fit, 100.0 + margin, 1.0) for margin in margins]
+    larger = [CandidateScore(relaxation, fit, 100.0 + margin, 1.0) for margin in margins]
+    assert [simple.is_confusable_with(each, policy) for each in alike] == [False, True, True, True]
+    assert [simple.is_confusable_with(each, policy) for each in larger] == [False, False, False, True]

@@ -98,16 +98,24 @@ def test_beside_a_disturbance_what_came_first_needs_as_much_evidence_beside_what
     assert [hypothesis.effect.name for hypothesis in selection.result().accepted] == names
 
 
-@pytest.mark.parametrize(("max_left_share", "max_size", "rounds"), [(0.04, 0.0, 1), (1e-9, 0.0, 2), (1e-9, 1e6, 1)])
+@pytest.mark.parametrize(
+    ("limits", "rounds"),
+    [
+        ({"max_left_share": 0.04, "max_size_of_disturbance": 0.0}, 1),
+        ({"max_left_share": 1e-9, "max_size_of_disturbance": 0.0}, 2),
+        # Little was missed: a further effect is looked for only beside one that explains some of it.
+        ({"max_left_share": 1e-9, "max_size_of_disturbance": 1e6}, 2),
+        ({"max_left_share": 1e-9, "max_size_of_disturbance": 1e6, "min_explained_share": 1.0}, 1),
+    ],
+)
 def test_beside_a_disturbance_the_search_ends_where_what_is_left_could_not_matter(
-    max_left_share: float, max_size: float, rounds: int, monkeypatch: pytest.MonkeyPatch
+    limits: dict[str, float], rounds: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     robot = example("three")
     fit, check = pair("three", 5, {"payload": {"mass": 6.0}})
     noise = estimate_noise(robot, fit)
     noise = replace(noise, disturbance=disturbance_prior(robot, noise).median)
-    size = replace(DEFAULT_POLICY.size, max_left_share=max_left_share, max_size_of_disturbance=max_size)
-    policy = replace(DEFAULT_POLICY, size=size)
+    policy = replace(DEFAULT_POLICY, size=replace(DEFAULT_POLICY.size, **limits))
     context = IdentificationContext(robot, Fitter(noise), split_data(robot, noise, fit, check), policy=policy)
     payload = Hypothesis(BY_NAME["payload"], ())
     with_payload = robot.with_effect(EffectSetting("payload", {"mass": 6.0}))
@@ -124,6 +132,26 @@ def test_beside_a_disturbance_the_search_ends_where_what_is_left_could_not_matte
     monkeypatch.setattr(stepwise_selection._StepwiseSelection, "eliminate", lambda self: None)
     select_effects(context)
     assert len(numbers) == rounds
+
+
+@pytest.mark.parametrize(("mass", "name"), [(5.8, "payload"), (4.0, "relaxation")])
+def test_a_simpler_effect_ties_by_its_form_unless_it_leaves_more_than_a_form_may(mass: float, name: str) -> None:
+    """Of two with nearly the same evidence, where the one with more parameters explains all that is missed."""
+    robot = example("three")
+    fit, check = pair("three", 5, {"payload": {"mass": 6.0}})
+    noise = estimate_noise(robot, fit)
+    noise = replace(noise, disturbance=disturbance_prior(robot, noise).median)
+    context = IdentificationContext(robot, Fitter(noise), split_data(robot, noise, fit, check))
+    loaded, other = (robot.with_effect(EffectSetting("payload", {"mass": each})) for each in (6.0, mass))
+    scores = [
+        CandidateScore(Hypothesis(BY_NAME["payload"], ()), Fit.without_parameters(other), 950.0, 1.0),
+        CandidateScore(Hypothesis(BY_NAME["relaxation"], (1, 2, 3)), Fit.without_parameters(loaded), 1000.0, 1.0),
+    ]
+    selection = stepwise_selection._StepwiseSelection(context, Fit.without_parameters(robot), context.fitter)
+    best = selection._most_parsimonious(scores, robot)
+    assert best is not None
+    assert best.hypothesis.effect.name == name
+    assert selection._most_parsimonious([], robot) is None
 
 
 @pytest.mark.parametrize("swapped", [False, True])

@@ -31,9 +31,9 @@ class CandidateScore:
         return len(self.hypothesis.form)
 
     def is_confusable_with(self, other: CandidateScore, policy: SelectionPolicy) -> bool:
-        """Whether the other explains as much with no more parameters."""
-        close = self.evidence - other.evidence < policy.tie_nats
-        return close and other.parameter_count <= self.parameter_count
+        """Whether the other explains as much with no more parameters, or more with more of them."""
+        gain = other.evidence - self.evidence
+        return gain > (-policy.tie_nats if other.parameter_count <= self.parameter_count else policy.tie_nats)
 
     def candidate(self, round_number: int, accepted: bool) -> Candidate:
         return Candidate(

@@ -127,8 +127,7 @@ class _StepwiseSelection:
             scores, is_complete = score_candidates(self.context, search_round)
             if is_complete:
                 self.complete_rounds[tuple(self.accepted)] = scores
-            policy, has_disturbance = self.context.policy.selection, self.context.fitter.has_disturbance
-            best = most_parsimonious(scores, policy, has_disturbance)
+            best = self._most_parsimonious(scores, self.current.robot)
             significant = best is not None and best.evidence > self._required_evidence(self.accepted)
             self.candidates += [trial.candidate(number, significant and trial is best) for trial in scores]
             if best is None or not significant:
@@ -143,13 +142,34 @@ class _StepwiseSelection:
         return self.context.policy.selection.required_evidence(threshold, first_evidence, has_disturbance)
 
     def _leaves_little(self) -> bool:
-        """Whether the accepted hypotheses leave little, or no more than a small random force was missing before."""
-        context, policy, validation = self.context, self.context.policy.size, self.context.split.validation
-        robot = calibrated_robot(context.fitter, self.current.robot, context.split.estimation)
-        floor = sensor_noise_floor(context.fitter, robot, validation)
-        missed = missed_without_effects(context, self.without_effects, validation, floor)
-        left = missed_with_effects(context.fitter, robot, validation, floor)
-        return left < policy.max_left_share * missed or missed < policy.max_size_of_disturbance**2
+        """Whether the accepted hypotheses leave little, or explain little of what a small random force may be."""
+        policy, fitter = self.context.policy.size, self.context.fitter
+        robot = calibrated_robot(fitter, self.current.robot, self.context.split.estimation)
+        floor = sensor_noise_floor(fitter, robot, self.context.split.validation)
+        missed = missed_without_effects(self.context, self.without_effects, self.context.split.validation, floor)
+        left = missed_with_effects(fitter, robot, self.context.split.validation, floor)
+        is_explained = left <= (1.0 - policy.min_explained_share) * missed
+        is_small = missed < policy.max_size_of_disturbance**2
+        return left < policy.max_left_share * missed or (is_small and not is_explained)
+
+    def _most_parsimonious(self, scores: Sequence[CandidateScore], without: Robot) -> CandidateScore | None:
+        """Most parsimonious candidate: the simplest of those that tie with the best one, but for their forms.
+
+        One whose effect leaves more than a form may, of what the best one explains, ties by chance alone. ``without``
+        is the robot without any of them.
+        """
+        context, validation = self.context, self.context.split.validation
+        best = most_parsimonious(scores, context.policy.selection)
+        simplest = most_parsimonious(scores, context.policy.selection, context.fitter.has_disturbance)
+        if best is None or simplest is None or simplest is best:
+            return best
+        robots = [
+            calibrated_robot(context.fitter, robot, context.split.estimation)
+            for robot in (without, simplest.fit.robot, best.fit.robot)
+        ]
+        floor = sensor_noise_floor(context.fitter, robots[-1], validation)
+        missed, left, least = (missed_with_effects(context.fitter, robot, validation, floor) for robot in robots)
+        return simplest if left - least <= context.policy.size.max_left_share_of_form * (missed - least) else best
 
     def eliminate(self) -> None:
         """Backward elimination: each accepted hypothesis against its best alternatives, and against its absence.
@@ -177,7 +197,7 @@ class _StepwiseSelection:
                 self.complete_rounds[tuple(others)] = scores
             alternatives = [trial for trial in scores if not trial.hypothesis.overlaps(tested)]
             contender = self._comparable(score, others)
-            best = most_parsimonious([contender, *alternatives], policy, self.context.fitter.has_disturbance)
+            best = self._most_parsimonious([contender, *alternatives], without.robot)
             if tuple(others) not in reported:
                 self.candidates += [t.candidate(number, t is best) for t in alternatives]
             reported.add(tuple(others))
