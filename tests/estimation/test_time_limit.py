@@ -146,8 +146,13 @@ def recordings() -> tuple[Recording, Recording]:
     return fit, check
 
 
-def test_a_trace_without_time_for_effects_is_unexplained(recordings: tuple[Recording, Recording]) -> None:
-    found = traced_until("round 1: score test", *recordings)
+@pytest.fixture(scope="module")
+def without_time_for_effects(recordings: tuple[Recording, Recording]) -> Trace:
+    return traced_until("round 1: score test", *recordings)
+
+
+def test_a_trace_without_time_for_effects_is_unexplained(without_time_for_effects: Trace) -> None:
+    found = without_time_for_effects
     assert found.verdict == "unexplained"
     assert found.sentence.startswith("The search ended at its time limit of 600 s. Until then: the residual is not")
     assert found.effects == ()
@@ -156,10 +161,9 @@ def test_a_trace_without_time_for_effects_is_unexplained(recordings: tuple[Recor
     assert found.seconds == 601.0
 
 
-def test_a_trace_without_time_for_effects_tells_where_the_error_sits(recordings: tuple[Recording, Recording]) -> None:
-    found = traced_until("round 1: score test", *recordings)
-    assert "tensions of cables 1, 2, 3 deviate" in found.components.sentence
-    assert not [sentence for sentence in found.untried if "component" in sentence]
+def test_a_trace_without_time_for_effects_tells_where_the_error_sits(without_time_for_effects: Trace) -> None:
+    assert "tensions of cables 1, 2, 3 deviate" in without_time_for_effects.components.sentence
+    assert not [sentence for sentence in without_time_for_effects.untried if "component" in sentence]
 
 
 @pytest.mark.validate
@@ -218,8 +222,8 @@ def test_numbers_without_a_solution_end_in_an_error_that_can_be_read(
         trace(example("three"), *recordings)
 
 
-def test_the_report_tells_what_was_left(recordings: tuple[Recording, Recording], tmp_path: Path) -> None:
-    found = traced_until("round 1: score test", *recordings)
+def test_the_report_tells_what_was_left(without_time_for_effects: Trace, tmp_path: Path) -> None:
+    found = without_time_for_effects
     write_report(found, tmp_path)
     assert tuple(json.loads((tmp_path / "report.json").read_text())["untried"]) == found.untried
     assert found.untried[0] in (tmp_path / "index.html").read_text()
