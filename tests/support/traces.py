@@ -90,16 +90,17 @@ def made_comparison(role: str, robot: Robot, path: str, samples: int, seed: int)
 
 def made_candidates(cables: tuple[int, ...]) -> tuple[Candidate, ...]:
     """Two rounds of hypotheses."""
-    return (
-        Candidate(1, "damping", cables, {"damping": 2.1034e9}, 812.4, 1.02, True),
-        Candidate(1, "modulus", cables, {"modulus": 9.81e10}, 64.2, 2.41, False),
-        Candidate(1, "modulus", (2,), {"modulus": 9.3e10}, 21.7, 2.62, False),
-        Candidate(1, "payload", (), {"mass": 0.31}, -1.3, 2.77, False),
-        Candidate(1, "drag", (), {"area": 1.2}, float("nan"), float("nan"), False),
-        *(Candidate(1, "relaxation", (cable,), {"time": 0.4}, -2.0 - cable, 2.8, False) for cable in cables),
-        Candidate(2, "modulus", cables, {"modulus": 1.0219e11}, 0.4, 1.02, False),
-        Candidate(2, "payload", (), {"mass": -0.02}, -0.8, 1.02, False),
+    tried = (
+        (1, "damping", cables, {"damping": 2.1034e9}, 812.4, 1.02, True),
+        (1, "modulus", cables, {"modulus": 9.81e10}, 64.2, 2.41, False),
+        (1, "modulus", (2,), {"modulus": 9.3e10}, 21.7, 2.62, False),
+        (1, "payload", (), {"mass": 0.31}, -1.3, 2.77, False),
+        (1, "drag", (), {"area": 1.2}, float("nan"), float("nan"), False),
+        *((1, "relaxation", (cable,), {"time": 0.4}, -2.0 - cable, 2.8, False) for cable in cables),
+        (2, "modulus", cables, {"modulus": 1.0219e11}, 0.4, 1.02, False),
+        (2, "payload", (), {"mass": -0.02}, -0.8, 1.02, False),
     )
+    return tuple(Candidate(*each, tuple(each[3])) for each in tried)
 
 
 def made_separation(cables: tuple[int, ...]) -> Identifiability:

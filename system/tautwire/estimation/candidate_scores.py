@@ -44,6 +44,7 @@ class CandidateScore:
             evidence=self.evidence,
             mean_square=self.mean_square,
             accepted=accepted,
+            fitted=self.hypothesis.form,
         )
 
 
