@@ -18,7 +18,7 @@ from tautwire.estimation.parameter_fit import Fit, Fitter
 from tautwire.estimation.policy import DEFAULT_POLICY
 from tautwire.estimation.residual_analysis import residuals_are_white
 from tautwire.estimation.stepwise_selection import SelectionResult, select_effects
-from tautwire.estimation.time_limit import OutOfTimeError
+from tautwire.estimation.time_limit import OutOfTimeError, TimeLimit
 from tautwire.recordings.recording import Recording
 from tautwire.robot.schema import EffectSetting, Robot
 from tautwire_fmu.laws.effects import BY_NAME
@@ -141,14 +141,19 @@ def test_a_simpler_effect_ties_by_its_form_unless_it_leaves_more_than_a_form_may
     fit, check = pair("three", 5, {"payload": {"mass": 6.0}})
     noise = estimate_noise(robot, fit)
     noise = replace(noise, disturbance=disturbance_prior(robot, noise).median)
-    context = IdentificationContext(robot, Fitter(noise), split_data(robot, noise, fit, check))
+    scores: list[CandidateScore] = []
+    limit = TimeLimit(600.0, lambda: 601.0 if scores else 0.0)
+    fitter, split = Fitter(noise, poll_interrupts=limit.check), split_data(robot, noise, fit, check)
+    context = IdentificationContext(robot, fitter, split, time_limit=limit)
     loaded, other = (robot.with_effect(EffectSetting("payload", {"mass": each})) for each in (6.0, mass))
-    scores = [
+    scores += [
         CandidateScore(Hypothesis(BY_NAME["payload"], ()), Fit.without_parameters(other), 950.0, 1.0),
         CandidateScore(Hypothesis(BY_NAME["relaxation"], (1, 2, 3)), Fit.without_parameters(loaded), 1000.0, 1.0),
     ]
     selection = stepwise_selection._StepwiseSelection(context, Fit.without_parameters(robot), context.fitter)
-    best = selection._most_parsimonious(scores, robot)
+    # Time is up once there are scores, which must not be lost by that.
+    with limit.searching(0.6):
+        best = selection._most_parsimonious(scores, robot)
     assert best is not None
     assert best.hypothesis.effect.name == name
     assert selection._most_parsimonious([], robot) is None

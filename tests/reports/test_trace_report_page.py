@@ -179,7 +179,7 @@ def test_hostile_links_stay_paths_beside_the_page() -> None:
 def test_hostile_effects_and_columns_are_escaped() -> None:
     trace = made_trace(samples=200)
     effect = replace(trace.effects[0], name=HOSTILE, component=HOSTILE, parameters={HOSTILE: _estimate(trace)})
-    candidate = replace(trace.candidates[0], name=HOSTILE, values={HOSTILE: 1.0})
+    candidate = replace(trace.candidates[0], name=HOSTILE, values={HOSTILE: 1.0}, form=(HOSTILE,))
     recording = replace(trace.comparisons[0].recording, unknown_columns=(HOSTILE, "\u202e\udc80"))
     comparison = replace(trace.comparisons[0], recording=recording)
     strange = replace(

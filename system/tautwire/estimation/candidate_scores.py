@@ -44,7 +44,7 @@ class CandidateScore:
             evidence=self.evidence,
             mean_square=self.mean_square,
             accepted=accepted,
-            fitted=self.hypothesis.form,
+            form=self.hypothesis.form,
         )
 
 

@@ -33,14 +33,23 @@ from .verdict import verdict_beside_disturbance, verdict_of, verdict_of_ended_se
 
 def start_side_runs(state: Identification) -> Identification:
     """Co-simulate the declared robot, and localise its error in a component, beside all that follows."""
+    return _localised(_with_side_runs(state))
+
+
+def _localised(state: Identification) -> Identification:
+    """The same state; a search that takes all the time must not take that of the localisation."""
+    for localisation in state.pending_localisation:
+        localisation.begin()
+    return state
+
+
+def _with_side_runs(state: Identification) -> Identification:
     context, prepared = state.context, state.prepared
     runs = start_cosimulations(context.workers, context.fitter, context.robot, prepared.data_sets)
     robot, data = calibrated_estimation_data(prepared, context.robot)
     localisation = context.workers.submit(
         localise_residual, robot, data, context.fitter.noise, context.policy.localisation
     )
-    # A search that takes all the time must not take this one's.
-    localisation.begin()
     return replace(state, pending_runs=tuple(runs), pending_localisation=(localisation,))
 
 
@@ -59,9 +68,9 @@ def select_in_corrected_recordings(state: Identification) -> Identification:
         if not state.selection_explains:
             state.context.time_limit.check()
             context = replace(state.context, fitter=prepared.fitter, split=prepared.split)
-            state = start_side_runs(replace(state, context=context, prepared=prepared))
+            state = _with_side_runs(replace(state, context=context, prepared=prepared))
             state = replace(state, selection=select_effects(context))
-    return state
+    return _localised(state)
 
 
 def try_confusable_models(state: Identification) -> Identification:

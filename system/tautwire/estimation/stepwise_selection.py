@@ -163,12 +163,14 @@ class _StepwiseSelection:
         simplest = most_parsimonious(scores, context.policy.selection, context.fitter.has_disturbance)
         if best is None or simplest is None or simplest is best:
             return best
-        robots = [
-            calibrated_robot(context.fitter, robot, context.split.estimation)
-            for robot in (without, simplest.fit.robot, best.fit.robot)
-        ]
-        floor = sensor_noise_floor(context.fitter, robots[-1], validation)
-        missed, left, least = (missed_with_effects(context.fitter, robot, validation, floor) for robot in robots)
+        # The fits are there: time that is up must not lose them.
+        with context.time_limit.suspended():
+            robots = [
+                calibrated_robot(context.fitter, robot, context.split.estimation)
+                for robot in (without, simplest.fit.robot, best.fit.robot)
+            ]
+            floor = sensor_noise_floor(context.fitter, robots[-1], validation)
+            missed, left, least = (missed_with_effects(context.fitter, robot, validation, floor) for robot in robots)
         return simplest if left - least <= context.policy.size.max_left_share_of_form * (missed - least) else best
 
     def eliminate(self) -> None:
@@ -204,9 +206,10 @@ class _StepwiseSelection:
             if best is not None and best is not contender and self.swaps < policy.max_swaps:
                 self._accept_beside(others, best)
                 pending = [a for a in self.accepted if a is not self.accepted[-1]]
-                tested, score, self.swaps = self.accepted[-1], best, self.swaps + 1
+                tested, self.swaps = self.accepted[-1], self.swaps + 1
+                score = contender = best
             self.evidences[tested] = score.evidence
-            names = {t.hypothesis.effect.name for t in alternatives if score.is_confusable_with(t, policy)}
+            names = {t.hypothesis.effect.name for t in alternatives if contender.is_confusable_with(t, policy)}
             self.confusable[tested] = sorted(names - {tested.effect.name})
 
     def result(self) -> SelectionResult:

@@ -69,8 +69,8 @@ class Candidate:
     """A hypothesis that was tried: one effect more than the model had in its round.
 
     ``evidence`` is the natural log of its likelihood ratio on unseen data, against the model without it;
-    ``mean_square`` the mean square of the whitened innovations there (one where the residual is white noise). Of
-    ``values`` those of the parameters in ``fitted`` were fitted; the others are neutral.
+    ``mean_square`` the mean square of the whitened innovations there (one where the residual is white noise). A
+    fit estimates the parameters of its ``form``; the others are neutral.
     """
 
     round: int
@@ -80,12 +80,12 @@ class Candidate:
     evidence: float
     mean_square: float
     accepted: bool
-    fitted: tuple[str, ...]
+    form: tuple[str, ...]
 
     @property
-    def fitted_values(self) -> Mapping[str, float]:
-        """The values of the parameters that were fitted."""
-        return {name: value for name, value in self.values.items() if name in self.fitted}
+    def form_values(self) -> Mapping[str, float]:
+        """The values of the parameters that a fit estimates."""
+        return {name: value for name, value in self.values.items() if name in self.form}
 
 
 @dataclass(frozen=True)

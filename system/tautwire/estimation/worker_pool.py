@@ -63,8 +63,8 @@ class PendingResult(Generic[Result]):
         return self._future is None or self._future.done()
 
     def begin(self) -> None:
-        """Do the work here and now, and keep its result, unless a process does it already."""
-        if self._future is None:
+        """Do the work here and now, and keep its result, unless that was done or a process does it."""
+        if self._future is None and not self._kept:
             self._kept = (self._compute(),)
 
     def restart(self) -> None:

@@ -246,7 +246,7 @@ def _fitted_row(trace: Trace, candidate: Candidate, max_evidence: float) -> Row:
 
 def _unfitted_row(trace: Trace, candidate: Candidate) -> Row:
     location = cables_text(candidate.cables, trace.robot_before.cable_count) if candidate.cables else PLATFORM
-    return [candidate.name, location, Number(values_text(candidate.name, candidate.fitted_values))]
+    return [candidate.name, location, Number(values_text(candidate.name, candidate.form_values))]
 
 
 def _innovation_rows(trace: Trace) -> list[Row]:

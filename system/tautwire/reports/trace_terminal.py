@@ -158,7 +158,7 @@ def _candidate_cells(candidate: Candidate, cable_count: int) -> list[Text]:
         Text(format_evidence(candidate.evidence)),
         Text(format_significant(candidate.mean_square)),
         Text("taken" if candidate.accepted else ""),
-        Text(one_line(values_text(candidate.name, candidate.fitted_values))),
+        Text(one_line(values_text(candidate.name, candidate.form_values))),
     ]
 
 
