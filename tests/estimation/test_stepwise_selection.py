@@ -98,6 +98,26 @@ def test_beside_a_disturbance_what_came_first_needs_as_much_evidence_beside_what
     assert [hypothesis.effect.name for hypothesis in selection.result().accepted] == names
 
 
+@pytest.mark.parametrize(("has_disturbance", "also_possible"), [(False, []), (True, ["relaxation"])])
+def test_beside_a_disturbance_what_had_more_evidence_in_the_same_round_is_also_possible(
+    has_disturbance: bool, also_possible: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """Evidence of 1030 under the disturbance of today says nothing against 1000 under that of the round."""
+    context = context_with(has_disturbance)
+    robot = context.robot
+    fit = Fit.without_parameters(robot)
+    damping, relaxation = (Hypothesis(BY_NAME[name], (1, 2, 3)) for name in ("damping", "relaxation"))
+    selection = stepwise_selection._StepwiseSelection(context, fit, context.fitter, [damping])
+    selection.forward_evidences = {damping: 950.0}
+    scores = [CandidateScore(h, fit, evidence, 1.0) for h, evidence in ((damping, 950.0), (relaxation, 1000.0))]
+    selection.complete_rounds[()] = scores
+    monkeypatch.setattr(selection, "_evidence", lambda without, others: 1030.0)
+    monkeypatch.setattr(selection, "_best_candidate", lambda scores, without: scores[0])
+    monkeypatch.setattr(stepwise_selection, "fit_model", lambda *_, **__: fit)
+    selection.eliminate()
+    assert selection.confusable[damping] == also_possible
+
+
 @pytest.mark.parametrize(
     ("limits", "rounds"),
     [
@@ -153,10 +173,10 @@ def test_a_simpler_effect_ties_by_its_form_unless_it_leaves_more_than_a_form_may
     selection = stepwise_selection._StepwiseSelection(context, Fit.without_parameters(robot), context.fitter)
     # Time is up once there are scores, which must not be lost by that.
     with limit.searching(0.6):
-        best = selection._most_parsimonious(scores, robot)
+        best = selection._best_candidate(scores, robot)
     assert best is not None
     assert best.hypothesis.effect.name == name
-    assert selection._most_parsimonious([], robot) is None
+    assert selection._best_candidate([], robot) is None
 
 
 @pytest.mark.parametrize("swapped", [False, True])

@@ -202,6 +202,23 @@ def test_candidates_fitted_before_time_was_up_count(recordings: tuple[Recording,
     assert found.sentence.endswith("The search ended at its time limit of 600 s, before all was tried.")
 
 
+def test_the_error_is_localised_before_a_search_that_may_take_all_the_time(
+    recordings: tuple[Recording, Recording], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    steps: list[str] = []
+
+    def step(name: str) -> None:
+        steps.append(name)
+        if name == "selection":
+            raise InterruptedError
+
+    monkeypatch.setattr(identification_stages, "localise_residual", lambda *_: step("localisation"))
+    monkeypatch.setattr(identification_stages, "select_effects", lambda _: step("selection"))
+    with pytest.raises(InterruptedError):
+        trace(example("three"), *recordings)
+    assert steps == ["localisation", "selection"]
+
+
 def test_nothing_missing_is_never_said_for_lack_of_time() -> None:
     fit, check = (recorded("three", seed, {}).first(401) for seed in (3, 53))
     found = traced_until("round 1", fit, check)

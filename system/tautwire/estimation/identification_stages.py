@@ -33,17 +33,6 @@ from .verdict import verdict_beside_disturbance, verdict_of, verdict_of_ended_se
 
 def start_side_runs(state: Identification) -> Identification:
     """Co-simulate the declared robot, and localise its error in a component, beside all that follows."""
-    return _localised(_with_side_runs(state))
-
-
-def _localised(state: Identification) -> Identification:
-    """The same state; a search that takes all the time must not take that of the localisation."""
-    for localisation in state.pending_localisation:
-        localisation.begin()
-    return state
-
-
-def _with_side_runs(state: Identification) -> Identification:
     context, prepared = state.context, state.prepared
     runs = start_cosimulations(context.workers, context.fitter, context.robot, prepared.data_sets)
     robot, data = calibrated_estimation_data(prepared, context.robot)
@@ -51,6 +40,13 @@ def _with_side_runs(state: Identification) -> Identification:
         localise_residual, robot, data, context.fitter.noise, context.policy.localisation
     )
     return replace(state, pending_runs=tuple(runs), pending_localisation=(localisation,))
+
+
+def begin_localisation(state: Identification) -> Identification:
+    """Localise the declared robot's error before a search that may take all the time, where no process does."""
+    for localisation in state.pending_localisation:
+        localisation.begin()
+    return state
 
 
 def select(state: Identification) -> Identification:
@@ -68,9 +64,9 @@ def select_in_corrected_recordings(state: Identification) -> Identification:
         if not state.selection_explains:
             state.context.time_limit.check()
             context = replace(state.context, fitter=prepared.fitter, split=prepared.split)
-            state = _with_side_runs(replace(state, context=context, prepared=prepared))
+            state = start_side_runs(replace(state, context=context, prepared=prepared))
             state = replace(state, selection=select_effects(context))
-    return _localised(state)
+    return state
 
 
 def try_confusable_models(state: Identification) -> Identification:
@@ -200,8 +196,10 @@ def analyse_detectability(state: Identification) -> Identification:
 
 STAGES: tuple[Callable[[Identification], Identification], ...] = (
     start_side_runs,
+    begin_localisation,
     select,
     select_in_corrected_recordings,
+    begin_localisation,
     try_confusable_models,
     try_declared_start,
     separate_cables,

@@ -27,7 +27,7 @@ from .policy import SelectionPolicy
 from .residual_analysis import residuals_are_white
 from .smoothed_states import calibrated_robot
 from .time_limit import OutOfTimeError
-from .trace_result import Candidate
+from .trace_result import Candidate, Errors
 
 
 @dataclass(frozen=True)
@@ -127,7 +127,7 @@ class _StepwiseSelection:
             scores, is_complete = score_candidates(self.context, search_round)
             if is_complete:
                 self.complete_rounds[tuple(self.accepted)] = scores
-            best = self._most_parsimonious(scores, self.current.robot)
+            best = self._best_candidate(scores, self.current.robot)
             significant = best is not None and best.evidence > self._required_evidence(self.accepted)
             self.candidates += [trial.candidate(number, significant and trial is best) for trial in scores]
             if best is None or not significant:
@@ -143,35 +143,34 @@ class _StepwiseSelection:
 
     def _leaves_little(self) -> bool:
         """Whether the accepted hypotheses leave little, or explain little of what a small random force may be."""
-        policy, fitter = self.context.policy.size, self.context.fitter
-        robot = calibrated_robot(fitter, self.current.robot, self.context.split.estimation)
-        floor = sensor_noise_floor(fitter, robot, self.context.split.validation)
-        missed = missed_without_effects(self.context, self.without_effects, self.context.split.validation, floor)
-        left = missed_with_effects(fitter, robot, self.context.split.validation, floor)
+        policy, validation = self.context.policy.size, self.context.split.validation
+        (left,), floor = self._missed_on_validation(self.current.robot)
+        missed = missed_without_effects(self.context, self.without_effects, validation, floor)
         is_explained = left <= (1.0 - policy.min_explained_share) * missed
         is_small = missed < policy.max_size_of_disturbance**2
         return left < policy.max_left_share * missed or (is_small and not is_explained)
 
-    def _most_parsimonious(self, scores: Sequence[CandidateScore], without: Robot) -> CandidateScore | None:
-        """Most parsimonious candidate: the simplest of those that tie with the best one, but for their forms.
-
-        One whose effect leaves more than a form may, of what the best one explains, ties by chance alone. ``without``
-        is the robot without any of them.
-        """
+    def _missed_on_validation(self, *robots: Robot) -> tuple[list[float], Errors]:
+        """What robots with their effects, calibrated on FIT, miss on CHECK; the last one's noise counts as none."""
         context, validation = self.context, self.context.split.validation
-        best = most_parsimonious(scores, context.policy.selection)
-        simplest = most_parsimonious(scores, context.policy.selection, context.fitter.has_disturbance)
+        calibrated = [calibrated_robot(context.fitter, robot, context.split.estimation) for robot in robots]
+        floor = sensor_noise_floor(context.fitter, calibrated[-1], validation)
+        return [missed_with_effects(context.fitter, robot, validation, floor) for robot in calibrated], floor
+
+    def _best_candidate(self, scores: Sequence[CandidateScore], without: Robot) -> CandidateScore | None:
+        """Best candidate of a round, or a simpler one that ties with it and explains nearly as much.
+
+        Beside a disturbance candidates tie within what their forms may leave; the simpler one is taken where it leaves
+        no more than that of what the best explains. ``without`` is the robot without any of them.
+        """
+        best = most_parsimonious(scores, self.context.policy.selection)
+        simplest = most_parsimonious(scores, self.context.policy.selection, self.context.fitter.has_disturbance)
         if best is None or simplest is None or simplest is best:
             return best
         # The fits are there: time that is up must not lose them.
-        with context.time_limit.suspended():
-            robots = [
-                calibrated_robot(context.fitter, robot, context.split.estimation)
-                for robot in (without, simplest.fit.robot, best.fit.robot)
-            ]
-            floor = sensor_noise_floor(context.fitter, robots[-1], validation)
-            missed, left, least = (missed_with_effects(context.fitter, robot, validation, floor) for robot in robots)
-        return simplest if left - least <= context.policy.size.max_left_share_of_form * (missed - least) else best
+        with self.context.time_limit.suspended():
+            (missed, left, least), _ = self._missed_on_validation(without, simplest.fit.robot, best.fit.robot)
+        return simplest if left - least <= self.context.policy.size.max_left_share_of_form * (missed - least) else best
 
     def eliminate(self) -> None:
         """Backward elimination: each accepted hypothesis against its best alternatives, and against its absence.
@@ -199,7 +198,7 @@ class _StepwiseSelection:
                 self.complete_rounds[tuple(others)] = scores
             alternatives = [trial for trial in scores if not trial.hypothesis.overlaps(tested)]
             contender = self._comparable(score, others)
-            best = self._most_parsimonious([contender, *alternatives], without.robot)
+            best = self._best_candidate([contender, *alternatives], without.robot)
             if tuple(others) not in reported:
                 self.candidates += [t.candidate(number, t is best) for t in alternatives]
             reported.add(tuple(others))

@@ -9,7 +9,7 @@ from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
 from contextlib import contextmanager
-from functools import partial
+from functools import cache, partial
 from multiprocessing import get_context
 from pathlib import Path
 from types import TracebackType
@@ -52,10 +52,9 @@ class PendingResult(Generic[Result]):
         poll_interrupts: Callable[[], None],
         processes: int,
     ) -> None:
-        self._start, self._compute = start, compute
+        self._start, self._compute = start, cache(compute)
         self._poll_interrupts, self._processes = poll_interrupts, processes
         self._future = start() if start else None
-        self._kept: tuple[Result, ...] = ()
 
     @property
     def is_done(self) -> bool:
@@ -63,9 +62,9 @@ class PendingResult(Generic[Result]):
         return self._future is None or self._future.done()
 
     def begin(self) -> None:
-        """Do the work here and now, and keep its result, unless that was done or a process does it."""
-        if self._future is None and not self._kept:
-            self._kept = (self._compute(),)
+        """Do the work here and now, unless that was done or a process does it."""
+        if self._future is None:
+            self._compute()
 
     def restart(self) -> None:
         """Start the work anew, in another process."""
@@ -74,8 +73,6 @@ class PendingResult(Generic[Result]):
 
     def result(self) -> Result:
         """The result, or what the work raised. Without a process of its own it is done here."""
-        if self._kept:
-            return self._kept[0]
         if self._future is None:
             return self._compute()
         while not wait([self._future], POLL_INTERVAL).done:
