@@ -44,6 +44,19 @@ def test_fits_80_columns_and_cuts_nothing(eight: bool) -> None:
     assert "…" not in text
 
 
+def test_breaks_no_word_of_long_parameters() -> None:
+    trace = made_trace()
+    found = trace.effects[0]
+    (estimate,) = (replace(each, value=0.01916, low=0.01818, high=0.02012) for each in found.parameters.values())
+    effects = [
+        replace(found, name=name, parameters=dict.fromkeys(names, estimate))
+        for name, names in (("friction", ("coefficient", "smoothing")), ("hysteresis", ("force", "yield_strain")))
+    ]
+    text = rendered(replace(trace, effects=tuple(effects)))
+    for word in ("coefficient", "smoothing", "hysteresis", "yield_strain"):
+        assert word in text
+
+
 @pytest.mark.parametrize("eight", [False, True])
 def test_every_error_is_there(eight: bool) -> None:
     trace = made_trace(eight=eight)

@@ -106,7 +106,7 @@ def check_noise(
     measured = float(np.sqrt(np.mean(speed_levels)))
     if not is_flat(speed_levels, policy.max_band_ratio) or measured <= policy.max_noise_ratio * noise.winch_speed:
         return checked
-    note = _replacement_note("winch speeds", noise.winch_speed, measured, "m/s")
+    note = f"winch speeds: {_replacement_finding(noise.winch_speed, measured, 'm/s')}"
     return replace(checked, noise=replace(checked.noise, winch_speed=measured), notes=(*checked.notes, note))
 
 
@@ -114,7 +114,8 @@ def _check_sensor_kind(
     checked: CheckedNoise, recordings: tuple[Recording, ...], columns: range, unit: str, policy: NoiseCheckPolicy
 ) -> CheckedNoise:
     """Test the outputs of one kind of sensor, whose noise has one colour."""
-    notes, is_coloured = list(checked.notes), checked.is_coloured
+    outputs_by_finding: dict[str, list[str]] = {}
+    is_coloured = checked.is_coloured
     declared = checked.noise.of_outputs(recordings[0].cable_count)
     deviations = list(declared)
     levels = {}
@@ -138,28 +139,27 @@ def _check_sensor_kind(
             )
             origin = "at rest" if standstill else "as declared"
             description = f"noise is coloured ({basis}; {deviations[column]:.3g} {unit} {origin})"
-            notes.append(f"{name}: {description}; its memory is estimated with the disturbance")
+            finding = f"{description}; its memory is estimated with the disturbance"
             is_coloured = True
         elif declared[column] / policy.max_noise_ratio <= floor <= declared[column] * policy.max_noise_ratio:
             continue
         elif flat:
-            notes.append(_replacement_note(name, declared[column], floor, unit))
+            finding = _replacement_finding(declared[column], floor, unit)
             deviations[column] = floor
         else:
-            notes.append(
-                f"{name}: its spectrum is above the declared noise, {declared[column]:.3g} {unit}, and has no "
-                "floor: either the noise is larger and coloured, or the sampling misses fast motion; the declared "
-                "noise is used"
+            finding = (
+                f"the spectrum is above the declared noise, {declared[column]:.3g} {unit}, and has no floor: either "
+                "the noise is larger and coloured, or the sampling misses fast motion; the declared noise is used"
             )
-    if len(notes) == len(checked.notes):
+        outputs_by_finding.setdefault(finding, []).append(name)
+    if not outputs_by_finding:
         return checked
-    return CheckedNoise(replace(checked.noise, own=tuple(deviations)), is_coloured, tuple(notes))
+    notes = [f"{', '.join(outputs)}: {finding}" for finding, outputs in outputs_by_finding.items()]
+    return CheckedNoise(replace(checked.noise, own=tuple(deviations)), is_coloured, (*checked.notes, *notes))
 
 
-def _replacement_note(name: str, declared: float, measured: float, unit: str) -> str:
-    return (
-        f"{name}: declared noise {declared:.3g} {unit}, spectral noise floor {measured:.3g} {unit}: the latter is used"
-    )
+def _replacement_finding(declared: float, measured: float, unit: str) -> str:
+    return f"declared noise {declared:.3g} {unit}, spectral noise floor {measured:.3g} {unit}: the latter is used"
 
 
 def _standstill_statistics(

@@ -69,7 +69,9 @@ def trace_table(trace: Trace) -> RenderableType:
 
 
 def _new_table(title: str) -> Table:
-    return Table(title=title, title_justify="left", title_style="bold", box=box.SIMPLE, pad_edge=False)
+    return Table(
+        title=title, title_justify="left", title_style="bold", box=box.SIMPLE, pad_edge=False, collapse_padding=True
+    )
 
 
 def _error_table(trace: Trace) -> Table:
