@@ -104,14 +104,17 @@ def _refitted_beside_own_disturbance(
 ) -> dict[Hypothesis, CandidateScore]:
     """Better scores of the candidates that explain FIT best, each beside a disturbance of its own.
 
-    Only where the best of them is not established: under the disturbance of a model without it, which had to be large,
-    an effect that explains nearly all may be fitted badly.
+    Only where the best of them on FIT is not established, or does not tie with the best on CHECK: under the disturbance
+    of a model without it, which had to be large, an effect that explains nearly all may be fitted badly.
     """
     estimation, tolerance = context.split.estimation, context.policy.fit.coarse_cost_tolerance
     models = {h: tuple(with_hypothesis(accepted, h)) for h in scores}
-    explained = {h: context.fitter.log_likelihood(scores[h].fit.robot, models[h], estimation) for h in scores}
+    # The fits are there: time that is up must not lose them.
+    with context.time_limit.suspended():
+        explained = {h: context.fitter.log_likelihood(scores[h].fit.robot, models[h], estimation) for h in scores}
     ranked = sorted(scores, key=lambda h: -explained[h])
-    required = max((context.evidence_threshold(), *(score.evidence for score in scores.values())))
+    top = max((score.evidence for score in scores.values()), default=0.0)
+    required = max(context.evidence_threshold(), top - context.policy.selection.tie(top, has_disturbance=True))
     if not ranked or scores[ranked[0]].evidence >= required:
         return {}
     tasks = {
