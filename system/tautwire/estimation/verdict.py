@@ -73,7 +73,9 @@ def verdict_beside_disturbance(
         share_of = {labels[index]: shares.effects[index] for index in large}
         named = _sum_up([f"{name} ({_per_cent(share)} of what is missed)" for name, share in share_of.items()])
         kind = ", which is no more than a small random force" if is_disturbance else ""
-        lacks = f"The model lacks {named}; {_per_cent(shares.left)} remains{kind}."
+        others = 1.0 - shares.left - max(shares.effects) if len(names) == 1 else 0.0
+        uncertain = f"{_per_cent(others)} lies within stated uncertainties, " if others >= policy.min_share else ""
+        lacks = f"The model lacks {named}; {uncertain}{_per_cent(shares.left)} remains{kind}."
         return "effects", f"{lacks} The error is then {remaining}."
     closest = f" Of it {_per_cent(1.0 - shares.left)} would go to {_sum_up(names)}." if names else ""
     return "unexplained", f"No known effect explains a substantial share of the residual: {remaining}.{closest}"
