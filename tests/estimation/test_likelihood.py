@@ -10,6 +10,7 @@ from tautwire.estimation.likelihood import Likelihood
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.robot.schema import EffectSetting
 from tautwire.robot.symbolic_model import FreeParameter
+from tautwire_fmu.laws.effects import BY_NAME
 from tests.support.effect_cases import Case, same
 from tests.support.recordings import recorded
 from tests.support.robots import example
@@ -53,6 +54,23 @@ def test_slopes_are_the_derivatives_of_the_innovations() -> None:
         more, less = (likelihood.innovations(short, at + sign * step).values for sign in (1, -1))
         difference = (more - less) / (2.0 * width)
         assert np.max(np.abs(difference - slopes[:, :, index])) < 0.02 * np.max(np.abs(difference))
+
+
+def test_noise_of_winch_speeds_reaches_tensions_alike_by_damping_and_by_relaxation_in_no_time() -> None:
+    more_damping, time = 5e8, 1e-3
+    declared = ROBOT.cables[0].damping
+    relaxation = EffectSetting(
+        "relaxation", BY_NAME["relaxation"].completed_values({"modulus": more_damping / time, "time": time}), (1, 2, 3)
+    )
+    damping = EffectSetting("damping", {"damping": declared + more_damping}, (1, 2, 3))
+    relaxing, damped = (
+        Likelihood(ROBOT.with_effect(effect), (), replace(NOISE, tension=0.05), 0.02)
+        .innovations(RECORDING.first(200), ())
+        .log_variances
+        for effect in (relaxation, damping)
+    )
+    # Before that the start is not known.
+    assert relaxing[10:] == pytest.approx(damped[10:], abs=0.05)
 
 
 def test_missing_cells_are_passed_over() -> None:

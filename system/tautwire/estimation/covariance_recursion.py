@@ -5,9 +5,10 @@ missing one: with variance ``r`` of the noise, row ``h`` of the output matrix, a
 
     s = h P h' + r        g = P h' / s        x <- x + g e        P <- P - g h P
 
-Over a step, transition matrices ``F`` of the states that move, beside those that only decay by ``d``:
+Over a step, transition matrices ``F`` of the states that move, beside those that only decay by ``d``; process noise of
+the former is there from the step's begin, so that what decays within a step follows it:
 
-    P <- [F; diag d] P [F; diag d]' + diag q
+    P <- [F; diag d] (P + diag [q; 0]) [F; diag d]' + diag [0; q]
 
 Sensitivities to the free parameters are propagated with the gain held fixed. Loops in machine code take a third of the
 time of the same operations written out one by one, which outgrow the processor's caches.
@@ -186,6 +187,8 @@ def _update_covariance_over_step(results: tuple[Any, ...], covariance: Any) -> N
     transition, decay, process_noise = results[1], results[3][0], results[4][0]
     from_count, moving_count = transition.shape
     size = len(covariance)
+    for r in range(moving_count):
+        covariance[r, r] += process_noise[r]
     propagated = np.zeros((moving_count, size))
     for r in range(moving_count):
         for j in range(from_count):
@@ -204,7 +207,7 @@ def _update_covariance_over_step(results: tuple[Any, ...], covariance: Any) -> N
             for c in range(from_count):
                 total += transition[c, j] * propagated[r, c]
             covariance[r, j] = covariance[j, r] = total
-    for r in range(size):
+    for r in range(moving_count, size):
         covariance[r, r] += process_noise[r]
 
 
