@@ -154,6 +154,35 @@ def test_beside_a_disturbance_the_search_ends_where_what_is_left_could_not_matte
     assert len(numbers) == rounds
 
 
+@pytest.mark.parametrize(
+    ("has_disturbance", "events"),
+    [(False, [1, 2, 3, "elimination"]), (True, [1, 2, "elimination", 3, "elimination"])],
+)
+def test_beside_a_disturbance_what_came_first_is_tested_again_before_a_third_is_looked_for(
+    has_disturbance: bool, events: list[object], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    context = context_with(has_disturbance)
+    robot = context.robot
+    happened: list[object] = []
+
+    def scored(_: object, number: int) -> tuple[list[CandidateScore], bool]:
+        happened.append(number)
+        name, cables, evidence = [("damping", (1, 2, 3), 1000.0), ("payload", (), 400.0), ("drag", (), 0.0)][number - 1]
+        hypothesis = Hypothesis(BY_NAME[name], cables)
+        extended = Fit.without_parameters(robot.with_effect(hypothesis.setting(robot)))
+        return [CandidateScore(hypothesis, extended, evidence, 1.0)], True
+
+    selection = stepwise_selection._StepwiseSelection
+    monkeypatch.setattr(stepwise_selection, "score_candidates", scored)
+    monkeypatch.setattr(stepwise_selection, "_search_round", lambda _, number, *__: number)
+    monkeypatch.setattr(stepwise_selection, "fit_model", lambda *_, **__: Fit.without_parameters(robot))
+    monkeypatch.setattr(stepwise_selection, "with_disturbance_beside", lambda context, chosen, fit: (context, fit))
+    monkeypatch.setattr(selection, "_leaves_little", lambda self: False)
+    monkeypatch.setattr(selection, "eliminate", lambda self: happened.append("elimination"))
+    select_effects(context)
+    assert happened == events
+
+
 @pytest.mark.parametrize(("mass", "name"), [(5.8, "payload"), (4.0, "relaxation")])
 def test_a_simpler_effect_ties_by_its_form_unless_it_leaves_more_than_a_form_may(mass: float, name: str) -> None:
     """Of two with nearly the same evidence, where the one with more parameters explains all that is missed."""

@@ -58,6 +58,8 @@ def nothing_selected(robot: Robot) -> SelectionResult:
 def select_effects(context: IdentificationContext) -> SelectionResult:
     """Select the effects that a model lacks: forward while one is significant, then backward.
 
+    Beside a disturbance backward whenever one was added to others, too.
+
     What the robot file declares, effects included, stays as it is until a hypothesis replaces it. Where time is up, it
     is what was selected until then.
     """
@@ -103,7 +105,8 @@ class _StepwiseSelection:
     """A selection in progress; at any time its accepted hypotheses and their fit belong together.
 
     ``evidences`` are those of the hypotheses that passed the backward elimination, ``forward_evidences`` those with
-    which they were accepted. ``without_effects`` fits the robot without any.
+    which they were accepted; ``survivors`` are the hypotheses that it left last. ``without_effects`` fits the robot
+    without any.
     """
 
     context: IdentificationContext
@@ -115,6 +118,7 @@ class _StepwiseSelection:
     forward_evidences: dict[Hypothesis, float] = field(default_factory=dict)
     confusable: dict[Hypothesis, list[str]] = field(default_factory=dict)
     evidences: dict[Hypothesis, float] = field(default_factory=dict)
+    survivors: list[Hypothesis] = field(default_factory=list)
     swaps: int = 0
 
     def add(self) -> None:
@@ -132,7 +136,13 @@ class _StepwiseSelection:
             self.candidates += [trial.candidate(number, significant and trial is best) for trial in scores]
             if best is None or not significant:
                 break
-            self._accept_beside(self.accepted, best)
+            before = list(self.accepted)
+            self._accept_beside(before, best)
+            if before and self.context.fitter.has_disturbance:
+                # What came first stood for the second as well: another may come nearer beside it.
+                self.eliminate()
+            if self.accepted == before:
+                break
 
     def _required_evidence(self, others: Sequence[Hypothesis]) -> float:
         """Evidence that a hypothesis needs beside the others."""
@@ -178,6 +188,8 @@ class _StepwiseSelection:
         It is dropped where it is not needed, and replaced by an alternative that explains more, or as much with fewer
         parameters.
         """
+        if self.accepted == self.survivors:
+            return
         policy = self.context.policy.selection
         pending = list(self.accepted)
         reported = set(self.complete_rounds)
@@ -190,7 +202,7 @@ class _StepwiseSelection:
                 self._accept(others, fit_model(self.context, others, without.robot))
                 pending = list(others)
                 continue
-            number = policy.max_rounds + 1 + len(self.evidences) + self.swaps
+            number = 1 + max([policy.max_rounds, *(candidate.round for candidate in self.candidates)])
             scores = self.complete_rounds.get(tuple(others))
             if scores is None:
                 search_round = _search_round(self.context, number, without.robot, others, score)
@@ -210,6 +222,7 @@ class _StepwiseSelection:
             self.evidences[tested] = score.evidence
             names = {t.hypothesis.effect.name for t in alternatives if contender.is_confusable_with(t, policy)}
             self.confusable[tested] = sorted(names - {tested.effect.name})
+        self.survivors = list(self.accepted)
 
     def result(self) -> SelectionResult:
         """What is selected so far."""
