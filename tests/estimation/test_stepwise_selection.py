@@ -98,6 +98,32 @@ def test_beside_a_disturbance_what_came_first_needs_as_much_evidence_beside_what
     assert [hypothesis.effect.name for hypothesis in selection.result().accepted] == names
 
 
+def test_what_was_dropped_beside_another_does_not_come_back_in_its_place(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Damping came first, with a little more evidence than creep, and is not needed beside it."""
+    context = context_with(has_disturbance=True)
+    robot = context.robot
+    fit = Fit.without_parameters(robot)
+    damping, creep = (Hypothesis(BY_NAME[name], (1, 2, 3)) for name in ("damping", "creep"))
+    selection = stepwise_selection._StepwiseSelection(context, fit, context.fitter, [damping, creep])
+    selection.current = Fit.without_parameters(
+        robot.with_effect(damping.setting(robot)).with_effect(creep.setting(robot))
+    )
+    selection.forward_evidences = {damping: 1000.0, creep: 150.0}
+    scores = [CandidateScore(h, fit, evidence, 1.0) for h, evidence in ((damping, 1000.0), (creep, 950.0))]
+    selection.complete_rounds[(), None] = scores
+    evidence = {(creep,): 80.0, (): 970.0}
+    monkeypatch.setattr(selection, "_evidence", lambda without, others: evidence[tuple(others)])
+    monkeypatch.setattr(selection, "_best_candidate", lambda scores, without: max(scores, key=lambda s: s.evidence))
+    monkeypatch.setattr(stepwise_selection, "fit_model", lambda *_, **__: selection.current)
+    monkeypatch.setattr(stepwise_selection, "with_disturbance_beside", lambda context, chosen, fit: (context, fit))
+    selection.eliminate()
+    assert selection.accepted == [creep]
+    assert selection.confusable[creep] == ["damping"]
+    # What it left last is not tested again.
+    monkeypatch.setattr(selection, "_evidence", lambda without, others: pytest.fail("tested again"))
+    selection.eliminate()
+
+
 @pytest.mark.parametrize(("has_disturbance", "also_possible"), [(False, []), (True, ["relaxation"])])
 def test_beside_a_disturbance_what_had_more_evidence_in_the_same_round_is_also_possible(
     has_disturbance: bool, also_possible: list[str], monkeypatch: pytest.MonkeyPatch
@@ -110,7 +136,7 @@ def test_beside_a_disturbance_what_had_more_evidence_in_the_same_round_is_also_p
     selection = stepwise_selection._StepwiseSelection(context, fit, context.fitter, [damping])
     selection.forward_evidences = {damping: 950.0}
     scores = [CandidateScore(h, fit, evidence, 1.0) for h, evidence in ((damping, 950.0), (relaxation, 1000.0))]
-    selection.complete_rounds[()] = scores
+    selection.complete_rounds[(), None] = scores
     monkeypatch.setattr(selection, "_evidence", lambda without, others: 1030.0)
     monkeypatch.setattr(selection, "_best_candidate", lambda scores, without: scores[0])
     monkeypatch.setattr(stepwise_selection, "fit_model", lambda *_, **__: fit)

@@ -105,7 +105,8 @@ class _StepwiseSelection:
     """A selection in progress; at any time its accepted hypotheses and their fit belong together.
 
     ``evidences`` are those of the hypotheses that passed the backward elimination, ``forward_evidences`` those with
-    which they were accepted; ``survivors`` are the hypotheses that it left last. ``without_effects`` fits the robot
+    which they were accepted; ``survivors`` are the hypotheses that it left last. ``complete_rounds`` are by the
+    hypotheses beside which a round was scored, and the one that it was to replace. ``without_effects`` fits the robot
     without any.
     """
 
@@ -114,23 +115,25 @@ class _StepwiseSelection:
     without_effects: Fitter
     accepted: list[Hypothesis] = field(default_factory=list)
     candidates: list[Candidate] = field(default_factory=list)
-    complete_rounds: dict[tuple[Hypothesis, ...], list[CandidateScore]] = field(default_factory=dict)
+    complete_rounds: dict[tuple[tuple[Hypothesis, ...], Hypothesis | None], list[CandidateScore]] = field(
+        default_factory=dict
+    )
     forward_evidences: dict[Hypothesis, float] = field(default_factory=dict)
     confusable: dict[Hypothesis, list[str]] = field(default_factory=dict)
     evidences: dict[Hypothesis, float] = field(default_factory=dict)
     survivors: list[Hypothesis] = field(default_factory=list)
-    swaps: int = 0
 
     def add(self) -> None:
         """Forward selection: the best hypothesis of each round, while it is significant."""
         self.current = fit_model(self.context, self.accepted)
-        for number in range(1, self.context.policy.selection.max_rounds + 1):
+        for _ in range(self.context.policy.selection.max_rounds):
             if self.accepted and self.context.fitter.has_disturbance and self._leaves_little():
                 break
+            number = self._next_number()
             search_round = _search_round(self.context, number, self.current.robot, self.accepted)
             scores, is_complete = score_candidates(self.context, search_round)
             if is_complete:
-                self.complete_rounds[tuple(self.accepted)] = scores
+                self.complete_rounds[tuple(self.accepted), None] = scores
             best = self._best_candidate(scores, self.current.robot)
             significant = best is not None and best.evidence > self._required_evidence(self.accepted)
             self.candidates += [trial.candidate(number, significant and trial is best) for trial in scores]
@@ -143,6 +146,10 @@ class _StepwiseSelection:
                 self.eliminate()
             if self.accepted == before:
                 break
+
+    def _next_number(self) -> int:
+        """Number of the round that follows those with candidates."""
+        return 1 + max((candidate.round for candidate in self.candidates), default=0)
 
     def _required_evidence(self, others: Sequence[Hypothesis]) -> float:
         """Evidence that a hypothesis needs beside the others."""
@@ -190,9 +197,8 @@ class _StepwiseSelection:
         """
         if self.accepted == self.survivors:
             return
-        policy = self.context.policy.selection
-        pending = list(self.accepted)
-        reported = set(self.complete_rounds)
+        policy, pending, swaps = self.context.policy.selection, list(self.accepted), 0
+        dropped: list[Hypothesis] = []
         while pending:
             tested = pending.pop(0)
             others = [a for a in self.accepted if a is not tested]
@@ -200,29 +206,34 @@ class _StepwiseSelection:
             score = CandidateScore(tested, self.current, self._evidence(without, others), float("nan"))
             if score.evidence < self._required_evidence(others):
                 self._accept(others, fit_model(self.context, others, without.robot))
-                pending = list(others)
+                pending, dropped = list(others), [*dropped, tested]
                 continue
-            number = 1 + max([policy.max_rounds, *(candidate.round for candidate in self.candidates)])
-            scores = self.complete_rounds.get(tuple(others))
+            number, scores = None, self._known_scores(others, tested)
             if scores is None:
+                number = self._next_number()
                 search_round = _search_round(self.context, number, without.robot, others, score)
                 scores, _ = score_candidates(self.context, search_round)
-                self.complete_rounds[tuple(others)] = scores
+                self.complete_rounds[tuple(others), tested] = scores
             alternatives = [trial for trial in scores if not trial.hypothesis.overlaps(tested)]
             contender = self._comparable(score, others)
-            best = self._best_candidate([contender, *alternatives], without.robot)
-            if tuple(others) not in reported:
+            # One that was not needed beside this one does not come back in its place.
+            allowed = [t for t in alternatives if not any(t.hypothesis.overlaps(each) for each in dropped)]
+            best = self._best_candidate([contender, *allowed], without.robot)
+            if number is not None:
                 self.candidates += [t.candidate(number, t is best) for t in alternatives]
-            reported.add(tuple(others))
-            if best is not None and best is not contender and self.swaps < policy.max_swaps:
+            if best is not None and best is not contender and swaps < policy.max_swaps:
                 self._accept_beside(others, best)
                 pending = [a for a in self.accepted if a is not self.accepted[-1]]
-                tested, self.swaps = self.accepted[-1], self.swaps + 1
+                tested, swaps = self.accepted[-1], swaps + 1
                 score = contender = best
             self.evidences[tested] = score.evidence
             names = {t.hypothesis.effect.name for t in alternatives if contender.is_confusable_with(t, policy)}
             self.confusable[tested] = sorted(names - {tested.effect.name})
         self.survivors = list(self.accepted)
+
+    def _known_scores(self, others: Sequence[Hypothesis], rival: Hypothesis) -> list[CandidateScore] | None:
+        """Scores of what may stand beside others in place of a rival, where there was such a round."""
+        return self.complete_rounds.get((tuple(others), None), self.complete_rounds.get((tuple(others), rival)))
 
     def result(self) -> SelectionResult:
         """What is selected so far."""
@@ -242,6 +253,7 @@ class _StepwiseSelection:
         # One that loses cables to another keeps its evidence.
         last = {h: e for h in hypotheses for old, e in self.forward_evidences.items() if h.overlaps(old)}
         self.forward_evidences |= {**last, best.hypothesis: best.evidence}
+        self.evidences.pop(best.hypothesis, None)
         self._accept(hypotheses, best.fit)
 
     def _accept(self, hypotheses: list[Hypothesis], fit: Fit) -> None:
@@ -257,7 +269,7 @@ class _StepwiseSelection:
 
         The disturbance has been fitted anew beside the accepted hypotheses since.
         """
-        known = self.complete_rounds.get(tuple(others), []) if self.context.fitter.has_disturbance else []
+        known = self.complete_rounds.get((tuple(others), None), []) if self.context.fitter.has_disturbance else []
         return next((each for each in known if each.hypothesis == score.hypothesis), score)
 
     def _evidence(self, without: Fit, others: Sequence[Hypothesis]) -> float:
