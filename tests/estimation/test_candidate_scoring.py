@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
@@ -16,6 +18,8 @@ from tautwire.estimation.hypotheses import Hypothesis
 from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fit, Fitter
+from tautwire.estimation.time_limit import TimeLimit
+from tautwire.robot.schema import Robot
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.support.recordings import recorded
 from tests.support.robots import example
@@ -34,6 +38,42 @@ def test_a_coarse_baseline_is_made_exact_where_it_decides(
     search_round = SearchRound(1, robot, (), None, is_white=True, is_ranking=False)
     scores = candidate_scoring._with_exact_baseline(context, search_round, 1000.0, {hypothesis: score})
     assert scores[hypothesis].evidence == expected
+
+
+@pytest.mark.parametrize(
+    ("best_on_fit", "evidence", "is_refitted"),
+    [
+        ("payload", {"payload": 950.0, "relaxation": 1000.0}, False),
+        ("relaxation", {"payload": 950.0, "relaxation": 1000.0}, True),
+        ("payload", {"payload": 950.0, "drag": 2000.0}, True),
+        ("payload", {"payload": 3.0, "drag": 2.0}, True),
+    ],
+)
+def test_candidates_get_disturbances_of_their_own_unless_fit_and_check_agree_on_the_best(
+    best_on_fit: str, evidence: dict[str, float], is_refitted: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot, recording = example("three"), recorded("three", 1)
+    noise = estimate_noise(robot, recording)
+    split = split_data(robot, noise, recording, None)
+    scores: dict[Hypothesis, CandidateScore] = {}
+    limit = TimeLimit(600.0, lambda: 601.0 * bool(scores))
+
+    def log_likelihood(robot: Robot, *_: object) -> float:
+        limit.check()
+        return float(robot.effects[0].name == best_on_fit)
+
+    refitted: list[Hypothesis] = []
+    fitter: Any = SimpleNamespace(log_likelihood=log_likelihood)
+    context = IdentificationContext(robot, fitter, split, time_limit=limit)
+    for name, nats in evidence.items():
+        hypothesis = Hypothesis(BY_NAME[name], (1, 2, 3) if name == "relaxation" else ())
+        fit = Fit.without_parameters(robot.with_effect(hypothesis.setting(robot)))
+        scores[hypothesis] = CandidateScore(hypothesis, fit, nats, 1.0)
+    monkeypatch.setattr(candidate_scoring, "fit_candidates", lambda _, __, tasks, *___: refitted.extend(tasks) or {})
+    # Time is up once there are scores, which must not be lost by that.
+    with limit.searching(0.6):
+        candidate_scoring._refitted_beside_own_disturbance(context, "round 1", (), scores, 0.0)
+    assert [each.effect.name for each in refitted] == ([best_on_fit, *(set(evidence) - {best_on_fit})] * is_refitted)
 
 
 def test_an_effect_that_a_large_disturbance_takes_up_is_a_candidate() -> None:

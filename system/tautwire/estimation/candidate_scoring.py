@@ -14,7 +14,7 @@ from .candidate_fits import (
     maximised_validation_likelihood,
 )
 from .candidate_proposals import FitTask, SearchRound, shortlist, starting_robots
-from .candidate_scores import CandidateScore, unfitted_score
+from .candidate_scores import CandidateScore, most_parsimonious, unfitted_score
 from .disturbance_posterior import disturbance_prior
 from .grid_search import grid_search, zero_slope_predictions
 from .hypotheses import Hypothesis, with_hypothesis
@@ -104,7 +104,7 @@ def _refitted_beside_own_disturbance(
 ) -> dict[Hypothesis, CandidateScore]:
     """Better scores of the candidates that explain FIT best, each beside a disturbance of its own.
 
-    Only where the best of them on FIT is not established, or does not tie with the best on CHECK: under the disturbance
+    Only where the best of them on FIT is not established, or not the most parsimonious on CHECK: under the disturbance
     of a model without it, which had to be large, an effect that explains nearly all may be fitted badly.
     """
     estimation, tolerance = context.split.estimation, context.policy.fit.coarse_cost_tolerance
@@ -113,9 +113,8 @@ def _refitted_beside_own_disturbance(
     with context.time_limit.suspended():
         explained = {h: context.fitter.log_likelihood(scores[h].fit.robot, models[h], estimation) for h in scores}
     ranked = sorted(scores, key=lambda h: -explained[h])
-    top = max((score.evidence for score in scores.values()), default=0.0)
-    required = max(context.evidence_threshold(), top - context.policy.selection.tie(top, has_disturbance=True))
-    if not ranked or scores[ranked[0]].evidence >= required:
+    best = most_parsimonious(list(scores.values()), context.policy.selection, has_disturbance=True)
+    if best is None or (best.hypothesis == ranked[0] and best.evidence >= context.evidence_threshold()):
         return {}
     tasks = {
         h: FitTask(models[h], (scores[h].fit.robot,), -inf, tolerance, disturbance_refits=2)
