@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import pytest
 
 from tautwire.estimation.effect_estimates import effects_by_size
@@ -46,9 +48,15 @@ def test_what_a_small_random_force_would_leave_lacks_nothing() -> None:
 def test_an_effect_is_named_that_explains_a_good_part_of_little() -> None:
     word, sentence = verdict(shares(0.12, 6.0, drum=(0.27, 5.0)), "drum")
     assert word == "effects"
-    assert "drum (27 % of what is missed); 61 % lies within stated uncertainties, 12 % remains, which" in sentence
-    assert "no more than a small random force" in sentence
+    assert "drum (27 % of what is missed); 12 % remains, which is no more than a small random force" in sentence
     assert sentence.endswith("The error is then 40 N in tension_2, strongest at 1.2 Hz.")
+
+
+def test_what_uncertain_numbers_explain_beside_the_one_effect_is_told() -> None:
+    robot = replace(ROBOT, platform=replace(ROBOT.platform, mass_uncertainty=0.1))
+    of = shares(0.12, 6.0, drum=(0.27, 5.0))
+    _, sentence = verdict_beside_disturbance(replace(CONTEXT, robot=robot), [hypothesis("drum")], of, REMAINING)
+    assert "missed); 61 % lies within stated uncertainties, and 12 % remains, which" in sentence
 
 
 def test_the_largest_effect_is_named_first_with_its_share() -> None:

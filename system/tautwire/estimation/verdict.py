@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from tautwire_fmu.laws.effects import UNLISTED
 
 from ..robot.schema import Robot
+from ..robot.uncertain_parameters import uncertain_parameters
 from .candidate_scores import setting_of
 from .discovery.candidate_terms import effects_text, formula_text
 from .discovery.formula_discovery import Discovery
@@ -73,8 +74,9 @@ def verdict_beside_disturbance(
         share_of = {labels[index]: shares.effects[index] for index in large}
         named = _sum_up([f"{name} ({_per_cent(share)} of what is missed)" for name, share in share_of.items()])
         kind = ", which is no more than a small random force" if is_disturbance else ""
-        others = 1.0 - shares.left - max(shares.effects) if len(names) == 1 else 0.0
-        uncertain = f"{_per_cent(others)} lies within stated uncertainties, " if others >= policy.min_share else ""
+        others = 1.0 - shares.left - max(shares.effects)
+        is_stated = len(names) == 1 and others >= policy.min_share and uncertain_parameters(context.robot)
+        uncertain = f"{_per_cent(others)} lies within stated uncertainties, and " if is_stated else ""
         lacks = f"The model lacks {named}; {uncertain}{_per_cent(shares.left)} remains{kind}."
         return "effects", f"{lacks} The error is then {remaining}."
     closest = f" Of it {_per_cent(1.0 - shares.left)} would go to {_sum_up(names)}." if names else ""
