@@ -24,7 +24,7 @@ BY_PARAMETERS = GENERATOR.normal(size=(OUTPUTS, PARAMETERS))
 WHITE_VARIANCES = np.array([0.2, 0.5, 1.0])
 MEASURED = GENERATOR.normal(size=(COUNT, OUTPUTS))
 OBSERVED = (GENERATOR.random((COUNT, OUTPUTS)) < 0.8).astype(float)
-# That of states that move acts from the begin of a step on, that of the others at its end.
+# That of states that move acts from the start of a step on, that of the others at its end.
 NOISE_AT_BEGIN = np.diag(np.where(np.arange(SIZE) < MOVING, PROCESS_NOISE, 0.0))
 NOISE_AT_END = np.diag(PROCESS_NOISE) - NOISE_AT_BEGIN
 FULL_TRANSITION = np.diag(DECAY)

@@ -108,7 +108,7 @@ def test_the_linearised_filter_moves_disturbance_states_as_the_filter_does() -> 
     for k, (now, later) in enumerate(pairwise(segment.covariances)):
         gain, output = linearised.gain[k], linearised.output_matrix[k]
         transition, updated = linearised.transition[k], now - gain @ output @ now
-        # Noise of the winch speeds acts on unstrained lengths from the begin of the step on.
+        # Noise of the winch speeds acts on unstrained lengths from the start of the step on.
         drift = np.diag(later - transition @ updated @ transition.T)[6:9]
         assert np.all(drift > 0.0)
         updated[range(6, 9), range(6, 9)] += drift

@@ -6,7 +6,7 @@ missing one: with variance ``r`` of the noise, row ``h`` of the output matrix, a
     s = h P h' + r        g = P h' / s        x <- x + g e        P <- P - g h P
 
 Over a step, transition matrices ``F`` of the states that move, beside those that only decay by ``d``; process noise of
-the former is there from the step's begin, so that what decays within a step follows it:
+the former is there from the step's start, so that what decays within a step follows it:
 
     P <- [F; diag d] (P + diag [q; 0]) [F; diag d]' + diag [0; q]
 
