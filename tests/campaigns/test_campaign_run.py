@@ -13,6 +13,7 @@ from tautwire.campaigns.campaign_run import Job, build_context, run_job
 from tautwire.campaigns.campaign_runner import path_recordings
 from tautwire.campaigns.fmu_cache import FmuBundle, build_bundle, cached_fmus, structure_digest
 from tautwire.campaigns.parameter_space import with_values
+from tautwire.campaigns.plan_file import read_plan
 from tautwire.control import ClosedLoopOptions, cosimulate_closed_loop
 from tautwire.cosimulation.robot_cosimulation import cosimulate
 from tautwire.fmus.packaging import build_fmus
@@ -21,7 +22,7 @@ from tautwire.recordings.recording import read_recording
 from tautwire.robot.robot_file_reader import robot_from_content
 from tautwire.robot.schema import EffectSetting, Robot
 from tautwire.robot.static_equilibrium import static_tensions
-from tests.support.campaigns import AT_REST, moving, read
+from tests.support.campaigns import AT_REST, moving, plan_file, read
 from tests.support.robots import EXAMPLES, LIMITED, example, with_winch
 
 VALUES = (1.04e11, 310.0)
@@ -158,6 +159,17 @@ def test_a_robot_of_another_structure_gets_fmus_of_its_own_once(tmp_path: Path) 
     assert [each.name for each in tmp_path.iterdir()] == [structure_digest(other)]
 
 
+def test_a_path_is_read_by_the_columns_of_the_robot_file(tmp_path: Path) -> None:
+    (tmp_path / "speeds.csv").write_text("time,drive1,drive2,drive3\n0,1,2,3\n0.1,1,2,3\n", encoding="utf-8")
+    plan = plan_file(tmp_path, AT_REST + '[[path]]\nname = "log"\nrecording = "speeds.csv"\n')
+    with (tmp_path / "robot.toml").open("a", encoding="utf-8") as robot_file:
+        robot_file.write('[recording.columns]\n"winch_speed_{}" = { name = "drive{}", unit = "mm/s", sign = -1 }\n')
+    read_back = read_plan(plan)
+    robot = robot_from_content(dict(read_back.content), read_back.file)
+    speeds = path_recordings(read_back, robot)["log"].winch_speed
+    np.testing.assert_allclose(speeds, [[-0.001, -0.002, -0.003]] * 2)
+
+
 @pytest.mark.validate(but=["20.0"])
 @pytest.mark.parametrize("softness", [0.0, 20.0])
 def test_a_cable_is_slack_where_nothing_pulls_at_it(softness: float, tmp_path: Path) -> None:
@@ -181,7 +193,7 @@ name = "all"
 recording = "speeds.csv"
 """
     plan = read(tmp_path, text)
-    shared = build_context(plan, path_recordings(plan, 3))
+    shared = build_context(plan, path_recordings(plan, robot_from_content(dict(plan.content), plan.file)))
     begun, whole = (run_job(shared, Job(i, 0, i, (softness,)), tmp_path / "kept").row for i in (0, 1))
     assert begun["slack"] is False and whole["slack"] is True
     least = min(whole[f"tension_{cable}_least"] for cable in (1, 2, 3))

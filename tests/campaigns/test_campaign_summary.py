@@ -14,6 +14,7 @@ from scipy.stats import norm
 
 from tautwire.campaigns.campaign_dataset import PartWriter, open_dataset, read_rows
 from tautwire.campaigns.campaign_figures import quantile_bands
+from tautwire.campaigns.campaign_page import _sobol_rows
 from tautwire.campaigns.campaign_plan import Plan
 from tautwire.campaigns.campaign_run import RunResult
 from tautwire.campaigns.campaign_runner import write_summary
@@ -22,8 +23,9 @@ from tautwire.campaigns.dataset_schema import RowColumn, row_columns
 from tautwire.campaigns.input_sampling import draw_samples
 from tautwire.campaigns.trace_summary import summarise_traces
 from tautwire.errors import InputError
+from tautwire.number_format import format_engineering
 from tests.support.campaigns import AT_REST, moving, read
-from tests.support.pages import FETCHING, Page
+from tests.support.pages import FETCHING, MAX_PAGE_BYTES, Page
 from tests.support.traces import HOSTILE
 
 GRID = (
@@ -193,6 +195,7 @@ def test_pages_are_whole_and_ask_nothing_of_the_network(text: str, tmp_path: Pat
     document = write_summary(plan, out)
     page = Page((out / "index.html").read_text(encoding="utf-8"))
     assert page.open == [] and len(page.scripts) == 3
+    assert (out / "index.html").stat().st_size < MAX_PAGE_BYTES
     assert document["failed"] == 1 and "1 of " in page.text and "UnreachableError: a cable cannot push" in page.text
     assert json.loads((out / "summary.json").read_text(encoding="utf-8")) == json.loads(json.dumps(document))
     for tag, attributes in page.elements:
@@ -201,6 +204,22 @@ def test_pages_are_whole_and_ask_nothing_of_the_network(text: str, tmp_path: Pat
     assert len(variants) == len(plan.variants)
     panels = [each for each in page.all("figure") if each.get("data-kind") == "band"]
     assert len(panels) == (6 if plan.paths else 0)
+
+
+def test_the_headline_counts_the_runs_of_each_controller_and_compares_them(tmp_path: Path) -> None:
+    plan, out = written(tmp_path, moving(64))
+    document = write_summary(plan, out)
+    page = Page((out / "index.html").read_text(encoding="utf-8"))
+    low, high = (
+        [each["quantiles"][level] for each in document["spreads"] if each["name"] == "path_error_largest"]
+        for level in ("2.5 %", "97.5 %")
+    )
+    spans = [
+        format_engineering(one, "m") + " to " + format_engineering(other, "m")
+        for one, other in zip(low, high, strict=True)
+    ]
+    expected = f"64 runs with each of 2 controllers: in 95 % of them the largest path error is {spans[0]} (none), "
+    assert f"{expected}{spans[1]} (feedforward)." in page.text.replace("\N{NO-BREAK SPACE}", " ")
 
 
 def test_texts_of_a_grid_stand_on_an_axis_by_their_places(tmp_path: Path) -> None:
@@ -222,6 +241,15 @@ def test_the_page_names_the_inputs_that_make_much_of_an_output(tmp_path: Path) -
     assert section.count("<tr") - 1 == len(shown)
     for each in shown:
         assert each["output"].replace("_", " ") in section and f"{each['total']:.2f} \N{PLUS-MINUS SIGN}" in section
+
+
+def test_an_output_that_depends_on_no_input_says_so(tmp_path: Path) -> None:
+    plan = read(tmp_path, AT_REST.replace("count = 8", "count = 64"))
+    noise = np.random.default_rng(2).normal(size=64)
+    rows = made_up(plan).set_column(3, "out", pa.array(noise))
+    dependences = summarise_runs(plan, COLUMNS, rows).dependences
+    assert not any(each.is_significant for each in dependences)
+    assert [row[:2] for row in _sobol_rows(dependences)["at rest"]] == [["out", "none that can be told from 0"]]
 
 
 def test_hostile_reasons_do_nothing(tmp_path: Path) -> None:

@@ -60,6 +60,6 @@ def read(folder: Path, text: str, robot: str = "three") -> Plan:
 
 def bare_results(plan: Plan, folder: Path) -> list[RunResult]:
     """All runs in a bare loop of this process."""
-    cables = robot_from_content(dict(plan.content), plan.file).cable_count
-    shared = build_context(plan, path_recordings(plan, cables))
+    robot = robot_from_content(dict(plan.content), plan.file)
+    shared = build_context(plan, path_recordings(plan, robot))
     return [run_job(shared, job, folder) for job in planned_jobs(plan, np.ones(run_count(plan), dtype=bool))]

@@ -8,6 +8,7 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext, suppress
 from pathlib import Path
 from types import TracebackType
+from typing import Any
 
 import numpy as np
 import pyarrow as pa
@@ -17,6 +18,7 @@ from numpy.typing import NDArray
 from .. import __version__
 from ..atomic_output import acquire_lock
 from ..errors import InputError
+from ..provenance import Provenance
 from .campaign_plan import Plan, PlanError, PlanMismatchError
 from .campaign_run import RunResult
 from .dataset_schema import RowColumn
@@ -28,7 +30,7 @@ ARROW_TYPES = {"whole": pa.int64(), "number": pa.float64(), "flag": pa.bool_(), 
 
 
 @contextmanager
-def open_dataset(folder: Path, plan: Plan) -> Iterator[None]:
+def open_dataset(folder: Path, plan: Plan, provenance: Provenance | None = None) -> Iterator[None]:
     """Open the folder of a campaign, created if absent, with an exclusive lock until the block ends.
 
     Raises PlanMismatchError where it contains rows of another plan, InputError where another process writes there.
@@ -38,7 +40,7 @@ def open_dataset(folder: Path, plan: Plan) -> Iterator[None]:
     except OSError as error:
         raise InputError(str(folder), f"cannot write there: {error.strerror}", "choose another --out") from error
     with _exclusive_lock(folder):
-        _require_same_plan(folder, plan)
+        _require_same_plan(folder, plan, provenance)
         for name in (RUNS_FOLDER, SERIES_FOLDER):
             for partial_file in (folder / name).glob(f"*{PARTIAL_SUFFIX}"):
                 partial_file.unlink()
@@ -49,10 +51,12 @@ def open_dataset(folder: Path, plan: Plan) -> Iterator[None]:
         yield
 
 
-def _require_same_plan(folder: Path, plan: Plan) -> None:
+def _require_same_plan(folder: Path, plan: Plan, provenance: Provenance | None) -> None:
     manifest = folder / MANIFEST_FILE
     if not any((folder / RUNS_FOLDER).glob("*.parquet")):
-        _write_atomically(manifest, json.dumps({"digest": plan.digest(), "tautwire": __version__}).encode())
+        document: dict[str, Any] = {"digest": plan.digest(), "tautwire": __version__}
+        document |= {"provenance": provenance.document()} if provenance else {}
+        _write_atomically(manifest, json.dumps(document).encode())
         return
     if not manifest.exists():
         raise PlanMismatchError(str(folder), "unknown", plan.digest())
@@ -95,8 +99,9 @@ def _read_part(part: Path, columns: list[str] | None) -> pa.Table:
 class PartWriter:
     """Buffered writer of rows: :meth:`flush` writes them as one Parquet part, with their series as another."""
 
-    def __init__(self, folder: Path, columns: Sequence[RowColumn]) -> None:
+    def __init__(self, folder: Path, columns: Sequence[RowColumn], provenance: Provenance | None = None) -> None:
         self._folder = folder
+        self._metadata = provenance.schema_metadata() if provenance else None
         self._schema = pa.schema([pa.field(each.name, ARROW_TYPES[each.kind]) for each in columns])
         self._buffer: list[RunResult] = []
         part_numbers = [int(part.stem.rpartition("-")[2]) for part in part_files(folder)]
@@ -118,10 +123,9 @@ class PartWriter:
         name = f"part-{self._next_number:06d}.parquet"
         series = _series_table(self._buffer)
         if series is not None:
-            _write_table(self._folder / SERIES_FOLDER / name, series)
-        _write_table(
-            self._folder / RUNS_FOLDER / name, pa.Table.from_pylist([r.row for r in self._buffer], self._schema)
-        )
+            _write_table(self._folder / SERIES_FOLDER / name, series.replace_schema_metadata(self._metadata))
+        rows = pa.Table.from_pylist([each.row for each in self._buffer], self._schema)
+        _write_table(self._folder / RUNS_FOLDER / name, rows.replace_schema_metadata(self._metadata))
         self._next_number += 1
         self._buffer = []
 

@@ -92,7 +92,7 @@ def figure_data(plan: Plan, cable_count: int, results: CampaignResults) -> dict[
         inputs = [pack_float32(_numeric_values(thinned_rows, each)) for each in plan.inputs] if is_grid else []
         variants.append({"label": variant_label(path, controller), **bands, "spreads": outputs, "inputs": inputs})
     axes = [{"label": _axis_label(each), "place": place} for place, each in enumerate(plan.inputs)]
-    # The scripts shared by all pages start from choices where there are any; those of campaigns start by themselves.
+    # The scripts that all pages share read choices; those of campaigns read variants.
     return {"choices": [], "variants": variants, "inputs": axes}
 
 

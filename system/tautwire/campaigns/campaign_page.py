@@ -9,6 +9,7 @@ from typing import Any
 import pyarrow as pa
 
 from ..number_format import format_engineering, format_percent, format_significant
+from ..provenance import Provenance
 from ..reports import inline_charts as charts
 from ..reports.page_rendering import Number, PageHeader, Row, render_page
 from ..robot.schema import Robot
@@ -27,6 +28,7 @@ from .trace_summary import IdentifiedParameter, TraceSummary
 
 # Sobol indices below this are only in the summary.
 MIN_SOBOL_INDEX = 0.05
+NO_SIGNIFICANT_INDEX = "none that can be told from 0"
 OUTPUT_GROUPS = {
     "static_tension": "Static tension",
     "frequency": "Frequency",
@@ -43,7 +45,13 @@ FLAG_LABELS = {
 }
 
 
-def campaign_page(plan: Plan, robot: Robot, results: CampaignResults, links: Mapping[str, str]) -> str:
+def campaign_page(
+    plan: Plan,
+    robot: Robot,
+    results: CampaignResults,
+    links: Mapping[str, str],
+    provenance: Provenance | None = None,
+) -> str:
     """The page of a campaign over samples or a grid; ``links`` maps labels to paths beside the page."""
     figures, summary = figure_data(plan, robot.cable_count, results), results.summary
     subject, headline = f"{robot.name}, {robot.cable_count} cables", _headline(plan, summary)
@@ -52,7 +60,7 @@ def campaign_page(plan: Plan, robot: Robot, results: CampaignResults, links: Map
         verdict = (f"{summary.failed} of {summary.count} runs failed", "unexplained")
     return render_page(
         "campaign",
-        PageHeader("Tautwire campaign", subject, headline, f"{robot.name}: {headline}", *verdict, links),
+        PageHeader("Tautwire campaign", subject, headline, f"{robot.name}: {headline}", *verdict, links, provenance),
         figures,
         plan=plan,
         variants=[each["label"] for each in figures["variants"]],
@@ -69,22 +77,28 @@ def campaign_page(plan: Plan, robot: Robot, results: CampaignResults, links: Map
 
 
 def _headline(plan: Plan, summary: Summary) -> str:
-    """The headline: number of runs, and the 95 % range of the path error or of the lowest frequency."""
+    """The headline: runs of each controller, and the 95 % ranges of the path error or of the lowest frequency."""
     run_count_text = f"{summary.count} runs"
+    if len(plan.controllers) > 1:
+        run_count_text = (
+            f"{summary.count // len(plan.controllers)} runs with each of {len(plan.controllers)} controllers"
+        )
     for name, description in (
         ("path_error_largest", "the largest path error"),
         ("frequency_1", "the lowest frequency"),
     ):
         matching = [each for each in summary.spreads if each.name == name]
         if matching:
-            spread = matching[0]
-            variant = (
-                f" ({variant_label(spread.path, spread.controller)})" if spread.path and len(plan.variants) > 1 else ""
-            )
-            low, high = spread.quantiles[0], spread.quantiles[-1]
-            span = f"{format_engineering(low, spread.unit)} to {format_engineering(high, spread.unit)}"
-            return f"{run_count_text}: in 95 % of them {description}{variant} is {span}."
+            along = f" along {matching[0].path}" if len(plan.paths) > 1 else ""
+            compared = [each for each in matching if each.path == matching[0].path]
+            spans = ", ".join(_span_text(each, named=len(compared) > 1) for each in compared)
+            return f"{run_count_text}: in 95 % of them {description}{along} is {spans}."
     return f"{run_count_text}."
+
+
+def _span_text(spread: Spread, named: bool) -> str:
+    low, high = (format_engineering(value, spread.unit) for value in (spread.quantiles[0], spread.quantiles[-1]))
+    return f"{low} to {high}" + (f" ({spread.controller})" if named else "")
 
 
 def _probability_row(each: FlagProbability) -> Row:
@@ -145,18 +159,20 @@ def _output_group(name: str) -> str:
 
 
 def _sobol_rows(dependences: Sequence[SobolIndices]) -> dict[str, list[Row]]:
-    """Sobol indices by path and controller: for each output a row per influential input, the largest first."""
+    """Sobol indices by path and controller, and by output: a row per influential input, the largest first."""
     tables: dict[str, list[Row]] = {}
-    for path, controller in dict.fromkeys((each.path, each.controller) for each in dependences):
-        variant_indices = [each for each in dependences if (each.path, each.controller) == (path, controller)]
-        tables[variant_label(path, controller)] = [
-            _sobol_row(each)
-            for output in dict.fromkeys(each.output for each in variant_indices)
-            for each in sorted(
-                (one for one in variant_indices if one.output == output), key=_largest_index, reverse=True
-            )
-            if _largest_index(each) >= MIN_SOBOL_INDEX
+    for path, controller, output in dict.fromkeys((each.path, each.controller, each.output) for each in dependences):
+        significant = [
+            each
+            for each in dependences
+            if (each.path, each.controller, each.output) == (path, controller, output) and each.is_significant
         ]
+        rows = tables.setdefault(variant_label(path, controller), [])
+        if significant:
+            influential = [each for each in significant if _largest_index(each) >= MIN_SOBOL_INDEX]
+            rows += [_sobol_row(each) for each in sorted(influential, key=_largest_index, reverse=True)]
+        else:
+            rows.append([column_label(output), NO_SIGNIFICANT_INDEX, "", "", ""])
     return tables
 
 
@@ -189,12 +205,18 @@ def _spread_values(each: Spread) -> tuple[float, ...]:
     return (each.mean, each.standard_deviation, low, middle, high, each.least, each.largest)
 
 
-def trace_summary_page(plan: Plan, summary: TraceSummary, rows: pa.Table, links: Mapping[str, str]) -> str:
+def trace_summary_page(
+    plan: Plan,
+    summary: TraceSummary,
+    rows: pa.Table,
+    links: Mapping[str, str],
+    provenance: Provenance | None = None,
+) -> str:
     """The page of a campaign of traces; its figures need no scripts."""
     counts = ", ".join(f"{count} {verdict}" for verdict, count in summary.verdicts) or "none could be traced"
     sentence = f"{summary.count} recordings: {counts}."
     verdict = (f"{summary.failed} failed", "unexplained") if summary.failed else ("All traced", "none")
-    header = PageHeader("Tautwire campaign", Path(plan.file).stem, sentence, sentence, *verdict, links)
+    header = PageHeader("Tautwire campaign", Path(plan.file).stem, sentence, sentence, *verdict, links, provenance)
     recordings = [_recording_row(row) for row in rows.to_pylist()]
     return render_page("trace_summary", header, findings=_finding_rows(summary.findings), recordings=recordings)
 

@@ -67,7 +67,7 @@ class ReferenceInput:
 def path_start(robot: Robot, path: PathPlan) -> Point:
     """Start position of a run along a path."""
     if path.kind == "helix":
-        x, y, z = _path_trajectory(robot, path).position(np.zeros(1))[0].tolist()
+        x, y, z = path_trajectory(robot, path).position(np.zeros(1))[0].tolist()
         return (x, y, z)
     return path.start or robot.platform.start
 
@@ -85,7 +85,7 @@ def build_reference_input(
         count = int(np.searchsorted(recording.time, recording.time[0] + path.numbers["duration"], side="right"))
         time = recording.time[:count]
         return ReferenceInput(nominal_robot, time, None, None, recording.winch_speed[:count])
-    trajectory = _path_trajectory(nominal_robot, path)
+    trajectory = path_trajectory(nominal_robot, path)
     duration = path.numbers["duration"] + compute.settle
     if controller == OPEN_LOOP:
         time = np.linspace(0.0, duration, ceil(duration / compute.step) + 1)
@@ -105,7 +105,8 @@ def _designed_controller(robot: Robot, trajectory: Trajectory, controller: str) 
     return schedule_controller(robot, trajectory) if controller == "scheduled" else design_robust(robot)
 
 
-def _path_trajectory(robot: Robot, path: PathPlan) -> Trajectory:
+def path_trajectory(robot: Robot, path: PathPlan) -> Trajectory:
+    """The trajectory of a line or a helix; a line without a start begins where the platform does."""
     numbers = path.numbers
     end = path.end or robot.platform.start
     if path.kind == "helix":

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import errno
 import json
+import os
 from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 from itertools import islice
@@ -16,8 +17,10 @@ from numpy.typing import NDArray
 
 from ..atomic_output import atomic_folder
 from ..errors import InputError
+from ..provenance import Provenance
 from ..recordings.recording import Recording, read_recording
 from ..robot.robot_file_reader import robot_from_content
+from ..robot.schema import Robot
 from .campaign_dataset import PartWriter, completed_runs, read_rows
 from .campaign_figures import CampaignResults
 from .campaign_page import campaign_page, trace_summary_page
@@ -43,6 +46,17 @@ DISK_FULL_ERRNOS = (errno.ENOSPC, errno.EDQUOT)
 PAGE_LINKS = {"summary.json": "summary.json"}
 
 
+def input_files(plan: Plan, plan_file: Path) -> dict[str, Path]:
+    """The files that a campaign reads, by name: the plan; the robot file and recordings, relative to the plan.
+
+    A recording that is not there is a failed run, and no input.
+    """
+    recordings = plan.trace.recordings if plan.trace else [path.recording for path in plan.paths if path.recording]
+    files = [Path(file) for file in (plan.file, *recordings)]
+    folder = plan_file.parent
+    return {str(plan_file): plan_file} | {os.path.relpath(file, folder): file for file in files if file.is_file()}
+
+
 def run_count(plan: Plan) -> int:
     """Number of runs, and so of rows, of a plan."""
     return len(plan.trace.recordings) if plan.trace else plan.count * len(plan.variants)
@@ -60,31 +74,37 @@ def planned_jobs(plan: Plan, selected: NDArray[np.bool_]) -> Iterator[Job]:
         yield Job(int(index), sample, variant, tuple(each.distribution.value(number) for each, number in numbers))
 
 
-def planned_tasks(plan: Plan, selected: NDArray[np.bool_], cable_count: int) -> Iterator[Task]:
+def planned_tasks(plan: Plan, selected: NDArray[np.bool_], robot: Robot) -> Iterator[Task]:
     """The selected runs as tasks; a recording is read when its task is submitted, and sent with it."""
     jobs = planned_jobs(plan, selected)
     if plan.trace is not None:
-        yield from (_trace_task(plan.trace.recordings[job.index], job, cable_count) for job in jobs)
+        yield from (_trace_task(plan.trace.recordings[job.index], job, robot) for job in jobs)
         return
     runs_per_task = 1 if plan.paths else MODAL_RUNS_PER_TASK if plan.compute.modes else STATIC_RUNS_PER_TASK
     while batch := tuple(islice(jobs, runs_per_task)):
         yield Task(batch)
 
 
-def _trace_task(file: str, job: Job, cable_count: int) -> Task:
+def _trace_task(file: str, job: Job, robot: Robot) -> Task:
     name = Path(file).name
     try:
-        return Task((job,), read_recording(file, cable_count), name)
+        return Task((job,), read_recording(file, robot.cable_count, robot.recorded_columns), name)
     except InputError as error:
         return Task((job,), None, name, failure_reason(error))
 
 
-def path_recordings(plan: Plan, cable_count: int) -> dict[str, Recording]:
+def path_recordings(plan: Plan, robot: Robot) -> dict[str, Recording]:
     """The recordings of winch speeds that paths name, by path name."""
-    return {path.name: read_recording(path.recording, cable_count) for path in plan.paths if path.recording}
+    return {
+        path.name: read_recording(path.recording, robot.cable_count, robot.recorded_columns)
+        for path in plan.paths
+        if path.recording
+    }
 
 
-def run_campaign(plan: Plan, folder: Path, client: Any, report_progress: ProgressCallback) -> int:
+def run_campaign(
+    plan: Plan, folder: Path, client: Any, report_progress: ProgressCallback, provenance: Provenance | None = None
+) -> int:
     """Run the missing runs of a campaign with a Dask client, and return their number.
 
     The folder must be locked by :func:`tautwire.campaigns.campaign_dataset.open_dataset`.
@@ -93,15 +113,15 @@ def run_campaign(plan: Plan, folder: Path, client: Any, report_progress: Progres
     written. Raises what :func:`tautwire.campaigns.campaign_run.build_context` raises.
     """
     count = run_count(plan)
-    cable_count = robot_from_content(dict(plan.content), plan.file).cable_count
+    robot = robot_from_content(dict(plan.content), plan.file)
     completed = completed_runs(folder, count)
     if completed.all():
         return 0
     try:
-        with PartWriter(folder, row_columns(plan, cable_count)) as writer:
+        with PartWriter(folder, row_columns(plan, robot.cable_count), provenance) as writer:
             report_progress("preparing", 0.0)
-            shared = context_future(client, plan, path_recordings(plan, cable_count))
-            tasks = planned_tasks(plan, ~completed, cable_count)
+            shared = context_future(client, plan, path_recordings(plan, robot))
+            tasks = planned_tasks(plan, ~completed, robot)
             _write_results(
                 task_results(client, shared, plan, tasks), writer, int(completed.sum()), count, report_progress
             )
@@ -146,18 +166,19 @@ def require_libraries(plan: Plan) -> None:
             raise MissingExtraError(name)
 
 
-def write_summary(plan: Plan, folder: Path) -> dict[str, Any]:
+def write_summary(plan: Plan, folder: Path, provenance: Provenance | None = None) -> dict[str, Any]:
     """Write ``summary.json`` and ``index.html`` into a campaign's folder, and return the summary."""
     rows = read_rows(folder)
     if plan.trace is not None:
         traces = summarise_traces(rows)
-        document, page = traces.document(), trace_summary_page(plan, traces, rows, PAGE_LINKS)
+        document, page = traces.document(), trace_summary_page(plan, traces, rows, PAGE_LINKS, provenance)
     else:
         robot = robot_from_content(dict(plan.content), plan.file)
         columns = row_columns(plan, robot.cable_count)
         summary = summarise_runs(plan, columns, rows)
         results = CampaignResults(columns, rows, summary, folder)
-        document, page = summary.document(), campaign_page(plan, robot, results, PAGE_LINKS)
+        document, page = summary.document(), campaign_page(plan, robot, results, PAGE_LINKS, provenance)
+    document |= {"provenance": provenance.document()} if provenance else {}
     with atomic_folder(folder) as scratch:
         (scratch / "summary.json").write_text(json.dumps(document, indent=1), encoding="utf-8")
         (scratch / "index.html").write_text(page, encoding="utf-8")

@@ -18,14 +18,15 @@ from ..json_document import json_value
 from .campaign_plan import MissingExtraError, Plan
 from .dataset_schema import FAILURE_COLUMN, RowColumn
 from .input_sampling import salib_problem, saltelli_block_size
+from .polynomial_chaos import first_order_indices, min_sample_count
 
 Array = NDArray[np.float64]
 
 SPREAD_QUANTILE_LEVELS = (0.025, 0.25, 0.5, 0.75, 0.975)
 CONFIDENCE_LEVEL = 0.95
 MAX_REASONS = 20
-# Fewer samples (RBD-FAST) or blocks (Saltelli) give meaningless estimates by SALib.
-MIN_RBD_FAST_SAMPLES, MIN_SALTELLI_BLOCKS = 64, 8
+# Fewer samples or blocks of a Saltelli design give meaningless estimates.
+MIN_SAMPLES, MIN_SALTELLI_BLOCKS = 64, 8
 
 
 @dataclass(frozen=True)
@@ -77,6 +78,11 @@ class SobolIndices:
     first_width: float
     total: float | None = None
     total_width: float | None = None
+
+    @property
+    def is_significant(self) -> bool:
+        """Whether the interval of an index excludes 0."""
+        return self.first > self.first_width or (self.total or 0.0) > (self.total_width or 0.0)
 
 
 @dataclass(frozen=True)
@@ -193,14 +199,18 @@ def _sobol_unavailable_reason(plan: Plan) -> str:
         return 'no Sobol indices: inputs are correlated, which requires method = "saltelli"'
     if any(each.distribution.discrete_values for each in plan.inputs):
         return 'no Sobol indices: inputs are discrete, which requires method = "saltelli"'
-    too_few = plan.count < MIN_RBD_FAST_SAMPLES
-    return f"no Sobol indices: {plan.count} samples, {MIN_RBD_FAST_SAMPLES} or more are required" if too_few else ""
+    required = _min_samples(plan)
+    return f"no Sobol indices: {plan.count} samples, {required} or more are required" if plan.count < required else ""
+
+
+def _min_samples(plan: Plan) -> int:
+    return max(MIN_SAMPLES, min_sample_count(len(plan.inputs)))
 
 
 def _sobol_indices(
     plan: Plan, path: str, controller: str, output: str, values: Array, rows: pa.Table
 ) -> list[SobolIndices]:
-    """Sobol indices by SALib, from complete blocks of a Saltelli design, or by RBD-FAST from any other samples.
+    """Sobol indices by SALib, from complete blocks of a Saltelli design, or by polynomial chaos from any other samples.
 
     Blocks with a failed run are omitted; the list is empty where too few remain, or the output is constant.
     """
@@ -210,7 +220,7 @@ def _sobol_indices(
         usable = values.reshape(-1, block_size)[is_complete].ravel()
         if is_complete.sum() < MIN_SALTELLI_BLOCKS or _is_constant(usable):
             return []
-        analysis = _salib_analysis("sobol", salib_problem(plan), usable, calc_second_order=False, seed=plan.seed)
+        analysis = _saltelli_analysis(plan, usable)
         return [
             SobolIndices(path, controller, output, *each)
             for each in zip(
@@ -218,25 +228,26 @@ def _sobol_indices(
             )
         ]
     usable = np.isfinite(values)
-    if usable.sum() < MIN_RBD_FAST_SAMPLES or _is_constant(values[usable]):
+    if usable.sum() < _min_samples(plan) or _is_constant(values[usable]):
         return []
     inputs = np.column_stack([column_values(rows, key) for key in plan.keys])[usable]
-    analysis = _salib_analysis("rbd_fast", salib_problem(plan), inputs, values[usable], seed=plan.seed)
-    pairs = zip(plan.keys, map(float, analysis["S1"]), map(float, analysis["S1_conf"]), strict=True)
-    return [SobolIndices(path, controller, output, *each) for each in pairs]
+    result = first_order_indices([each.distribution for each in plan.inputs], inputs, values[usable], CONFIDENCE_LEVEL)
+    triples = zip(plan.keys, result.indices.tolist(), result.half_widths.tolist(), strict=True)
+    return [SobolIndices(path, controller, output, *each) for each in triples]
 
 
 def _is_constant(values: Array) -> bool:
     return bool(np.ptp(values) <= 1e-12 * np.max(np.abs(values), initial=0.0))
 
 
-def _salib_analysis(method: str, problem: dict[str, Any], *arguments: Array, **options: Any) -> Any:
+def _saltelli_analysis(plan: Plan, values: Array) -> Any:
     try:
-        from SALib.analyze import rbd_fast, sobol
+        from SALib.analyze import sobol
     except ImportError as error:
         raise MissingExtraError("SALib") from error
+    problem = salib_problem(plan)
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
-        analysis = (sobol if method == "sobol" else rbd_fast).analyze(problem, *arguments, **options)
+        analysis = sobol.analyze(problem, values, calc_second_order=False, seed=plan.seed)
     analysis["names"] = list(dict.fromkeys(problem.get("groups", problem["names"])))
     return analysis

@@ -13,6 +13,7 @@ from ..name_suggestions import suggest_name
 from ..recordings.recording import read_recording
 from ..robot.checked_table import CheckedTable
 from ..robot.robot_file_reader import robot_content, robot_from_content
+from ..robot.schema import Robot
 from ..robot.trajectory import ANGLE_RULE, RADIUS_RULE, RISE_RULE
 from ..robot.trajectory import DURATION_RULE as OF_PATH
 from ..toml_text import parse_toml
@@ -59,7 +60,7 @@ PLAN_KEYS = (
 SIMULATION_KEYS = ("sample", "vary", "found", "correlation", "path", "controllers", "believes", "compute")
 MAX_PLAN_SIZE = 1_000_000  # bytes
 MAX_RUNS = 10_000_000
-RECORDING_SUFFIXES = (".csv", ".parquet", ".mf4", ".mdf")
+RECORDING_SUFFIXES = (".csv", ".parquet", ".mf4", ".mdf", ".mat")
 SEED_RULE = NumberRule("a seed", "", 0.0, 2.0**53, default=0.0)
 COUNT_RULE = NumberRule("the number of samples", "", 1.0, float(MAX_RUNS))
 CORRELATION_RULE = NumberRule("the correlation", "", -0.999, 0.999)
@@ -108,11 +109,11 @@ def file_digest(file: Path) -> str:
     return hashlib.sha256(read_bytes(file, PlanError)).hexdigest()[:16]
 
 
-def read_paths(table: CheckedTable, cable_count: int, inputs: tuple[Input, ...]) -> tuple[PathPlan, ...]:
+def read_paths(table: CheckedTable, robot: Robot, inputs: tuple[Input, ...]) -> tuple[PathPlan, ...]:
     """Read all paths of a plan; names must be unique."""
     paths: list[PathPlan] = []
     for number, path_table in enumerate(table.tables("path") if "path" in table.content else (), start=1):
-        path = _read_path(path_table, f"path {number}", cable_count)
+        path = _read_path(path_table, f"path {number}", robot)
         if path.name in [each.name for each in paths]:
             path_table.refuse("name", f"is {format_value(path.name)} again", "give each path its own name")
         start_varies = any(each.key.startswith("platform.start") for each in inputs)
@@ -122,7 +123,7 @@ def read_paths(table: CheckedTable, cable_count: int, inputs: tuple[Input, ...])
     return tuple(paths)
 
 
-def _read_path(table: CheckedTable, default: str, cable_count: int) -> PathPlan:
+def _read_path(table: CheckedTable, default: str, robot: Robot) -> PathPlan:
     hint = 'give the path a name of one line, as in name = "up"'
     name = (table.text("name", hint) or "") if "name" in table.content else default
     if not name.strip() or not name.isprintable():
@@ -142,12 +143,23 @@ def _read_path(table: CheckedTable, default: str, cable_count: int) -> PathPlan:
         return PathPlan(name, "helix", numbers, table.point("centre", "the centre of the helix at its start"))
     table.require_known(("name", "recording", "until"))
     file = file_relative_to_plan(table, table.text("recording", "name a recording with winch speeds"))
-    recording = read_recording(file, cable_count)
+    recording = read_recording(file, robot.cable_count, robot.recorded_columns)
     duration, second_time = recording.duration, float(recording.time[1] - recording.time[0])
     until = table.number("until", UNTIL_RULE) if "until" in table.content else duration
     if until < second_time:
         table.refuse("until", f"is {until!r}, before the recording's second sample", f"write {second_time:g} or more")
     return PathPlan(name, "recording", {"duration": min(until, duration)}, None, None, str(file), file_digest(file))
+
+
+def read_path_file(path: str | Path, robot: Robot) -> PathPlan:
+    """Read a file of one path, a line or a helix: the keys of a plan's ``[[path]]``.
+
+    Raises PlanError where it is invalid.
+    """
+    table = _load_plan(Path(path))
+    if "recording" in table.content:
+        table.refuse("recording", "is no path of the platform", "give end and duration, or a helix")
+    return _read_path(table, "path", robot)
 
 
 def read_plan(path: str | Path) -> Plan:
@@ -159,10 +171,10 @@ def read_plan(path: str | Path) -> Plan:
     table.require_known(PLAN_KEYS)
     robot_file = file_relative_to_plan(table, table.text("robot", 'name the robot file, as in robot = "robot.toml"'))
     content = robot_content(robot_file)
-    cables = robot_from_content(content, robot_file).cable_count
+    robot = robot_from_content(content, robot_file)
     seed = whole_number(table, "seed", SEED_RULE)
     if "trace" in table.content:
-        return Plan(str(robot_file), content, seed, "grid", paths=(), trace=_read_trace(table, cables))
+        return Plan(str(robot_file), content, seed, "grid", paths=(), trace=_read_trace(table))
     identified = _read_identified_inputs(table, content, robot_file)
     inputs = _read_inputs(table, identified)
     method, count = _read_sample(table, inputs)
@@ -174,7 +186,7 @@ def read_plan(path: str | Path) -> Plan:
         count=count,
         inputs=inputs,
         correlations=_read_correlations(table, inputs, method, identified.correlations),
-        paths=read_paths(table, cables, inputs),
+        paths=read_paths(table, robot, inputs),
         controllers=_read_controllers(table),
         belief=choice(table, "believes", BELIEFS) or BELIEFS[0],
         compute=_read_compute(table),
@@ -312,7 +324,7 @@ def _read_compute(table: CheckedTable) -> Compute:
     )
 
 
-def _read_trace(table: CheckedTable, cable_count: int) -> TracePlan:
+def _read_trace(table: CheckedTable) -> TracePlan:
     for key in SIMULATION_KEYS:
         if key in table.content:
             table.refuse(key, "is not allowed beside [trace]", "remove it, or make two plans")

@@ -10,7 +10,8 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import InputError
-from .console import AsJson, CommandOutput, Quiet, progress_bar
+from ..provenance import Provenance, provenance_of
+from .console import AsJson, CommandOutput, Quiet, command_provenance, progress_bar, shell_quoted
 
 if TYPE_CHECKING:
     from ..campaigns.campaign_plan import Plan
@@ -21,6 +22,7 @@ WORKERS_HELP = "Worker processes on this machine; by default one per processor."
 
 
 def campaign(
+    context: typer.Context,
     plan_file: Annotated[
         Path, typer.Argument(metavar="PLAN.toml", help="The plan: what varies, and what is computed.")
     ],
@@ -38,7 +40,7 @@ def campaign(
     Example: tautwire campaign plan.toml --out campaign/
     """
     from ..atomic_output import refuse_overwriting_inputs
-    from ..campaigns.campaign_runner import require_libraries
+    from ..campaigns.campaign_runner import input_files, require_libraries
     from ..campaigns.plan_file import read_plan
     from ..estimation import processors
 
@@ -53,30 +55,35 @@ def campaign(
         raise InputError("--out", "is missing", "name a folder, as in --out campaign/, or add --dry-run")
     require_libraries(plan)
     refuse_overwriting_inputs([plan_file, Path(plan.file)], [out / name for name in ("campaign.json", "summary.json")])
-    _run_and_summarise(plan, out, scheduler, workers or processors(), output)
+    provenance = provenance_of(input_files(plan, plan_file), context.obj)
+    _run_and_summarise(plan, out, (scheduler, workers or processors()), provenance, output)
 
 
-def _run_and_summarise(plan: Plan, out: Path, scheduler: str | None, workers: int, output: CommandOutput) -> None:
-    """Runs what the dataset lacks, writes the summary and prints it."""
+def _run_and_summarise(
+    plan: Plan, out: Path, cluster: tuple[str | None, int], provenance: Provenance, output: CommandOutput
+) -> None:
+    """Runs what the dataset lacks, writes the summary and prints it; ``cluster``: scheduler or None, and workers."""
     from ..campaigns.campaign_dataset import completed_runs, open_dataset
     from ..campaigns.campaign_runner import run_campaign, run_count, write_summary
     from ..campaigns.dask_cluster import dashboard_message, dask_client
 
     new_runs = 0
-    with open_dataset(out, plan):
+    with open_dataset(out, plan, provenance):
         if not completed_runs(out, run_count(plan)).all():
-            with dask_client(scheduler, workers) as client, progress_bar(output) as progress:
+            with dask_client(*cluster) as client, progress_bar(output) as progress:
                 output.note(dashboard_message(client))
                 if not client.nthreads():
                     output.note("no worker yet; runs begin when one connects")
-                new_runs = run_campaign(plan, out, client, progress)
+                new_runs = run_campaign(plan, out, client, progress, provenance)
         with progress_bar(output) as progress:
             progress("summing up", 0.0)
-            summary = write_summary(plan, out)
+            summary = write_summary(plan, out, provenance)
     run_counts = f"{run_count(plan)} runs, {new_runs} of them now, {summary['failed']} failed"
     written = {"rows": out / "runs", "summary": out / "summary.json", "page": out / "index.html"}
     output.result([run_counts, *written.values()], {**written, "made": new_runs, **summary})
-    output.suggest_next(f"open {written['page']}; pandas.read_parquet('{written['rows']}') has one row per run")
+    output.suggest_next(
+        f"open {shell_quoted(written['page'])}; pandas.read_parquet({str(written['rows'])!r}) has one row per run"
+    )
 
 
 def _print_rows(plan: Plan, output: CommandOutput) -> None:
@@ -111,6 +118,7 @@ def _print_rows(plan: Plan, output: CommandOutput) -> None:
 
 
 def paper(
+    context: typer.Context,
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Output folder of claims.html, claims.json and figures.")],
     as_json: AsJson = False,
     quiet: Quiet = False,
@@ -126,9 +134,11 @@ def paper(
 
     output = CommandOutput(as_json, quiet)
     with atomic_folder(out) as scratch, progress_bar(output) as progress:
-        result = write_paper(scratch, progress)
+        provenance = command_provenance(context)
+        result = write_paper(scratch, progress, provenance)
     counts = dict(result.counts)
     output.note(", ".join(f"{count} {verdict}" for verdict, count in counts.items()))
     paths = [out / "claims.html", out / "claims.json"]
-    output.result(paths, {"claims": len(result.entries), "verdicts": counts, "page": paths[0], "ledger": paths[1]})
-    output.suggest_next(f"open {paths[0]} in a browser")
+    document = {"claims": len(result.entries), "verdicts": counts, "page": paths[0], "ledger": paths[1]}
+    output.result(paths, {**document, "provenance": provenance.document()})
+    output.suggest_next(f"open {shell_quoted(paths[0])} in a browser")

@@ -27,17 +27,21 @@ panelKinds.spread = (_, place) => {
   if (output.edges === null) return { numbers: "", words: `${what}: no values.`, empty: "No values" };
   const colour = colours();
   const edges = series(output.edges), counts = series(output.counts);
-  const x = counts.map((_, k) => 0.5 * (edges[k] + edges[k + 1]));
-  const width = counts.map((_, k) => edges[k + 1] - edges[k]);
+  const width = edges[1] - edges[0];
+  // Steps halfway between the middles of bins, with an empty bin at either end; the plotly bundle has no bars.
+  const x = [edges[0], ...edges].map((edge, k) => edge + (k === 0 ? -0.5 : 0.5) * width);
   const traces = [{
-    type: "bar", name: "runs", x, y: counts, width, marker: { color: colour.accent, line: { width: 0 } },
-    hovertemplate: "%{y} runs",
+    type: "scatter", mode: "lines", name: "runs", x, y: [0, ...counts, 0], fill: "tozeroy", fillcolor: colour.accent,
+    line: { shape: "hvh", width: 0 }, hovertemplate: "%{y} runs",
   }];
   const shapes = output.quantiles.map((value) => ({
     type: "line", yref: "paper", y0: 0, y1: 1, x0: value, x1: value, line: { color: colour.text, width: 1, dash: "dot" },
   }));
-  const axes = { xaxis: axis(colour, output.unit, { hoverformat: ".5~g" }), yaxis: axis(colour, "Runs"), bargap: 0, shapes };
-  return { numbers: output.words, words: `${what}: 95 % of runs lie within ${output.words}.`, traces, layout: layout(colour, axes) };
+  const range = [edges[0], edges[edges.length - 1]];
+  const axes = { xaxis: axis(colour, output.unit, { hoverformat: ".5~g", range }), yaxis: axis(colour, "Runs"), shapes };
+  const columns = [["from", edges.slice(0, -1)], ["to", edges.slice(1)]].map(([end, values]) => [`${end} (${output.unit})`, values]);
+  const words = `${what}: 95 % of runs lie within ${output.words}.`;
+  return { numbers: output.words, words, traces, layout: layout(colour, axes), columns: [...columns, ["runs", counts]] };
 };
 
 panelKinds.against = (_, place) => {
@@ -58,14 +62,13 @@ panelKinds.against = (_, place) => {
 function startCampaign() {
   for (const figure of document.querySelectorAll("figure")) watcher.observe(figure);
   window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => redraw("figure"));
-  window.addEventListener("beforeprint", () => [...stale].forEach(drawFigure));
+  window.addEventListener("beforeprint", preparePrint);
   if (againstInput) againstInput.addEventListener("change", () => redraw("figure[data-kind=against]"));
   const chosenNow = radio("choice", (value) => {
     state.choice = Number(value);
+    state.span = null;
     redraw("figure");
   });
   state.choice = Number(chosenNow ?? 0);
   redraw("figure");
 }
-
-startCampaign();
