@@ -22,7 +22,6 @@ class Controller(Slave):
         data = read_resource(kwargs["resources"], "controller.json")
         self.plan = law.plan_from_resource(data)
         self.cable_count = len(self.plan.compliances)
-        self.designed_period = float(data["period"])
         self.sensors = slice(FIRST_MEASUREMENT, FIRST_MEASUREMENT + 3 + self.cable_count)
         self.first_output = self.sensors.stop
         first_state = self.first_output + 2 * self.cable_count
@@ -33,20 +32,13 @@ class Controller(Slave):
         self.parameters_changed()
 
     def parameters_changed(self) -> None:
-        period, *bounds = self.real[self.first_parameter :]
+        _period, *bounds = self.real[self.first_parameter :]
         self.limits = law.Limits(*bounds)
-        self.period_error = (
-            ""
-            if period == self.designed_period
-            else f"period is {period!r} s, the controller is made for {self.designed_period!r} s: design another"
-        )
         if not self.started:
             self._store_state(law.initial_controller_state(self.plan, self.limits), 0.0, self.real[self.sensors])
 
     def advance(self, step: float, inputs_at_end: bool) -> None:
         """Sample the inputs at the start of each period, and update the controller state at its end."""
-        if self.period_error:
-            raise ValueError(self.period_error)
         state, phase, measured = self._load_state()
         period, elapsed = self.plan.period, 0.0
         while step - elapsed > SAMPLE_TIME_TOLERANCE * period:

@@ -1,5 +1,6 @@
 """Completes modelDescription.xml: units, bounds, exact start values, dependencies, initial unknowns."""
 
+import math
 from typing import Dict, NamedTuple, Optional, Sequence, Tuple
 from xml.etree.ElementTree import Element, SubElement
 
@@ -25,6 +26,21 @@ class Variable(NamedTuple):
     depends_on: Tuple[str, ...] = ()
     discrete: bool = False
     rate_of: Optional[str] = None
+
+
+def bound_problem(variable: Variable, value: float) -> str:
+    """What is wrong with a value of a variable: not finite, or outside the declared bounds; empty where nothing is."""
+    lowest = -math.inf if variable.minimum is None else variable.minimum
+    highest = math.inf if variable.maximum is None else variable.maximum
+    if math.isfinite(value) and lowest <= value <= highest:
+        return ""
+    bounds = " and ".join(
+        f"{words} {bound!r}"
+        for words, bound in (("at least", variable.minimum), ("at most", variable.maximum))
+        if bound is not None
+    )
+    unit = "" if variable.unit == "1" else f" {variable.unit}"
+    return f"{variable.name} is {value!r}{unit}, it has to be {f'{bounds}{unit}' if bounds else 'finite'}"
 
 
 def vector_variables(vector: Variable, start: Tuple[float, float, float] = (0.0, 0.0, 0.0)) -> Tuple[Variable, ...]:

@@ -73,7 +73,11 @@ def test_the_run_until_then_is_written(
     )
     assert stderr.endswith(f"; the run up to then is in {out}\n")
     assert pd.read_csv(out)["time"].tolist() == pytest.approx([0.0, 0.1, 0.2, 0.3, 0.4, 0.5])
-    assert sorted(path.name for path in scratch.parent.iterdir()) == ["result.csv", "scratch"]
+    assert sorted(path.name for path in scratch.parent.iterdir()) == [
+        "result.csv",
+        "result.csv-metadata.json",
+        "scratch",
+    ]
     assert list(scratch.iterdir()) == []
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import zipfile
 from dataclasses import replace
+from itertools import combinations
 from pathlib import Path
 
 import fmpy
@@ -18,7 +19,7 @@ from tautwire.errors import InputError
 from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.robot.schema import EffectSetting
 from tautwire_fmu.units import UNITS
-from tests.support.robots import paper_robot
+from tests.support.robots import LIMITED, paper_robot, with_winch
 
 SSD = "{http://ssp-standard.org/SSP1/SystemStructureDescription}"
 SSC = "{http://ssp-standard.org/SSP1/SystemStructureCommon}"
@@ -29,6 +30,16 @@ STRUCTURES = (SYSTEM_STRUCTURE, COMPONENTS_ONLY)
 @pytest.fixture(scope="module")
 def archive(three_fmus: RobotFmus, tmp_path_factory: pytest.TempPathFactory) -> Path:
     return write_ssp(paper_robot(), three_fmus, tmp_path_factory.mktemp("ssp") / "paper.ssp")
+
+
+@pytest.fixture(scope="module")
+def winch_archive(winch_fmus: RobotFmus, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_ssp(with_winch(paper_robot(), LIMITED), winch_fmus, tmp_path_factory.mktemp("ssp") / "winch.ssp")
+
+
+def rectangle(node: etree._Element) -> tuple[float, float, float, float]:
+    x1, y1, x2, y2 = (float(node.get(name)) for name in ("x1", "y1", "x2", "y2"))
+    return x1, y1, x2, y2
 
 
 def structure(archive: Path, name: str) -> etree._Element:
@@ -100,6 +111,37 @@ def test_every_parameter_has_its_exact_value(tmp_path: Path) -> None:
         expected = {v.name: (float(v.start), v.unit) for v in variables if v.causality == "parameter"}
         assert {p.name: (float(p.value), p.unit) for p in values.parameters} == expected
         assert ("effect.modulus.modulus" in expected) == (component.name == "cable_2")
+
+
+@pytest.mark.parametrize("name", STRUCTURES)
+def test_the_default_experiment_is_that_of_the_fmus(archive: Path, three_fmus: RobotFmus, name: str) -> None:
+    experiment = structure(archive, name).find(f"{SSD}DefaultExperiment")
+    own = fmpy.read_model_description(str(three_fmus.platform)).defaultExperiment
+    times = [float(experiment.get(key)) for key in ("startTime", "stopTime")]
+    assert times == [float(own.startTime), float(own.stopTime)]
+
+
+@pytest.mark.parametrize("name", STRUCTURES)
+def test_blocks_lie_within_the_system_and_apart_from_each_other(winch_archive: Path, name: str) -> None:
+    system = structure(winch_archive, name).find(f"{SSD}System")
+    left, bottom, right, top = rectangle(system.find(f"{SSD}SystemGeometry"))
+    blocks = [rectangle(node) for node in system.iter(f"{SSD}ElementGeometry")]
+    assert len(blocks) == 7
+    assert all(left < x1 < x2 < right and bottom < y1 < y2 < top for x1, y1, x2, y2 in blocks)
+    for a, b in combinations(blocks, 2):
+        assert a[2] < b[0] or b[2] < a[0] or a[3] < b[1] or b[3] < a[1]
+
+
+@pytest.mark.parametrize("name", STRUCTURES)
+def test_connectors_lie_apart_on_the_edges_of_their_blocks(winch_archive: Path, name: str) -> None:
+    for connectors in structure(winch_archive, name).iter(f"{SSD}Connectors"):
+        points = set()
+        for connector in connectors:
+            geometry = connector.find(f"{SSD}ConnectorGeometry")
+            points.add((float(geometry.get("x")), float(geometry.get("y"))))
+            assert geometry.get("x") == ("0.0" if connector.get("kind") == "input" else "1.0")
+        assert len(points) == len(connectors)
+        assert all(0.0 < y < 1.0 for _, y in points)
 
 
 @pytest.mark.parametrize("name", STRUCTURES)

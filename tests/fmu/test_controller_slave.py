@@ -7,7 +7,6 @@ from pathlib import Path
 import fmpy
 import numpy as np
 import pytest
-from fmpy.fmi1 import FMICallException
 from fmpy.validation import validate_fmu
 from numpy.typing import NDArray
 
@@ -28,6 +27,7 @@ from tautwire.control import (
     schedule_robust,
     shape_along,
 )
+from tautwire.fmus.component import Component, ComponentError
 from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.robot.schema import Robot
 from tautwire.robot.trajectory import Line, Trajectory
@@ -159,6 +159,10 @@ def test_description_is_valid_and_says_which_outputs_jump(controller: Path) -> N
     assert float(variables["period"].start) == 0.01
 
 
+def test_default_step_is_the_sample_period(controller: Path) -> None:
+    assert float(fmpy.read_model_description(str(controller)).defaultExperiment.stepSize) == 0.01
+
+
 def walk(hand: Hand, step: float, count: int, seen: Array) -> Array:
     """Speeds and rates after each step, under deviations held over each sample of 10 ms."""
     rows, start = [], hand.get("position.x", "position.y", "position.z")
@@ -207,11 +211,9 @@ def test_state_can_be_saved_and_the_same_bits_come_again(controller: Path) -> No
 
 
 def test_another_period_is_refused(controller: Path) -> None:
-    with in_hand(controller) as hand:
-        hand.set(period=0.02)
-        hand.run()
-        with pytest.raises(FMICallException):
-            hand.step(0.0, 0.02)
+    words = r"period is 0.02 s, it has to be at least 0.01 and at most 0.01 s"
+    with Component("controller", controller) as component, pytest.raises(ComponentError, match=words):
+        component.initialize(0.0, {"period": 0.02})
 
 
 def test_tighter_limit_of_speed_may_be_set_while_it_runs(controller: Path) -> None:

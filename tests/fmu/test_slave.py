@@ -1,14 +1,28 @@
 """The slaves through FMI: they are the laws, remember everything, and are good to any master."""
 
+import gc
+
+import fmpy
 import numpy as np
 import pytest
 from fmpy.fmi1 import FMICallException
 
-from tautwire.fmus.packaging import RobotFmus
+from tautwire.fmus.component import Component, ComponentError
+from tautwire.fmus.packaging import RobotFmus, build_fmus
+from tautwire.robot.schema import EffectSetting
 from tests.support.fmus import Hand, in_hand
+from tests.support.robots import paper_robot
+
+FATAL = 4
 
 MOTION = {"position__z": 5.1, "velocity__x": 0.2, "velocity__z": -0.3, "winch_speed": 0.4}
 SHOWN = ("tension", "force.x", "force.y", "force.z", "force_rate.x", "tension_rate", "length", "strain", "elongation")
+
+
+@pytest.fixture(scope="module")
+def payload_fmus(tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
+    robot = paper_robot().with_effect(EffectSetting("payload", {"mass": 12.0}))
+    return build_fmus(robot, tmp_path_factory.mktemp("payload"))
 
 
 def test_a_cable_shows_the_law(damped_fmus: RobotFmus) -> None:
@@ -178,14 +192,68 @@ def test_bytes_that_are_no_state_are_refused_at_the_next_step(three_fmus: RobotF
 
 
 @pytest.mark.parametrize("value", [float("nan"), float("inf")])
-def test_inputs_that_are_no_numbers_are_refused(three_fmus: RobotFmus, value: float) -> None:
+def test_inputs_that_are_not_finite_end_the_step_with_an_error_and_change_nothing(
+    three_fmus: RobotFmus, value: float
+) -> None:
     with in_hand(three_fmus.cables[0]) as cable, in_hand(three_fmus.platform) as platform:
-        cable.set(winch_speed=value)
+        cable.run()
+        platform.run()
+        cable.set(winch_acceleration=value)
         platform.set(force_1__x=value)
         for hand, state in ((cable, "unstrained_length"), (platform, "position.x")):
-            hand.run()
             before = hand.get(state)
             for _ in range(4):
-                with pytest.raises(FMICallException):
+                with pytest.raises(FMICallException) as caught:
                     hand.step(0.0, 0.01)
+                assert caught.value.status == FATAL
             assert hand.get(state) == before
+        cable.set(winch_acceleration=0.0)
+        cable.step(0.0, 0.01)
+
+
+def test_inputs_that_are_not_finite_are_named_as_initialisation_ends(three_fmus: RobotFmus) -> None:
+    with Component("cable", three_fmus.cables[0]) as cable:
+        cable.initialize(0.0, {})
+        block = cable.block(["velocity.x", "winch_speed"])
+        block.values[:] = 0.0, np.nan
+        cable.write(block)
+        with pytest.raises(ComponentError, match=r"ExitInitializationMode.*at 0.0 s winch_speed is nan: inputs"):
+            cable.run()
+
+
+def test_finite_inputs_whose_sum_is_not_are_no_error(three_fmus: RobotFmus) -> None:
+    with in_hand(three_fmus.platform) as platform:
+        platform.run()
+        platform.set(force_1__x=1.5e308, force_2__x=-1.5e308, force_1__y=1.5e308, force_2__y=-1.5e308, input_time=1e308)
+        platform.step(0.0, 0.01)
+
+
+@pytest.mark.parametrize(
+    ("component", "name", "value", "problem"),
+    [
+        ("platform", "mass", -3.0, r"mass is -3.0 kg, it has to be at least 0.0 kg"),
+        ("platform", "gravity", float("nan"), r"gravity is nan m/s2, it has to be finite"),
+        ("platform", "effect.payload.mass", 2e6, r"has to be at least -1000000.0 and at most 1000000.0 kg"),
+        ("cable_1", "modulus", -1.0, r"modulus is -1.0 Pa, it has to be at least 0.0 Pa"),
+    ],
+)
+def test_parameters_outside_their_bounds_are_refused(
+    payload_fmus: RobotFmus, component: str, name: str, value: float, problem: str
+) -> None:
+    with Component(component, payload_fmus.by_component[component]) as instance:
+        with pytest.raises(ComponentError, match=f"fmi2SetReal gave 'fatal'.*{problem}"):
+            instance.initialize(0.0, {name: value})
+        block = instance.block([name])
+        instance.read(block)
+        assert block.values[0] == float(instance.variables[name].start)
+
+
+def test_refused_parameters_leave_the_process_alive(three_fmus: RobotFmus) -> None:
+    for _ in range(20):
+        with in_hand(three_fmus.platform) as platform:
+            for _ in range(3):
+                with pytest.raises(FMICallException):
+                    platform.set(mass=-3.0)
+        gc.collect()
+    rows = fmpy.simulate_fmu(str(three_fmus.platform), stop_time=0.1, output=["position.z"])
+    assert rows["position.z"][-1] == pytest.approx(5.0, abs=1e-12)

@@ -141,7 +141,7 @@ def test_it_runs_in_a_fresh_process(three_fmus: RobotFmus) -> None:
 def test_an_interrupt_while_pythonfmu_works_ends_the_build_and_leaves_no_fmu(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    def interrupted(unfinished: Path, finished: Path) -> None:
+    def interrupted(*arguments: object) -> None:
         signal.raise_signal(signal.SIGINT)
 
     monkeypatch.setattr(packaging, "patch_wrapper_exit", interrupted)

@@ -1,4 +1,7 @@
-"""Draws the pictures of README and docs that come from runs, into a folder: ``python -m tests.pictures docs``."""
+"""Draws the icons of the FMUs, and the pictures of README and docs that come from runs, these into a folder.
+
+Run as ``python -m tests.pictures docs``.
+"""
 
 from __future__ import annotations
 
@@ -6,14 +9,17 @@ import sys
 from pathlib import Path
 
 from tautwire import read_recording, read_robot, trace
+from tests.pictures.component_icons import draw_icons
 from tests.pictures.traced_run import draw
+from tests.support.folders import ROOT
 from tests.support.robots import EXAMPLES
 
 THREE = EXAMPLES / "three"
 
 
 def main(folder: Path) -> None:
-    """Trace the shipped three-cable robot, and draw its run with what was left before and after."""
+    """Draw the icons; trace the three-cable example, and draw its run with what was left before and after."""
+    draw_icons(ROOT / "system" / "tautwire" / "fmus" / "icons")
     robot = read_robot(THREE / "robot.toml")
     fit, check = (read_recording(THREE / f"{name}.csv", robot.cable_count) for name in ("fit", "check"))
     draw(trace(robot, fit, check), folder / "traced_run.png")

@@ -161,11 +161,39 @@ def acceleration(plan: ControlPlan, controller_state: ControllerState) -> List[f
 
 
 def _limited_end_speeds(plan: ControlPlan, limits: Limits, controller_state: ControllerState) -> List[float]:
+    """Winch speeds at the end of the sample that the gains demand, within the limits."""
+    k = controller_state.sample
+    speed_deviations = _difference(controller_state.begin, _feedforward_speeds(plan, controller_state.scales, k))
+    demanded_accelerations = _demanded_accelerations(gains_at(plan, k), controller_state.state, speed_deviations)
+    return _end_speeds(plan, limits, controller_state, demanded_accelerations)
+
+
+def state_after_demanded_speeds(
+    plan: ControlPlan, limits: Limits, controller_state: ControllerState, measured: Vector, speeds: Vector
+) -> ControllerState:
+    """Controller state of the next sample, at whose end the winches have the demanded ``speeds``, within the limits.
+
+    For laws other than that of the gains; ``measured`` is as for :func:`next_controller_state`.
+    """
+    k, begin = controller_state.sample + 1, controller_state.end
+    earlier_tensions = controller_state.tensions if k > 1 else measured[3:]
+    next_state = controller_state._replace(sample=k, begin=begin, tensions=measured[3:], earlier=earlier_tensions)
+    feedforward_changes = _difference(
+        _feedforward_speeds(plan, next_state.scales, k + 1), _feedforward_speeds(plan, next_state.scales, k)
+    )
+    demanded_accelerations = [
+        (wanted - speed - change) / plan.period for wanted, speed, change in zip(speeds, begin, feedforward_changes)
+    ]
+    return next_state._replace(end=_end_speeds(plan, limits, next_state, demanded_accelerations))
+
+
+def _end_speeds(
+    plan: ControlPlan, limits: Limits, controller_state: ControllerState, demanded_accelerations: Vector
+) -> List[float]:
     """Winch speeds at the end of the sample, within the limits; the limits of the winch take precedence."""
     k = controller_state.sample
     feedforward_speeds = _feedforward_speeds(plan, controller_state.scales, k + 1)
     speed_deviations = _difference(controller_state.begin, _feedforward_speeds(plan, controller_state.scales, k))
-    demanded_accelerations = _demanded_accelerations(gains_at(plan, k), controller_state.state, speed_deviations)
     max_speed_change = plan.period * limits.acceleration
     end_speeds = []
     for speed, feedforward_speed, speed_deviation, demanded_acceleration, compliance, tension, earlier_tension in zip(

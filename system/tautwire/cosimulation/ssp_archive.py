@@ -1,4 +1,4 @@
-"""Writes a robot's FMUs, their connections, parameter values and units as one SSP 1.0 archive.
+"""Writes a robot's FMUs, their connections, parameter values, units and layout as one SSP 1.0 archive.
 
 ``SystemStructure.ssd`` has system connectors for the external inputs of the winches and for the recorded outputs.
 Importers that know connections between components only (libcosim, ecos) refuse those, so ``ComponentsOnly.ssd``, a
@@ -19,6 +19,7 @@ from fmpy.model_description import ModelDescription, ScalarVariable
 
 from tautwire_fmu.units import UNITS
 
+from .. import __version__
 from ..atomic_output import atomic_file
 from ..errors import one_line
 from ..fmus.fmi_binding import is_real_scalar
@@ -30,6 +31,7 @@ from ..robot.schema import Robot
 from . import Connection, Port
 from .robot_cosimulation import wire_fmus
 from .robot_wiring import PLATFORM, midpoint_connections
+from .ssp_layout import Rectangle, component_rectangle, connector_positions, system_rectangle
 
 SYSTEM_STRUCTURE = "SystemStructure.ssd"
 COMPONENTS_ONLY = "ComponentsOnly.ssd"
@@ -40,6 +42,8 @@ NAMESPACES = {
     "xmlns:ssc": f"{NAMESPACE}Common",
     "xmlns:ssv": f"{NAMESPACE}ParameterValues",
 }
+# s: as in the FMUs.
+DEFAULT_STOP_TIME = 10.0
 MAX_STEM_BYTES = 100
 RESERVED_NAMES = re.compile(r"(con|prn|aux|nul|com[0-9]|lpt[0-9])(\.|$)", re.IGNORECASE)
 # Reproducible archives: the same FMUs give the same bytes, without the time of writing.
@@ -135,28 +139,34 @@ def _system_description(
 ) -> bytes:
     name = one_line(robot.name)
     root = Element("ssd:SystemStructureDescription", {**NAMESPACES, "version": "1.0", "name": name})
-    root.set("generationTool", "Tautwire")
+    root.set("generationTool", f"Tautwire {__version__}")
     system = SubElement(root, "ssd:System", {"name": SYSTEM_NAME, "description": f"cable robot {name}"})
     if system_inputs or system_outputs:
         connectors = SubElement(system, "ssd:Connectors")
-        for kind, ports in (("input", system_inputs), ("output", system_outputs)):
-            for connector_name, port in ports.items():
-                _add_connector(connectors, connector_name, kind, port.variable, components[port.component])
+        kinds = ["input"] * len(system_inputs) + ["output"] * len(system_outputs)
+        ports = [*system_inputs.items(), *system_outputs.items()]
+        for kind, position, (connector_name, port) in zip(kinds, connector_positions(kinds), ports, strict=True):
+            _add_connector(connectors, connector_name, kind, position, port.variable, components[port.component])
     elements = SubElement(system, "ssd:Elements")
     for component in components.values():
-        _add_component(elements, component)
+        _add_component(elements, component, robot.cable_count)
     _add_connections(system, wires, system_inputs, system_outputs)
+    _add_rectangle(system, "ssd:SystemGeometry", system_rectangle(robot.cable_count))
     _add_units(root, components.values())
+    SubElement(root, "ssd:DefaultExperiment", {"startTime": "0.0", "stopTime": str(DEFAULT_STOP_TIME)})
     indent(root)
     return bytes(tostring(root, encoding="utf-8", xml_declaration=True))
 
 
-def _add_component(elements: Element, component: _SspComponent) -> None:
+def _add_component(elements: Element, component: _SspComponent, cable_count: int) -> None:
     attributes = {"name": component.name, "type": "application/x-fmu-sharedlibrary", "source": _fmu_path(component)}
     element = SubElement(elements, "ssd:Component", attributes | {"implementation": "CoSimulation"})
     connectors = SubElement(element, "ssd:Connectors")
-    for connector in component.connectors:
-        _add_connector(connectors, connector, component.variables[connector].causality, connector, component)
+    kinds = [component.variables[connector].causality for connector in component.connectors]
+    positions = connector_positions(kinds)
+    for connector, kind, position in zip(component.connectors, kinds, positions, strict=True):
+        _add_connector(connectors, connector, kind, position, connector, component)
+    _add_rectangle(element, "ssd:ElementGeometry", component_rectangle(component.name, cable_count))
     bindings = SubElement(element, "ssd:ParameterBindings")
     values = SubElement(SubElement(bindings, "ssd:ParameterBinding"), "ssd:ParameterValues")
     settings = SubElement(values, "ssv:ParameterSet", {"version": "1.0", "name": "values"})
@@ -173,11 +183,19 @@ def _add_component(elements: Element, component: _SspComponent) -> None:
     )
 
 
-def _add_connector(parent: Element, name: str, kind: str, variable: str, component: _SspComponent) -> None:
+def _add_connector(
+    parent: Element, name: str, kind: str, position: tuple[float, float], variable: str, component: _SspComponent
+) -> None:
     connector = SubElement(parent, "ssd:Connector", {"name": name, "kind": kind})
     if component.variables[variable].description:
         connector.set("description", component.variables[variable].description)
     SubElement(connector, "ssc:Real", {"unit": component.connectors[variable]})
+    x, y = position
+    SubElement(connector, "ssd:ConnectorGeometry", {"x": repr(x), "y": repr(y)})
+
+
+def _add_rectangle(parent: Element, tag: str, rectangle: Rectangle) -> None:
+    SubElement(parent, tag, {name: repr(value) for name, value in rectangle._asdict().items()})
 
 
 def _add_connections(

@@ -144,7 +144,7 @@ class Component:
 
     def _log(self, status: int, message: bytes) -> None:
         if status >= FMI_WARNING:
-            self.messages.append(message.decode("utf-8", "replace"))
+            self.messages.append(" ".join(message.decode("utf-8", "replace").split()))
             del self.messages[:-MAX_MESSAGES]
 
     def block(self, names: Sequence[str], values: Array | None = None) -> VariableBlock:

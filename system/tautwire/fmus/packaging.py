@@ -17,12 +17,15 @@ import tautwire_fmu
 from tautwire_fmu.laws.effects import BY_NAME
 from tautwire_fmu.laws.winch_drive import NO_LIMIT
 
+from .. import __version__
 from ..process_signals import defer_interrupts
 from ..robot.active_effects import formula_texts, has_sensor_effects, platform_fmu_settings
 from ..robot.robot_assembly import assemble_robot
 from ..robot.schema import EffectSetting, Robot, validate_robot
 from ..robot.static_equilibrium import static_forces, static_tensions
 from ..validation import validate_callable, validate_folder
+from .fmu_archive import read_model_description
+from .fmu_documentation import documentation_files
 from .fmu_slots import check_user_fmus
 from .pythonfmu_builder import installed_builder, patch_wrapper_exit
 
@@ -199,14 +202,15 @@ def _effect_resource(setting: EffectSetting) -> dict[str, Any]:
 def _build_fmu(module: str, base: str, name: str, data: dict[str, Any], folder: Path) -> Path:
     sources = Path(tautwire_fmu.__file__).parent
     package = f"tautwire_fmu_{_digest(sources)}"
-    text = json.dumps(data | {"model_name": name}, sort_keys=True)
+    data = data | {"model_name": name, "version": __version__}
+    text = json.dumps(data, sort_keys=True)
     guid = str(uuid5(NAMESPACE_URL, package + module + text))
     # An interrupt within one of the many imports may be raised in a callback, where it is lost.
     with defer_interrupts() as raise_interrupt, tempfile.TemporaryDirectory(prefix="tautwire-build-") as scratch_name:
         scratch = Path(scratch_name)
         shutil.copytree(sources, scratch / package, ignore=shutil.ignore_patterns("__pycache__", "*.pyc"))
         resource = scratch / f"{module}.json"
-        resource.write_text(json.dumps(data | {"model_name": name, "guid": guid}), encoding="utf-8")
+        resource.write_text(json.dumps(data | {"guid": guid}), encoding="utf-8")
         script = scratch / f"{name}_{guid.replace('-', '')[:12]}.py"
         script.write_text(LAUNCHER.format(package=package, base=base), encoding="utf-8")
         unpatched_fmu = scratch / "built" / f"{name}.fmu"
@@ -215,7 +219,8 @@ def _build_fmu(module: str, base: str, name: str, data: dict[str, Any], folder: 
                 script, dest=unpatched_fmu, project_files=[scratch / package, resource], **FMU_OPTIONS
             )
         patched_fmu = scratch / f"{name}.fmu"
-        patch_wrapper_exit(unpatched_fmu, patched_fmu)
+        additions = documentation_files(module, data, read_model_description(unpatched_fmu))
+        patch_wrapper_exit(unpatched_fmu, patched_fmu, additions)
         raise_interrupt()
         return _put_atomically(shutil.move, patched_fmu, folder / f"{name}.fmu")
 

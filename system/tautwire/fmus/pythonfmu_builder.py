@@ -15,7 +15,7 @@ import importlib
 import io
 import sys
 import zipfile
-from collections.abc import Collection, Iterator
+from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from copy import copy
 from pathlib import Path
@@ -84,14 +84,19 @@ ELF_MACHINE = "EM_X86_64"
 RETURN_INSTRUCTION = b"\xc3"
 
 
-def patch_wrapper_exit(fmu: Path, target: Path) -> None:
-    """Write ``fmu`` to ``target`` with its wrapper's finalizer patched out; all else stays byte for byte."""
+def patch_wrapper_exit(fmu: Path, target: Path, additions: Mapping[str, bytes] | None = None) -> None:
+    """Write ``fmu`` to ``target`` with its wrapper's finalizer patched out; all else stays byte for byte.
+
+    ``additions`` are the contents of further files by their paths in the archive.
+    """
     with zipfile.ZipFile(fmu) as source_archive, zipfile.ZipFile(target, "w") as target_archive:
         for entry in source_archive.infolist():
             content = source_archive.read(entry)
             if entry.filename.startswith(WRAPPER_FOLDER):
                 content = with_immediate_return(content)
             target_archive.writestr(copy(entry), content)
+        for name, content in (additions or {}).items():
+            target_archive.writestr(name, content, zipfile.ZIP_DEFLATED)
 
 
 def with_immediate_return(library: bytes) -> bytes:

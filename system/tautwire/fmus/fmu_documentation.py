@@ -1,0 +1,105 @@
+"""Files that explain an FMU to its user: a page on law and variables, the licenses, and an icon."""
+
+from __future__ import annotations
+
+import ast
+import re
+from collections.abc import Mapping
+from functools import cache
+from importlib import metadata
+from importlib.resources import files
+from textwrap import dedent
+from types import ModuleType
+from typing import TYPE_CHECKING, Any
+
+from fmpy.model_description import ModelDescription
+
+from tautwire_fmu.laws import cable, point_mass, sampled_control, winch_drive
+from tautwire_fmu.laws.effects import BY_NAME
+
+if TYPE_CHECKING:
+    from jinja2 import Template
+
+LAWS: Mapping[str, ModuleType] = {
+    "cable": cable,
+    "point_mass": point_mass,
+    "winch": winch_drive,
+    "controller": sampled_control,
+}
+TABLES = {"Inputs": "input", "Outputs": "output", "Parameters": "parameter", "States": "local"}
+# Both travel inside every FMU.
+LICENSED_PACKAGES = ("tautwire", "pythonfmu")
+CODE_PATTERN = re.compile(r"(?::\w+:)?(`{1,2})~?(.+?)\1", re.DOTALL)
+
+
+def documentation_files(kind: str, data: Mapping[str, Any], description: ModelDescription) -> dict[str, bytes]:
+    """Contents by path in the archive: ``documentation/index.html``, the licenses, and the icon ``model.png``.
+
+    ``kind`` is a key of :data:`LAWS`, ``data`` the resource of the FMU.
+    """
+    return {
+        "documentation/index.html": documentation_page(kind, data, description).encode("utf-8"),
+        "documentation/licenses/license.txt": license_text().encode("utf-8"),
+        "model.png": files(__package__).joinpath(f"icons/{kind}.png").read_bytes(),
+    }
+
+
+def documentation_page(kind: str, data: Mapping[str, Any], description: ModelDescription) -> str:
+    """HTML page about an FMU: its law with formulas and source, its effects, its variables with units and values."""
+    variables = description.modelVariables
+    return _template().render(
+        name=description.modelName,
+        description=description.description,
+        tool=description.generationTool,
+        component_blocks=_text_blocks(_slave_docstring(kind)),
+        law=data.get("law"),
+        law_blocks=_text_blocks(LAWS[kind].__doc__ or ""),
+        effects=[BY_NAME[setting["name"]] for setting in data.get("effects", ())],
+        formulas=data.get("formulas") or {},
+        tables={
+            title: [variable for variable in variables if variable.causality == causality]
+            for title, causality in TABLES.items()
+        },
+    )
+
+
+@cache
+def license_text() -> str:
+    """License texts of Tautwire and of pythonfmu."""
+    return "\n\n".join(f"{package}\n\n{_package_license(package)}" for package in LICENSED_PACKAGES)
+
+
+@cache
+def _template() -> Template:
+    # Imported here: jinja2 takes longer to import than this module.
+    from jinja2 import Environment, PackageLoader, StrictUndefined
+
+    loader = PackageLoader("tautwire.fmus")
+    environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
+    return environment.get_template("fmu.html.jinja")
+
+
+def _package_license(package: str) -> str:
+    try:
+        paths = metadata.files(package) or []
+    except metadata.PackageNotFoundError:
+        paths = []
+    texts = [path.read_text(encoding="utf-8") for path in paths if path.name == "LICENSE"]
+    return texts[0] if texts else "MIT License, https://opensource.org/license/mit\n"
+
+
+@cache
+def _slave_docstring(kind: str) -> str:
+    """What goes in and out, read from the source: an import would bring in pythonfmu, perhaps that of a loaded FMU."""
+    source = files("tautwire_fmu").joinpath(f"{kind}_slave.py").read_text(encoding="utf-8")
+    return (ast.get_docstring(ast.parse(source)) or "").partition(" of ")[2]
+
+
+def _text_blocks(docstring: str) -> list[dict[str, Any]]:
+    """Paragraphs and indented formulas of a docstring, without its markup."""
+    blocks = []
+    for block in re.split(r"\n\s*\n", docstring.strip("\n")):
+        is_formula = block.startswith("    ")
+        text = dedent(block) if is_formula else CODE_PATTERN.sub(r"\2", block)
+        blocks.append({"is_formula": is_formula, "text": text})
+    return blocks
