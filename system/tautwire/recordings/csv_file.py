@@ -1,10 +1,9 @@
 """Recordings in CSV files: one header line, then one line per sample."""
 
 import csv
-import re
-from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
-from io import BytesIO, TextIOWrapper
+from collections.abc import Container, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+from io import BytesIO
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -14,13 +13,13 @@ import pandas as pd  # type: ignore[import-untyped,unused-ignore]
 from numpy.typing import NDArray
 
 from ..errors import RecordingError, format_value, raise_error
-from ..input_files import read_text_bytes
+from .column_map import ColumnMap
+from .csv_dialect import read_csv_text
+from .csv_header import as_text
+from .csv_lines import is_number
 from .recording_table import MISSING_CELLS, ErrorSink, Header, Row, parse_header
 
 MAX_FILE_SIZE = 2**31  # bytes; it is held in memory
-
-_BYTE_ORDER_MARK = b"\xef\xbb\xbf"
-_NUMBER = re.compile(r"[-+]?[0-9]*[.,]?[0-9]+([eE][-+]?[0-9]+)?")
 
 
 @dataclass(frozen=True)
@@ -30,6 +29,7 @@ class CsvTable:
     file: str
     content: bytes
     header: Header
+    separator: str = ","
 
     def numbers(self) -> Mapping[str, NDArray[np.float64]] | None:
         """The known columns, each (N,), NaN where a cell is missing; None where this is not a table of numbers."""
@@ -41,8 +41,10 @@ class CsvTable:
             frame = pd.read_csv(
                 BytesIO(content),
                 header=0,
+                sep=self.separator,
+                decimal=header.decimal_mark,
                 names=list(header.names),
-                dtype={name: str if name in header.unknown_names else np.float64 for name in header.names},
+                dtype={name: str if name in self._texts() else np.float64 for name in header.names},
                 encoding="utf-8",
                 skipinitialspace=True,
                 keep_default_na=False,
@@ -51,19 +53,31 @@ class CsvTable:
             )
         except (ValueError, OverflowError):
             return None
-        return (
-            {name: frame[name].to_numpy() for name in header.known_names} if self._is_rectangular(len(frame)) else None
-        )
+        if not self._is_rectangular(len(frame)):
+            return None
+        return {name: self._column(name, frame[name]) for name in header.known_names}
+
+    def _texts(self) -> Container[str]:
+        """Columns that pandas does not parse."""
+        return (*self.header.unknown_names, *(("time",) if self.header.clock else ()))
+
+    def _column(self, name: str, cells: pd.Series) -> NDArray[np.float64]:
+        """A known column in SI units."""
+        clock = self.header.clock
+        if name == "time" and clock is not None:
+            return np.array([clock.seconds(str(cell)) for cell in cells])
+        numbers: NDArray[np.float64] = cells.to_numpy()
+        return self.header.to_si(name, numbers)
 
     def rows(self) -> Iterator[Row]:
         """Rows below the header that are not blank, each with the file and the line on which it begins."""
-        rows = csv.reader(_as_text(self.content), skipinitialspace=True, strict=True)
-        first_line = 1
+        rows = csv.reader(as_text(self.content), delimiter=self.separator, skipinitialspace=True, strict=True)
+        first_line, is_below_header = 1, False
         try:
-            next(rows)
-            first_line = rows.line_num + 1
             for row in rows:
-                if len(row) > 1 or "".join(row).strip():
+                if not is_below_header:
+                    is_below_header = any(row)
+                elif len(row) > 1 or "".join(row).strip():
                     yield Row(f"{self.file}: line {first_line}", first_line, row)
                 first_line = rows.line_num + 1
         except csv.Error as problem:
@@ -76,27 +90,27 @@ class CsvTable:
         """Whether the first rows are as wide as the header; pandas pads short ones silently."""
         width = len(self.header.names)
         if row_count > 1 and b'"' not in self.content:
-            return self.content.count(b",") == (row_count + 1) * (width - 1)
+            return self.content.count(self.separator.encode()) == (row_count + 1) * (width - 1)
         try:
-            rows = csv.reader(_as_text(self.content), skipinitialspace=True)
+            rows = csv.reader(as_text(self.content), delimiter=self.separator, skipinitialspace=True)
             data_rows = (row for row in rows if len(row) > 1 or "".join(row).strip())
             return all(len(row) == width for row in islice(data_rows, row_count + 1))
         except csv.Error:
             return False
 
 
-def open_csv(path: str | Path, cable_count: int, sink: ErrorSink = raise_error) -> CsvTable:
+def open_csv(path: str | Path, columns: ColumnMap, sink: ErrorSink = raise_error) -> CsvTable:
     """Open the CSV file of a recording; raises RecordingError where it is not text or has no valid header.
 
     Errors in the columns of the header go to the ``sink``.
     """
     file = str(path)
-    content = read_text_bytes(path, RecordingError, "CSV", MAX_FILE_SIZE)
-    content = content.removeprefix(_BYTE_ORDER_MARK)
-    cells = _first_row(content, file)
-    where = f"{file}: line 1"
-    _require_header(cells, where)
-    return CsvTable(file, content, parse_header(cells, where, cable_count, sink, line=1))
+    text = read_csv_text(file, MAX_FILE_SIZE, columns)
+    where = f"{file}: line {text.header_line}"
+    _require_header(text.header.names, where)
+    header = parse_header(text.header.names, where, columns.cable_count, sink, line=text.header_line)
+    header = replace(text.header, names=header.names, unknown_names=header.unknown_names)
+    return CsvTable(file, text.content, header, text.separator)
 
 
 def _exact_float_options() -> dict[str, Any]:
@@ -105,27 +119,7 @@ def _exact_float_options() -> dict[str, Any]:
     return {} if version >= (3, 1) else {"float_precision": "round_trip"}
 
 
-def _as_text(content: bytes) -> TextIOWrapper:
-    """The lines of a CSV file, as the csv module wants them."""
-    return TextIOWrapper(BytesIO(content), encoding="utf-8", newline="")
-
-
-def _first_row(content: bytes, file: str) -> list[str]:
-    if not content.strip():
-        raise RecordingError(file, "is empty", "write a header line and two or more samples")
-    try:
-        return [cell.strip() for cell in next(csv.reader(_as_text(content), skipinitialspace=True))]
-    except csv.Error as problem:
-        raise RecordingError(f"{file}: line 1", f"is not valid CSV ({problem})", "write a header line") from problem
-
-
-def _require_header(cells: list[str], where: str) -> None:
-    if not any(cells):
-        raise RecordingError(where, "is blank, the header is missing", "begin with the names of the columns")
-    for separator, name in ((";", "semicolons"), ("\t", "tabs")):
-        if "time" not in cells and any(separator in cell for cell in cells):
-            hint = "separate them with commas, and write numbers with a decimal point"
-            raise RecordingError(where, f"the columns are separated with {name}", hint)
-    if all(_NUMBER.fullmatch(cell) for cell in cells):
+def _require_header(cells: Sequence[str], where: str) -> None:
+    if any(cells) and all(map(is_number, cells)):
         hint = "begin with a line that names the columns, as in time,winch_speed_1"
         raise RecordingError(where, f"has numbers ({format_value(cells[0])}), so the header is missing", hint)
