@@ -80,12 +80,23 @@ def test_other_channels_are_named_and_not_read(tmp_path: Path) -> None:
     assert read_recording(path, 3).unknown_columns == ("voltage",)
 
 
+def test_other_units_are_converted_with_a_note(tmp_path: Path) -> None:
+    plain = read_recording(written(tmp_path / "fit.mf4", (TIME, SPEEDS | OUTPUTS)), 3)
+    units = {"x": "mm", "winch_speed_1": "m*s^-1", "tension_1": "kN"}
+    recording = read_recording(written(tmp_path / "units.mf4", (TIME, SPEEDS | OUTPUTS), units=units), 3)
+    assert np.array_equal(recording.position[:, 0], plain.position[:, 0] / 1e3, equal_nan=True)
+    assert np.array_equal(recording.tension[:, 0], plain.tension[:, 0] * 1e3, equal_nan=True)
+    assert np.array_equal(recording.winch_speed, plain.winch_speed)
+    (note,) = recording.notes
+    assert note.partition(": read ")[2] == "tension_1 in kN; x in mm"
+
+
 def test_what_cannot_be_right_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "fit.mf4"
     fewer = {name: values for name, values in SPEEDS.items() if name != "winch_speed_2"}
     assert "the column winch_speed_2 is missing" in refused(written(path, (TIME, fewer | OUTPUTS)))
-    in_millimetres = written(path, (TIME, SPEEDS | OUTPUTS), units={"x": "mm"})
-    assert "channel x: is in 'mm'; convert it to m" in refused(in_millimetres)
+    in_furlongs = written(path, (TIME, SPEEDS | OUTPUTS), units={"x": "fur"})
+    assert ": channel x: is in 'fur', not a known unit of length; write one of m, mm" in refused(in_furlongs)
     twice = written(path, (TIME, SPEEDS | OUTPUTS), (TIME, {"z": [1.0, 2.0, 3.0]}))
     assert "channel z: appears more than once" in refused(twice)
     words = written(path, (TIME, SPEEDS | {"z": np.array([b"a", b"b", b"c"])}))

@@ -121,7 +121,7 @@ def test_row_groups_are_read_on_end(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("changed", "place", "words"),
     [
-        ({"winch_speed_2": [0.2, None, 0.22]}, ": row 2, column winch_speed_2", ["'nan'", "number"]),
+        ({"winch_speed_2": [0.2, 0.21, None]}, ": row 3, column winch_speed_2", ["'nan'", "number"]),
         ({"winch_speed_2": [0.2, 0.21, -np.inf]}, ": row 3, column winch_speed_2", ["'-inf'", "finite"]),
         ({"time": [None, 0.01, 0.02]}, ": row 1, column time", ["'nan'", "number"]),
         ({"time": [0.0, 0.02, 0.01]}, ": row 3, column time", ["0.01 after 0.02", "rise"]),

@@ -4,7 +4,7 @@ import gc
 import sys
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -13,18 +13,13 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError, format_value, raise_error
 from ..input_files import readable_file
-from ..robot.schema import AXES
+from .column_map import ColumnMap
 from .recording_table import ColumnTable, ErrorSink, Header, parse_header, require_samples
+from .units import Unit, units_in_words
 
 MDF_SUFFIXES = (".mf4", ".mdf")
 _MDF_MAGIC = b"MDF     "
 _REWRITE_HINT = "export it again as MDF 4, or as CSV or Parquet under another name"
-_ACCEPTED_UNITS = {
-    "winch_speed": ("", "m/s", "m*s^-1"),
-    "rope_length": ("", "m"),
-    "tension": ("", "N"),
-    "position": ("", "m"),
-}
 _INPUTS = ("winch_speed_", "rope_length_")
 # s: times of two groups that are closer than this coincide.
 _TIME_TOLERANCE = 1e-9
@@ -44,13 +39,14 @@ def is_mdf(path: str | Path) -> bool:
         return file.suffix.lower() in MDF_SUFFIXES or content.read(len(_MDF_MAGIC)) == _MDF_MAGIC
 
 
-def open_mdf(path: str | Path, cable_count: int, sink: ErrorSink = raise_error) -> ColumnTable:
+def open_mdf(path: str | Path, columns: ColumnMap, sink: ErrorSink = raise_error) -> ColumnTable:
     """Open the MDF file of a recording, as a table with a row at each sample time of any channel that is read.
 
     Winch speeds are interpolated linearly; an output has no value at the sample times of others. Times that some winch
     speed does not cover are omitted. Needs the package asammdf.
 
-    Raises RecordingError where it is no MDF file, a channel is missing, duplicate or not numeric, or a unit is not SI.
+    Raises RecordingError where it is no MDF file, a channel is missing, duplicate or not numeric, or a unit is not
+    known.
     Errors in the names of channels go to the ``sink``.
     """
     file = str(path)
@@ -64,7 +60,7 @@ def open_mdf(path: str | Path, cable_count: int, sink: ErrorSink = raise_error) 
     with _suppress_unraisable():
         try:
             with MDF(Path(path)) as content:
-                header, channels = _read_channels(content, file, cable_count, sink)
+                header, channels = _read_channels(content, file, columns.without_time(), sink)
         except RecordingError:
             raise
         # asammdf may raise anything on a corrupt file.
@@ -88,7 +84,7 @@ def _suppress_unraisable() -> Iterator[None]:
         sys.unraisablehook = previous_hook
 
 
-def _read_channels(content: Any, file: str, cable_count: int, sink: ErrorSink) -> tuple[Header, dict[str, Channel]]:
+def _read_channels(content: Any, file: str, columns: ColumnMap, sink: ErrorSink) -> tuple[Header, dict[str, Channel]]:
     for group in content.groups:
         require_samples(group.channel_group.cycles_nr, file)
     masters = set(content.masters_db.items())
@@ -97,25 +93,34 @@ def _read_channels(content: Any, file: str, cable_count: int, sink: ErrorSink) -
         for name, candidates in content.channels_db.items()
     }
     names = [name for name, channel_locations in locations.items() if channel_locations and name != "time"]
-    header = parse_header(["time", *names], file, cable_count, sink)
-    channels = {}
+    standard_names = columns.renamed(["time", *names], file)
+    header = parse_header(standard_names, file, columns.cable_count, sink)
+    stored = dict(zip(standard_names, ["time", *names], strict=True))
+    signals: dict[str, Any] = {}
+    stated: dict[str, Unit] = {}
     for name in header.known_names:
         if name == "time":
             continue
-        if len(locations[name]) > 1:
-            raise RecordingError(f"{file}: channel {name}", "appears more than once", "keep one of them")
-        group, index = locations[name][0]
-        channels[name] = _channel(content.get(name, group=group, index=index), f"{file}: channel {name}", name)
-    return header, channels
+        where = f"{file}: channel {stored[name]}"
+        if len(locations[stored[name]]) > 1:
+            raise RecordingError(where, "appears more than once", "keep one of them")
+        group, index = locations[stored[name]][0]
+        signals[name] = content.get(stored[name], group=group, index=index)
+        text = signals[name].unit
+        unit = columns.stated_unit(name, text, where) if text.strip() else None
+        stated |= {name: unit} if unit else {}
+    units = {name: unit for name, unit in columns.units(stated, file).items() if not unit.is_si}
+    scaled = replace(header, units=units, scales=columns.scales)
+    channels = {
+        name: _channel(signal, name, scaled, f"{file}: channel {stored[name]}") for name, signal in signals.items()
+    }
+    return replace(header, dialect=units_in_words(units)), channels
 
 
-def _channel(signal: Any, where: str, name: str) -> Channel:
-    units = _ACCEPTED_UNITS["position" if name in AXES else name.rpartition("_")[0]]
-    if signal.unit.strip() not in units:
-        raise RecordingError(where, f"is in {format_value(signal.unit)}", f"convert it to {units[1]}")
+def _channel(signal: Any, name: str, scaled: Header, where: str) -> Channel:
     if signal.samples.ndim != 1 or signal.samples.dtype.kind not in "iuf":
         raise RecordingError(where, "contains no numbers", "store one number per sample, in SI units")
-    values = signal.samples.astype(np.float64)
+    values = scaled.to_si(name, signal.samples.astype(np.float64))
     if signal.invalidation_bits is not None:
         values[np.asarray(signal.invalidation_bits, dtype=bool)] = np.nan
     return Channel(np.asarray(signal.timestamps, dtype=np.float64), values)

@@ -1,5 +1,8 @@
 """Recordings in Parquet files: the columns of the CSV format, as numbers."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -9,6 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError, format_value, raise_error
 from ..input_files import readable_file
+from .column_map import ColumnMap
 from .recording_table import ColumnTable, ErrorSink, parse_header, require_samples
 
 BATCH_ROWS = 2**16
@@ -24,23 +28,40 @@ def is_parquet(path: str | Path) -> bool:
         return file.suffix.lower() == ".parquet" or content.read(len(_PARQUET_MAGIC)) == _PARQUET_MAGIC
 
 
-def open_parquet(path: str | Path, cable_count: int, sink: ErrorSink = raise_error) -> ColumnTable:
+def open_parquet(path: str | Path, columns: ColumnMap, sink: ErrorSink = raise_error) -> ColumnTable:
     """Open the Parquet file of a recording; raises RecordingError where it is invalid, a column missing or not numeric.
 
     Errors in the names of columns go to the ``sink``.
     """
     file = str(path)
+    with _readable_parquet(file), pq.ParquetFile(path) as content:
+        require_samples(content.metadata.num_rows, file)
+        names = columns.renamed(content.schema_arrow.names, file)
+        header = parse_header(names, file, columns.cable_count, sink)
+        scaled = replace(header, units=columns.units({}, file), scales=columns.scales)
+        stored = dict(zip(names, content.schema_arrow.names, strict=True))
+        # Column by column, so that Arrow never holds more than one in memory.
+        numbers = {
+            name: scaled.to_si(name, _read_column(content, stored[name], f"{file}: column {stored[name]}"))
+            for name in header.known_names
+        }
+    return ColumnTable(file, header, numbers)
+
+
+def parquet_column_names(path: str | Path) -> tuple[str, ...]:
+    """Names of the columns in a Parquet file, as recorded; raises RecordingError as open_parquet does."""
+    with _readable_parquet(str(path)), pq.ParquetFile(path) as content:
+        return tuple(content.schema_arrow.names)
+
+
+@contextmanager
+def _readable_parquet(file: str) -> Iterator[None]:
+    """Raises RecordingError for what pyarrow raises on a corrupt file."""
     try:
-        with pq.ParquetFile(path) as content:
-            require_samples(content.metadata.num_rows, file)
-            header = parse_header(content.schema_arrow.names, file, cable_count, sink)
-            # Column by column, so that Arrow never holds more than one in memory.
-            columns = {name: _read_column(content, name, f"{file}: column {name}") for name in header.known_names}
+        yield
     except (pa.ArrowException, OSError, ValueError) as problem:
-        raise RecordingError(
-            file, f"cannot be read as Parquet ({format_value(str(problem), 200)})", _REWRITE_HINT
-        ) from problem
-    return ColumnTable(file, header, columns)
+        reason = format_value(str(problem), 200)
+        raise RecordingError(file, f"cannot be read as Parquet ({reason})", _REWRITE_HINT) from problem
 
 
 def _read_column(content: pq.ParquetFile, name: str, where: str) -> NDArray[np.float64]:

@@ -8,15 +8,26 @@ import numpy as np
 import pandas as pd  # type: ignore[import-untyped,unused-ignore]
 from numpy.typing import NDArray
 
-from ..errors import RecordingError, format_value, raise_error
+from ..errors import (
+    AbsentColumnsError,
+    ArgumentError,
+    RecordingError,
+    describe_value,
+    format_value,
+    one_line,
+    raise_error,
+)
 from ..input_files import validate_path
-from ..robot.robot_file_reader import MAX_CABLES
-from ..robot.schema import AXES
+from ..robot.robot_file_reader import MAX_CABLES, read_columns_file
+from ..robot.schema import AXES, RecordedColumn
 from ..validation import validate_instance, validate_integer
+from .column_map import ColumnMap, column_map
 from .csv_file import CsvTable, open_csv
+from .mat_file import is_mat, open_mat
 from .mdf_file import is_mdf, open_mdf
 from .parquet_file import is_parquet, open_parquet
 from .recording_table import MAX_MAGNITUDE, ColumnTable, ErrorSink, not_a_table_error, parse_header, row_errors
+from .speed_gaps import bridge_speed_gaps
 
 CABLE_COUNT_HINT = "give the robot's cable_count"
 
@@ -27,7 +38,8 @@ class Recording:
 
     ``time`` (N,) in s, strictly rising; ``winch_speed`` (N, n) in m/s, positive reels in; ``tension`` (N, n)
     in N and ``position`` (N, 3) in m, NaN where a cell or a column is missing. ``unknown_columns`` by name;
-    ``rope_lengths`` are the numbers of the cables whose winch speed is the rate of a recorded rope length.
+    ``rope_lengths`` are the numbers of the cables whose winch speed is the rate of a recorded rope length. ``read_as``
+    says what of the file differs from the standard, and which winch speeds are interpolated.
     """
 
     path: str
@@ -37,6 +49,7 @@ class Recording:
     position: NDArray[np.float64]
     unknown_columns: tuple[str, ...] = ()
     rope_lengths: tuple[int, ...] = ()
+    read_as: tuple[str, ...] = ()
 
     @property
     def cable_count(self) -> int:
@@ -65,12 +78,13 @@ class Recording:
 
     @property
     def notes(self) -> tuple[str, ...]:
-        """Remarks on what was read: columns that nobody knows, and speeds that are rates of rope lengths."""
-        notes = [f"not read: {', '.join(self.unknown_columns)}"] if self.unknown_columns else []
+        """Remarks on what was read: the file's dialect, unknown columns, and speeds that are rates of rope lengths."""
+        notes = list(self.read_as)
+        notes += [f"not read: {', '.join(self.unknown_columns)}"] if self.unknown_columns else []
         if self.rope_lengths:
             cables = ", ".join(map(str, self.rope_lengths))
             notes.append(f"winch speeds are the rates of the recorded rope lengths, of cables {cables}")
-        return tuple(f"{self.path}: {note}" for note in notes)
+        return tuple(f"{self.path}: {one_line(note)}" for note in notes)
 
     @property
     def channel_names(self) -> tuple[str, ...]:
@@ -96,6 +110,21 @@ class Recording:
         """All outputs, shape (N, 3 + n), in the order of ``channel_names``, in m and N; NaN where missing."""
         return np.hstack((self.position, self.tension))
 
+    def wound_lengths(self) -> NDArray[np.float64]:
+        """Lengths of rope that the winches have reeled in since the first sample, shape (N, n), in m."""
+        wound = np.zeros_like(self.winch_speed)
+        mean_speeds = 0.5 * (self.winch_speed[1:] + self.winch_speed[:-1])
+        np.cumsum(mean_speeds * np.diff(self.time)[:, None], axis=0, out=wound[1:])
+        return wound
+
+    def has_same_samples(self, other: "Recording") -> bool:
+        """Whether another recording has the same numbers in all its samples."""
+        return (
+            np.array_equal(self.time, other.time)
+            and np.array_equal(self.winch_speed, other.winch_speed)
+            and np.array_equal(self.measured(), other.measured(), equal_nan=True)
+        )
+
     def frame(self) -> pd.DataFrame:
         """The recording as a table with the columns of a recording file; all of them, NaN where missing."""
         speeds = [f"winch_speed_{cable}" for cable in range(1, self.cable_count + 1)]
@@ -103,24 +132,42 @@ class Recording:
         return pd.DataFrame(rows, columns=["time", *speeds, *self.channel_names])
 
 
-def read_recording(path: str | Path, cable_count: int) -> Recording:
-    """Read a recording from a CSV, Parquet or MDF file, of a robot with n = ``cable_count`` cables, N samples.
+def read_recording(
+    path: str | Path, cable_count: int, columns: Sequence[RecordedColumn] | str | Path = ()
+) -> Recording:
+    """Read a recording from a CSV, Parquet, MDF or MATLAB file, of a robot with n = ``cable_count`` cables, N samples.
 
     Columns are ``time`` (s), ``winch_speed_1`` ... (m/s), ``tension_1`` ... (N), ``x``, ``y``, ``z`` (m); where the
     length of a rope is recorded, ``rope_length_1`` ... (m, any zero, smaller as it reels in), its rate is the speed.
+    Units that a CSV or MDF file states are converted to these; gaps of a few samples in a speed are interpolated. The
+    recording's ``notes`` say so. ``columns`` are those of other names and scales: a robot's ``recorded_columns``, or a
+    TOML file with a table [recording.columns].
 
-    Raises RecordingError, which names the line or row, where the file is not a valid recording; ArgumentError where
-    ``path`` is no path or ``cable_count`` no whole number from 1 to 100.
+    Raises RecordingError, which names the line or row, where the file is not a valid recording; RobotFileError where
+    ``columns`` are not valid; ArgumentError where ``path`` is no path or ``cable_count`` no whole number from 1 to 100.
     """
     validate_path("read_recording: path", path)
     validate_integer("read_recording: cable_count", cable_count, 1, CABLE_COUNT_HINT, MAX_CABLES)
-    return _validated_recording(_open_table(path, cable_count, raise_error), cable_count)
+    declared = _declared_columns(columns, cable_count)
+    table, notes = _open_table(path, column_map(declared, cable_count), raise_error)
+    recording = _validated_recording(table, cable_count)
+    return replace(recording, read_as=(*notes, *recording.read_as))
+
+
+def _declared_columns(columns: Sequence[RecordedColumn] | str | Path, cable_count: int) -> tuple[RecordedColumn, ...]:
+    if isinstance(columns, str | Path):
+        return read_columns_file(columns, cable_count)
+    if not isinstance(columns, tuple | list) or not all(isinstance(column, RecordedColumn) for column in columns):
+        hint = "give a robot's recorded_columns, or the path of a TOML file"
+        raise ArgumentError("read_recording: columns", columns, f"is {describe_value(columns)}, no columns", hint)
+    return tuple(columns)
 
 
 def _validated_recording(table: CsvTable | ColumnTable, cable_count: int) -> Recording:
     numbers = table.numbers()
     if numbers is None:
         raise _first_error(table)
+    numbers, gap_notes = bridge_speed_gaps(numbers)
     cables = range(1, cable_count + 1)
     recording = Recording(
         path=table.file,
@@ -130,6 +177,7 @@ def _validated_recording(table: CsvTable | ColumnTable, cable_count: int) -> Rec
         position=_stacked_columns(numbers, AXES),
         unknown_columns=table.header.unknown_names,
         rope_lengths=tuple(cable for cable in cables if numbers.get(f"rope_length_{cable}") is not None),
+        read_as=(*((f"read {table.header.dialect}",) if table.header.dialect else ()), *gap_notes),
     )
     if not _is_valid(recording):
         raise _first_error(table)
@@ -146,20 +194,34 @@ def _winch_speeds(numbers: Mapping[str, NDArray[np.float64]], cables: Iterable[i
     return _stacked_columns(speeds, [f"winch_speed_{cable}" for cable in cables])
 
 
-def recording_errors(path: str | Path, cable_count: int) -> Iterator[RecordingError]:
+def recording_errors(
+    path: str | Path, cable_count: int, columns: Sequence[RecordedColumn] = ()
+) -> Iterator[RecordingError]:
     """All errors of a recording, in the file's order; none where it is valid. Slow: every cell is parsed.
 
     Raises RecordingError where the file cannot be read as a recording at all.
     """
     header_errors: list[RecordingError] = []
-    table = _open_table(path, cable_count, header_errors.append)
+    table, _ = _open_table(path, column_map(columns, cable_count), header_errors.append)
     yield from header_errors
-    yield from row_errors(table.rows(), table.header, table.file)
+    if table.header.known_names:
+        yield from row_errors(table.rows(), table.header, table.file)
 
 
-def _open_table(path: str | Path, cable_count: int, sink: ErrorSink) -> CsvTable | ColumnTable:
-    open_table = open_parquet if is_parquet(path) else open_mdf if is_mdf(path) else open_csv
-    return open_table(path, cable_count, sink)
+def _open_table(
+    path: str | Path, columns: ColumnMap, sink: ErrorSink
+) -> tuple[CsvTable | ColumnTable, tuple[str, ...]]:
+    """The table of a recording, and a note on its columns; one that has standard names alone is read by these."""
+    formats = ((is_parquet, open_parquet), (is_mdf, open_mdf), (is_mat, open_mat))
+    open_table = next((open_format for is_format, open_format in formats if is_format(path)), open_csv)
+    try:
+        return open_table(path, columns, sink), ((columns.in_words(),) if columns.declared else ())
+    except AbsentColumnsError as absent:
+        try:
+            table = open_table(path, ColumnMap(columns.cable_count), raise_error)
+        except RecordingError:
+            raise absent from None
+        return table, ("has none of the columns that are declared, and is read by the standard names",)
 
 
 def _first_error(table: CsvTable | ColumnTable) -> RecordingError:

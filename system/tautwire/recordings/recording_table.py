@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
-from itertools import repeat
+from dataclasses import dataclass, field
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +13,10 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError, format_value, raise_error
 from ..name_suggestions import closest_name
-from ..robot.schema import AXES
+from ..robot.schema import AXES, RecordedColumn
+from .clock_time import ClockFormat
+from .speed_gaps import MAX_GAP_SAMPLES, CellError, is_speed_used, without_bridged_gaps
+from .units import Number, Unit
 
 # A larger file is no recording of a cable robot, or does not fit into memory.
 MAX_COLUMNS = 10_000
@@ -27,15 +29,46 @@ _CABLE_COLUMN = re.compile(r"(?:winch_speed|rope_length|tension)_(0|[1-9][0-9]{0
 
 @dataclass(frozen=True)
 class Header:
-    """Columns of a recording: ``names`` are all in the file's order, each once; ``unknown_names`` are not read."""
+    """Columns of a recording: ``names`` are all in the file's order, each once; ``unknown_names`` are not read.
+
+    Numbers are written with ``decimal_mark``; ``units`` are those of columns that are not in SI units, ``scales`` what
+    is declared of columns; ``clock`` is the format of times that are no numbers. ``dialect`` says in words what differs
+    from the standard.
+    """
 
     names: tuple[str, ...]
     unknown_names: tuple[str, ...]
+    decimal_mark: str = "."
+    units: Mapping[str, Unit] = field(default_factory=dict)
+    scales: Mapping[str, RecordedColumn] = field(default_factory=dict)
+    clock: ClockFormat | None = None
+    dialect: str = ""
 
     @property
     def known_names(self) -> tuple[str, ...]:
         """The columns that are read, in the file's order."""
         return tuple(name for name in self.names if name not in self.unknown_names)
+
+    def number(self, name: str, cell: str) -> float:
+        """The number in a cell of a known column, in SI units; NaN where it is none."""
+        if name == "time" and self.clock is not None:
+            return self.clock.seconds(cell)
+        # Python's float also accepts underscores and the digits of all scripts.
+        if "_" in cell or not cell.isascii() or (self.decimal_mark == "," and "." in cell):
+            return math.nan
+        try:
+            number = float(cell.replace(self.decimal_mark, "."))
+        except ValueError:
+            return math.nan
+        return self.to_si(name, number)
+
+    def to_si(self, name: str, recorded: Number) -> Number:
+        """The recorded numbers of a known column in SI units."""
+        unit, scale = self.units.get(name), self.scales.get(name)
+        if scale is None:
+            return recorded if unit is None else unit.to_si(recorded)
+        from_zero = recorded - scale.offset
+        return scale.sign * scale.factor * (from_zero if unit is None else unit.to_si(from_zero))
 
 
 def parse_header(
@@ -82,6 +115,11 @@ def known_columns(cable_count: int) -> frozenset[str]:
     return frozenset(("time", *AXES, *cable_columns))
 
 
+def is_column_name(name: str) -> bool:
+    """Whether a column of a recording of some robot may have this name, whatever its number of cables."""
+    return name == "time" or name in AXES or _CABLE_COLUMN.fullmatch(name) is not None
+
+
 class Row(NamedTuple):
     """The cells of one sample; ``where`` names the file and the line or row, ``number`` is that, from 1."""
 
@@ -98,27 +136,35 @@ _DECIMAL_COMMA = re.compile(r"[-+]?[0-9]+,[0-9]+([eE][-+]?[0-9]+)?")
 
 def row_errors(rows: Iterable[Row], header: Header, file: str) -> Iterator[RecordingError]:
     """Validation errors of all samples of a recording, in the file's order; parses every cell, so it is slow."""
+    speed_names = [name for name in header.known_names if name.startswith("winch_speed_")]
+    yield from without_bridged_gaps(_sample_errors(rows, header, file), speed_names)
+
+
+def _sample_errors(rows: Iterable[Row], header: Header, file: str) -> Iterator[list[CellError]]:
+    """Validation errors of each sample, and at the end of their number."""
     count, previous_time = 0, -math.inf
     for row in rows:
         count += 1
         if len(row.cells) != len(header.names):
-            yield _width_error(row, len(header.names))
+            yield [CellError(_width_error(row, len(header.names)))]
             continue
-        time = math.nan
+        errors, time = [], math.nan
         for name, cell in zip(header.names, row.cells, strict=True):
             if name not in header.unknown_names:
-                value = _parse_cell(row, name, cell.strip(" "))
+                value = _parse_cell(row, header, name, cell.strip(" "))
                 if isinstance(value, RecordingError):
-                    yield value
+                    is_missing_speed = name.startswith("winch_speed_") and cell.strip(" ") in MISSING_CELLS
+                    errors.append(CellError(value, name if is_missing_speed else None))
                 elif name == "time":
                     time = value
         if time <= previous_time:
             problem = f"is {time!r} after {previous_time!r}, must rise from sample to sample"
-            yield _cell_error(row, "time", problem, "sort the samples and remove duplicates")
+            errors.append(CellError(_cell_error(row, "time", problem, "sort the samples and remove duplicates")))
         previous_time = time if time > previous_time else previous_time
+        yield errors
     if count < 2:
         samples = "1 sample" if count else "no samples"
-        yield RecordingError(file, f"has {samples}, must have at least 2", "record for longer")
+        yield [CellError(RecordingError(file, f"has {samples}, must have at least 2", "record for longer"))]
 
 
 def not_a_table_error(file: str) -> RecordingError:
@@ -133,29 +179,39 @@ def _width_error(row: Row, width: int) -> RecordingError:
     return RecordingError(row.where, f"has {len(row.cells)} cells, the header has {width}", hint, row.number)
 
 
-def _parse_cell(row: Row, name: str, cell: str) -> float | RecordingError:
+def _parse_cell(row: Row, header: Header, name: str, cell: str) -> float | RecordingError:
     """The number in a cell, NaN where an output is missing; or what is wrong with it."""
     if cell in MISSING_CELLS:
-        if name == "time" or name.startswith(("winch_speed_", "rope_length_")):
+        if name == "time" or name.startswith("rope_length_") or is_speed_used(name, header.known_names):
             problem = f"is {format_value(cell) if cell else 'empty'}, must be a number"
-            return _cell_error(row, name, problem, "write a number, or cut the recording before this sample")
+            hint = "write a number, or cut the recording before this sample"
+            if name.startswith("winch_speed_"):
+                hint += f"; at most {MAX_GAP_SAMPLES} in a row are interpolated, between numbers"
+            return _cell_error(row, name, problem, hint)
         return math.nan
-    try:
-        # Python's float also accepts underscores and the digits of all scripts.
-        number = math.nan if "_" in cell or not cell.isascii() else float(cell)
-    except ValueError:
-        number = math.nan
+    number = header.number(name, cell)
     if abs(number) <= MAX_MAGNITUDE:
         return number
     hint = "write a number, or leave the cell of an output empty where nothing was measured"
     if math.isinf(number):
         return _cell_error(row, name, f"is {format_value(cell)}, must be finite", hint)
-    if _DECIMAL_COMMA.fullmatch(cell):
-        hint = "write it with a decimal point"
     if math.isnan(number):
-        return _cell_error(row, name, f"is {format_value(cell)}, not a number", hint)
+        return _cell_error(row, name, *_not_a_number(header, name, cell, hint))
     problem = f"is {format_value(cell)}, must be at most {MAX_MAGNITUDE:g} in magnitude"
     return _cell_error(row, name, problem, "give it in SI units")
+
+
+def _not_a_number(header: Header, name: str, cell: str, hint: str) -> tuple[str, str]:
+    """The problem of a cell that holds no number, and the hint."""
+    if name == "time" and header.clock is not None:
+        return f"is {format_value(cell)}, not a time in {header.clock.style}", "write all times as the first"
+    if name == "time" and (":" in cell or cell.count("-") > 1):
+        hint = "write seconds, hh:mm:ss, or ISO 8601 as in 2024-05-31T12:00:00.25Z"
+    elif header.decimal_mark == "," and "." in cell:
+        hint = "write it with a decimal comma, as others in this file, and without separators of thousands"
+    elif _DECIMAL_COMMA.fullmatch(cell):
+        hint = "write it with a decimal point"
+    return f"is {format_value(cell)}, not a number", hint
 
 
 def _cell_error(row: Row, name: str, problem: str, hint: str) -> RecordingError:
@@ -176,6 +232,8 @@ class ColumnTable:
 
     def rows(self) -> Iterator[Row]:
         """The samples, counted from 1, each with the file and its number, as a CSV file would have them."""
-        columns = [self.columns.get(name, repeat(math.nan)) for name in self.header.names]
-        for number, row in enumerate(zip(*columns, strict=False), 1):
+        sample_count = len(next(iter(self.columns.values()), ()))
+        missing = np.full(sample_count, math.nan)
+        columns = [self.columns.get(name, missing) for name in self.header.names]
+        for number, row in enumerate(zip(*columns, strict=True), 1):
             yield Row(f"{self.file}: row {number}", number, [repr(float(value)) for value in row])

@@ -16,9 +16,22 @@ from ..toml_text import parse_toml
 from ..validation import NumberRule
 from .checked_table import CheckedTable, ErrorSink
 from .effect_tables import read_cable_list, read_effects, read_formulas
-from .schema import Cable, Platform, Point, Robot, Sensors, TensionLimits, UserFmu, Winch, fmu_slots
+from .recorded_columns import read_recorded_columns
+from .schema import Cable, Platform, Point, RecordedColumn, Robot, Sensors, TensionLimits, UserFmu, Winch, fmu_slots
 
-TOP_LEVEL_KEYS = ("name", "gravity", "platform", "tension", "sensors", "cable", "effect", "winch", "fmu", "formula")
+TOP_LEVEL_KEYS = (
+    "name",
+    "gravity",
+    "platform",
+    "tension",
+    "sensors",
+    "cable",
+    "effect",
+    "winch",
+    "fmu",
+    "formula",
+    "recording",
+)
 MAX_FILE_BYTES = 10_000_000  # bytes
 MAX_CABLES = 100
 MIN_POINT_DISTANCE = 1e-6  # m; no two exit points can be built closer
@@ -88,6 +101,18 @@ def read_robot_with_sink(path: str | Path, sink: ErrorSink) -> Robot:
     return _read_robot_table(CheckedTable(file, "", parsed, sink), default_name=one_line(Path(path).stem))
 
 
+def read_columns_file(path: str | Path, cable_count: int) -> tuple[RecordedColumn, ...]:
+    """Reads the columns of recordings by the laboratory's names from a TOML file with the table [recording.columns].
+
+    The table may stand in a robot file. Raises RobotFileError, which names the first invalid key.
+    """
+    root = CheckedTable(str(path), "", robot_content(path))
+    if "recording" not in root.content:
+        root.refuse("recording", "is missing", "write the table [recording.columns]")
+    root.require_known(TOP_LEVEL_KEYS if "cable" in root.content else ("recording",))
+    return read_recorded_columns(root, cable_count)
+
+
 def robot_content(path: str | Path) -> dict[str, Any]:
     """The unvalidated keys and values of a robot file; raises RobotFileError if it is not TOML."""
     return _parse_robot_file(robot_file_text(path), str(path))
@@ -143,6 +168,7 @@ def _read_robot_table(root: CheckedTable, default_name: str) -> Robot:
         winch=_read_winch(winch) if winch else None,
         fmus=_read_fmus(fmu, len(cables)) if fmu else (),
         formulas=read_formulas(root, partial(read_cable_list, cable_count=len(cables))),
+        recorded_columns=read_recorded_columns(root, len(cables)),
     )
 
 

@@ -1,7 +1,7 @@
 """The declared robot: platform, cables, winch, sensors, effects and formulas as immutable data."""
 
 from collections.abc import Iterable, Iterator, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 from ..validation import validate_instance
@@ -173,6 +173,23 @@ class Formula:
 
 
 @dataclass(frozen=True)
+class RecordedColumn:
+    """A column as the laboratory records it: its SI value is ``sign * factor * unit * (recorded - offset)``.
+
+    ``column`` is the standard name and ``name`` the laboratory's, both with ``{}`` for the number of each cable, or
+    neither. A blank ``unit`` is the one that the recording states, or SI; ``file`` says where this is declared.
+    """
+
+    column: str
+    name: str
+    unit: str = ""
+    factor: float = 1.0
+    sign: float = 1.0
+    offset: float = 0.0
+    file: str = field(default="", compare=False)
+
+
+@dataclass(frozen=True)
 class Robot:
     """A cable-driven parallel robot as declared; ``gravity`` in m/s^2.
 
@@ -191,6 +208,7 @@ class Robot:
     winch: Winch | None = None
     fmus: tuple[UserFmu, ...] = ()
     formulas: tuple[Formula, ...] = ()
+    recorded_columns: tuple[RecordedColumn, ...] = ()
     initial_state: InitialState | None = None
     start_is_measured: tuple[bool, bool, bool] = (False, False, False)
 

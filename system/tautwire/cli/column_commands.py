@@ -1,0 +1,75 @@
+"""The command ``columns``: a proposal of what the columns of a recording are."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from ..errors import InputError
+from ..robot.robot_file_reader import MAX_CABLES, read_robot
+from .console import AsJson, CommandOutput, Quiet, shell_quoted
+
+
+def columns(
+    recording: Annotated[Path, typer.Argument(metavar="RECORDING.csv", help="A recording; CSV, Parquet or MATLAB.")],
+    robot_file: Annotated[
+        Path | None, typer.Argument(metavar="ROBOT.toml", help="The robot file, for the number of cables.")
+    ] = None,
+    cables: Annotated[
+        int | None, typer.Option(help="Number of cables, without a robot file.", min=1, max=MAX_CABLES)
+    ] = None,
+    out: Annotated[Path | None, typer.Option(metavar="COLUMNS.toml", help="Output file of the table.")] = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Propose what the columns of a recording are.
+
+    By the words, numbers and units in their names; what is doubtful has a comment. Check it, then give it as --columns.
+
+    Example: tautwire columns log.csv robot.toml --out columns.toml
+    """
+    from ..atomic_output import atomic_file, refuse_other_formats, refuse_overwriting_inputs
+    from ..recordings.column_proposal import column_names, proposal_text, propose_columns
+
+    output = CommandOutput(as_json, quiet)
+    cable_count = _cable_count(robot_file, cables)
+    refuse_other_formats(out, ".toml")
+    refuse_overwriting_inputs([recording, *([robot_file] if robot_file else [])], [out] if out else [])
+    proposal = propose_columns(column_names(recording), cable_count)
+    text = proposal_text(recording, proposal, cable_count)
+    if out is not None:
+        with atomic_file(out) as scratch:
+            scratch.write_text(text, encoding="utf-8")
+    document = {
+        "columns": [asdict(each) for each in proposal.columns],
+        "standard_names": sorted(proposal.standard_names),
+        "unused": proposal.unused,
+        **({"table": out} if out else {}),
+    }
+    output.result([text.rstrip("\n") if out is None else out], document)
+    output.suggest_next(_next_step(recording, robot_file, cable_count, out))
+
+
+def _cable_count(robot_file: Path | None, cables: int | None) -> int:
+    """The number of cables, by the robot file or the option; raises InputError where both are missing or differ."""
+    if robot_file is None and cables is None:
+        raise InputError("--cables", "is missing", "name the robot file, or give the number, as in --cables 4")
+    cable_count = cables if robot_file is None else read_robot(robot_file).cable_count
+    if cable_count is None or (cables is not None and cables != cable_count):
+        raise InputError("--cables", f"is {cables}, the robot has {cable_count}", "omit one of the two")
+    return cable_count
+
+
+def _next_step(recording: Path, robot_file: Path | None, cable_count: int, out: Path | None) -> str:
+    """What is to be done with a proposal: write it, then check the recording with it."""
+    log = shell_quoted(recording)
+    if out is None:
+        source = f"--cables {cable_count}" if robot_file is None else shell_quoted(robot_file)
+        return f"tautwire columns {log} {source} --out columns.toml"
+    table = shell_quoted(out)
+    if robot_file is None:
+        return f"read it, then check the recording with your robot file: --columns {table}"
+    return f"read it, then tautwire check {shell_quoted(robot_file)} {log} --columns {table}"

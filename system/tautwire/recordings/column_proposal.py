@@ -1,0 +1,298 @@
+"""A proposal of [recording.columns] for a recording, by the words and units in the names of its columns."""
+
+from __future__ import annotations
+
+import json
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import RecordingError, one_line
+from ..input_files import read_encoded_text
+from ..robot.recorded_columns import CABLE_COLUMNS
+from ..robot.schema import AXES
+from .clock_time import clock_format
+from .csv_lines import SEPARATORS, is_comment, is_number, split_cells, unit_in_name, without_comment_mark
+from .mat_file import is_mat, mat_column_names
+from .mdf_file import is_mdf
+from .parquet_file import is_parquet, parquet_column_names
+from .recording_table import MISSING_CELLS, is_column_name, known_columns
+from .units import find_unit
+
+MAX_CSV_SIZE = 2**31  # bytes
+MAX_HEAD_LINES = 500
+
+# Words of laboratories for each kind of column, the most specific first; a word is a part of a name in lower case.
+WORDS = (
+    ("time", ("t", "ts", "time", "timestamp", "zeit", "temps", "seconds")),
+    ("tension", ("tension", "force", "kraft", "loadcell", "load", "cell", "f", "ft")),
+    ("winch_speed", ("velocity", "vel", "speed", "omega", "v", "geschwindigkeit", "drehzahl")),
+    ("rope_length", ("length", "encoder", "enc", "geber", "counts", "cnt", "laenge", "länge", "angle", "winkel")),
+)
+# Words of what is measured at, without the quantity.
+DRIVE_WORDS = ("winch", "drive", "motor", "drum", "trommel", "winde", "antrieb")
+ROPE_WORDS = ("rope", "seil", "cable")
+# Words that a name of a coordinate may have beside x, y or z.
+POSITION_WORDS = ("pos", "position", "rigid", "body", "tracker", "platform", "tcp", "marker")
+# Words of columns that no standard column is for, though they may have a word of one.
+OTHER_WORDS = """
+    set setpoint target desired command cmd ref soll error fault alarm status state zustand mode flag enable enabled
+    torque moment drehmoment current strom voltage volt volts spannung power leistung pwm duty percent pct
+    temp temperature temperatur pressure druck acc accel acceleration beschleunigung gyro mag imu rate jerk
+    quat quaternion rot rotation orientation euler roll pitch yaw cycle period duration delay latency jitter
+"""
+# Factors of the units that are no units of length or speed, which only the laboratory's numbers convert.
+_COUNTS = dict.fromkeys(("counts", "count", "cnt", "inc", "ticks", "pulses"), "metres per count")
+_FACTORS = {
+    "rope_length": _COUNTS
+    | {"rad": "the drum's radius"}
+    | dict.fromkeys(("deg", "°"), "radius * pi / 180")
+    | dict.fromkeys(("rev", "turns"), "radius * 2 * pi"),
+    "winch_speed": {"rad/s": "the drum's radius", "rev/s": "radius * 2 * pi"}
+    | dict.fromkeys(("deg/s", "°/s"), "radius * pi / 180")
+    | dict.fromkeys(("rpm", "1/min", "u/min", "rev/min"), "radius * pi / 30"),
+}
+# Words without a unit that tell that a factor is needed.
+_FACTOR_WORDS = {
+    "rope_length": (
+        ("counts", "cnt", "enc", "encoder", "geber", "angle", "winkel"),
+        "metres per count, or the drum's radius for rad",
+    ),
+    "winch_speed": (("omega", "drehzahl"), "the drum's radius for rad/s, radius * pi / 30 for rpm"),
+}
+
+_NOT_NAMED = "quantity not named"
+_PARTS = re.compile(r"[^\W\d_]+|[0-9]+")
+
+
+@dataclass(frozen=True)
+class ProposedColumn:
+    """One line of a proposal: the standard ``column``, the laboratory's ``name``, its ``unit``, and the ``doubt``."""
+
+    column: str
+    name: str
+    unit: str = ""
+    doubt: str = ""
+
+    def line(self) -> str:
+        """The line of TOML, with the doubt as a comment behind it."""
+        entries = [f"name = {json.dumps(self.name, ensure_ascii=False)}"]
+        entries += [f'unit = "{self.unit}"'] if self.unit else []
+        return f"{self.column} = {{ {', '.join(entries)} }}" + (f"  # {self.doubt}" if self.doubt else "")
+
+
+@dataclass(frozen=True)
+class ColumnProposal:
+    """Proposed ``columns``, of which ``standard_names`` need no line; the reason for each ``unused`` name."""
+
+    columns: tuple[ProposedColumn, ...]
+    standard_names: frozenset[str]
+    unused: Mapping[str, str]
+
+
+def column_names(path: Path) -> dict[str, str | None]:
+    """The names of a recording's columns, with the standard name of those that are read without a declaration.
+
+    Of CSV in any dialect, Parquet or MATLAB; raises RecordingError where there are none.
+    """
+    if is_mat(path):
+        return mat_column_names(path)
+    names = parquet_column_names(path) if is_parquet(path) else _csv_column_names(path)
+    return {name: name if is_column_name(name) else None for name in names}
+
+
+def _csv_column_names(path: Path) -> tuple[str, ...]:
+    if is_mdf(path):
+        hint = "export it as CSV, or write the names of its channels into the table"
+        raise RecordingError(str(path), "is MDF, of which no columns are proposed", hint)
+    content, _ = read_encoded_text(path, RecordingError, "CSV", MAX_CSV_SIZE)
+    lines = content.decode("utf-8").splitlines()[:MAX_HEAD_LINES]
+    for index, line in enumerate(lines):
+        if is_comment(line) or not line.strip():
+            continue
+        for separator in SEPARATORS:
+            cells = split_cells(line, separator)
+            if len(cells) > 1 and cells[0] and all(map(_is_sample, cells)):
+                names = _names_above(lines[:index], separator, len(cells))
+                if names:
+                    return names
+    hint = "begin with a line that names the columns, and samples below it"
+    raise RecordingError(str(path), "has no line of names above numbers", hint)
+
+
+def _is_sample(cell: str) -> bool:
+    return is_number(cell) or cell in MISSING_CELLS or clock_format(cell) is not None
+
+
+def _names_above(lines: Sequence[str], separator: str, count: int) -> tuple[str, ...]:
+    """The cells of the first line with as many as the samples have."""
+    for line in lines:
+        cells = split_cells(without_comment_mark(line) if is_comment(line) else line, separator)
+        if len(cells) == count and len(set(cells)) == count and not all(map(is_number, cells)):
+            return tuple(cells)
+    return ()
+
+
+def propose_columns(names: Mapping[str, str | None], cable_count: int) -> ColumnProposal:
+    """Propose the columns of a recording of n = ``cable_count`` cables by its names, as ``column_names`` has them.
+
+    A standard name is always used. Another is where its words tell one kind, and its numbers the cable, of a column
+    without a standard name; where two are for one column neither is.
+    """
+    known = known_columns(cable_count)
+    claims: dict[str, list[str]] = {}
+    for name, column in names.items():
+        if column in known:
+            claims.setdefault(str(column), []).append(name)
+    standard = frozenset(claims)
+    claimed, unused = _claims([name for name, column in names.items() if column not in known], cable_count)
+    for column, claimants in claimed.items():
+        if column in standard:
+            unused |= dict.fromkeys(claimants, f"looks like {column}, which is read by its standard name")
+        else:
+            claims[column] = claimants
+    columns = []
+    for column, claimants in claims.items():
+        if len(claimants) > 1:
+            unused |= {name: f"one of {len(claimants)} that look like {column}" for name in claimants}
+        else:
+            columns.append(ProposedColumn(column, *claimants) if column in standard else _proposed(column, *claimants))
+    columns.sort(key=lambda each: _order(each.column))
+    return ColumnProposal(tuple(columns), standard & {each.column for each in columns}, unused)
+
+
+def _claims(names: Sequence[str], cable_count: int) -> tuple[dict[str, list[str]], dict[str, str]]:
+    """The names that are for each column by their words, and the reasons for the others."""
+    claims: dict[str, list[str]] = {}
+    unused: dict[str, str] = {}
+    numbered: dict[str, dict[str, int]] = {kind: {} for kind in CABLE_COLUMNS}
+    for name in names:
+        kind, _ = _kind(name)
+        unit, number = unit_in_name(name), _cable_number(name)
+        if not name.strip() or not name.isprintable():
+            unused[name] = "blank, or not printable"
+        elif kind is None:
+            unused[name] = "no known word, or words of other quantities"
+        elif unit and unit == _stated_unit(name) and not _is_unit_of(unit, kind):
+            unused[name] = f"looks like {kind}, and {unit} is not a known unit of it"
+        elif kind not in numbered:
+            claims.setdefault(kind, []).append(name)
+        elif number is None:
+            unused[name] = f"looks like {kind}, of no one cable"
+        else:
+            numbered[kind][name] = number
+    for kind, numbers in numbered.items():
+        # Where 0 is beside n, cables are counted from 1 and 0 is none of them.
+        first = 0 if 0 in numbers.values() and cable_count not in numbers.values() else 1
+        for name, number in numbers.items():
+            if not 0 <= number - first < cable_count:
+                unused[name] = f"looks like {kind} of cable {number - first + 1}, and there are {cable_count}"
+            else:
+                claims.setdefault(f"{kind}_{number - first + 1}", []).append(name)
+    return claims, unused
+
+
+def proposal_text(path: Path, proposal: ColumnProposal, cable_count: int) -> str:
+    """The proposal as TOML that ``--columns`` reads; what it cannot tell is commented out, with the reason."""
+    lines = [f"# Columns of {one_line(path.name)}, proposed by their names: check them.", "[recording.columns]"]
+    if proposal.standard_names:
+        standard = sorted(proposal.standard_names, key=_order)
+        lines.append(f"# read by their standard names: {', '.join(standard)}")
+    lines += [each.line() for each in proposal.columns if each.column not in proposal.standard_names]
+    told = {each.column for each in proposal.columns} | proposal.standard_names
+    required = ["time", *(f"winch_speed_{cable}" for cable in range(1, cable_count + 1))]
+    for column in required:
+        if not told & {column, column.replace("winch_speed", "rope_length")}:
+            lines.append(f'# {column} = {{ name = "" }}  # none of the names tells it, and it is required')
+    lines += [f"# not used: {name!a}: {reason}" for name, reason in proposal.unused.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _order(column: str) -> tuple[int, int]:
+    kinds = ("time", "winch_speed", "rope_length", "tension", *AXES)
+    kind, _, number = column.rpartition("_")
+    return (kinds.index(kind), int(number)) if kind else (kinds.index(column), 0)
+
+
+def _stated_unit(name: str) -> str:
+    """The unit in a name: in brackets, or a known one behind a slash or at its end; blank without."""
+    beside = unit_in_name(name)
+    if beside[:1] in ("[", "("):
+        return "" if beside[1:-1].strip().isdigit() else beside
+    *before, ending = re.split(r"[\s_.]+", name)
+    kinds = ("time", "x", *CABLE_COLUMNS)
+    candidates = [text for text in (ending if before else "", beside) if text]
+    return next((text for text in candidates if any(_is_unit_of(text, kind) for kind in kinds)), "")
+
+
+def _is_unit_of(text: str, kind: str) -> bool:
+    """Whether this is a unit of a kind of column, or one that a factor converts to it."""
+    return find_unit(text, f"{kind}_1" if kind in CABLE_COLUMNS else kind) is not None or bool(_factor(text, kind))
+
+
+def _factor(unit: str, kind: str) -> str:
+    """The factor that a unit needs; blank where none is known."""
+    return _FACTORS.get(kind, {}).get(unit.strip("[]() ").lower(), "")
+
+
+def _words(name: str) -> list[str]:
+    """Words of a name in lower case, without its unit: parted at capitals, digits and marks."""
+    parted = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name.removesuffix(_stated_unit(name)))
+    return [part.lower() for part in _PARTS.findall(parted)]
+
+
+def _kind(name: str) -> tuple[str | None, str]:
+    """The kind of a column that the words of its name tell, and the doubt; None where they tell another quantity."""
+    unit = _stated_unit(name)
+    every_word = _words(name)
+    words = [word for word in every_word if not word.isdigit()]
+    has_number = len(words) < len(every_word)
+    kinds = {kind: set(known) & set(words) for kind, known in WORDS if set(known) & set(words)}
+    is_drive, is_position = _has_any(words, DRIVE_WORDS), _has_any(words, POSITION_WORDS)
+    axes = [word for word in words if word in AXES]
+    if _has_any(words, OTHER_WORDS.split()) or (axes and (kinds or is_drive or len(axes) > 1)):
+        return None, ""
+    if axes:
+        is_named = is_position or len(words) == 1 or _is_unit_of(unit, axes[0])
+        return (axes[0], "" if is_named else _NOT_NAMED) if is_position or len(words) <= 2 else (None, "")
+    # A time has no number; T with one is the symbol of tension.
+    if has_number and kinds.pop("time", set()) == {"t"} and not kinds and not is_drive:
+        kinds = {"tension": {"t"}}
+    for kind, telling in kinds.items():
+        is_symbol = kind != "time" and all(len(word) == 1 for word in telling)
+        return kind, _NOT_NAMED if is_symbol and not _is_unit_of(unit, kind) else ""
+    if is_drive and is_position:
+        return "rope_length", ""
+    if is_drive or _has_any(words, ROPE_WORDS):
+        candidates = ("winch_speed", "rope_length") if is_drive else ("rope_length", "winch_speed", "tension")
+        told = [kind for kind in candidates if _is_unit_of(unit, kind)]
+        return (told[0], "") if told else (candidates[0], _NOT_NAMED)
+    return None, ""
+
+
+def _has_any(words: Iterable[str], known: Iterable[str]) -> bool:
+    return bool(set(words) & set(known))
+
+
+def _cable_number(name: str) -> int | None:
+    """The number in a name; None where it has none, or several."""
+    numbers = [int(word) for word in _words(name) if word.isdigit() and len(word) < 4]
+    return numbers[0] if len(numbers) == 1 else None
+
+
+def _proposed(column: str, name: str) -> ProposedColumn:
+    """The column with the unit that its name has, and a remark where quantity, scale or sign is not certain."""
+    kind = column.rpartition("_")[0] or column
+    stated, (_, doubt) = _stated_unit(name), _kind(name)
+    unit, factor = find_unit(stated, column), _factor(stated, kind)
+    known, factor_without_unit = _FACTOR_WORDS.get(kind, ((), ""))
+    if unit is not None:
+        scale = "" if unit_in_name(name).endswith(stated) else "unit by the name's end"
+    elif factor or (not stated and _has_any(_words(name), known)):
+        scale = f"add factor = {factor or factor_without_unit}"
+    else:
+        scale = f"ends in {stated}, no unit of it" if stated else "no unit in the name: the file's, or SI"
+    signs = {"winch_speed": "positive has to reel in", "rope_length": "has to fall as it reels in"}
+    remark = "; ".join(part for part in (scale, doubt, signs.get(kind, "")) if part)
+    return ProposedColumn(column, name, unit.symbol if unit else "", remark)

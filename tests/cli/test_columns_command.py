@@ -1,0 +1,251 @@
+"""`tautwire columns` proposes a table that reads a laboratory's recording, and says what it cannot tell."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from dataclasses import asdict
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+import tomlkit
+from scipy.io import savemat
+
+from tautwire.cli import run
+from tautwire.recordings.column_proposal import column_names, propose_columns
+from tautwire.recordings.recording import read_recording
+from tests.support.robots import EXAMPLES
+
+FIT = EXAMPLES / "three" / "fit.csv"
+ROBOT = str(EXAMPLES / "three" / "robot.toml")
+
+
+def standard() -> pd.DataFrame:
+    columns = [f"{kind}_{cable}" for kind in ("winch_speed", "tension") for cable in (1, 2, 3)]
+    return pd.read_csv(FIT, nrows=60)[["time", *columns, "x", "y", "z"]]
+
+
+def renamed(speed: str, tension: str, axis: str, time: str, first: int = 1) -> dict[str, str]:
+    numbers = {cable: cable - 1 + first for cable in (1, 2, 3)}
+    speeds = {f"winch_speed_{cable}": speed.format(number) for cable, number in numbers.items()}
+    tensions = {f"tension_{cable}": tension.format(number) for cable, number in numbers.items()}
+    return {"time": time} | speeds | tensions | {each: axis.format(each.upper()) for each in "xyz"}
+
+
+LOGS = {
+    "drives and a tracker": (renamed("Drive{}.Velocity", "Load Cell {}", "Rigid Body {}", "Timestamp"), {}, ","),
+    "German, ends of names": (
+        renamed("v{}_mm/s", "Kraft{}_kN", "pos_{}_mm", "Zeit_ms"),
+        {"time": 1e3, "winch": 1e3, "tension": 1e-3, "xyz": 1e3},
+        ";",
+    ),
+    "brackets, from 0": (
+        renamed("motor {} speed [m/min]", "F{} [N]", "{} [mm]", "t [ms]", first=0),
+        {"time": 1e3, "winch": 60.0, "xyz": 1e3},
+        "\t",
+    ),
+}
+
+
+@pytest.mark.parametrize("name", LOGS)
+def test_a_proposal_reads_the_recording_as_it_stands(name: str, tmp_path: Path) -> None:
+    names, scales, separator = LOGS[name]
+    frame = standard()
+    log = pd.DataFrame(
+        {names[c]: frame[c] * scales.get("xyz" if c in "xyz" else c.partition("_")[0], 1.0) for c in frame}
+    )
+    log["Setpoint 1"] = 1.0
+    log.to_csv(tmp_path / "log.csv", index=False, sep=separator)
+    table = tmp_path / "columns.toml"
+    assert run(["columns", str(tmp_path / "log.csv"), ROBOT, "--out", str(table)]) == 0
+    read = read_recording(tmp_path / "log.csv", 3, table)
+    frame.to_csv(tmp_path / "standard.csv", index=False)
+    expected = read_recording(tmp_path / "standard.csv", 3)
+    np.testing.assert_allclose(read.frame(), expected.frame(), rtol=1e-12, atol=1e-15)
+    assert "# not used: 'Setpoint 1'" in table.read_text(encoding="utf-8")
+
+
+def test_what_is_ambiguous_or_missing_is_a_comment(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text("t,Time,Drive1.Velocity,Enc2 cnt,blob\n0,0,1,2,3\n1,1,1,2,3\n", encoding="utf-8")
+    assert run(["columns", str(log), "--cables", "3"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert "# not used: 't': one of 2 that look like time" in lines
+    assert any(line.startswith("# time = ") and "required" in line for line in lines)
+    assert any(line.startswith("# winch_speed_3 = ") for line in lines)
+    (encoder,) = [line for line in lines if line.startswith("rope_length_2 = ")]
+    assert "# add factor = metres per count" in encoder
+    (speed,) = [line for line in lines if line.startswith("winch_speed_1 = ")]
+    assert "the file's, or SI; positive has to reel in" in speed
+
+
+def proposed(tmp_path: Path, *names: str) -> tuple[dict[str, dict[str, str]], dict[str, str]]:
+    """The columns that are proposed for a recording of three cables, and the reasons for names that are not used."""
+    log = tmp_path / "log.csv"
+    log.write_text(f"{','.join(names)}\n{','.join('1' for _ in names)}\n", encoding="utf-8")
+    proposal = propose_columns(column_names(log), 3)
+    return {each.column: asdict(each) for each in proposal.columns}, dict(proposal.unused)
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "Motor1 temp",
+        "acc_x",
+        "gyro y",
+        "quat_z",
+        "rot z",
+        "Load 1 [%]",
+        "Drive1 Voltage [V]",
+        "Drive2 Status",
+        "v1 [N]",
+        "x [m/s^2]",
+        "Kraft1 [bar]",
+        "Motor1 [kN]",
+        "time_2",
+        "Torque1",
+        "Cycle Time [ms]",
+    ],
+)
+def test_other_quantities_are_not_used(name: str, tmp_path: Path) -> None:
+    columns, unused = proposed(tmp_path, "Zeit", name)
+    assert set(columns) == {"time"}
+    assert set(unused) == {name}
+
+
+@pytest.mark.parametrize(
+    ("name", "column", "unit", "remark"),
+    [
+        ("Winch3.Position [mm]", "rope_length_3", "mm", "has to fall"),
+        ("Drive1 [mm]", "rope_length_1", "mm", "has to fall"),
+        ("Seil2 [kN]", "tension_2", "kN", ""),
+        ("T2 [N]", "tension_2", "N", ""),
+        ("T3", "tension_3", "", "no unit in the name: the file's, or SI; quantity not named"),
+        ("Drive2", "winch_speed_2", "", "quantity not named"),
+        ("Drive2 [m/min]", "winch_speed_2", "m/min", "positive has to reel in"),
+        ("motor_1_velocity", "winch_speed_1", "", "no unit in the name: the file's, or SI; positive has"),
+        ("foo y", "y", "", "quantity not named"),
+        ("Encoder1 [counts]", "rope_length_1", "", "add factor = metres per count; has to fall"),
+        ("Trommel2 Winkel [deg]", "rope_length_2", "", "add factor = radius * pi / 180; has to fall"),
+        ("Drum2 angle [rad]", "rope_length_2", "", "add factor = the drum's radius; has to fall"),
+        ("enc_1", "rope_length_1", "", "add factor = metres per count, or the drum's radius for rad; has to fall"),
+        ("Geber 3", "rope_length_3", "", "add factor = metres per count, or the drum's radius for rad; has to fall"),
+        ("motor1 speed rpm", "winch_speed_1", "", "add factor = radius * pi / 30; positive"),
+        ("Drehzahl 2 [1/min]", "winch_speed_2", "", "add factor = radius * pi / 30; positive"),
+        ("Motor3 [rad/s]", "winch_speed_3", "", "add factor = the drum's radius; positive"),
+        ("Encoder velocity 1 [deg/s]", "winch_speed_1", "", "add factor = radius * pi / 180; positive"),
+        ("v[2]", "winch_speed_2", "", "quantity not named"),
+    ],
+)
+def test_a_name_tells_quantity_cable_unit_and_factor(
+    name: str, column: str, unit: str, remark: str, tmp_path: Path
+) -> None:
+    columns, unused = proposed(tmp_path, "Zeit", name)
+    assert not unused
+    assert columns.keys() == {"time", column}
+    assert columns[column]["unit"] == unit
+    assert remark in columns[column]["doubt"]
+
+
+def test_a_number_0_beside_those_of_all_cables_is_none(tmp_path: Path) -> None:
+    columns, unused = proposed(tmp_path, "Zeit", "T0", "F1 [N]", "F2 [N]", "F3 [N]")
+    assert [columns[f"tension_{cable}"]["name"] for cable in (1, 2, 3)] == ["F1 [N]", "F2 [N]", "F3 [N]"]
+    assert unused == {"T0": "looks like tension of cable 0, and there are 3"}
+
+
+def test_counts_are_read_with_the_factor_that_is_asked_for(tmp_path: Path) -> None:
+    frame = standard()
+    names = {f"winch_speed_{cable}": f"Motor{cable} [rpm]" for cable in (1, 2, 3)}
+    rpm = frame.assign(**{name: frame[name] / (0.05 * np.pi / 30) for name in names}).rename(columns=names)
+    rpm.to_csv(tmp_path / "log.csv", index=False)
+    table = tmp_path / "columns.toml"
+    assert run(["columns", str(tmp_path / "log.csv"), "--cables", "3", "--out", str(table)]) == 0
+    text = table.read_text(encoding="utf-8")
+    assert text.count("add factor = radius * pi / 30") == 3
+    table.write_text(text.replace(']" }', f']", factor = {0.05 * np.pi / 30} }}'), encoding="utf-8")
+    read = read_recording(tmp_path / "log.csv", 3, table).frame()
+    np.testing.assert_allclose(read["winch_speed_2"], frame["winch_speed_2"], rtol=1e-12, atol=1e-15)
+
+
+def test_standard_names_are_read_as_they_are(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    frame = standard().assign(t=0.0)
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    assert run(["columns", str(tmp_path / "log.csv"), ROBOT]) == 0
+    text = capsys.readouterr().out
+    assert "# read by their standard names: time, winch_speed_1, " in text
+    assert "# not used: 't': looks like time, which is read by its standard name" in text
+    assert tomlkit.parse(text).unwrap() == {"recording": {"columns": {}}}
+    assert "required" not in text
+    (tmp_path / "columns.toml").write_text(text, encoding="utf-8")
+    read = read_recording(tmp_path / "log.csv", 3, tmp_path / "columns.toml")
+    np.testing.assert_array_equal(read.frame()["tension_3"], frame["tension_3"])
+
+
+def test_matrices_of_matlab_keep_their_standard_names(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    frame = standard()
+    speeds = frame[[f"winch_speed_{cable}" for cable in (1, 2, 3)]].to_numpy()
+    log = {"t": frame["time"].to_numpy(), "winch_speed": speeds, "position": frame[["x", "y", "z"]].to_numpy()}
+    savemat(tmp_path / "log.mat", {"log": log}, oned_as="column")
+    table = tmp_path / "columns.toml"
+    assert run(["columns", str(tmp_path / "log.mat"), ROBOT, "--out", str(table)]) == 0
+    text = table.read_text(encoding="utf-8")
+    assert "# read by their standard names: winch_speed_1, winch_speed_2, winch_speed_3, x, y, z" in text
+    assert "not used" not in text
+    assert tomlkit.parse(text).unwrap()["recording"]["columns"] == {"time": {"name": "log.t"}}
+    read = read_recording(tmp_path / "log.mat", 3, table)
+    np.testing.assert_array_equal(read.frame()["y"], frame["y"])
+
+
+@pytest.mark.parametrize("robot", [[ROBOT], ["--cables", "3"]])
+def test_the_next_step_is_a_command_that_runs(
+    robot: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    standard().rename(columns={"time": "t"}).to_csv("log 1.csv", index=False)
+    assert run(["columns", "log 1.csv", *robot]) == 0
+    last = capsys.readouterr().err.splitlines()[-1]
+    arguments = shlex.split(last.removeprefix("next: tautwire "))
+    assert arguments == ["columns", "log 1.csv", *robot, "--out", "columns.toml"]
+    assert run(arguments) == 0
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert last.endswith("--columns columns.toml")
+    if robot == [ROBOT]:
+        assert run(shlex.split(last.partition("tautwire ")[2])) == 0
+    else:
+        assert ".toml" not in last.removesuffix("columns.toml")
+
+
+def test_json_lists_the_columns(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    frame = standard().rename(columns={"x": "Rigid Body 1 X", "time": "t_ms"})
+    frame.to_parquet(tmp_path / "log.parquet")
+    assert run(["columns", str(tmp_path / "log.parquet"), ROBOT, "--json", "--quiet"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["columns"][0] == {
+        "column": "time",
+        "name": "t_ms",
+        "unit": "ms",
+        "doubt": "unit by the name's end",
+    }
+    assert {"x", "y", "z", "tension_3", "winch_speed_3"} < {each["column"] for each in document["columns"]}
+
+
+@pytest.mark.parametrize(
+    ("arguments", "words"),
+    [
+        (["{fit}"], "--cables: is missing"),
+        (["{fit}", "{robot}", "--cables", "4"], "--cables: is 4, the robot has 3"),
+        (["{robot}", "--cables", "3"], "no line of names above numbers"),
+        (["{empty}", "--cables", "3"], "no line of names above numbers"),
+        (["{bad}", "--cables", "3"], "bad.parquet: cannot be read as Parquet"),
+    ],
+)
+def test_what_cannot_be_told_is_refused(
+    arguments: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    (tmp_path / "empty.csv").write_text("1,2\n3,4\n", encoding="utf-8")
+    (tmp_path / "bad.parquet").write_bytes(b"PAR1 and no more of it")
+    places = {"fit": str(FIT), "robot": ROBOT} | {path.stem: str(path) for path in tmp_path.iterdir()}
+    assert run(["columns", *(argument.format_map(places) for argument in arguments)]) == 2
+    assert words in capsys.readouterr().err

@@ -1,0 +1,238 @@
+"""Files as laboratories have them: `check` reads each right, or refuses it and names the cause."""
+
+from __future__ import annotations
+
+import io
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import pandas as pd
+import pytest
+
+from tautwire.cli.input_checks import check_files
+from tautwire.recordings.recording import read_recording
+from tests.support.robots import EXAMPLES
+
+ROBOT = (EXAMPLES / "three" / "robot.toml").read_text(encoding="utf-8")
+ROWS = 800
+AXES, CELLS = ["x", "y", "z"], ["tension_1", "tension_2", "tension_3"]
+SPEEDS = ["winch_speed_1", "winch_speed_2", "winch_speed_3"]
+
+Frame = pd.DataFrame
+Writer = Callable[[Frame], str | bytes]
+
+
+def standard() -> Frame:
+    """The first samples of the shipped recording, with the columns of a recording file alone."""
+    frame = pd.read_csv(EXAMPLES / "three" / "fit.csv", nrows=ROWS)
+    return frame[["time", *SPEEDS, *CELLS, *AXES]]
+
+
+def text_of(frame: Frame, separator: str = ",", decimal: str = ".", header: bool = True, end: str = "\n") -> str:
+    buffer = io.StringIO()
+    frame.to_csv(buffer, sep=separator, decimal=decimal, index=False, header=header, lineterminator=end)
+    return buffer.getvalue()
+
+
+def scaled(columns: list[str], factor: float) -> Writer:
+    """The columns in another unit, and nothing that says so."""
+    return lambda frame: text_of(frame.assign(**{name: frame[name] * factor for name in columns}))
+
+
+def stated(columns: list[str], factor: float, unit: str, pattern: str = "{} [{}]") -> Writer:
+    """The columns in another unit, with the unit beside their names."""
+    names = {name: pattern.format(name, unit) for name in columns}
+    changed = scaled(columns, factor)
+    return lambda frame: text_of(pd.read_csv(io.StringIO(str(changed(frame)))).rename(columns=names))
+
+
+def reordered(columns: list[str], order: list[int]) -> Writer:
+    """Columns that hold one another's numbers."""
+    return lambda frame: text_of(frame.assign(**{a: frame[columns[k]] for a, k in zip(columns, order, strict=True)}))
+
+
+def above(*lines: str) -> Writer:
+    return lambda frame: "\n".join([*lines, text_of(frame)])
+
+
+def with_lines(change: Callable[[list[str]], list[str]]) -> Writer:
+    return lambda frame: "\n".join(change(text_of(frame).split("\n")))
+
+
+def with_clock(form: str) -> Writer:
+    begin = pd.Timestamp("2026-05-04T23:59:50")
+    times = {"iso": lambda t: (begin + t).isoformat() + "Z", "clock": lambda t: f"10:00:{t.total_seconds():06.3f}"}
+
+    def write(frame: Frame) -> str:
+        shown = [times[form](pd.Timedelta(round(1e3 * (seconds - frame.time[0])), unit="ms")) for seconds in frame.time]
+        return text_of(frame.assign(time=shown))
+
+    return write
+
+
+def tracker_late(frame: Frame) -> str:
+    rows = round(0.8 / (frame.time[1] - frame.time[0]))
+    late = frame[[*AXES, *CELLS]].shift(-rows)
+    return text_of(frame.assign(**{name: late[name] for name in late}).iloc[:-rows])
+
+
+def empty_speeds(count: int) -> Writer:
+    def write(frame: Frame) -> str:
+        changed = frame.copy()
+        changed.loc[100 : 99 + count, "winch_speed_2"] = np.nan
+        return text_of(changed)
+
+    return write
+
+
+READ: dict[str, Writer] = {
+    "the standard": text_of,
+    "columns in another order": lambda frame: text_of(frame[frame.columns[::-1]]),
+    "a column that nobody knows": lambda frame: text_of(frame.assign(status="ok")),
+    "semicolons": lambda frame: text_of(frame, ";"),
+    "semicolons and decimal commas": lambda frame: text_of(frame, ";", ","),
+    "tabs": lambda frame: text_of(frame, "\t"),
+    "tabs and decimal commas": lambda frame: text_of(frame, "\t", ","),
+    "spaces": lambda frame: text_of(frame, " "),
+    "Windows line ends": lambda frame: text_of(frame, end="\r\n"),
+    "old line ends": lambda frame: text_of(frame, end="\r"),
+    "byte order mark": lambda frame: b"\xef\xbb\xbf" + text_of(frame).encode(),
+    "UTF-16": lambda frame: text_of(frame).encode("utf-16"),
+    "comments above": above("# robot three", "# payload: none"),
+    "comments among samples": with_lines(lambda lines: [*lines[:50], "# paused here", *lines[50:]]),
+    "header that is a comment": lambda frame: "# " + text_of(frame),
+    "header that is a MATLAB comment": lambda frame: "% " + text_of(frame),
+    "text above the header": above("Exported by logger 4.2", "Date;2026-05-04"),
+    "a line of units": with_lines(lambda lines: [lines[0], "s,m/s,m/s,m/s,N,N,N,m,m,m", *lines[1:]]),
+    "blank lines": with_lines(lambda lines: [lines[0], "", *lines[1:300], "", *lines[300:]]),
+    "a separator at the end of lines": with_lines(lambda lines: [line + "," if line else "" for line in lines]),
+    "numbers in quotation marks": with_lines(
+        lambda lines: [",".join(f'"{cell}"' for cell in line.split(",")) if line else "" for line in lines]
+    ),
+    "time in ms that says so": stated(["time"], 1e3, "ms"),
+    "positions in mm that say so": stated(AXES, 1e3, "mm", "{} ({})"),
+    "tensions in kN that say so": stated(CELLS, 1e-3, "kN", "{} / {}"),
+    "speeds in mm/s that say so": stated(SPEEDS, 1e3, "mm/s"),
+    "micrometres in Latin-1": lambda frame: str(stated(AXES, 1e6, "\u00b5m")(frame)).encode("latin-1"),
+    "a raw column beside the one that is read": lambda frame: text_of(frame.assign(**{"x (raw)": 0.0})),
+    "columns in the text above": above("Recorded channels: time x y z"),
+    "ISO 8601 over midnight": with_clock("iso"),
+    "clock times": with_clock("clock"),
+}
+
+REFUSED: dict[str, tuple[Writer, str]] = {
+    "time in ms": (scaled(["time"], 1e3), "time is in ms"),
+    "time in us": (scaled(["time"], 1e6), "time is in us"),
+    "speeds in mm/s": (scaled(SPEEDS, 1e3), "winch_speed_1 to winch_speed_3 are in mm/s"),
+    "speeds in m/min": (scaled(SPEEDS, 60.0), "winch_speed_1 to winch_speed_3 are in m/min"),
+    "speeds of a drum's angle": (scaled(SPEEDS, 20.0), "drums with a radius of 0.04999 m if in rad/s"),
+    "all speeds of the other sign": (scaled(SPEEDS, -1.0), "winch_speed_1 to winch_speed_3 have the other sign"),
+    "one speed of the other sign": (scaled(["winch_speed_3"], -1.0), "winch_speed_3 has the other sign"),
+    "winches in another order": (reordered(SPEEDS, [1, 2, 0]), "winches of cables 1 to 3 are winch_speed_3"),
+    "positions in mm": (scaled(AXES, 1e3), "x, y, z are in mm"),
+    "axes in another order": (reordered(AXES, [2, 0, 1]), "x, y, z are the recording's y, z, x"),
+    "another origin": (
+        lambda f: text_of(f.assign(**{a: f[a] - f[a][0] for a in AXES})),
+        "x, y, z have another origin, about [29.",
+    ),
+    "clocks apart": (tracker_late, "the winches' clock is 0."),
+    "tensions in kN": (scaled(CELLS, 1e-3), "tension_1 to tension_3 are in kN"),
+    "tensions in kg": (scaled(CELLS, 1.0 / 9.80665), "tension_1 to tension_3 are in kg"),
+    "tensions in g": (scaled(CELLS, 1e3 / 9.80665), "tension_1 to tension_3 are in g"),
+    "tensions of the other sign": (scaled(CELLS, -1.0), "tension_1 to tension_3 have the other sign"),
+    "load cells swapped": (reordered(CELLS, [1, 0, 2]), "are tension_2, tension_1, tension_3"),
+    "commas for separators and decimals": (lambda f: text_of(f, ",", ",").replace('"', ""), "cells, the header has"),
+    "no header": (lambda frame: text_of(frame, header=False), "the header is missing"),
+    "a unit that nobody knows": (stated(AXES, 1.0, "furlong"), "'[furlong]', not a known unit of length"),
+    "units of some columns": (
+        with_lines(lambda lines: [lines[0], "# s, m/s, m/s, m/s, N, N, N, mm, mm", *lines[1:]]),
+        "line 2: has 9 units, the header has 10 columns",
+    ),
+    "words in the first sample": (
+        with_lines(lambda lines: [lines[0], ",".join(["null"] * 10), *lines[1:]]),
+        "is 'null', not a number",
+    ),
+    "a winch without speed": (lambda f: text_of(f.rename(columns={"winch_speed_2": "v2"})), "winch_speed_2 is missing"),
+    "a second column of a name": (lambda f: text_of(f.rename(columns={"y": "x"})), "'x' appears twice"),
+    "a fourth cable": (lambda f: text_of(f.assign(tension_4=1.0)), "tension_4 belongs to no cable"),
+    "samples in reverse": (lambda frame: text_of(frame[::-1]), "must rise from sample to sample"),
+    "samples twice": (lambda frame: text_of(pd.concat((frame, frame))), "must rise from sample to sample"),
+    "words in cells": (lambda frame: text_of(frame.assign(tension_2="OVERLOAD")), "and 799 more like it"),
+    "a speed that is missing for long": (empty_speeds(40), "winch_speed_2: is empty, must be a number"),
+    "one sample": (lambda frame: text_of(frame.iloc[:1]), "has 1 sample, must have at least 2"),
+    "nothing": (lambda frame: "", "is empty"),
+    "a workbook": (lambda frame: b"PK\x03\x04" + bytes(100), "a zip archive or a spreadsheet, not text"),
+    "another robot": (
+        lambda frame: text_of(pd.read_csv(EXAMPLES / "caroca" / "fit.csv", nrows=ROWS)),
+        "does not match the positions",
+    ),
+}
+
+ROBOTS: dict[str, tuple[str, str, str]] = {
+    "modulus in GPa": ("modulus = 1.022e11", "modulus = 102.2", "in GPa as 1.022e+11"),
+    "modulus in MPa": ("modulus = 1.022e11", "modulus = 102200.0", "in MPa as 1.022e+11"),
+    "area in mm^2": ("area = 1.25664e-5", "area = 12.5664", "in mm^2 as 12.5664e-6"),
+    "damping of a whole rope": ("damping = 4.0e8", "damping = 4.0e12", "write it in Pa s"),
+    "anchors in mm": ("50.0, 50.0]", "50000.0, 50000.0]", "in mm multiply by 0.001"),
+}
+
+
+@dataclass(frozen=True)
+class Laboratory:
+    """A folder with the robot file and one recording."""
+
+    folder: Path
+
+    def problems(self, content: str | bytes) -> list[str]:
+        recording = self.recording(content)
+        checked = check_files(self.robot(ROBOT), recording)
+        return [str(problem) for problem in checked.problems]
+
+    def robot(self, text: str) -> Path:
+        path = self.folder / "robot.toml"
+        path.write_text(text, encoding="utf-8")
+        return path
+
+    def recording(self, content: str | bytes) -> Path:
+        path = self.folder / "log.csv"
+        path.write_bytes(content if isinstance(content, bytes) else content.encode())
+        return path
+
+
+@pytest.mark.parametrize("file", READ)
+def test_it_is_read_right(file: str, tmp_path: Path) -> None:
+    laboratory, frame = Laboratory(tmp_path), standard()
+    assert laboratory.problems(READ[file](frame)) == []
+    recording = read_recording(tmp_path / "log.csv", 3)
+    expected = frame.to_numpy(dtype=float)
+    shown = np.column_stack((recording.time, recording.winch_speed, recording.tension, recording.position))
+    assert shown[:, 0] - shown[0, 0] == pytest.approx(expected[:, 0] - expected[0, 0], abs=1e-9)
+    assert shown[:, 1:] == pytest.approx(expected[:, 1:], rel=1e-12, abs=1e-15)
+
+
+def test_one_speed_that_is_missing_is_interpolated_and_told(tmp_path: Path) -> None:
+    laboratory, frame = Laboratory(tmp_path), standard()
+    checked = check_files(laboratory.robot(ROBOT), laboratory.recording(empty_speeds(1)(frame)))
+    assert checked.problems == () and any("winch_speed_2" in note for note in checked.notes)
+    recording = read_recording(tmp_path / "log.csv", 3)
+    neighbours = frame["winch_speed_2"][[99, 101]].mean()
+    assert recording.winch_speed[100, 1] == pytest.approx(neighbours, rel=1e-12)
+
+
+@pytest.mark.parametrize("file", REFUSED)
+def test_it_is_refused_with_its_cause(file: str, tmp_path: Path) -> None:
+    write, cause = REFUSED[file]
+    problems = Laboratory(tmp_path).problems(write(standard()))
+    assert any(cause in problem for problem in problems), problems
+    assert len(problems) <= 10
+
+
+@pytest.mark.parametrize("change", ROBOTS)
+def test_a_robot_file_in_other_units_is_refused_with_the_unit(change: str, tmp_path: Path) -> None:
+    before, after, cause = ROBOTS[change]
+    assert before in ROBOT
+    laboratory = Laboratory(tmp_path)
+    checked = check_files(laboratory.robot(ROBOT.replace(before, after)), laboratory.recording(text_of(standard())))
+    assert any(cause in str(problem) for problem in checked.problems), checked.problems
