@@ -7,8 +7,12 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
-from tautwire.cli.input_checks import MAX_PROBLEMS_PER_FILE, Problem, check_files
-from tautwire.errors import InputError, RobotFileError
+from tautwire.cli import input_checks
+from tautwire.cli.input_checks import Problem, check_files
+from tautwire.errors import InputError, RecordingError, RobotFileError
+from tautwire.estimation import trace
+from tautwire.recordings.recording import read_recording
+from tautwire.robot.implausible_units import implausible_units
 from tautwire.robot.robot_file_reader import read_robot
 from tautwire.robot.static_equilibrium import static_tensions
 from tests.support.own_fmus import packed
@@ -174,12 +178,48 @@ def test_problems_of_robot_file_and_recording_are_listed_together(tmp_path: Path
     assert files == [str(robot)] + [str(recording)] * 2
 
 
-def test_the_number_of_listed_problems_is_bounded(tmp_path: Path) -> None:
-    rows = "".join(f"{k},a,b,c\n" for k in range(MAX_PROBLEMS_PER_FILE))
-    text = f"time,winch_speed_1,winch_speed_2,winch_speed_3\n{rows}"
-    checked = check_files(THREE / "robot.toml", written(tmp_path, text, "fit.csv"))
-    assert len(checked.problems) == MAX_PROBLEMS_PER_FILE
-    assert f"only the first {MAX_PROBLEMS_PER_FILE}" in checked.notes[-1]
+HEADER = "time,winch_speed_1,winch_speed_2,winch_speed_3,tension_1"
+
+
+def test_alike_errors_are_one_problem_with_their_number(tmp_path: Path) -> None:
+    rows = [f"{k},0,0,{k},{k}" for k in range(900)]
+    for k in (5, 6, 7, 800):
+        rows[k] = f'{k},0,0,{k},"1,{k}"'
+    rows[9], rows[10], rows[20], rows[30] = "9,0,0,inf,5", "10,0,0,-inf,5", "20,0,0,it's,x", "0,0,0,0,0"
+    rows[40], rows[50] = "40,0,0", "50,0,0"
+    place = written(tmp_path, "\n".join([HEADER, *rows]), "fit.csv")
+    problems = [str(problem) for problem in check_files(THREE / "robot.toml", place).problems]
+    said = [
+        "line 7, column tension_1: is '1,5', not a number (and 3 more like it, last in line 802); write it with",
+        "line 11, column winch_speed_3: is 'inf', must be finite (and 1 more like it, last in line 12); write",
+        'line 22, column winch_speed_3: is "it\'s", not a number; write',
+        "line 22, column tension_1: is 'x', not a number; write",
+        "line 32, column time: is 0.0 after 29.0, must rise from sample to sample; sort",
+        "line 42: has 3 cells, the header has 5 (and 1 more like it, last in line 52); complete",
+    ]
+    assert [
+        problem.removeprefix(f"{place}: ")[: len(start)] for problem, start in zip(problems, said, strict=True)
+    ] == said
+
+
+def test_the_number_of_counted_errors_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(input_checks, "MAX_COUNTED_ERRORS", 100)
+    rows = "".join(f"{k},a,b,c,\n" for k in range(40))
+    checked = check_files(THREE / "robot.toml", written(tmp_path, f"{HEADER}\n{rows}", "fit.csv"))
+    assert [problem.problem for problem in checked.problems] == [
+        "is 'a', not a number (and 33 more like it, last in line 35)",
+        "is 'b', not a number (and 32 more like it, last in line 34)",
+        "is 'c', not a number (and 32 more like it, last in line 34)",
+    ]
+    assert checked.notes[-1].endswith("only the first 100 wrong cells are counted")
+
+
+def test_the_number_of_listed_problems_is_bounded(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(input_checks, "MAX_PROBLEMS_PER_FILE", 2)
+    place = written(tmp_path, f"{HEADER}\n0,a,b,c,0\n1,0,0,0,0\n", "fit.csv")
+    checked = check_files(THREE / "robot.toml", place)
+    assert len(checked.problems) == 2
+    assert checked.notes[-1].endswith("only the first 2 problems are listed")
 
 
 @pytest.mark.parametrize("name", ["three", "caroca", "eight"])
@@ -204,6 +244,28 @@ def test_a_recording_of_speeds_alone_is_fine_for_simulate(tmp_path: Path) -> Non
     assert checked.problems == () and "trace does not" in checked.notes[-1]
 
 
+def test_a_recording_in_other_units_is_refused_by_check_and_trace_in_the_same_words(tmp_path: Path) -> None:
+    frame = pd.read_csv(THREE / "fit.csv")
+    frame["time"] *= 1e3
+    frame[["tension_1", "tension_2", "tension_3"]] /= 1e3
+    place = tmp_path / "fit.csv"
+    frame.to_csv(place, index=False)
+    (problem,) = check_files(THREE / "robot.toml", place).problems
+    assert "time is in ms" in problem.problem and "are in kN" in problem.problem
+    robot = read_robot(THREE / "robot.toml")
+    with pytest.raises(RecordingError) as caught:
+        trace(robot, read_recording(place, 3))
+    assert str(caught.value) == str(problem)
+
+
+def test_check_that_is_fit_is_refused() -> None:
+    robot = read_robot(THREE / "robot.toml")
+    fit = read_recording(THREE / "fit.csv", 3)
+    with pytest.raises(RecordingError, match="has the same samples as FIT") as caught:
+        trace(robot, fit, read_recording(THREE / "fit.csv", 3))
+    assert "a recording of another motion" in caught.value.hint
+
+
 LINES = (THREE / "robot.toml").read_text(encoding="utf-8").split("\n")
 WRITTEN = ("-1", "0", "nan", "1e99", "'a'", "[]", "[1, 2, 3]", "{}", "true", "[[", '"""', "\n[effect.x]\n", "")
 VALUES = st.sampled_from(WRITTEN)
@@ -216,8 +278,9 @@ def test_it_tells_nothing_only_of_what_can_be_read(tmp_path: Path, changes: dict
     place = written(tmp_path, "\n".join(lines))
     problems = check_files(place).problems
     try:
-        static_tensions(read_robot(place))
-        sound = True
+        robot = read_robot(place)
+        static_tensions(robot)
+        sound = not list(implausible_units(robot, str(place)))
     except InputError as error:
         sound = False
         assert error.problem in {problem.problem for problem in problems}

@@ -2,31 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+import re
+from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 
-from ..errors import InputError, RobotFileError, one_line
+from ..errors import InputError, RecordingError, RobotFileError, one_line
 from ..estimation.preprocessing import prepare_recordings
 from ..fmus.fmu_slots import check_user_fmus
+from ..recordings.column_map import unit_errors
 from ..recordings.recording import Recording, read_recording, recording_errors
 from ..recordings.start_position import start_position
 from ..recordings.white_noise_estimate import white_noise_deviation
-from ..robot.robot_file_reader import read_robot_with_sink, robot_file_text
+from ..robot.implausible_units import implausible_units
+from ..robot.robot_file_reader import read_columns_file, read_robot_with_sink, robot_file_text
 from ..robot.schema import Robot, fmu_slots
 from ..robot.static_equilibrium import static_tensions
 from ..toml_text import line_of_key
 
-# Per file; a recording with a wrong separator breaks rules in each of its cells.
 MAX_PROBLEMS_PER_FILE = 1000
+# A recording may break a rule in each of its cells; alike errors are counted as one problem.
+MAX_COUNTED_ERRORS = 100_000
 # Finding the line of each problem takes time, so line numbers are left out where the file is long.
 MAX_ROBOT_FILE_PROBLEMS = 50
 MAX_CHARACTERS_FOR_LINE_NUMBERS = 50_000  # characters
 MIN_CABLE_COUNT = 3
 # Keys that do not affect whether the cables hold the platform at the start.
-KEYS_WITHOUT_INFLUENCE_ON_STATICS = frozenset((("name",), ("sensors",), ("winch",), ("fmu",)))
+KEYS_WITHOUT_INFLUENCE_ON_STATICS = frozenset((("name",), ("sensors",), ("winch",), ("fmu",), ("recording",)))
+
+_LINE_OR_ROW = re.compile(r"(?<=: )((?:line|row) [0-9]+)(?=$|,)")
+_QUOTED_OR_NUMBER = re.compile(r"'(?:[^'\\]|\\.)*'|\"[^\"]*\"|(?<!\w)[-+]?[0-9][-+.0-9e]*")
 
 
 @dataclass(frozen=True)
@@ -45,10 +52,15 @@ class Problem:
 
 @dataclass(frozen=True)
 class CheckResult:
-    """The result of a check: ``problems`` in the order of lines; ``notes`` are remarks that are no problems."""
+    """The result of a check: ``problems`` in the order of lines; ``notes`` are remarks that are no problems.
+
+    ``robot`` and ``recording`` are what was read, None where it could not be.
+    """
 
     problems: tuple[Problem, ...]
     notes: tuple[str, ...]
+    robot: Robot | None = None
+    recording: Recording | None = None
 
 
 class _TooManyProblemsError(Exception):
@@ -59,27 +71,30 @@ def check_files(
     robot_file: Path,
     recording_file: Path | None = None,
     progress: Callable[[str, float], None] = lambda what, done: None,
+    columns_file: Path | None = None,
 ) -> CheckResult:
     """Collects all problems of a robot file and, if there is one, of a recording of that robot; raises nothing.
 
-    ``progress`` is called with the present activity and the fraction of it that is done.
+    ``columns_file`` declares the recording's columns in place of the robot file. ``progress`` is called with the
+    present activity and the fraction of it that is done.
     """
     problems: list[Problem] = []
     notes: list[str] = []
     progress("reading the robot file", 0.0)
     robot = _check_robot_file(robot_file, problems, notes)
     if recording_file is None:
-        return CheckResult(tuple(problems), tuple(notes))
+        return CheckResult(tuple(problems), tuple(notes), robot)
     if robot is None or robot.cable_count < MIN_CABLE_COUNT:
         notes.append(f"{recording_file} was not checked: the number of cables is unknown")
-        return CheckResult(tuple(problems), tuple(notes))
+        return CheckResult(tuple(problems), tuple(notes), robot)
     recording_problems: list[Problem] = []
     progress("reading the recording", 0.0)
-    recording = _check_recording(recording_file, robot.cable_count, recording_problems, notes)
+    reader = _with_columns(robot, columns_file, recording_problems)
+    recording = None if reader is None else _check_recording(recording_file, reader, recording_problems, notes)
     if recording is not None and not problems:
         progress("checking both together", 0.0)
         _check_together(robot, recording, recording_problems, notes)
-    return CheckResult((*problems, *recording_problems), tuple(notes))
+    return CheckResult((*problems, *recording_problems), tuple(notes), robot, recording)
 
 
 def _check_robot_file(path: Path, problems: list[Problem], notes: list[str]) -> Robot | None:
@@ -96,6 +111,10 @@ def _check_robot_file(path: Path, problems: list[Problem], notes: list[str]) -> 
         robot = None
     problems += sorted((_robot_file_problem(path, text, error) for error in errors), key=_line_order)
     if robot is not None:
+        problems += [_robot_file_problem(path, text, error) for error in unit_errors(robot.recorded_columns)]
+        if not errors:
+            implausible = implausible_units(robot, str(path))
+            problems += [_robot_file_problem(path, text, error) for error in implausible]
         if not {error.key_path[:1] for error in errors} - KEYS_WITHOUT_INFLUENCE_ON_STATICS:
             with _collecting_problems(problems, path, _line_in_robot_file(text, ("platform", "start"))):
                 static_tensions(robot)
@@ -117,17 +136,58 @@ def _check_robot_fmus(path: Path, text: str, robot: Robot) -> list[Problem]:
     return problems
 
 
-def _check_recording(path: Path, cable_count: int, problems: list[Problem], notes: list[str]) -> Recording | None:
+def _with_columns(robot: Robot, columns_file: Path | None, problems: list[Problem]) -> Robot | None:
+    """The robot with the columns that a file declares; None where it does not, or any unit of columns is wrong."""
+    if columns_file is not None:
+        with _collecting_problems(problems, columns_file):
+            robot = replace(robot, recorded_columns=read_columns_file(columns_file, robot.cable_count))
+            text = robot_file_text(columns_file)
+            problems += [_robot_file_problem(columns_file, text, e) for e in unit_errors(robot.recorded_columns)]
+    return None if problems or any(unit_errors(robot.recorded_columns)) else robot
+
+
+def _check_recording(path: Path, robot: Robot, problems: list[Problem], notes: list[str]) -> Recording | None:
     with _collecting_problems(problems, path):
-        faults = recording_errors(path, cable_count)
-        problems.extend(
-            Problem(str(path), e.line, e.where, e.problem, e.hint) for e in islice(faults, MAX_PROBLEMS_PER_FILE)
-        )
-        if next(faults, None) is not None:
+        faults = recording_errors(path, robot.cable_count, robot.recorded_columns)
+        groups = _alike_errors(islice(faults, MAX_COUNTED_ERRORS))
+        problems.extend(_grouped_problem(path, group) for group in groups[:MAX_PROBLEMS_PER_FILE])
+        if len(groups) > MAX_PROBLEMS_PER_FILE:
             notes.append(f"{path}: only the first {MAX_PROBLEMS_PER_FILE} problems are listed")
+        if next(faults, None) is not None:
+            notes.append(f"{path}: only the first {MAX_COUNTED_ERRORS} wrong cells are counted")
         if not problems:
-            return read_recording(path, cable_count)
+            return read_recording(path, robot.cable_count, robot.recorded_columns)
     return None
+
+
+@dataclass(frozen=True)
+class _AlikeErrors:
+    """Errors of one kind in one column: the first and the last, and their number."""
+
+    first: RecordingError
+    last: RecordingError
+    count: int
+
+
+def _alike_errors(errors: Iterable[RecordingError]) -> list[_AlikeErrors]:
+    """Errors grouped by column and kind, in the order of the first of each."""
+    groups: dict[tuple[str, ...], _AlikeErrors] = {}
+    for error in errors:
+        # Lines and cells differ between errors of one kind.
+        kind = tuple(_QUOTED_OR_NUMBER.sub("", text) for text in (error.problem, error.hint))
+        key = (_LINE_OR_ROW.sub("", error.where), *kind)
+        group = groups.get(key)
+        groups[key] = _AlikeErrors(group.first if group else error, error, group.count + 1 if group else 1)
+    return list(groups.values())
+
+
+def _grouped_problem(path: Path, group: _AlikeErrors) -> Problem:
+    first, problem = group.first, group.first.problem
+    last_place = _LINE_OR_ROW.search(group.last.where)
+    if group.count > 1:
+        last = f", last in {last_place.group(1)}" if last_place else ""
+        problem += f" (and {group.count - 1} more like it{last})"
+    return Problem(str(path), first.line, first.where, problem, first.hint)
 
 
 def _check_together(robot: Robot, recording: Recording, problems: list[Problem], notes: list[str]) -> None:
@@ -137,9 +197,10 @@ def _check_together(robot: Robot, recording: Recording, problems: list[Problem],
         notes.append(f"{path}: no tension and no position was measured; simulate accepts it, trace does not")
         return
     with _collecting_problems(problems, path):
+        prepared_notes = prepare_recordings(robot.as_modelled(), recording, None).notes
         noise = robot.sensors.position_noise or white_noise_deviation(recording.position)
         notes.extend(start_position(robot, noise, recording)[1])
-        notes.extend(prepare_recordings(robot.as_modelled(), recording, None).notes)
+        notes.extend(prepared_notes)
 
 
 def _collect_up_to(errors: list[RobotFileError], max_count: int) -> Callable[[RobotFileError], None]:

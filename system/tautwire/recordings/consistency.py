@@ -1,4 +1,4 @@
-"""Consistency of a recording and a robot: start position and winch travel."""
+"""Consistency of a recording and a robot: start position, winch travel, and the balance of forces."""
 
 from __future__ import annotations
 
@@ -9,6 +9,9 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError
 from ..robot.schema import Robot
+from .alternative_readings import GeometryReading, Mistake, WindingReading
+from .mistaken_motion import MotionCheck, check_motion
+from .mistaken_tensions import TensionCheck, check_tensions
 from .recording import Recording
 
 Array = NDArray[np.float64]
@@ -18,11 +21,73 @@ MIN_CHECKED_START_SHARE, MIN_REELED_SHARE = 0.1, 1e-3
 # Share of the winch travel: stretch, wrong drums and drift stay far below, another robot mismatches by all of it.
 MAX_REELING_MISMATCH = 0.5
 CHECKED_DURATION = 60.0  # s
+# Their contributions to lengths, forces and readings are not computed here.
+EFFECTS_IN_BALANCES = frozenset(
+    ("anchor", "drum", "frame", "pulley", "payload", "sensor_delay", "sensor_gain", "sensor_offset")
+)
 # Rows at rest at the start, and the quantile of rows without outliers of the tracker.
 ROWS_AT_REST, INLIER_QUANTILE = 5, 0.95
 CONSISTENCY_HINT = (
     "give a recording of this robot, with positions in m in the robot file's frame, or correct the robot file"
 )
+
+
+def require_plausible(robot: Robot, recording: Recording) -> None:
+    """Raises RecordingError where units, signs, orders, axes or clocks seem to be others than the files say.
+
+    It names what shows each mistake, the likely cause, and what mends it.
+    """
+    mistakes = recording_mistakes(robot, recording)
+    if mistakes:
+        problem, hint = ("; ".join(texts) for texts in zip(*((m.problem, m.hint) for m in mistakes), strict=True))
+        raise RecordingError(recording.path, problem, hint)
+
+
+def recording_mistakes(robot: Robot, recording: Recording) -> tuple[RecordingError, ...]:
+    """What the winch travel, the positions and the tensions say of mistakes in the recording or the robot file.
+
+    Empty where they say nothing, and for a robot that declares effects which are no part of either balance.
+    """
+    if robot.formulas or any(setting.name in EFFECTS_IN_BALANCES for setting in robot.effects):
+        return ()
+    motion = check_motion(robot, recording)
+    errors = []
+    geometry, winding = GeometryReading(), WindingReading()
+    if motion is not None and motion.readings:
+        errors.append(_motion_error(recording.path, motion))
+        geometry, winding = motion.readings[0].geometry, motion.readings[0].winding
+    tensions = check_tensions(robot, recording, geometry, winding)
+    if tensions is not None and tensions.mistakes:
+        errors.append(_tension_error(recording.path, tensions))
+    return tuple(errors)
+
+
+def _motion_error(path: str, motion: MotionCheck) -> RecordingError:
+    problem = (
+        f"winch travel does not match the positions: it is off by {_percentage(motion.misfit)}, by "
+        f"{_percentage(motion.readings[0].misfit)} if {_causes([r.mistakes for r in motion.readings])}"
+    )
+    return RecordingError(path, problem, _remedies([reading.mistakes for reading in motion.readings]))
+
+
+def _tension_error(path: str, tensions: TensionCheck) -> RecordingError:
+    problem = (
+        f"tensions do not match the platform's weight: they carry {_percentage(tensions.carried)} of it and are off by "
+        f"{_percentage(tensions.misfit)}, by {_percentage(tensions.mended_misfit)} if {_causes(tensions.mistakes)}"
+    )
+    return RecordingError(path, problem, _remedies(tensions.mistakes))
+
+
+def _causes(alternatives: Sequence[Sequence[Mistake]]) -> str:
+    return ", or if ".join(" and ".join(mistake.cause for mistake in mistakes) for mistakes in alternatives)
+
+
+def _remedies(alternatives: Sequence[Sequence[Mistake]]) -> str:
+    return ", or ".join(", and ".join(mistake.remedy for mistake in mistakes) for mistakes in alternatives)
+
+
+def _percentage(share: float) -> str:
+    return f"{100.0 * share:,.0f} %" if abs(share) >= 0.1 else f"{100.0 * share:.2g} %"
 
 
 def describe_start(robot: Robot, start: Array) -> str:
@@ -63,9 +128,7 @@ def reeling_mismatch(robot: Robot, recording: Recording) -> tuple[float, float]:
 
     Omits the rows with the largest mismatch, since they may be outliers.
     """
-    time, speeds = recording.time, recording.winch_speed
-    reeled = np.zeros_like(speeds)
-    np.cumsum(0.5 * (speeds[1:] + speeds[:-1]) * np.diff(time)[:, None], axis=0, out=reeled[1:])
+    time, reeled = recording.time, recording.wound_lengths()
     rows = np.isfinite(recording.position).all(axis=1) & (time <= time[0] + CHECKED_DURATION)
     if not rows.any():
         return 0.0, 0.0

@@ -1,0 +1,252 @@
+"""Mistakes in units, signs or order of load cells, told by the balance of forces on the platform."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+from dataclasses import dataclass
+from itertools import combinations, permutations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..robot.schema import AXES, Robot
+from .alternative_readings import TIME_UNITS, GeometryReading, Mistake, WindingReading, convert
+from .mistaken_motion import MIN_IMPROVEMENT
+from .recording import Recording
+from .units import UNITS
+from .white_noise_estimate import white_noise_deviation
+
+Array = NDArray[np.float64]
+
+# Whatever the unit, load cells in the right order leave less than the first; in another unit, than the second.
+MAX_ORDER_MISFIT, MAX_SCALED_MISFIT = 0.015, 0.3
+# Standard deviation of the ropes' directions from which on the motion tells one load cell from another.
+MIN_DIRECTION_DEVIATION = 0.01
+EQUAL_RATIO = 1.5
+# How far payloads and gains may be off, and by how much where the unit is of the size of a wrong mass.
+MAX_UNIT_RATIO, MAX_NEAR_UNIT_RATIO, NEAR_UNITS = 1.3, 1.1, ("kg", "lbf")
+MIN_SIGNAL_NOISE_RATIO = 5.0
+BLOCK_DURATION = 0.25  # s; forces are averaged over it
+MAX_BLOCK_STRETCH = 1.5  # a longer block spans a gap
+MIN_BLOCKS = 4
+MAX_BLOCKS = 400
+MIN_SEEN_SHARE = 0.1  # of the weight, in the directions that load cells see
+MAX_PERMUTED_CABLES = 5
+MAX_UNSEEN_TRAVEL = 0.05  # of a rope: without positions the platform counts as at the start until it was reeled
+
+FORCE_UNITS = {
+    unit.symbol: unit.to_si(1.0) for unit in UNITS["force"] if unit.symbol in ("N", "kN", "mN", "kg", "g", "lbf")
+}
+
+
+@dataclass(frozen=True)
+class TensionReading:
+    """How the load cells are read: ``unit``, a common ``sign``, and the cell of each cable, counted from 0."""
+
+    unit: str
+    sign: int
+    order: tuple[int, ...]
+
+    @property
+    def factor(self) -> float:
+        """Tension in N by what is read as one."""
+        return self.sign * FORCE_UNITS[self.unit]
+
+    def mistakes(self) -> Iterator[Mistake]:
+        """What this reading changes."""
+        columns = [f"tension_{cable + 1}" for cable in self.order]
+        names = f"tension_1 to tension_{len(columns)}"
+        if self.unit != "N":
+            other = f", or the robot file's platform.mass is {FORCE_UNITS[self.unit]:.4g} times the true one"
+            yield Mistake(
+                f"{names} are in {self.unit}{other}", convert("them", self.unit, FORCE_UNITS[self.unit], "tension_1")
+            )
+        if self.sign < 0:
+            yield Mistake(f"{names} have the other sign", "multiply by -1: a rope that pulls has a positive tension")
+        if list(self.order) != sorted(self.order):
+            yield Mistake(
+                f"the load cells of cables 1 to {len(columns)} are {', '.join(columns)}",
+                "rename the columns in this order",
+            )
+
+
+@dataclass(frozen=True)
+class TensionCheck:
+    """Tensions against weight and inertia: the part ``carried``, the misfit as read, and readings that mend it."""
+
+    carried: float
+    misfit: float
+    mended_misfit: float
+    mistakes: tuple[tuple[Mistake, ...], ...]
+
+
+@dataclass(frozen=True)
+class ForceBalance:
+    """B blocks of the balance ``sum_i T_i u_i = m (a + g)``, without the directions of cables that have no load cell.
+
+    ``directions`` (B, 3, n), ``tensions`` (B, n) as read, 0 where there is no load cell, ``required`` (B, 3) in N;
+    ``time`` (B,) in s of the middles.
+    """
+
+    time: Array
+    directions: Array
+    tensions: Array
+    required: Array
+    has_load_cell: tuple[bool, ...]
+
+    def balanced_tensions(self) -> Array:
+        """The balanced tensions nearest to the measured ones, (B, n) in N, NaN where there is no load cell."""
+        unbalanced = self.required - self._forces(tuple(range(len(self.has_load_cell))))
+        corrections = np.einsum("bic,bc->bi", np.linalg.pinv(self.directions), unbalanced)
+        return np.where(self.has_load_cell, self.tensions + corrections, np.nan)
+
+    def carried(self, order: tuple[int, ...]) -> float:
+        """The part of the required force that the tensions, read in this order, carry; 1 where they are right."""
+        return float(np.sum(self._forces(order) * self.required) / np.sum(self.required**2))
+
+    def misfit(self, order: tuple[int, ...], factor: float = 1.0) -> float:
+        """Rms of what is not balanced, over that of the required force."""
+        unbalanced = factor * self._forces(order) - self.required
+        return float(np.sqrt(np.sum(unbalanced**2) / np.sum(self.required**2)))
+
+    def best_factor(self, order: tuple[int, ...]) -> float:
+        """The factor on all tensions that balances best; 0 where none does."""
+        forces = self._forces(order)
+        energy = float(np.sum(forces**2))
+        return float(np.sum(forces * self.required)) / energy if energy > 0.0 else 0.0
+
+    def _forces(self, order: tuple[int, ...]) -> Array:
+        return np.asarray(np.einsum("bci,bi->bc", self.directions, self.tensions[:, order]))
+
+
+def check_tensions(
+    robot: Robot, recording: Recording, geometry: GeometryReading, winding: WindingReading
+) -> TensionCheck | None:
+    """Test the load cells by the balance of forces on the platform, ``sum_i T_i u_i = m (a + g)``.
+
+    Forces are averaged over a quarter second; a cable without load cell may pull as it likes. The misfit is the rms of
+    what is not balanced, over that of weight and inertia. Another order of load cells is told by the misfit that is
+    left whatever the unit, another unit or sign by the factor that balances best. None where too little was measured.
+    """
+    balance = force_balance(robot, recording, geometry, winding)
+    if balance is None:
+        return None
+    declared = tuple(range(robot.cable_count))
+    readings = [reading for order in _likely_orders(balance) for reading in _unit_readings(balance, order)]
+    fewest = min((len(tuple(reading.mistakes())) for reading in readings), default=0)
+    mistakes = tuple(mistakes for r in readings if len(mistakes := tuple(r.mistakes())) == fewest) if fewest else ()
+    mended_misfit = min((balance.misfit(reading.order, reading.factor) for reading in readings), default=np.inf)
+    return TensionCheck(balance.carried(declared), balance.misfit(declared), mended_misfit, mistakes)
+
+
+def _likely_orders(balance: ForceBalance) -> list[tuple[int, ...]]:
+    """The declared order of load cells, or those that divide the misfit, whatever the unit, by the factor."""
+    orders = list(_orders(balance.has_load_cell))
+    misfits = [balance.misfit(order, balance.best_factor(order)) for order in orders]
+    best = min(misfits)
+    tells_cells_apart = float(np.std(balance.directions, axis=0).max()) > MIN_DIRECTION_DEVIATION
+    if not tells_cells_apart or not best <= MAX_ORDER_MISFIT < misfits[0] or best * MIN_IMPROVEMENT > misfits[0]:
+        return orders[:1]
+    return [order for order, misfit in zip(orders, misfits, strict=True) if misfit <= EQUAL_RATIO * best]
+
+
+def _unit_readings(balance: ForceBalance, order: tuple[int, ...]) -> Iterator[TensionReading]:
+    """The unit and sign that the best factor on tensions in this order suggests; none where it is no unit's."""
+    factor = balance.best_factor(order)
+    if balance.misfit(order, factor) > MAX_SCALED_MISFIT:
+        return
+    for unit, size in FORCE_UNITS.items():
+        limit = MAX_NEAR_UNIT_RATIO if unit in NEAR_UNITS else MAX_UNIT_RATIO
+        if 1.0 / limit < abs(factor) / size < limit:
+            yield TensionReading(unit, -1 if factor < 0.0 else 1, order)
+
+
+def force_balance(
+    robot: Robot, recording: Recording, geometry: GeometryReading, winding: WindingReading
+) -> ForceBalance | None:
+    """The balance of forces in blocks of a quarter second; None where too few are whole, or no direction is left."""
+    has_load_cell = np.asarray(np.isfinite(recording.tension).any(axis=0))
+    block_means = _block_means(robot, recording, winding)
+    if block_means is None or not _is_more_than_noise(recording.tension):
+        return None
+    time, positions, tensions, duration = block_means
+    directions = geometry.directions(robot, positions)[1].transpose(0, 2, 1)
+    in_metres = geometry.positions(robot, positions)
+    # The second difference of means is the acceleration seen through a B-spline, and so are the forces beside it.
+    acceleration = (in_metres[2:] - 2.0 * in_metres[1:-1] + in_metres[:-2]) / duration**2
+    tensions = (tensions[2:] + 4.0 * tensions[1:-1] + tensions[:-2]) / 6.0
+    directions = directions[1:-1]
+    whole = np.isfinite(acceleration).all(axis=1) & np.isfinite(tensions[:, has_load_cell]).all(axis=1)
+    if np.count_nonzero(whole) < MIN_BLOCKS:
+        return None
+    tensions, directions = np.where(has_load_cell, tensions, 0.0)[whole], directions[whole]
+    in_plane = np.isin(np.arange(len(AXES)), robot.axes_in_plane)
+    required = robot.platform.mass * (acceleration[whole] + np.array([0.0, 0.0, robot.gravity])) * in_plane
+    projection = _without_directions(directions[:, :, np.logical_not(has_load_cell)])
+    required = np.einsum("bij,bj->bi", projection, required)
+    weight = robot.platform.mass * robot.gravity
+    if not np.sqrt(np.mean(np.sum(required**2, axis=1))) > MIN_SEEN_SHARE * weight > 0.0:
+        return None
+    cells = tuple(map(bool, has_load_cell))
+    return ForceBalance(time[1:-1][whole], projection @ directions, tensions, required, cells)
+
+
+def _block_means(
+    robot: Robot, recording: Recording, winding: WindingReading
+) -> tuple[Array, Array, Array, float] | None:
+    """Middles of blocks (B,) in s, means of positions (B, 3) and tensions (B, n), and the duration of a block in s."""
+    interval = float(np.median(np.diff(recording.time))) * TIME_UNITS[winding.time_unit]
+    size = max(1, round(BLOCK_DURATION / interval))
+    rows = min(recording.sample_count, MAX_BLOCKS * size)
+    if not np.isfinite(recording.position[:, robot.axes_in_plane]).any(axis=0).all():
+        travel = np.abs(winding.factor * recording.wound_lengths()).max(axis=1)
+        lengths = [math.dist(anchor, robot.platform.start) for anchor in robot.anchors]
+        rows = min(rows, int(np.argmax(travel > MAX_UNSEEN_TRAVEL * min(lengths))) or rows)
+    count = rows // size
+    if count < MIN_BLOCKS:
+        return None
+    starts = recording.time[: count * size : size] * TIME_UNITS[winding.time_unit]
+    spans_gap = np.append(np.diff(starts) > MAX_BLOCK_STRETCH * size * interval, False)
+    means = []
+    for values in (recording.position, recording.tension):
+        blocks = values[: count * size].reshape(count, size, -1)
+        counts = np.isfinite(blocks).sum(axis=1)
+        mean = np.nansum(blocks, axis=1) / np.where(counts > 0, counts, np.nan)
+        means.append(np.where(spans_gap[:, None], np.nan, mean))
+    return starts + 0.5 * size * interval, means[0], means[1], size * interval
+
+
+def _is_more_than_noise(tension: Array) -> bool:
+    """Whether load cells show forces: the rest after taring at a standstill is noise and drift."""
+    measured = tension[np.isfinite(tension)]
+    if not measured.size:
+        return False
+    noise = white_noise_deviation(tension)
+    return bool(np.median(np.abs(measured)) > MIN_SIGNAL_NOISE_RATIO * (noise if np.isfinite(noise) else 0.0))
+
+
+def _without_directions(directions: Array) -> Array:
+    """Projections (B, 3, 3) onto what is perpendicular to unit vectors (B, 3, k)."""
+    return np.asarray(np.eye(3) - directions @ np.linalg.pinv(directions))
+
+
+def _orders(has_load_cell: tuple[bool, ...]) -> Iterator[tuple[int, ...]]:
+    """Orders of the load cells, the declared one first: all of a few, else all with two swapped or all shifted."""
+    cells = [index for index, has in enumerate(has_load_cell) if has]
+    count = len(has_load_cell)
+    if len(cells) <= MAX_PERMUTED_CABLES:
+        for permuted in permutations(cells):
+            order = list(range(count))
+            for cell, source in zip(cells, permuted, strict=True):
+                order[cell] = source
+            yield tuple(order)
+        return
+    yield tuple(range(count))
+    for first, second in combinations(cells, 2):
+        order = list(range(count))
+        order[first], order[second] = second, first
+        yield tuple(order)
+    if len(cells) == count:
+        yield tuple(reversed(range(count)))
+        yield from (tuple((index + shift) % count for index in range(count)) for shift in range(1, count))

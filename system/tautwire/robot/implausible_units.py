@@ -1,0 +1,79 @@
+"""Numbers of a robot file that no robot has, and the unit in which they were probably written."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator
+
+from ..errors import RobotFileError
+from .schema import Cable, Robot
+
+MAX_MODULUS_IN_GPA = 1000.0  # of any fibre
+MAX_AREA = 0.05  # m^2, of a rope 25 cm thick
+MAX_COORDINATE = 2000.0  # m
+MAX_RETARDATION = 2.0  # s, damping by modulus; polymer ropes have some 1e-2
+MAX_FREQUENCY = 5000.0  # Hz, of a platform on ropes
+
+
+def implausible_units(robot: Robot, file: str) -> Iterator[RobotFileError]:
+    """Errors for numbers that no cable robot has, each with the unit that was probably meant.
+
+    They are modulus, area, damping and anchors of the cables; where each alone is plausible, an upper bound of the
+    highest modal frequency, ``sqrt(sum_i E_i A_i / L_i / m) / 2 pi``.
+    """
+    weight = robot.platform.mass * robot.gravity / robot.cable_count
+    cables = enumerate(robot.cables, 1)
+    errors = [error for number, cable in cables for error in _cable_errors(cable, number, weight, file)]
+    yield from errors
+    if any(abs(coordinate) > MAX_COORDINATE for coordinate in robot.platform.start):
+        problem = f"is {max(map(abs, robot.platform.start)):g} m from the origin, no robot is larger than 2 km"
+        yield _error(file, ("platform", "start"), problem, "write it in m, if this is in mm multiply by 0.001")
+    elif not errors:
+        yield from _stiffness_errors(robot, file)
+
+
+def _cable_errors(cable: Cable, number: int, weight: float, file: str) -> Iterator[RobotFileError]:
+    modulus, area = cable.modulus, cable.area
+    if area <= MAX_AREA and modulus * area < weight:
+        unit, factor = ("GPa", 1e9) if modulus <= MAX_MODULUS_IN_GPA else ("MPa", 1e6)
+        problem = (
+            f"is {modulus:g} Pa, with which its share of the weight, {weight:.3g} N, would stretch it to the double"
+        )
+        hint = f"write it in Pa, if this is in {unit} as {modulus * factor:g}"
+        yield _error(file, ("cable", number - 1, "modulus"), problem, hint)
+    elif cable.damping > MAX_RETARDATION * modulus:
+        problem = (
+            f"is {cable.damping:g} Pa s, {cable.damping / modulus:.3g} s times the modulus, ropes have at most 2 s"
+        )
+        hint = "write it in Pa s, as modulus times the rope's time of retardation; 0.01 s is usual"
+        yield _error(file, ("cable", number - 1, "damping"), problem, hint)
+    if area > MAX_AREA:
+        problem = f"is {area:g} m^2, ropes have at most {MAX_AREA:g}"
+        yield _error(
+            file, ("cable", number - 1, "area"), problem, f"write it in m^2, if this is in mm^2 as {area:g}e-6"
+        )
+    if any(abs(coordinate) > MAX_COORDINATE for coordinate in cable.anchor):
+        problem = f"is {max(map(abs, cable.anchor)):g} m from the origin, no robot is larger than 2 km"
+        yield _error(
+            file, ("cable", number - 1, "anchor"), problem, "write it in m, if this is in mm multiply by 0.001"
+        )
+
+
+def _stiffness_errors(robot: Robot, file: str) -> Iterator[RobotFileError]:
+    lengths = [math.dist(cable.anchor, robot.platform.start) for cable in robot.cables]
+    stiffness = sum(
+        c.modulus * c.area / length for c, length in zip(robot.cables, lengths, strict=True) if length > 0.0
+    )
+    frequency = math.sqrt(stiffness / robot.platform.mass) / (2.0 * math.pi)
+    if frequency > MAX_FREQUENCY:
+        problem = (
+            f"of {robot.platform.mass:g} kg on ropes of {stiffness:.3g} N/m has modes of up to "
+            f"{frequency / 1e3:.3g} kHz, robots have at most {MAX_FREQUENCY / 1e3:g} kHz"
+        )
+        hint = "compare the units of mass (kg), modulus (Pa), area (m^2) and anchors (m)"
+        yield _error(file, ("platform", "mass"), problem, hint)
+
+
+def _error(file: str, key_path: tuple[str | int, ...], problem: str, hint: str) -> RobotFileError:
+    key = "".join(f"[{part + 1}]" if isinstance(part, int) else f".{part}" for part in key_path).lstrip(".")
+    return RobotFileError(f"{file}: {key}", problem, hint, key_path)

@@ -1,0 +1,284 @@
+"""Units, signs, order, axes and clocks that are not as declared are told by winch travel and positions."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tautwire.errors import RecordingError
+from tautwire.recordings.consistency import recording_mistakes, require_plausible
+from tautwire.recordings.mistaken_motion import MAX_MISFIT, check_motion
+from tautwire.recordings.recording import Recording, read_recording
+from tautwire.robot.schema import EffectSetting, Robot
+from tests.support.recordings import recorded
+from tests.support.robots import EXAMPLES, example
+
+Change = Callable[[Recording], Recording]
+RADIUS = 0.05
+
+
+def time_in(unit: float) -> Change:
+    return lambda recording: replace(recording, time=recording.time / unit)
+
+
+def speeds(factors: float | list[float]) -> Change:
+    return lambda recording: replace(recording, winch_speed=recording.winch_speed * factors)
+
+
+def speeds_swapped(recording: Recording) -> Recording:
+    order = [1, 0, *range(2, recording.cable_count)]
+    return replace(recording, winch_speed=recording.winch_speed[:, order])
+
+
+def positions(factors: float | list[float], axes: tuple[int, ...] = (0, 1, 2)) -> Change:
+    return lambda recording: replace(recording, position=recording.position[:, axes] * factors)
+
+
+def another_origin(recording: Recording) -> Recording:
+    return replace(recording, position=recording.position - recording.position[0])
+
+
+def tracker_late(recording: Recording) -> Recording:
+    """The tracker's samples, each 0.8 s after the winches' of the same row."""
+    rows = round(0.8 / float(np.median(np.diff(recording.time))))
+    return replace(
+        recording,
+        time=recording.time[:-rows],
+        winch_speed=recording.winch_speed[:-rows],
+        position=recording.position[rows:],
+        tension=recording.tension[rows:],
+    )
+
+
+def both(first: Change, second: Change) -> Change:
+    return lambda recording: second(first(recording))
+
+
+MISTAKES: dict[str, tuple[Change, str, str]] = {
+    "time in ms": (time_in(1e-3), "if time is in ms", "multiply time by 0.001"),
+    "time in us": (time_in(1e-6), "if time is in us", "multiply time by 1e-06"),
+    "speeds in mm/s": (speeds(1e3), "are in mm/s", "multiply them by 0.001"),
+    "speeds in m/min": (speeds(60.0), "are in m/min", "multiply them by 0.01667"),
+    "speeds of angles": (speeds(1.0 / RADIUS), "of drums with a radius of 0.0", "the drum's radius"),
+    "all signs": (speeds(-1.0), "winch_speed_1 to winch_speed_{n} have the other sign", "multiply by -1"),
+    "winches swapped": (speeds_swapped, "winches of cables 1 to {n} are winch_speed_2, winch_speed_1", "rename"),
+    "positions in mm": (positions(1e3), "if x, y, z are in mm", "multiply x, y, z by 0.001"),
+    "positions in cm": (positions(1e2), "if x, y, z are in cm", "multiply x, y, z by 0.01"),
+    "axes in another order": (positions(1.0, (2, 0, 1)), "x, y, z are the recording's y, z, x", "write the columns"),
+    "z downwards": (positions([1.0, -1.0, -1.0]), "x, y, z are the recording's x, -y, -z", "write the columns"),
+    "another origin": (another_origin, "x, y, z have another origin, about [", "add that vector"),
+    "clocks apart": (tracker_late, "the winches' clock is 0.7", "subtract that from the winches' times"),
+    "ms and mm": (both(time_in(1e-3), positions(1e3)), "x, y, z are in mm and time is in ms", "and multiply time"),
+}
+
+
+def shipped(name: str) -> tuple[Robot, Recording]:
+    robot = example(name).as_modelled()
+    return robot, read_recording(EXAMPLES / name / "check.csv", robot.cable_count)
+
+
+@pytest.mark.parametrize("name", ["three", "caroca", "eight"])
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_mistake_is_told_with_its_cause_and_its_remedy(name: str, mistake: str) -> None:
+    robot, recording = shipped(name)
+    change, cause, remedy = MISTAKES[mistake]
+    (error,) = recording_mistakes(robot, change(recording))
+    assert cause.format(n=robot.cable_count) in error.problem and remedy in error.hint
+    assert error.problem.startswith("winch travel does not match the positions: it is off by ")
+
+
+@pytest.mark.parametrize("cable", [1, 2, 3])
+def test_the_winch_with_the_other_sign_is_named(cable: int) -> None:
+    robot, recording = shipped("three")
+    factors = [-1.0 if number == cable else 1.0 for number in robot.cable_numbers]
+    (error,) = recording_mistakes(robot, speeds(factors)(recording))
+    assert f"if winch_speed_{cable} has the other sign" in error.problem
+
+
+def test_the_radius_of_drums_whose_angle_was_recorded_is_measured() -> None:
+    robot, recording = shipped("three")
+    check = check_motion(robot, speeds(1.0 / RADIUS)(recording))
+    assert check is not None
+    assert check.readings[0].winding.radius == pytest.approx(RADIUS, rel=5e-3)
+
+
+def test_a_rope_length_in_mm_is_told_by_its_column() -> None:
+    robot, recording = shipped("three")
+    recording = replace(speeds(1e3)(recording), rope_lengths=(1, 2, 3))
+    (error,) = recording_mistakes(robot, recording)
+    assert "rope_length_1 to rope_length_3 are in mm" in error.problem
+
+
+@pytest.mark.parametrize("with_start", [False, True])
+def test_anchors_in_mm_are_told(with_start: bool) -> None:
+    robot, recording = shipped("caroca")
+    cables = tuple(
+        replace(cable, anchor=(1e3 * cable.anchor[0], 1e3 * cable.anchor[1], 1e3 * cable.anchor[2]))
+        for cable in robot.cables
+    )
+    start = tuple((1e3 if with_start else 1.0) * coordinate for coordinate in robot.platform.start)
+    in_mm = replace(robot, cables=cables, platform=replace(robot.platform, start=start))
+    (error,) = recording_mistakes(in_mm, recording)
+    assert "anchors in the robot file are in mm" in error.problem
+
+
+def test_readings_that_fit_equally_are_all_told() -> None:
+    robot, recording = shipped("three")
+    (error,) = recording_mistakes(robot, speeds_swapped(recording))
+    assert "winch_speed_2, winch_speed_1, winch_speed_3, or if the robot file's x, y, z are" in error.problem
+
+
+@pytest.mark.parametrize("name", ["three", "caroca", "eight"])
+def test_a_correct_recording_is_not_refused(name: str) -> None:
+    robot, recording = shipped(name)
+    require_plausible(robot, recording)
+    check = check_motion(robot, recording)
+    assert check is not None and check.misfit < 0.01
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        {"drum": {"radius_ratio": 1.08}},
+        {"drum": {"radius_ratio": 0.9, "cables": [2]}},
+        {"modulus": {"modulus": 4e9}},
+        {"sensor_delay": {"seconds": 0.1, "outputs": "position"}},
+    ],
+    ids=str,
+)
+def test_effects_are_not_taken_for_mistakes(effects: dict[str, Any]) -> None:
+    robot = example("three").as_modelled()
+    assert recording_mistakes(robot, recorded("three", 3, effects)) == ()
+
+
+def winding_of(
+    robot: Robot, position: np.ndarray, time: np.ndarray, gain: float = 1.0, delay: float = 0.0
+) -> Recording:
+    """Positions, and winches whose travel is that of the ropes over the gain, seen by a tracker that is late."""
+    lengths = np.linalg.norm(np.array(robot.anchors) - position[:, None], axis=2)
+    late = np.column_stack([np.interp(time - delay, time, column) for column in position.T])
+    speed = -np.gradient(lengths, time, axis=0) / gain
+    return Recording("log.csv", time, speed, np.full(lengths.shape, np.nan), late)
+
+
+def along_z(robot: Robot, amplitude: float, period: float, time: np.ndarray) -> np.ndarray:
+    return np.array(robot.platform.start) + np.outer(amplitude * np.sin(2.0 * np.pi * time / period), [0.0, 0.3, 1.0])
+
+
+@pytest.mark.parametrize("name", ["three", "eight"])
+@pytest.mark.parametrize(("period", "delay"), [(2.1, 0.1), (3.07, 0.12), (4.9, 0.3)])
+def test_a_small_delay_in_a_periodic_motion_is_no_clock(name: str, period: float, delay: float) -> None:
+    robot, time = example(name).as_modelled(), np.arange(4001) / 100.0
+    recording = winding_of(robot, along_z(robot, 0.1, period, time), time, delay=delay)
+    check = check_motion(robot, recording)
+    assert check is not None and check.misfit > MAX_MISFIT
+    assert recording_mistakes(robot, recording) == ()
+
+
+@pytest.mark.parametrize("gain", [-1.0, 0.5, 1.5, 2.0])
+def test_a_platform_that_swings_is_not_judged_by_its_winches(gain: float) -> None:
+    """Near its lowest mode, 1.6 Hz with such ropes, the platform moves otherwise than the winches."""
+    robot = example("caroca").as_modelled()
+    soft = replace(robot, cables=tuple(replace(cable, modulus=5e8) for cable in robot.cables))
+    time = np.arange(4001) / 100.0
+    recording = winding_of(soft, along_z(soft, 0.02, 0.4, time), time, gain)
+    assert recording_mistakes(soft, recording) == ()
+    assert gain != -1.0 or recording_mistakes(robot, recording)
+
+
+@pytest.mark.parametrize("gain", [1.35, 2.0])
+def test_ropes_that_give_are_no_drums(gain: float) -> None:
+    robot, time = example("three").as_modelled(), np.arange(4001) / 100.0
+    assert recording_mistakes(robot, winding_of(robot, along_z(robot, 0.5, 9.0, time), time, gain)) == ()
+
+
+def test_an_effect_that_the_robot_file_declares_is_no_mistake() -> None:
+    robot, recording = shipped("three")
+    moved = another_origin(recording)
+    x, y, z = (-coordinate for coordinate in recording.position[0])
+    offset = {"position_offset_x": x, "position_offset_y": y, "position_offset_z": z}
+    assert recording_mistakes(robot, moved)
+    assert recording_mistakes(robot.with_effect(EffectSetting("sensor_offset", offset)), moved) == ()
+
+
+def test_a_sign_and_an_order_are_told_by_the_columns_of_the_file() -> None:
+    robot, recording = shipped("caroca")
+    changed = speeds_swapped(speeds([-1.0, 1.0, 1.0])(recording))
+    (error,) = recording_mistakes(robot, changed)
+    assert "if winch_speed_2 has the other sign and the winches of cables 1 to 3 are winch_speed_2" in error.problem
+
+
+def test_what_no_reading_mends_is_left_to_the_trace() -> None:
+    robot, recording = shipped("three")
+    generator = np.random.default_rng(1)
+    recording = replace(recording, winch_speed=generator.normal(size=recording.winch_speed.shape))
+    check = check_motion(robot, recording)
+    assert check is not None and check.misfit > MAX_MISFIT and check.readings == ()
+
+
+def test_nothing_is_said_where_nothing_moves_or_no_position_was_measured() -> None:
+    robot, recording = shipped("three")
+    assert check_motion(robot, speeds(0.0)(recording)) is None
+    assert check_motion(robot, positions(np.nan)(recording)) is None
+    assert check_motion(robot, positions([np.nan, np.nan, 1.0])(recording)) is None
+    generator = np.random.default_rng(1)
+    still = recording.position[0] + 1e-3 * generator.normal(size=recording.position.shape)
+    assert check_motion(robot, replace(recording, position=still)) is None
+
+
+def test_some_wild_positions_do_not_hide_a_mistake() -> None:
+    robot, recording = shipped("three")
+    position = recording.position.copy()
+    position[::37] += 3.0
+    (error,) = recording_mistakes(robot, speeds(-1.0)(replace(recording, position=position)))
+    assert "have the other sign" in error.problem
+
+
+def test_the_stretch_of_a_long_recording_where_winches_move_is_taken() -> None:
+    robot, recording = shipped("three")
+    interval, count = float(np.median(np.diff(recording.time))), 20_000
+    at_rest = replace(
+        recording,
+        time=np.arange(count + recording.sample_count) * interval,
+        winch_speed=np.vstack((np.zeros((count, 3)), -recording.winch_speed)),
+        tension=np.vstack((np.tile(recording.tension[0], (count, 1)), recording.tension)),
+        position=np.vstack((np.tile(recording.position[0], (count, 1)), recording.position)),
+    )
+    with pytest.raises(RecordingError, match="have the other sign"):
+        require_plausible(robot, at_rest)
+
+
+def planar(robot: Robot) -> Robot:
+    """The robot with all anchors and the start in the plane y = 0."""
+    cables = tuple(replace(cable, anchor=(cable.anchor[0], 0.0, cable.anchor[2])) for cable in robot.cables)
+    x, _, z = robot.platform.start
+    return replace(robot, cables=cables, platform=replace(robot.platform, start=(x, 0.0, z)))
+
+
+def planar_recording(robot: Robot) -> Recording:
+    """Positions on a curve in the plane, and the winch speeds that inextensible ropes have there."""
+    time = np.arange(2001) / 100.0
+    offset = np.column_stack((0.3 * np.sin(time), 0.0 * time, 0.2 * np.sin(1.7 * time)))
+    position = np.array(robot.platform.start) + offset
+    lengths = np.linalg.norm(np.array(robot.anchors) - position[:, None], axis=2)
+    return Recording("plane.csv", time, -np.gradient(lengths, time, axis=0), np.full(lengths.shape, np.nan), position)
+
+
+def test_a_planar_robot_may_have_noise_across_its_plane() -> None:
+    robot = planar(example("caroca").as_modelled())
+    recording = planar_recording(robot)
+    position = recording.position.copy()
+    position[:, 1] += 5.0 + np.linspace(0.0, 1.0, len(position))
+    require_plausible(robot, replace(recording, position=position))
+    position[:, 1] = np.nan
+    require_plausible(robot, replace(recording, position=position))
+
+
+def test_a_planar_robot_whose_tracker_calls_its_plane_x_y_is_told() -> None:
+    robot = planar(example("caroca").as_modelled())
+    (error,) = recording_mistakes(robot, positions(1.0, (0, 2, 1))(planar_recording(robot)))
+    assert "the robot file's x, y, z are the recording's x, z, y" in error.problem

@@ -1,0 +1,205 @@
+"""Units, signs and order of load cells that are not as declared are told by the balance of forces."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from tautwire.recordings.alternative_readings import GeometryReading, WindingReading
+from tautwire.recordings.consistency import recording_mistakes
+from tautwire.recordings.mistaken_tensions import TensionCheck, check_tensions
+from tautwire.recordings.recording import Recording, read_recording
+from tautwire.robot.schema import Robot
+from tests.support.recordings import recorded
+from tests.support.robots import EXAMPLES, example
+
+NAMES = ["three", "caroca", "eight"]
+
+
+def shipped(name: str) -> tuple[Robot, Recording]:
+    robot = example(name).as_modelled()
+    return robot, read_recording(EXAMPLES / name / "check.csv", robot.cable_count)
+
+
+def tensions(recording: Recording, factor: Any) -> Recording:
+    return replace(recording, tension=recording.tension * factor)
+
+
+def checked(robot: Robot, recording: Recording) -> TensionCheck | None:
+    return check_tensions(robot, recording, GeometryReading(), WindingReading())
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    ("factor", "cause", "remedy"),
+    [
+        (1e-3, "are in kN, or the robot file's platform.mass is 1000 times the true one", "multiply them by 1000"),
+        (1e3, "are in mN", "multiply them by 0.001"),
+        (1.0 / 9.80665, "are in kg", "multiply them by 9.807, or write the unit into the header as in tension_1 [kg]"),
+        (1e3 / 9.80665, "are in g", "multiply them by 0.009807"),
+        (1.0 / 4.4482216, "are in lbf", "multiply them by 4.448"),
+        (-1.0, "have the other sign", "multiply by -1"),
+    ],
+)
+def test_a_unit_or_a_sign_is_told_with_its_remedy(name: str, factor: float, cause: str, remedy: str) -> None:
+    robot, recording = shipped(name)
+    (error,) = recording_mistakes(robot, tensions(recording, factor))
+    assert f"if tension_1 to tension_{robot.cable_count} {cause}" in error.problem and remedy in error.hint
+    assert "tensions do not match the platform's weight" in error.problem
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_swapped_load_cells_are_told(name: str) -> None:
+    robot, recording = shipped(name)
+    order = [1, 0, *range(2, robot.cable_count)]
+    (error,) = recording_mistakes(robot, replace(recording, tension=recording.tension[:, order]))
+    assert f"load cells of cables 1 to {robot.cable_count} are tension_2, tension_1, tension_3" in error.problem
+
+
+def test_load_cells_in_a_circle_are_told() -> None:
+    robot, recording = shipped("caroca")
+    (error,) = recording_mistakes(robot, replace(recording, tension=recording.tension[:, [1, 2, 0]]))
+    assert "are tension_3, tension_1, tension_2" in error.problem
+
+
+def test_a_unit_and_an_order_are_told_together() -> None:
+    robot, recording = shipped("caroca")
+    (error,) = recording_mistakes(robot, replace(recording, tension=1e-3 * recording.tension[:, [1, 0, 2]]))
+    assert "are in kN" in error.problem and "are tension_2, tension_1, tension_3" in error.problem
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_cable_without_load_cell_hides_no_unit(name: str) -> None:
+    robot, recording = shipped(name)
+    cells = np.array([np.nan, *[1e-3] * (robot.cable_count - 1)])
+    (error,) = recording_mistakes(robot, tensions(recording, cells))
+    assert "are in kN" in error.problem
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_without_positions_the_start_serves(name: str) -> None:
+    robot, recording = shipped(name)
+    recording = replace(recording, position=np.full_like(recording.position, np.nan))
+    assert recording_mistakes(robot, recording) == ()
+    (error,) = recording_mistakes(robot, tensions(recording, 1e-3))
+    assert "are in kN" in error.problem
+
+
+def test_mistakes_of_motion_and_of_tensions_are_told_both() -> None:
+    robot, recording = shipped("three")
+    recording = replace(tensions(recording, 1e-3), time=1e3 * recording.time, position=1e3 * recording.position)
+    motion, forces = recording_mistakes(robot, recording)
+    assert "x, y, z are in mm and time is in ms" in motion.problem and "are in kN" in forces.problem
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_the_balance_holds_on_correct_recordings(name: str) -> None:
+    robot, recording = shipped(name)
+    check = checked(robot, recording)
+    assert check is not None and check.mistakes == ()
+    assert check.carried == pytest.approx(1.0, abs=0.08) and check.misfit < 0.08
+
+
+def test_inertia_is_part_of_the_balance() -> None:
+    """A platform that falls with half of gravity is carried by half of its weight."""
+    robot = replace(example("three").as_modelled(), effects=())
+    time = np.arange(301) / 100.0
+    start = np.array(robot.platform.start)
+    position = start + np.outer(-0.25 * robot.gravity * time**2, [0.0, 0.0, 1.0]) * 0.1
+    vectors = np.array(robot.anchors) - position[:, None]
+    directions = vectors / np.linalg.norm(vectors, axis=2)[..., None]
+    weight = robot.platform.mass * robot.gravity * (1.0 - 0.05) * np.array([0.0, 0.0, 1.0])
+    tension = np.linalg.solve(directions.transpose(0, 2, 1), np.tile(weight, (len(time), 1))[..., None])[..., 0]
+    lengths = np.linalg.norm(vectors, axis=2)
+    recording = Recording("fall.csv", time, -np.gradient(lengths, time, axis=0), tension, position)
+    check = checked(robot, recording)
+    assert check is not None and check.misfit < 2e-3
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [
+        {"payload": {"mass": 70.0}},
+        {"sensor_gain": {"gain": 1.15, "cables": [2]}},
+        {"sensor_offset": {"force": 200.0, "cables": [1]}},
+        {"drag": {"drag_area": 30.0, "wind": [5.0, 0.0, 0.0]}},
+    ],
+    ids=str,
+)
+def test_effects_are_not_taken_for_mistakes(effects: dict[str, Any]) -> None:
+    robot = example("three").as_modelled()
+    assert recording_mistakes(robot, recorded("three", 3, effects)) == ()
+
+
+def balanced(robot: Robot, offset: np.ndarray, internal: float = 0.0) -> Recording:
+    """A slow motion with the tensions that carry the weight, and an internal tension where cables are redundant."""
+    position = np.array(robot.platform.start) + offset
+    vectors = np.array(robot.anchors) - position[:, None]
+    directions = (vectors / np.linalg.norm(vectors, axis=2)[..., None]).transpose(0, 2, 1)
+    inverse = np.linalg.pinv(directions)
+    weight = np.array([0.0, 0.0, robot.platform.mass * robot.gravity])
+    count = robot.cable_count
+    tension = inverse @ weight + (np.eye(count) - inverse @ directions) @ np.full(count, internal)
+    time = np.arange(len(offset)) / 100.0
+    return Recording("log.csv", time, np.zeros((len(offset), count)), tension, position)
+
+
+@pytest.mark.parametrize("reach", [0.0, 0.1])
+def test_gains_of_a_few_per_cent_are_no_swapped_cells(reach: float) -> None:
+    robot = example("eight").as_modelled()
+    time = np.arange(2001) / 100.0
+    offset = reach * np.column_stack((np.sin(time), np.cos(1.3 * time), np.sin(0.7 * time)))
+    recording = balanced(robot, offset, internal=robot.platform.mass * robot.gravity)
+    for seed in range(40):
+        generator = np.random.default_rng(seed)
+        gains = 1.0 + 0.03 * generator.normal(size=robot.cable_count)
+        check = checked(robot, tensions(recording, gains))
+        assert check is not None and check.mistakes == ()
+
+
+@pytest.mark.parametrize("ratio", [0.3, 2.0, 3.0, 4.0, 6.0, 8.0])
+def test_another_payload_is_no_unit(ratio: float) -> None:
+    robot, recording = shipped("three")
+    assert recording_mistakes(robot, tensions(recording, 1.0 / ratio)) == ()
+
+
+def test_load_cells_that_were_tared_at_the_standstill_are_no_unit() -> None:
+    robot = example("three").as_modelled()
+    recording = balanced(robot, np.zeros((2001, 3)))
+    noise = np.random.default_rng(1).normal(size=recording.tension.shape)
+    assert recording_mistakes(robot, replace(recording, tension=1.6 + noise)) == ()
+
+
+def test_nothing_is_said_without_gravity() -> None:
+    robot, recording = shipped("three")
+    assert checked(replace(robot, gravity=0.0), recording) is None
+
+
+def test_a_tracker_that_is_slower_than_the_load_cells_serves() -> None:
+    robot, recording = shipped("three")
+    position = np.full_like(recording.position, np.nan)
+    position[::10] = recording.position[::10]
+    check = checked(robot, replace(tensions(recording, 1e-3), position=position))
+    assert check is not None and any("are in kN" in mistake.cause for (mistake,) in check.mistakes)
+
+
+def test_blocks_that_span_a_gap_do_not_count() -> None:
+    robot, recording = shipped("three")
+    time = recording.time + 30.0 * (recording.time > recording.time[recording.sample_count // 2])
+    check = checked(robot, replace(recording, time=time))
+    assert check is not None and check.misfit < 0.01
+
+
+def test_nothing_is_said_of_too_little() -> None:
+    robot, recording = shipped("three")
+    assert checked(robot, tensions(recording, np.nan)) is None
+    assert checked(robot, recording.first(20)) is None
+
+
+def test_noise_is_not_taken_for_a_unit() -> None:
+    robot, recording = shipped("three")
+    noise = np.random.default_rng(2).normal(size=recording.tension.shape)
+    assert checked(robot, replace(recording, tension=noise)) is None

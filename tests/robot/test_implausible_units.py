@@ -1,0 +1,81 @@
+"""Numbers that no robot has are told with the unit in which they were probably written."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from tautwire.robot.implausible_units import implausible_units
+from tautwire.robot.robot_file_reader import read_robot
+from tautwire.robot.schema import Robot
+from tests.support.robots import EXAMPLES, example
+
+
+def with_cables(robot: Robot, **changes: Any) -> Robot:
+    return replace(robot, cables=tuple(replace(cable, **changes) for cable in robot.cables))
+
+
+@pytest.mark.parametrize("name", ["three", "caroca", "eight"])
+def test_shipped_robots_are_plausible(name: str) -> None:
+    assert list(implausible_units(example(name), "robot.toml")) == []
+
+
+@pytest.mark.parametrize(
+    ("changes", "key", "hint"),
+    [
+        ({"modulus": 100.0}, "modulus", "in GPa as 1e+11"),
+        ({"modulus": 2.5}, "modulus", "in GPa as 2.5e+09"),
+        ({"modulus": 9.5e4}, "modulus", "in MPa as 9.5e+10"),
+        ({"area": 3.0}, "area", "in mm^2 as 3e-6"),
+        ({"anchor": (0.0, 0.0, 12000.0)}, "anchor", "in mm multiply by 0.001"),
+        ({"modulus": 1e9, "damping": 39e9}, "damping", "write it in Pa s"),
+    ],
+)
+def test_each_cable_is_told_with_the_unit(changes: dict[str, Any], key: str, hint: str) -> None:
+    robot = with_cables(example("caroca"), **changes)
+    errors = list(implausible_units(robot, "robot.toml"))
+    assert [error.where for error in errors] == [f"robot.toml: cable[{number}].{key}" for number in robot.cable_numbers]
+    assert all(hint in error.hint for error in errors)
+    assert [error.key_path for error in errors] == [("cable", index, key) for index in range(robot.cable_count)]
+
+
+def test_a_start_in_mm_is_told() -> None:
+    robot = example("caroca")
+    robot = replace(robot, platform=replace(robot.platform, start=(1000.0, 0.0, 2500.0)))
+    (error,) = implausible_units(robot, "robot.toml")
+    assert error.where == "robot.toml: platform.start" and "2500 m" in error.problem
+
+
+def test_modes_that_no_robot_has_are_told_in_khz() -> None:
+    robot = with_cables(example("caroca"), area=0.04, modulus=1e12)
+    robot = replace(robot, platform=replace(robot.platform, mass=1.0))
+    (error,) = implausible_units(robot, "robot.toml")
+    assert "kHz" in error.problem and "modulus (Pa)" in error.hint
+
+
+def test_a_soft_rope_with_much_damping_is_plausible() -> None:
+    """Polymer ropes, rubber, springs, and ropes as good as rigid: whoever has such a robot is not refused."""
+    for modulus, area in ((2e8, 8e-6), (2e6, 8e-4), (5e5, 0.01), (1e13, 1e-6)):
+        robot = with_cables(example("caroca"), modulus=modulus, damping=0.1 * modulus, area=area)
+        assert list(implausible_units(robot, "robot.toml")) == []
+
+
+def test_a_file_in_gpa_is_told_by_check_and_trace_alike(tmp_path: Path) -> None:
+    from tautwire.cli.console import read_plausible_robot
+    from tautwire.cli.input_checks import check_files
+    from tautwire.errors import RobotFileError
+
+    text = (EXAMPLES / "three" / "robot.toml").read_text(encoding="utf-8")
+    modulus = read_robot(EXAMPLES / "three" / "robot.toml").cables[0].modulus
+    lines = ["modulus = 102.0" if line.startswith("modulus =") else line for line in text.split("\n")]
+    file = tmp_path / "robot.toml"
+    file.write_text("\n".join(lines), encoding="utf-8")
+    assert modulus > 1e9
+    problem, *others = check_files(file).problems
+    assert len(others) == 2 and lines[int(problem.line or 0) - 1].startswith("modulus")
+    with pytest.raises(RobotFileError) as caught:
+        read_plausible_robot(file)
+    assert caught.value.problem == problem.problem and caught.value.hint == problem.hint
