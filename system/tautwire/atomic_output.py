@@ -28,6 +28,11 @@ CAN_LOCK_FILES = sys.platform != "win32"
 STAGING_PREFIX = ".tautwire-"
 LOCK_NAME = "lock"
 SCRATCH_NAME = "new"
+# What other programs would open as something else than it is.
+DATA_SUFFIXES = (
+    *(".csv", ".tsv", ".json", ".parquet", ".feather", ".h5", ".hdf5", ".mat", ".mdf", ".mf4"),
+    *(".ods", ".pdf", ".png", ".svg", ".xls", ".xlsm", ".xlsx"),
+)
 DISK_FULL_ERRNOS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 # s; a run that removes stale staging folders holds their locks meanwhile.
 LOCK_TIMEOUT = 1.0
@@ -54,6 +59,14 @@ def refuse_overwriting_inputs(inputs: Iterable[Path], outputs: Iterable[Path]) -
     for output in outputs:
         if os.path.realpath(output) in input_paths:
             raise InputError(str(output), "is an input, and the output would replace it", "choose another --out")
+
+
+def refuse_other_formats(out: Path | None, *written: str, option: str = "--out") -> None:
+    """Raises InputError where a result's name promises another format of data than those ``written``."""
+    suffix = "" if out is None else out.suffix.lower()
+    if suffix in DATA_SUFFIXES and suffix not in written:
+        names = " or ".join(f"{out.stem if out else ''}{each}" for each in written)
+        raise InputError(str(out), f"ends in {suffix}, which is not written here", f"give {option} {names}")
 
 
 def refuse_same_output(out: Path | None, other: Path | None, option: str = "--report") -> None:

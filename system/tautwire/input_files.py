@@ -1,5 +1,6 @@
 """Reading files that users supply, with size limits and checks that they are text."""
 
+import codecs
 import os
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -9,7 +10,7 @@ from .errors import ArgumentError, InputError, describe_value
 
 HEAD_SIZE = 2**16  # bytes, checked before the rest is read
 
-_UTF_16_MARKS = (b"\xff\xfe", b"\xfe\xff")
+_UTF_16_MARKS = (codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 
 
 def validate_path(where: str, value: object) -> Path:
@@ -41,6 +42,35 @@ def read_text_bytes(
     content = read_bytes(path, error_class, max_size)
     require_utf8_text(content, str(path), error_class, expected_format)
     return content
+
+
+def read_encoded_text(
+    path: str | Path, error_class: type[InputError], expected_format: str, max_size: int | None = None
+) -> tuple[bytes, str]:
+    """Reads a text file as UTF-8 without its byte order mark, and names the encoding that it had.
+
+    That is UTF-8, UTF-16 where the file begins with its mark, or else Latin-1, which any bytes are: the caller has to
+    limit where it is accepted. Raises ``error_class`` as :func:`read_text_bytes` does.
+    """
+    with readable_file(path, error_class) as file, file.open("rb") as head_file:
+        head = head_file.read(HEAD_SIZE)
+    if not head.startswith(_UTF_16_MARKS):
+        _refuse_binary(head, str(path), error_class, expected_format)
+    content = read_bytes(path, error_class, max_size)
+    encoding = "UTF-8"
+    if content.startswith(_UTF_16_MARKS):
+        try:
+            content, encoding = content.decode("utf-16").encode("utf-8"), "UTF-16"
+        except UnicodeDecodeError as problem:
+            hint = f"save it as {expected_format} in UTF-8"
+            raise error_class(str(path), f"is not valid UTF-16 ({problem.reason})", hint) from problem
+    _refuse_binary(content, str(path), error_class, expected_format)
+    if not content.isascii():
+        try:
+            content.decode("utf-8")
+        except UnicodeDecodeError:
+            content, encoding = content.decode("latin-1").encode("utf-8"), "Latin-1"
+    return content.removeprefix(codecs.BOM_UTF8), encoding
 
 
 @contextmanager

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import tracemalloc
 from pathlib import Path
 
@@ -14,6 +15,7 @@ import pytest
 from tautwire.cosimulation import result_file
 from tautwire.cosimulation.result_file import BLOCK_BYTES, Column, open_result_file
 from tautwire.errors import TautwireError
+from tautwire.provenance import PROVENANCE_KEY, Provenance
 
 COLUMNS = [Column("time", "s"), Column("x", "m"), Column("tension_1", "N")]
 ROWS = np.column_stack([np.arange(7) * 0.1, np.geomspace(1e-9, 1e9, 7), np.linspace(-1.0, 1.0, 7) / 3.0])
@@ -30,6 +32,20 @@ def write(target: Path, rows: np.ndarray, fault: BaseException | None = None) ->
 
 def read(path: Path) -> pd.DataFrame:
     return pd.read_parquet(path) if path.suffix == ".parquet" else pd.read_csv(path)
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_its_provenance_is_metadata_and_no_line_of_its_own(tmp_path: Path, name: str) -> None:
+    made = Provenance("0.1.0", "tautwire simulate robot.toml", "2026-01-02T03:04:05Z", {"robot.toml": "ab" * 32})
+    with open_result_file(tmp_path / name, COLUMNS, made) as result:
+        result.add(0.0, np.array([1.0, 2.0]))
+    assert list(read(tmp_path / name).columns) == ["time", "x", "tension_1"]
+    if name.endswith(".parquet"):
+        stored = json.loads(pq.read_schema(tmp_path / name).metadata[PROVENANCE_KEY.encode()])
+    else:
+        (note,) = json.loads((tmp_path / "result.csv-metadata.json").read_text(encoding="utf-8"))["notes"]
+        stored = note["provenance"]
+    assert stored == made.document()
 
 
 @pytest.mark.parametrize("name", [*NAMES, "result.PARQUET", "result"])

@@ -12,6 +12,7 @@ from tautwire.paper.open_claims import OpenClaim
 from tautwire.paper.paper_claims import Claim, LedgerEntry
 from tautwire.paper.paper_extensions import ExtensionFigure
 from tautwire.paper.paper_page import SECTION_FIGURES, PageContent, inline_svg, number_text, paper_page
+from tests.support.pages import MAX_PAGE_BYTES
 
 CLAIM = Claim(
     "it", "4.1.1", "difference of r1 <27.5 s>", "mm", 2.4, 0.1, 0.05, explanation="at 9.8 m/s^2", printed_digits="2.40"
@@ -37,6 +38,7 @@ def _page(tmp_path) -> str:  # type: ignore[no-untyped-def]
 
 def test_page_has_every_claim_figure_and_trial_and_asks_for_nothing(tmp_path) -> None:  # type: ignore[no-untyped-def]
     page = _page(tmp_path)
+    assert len(page.encode()) < MAX_PAGE_BYTES
     assert "2 claims: 0 reproduced, 2 reproduced after correction, 0 not reproducible" in page
     assert "Difference of r1 &lt;27.5 s&gt;" in page and ">2.40 <" in page.replace("2.40<span", "2.40 <span")
     assert "Axes of the figures: 2 " not in page and "Axes of the figures: 1 reproduced after correction" in page

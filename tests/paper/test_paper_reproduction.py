@@ -204,6 +204,7 @@ def test_folder_holds_ledger_page_and_every_figure_twice(paper: PaperReproductio
     assert "nan" not in re.sub(r"<[^>]*>", " ", page).lower().split()
     names = {f"{name}.{kind}" for name in FIGURE_NAMES for kind in ("png", "svg")}
     results = {path.name: path.stat().st_size for path in folder.iterdir()}
+    assert results.pop("provenance.json") > 0
     assert set(results) == names | {"claims.json", "claims.html"}
     assert min(results.values()) > 5000
 

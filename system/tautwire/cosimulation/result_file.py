@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,6 +16,7 @@ from numpy.typing import NDArray
 
 from ..atomic_output import atomic_file
 from ..errors import TautwireError
+from ..provenance import CSV_METADATA_SUFFIX, Provenance
 
 Array = NDArray[np.float64]
 WriteRows = Callable[[Array], None]
@@ -60,17 +62,21 @@ class ResultFile:
 
 
 @contextmanager
-def open_result_file(target: Path, columns: Sequence[Column]) -> Iterator[ResultFile]:
+def open_result_file(
+    target: Path, columns: Sequence[Column], provenance: Provenance | None = None
+) -> Iterator[ResultFile]:
     """A result file that becomes ``target`` when the block ends well, or fails after some rows.
 
-    It is Parquet where the name ends in ``.parquet``, with each column's unit in its field's metadata, else CSV.
+    It is Parquet where the name ends in ``.parquet``, with each column's unit in its field's metadata and the
+    provenance in its schema's, else CSV, with its metadata beside it.
 
     Raises InputError where ``target`` cannot be written; a TautwireError of the block, once there are rows, as one
     that says where these are. After anything else nothing is left.
     """
     failure: TautwireError | None = None
-    open_writer = _parquet_writer if target.suffix.lower() == PARQUET_SUFFIX else _csv_writer
-    with atomic_file(target) as scratch, open_writer(scratch, columns) as write:
+    is_parquet = target.suffix.lower() == PARQUET_SUFFIX
+    writer = partial(_parquet_writer, provenance=provenance) if is_parquet else _csv_writer
+    with atomic_file(target) as scratch, writer(scratch, columns) as write:
         result = ResultFile(len(columns), write)
         try:
             yield result
@@ -79,15 +85,28 @@ def open_result_file(target: Path, columns: Sequence[Column]) -> Iterator[Result
                 raise
             failure = error
         result.flush()
+    if not is_parquet:
+        write_csv_metadata(target, provenance)
     if failure is not None:
         raise TautwireError(f"{failure}; the run up to then is in {target}") from failure
 
 
+def write_csv_metadata(target: Path, provenance: Provenance | None) -> None:
+    """Writes the provenance of a CSV file beside it, where "CSV on the Web" looks for it; nothing where it is None.
+
+    In the CSV file itself it would be a line that other programs do not expect.
+    """
+    if provenance is not None:
+        with atomic_file(target.with_name(target.name + CSV_METADATA_SUFFIX)) as scratch:
+            scratch.write_text(provenance.csv_metadata(target.name), encoding="utf-8")
+
+
 @contextmanager
-def _parquet_writer(path: Path, columns: Sequence[Column]) -> Iterator[WriteRows]:
+def _parquet_writer(path: Path, columns: Sequence[Column], provenance: Provenance | None = None) -> Iterator[WriteRows]:
     """A row group for every block."""
     schema = pa.schema(
-        [pa.field(column.name, pa.float64(), nullable=False, metadata={"unit": column.unit}) for column in columns]
+        [pa.field(column.name, pa.float64(), nullable=False, metadata={"unit": column.unit}) for column in columns],
+        metadata=provenance.schema_metadata() if provenance else None,
     )
     with pq.ParquetWriter(path, schema, use_dictionary=False) as writer:
         yield lambda rows: writer.write_table(pa.Table.from_arrays([pa.array(c) for c in rows.T], schema=schema))

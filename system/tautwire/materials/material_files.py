@@ -11,7 +11,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..json_document import write_json
-from ..robot.robot_file_writer import robot_text
+from ..provenance import Provenance, provenance_of
+from ..robot.robot_file_writer import write_robot
 from ..robot.schema import Robot
 from .material_report import GIGA, MODEL_TITLES, verdict_notes, verdict_sentence
 from .material_verdict import (
@@ -217,16 +218,23 @@ def _draw_residuals(
     axes.set_ylabel("model - measured (sigma)")
 
 
-def write_material(verdict: MaterialVerdict, folder: Path, robot: Robot | None = None) -> None:
+def write_material(
+    verdict: MaterialVerdict,
+    folder: Path,
+    robot: Robot | None = None,
+    provenance: Provenance | None = None,
+    robot_file: Path | None = None,
+) -> None:
     """Write ``fit.json``, the figure as PNG and SVG, and the lines for a robot file into a folder.
 
-    ``robot`` is written too, as ``robot.toml``, with the rope on all its cables.
+    ``robot`` is written too, as ``robot.toml``, with the rope on all its cables and the comments of its ``robot_file``.
     """
-    write_json(folder / "fit.json", material_document(verdict))
+    provenance = provenance or provenance_of()
+    write_json(folder / "fit.json", {**material_document(verdict), "provenance": provenance.document()})
     figure = material_figure(verdict)
     figure.savefig(folder / "material.png", dpi=DOTS_PER_INCH)
     figure.savefig(folder / "material.svg")
     rope = robot_material(verdict.model("robot").material)
-    (folder / "relaxation.toml").write_text(rope.text(), encoding="utf-8")
+    (folder / "relaxation.toml").write_text(f"{provenance.comment()}\n{rope.text()}", encoding="utf-8")
     if robot:
-        (folder / "robot.toml").write_text(robot_text(with_material(robot, rope)), encoding="utf-8")
+        write_robot(with_material(robot, rope), folder / "robot.toml", provenance, robot_file)

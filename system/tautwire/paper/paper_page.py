@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from itertools import groupby
 from typing import Any
 
+from ..provenance import Provenance
 from ..reports.page_rendering import Label, Number, PageHeader, Prose, Row, SectionLink, render_page
 from .figure_style import BACKGROUND_COLOUR, TEXT_COLOUR, PaperFigure
 from .open_claims import OpenClaim
@@ -87,14 +88,14 @@ class PaperSection:
     folded_claims: Sequence[FoldedClaims]
 
 
-def paper_page(content: PageContent, links: Mapping[str, str]) -> str:
+def paper_page(content: PageContent, links: Mapping[str, str], provenance: Provenance | None = None) -> str:
     """The page as HTML; ``links`` maps labels to files beside it."""
     headline = f"{len(content.entries)} claims: {_verdict_counts(content.entries, VERDICT_NAMES)}"
     title = "the paper, claim by claim"
     figures = {each.name: _drawn_figure(each, content.svg_texts[each.name]) for each in content.figures}
     return render_page(
         "paper",
-        PageHeader("Tautwire paper", title, headline, title.capitalize(), links=links),
+        PageHeader("Tautwire paper", title, headline, title.capitalize(), links=links, provenance=provenance),
         verdict_columns=["Section", *((verdict.capitalize(), "number") for verdict in VERDICT_NAMES)],
         overview=_overview_rows(content.entries),
         parts=[_paper_section(number, content.entries, figures) for number in SECTION_TITLES],

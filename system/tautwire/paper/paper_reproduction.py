@@ -11,6 +11,7 @@ from pathlib import Path
 from ..estimation.worker_pool import WorkerPool, processors
 from ..json_document import write_json
 from ..materials import RobotMaterial
+from ..provenance import Provenance, provenance_of
 from . import helix_runs as helix
 from . import open_claims as tried
 from . import paper_extensions as beyond
@@ -52,11 +53,12 @@ class PaperReproduction:
         return Counter(entry.verdict for entry in self.entries)
 
 
-def write_paper(folder: Path, progress: Progress) -> PaperReproduction:
-    """Run everything and write ``claims.json``, ``claims.html`` and all figures into an existing folder.
+def write_paper(folder: Path, progress: Progress, provenance: Provenance | None = None) -> PaperReproduction:
+    """Run everything and write ``claims.json``, ``claims.html``, ``provenance.json`` and all figures into a folder.
 
     Raises RunError where an FMU fails.
     """
+    provenance = provenance or provenance_of()
     with WorkerPool(min(processors(), MAX_PROCESSES)) as workers:
         reproduction = run_paper(workers, progress)
     runs = reproduction.runs["corrected"]
@@ -72,10 +74,10 @@ def write_paper(folder: Path, progress: Progress) -> PaperReproduction:
         ]
         svgs = write_figures(figures, folder, partial(progress, "drawing"))
     write_json(folder / "claims.json", [entry.document() for entry in reproduction.entries])
+    write_json(folder / "provenance.json", provenance.document())
     claims = examine_open_claims(runs.parameters, runs.records)
-    page = paper_page(
-        PageContent(reproduction.entries, figures, svgs, claims, extensions), {"claims.json": "claims.json"}
-    )
+    content = PageContent(reproduction.entries, figures, svgs, claims, extensions)
+    page = paper_page(content, {"claims.json": "claims.json"}, provenance)
     (folder / "claims.html").write_text(page, encoding="utf-8")
     return reproduction
 
