@@ -12,6 +12,8 @@ from tautwire_fmu.laws.effects import BY_NAME
 from tautwire_fmu.laws.formula import VARIABLES_BY_TARGET
 
 from ..errors import RobotFileError
+from ..provenance import Provenance
+from .recorded_columns import COLUMN_NUMBERS
 from .robot_file_reader import robot_from_text
 from .schema import (
     PER_CABLE_COMPONENTS,
@@ -19,6 +21,7 @@ from .schema import (
     EffectSetting,
     Formula,
     Point,
+    RecordedColumn,
     Robot,
     Sensors,
     TensionLimits,
@@ -48,18 +51,30 @@ def robot_text(robot: Robot) -> str:
         *(_cable_block(number, cable) for number, cable in enumerate(robot.cables, 1)),
         *(_effect_block(robot, setting) for setting in robot.effects),
         *_formula_blocks(robot),
+        _recorded_column_block(robot.recorded_columns),
     ]
     return "\n\n".join("\n".join(block) for block in blocks if block) + "\n"
 
 
-def write_robot(robot: Robot, path: str | Path) -> None:
-    """Writes a robot file atomically, such that it reads back equal.
+def write_robot(
+    robot: Robot, path: str | Path, provenance: Provenance | None = None, source: str | Path | None = None
+) -> None:
+    """Writes a robot file atomically, such that it reads back equal, with its provenance as comments at the head.
+
+    Where the robot is a change of one that was read from ``source``, comments, order and layout of that file are kept.
 
     Raises RobotFileError if no file may declare such a robot, OSError if writing fails.
     """
+    from .robot_file_editor import edited_robot_text
+
     text = robot_text(robot)
-    if robot_from_text(text, path, robot.name) != _with_neutral_values(robot):
+    if robot_from_text(text, path, robot.name) != completed_robot(robot):
         raise RobotFileError(str(path), "would not read back equal", "build the robot as read_robot does")
+    if source is not None:
+        text = edited_robot_text(source, robot, path) or text
+    if provenance is not None:
+        line_end = "\r\n" if "\r\n" in text else "\n"
+        text = f"{provenance.comment()}\n".replace("\n", line_end) + text
     target = Path(path)
     temporary = target.with_name(f".{target.name}.{os.getpid()}.part")
     try:
@@ -69,7 +84,7 @@ def write_robot(robot: Robot, path: str | Path) -> None:
         temporary.unlink(missing_ok=True)
 
 
-def _with_neutral_values(robot: Robot) -> Robot:
+def completed_robot(robot: Robot) -> Robot:
     """The robot with the neutral values of its effects filled in."""
     effects = (replace(s, values=BY_NAME[s.name].completed_values(s.values)) for s in robot.effects)
     return replace(robot, effects=tuple(effects))
@@ -179,3 +194,18 @@ def _formula_lines(robot: Robot, group: Sequence[Formula]) -> list[str]:
     lines = [f"{formula.target} = {json.dumps(formula.text)}" for formula in group]
     cables = [formula.cables for formula in group if formula.cables and formula.cables != robot.cable_numbers]
     return [*lines, *(f"cables = {list(some)}" for some in cables)]
+
+
+def _recorded_column_block(columns: Sequence[RecordedColumn]) -> list[str]:
+    return ["[recording.columns]  # by the laboratory's names", *map(recorded_column_line, columns)] if columns else []
+
+
+def recorded_column_line(column: RecordedColumn) -> str:
+    """The TOML line that declares a column of recordings by the laboratory's name."""
+    entries = [f"name = {json.dumps(column.name, ensure_ascii=False)}"]
+    entries += [f"unit = {json.dumps(column.unit, ensure_ascii=False)}"] if column.unit else []
+    for key, rule in COLUMN_NUMBERS.items():
+        value = getattr(column, key)
+        entries += [f"{key} = {int(value) if key == 'sign' else float(value)!r}"] if value != rule.default else []
+    key = column.column if column.column.isidentifier() else json.dumps(column.column)
+    return f"{key} = {{ {', '.join(entries)} }}"

@@ -74,6 +74,11 @@ TEMPLATE_TAIL = """
 # User FMUs instead of the project's, relative to this file.
 # [fmu]
 # platform = "mine.fmu"
+
+# Recordings' columns by the laboratory's names; "tautwire columns" proposes this table.
+# [recording.columns]
+# time = { name = "t_ms", unit = "ms" }
+# "winch_speed_{}" = { name = "Drive{}.Velocity", unit = "mm/s", sign = -1 }
 """
 
 
