@@ -25,8 +25,8 @@ WHITE_VARIANCES = np.array([0.2, 0.5, 1.0])
 MEASURED = GENERATOR.normal(size=(COUNT, OUTPUTS))
 OBSERVED = (GENERATOR.random((COUNT, OUTPUTS)) < 0.8).astype(float)
 # That of states that move acts from the start of a step on, that of the others at its end.
-NOISE_AT_BEGIN = np.diag(np.where(np.arange(SIZE) < MOVING, PROCESS_NOISE, 0.0))
-NOISE_AT_END = np.diag(PROCESS_NOISE) - NOISE_AT_BEGIN
+NOISE_AT_START = np.diag(np.where(np.arange(SIZE) < MOVING, PROCESS_NOISE, 0.0))
+NOISE_AT_END = np.diag(PROCESS_NOISE) - NOISE_AT_START
 FULL_TRANSITION = np.diag(DECAY)
 FULL_TRANSITION[:MOVING] = 0.0
 FULL_TRANSITION[:MOVING, :FROM] = TRANSITION
@@ -77,7 +77,7 @@ def test_states_covariances_and_likelihood_are_those_of_the_joint_update() -> No
         assert np.sum(record.values[k, seen] ** 2) == pytest.approx(error @ np.linalg.solve(variance, error))
         assert np.sum(record.log_variances[k, seen]) == pytest.approx(np.linalg.slogdet(variance)[1])
         expected_state = FULL_TRANSITION @ (expected_state + gain @ error)
-        updated = expected_covariance - gain @ rows @ expected_covariance + NOISE_AT_BEGIN
+        updated = expected_covariance - gain @ rows @ expected_covariance + NOISE_AT_START
         expected_covariance = FULL_TRANSITION @ updated @ FULL_TRANSITION.T + NOISE_AT_END
     assert moments.state == pytest.approx(expected_state)
     assert moments.covariance == pytest.approx(expected_covariance)
@@ -99,6 +99,6 @@ def test_sensitivities_are_derivatives_by_a_parameter_of_a_linear_model() -> Non
             assert np.sum(slopes[k, parameter, seen] ** 2) == pytest.approx(moved @ np.linalg.solve(variance, moved))
             change = FULL_TRANSITION @ (change + gain @ moved)
             change[:MOVING] += DIRECT[:, parameter]
-            updated = state - gain @ rows @ state + NOISE_AT_BEGIN
+            updated = state - gain @ rows @ state + NOISE_AT_START
             state = FULL_TRANSITION @ updated @ FULL_TRANSITION.T + NOISE_AT_END
         assert moments.sensitivities[parameter] == pytest.approx(change)

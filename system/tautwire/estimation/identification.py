@@ -7,9 +7,10 @@ from contextlib import contextmanager
 from dataclasses import replace
 
 import numpy as np
+from numpy.typing import NDArray
 from threadpoolctl import threadpool_limits
 
-from ..errors import ArgumentError, NumericalError
+from ..errors import ArgumentError, NumericalError, RecordingError
 from ..process_signals import defer_interrupts
 from ..recordings.recording import Recording, require_outputs
 from ..robot.schema import Robot, validate_robot
@@ -25,7 +26,7 @@ from .residual_analysis import largest_autocorrelations
 from .smoothed_states import calibrate, initial_state_note, with_initial_state
 from .stepwise_selection import nothing_selected
 from .time_limit import OutOfTimeError, TimeLimit
-from .trace_result import Trace
+from .trace_result import Comparison, Trace
 from .verdict import confirmed_formula
 from .worker_pool import WorkerPool
 
@@ -42,7 +43,7 @@ def validate_trace_arguments(
 ) -> None:
     """Validate the arguments of a trace.
 
-    Raises RecordingError where a recording has no measured output, ArgumentError for all else.
+    Raises RecordingError where a recording has no measured output, or both are the same, ArgumentError for all else.
     """
     validate_robot("trace: robot", robot)
     validate_callable("trace: progress", progress)
@@ -56,6 +57,9 @@ def validate_trace_arguments(
             problem = f"has winch speeds of {recording.cable_count} cables, the robot has {robot.cable_count}"
             raise ArgumentError(argument, recording, problem, "give a recording of this robot")
         require_outputs(recording)
+    if check is not None and check.has_same_samples(fit):
+        hint = "give a recording of another motion, or none: then the second half of FIT validates"
+        raise RecordingError(check.path, "has the same samples as FIT, and can validate nothing", hint)
 
 
 def validated_false_alarm_rate(argument: str, value: object) -> float:
@@ -167,7 +171,7 @@ def _result(state: Identification) -> Trace:
         also_possible=state.selection.confusable if state.effects_hold else (),
         candidates=state.selection.candidates,
         formula=confirmed_formula(context.robot, state.selection, state.effects_hold, state.discovery),
-        comparisons=state.comparisons,
+        comparisons=_with_innovations(state, innovations.values),
         noise_floor=state.noise_floors[-1],
         noise_before=white_before,
         noise_after=state.is_white_after,
@@ -189,6 +193,16 @@ def _result(state: Identification) -> Trace:
         left_share=state.shares.left if state.shares else None,
         small_effects=state.small_effects,
         untried=context.time_limit.untried,
+    )
+
+
+def _with_innovations(state: Identification, on_validation: NDArray[np.float64]) -> tuple[Comparison, ...]:
+    """The comparisons with innovations under the final robot; the last one is that of the validation data."""
+    fitter, robot = state.context.fitter, state.final_robot
+    earlier = [fitter.innovations(robot, data).values for data in state.prepared.data_sets[:-1]]
+    return tuple(
+        replace(comparison, innovations=values)
+        for comparison, values in zip(state.comparisons, (*earlier, on_validation), strict=True)
     )
 
 

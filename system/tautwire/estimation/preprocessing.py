@@ -1,7 +1,8 @@
 """Preprocessing of recordings, step by step: from what was recorded to data that a filter may trust.
 
 1. Long recordings are truncated (:func:`shortened`).
-2. Each alone loses dead channels and outliers, and is cut at gaps (:data:`CLEANING_STEPS`).
+2. Each alone loses dead channels and outliers, is refused where its units cannot be, and is cut at gaps
+   (:data:`CLEANING_STEPS`).
 3. The declared noise is tested against all of them; self-stress and motion at the start widen the prior of the initial
    state (:func:`prepare_recordings`).
 4. They are split into estimation and validation data; winch speeds that are central differences, and clock offsets,
@@ -17,6 +18,7 @@ import numpy as np
 
 from ..errors import RecordingError
 from ..recordings.central_differences import may_be_central_differences, with_speeds_between_samples
+from ..recordings.consistency import require_plausible
 from ..recordings.dead_channels import without_dead_channels
 from ..recordings.gaps import without_gaps
 from ..recordings.outliers import without_outliers
@@ -57,6 +59,12 @@ def _with_outputs(robot: Robot, recording: Recording, policy: PreprocessingPolic
     return recording, ()
 
 
+def _plausible(robot: Robot, recording: Recording, policy: PreprocessingPolicy) -> tuple[Recording, tuple[str, ...]]:
+    """The recording as it is; raises RecordingError where its units, signs or order seem to be mistaken."""
+    require_plausible(robot, recording)
+    return recording, ()
+
+
 def _without_gaps(robot: Robot, recording: Recording, policy: PreprocessingPolicy) -> tuple[Recording, tuple[str, ...]]:
     detectable = detectable_length(robot, estimate_noise(robot, recording), recording)
     return without_gaps(recording, policy.max_length_error_sigmas * detectable, policy.max_step_intervals)
@@ -68,6 +76,7 @@ CLEANING_STEPS: tuple[CleaningStep, ...] = (
     lambda robot, recording, policy: without_dead_channels(recording, policy.dead_channels),
     lambda robot, recording, policy: without_outliers(recording, policy.outliers),
     _with_outputs,
+    _plausible,
     _without_gaps,
     lambda robot, recording, policy: without_noise_of_standing_winches(robot, recording),
 )

@@ -103,7 +103,11 @@ class Errors:
 
 @dataclass(frozen=True)
 class Comparison:
-    """One recording beside the co-simulations of the robot before and after; ``role`` is "fit" or "check"."""
+    """One recording beside the co-simulations of the robot before and after; ``role`` is "fit" or "check".
+
+    ``innovations`` (N, 3 + n) are the whitened one-step prediction errors under the robot after, NaN where nothing was
+    measured.
+    """
 
     role: str
     recording: Recording
@@ -111,6 +115,7 @@ class Comparison:
     after: CosimulationResult
     errors_before: Errors
     errors_after: Errors
+    innovations: Array | None = None
 
 
 @dataclass(frozen=True)

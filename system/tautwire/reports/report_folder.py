@@ -1,4 +1,4 @@
-"""The report folder of a trace: the robot with its effects, its FMUs, ``report.json`` and an HTML page."""
+"""The report folder of a trace: the robot with its effects, its FMUs, ``report.json``, residuals and an HTML page."""
 
 from __future__ import annotations
 
@@ -13,10 +13,12 @@ from ..estimation.localisation.component_residuals import ComponentResidual
 from ..estimation.trace_result import Detectable, Errors, FoundEffect, Trace
 from ..fmus.packaging import RobotFmus, build_fmus, with_user_fmus_copied
 from ..json_document import json_value, write_json
+from ..provenance import Provenance, provenance_of
 from ..recordings.recording import Recording
 from ..robot.robot_file_writer import write_robot
 from ..robot.schema import AXES
 from ..validation import validate_folder, validate_instance
+from .residual_file import RESIDUAL_FILE, write_residuals
 from .trace_report_page import trace_page
 from .trace_texts import ROLES, comparison_by_role
 
@@ -130,8 +132,13 @@ def _by_output(trace: Trace, values: Iterable[float]) -> dict[str, float]:
     return dict(zip(names, values, strict=True))
 
 
-def write_report(trace: Trace, folder: str | Path) -> RobotFmus:
-    """Writes ``robot.toml``, its FMUs, ``report.json`` and ``index.html`` into a folder, which is created if absent.
+def write_report(
+    trace: Trace, folder: str | Path, provenance: Provenance | None = None, robot_file: str | Path | None = None
+) -> RobotFmus:
+    """Writes ``robot.toml``, its FMUs, ``report.json``, ``residuals.parquet`` and ``index.html`` into a folder.
+
+    The folder is created if absent. ``robot_file`` is the file that the robot was read from: ``robot.toml`` keeps
+    its comments and order. Without ``provenance`` the files tell version and date.
 
     Returns the paths of the FMUs. Raises ArgumentError where ``trace`` is not what :func:`tautwire.trace` returns or
     ``folder`` names none, OSError where the disk refuses.
@@ -139,10 +146,12 @@ def write_report(trace: Trace, folder: str | Path) -> RobotFmus:
     validate_instance("write_report: trace", trace, Trace, "give what trace returns")
     folder = validate_folder("write_report: folder", folder)
     folder.mkdir(parents=True, exist_ok=True)
-    write_robot(trace.robot_after, folder / "robot.toml")
+    provenance = provenance or provenance_of()
+    write_robot(trace.robot_after, folder / "robot.toml", provenance, robot_file)
     fmus = with_user_fmus_copied(build_fmus(trace.robot_after, folder), folder)
-    write_json(folder / "report.json", trace_document(trace))
-    links = {"robot.toml": "robot.toml", "report.json": "report.json"}
+    write_json(folder / "report.json", {**trace_document(trace), "provenance": provenance.document()})
+    write_residuals(trace, folder / RESIDUAL_FILE, provenance)
+    links = {name: name for name in ("robot.toml", "report.json", RESIDUAL_FILE)}
     links |= {path.name: path.name for path in fmus.paths}
-    (folder / "index.html").write_text(trace_page(trace, links), encoding="utf-8")
+    (folder / "index.html").write_text(trace_page(trace, links, provenance), encoding="utf-8")
     return fmus
