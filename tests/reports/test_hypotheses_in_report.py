@@ -4,10 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 from rich.console import Console
 
-from tautwire.estimation.trace_result import Candidate, Trace
+from tautwire.estimation.trace_result import Candidate, Estimate, FoundEffect, Trace
+from tautwire.number_format import ABSENT_TEXT
 from tautwire.reports import trace_page, trace_table
+from tautwire.reports.page_rendering import Number
+from tautwire.reports.trace_report_page import _effect_rows, _unfitted_row
 from tests.support.pages import section_of
 from tests.support.traces import made_trace
 
@@ -54,3 +58,19 @@ def test_terminal_leaves_out_what_was_not_fitted() -> None:
     text = " ".join(captured.get().split())
     assert "creep 1" not in text and "drag" not in text
     assert "no predicted gain" in text and "or not fitted" in text
+
+
+def test_an_effect_with_two_parameters_is_named_once() -> None:
+    trace = made_trace()
+    estimate = Estimate(1.0, "N", 0.9, 1.1, None)
+    effect = FoundEffect("hysteresis", "cable", (2,), {"force": estimate, "yield_strain": estimate}, 40.0)
+    rows = _effect_rows(trace, effect)
+    assert [row[:3] for row in rows] == [["hysteresis", "cable 2", "force"], ["", "", "yield_strain"]]
+
+
+def test_a_prediction_without_effect_is_a_dash() -> None:
+    trace = made_trace()
+    sag = Candidate(1, "sag", (3,), {"linear_density": 0.0, "catenary": 0.0}, 0.0, np.nan, False, ("linear_density",))
+    predicted = replace(sag, values={"linear_density": 0.5, "catenary": 0.0})
+    texts = [_unfitted_row(trace, each)[2] for each in (sag, predicted)]
+    assert texts == [Number(ABSENT_TEXT), Number("linear_density 0.500 kg/m")]

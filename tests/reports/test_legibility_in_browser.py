@@ -28,6 +28,17 @@ pytestmark = [
     pytest.mark.skipif(chromium() is None, reason=f"the pages are not tried in a browser: {MISSING}"),
 ]
 
+PAPER_WIDTH = 718  # pixels of A4 between margins of 1 cm
+# Everything on paper that reaches beyond it, and figures that are not as wide as their frame.
+BEYOND_PAPER = """
+const all = [...document.querySelectorAll('figure, table, pre, .main-svg, .on-paper')];
+const shrunk = [...document.querySelectorAll('.js-plotly-plot')].every((plot) => {
+  const [width, drawn] = [plot, plot.querySelector('.main-svg')].map((each) => each.getBoundingClientRect().width);
+  return Math.abs(width - drawn) < 1 && plot.querySelector('.main-svg').hasAttribute('viewBox');
+});
+const beyond = all.filter((each) => each.getBoundingClientRect().right > arguments[0] + 1);
+return [beyond.map((each) => each.outerHTML.slice(0, 80)), shrunk];
+"""
 SCREENS = (LAPTOP, LAPTOP_DARK, PHONE, PHONE_DARK)
 CONTRAST = (SUPPORT / "browser" / "contrast.js").read_text(encoding="utf-8")
 # Every title and label of figures that reaches beyond its figure, or lies over another of its figure.
@@ -38,8 +49,8 @@ for (const plot of document.querySelectorAll('.panel > .plot.js-plotly-plot')) {
   const words = [...plot.querySelectorAll('.xtitle, .ytitle, .y2title, .annotation-text')];
   const boxes = words.map((each) => each.getBoundingClientRect());
   boxes.forEach((box, place) => {
-    const inside = box.left >= frame.left && box.right <= frame.right && box.top >= frame.top
-      && box.bottom <= frame.bottom;
+    const inside = box.left >= frame.left - 0.1 && box.right <= frame.right + 0.1 && box.top >= frame.top - 0.1
+      && box.bottom <= frame.bottom + 0.1;
     const over = boxes.slice(0, place).some((other) => box.left < other.right - 1 && other.left < box.right - 1
       && box.top < other.bottom - 1 && other.top < box.bottom - 1);
     if (!inside || over || box.width === 0) cut.push(words[place].textContent);
@@ -125,3 +136,33 @@ def test_figures_say_in_words_what_they_show(browser: Browser, pages: dict[str, 
     browser.run("document.querySelectorAll('input[name=choice]')[1].click()")
     browser.run(DRAW_ALL)
     assert all("Check recording: root mean square" in label for label in browser.run(script))
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_contents_stay_at_the_side_while_the_page_scrolls(browser: Browser, pages: dict[str, Path], kind: str) -> None:
+    opened(browser, pages[kind]).run("scrollTo(0, document.documentElement.scrollHeight / 2)")
+    script = """const [nav, section] = ['.contents', '.sections'].map((each) => document.querySelector(each));
+    const box = nav.getBoundingClientRect();
+    return [box.top >= 0 && box.bottom <= innerHeight, box.right < section.getBoundingClientRect().left,
+      [...nav.querySelectorAll('a')].map((each) => each.textContent)]"""
+    in_view, is_beside, titles = browser.run(script)
+    assert in_view and is_beside
+    assert titles == browser.run("return [...document.querySelectorAll('h2')].map((each) => each.textContent)")
+
+
+def test_contents_stand_above_the_sections_on_a_phone(browser: Browser, pages: dict[str, Path]) -> None:
+    opened(browser, pages["trace"], PHONE)
+    bottom, top = browser.run("""return [document.querySelector('.contents').getBoundingClientRect().bottom,
+      document.querySelector('.sections').getBoundingClientRect().top]""")
+    assert bottom <= top
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_nothing_is_cut_on_paper(browser: Browser, pages: dict[str, Path], kind: str) -> None:
+    opened(browser, pages[kind]).show_as_printed(PAPER_WIDTH)
+    beyond, is_shrunk = browser.run(BEYOND_PAPER, PAPER_WIDTH)
+    assert beyond == [] and is_shrunk
+    hidden = "return [...document.querySelectorAll('.contents, .tools, .controls')].every((e) => !e.offsetParent)"
+    assert browser.run(hidden)
+    assert browser.run("return document.querySelector('.on-paper').naturalWidth") > 300
+    assert browser.run("return document.querySelectorAll('details:not([open])').length") == 0

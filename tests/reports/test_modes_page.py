@@ -15,7 +15,7 @@ from tautwire.linear import LinearPlant, linearise
 from tautwire.reports.downsampling import unpack_float32
 from tautwire.reports.modes_page import DRAWN_SWING_SHARE, modes_data, modes_page
 from tautwire.robot.schema import Robot
-from tests.support.pages import FETCHING, Page
+from tests.support.pages import FETCHING, MAX_PAGE_BYTES, Page
 from tests.support.robots import EXAMPLES, example
 from tests.support.traces import HOSTILE
 
@@ -100,3 +100,8 @@ def test_linearise_writes_the_page_beside_the_model(tmp_path: Path) -> None:
     assert command(["linearise", robot, "--out", str(model), "--report", str(page)]) == 0
     assert "model.json" in Page(page.read_text(encoding="utf-8")).links()
     assert command(["linearise", robot, "--out", str(model), "--report", str(model)]) == 2
+
+
+def test_page_of_eight_cables_stays_small() -> None:
+    robot, plant = plant_of("eight")
+    assert len(modes_page(robot, plant, {}).encode()) < MAX_PAGE_BYTES

@@ -15,7 +15,7 @@ from tautwire.cosimulation.robot_wiring import result_columns
 from tautwire.reports.downsampling import unpack_float32
 from tautwire.reports.run_overview import RunOverview
 from tautwire.reports.run_page import run_page
-from tests.support.pages import FETCHING, Page
+from tests.support.pages import FETCHING, MAX_PAGE_BYTES, Page
 from tests.support.robots import EXAMPLES
 from tests.support.traces import HOSTILE, made_run
 
@@ -145,3 +145,15 @@ def test_a_run_that_cannot_begin_leaves_no_page(tmp_path: Path) -> None:
     arguments = ["simulate", str(THREE / "robot.toml"), "--speeds", str(recording)]
     assert command([*arguments, "--out", str(tmp_path / "result.csv"), "--report", str(page)]) == 2
     assert [path.name for path in tmp_path.iterdir()] == ["empty.csv"]
+
+
+@pytest.mark.parametrize("eight", [False, True])
+def test_page_of_a_long_run_stays_small_and_keeps_peaks(eight: bool) -> None:
+    run = made_run(samples=20_000, eight=eight)
+    content = run_page(run, {})
+    assert len(content.encode()) < MAX_PAGE_BYTES
+    position = Page(content).data()["choices"][0]["channels"][2]
+    low, high = (each[2] for each in run.overview.extremes())
+    drawn = unpack_float32(position["values"])
+    assert (drawn.min(), drawn.max()) == pytest.approx((low, high), rel=1e-6)
+    assert len(drawn) == len(unpack_float32(position["time"]))

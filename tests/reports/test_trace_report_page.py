@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import base64
+import gzip
 import json
 import re
 from dataclasses import replace
@@ -10,9 +12,12 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pyarrow.parquet as pq
 import pytest
+from markupsafe import escape
 
 from tautwire.estimation.trace_result import Correlation, FittedParameter, Identifiability, Trace
+from tautwire.provenance import PROVENANCE_KEY, Provenance
 from tautwire.reports import trace_document, trace_page, write_report
 from tautwire.reports.downsampling import (
     envelope_times,
@@ -25,7 +30,7 @@ from tautwire.reports.downsampling import (
 from tautwire.reports.robot_scene import deviation_magnification
 from tautwire.reports.trace_figures import MAX_CURVE_POINTS, trace_page_data
 from tautwire.robot.robot_file_reader import read_robot
-from tests.support.pages import FETCHING, Page
+from tests.support.pages import FETCHING, MAX_PAGE_BYTES, Page
 from tests.support.traces import HOSTILE, TENSION_NOISE, made_trace, nothing_found, without_positions
 
 LINKS = {"robot.toml": "robot.toml", "cable 1": "fmus/cable 1.fmu"}
@@ -145,14 +150,15 @@ def trace_style() -> str:
     return content[content.index("<style>") : content.index("</style>")]
 
 
-def test_plotly_is_there_once() -> None:
-    assert sum("plotly.js v" in script for script in page("three").scripts) == 1
-    assert len(page("three").scripts) == 3
+def test_plotly_is_there_once_and_packed() -> None:
+    scripts = page("three").scripts
+    assert len(scripts) == 3
+    assert "plotly.js (gl3d - minified) v4" in gzip.decompress(base64.b64decode(scripts[1])).decode()[:200]
 
 
 @pytest.mark.parametrize("eight", [False, True])
 def test_page_stays_small_for_long_recordings(eight: bool) -> None:
-    assert len(trace_page(made_trace(eight, samples=120_000), LINKS)) < 7_000_000
+    assert len(trace_page(made_trace(eight, samples=120_000), LINKS).encode()) < MAX_PAGE_BYTES
 
 
 def test_verdict_numbers_and_links_are_written_without_scripts() -> None:
@@ -299,9 +305,16 @@ def test_packing_keeps_numbers_and_turns_the_infinite_into_gaps() -> None:
 
 def test_folder_holds_robot_fmus_report_and_page_that_links_them(tmp_path: Path) -> None:
     trace = made_trace(samples=200)
-    fmus = write_report(trace, tmp_path)
+    provenance = Provenance("0.1.0", "tautwire trace '<b>.toml'", "2026-01-02T03:04:05Z", {"<b>.toml": "ab" * 32})
+    fmus = write_report(trace, tmp_path, provenance)
     assert read_robot(tmp_path / "robot.toml") == trace.robot_after
-    assert json.loads((tmp_path / "report.json").read_text(encoding="utf-8")) == trace_document(trace)
+    assert (tmp_path / "robot.toml").read_text(encoding="utf-8").startswith(provenance.comment())
+    document = {**trace_document(trace), "provenance": provenance.document()}
+    assert json.loads((tmp_path / "report.json").read_text(encoding="utf-8")) == document
+    metadata = pq.read_schema(tmp_path / "residuals.parquet").metadata
+    assert json.loads(metadata[PROVENANCE_KEY.encode()]) == provenance.document()
+    footer = (tmp_path / "index.html").read_text(encoding="utf-8").rpartition("<footer>")[2].partition("</footer>")[0]
+    assert all(escape(text) in footer for text in ("tautwire trace '<b>.toml'", provenance.created, "ab" * 32))
     links = Page((tmp_path / "index.html").read_text(encoding="utf-8")).links()
     assert sorted(links) == sorted(path.name for path in tmp_path.iterdir() if path.name != "index.html")
     assert {path.name for path in (*fmus.cables, fmus.platform)} < set(links)

@@ -6,6 +6,7 @@ import json
 from html.parser import HTMLParser
 from typing import Any
 
+MAX_PAGE_BYTES = 1_500_000
 VOID = {"meta", "input", "img", "br", "link", "hr"}
 # Attributes that fetch what they name.
 FETCHING = {"src", "srcset", "poster", "data", "action", "background"}

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..linear import LinearPlant
 from ..number_format import format_percent, format_significant
+from ..provenance import Provenance
 from ..robot.schema import Robot
 from . import inline_charts as charts
 from .downsampling import pack_float32
@@ -125,14 +126,14 @@ def _gain_data(system: Any, response: Array, output_index: int, input_index: int
     }
 
 
-def modes_page(robot: Robot, plant: LinearPlant, links: Mapping[str, str]) -> str:
+def modes_page(robot: Robot, plant: LinearPlant, links: Mapping[str, str], provenance: Provenance | None = None) -> str:
     """The page of a robot linearised about rest; ``links`` maps labels to paths beside the page."""
     figures, headline = modes_data(robot, plant), _modes_sentence(plant)
     subject, title = f"{robot.name}, {robot.cable_count} cables", f"{robot.name}: {headline}"
     verdict = ("See the notes", "unexplained") if plant.notes else ("Linear for small motions", "none")
     return render_page(
         "modes",
-        PageHeader("Tautwire linear plant", subject, headline, title, *verdict, links),
+        PageHeader("Tautwire linear plant", subject, headline, title, *verdict, links, provenance),
         figures,
         robot=robot,
         plant=plant,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from base64 import b64encode
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cache
@@ -14,6 +15,7 @@ from markupsafe import Markup, escape
 
 from .. import __version__
 from ..errors import one_line
+from ..provenance import Provenance
 from .inline_charts import Chart
 
 if TYPE_CHECKING:
@@ -24,6 +26,7 @@ EXPONENT_PATTERN = re.compile(r"(?<=\d)e([+-]?)0*(\d+)\b")
 UNIT_EXPONENT_PATTERN = re.compile(r"\^(-?\d+)")
 # A dash that stands alone is an absent number; any other is a minus sign.
 LONE_DASH_PATTERN = re.compile(r"(?<!\S)-(?=[\s,]|$)")
+PLOTLY = "plotly-gl3d-4.1.1.min.js.gz"
 SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "+")
 
 
@@ -31,7 +34,7 @@ SUPERSCRIPTS = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹", "+
 class PageHeader:
     """Header of a page: what made it about what ``subject``, a ``verdict`` in a CSS class, and the ``headline``.
 
-    ``links`` maps labels to files beside the page, such as "robot.toml".
+    ``links`` maps labels to files beside the page, such as "robot.toml"; the footer tells the ``provenance``.
     """
 
     product: str
@@ -41,6 +44,7 @@ class PageHeader:
     verdict: str = ""
     verdict_class: str = "none"
     links: Mapping[str, str] = field(default_factory=dict)
+    provenance: Provenance | None = None
 
 
 @dataclass(frozen=True)
@@ -118,11 +122,10 @@ def _typeset_power(match: re.Match[str]) -> str:
     )
 
 
-def _plotly_script() -> Markup:
-    # Imported here: plotly takes long to import, and only pages with figures need it.
-    from plotly.offline import get_plotlyjs
-
-    return Markup(get_plotlyjs())
+def _packed_plotly() -> Markup:
+    """The vendored plotly.js as base64 of gzip, which a page inflates with ``assets/start.js``."""
+    packed = (files(__package__) / "vendor" / PLOTLY).read_bytes()
+    return Markup(b64encode(packed).decode("ascii"))
 
 
 @cache
@@ -141,5 +144,5 @@ def _environment() -> Environment:
     )
     environment.policies["json.dumps_kwargs"] = {"allow_nan": False, "separators": (",", ":")}
     environment.filters.update(number=typeset_number, prose=typeset_prose, relative_url=relative_url)
-    environment.globals.update(asset=asset, plotly_script=_plotly_script, version=__version__)
+    environment.globals.update(asset=asset, packed_plotly=_packed_plotly, version=__version__)
     return environment

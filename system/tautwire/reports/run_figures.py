@@ -20,7 +20,8 @@ Array = NDArray[np.float64]
 
 # SI units of the display units that are not SI.
 SI_UNITS = {"mm": "m"}
-MAX_SERIES_POINTS = 3000
+MAX_SERIES_NUMBERS = 90_000  # in all curves of a page, times included, which so weighs at most 1.5 MB
+MAX_SERIES_POINTS, MIN_SERIES_POINTS = 3000, 300  # per curve
 MAX_PATH_POINTS = 900
 
 
@@ -76,9 +77,12 @@ def output_series(run: ReportedRun) -> list[OutputSeries]:
 
 def run_data(run: ReportedRun, series: Sequence[OutputSeries]) -> dict[str, Any]:
     """The figure data of a run."""
+    compared_count = sum(each.recorded is not None for each in series)
+    points = MAX_SERIES_NUMBERS // max(1, 2 * len(series) + 4 * compared_count)
+    points = int(np.clip(points, MIN_SERIES_POINTS, MAX_SERIES_POINTS))
     choice = {
         "label": "Run",
-        "channels": [_series_data(run, each) for each in series],
+        "channels": [_series_data(run, each, points) for each in series],
         "scene": scene_data(_run_scene(run)),
     }
     return {
@@ -97,33 +101,33 @@ def _compared(run: ReportedRun, column_index: int, recorded: Array | None) -> tu
     return recorded, thinned_recording[:count] - rows[:count]
 
 
-def _series_data(run: ReportedRun, series: OutputSeries) -> dict[str, Any]:
-    """An output over time, and its recorded values until the run ended."""
+def _series_data(run: ReportedRun, series: OutputSeries, points: int) -> dict[str, Any]:
+    """An output over time, and its recorded values until the run ended, of at most ``points`` points each."""
     time, values = run.overview.curve(series.column_index)
     description: dict[str, Any] = {"label": series.label, "title": series.title, "unit": series.unit}
     curve = {
-        "time": pack_float32(time),
-        "values": pack_float32(series.scale * values),
+        "time": pack_float32(envelope_times(time, points)),
+        "values": pack_float32(series.scale * min_max_envelope(values, points)),
         "range": _range_texts(series.scale * values),
     }
     if series.recorded is None:
         return {**description, **curve, "recorded": None, "difference": None}
     sample_count = int(np.searchsorted(run.recording.time, run.overview.last_time, side="right"))
     recorded = {
-        "time": pack_float32(envelope_times(run.recording.time[:sample_count], MAX_SERIES_POINTS)),
-        "values": pack_float32(series.scale * min_max_envelope(series.recorded[:sample_count], MAX_SERIES_POINTS)),
+        "time": pack_float32(envelope_times(run.recording.time[:sample_count], points)),
+        "values": pack_float32(series.scale * min_max_envelope(series.recorded[:sample_count], points)),
     }
-    return {**description, **curve, "recorded": recorded, "difference": _difference_data(run, series)}
+    return {**description, **curve, "recorded": recorded, "difference": _difference_data(run, series, points)}
 
 
-def _difference_data(run: ReportedRun, series: OutputSeries) -> dict[str, Any] | None:
+def _difference_data(run: ReportedRun, series: OutputSeries, points: int) -> dict[str, Any] | None:
     """Recorded minus co-simulated over time, in a unit of fitting size; None where nothing can be compared."""
     if not math.isfinite(series.rms_difference):
         return None
     unit, unit_size = series.difference_unit
     return {
-        "time": pack_float32(run.overview.time[: len(series.difference)]),
-        "values": pack_float32(series.difference / unit_size),
+        "time": pack_float32(envelope_times(run.overview.time[: len(series.difference)], points)),
+        "values": pack_float32(min_max_envelope(series.difference / unit_size, points)),
         "apart": format_significant(series.rms_difference / unit_size),
         "unit": unit,
     }

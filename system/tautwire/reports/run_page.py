@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -14,6 +14,7 @@ from ..cosimulation import RunStatistics
 from ..cosimulation.result_file import Column
 from ..errors import TautwireError
 from ..number_format import format_engineering, format_significant
+from ..provenance import Provenance
 from ..recordings.recording import read_recording
 from ..robot.schema import AXES, Robot
 from .page_rendering import Number, PageHeader, Row, render_page
@@ -34,11 +35,20 @@ class QuantityView:
     has_recorded: bool
 
 
-def run_page(run: ReportedRun, links: Mapping[str, str]) -> str:
+@dataclass(frozen=True)
+class PageFile:
+    """Where a page is written, with its ``links`` and its ``provenance``."""
+
+    path: Path
+    links: Mapping[str, str] = field(default_factory=dict)
+    provenance: Provenance | None = None
+
+
+def run_page(run: ReportedRun, links: Mapping[str, str], provenance: Provenance | None = None) -> str:
     """The page of a run; ``links`` maps labels to paths beside the page, such as "result.csv"."""
     lines, headline = output_series(run), _run_sentence(run)
     title, subject = f"{run.robot.name}: {headline}", f"{run.robot.name}, {run.robot.cable_count} cables"
-    header = PageHeader("Tautwire run", subject, headline, title, *_verdict(run), links)
+    header = PageHeader("Tautwire run", subject, headline, title, *_verdict(run), links, provenance)
     unread = ", ".join(run.recording.unknown_columns)
     notes = [*run.notes, *([f"Columns of the recording that were not read: {unread}"] if unread else [])]
     statistics = None if run.statistics is None else _statistics_texts(run.statistics)
@@ -123,12 +133,11 @@ MIN_ROWS = 2
 
 @contextmanager
 def atomic_run_page(
-    target: Path | None,
+    target: PageFile | None,
     robot: Robot,
     columns: Sequence[Column],
     overview: RunOverview,
     recording_file: Path,
-    links: Mapping[str, str],
 ) -> Iterator[Callable[[RunStatistics, Sequence[str]], None]]:
     """Context manager that writes a run's page to ``target`` when the block ends; without a ``target`` writes nothing.
 
@@ -139,21 +148,21 @@ def atomic_run_page(
     """
     outcomes: list[tuple[RunStatistics, Sequence[str]]] = []
     failure: TautwireError | None = None
-    with nullcontext() if target is None else atomic_file(target) as scratch:
+    with nullcontext() if target is None else atomic_file(target.path) as scratch:
         try:
             yield lambda statistics, notes: outcomes.append((statistics, notes))
         except TautwireError as error:
             if overview.row_count < MIN_ROWS:
                 raise
             failure = error
-        if scratch is not None:
+        if scratch is not None and target is not None:
             statistics, notes = outcomes[0] if outcomes else (None, ())
             names = tuple(column.name for column in columns[1:])
             recording, failure_text = (
-                read_recording(recording_file, robot.cable_count),
+                read_recording(recording_file, robot.cable_count, robot.recorded_columns),
                 None if failure is None else str(failure),
             )
             run = ReportedRun(robot, names, overview, recording, statistics, tuple(notes), failure_text)
-            scratch.write_text(run_page(run, links), encoding="utf-8")
+            scratch.write_text(run_page(run, target.links, target.provenance), encoding="utf-8")
     if failure is not None:
         raise failure

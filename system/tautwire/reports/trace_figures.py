@@ -24,9 +24,9 @@ from .trace_texts import MeasuredOutput, axis_outputs, cable_outputs
 
 Array = NDArray[np.float64]
 
-MAX_RESIDUAL_POINTS = 260_000  # in all residual curves of a page, which so stays a few MB
+MAX_RESIDUAL_POINTS = 40_000  # in all residual curves of a page, which so weighs at most 1.5 MB
 MAX_CURVE_POINTS, MIN_CURVE_POINTS = 3000, 400  # per curve
-MAX_PATH_POINTS = 900
+MAX_PATH_POINTS, MAX_SCENE_NUMBERS = 900, 20_000  # in the scene of a recording
 ROLE_LABELS = {"fit": "Fit recording", "check": "Check recording"}
 
 
@@ -121,7 +121,8 @@ def _spectrum_data(time: Array, before: Array, after: Array, sigma: float) -> di
 def _trace_scene(trace: Trace, comparison: Comparison) -> RobotScene:
     """The scene of the extended model's run, with the paths of the declared model and of the recording."""
     recording = comparison.recording
-    indices = evenly_spaced_indices(recording.time.size, MAX_PATH_POINTS)
+    column_count = 13 + 2 * trace.robot_after.cable_count  # time, platform, three paths, tensions of model and cells
+    indices = evenly_spaced_indices(recording.time.size, min(MAX_PATH_POINTS, MAX_SCENE_NUMBERS // column_count))
     paths = [
         ScenePath("before", comparison.before.position[indices], "before", 4),
         ScenePath("after", comparison.after.position[indices], "accent", 5),

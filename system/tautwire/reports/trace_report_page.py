@@ -9,10 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from tautwire_fmu.laws.effects import BY_NAME
+
 from ..cosimulation.robot_wiring import PLATFORM
 from ..estimation.localisation.component_residuals import ComponentResidual
 from ..estimation.trace_result import Candidate, FittedParameter, FoundEffect, Trace
 from ..number_format import ABSENT_TEXT, format_engineering, format_percent, format_significant
+from ..provenance import Provenance
 from . import inline_charts as charts
 from .page_rendering import Label, Number, PageHeader, Row, render_page
 from .trace_figures import ROLE_LABELS, measured_outputs, noise_deviation, trace_page_data
@@ -56,12 +59,12 @@ class SearchRound:
     not_fitted: Sequence[Row]
 
 
-def trace_page(trace: Trace, links: Mapping[str, str]) -> str:
+def trace_page(trace: Trace, links: Mapping[str, str], provenance: Provenance | None = None) -> str:
     """The report page; ``links`` maps labels to paths beside the page, such as "robot.toml"."""
     robot, figures = trace.robot_before, trace_page_data(trace)
     subject, title = f"{robot.name}, {robot.cable_count} cables", f"{robot.name}: {trace.sentence}"
     verdict = VERDICTS[trace.verdict]
-    header = PageHeader("Tautwire trace", subject, trace.sentence, title, verdict, trace.verdict, links)
+    header = PageHeader("Tautwire trace", subject, trace.sentence, title, verdict, trace.verdict, links, provenance)
     tables = {
         "total_errors": _total_error_rows(trace),
         "output_errors": _output_error_rows(trace),
@@ -147,9 +150,9 @@ def _effect_rows(trace: Trace, effect: FoundEffect) -> list[Row]:
         text = format_estimate(estimate)
         chart = charts.whisker(estimate.value, estimate.low, estimate.high, estimate.declared)
         value, interval = Number(text.value, strong=True), Number(f"{text.low} to {text.high}")
-        evidence_once = "" if rows else evidence
-        names = effect.name, location, name
-        rows.append([*names, value, interval, Number(text.declared), text.unit, chart, evidence_once])
+        # Named once: each name is one effect, however many parameters it has.
+        names, evidence_once = (("", ""), "") if rows else ((effect.name, location), evidence)
+        rows.append([*names, name, value, interval, Number(text.declared), text.unit, chart, evidence_once])
     return rows
 
 
@@ -232,21 +235,28 @@ def _search_rounds(trace: Trace) -> list[SearchRound]:
 
 
 def _fitted_row(trace: Trace, candidate: Candidate, max_evidence: float) -> Row:
-    name, location, values = _unfitted_row(trace, candidate)
     return [
-        name,
-        location,
+        candidate.name,
+        _candidate_location(trace, candidate),
         Number(format_evidence(candidate.evidence)),
         charts.bar(candidate.evidence, max_evidence, css_class="after" if candidate.accepted else "before"),
         Number(format_significant(candidate.mean_square)),
-        values,
+        Number(values_text(candidate.name, candidate.form_values)),
         Label("taken", "taken") if candidate.accepted else "",
     ]
 
 
 def _unfitted_row(trace: Trace, candidate: Candidate) -> Row:
-    location = cables_text(candidate.cables, trace.robot_before.cable_count) if candidate.cables else PLATFORM
-    return [candidate.name, location, Number(values_text(candidate.name, candidate.form_values))]
+    """A candidate with the values predicted for it; a dash where these are neutral."""
+    parameters = {each.name: each for each in BY_NAME[candidate.name].parameters} if candidate.name in BY_NAME else {}
+    values = candidate.form_values
+    is_neutral = any(name in parameters and parameters[name].neutral == value for name, value in values.items())
+    text = ABSENT_TEXT if is_neutral else values_text(candidate.name, values)
+    return [candidate.name, _candidate_location(trace, candidate), Number(text)]
+
+
+def _candidate_location(trace: Trace, candidate: Candidate) -> str:
+    return cables_text(candidate.cables, trace.robot_before.cable_count) if candidate.cables else PLATFORM
 
 
 def _innovation_rows(trace: Trace) -> list[Row]:

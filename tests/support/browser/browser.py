@@ -39,6 +39,9 @@ FLAGS = (
     "--hide-scrollbars",
 )
 WAIT = 30.0
+# A page with figures has first to inflate what draws them.
+STARTED = """return document.readyState === 'complete'
+  && (!document.getElementById('packed-plotly') || 'started' in document.documentElement.dataset)"""
 # What chromium says of itself, not of the page: software drawing, and how plotly reads pixels back.
 OWN_WORDS = ("GL Driver Message", "willReadFrequently")
 
@@ -79,14 +82,20 @@ class Browser:
         scheme = {"name": "prefers-color-scheme", "value": "dark" if screen.dark else "light"}
         self._command("Emulation.setDeviceMetricsOverride", metrics)
         self._command("Emulation.setTouchEmulationEnabled", {"enabled": screen.phone})
-        self._command("Emulation.setEmulatedMedia", {"features": [scheme]})
+        self._command("Emulation.setEmulatedMedia", {"media": "", "features": [scheme]})
+
+    def show_as_printed(self, width: int) -> None:
+        """Show the open page with the styles of paper, of a width in pixels."""
+        self.run("window.dispatchEvent(new Event('beforeprint'))")
+        self._command("Emulation.setEmulatedMedia", {"media": "print"})
+        self.run("document.body.style.width = `${arguments[0]}px`", width)
 
     def open(self, page: Path) -> None:
         """Open a page from the disk, and forget what was heard before."""
         self.heard()
         self.requests()
         self._driver.get(page.resolve().as_uri())
-        self.wait(lambda: self.run("return document.readyState") == "complete", "the page to load")
+        self.wait(lambda: self.run(STARTED), "the page to load and to start")
 
     def run(self, script: str, *values: Any) -> Any:
         """The result of a script in the page."""
@@ -119,6 +128,31 @@ class Browser:
         shot = self._command("Page.captureScreenshot", {"format": "png", "clip": clip})
         return np.asarray(Image.open(io.BytesIO(base64.b64decode(shot["data"]))).convert("RGB"))
 
+    def drag(self, selector: str, start: tuple[float, float], end: tuple[float, float]) -> None:
+        """Drag the mouse between two points of an element in view, as shares of its width and height."""
+        self._move_mouse("mouseMoved", *self._point(selector, start))
+        self._move_mouse("mousePressed", *self._point(selector, start))
+        for share in (0.3, 0.7, 1.0):
+            point = tuple(a + share * (b - a) for a, b in zip(start, end, strict=True))
+            self._move_mouse("mouseMoved", *self._point(selector, point))
+        self._move_mouse("mouseReleased", *self._point(selector, end))
+
+    def double_click(self, selector: str) -> None:
+        """Click twice in the middle of an element in view."""
+        for count in (1, 2):
+            for event in ("mousePressed", "mouseReleased"):
+                self._move_mouse(event, *self._point(selector, (0.5, 0.5)), count)
+
+    def downloaded(self, script: str, folder: Path) -> Path:
+        """The file that a script of the page makes the browser save in an empty folder."""
+        self._command("Browser.setDownloadBehavior", {"behavior": "allow", "downloadPath": str(folder)})
+        self.run(script)
+        unfinished = (".crdownload", ".tmp")
+        return self.wait(
+            lambda: [p for p in folder.iterdir() if p.suffix not in unfinished and p.name[0] != "."],
+            "a file to be saved",
+        )[0]
+
     def press(self, *keys: str) -> None:
         """Press keys where the focus is; names such as "TAB" or letters."""
         for key in keys:
@@ -135,6 +169,15 @@ class Browser:
         asked = [event["params"] for event in events if event["method"] == "Network.requestWillBeSent"]
         sockets = [event["params"]["url"] for event in events if event["method"] == "Network.webSocketCreated"]
         return [each["request"]["url"] for each in asked] + sockets
+
+    def _point(self, selector: str, shares: tuple[float, ...]) -> list[float]:
+        script = """const box = document.querySelector(arguments[0]).getBoundingClientRect();
+        return [box.left + arguments[1][0] * box.width, box.top + arguments[1][1] * box.height]"""
+        return [float(each) for each in self.run(script, selector, shares)]
+
+    def _move_mouse(self, event: str, x: float, y: float, clicks: int = 1) -> None:
+        values = {"type": event, "x": x, "y": y, "button": "left", "buttons": 1, "clickCount": clicks}
+        self._command("Input.dispatchMouseEvent", values)
 
     def _command(self, name: str, values: dict[str, Any]) -> Any:
         return self._driver.execute_cdp_cmd(name, values)

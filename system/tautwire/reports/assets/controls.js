@@ -1,6 +1,6 @@
 // Controls, and drawing of what comes into view.
 
-const state = { choice: 0, place: 0, times: 1, view: "perspective", scale: "all", timer: 0 };
+const state = { choice: 0, place: 0, times: 1, view: "perspective", scale: "all", span: null, timer: 0 };
 const slider = document.getElementById("time");
 const chosen = () => report.choices[state.choice];
 const stale = new Set();
@@ -9,7 +9,7 @@ const stale = new Set();
 function drawFigure(figure) {
   stale.delete(figure);
   if (figure.classList.contains("scene")) drawScene(chosen(), state.place, state.times, state.view);
-  else drawPanel(figure, chosen(), state.scale);
+  else drawPanel(figure);
   document.documentElement.dataset.drawn = String(document.querySelectorAll(".js-plotly-plot").length);
 }
 
@@ -22,12 +22,31 @@ const watcher = new IntersectionObserver((entries) => {
   }
 }, { rootMargin: "600px 0px" });
 
-/** Draw figures again: those in view at once, the others when they come into view. */
-function redraw(selector) {
+/** Draw figures again but for one: those in view at once, the others when they come into view. */
+function redraw(selector, except = null) {
   for (const figure of document.querySelectorAll(selector)) {
+    if (figure === except) continue;
     stale.add(figure);
     if (inView.has(figure)) drawFigure(figure);
   }
+}
+
+/** Draw all that is not drawn yet, and open what is folded. */
+function preparePrint() {
+  [...stale].forEach(drawFigure);
+  document.querySelectorAll(".js-plotly-plot").forEach(fitPaper);
+  for (const folded of document.querySelectorAll("details")) folded.open = true;
+  if (sceneFigure && has3d) showPicture(sceneFigure);
+}
+
+/** Lay a picture over a scene in 3D, whose own drawing area browsers leave blank on paper. */
+function showPicture(plot) {
+  plot.querySelector(".on-paper")?.remove();
+  const picture = new Image();
+  picture.className = "on-paper";
+  picture.alt = "";
+  picture.src = plot._fullLayout.scene._scene.toImage("png");
+  plot.querySelector(".gl-container").append(picture);
 }
 
 function showTime() {
@@ -87,6 +106,7 @@ function play() {
 function choose(index) {
   stop();
   state.choice = index;
+  state.span = null;
   state.place = 0;
   state.times = chosen().scene.magnify;
   const magnify = document.getElementById("magnify");
@@ -130,7 +150,7 @@ function start() {
   });
   document.getElementById("play").addEventListener("click", () => (state.timer ? stop() : play()));
   window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => redraw("figure"));
-  window.addEventListener("beforeprint", () => [...stale].forEach(drawFigure));
+  window.addEventListener("beforeprint", preparePrint);
   state.scale = radio("scale", (value) => {
     state.scale = value;
     redraw("figure[data-kind=residual]");

@@ -54,7 +54,14 @@ function layout(colour, more) {
   };
 }
 
-const config = { displayModeBar: false, responsive: true, showTips: false };
+const config = { displayModeBar: false, responsive: true, showTips: false, doubleClick: false };
+
+/** Let the style sheet shrink a drawn figure to the width of paper: a drawing without a view box would be cut. */
+function fitPaper(plot) {
+  const { width, height } = plot._fullLayout;
+  plot.style.setProperty("--shape", `${width} / ${height}`);
+  for (const drawing of plot.querySelectorAll(".main-svg")) drawing.setAttribute("viewBox", `0 0 ${width} ${height}`);
+}
 
 /** A number with three significant digits, with four where these are whole, as the tables write it. */
 function significant(value) {

@@ -69,14 +69,19 @@ function frequencyBands(bands, frequencies, colour) {
 }
 
 /**
- * Draw what a panel's kind makes of a choice.
+ * What a panel's kind makes of what is chosen.
  *
  * A kind gives traces and layout, or why there is nothing to draw (empty); numbers for the caption; words for those
- * who cannot see the figure.
+ * who cannot see the figure; and columns to save where the lines are not the data.
  */
-function drawPanel(panel, choice, scale) {
-  const drawn = panelKinds[panel.dataset.kind](choice, Number(panel.dataset.channel), scale);
+function panelOf(panel) {
+  return panelKinds[panel.dataset.kind](chosen(), Number(panel.dataset.channel), state.scale);
+}
+
+function drawPanel(panel) {
+  const drawn = panelOf(panel);
   const plot = panel.querySelector(".plot");
+  panel.querySelector(".tools").hidden = Boolean(drawn.empty);
   panel.querySelector(".numbers").textContent = drawn.numbers;
   plot.setAttribute("aria-label", drawn.words);
   plot.classList.toggle("empty", Boolean(drawn.empty));
@@ -85,6 +90,10 @@ function drawPanel(panel, choice, scale) {
     plot.textContent = drawn.empty;
     return;
   }
-  if (!plot.classList.contains("js-plotly-plot")) plot.textContent = "";
+  if (state.span && panel.matches(overTime)) drawn.layout.xaxis.range = [...state.span];
+  const isNew = !plot.on;
+  if (isNew) plot.textContent = "";
   Plotly.react(plot, drawn.traces, drawn.layout, config);
+  if (isNew) followZoom(panel, plot);
+  fitPaper(plot);
 }

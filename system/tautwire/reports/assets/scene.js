@@ -122,7 +122,9 @@ function drawScene(choice, place, times, view) {
   const paths = scene.paths.map((path) => pathTrace(path, scene, times, colour));
   const traces = [cableTrace(scene, place, colour), ...pointTraces(scene, place, colour), ...paths];
   if (!has3d) return drawFlat(traces, view, colour);
-  return Plotly.react(sceneFigure, traces, sceneLayout(colour), config);
+  const drawn = Plotly.react(sceneFigure, traces, sceneLayout(colour), config);
+  drawn.then(fitPaper);
+  return drawn;
 }
 
 /** Move what the slider moves: the cables, the first trace, and the platform, the third. */

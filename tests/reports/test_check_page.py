@@ -1,0 +1,102 @@
+"""The page of a check: what was read, how it fits the robot, and the problems with what mends them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import pandas as pd
+import pytest
+
+from tautwire.cli import run
+from tautwire.cli.input_checks import check_files
+from tautwire.reports.check_page import CheckedFiles, check_page
+from tautwire.reports.downsampling import unpack_float32
+from tests.support.pages import MAX_PAGE_BYTES, Page
+from tests.support.robots import EXAMPLES
+from tests.support.traces import HOSTILE
+
+ROBOT, FIT = (EXAMPLES / "three" / name for name in ("robot.toml", "fit.csv"))
+SECTIONS = ["robot", "speeds", "lengths", "tensions", "read"]
+
+
+def report_of(folder: Path, recording: Path, exit_status: int) -> Page:
+    """The page that the command writes of a recording."""
+    page = folder / "check.html"
+    assert run(["check", str(ROBOT), str(recording), "--report", str(page)]) == exit_status
+    assert page.stat().st_size < MAX_PAGE_BYTES
+    return Page(page.read_text(encoding="utf-8"))
+
+
+def sections(page: Page) -> list[str]:
+    """Ids of the sections except the notes."""
+    return [each["id"] for each in page.all("section") if each["id"] != "notes"]
+
+
+def slopes(page: Page) -> list[float]:
+    """Slopes in the captions of the panels of rope lengths."""
+    channels = page.data()["choices"][0]["channels"]
+    return [float(each["numbers"].split()[1]) for each in channels if each["title"] == "Shortening"]
+
+
+@pytest.fixture(scope="module")
+def fit_page(tmp_path_factory: pytest.TempPathFactory) -> Page:
+    """The page of a correct recording."""
+    return report_of(tmp_path_factory.mktemp("page"), FIT, 0)
+
+
+def test_page_of_a_correct_recording_has_every_section_and_no_problem(fit_page: Page) -> None:
+    assert sections(fit_page) == SECTIONS
+    assert "No problems found" in fit_page.text and fit_page.open == []
+    assert slopes(fit_page) == pytest.approx([1.0, 1.0, 1.0], abs=0.05)
+
+
+def test_panels_hold_what_was_recorded_and_what_balances(fit_page: Page) -> None:
+    recorded, channels = pd.read_csv(FIT), fit_page.data()["choices"][0]["channels"]
+    assert [each["title"] for each in channels] == 3 * ["Winch speed"] + 3 * ["Shortening"] + 3 * ["Tension"]
+    speed = unpack_float32(channels[0]["curves"][0]["y"])
+    assert speed.max() == pytest.approx(recorded["winch_speed_1"].max(), rel=1e-6)
+    measured, balanced = (unpack_float32(curve["y"]) for curve in channels[6]["curves"])
+    assert measured == pytest.approx(balanced, rel=0.05)
+
+
+def test_problem_of_speeds_in_mm_per_second_stands_on_the_page_with_what_mends_it(tmp_path: Path) -> None:
+    recorded, wrong = pd.read_csv(FIT), tmp_path / "wrong.csv"
+    speeds = [name for name in recorded if name.startswith("winch_speed_")]
+    recorded[speeds] *= 1000.0
+    recorded.to_csv(wrong, index=False)
+    page = report_of(tmp_path, wrong, 2)
+    assert sections(page) == ["problems", *SECTIONS]
+    assert "are in mm/s" in page.text and "multiply them by 0.001" in page.text
+    assert slopes(page) == pytest.approx([1e-3, 1e-3, 1e-3], rel=0.05)
+
+
+def test_page_of_an_unreadable_recording_shows_the_robot_alone(tmp_path: Path) -> None:
+    wrong = tmp_path / "wrong.csv"
+    wrong.write_text("time,winch_speed_1,winch_speed_2,winch_speed_3,x\n0.0,0,0,0,a\n0.1,0,0,0,1\n", encoding="utf-8")
+    page = report_of(tmp_path, wrong, 2)
+    assert sections(page) == ["problems", "robot"]
+    assert "No recording could be read" in page.text
+
+
+def test_robot_file_without_geometry_leaves_no_page(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    robot, page = tmp_path / "robot.toml", tmp_path / "check.html"
+    robot.write_text("name = \n", encoding="utf-8")
+    assert run(["check", str(robot), "--report", str(page)]) == 2
+    assert not page.exists() and "was not written" in capsys.readouterr().err
+
+
+def test_hostile_names_do_nothing() -> None:
+    result = check_files(ROBOT, FIT)
+    assert result.robot is not None
+    checked = CheckedFiles(result.robot, result.recording, ((HOSTILE, HOSTILE, HOSTILE),), (HOSTILE,))
+    page = Page(check_page(checked, {}))
+    assert "img" not in [tag for tag, _ in page.elements] and page.open == []
+
+
+@pytest.mark.parametrize("absent", ["recording", "columns"])
+def test_the_page_tells_of_files_that_are_not_there(absent: str, tmp_path: Path) -> None:
+    robot, page = str(EXAMPLES / "three" / "robot.toml"), tmp_path / "check.html"
+    recording = str(tmp_path / "absent.csv" if absent == "recording" else EXAMPLES / "three" / "fit.csv")
+    options = [] if absent == "recording" else ["--columns", str(tmp_path / "absent.toml")]
+    assert run(["check", robot, recording, *options, "--report", str(page)]) == 2
+    assert "there is no such file" in page.read_text(encoding="utf-8")
