@@ -10,7 +10,7 @@ import pytest
 
 from tautwire.cosimulation import result_file
 from tautwire.cosimulation.isolation import CALL_TIMEOUT
-from tautwire.cosimulation.recording_simulation import simulate_recording
+from tautwire.cosimulation.recording_simulation import read_recorded_inputs, simulate_recording
 from tautwire.cosimulation.result_file import open_result_file
 from tautwire.cosimulation.robot_wiring import result_columns
 from tautwire.cosimulation.run_arguments import SimulationOptions
@@ -31,7 +31,10 @@ def test_the_recorder_gets_a_row_for_every_sample_until_the_end(tmp_path: Path) 
     write_recording(tmp_path / "recording.parquet", 50)
     rows, robot = Rows(), example("three")
     statistics, notes = simulate_recording(
-        robot, tmp_path / "recording.parquet", rows, SimulationOptions(0.5 * STEP, until=0.02), lambda what, done: None
+        read_recorded_inputs(robot, tmp_path / "recording.parquet", 0.02),
+        rows,
+        SimulationOptions(0.5 * STEP),
+        lambda what, done: None,
     )
     assert [time for time, _ in rows] == pytest.approx(np.arange(21) * STEP)
     assert {row.shape for _, row in rows} == {(len(result_columns(3)) - 1,)}
@@ -43,13 +46,7 @@ def test_the_recorder_gets_a_row_for_every_sample_until_the_end(tmp_path: Path) 
 def test_less_than_two_samples_are_refused(tmp_path: Path) -> None:
     write_recording(tmp_path / "recording.parquet", 50)
     with pytest.raises(RecordingError, match="fewer than two samples"):
-        simulate_recording(
-            example("three"),
-            tmp_path / "recording.parquet",
-            Rows(),
-            SimulationOptions(STEP, until=-1.0),
-            lambda what, done: None,
-        )
+        read_recorded_inputs(example("three"), tmp_path / "recording.parquet", -1.0)
 
 
 @pytest.mark.validate
@@ -65,8 +62,7 @@ def test_memory_stays_flat_over_a_long_run(tmp_path: Path, monkeypatch: pytest.M
 
     with open_result_file(tmp_path / "result.parquet", result_columns(3)) as rows:
         simulate_recording(
-            example("three"),
-            tmp_path / "recording.parquet",
+            read_recorded_inputs(example("three"), tmp_path / "recording.parquet"),
             rows,
             SimulationOptions(STEP, call_timeout=CALL_TIMEOUT),
             look,

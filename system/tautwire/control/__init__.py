@@ -9,6 +9,7 @@ from .closed_loop import (
     cosimulate_with_controller,
     sample_times,
 )
+from .controller_fmu import ControllerFmuError
 from .design import (
     POSITION_NOISE,
     TENSION_NOISE,
@@ -20,6 +21,7 @@ from .design import (
     StretchError,
     measurement_noise,
 )
+from .external_controller import ControllerError, fmu_controller, function_controller, state_space_controller
 from .feedforward import Reference, elastic_reference, path_tensions, rigid_reference
 from .gain_scheduling import ScheduledController, schedule_controller
 from .hinf_loop_shaping import RobustAim, RobustController, design_robust, schedule_robust
@@ -35,6 +37,8 @@ __all__ = [
     "ClosedLoopOptions",
     "ControlAim",
     "Controller",
+    "ControllerError",
+    "ControllerFmuError",
     "Design",
     "Feedforward",
     "Knot",
@@ -57,6 +61,8 @@ __all__ = [
     "design_controller",
     "design_robust",
     "elastic_reference",
+    "fmu_controller",
+    "function_controller",
     "margins_of",
     "margins_over",
     "measurement_noise",
@@ -73,4 +79,5 @@ __all__ = [
     "shaper",
     "shaper_for_modes",
     "speed_controller",
+    "state_space_controller",
 ]

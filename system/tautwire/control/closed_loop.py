@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from control import StateSpace
 from numpy.typing import ArrayLike, NDArray
 
 from ..array_validation import validate_array, validate_increasing
@@ -34,9 +35,10 @@ from ..validation import (
     validate_integer,
     validate_number,
 )
-from .design import Design
+from .design import ControlAim, Design
+from .external_controller import SpeedLaw, designed, path_source
 from .feedforward import Reference, elastic_reference
-from .path_controller import PathController, controller_data
+from .path_controller import controller_data
 
 Array = NDArray[np.float64]
 
@@ -107,32 +109,40 @@ class RunOptions:
 class ClosedLoopOptions(RunOptions):
     """Options of a run whose controller is in the master: ``seed`` enables the noise of the robot's sensors.
 
-    ``reference`` is at the controller's samples, by default that of the elastic model.
+    ``reference`` is at the controller's samples, by default that of the elastic model. ``aim`` has the sample period
+    and the limits of a controller that is no design; ``discretisation`` of a continuous one is ``tustin`` or ``zoh``.
     """
 
     seed: int | None = None
     reference: Reference | None = None
+    aim: ControlAim | None = None
+    discretisation: str = "tustin"
 
 
 def cosimulate_closed_loop(
     fmus: RobotFmus,
     robot: Robot,
-    controller: Design,
+    controller: Design | StateSpace | SpeedLaw | str | Path,
     trajectory: Trajectory,
     duration: float,
     options: ClosedLoopOptions | None = None,
 ) -> CosimulationResult:
     """Co-simulates the FMUs in closed loop over N whole samples until ``duration`` (s) is reached.
 
+    ``controller`` is a design, a python-control StateSpace (:func:`state_space_controller`), a function
+    ``(time, measured) -> speeds`` (:func:`function_controller`) or a controller FMU (:func:`fmu_controller`).
     ``robot`` is the controller's model. Returns the run at the controller's samples. With winches the controller's
     speeds are their commands.
 
-    Raises UnreachableError where the path requires a cable to push, StretchError where no speeds follow it, RunError
-    where an FMU fails, InputError where an FMU lacks a tension output or robot, controller and FMUs do not match,
-    ArgumentError for an invalid argument.
+    Raises ControllerError where a function fails, UnreachableError where the path requires a cable to push,
+    StretchError where no speeds follow it, RunError where an FMU fails, ControllerFmuError where a controller FMU does
+    not fit, InputError where an FMU lacks a tension output or robot, controller and FMUs do not match, ArgumentError
+    for an invalid argument.
     """
     caller, options = "cosimulate_closed_loop", options or ClosedLoopOptions()
     validate_fmus(f"{caller}: fmus", fmus)
+    validate_robot(f"{caller}: robot", robot)
+    controller = designed(f"{caller}: controller", controller, robot.cable_count, options.aim, options.discretisation)
     _require_design(caller, robot, controller, trajectory)
     validate_number(f"{caller}: duration", duration, RUN_DURATION_RULE)
     if options.seed is not None:
@@ -144,9 +154,9 @@ def cosimulate_closed_loop(
     if options.reference is not None:
         _require_reference(caller, options.reference, len(times), robot.cable_count)
     force = _external_force(caller, options, len(times))
-    source: InputSource = PathController(robot, controller, trajectory, times, options.seed, options.reference)
-    extra = AdditionalComponents(external_inputs=FORCE_PORTS) if force else NO_ADDITIONAL_COMPONENTS
-    return _run(fmus, JoinedSources((source, *force)) if force else source, times, options, extra)
+    with path_source(robot, controller, trajectory, times, options.seed, options.reference) as source:
+        extra = AdditionalComponents(external_inputs=FORCE_PORTS) if force else NO_ADDITIONAL_COMPONENTS
+        return _run(fmus, JoinedSources((source, *force)) if force else source, times, options, extra)
 
 
 def build_controller_fmu(

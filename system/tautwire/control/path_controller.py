@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautwire_fmu.laws import sampled_control as law
-from tautwire_fmu.laws.sampled_control import Limits
+from tautwire_fmu.laws.sampled_control import ControllerState, Limits
 from tautwire_fmu.laws.winch_drive import NO_LIMIT
 
 from ..errors import InputError
@@ -101,6 +101,7 @@ class PathController:
     ) -> None:
         self.controller = controller
         reference = reference or elastic_reference(robot, trajectory, times)
+        self.reference = reference
         self.plan = law.plan_from_resource(controller_data(robot, controller, reference))
         self.limits = control_limits(robot, controller)
         self.noise = np.zeros_like(reference.expected)
@@ -128,14 +129,16 @@ class PathController:
         start = begin + (time - self.times[index]) * rate
         return np.column_stack([start, rate]).ravel(), np.column_stack([start + step * rate, rate]).ravel()
 
+    def _next_state(self, controller_state: ControllerState, measurement: list[float]) -> ControllerState:
+        """The state of the next sample, from the measurement at the beginning of this one."""
+        return law.next_controller_state(self.plan, self.limits, controller_state, measurement)
+
     def _take_sample(self, index: int, outputs: Array) -> None:
         """Takes a sample once; the measurement of the previous sample is then processed and acts."""
         if self._measurement is not None and index == self._controller_state.sample:
             return
         if self._measurement is not None:
-            self._controller_state = law.next_controller_state(
-                self.plan, self.limits, self._controller_state, self._measurement
-            )
+            self._controller_state = self._next_state(self._controller_state, self._measurement)
             self._speeds.append(self._controller_state.end)
         count = self.controller.cable_count
         measured = np.concatenate([outputs[:3], outputs[6 : 6 + count]])

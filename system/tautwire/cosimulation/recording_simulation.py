@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -78,29 +79,45 @@ def step_doubling_note(run: Run, time: Array, step: float, positions: Array) -> 
     return f"estimated error of the position{period}: {position_error:.2g} m, from a second run with half the step"
 
 
-def simulate_recording(
-    robot: Robot, path: Path, recorder: Recorder, options: SimulationOptions, progress: Callable[[str, float], None]
-) -> tuple[RunStatistics, tuple[str, ...]]:
-    """Record a run at the recording's times; returns its statistics and notes for the user.
+@dataclass(frozen=True, eq=False)
+class RecordedInputs:
+    """The robot at the start of a recording, the recorded winch speeds, and notes for the user on both.
 
-    Raises RecordingError where fewer than two samples lie before ``until``, ComponentError where an FMU fails: the
-    recorder has what came before.
+    Measurements are no part of it, so that they need not stay in memory through a long run.
     """
-    recording = read_recording(path, robot.cable_count)
+
+    robot: Robot
+    inputs: PiecewiseLinearInput
+    notes: tuple[str, ...]
+
+
+def read_recorded_inputs(robot: Robot, path: Path, until: float | None = None) -> RecordedInputs:
+    """Read the winch speeds of a recording up to ``until`` (s); RecordingError where these are fewer than two."""
+    recording = read_recording(path, robot.cable_count, robot.recorded_columns)
     noise = robot.sensors.position_noise or white_noise_deviation(recording.position)
     start, notes = start_position(robot, noise, recording)
-    count = _sample_count(recording, options.until)
+    count = _sample_count(recording, until)
     inputs = PiecewiseLinearInput(recording.time[:count], recording.winch_speed[:count])
-    # The start is known; measurements need not stay in memory through a long run.
-    del recording
     if robot.winch_numbers:
         notes = (*notes, f"{path}: winch speeds are taken as commands of the winches")
     notes = (*notes, *notes_on_unstated_units(robot.fmus, robot.cable_count))
+    return RecordedInputs(with_true_start(with_measured_start(robot, start)), inputs, notes)
+
+
+def simulate_recording(
+    recorded: RecordedInputs,
+    recorder: Recorder,
+    options: SimulationOptions,
+    progress: Callable[[str, float], None],
+) -> tuple[RunStatistics, tuple[str, ...]]:
+    """Record a run at the recording's times; returns its statistics and notes for the user.
+
+    Raises ComponentError where an FMU fails: the recorder has what came before.
+    """
     with TemporaryDirectory(prefix="tautwire-simulate-") as folder:
-        robot_at_start = with_true_start(with_measured_start(robot, start))
-        fmus = build_fmus(robot_at_start, Path(folder), partial(progress, "building"))
-        statistics, run_notes = _run_with_error_estimate(fmus, inputs, recorder, options, progress)
-    return statistics, (*notes, *run_notes, *statistics.warnings())
+        fmus = build_fmus(recorded.robot, Path(folder), partial(progress, "building"))
+        statistics, run_notes = _run_with_error_estimate(fmus, recorded.inputs, recorder, options, progress)
+    return statistics, (*recorded.notes, *run_notes, *statistics.warnings())
 
 
 def _run_with_error_estimate(
