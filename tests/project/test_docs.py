@@ -12,7 +12,9 @@ from typing import Any
 
 import pytest
 
+import tautwire
 from tautwire.campaigns import plan_file as plans
+from tautwire.cli import run as command
 from tautwire.cosimulation.robot_wiring import result_columns
 from tautwire.estimation.trace_result import Correlation, FittedParameter, Resonance
 from tautwire.linear import linearise
@@ -55,17 +57,20 @@ def code_of(page: str) -> dict[str, str]:
 @pytest.mark.parametrize("page", ["index.md", "linear.md"])
 def test_examples_of_a_page_run(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
+    assert command(["example", "three", "."]) == 0
     for code in code_of(page).values():
         exec(compile(code, page, "exec"), {})
 
 
 def test_example_of_the_controllers_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
-    (example,) = code_of("control.md").values()
-    results: dict[str, object] = {}
-    exec(compile(example, "control.md", "exec"), results)
-    difference = results["motion"].position - results["same"].position  # type: ignore[attr-defined]
-    assert abs(difference).max() < 1e-9
+    results: dict[str, Any] = {}
+    for code in code_of("control.md").values():
+        exec(compile(code, "control.md", "exec"), results)
+    for name in ("same", "by_fmu"):
+        assert abs(results["motion"].position - results[name].position).max() < 1e-9
+    for name in ("filtered", "proportional"):
+        assert abs(results[name].position[-1] - results["path"].end).max() < 0.02
 
 
 def test_an_effect_is_added_by_following_its_page(tmp_path: Path) -> None:
@@ -99,8 +104,14 @@ def test_the_site_builds_without_a_warning_and_asks_nothing_of_the_network(tmp_p
     pytest.importorskip("material", reason="mkdocs-material is not installed: pip install mkdocs-material")
     build = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(tmp_path)]
     subprocess.run(build, cwd=ROOT, env={**os.environ, "NO_MKDOCS_2_WARNING": "1"}, check=True, timeout=120)
-    pages = list(tmp_path.glob("*.html"))
-    assert {path.stem for path in DOCS.glob("*.md")} <= {page.stem for page in pages}
+    pages = list(tmp_path.rglob("*.html"))
+    sources = [*DOCS.glob("*.md"), *DOCS.glob("tutorials/*.ipynb")]
+    assert {path.stem for path in sources} <= {page.stem for page in pages}
+    mathematics = (tmp_path / "mathematics.html").read_text(encoding="utf-8")
+    assert mathematics.count("<math") > 40 and "$" not in mathematics
+    reference = (tmp_path / "reference.html").read_text(encoding="utf-8")
+    assert [name for name in tautwire.__all__ if f'id="tautwire.{name}"' not in reference] == []
+    assert "Raises RobotFileError" in reference and ":func:" not in reference
     for page in pages:
         loaded = re.findall(
             r"<(?:script|link|img|iframe)[^>]*?(?:src|href)=\"?([^\s\">]+)", page.read_text(encoding="utf-8")

@@ -18,7 +18,7 @@ from tautwire.fmus.packaging import RobotFmus
 from tests.support.robots import EXAMPLES, example
 
 THREE = EXAMPLES / "three"
-SLOW = ("casadi", "control", "plotly", "pandas", "fmpy", "scipy", "numpy", "matplotlib")
+SLOW = ("casadi", "control", "pandas", "fmpy", "scipy", "numpy", "matplotlib")
 
 
 def test_every_name_is_there_and_described() -> None:

@@ -1,7 +1,9 @@
-"""The README's Python and commands run as they stand."""
+"""The README's Python and shell blocks run as they are printed."""
 
+import os
 import re
-import shlex
+import subprocess
+import sys
 from pathlib import Path
 
 import pytest
@@ -9,11 +11,34 @@ import pytest
 from tautwire.cli import app
 from tautwire.cli import run as command
 from tests.support.folders import ROOT
-from tests.support.robots import EXAMPLES
 
-# Traces, programs and the paper take minutes and have tests of their own; a campaign needs a plan of the user's.
-LEFT_OUT = ("trace", "excite", "paper", "campaign")
 README = ROOT / "README.md"
+# Commands that take more than ten seconds.
+LONG = ("trace", "simulate", "material", "excite", "campaign", "paper")
+# tests/project/test_wheel.py installs it.
+INSTALLED = "pip install"
+
+
+def blocks_of(language: str) -> list[str]:
+    """The README's blocks of a language; those of the shell have an empty one."""
+    pairs = re.findall(r"^```(\w*)\n(.*?)^```$", README.read_text(encoding="utf-8"), re.DOTALL | re.MULTILINE)
+    return [text for name, text in pairs if name == language]
+
+
+def shell_blocks() -> list[str]:
+    """The shell blocks that need no installation."""
+    return [block for block in blocks_of("") if not block.startswith(INSTALLED)]
+
+
+def run_in_shell(script: str, folder: Path) -> None:
+    """Runs a block line by line, as it is typed, with this environment's commands; the first failure ends it."""
+    paths = os.pathsep.join((str(Path(sys.executable).parent), os.environ["PATH"]))
+    subprocess.run(["sh", "-eu", "-c", script], cwd=folder, env={**os.environ, "PATH": paths}, check=True, timeout=1500)
+
+
+def written_by(script: str) -> list[str]:
+    """What the commands of a block are told to write."""
+    return re.findall(r"--(?:out|report|plot) (\S+)", script)
 
 
 @pytest.mark.validate
@@ -21,7 +46,8 @@ def test_every_python_example_runs(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    examples = re.findall(r"```python\n(.*?)```", README.read_text(encoding="utf-8"), re.DOTALL)
+    assert command(["example", "three"]) == 0
+    examples = blocks_of("python")
     assert len(examples) >= 4
     for example in examples:
         exec(compile(example, str(README), "exec"), {})
@@ -35,26 +61,25 @@ def test_every_command_is_named() -> None:
         assert each.callback and f"\ntautwire {each.callback.__name__} " in shown
 
 
-def shown_commands() -> list[list[str]]:
-    """The words of each command shown, without comments, the shipped robot in the place of the shell's variable."""
-    lines = re.findall(r"^tautwire (.*)$", README.read_text(encoding="utf-8"), re.MULTILINE)
-    return [shlex.split(line.replace("$E", str(EXAMPLES / "three")), comments=True) for line in lines]
+@pytest.mark.validate
+@pytest.mark.parametrize("block", shell_blocks(), ids=["main job", "commands"])
+def test_every_shell_block_runs_as_printed(block: str, tmp_path: Path) -> None:
+    run_in_shell(block, tmp_path)
+    folder = tmp_path / "three" if "\ncd three\n" in block else tmp_path
+    assert written_by(block) and all((folder / each).exists() for each in written_by(block))
 
 
-def test_the_shell_s_variable_is_the_folder_of_a_shipped_robot() -> None:
-    (folder,) = re.findall(r"^E=(\S+)", README.read_text(encoding="utf-8"), re.MULTILINE)
-    assert (README.parent / folder).resolve() == (EXAMPLES / "three").resolve()
+def test_every_shell_block_runs_without_its_long_commands(tmp_path: Path) -> None:
+    for number, block in enumerate(shell_blocks()):
+        lines = [line for line in block.splitlines() if not line.startswith(tuple(f"tautwire {each}" for each in LONG))]
+        folder = tmp_path / str(number)
+        folder.mkdir()
+        run_in_shell("\n".join(lines), folder)
 
 
-@pytest.mark.validate(but=["new", "check", "build", "fmus"])
-@pytest.mark.parametrize(
-    "words", [each for each in shown_commands() if each[0] not in LEFT_OUT], ids=lambda each: each[0]
-)
-def test_every_command_runs(words: list[str], tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.chdir(tmp_path)
-    assert command(words) == 0
-    written = [words[k + 1] for k, word in enumerate(words) if word in ("--out", "--report", "--plot")]
-    assert all((tmp_path / each).exists() for each in written)
+def test_what_is_installed_is_this_project() -> None:
+    (block,) = [block for block in blocks_of("") if block.startswith(INSTALLED)]
+    assert block.split()[:4] == ["pip", "install", ".", "#"]
 
 
 def test_it_is_short() -> None:

@@ -2,6 +2,7 @@
 
 import hashlib
 import os
+import re
 import shutil
 import subprocess
 import sys
@@ -13,7 +14,6 @@ import pytest
 
 from tests.support.folders import ROOT
 
-EXAMPLE = ROOT / "system" / "tautwire" / "examples" / "caroca"
 ENVIRONMENTS = ROOT / ".venv-wheels"
 SUPPORTED = ("3.10", "3.11", "3.12", "3.13")
 
@@ -56,12 +56,24 @@ def test_both_packages_and_the_examples_are_in_the_wheel(built: Path) -> None:
         "tautwire/py.typed",
         "tautwire/reports/assets/style.css",
         "tautwire/reports/templates/base.html.jinja",
+        "tautwire/fmus/templates/fmu.html.jinja",
+        "tautwire/fmus/icons/point_mass.png",
+        "tautwire/reports/vendor/plotly-gl3d-4.1.1.min.js.gz",
+        "tautwire/reports/vendor/plotly-LICENSE",
         "tautwire/examples/three/robot.toml",
         "tautwire/examples/three/fit.csv",
+        "tautwire/examples/three/plan.toml",
         "tautwire_fmu/slaves.py",
         "tautwire_fmu/laws/effects/damping.py",
     } <= names
     assert not [name for name in names if name.startswith(("tests", "build")) or "__pycache__" in name]
+
+
+@pytest.mark.validate
+def test_the_readme_states_the_size_of_the_wheel(built: Path) -> None:
+    (wheel,) = built.glob("tautwire-*.whl")
+    (stated,) = re.findall(r"The wheel is ([\d.]+) MB", (ROOT / "README.md").read_text(encoding="utf-8"))
+    assert float(stated) == pytest.approx(wheel.stat().st_size / 1e6, rel=0.1)
 
 
 @pytest.mark.validate
@@ -106,9 +118,10 @@ def test_it_works_with_nothing_but_what_it_declares(version: str, built: Path, t
     # This Python takes the sdist, the others the wheel.
     (package,) = built.glob("tautwire-*.tar.gz" if python == sys.executable else "tautwire-*.whl")
     environment = environment_with(package, python, version)
-    shutil.copytree(EXAMPLE, work / "caroca")
+    work.mkdir()
     for arguments in (
         ["new", "hall"],
+        ["example", "caroca"],
         ["check", "caroca/robot.toml", "caroca/fit.csv"],
         ["build", "caroca/robot.toml", "--out", "fmus"],
         ["simulate", "caroca/robot.toml", "--speeds", "caroca/fit.csv", "--until", "0.5", "--out", "result.csv"],
