@@ -2,8 +2,8 @@
 # validate: all tests that take longer. make bench: the co-simulation's speed; make bench-long: memory over a million
 # steps; make bench-trace: the tracer on blind recordings, exact and lifelike, goes on where it was stopped; make
 # bench-control: the controllers; make bench-campaign: many runs. make docs: the pages in docs/, into build/docs; make
-# pictures: those of README and docs that come from runs. make floors: tests with the lowest versions that
-# pyproject.toml declares, on a Python of at most 3.12. Each sets up what it needs.
+# pictures: those of README and docs that come from runs, and the FMUs' icons. make floors: tests with the lowest
+# versions that pyproject.toml declares, on a Python of at most 3.12. Each sets up what it needs.
 
 PYTHON ?= python3
 VENV := .venv
@@ -15,8 +15,8 @@ FLOORS := .venv-floors
 FLOOR_TESTS := $(addprefix tests/,$(addsuffix .py,cli/test_commands cli/test_input_checks cli/test_material_command \
 	cli/test_refused_input control/test_lqg control/test_robust_design cosimulation/test_robot_cosimulation \
 	estimation/test_recording_preparation linear/test_linear_plant linear/test_plant_figures project/test_public_names \
-	recordings/test_csv_file recordings/test_mdf_file recordings/test_parquet_file reports/test_trace_report_page \
-	robot/test_static_equilibrium))
+	recordings/test_csv_file recordings/test_mat_file recordings/test_mdf_file recordings/test_parquet_file \
+	reports/test_trace_report_page robot/test_static_equilibrium))
 
 .PHONY: run test validate lint types docs pictures floors bench bench-long bench-trace bench-control bench-campaign clean
 
@@ -44,7 +44,7 @@ $(READY): pyproject.toml
 	touch $@
 
 docs: $(READY)
-	NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict --quiet
+	NO_MKDOCS_2_WARNING=1 TAUTWIRE_RUN_TUTORIALS=true $(BIN)/mkdocs build --strict --quiet
 
 pictures: $(READY)
 	$(BIN)/python -m tests.pictures docs
@@ -52,7 +52,7 @@ pictures: $(READY)
 floors: $(READY)
 	$(BIN)/python -m tests.floors > build/floors.txt
 	$(PYTHON) -m venv --clear $(FLOORS)
-	$(FLOORS)/bin/python -m pip install --quiet --no-compile --constraint build/floors.txt --editable ".[mdf]" \
+	$(FLOORS)/bin/python -m pip install --quiet --no-compile --constraint build/floors.txt --editable ".[mat,mdf]" \
 		pytest-xdist hypothesis
 	$(FLOORS)/bin/$(PYTEST) -m "not validate" $(FLOOR_TESTS)
 

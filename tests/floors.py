@@ -13,12 +13,12 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-EXTRAS = ("mdf",)
+EXTRAS = ("mat", "mdf")
 PROJECT = Path(__file__).parent.parent / "pyproject.toml"
 
 
 def floors() -> Iterator[str]:
-    """A line for each dependency of the package and of its extra ``mdf``: the lowest version that it may have."""
+    """A line for each dependency of the package and of ``EXTRAS``: the lowest version that it may have."""
     project = tomllib.loads(PROJECT.read_text(encoding="utf-8"))["project"]
     extras = [each for extra in EXTRAS for each in project["optional-dependencies"][extra]]
     for requirement in map(Requirement, [*project["dependencies"], *extras]):

@@ -16,6 +16,7 @@ FILES = (
     "name_suggestions",
     "number_format",
     "process_signals",
+    "provenance",
     "toml_text",
 )
 ROOMS = (

@@ -70,6 +70,10 @@ class RecordingError(InputError):
         self.line = line
 
 
+class AbsentColumnsError(RecordingError):
+    """A recording has none of the columns that were declared by the laboratory's names."""
+
+
 class NumericalError(TautwireError):
     """A trace has no finite numbers to go on with; carries what linear algebra says of them."""
 

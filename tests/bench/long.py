@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 
 from tautwire.cosimulation.isolation import CALL_TIMEOUT
-from tautwire.cosimulation.recording_simulation import simulate_recording
+from tautwire.cosimulation.recording_simulation import read_recorded_inputs, simulate_recording
 from tautwire.cosimulation.result_file import open_result_file
 from tautwire.cosimulation.robot_wiring import result_columns
 from tautwire.cosimulation.run_arguments import SimulationOptions
@@ -47,7 +47,7 @@ def run(folder: Path, steps: int) -> None:
     print("| done | resident memory | of the FMUs' process | wall time |\n| --- | --- | --- | --- |")
     with open_result_file(result, result_columns(robot.cable_count)) as rows:
         statistics, _ = simulate_recording(
-            robot, recording, rows, SimulationOptions(STEP, call_timeout=CALL_TIMEOUT), tell
+            read_recorded_inputs(robot, recording), rows, SimulationOptions(STEP, call_timeout=CALL_TIMEOUT), tell
         )
     content = pq.ParquetFile(result).metadata
     print(

@@ -83,7 +83,8 @@ def test_a_run_that_fails_leaves_what_it_had_computed(
     assert "FMU " in stderr and f"the run up to then is in {result}" in stderr
     frame = pd.read_csv(result) if name.endswith(".csv") else pd.read_parquet(result)
     assert frame["time"].tolist() == [0.0, 0.1, 0.2]
-    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([name, "torn.csv"])
+    written = [name, "result.csv-metadata.json"] if name.endswith(".csv") else [name]
+    assert sorted(path.name for path in tmp_path.iterdir()) == sorted([*written, "torn.csv"])
 
 
 def test_linearise_writes_the_model(tmp_path: Path) -> None:
@@ -113,6 +114,14 @@ def test_trace_finds_the_damping_of_the_shipped_robot(
         assert after["position_rms"] < 1.2 * floor["position_rms"]
         assert after["tension_rms"] < 1.2 * floor["tension_rms"] < report["error_before"][role]["tension_rms"]
     assert report["residual_is_noise"] == {"before": False, "after": True}
+    residuals = pd.read_parquet(out / "residuals.parquet")
+    assert residuals["recording"].value_counts().to_dict() == {
+        role: len(pd.read_csv(file)) for role, file in zip(("FIT", "CHECK"), short, strict=True)
+    }
+    check = residuals[residuals["recording"] == "CHECK"]
+    assert (check["tension_2_innovation"] ** 2).mean() == pytest.approx(report["left"]["tension_2"], rel=1e-9)
+    missed = check["x_measured"] - check["x_before"]
+    assert (missed**2).mean() ** 0.5 == pytest.approx(report["error_before"]["check"]["axes"]["x"], rel=1e-9)
     captured = capsys.readouterr()
     assert "damping" in captured.out
     assert captured.err.splitlines()[-1].startswith(
@@ -292,4 +301,6 @@ def test_linearise_says_that_winches_have_no_part_in_it(tmp_path: Path, capsys: 
     assert "[winch]" not in capsys.readouterr().err
     assert run(["linearise", with_tables(tmp_path, WINCH), "--out", str(place)]) == 0
     assert capsys.readouterr().err.startswith("[winch]: not used here")
-    assert place.read_text() == plain.read_text()
+    model, plain_model = (json.loads(path.read_text()) for path in (place, plain))
+    assert model.pop("provenance")["inputs"] != plain_model.pop("provenance")["inputs"]
+    assert model == plain_model

@@ -111,7 +111,7 @@ def test_what_a_killed_run_leaves_is_cleared_by_the_next(
     assert "out" not in left
     assert [name for name in left if name.startswith(STAGING_PREFIX)]
     assert run([*QUICK, "--out", str(tmp_path / "workspace.csv"), "--quiet"]) == 0
-    assert names(tmp_path) == ["scratch", "workspace.csv"]
+    assert names(tmp_path) == ["scratch", "workspace.csv", "workspace.csv-metadata.json"]
 
 
 @pytest.mark.validate(but=["build"])
@@ -145,7 +145,8 @@ def test_a_second_run_to_the_same_target_is_refused(tmp_path: Path, capsys: pyte
         process.communicate(timeout=120)
         assert process.returncode == 0
     assert len(pd.read_csv(out)) == len(pd.read_csv(FIT).query("time <= 0.5"))
-    assert names(tmp_path) == ["other.csv", "out.csv", "scratch"]
+    results = [f"{name}.csv{suffix}" for name in ("other", "out") for suffix in ("", "-metadata.json")]
+    assert names(tmp_path) == [*results, "scratch"]
     assert run([*QUICK, "--out", str(out), "--quiet"]) == 0
 
 
@@ -302,7 +303,7 @@ def test_streams_that_nobody_reads_cost_no_result(tmp_path: Path, case: str) -> 
     assert completed.stdout == f"status {status}\n"
     assert completed.stderr.startswith(words) and completed.stderr.count("\n") == bool(words)
     assert len(pd.read_csv(out)) == 12
-    assert names(tmp_path) == ["workspace.csv"]
+    assert names(tmp_path) == ["workspace.csv", "workspace.csv-metadata.json"]
 
 
 @linux

@@ -38,7 +38,7 @@ LONG = {
     "paper": (["--out", "out"], "tautwire.paper.write_paper"),
 }
 # It only writes a text.
-AT_ONCE = {"new"}
+AT_ONCE = {"columns", "example", "new"}
 
 
 @pytest.fixture

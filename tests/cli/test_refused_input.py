@@ -65,7 +65,7 @@ def with_cell(tmp_path: Path, row: int, column: str, cell: str) -> Path:
     ("row", "column", "cell", "said"),
     [
         (5, "winch_speed_2", "fast", "line 7"),
-        (5, "winch_speed_2", "nan", "line 7"),
+        (39, "winch_speed_2", "nan", "line 41"),
         (5, "time", "0.001", "line 7"),
         (5, "x", "12m", "line 7"),
     ],
@@ -199,3 +199,22 @@ def test_build_does_not_write_over_a_users_fmu(tmp_path: Path, capsys: pytest.Ca
     assert "is an input" in capsys.readouterr().err
     assert run(["build", robot, "--out", str(tmp_path / "out")]) == 0
     assert (tmp_path / "out" / "platform.fmu").read_bytes() == (tmp_path / "platform.fmu").read_bytes()
+
+
+@pytest.mark.parametrize(
+    ("arguments", "name", "hint"),
+    [
+        (["simulate", ROBOT, "--speeds", str(THREE / "fit.csv")], "r.xlsx", "give --out r.csv or r.parquet"),
+        (["linearise", ROBOT], "r.XLSX", "give --out r.json"),
+        (["workspace", ROBOT], "r.xlsx", "give --out r.csv"),
+        (["excite", ROBOT], "r.parquet", "give --out r.csv"),
+    ],
+)
+def test_a_name_that_promises_another_format_is_refused(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], name: str, hint: str
+) -> None:
+    assert run([*arguments, "--out", str(tmp_path / name)]) == 2
+    captured = capsys.readouterr()
+    assert captured.err.count("\n") == 1
+    assert f"{name}: ends in {Path(name).suffix.lower()}, which is not written here; {hint}" in captured.err
+    assert not list(tmp_path.iterdir())

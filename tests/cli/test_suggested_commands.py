@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import re
+import shlex
+import shutil
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -18,8 +20,14 @@ PROGRAMS = ["--effects", "damping,payload", "--programs", "2", "--duration", "1"
 
 CASES = {
     "new": (["new", "hall"], "check hall.toml"),
+    "example": (["example", "three"], "check three/robot.toml three/fit.csv"),
     "check": (["check", ROBOT], f"build {ROBOT} --out build/"),
     "check a recording": (["check", ROBOT, FIT], f"trace {ROBOT} {FIT} --out report/"),
+    "columns": (["columns", FIT, ROBOT], f"columns {FIT} {ROBOT} --out columns.toml"),
+    "columns, a table": (
+        ["columns", FIT, ROBOT, "--out", "columns.toml"],
+        f"check {ROBOT} {FIT} --columns columns.toml",
+    ),
     "build": (["build", ROBOT, "--out", "fmus"], f"fmus {ROBOT}"),
     "fmus": (["fmus", ROBOT], f"build {ROBOT} --out build/"),
     "simulate": (
@@ -49,8 +57,24 @@ def test_the_last_line_names_a_command_that_is_one(
     get_command(app).commands[name].make_context(name, given)  # type: ignore[attr-defined]
 
 
+def test_paths_with_spaces_are_one_word_of_the_suggested_command(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    robot, fit = tmp_path / "my robot's.toml", tmp_path / "fit 1.csv"
+    shutil.copyfile(ROBOT, robot)
+    shutil.copyfile(FIT, fit)
+    for arguments, expected in (
+        (["check", str(robot), str(fit)], ["trace", str(robot), str(fit), "--out", "report/"]),
+        (["fmus", str(robot)], ["build", str(robot), "--out", "build/"]),
+    ):
+        assert run(arguments) == 0
+        (named,) = re.findall(r"tautwire (.+?)(?:;|$)", capsys.readouterr().err.splitlines()[-1])
+        assert shlex.split(named) == expected
+
+
 @pytest.mark.parametrize("how", ["--json", "--quiet"])
-@pytest.mark.parametrize("case", ["new", "check", "build", "fmus", "simulate"])
+@pytest.mark.parametrize("case", ["new", "example", "check", "build", "fmus", "simulate"])
 def test_nothing_of_it_is_for_machines(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], case: str, how: str
 ) -> None:
@@ -87,7 +111,7 @@ def test_the_papers_page_is_to_be_opened(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     result = SimpleNamespace(counts={"reproduced": 1}, entries=(1,))
-    monkeypatch.setattr("tautwire.paper.write_paper", lambda folder, tell: result)
+    monkeypatch.setattr("tautwire.paper.write_paper", lambda folder, *_: result)
     out = tmp_path / "paper"
     assert run(["paper", "--out", str(out)]) == 0
     assert capsys.readouterr().err.splitlines() == ["1 reproduced", f"next: open {out / 'claims.html'} in a browser"]

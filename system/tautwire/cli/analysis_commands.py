@@ -13,6 +13,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from ..errors import InputError, UnreachableError
+from ..provenance import Provenance
 from ..robot.robot_file_reader import read_robot
 from ..robot.schema import Robot
 from .console import (
@@ -20,6 +21,7 @@ from .console import (
     CommandOutput,
     Quiet,
     RobotFile,
+    command_provenance,
     note_unused_tables,
     parse_position,
     progress_bar,
@@ -33,6 +35,7 @@ if TYPE_CHECKING:
 
 
 def linearise(
+    context: typer.Context,
     robot_file: RobotFile,
     out: Annotated[
         Path | None, typer.Option(metavar="MODEL.json", help="Output file of the model; not needed with --json.")
@@ -50,11 +53,13 @@ def linearise(
 
     Example: tautwire linearise robot.toml --at 10,5.5,4 --out model.json --report modes.html
     """
-    from ..atomic_output import refuse_overwriting_inputs, refuse_same_output
+    from ..atomic_output import refuse_other_formats, refuse_overwriting_inputs, refuse_same_output
     from ..linear import linearise as linearised
     from ..linear import model_document
 
     require_output(out, as_json, "model.json")
+    refuse_other_formats(out, ".json")
+    refuse_other_formats(report, ".html", option="--report")
     refuse_overwriting_inputs([robot_file], [path for path in (out, report) if path])
     refuse_same_output(out, report)
     output = CommandOutput(as_json, quiet)
@@ -65,8 +70,14 @@ def linearise(
             plant = linearised(robot, None if at is None else parse_position(at))
     except UnreachableError as error:
         raise UnreachableError("--at", error.position, error.cable, error.tension, error.reason) from error
-    document = model_document(plant)
-    written = _write_model(document, out, robot, plant, report, robot_file)
+    provenance = command_provenance(context, robot_file)
+    document = {**model_document(plant), "provenance": provenance.document()}
+    page = None
+    if report is not None:
+        from ..reports.modes_page import modes_page
+
+        page = modes_page(robot, plant, relative_links(report, robot_file, *([out] if out else [])), provenance)
+    written = _write_model(document, out, page, report)
     note_unused_tables(robot, output)
     for note in plant.notes:
         output.note(note)
@@ -81,10 +92,8 @@ def _mode_lines(plant: LinearPlant) -> list[str]:
 def _write_model(
     document: Mapping[str, Any],
     out: Path | None,
-    robot: Robot,
-    plant: LinearPlant,
+    page: str | None,
     report: Path | None,
-    robot_file: Path,
 ) -> dict[str, Path]:
     """Writes the model and its page as requested, both or neither; returns the written files by name."""
     from ..atomic_output import atomic_file
@@ -93,16 +102,13 @@ def _write_model(
         if out is not None:
             scratch = stack.enter_context(atomic_file(out))
             scratch.write_text(json.dumps(document, indent=1), encoding="utf-8")
-        if report is not None:
-            from ..reports.modes_page import modes_page
-
-            links = relative_links(report, robot_file, *([out] if out else []))
-            page = stack.enter_context(atomic_file(report))
-            page.write_text(modes_page(robot, plant, links), encoding="utf-8")
+        if report is not None and page is not None:
+            stack.enter_context(atomic_file(report)).write_text(page, encoding="utf-8")
     return ({"model": out} if out else {}) | ({"report": report} if report else {})
 
 
 def workspace(
+    context: typer.Context,
     robot_file: RobotFile,
     out: Annotated[
         Path | None, typer.Option(metavar="WORKSPACE.csv", help="Output file of the table; not needed with --json.")
@@ -125,13 +131,14 @@ def workspace(
 
     Example: tautwire workspace robot.toml --out workspace.csv --plot workspace.png
     """
-    from ..atomic_output import refuse_overwriting_inputs, refuse_same_output
+    from ..atomic_output import refuse_other_formats, refuse_overwriting_inputs, refuse_same_output
     from ..reports.workspace_figure import require_figure_format
     from ..robot.workspace import wrench_feasible_workspace
 
     require_output(out, as_json, "workspace.csv")
-    refuse_overwriting_inputs([robot_file], [path for path in (out, plot) if path])
     refuse_same_output(out, plot, "--plot")
+    refuse_other_formats(out, ".csv")
+    refuse_overwriting_inputs([robot_file], [path for path in (out, plot) if path])
     if plot is not None:
         require_figure_format(plot)
     output = CommandOutput(as_json, quiet)
@@ -141,19 +148,28 @@ def workspace(
     with progress_bar(output) as progress:
         grid_progress = partial(progress, "computing the workspace")
         feasibility = wrench_feasible_workspace(robot, lower_corner, upper_corner, spacing, acceleration, grid_progress)
-    written = _write_workspace(feasibility, out, robot, plot)
+    provenance = command_provenance(context, robot_file)
+    written = _write_workspace(feasibility, out, robot, plot, provenance)
     counts = {"feasible": int(feasibility.feasible.sum()), "positions": int(feasibility.feasible.size)}
     summary_line = "{feasible} of {positions} positions are wrench-feasible".format_map(counts)
     # Without a table file, JSON output holds the rows.
     output.result(
         [summary_line, *written.values()],
-        {**written, **counts, **({} if out else {"rows": _workspace_records(feasibility)})},
+        {
+            **written,
+            **counts,
+            **({} if out else {"rows": _workspace_records(feasibility)}),
+            "provenance": provenance.document(),
+        },
     )
 
 
-def _write_workspace(feasibility: Workspace, out: Path | None, robot: Robot, plot: Path | None) -> dict[str, Path]:
+def _write_workspace(
+    feasibility: Workspace, out: Path | None, robot: Robot, plot: Path | None, provenance: Provenance
+) -> dict[str, Path]:
     """Writes the table and the figure as requested, both or neither; returns the written files by name."""
     from ..atomic_output import atomic_file
+    from ..cosimulation.result_file import write_csv_metadata
     from ..reports.workspace_figure import workspace_figure
 
     with ExitStack() as stack:
@@ -161,6 +177,8 @@ def _write_workspace(feasibility: Workspace, out: Path | None, robot: Robot, plo
             feasibility.frame().to_csv(stack.enter_context(atomic_file(out)), index=False, float_format="%.10g")
         if plot is not None:
             workspace_figure(robot, feasibility).savefig(stack.enter_context(atomic_file(plot)))
+    if out is not None:
+        write_csv_metadata(out, provenance)
     return ({"workspace": out} if out else {}) | ({"plot": plot} if plot else {})
 
 

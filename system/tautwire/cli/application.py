@@ -1,4 +1,4 @@
-"""The command line: ``tautwire new | check | build | simulate | trace`` and more, see ``tautwire --help``."""
+"""The command line: ``tautwire new | example | check | build | simulate | trace`` and more, see ``tautwire --help``."""
 
 from __future__ import annotations
 
@@ -13,12 +13,14 @@ import typer
 from .. import __version__
 from ..errors import InputError, TautwireError
 from ..process_signals import raise_interrupt_on_termination
+from ..provenance import command_text
 from .analysis_commands import linearise, workspace
 from .batch_commands import campaign, paper
+from .column_commands import columns
 from .console import INTERRUPTED, flush_or_discard, open_closed_streams, print_error
 from .fmu_commands import build, fmus, simulate
 from .identification_commands import excite, material, trace
-from .robot_file_commands import check, new
+from .robot_file_commands import check, example, new
 
 # The base class of usage errors; newer typer hides it in a private module.
 UsageError: type[Exception] = typer.BadParameter.__bases__[0]
@@ -26,7 +28,22 @@ UsageError: type[Exception] = typer.BadParameter.__bases__[0]
 EXIT_SUCCESS, EXIT_FAILURE, EXIT_WRONG_INPUT = 0, 1, 2
 
 
-COMMANDS = (new, check, build, fmus, simulate, linearise, workspace, trace, excite, material, campaign, paper)
+COMMANDS = (
+    new,
+    example,
+    check,
+    columns,
+    build,
+    fmus,
+    simulate,
+    linearise,
+    workspace,
+    trace,
+    excite,
+    material,
+    campaign,
+    paper,
+)
 
 
 def _split_docstring(command: Callable[..., None]) -> tuple[str, str]:
@@ -76,7 +93,7 @@ def main() -> None:
 def run(arguments: list[str]) -> int:
     """Runs one command and returns its exit status; errors go to standard error, one line each."""
     try:
-        status = app(arguments or ["--help"], prog_name="tautwire", standalone_mode=False)
+        status = app(arguments or ["--help"], prog_name="tautwire", standalone_mode=False, obj=command_text(arguments))
         sys.stdout.flush()
     except InputError as error:
         return _report_error(f"{error}{_example_suffix(arguments) if _is_usage_error(error) else ''}", EXIT_WRONG_INPUT)

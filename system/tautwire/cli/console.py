@@ -5,10 +5,11 @@ from __future__ import annotations
 import json
 import math
 import os
+import shlex
 import sys
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager, suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, TextIO
 
@@ -24,11 +25,15 @@ from rich.progress import (
 )
 
 from ..errors import InputError, UnreachableError
-from ..robot.robot_file_reader import read_robot
-from ..robot.schema import Robot
+from ..provenance import Provenance, provenance_of
+from ..robot.robot_file_reader import read_columns_file, read_robot
+from ..robot.schema import Robot, UserFmu
 
 RobotFile = Annotated[Path, typer.Argument(metavar="ROBOT.toml", help="The robot file.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object, and nothing else.")]
+Columns = Annotated[
+    Path | None, typer.Option(metavar="COLUMNS.toml", help="Columns by the laboratory's names, see tautwire columns.")
+]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
 
 
@@ -58,21 +63,51 @@ class CommandOutput:
             self.note(f"next: {text}")
 
 
+def command_provenance(context: typer.Context, *inputs: Path | None, fmus: Iterable[UserFmu] = ()) -> Provenance:
+    """Provenance of what a command computes from files; FMUs that fill slots are named after these."""
+    files = {str(path): path for path in inputs if path is not None}
+    files |= {f"{fmu.slot}={fmu.path.name}": fmu.path for fmu in fmus}
+    return provenance_of(files, context.obj)
+
+
+def shell_quoted(path: Path) -> str:
+    """A path as one word of a shell command, to be pasted."""
+    return shlex.quote(str(path))
+
+
 DEFAULT_OUTPUT = CommandOutput()
 INTERRUPTED = "interrupted; nothing was written"
 
 
 def read_holdable_robot(path: Path) -> Robot:
     """Reads a robot file; raises UnreachableError where its cables cannot hold the platform at the start."""
-    from ..robot.static_equilibrium import static_tensions
+    return _require_holdable(read_robot(path), path)
+
+
+def read_plausible_robot(path: Path) -> Robot:
+    """Reads a robot file; raises RobotFileError where its units seem to be others, else as read_holdable_robot."""
+    from ..robot.implausible_units import implausible_units
 
     robot = read_robot(path)
+    for error in implausible_units(robot, str(path)):
+        raise error
+    return _require_holdable(robot, path)
+
+
+def _require_holdable(robot: Robot, path: Path) -> Robot:
+    from ..robot.static_equilibrium import static_tensions
+
     try:
         static_tensions(robot)
     except UnreachableError as error:
         where = f"{path}: platform.start"
         raise UnreachableError(where, error.position, error.cable, error.tension, error.reason) from error
     return robot
+
+
+def with_columns(robot: Robot, columns: Path | None) -> Robot:
+    """The robot with the columns of recordings that a file declares, in place of its own; as it is without a file."""
+    return robot if columns is None else replace(robot, recorded_columns=read_columns_file(columns, robot.cable_count))
 
 
 def note_unused_tables(robot: Robot, output: CommandOutput = DEFAULT_OUTPUT) -> None:

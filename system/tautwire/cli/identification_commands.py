@@ -13,17 +13,23 @@ from rich.console import Console
 
 from ..errors import InputError
 from ..process_signals import exit_on_overdue_interrupt, own_temporary_folder
+from ..provenance import Provenance
 from ..robot.robot_file_reader import read_robot
 from .console import (
     INTERRUPTED,
     AsJson,
+    Columns,
     CommandOutput,
     Quiet,
     RobotFile,
+    command_provenance,
     note_unused_tables,
     print_error,
     progress_bar,
     read_holdable_robot,
+    read_plausible_robot,
+    shell_quoted,
+    with_columns,
 )
 
 if TYPE_CHECKING:
@@ -31,12 +37,12 @@ if TYPE_CHECKING:
     from ..materials import MaterialOptions, MaterialVerdict
     from ..materials.material_table import MaterialTable
     from ..materials.viscoelastic_model import Material
-    from ..robot.schema import Robot
 
 DYNAMIC_TEST_HELP = "A dynamic test of the rope; by default Table 1 of the paper, with its declared pair."
 
 
 def material(
+    context: typer.Context,
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Output folder of fit.json and the figure.")],
     table: Annotated[Path | None, typer.Argument(metavar="TABLE.csv", help=DYNAMIC_TEST_HELP)] = None,
     at: Annotated[
@@ -60,7 +66,7 @@ def material(
     """
     from ..atomic_output import atomic_folder, refuse_overwriting_inputs
     from ..materials import PAPER_PAIR_FREQUENCY, PAPER_TABLE, MaterialOptions, pair_of_row, read_material_table
-    from ..materials.material_files import MATERIAL_FILES
+    from ..materials.material_files import MATERIAL_FILES, write_material
     from ..materials.robot_material import declared_material
 
     _validate_material_options(shared, alpha, coverage)
@@ -76,13 +82,14 @@ def material(
     if at is not None:
         declared = pair_of_row(measurements, at)
     options = MaterialOptions(shared_variance=shared, coverage_factor=coverage, significance_level=alpha)
+    provenance = command_provenance(context, table, robot_file)
     with atomic_folder(out) as scratch:
-        verdict = _fit_material(measurements, declared, options, robot, scratch, output)
-    _print_material(verdict, out / "fit.json", output)
+        verdict = _fit_material(measurements, declared, options, output)
+        write_material(verdict, scratch, robot, provenance, robot_file)
+    _print_material(verdict, out / "fit.json", provenance, output)
     if robot is not None:
-        output.suggest_next(
-            f"tautwire check {out / 'robot.toml'} RECORDING.csv, and trace: does the robot move like that?"
-        )
+        check_command = f"tautwire check {shell_quoted(out / 'robot.toml')} RECORDING.csv"
+        output.suggest_next(f"{check_command}, and trace: does the robot move like that?")
 
 
 def _validate_material_options(shared: float, alpha: float, coverage: float) -> None:
@@ -97,30 +104,28 @@ def _fit_material(
     measurements: MaterialTable,
     declared: Material | None,
     options: MaterialOptions,
-    robot: Robot | None,
-    folder: Path,
     output: CommandOutput,
 ) -> MaterialVerdict:
-    """Fits models to a dynamic test and writes the fit, and a robot with the fitted rope, into a folder."""
+    """Fits models to a dynamic test."""
     from ..materials import trace_material
-    from ..materials.material_files import write_material
 
     with progress_bar(output) as progress:
-        verdict = trace_material(measurements, declared, options, progress)
-    write_material(verdict, folder, robot)
-    return verdict
+        return trace_material(measurements, declared, options, progress)
 
 
-def _print_material(verdict: MaterialVerdict, path: Path, output: CommandOutput) -> None:
+def _print_material(verdict: MaterialVerdict, path: Path, provenance: Provenance, output: CommandOutput) -> None:
     from ..materials.material_files import material_document
     from ..materials.material_report import material_verdict_table
 
     if not (output.quiet or output.as_json):
         Console().print(material_verdict_table(verdict))
-    output.result([path], {"folder": path.parent, **material_document(verdict)})
+    document = {**material_document(verdict), "provenance": provenance.document()}
+    output.result([path], {"folder": path.parent, **document})
 
 
-def judge_rope_material(table: Path, robot_file: Path, out: Path, alpha: float, output: CommandOutput) -> None:
+def judge_rope_material(
+    context: typer.Context, table: Path, robot_file: Path, out: Path, alpha: float, output: CommandOutput
+) -> None:
     """Traces a robot's rope: its constants are tested against a dynamic test, and the extended robot gets its FMUs.
 
     Writes what :func:`material` writes, the same verdict as ``report.json``, and the FMUs.
@@ -128,25 +133,29 @@ def judge_rope_material(table: Path, robot_file: Path, out: Path, alpha: float, 
     from ..atomic_output import atomic_folder, refuse_overwriting_inputs
     from ..fmus.packaging import build_fmus
     from ..materials import MaterialOptions, read_material_table
-    from ..materials.material_files import MATERIAL_FILES
+    from ..materials.material_files import MATERIAL_FILES, write_material
     from ..materials.robot_material import declared_material
 
     measurements, robot = read_material_table(table), read_holdable_robot(robot_file)
     refuse_overwriting_inputs([table, robot_file], [out / name for name in (*MATERIAL_FILES, "report.json")])
     declared = declared_material(robot, str(robot_file))
+    provenance = command_provenance(context, robot_file, table)
     with atomic_folder(out) as scratch:
         options = MaterialOptions(significance_level=alpha)
-        verdict = _fit_material(measurements, declared, options, robot, scratch, output)
+        verdict = _fit_material(measurements, declared, options, output)
+        write_material(verdict, scratch, robot, provenance, robot_file)
         shutil.copyfile(scratch / "fit.json", scratch / "report.json")
         build_fmus(read_robot(scratch / "robot.toml"), scratch)
-    _print_material(verdict, out / "report.json", output)
+    _print_material(verdict, out / "report.json", provenance, output)
 
 
 def trace(
+    context: typer.Context,
     robot_file: RobotFile,
-    fit: Annotated[Path, typer.Argument(metavar="FIT.csv", help="The recording to fit; CSV, Parquet or MDF.")],
+    fit: Annotated[Path, typer.Argument(metavar="FIT.csv", help="The recording to fit; CSV, Parquet, MDF or .mat.")],
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Output folder of the report.")],
     check: Annotated[Path | None, typer.Option(metavar="CHECK.csv", help="A recording for validation.")] = None,
+    columns: Columns = None,
     alpha: Annotated[float, typer.Option(help="False-alarm rate.")] = 0.01,
     time_limit: Annotated[float, typer.Option(metavar="SECONDS", help="Time for the best answer.", min=1.0)] = 600.0,
     as_json: AsJson = False,
@@ -170,6 +179,7 @@ def trace(
     from ..materials.material_table import is_material_table
     from ..recordings.recording import read_recording
     from ..reports import write_report
+    from ..reports.residual_file import RESIDUAL_FILE
 
     validated_false_alarm_rate("--alpha", alpha)
     limit = TimeLimit(time_limit)
@@ -177,13 +187,16 @@ def trace(
     if is_material_table(fit):
         if check is not None:
             raise InputError("--check", f"{fit} is a dynamic test of a rope", "omit it: its rows are cross-validated")
-        judge_rope_material(fit, robot_file, out, alpha, output)
+        judge_rope_material(context, fit, robot_file, out, alpha, output)
         return
-    robot = read_holdable_robot(robot_file)
-    recording = read_recording(fit, robot.cable_count)
-    check_recording = None if check is None else read_recording(check, robot.cable_count)
-    file_names = ["robot.toml", "report.json", "index.html"]
-    refuse_overwriting_inputs([robot_file, fit, *([check] if check else [])], [out / name for name in file_names])
+    robot = with_columns(read_plausible_robot(robot_file), columns)
+    recording = read_recording(fit, robot.cable_count, robot.recorded_columns)
+    check_recording = None if check is None else read_recording(check, robot.cable_count, robot.recorded_columns)
+    file_names = ["robot.toml", "report.json", RESIDUAL_FILE, "index.html"]
+    refuse_overwriting_inputs(
+        [robot_file, fit, *(path for path in (check, columns) if path)], [out / name for name in file_names]
+    )
+    provenance = command_provenance(context, robot_file, fit, check, columns)
     with (
         own_temporary_folder() as temporary,
         atomic_folder(out) as scratch,
@@ -192,9 +205,9 @@ def trace(
     ):
         trace_result = traced(robot, recording, check_recording, progress, alpha, processors(), limit)
         progress("writing the report", 0.0)
-        write_report(trace_result, scratch)
+        write_report(trace_result, scratch, provenance, robot_file)
     note_unused_tables(robot, output)
-    _print_trace(trace_result, out, output)
+    _print_trace(trace_result, out, provenance, output)
 
 
 def _end_interrupted(temporary: Path, scratch: Path) -> None:
@@ -209,18 +222,19 @@ def _end_interrupted(temporary: Path, scratch: Path) -> None:
     print_error(f"tautwire: {INTERRUPTED}")
 
 
-def _print_trace(trace_result: Trace, out: Path, output: CommandOutput) -> None:
+def _print_trace(trace_result: Trace, out: Path, provenance: Provenance, output: CommandOutput) -> None:
     from ..reports import trace_document, trace_table
 
     if not (output.quiet or output.as_json):
         Console().print(trace_table(trace_result))
-    output.result([out / "index.html"], {"folder": out, **trace_document(trace_result)})
-    output.suggest_next(
-        f"open {out / 'index.html'}; {out / 'robot.toml'} is the completed robot, with its FMUs beside it"
-    )
+    document = {**trace_document(trace_result), "provenance": provenance.document()}
+    output.result([out / "index.html"], {"folder": out, **document})
+    page, completed = shell_quoted(out / "index.html"), shell_quoted(out / "robot.toml")
+    output.suggest_next(f"open {page}; {completed} is the completed robot, with its FMUs beside it")
 
 
 def excite(
+    context: typer.Context,
     robot_file: RobotFile,
     out: Annotated[Path, typer.Option(metavar="PROGRAM.csv", help="Output file of the winch speeds, as a recording.")],
     effects: Annotated[str | None, typer.Option(help="Effects to separate, comma-separated; by default all.")] = None,
@@ -239,24 +253,27 @@ def excite(
 
     Example: tautwire excite robot.toml --effects damping,relaxation,hysteresis --out program.csv
     """
-    from ..atomic_output import atomic_file, refuse_overwriting_inputs
+    from ..atomic_output import atomic_file, refuse_other_formats, refuse_overwriting_inputs
+    from ..cosimulation.result_file import write_csv_metadata
     from ..estimation.input_design import DesignOptions, default_limits, design_excitation, effects_by_name
 
     output = CommandOutput(as_json, quiet)
+    refuse_other_formats(out, ".csv")
     refuse_overwriting_inputs([robot_file], [out])
     robot = read_holdable_robot(robot_file)
     selected_effects = effects_by_name(robot, effects)
     with progress_bar(output) as progress:
         options = DesignOptions(default_limits(robot, speed, reach), duration, 1.0 / rate, programs, seed)
         excitation = design_excitation(robot, selected_effects, options, progress)
+    provenance = command_provenance(context, robot_file)
     with atomic_file(out) as scratch:
         excitation.frame().to_csv(scratch, index=False, float_format="%.10g")
+    write_csv_metadata(out, provenance)
     pairs = [(pair.effect.label(robot), pair.other.label(robot), pair.nats) for pair in excitation.pairs]
     lines = [f"{effect} and {other}: separation {nats:.3g} nats" for effect, other, nats in pairs[:5]]
     median_line = f"closest pair of the median program: {excitation.median_separation:.3g} nats"
     pair_records = [{"effect": effect, "other": other, "nats": nats} for effect, other, nats in pairs]
-    output.result(
-        [*lines, median_line, out], {"program": out, "pairs": pair_records, "median": excitation.median_separation}
-    )
-    trace_command = f"tautwire trace {robot_file} RECORDING.csv --out report/"
+    document = {"program": out, "pairs": pair_records, "median": excitation.median_separation}
+    output.result([*lines, median_line, out], {**document, "provenance": provenance.document()})
+    trace_command = f"tautwire trace {shell_quoted(robot_file)} RECORDING.csv --out report/"
     output.suggest_next(f"run it on the robot, record positions and tensions, then {trace_command}")

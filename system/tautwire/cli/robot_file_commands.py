@@ -1,18 +1,41 @@
-"""The commands ``new`` and ``check``: a robot file to begin with, and a check of robot file and recording."""
+"""The commands ``new``, ``example`` and ``check``: files to begin with, and a check of robot file and recording."""
 
 from __future__ import annotations
 
+import os
+import shutil
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..errors import InputError
-from .console import AsJson, CommandOutput, Quiet, RobotFile, progress_bar
+from .console import (
+    AsJson,
+    Columns,
+    CommandOutput,
+    Quiet,
+    RobotFile,
+    command_provenance,
+    progress_bar,
+    relative_links,
+    shell_quoted,
+)
+
+if TYPE_CHECKING:
+    from ..provenance import Provenance
+    from .input_checks import CheckResult
 
 ROBOT_FILE_SUFFIX = ".toml"
 EXIT_WRONG_INPUT = 2
+EXAMPLES = {
+    "three": "three cables of some 70 m, 300 kg; its recordings have more damping than the robot file",
+    "eight": "eight cables in a hall, 60 kg; its recordings have nothing that the robot file lacks",
+    "caroca": "three cables of some 4 m, 100 kg; its recordings have a payload that the robot file lacks",
+}
+EXAMPLE_FILES = ("robot.toml", "fit.csv", "check.csv", "plan.toml")
 
 
 def new(
@@ -41,13 +64,55 @@ def new(
     with atomic_file(target) as scratch:
         scratch.write_text(new_robot_text(robot_name, cables), encoding="utf-8")
     output.result([target], {"robot": target})
-    output.suggest_next(f"enter your robot's numbers in {target}, then tautwire check {target}")
+    output.suggest_next(f"enter your robot's numbers in {target}, then tautwire check {shell_quoted(target)}")
+
+
+def example(
+    name: Annotated[str | None, typer.Argument(metavar="[NAME]", help="The example; absent: list all.")] = None,
+    folder: Annotated[
+        Path | None, typer.Argument(metavar="[FOLDER]", help="Output folder; by default NAME.", show_default=False)
+    ] = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Copy a shipped example, or list all.
+
+    The recordings are simulated: one to fit a model to, and one to check it on.
+
+    Example: tautwire example three
+    """
+    from ..atomic_output import atomic_folder
+
+    output = CommandOutput(as_json, quiet)
+    if name is None:
+        output.result([f"{each:<8}{text}" for each, text in EXAMPLES.items()], {"examples": EXAMPLES})
+        output.suggest_next(f"tautwire example {next(iter(EXAMPLES))}")
+        return
+    if name not in EXAMPLES:
+        raise InputError("NAME", f"{name!r} is not an example", f"give one of {', '.join(EXAMPLES)}")
+    target = folder or Path(name)
+    if target.exists() and not target.is_dir():
+        raise InputError(str(target), "is a file", "choose another folder, as in tautwire example three FOLDER")
+    robot, fit, check_recording, plan = paths = [target / file for file in EXAMPLE_FILES]
+    for path in paths:
+        if path.exists() or path.is_symlink():
+            raise InputError(str(path), "exists already", f"choose another folder: tautwire example {name} FOLDER")
+    with atomic_folder(target) as scratch:
+        for file in EXAMPLE_FILES:
+            shutil.copyfile(Path(__file__).parents[1] / "examples" / name / file, scratch / file)
+    output.result(paths, {"robot": robot, "recordings": [fit, check_recording], "plan": plan})
+    output.suggest_next(f"tautwire check {shell_quoted(robot)} {shell_quoted(fit)}")
 
 
 def check(
+    context: typer.Context,
     robot_file: RobotFile,
     recording: Annotated[
-        Path | None, typer.Argument(metavar="RECORDING.csv", help="A recording of it; CSV, Parquet or MDF.")
+        Path | None, typer.Argument(metavar="RECORDING.csv", help="A recording of it; CSV, Parquet, MDF or .mat.")
+    ] = None,
+    columns: Columns = None,
+    report: Annotated[
+        Path | None, typer.Option(metavar="PAGE.html", help="Output page: what the check read, and its problems.")
     ] = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
@@ -55,20 +120,34 @@ def check(
     """Check a robot file and a recording, and list every problem.
 
     Each problem is a line, which names the line of the file; the exit status is 2 if there are problems. Otherwise it
-    says what a trace would do to the recording before looking at it.
+    says what a trace would do to the recording before looking at it. --report draws what was read, also if there are
+    problems.
 
-    Example: tautwire check robot.toml recording.csv
+    Example: tautwire check robot.toml recording.csv --report check.html
     """
+    from ..atomic_output import refuse_other_formats, refuse_overwriting_inputs
     from .input_checks import check_files
 
+    if columns is not None and recording is None:
+        raise InputError("--columns", "is given without a recording", "name the recording that has these columns")
+    inputs = [path for path in (robot_file, recording, columns) if path]
+    refuse_other_formats(report, ".html", option="--report")
+    refuse_overwriting_inputs(inputs, [report] if report else [])
     output = CommandOutput(as_json, quiet)
     with progress_bar(output) as progress:
-        result = check_files(robot_file, recording, progress)
+        result = check_files(robot_file, recording, progress, columns)
+        readable = (path for path in inputs if path.is_file() and os.access(path, os.R_OK))
+        is_reported = report is not None and _write_report(
+            result, report, inputs, command_provenance(context, *readable)
+        )
     problems = [asdict(problem) for problem in result.problems]
     for note in () if as_json else result.notes:
         output.note(note)
+    if report is not None:
+        output.note(str(report) if is_reported else f"{report} was not written: the robot file shows no geometry")
     # Problems are printed even with --quiet.
-    CommandOutput(as_json).result(result.problems, {"problems": problems, "notes": result.notes})
+    written = {"report": report} if is_reported else {}
+    CommandOutput(as_json).result(result.problems, {"problems": problems, "notes": result.notes, **written})
     if result.problems:
         file_count = len({problem.file for problem in result.problems})
         output.suggest_next(
@@ -78,10 +157,26 @@ def check(
     if not as_json:
         output.result([f"{file}: no problems found" for file in (robot_file, recording) if file], {})
     if recording is None:
-        output.suggest_next(f"tautwire build {robot_file} --out build/")
+        output.suggest_next(f"tautwire build {shell_quoted(robot_file)} --out build/")
     else:
-        trace_command = f"tautwire trace {robot_file} {recording} --out report/"
+        named = "" if columns is None else f" --columns {shell_quoted(columns)}"
+        trace_command = f"tautwire trace {shell_quoted(robot_file)} {shell_quoted(recording)}{named} --out report/"
         output.suggest_next(f"{trace_command}; with a second recording of the robot add --check SECOND.csv")
+
+
+def _write_report(result: CheckResult, target: Path, inputs: Sequence[Path], provenance: Provenance) -> bool:
+    """Writes the page of a check; False where the robot file shows no geometry to draw."""
+    from ..atomic_output import atomic_file
+    from ..reports.check_page import CheckedFiles, can_be_drawn, check_page
+
+    robot = result.robot
+    if robot is None or not can_be_drawn(robot):
+        return False
+    problems = tuple((problem.where, problem.problem, problem.hint) for problem in result.problems)
+    checked = CheckedFiles(robot, result.recording, problems, result.notes, provenance)
+    with atomic_file(target) as scratch:
+        scratch.write_text(check_page(checked, relative_links(target, *inputs)), encoding="utf-8")
+    return True
 
 
 def _count_text(count: int, noun: str) -> str:
