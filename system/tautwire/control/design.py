@@ -149,6 +149,29 @@ class Design(Protocol):
 
 
 @dataclass(frozen=True)
+class RegulatorDesign:
+    """A sampled ``regulator`` with the anti-windup gain ``tracking`` (q, n), one for the whole path; as in Knot."""
+
+    aim: ControlAim
+    regulator: Any
+    tracking: Array
+
+    @property
+    def cable_count(self) -> int:
+        """Number of cables."""
+        return int(self.regulator.noutputs)
+
+    @property
+    def uses_feedback(self) -> bool:
+        """See :class:`Design`."""
+        return True
+
+    def knots(self) -> tuple[Knot, ...]:
+        """See :class:`Design`."""
+        return (Knot(0.0, self.regulator, self.tracking),)
+
+
+@dataclass(frozen=True)
 class Feedforward:
     """Pure feedforward: the winches get the reference speeds, within the speed limits."""
 

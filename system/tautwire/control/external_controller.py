@@ -26,7 +26,7 @@ from ..robot.schema import Robot
 from ..robot.trajectory import Trajectory
 from ..validation import validate_file, validate_instance
 from .controller_fmu import ControllerFmu, Sample
-from .design import ControlAim, Design, Feedforward, Knot, regulator_signals
+from .design import ControlAim, Design, Feedforward, RegulatorDesign, regulator_signals
 from .feedforward import Reference
 from .path_controller import PathController
 
@@ -51,28 +51,6 @@ class ControllerError(TautwireError):
 
 
 @dataclass(frozen=True)
-class StateSpaceController:
-    """A state space as a design: a ``regulator`` whose integrated accelerations are the demanded speeds."""
-
-    aim: ControlAim
-    regulator: Any
-
-    @property
-    def cable_count(self) -> int:
-        """Number of cables."""
-        return int(self.regulator.noutputs)
-
-    @property
-    def uses_feedback(self) -> bool:
-        """See :class:`tautwire.control.Design`."""
-        return True
-
-    def knots(self) -> tuple[Knot, ...]:
-        """See :class:`tautwire.control.Design`; without an anti-windup gain."""
-        return (Knot(0.0, self.regulator, np.zeros((self.regulator.nstates, self.cable_count))),)
-
-
-@dataclass(frozen=True)
 class SpeedController(Feedforward):
     """Winch speeds (n,) from a sample by ``speeds_from``, in place of those of a reference."""
 
@@ -86,7 +64,7 @@ class SpeedController(Feedforward):
 
 def state_space_controller(
     system: StateSpace, cable_count: int, aim: ControlAim | None = None, discretisation: str = "tustin"
-) -> StateSpaceController:
+) -> RegulatorDesign:
     """Sampled-data controller from a linear one: deviations from the path in, deviations of the winch speeds out.
 
     Inputs are ``position_x`` to ``position_z`` in m, ``tension_i`` in N and ``winch_speed_i`` in m/s, measured minus
@@ -121,7 +99,7 @@ def state_space_controller(
         remove_useless_states=False,
         **signals,
     )
-    return StateSpaceController(aim, regulator)
+    return RegulatorDesign(aim, regulator, np.zeros((regulator.nstates, cable_count)))
 
 
 def function_controller(function: SpeedLaw, cable_count: int, aim: ControlAim | None = None) -> SpeedController:

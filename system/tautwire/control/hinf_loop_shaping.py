@@ -27,7 +27,7 @@ from threadpoolctl import threadpool_limits
 from ..linear import LinearPlant, linearise
 from ..robot.schema import Robot
 from ..robot.trajectory import Trajectory
-from .design import ControlAim, Knot, MarginError, regulator_signals
+from .design import ControlAim, Knot, MarginError, RegulatorDesign, regulator_signals
 from .gain_scheduling import DESIGN_POINTS, ScheduledController
 from .sampled_plant import ramp_plant
 from .stability_margins import Margins, Range, margins_of
@@ -127,33 +127,16 @@ class RobustAim:
 
 
 @dataclass(frozen=True)
-class RobustController:
+class RobustController(RegulatorDesign):
     """A robust controller with q states, the first three of which are integrals of position.
 
-    ``linear`` is the plant in the middle of the range; ``regulator`` and ``tracking`` (q, n) are as in :class:`Knot`;
-    ``bandwidth``, that of position, is a multiple of the lowest mode; ``margins`` are the worst over the range.
+    ``linear`` is the plant in the middle of the range; ``bandwidth``, that of position, is a multiple of the lowest
+    mode; ``margins`` are the worst over the range.
     """
 
-    aim: ControlAim
     linear: LinearPlant
-    regulator: Any
-    tracking: Array
     bandwidth: float
     margins: Margins
-
-    @property
-    def cable_count(self) -> int:
-        """Number of cables."""
-        return int(self.regulator.noutputs)
-
-    @property
-    def uses_feedback(self) -> bool:
-        """See :class:`tautwire.control.Design`."""
-        return True
-
-    def knots(self) -> tuple[Knot, ...]:
-        """See :class:`tautwire.control.Design`; one for the whole path."""
-        return (Knot(0.0, self.regulator, self.tracking),)
 
 
 def design_robust(
@@ -237,7 +220,7 @@ def _design_at(
         if worst.min_disk < robust.margin:
             break
         worst = worst.worst_of(margins_of(plant, knot))
-    return RobustController(aim, linear, regulator, tracking, bandwidth, worst)
+    return RobustController(aim, regulator, tracking, linear, bandwidth, worst)
 
 
 def back_calculation(regulator: Any, share: float) -> Array:
