@@ -18,9 +18,10 @@ from .analysis_commands import linearise, workspace
 from .batch_commands import campaign, paper
 from .column_commands import columns
 from .console import INTERRUPTED, flush_or_discard, open_closed_streams, print_error
-from .fmu_commands import build, fmus, simulate
+from .fmu_commands import build, fmus
 from .identification_commands import excite, material, trace
 from .robot_file_commands import check, example, new
+from .simulation_command import simulate
 
 # The base class of usage errors; newer typer hides it in a private module.
 UsageError: type[Exception] = typer.BadParameter.__bases__[0]

@@ -75,6 +75,12 @@ def shell_quoted(path: Path) -> str:
     return shlex.quote(str(path))
 
 
+def trace_command(robot_file: Path, recording: Path, columns: Path | None) -> str:
+    """A trace of the recording as a shell command, to be pasted."""
+    columns_option = "" if columns is None else f" --columns {shell_quoted(columns)}"
+    return f"tautwire trace {shell_quoted(robot_file)} {shell_quoted(recording)}{columns_option} --out report/"
+
+
 DEFAULT_OUTPUT = CommandOutput()
 INTERRUPTED = "interrupted; nothing was written"
 

@@ -22,6 +22,7 @@ from .console import (
     progress_bar,
     relative_links,
     shell_quoted,
+    trace_command,
 )
 
 if TYPE_CHECKING:
@@ -159,9 +160,8 @@ def check(
     if recording is None:
         output.suggest_next(f"tautwire build {shell_quoted(robot_file)} --out build/")
     else:
-        named = "" if columns is None else f" --columns {shell_quoted(columns)}"
-        trace_command = f"tautwire trace {shell_quoted(robot_file)} {shell_quoted(recording)}{named} --out report/"
-        output.suggest_next(f"{trace_command}; with a second recording of the robot add --check SECOND.csv")
+        next_command = trace_command(robot_file, recording, columns)
+        output.suggest_next(f"{next_command}; with a second recording of the robot add --check SECOND.csv")
 
 
 def _write_report(result: CheckResult, target: Path, inputs: Sequence[Path], provenance: Provenance) -> bool:
