@@ -14,6 +14,7 @@ import pytest
 import tautwire
 from tautwire.cli import app, run
 from tautwire.robot.robot_file_reader import read_robot
+from tests.support.progress import without_progress_lines
 from tests.support.robots import EXAMPLES, example
 
 THREE = EXAMPLES / "three"
@@ -260,7 +261,7 @@ def test_ctrl_c_leaves_nothing_behind(tmp_path: Path, command: str, delay: float
     stdout, stderr = process.communicate(timeout=60)
     # Python lets the signal end a process in which it was caught within some exec, as dataclasses do.
     assert process.returncode in (1, -signal.SIGINT)
-    assert stderr == "tautwire: interrupted; nothing was written\n"
+    assert without_progress_lines(stderr) == "tautwire: interrupted; nothing was written\n"
     assert stdout == ""
     assert [path.name for path in tmp_path.iterdir()] == ["scratch"]
     assert list(scratch.iterdir()) == []

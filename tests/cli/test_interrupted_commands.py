@@ -18,6 +18,7 @@ import pytest
 from tautwire.atomic_output import STAGING_PREFIX, atomic_file, atomic_folder
 from tautwire.cli import run
 from tautwire.errors import DiskFullError, InputError
+from tests.support.progress import without_progress_lines
 from tests.support.robots import EXAMPLES
 
 THREE = EXAMPLES / "three"
@@ -124,7 +125,7 @@ def test_a_request_to_end_is_like_ctrl_c(tmp_path: Path, case: str, number: int)
         others = descendants(process.pid) if sys.platform == "linux" else set()
         process.send_signal(number)
         stdout, stderr = process.communicate(timeout=60)
-    assert (stderr, stdout) == (INTERRUPTED, "")
+    assert (without_progress_lines(stderr), stdout) == (INTERRUPTED, "")
     # Python lets SIGINT's own handler end a process by that signal where it was caught within some exec.
     assert process.returncode in (1, -signal.SIGINT)
     assert not others or until(lambda: not others & parents().keys(), 20.0)
@@ -210,7 +211,7 @@ def test_a_full_disk_is_reported_and_nothing_is_half_written(tmp_path: Path, alr
         check=True,
     )
     assert json.loads(process.stdout) == [1] * len(commands)
-    error_lines = process.stderr.splitlines()
+    error_lines = without_progress_lines(process.stderr).splitlines()
     for line, arguments in zip(error_lines, commands, strict=True):
         target = "out/hall.toml" if arguments[0] == "new" else arguments[-1]
         assert line.startswith(f"tautwire: {target}: was not written, no disk space left (File too large); make room")
@@ -301,7 +302,8 @@ def test_streams_that_nobody_reads_cost_no_result(tmp_path: Path, case: str) -> 
         check=True,
     )
     assert completed.stdout == f"status {status}\n"
-    assert completed.stderr.startswith(words) and completed.stderr.count("\n") == bool(words)
+    stderr = without_progress_lines(completed.stderr)
+    assert stderr.startswith(words) and stderr.count("\n") == bool(words)
     assert len(pd.read_csv(out)) == 12
     assert names(tmp_path) == ["workspace.csv", "workspace.csv-metadata.json"]
 

@@ -1,9 +1,11 @@
-"""The progress bar on a terminal."""
+"""The progress bar on a terminal, and lines of progress elsewhere."""
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from io import StringIO
 from pathlib import Path
 from types import SimpleNamespace
@@ -13,6 +15,7 @@ from rich.console import Console
 
 from tautwire.cli import COMMANDS, run
 from tautwire.cli import console as shared
+from tautwire.cli.progress_lines import ActivityProgress, progress_line, progress_lines
 from tautwire.errors import TautwireError
 from tests.support.campaigns import AT_REST, plan_file
 from tests.support.robots import EXAMPLES
@@ -104,9 +107,36 @@ def test_remaining_time_is_estimated_where_parts_come_minutes_apart(monkeypatch:
     assert "0:10:00" in heard.getvalue()
 
 
-def test_nothing_is_drawn_where_nobody_watches(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_short_command_says_nothing_where_nobody_watches(monkeypatch: pytest.MonkeyPatch) -> None:
     heard = StringIO()
     monkeypatch.setattr(shared, "Console", lambda **options: Console(file=heard))
     with shared.progress_bar() as tell:
         tell("running", 0.5)
     assert heard.getvalue() == ""
+
+
+def test_where_no_bar_can_be_drawn_a_line_tells_what_is_done_and_how_long_it_will_take(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr(shared, "progress_lines", partial(progress_lines, interval=0.05))
+    with shared.progress_bar() as tell:
+        tell("running", 0.0)
+        time.sleep(0.1)
+        tell("running", 0.5)
+        time.sleep(0.1)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines[0] == "0 s: running" and lines[-1] == "0 s: running, 50 %, about 0 s left"
+    with shared.progress_bar(shared.CommandOutput(quiet=True)) as tell:
+        tell("running", 0.5)
+        time.sleep(0.1)
+    assert capsys.readouterr().err == ""
+
+
+def test_remaining_time_of_a_line_is_that_of_what_was_begun_with_it() -> None:
+    progress = ActivityProgress("running", 100.0, 0.5, 100.0, 0.5)
+    assert progress_line(progress, 30.0, 110.0) == "30 s: running"
+    assert progress_line(progress, 30.0, 110.0, 600.0) == "30 s of at most 10 min: running"
+    # A tenth came in 60 s, four tenths are left; 20 s ago.
+    progress = progress.updated("running", 0.6, 160.0)
+    assert progress_line(progress, 300.0, 180.0) == "5 min: running, 60 %, about 4 min left"
+    assert progress_line(progress.updated("writing", 0.0, 181.0), 301.0, 181.0) == "5 min: writing"

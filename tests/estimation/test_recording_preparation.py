@@ -16,6 +16,7 @@ from tautwire.estimation.parameter_fit import Fitter
 from tautwire.estimation.preprocessing import PreparedRecordings, prepare_recordings
 from tautwire.estimation.residual_analysis import residuals_are_white
 from tautwire.recordings.recording import Recording
+from tests.support.progress import without_progress_lines
 from tests.support.recordings import recorded
 from tests.support.robots import EXAMPLES, example
 
@@ -117,7 +118,7 @@ def test_what_is_refused_is_one_line_and_nothing_is_written(tmp_path: Path, caps
     frame.to_csv(tmp_path / "fit.csv", index=False)
     robot, out = str(EXAMPLES / "three" / "robot.toml"), tmp_path / "report"
     assert run(["trace", robot, str(tmp_path / "fit.csv"), "--out", str(out)]) == 2
-    said = capsys.readouterr().err.splitlines()
+    said = without_progress_lines(capsys.readouterr().err).splitlines()
     assert len(said) == 1
     assert "fit.csv: column tension_2: has outliers in" in said[0] and "repair the sensor" in said[0]
     assert not out.exists()

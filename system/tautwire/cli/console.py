@@ -28,6 +28,7 @@ from ..errors import InputError, UnreachableError
 from ..provenance import Provenance, provenance_of
 from ..robot.robot_file_reader import read_columns_file, read_robot
 from ..robot.schema import Robot, UserFmu
+from .progress_lines import progress_lines
 
 RobotFile = Annotated[Path, typer.Argument(metavar="ROBOT.toml", help="The robot file.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object, and nothing else.")]
@@ -143,11 +144,20 @@ def parse_position(text: str, option: str = "--at") -> tuple[float, float, float
 
 
 @contextmanager
-def progress_bar(output: CommandOutput = DEFAULT_OUTPUT) -> Iterator[Callable[[str, float], None]]:
-    """Context manager for a progress bar on standard error; none where that is no terminal, or with ``quiet``."""
+def progress_bar(
+    output: CommandOutput = DEFAULT_OUTPUT, time_limit: float | None = None
+) -> Iterator[Callable[[str, float], None]]:
+    """Context manager for a progress bar on standard error; lines of text where that is no terminal.
+
+    With ``quiet`` it shows nothing. Lines name the ``time_limit`` of the command, in s.
+    """
     console = Console(stderr=True)
-    if output.quiet or not console.is_terminal:
-        yield lambda what, done: None
+    if output.quiet:
+        yield lambda activity, fraction: None
+        return
+    if not console.is_terminal:
+        with progress_lines(print_error, time_limit) as report_progress:
+            yield report_progress
         return
     columns = (
         SpinnerColumn(),
@@ -161,14 +171,14 @@ def progress_bar(output: CommandOutput = DEFAULT_OUTPUT) -> Iterator[Callable[[s
         task = bar.add_task("", total=1.0)
         current_activity = ""
 
-        def report_progress(activity: str, fraction: float) -> None:
+        def update_bar(activity: str, fraction: float) -> None:
             nonlocal current_activity
             if activity != current_activity:
                 bar.reset(task, description=activity)
                 current_activity = activity
             bar.update(task, completed=fraction)
 
-        yield report_progress
+        yield update_bar
 
 
 def open_closed_streams() -> None:

@@ -201,7 +201,7 @@ def trace(
         own_temporary_folder() as temporary,
         atomic_folder(out) as scratch,
         exit_on_overdue_interrupt(lambda: _end_interrupted(temporary, scratch)),
-        progress_bar(output) as progress,
+        progress_bar(output, time_limit) as progress,
     ):
         trace_result = traced(robot, recording, check_recording, progress, alpha, processors(), limit)
         progress("writing the report", 0.0)
