@@ -49,7 +49,7 @@ def test_files_of_each_kind_close_the_loop(tmp_path: Path) -> None:
         ("law.json", "{}", ("has no A, B, C, D, dt",)),
         ("law.json", "[1", ("is not JSON",)),
         ("law.json", json.dumps({**STATE_SPACE, "D": [[1, 2], [3]]}), ("is not a state space",)),
-        ("law.json", json.dumps({**STATE_SPACE, "D": [[1, 2]]}), ("has 2 inputs, must have 6",)),
+        ("law.json", json.dumps({**STATE_SPACE, "D": [[1, 2]]}), ("law.json", "has 2 inputs, must have 6")),
         ("law.py", "x = 1", ("has no function controller",)),
         ("law.py", "1 / 0", ("raised ZeroDivisionError",)),
         ("law.m", "", ("ending '.m'", "(.json)")),

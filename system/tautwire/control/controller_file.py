@@ -9,10 +9,11 @@ from typing import Any
 
 import control
 
-from ..errors import InputError, describe_value, format_value
+from ..errors import ArgumentError, InputError, describe_value, format_value
 from ..input_files import read_bytes, require_utf8_text
 from ..validation import validate_file
-from .external_controller import SpeedLaw
+from .design import RegulatorDesign
+from .external_controller import SpeedLaw, state_space_controller
 
 MAX_FILE_SIZE = 100_000_000  # bytes
 FUNCTION_NAME = "controller"
@@ -22,8 +23,8 @@ class ControllerFileError(InputError):
     """A file does not contain a controller."""
 
 
-def read_controller(path: Path) -> Any:
-    """Reads a controller for :func:`cosimulate_closed_loop`: the path of an ``.fmu``, a StateSpace or a function.
+def read_controller(path: Path, cable_count: int) -> Any:
+    """Reads a controller for :func:`cosimulate_closed_loop`: the path of an ``.fmu``, a design or a function.
 
     ``.json`` has ``A``, ``B``, ``C``, ``D``, ``dt`` and optionally ``inputs`` and ``outputs``; ``.py`` is executed and
     has a function ``controller(time, measured)``.
@@ -37,10 +38,10 @@ def read_controller(path: Path) -> Any:
     file = validate_file("--controller", path)
     if suffix == ".fmu":
         return file
-    return _read_state_space(file) if suffix == ".json" else _read_function(file)
+    return _read_state_space(file, cable_count) if suffix == ".json" else _read_function(file)
 
 
-def _read_state_space(path: Path) -> control.StateSpace:
+def _read_state_space(path: Path, cable_count: int) -> RegulatorDesign:
     content = read_bytes(path, ControllerFileError, MAX_FILE_SIZE)
     require_utf8_text(content, str(path), ControllerFileError, "JSON")
     hint = "write A, B, C, D as lists of rows, and dt in s, 0 if continuous"
@@ -56,9 +57,13 @@ def _read_state_space(path: Path) -> control.StateSpace:
     labels = {key: document[key] for key in ("inputs", "outputs") if document.get(key) is not None}
     try:
         matrices = [document[key] for key in "ABCD"]
-        return control.ss(*matrices, document["dt"], remove_useless_states=False, **labels)
+        system = control.ss(*matrices, document["dt"], remove_useless_states=False, **labels)
     except Exception as error:
         raise ControllerFileError(str(path), f"is not a state space ({error})", hint) from error
+    try:
+        return state_space_controller(system, cable_count)
+    except ArgumentError as error:
+        raise ControllerFileError(str(path), error.problem, error.hint) from error
 
 
 def _read_function(path: Path) -> SpeedLaw:

@@ -15,6 +15,8 @@ from .units import UNITS
 Array = NDArray[np.float64]
 
 DRUM_RADII = (0.005, 0.5)  # m
+NEGATE = "multiply by -1, or declare sign = -1 in [recording.columns]"
+REORDER = "rename the columns in this order, or declare their names so in [recording.columns]"
 
 # Those that recordings are written in by mistake, and what one of each is in SI units.
 TIME_UNITS = {unit.symbol: unit.to_si(1.0) for unit in UNITS["time"] if unit.symbol in ("s", "ms", "us")}
@@ -106,7 +108,10 @@ class WindingReading:
             unit = self.time_unit
             yield Mistake(f"time is in {unit}", convert("time", unit, TIME_UNITS[unit], "time"))
         if self.speed_unit is None:
-            yield Mistake(_drum_angle_text(names, self.radius), "multiply them by the drum's radius, in m/s")
+            yield Mistake(
+                _drum_angle_text(names, self.radius),
+                "multiply them by the drum's radius, or declare it as factor in [recording.columns]",
+            )
         elif self.speed_unit != "m/s":
             unit = self.speed_unit.removesuffix("/s") if recording.rope_lengths else self.speed_unit
             remedy = convert("them", unit, SPEED_UNITS[self.speed_unit], names[0])
@@ -116,11 +121,12 @@ class WindingReading:
             verb = "has" if len(wrong) == 1 else "have"
             subject = _range_text(wrong) if len(wrong) == len(names) else ", ".join(wrong)
             yield Mistake(
-                f"{subject} {verb} the other sign", "multiply by -1: a winch that reels in has a positive speed"
+                f"{subject} {verb} the other sign",
+                f"{NEGATE}: a winch that reels in has a positive speed",
             )
         if self.order != tuple(range(len(self.order))):
             written = ", ".join(names[column] for column in self.order)
-            yield Mistake(f"the winches of cables 1 to {len(names)} are {written}", "rename the columns in this order")
+            yield Mistake(f"the winches of cables 1 to {len(names)} are {written}", REORDER)
         if self.clock_offset:
             side, remedy = (
                 ("ahead of", "subtract that from the winches' times")
@@ -132,8 +138,9 @@ class WindingReading:
 
 
 def convert(what: str, unit: str, factor: float, column: str) -> str:
-    """The remedy for columns in another unit: convert them, or say so in the header of a CSV file."""
-    return f"multiply {what} by {factor:.4g}, or write the unit into the header as in {column} [{unit}]"
+    """The remedy for columns in another unit: convert them, or declare the unit."""
+    declared = f'{column} [{unit}] in the header of a CSV file, unit = "{unit}" in [recording.columns]'
+    return f"multiply {what} by {factor:.4g}, or declare the unit: {declared}"
 
 
 def _range_text(names: list[str]) -> str:

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..robot.schema import AXES, Robot
-from .alternative_readings import TIME_UNITS, GeometryReading, Mistake, WindingReading, convert
+from .alternative_readings import NEGATE, REORDER, TIME_UNITS, GeometryReading, Mistake, WindingReading, convert
 from .mistaken_motion import MIN_IMPROVEMENT
 from .recording import Recording
 from .units import UNITS
@@ -63,11 +63,11 @@ class TensionReading:
                 f"{names} are in {self.unit}{other}", convert("them", self.unit, FORCE_UNITS[self.unit], "tension_1")
             )
         if self.sign < 0:
-            yield Mistake(f"{names} have the other sign", "multiply by -1: a rope that pulls has a positive tension")
+            yield Mistake(f"{names} have the other sign", f"{NEGATE}: a rope that pulls has a positive tension")
         if list(self.order) != sorted(self.order):
             yield Mistake(
                 f"the load cells of cables 1 to {len(columns)} are {', '.join(columns)}",
-                "rename the columns in this order",
+                REORDER,
             )
 
 
