@@ -31,6 +31,7 @@ def test_the_only_one_keeps_twice_as_much_since_it_judges_too() -> None:
     assert shortened(FIT, None, 401)[2] == ()
 
 
+@pytest.mark.validate
 def test_a_trace_takes_the_beginning_and_says_so(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(preprocessing, "shortened", lambda fit, check, _: shortened(fit, check, 300))
     found = trace(example("three"), FIT, CHECK)

@@ -60,6 +60,7 @@ def test_a_tracker_off_zero_takes_the_place_of_a_pulley_for_a_start_elsewhere() 
     assert declared.split.validation.start == ROBOT.platform.start
 
 
+@pytest.mark.validate
 def test_a_pulley_keeps_its_name_where_a_run_starts_elsewhere() -> None:
     hidden = {"pulley": {"radius": 0.005}}
     context = context_of(hidden)

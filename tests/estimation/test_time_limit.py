@@ -219,6 +219,7 @@ def test_the_error_is_localised_before_a_search_that_may_take_all_the_time(
     assert steps == ["localisation", "selection"]
 
 
+@pytest.mark.validate
 def test_nothing_missing_is_never_said_for_lack_of_time() -> None:
     fit, check = (recorded("three", seed, {}).first(401) for seed in (3, 53))
     found = traced_until("round 1", fit, check)

@@ -55,6 +55,7 @@ def of_friction() -> Trace:
     return traced({"friction": {"coefficient": 0.05}}, 401)
 
 
+@pytest.mark.validate
 def test_a_listed_effect_is_named_with_its_share(of_friction: Trace) -> None:
     assert of_friction.verdict == "effects", of_friction.sentence
     (effect,) = of_friction.effects
@@ -66,6 +67,7 @@ def test_a_listed_effect_is_named_with_its_share(of_friction: Trace) -> None:
     assert effect.share <= 1.0 - of_friction.left_share
 
 
+@pytest.mark.validate
 def test_the_report_tells_what_disturbance_was_assumed(of_friction: Trace) -> None:
     document = trace_document(of_friction)
     disturbance, sensors = document["disturbance"], example("three").sensors

@@ -42,18 +42,14 @@ def test_a_formula_that_is_discovered_runs_in_the_fmus(tmp_path: Path) -> None:
     assert np.allclose(again.position, found.comparisons[0].after.position[:101], atol=1e-9)
 
 
-@pytest.mark.validate(but=["8 s"])
-@pytest.mark.parametrize(
-    ("length", "frequency", "accuracy", "samples"),
-    [pytest.param(2.0, 0.352, 0.06, 801, id="16 s"), pytest.param(0.5, 0.705, 0.1, 401, id="8 s")],
-)
-def test_what_swings_is_not_explained_but_said(length: float, frequency: float, accuracy: float, samples: int) -> None:
-    found = traced({"unlisted_swing": {"mass": 20.0, "length": length}}, samples)
+@pytest.mark.validate
+def test_what_swings_is_not_explained_but_said() -> None:
+    found = traced({"unlisted_swing": {"mass": 20.0, "length": 0.5}}, 401)
     assert found.verdict == "unexplained"
     assert found.formula is None
     assert found.robot_after == found.robot_before
     (line,) = trace_document(found)["resonance"]
-    assert line["frequency_hz"] == pytest.approx(frequency, rel=accuracy)
+    assert line["frequency_hz"] == pytest.approx(0.705, rel=0.1)
     assert line["outputs"] == ["x", "y"]
     assert line["on"] == ["fit", "check"]
     assert any(f"an oscillation at {line['frequency_hz']:.2g}" in note for note in found.notes)

@@ -249,7 +249,7 @@ def test_parameters_outside_their_bounds_are_refused(
 
 
 def test_refused_parameters_leave_the_process_alive(three_fmus: RobotFmus) -> None:
-    for _ in range(20):
+    for _ in range(5):
         with in_hand(three_fmus.platform) as platform:
             for _ in range(3):
                 with pytest.raises(FMICallException):

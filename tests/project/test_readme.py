@@ -13,8 +13,6 @@ from tautwire.cli import run as command
 from tests.support.folders import ROOT
 
 README = ROOT / "README.md"
-# Commands that take more than ten seconds.
-LONG = ("trace", "simulate", "material", "excite", "campaign", "paper")
 # tests/project/test_wheel.py installs it.
 INSTALLED = "pip install"
 
@@ -67,14 +65,6 @@ def test_every_shell_block_runs_as_printed(block: str, tmp_path: Path) -> None:
     run_in_shell(block, tmp_path)
     folder = tmp_path / "three" if "\ncd three\n" in block else tmp_path
     assert written_by(block) and all((folder / each).exists() for each in written_by(block))
-
-
-def test_every_shell_block_runs_without_its_long_commands(tmp_path: Path) -> None:
-    for number, block in enumerate(shell_blocks()):
-        lines = [line for line in block.splitlines() if not line.startswith(tuple(f"tautwire {each}" for each in LONG))]
-        folder = tmp_path / str(number)
-        folder.mkdir()
-        run_in_shell("\n".join(lines), folder)
 
 
 def test_what_is_installed_is_this_project() -> None:

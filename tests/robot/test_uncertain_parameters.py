@@ -166,6 +166,7 @@ def test_beyond_three_standard_deviations_only_a_tenth_counts() -> None:
     assert tensions == pytest.approx([tensions[0] * mass / 300.0 for mass in masses.tolist()], rel=1e-9)
 
 
+@pytest.mark.validate
 def test_a_stiffness_within_what_is_stated_is_no_effect_and_is_put_right() -> None:
     found = traced(unsure(modulus=3e9), STIFFER)
     assert found.verdict == "none"

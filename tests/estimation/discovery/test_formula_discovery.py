@@ -74,6 +74,7 @@ def test_a_formula_of_the_robot_file_stays() -> None:
     assert result.robot.formulas == (*half.formulas, *result.formulas)
 
 
+@pytest.mark.validate
 def test_nothing_is_found_where_nothing_is_hidden() -> None:
     results = [discovered({}, seed) for seed in (5, 6)]
     assert not any(each is not None and each.is_accepted(THRESHOLD) for each in results)
