@@ -89,7 +89,13 @@ class CompiledFilter:
     @property
     def instruction_count(self) -> int:
         """Instructions of its functions, in proportion to which it takes memory."""
-        return self._outputs.instruction_count + self._time_update.instruction_count
+        return self.outputs.instruction_count + self._time_update.instruction_count
+
+    @cached_property
+    def outputs(self) -> CompiledFunction:
+        """See :func:`tautwire.estimation.kalman_filter.output_function`."""
+        function = output_function(self.model, self._cable_count, self._noise, self._has_sensitivities)
+        return CompiledFunction(function, max_compiled=sys.maxsize)
 
     @cached_property
     def jacobians(self) -> CompiledFunction:
@@ -110,7 +116,7 @@ class CompiledFilter:
         state, covariance = start.state.copy(), start.covariance.copy()
         sensitivities = np.ascontiguousarray(start.sensitivities.T).copy()
         theta, density = inputs.parameters, np.full((1, 1), inputs.acceleration_noise_density)
-        outputs = self._outputs.bind(count, state[:, None], theta, shift, speed, later, step)
+        outputs = self.outputs.bind(count, state[:, None], theta, shift, speed, later, step)
         time_update = self._time_update.bind(
             count, state[:, None], theta, speed, later, step, drift, density, inputs.disturbance
         )
@@ -133,11 +139,6 @@ class CompiledFilter:
             record.sensitivities.swapaxes(1, 2),
             FilterState(state, covariance, sensitivities.T),
         )
-
-    @cached_property
-    def _outputs(self) -> CompiledFunction:
-        function = output_function(self.model, self._cable_count, self._noise, self._has_sensitivities)
-        return CompiledFunction(function, max_compiled=sys.maxsize)
 
     @cached_property
     def _time_update(self) -> CompiledFunction:

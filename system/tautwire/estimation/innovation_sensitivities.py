@@ -101,8 +101,7 @@ def linearise_filter(
         predicted = segment.states[:, :-1]
         is_observed = observed.T[:, :, None] > 0.0
         innovations = np.where(is_observed[:, :, 0], segment.values, 0.0)
-        columns = (theta, shift, speed, later, step, likelihood.disturbance_arguments)
-        output_matrix = by_sample(likelihood.jacobians(count, predicted, predicted, *columns)[0], count)
+        output_matrix = by_sample(likelihood.outputs(count, predicted, theta, shift, speed, later, step)[1], count)
         cross_covariance = segment.covariances @ np.where(is_observed, output_matrix, 0.0).swapaxes(1, 2)
         covariance = np.where(is_observed, output_matrix, 0.0) @ cross_covariance + np.diag(variances)
         covariance, cholesky_factor = factorised(covariance)
@@ -110,7 +109,7 @@ def linearise_filter(
         gain = cross_covariance @ np.linalg.inv(covariance)
         corrections = np.einsum("kij,kjl,kl->ki", gain, cholesky_factor, innovations)
         updated = predicted + corrections.T
-        _, *jacobians = likelihood.jacobians(count, predicted, updated, *columns)
+        jacobians = likelihood.jacobians(count, updated, theta, speed, later, step, likelihood.disturbance_arguments)
         transition, half_transition = (by_sample(matrix, count) for matrix in jacobians)
         yield LinearisedSegment(
             segment.states[:size],

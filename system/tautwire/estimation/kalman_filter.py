@@ -171,32 +171,26 @@ def _with_force(model: SymbolicModel, force: SX) -> SymbolicModel:
 def filter_jacobians(
     model: SymbolicModel, cable_count: int, noise: Noise, substeps: Substeps, constant_count: int = 0
 ) -> Function:
-    """Jacobians of a filter step: of the outputs by the predicted state, of the next state by the updated one.
+    """Jacobians of a filter step by the updated state.
 
-    Arguments: state before and after the measurement update, parameters, shift, speed, next speed, time step,
-    disturbance, as for :func:`output_function` and :func:`time_update_function`. Results: derivatives of the outputs
-    (m, n), of the state at the next sample (n, n), and of the model's states in it by those half a step before it, from
-    the cubic through both ends.
+    Arguments: state after the measurement update, parameters, speed, next speed, time step, disturbance, as for
+    :func:`time_update_function`. Results: derivatives of the state at the next sample (n, n), and of the model's states
+    in it by those half a step before it, from the cubic through both ends.
     """
     disturbance = _DisturbanceSymbols(cable_count if noise.disturbance else None)
     model_size = model.states.numel()
-    predicted, updated = (SX.sym(name, model_size + disturbance.count) for name in ("before", "after"))
-    shift = SX.sym("shift", 3 + cable_count)
+    updated = SX.sym("after", model_size + disturbance.count)
     speed, later, step = SX.sym("speed", cable_count), SX.sym("later", cable_count), SX.sym("step")
-    inputs = casadi.vertcat(speed, SX(3, 1))
-    instant = [inputs, model.parameters, later, step, shift]
-    outputs = measurement_model(model, cable_count).call([predicted[:model_size], *instant])
-    _, by_state, _ = disturbance.added_to(outputs, predicted)
     interval = _Interval(speed, later, step, substeps)
     _, transition, _ = disturbance.time_update(model, constant_count, updated, interval)
     rate_jacobian = Function(
         "bending", [model.states, model.inputs, model.parameters], [casadi.jacobian(model.rates, model.states)]
     )
-    jacobian_at_update = rate_jacobian(updated[:model_size], inputs, model.parameters)
+    jacobian_at_update = rate_jacobian(updated[:model_size], casadi.vertcat(speed, SX(3, 1)), model.parameters)
     identity, of_model = SX.eye(model_size), transition[:model_size, :model_size]
     half_transition = 0.5 * (of_model + identity) + step / 8.0 * casadi.mtimes(identity - of_model, jacobian_at_update)
-    arguments = [predicted, updated, model.parameters, shift, speed, later, step, disturbance.arguments]
-    return Function("filter_slopes", arguments, [casadi.densify(f) for f in (by_state, transition, half_transition)])
+    arguments = [updated, model.parameters, speed, later, step, disturbance.arguments]
+    return Function("filter_slopes", arguments, [casadi.densify(f) for f in (transition, half_transition)])
 
 
 @dataclass(frozen=True)

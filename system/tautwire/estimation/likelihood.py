@@ -144,6 +144,11 @@ class Likelihood:
         return self._filter_functions.instruction_count
 
     @property
+    def outputs(self) -> CompiledFunction:
+        """See :func:`tautwire.estimation.kalman_filter.output_function`."""
+        return self._filter_functions.outputs
+
+    @property
     def jacobians(self) -> CompiledFunction:
         """See :func:`tautwire.estimation.kalman_filter.filter_jacobians`."""
         return self._filter_functions.jacobians
