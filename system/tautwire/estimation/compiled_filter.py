@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..robot.symbolic_model import SymbolicModel, constants_as_parameters
 from .covariance_recursion import Moments, Record, Samples, Step, run_recursion
 from .integration_steps import Substeps
-from .kalman_filter import Noise, filter_jacobians, output_function, time_update_function
+from .kalman_filter import Noise, filter_jacobians, output_function, simulation_function, time_update_function
 from .native_functions import BoundFunction, CompiledFunction
 
 Array = NDArray[np.float64]
@@ -96,6 +96,11 @@ class CompiledFilter:
         """See :func:`tautwire.estimation.kalman_filter.output_function`."""
         function = output_function(self.model, self._cable_count, self._noise, self._has_sensitivities)
         return CompiledFunction(function, max_compiled=sys.maxsize)
+
+    @cached_property
+    def simulation(self) -> CompiledFunction:
+        """See :func:`tautwire.estimation.kalman_filter.simulation_function`; the state is carried."""
+        return CompiledFunction(simulation_function(self.model, self._cable_count, self._substeps), carried=1)
 
     @cached_property
     def jacobians(self) -> CompiledFunction:

@@ -193,6 +193,20 @@ def filter_jacobians(
     return Function("filter_slopes", arguments, [casadi.densify(f) for f in (transition, half_transition)])
 
 
+def simulation_function(model: SymbolicModel, cable_count: int, substeps: Substeps) -> Function:
+    """Step of a simulation without noise: the state moves as in :func:`time_update_function`.
+
+    Arguments: state, parameters, speed, next speed, time step. Results: state at the next sample (n,), and x, y, z and
+    the tensions of this one without delay (m,).
+    """
+    speed, later, step = SX.sym("speed", cable_count), SX.sym("later", cable_count), SX.sym("step")
+    trajectory = _trajectory(model, model.parameters, model.states, _Interval(speed, later, step, substeps))
+    no_force = SX.zeros(model.inputs.numel() - cable_count)
+    (outputs,) = casadi.substitute([model.outputs], [model.inputs], [casadi.vertcat(speed, no_force)])
+    shown = casadi.vertcat(outputs[:3], outputs[6 : 6 + cable_count])
+    return Function("simulation", [model.states, model.parameters, speed, later, step], [trajectory[-1], shown])
+
+
 @dataclass(frozen=True)
 class _Interval:
     """Interval between two samples: winch speeds at both ends, its length, and how it is divided."""
@@ -223,10 +237,7 @@ def _time_update(model: SymbolicModel, constant_count: int, state: SX, interval:
     moving, parameter_count = model.states.numel() - constant_count, model.parameters.numel()
     reduced = constants_as_parameters(model, constant_count)
     theta = casadi.vertcat(model.parameters, state[moving:])
-    runge_kutta_step = _runge_kutta_step(reduced, interval.speed.numel())
-    trajectory, steps = [state[:moving]], interval.substeps.state
-    for begin, end in interval.parts(steps):
-        trajectory.append(runge_kutta_step(trajectory[-1], theta, begin, end, interval.step / steps))
+    trajectory = _trajectory(reduced, theta, state[:moving], interval)
     transition, sensitivities = _sensitivities(reduced, theta, trajectory, interval)
     return (
         casadi.vertcat(trajectory[-1], state[moving:]),
@@ -236,6 +247,15 @@ def _time_update(model: SymbolicModel, constant_count: int, state: SX, interval:
         ),
         casadi.vertcat(sensitivities[:, :parameter_count], SX(constant_count, parameter_count)),
     )
+
+
+def _trajectory(model: SymbolicModel, theta: SX, state: SX, interval: _Interval) -> list[SX]:
+    """States at the ends of the parts of a step, from its begin on."""
+    runge_kutta_step = _runge_kutta_step(model, interval.speed.numel())
+    trajectory, steps = [state], interval.substeps.state
+    for begin, end in interval.parts(steps):
+        trajectory.append(runge_kutta_step(trajectory[-1], theta, begin, end, interval.step / steps))
+    return trajectory
 
 
 def _sensitivities(model: SymbolicModel, theta: SX, trajectory: list[SX], interval: _Interval) -> tuple[SX, SX]:

@@ -16,7 +16,6 @@ from copy import copy
 from dataclasses import dataclass, field, replace
 from math import log, pi
 
-import casadi
 import numpy as np
 from numpy.typing import NDArray
 
@@ -194,23 +193,16 @@ class Likelihood:
 
     def simulated_outputs(self, recording: Recording, parameters: Sequence[float] | Array) -> Array:
         """Simulated outputs without noise, as late as the sensors show them, over a recording's winch speeds (N, m)."""
-        no_measurements = np.full(recording.measured().shape, np.nan)
-        outputs = casadi.vertcat(self.model.outputs[:3], self.model.outputs[6 : 6 + self.cable_count])
-        function = casadi.Function("shown", [self.model.states, self.model.inputs, self.model.parameters], [outputs])
-        no_force = np.zeros(self.model.inputs.numel() - self.cable_count)
-        parts = []
-        for segment in self._filter(
-            recording, (no_measurements, np.zeros_like(no_measurements)), parameters, self._start_covariance(), 0.0
-        ):
-            states = segment.states[: self.model.states.numel(), :-1][:, segment.is_recorded]
-            speeds = segment.columns[3][:, segment.is_recorded]
-            count = states.shape[1]
-            inputs = np.vstack([speeds, np.repeat(no_force[:, None], count, axis=1)])
-            theta = np.repeat(self._arguments(parameters)[:, None], count, axis=1)
-            parts.append(np.array(function.map(count)(states, inputs, theta)).T)
-        lags = np.array(self._filter_functions.lags(self._arguments(parameters))).ravel()
-        time, columns = recording.time, np.vstack(parts).T
-        return np.array([np.interp(time - lag, time, column) for lag, column in zip(lags, columns, strict=True)]).T
+        nothing = np.zeros_like(recording.measured())
+        columns, is_recorded = _filter_columns(recording, nothing, nothing)
+        theta, (speed, later, step) = self._arguments(parameters), columns[3:6]
+        start, _ = self._filter_functions.start(theta)
+        _, outputs = self._filter_functions.simulation(
+            len(is_recorded), np.array(start), theta[:, None], speed, later, step
+        )
+        lags = np.array(self._filter_functions.lags(theta)).ravel()
+        time, shown = recording.time, outputs[:, is_recorded]
+        return np.array([np.interp(time - lag, time, column) for lag, column in zip(lags, shown, strict=True)]).T
 
     def _aligned_outputs(self, recording: Recording, parameters: Sequence[float] | Array) -> tuple[Array, Array]:
         lags = np.array(self._filter_functions.lags(self._arguments(parameters))).ravel()
