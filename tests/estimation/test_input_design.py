@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tautwire.cli import run
+from tautwire.estimation import input_design
 from tautwire.estimation.input_design import (
     DesignOptions,
     ExcitationError,
@@ -36,6 +37,21 @@ def test_a_path_of_sines_begins_and_ends_at_rest_and_has_its_own_derivatives() -
     assert np.allclose(np.gradient(position, times, axis=0)[1:-1], velocity[1:-1], atol=1e-5)
     assert np.allclose(np.gradient(velocity, times, axis=0)[1:-1], acceleration[1:-1], atol=3e-3)
     assert np.max(np.abs(path.scaled(0.5).position(times) - position[0])) < np.max(np.abs(position - position[0]))
+
+
+@pytest.mark.parametrize(("programs", "tried"), [(96, 96), (64, 64), (1, 64)])
+def test_as_many_programs_are_tried_as_are_asked_for_and_progress_counts_them(programs: int, tried: int) -> None:
+    class Bowl:
+        options = DesignOptions(LIMITS, 3.0, 0.05, programs)
+
+        @staticmethod
+        def score(decision_variables: np.ndarray) -> float:
+            return -float(np.sum((decision_variables - 0.3) ** 2))
+
+    reported: list[tuple[str, float]] = []
+    best, scores = input_design._search(Bowl(), lambda *report: reported.append(report))  # type: ignore[arg-type]
+    assert Bowl.score(best) == max(scores)
+    assert reported == [("trying programs", number / tried) for number in range(tried)]
 
 
 @pytest.mark.validate

@@ -8,11 +8,18 @@ import pytest
 from tautwire.estimation.estimation_data import split_data
 from tautwire.estimation.hypotheses import Hypothesis, hypotheses
 from tautwire.estimation.identification_context import IdentificationContext
-from tautwire.estimation.innovation_sensitivities import SensitivityColumn
+from tautwire.estimation.innovation_sensitivities import SensitivityColumn, linearise_filter
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fitter
 from tautwire.estimation.preprocessing import prepare_data
-from tautwire.estimation.score_test import ScoreStatistics, _predicted_gain, score_test, score_test_in_workers
+from tautwire.estimation.score_test import (
+    ScoreStatistics,
+    _predicted_gain,
+    effect_sensitivities,
+    score_test,
+    score_test_in_workers,
+    statistics_of_runs,
+)
 from tautwire.estimation.worker_pool import WorkerPool
 from tautwire.recordings.recording import read_recording
 from tautwire.robot.robot_file_reader import read_robot
@@ -33,6 +40,18 @@ def test_what_is_there_has_the_largest_score_and_its_values() -> None:
     best = max(found, key=lambda hypothesis: found[hypothesis].gain)
     assert best.effect.name == "payload"
     assert found[best].values["mass"] == pytest.approx(0.5, rel=0.05)
+
+
+def test_sensitivities_of_effects_serve_one_run_after_another() -> None:
+    likelihood, values = Fitter(NOISE).likelihood(ROBOT, (), SAMPLE)
+    relaxation = [h for h in hypotheses(ROBOT) if h.effect.name == "relaxation"]
+    effects = effect_sensitivities(ROBOT, SAMPLE.start, relaxation, likelihood.model.state_names)
+    first, second = (
+        statistics_of_runs(linearise_filter(likelihood, values, SAMPLE.recording), effects, SAMPLE.rows)
+        for _ in range(2)
+    )
+    assert np.any(first.fisher_information)
+    assert np.array_equal(first.fisher_information, second.fisher_information)
 
 
 @pytest.mark.validate

@@ -242,7 +242,7 @@ def excite(
     reach: Annotated[float | None, typer.Option(help="Farthest from the start along an axis, m.", min=1e-6)] = None,
     duration: Annotated[float, typer.Option(help="s", min=1.0, max=3600.0)] = 30.0,
     rate: Annotated[float, typer.Option(help="Samples per second.", min=1.0, max=1000.0)] = 50.0,
-    programs: Annotated[int, typer.Option(help="Approximate number of programs to try.", min=1, max=100_000)] = 64,
+    programs: Annotated[int, typer.Option(help="Approximate number of programs to try.", min=1, max=100_000)] = 96,
     seed: Annotated[int, typer.Option(help="Random seed.", min=0)] = 0,
     as_json: AsJson = False,
     quiet: Quiet = False,

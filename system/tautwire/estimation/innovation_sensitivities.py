@@ -185,7 +185,7 @@ class EffectSensitivities:
         self._nominal_values = np.array([value for _, _, value in nominal])
         self._shape_values = [np.tile(list(trial.values()), len(cable_groups)) for trial in trials]
         self._compile(extended_robot, free, fixed, state_names, robot.cable_count)
-        self._effect_states_now = [self._initial_states(number)[0] for number in range(len(trials))]
+        self.restart()
         self.start_sensitivities = np.hstack(
             [self._initial_states(number)[1][:, moving] for number, moving in enumerate(self._moving_indices)]
         )
@@ -234,6 +234,10 @@ class EffectSensitivities:
             "start", [theta], [casadi.densify(model.start[effect_indices]), casadi.densify(start_sensitivities)]
         )
         self._input_count = model.inputs.numel()
+
+    def restart(self) -> None:
+        """Go back to the start, for another run."""
+        self._effect_states_now = [self._initial_states(number)[0] for number in range(len(self._grid_points))]
 
     def _initial_states(self, trial: int) -> tuple[tuple[Array, Array], Array]:
         effect_states, start = self._start_function(self._parameter_values(trial))

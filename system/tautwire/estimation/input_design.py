@@ -13,12 +13,13 @@ from __future__ import annotations
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from math import log10
+from math import ceil, log2, log10
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 from scipy.optimize import Bounds, differential_evolution
+from threadpoolctl import threadpool_limits
 
 from ..errors import InputError, TautwireError
 from ..recordings.recording import Recording
@@ -28,12 +29,13 @@ from ..robot.trajectory import ideal_winch_speeds
 from .estimation_data import DataSet
 from .hypotheses import Hypothesis, hypotheses
 from .identifiability import separation_nats, start_steps
+from .innovation_sensitivities import EffectSensitivities, linearise_filter
 from .kalman_filter import Noise
 from .likelihood import Likelihood
 from .measurement_noise import estimate_noise
 from .multisine import MultisinePath
 from .parameter_fit import Fitter
-from .score_test import score_statistics
+from .score_test import effect_sensitivities, statistics_of_runs
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -116,30 +118,37 @@ def design_excitation(
 
     Raises ExcitationError where none is within the limits.
     """
-    declared = robot.sensors
-    noise = Noise(declared.position_noise or 0.0, declared.tension_noise or 0.0, declared.winch_speed_noise or 0.0, 0.0)
-    likelihood = Likelihood(robot, (), noise, options.interval)
-    # Declared noise is the same for all programs: they share what one fitter has compiled.
-    design = _DesignProblem(robot, tuple(effects), options, likelihood, lru_cache(maxsize=1)(Fitter))
+    # On matrices as small as these, threads wait for each other longer than one of them computes.
+    with threadpool_limits(1):
+        progress("compiling the filter", 0.0)
+        design = _design_problem(robot, tuple(effects), options)
+        best, scores = _search(design, progress)
+        if max(scores) <= INFEASIBLE_SCORE:
+            raise ExcitationError(len(scores))
+        path, program = design.program(best)
+        pairs = tuple(design.separations(program))
+    median_separation = 10.0 ** float(np.median([score for score in scores if score > INFEASIBLE_SCORE]))
+    return Excitation(path, program.time, program.winch_speed, pairs, median_separation)
+
+
+def _search(design: _DesignProblem, progress: Progress) -> tuple[Array, list[float]]:
+    """The best decision variables, and the scores of all programs in the order in which they were tried."""
     count = 6 * (SLOW_SINES + FAST_SINES)
-    bounds = Bounds(np.zeros(count), np.ones(count))
-    generations = max(1, options.programs // count - 1)
+    # Sobol's sequence is balanced at powers of two.
+    population = 2 ** ceil(log2(count))
+    generations = max(1, round(design.options.programs / population) - 1)
     scores: list[float] = []
 
     def cost(decision_variables: Array) -> float:
-        progress("trying programs", min(len(scores) / ((generations + 1) * count), 1.0))
+        progress("trying programs", len(scores) / ((generations + 1) * population))
         scores.append(design.score(decision_variables))
         return -scores[-1]
 
+    bounds, seed = Bounds(np.zeros(count), np.ones(count)), design.options.seed
     best = differential_evolution(
-        cost, bounds, init="sobol", popsize=1, maxiter=generations, polish=False, seed=options.seed, tol=0.0
+        cost, bounds, init="sobol", popsize=1, maxiter=generations, polish=False, seed=seed, tol=0.0
     )
-    if max(scores) <= INFEASIBLE_SCORE:
-        raise ExcitationError(len(scores))
-    path = design.path(best.x)
-    time, speed = design.sampled_program(path)
-    median_separation = 10.0 ** float(np.median([score for score in scores if score > INFEASIBLE_SCORE]))
-    return Excitation(path, time, speed, tuple(design.separations(path)), median_separation)
+    return best.x, scores
 
 
 @dataclass(frozen=True)
@@ -148,18 +157,29 @@ class _DesignProblem:
     effects: tuple[Hypothesis, ...]
     options: DesignOptions
     likelihood: Likelihood
+    sensitivities: tuple[EffectSensitivities, ...]
     fitter_for: Callable[[Noise], Fitter]
 
     def score(self, decision_variables: Array) -> float:
         """Log10 of the smallest separation in nats."""
         try:
-            pairs = self.separations(self.path(decision_variables))
+            _, program = self.program(decision_variables)
         except _InfeasibleError:
             return INFEASIBLE_SCORE
+        pairs = self.separations(program)
         return log10(max(pairs[0].nats, MIN_SEPARATION)) if pairs else INFEASIBLE_SCORE
 
-    def path(self, decision_variables: Array) -> MultisinePath:
-        """Decode decision variables between 0 and 1 into a path, shrunk until it is within the limits."""
+    def program(self, decision_variables: Array) -> tuple[MultisinePath, Recording]:
+        """Decode decision variables between 0 and 1 into a path within the limits, and what sensors show along it."""
+        path = self._path(decision_variables)
+        for _ in range(MAX_SHRINKS):
+            recording = self._simulated_within_limits(path)
+            if recording is not None:
+                return path, recording
+            path = path.scaled(SHRINK_FACTOR)
+        raise _InfeasibleError
+
+    def _path(self, decision_variables: Array) -> MultisinePath:
         amplitude, frequency_fraction = np.asarray(decision_variables).reshape(2, SLOW_SINES + FAST_SINES, 3)
         slowest, middle, fastest = 1.0 / self.options.duration, 6.0 / self.options.duration, 0.2 / self.options.interval
         begin = np.array([slowest] * SLOW_SINES + [middle] * FAST_SINES)[:, None]
@@ -170,44 +190,32 @@ class _DesignProblem:
             self.options.limits.reach / (SLOW_SINES + FAST_SINES),
             self.options.limits.speed / (2.0 * np.pi * frequencies),
         )
-        path = MultisinePath(
+        return MultisinePath(
             self.robot.platform.start, self.options.duration, _as_rows(amplitude * max_amplitude), _as_rows(frequencies)
         )
-        for _ in range(MAX_SHRINKS):
-            if self._is_within_limits(path):
-                return path
-            path = path.scaled(SHRINK_FACTOR)
-        raise _InfeasibleError
 
-    def sampled_program(self, path: MultisinePath) -> tuple[Array, Array]:
-        time = np.asarray(
-            self.options.interval * np.arange(round(self.options.duration / self.options.interval) + 1),
-            dtype=np.float64,
-        )
-        return time, ideal_winch_speeds(self.robot, path, time)
-
-    def _is_within_limits(self, path: MultisinePath) -> bool:
-        _, speed = self.sampled_program(path)
-        if np.max(np.abs(speed)) > self.options.limits.speed:
-            return False
-        tension = self._simulate(path).tension
-        min_tension, max_tension = float(np.min(tension)), float(np.max(tension))
-        return bool(self.options.limits.min_tension <= min_tension and max_tension <= self.options.limits.max_tension)
-
-    def _simulate(self, path: MultisinePath) -> Recording:
-        """Simulated recording of sensors without noise."""
-        time, speed = self.sampled_program(path)
+    def _simulated_within_limits(self, path: MultisinePath) -> Recording | None:
+        """Simulated recording of sensors without noise; None where a limit is broken."""
+        limits, interval = self.options.limits, self.options.interval
+        time = np.asarray(interval * np.arange(round(self.options.duration / interval) + 1), dtype=np.float64)
+        speed = ideal_winch_speeds(self.robot, path, time)
+        if np.max(np.abs(speed)) > limits.speed:
+            return None
         unmeasured = np.full(speed.shape, np.nan)
         template = Recording("program", time, speed, unmeasured, unmeasured[:, :3])
         outputs = self.likelihood.simulated_outputs(template, ())
-        return replace(template, position=outputs[:, :3], tension=outputs[:, 3:])
+        tension = outputs[:, 3:]
+        if not (limits.min_tension <= np.min(tension) and np.max(tension) <= limits.max_tension):
+            return None
+        return replace(template, position=outputs[:, :3], tension=tension)
 
-    def separations(self, path: MultisinePath) -> list[EffectSeparation]:
-        """Separations of each effect from each other, the closest first."""
-        recording = self._simulate(path)
+    def separations(self, recording: Recording) -> list[EffectSeparation]:
+        """Separations of each effect from each other along a program, the closest first."""
         fitter = self.fitter_for(estimate_noise(self.robot, recording))
-        sample = DataSet(recording, self.robot.platform.start, np.ones(len(recording.time), dtype=bool))
-        signatures = score_statistics(self.robot, (), self.effects, fitter, sample)
+        every_row = np.ones(len(recording.time), dtype=bool)
+        likelihood, values = fitter.likelihood(self.robot, (), DataSet(recording, self.robot.platform.start, every_row))
+        runs = linearise_filter(likelihood, values, recording)
+        signatures = statistics_of_runs(runs, self.sensitivities, every_row)
         start_directions = {one: start_steps(signatures, self.robot, one) for one in self.effects}
         # An effect that this motion would not show at all (slack, where no rope hangs) does not rank programs.
         visible_effects = [
@@ -222,6 +230,15 @@ class _DesignProblem:
             if one.effect is not other.effect
         ]
         return sorted(separations, key=lambda pair: pair.nats)
+
+
+def _design_problem(robot: Robot, effects: tuple[Hypothesis, ...], options: DesignOptions) -> _DesignProblem:
+    declared = robot.sensors
+    noise = Noise(declared.position_noise or 0.0, declared.tension_noise or 0.0, declared.winch_speed_noise or 0.0, 0.0)
+    likelihood = Likelihood(robot, (), noise, options.interval)
+    sensitivities = effect_sensitivities(robot, robot.platform.start, effects, likelihood.model.state_names)
+    # Declared noise is the same for all programs: they share what one fitter has compiled.
+    return _DesignProblem(robot, effects, options, likelihood, sensitivities, lru_cache(maxsize=1)(Fitter))
 
 
 class _InfeasibleError(Exception):

@@ -10,7 +10,7 @@ Source: Rao's score test, e.g. Cox and Hinkley (1974), Theoretical Statistics, s
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 
@@ -24,7 +24,7 @@ from ..robot.schema import Robot
 from .estimation_data import DataSet
 from .hypotheses import PLATFORM_SENSOR_FORMS, Hypothesis, free_parameters
 from .identification_context import IdentificationContext
-from .innovation_sensitivities import EffectSensitivities, SensitivityColumn, linearise_filter
+from .innovation_sensitivities import EffectSensitivities, LinearisedSegment, SensitivityColumn, linearise_filter
 from .parameter_fit import Fitter
 
 Array = NDArray[np.float64]
@@ -111,28 +111,40 @@ def score_statistics(
     free = free_parameters(robot, accepted)
     settings = [robot.effects[f.effect_index] for f in free]
     columns = [SensitivityColumn(s.name, s.cables, f.name, 0) for s, f in zip(settings, free, strict=True)]
-    robot_at_start = with_measured_start(robot, data.start)
-    sensitivities = list(_effect_sensitivities(robot_at_start, hypotheses, likelihood.model.state_names))
-    columns += [column for direction in sensitivities for column in direction.columns]
-    nominal_values = np.concatenate([np.array(values), *(direction.values for direction in sensitivities)])
+    effects = effect_sensitivities(robot, data.start, hypotheses, likelihood.model.state_names)
+    runs = linearise_filter(likelihood, values, data.recording, acceleration_noise_density)
+    return statistics_of_runs(runs, effects, data.rows, columns, values)
+
+
+def statistics_of_runs(
+    runs: Iterable[LinearisedSegment],
+    effects: Sequence[EffectSensitivities],
+    rows: NDArray[np.bool_],
+    own_columns: Sequence[SensitivityColumn] = (),
+    own_values: Sequence[float] = (),
+) -> ScoreStatistics:
+    """Score statistics of a linearised filter's own parameters and of effects beside them, by some recorded rows."""
+    columns = (*own_columns, *(column for effect in effects for column in effect.columns))
+    nominal_values = np.concatenate([np.array(own_values), *(effect.values for effect in effects)])
     fisher_information, score = np.zeros((len(nominal_values), len(nominal_values))), np.zeros(len(nominal_values))
-    state_sensitivities = np.hstack([direction.start_sensitivities for direction in sensitivities])
+    state_sensitivities = np.hstack([effect.start_sensitivities for effect in effects])
     recorded_rows = 0
-    for run in linearise_filter(likelihood, values, data.recording, acceleration_noise_density):
-        fitter.poll_interrupts()
-        rows = np.zeros(len(run.is_recorded), dtype=bool)
-        rows[run.is_recorded] = data.rows[recorded_rows : recorded_rows + int(np.sum(run.is_recorded))]
+    for effect in effects:
+        effect.restart()
+    for run in runs:
+        counting = np.zeros(len(run.is_recorded), dtype=bool)
+        counting[run.is_recorded] = rows[recorded_rows : recorded_rows + int(np.sum(run.is_recorded))]
         recorded_rows += int(np.sum(run.is_recorded))
-        parts = zip(*(direction.forcing_terms(run) for direction in sensitivities), strict=True)
+        parts = zip(*(effect.forcing_terms(run) for effect in effects), strict=True)
         state_sensitivities, innovation_sensitivities = run.propagate_sensitivities(
             state_sensitivities, *(np.concatenate(part, axis=2) for part in parts)
         )
-        jacobian = np.concatenate([run.sensitivities, innovation_sensitivities], axis=2)[rows].reshape(
+        jacobian = np.concatenate([run.sensitivities, innovation_sensitivities], axis=2)[counting].reshape(
             -1, len(nominal_values)
         )
         fisher_information += jacobian.T @ jacobian
-        score += jacobian.T @ run.values[rows].ravel()
-    return _without_non_finite(ScoreStatistics(tuple(columns), nominal_values, fisher_information, score))
+        score += jacobian.T @ run.values[counting].ravel()
+    return _without_non_finite(ScoreStatistics(columns, nominal_values, fisher_information, score))
 
 
 def _without_non_finite(statistics: ScoreStatistics) -> ScoreStatistics:
@@ -144,14 +156,18 @@ def _without_non_finite(statistics: ScoreStatistics) -> ScoreStatistics:
     )
 
 
-def _effect_sensitivities(
-    robot: Robot, hypotheses: Sequence[Hypothesis], state_names: Sequence[str]
-) -> Iterator[EffectSensitivities]:
+def effect_sensitivities(
+    robot: Robot, start: tuple[float, float, float], hypotheses: Sequence[Hypothesis], state_names: Sequence[str]
+) -> tuple[EffectSensitivities, ...]:
+    """Sensitivities to each effect of some hypotheses, of a robot that starts at ``start`` (m) with those states."""
+    robot_at_start = with_measured_start(robot, start)
+    found = []
     for effect in dict.fromkeys(hypothesis.effect for hypothesis in hypotheses):
         of_effect = [hypothesis for hypothesis in hypotheses if hypothesis.effect is effect]
         cables = sorted({cable for hypothesis in of_effect for cable in hypothesis.cables})
         forms = list(dict.fromkeys(hypothesis.form for hypothesis in of_effect))
-        yield EffectSensitivities(robot, effect, cables, forms, starting_grid(effect), state_names)
+        found.append(EffectSensitivities(robot_at_start, effect, cables, forms, starting_grid(effect), state_names))
+    return tuple(found)
 
 
 def starting_grid(effect: Effect) -> list[dict[str, float]]:
