@@ -24,7 +24,9 @@ EVERYWHERE = (1, 2, 3)
 def along(name: str, form: tuple[str, ...], trial: dict[str, float]) -> np.ndarray:
     """Slopes of the innovations by an effect's parameters, cable by cable: (N, m, p)."""
     likelihood = Likelihood(ROBOT, (), NOISE, INTERVAL)
-    directions = EffectSensitivities(ROBOT, BY_NAME[name], EVERYWHERE, [form], [trial], likelihood.model.state_names)
+    directions = EffectSensitivities(
+        ROBOT, BY_NAME[name], [(cable,) for cable in EVERYWHERE], [form], [trial], likelihood.model.state_names
+    )
     slopes, parts = directions.start_sensitivities, []
     for run in linearise_filter(likelihood, [], RECORDING):
         slopes, moved = run.propagate_sensitivities(slopes, *directions.forcing_terms(run))

@@ -145,7 +145,7 @@ class SensitivityColumn:
 
 
 class EffectSensitivities:
-    """Sensitivities to one effect, switched on and neutral on each cable alone, beside what a robot has already.
+    """Sensitivities to one effect, switched on and neutral on each group of cables, beside what a robot has already.
 
     ``columns`` (p) name the parameters; ``values`` (p) where they begin; ``start_sensitivities`` (n, p) are those of
     the start.
@@ -155,12 +155,13 @@ class EffectSensitivities:
         self,
         robot: Robot,
         effect: Effect,
-        cables: Sequence[int],
+        cable_groups: Sequence[tuple[int, ...]],
         forms: Sequence[tuple[str, ...]],
         trials: Sequence[Mapping[str, float]],
         state_names: Sequence[str],
     ) -> None:
-        cable_groups = [()] if effect.component not in PER_CABLE_COMPONENTS else [(cable,) for cable in cables]
+        if effect.component not in PER_CABLE_COMPONENTS:
+            cable_groups = [()]
         free, extended_robot, fixed, nominal = [], robot, [], []
         for group in cable_groups:
             setting = Hypothesis(effect, group).neutral(robot, group)

@@ -164,9 +164,12 @@ def effect_sensitivities(
     found = []
     for effect in dict.fromkeys(hypothesis.effect for hypothesis in hypotheses):
         of_effect = [hypothesis for hypothesis in hypotheses if hypothesis.effect is effect]
-        cables = sorted({cable for hypothesis in of_effect for cable in hypothesis.cables})
+        groups = list(dict.fromkeys(hypothesis.cables for hypothesis in of_effect))
+        # Columns of cables alone serve hypotheses on several, but are as many times as costly.
+        if len(groups) > 1:
+            groups = [(cable,) for cable in sorted({cable for group in groups for cable in group})]
         forms = list(dict.fromkeys(hypothesis.form for hypothesis in of_effect))
-        found.append(EffectSensitivities(robot_at_start, effect, cables, forms, starting_grid(effect), state_names))
+        found.append(EffectSensitivities(robot_at_start, effect, groups, forms, starting_grid(effect), state_names))
     return tuple(found)
 
 
@@ -219,12 +222,13 @@ def _gain_share_at_bound(start: float, best: float, bound: float) -> float:
 def parameter_columns(statistics: ScoreStatistics, hypothesis: Hypothesis, trial: int) -> tuple[list[str], Array]:
     """Parameters of a hypothesis that have a score, and the columns that each moves (columns, parameters)."""
     names, columns = [], []
-    acting_cables = set(hypothesis.cables[:1] if hypothesis.form in PLATFORM_SENSOR_FORMS else hypothesis.cables)
+    is_of_platform = hypothesis.form in PLATFORM_SENSOR_FORMS
+    acting_cables = set(hypothesis.cables[:1] if is_of_platform else hypothesis.cables)
     for name in hypothesis.form:
         weights = [
             float(
                 (column.effect, column.parameter, column.trial) == (hypothesis.effect.name, name, trial)
-                and set(column.cables) <= acting_cables
+                and set(column.cables[:1] if is_of_platform else column.cables) <= acting_cables
             )
             for column in statistics.columns
         ]
