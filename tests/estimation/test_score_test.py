@@ -54,6 +54,22 @@ def test_sensitivities_of_effects_serve_one_run_after_another() -> None:
     assert np.array_equal(first.fisher_information, second.fisher_information)
 
 
+def test_a_column_of_all_cables_is_the_sum_of_those_of_each() -> None:
+    likelihood, values = Fitter(NOISE).likelihood(ROBOT, (), SAMPLE)
+    on_all, on_one = (Hypothesis(BY_NAME["damping"], cables) for cables in (ROBOT.cable_numbers, (1,)))
+    together, apart = (
+        statistics_of_runs(
+            linearise_filter(likelihood, values, SAMPLE.recording),
+            effect_sensitivities(ROBOT, SAMPLE.start, chosen, likelihood.model.state_names),
+            SAMPLE.rows,
+        )
+        for chosen in ([on_all], [on_all, on_one])
+    )
+    assert [column.cables for column in together.columns] == [ROBOT.cable_numbers]
+    assert [column.cables for column in apart.columns] == [(cable,) for cable in ROBOT.cable_numbers]
+    assert float(together.fisher_information[0, 0]) == pytest.approx(float(np.sum(apart.fisher_information)))
+
+
 @pytest.mark.validate
 def test_workers_compute_the_same_scores() -> None:
     damped = Hypothesis(BY_NAME["damping"], ROBOT.cable_numbers)

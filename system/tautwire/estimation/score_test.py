@@ -224,16 +224,20 @@ def parameter_columns(statistics: ScoreStatistics, hypothesis: Hypothesis, trial
     names, columns = [], []
     is_of_platform = hypothesis.form in PLATFORM_SENSOR_FORMS
     acting_cables = set(hypothesis.cables[:1] if is_of_platform else hypothesis.cables)
+    own_columns = [
+        (index, column)
+        for index, column in enumerate(statistics.columns)
+        if column.effect == hypothesis.effect.name
+        and column.trial == trial
+        and set(column.cables[:1] if is_of_platform else column.cables) <= acting_cables
+    ]
+    information = np.diag(statistics.fisher_information)
     for name in hypothesis.form:
-        weights = [
-            float(
-                (column.effect, column.parameter, column.trial) == (hypothesis.effect.name, name, trial)
-                and set(column.cables[:1] if is_of_platform else column.cables) <= acting_cables
-            )
-            for column in statistics.columns
-        ]
-        if np.diag(statistics.fisher_information) @ np.array(weights) > 0.0:
+        indices = [index for index, column in own_columns if column.parameter == name]
+        if np.sum(information[indices]) > 0.0:
             names.append(name)
+            weights = np.zeros(len(information))
+            weights[indices] = 1.0
             columns.append(weights)
     return names, np.array(columns).reshape(len(names), len(statistics.columns)).T
 
