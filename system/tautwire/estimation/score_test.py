@@ -13,6 +13,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
+from math import prod
 
 import numpy as np
 from numpy.typing import NDArray
@@ -184,8 +185,9 @@ def starting_grid(effect: Effect) -> list[dict[str, float]]:
 
 def grid_size(hypothesis: Hypothesis) -> int:
     """Number of grid points for a hypothesis: one where its form has no gridded parameter."""
-    trials = starting_grid(hypothesis.effect)
-    return len(trials) if set(trials[0]) & set(hypothesis.form) else 1
+    gridded = [p for p in hypothesis.effect.parameters if p.multistart_values]
+    is_gridded = any(p.name in hypothesis.form for p in gridded)
+    return prod(len(p.multistart_values) for p in gridded) if is_gridded else 1
 
 
 def _predicted_gain(
