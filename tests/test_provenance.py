@@ -29,6 +29,14 @@ def test_inputs_are_named_as_the_command_had_them_with_their_hashes(
     assert provenance_of({"cable_1=own.fmu": Path("fit.csv")}).inputs.keys() == {"cable_1=own.fmu"}
 
 
+def test_a_folder_stands_for_its_files(tmp_path: Path) -> None:
+    (tmp_path / "run.mcap").write_bytes(b"a")
+    (tmp_path / "metadata.yaml").write_bytes(b"b")
+    (tmp_path / "notes").mkdir()
+    hashes = {"bag/metadata.yaml": hashlib.sha256(b"b").hexdigest(), "bag/run.mcap": hashlib.sha256(b"a").hexdigest()}
+    assert provenance_of({"bag": tmp_path}).inputs == hashes
+
+
 def test_the_date_is_that_of_a_reproducible_build(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("SOURCE_DATE_EPOCH", "1700000000")
     assert provenance_of().created == "2023-11-14T22:13:20Z"

@@ -6,7 +6,7 @@ import hashlib
 import json
 import os
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from datetime import datetime, timezone
 from pathlib import Path
@@ -64,12 +64,14 @@ class Provenance:
 def provenance_of(inputs: Sequence[str | Path] | Mapping[str, Path] = (), command: str | None = None) -> Provenance:
     """Provenance of a result that is about to be computed from files; a mapping gives names to them.
 
+    A folder, such as a ROS bag, stands for the files in it.
     The date is that of the environment variable ``SOURCE_DATE_EPOCH``, in s since 1970, if it is set, else now.
 
     Raises InputError where that is no date, OSError where a file cannot be read.
     """
     named = inputs if isinstance(inputs, Mapping) else {str(path): Path(path) for path in inputs}
-    return Provenance(__version__, command, _utc_date(), {name: _sha256(path) for name, path in named.items()})
+    files = {name: file for key, path in named.items() for name, file in _files_of(key, path)}
+    return Provenance(__version__, command, _utc_date(), {name: _sha256(file) for name, file in files.items()})
 
 
 def command_text(arguments: Sequence[str]) -> str:
@@ -85,6 +87,16 @@ def _utc_date() -> str:
         hint = "give whole seconds since 1970, such as 1700000000, or unset it"
         raise InputError(DATE_VARIABLE, f"{text!r} is not a date", hint) from error
     return date.strftime("%Y-%m-%dT%H:%M:%SZ")
+
+
+def _files_of(name: str, path: Path) -> Iterator[tuple[str, Path]]:
+    """A file with its name, or the files of a folder with theirs after the folder's."""
+    if not path.is_dir():
+        yield name, path
+        return
+    for file in sorted(path.iterdir()):
+        if file.is_file():
+            yield f"{name.rstrip('/')}/{file.name}", file
 
 
 def _sha256(path: Path) -> str:

@@ -109,7 +109,8 @@ def check(
     context: typer.Context,
     robot_file: RobotFile,
     recording: Annotated[
-        Path | None, typer.Argument(metavar="RECORDING.csv", help="A recording of it; CSV, Parquet, MDF or .mat.")
+        Path | None,
+        typer.Argument(metavar="RECORDING.csv", help="A recording of it; CSV, Parquet, MDF, .mat or a ROS bag."),
     ] = None,
     columns: Columns = None,
     report: Annotated[
@@ -137,7 +138,12 @@ def check(
     output = CommandOutput(as_json, quiet)
     with progress_bar(output) as progress:
         result = check_files(robot_file, recording, progress, columns)
-        readable = (path for path in inputs if path.is_file() and os.access(path, os.R_OK))
+        # Of folders only a bag that was read has its files hashed.
+        readable = (
+            path
+            for path in inputs
+            if (path.is_file() and os.access(path, os.R_OK)) or (path.is_dir() and result.recording is not None)
+        )
         is_reported = report is not None and _write_report(
             result, report, inputs, command_provenance(context, *readable)
         )
