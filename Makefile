@@ -16,7 +16,7 @@ FLOOR_TESTS := $(addprefix tests/,$(addsuffix .py,cli/test_commands cli/test_inp
 	cli/test_refused_input control/test_lqg control/test_robust_design cosimulation/test_robot_cosimulation \
 	estimation/test_recording_preparation linear/test_linear_plant linear/test_plant_figures project/test_public_names \
 	recordings/test_csv_file recordings/test_mat_file recordings/test_mdf_file recordings/test_parquet_file \
-	reports/test_trace_report_page robot/test_static_equilibrium))
+	recordings/test_ros_bag reports/test_trace_report_page robot/test_static_equilibrium))
 
 .PHONY: run test validate lint types docs pictures floors bench bench-long bench-trace bench-control bench-campaign clean
 
@@ -52,7 +52,7 @@ pictures: $(READY)
 floors: $(READY)
 	$(BIN)/python -m tests.floors > build/floors.txt
 	$(PYTHON) -m venv --clear $(FLOORS)
-	$(FLOORS)/bin/python -m pip install --quiet --no-compile --constraint build/floors.txt --editable ".[mat,mdf]" \
+	$(FLOORS)/bin/python -m pip install --quiet --no-compile --constraint build/floors.txt --editable ".[mat,mdf,ros]" \
 		pytest-xdist hypothesis
 	$(FLOORS)/bin/$(PYTEST) -m "not validate" $(FLOOR_TESTS)
 

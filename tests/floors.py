@@ -13,7 +13,7 @@ if sys.version_info >= (3, 11):
 else:
     import tomli as tomllib
 
-EXTRAS = ("mat", "mdf")
+EXTRAS = ("mat", "mdf", "ros")
 PROJECT = Path(__file__).parent.parent / "pyproject.toml"
 
 

@@ -14,7 +14,7 @@ raise ``tautwire.errors.ArgumentError``; every exception raised on purpose is a 
 ``modes_along_figure``     the modes along a path as a figure; ``modes_along`` gives the numbers
 ``design_controller``      designs an LQG controller with integral action on the linear plant
 ``cosimulate_closed_loop`` co-simulates the FMUs in closed loop with a controller
-``read_recording``         reads winch speeds and sensor measurements from CSV, Parquet, MDF or MATLAB
+``read_recording``         reads winch speeds and sensor measurements from CSV, Parquet, MDF, MATLAB or ROS
 ``recording_from_frame``   the same from a pandas frame
 ``trace``                  identifies what the model lacks, from recordings
 ``write_report``           writes the report, the extended robot file and its FMUs into a folder

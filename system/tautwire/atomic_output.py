@@ -30,7 +30,7 @@ LOCK_NAME = "lock"
 SCRATCH_NAME = "new"
 # What other programs would open as something else than it is.
 DATA_SUFFIXES = (
-    *(".csv", ".tsv", ".json", ".parquet", ".feather", ".h5", ".hdf5", ".mat", ".mdf", ".mf4"),
+    *(".csv", ".tsv", ".json", ".parquet", ".feather", ".h5", ".hdf5", ".mat", ".mdf", ".mf4", ".mcap", ".db3"),
     *(".ods", ".pdf", ".png", ".svg", ".xls", ".xlsm", ".xlsx"),
 )
 DISK_FULL_ERRNOS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)

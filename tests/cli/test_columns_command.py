@@ -14,7 +14,8 @@ import tomlkit
 from scipy.io import savemat
 
 from tautwire.cli import run
-from tautwire.recordings.column_proposal import column_names, propose_columns
+from tautwire.recordings.column_names import column_names
+from tautwire.recordings.column_proposal import propose_columns
 from tautwire.recordings.recording import read_recording
 from tests.support.robots import EXAMPLES
 

@@ -16,7 +16,7 @@ from hypothesis import strategies as st
 from scipy.io import savemat
 
 from tautwire.errors import RecordingError
-from tautwire.recordings.column_proposal import column_names
+from tautwire.recordings.column_names import column_names
 from tautwire.recordings.recording import Recording, read_recording, recording_errors
 from tests.recordings.test_parquet_file import COLUMNS, same
 
@@ -278,7 +278,7 @@ def test_members_of_structs_and_matrices_are_read_by_the_laboratorys_names(tmp_p
     drives = {f"drive{cable}": -TABLE[f"winch_speed_{cable}"] * 1e3 for cable in (1, 2, 3)}
     log = {"t": TABLE["time"], "F": MATRICES["tension"], "x": TABLE["x"], "y": TABLE["y"], "z": TABLE["z"]}
     path = written(tmp_path / "fit.mat", {"log": log | drives}, level)
-    assert {"log.t", "log.F_1", "log.F_2", "log.F_3"} <= set(column_names(path))
+    assert {"log.t", "log.F_1", "log.F_2", "log.F_3"} <= {column.name for column in column_names(path)}
     table = tmp_path / "columns.toml"
     table.write_text(
         """[recording.columns]

@@ -60,7 +60,7 @@ PLAN_KEYS = (
 SIMULATION_KEYS = ("sample", "vary", "found", "correlation", "path", "controllers", "believes", "compute")
 MAX_PLAN_SIZE = 1_000_000  # bytes
 MAX_RUNS = 10_000_000
-RECORDING_SUFFIXES = (".csv", ".parquet", ".mf4", ".mdf", ".mat")
+RECORDING_SUFFIXES = (".csv", ".parquet", ".mf4", ".mdf", ".mat", ".mcap")
 SEED_RULE = NumberRule("a seed", "", 0.0, 2.0**53, default=0.0)
 COUNT_RULE = NumberRule("the number of samples", "", 1.0, float(MAX_RUNS))
 CORRELATION_RULE = NumberRule("the correlation", "", -0.999, 0.999)

@@ -14,7 +14,9 @@ from .console import AsJson, CommandOutput, Quiet, shell_quoted
 
 
 def columns(
-    recording: Annotated[Path, typer.Argument(metavar="RECORDING.csv", help="A recording; CSV, Parquet or MATLAB.")],
+    recording: Annotated[
+        Path, typer.Argument(metavar="RECORDING.csv", help="A recording; CSV, Parquet, .mat or a ROS bag.")
+    ],
     robot_file: Annotated[
         Path | None, typer.Argument(metavar="ROBOT.toml", help="The robot file, for the number of cables.")
     ] = None,
@@ -32,7 +34,8 @@ def columns(
     Example: tautwire columns log.csv robot.toml --out columns.toml
     """
     from ..atomic_output import atomic_file, refuse_other_formats, refuse_overwriting_inputs
-    from ..recordings.column_proposal import column_names, proposal_text, propose_columns
+    from ..recordings.column_names import column_names
+    from ..recordings.column_proposal import proposal_text, propose_columns
 
     output = CommandOutput(as_json, quiet)
     cable_count = _cable_count(robot_file, cables)

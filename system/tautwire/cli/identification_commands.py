@@ -152,7 +152,9 @@ def judge_rope_material(
 def trace(
     context: typer.Context,
     robot_file: RobotFile,
-    fit: Annotated[Path, typer.Argument(metavar="FIT.csv", help="The recording to fit; CSV, Parquet, MDF or .mat.")],
+    fit: Annotated[
+        Path, typer.Argument(metavar="FIT.csv", help="The recording to fit; CSV, Parquet, MDF, .mat or a ROS bag.")
+    ],
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Output folder of the report.")],
     check: Annotated[Path | None, typer.Option(metavar="CHECK.csv", help="A recording for validation.")] = None,
     columns: Columns = None,

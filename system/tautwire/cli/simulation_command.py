@@ -64,7 +64,7 @@ def simulate(
     robot_file: RobotFile,
     out: Annotated[Path, typer.Option(metavar="RESULT.csv", help="Output file of the result; Parquet if .parquet.")],
     speeds: Annotated[
-        Path | None, typer.Option(metavar="RECORDING.csv", help="Winch speeds; CSV, Parquet, MDF or .mat.")
+        Path | None, typer.Option(metavar="RECORDING.csv", help="Winch speeds; CSV, Parquet, MDF, .mat or a ROS bag.")
     ] = None,
     controller: Annotated[Path | None, typer.Option(metavar="FILE", help=CONTROLLER_HELP)] = None,
     path: Annotated[Path | None, typer.Option(metavar="PATH.toml", help="Path to follow with --controller.")] = None,

@@ -1,1 +1,1 @@
-"""Recordings: winch speeds and sensor signals, from CSV, Parquet, MDF and MATLAB files."""
+"""Recordings: winch speeds and sensor signals, from CSV, Parquet, MDF and MATLAB files and ROS bags."""

@@ -98,6 +98,11 @@ class ColumnMap:
             units |= {name: unit} if unit else {}
         return units
 
+    def declared_units(self) -> dict[str, Unit]:
+        """Units that are declared of standard columns, for a recording that states none."""
+        found = {name: find_unit(column.unit, name) for name, column in self.scales.items()}
+        return {name: unit for name, unit in found.items() if unit is not None}
+
     def require_plain_clock(self, where: str, line: int | None = None) -> None:
         """Raises RecordingError where times that are clock times have a scale."""
         column = self.scales.get("time")

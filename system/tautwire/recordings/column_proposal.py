@@ -8,25 +8,18 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from ..errors import RecordingError, one_line
-from ..input_files import read_encoded_text
+from ..errors import one_line
 from ..robot.recorded_columns import CABLE_COLUMNS
 from ..robot.schema import AXES
-from .clock_time import clock_format
-from .csv_lines import SEPARATORS, is_comment, is_number, split_cells, unit_in_name, without_comment_mark
-from .mat_file import is_mat, mat_column_names
-from .mdf_file import is_mdf
-from .parquet_file import is_parquet, parquet_column_names
-from .recording_table import MISSING_CELLS, is_column_name, known_columns
+from .column_names import ColumnName
+from .csv_lines import unit_in_name
+from .recording_table import known_columns
 from .units import find_unit
-
-MAX_CSV_SIZE = 2**31  # bytes
-MAX_HEAD_LINES = 500
 
 # Words of laboratories for each kind of column, the most specific first; a word is a part of a name in lower case.
 WORDS = (
     ("time", ("t", "ts", "time", "timestamp", "zeit", "temps", "seconds")),
-    ("tension", ("tension", "force", "kraft", "loadcell", "load", "cell", "f", "ft")),
+    ("tension", ("tension", "force", "effort", "kraft", "loadcell", "load", "cell", "f", "ft")),
     ("winch_speed", ("velocity", "vel", "speed", "omega", "v", "geschwindigkeit", "drehzahl")),
     ("rope_length", ("length", "encoder", "enc", "geber", "counts", "cnt", "laenge", "länge", "angle", "winkel")),
 )
@@ -59,6 +52,7 @@ _FACTOR_WORDS = {
         ("counts", "cnt", "enc", "encoder", "geber", "angle", "winkel"),
         "metres per count, or the drum's radius for rad",
     ),
+    "tension": (("effort",), "1 / the drum's radius where it is a torque in N m"),
     "winch_speed": (("omega", "drehzahl"), "the drum's radius for rad/s, radius * pi / 30 for rpm"),
 }
 
@@ -91,50 +85,7 @@ class ColumnProposal:
     unused: Mapping[str, str]
 
 
-def column_names(path: Path) -> dict[str, str | None]:
-    """The names of a recording's columns, with the standard name of those that are read without a declaration.
-
-    Of CSV in any dialect, Parquet or MATLAB; raises RecordingError where there are none.
-    """
-    if is_mat(path):
-        return mat_column_names(path)
-    names = parquet_column_names(path) if is_parquet(path) else _csv_column_names(path)
-    return {name: name if is_column_name(name) else None for name in names}
-
-
-def _csv_column_names(path: Path) -> tuple[str, ...]:
-    if is_mdf(path):
-        hint = "export it as CSV, or write the names of its channels into the table"
-        raise RecordingError(str(path), "is MDF, of which no columns are proposed", hint)
-    content, _ = read_encoded_text(path, RecordingError, "CSV", MAX_CSV_SIZE)
-    lines = content.decode("utf-8").splitlines()[:MAX_HEAD_LINES]
-    for index, line in enumerate(lines):
-        if is_comment(line) or not line.strip():
-            continue
-        for separator in SEPARATORS:
-            cells = split_cells(line, separator)
-            if len(cells) > 1 and cells[0] and all(map(_is_sample, cells)):
-                names = _names_above(lines[:index], separator, len(cells))
-                if names:
-                    return names
-    hint = "begin with a line that names the columns, and samples below it"
-    raise RecordingError(str(path), "has no line of names above numbers", hint)
-
-
-def _is_sample(cell: str) -> bool:
-    return is_number(cell) or cell in MISSING_CELLS or clock_format(cell) is not None
-
-
-def _names_above(lines: Sequence[str], separator: str, count: int) -> tuple[str, ...]:
-    """The cells of the first line with as many as the samples have."""
-    for line in lines:
-        cells = split_cells(without_comment_mark(line) if is_comment(line) else line, separator)
-        if len(cells) == count and len(set(cells)) == count and not all(map(is_number, cells)):
-            return tuple(cells)
-    return ()
-
-
-def propose_columns(names: Mapping[str, str | None], cable_count: int) -> ColumnProposal:
+def propose_columns(names: Sequence[ColumnName], cable_count: int) -> ColumnProposal:
     """Propose the columns of a recording of n = ``cable_count`` cables by its names, as ``column_names`` has them.
 
     A standard name is always used. Another is where its words tell one kind, and its numbers the cable, of a column
@@ -142,11 +93,12 @@ def propose_columns(names: Mapping[str, str | None], cable_count: int) -> Column
     """
     known = known_columns(cable_count)
     claims: dict[str, list[str]] = {}
-    for name, column in names.items():
-        if column in known:
-            claims.setdefault(str(column), []).append(name)
+    for each in names:
+        if each.standard_name in known:
+            claims.setdefault(str(each.standard_name), []).append(each.name)
     standard = frozenset(claims)
-    claimed, unused = _claims([name for name, column in names.items() if column not in known], cable_count)
+    words = {each.name: each.words for each in names if each.standard_name not in known}
+    claimed, unused = _claims(words, cable_count)
     for column, claimants in claimed.items():
         if column in standard:
             unused |= dict.fromkeys(claimants, f"looks like {column}, which is read by its standard name")
@@ -157,24 +109,26 @@ def propose_columns(names: Mapping[str, str | None], cable_count: int) -> Column
         if len(claimants) > 1:
             unused |= {name: f"one of {len(claimants)} that look like {column}" for name in claimants}
         else:
-            columns.append(ProposedColumn(column, *claimants) if column in standard else _proposed(column, *claimants))
+            (name,) = claimants
+            is_standard = column in standard
+            columns.append(ProposedColumn(column, name) if is_standard else _proposed(column, name, words[name]))
     columns.sort(key=lambda each: _order(each.column))
     return ColumnProposal(tuple(columns), standard & {each.column for each in columns}, unused)
 
 
-def _claims(names: Sequence[str], cable_count: int) -> tuple[dict[str, list[str]], dict[str, str]]:
-    """The names that are for each column by their words, and the reasons for the others."""
+def _claims(words: Mapping[str, str], cable_count: int) -> tuple[dict[str, list[str]], dict[str, str]]:
+    """The names that are for each column by the words of each, and the reasons for the others."""
     claims: dict[str, list[str]] = {}
     unused: dict[str, str] = {}
     numbered: dict[str, dict[str, int]] = {kind: {} for kind in CABLE_COLUMNS}
-    for name in names:
-        kind, _ = _kind(name)
-        unit, number = unit_in_name(name), _cable_number(name)
+    for name, text in words.items():
+        kind, _ = _kind(text)
+        unit, number = unit_in_name(text), _cable_number(text)
         if not name.strip() or not name.isprintable():
             unused[name] = "blank, or not printable"
         elif kind is None:
             unused[name] = "no known word, or words of other quantities"
-        elif unit and unit == _stated_unit(name) and not _is_unit_of(unit, kind):
+        elif unit and unit == _stated_unit(text) and not _is_unit_of(unit, kind):
             unused[name] = f"looks like {kind}, and {unit} is not a known unit of it"
         elif kind not in numbered:
             claims.setdefault(kind, []).append(name)
@@ -281,15 +235,15 @@ def _cable_number(name: str) -> int | None:
     return numbers[0] if len(numbers) == 1 else None
 
 
-def _proposed(column: str, name: str) -> ProposedColumn:
-    """The column with the unit that its name has, and a remark where quantity, scale or sign is not certain."""
+def _proposed(column: str, name: str, words: str) -> ProposedColumn:
+    """The column with the unit that its words have, and a remark where quantity, scale or sign is not certain."""
     kind = column.rpartition("_")[0] or column
-    stated, (_, doubt) = _stated_unit(name), _kind(name)
+    stated, (_, doubt) = _stated_unit(words), _kind(words)
     unit, factor = find_unit(stated, column), _factor(stated, kind)
     known, factor_without_unit = _FACTOR_WORDS.get(kind, ((), ""))
     if unit is not None:
-        scale = "" if unit_in_name(name).endswith(stated) else "unit by the name's end"
-    elif factor or (not stated and _has_any(_words(name), known)):
+        scale = "" if unit_in_name(words).endswith(stated) else "unit by the name's end"
+    elif factor or (not stated and _has_any(_words(words), known)):
         scale = f"add factor = {factor or factor_without_unit}"
     else:
         scale = f"ends in {stated}, no unit of it" if stated else "no unit in the name: the file's, or SI"

@@ -27,6 +27,7 @@ from .mat_file import is_mat, open_mat
 from .mdf_file import is_mdf, open_mdf
 from .parquet_file import is_parquet, open_parquet
 from .recording_table import MAX_MAGNITUDE, ColumnTable, ErrorSink, not_a_table_error, parse_header, row_errors
+from .ros_bag import is_bag, open_bag
 from .speed_gaps import bridge_speed_gaps
 
 CABLE_COUNT_HINT = "give the robot's cable_count"
@@ -135,7 +136,7 @@ class Recording:
 def read_recording(
     path: str | Path, cable_count: int, columns: Sequence[RecordedColumn] | str | Path = ()
 ) -> Recording:
-    """Read a recording from a CSV, Parquet, MDF or MATLAB file, of a robot with n = ``cable_count`` cables, N samples.
+    """Read a recording from CSV, Parquet, MDF, MATLAB or a ROS bag, of n = ``cable_count`` cables, N samples.
 
     Columns are ``time`` (s), ``winch_speed_1`` ... (m/s), ``tension_1`` ... (N), ``x``, ``y``, ``z`` (m); where the
     length of a rope is recorded, ``rope_length_1`` ... (m, any zero, smaller as it reels in), its rate is the speed.
@@ -212,7 +213,7 @@ def _open_table(
     path: str | Path, columns: ColumnMap, sink: ErrorSink
 ) -> tuple[CsvTable | ColumnTable, tuple[str, ...]]:
     """The table of a recording, and a note on its columns; one that has standard names alone is read by these."""
-    formats = ((is_parquet, open_parquet), (is_mdf, open_mdf), (is_mat, open_mat))
+    formats = ((is_bag, open_bag), (is_parquet, open_parquet), (is_mdf, open_mdf), (is_mat, open_mat))
     open_table = next((open_format for is_format, open_format in formats if is_format(path)), open_csv)
     try:
         return open_table(path, columns, sink), ((columns.in_words(),) if columns.declared else ())

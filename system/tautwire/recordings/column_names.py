@@ -1,0 +1,79 @@
+"""Names of the columns in a recording of any format, and the words that tell what each measures."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..errors import RecordingError
+from ..input_files import read_encoded_text
+from .clock_time import clock_format
+from .csv_lines import SEPARATORS, is_comment, is_number, split_cells, without_comment_mark
+from .mat_file import is_mat, mat_column_names
+from .mdf_file import is_mdf
+from .parquet_file import is_parquet, parquet_column_names
+from .recording_table import MISSING_CELLS, is_column_name
+from .ros_bag import bag_columns, is_bag
+from .ros_column_words import column_words
+
+MAX_CSV_SIZE = 2**31  # bytes
+MAX_HEAD_LINES = 500
+
+
+@dataclass(frozen=True)
+class ColumnName:
+    """The ``name`` of a recorded column, its ``standard_name`` where it is read without a declaration, and its words.
+
+    ``words`` tell what it measures, by default the name.
+    """
+
+    name: str
+    standard_name: str | None
+    words: str
+
+
+def column_names(path: Path) -> list[ColumnName]:
+    """The names of a recording's columns.
+
+    Of CSV in any dialect, Parquet, MATLAB or a ROS bag; raises RecordingError where there are none.
+    """
+    if is_bag(path):
+        own = [ColumnName(column.name, None, column_words(column)) for column in bag_columns(path)]
+        return [ColumnName("time", "time", "time"), *own]
+    if is_mat(path):
+        return [ColumnName(name, standard, name) for name, standard in mat_column_names(path).items()]
+    names = parquet_column_names(path) if is_parquet(path) else _csv_column_names(path)
+    return [ColumnName(name, name if is_column_name(name) else None, name) for name in names]
+
+
+def _csv_column_names(path: Path) -> tuple[str, ...]:
+    if is_mdf(path):
+        hint = "export it as CSV, or write the names of its channels into the table"
+        raise RecordingError(str(path), "is MDF, of which no columns are proposed", hint)
+    content, _ = read_encoded_text(path, RecordingError, "CSV", MAX_CSV_SIZE)
+    lines = content.decode("utf-8").splitlines()[:MAX_HEAD_LINES]
+    for index, line in enumerate(lines):
+        if is_comment(line) or not line.strip():
+            continue
+        for separator in SEPARATORS:
+            cells = split_cells(line, separator)
+            if len(cells) > 1 and cells[0] and all(map(_is_sample, cells)):
+                names = _names_above(lines[:index], separator, len(cells))
+                if names:
+                    return names
+    hint = "begin with a line that names the columns, and samples below it"
+    raise RecordingError(str(path), "has no line of names above numbers", hint)
+
+
+def _is_sample(cell: str) -> bool:
+    return is_number(cell) or cell in MISSING_CELLS or clock_format(cell) is not None
+
+
+def _names_above(lines: Sequence[str], separator: str, count: int) -> tuple[str, ...]:
+    """The cells of the first line with as many as the samples have."""
+    for line in lines:
+        cells = split_cells(without_comment_mark(line) if is_comment(line) else line, separator)
+        if len(cells) == count and len(set(cells)) == count and not all(map(is_number, cells)):
+            return tuple(cells)
+    return ()
