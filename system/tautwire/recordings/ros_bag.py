@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from array import array
+from collections import defaultdict
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
@@ -187,14 +188,14 @@ def _read_samples(reader: Any, names: Collection[str], file: str) -> dict[str, _
         if paths:
             require_samples(connection.msgcount, f"{file}: {format_value(topic)}")
             wanted[topic] = {prefix for path in paths for prefix in path_prefixes(path)}
-    samples: dict[str, _Samples] = {}
+    samples: defaultdict[str, _Samples] = defaultdict(_Samples)
     count = 0
     connections = [connection for connection in reader.connections if connection.topic in wanted]
     # Without any, rosbags would read all.
     for connection, receipt, content in reader.messages(connections) if connections else ():
         message = reader.deserialize(content, connection.msgtype)
         for path, stamp, number in numbers_in_message(message, wanted[connection.topic]):
-            samples.setdefault(f"{connection.topic}/{path}", _Samples()).add(stamp, receipt, number)
+            samples[f"{connection.topic}/{path}"].add(stamp, receipt, number)
             count += 1
         if count > MAX_NUMBERS:
             raise RecordingError(file, f"has more than {MAX_NUMBERS} numbers to read", "cut it into several recordings")

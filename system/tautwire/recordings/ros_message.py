@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator, Sequence
+from collections.abc import Container, Iterable, Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -49,19 +49,19 @@ def _numbers_in(
         if not isinstance(value, list | np.ndarray):
             yield from _numbers_in_value(value, field_path, stamp, names, wanted)
         elif len(value) <= MAX_ARRAY_LENGTH:
-            for label, entry in zip(_labels(value, names), value, strict=True):
-                yield from _numbers_in_value(entry, f"{field_path}[{label}]", stamp, names, wanted)
+            entries = value.tolist() if isinstance(value, np.ndarray) else value
+            for label, entry in zip(_labels(value, names), entries, strict=True):
+                entry_path = f"{field_path}[{label}]"
+                if wanted is None or entry_path in wanted:
+                    yield from _numbers_in_value(entry, entry_path, stamp, names, wanted)
 
 
 def _numbers_in_value(
     value: Any, path: str, stamp: int | None, names: Sequence[str], wanted: Container[str] | None
-) -> Iterator[Sample]:
-    if wanted is not None and path not in wanted:
-        return
-    if isinstance(value, int | float | np.number | np.bool_):
-        yield path, stamp, float(value)
-    elif hasattr(value, "__dataclass_fields__"):
-        yield from _numbers_in(value, path, stamp, names, wanted)
+) -> Iterable[Sample]:
+    if isinstance(value, float | int):
+        return ((path, stamp, float(value)),)
+    return _numbers_in(value, path, stamp, names, wanted) if hasattr(value, "__dataclass_fields__") else ()
 
 
 def _labels(entries: Any, names: Sequence[str]) -> Sequence[object]:
