@@ -105,6 +105,14 @@ def test_times_are_of_the_header_and_else_of_receipt(tmp_path: Path) -> None:
     assert "by its receive time" in recording.notes[-1]
 
 
+def test_samples_are_put_in_order_and_repeated_ones_read_once(tmp_path: Path) -> None:
+    shuffled = [STATES[1][index] for index in (1, 0, 2, 1)]
+    recording = read(bag(tmp_path, {"/joint_states": (STATES[0], shuffled)}), *SPEED_TABLE)
+    assert recording.time.tolist() == COLUMNS["time"]
+    assert np.array_equal(recording.winch_speed, SPEEDS)
+    assert "without 3 numbers at a time that another has" in recording.notes[-1]
+
+
 def test_a_sample_goes_to_the_nearest_row_on_the_line_to_the_next(tmp_path: Path) -> None:
     """A slow tracker that is 4 ms late, and a fast load cell, of quantities that rise with time."""
     slow, fast = np.arange(0.004, 1.0, 0.05), np.arange(0.0, 1.0, 0.001)
@@ -208,6 +216,12 @@ def test_types_that_the_bag_does_not_define_are_named(tmp_path: Path) -> None:
 def test_a_file_is_known_by_its_first_bytes(tmp_path: Path) -> None:
     path = (bag(tmp_path) / "run.mcap").rename(tmp_path / "fit.dat")
     assert "is MCAP by its first bytes, and not by its name; rename it to end in .mcap" in refused(path)
+
+
+def test_a_bag_of_ros_1_is_refused_with_the_command_that_converts_it(tmp_path: Path) -> None:
+    path = tmp_path / "run.bag"
+    path.write_bytes(b"#ROSBAG V2.0\nE\0\0\0")
+    assert "is a bag of ROS 1; make one of ROS 2 of it: rosbags-convert --src" in refused(path)
 
 
 def test_the_missing_package_is_named(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -29,6 +29,7 @@ MAX_METADATA_SIZE = 10_000_000  # bytes
 MAX_NUMBERS = 2**27
 
 _MCAP_MAGIC = b"\x89MCAP0\r\n"
+_ROS_1_MAGIC = b"#ROSBAG V"
 _COMPRESSED_SUFFIX = ".zstd"
 _DATA_SUFFIXES = (*BAG_SUFFIXES, _COMPRESSED_SUFFIX)
 # Several nodes may publish parts of one topic, such as /tf, in turn.
@@ -85,7 +86,7 @@ def is_bag(path: str | Path) -> bool:
     if os.path.isdir(path):
         return any(file.name == METADATA_FILE or file.suffix in _DATA_SUFFIXES for file in _files_in(Path(path)))
     with readable_file(path, RecordingError) as file, file.open("rb") as content:
-        return file.suffix.lower() in BAG_SUFFIXES or content.read(len(_MCAP_MAGIC)) == _MCAP_MAGIC
+        return file.suffix.lower() in BAG_SUFFIXES or content.read(16).startswith((_MCAP_MAGIC, _ROS_1_MAGIC))
 
 
 def open_bag(path: str | Path, columns: ColumnMap, sink: ErrorSink = raise_error) -> ColumnTable:
@@ -154,6 +155,10 @@ def _files_in(folder: Path) -> list[Path]:
 def _require_plain_files(path: Path) -> None:
     """Raises RecordingError where a bag lacks its metadata, or has files that rosbags would not read safely."""
     if not path.is_dir():
+        with readable_file(path, RecordingError), path.open("rb") as content:
+            if content.read(len(_ROS_1_MAGIC)) == _ROS_1_MAGIC:
+                hint = "make one of ROS 2 of it: rosbags-convert --src FILE.bag --dst FOLDER --dst-typestore latest"
+                raise RecordingError(str(path), "is a bag of ROS 1", hint)
         if path.suffix not in BAG_SUFFIXES:
             hint = f"rename it to end in {BAG_SUFFIXES[0]}"
             raise RecordingError(str(path), "is MCAP by its first bytes, and not by its name", hint)
