@@ -141,6 +141,19 @@ def test_winch_speeds_of_several_topics_are_interpolated_where_all_have_them(tmp
     np.testing.assert_allclose(recording.winch_speed, (recording.time[:, None] + 0.11) * [1.0, 2.0, 3.0], rtol=1e-9)
 
 
+def test_a_winch_speed_is_not_interpolated_over_a_long_gap(tmp_path: Path) -> None:
+    times = np.arange(0.0, 1.0, 0.01)
+    with_gap = np.concatenate((times[:30], times[50:])) + 0.002
+    topics = {f"/winch_{n}/speed": scalars((t, 0.1) for t in (with_gap if n == 2 else times)) for n in (1, 2, 3)}
+    column = RecordedColumn("winch_speed_{}", "/winch_{}/speed/data")
+    problem = refused(bag(tmp_path, topics), column)
+    assert "row 30, column winch_speed_2: is 'nan', must be a number" in problem
+    assert "at most 5 in a row are interpolated" in problem
+    topics["/winch_2/speed"] = scalars((t, 0.1) for t in np.delete(times, slice(40, 45)) + 0.002)
+    recording = read(write_bag(tmp_path / "short", topics), column)
+    np.testing.assert_allclose(recording.winch_speed, 0.1, rtol=1e-12)
+
+
 def test_a_transform_is_found_by_its_frame_and_has_its_own_time(tmp_path: Path) -> None:
     def transform(time: float, frame: str, x: float) -> Any:
         moved = message("geometry_msgs/Vector3", x, 0.0, 0.0)
@@ -174,6 +187,9 @@ def test_what_cannot_be_right_is_refused(tmp_path: Path) -> None:
     other_clock = {"/joint_states": STATES, "/x": scalars([(100.0, 1.0), (100.1, 2.0)])}
     apart = refused(write_bag(tmp_path / "apart", other_clock), *SPEED_TABLE, RecordedColumn("x", "/x/data"))
     assert "'/x/data': has no sample near those of '/joint_states/velocity[winch_1]', and begins 100 s after" in apart
+    winches = {f"/winch_{n}": scalars([(5.0 * n, 0.1), (5.0 * n + 1.0, 0.1)]) for n in (1, 2, 3)}
+    apart = refused(write_bag(tmp_path / "winches", winches), RecordedColumn("winch_speed_{}", "/winch_{}/data"))
+    assert "'/winch_3/data': has no sample near those of '/winch_1/data', and begins 10 s after" in apart
 
 
 def test_damaged_bags_are_refused(tmp_path: Path) -> None:

@@ -24,7 +24,7 @@ from .ros_rows import SampledNumber, align_on_winch_rows
 
 METADATA_FILE = "metadata.yaml"
 BAG_SUFFIXES = (".mcap", ".db3")
-MAX_METADATA_SIZE = 10_000_000  # bytes
+MAX_METADATA_SIZE = 2_000_000  # bytes, which take 11 s
 # Three numbers of eight bytes for each sample, 3 GiB.
 MAX_NUMBERS = 2**27
 

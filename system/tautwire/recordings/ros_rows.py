@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError, format_value
 from ..name_suggestions import join_names
+from .speed_gaps import MAX_GAP_SAMPLES
 
 _INPUTS = ("winch_speed_", "rope_length_")
 _NANOSECONDS = 1e9  # in a second
@@ -41,7 +42,8 @@ class Rows:
 def align_on_winch_rows(numbers: Mapping[str, SampledNumber], file: str) -> Rows:
     """Columns on the rows of the first cable's winch speed, or rope length, of samples by their standard names.
 
-    Other winch speeds and rope lengths are interpolated linearly, and rows that one of them does not cover are omitted.
+    Other winch speeds and rope lengths are interpolated linearly over up to five samples that are missing, and rows
+    before the first or after the last of one of them are omitted.
     A sample of an output goes to the nearest row, if that is within half a row period, with its value there on the line
     to the next sample; other cells are NaN.
 
@@ -56,15 +58,15 @@ def align_on_winch_rows(numbers: Mapping[str, SampledNumber], file: str) -> Rows
     first, last = max(each.times[0] for each in inputs), min(each.times[-1] for each in inputs)
     rows = base.times[(base.times >= first) & (base.times <= last)]
     if not len(rows):
-        shortest = next(each for each in inputs if not np.any((base.times >= each.times[0]) & (base.times <= last)))
-        raise _clock_error(shortest, base, file)
-    half_period = 0.5 * float(np.median(np.diff(rows))) if len(rows) > 1 else 0.0
+        ends_first = min(inputs, key=lambda each: int(each.times[-1]))
+        raise _clock_error(max(inputs, key=lambda each: int(each.times[0])), ends_first, file)
+    period = float(np.median(np.diff(rows))) if len(rows) > 1 else 0.0
     columns = {"time": (rows - rows[0]) / _NANOSECONDS}
     for name, each in series.items():
         if name.startswith(_INPUTS):
-            columns[name] = np.interp(rows - rows[0], each.times - rows[0], each.values)
+            columns[name] = _interpolated(each, rows, period)
             continue
-        columns[name] = _nearest_samples(each, rows, half_period)
+        columns[name] = _nearest_samples(each, rows, 0.5 * period)
         if np.isfinite(each.values).any() and not np.isfinite(columns[name]).any():
             raise _clock_error(each, base, file)
     repeated = sum(len(numbers[name].times) - len(each.times) for name, each in series.items())
@@ -82,6 +84,17 @@ def _in_words(columns: Mapping[str, NDArray[np.float64]], repeated: int) -> str:
     parts = [f"; {join_names(names)} in {count} of {row_count} rows" for count, names in sparse.items()]
     parts += [f"; without {repeated} numbers at a time that another has"] if repeated else []
     return "".join(parts)
+
+
+def _interpolated(number: SampledNumber, rows: NDArray[np.int64], period: float) -> NDArray[np.float64]:
+    """Values (N,) at all rows, linear between samples; NaN inside of gaps that are too long for that."""
+    column = np.interp(rows - rows[0], number.times - rows[0], number.values)
+    steps = np.diff(number.times)
+    if len(steps):
+        longest = (MAX_GAP_SAMPLES + 1) * max(float(np.median(steps)), period)
+        after = np.clip(np.searchsorted(number.times, rows), 1, len(steps))
+        column[(steps[after - 1] > longest) & ~np.isin(rows, number.times)] = np.nan
+    return column
 
 
 def _nearest_samples(number: SampledNumber, rows: NDArray[np.int64], half_period: float) -> NDArray[np.float64]:
