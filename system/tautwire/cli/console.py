@@ -26,7 +26,7 @@ from rich.progress import (
 
 from ..errors import InputError, UnreachableError
 from ..provenance import Provenance, provenance_of
-from ..robot.robot_file_reader import read_columns_file, read_robot
+from ..robot.robot_file_reader import read_columns_file, read_robot, read_tracker_file
 from ..robot.schema import Robot, UserFmu
 from .progress_lines import progress_lines
 
@@ -34,6 +34,9 @@ RobotFile = Annotated[Path, typer.Argument(metavar="ROBOT.toml", help="The robot
 AsJson = Annotated[bool, typer.Option("--json", help="Print the result as one JSON object, and nothing else.")]
 Columns = Annotated[
     Path | None, typer.Option(metavar="COLUMNS.toml", help="Columns by the laboratory's names, see tautwire columns.")
+]
+TrackerFile = Annotated[
+    Path | None, typer.Option(metavar="TRACKER.csv", help="Positions in a file of their own, with its own clock.")
 ]
 Quiet = Annotated[bool, typer.Option("--quiet", "-q", help="Print errors only.")]
 
@@ -76,10 +79,11 @@ def shell_quoted(path: Path) -> str:
     return shlex.quote(str(path))
 
 
-def trace_command(robot_file: Path, recording: Path, columns: Path | None) -> str:
+def trace_command(robot_file: Path, recording: Path, columns: Path | None, tracker: Path | None = None) -> str:
     """A trace of the recording as a shell command, to be pasted."""
-    columns_option = "" if columns is None else f" --columns {shell_quoted(columns)}"
-    return f"tautwire trace {shell_quoted(robot_file)} {shell_quoted(recording)}{columns_option} --out report/"
+    files = {"--columns": columns, "--tracker": tracker}
+    options = "".join(f" {option} {shell_quoted(path)}" for option, path in files.items() if path is not None)
+    return f"tautwire trace {shell_quoted(robot_file)} {shell_quoted(recording)}{options} --out report/"
 
 
 DEFAULT_OUTPUT = CommandOutput()
@@ -114,7 +118,10 @@ def _require_holdable(robot: Robot, path: Path) -> Robot:
 
 def with_columns(robot: Robot, columns: Path | None) -> Robot:
     """The robot with the columns of recordings that a file declares, in place of its own; as it is without a file."""
-    return robot if columns is None else replace(robot, recorded_columns=read_columns_file(columns, robot.cable_count))
+    if columns is None:
+        return robot
+    recorded_columns = read_columns_file(columns, robot.cable_count)
+    return replace(robot, recorded_columns=recorded_columns, tracker=read_tracker_file(columns))
 
 
 def note_unused_tables(robot: Robot, output: CommandOutput = DEFAULT_OUTPUT) -> None:

@@ -22,6 +22,7 @@ from .console import (
     CommandOutput,
     Quiet,
     RobotFile,
+    TrackerFile,
     command_provenance,
     note_unused_tables,
     print_error,
@@ -37,6 +38,8 @@ if TYPE_CHECKING:
     from ..materials import MaterialOptions, MaterialVerdict
     from ..materials.material_table import MaterialTable
     from ..materials.viscoelastic_model import Material
+    from ..recordings.recording import Recording
+    from ..robot.schema import Robot
 
 DYNAMIC_TEST_HELP = "A dynamic test of the rope; by default Table 1 of the paper, with its declared pair."
 
@@ -158,6 +161,10 @@ def trace(
     out: Annotated[Path, typer.Option(metavar="FOLDER", help="Output folder of the report.")],
     check: Annotated[Path | None, typer.Option(metavar="CHECK.csv", help="A recording for validation.")] = None,
     columns: Columns = None,
+    tracker: TrackerFile = None,
+    check_tracker: Annotated[
+        Path | None, typer.Option(metavar="TRACKER.csv", help="The tracker's file of the recording for validation.")
+    ] = None,
     alpha: Annotated[float, typer.Option(help="False-alarm rate.")] = 0.01,
     time_limit: Annotated[float, typer.Option(metavar="SECONDS", help="Time for the best answer.", min=1.0)] = 600.0,
     as_json: AsJson = False,
@@ -179,11 +186,12 @@ def trace(
     from ..estimation.identification import validated_false_alarm_rate
     from ..estimation.time_limit import TimeLimit
     from ..materials.material_table import is_material_table
-    from ..recordings.recording import read_recording
     from ..reports import write_report
     from ..reports.residual_file import RESIDUAL_FILE
 
     validated_false_alarm_rate("--alpha", alpha)
+    if check_tracker is not None and check is None:
+        raise InputError("--check-tracker", "is given without --check", "name the winches' log of the same motion")
     limit = TimeLimit(time_limit)
     output = CommandOutput(as_json, quiet)
     if is_material_table(fit):
@@ -192,13 +200,14 @@ def trace(
         judge_rope_material(context, fit, robot_file, out, alpha, output)
         return
     robot = with_columns(read_plausible_robot(robot_file), columns)
-    recording = read_recording(fit, robot.cable_count, robot.recorded_columns)
-    check_recording = None if check is None else read_recording(check, robot.cable_count, robot.recorded_columns)
+    recording = _read_recording(robot, fit, tracker)
+    check_recording = None if check is None else _read_recording(robot, check, check_tracker)
     file_names = ["robot.toml", "report.json", RESIDUAL_FILE, "index.html"]
     refuse_overwriting_inputs(
-        [robot_file, fit, *(path for path in (check, columns) if path)], [out / name for name in file_names]
+        [robot_file, fit, *(path for path in (check, columns, tracker, check_tracker) if path)],
+        [out / name for name in file_names],
     )
-    provenance = command_provenance(context, robot_file, fit, check, columns)
+    provenance = command_provenance(context, robot_file, fit, check, columns, tracker, check_tracker)
     with (
         own_temporary_folder() as temporary,
         atomic_folder(out) as scratch,
@@ -210,6 +219,15 @@ def trace(
         write_report(trace_result, scratch, provenance, robot_file)
     note_unused_tables(robot, output)
     _print_trace(trace_result, out, provenance, output)
+
+
+def _read_recording(robot: Robot, path: Path, tracker: Path | None) -> Recording:
+    """A recording, with the positions of a tracker's file where one is given."""
+    from ..recordings.recording import read_recording
+    from ..recordings.tracker import with_tracker
+
+    recording = read_recording(path, robot.cable_count, robot.recorded_columns)
+    return recording if tracker is None else with_tracker(robot, recording, tracker)
 
 
 def _end_interrupted(temporary: Path, scratch: Path) -> None:

@@ -15,12 +15,14 @@ from ..fmus.fmu_slots import check_user_fmus
 from ..recordings.column_map import unit_errors
 from ..recordings.recording import Recording, read_recording, recording_errors
 from ..recordings.start_position import start_position
+from ..recordings.tracker import with_tracker
 from ..recordings.white_noise_estimate import white_noise_deviation
 from ..robot.implausible_units import implausible_units
-from ..robot.robot_file_reader import read_columns_file, read_robot_with_sink, robot_file_text
+from ..robot.robot_file_reader import read_robot_with_sink, robot_file_text
 from ..robot.schema import Robot, fmu_slots
 from ..robot.static_equilibrium import static_tensions
 from ..toml_text import line_of_key
+from .console import with_columns
 
 MAX_PROBLEMS_PER_FILE = 1000
 # A recording may break a rule in each of its cells; alike errors are counted as one problem.
@@ -72,10 +74,12 @@ def check_files(
     recording_file: Path | None = None,
     progress: Callable[[str, float], None] = lambda what, done: None,
     columns_file: Path | None = None,
+    tracker_file: Path | None = None,
 ) -> CheckResult:
     """Collects all problems of a robot file and, if there is one, of a recording of that robot; raises nothing.
 
-    ``columns_file`` declares the recording's columns in place of the robot file. ``progress`` is called with the
+    ``columns_file`` declares the recording's columns in place of the robot file, and ``tracker_file`` has the positions
+    where the recording has none. ``progress`` is called with the
     present activity and the fraction of it that is done.
     """
     problems: list[Problem] = []
@@ -91,6 +95,8 @@ def check_files(
     progress("reading the recording", 0.0)
     reader = _with_columns(robot, columns_file, recording_problems)
     recording = None if reader is None else _check_recording(recording_file, reader, recording_problems, notes)
+    if recording is not None and reader is not None and tracker_file is not None:
+        recording = _with_tracker(reader, recording, tracker_file, recording_problems, notes)
     if recording is not None and not problems:
         progress("checking both together", 0.0)
         _check_together(robot, recording, recording_problems, notes)
@@ -111,7 +117,7 @@ def _check_robot_file(path: Path, problems: list[Problem], notes: list[str]) -> 
         robot = None
     problems += sorted((_robot_file_problem(path, text, error) for error in errors), key=_line_order)
     if robot is not None:
-        problems += [_robot_file_problem(path, text, error) for error in unit_errors(robot.recorded_columns)]
+        problems += [_robot_file_problem(path, text, error) for error in _unit_errors(robot)]
         if not errors:
             implausible = implausible_units(robot, str(path))
             problems += [_robot_file_problem(path, text, error) for error in implausible]
@@ -140,24 +146,42 @@ def _with_columns(robot: Robot, columns_file: Path | None, problems: list[Proble
     """The robot with the columns that a file declares; None where it does not, or any unit of columns is wrong."""
     if columns_file is not None:
         with _collecting_problems(problems, columns_file):
-            robot = replace(robot, recorded_columns=read_columns_file(columns_file, robot.cable_count))
+            robot = with_columns(robot, columns_file)
             text = robot_file_text(columns_file)
-            problems += [_robot_file_problem(columns_file, text, e) for e in unit_errors(robot.recorded_columns)]
-    return None if problems or any(unit_errors(robot.recorded_columns)) else robot
+            problems += [_robot_file_problem(columns_file, text, e) for e in _unit_errors(robot)]
+    return None if problems or any(_unit_errors(robot)) else robot
+
+
+def _unit_errors(robot: Robot) -> Iterator[RobotFileError]:
+    return unit_errors((*robot.recorded_columns, *robot.tracker.columns))
 
 
 def _check_recording(path: Path, robot: Robot, problems: list[Problem], notes: list[str]) -> Recording | None:
     with _collecting_problems(problems, path):
-        faults = recording_errors(path, robot.cable_count, robot.recorded_columns)
-        groups = _alike_errors(islice(faults, MAX_COUNTED_ERRORS))
-        problems.extend(_grouped_problem(path, group) for group in groups[:MAX_PROBLEMS_PER_FILE])
-        if len(groups) > MAX_PROBLEMS_PER_FILE:
-            notes.append(f"{path}: only the first {MAX_PROBLEMS_PER_FILE} problems are listed")
-        if next(faults, None) is not None:
-            notes.append(f"{path}: only the first {MAX_COUNTED_ERRORS} wrong cells are counted")
+        _list_errors(path, recording_errors(path, robot.cable_count, robot.recorded_columns), problems, notes)
         if not problems:
             return read_recording(path, robot.cable_count, robot.recorded_columns)
     return None
+
+
+def _with_tracker(
+    robot: Robot, recording: Recording, path: Path, problems: list[Problem], notes: list[str]
+) -> Recording | None:
+    """The recording with a tracker's positions; None where there are problems."""
+    with _collecting_problems(problems, path):
+        _list_errors(path, recording_errors(path, 0, robot.tracker.columns), problems, notes)
+        if not problems:
+            return with_tracker(robot, recording, path)
+    return None
+
+
+def _list_errors(path: Path, faults: Iterator[RecordingError], problems: list[Problem], notes: list[str]) -> None:
+    groups = _alike_errors(islice(faults, MAX_COUNTED_ERRORS))
+    problems.extend(_grouped_problem(path, group) for group in groups[:MAX_PROBLEMS_PER_FILE])
+    if len(groups) > MAX_PROBLEMS_PER_FILE:
+        notes.append(f"{path}: only the first {MAX_PROBLEMS_PER_FILE} problems are listed")
+    if next(faults, None) is not None:
+        notes.append(f"{path}: only the first {MAX_COUNTED_ERRORS} wrong cells are counted")
 
 
 @dataclass(frozen=True)

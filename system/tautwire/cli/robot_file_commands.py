@@ -18,6 +18,7 @@ from .console import (
     CommandOutput,
     Quiet,
     RobotFile,
+    TrackerFile,
     command_provenance,
     progress_bar,
     relative_links,
@@ -113,6 +114,7 @@ def check(
         typer.Argument(metavar="RECORDING.csv", help="A recording of it; CSV, Parquet, MDF, .mat or a ROS bag."),
     ] = None,
     columns: Columns = None,
+    tracker: TrackerFile = None,
     report: Annotated[
         Path | None, typer.Option(metavar="PAGE.html", help="Output page: what the check read, and its problems.")
     ] = None,
@@ -132,12 +134,14 @@ def check(
 
     if columns is not None and recording is None:
         raise InputError("--columns", "is given without a recording", "name the recording that has these columns")
-    inputs = [path for path in (robot_file, recording, columns) if path]
+    if tracker is not None and recording is None:
+        raise InputError("--tracker", "is given without a recording", "name the winches' log of the same motion")
+    inputs = [path for path in (robot_file, recording, columns, tracker) if path]
     refuse_other_formats(report, ".html", option="--report")
     refuse_overwriting_inputs(inputs, [report] if report else [])
     output = CommandOutput(as_json, quiet)
     with progress_bar(output) as progress:
-        result = check_files(robot_file, recording, progress, columns)
+        result = check_files(robot_file, recording, progress, columns, tracker)
         # Of folders only a bag that was read has its files hashed.
         readable = (
             path
@@ -162,11 +166,11 @@ def check(
         )
         raise typer.Exit(EXIT_WRONG_INPUT)
     if not as_json:
-        output.result([f"{file}: no problems found" for file in (robot_file, recording) if file], {})
+        output.result([f"{file}: no problems found" for file in (robot_file, recording, tracker) if file], {})
     if recording is None:
         output.suggest_next(f"tautwire build {shell_quoted(robot_file)} --out build/")
     else:
-        next_command = trace_command(robot_file, recording, columns)
+        next_command = trace_command(robot_file, recording, columns, tracker)
         output.suggest_next(f"{next_command}; with a second recording of the robot add --check SECOND.csv")
 
 

@@ -135,13 +135,13 @@ def unit_errors(declared: Sequence[RecordedColumn]) -> Iterator[RobotFileError]:
             quantity = quantity_of(standard_name)
             problem = f"is {format_value(column.unit)}, not a known unit of {quantity}"
             hint = f"write one of {', '.join(unit.symbol for unit in UNITS[quantity])}, or a factor in its place"
-            key_path = ("recording", "columns", column.column, "unit")
+            key_path = (*column.table.split("."), column.column, "unit")
             yield RobotFileError(place_of(column, "unit"), problem, hint, key_path)
 
 
 def place_of(column: RecordedColumn, key: str = "") -> str:
     """The file and key where a column is declared."""
-    path = f"recording.columns.{column.column}" + (f".{key}" if key else "")
+    path = f"{column.table}.{column.column}" + (f".{key}" if key else "")
     return f"{column.file}: {path}" if column.file else path
 
 

@@ -155,6 +155,17 @@ def read_recording(
     return replace(recording, read_as=(*notes, *recording.read_as))
 
 
+def read_tracker(path: str | Path, columns: Sequence[RecordedColumn] = ()) -> Recording:
+    """Read a tracker's file, with the columns time, x, y, z in the formats of recordings: a recording of no cables.
+
+    Raises RecordingError where the file is not valid, RobotFileError where ``columns`` are not.
+    """
+    validate_path("read_tracker: path", path)
+    table, notes = _open_table(path, column_map(columns, 0), raise_error)
+    recording = _validated_recording(table, 0)
+    return replace(recording, read_as=tuple(f"{path}: {note}" for note in (*notes, *recording.read_as)))
+
+
 def _declared_columns(columns: Sequence[RecordedColumn] | str | Path, cable_count: int) -> tuple[RecordedColumn, ...]:
     if isinstance(columns, str | Path):
         return read_columns_file(columns, cable_count)

@@ -76,7 +76,7 @@ def parse_header(
 ) -> Header:
     """Parse the header in these cells; raises RecordingError unless time and every winch have a column.
 
-    A winch has its speed, or the length of its rope.
+    A winch has its speed, or the length of its rope. A tracker's file has no cables, and columns of any are not read.
 
     Errors go to the ``sink``; where it does not raise, so do those that follow.
     """
@@ -89,7 +89,7 @@ def parse_header(
         if name in names[:index]:
             sink(RecordingError(where, f"the column {format_value(name)} appears twice", "keep one of the two", line))
         cable_match = _CABLE_COLUMN.fullmatch(name)
-        if cable_match and not 1 <= int(cable_match.group(1)) <= cable_count:
+        if cable_match and cable_count and not 1 <= int(cable_match.group(1)) <= cable_count:
             problem = f"the column {name} belongs to no cable, the robot has cables 1 to {cable_count}"
             sink(RecordingError(where, problem, "give the robot file that belongs to this recording", line))
     unknown_names = tuple(name for name in names if name not in allowed_names)

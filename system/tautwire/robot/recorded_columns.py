@@ -1,4 +1,4 @@
-"""Columns of recordings by the laboratory's names, as the table [recording.columns] declares them."""
+"""Columns of recordings and of a tracker's files by the laboratory's names, as the table [recording] declares them."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from ..errors import format_value
 from ..name_suggestions import suggest_name
 from ..validation import NumberRule
 from .checked_table import CheckedTable
-from .schema import AXES, RecordedColumn
+from .schema import AXES, RecordedColumn, Tracker
 
 CABLE_COLUMNS = ("winch_speed", "rope_length", "tension")
 COLUMN_NUMBERS = {
@@ -17,6 +17,9 @@ COLUMN_NUMBERS = {
     "sign": NumberRule("the sign of the column, 1 or -1", "", -1.0, 1.0, default=1.0),
     "offset": NumberRule("what the column shows at zero, as recorded", "", default=0.0),
 }
+
+CLOCK_OFFSET_RULE = NumberRule("what the tracker's clock shows at the first sample of the winches' log", "s")
+CLOCK_RATE_RULE = NumberRule("how many times as fast the tracker's clock runs", "", 0.9, 1.1, default=1.0)
 
 _EVERY_CABLE = "{}"
 _NUMBERED = re.compile(rf"({'|'.join(CABLE_COLUMNS)})_([0-9]{{1,6}})")
@@ -28,8 +31,28 @@ def read_recorded_columns(root: CheckedTable, cable_count: int) -> tuple[Recorde
     recording = root.table("recording")
     if recording is None:
         return ()
-    recording.require_known(("columns",))
-    table = recording.table("columns")
+    recording.require_known(("columns", "tracker"))
+    return _read_columns(recording, cable_count)
+
+
+def read_tracker_table(root: CheckedTable) -> Tracker:
+    """Reads the table [recording.tracker] of a file; a tracker with standard columns where it has no such table."""
+    is_table = isinstance(root.content.get("recording"), dict)
+    recording = root.table("recording") if is_table else None
+    table = None if recording is None else recording.table("tracker")
+    if table is None:
+        return Tracker()
+    table.require_known(("columns", "clock_offset", "clock_rate"))
+    offset = table.optional_number("clock_offset", CLOCK_OFFSET_RULE)
+    rate = table.number("clock_rate", CLOCK_RATE_RULE)
+    if offset is None and "clock_rate" in table.content:
+        table.refuse("clock_rate", "is stated without clock_offset", "state both, or leave both to the winch travel")
+    return Tracker(_read_columns(table, 0), offset, rate)
+
+
+def _read_columns(parent: CheckedTable, cable_count: int) -> tuple[RecordedColumn, ...]:
+    """The columns that the table ``columns`` of another declares; of no cables those of a tracker."""
+    table = parent.table("columns")
     if table is None:
         return ()
     columns = tuple(_read_column(table, key) for key in table.content if _is_column(table, key, cable_count))
@@ -61,7 +84,7 @@ def recorded_name(standard_name: str, column: RecordedColumn) -> str:
 def _is_column(table: CheckedTable, key: str, cable_count: int) -> bool:
     """Whether a key is the name of a standard column, or of those of all cables; refuses it otherwise."""
     match = _NUMBERED.fullmatch(key)
-    for_all = tuple(f"{kind}_{_EVERY_CABLE}" for kind in CABLE_COLUMNS)
+    for_all = tuple(f"{kind}_{_EVERY_CABLE}" for kind in CABLE_COLUMNS if cable_count)
     if key in ("time", *AXES, *for_all):
         return True
     if match is None or match.group(2).startswith("0"):
@@ -69,6 +92,9 @@ def _is_column(table: CheckedTable, key: str, cable_count: int) -> bool:
         numbered = [f"{kind}_{int(digits)}" for kind in CABLE_COLUMNS for digits in numbers]
         names = ("time", *AXES, *for_all, *numbered)
         table.refuse(key, "is not a column of a recording", f"write {suggest_name(key, names)}")
+        return False
+    if cable_count == 0:
+        table.refuse(key, "is not a column of a tracker", "move it to [recording.columns]")
         return False
     if int(match.group(2)) > cable_count:
         problem = f"belongs to no cable, the robot has cables 1 to {cable_count}"
@@ -82,7 +108,7 @@ def _read_column(table: CheckedTable, key: str) -> RecordedColumn | None:
     if isinstance(value, str):
         content = CheckedTable(table.file, table.key, {"name": value}, table.sink, table.key_path)
         name = _read_name(content, key, where=(table, key))
-        return None if name is None else RecordedColumn(key, name, file=table.file)
+        return None if name is None else RecordedColumn(key, name, file=table.file, table=table.key)
     if not isinstance(value, dict):
         problem = f"is {format_value(value)}, neither a name nor a table"
         table.refuse(key, problem, 'write it as in x = "Body X", or x = { name = "Body X", unit = "mm" }')
@@ -98,7 +124,7 @@ def _read_column(table: CheckedTable, key: str) -> RecordedColumn | None:
     if abs(numbers["sign"]) < 1.0:
         entry.refuse("sign", f"is {numbers['sign']:g}, must be 1 or -1", "write scales as factor")
     unit = entry.text("unit", 'write it as in unit = "mm"') if "unit" in entry.content else ""
-    return None if name is None else RecordedColumn(key, name, unit or "", **numbers, file=table.file)
+    return None if name is None else RecordedColumn(key, name, unit or "", **numbers, file=table.file, table=table.key)
 
 
 def _read_name(entry: CheckedTable, key: str, where: tuple[CheckedTable, str]) -> str | None:

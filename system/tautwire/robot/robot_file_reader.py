@@ -16,8 +16,20 @@ from ..toml_text import parse_toml
 from ..validation import NumberRule
 from .checked_table import CheckedTable, ErrorSink
 from .effect_tables import read_cable_list, read_effects, read_formulas
-from .recorded_columns import read_recorded_columns
-from .schema import Cable, Platform, Point, RecordedColumn, Robot, Sensors, TensionLimits, UserFmu, Winch, fmu_slots
+from .recorded_columns import read_recorded_columns, read_tracker_table
+from .schema import (
+    Cable,
+    Platform,
+    Point,
+    RecordedColumn,
+    Robot,
+    Sensors,
+    TensionLimits,
+    Tracker,
+    UserFmu,
+    Winch,
+    fmu_slots,
+)
 
 TOP_LEVEL_KEYS = (
     "name",
@@ -106,11 +118,20 @@ def read_columns_file(path: str | Path, cable_count: int) -> tuple[RecordedColum
 
     The table may stand in a robot file. Raises RobotFileError, which names the first invalid key.
     """
+    return read_recorded_columns(_columns_table(path), cable_count)
+
+
+def read_tracker_file(path: str | Path) -> Tracker:
+    """Reads the tracker that the table [recording.tracker] of such a file declares."""
+    return read_tracker_table(_columns_table(path))
+
+
+def _columns_table(path: str | Path) -> CheckedTable:
     root = CheckedTable(str(path), "", robot_content(path))
     if "recording" not in root.content:
         root.refuse("recording", "is missing", "write the table [recording.columns]")
     root.require_known(TOP_LEVEL_KEYS if "cable" in root.content else ("recording",))
-    return read_recorded_columns(root, cable_count)
+    return root
 
 
 def robot_content(path: str | Path) -> dict[str, Any]:
@@ -169,6 +190,7 @@ def _read_robot_table(root: CheckedTable, default_name: str) -> Robot:
         fmus=_read_fmus(fmu, len(cables)) if fmu else (),
         formulas=read_formulas(root, partial(read_cable_list, cable_count=len(cables))),
         recorded_columns=read_recorded_columns(root, len(cables)),
+        tracker=read_tracker_table(root),
     )
 
 

@@ -25,6 +25,7 @@ from .schema import (
     Robot,
     Sensors,
     TensionLimits,
+    Tracker,
     UserFmu,
     Winch,
 )
@@ -51,7 +52,9 @@ def robot_text(robot: Robot) -> str:
         *(_cable_block(number, cable) for number, cable in enumerate(robot.cables, 1)),
         *(_effect_block(robot, setting) for setting in robot.effects),
         *_formula_blocks(robot),
-        _recorded_column_block(robot.recorded_columns),
+        _recorded_column_block(robot.recorded_columns, "[recording.columns]  # by the laboratory's names"),
+        _tracker_block(robot.tracker),
+        _recorded_column_block(robot.tracker.columns, "[recording.tracker.columns]"),
     ]
     return "\n\n".join("\n".join(block) for block in blocks if block) + "\n"
 
@@ -196,8 +199,15 @@ def _formula_lines(robot: Robot, group: Sequence[Formula]) -> list[str]:
     return [*lines, *(f"cables = {list(some)}" for some in cables)]
 
 
-def _recorded_column_block(columns: Sequence[RecordedColumn]) -> list[str]:
-    return ["[recording.columns]  # by the laboratory's names", *map(recorded_column_line, columns)] if columns else []
+def _recorded_column_block(columns: Sequence[RecordedColumn], table: str) -> list[str]:
+    return [table, *map(recorded_column_line, columns)] if columns else []
+
+
+def _tracker_block(tracker: Tracker) -> list[str]:
+    if tracker.clock_offset is None:
+        return []
+    offset = _number_line("clock_offset", tracker.clock_offset, "s, at the first sample of the winches' log")
+    return ["[recording.tracker]", offset, f"clock_rate = {tracker.clock_rate!r}"]
 
 
 def recorded_column_line(column: RecordedColumn) -> str:

@@ -177,7 +177,8 @@ class RecordedColumn:
     """A column as the laboratory records it: its SI value is ``sign * factor * unit * (recorded - offset)``.
 
     ``column`` is the standard name and ``name`` the laboratory's, both with ``{}`` for the number of each cable, or
-    neither. A blank ``unit`` is the one that the recording states, or SI; ``file`` says where this is declared.
+    neither. A blank ``unit`` is the one that the recording states, or SI; ``file`` and ``table`` say where this is
+    declared.
     """
 
     column: str
@@ -187,6 +188,20 @@ class RecordedColumn:
     sign: float = 1.0
     offset: float = 0.0
     file: str = field(default="", compare=False)
+    table: str = field(default="recording.columns", compare=False)
+
+
+@dataclass(frozen=True)
+class Tracker:
+    """A tracker that records positions into a file of its own: its columns, and its clock where that is known.
+
+    At the first sample of the winches' log it shows ``clock_offset``, in s, and from there runs ``clock_rate`` times as
+    fast; None where the offset is to be estimated, and then the rate is too.
+    """
+
+    columns: tuple[RecordedColumn, ...] = ()
+    clock_offset: float | None = None
+    clock_rate: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -209,6 +224,7 @@ class Robot:
     fmus: tuple[UserFmu, ...] = ()
     formulas: tuple[Formula, ...] = ()
     recorded_columns: tuple[RecordedColumn, ...] = ()
+    tracker: Tracker = Tracker()
     initial_state: InitialState | None = None
     start_is_measured: tuple[bool, bool, bool] = (False, False, False)
 

@@ -1,0 +1,112 @@
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from tautwire.errors import RecordingError
+from tautwire.recordings.recording import Recording, read_recording
+from tautwire.recordings.tracker_clock import estimate_tracker_clock
+from tests.support.robots import EXAMPLES, example
+from tests.support.trackers import log_along, split, tracker_along
+
+Array = NDArray[np.float64]
+
+ROBOT = example("three")
+START = np.array(ROBOT.platform.start)
+TIMES = np.arange(0.0, 20.0, 1.0 / 120.0)
+
+
+def wandering(time: Array) -> Array:
+    """A path that does not repeat itself."""
+    waves = [np.sin(0.9 * time) + 0.4 * np.sin(2.3 * time), np.sin(1.3 * time), 0.7 * np.sin(0.55 * time)]
+    return START + np.column_stack(waves)
+
+
+def repeated(time: Array) -> Array:
+    """A path of period 5 s."""
+    phase = 0.4 * np.pi * time
+    return START + np.column_stack([np.sin(phase), np.cos(phase), 0.5 * np.sin(2.0 * phase)])
+
+
+def steady(time: Array) -> Array:
+    """A path along which all winches run at nearly constant speeds."""
+    return START + 0.02 * time[:, None] * np.ones(3)
+
+
+def refusal(log: Recording, tracker: Recording) -> RecordingError:
+    with pytest.raises(RecordingError) as caught:
+        estimate_tracker_clock(ROBOT, log, tracker)
+    assert "clock_offset" in caught.value.hint
+    return caught.value
+
+
+@pytest.mark.parametrize("name", ["three", "caroca", "eight"])
+@pytest.mark.parametrize(("samples_per_second", "offset", "rate"), [(120.0, 3.412, 1.0), (30.0, -77.7, 1.0002)])
+def test_offset_and_rate_are_recovered_to_a_millisecond(
+    name: str, samples_per_second: float, offset: float, rate: float
+) -> None:
+    robot = example(name)
+    recording = read_recording(EXAMPLES / name / "fit.csv", robot.cable_count)
+    log, tracker = split(recording, samples_per_second, offset, rate)
+    clock = estimate_tracker_clock(robot, log, tracker)
+    # At both ends of the recording.
+    assert abs(clock.offset - offset) < 1e-3
+    assert abs(clock.offset - offset + (clock.rate - rate) * recording.duration) < 1e-3
+    assert 0.0 < clock.deviation < 1e-3
+
+
+def test_a_rate_that_is_not_significant_is_one() -> None:
+    clock = estimate_tracker_clock(ROBOT, log_along(ROBOT, wandering, 20.0), tracker_along(wandering, TIMES, 8.0))
+    assert clock.rate == 1.0
+    assert clock.offset == pytest.approx(8.0, abs=1e-4)
+
+
+def test_a_tracker_that_records_for_longer_or_shorter_is_aligned() -> None:
+    log = log_along(ROBOT, wandering, 20.0)
+    for times in (np.arange(-30.0, 45.0, 0.01), np.arange(8.0, 15.0, 0.01), np.arange(9.0, 60.0, 0.01)):
+        assert estimate_tracker_clock(ROBOT, log, tracker_along(wandering, times, 8.0)).offset == pytest.approx(
+            8.0, abs=2e-4
+        )
+
+
+def test_gaps_and_outliers_do_not_shift_the_clock() -> None:
+    tracker = tracker_along(wandering, TIMES, 8.0)
+    tracker.position[300:600] = np.nan
+    tracker.position[1000:1010] += 0.3
+    assert estimate_tracker_clock(ROBOT, log_along(ROBOT, wandering, 20.0), tracker).offset == pytest.approx(
+        8.0, abs=2e-4
+    )
+
+
+def test_a_repeated_motion_of_which_the_tracker_saw_a_part_is_ambiguous() -> None:
+    times = TIMES[(TIMES > 5.0) & (TIMES < 12.0)]
+    error = refusal(log_along(ROBOT, repeated, 20.0), tracker_along(repeated, times, 8.0))
+    assert "about equally well" in error.problem
+    assert "8.000 s" in error.problem
+
+
+def test_a_steady_motion_without_start_or_stop_is_too_uncertain() -> None:
+    times = TIMES[(TIMES > 5.0) & (TIMES < 12.0)]
+    assert "its clock" in refusal(log_along(ROBOT, steady, 20.0), tracker_along(steady, times)).problem
+
+
+def test_a_tracker_of_another_motion_fits_at_no_offset() -> None:
+    error = refusal(log_along(ROBOT, wandering, 20.0), tracker_along(repeated, TIMES))
+    assert "at no offset" in error.problem
+    assert "units, axes and origin" in error.hint
+
+
+def test_too_little_overlap_is_refused() -> None:
+    error = refusal(log_along(ROBOT, wandering, 20.0), tracker_along(wandering, TIMES + 19.0))
+    assert "at no offset" in error.problem
+
+
+@pytest.mark.parametrize("is_log_still", [True, False])
+def test_a_file_without_motion_is_refused(is_log_still: bool) -> None:
+    def still(time: Array) -> Array:
+        return START + 0.0 * time[:, None]
+
+    log = log_along(ROBOT, still if is_log_still else wandering, 20.0)
+    log.winch_speed[np.abs(log.winch_speed) < 1e-9] = 0.0
+    error = refusal(log, tracker_along(wandering if is_log_still else still, TIMES))
+    assert error.where == ("log.csv" if is_log_still else "tracker.csv")
+    assert "no motion" in error.problem
