@@ -15,7 +15,7 @@ from .tracker_clock import TrackerClock, estimate_tracker_clock
 
 Array = NDArray[np.float64]
 
-# The polynomial through neighbours that moves a sample to its row adds no more than 3 % to the variance of its noise.
+# The polynomial through neighbours moves a sample to its row, and adds some 1 % to the variance of its noise.
 NEIGHBOURS, POLYNOMIAL_DEGREE = 9, 3
 # Beyond so many intervals without a sample a polynomial would be a guess.
 MAX_GAP_INTERVALS = 5.0

@@ -21,14 +21,15 @@ TRAVEL_WINDOW = 0.2  # s; travel over a shorter time drowns in a tracker's noise
 # Share of the motion of the log or of the tracker that both have to have recorded.
 MIN_MOTION_SHARE = 0.25
 MIN_MOTION_NOISE_RATIO = 20.0
-MAX_CANDIDATES = 8
-MAX_ITERATIONS, TOLERANCE = 30, 1e-6  # s
+# Candidates whose coarse misfit is larger than the best by more are not refined.
+MAX_CANDIDATES, MAX_COARSE_DIFFERENCE = 8, 0.3
+MAX_ITERATIONS, TOLERANCE = 15, 1e-6  # s
 MIN_SAMPLES, MAX_SAMPLES = 20, 20_000
 # The rms of lengths less travel over that of lengths: beyond the first it is another motion or another unit.
 MAX_MISFIT, EQUAL_RATIO, EQUAL_DIFFERENCE = 0.2, 1.5, 0.005
 OUTLIER_RATIO = 25.0  # of squares, to their median
 JACKKNIFE_BLOCKS = 10
-MIN_RATE_SIGMAS, MAX_RATE_ERROR = 4.0, 1e-2
+MIN_RATE_SIGMAS, MAX_RATE_ERROR = 3.0, 1e-2
 MAX_DEVIATION = 5e-3  # s
 
 STATE_OFFSET_HINT = "or state clock_offset in [recording.tracker]"
@@ -145,9 +146,10 @@ def _candidate_offsets(log: Recording, times: Array, lengths: Array) -> list[flo
     lags = correlation_lags(len(shortened), len(reeled))
     offsets = []
     reach = round(TRAVEL_WINDOW / interval) + 1
+    limit = float(misfits.min()) + MAX_COARSE_DIFFERENCE
     for _ in range(MAX_CANDIDATES):
         index = int(np.argmin(misfits))
-        if not np.isfinite(misfits[index]):
+        if not misfits[index] <= limit < np.inf:
             break
         offsets.append(float(times[0] + lags[index] * interval))
         # The whole valley around a minimum is one candidate.
