@@ -111,6 +111,12 @@ def test_too_little_overlap_is_refused() -> None:
     assert "at no offset" in error.problem
 
 
+def test_coordinates_that_were_never_measured_together_are_refused() -> None:
+    tracker = tracker_along(wandering, TIMES)
+    tracker.position[::2, 0] = tracker.position[1::2, 1] = np.nan
+    assert "has 0 samples with every coordinate" in refusal(log_along(ROBOT, wandering, 20.0), tracker).problem
+
+
 @pytest.mark.parametrize("is_log_still", [True, False])
 def test_a_file_without_motion_is_refused(is_log_still: bool) -> None:
     def still(time: Array) -> Array:

@@ -72,8 +72,7 @@ def estimate_tracker_clock(robot: Robot, log: Recording, tracker: Recording) -> 
     times, positions = tracker.time[rows], tracker.position[rows]
     lengths = GeometryReading().directions(robot, positions)[0]
     _require_motion(log, tracker, positions)
-    stride = 1 + len(times) // MAX_SAMPLES
-    fit = _ClockFit(robot, log, times[::stride], lengths[::stride])
+    fit = _ClockFit(robot, log, times, lengths)
     alignments = [fit.refined(offset) for offset in _candidate_offsets(log, times, lengths)]
     fitting = sorted((each for each in alignments if each and each.misfit <= MAX_MISFIT), key=lambda each: each.misfit)
     if not fitting:
@@ -100,7 +99,11 @@ def _measured_rows(robot: Robot, tracker: Recording) -> NDArray[np.int64]:
     if not measured[list(robot.axes_in_plane)].all():
         hint = f"record every coordinate, {STATE_OFFSET_HINT}"
         raise RecordingError(tracker.path, "its positions are along too few axes to find its clock", hint)
-    return np.flatnonzero(np.isfinite(tracker.position[:, measured]).all(axis=1))
+    rows = np.flatnonzero(np.isfinite(tracker.position[:, measured]).all(axis=1))
+    if len(rows) < MIN_SAMPLES:
+        problem = f"has {len(rows)} samples with every coordinate, at least {MIN_SAMPLES} are needed to find its clock"
+        raise RecordingError(tracker.path, problem, f"record for longer, {STATE_OFFSET_HINT}")
+    return rows
 
 
 def _require_motion(log: Recording, tracker: Recording, positions: Array) -> None:
@@ -219,7 +222,8 @@ class _ClockFit:
 
     def _overlap(self, clock: TrackerClock) -> _Overlap:
         log_times = clock.log_times(self.times, self.log.time[0])
-        rows = (log_times >= self.log.time[0]) & (log_times <= self.log.time[-1])
+        rows = np.flatnonzero((log_times >= self.log.time[0]) & (log_times <= self.log.time[-1]))
+        rows = rows[:: 1 + len(rows) // MAX_SAMPLES]
         lengths = self.lengths[rows]
         travel, tensions, speeds = (
             np.column_stack([np.interp(log_times[rows], self.log.time, column) for column in signals.T])
