@@ -16,6 +16,9 @@ UNIT_POWER_PATTERN = re.compile(r"(?<=[A-Za-z])\^?([23])(?!\d)")
 SUPERSCRIPTS = {"2": "²", "3": "³"}
 MIN_PLAIN_NUMBER, MAX_PLAIN_NUMBER = 1e-4, 1e6
 INTEGER_DIGITS = 4
+# Units of pages whatever the size, as on workshop drawings, and their size in SI units.
+PAGE_UNITS = {"m": ("mm", 1e-3)}
+MAX_DIGITS = 8
 
 
 def format_significant(value: float | None, digits: int = 3) -> str:
@@ -43,6 +46,27 @@ def choose_unit(value: float, unit: str) -> tuple[str, float]:
     prefixes_below_value = [each for each in allowed_prefixes if size >= each[0] * (1.0 - 1e-9)]
     factor, letter = (prefixes_below_value or allowed_prefixes[-1:])[0] if size > 0.0 else (1.0, "")
     return _typeset_unit(letter + unit), factor
+
+
+def page_unit(unit: str) -> tuple[str, float]:
+    """Unit in which pages state a quantity of an SI ``unit``, and its size in SI units: positions are in mm."""
+    return PAGE_UNITS.get(unit, (unit, 1.0))
+
+
+def format_on_page(value: float | None, unit: str, digits: int = 3) -> str:
+    """Formats a value in an SI unit as pages state it: a length in mm, anything else with a fitting prefix."""
+    if unit not in PAGE_UNITS or value is None or not math.isfinite(value):
+        return format_engineering(value, unit, digits)
+    name, size = page_unit(unit)
+    return f"{format_significant(value / size, digits)} {name}"
+
+
+def digits_for_range(low: float, high: float) -> int:
+    """Number of significant digits that show the values of a range ``low`` to ``high`` to four digits of its width."""
+    size, width = max(abs(low), abs(high)), high - low
+    if not 0.0 < width < math.inf:
+        return INTEGER_DIGITS
+    return min(MAX_DIGITS, INTEGER_DIGITS + max(0, math.ceil(math.log10(size / width))))
 
 
 def format_engineering(value: float | None, unit: str, digits: int = 3) -> str:

@@ -53,6 +53,7 @@ def test_page_of_a_correct_recording_has_every_section_and_no_problem(fit_page: 
 def test_panels_hold_what_was_recorded_and_what_balances(fit_page: Page) -> None:
     recorded, channels = pd.read_csv(FIT), fit_page.data()["choices"][0]["channels"]
     assert [each["title"] for each in channels] == 3 * ["Winch speed"] + 3 * ["Shortening"] + 3 * ["Tension"]
+    assert {(each["unit"], each["xTitle"]) for each in channels[3:6]} == {("mm", "Reeled in (mm)")}
     speed = unpack_float32(channels[0]["curves"][0]["y"])
     assert speed.max() == pytest.approx(recorded["winch_speed_1"].max(), rel=1e-6)
     measured, balanced = (unpack_float32(curve["y"]) for curve in channels[6]["curves"])

@@ -52,11 +52,11 @@ def test_every_output_has_its_panel_with_what_was_recorded() -> None:
     assert channels[6]["recorded"] is None and channels[6]["difference"] is None
 
 
-def test_difference_is_recorded_minus_co_simulated_in_a_handy_unit() -> None:
+def test_difference_is_recorded_minus_co_simulated_and_of_positions_in_mm() -> None:
     run = made_run()
     channels = Page(run_page(run, {})).data()["choices"][0]["channels"]
     for channel, recorded, column, unit, one in (
-        (channels[2], run.recording.position[:, 2], "z", "µm", 1e-6),
+        (channels[2], run.recording.position[:, 2], "z", "mm", 1e-3),
         (channels[3], run.recording.tension[:, 0], "tension_1", "N", 1.0),
     ):
         simulated = run.overview.rows[:, run.columns.index(column)]
@@ -64,6 +64,18 @@ def test_difference_is_recorded_minus_co_simulated_in_a_handy_unit() -> None:
         expected = (recorded - simulated) / one
         assert unpack_float32(channel["difference"]["values"]) == pytest.approx(expected, rel=1e-5, abs=1e-3)
         assert unpack_float32(channel["difference"]["time"]) == pytest.approx(run.overview.time)
+
+
+def test_coordinates_are_printed_to_the_digits_that_their_range_needs() -> None:
+    run = made_run(samples=200)
+    overview = RunOverview()
+    for time, row in zip(run.overview.time, run.overview.rows, strict=True):
+        moved = row.copy()
+        moved[0] = 28.86 + 1e-4 * time
+        overview.add(float(time), moved)
+    page = Page(run_page(replace(run, overview=overview), {}))
+    assert page.data()["choices"][0]["channels"][0]["range"] == ["28860.000", "28862.000"]
+    assert "28862.000" in page.text
 
 
 def test_page_stays_small_for_long_runs() -> None:
@@ -155,5 +167,6 @@ def test_page_of_a_long_run_stays_small_and_keeps_peaks(eight: bool) -> None:
     position = Page(content).data()["choices"][0]["channels"][2]
     low, high = (each[2] for each in run.overview.extremes())
     drawn = unpack_float32(position["values"])
-    assert (drawn.min(), drawn.max()) == pytest.approx((low, high), rel=1e-6)
+    assert position["unit"] == "mm"
+    assert (drawn.min(), drawn.max()) == pytest.approx((1e3 * low, 1e3 * high), rel=1e-6)
     assert len(drawn) == len(unpack_float32(position["time"]))

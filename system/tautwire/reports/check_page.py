@@ -108,9 +108,10 @@ def _speed_panels(recording: Recording) -> list[CheckPanel]:
 def _length_panels(regression: LengthRegression) -> list[CheckPanel]:
     panels = []
     for cable, (lengths, wound) in enumerate(zip(regression.lengths.T, regression.wound.T, strict=True), 1):
-        curves = (CheckCurve("reeled in", wound, wound, True), CheckCurve("by the positions", wound, -lengths))
+        travel, shortening = 1e3 * wound, -1e3 * lengths
+        curves = (CheckCurve("reeled in", travel, travel, True), CheckCurve("by the positions", travel, shortening))
         numbers = f"slope {format_significant(regression.slopes[cable - 1])}"
-        panels.append(CheckPanel("Shortening", f"cable {cable}", "m", "Reeled in (m)", curves, numbers))
+        panels.append(CheckPanel("Shortening", f"cable {cable}", "mm", "Reeled in (mm)", curves, numbers))
     return panels
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from ..number_format import choose_unit, format_significant
+from ..number_format import PAGE_UNITS, choose_unit, digits_for_range, format_significant
 from ..robot.schema import AXES
 from .downsampling import envelope_times, evenly_spaced_indices, min_max_envelope, pack_float32
 from .robot_scene import MAGNIFICATIONS, RobotScene, ScenePath, deviation_magnification, scene_data
@@ -18,8 +18,8 @@ from .run_overview import ReportedRun
 
 Array = NDArray[np.float64]
 
-# SI units of the display units that are not SI.
-SI_UNITS = {"mm": "m"}
+# Units that a difference has whatever its size, with their size in SI units.
+FIXED_UNITS = dict(PAGE_UNITS.values())
 MAX_SERIES_NUMBERS = 90_000  # in all curves of a page, times included, which so weighs at most 1.5 MB
 MAX_SERIES_POINTS, MIN_SERIES_POINTS = 3000, 300  # per curve
 MAX_PATH_POINTS = 900
@@ -29,8 +29,9 @@ MAX_PATH_POINTS = 900
 class OutputSeries:
     """One output of a run over time: its column, its labels, and its recorded values.
 
-    ``scale`` turns SI into ``unit``. ``recorded`` (N,) is over the recording's time, None where it has none;
-    ``difference`` (M,) is recorded minus co-simulated at the overview's first M rows, in SI.
+    ``scale`` turns SI into ``unit``; values are printed to so many significant ``digits``. ``recorded`` (N,) is over
+    the recording's time, None where it has none; ``difference`` (M,) is recorded minus co-simulated at the overview's
+    first M rows, in SI.
     """
 
     column_index: int
@@ -38,6 +39,7 @@ class OutputSeries:
     label: str
     unit: str
     scale: float
+    digits: int
     recorded: Array | None
     difference: Array
 
@@ -50,8 +52,10 @@ class OutputSeries:
     @property
     def difference_unit(self) -> tuple[str, float]:
         """The display unit of the difference, and its size in SI units."""
+        if self.unit in FIXED_UNITS:
+            return self.unit, FIXED_UNITS[self.unit]
         magnitudes = np.abs(self.difference[np.isfinite(self.difference)])
-        return choose_unit(float(np.max(magnitudes, initial=0.0)), SI_UNITS.get(self.unit, self.unit))
+        return choose_unit(float(np.max(magnitudes, initial=0.0)), self.unit)
 
 
 def output_series(run: ReportedRun) -> list[OutputSeries]:
@@ -61,17 +65,19 @@ def output_series(run: ReportedRun) -> list[OutputSeries]:
     tensions: Mapping[str, Array] = {str(i): recording.tension[:, i - 1] for i in cables}
     speeds: Mapping[str, Array] = {str(i): recording.winch_speed[:, i - 1] for i in cables}
     quantities: tuple[tuple[str, str, Sequence[object], str, float, Mapping[str, Array]], ...] = (
-        ("Position", "", AXES, "m", 1.0, positions),
+        ("Position", "", AXES, "mm", 1e3, positions),
         ("Tension", "tension_", cables, "N", 1.0, tensions),
         ("Velocity", "v", AXES, "m/s", 1.0, {}),
         ("Elongation", "elongation_", cables, "mm", 1e3, {}),
         ("Winch speed", "winch_speed_", cables, "m/s", 1.0, speeds),
     )
-    series = []
+    series, (low, high) = [], run.overview.extremes()
     for title, prefix, names, unit, scale, recorded in quantities:
         for index, name in run.column_indices(prefix, names).items():
             label = name if names is AXES else f"cable {name}"
-            series.append(OutputSeries(index, title, label, unit, scale, *_compared(run, index, recorded.get(name))))
+            digits = digits_for_range(float(low[index]), float(high[index])) if title == "Position" else 4
+            compared = _compared(run, index, recorded.get(name))
+            series.append(OutputSeries(index, title, label, unit, scale, digits, *compared))
     return series
 
 
@@ -104,11 +110,16 @@ def _compared(run: ReportedRun, column_index: int, recorded: Array | None) -> tu
 def _series_data(run: ReportedRun, series: OutputSeries, points: int) -> dict[str, Any]:
     """An output over time, and its recorded values until the run ended, of at most ``points`` points each."""
     time, values = run.overview.curve(series.column_index)
-    description: dict[str, Any] = {"label": series.label, "title": series.title, "unit": series.unit}
+    description: dict[str, Any] = {
+        "label": series.label,
+        "title": series.title,
+        "unit": series.unit,
+        "digits": series.digits,
+    }
     curve = {
         "time": pack_float32(envelope_times(time, points)),
         "values": pack_float32(series.scale * min_max_envelope(values, points)),
-        "range": _range_texts(series.scale * values),
+        "range": _range_texts(series.scale * values, series.digits),
     }
     if series.recorded is None:
         return {**description, **curve, "recorded": None, "difference": None}
@@ -133,11 +144,11 @@ def _difference_data(run: ReportedRun, series: OutputSeries, points: int) -> dic
     }
 
 
-def _range_texts(values: Array) -> list[str]:
+def _range_texts(values: Array, digits: int) -> list[str]:
     """Minimum and maximum as text with a true minus sign; empty where nothing is finite."""
     finite = values[np.isfinite(values)]
     ends = (float(finite.min()), float(finite.max())) if finite.size else ()
-    return [format_significant(end).replace("-", "\N{MINUS SIGN}") for end in ends]
+    return [format_significant(end, digits).replace("-", "\N{MINUS SIGN}") for end in ends]
 
 
 def _run_scene(run: ReportedRun) -> RobotScene:

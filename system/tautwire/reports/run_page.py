@@ -13,7 +13,7 @@ from ..atomic_output import atomic_file
 from ..cosimulation import RunStatistics
 from ..cosimulation.result_file import Column
 from ..errors import TautwireError
-from ..number_format import format_engineering, format_significant
+from ..number_format import format_engineering, format_on_page, format_significant
 from ..provenance import Provenance
 from ..recordings.recording import read_recording
 from ..robot.schema import AXES, Robot
@@ -65,7 +65,7 @@ def _statistics_texts(statistics: RunStatistics) -> dict[str, str]:
         "iterations": str(statistics.iterations),
         "energy_exchanged": format_engineering(statistics.energy_exchanged, "J"),
         "energy_residual": format_engineering(statistics.energy_residual, "J"),
-        "path_error": "" if error is None else format_engineering(error, "m"),
+        "path_error": "" if error is None else format_on_page(error, "m"),
     }
 
 
@@ -125,7 +125,7 @@ def _rms_cell(line: OutputSeries) -> Number:
 
 
 def _value_cell(line: OutputSeries, value: float) -> Number:
-    return Number(format_significant(line.scale * float(value), 4), line.unit)
+    return Number(format_significant(line.scale * float(value), line.digits), line.unit)
 
 
 MIN_ROWS = 2

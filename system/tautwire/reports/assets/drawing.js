@@ -28,7 +28,7 @@ function series(text) {
 function colours() {
   const style = getComputedStyle(document.documentElement);
   const names = ["page", "surface", "text", "muted", "rule", "strong-rule", "accent", "before", "measured", "band",
-    "grid", "low", "middle", "high", "mode", "mode-band", "warn", "warn-band"];
+    "band-fill", "grid", "low", "middle", "high", "mode", "mode-band", "warn", "warn-band"];
   return Object.fromEntries(names.map((name) => [name, style.getPropertyValue(`--${name}`).trim()]));
 }
 
@@ -39,6 +39,7 @@ function axis(colour, title, more) {
   return {
     title: { text: title, standoff: 6, font: { size: 12 } }, color: colour.muted, gridcolor: colour.grid,
     linecolor: colour["strong-rule"], zeroline: false, ticks: "", nticks: 6, automargin: true,
+    exponentformat: "power", minexponent: 6,
     // Dragging would keep a finger from scrolling the page.
     fixedrange: isTouch, ...more,
   };

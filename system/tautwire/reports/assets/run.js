@@ -6,7 +6,7 @@ function outputPanel(choice, place, isTall) {
   if (channel.range.length === 0) return { numbers: "", words: `${what}: no finite value.`, empty: "No finite value" };
   const colour = colours();
   const [low, high] = channel.range;
-  const hover = { hovertemplate: `%{y:.4~g} ${channel.unit}` };
+  const hover = { hovertemplate: `%{y:.${channel.digits}~r} ${channel.unit}` };
   const traces = [lineTrace("co-simulated", channel.time, channel.values, colour.accent, hover)];
   const axes = { xaxis: axis(colour, "Time (s)", { hoverformat: ".4~g" }), yaxis: axis(colour, channel.unit) };
   let words = `${what}: from ${low} to ${high} ${channel.unit}`;
