@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
@@ -47,6 +48,50 @@ def test_page_loads_in_silence_fits_its_screen_and_draws_every_figure(
     figures = browser.run("return document.querySelectorAll('figure').length")
     assert figures >= 10
     assert browser.run("return document.querySelectorAll('.js-plotly-plot .trace').length") >= figures
+
+
+def contrast(one: list[int], other: list[int]) -> float:
+    """Contrast ratio of two colours by WCAG."""
+
+    def luminance(colour: list[int]) -> float:
+        shares = [c / 12.92 if c <= 0.04045 else ((c + 0.055) / 1.055) ** 2.4 for c in (v / 255.0 for v in colour)]
+        return 0.2126 * shares[0] + 0.7152 * shares[1] + 0.0722 * shares[2]
+
+    low, high = sorted((luminance(one), luminance(other)))
+    return (high + 0.05) / (low + 0.05)
+
+
+def colours_of(browser: Browser, *scripts: str) -> list[list[int]]:
+    """Colours that scripts of the page give, as red, green and blue."""
+    return [[int(each) for each in re.findall(r"\d+", browser.run(f"return {script}"))[:3]] for script in scripts]
+
+
+@pytest.mark.parametrize("page", ["path"], indirect=True)
+@pytest.mark.parametrize("screen", [LAPTOP, PHONE_DARK], ids=lambda screen: screen.name)
+def test_bands_stand_out_from_their_ground_and_medians_from_bands(browser: Browser, page: Path, screen: Screen) -> None:
+    browser.show(screen)
+    browser.open(page)
+    browser.see("figure[data-kind=band]")
+    plot = "document.querySelector('figure[data-kind=band] .plot')"
+    fill, ground, median = colours_of(
+        browser,
+        f"getComputedStyle({plot}.querySelector('.js-fill')).fill",
+        "getComputedStyle(document.querySelector('figure[data-kind=band]')).backgroundColor",
+        f"getComputedStyle({plot}.querySelectorAll('.js-line')[2]).stroke",
+    )
+    assert contrast(fill, ground) >= 3.0 and contrast(fill, median) >= 3.0
+
+
+@pytest.mark.parametrize("page", ["indices"], indirect=True)
+@pytest.mark.parametrize("screen", [LAPTOP, PHONE_DARK], ids=lambda screen: screen.name)
+def test_numbers_of_the_heat_map_can_be_read_on_every_ground(browser: Browser, page: Path, screen: Screen) -> None:
+    browser.show(screen)
+    browser.open(page)
+    for level in range(6):
+        cell = f"getComputedStyle(document.querySelector('.keys .heat-{level}'))"
+        text, ground = colours_of(browser, f"{cell}.color", f"{cell}.backgroundColor")
+        assert contrast(text, ground) >= 4.5, level
+    assert browser.run("return document.querySelectorAll('table.heat .heat-cell').length") == 100
 
 
 @pytest.mark.parametrize("page", ["path", "grid"], indirect=True)

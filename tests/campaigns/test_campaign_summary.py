@@ -14,16 +14,19 @@ from scipy.stats import norm
 
 from tautwire.campaigns.campaign_dataset import PartWriter, open_dataset, read_rows
 from tautwire.campaigns.campaign_figures import quantile_bands
+from tautwire.campaigns.campaign_heat_map import sobol_heat_maps
 from tautwire.campaigns.campaign_page import _sobol_rows
 from tautwire.campaigns.campaign_plan import Plan
 from tautwire.campaigns.campaign_run import RunResult
 from tautwire.campaigns.campaign_runner import write_summary
-from tautwire.campaigns.campaign_summary import Summary, summarise_runs
+from tautwire.campaigns.campaign_summary import SobolIndices, Summary, summarise_runs
 from tautwire.campaigns.dataset_schema import RowColumn, row_columns
 from tautwire.campaigns.input_sampling import draw_samples
 from tautwire.campaigns.trace_summary import summarise_traces
 from tautwire.errors import InputError
-from tautwire.number_format import format_engineering
+from tautwire.number_format import format_on_page
+from tautwire.reports.downsampling import unpack_float32
+from tautwire.reports.page_rendering import HeatCell
 from tests.support.campaigns import AT_REST, moving, read
 from tests.support.pages import FETCHING, MAX_PAGE_BYTES, Page
 from tests.support.traces import HOSTILE
@@ -189,6 +192,28 @@ def test_bands_are_quantiles_of_each_path_with_each_controller(tmp_path: Path) -
     assert bands.time.tolist() == pytest.approx(np.linspace(0.0, 0.15, 5).tolist())
 
 
+def test_bands_of_positions_are_drawn_in_mm_about_their_median(tmp_path: Path) -> None:
+    plan, out = written(tmp_path, moving(64))
+    write_summary(plan, out)
+    low, middle, high = quantile_bands(plan, out, 0, ("z",)).quantiles["z"]
+    drawn = Page((out / "index.html").read_text(encoding="utf-8")).data()["variants"][0]["bands"][2]
+    assert (drawn["label"], drawn["unit"]) == ("z", "mm")
+    for name, expected in (("low", low - middle), ("middle", middle), ("high", high - middle)):
+        assert unpack_float32(drawn[name]) == pytest.approx(1e3 * expected, rel=1e-5)
+
+
+def test_the_heat_map_has_outputs_over_inputs_and_takes_the_total_where_it_is_known() -> None:
+    def index(output: str, name: str, first: float, total: float | None = None) -> SobolIndices:
+        return SobolIndices("up", "none", output, name, first, 0.1, total, None if total is None else 0.1)
+
+    known = [index("a_1", "cable.area", 0.1, 0.85), index("a_1", "gravity", 0.5, 0.05)]
+    (heat,) = sobol_heat_maps(known)
+    assert heat.caption == "Sobol indices, total, up, none" and heat.inputs == ["cable area", "gravity"]
+    assert heat.rows == [["a 1", HeatCell("0.85", 5), HeatCell("-", 0)]]
+    (first_order,) = sobol_heat_maps([index("a_1", "gravity", 0.5)])
+    assert "first order" in first_order.caption and first_order.rows[0][1] == HeatCell("0.50", 3)
+
+
 @pytest.mark.parametrize("text", [moving(64), AT_REST, GRID, LAWS])
 def test_pages_are_whole_and_ask_nothing_of_the_network(text: str, tmp_path: Path) -> None:
     plan, out = written(tmp_path, text)
@@ -215,9 +240,9 @@ def test_the_headline_counts_the_runs_of_each_controller_and_compares_them(tmp_p
         for level in ("2.5 %", "97.5 %")
     )
     spans = [
-        format_engineering(one, "m") + " to " + format_engineering(other, "m")
-        for one, other in zip(low, high, strict=True)
+        format_on_page(one, "m") + " to " + format_on_page(other, "m") for one, other in zip(low, high, strict=True)
     ]
+    assert all(span.endswith(" mm") for span in spans)
     expected = f"64 runs with each of 2 controllers: in 95 % of them the largest path error is {spans[0]} (none), "
     assert f"{expected}{spans[1]} (feedforward)." in page.text.replace("\N{NO-BREAK SPACE}", " ")
 
@@ -237,7 +262,7 @@ def test_the_page_names_the_inputs_that_make_much_of_an_output(tmp_path: Path) -
     shown = [each for each in result if max(each["first"], each["total"]) >= 0.05]
     assert 0 < len(shown) < len(result)
     page = (out / "index.html").read_text(encoding="utf-8")
-    section = page[page.index('id="dependences"') :].split("</section>")[0]
+    section = page[page.index('id="dependences"') :].split("</section>")[0].split("<details>")[1]
     assert section.count("<tr") - 1 == len(shown)
     for each in shown:
         assert each["output"].replace("_", " ") in section and f"{each['total']:.2f} \N{PLUS-MINUS SIGN}" in section

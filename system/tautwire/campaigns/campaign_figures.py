@@ -12,7 +12,7 @@ import pyarrow as pa
 import pyarrow.parquet as pq
 from numpy.typing import NDArray
 
-from ..number_format import format_significant
+from ..number_format import format_significant, page_unit
 from ..reports.downsampling import evenly_spaced_indices, pack_float32
 from .campaign_dataset import SERIES_FOLDER, part_files
 from .campaign_plan import Input, Plan
@@ -131,36 +131,51 @@ def channel_description(name: str) -> tuple[str, str, str]:
 
 
 def _band_data(bands: QuantileBands, names: Sequence[str]) -> dict[str, Any]:
-    channels = []
-    for name in names:
-        title, label, unit = channel_description(name)
-        quantiles = bands.quantiles.get(name)
-        low, middle, high = (None, None, None) if quantiles is None else map(pack_float32, quantiles)
-        width = "" if quantiles is None else format_significant(float(np.nanmax(quantiles[2] - quantiles[0])))
-        channels.append(
-            {"title": title, "label": label, "unit": unit, "low": low, "middle": middle, "high": high, "width": width}
-        )
-    return {"time": pack_float32(bands.time), "bands": channels}
+    return {
+        "time": pack_float32(bands.time),
+        "bands": [_channel_data(name, bands.quantiles.get(name)) for name in names],
+    }
+
+
+def _channel_data(name: str, quantiles: Array | None) -> dict[str, Any]:
+    """A channel's median, and its band as distances from it: beside a long way float32 would round a narrow band."""
+    title, label, si_unit = channel_description(name)
+    unit, unit_size = page_unit(si_unit)
+    description = {"title": title, "label": label, "unit": unit}
+    if quantiles is None:
+        return {**description, "low": None, "middle": None, "high": None, "width": ""}
+    low, middle, high = quantiles / unit_size
+    return {
+        **description,
+        "low": pack_float32(low - middle),
+        "middle": pack_float32(middle),
+        "high": pack_float32(high - middle),
+        "width": format_significant(float(np.nanmax(high - low))),
+    }
 
 
 def _spread_data(
     rows: pa.Table, thinned_rows: pa.Table, column: RowColumn, quantiles: Mapping[str, Sequence[float]], is_grid: bool
 ) -> dict[str, Any]:
     """A histogram of an output, or its values over a grid."""
-    common: dict[str, Any] = {"label": column_label(column.name), "unit": column.unit or "1", "words": ""}
-    values = column_values(rows, column.name)
+    unit, unit_size = page_unit(column.unit)
+    common: dict[str, Any] = {"label": column_label(column.name), "unit": unit or "1", "words": ""}
+    values = column_values(rows, column.name) / unit_size
     finite = values[np.isfinite(values)]
     if not finite.size:
         return {**common, "edges": None, "counts": None, "quantiles": [], "values": None}
     if is_grid:
         range_text = (
-            f"{format_significant(float(finite.min()), 4)} to "
-            f"{format_significant(float(finite.max()), 4)} {column.unit}"
+            f"{format_significant(float(finite.min()), 4)} to {format_significant(float(finite.max()), 4)} {unit}"
         ).rstrip()
-        return {**common, "words": range_text, "values": pack_float32(column_values(thinned_rows, column.name))}
+        return {
+            **common,
+            "words": range_text,
+            "values": pack_float32(column_values(thinned_rows, column.name) / unit_size),
+        }
     counts, edges = np.histogram(finite, min(MAX_HISTOGRAM_BINS, max(5, int(np.sqrt(finite.size)))))
-    low, _, middle, _, high = quantiles[column.name]
-    words = f"{format_significant(low, 4)} to {format_significant(high, 4)} {column.unit}".rstrip()
+    low, _, middle, _, high = (each / unit_size for each in quantiles[column.name])
+    words = f"{format_significant(low, 4)} to {format_significant(high, 4)} {unit}".rstrip()
     histogram = {
         "edges": pack_float32(edges),
         "counts": pack_float32(counts.astype(float)),

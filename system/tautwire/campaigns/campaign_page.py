@@ -8,7 +8,14 @@ from typing import Any
 
 import pyarrow as pa
 
-from ..number_format import format_engineering, format_percent, format_significant
+from ..number_format import (
+    digits_for_range,
+    format_engineering,
+    format_on_page,
+    format_percent,
+    format_significant,
+    page_unit,
+)
 from ..provenance import Provenance
 from ..reports import inline_charts as charts
 from ..reports.page_rendering import Number, PageHeader, Row, render_page
@@ -21,6 +28,7 @@ from .campaign_figures import (
     numeric_outputs,
     variant_label,
 )
+from .campaign_heat_map import HEAT_KEYS, sobol_heat_maps
 from .campaign_plan import PARAMETER_NAMES, Distribution, Plan
 from .campaign_summary import FlagProbability, SobolIndices, Spread, Summary
 from .dataset_schema import RowColumn, series_columns
@@ -69,6 +77,8 @@ def campaign_page(
         band_panels=_band_panels(plan, robot),
         output_panels=_output_panels(plan, results.columns),
         dependences=_sobol_rows(summary.dependences),
+        heat_maps=sobol_heat_maps(summary.dependences),
+        heat_keys=HEAT_KEYS,
         min_sobol_index=f"{MIN_SOBOL_INDEX:g}",
         spreads=_spread_rows(summary.spreads),
         failures=[[reason, Number(str(count))] for reason, count in summary.reasons] if summary.failed else [],
@@ -97,7 +107,7 @@ def _headline(plan: Plan, summary: Summary) -> str:
 
 
 def _span_text(spread: Spread, named: bool) -> str:
-    low, high = (format_engineering(value, spread.unit) for value in (spread.quantiles[0], spread.quantiles[-1]))
+    low, high = (format_on_page(value, spread.unit) for value in (spread.quantiles[0], spread.quantiles[-1]))
     return f"{low} to {high}" + (f" ({spread.controller})" if named else "")
 
 
@@ -195,14 +205,21 @@ def _spread_rows(spreads: Sequence[Spread]) -> dict[str, list[Row]]:
     """Mean, deviation, quantiles and extremes of each output, by path and controller."""
     tables: dict[str, list[Row]] = {}
     for each in spreads:
-        numbers = [Number(format_significant(value, 4), each.unit) for value in _spread_values(each)]
-        tables.setdefault(variant_label(each.path, each.controller), []).append([column_label(each.name), *numbers])
+        tables.setdefault(variant_label(each.path, each.controller), []).append(_spread_row(each))
     return tables
 
 
-def _spread_values(each: Spread) -> tuple[float, ...]:
+def _spread_row(each: Spread) -> Row:
+    """The statistics in the page's unit, coordinates to more digits where they differ little."""
+    unit, unit_size = page_unit(each.unit)
+    digits = digits_for_range(each.least, each.largest) if each.unit == "m" else 4
     low, _, middle, _, high = each.quantiles
-    return (each.mean, each.standard_deviation, low, middle, high, each.least, each.largest)
+    mean, *rest = (
+        Number(format_significant(value / unit_size, digits), unit)
+        for value in (each.mean, low, middle, high, each.least, each.largest)
+    )
+    deviation = Number(format_significant(each.standard_deviation / unit_size, 4), unit)
+    return [column_label(each.name), mean, deviation, *rest]
 
 
 def trace_summary_page(
@@ -245,7 +262,7 @@ def _recording_row(row: Mapping[str, Any]) -> Row:
         row["recording"],
         row["verdict"] or "failed",
         *(
-            Number(format_engineering(row[f"{quantity}_rms_{when}"], unit))
+            Number(format_on_page(row[f"{quantity}_rms_{when}"], unit))
             for quantity, unit in columns
             for when in ("before", "after")
         ),

@@ -75,6 +75,15 @@ class Prose:
 
 
 @dataclass(frozen=True)
+class HeatCell:
+    """A cell of a heat map: a formatted number on a ground of ``level`` 0 (none) to 5 (strongest)."""
+
+    text: str
+    level: int
+    kind: str = field(default="heat", init=False)
+
+
+@dataclass(frozen=True)
 class SectionLink:
     """A table cell that links to a section of the page by its id."""
 
@@ -83,7 +92,7 @@ class SectionLink:
     kind: str = field(default="link", init=False)
 
 
-Cell: TypeAlias = str | Number | Label | Prose | SectionLink | Chart
+Cell: TypeAlias = str | Number | Label | Prose | HeatCell | SectionLink | Chart
 Row: TypeAlias = Sequence[Cell]
 
 

@@ -8,17 +8,29 @@ panelKinds.band = (_, place) => {
   const what = `${channel.title} over time, ${channel.label}`;
   if (channel.middle === null) return { numbers: "", words: `${what}: no values.`, empty: "No values" };
   const colour = colours();
-  const time = variant().time;
-  const hover = { hovertemplate: `%{y:.5~g} ${channel.unit}` };
-  const edge = { ...hover, line: { color: colour.accent, width: 0.5 } };
+  const time = variant().time, [low, high] = [series(channel.low), series(channel.high)];
+  const middle = series(channel.middle);
+  const above = (ends) => middle.map((value, i) => (value === null || ends[i] === null ? null : value + ends[i]));
+  const hover = { hovertemplate: `%{y:.7~r} ${channel.unit}` };
+  const line = (name, y, more) => ({ ...lineTrace(name, time, channel.middle, colour.text, hover), y, ...more });
+  const edge = { line: { color: colour["band-fill"], width: 1 } };
+  const fill = { ...edge, fill: "tonexty", fillcolor: colour["band-fill"] };
+  const below = { yaxis: "y2", hovertemplate: `%{y:.3~g} ${channel.unit}` };
   const traces = [
-    lineTrace("2.5 %", time, channel.low, colour.accent, edge),
-    lineTrace("97.5 %", time, channel.high, colour.accent, { ...edge, fill: "tonexty", fillcolor: colour.band }),
-    lineTrace("median", time, channel.middle, colour.accent, hover),
+    line("2.5th percentile", above(low), edge), line("97.5th percentile", above(high), fill),
+    line("median", middle),
+    line("2.5th percentile minus median", low, { ...edge, ...below }),
+    line("97.5th percentile minus median", high, { ...fill, ...below }),
   ];
-  const axes = { xaxis: axis(colour, "Time (s)", { hoverformat: ".4~g" }), yaxis: axis(colour, channel.unit) };
+  const axes = {
+    xaxis: axis(colour, "Time (s)", { hoverformat: ".4~g", anchor: "y2" }),
+    yaxis: axis(colour, channel.unit, { domain: [0.46, 1] }),
+    yaxis2: axis(colour, channel.unit, { domain: [0, 0.34], nticks: 4 }),
+    shapes: [{ ...levelLine(0, { color: colour.text, width: 1 }), yref: "y2" }],
+  };
   const numbers = `band up to ${channel.width} ${channel.unit} wide`;
-  return { numbers, words: `${what}: median and central 95 % of runs, ${numbers}.`, traces, layout: layout(colour, axes) };
+  const words = `${what}: median and 2.5th to 97.5th percentile of runs, ${numbers}.`;
+  return { numbers, words, traces, layout: layout(colour, axes) };
 };
 
 panelKinds.spread = (_, place) => {
@@ -53,7 +65,7 @@ panelKinds.against = (_, place) => {
   const traces = [{
     type: "scatter", mode: "markers", name: output.label, x: series(variant().inputs[input.place]),
     y: series(output.values), marker: { color: colour.accent, size: 5, opacity: 0.7 },
-    hovertemplate: `%{y:.5~g} ${output.unit}`,
+    hovertemplate: `%{y:.6~r} ${output.unit}`,
   }];
   const axes = { xaxis: axis(colour, input.label, { hoverformat: ".5~g" }), yaxis: axis(colour, output.unit), hovermode: "closest" };
   return { numbers: output.words, words: `${what}: from ${output.words}.`, traces, layout: layout(colour, axes) };
