@@ -11,6 +11,8 @@ from numpy.typing import NDArray
 
 pytest.importorskip("selenium", reason="the pages are not tried in a browser: selenium is in the dev extra")
 
+from tautwire import read_robot
+from tautwire.reports.check_page import CheckedFiles, check_page
 from tests.reports.test_page_rendering import themes
 from tests.reports.test_trace_report_page import SECTIONS
 from tests.support.browser.browser import (
@@ -24,11 +26,14 @@ from tests.support.browser.browser import (
     chromium,
 )
 from tests.support.browser.report_pages import DRAW_ALL, KINDS, near, opened
+from tests.support.planar import HORIZONTAL, VERTICAL, Plane, robot_text
 from tests.support.traces import HOSTILE
 
 pytestmark = pytest.mark.skipif(chromium() is None, reason=f"the pages are not tried in a browser: {MISSING}")
 
 NAMED = ("time-shown", "tensions")
+# The muted colour of cables without a tension, light and dark.
+CABLE = (np.array([0x5A, 0x64, 0x6D]), np.array([0x9C, 0xA7, 0xAE]))
 SLIDE = """const slider = document.getElementById('time');
 slider.value = String(Math.round(arguments[0] * slider.max));
 slider.dispatchEvent(new Event('input'));"""
@@ -52,6 +57,36 @@ def test_page_loads_in_silence_and_asks_for_nothing_but_itself(
     assert browser.heard() == []
     outside = [url for url in browser.requests() if not url.startswith(("data:", "blob:"))]
     assert outside == [pages[kind].resolve().as_uri()]
+
+
+@pytest.mark.validate
+@pytest.mark.parametrize("screen", [LAPTOP, PHONE_DARK], ids=lambda screen: screen.name)
+@pytest.mark.parametrize("plane", [VERTICAL, HORIZONTAL], ids=lambda plane: plane.up)
+def test_planar_robot_faces_the_reader_and_fills_the_figure(
+    browser: Browser, plane: Plane, screen: Screen, tmp_path: Path
+) -> None:
+    file, page = tmp_path / "robot.toml", tmp_path / "planar.html"
+    file.write_text(robot_text(plane), encoding="utf-8")
+    page.write_text(check_page(CheckedFiles(read_robot(file), None, (), ()), {}), encoding="utf-8")
+    opened(browser, page, screen)
+    picture = browser.pixels("#scene")
+    drawn = np.argwhere(np.abs(picture.astype(int) - CABLE[screen.dark]).max(axis=2) <= 24)
+    assert drawn.min() > 0 and (drawn.max(axis=0) < np.array(picture.shape[:2]) - 1).all()
+    assert max((np.ptp(drawn, axis=0) + 1) / picture.shape[:2]) > 0.6
+    axes, scales, eye = browser.run(
+        "const { aspectratio, camera, ...scene } = document.getElementById('scene')._fullLayout.scene;"
+        "const axes = ['x', 'y', 'z'].map((name) => scene[`${name}axis`]);"
+        "const scales = axes.map(({ range, _name }) => aspectratio[_name[0]] / (range[1] - range[0]));"
+        "return [axes.map((each) => each.visible), scales, camera.eye]"
+    )
+    across = {"y": "z", "z": "y"}[plane.up]
+    assert scales == pytest.approx(3 * scales[:1]) and abs(eye[across]) > 20.0 * abs(eye["x"]) + abs(eye[plane.up])
+    assert axes == [True, plane.up == "y", plane.up == "z"]
+    views = browser.run(
+        "return [...document.querySelectorAll('[data-view]')].filter((each) => each.offsetParent)"
+        ".map((each) => each.textContent)"
+    )
+    assert views == ["Whole", "Close up"] and browser.heard() == []
 
 
 @pytest.mark.validate(but=["trace-laptop"])

@@ -78,6 +78,15 @@ def test_coordinates_are_printed_to_the_digits_that_their_range_needs() -> None:
     assert "28862.000" in page.text
 
 
+def test_recorded_path_of_a_robot_measured_in_a_plane_lies_in_that_plane() -> None:
+    run = made_run(samples=200)
+    position = run.recording.position.copy()
+    position[:, 1] = np.nan
+    page = Page(run_page(replace(run, recording=replace(run.recording, position=position)), {}))
+    recorded, simulated = (each["columns"] for each in page.data()["choices"][0]["scene"]["paths"])
+    assert recorded[1] == simulated[1] and recorded[0] != simulated[0]
+
+
 def test_page_stays_small_for_long_runs() -> None:
     assert len(run_page(made_run(samples=40_000, eight=True), {})) < 7_000_000
 

@@ -47,6 +47,11 @@ class RobotScene:
     magnification: int = 1
 
 
+def fill_unmeasured(points: Array, path: Array) -> Array:
+    """Measured ``points`` (N, 3) with the coordinates of a ``path`` (N, 3) along axes that were not measured at all."""
+    return np.where(np.isfinite(points).any(axis=0), points, path)
+
+
 def pack_columns(values: Array) -> list[str]:
     """Each column packed as base64 of float32."""
     return [pack_float32(column) for column in values.T]

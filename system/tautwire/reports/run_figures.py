@@ -13,7 +13,14 @@ from numpy.typing import NDArray
 from ..number_format import PAGE_UNITS, choose_unit, digits_for_range, format_significant
 from ..robot.schema import AXES
 from .downsampling import envelope_times, evenly_spaced_indices, min_max_envelope, pack_float32
-from .robot_scene import MAGNIFICATIONS, RobotScene, ScenePath, deviation_magnification, scene_data
+from .robot_scene import (
+    MAGNIFICATIONS,
+    RobotScene,
+    ScenePath,
+    deviation_magnification,
+    fill_unmeasured,
+    scene_data,
+)
 from .run_overview import ReportedRun
 
 Array = NDArray[np.float64]
@@ -162,7 +169,7 @@ def _run_scene(run: ReportedRun) -> RobotScene:
     paths = [ScenePath("co-simulated", platform, "accent", 5)]
     recording, magnification = run.recording, 1
     if recording.has_position:
-        measured = recording.position[sample_indices]
+        measured = fill_unmeasured(recording.position[sample_indices], platform)
         paths.insert(0, ScenePath("recorded", measured, "before", 2, "dot"))
         magnification = deviation_magnification(np.array(run.robot.anchors), platform, [measured - platform])
     return RobotScene(

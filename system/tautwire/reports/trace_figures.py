@@ -19,7 +19,14 @@ from .downsampling import (
     white_noise_density,
 )
 from .mode_bands import Band, mode_bands, resonance_bands
-from .robot_scene import MAGNIFICATIONS, RobotScene, ScenePath, deviation_magnification, scene_data
+from .robot_scene import (
+    MAGNIFICATIONS,
+    RobotScene,
+    ScenePath,
+    deviation_magnification,
+    fill_unmeasured,
+    scene_data,
+)
 from .trace_texts import MeasuredOutput, axis_outputs, cable_outputs
 
 Array = NDArray[np.float64]
@@ -128,7 +135,8 @@ def _trace_scene(trace: Trace, comparison: Comparison) -> RobotScene:
         ScenePath("after", comparison.after.position[indices], "accent", 5),
     ]
     if recording.has_position:
-        paths.insert(0, ScenePath("measured", recording.position[indices], "measured", 2, "dot"))
+        measured = fill_unmeasured(recording.position, comparison.after.position)
+        paths.insert(0, ScenePath("measured", measured[indices], "measured", 2, "dot"))
     return RobotScene(
         time=recording.time[indices],
         platform=comparison.after.position[indices],
@@ -144,5 +152,5 @@ def _trace_magnification(trace: Trace, comparison: Comparison) -> int:
     path = comparison.after.position
     deviations = [comparison.before.position - path]
     if comparison.recording.has_position:
-        deviations.append(comparison.recording.position - path)
+        deviations.append(fill_unmeasured(comparison.recording.position, path) - path)
     return deviation_magnification(np.array(trace.robot_before.anchors), path, deviations)

@@ -103,6 +103,15 @@ function play() {
   state.timer = requestAnimationFrame(frame);
 }
 
+/** Offer the views that differ: a planar robot is seen from the front alone. */
+function showViews() {
+  const isPlanar = Boolean(facing(chosen().scene));
+  for (const button of document.querySelectorAll("[data-view]")) {
+    button.hidden = isPlanar && ["top", "front", "side"].includes(button.dataset.view);
+    if (button.dataset.view === "perspective") button.textContent = isPlanar ? "Whole" : "Perspective";
+  }
+}
+
 function choose(index) {
   stop();
   state.choice = index;
@@ -113,6 +122,7 @@ function choose(index) {
   if (magnify) magnify.value = String(state.times);
   slider.max = String(series(chosen().scene.time).length - 1);
   showTime();
+  showViews();
   redraw("figure");
 }
 

@@ -31,22 +31,24 @@ function mixed(share, { low, middle, high }) {
 function flatCables(cables, view, colour) {
   const { color, cmin, cmax } = cables.line;
   const points = seen(cables, view);
+  const shade = (tension) => mixed(Math.min(1, Math.max(0, (tension - cmin) / (cmax - cmin))), colour);
   return report.anchors.map((_, cable) => ({
     type: "scatter", mode: "lines", name: `cable ${cable + 1}`, hoverinfo: "name",
     x: points.x.slice(3 * cable, 3 * cable + 2), y: points.y.slice(3 * cable, 3 * cable + 2),
-    line: { width: 3, color: mixed(Math.min(1, Math.max(0, (color[3 * cable] - cmin) / (cmax - cmin))), colour) },
+    line: { width: 3, color: typeof color === "string" ? color : shade(color[3 * cable]) },
   }));
 }
 
 /** Draw what the traces of the scene in 3D hold. */
-function drawFlat(traces, view, colour) {
+function drawFlat(traces, chosenView, colour) {
+  const view = facing(chosen().scene) ?? chosenView;
   const [cables, ...others] = traces;
   const flat = others.map(({ type, hovertemplate, ...trace }) => ({
     ...trace, ...seen(trace, view), z: undefined, type: "scatter", hoverinfo: "name",
     ...(trace.line ? { line: { ...trace.line, width: 1.5 } } : {}),
   }));
   const bare = { visible: false, fixedrange: true };
-  const near = view === "close" ? others.slice(2).map((path) => seen(path, view)) : [];
+  const near = chosenView === "close" ? others.slice(2).map((path) => seen(path, view)) : [];
   const range = (name) => {
     const values = near.flatMap((points) => points[name]).filter((value) => value !== null);
     return values.length ? [Math.min(...values), Math.max(...values)] : undefined;

@@ -8,8 +8,53 @@ const views = {
   side: { eye: { x: 2.2, y: 0, z: 0 }, up: { x: 0, y: 0, z: 1 } },
 };
 
+const axisNames = ["x", "y", "z"];
+
+/** The least and the largest coordinate along each axis of points that come as three columns each. */
+function spansOf(points) {
+  return axisNames.map((_, k) => {
+    const values = points.flatMap((columns) => columns[k]).filter((value) => value !== null);
+    return [Math.min(...values), Math.max(...values)];
+  });
+}
+
+const exitPoints = () => axisNames.map((_, k) => report.anchors.map((anchor) => anchor[k]));
+
+/** The view that faces a planar robot, whose exit points and platform stay in a plane across an axis; else undefined. */
+function facing(scene) {
+  const spans = spansOf([exitPoints(), scene.platform.map(series)]);
+  const extents = spans.map(([low, high]) => high - low);
+  const least = Math.min(...extents);
+  return least <= 0.02 * Math.max(...extents) ? ["side", "front", "top"][extents.indexOf(least)] : undefined;
+}
+
+/** What fits the axes and the camera to the plane of a planar robot: nothing is drawn of the axis across it. */
+function planeLayout(view, scene, times) {
+  const paths = scene.paths.map((path) => magnified(path.columns, scene.platform, times));
+  const spans = spansOf([exitPoints(), scene.platform.map(series), ...paths]);
+  const size = Math.max(...spans.map(([low, high]) => high - low)) || 1;
+  const ranges = spans.map(([low, high]) => [low - 0.06 * size, high + 0.06 * size]);
+  const ratios = ranges.map(([low, high]) => (high - low) / size);
+  const [right, up, across] = { side: [1, 2, 0], front: [0, 2, 1], top: [0, 1, 2] }[view];
+  const { clientWidth, clientHeight } = sceneFigure;
+  // The camera sees a height of 0.83 at a distance of 1; the titles of the axes need a quarter more.
+  const height = Math.max(ratios[up], (0.9 * ratios[right] * clientHeight) / Math.max(1, clientWidth));
+  const away = (1.25 * height) / 0.83 + 0.5 * ratios[across];
+  const eye = Object.fromEntries(axisNames.map((name) => [name, Math.sign(views[view].eye[name]) * away]));
+  const center = { x: 0, y: 0, z: 0, [axisNames[up]]: -0.03 * height };
+  // From a little above, so that the axis to the right stands below the robot.
+  eye[axisNames[up]] = 0.03 * away;
+  const axes = axisNames.map((name, k) => [`${name}axis`, { range: ranges[k], visible: k !== across, tickangle: 0 }]);
+  return {
+    axes: Object.fromEntries(axes), camera: { eye, center, up: views[view].up },
+    aspectratio: Object.fromEntries(axisNames.map((name, k) => [name, ratios[k]])),
+  };
+}
+
 /** A view from far enough away that all fits into a narrow figure too, with the axes' titles. */
 function camera(name) {
+  const face = facing(chosen().scene);
+  if (face) return planeLayout(face, chosen().scene, state.times).camera;
   const { clientWidth, clientHeight } = sceneFigure;
   const further = Math.max(1, 1.9 * clientHeight / Math.max(1, clientWidth));
   const { x, y, z } = views[name].eye;
@@ -30,6 +75,11 @@ function closeUp(scene) {
     center[name] = scale * (0.5 * (first + last) - 0.5 * (low + high));
   });
   const away = Math.max(0.25, 1.1 * Math.max(...sizes));
+  const face = views[facing(scene)];
+  if (face) {
+    const eye = Object.fromEntries(axisNames.map((name) => [name, center[name] + 1.3 * away * Math.sign(face.eye[name])]));
+    return { center, eye, up: face.up };
+  }
   const eye = { x: center.x + 0.62 * away, y: center.y - 0.72 * away, z: center.z + 0.3 * away };
   return { center, eye, up: views.perspective.up };
 }
@@ -66,6 +116,8 @@ function pathTrace(path, scene, times, colour) {
   };
 }
 
+const hasTension = (scene) => scene.tension.some((column) => series(column).some((value) => value !== null));
+
 function cableTrace(scene, place, colour) {
   const lines = cableLines(scene, place);
   let [low, high] = scene.tensionRange;
@@ -73,7 +125,7 @@ function cableTrace(scene, place, colour) {
   return {
     type: "scatter3d", mode: "lines", name: "cables", x: lines.x, y: lines.y, z: lines.z, hoverinfo: "skip",
     connectgaps: false,
-    line: {
+    line: !hasTension(scene) ? { width: 8, color: colour.muted } : {
       width: 8, color: lines.tension, cmin: low, cmax: high, showscale: true,
       colorscale: [[0, colour.low], [0.5, colour.middle], [1, colour.high]],
       colorbar: {
@@ -102,16 +154,20 @@ function pointTraces(scene, place, colour) {
   return [anchors, platform];
 }
 
-function sceneLayout(colour) {
+function sceneLayout(colour, scene, times) {
+  const face = facing(scene);
+  const plane = face ? planeLayout(face, scene, times) : { axes: {} };
   const spatial = (name) => ({
     title: { text: `${name} (m)` }, color: colour.muted, gridcolor: colour["strong-rule"],
     zerolinecolor: colour["strong-rule"], showbackground: false, nticks: 6, showspikes: false,
+    ...plane.axes[`${name}axis`],
   });
   return layout(colour, {
     margin: { l: 0, r: 0, t: 0, b: 0 }, hovermode: "closest",
     scene: {
-      xaxis: spatial("x"), yaxis: spatial("y"), zaxis: spatial("z"), aspectmode: "data",
-      camera: camera("perspective"), dragmode: "turntable", uirevision: "kept", domain: { x: [0, 1], y: [0.1, 1] },
+      xaxis: spatial("x"), yaxis: spatial("y"), zaxis: spatial("z"),
+      ...(face ? { aspectmode: "manual", aspectratio: plane.aspectratio } : { aspectmode: "data" }),
+      camera: camera("perspective"), dragmode: face ? "pan" : "turntable", uirevision: `kept ${face}`, domain: { x: [0, 1], y: [face ? 0.17 : 0.1, 1] },
     },
   });
 }
@@ -122,7 +178,7 @@ function drawScene(choice, place, times, view) {
   const paths = scene.paths.map((path) => pathTrace(path, scene, times, colour));
   const traces = [cableTrace(scene, place, colour), ...pointTraces(scene, place, colour), ...paths];
   if (!has3d) return drawFlat(traces, view, colour);
-  const drawn = Plotly.react(sceneFigure, traces, sceneLayout(colour), config);
+  const drawn = Plotly.react(sceneFigure, traces, sceneLayout(colour, scene, times), config);
   drawn.then(fitPaper);
   return drawn;
 }
@@ -133,7 +189,8 @@ function moveRobot(choice, place, times, view) {
   const lines = cableLines(choice.scene, place);
   const [x, y, z] = positionAt(choice.scene, place).map((value) => [value]);
   return Plotly.restyle(sceneFigure, {
-    x: [lines.x, x], y: [lines.y, y], z: [lines.z, z], "line.color": [lines.tension, undefined],
+    x: [lines.x, x], y: [lines.y, y], z: [lines.z, z],
+    ...(hasTension(choice.scene) ? { "line.color": [lines.tension, undefined] } : {}),
   }, [0, 2]);
 }
 
