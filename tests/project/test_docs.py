@@ -54,7 +54,7 @@ def code_of(page: str) -> dict[str, str]:
     return {title or str(number): code for number, (title, code) in enumerate(blocks)}
 
 
-@pytest.mark.parametrize("page", ["index.md", "linear.md"])
+@pytest.mark.parametrize("page", ["index.md", "linear.md", "gallery.md"])
 def test_examples_of_a_page_run(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     assert command(["example", "three", "."]) == 0
