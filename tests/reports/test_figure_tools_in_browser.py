@@ -56,7 +56,7 @@ def test_numbers_of_a_residual_are_saved_with_names_and_units(
 @pytest.mark.parametrize(
     ("kind", "figure", "header"),
     [
-        ("run", "figure[data-kind=compared]", ["Time (s)", "recorded (m)", "co-simulated (m)"]),
+        ("run", "figure[data-kind=compared]", ["Time (s)", "recorded (mm)", "co-simulated (mm)"]),
         ("modes", "figure[data-kind=gain]", ["Frequency (Hz)", "gain (mm per mm/s)", "phase (°)"]),
         ("trace", "figure[data-kind=spectrum]", ["Frequency (Hz)", "before (mm/√Hz)", "after (mm/√Hz)"]),
         ("modes", "figure.scene", ["Phase (% of a period)", "platform x (m)", "platform y (m)", "platform z (m)"]),
