@@ -42,6 +42,11 @@ LOGS = {
         {"time": 1e3, "winch": 1e3, "tension": 1e-3, "xyz": 1e3},
         ";",
     ),
+    "units before the numbers": (
+        renamed("v_mm/s_{}", "F_kN_{}", "pos_{}", "t_ms"),
+        {"time": 1e3, "winch": 1e3, "tension": 1e-3},
+        ",",
+    ),
     "brackets, from 0": (
         renamed("motor {} speed [m/min]", "F{} [N]", "{} [mm]", "t [ms]", first=0),
         {"time": 1e3, "winch": 60.0, "xyz": 1e3},

@@ -13,6 +13,7 @@ import pytest
 
 from tautwire.estimation.worker_pool import WorkerLostError, WorkerPool
 from tests.cli.test_interrupted_commands import FIT, INTERRUPTED, ROBOT, descendants, names, parents, until
+from tests.support.progress import without_progress_lines
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks at processes as Linux lists them")
 
@@ -65,7 +66,7 @@ def test_an_interrupt_ends_a_trace_inside_a_compiled_call(
         assert time.monotonic() - sent_at < MAX_SECONDS
     finally:
         process.kill()
-    assert (stderr, stdout, process.returncode) == (INTERRUPTED, "", 1)
+    assert (without_progress_lines(stderr), stdout, process.returncode) == (INTERRUPTED, "", 1)
     assert until(lambda: not others & parents().keys(), MAX_SECONDS)
     assert names(tmp_path) == ["endless.py", "inside", "scratch"]
     assert names(tmp_path / "scratch") == []

@@ -170,11 +170,11 @@ def _order(column: str) -> tuple[int, int]:
 
 
 def _stated_unit(name: str) -> str:
-    """The unit in a name: in brackets, or a known one behind a slash or at its end; blank without."""
+    """The unit in a name: in brackets, or a known one behind a slash or at its end, a number aside; else blank."""
     beside = unit_in_name(name)
     if beside[:1] in ("[", "("):
         return "" if beside[1:-1].strip().isdigit() else beside
-    *before, ending = re.split(r"[\s_.]+", name)
+    *before, ending = re.split(r"[\s_.]+", re.sub(r"[\s_.]+\d+$", "", name))
     kinds = ("time", "x", *CABLE_COLUMNS)
     candidates = [text for text in (ending if before else "", beside) if text]
     return next((text for text in candidates if any(_is_unit_of(text, kind) for kind in kinds)), "")

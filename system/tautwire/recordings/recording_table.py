@@ -96,7 +96,10 @@ def parse_header(
     for required in ("time", *(f"winch_speed_{cable}" for cable in range(1, cable_count + 1))):
         if required not in names and required.replace("winch_speed", "rope_length") not in names:
             similar = closest_name(required, unknown_names)
-            hint = "add it" if similar is None else f"add it, or rename {format_value(similar)}"
+            renamed = "" if similar is None else f"rename {format_value(similar)}, "
+            # The only file without cables is a tracker's.
+            table = "recording.columns], see tautwire columns" if cable_count else "recording.tracker.columns]"
+            hint = f"add it, {renamed}or declare its name in [{table}"
             sink(RecordingError(where, f"the column {required} is missing", hint, line))
     return Header(names, unknown_names)
 
