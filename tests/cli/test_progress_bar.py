@@ -138,5 +138,5 @@ def test_remaining_time_of_a_line_is_that_of_what_was_begun_with_it() -> None:
     assert progress_line(progress, 30.0, 110.0, 600.0) == "30 s of at most 10 min: running"
     # A tenth came in 60 s, four tenths are left; 20 s ago.
     progress = progress.updated("running", 0.6, 160.0)
-    assert progress_line(progress, 300.0, 180.0) == "5 min: running, 60 %, about 4 min left"
-    assert progress_line(progress.updated("writing", 0.0, 181.0), 301.0, 181.0) == "5 min: writing"
+    assert progress_line(progress, 300.0, 180.0) == "300 s: running, 60 %, about 220 s left"
+    assert progress_line(progress.updated("writing", 0.0, 181.0), 901.0, 181.0) == "15 min: writing"

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 from threading import Event, Thread
 
 LINE_INTERVAL = 10.0  # s
-SECONDS_BELOW = 90.0
+SECONDS_BELOW = 600.0
 
 
 @dataclass(frozen=True)
