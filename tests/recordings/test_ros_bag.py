@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+import sqlite3
 import sys
+from contextlib import closing
 from pathlib import Path
 from typing import Any
 
@@ -219,10 +221,8 @@ def test_a_bag_that_is_compressed_as_a_whole_is_refused(tmp_path: Path) -> None:
 
 
 def test_types_that_the_bag_does_not_define_are_named(tmp_path: Path) -> None:
-    import apsw
-
     path = bag(tmp_path, is_sqlite=True)
-    with apsw.Connection(str(path / "run.db3")) as content:
+    with closing(sqlite3.connect(path / "run.db3")) as content, content:
         content.execute("UPDATE topics SET type = 'lab_msgs/msg/Winches' WHERE name = '/joint_states'")
     text = (path / "metadata.yaml").read_text()
     (path / "metadata.yaml").write_text(text.replace("sensor_msgs/msg/JointState", "lab_msgs/msg/Winches"))

@@ -164,11 +164,15 @@ class Browser:
         return [message for message in said if not any(words in message for words in OWN_WORDS)]
 
     def requests(self) -> list[str]:
-        """Addresses that were asked for since the last call, over any network or from the disk."""
+        """Addresses that pages asked for since the last call, over any network or from the disk.
+
+        Chromium's own page of a new tab may still be loading when the first page of a test is opened.
+        """
         events = [json.loads(entry["message"])["message"] for entry in self._driver.get_log("performance")]
         asked = [event["params"] for event in events if event["method"] == "Network.requestWillBeSent"]
         sockets = [event["params"]["url"] for event in events if event["method"] == "Network.webSocketCreated"]
-        return [each["request"]["url"] for each in asked] + sockets
+        own = ("chrome:", "chrome-untrusted:", "chrome-extension:")
+        return [each["request"]["url"] for each in asked if not each["documentURL"].startswith(own)] + sockets
 
     def _point(self, selector: str, shares: tuple[float, ...]) -> list[float]:
         script = """const box = document.querySelector(arguments[0]).getBoundingClientRect();
