@@ -77,6 +77,36 @@ def test_errors_with_a_memory_add_their_variance_to_the_first_innovations() -> N
     assert np.all(added > 0.0)
 
 
+def lengths_of(rms: float, bandwidth: float = 1.0, noise: Noise = NOISE) -> Noise:
+    return replace(noise, rope_lengths=(OrnsteinUhlenbeck(rms, bandwidth),) * ROBOT.cable_count)
+
+
+def test_errors_of_lengths_are_none_of_the_first_sample_from_which_they_count() -> None:
+    plain, other = (likelihood_of(noise).innovations(PAIR[0], ()) for noise in (NOISE, lengths_of(1e-4)))
+    assert np.allclose(other.log_variances[0], plain.log_variances[0], atol=1e-9)
+    assert np.all(other.log_variances[20] > plain.log_variances[20])
+
+
+def test_recorded_lengths_take_the_place_of_the_noise_of_speeds() -> None:
+    no_noise, tiny = replace(NOISE, winch_speed=0.0), lengths_of(1e-12)
+    plain, other = (likelihood_of(noise).innovations(PAIR[0], ()) for noise in (no_noise, tiny))
+    assert np.allclose(other.log_variances, plain.log_variances, atol=1e-6)
+
+
+@pytest.mark.parametrize("noise", [NOISE, disturbed(force=1.0)])
+def test_errors_of_lengths_with_a_memory_are_innovations_of_the_right_size(noise: Noise) -> None:
+    recording, rms, bandwidth = PAIR[0], 3e-4, 1.0
+    errors = process(rms, bandwidth, recording, 5)
+    wrong = replace(recording, winch_speed=recording.winch_speed - np.gradient(errors, recording.time, axis=0))
+    rows = np.ones(recording.sample_count, dtype=bool)
+    right, smaller, larger = (
+        likelihood_of(lengths_of(factor * rms, bandwidth, noise)).innovations(wrong, ()) for factor in (1.0, 0.5, 2.0)
+    )
+    # Speeds that are linear between samples smooth such errors a little.
+    assert 0.8 < np.mean(right.values**2) < 1.0 < 0.5 * np.mean(likelihood_of(noise).innovations(wrong, ()).values ** 2)
+    assert right.log_likelihood(rows) > 20.0 + max(each.log_likelihood(rows) for each in (smaller, larger))
+
+
 def test_an_undeclared_weight_is_followed_as_a_force_downwards() -> None:
     recording = recorded("three", 1, {"payload": {"mass": 30.0 / 9.81}})
     slow = Disturbance(OrnsteinUhlenbeck(30.0, 1e-3), *[OrnsteinUhlenbeck(0.0, 1.0)] * 2, NOISE.position, NOISE.tension)

@@ -6,7 +6,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tautwire.estimation import preprocessing, trace
+from tautwire.estimation import preprocessing, speed_versions, trace
 from tautwire.estimation.clock_offsets import CHANNEL_GROUPS, shifted
 from tautwire.estimation.estimation_data import DataSplit
 from tautwire.estimation.parameter_fit import Fitter
@@ -83,45 +83,52 @@ def counted(seed: int, count: float, effects: dict[str, Any] | None = None) -> R
     moved = 0.5 * (speeds[1:] + speeds[:-1]) * np.diff(recording.time)[:, None]
     travel = count * np.round(np.vstack([np.zeros(3), np.cumsum(moved, axis=0)]) / count)
     speeds = np.gradient(travel, recording.time, axis=0)
-    return replace(recording, winch_speed=speeds, rope_lengths=(1, 2, 3))
+    return replace(recording, winch_speed=speeds, rope_length=-travel)
 
 
 def mean_squares(found: PreparedData) -> list[float]:
     return [float(np.mean(each.values[each.observed] ** 2)) for each in found.innovations]
 
 
-def test_speeds_between_counts_leave_noise(monkeypatch: pytest.MonkeyPatch) -> None:
-    recordings = counted(1, 1e-6), counted(2, 1e-6)
+@pytest.mark.parametrize("count", [1e-6, 1e-4])
+def test_smoothed_lengths_leave_noise(monkeypatch: pytest.MonkeyPatch, count: float) -> None:
+    recordings = counted(1, count), counted(2, count)
     (found,) = prepare_data(THREE, *recordings, WorkerPool(1))
-    monkeypatch.setattr(preprocessing, "may_be_central_differences", lambda recording: False)
+    monkeypatch.setattr(speed_versions, "may_be_central_differences", lambda recording: False)
     (as_recorded,) = prepare_data(THREE, *recordings, WorkerPool(1))
     assert max(mean_squares(found)) < 1.03 < 1.08 < min(mean_squares(as_recorded))
-    assert [note for note in found.notes if "central differences" in note] == [
-        "three-1.csv and three-2.csv: winch speeds are central differences of counts; those between samples, which "
-        "differ by 0.00061 m/s (rms), were used"
-    ]
+    (note,) = (note for note in found.notes if "splines" in note)
+    rms = max(error.rms for error in found.fitter.noise.rope_lengths)
+    assert note.startswith("three-1.csv and three-2.csv: winch speeds are rates of rope lengths; those of smoothing")
+    assert f"with errors of {rms:.2g} m (rms)" in note and rms < max(0.3 * count, 1e-5)
 
 
-def test_coarse_counts_are_taken_as_they_are_first() -> None:
-    recordings = counted(1, 1e-3), counted(2, 1e-3)
-    found, *_ = prepare_data(THREE, *recordings, WorkerPool(1))
-    assert found.split.estimation.recording is recordings[0]
-    assert not any("central differences" in note for note in found.notes)
+def test_errors_of_coarse_counts_have_a_memory_that_is_estimated() -> None:
+    (found,) = prepare_data(THREE, counted(1, 1e-3), counted(2, 1e-3), WorkerPool(1))
+    assert found.fitter.has_disturbance and all(error.rms > 5e-5 for error in found.fitter.noise.rope_lengths)
+    assert max(mean_squares(found)) < 1.1
+
+
+def test_speeds_between_counts_are_used_where_no_lengths_were_recorded() -> None:
+    recordings = [replace(counted(seed, 1e-4), rope_length=None) for seed in (1, 2)]
+    found, *_ = prepare_data(THREE, recordings[0], recordings[1], WorkerPool(1))
+    assert [note for note in found.notes if "central differences" in note]
+    assert max(mean_squares(found)) < 1.05
 
 
 def test_a_recording_that_also_validates_has_the_same_speeds_in_both() -> None:
     (found,) = prepare_data(THREE, counted(1, 1e-6), None, WorkerPool(1))
     assert found.split.estimation.recording is found.split.validation.recording
-    assert any(note.startswith("three-1.csv: winch speeds are central differences") for note in found.notes)
+    assert any(note.startswith("three-1.csv: winch speeds are rates of rope lengths; ") for note in found.notes)
 
 
 def test_a_model_far_off_decides_on_no_speeds() -> None:
     recordings = counted(1, 1e-6, PAYLOAD), counted(2, 1e-6, PAYLOAD)
     as_recorded, corrected = prepare_data(THREE, *recordings, WorkerPool(1))
     assert as_recorded.split.estimation.recording is recordings[0]
-    assert any("central differences" in note for note in corrected.notes)
+    assert any("splines" in note for note in corrected.notes)
     # What speeds with few values are is nobody's knowledge, unlike what the reader makes of lengths.
-    unknown = [replace(recording, rope_lengths=(), winch_speed=few_valued(recording)) for recording in recordings]
+    unknown = [replace(recording, rope_length=None, winch_speed=few_valued(recording)) for recording in recordings]
     assert may_be_central_differences(unknown[0])
     (alone,) = prepare_data(THREE, unknown[0], unknown[1], WorkerPool(1))
     assert alone.split.estimation.recording is unknown[0]
@@ -133,11 +140,11 @@ def few_valued(recording: Recording) -> np.ndarray:
 
 
 @pytest.mark.validate
-def test_an_effect_is_named_beside_speeds_that_are_central_differences() -> None:
+def test_an_effect_is_named_beside_rope_lengths() -> None:
     found = trace(
         THREE, counted(1, 1e-6, {"drum": {"radius_ratio": 1.01}}), counted(2, 1e-6, {"drum": {"radius_ratio": 1.01}})
     )
     (drum,) = found.effects
     assert found.verdict == "effects" and drum.name == "drum"
     assert drum.parameters["radius_ratio"].value == pytest.approx(1.01, abs=1e-5)
-    assert found.noise_after and any("central differences" in note for note in found.notes)
+    assert found.noise_after and any("splines" in note for note in found.notes)

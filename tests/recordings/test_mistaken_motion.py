@@ -108,7 +108,8 @@ def test_the_radius_of_drums_whose_angle_was_recorded_is_measured() -> None:
 
 def test_a_rope_length_in_mm_is_told_by_its_column() -> None:
     robot, recording = shipped("three")
-    recording = replace(speeds(1e3)(recording), rope_lengths=(1, 2, 3))
+    recording = speeds(1e3)(recording)
+    recording = replace(recording, rope_length=-recording.wound_lengths())
     (error,) = recording_mistakes(robot, recording)
     assert "rope_length_1 to rope_length_3 are in mm" in error.problem
 

@@ -28,8 +28,8 @@ class FilterInputs:
 
     ``measured``, ``observed`` and ``shift`` (m, K), speed and next speed (cables, K), time step and drift (1, K) as
     ``columns``; the same for all samples are ``parameters`` (p, 1), ``disturbance`` (see
-    :meth:`tautwire.estimation.disturbance.Disturbance.filter_arguments`), variances of white noise (m,), and the
-    density of acceleration noise.
+    :func:`tautwire.estimation.kalman_filter.time_update_function`), variances of white noise (m,), and the density of
+    acceleration noise.
     """
 
     columns: tuple[Array, ...]
@@ -66,7 +66,7 @@ class FilterResults:
 class CompiledFilter:
     """Filter of a model whose last ``constant_count`` states are uncertain parameters.
 
-    Of the noise only whether it has a disturbance matters, and that of the winch speeds.
+    Of the noise only whether it has a disturbance matters, and that of winch speeds and rope lengths.
     """
 
     def __init__(

@@ -11,7 +11,6 @@ Source: Gelb (1974), Applied Optimal Estimation, sec. 2.4 and 4.5, on exponentia
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from math import pi
 
 import numpy as np
 from numpy.typing import NDArray
@@ -52,18 +51,9 @@ class Disturbance:
         """One for each disturbance state: three forces, then one for each output."""
         return (*[self.force] * 3, *[self.position] * 3, *[self.tension] * cable_count)
 
-    def variances(self, cable_count: int) -> Array:
-        """Stationary variances of the disturbance states (6 + n,)."""
-        return np.array([process.rms**2 for process in self.processes(cable_count)])
-
     def white_variances(self, cable_count: int) -> Array:
         """Variances of the white noise of x, y, z and each tension (3 + n,)."""
         return np.array([self.position_noise**2] * 3 + [self.tension_noise**2] * cable_count)
-
-    def filter_arguments(self, cable_count: int) -> Array:
-        """What the filter takes (12 + 2 n,): decay rates (1/s) and variances of the states."""
-        rates = [2.0 * pi * process.bandwidth for process in self.processes(cable_count)]
-        return np.array([*rates, *self.variances(cable_count)])
 
 
 def sensor_noise_only(disturbance: Disturbance, position_noise: float, tension_noise: float) -> Disturbance:
@@ -82,8 +72,3 @@ NEUTRAL = Disturbance(ABSENT, ABSENT, ABSENT, position_noise=1.0, tension_noise=
 
 def _described(process: OrnsteinUhlenbeck, unit: str) -> str:
     return f"{process.rms:.2g} {unit} (below {process.bandwidth:.2g} Hz)"
-
-
-def disturbance_state_count(cable_count: int) -> int:
-    """Number of disturbance states: three forces, and an error of each output."""
-    return 6 + cable_count

@@ -5,8 +5,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 
 import casadi
@@ -15,7 +14,8 @@ from casadi import SX, Function
 from numpy.typing import NDArray
 
 from ..robot.symbolic_model import SymbolicModel, constants_as_parameters
-from .disturbance import Disturbance, disturbance_state_count
+from .disturbance import Disturbance, OrnsteinUhlenbeck
+from .disturbance_symbols import DisturbanceSymbols
 from .integration_steps import Substeps
 from .measurement_model import measurement_model
 
@@ -24,7 +24,8 @@ from .measurement_model import measurement_model
 class Noise:
     """Noise levels as standard deviations: position (m), tension (N), winch speed (m/s), and start position (m).
 
-    Of a start that is not known at rest: its velocity (m/s), how far it is from equilibrium (m), and tensions that hold
+    ``rope_lengths`` (n) are errors with a memory (m) of cables whose rope length was recorded in place of a speed. Of a
+    start that is not known at rest: its velocity (m/s), how far it is from equilibrium (m), and tensions that hold
     nothing (N). ``own`` are those of single outputs (3 + n) where they differ from the others of their kind. With a
     ``disturbance``, which has a white noise of its own, those of outputs are not used by the filter.
     """
@@ -36,12 +37,17 @@ class Noise:
     start_velocity: float = 0.0
     start_stretch: float = 0.0
     self_stress: float = 0.0
+    rope_lengths: tuple[OrnsteinUhlenbeck, ...] = ()
     own: tuple[float, ...] = ()
     disturbance: Disturbance | None = None
 
     def of_outputs(self, cable_count: int) -> tuple[float, ...]:
         """Of x, y, z and each tension."""
         return self.own or (*[self.position] * 3, *[self.tension] * cable_count)
+
+    def processes(self, cable_count: int) -> tuple[OrnsteinUhlenbeck, ...]:
+        """One for each state behind the model's: errors of recorded rope lengths, and those of the disturbance."""
+        return (*self.rope_lengths, *(self.disturbance.processes(cable_count) if self.disturbance else ()))
 
     def white_variances(self, cable_count: int) -> NDArray[np.float64]:
         """Variances (3 + n,) of the white noise of x, y, z and each tension."""
@@ -57,11 +63,12 @@ def output_function(model: SymbolicModel, cable_count: int, noise: Noise, has_se
     ``shift`` (s) later (m,), and their derivatives by the state (m, n) and by the parameters (m, p). Without
     sensitivities p is 0, whatever parameters the model has.
     """
-    disturbance = _DisturbanceSymbols(cable_count if noise.disturbance else None)
+    disturbance = DisturbanceSymbols(len(noise.rope_lengths), 3 + cable_count if noise.disturbance else 0)
     state, shift = SX.sym("state", model.states.numel() + disturbance.count), SX.sym("shift", 3 + cable_count)
     speed, later, step = SX.sym("speed", cable_count), SX.sym("later", cable_count), SX.sym("step")
     instant = [casadi.vertcat(speed, SX(3, 1)), model.parameters, later, step, shift]
-    outputs = measurement_model(model, cable_count).call([state[: model.states.numel()], *instant])
+    model_state = disturbance.with_true_lengths(state, model.states.numel())
+    outputs = measurement_model(model, cable_count).call([model_state, *instant])
     expected, by_state, by_parameters = disturbance.added_to(outputs, state)
     count = model.parameters.numel() if has_sensitivities else 0
     arguments = [state, model.parameters, shift, speed, later, step]
@@ -80,29 +87,31 @@ def time_update_function(
 
     Arguments: state, parameters, speed, next speed, time step, drift, acceleration noise density, disturbance. Drift
     (s^2) times the variance of a winch speed is what its noise adds to the variance of each unstrained length; the
-    disturbance is that of :meth:`Disturbance.filter_arguments`, and empty where the noise has none.
+    disturbance has decay rates (1/s) and variances of the states behind the model's, and is empty where there are none.
 
     Results: the next state (n,); the derivatives of those d states that do not only decay, by the first c states (d, c)
     and by the parameters (d, p); the factors by which states decay, and the variances that are added to them (n,). The
     model's last ``constant_count`` states are constant.
     """
-    disturbance = _DisturbanceSymbols(cable_count if noise.disturbance else None)
+    disturbance = DisturbanceSymbols(len(noise.rope_lengths), 3 + cable_count if noise.disturbance else 0)
     model_size = model.states.numel()
     state = SX.sym("state", model_size + disturbance.count)
     speed, later, step = SX.sym("speed", cable_count), SX.sym("later", cable_count), SX.sym("step")
     drift, acceleration_noise_density = SX.sym("drift"), SX.sym("acceleration_noise_density")
     interval = _Interval(speed, later, step, substeps)
-    moved, transition, direct_sensitivity = disturbance.time_update(model, constant_count, state, interval)
+    moved, transition, direct_sensitivity = _time_update_beside(disturbance, model, constant_count, state, interval)
     process_noise = SX(state.numel(), 1)
     process_noise[3:6] = acceleration_noise_density**2 * step
-    process_noise[6 : 6 + cable_count] = noise.winch_speed**2 * drift
+    for cable in range(cable_count):
+        is_length = bool(noise.rope_lengths) and noise.rope_lengths[cable].rms > 0.0
+        process_noise[6 + cable] = 0.0 if is_length else noise.winch_speed**2 * drift
     process_noise[model_size:] = disturbance.process_noise(step)
     moving = model_size - constant_count
     count = model.parameters.numel() if has_sensitivities else 0
     arguments = [state, model.parameters, speed, later, step, drift, acceleration_noise_density, disturbance.arguments]
     results = [
         moved,
-        transition[:moving, : model_size + (3 if disturbance.count else 0)],
+        transition[:moving, : model_size + disturbance.driving_count],
         direct_sensitivity[:moving, :count],
         casadi.vertcat(SX.ones(model_size), disturbance.decay(step)),
         process_noise,
@@ -110,62 +119,14 @@ def time_update_function(
     return Function("time_update", arguments, results)
 
 
-class _DisturbanceSymbols:
-    """The disturbance states behind those of a model, and their numbers as symbols; none without a disturbance."""
-
-    def __init__(self, cable_count: int | None) -> None:
-        self.count = 0 if cable_count is None else disturbance_state_count(cable_count)
-        self.decay_rates, self._variances = SX.sym("decay_rate", self.count), SX.sym("variance", self.count)
-        self.arguments = casadi.vertcat(self.decay_rates, self._variances)
-
-    def added_to(self, outputs: Sequence[SX], state: SX) -> Sequence[SX]:
-        """The outputs with their errors, and the derivatives of these by the states."""
-        if not self.count:
-            return outputs
-        expected, by_state, by_parameters = outputs
-        count = expected.numel()
-        by_errors = casadi.horzcat(SX(count, 3), SX.eye(count))
-        return expected + state[state.numel() - count :], casadi.horzcat(by_state, by_errors), by_parameters
-
-    def decay(self, step: SX) -> SX:
-        """Factors by which the disturbance states decay in a step."""
-        return casadi.exp(-self.decay_rates * step)
-
-    def process_noise(self, step: SX) -> SX:
-        """Variances that a step adds to the disturbance states."""
-        return self._variances * (1.0 - casadi.exp(-2.0 * self.decay_rates * step))
-
-    def time_update(
-        self, model: SymbolicModel, constant_count: int, state: SX, interval: _Interval
-    ) -> tuple[SX, SX, SX]:
-        """As :func:`_time_update` of the model, with the force that its mean over the step leaves on the platform."""
-        if not self.count:
-            return _time_update(model, constant_count, state, interval)
-        size, parameters = model.states.numel(), model.parameters.numel()
-        force, decay = SX.sym("force", 3), self.decay(interval.step)
-        mean_decay = casadi.exp(-0.5 * self.decay_rates[:3] * interval.step)
-        next_state, transition, sensitivities = casadi.substitute(
-            list(_time_update(_with_force(model, force), constant_count, state[:size], interval)),
-            [force],
-            [mean_decay * state[size : size + 3]],
-        )
-        by_force = casadi.mtimes(sensitivities[:, parameters:], casadi.diag(mean_decay))
-        errors = self.count - 3
-        return (
-            casadi.vertcat(next_state, decay * state[size:]),
-            casadi.vertcat(
-                casadi.horzcat(transition, by_force, SX(size, errors)),
-                casadi.horzcat(SX(self.count, size), casadi.diag(decay)),
-            ),
-            casadi.vertcat(sensitivities[:, :parameters], SX(self.count, parameters)),
-        )
-
-
-def _with_force(model: SymbolicModel, force: SX) -> SymbolicModel:
-    """The model with a constant force on the platform as three more parameters."""
-    external_force = model.inputs[model.inputs.numel() - 3 :]
-    (rates,) = casadi.substitute([model.rates], [external_force], [external_force + force])
-    return replace(model, rates=rates, parameters=casadi.vertcat(model.parameters, force))
+def _time_update_beside(
+    disturbance: DisturbanceSymbols, model: SymbolicModel, constant_count: int, state: SX, interval: _Interval
+) -> tuple[SX, SX, SX]:
+    """As :func:`_time_update`, of the states behind the model's too."""
+    if not disturbance.count:
+        return _time_update(model, constant_count, state, interval)
+    results = _time_update(disturbance.driven(model), constant_count, state[: model.states.numel()], interval)
+    return disturbance.appended_to(results, state, interval.step)
 
 
 def filter_jacobians(
@@ -177,12 +138,12 @@ def filter_jacobians(
     :func:`time_update_function`. Results: derivatives of the state at the next sample (n, n), and of the model's states
     in it by those half a step before it, from the cubic through both ends.
     """
-    disturbance = _DisturbanceSymbols(cable_count if noise.disturbance else None)
+    disturbance = DisturbanceSymbols(len(noise.rope_lengths), 3 + cable_count if noise.disturbance else 0)
     model_size = model.states.numel()
     updated = SX.sym("after", model_size + disturbance.count)
     speed, later, step = SX.sym("speed", cable_count), SX.sym("later", cable_count), SX.sym("step")
     interval = _Interval(speed, later, step, substeps)
-    _, transition, _ = disturbance.time_update(model, constant_count, updated, interval)
+    _, transition, _ = _time_update_beside(disturbance, model, constant_count, updated, interval)
     rate_jacobian = Function(
         "bending", [model.states, model.inputs, model.parameters], [casadi.jacobian(model.rates, model.states)]
     )

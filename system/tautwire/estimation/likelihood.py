@@ -24,7 +24,7 @@ from ..robot.schema import Robot
 from ..robot.symbolic_model import FreeParameter, SymbolicModel, symbolic_model
 from ..robot.uncertain_parameters import uncertain_parameters
 from .compiled_filter import CompiledFilter, FilterInputs, FilterState
-from .disturbance import Disturbance, disturbance_state_count
+from .disturbance import Disturbance
 from .initial_state_prior import initial_covariance
 from .integration_steps import substeps_of_robot
 from .kalman_filter import Noise
@@ -69,7 +69,7 @@ class Innovations:
 class FilterSegment:
     """Filter segment: K successive samples of a filter's run.
 
-    ``columns`` are measured, observed and shift (m, K), speed and next speed (cables, K), time step and drift (1, K);
+    ``columns`` are those of :class:`tautwire.estimation.compiled_filter.FilterInputs`;
     ``is_recorded`` tells which samples are the recording's, the others fill gaps. ``states`` (n, K + 1) and
     ``covariances`` (K, n, n), none unless they are kept, are those predicted, with a disturbance's behind the model's;
     ``values``, ``log_variances`` (K, m) and ``sensitivities`` (K, m, p) as in Innovations.
@@ -264,26 +264,25 @@ class Likelihood:
     def _start(self, arguments: Array) -> tuple[Array, Array]:
         """Initial state (n, 1) and its sensitivities (n, p); disturbances start at zero."""
         state, sensitivities = (np.array(part) for part in self._filter_functions.start(arguments))
-        zeros = np.zeros((self._disturbance_state_count, 1 + sensitivities.shape[1]))
+        zeros = np.zeros((len(self.noise.processes(self.cable_count)), 1 + sensitivities.shape[1]))
         return np.vstack([state, zeros[:, :1]]), np.vstack([sensitivities, zeros[:, 1:]])
 
     @property
     def disturbance_arguments(self) -> Array:
-        """What the filter takes of the disturbance, a column; empty without one."""
-        disturbance = self.noise.disturbance
-        return (np.zeros(0) if disturbance is None else disturbance.filter_arguments(self.cable_count))[:, None]
-
-    @property
-    def _disturbance_state_count(self) -> int:
-        return disturbance_state_count(self.cable_count) if self.noise.disturbance else 0
+        """Decay rates (1/s) and variances of the states behind the model's, a column; empty where there are none."""
+        processes = self.noise.processes(self.cable_count)
+        rates = [2.0 * pi * process.bandwidth for process in processes]
+        return np.array([*rates, *(process.rms**2 for process in processes)])[:, None]
 
     def _start_covariance(self) -> Array:
         size = self.model.states.numel()
-        of_model = initial_covariance(self.robot, self.noise, size, len(self.uncertain))
-        if self.noise.disturbance is None:
-            return of_model
-        covariance = np.diag(np.append(np.zeros(size), self.noise.disturbance.variances(self.cable_count)))
-        covariance[:size, :size] = of_model
+        variances = [process.rms**2 for process in self.noise.processes(self.cable_count)]
+        covariance = np.diag(np.append(np.zeros(size), variances))
+        covariance[:size, :size] = initial_covariance(self.robot, self.noise, size, len(self.uncertain))
+        # Recorded lengths count from the first, whose own error is no error of the length that statics gives.
+        for cable, error in enumerate(self.noise.rope_lengths):
+            covariance[6 + cable, 6 + cable] += error.rms**2
+            covariance[6 + cable, size + cable] = covariance[size + cable, 6 + cable] = -(error.rms**2)
         return covariance
 
 

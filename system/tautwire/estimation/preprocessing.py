@@ -17,12 +17,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..errors import RecordingError
-from ..recordings.central_differences import may_be_central_differences, with_speeds_between_samples
 from ..recordings.consistency import require_plausible
 from ..recordings.dead_channels import without_dead_channels
 from ..recordings.gaps import without_gaps
 from ..recordings.outliers import without_outliers
 from ..recordings.recording import Recording, require_outputs
+from ..recordings.rope_length_smoothing import LengthSmoothing, length_smoothing
 from ..recordings.standing_winches import without_noise_of_standing_winches
 from ..robot.schema import Robot
 from ..robot.uncertain_parameters import is_surveyed
@@ -40,16 +40,18 @@ from .policy import DEFAULT_POLICY, IdentificationPolicy, ResidualAnalysisPolicy
 from .preprocessing_policy import PreprocessingPolicy
 from .residual_analysis import has_enough_samples, residuals_are_white
 from .smoothed_states import calibrate
+from .speed_versions import speed_versions
 from .worker_pool import WorkerPool
 
 
 @dataclass(frozen=True)
 class PreparedRecordings:
-    """Cleaned recordings and their noise, with notes of every step applied."""
+    """Cleaned recordings, their noise, and smoothing of FIT's rope lengths, with notes of every step applied."""
 
     fit: Recording
     check: Recording | None
     noise: Noise
+    smoothing: tuple[LengthSmoothing | None, ...]
     notes: tuple[str, ...]
 
 
@@ -107,12 +109,18 @@ def prepare_recordings(
     if not any(np.any(recording.winch_speed) for recording in cleaned):
         noise = replace(noise, winch_speed=0.0)
     noise, motion_notes = with_motion_at_start(robot, noise, cleaned, policy.initial_state)
-    if checked.is_coloured or is_surveyed(robot):
+    smoothing = length_smoothing(cleaned[0])
+    largest_error = max((each.rms for each in smoothing if each), default=0.0)
+    is_length_coloured = largest_error > policy.noticeable_length_error_sigmas * detectable_length(
+        robot, noise, cleaned[0]
+    )
+    if checked.is_coloured or is_length_coloured or is_surveyed(robot):
         noise = replace(noise, disturbance=disturbance_prior(robot, noise).median)
     return PreparedRecordings(
         fit=cleaned[0],
         check=None if check is None else cleaned[1],
         noise=noise,
+        smoothing=smoothing,
         notes=(*notes, *checked.notes, *self_stress_notes, *motion_notes),
     )
 
@@ -152,7 +160,7 @@ def prepare_data(
         all_notes = (*truncation_notes, *prepared.notes, *notes, *data_split.notes, *of_recordings)
         return PreparedData(data_split, data_sets, fitter, innovations_of(fitter, robot, data_split), all_notes)
 
-    versions = _speed_versions(fitter, robot, data_split, policy.preprocessing)
+    versions = speed_versions(fitter, robot, data_split, prepared.smoothing, policy.preprocessing)
     first, *others = (assembled(*version) for version in versions)
     # A disturbance would take up what clocks that are apart leave.
     if fitter.has_disturbance or all_residuals_white(first.innovations, first.split, policy.residual_analysis):
@@ -164,38 +172,6 @@ def prepare_data(
     clock_corrected = assembled(fitter, data_split, (*notes, *clock_notes))
     explained = all_residuals_white(clock_corrected.innovations, data_split, policy.residual_analysis)
     return (clock_corrected,) if explained else (first, *others, clock_corrected)
-
-
-def _speed_versions(
-    fitter: Fitter, robot: Robot, split: DataSplit, policy: PreprocessingPolicy
-) -> list[tuple[Fitter, DataSplit, tuple[str, ...]]]:
-    """The data with winch speeds as recorded or, where FIT is far likelier so, as taken from central differences.
-
-    Each under its own disturbance, with notes. Counts that are coarse add more noise than the motion that is taken
-    back. Where the model is far off, its errors decide on the likelihood: unless speeds explain a share of them, those
-    of rope lengths come in both versions.
-    """
-    as_recorded = (fitter, split, ())
-    recorded, check = split.estimation.recording, split.validation.recording
-    if not may_be_central_differences(recorded):
-        return [as_recorded]
-    speeds = with_speeds_between_samples(recorded)
-    estimation = replace(split.estimation, recording=speeds)
-    other = with_fitted_disturbance(fitter, robot, (), estimation)
-    rows, before = split.estimation.rows, fitter.innovations(robot, split.estimation)
-    gain = other.log_likelihood(robot, (), estimation) - before.log_likelihood(rows)
-    misfit = 0.5 * float(np.sum(before.values[before.observed & rows[:, None]] ** 2 - 1.0))
-    decisive_gain = max(policy.min_speed_gain, policy.min_speed_gain_to_misfit * misfit)
-    is_undecided = decisive_gain > policy.min_speed_gain and not fitter.has_disturbance and recorded.rope_lengths
-    if gain < decisive_gain and not is_undecided:
-        return [as_recorded]
-    is_shared = check is recorded
-    validation = replace(split.validation, recording=speeds if is_shared else with_speeds_between_samples(check))
-    size = float(np.max(np.std(speeds.winch_speed - recorded.winch_speed, axis=0)))
-    paths = recorded.path if is_shared else f"{recorded.path} and {check.path}"
-    note = f"{paths}: winch speeds are central differences of counts; those between samples, which differ by"
-    corrected = (other, DataSplit(estimation, validation, split.notes), (f"{note} {size:.2g} m/s (rms), were used",))
-    return [corrected] if gain >= decisive_gain else [as_recorded, corrected]
 
 
 def with_disturbance(prepared: PreparedData, robot: Robot) -> PreparedData:

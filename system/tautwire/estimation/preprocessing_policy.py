@@ -79,6 +79,9 @@ class PreprocessingPolicy:
     max_step_intervals: float = 1.5
     # Error of rope length in a gap, in standard deviations of the best sensor: a smaller one does not show.
     max_length_error_sigmas: float = 1.0
+    # The same from which errors of recorded rope lengths are to be told from sensors' noise: below, they add a tenth to
+    # its variance. Chosen, not calibrated.
+    noticeable_length_error_sigmas: float = 0.3
     # Nats on FIT from which winch speeds are central differences of counts. Of seven lifelike recordings from counts
     # three gained 110, 190 and 3,200; the others nothing, or lost up to 1,600 where counts are coarse.
     min_speed_gain: float = 20.0

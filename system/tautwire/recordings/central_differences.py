@@ -13,8 +13,6 @@ Source: Hamming (1989), Digital Filters, 3rd ed., on transfer functions of smoot
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 from numpy.typing import NDArray
 
@@ -47,7 +45,7 @@ def with_speeds_between_samples(recording: Recording) -> Recording:
     for _ in range(SERIES_ORDER):
         term = -0.25 * _second_difference(term, has_neighbours)
         speeds = speeds + term
-    return replace(recording, winch_speed=speeds)
+    return recording.with_winch_speed(speeds)
 
 
 def _second_difference(values: Array, has_neighbours: NDArray[np.bool_]) -> Array:

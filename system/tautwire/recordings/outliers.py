@@ -76,8 +76,8 @@ def without_outliers(
         column[is_missing] = np.interp(recording.time[is_missing], recording.time[~is_missing], column[~is_missing])
     description = ", ".join(f"{count} of {name}" for name, count in counts.items())
     note = f"{recording.path}: outliers beyond {policy.sigmas:g} sigma removed: {description}"
-    cleaned = replace(recording, position=measured[:, :3], tension=measured[:, 3:], winch_speed=winch_speed)
-    return cleaned, (note,)
+    cleaned = replace(recording, position=measured[:, :3], tension=measured[:, 3:])
+    return cleaned.with_winch_speed(winch_speed), (note,)
 
 
 def outlier_indices(signal: Array, policy: OutlierPolicy = DEFAULT_OUTLIER_POLICY) -> NDArray[np.intp]:

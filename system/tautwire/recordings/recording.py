@@ -39,8 +39,9 @@ class Recording:
 
     ``time`` (N,) in s, strictly rising; ``winch_speed`` (N, n) in m/s, positive reels in; ``tension`` (N, n)
     in N and ``position`` (N, 3) in m, NaN where a cell or a column is missing. ``unknown_columns`` by name;
-    ``rope_lengths`` are the numbers of the cables whose winch speed is the rate of a recorded rope length. ``read_as``
-    says what of the file differs from the standard, and which winch speeds are interpolated.
+    ``read_as`` says what of the file differs from the standard, and which winch speeds are interpolated.
+    ``rope_length`` (N, n) in m, smaller as it reels in, is NaN where no length of a cable was recorded; where it was,
+    the winch speed is its rate. None where no cable has one.
     """
 
     path: str
@@ -49,8 +50,8 @@ class Recording:
     tension: NDArray[np.float64]
     position: NDArray[np.float64]
     unknown_columns: tuple[str, ...] = ()
-    rope_lengths: tuple[int, ...] = ()
     read_as: tuple[str, ...] = ()
+    rope_length: NDArray[np.float64] | None = None
 
     @property
     def cable_count(self) -> int:
@@ -66,6 +67,13 @@ class Recording:
     def duration(self) -> float:
         """Time from the first to the last sample, in s."""
         return float(self.time[-1] - self.time[0])
+
+    @property
+    def rope_lengths(self) -> tuple[int, ...]:
+        """Numbers of the cables whose winch speed is the rate of a recorded rope length."""
+        if self.rope_length is None:
+            return ()
+        return tuple((1 + np.flatnonzero(np.isfinite(self.rope_length).all(axis=0))).tolist())
 
     @property
     def has_position(self) -> bool:
@@ -105,6 +113,7 @@ class Recording:
             winch_speed=self.winch_speed[rows],
             tension=self.tension[rows],
             position=self.position[rows],
+            rope_length=None if self.rope_length is None else self.rope_length[rows],
         )
 
     def measured(self) -> NDArray[np.float64]:
@@ -117,6 +126,13 @@ class Recording:
         mean_speeds = 0.5 * (self.winch_speed[1:] + self.winch_speed[:-1])
         np.cumsum(mean_speeds * np.diff(self.time)[:, None], axis=0, out=wound[1:])
         return wound
+
+    def with_winch_speed(self, winch_speed: NDArray[np.float64]) -> "Recording":
+        """The recording with other winch speeds (N, n), without the recorded lengths of cables whose speeds differ."""
+        if self.rope_length is None:
+            return replace(self, winch_speed=winch_speed)
+        is_same = np.all(winch_speed == self.winch_speed, axis=0)
+        return replace(self, winch_speed=winch_speed, rope_length=np.where(is_same, self.rope_length, np.nan))
 
     def has_same_samples(self, other: "Recording") -> bool:
         """Whether another recording has the same numbers in all its samples."""
@@ -188,7 +204,7 @@ def _validated_recording(table: CsvTable | ColumnTable, cable_count: int) -> Rec
         tension=_stacked_columns(numbers, [f"tension_{cable}" for cable in cables]),
         position=_stacked_columns(numbers, AXES),
         unknown_columns=table.header.unknown_names,
-        rope_lengths=tuple(cable for cable in cables if numbers.get(f"rope_length_{cable}") is not None),
+        rope_length=_stacked_columns(numbers, [f"rope_length_{cable}" for cable in cables]),
         read_as=(*((f"read {table.header.dialect}",) if table.header.dialect else ()), *gap_notes),
     )
     if not _is_valid(recording):

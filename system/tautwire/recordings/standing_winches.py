@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from ..robot.schema import Robot
@@ -30,4 +28,4 @@ def without_noise_of_standing_winches(robot: Robot, recording: Recording) -> tup
         return recording, ()
     winches = ", ".join(str(index + 1) for index in np.flatnonzero(stands))
     note = f"{recording.path}: winches stand, their speeds are noise and were taken as zero: {winches}"
-    return replace(recording, winch_speed=np.where(stands, 0.0, recording.winch_speed)), (note,)
+    return recording.with_winch_speed(np.where(stands, 0.0, recording.winch_speed)), (note,)

@@ -9,7 +9,9 @@ import pytest
 
 from tautwire.estimation.discovery.candidate_terms import Term
 from tautwire.estimation.discovery.formula_ports import FormulaPorts, series_sensitivities
+from tautwire.estimation.disturbance import OrnsteinUhlenbeck
 from tautwire.estimation.innovation_sensitivities import linearise_filter
+from tautwire.estimation.kalman_filter import Noise
 from tautwire.estimation.likelihood import Likelihood
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.robot.schema import Formula, Robot
@@ -21,12 +23,13 @@ ROBOT = example("three")
 RECORDING = recorded("three", 1).first(600)
 NOISE = estimate_noise(ROBOT, RECORDING)
 INTERVAL = float(RECORDING.time[1] - RECORDING.time[0])
+LENGTHS = replace(NOISE, rope_lengths=(OrnsteinUhlenbeck(1e-5, 5.0),) * 3)
 EVERYWHERE = (1, 2, 3)
 
 
-def along(robot: Robot, term: Term) -> np.ndarray:
+def along(robot: Robot, term: Term, noise: Noise) -> np.ndarray:
     """Slopes of the innovations by a term's coefficient, (N, m)."""
-    likelihood = Likelihood(robot, (), NOISE, INTERVAL)
+    likelihood = Likelihood(robot, (), noise, INTERVAL)
     ports = FormulaPorts(robot, likelihood.model.state_names)
     slopes, parts, begun = np.zeros((len(likelihood.model.state_names), 1)), [], None
     for run in linearise_filter(likelihood, [], RECORDING):
@@ -40,11 +43,11 @@ def along(robot: Robot, term: Term) -> np.ndarray:
     return np.concatenate(parts)
 
 
-def exact(robot: Robot, term: Term) -> np.ndarray:
+def exact(robot: Robot, term: Term, noise: Noise) -> np.ndarray:
     """The same by the filter itself."""
     formula = Formula(term.target, f"c1*{term.text}", term.cables, {"c1": 0.0})
     opened = replace(robot, formulas=(*robot.formulas, formula))
-    likelihood = Likelihood(opened, [FreeParameter(FORMULA_INDEX, "c1")], NOISE, INTERVAL)
+    likelihood = Likelihood(opened, [FreeParameter(FORMULA_INDEX, "c1")], noise, INTERVAL)
     return likelihood.innovations(RECORDING, [0.0]).sensitivities[:, :, 0]
 
 
@@ -60,10 +63,14 @@ TERMS = (
 
 
 @pytest.mark.parametrize("term", TERMS, ids=lambda term: f"{term.target} {term.text}")
-@pytest.mark.parametrize("formulas", [(), (Formula("force_x", "20*sin(3*time)*vx"),)], ids=["plain", "with time"])
-def test_a_term_moves_what_the_filter_says(term: Term, formulas: tuple[Formula, ...]) -> None:
+@pytest.mark.parametrize(
+    ("formulas", "noise"),
+    [((), NOISE), ((Formula("force_x", "20*sin(3*time)*vx"),), NOISE), ((), LENGTHS)],
+    ids=["plain", "with time", "errors of rope lengths"],
+)
+def test_a_term_moves_what_the_filter_says(term: Term, formulas: tuple[Formula, ...], noise: Noise) -> None:
     robot = replace(ROBOT, formulas=formulas)
-    expected, found = exact(robot, term), along(robot, term)
+    expected, found = exact(robot, term, noise), along(robot, term, noise)
     assert np.sum(expected**2) > 0.0
     alike = np.sum(found * expected) / np.sqrt(np.sum(found**2) * np.sum(expected**2))
     assert alike > 0.999

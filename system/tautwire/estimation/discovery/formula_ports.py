@@ -148,10 +148,10 @@ def series_sensitivities(
         [_site_sensitivity(*case, output_sensitivities, initial_output_sensitivities) for case in site_series], axis=2
     )
     begin, end = by_rates[:-1], by_rates[1:]
+    model_size = begin.shape[1]
+    transition = segment.transition[:, :model_size, :model_size]
     integrated = (
-        segment.step[:, None, None]
-        / 6.0
-        * (segment.transition @ begin + 2.0 * segment.half_transition @ (begin + end) + end)
+        segment.step[:, None, None] / 6.0 * (transition @ begin + 2.0 * segment.half_transition @ (begin + end) + end)
     )
     return integrated, by_outputs[:-1]
 
