@@ -4,7 +4,8 @@ A cable FMU along the measured path with the recorded winch speed gives a tensio
 the platform FMU under the measured tensions gives an acceleration, to be compared with the measured path. A wrong rope
 or winch shows at its cable alone, since the measured tension is real; a wrong weight or an external force at the
 platform alone; a wrong load cell at both, and the balance closes with the FMU's tension instead; a wrong exit point at
-both, and it does not close. The initial tension of each cable is free: it follows from the platform's weight.
+both, and it does not close. The initial tension of each cable is free: it follows from the platform's weight. A load
+cell's zero therefore shows at the platform alone, as a force along that cable.
 """
 
 from __future__ import annotations
@@ -26,7 +27,7 @@ from ..policy import DEFAULT_POLICY
 from .cable_simulation import CableSimulation, exit_shift, simulate_cable
 from .component_residuals import ComponentResidual, FaultLocalisation, root_mean_square
 from .fault_isolation import isolation_verdict, numbered
-from .force_balance import ForceBalance, force_balance, measured_forces, simulate_platform
+from .force_balance import ForceBalance, force_balance, measured_forces, offset_candidates, simulate_platform
 from .path_smoothing import MIN_MEASURED_SAMPLES, smooth_path
 from .policy import LocalisationPolicy
 from .residual_evaluation import MeasuredPorts, cable_residual, platform_residual
@@ -75,8 +76,13 @@ def _evaluate_components(
     measured_axes = np.flatnonzero(np.any(np.isfinite(balance.force), axis=0))
     platform = [platform_residual(measured.path, int(axis), balance, policy) for axis in measured_axes]
     is_deviating = [cable.is_significant for cable in cables]
-    balance_closes = False
-    if any(is_deviating) and any(axis.is_significant for axis in platform):
+    balance_closes, candidates = False, []
+    if any(axis.is_significant for axis in platform) and not any(is_deviating):
+        unit_forces = measured_forces(
+            runs, np.ones_like(recording.tension), np.array(measured.robot.anchors), path.position
+        )
+        candidates = offset_candidates(balance, unit_forces, path, policy.max_closure_ratio)
+    elif any(axis.is_significant for axis in platform):
         simulated_tension = np.column_stack([run.tension for run in runs])
         mixed_tension = np.where(is_deviating, simulated_tension, recording.tension)
         force = _balance_under(mixed_tension, measured, fmus, runs).force
@@ -86,7 +92,7 @@ def _evaluate_components(
         for number, cable, run in zip(numbers, cables, runs, strict=True)
         if platform and cable.is_significant and _may_be_exit_point(cable, run, platform)
     ]
-    verdict = isolation_verdict(cables, platform, balance_closes, exit_candidates)
+    verdict = isolation_verdict(cables, platform, balance_closes, exit_candidates, candidates)
     return FaultLocalisation(path.time, (*cables, *platform), *verdict, limitations)
 
 

@@ -15,19 +15,21 @@ def isolate_fault(
     platform_deviates: bool | None,
     balance_closes: bool = False,
     exit_candidates: Collection[int] = (),
+    offset_candidates: Sequence[str] = (),
 ) -> str:
     """The component in question, by the pattern of significant residuals.
 
     ``deviating_by_cable`` tells by number whether the tension of a cable's FMU deviates, without cables that could not
     be evaluated; ``platform_deviates`` whether the platform's balance does, None where it could not be.
     ``balance_closes`` tells that the balance closes with the tensions of those cables' FMUs; ``exit_candidates`` are
-    cables whose residual a shifted exit point would explain without showing in the balance.
+    cables whose residual a shifted exit point would explain without showing in the balance, ``offset_candidates``
+    components by whose constant error the balance would close.
 
     ==================== ================ ====================================================
     deviating tensions   platform's force component
     ==================== ================ ====================================================
     none                 within noise     nothing
-    none                 deviates         platform
+    none                 deviates         platform, or the zero of a load cell: a mean shows at no cable
     of cable i           within noise     cable i (rope or winch): its measured tension is real
     of cable i           deviates, closes load cell i, or friction between it and the platform
     of cable i           deviates         load cell i or exit point i, or several components
@@ -42,7 +44,7 @@ def isolate_fault(
     if platform_deviates is None:
         return _without_balance(deviating_by_cable, deviating_cables)
     if not deviating_cables:
-        return PLATFORM if platform_deviates else NO_COMPONENT
+        return alternatives(offset_candidates or [PLATFORM]) if platform_deviates else NO_COMPONENT
     position_sensor = ["the position sensor"] if len(deviating_cables) == len(deviating_by_cable) > 1 else []
     if not platform_deviates:
         cable_parts = "rope, winch or exit point" if set(deviating_cables) <= set(exit_candidates) else "rope or winch"
@@ -63,6 +65,7 @@ def isolation_verdict(
     platform: Sequence[ComponentResidual],
     balance_closes: bool = False,
     exit_candidates: Collection[int] = (),
+    offset_candidates: Sequence[str] = (),
 ) -> tuple[str, str]:
     """The component in question, and the sentence that says why; ``platform`` is empty where it was not evaluated."""
     deviating_by_cable = {int(part.component.split()[1]): part.is_significant for part in cables}
@@ -71,6 +74,7 @@ def isolation_verdict(
         any(part.is_significant for part in platform) if platform else None,
         balance_closes,
         exit_candidates,
+        offset_candidates,
     )
     facts = [*_cable_facts(cables), *_platform_facts(platform)]
     oscillating = [part for part in platform if part.is_significant and part.resonance_frequency is not None]

@@ -23,6 +23,7 @@ from numpy.typing import NDArray
 from ...cosimulation import Component
 from ...robot.schema import AXES
 from .cable_simulation import CableSimulation
+from .component_residuals import PLATFORM
 from .path_smoothing import MIN_MEASURED_SAMPLES, SmoothedPath, intensity_for_cutoff, smooth_axis
 
 Array = NDArray[np.float64]
@@ -174,3 +175,32 @@ def _acceleration_variance(
     squared_gain = 1.0 / (1.0 + (omega / cutoff) ** 6) ** 2
     density = squared_gain * (omega**4 * position_noise**2 * position_step + load_cell_noise**2 * cell_step)
     return float(trapezoid(density, omega)) / pi
+
+
+def offset_candidates(balance: ForceBalance, directions: Array, path: SmoothedPath, max_ratio: float) -> list[str]:
+    """Components by whose constant error a balance closes: one load cell's zero, or the platform's weight or a force.
+
+    ``directions`` (N, n, 3) are the cables', u. With the missing force F and the acceleration a, by least squares in
+    the numbers b, m and the vector c
+
+        F = b u_i        F = c + m a
+
+    The better of both, or both where the other leaves less than twice as much; none where neither leaves less than
+    ``max_ratio`` of F.
+    """
+    axes = np.flatnonzero(np.any(np.isfinite(balance.force), axis=0))
+    rows = np.all(np.isfinite(balance.force[:, axes]), axis=1)
+    missing = balance.force[rows][:, axes]
+
+    def left(regressors: Array) -> float:
+        columns = regressors.reshape(-1, missing.size).T
+        solution, *_ = np.linalg.lstsq(columns, missing.ravel(), rcond=None)
+        return float(np.linalg.norm(missing.ravel() - columns @ solution) / np.linalg.norm(missing))
+
+    constants = [np.tile(np.arange(len(axes)) == axis, (len(missing), 1)) for axis in range(len(axes))]
+    of_platform = left(np.array([*constants, path.acceleration[rows][:, axes]], dtype=float))
+    of_cells = [left(directions[rows][:, cable, axes]) for cable in range(directions.shape[1])]
+    best = int(np.argmin(of_cells))
+    candidates = {f"load cell {best + 1} (its zero)": of_cells[best], PLATFORM: of_platform}
+    closest = min(candidates.values())
+    return [name for name, share in candidates.items() if share <= min(max_ratio, 2.0 * closest)]
