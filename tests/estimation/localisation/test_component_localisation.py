@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from tautwire.estimation.disturbance import OrnsteinUhlenbeck
 from tautwire.estimation.estimation_data import split_data
 from tautwire.estimation.localisation.component_localisation import localise_residual
 from tautwire.estimation.localisation.component_residuals import ComponentResidual, FaultLocalisation
@@ -171,3 +172,16 @@ def test_faults_of_other_robots_are_localised(name: str) -> None:
         localise(robot, recorded(name, 3, {"payload": {"mass": 0.02 * robot.platform.mass}})).faulty_component
         == "platform"
     )
+
+
+def test_errors_of_recorded_lengths_are_expected_in_the_place_of_a_drift() -> None:
+    robot, recording = example("three"), recorded("three", 3)
+    noise = replace(estimate_noise(robot, recording), rope_lengths=(OrnsteinUhlenbeck(1e-4, 5.0),) * 3)
+    sample = split_data(robot, noise, recording, recording).estimation
+    lengths = residual_of(localise_residual(robot, sample, noise), "cable 1").expected_rms
+    none = replace(noise, rope_lengths=(), winch_speed=0.0)
+    bare = residual_of(localise_residual(robot, sample, none), "cable 1").expected_rms
+    cable = robot.cables[0]
+    length = float(np.linalg.norm(np.subtract(cable.anchor, robot.platform.start)))
+    # The path leads some way from the start.
+    assert np.sqrt(lengths**2 - bare**2) == pytest.approx(1e-4 * cable.modulus * cable.area / length, rel=0.1)

@@ -41,6 +41,8 @@ def cable_residual(
     With ``k`` the sensitivities of the tension, ``P`` the path's covariance, ``kappa`` the stiffness and ``t`` the time
 
         expected^2 = sigma_T^2 + k' P k + kappa^2 sigma_V^2 sum h^2, the last less that of its mean
+
+    and ``kappa^2`` times the variance of the length where that was recorded, in the last term's place.
     """
     recording = measured.recording
     residual = recording.tension[:, number - 1] - run.tension
@@ -69,8 +71,11 @@ def _expected_variance(
     """Expected variance (N^2) of a cable's residual, and the relative standard deviation of its mean square."""
     path, noise = measured.path, measured.noise
     load_cell_noise = noise.of_outputs(measured.recording.cable_count)[2 + number]
-    drift, drift_of_mean = drift_variance(run, path.time, noise.winch_speed)
-    steady_variance = float(np.mean(tension_variance(run, path, load_cell_noise, noise.winch_speed)[is_measured]))
+    length_error = noise.rope_lengths[number - 1].rms if noise.rope_lengths else 0.0
+    speed_noise = 0.0 if length_error else noise.winch_speed
+    drift, drift_of_mean = drift_variance(run, path.time, speed_noise)
+    variance = tension_variance(run, path, load_cell_noise, speed_noise) + (run.stiffness * length_error) ** 2
+    steady_variance = float(np.mean(variance[is_measured]))
     drift_excess = max(float(np.mean(drift[is_measured])) - drift_of_mean, 0.0)
     expected = steady_variance + drift_excess
     independent_samples = (
