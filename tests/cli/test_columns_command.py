@@ -18,6 +18,7 @@ from tautwire.recordings.column_names import column_names
 from tautwire.recordings.column_proposal import propose_columns
 from tautwire.recordings.recording import read_recording
 from tests.support.robots import EXAMPLES
+from tests.support.trackers import split
 
 FIT = EXAMPLES / "three" / "fit.csv"
 ROBOT = str(EXAMPLES / "three" / "robot.toml")
@@ -235,6 +236,45 @@ def test_json_lists_the_columns(tmp_path: Path, capsys: pytest.CaptureFixture[st
         "doubt": "unit by the name's end",
     }
     assert {"x", "y", "z", "tension_3", "winch_speed_3"} < {each["column"] for each in document["columns"]}
+
+
+def test_a_trackers_file_has_a_table_of_its_own_beside_the_log(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    log, tracker = split(read_recording(FIT, 3).first(2000), 60.0, 5.25, 1.0)
+    log.frame().rename(columns={"time": "t", "x": "set X"}).drop(columns=["y"]).to_csv("log.csv", index=False)
+    positions = {f"Rigid Body 1 {axis}": 1e3 * tracker.position[:, i] for i, axis in enumerate("XYZ")}
+    marked = {f"{name} [mm]": values for name, values in positions.items()}
+    pd.DataFrame({"Time (s)": tracker.time, **marked, "Marker 1": 0.0}).to_csv("tracker.csv", index=False, sep=";")
+    arguments = ["columns", "log.csv", ROBOT, "--tracker", "tracker.csv"]
+    assert run(arguments) == 0
+    captured = capsys.readouterr()
+    assert tomlkit.parse(captured.out).unwrap()["recording"]["tracker"]["columns"] == {
+        "time": {"name": "Time (s)", "unit": "s"},
+        **{axis: {"name": f"Rigid Body 1 {axis.upper()} [mm]", "unit": "mm"} for axis in "xyz"},
+    }
+    assert "# not used: 'z': is z of the log, beside that of tracker.csv: rename or remove it" in captured.out
+    assert "# not used: 'Marker 1': no known word" in captured.out
+    pd.read_csv("log.csv").drop(columns=["z"]).to_csv("log.csv", index=False)
+    assert run(shlex.split(captured.err.splitlines()[-1].partition("tautwire ")[2])) == 0
+    last = capsys.readouterr().err.splitlines()[-1]
+    assert run(shlex.split(last.partition("tautwire ")[2])) == 0
+    assert "tracker.csv: no problems found" in capsys.readouterr().out
+
+
+def test_what_a_trackers_file_does_not_tell_is_listed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    (tmp_path / "tracker.csv").write_text("frame,X,Y,Motor 1\n1,0,0,0\n2,0,0,0\n", encoding="utf-8")
+    (tmp_path / "log.csv").write_text("t,Motor 1 [m/s],pos x\n0,0,0\n1,0,0\n", encoding="utf-8")
+    files = [str(tmp_path / "log.csv"), "--cables", "1", "--tracker", str(tmp_path / "tracker.csv")]
+    assert run(["columns", *files, "--json"]) == 0
+    document = json.loads(capsys.readouterr().out)
+    assert document["unused"] == {"pos x": "looks like x, which is read from tracker.csv"}
+    assert [each["column"] for each in document["tracker"]["columns"]] == ["x", "y"]
+    assert document["tracker"]["unused"]["Motor 1"] == "looks like winch_speed, and a tracker's file has none"
+    assert run(["columns", *files]) == 0
+    missing = [line.split(" = ")[0] for line in capsys.readouterr().out.splitlines() if "none of the names" in line]
+    assert missing == ["# time", "# z"]
 
 
 @pytest.mark.parametrize(

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from ..errors import InputError
 from ..robot.robot_file_reader import MAX_CABLES, read_robot
-from .console import AsJson, CommandOutput, Quiet, shell_quoted
+from .console import AsJson, CommandOutput, Quiet, TrackerFile, shell_quoted
+
+if TYPE_CHECKING:
+    from ..recordings.column_proposal import ColumnProposal
 
 
 def columns(
@@ -23,6 +26,7 @@ def columns(
     cables: Annotated[
         int | None, typer.Option(help="Number of cables, without a robot file.", min=1, max=MAX_CABLES)
     ] = None,
+    tracker: TrackerFile = None,
     out: Annotated[Path | None, typer.Option(metavar="COLUMNS.toml", help="Output file of the table.")] = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
@@ -30,30 +34,39 @@ def columns(
     """Propose what the columns of a recording are.
 
     By the words, numbers and units in their names; what is doubtful has a comment. Check it, then give it as --columns.
+    Beside a tracker's file the table has the columns of both.
 
     Example: tautwire columns log.csv robot.toml --out columns.toml
     """
     from ..atomic_output import atomic_file, refuse_other_formats, refuse_overwriting_inputs
     from ..recordings.column_names import column_names
-    from ..recordings.column_proposal import proposal_text, propose_columns
+    from ..recordings.column_proposal import proposal_text, propose_columns, without_positions
 
     output = CommandOutput(as_json, quiet)
     cable_count = _cable_count(robot_file, cables)
     refuse_other_formats(out, ".toml")
-    refuse_overwriting_inputs([recording, *([robot_file] if robot_file else [])], [out] if out else [])
+    refuse_overwriting_inputs([path for path in (recording, robot_file, tracker) if path], [out] if out else [])
     proposal = propose_columns(column_names(recording), cable_count)
-    text = proposal_text(recording, proposal, cable_count)
+    text, document = "", dict[str, object]()
+    if tracker is not None:
+        proposal, of_tracker = without_positions(proposal, tracker), propose_columns(column_names(tracker), 0)
+        text, document = "\n" + proposal_text(tracker, of_tracker, 0), {"tracker": _listed(of_tracker)}
+    text = proposal_text(recording, proposal, cable_count) + text
     if out is not None:
         with atomic_file(out) as scratch:
             scratch.write_text(text, encoding="utf-8")
-    document = {
+    document = _listed(proposal) | document | ({"table": out} if out else {})
+    output.result([text.rstrip("\n") if out is None else out], document)
+    output.suggest_next(_next_step(recording, robot_file, cable_count, tracker, out))
+
+
+def _listed(proposal: ColumnProposal) -> dict[str, object]:
+    """The proposal as a JSON object."""
+    return {
         "columns": [asdict(each) for each in proposal.columns],
         "standard_names": sorted(proposal.standard_names),
         "unused": proposal.unused,
-        **({"table": out} if out else {}),
     }
-    output.result([text.rstrip("\n") if out is None else out], document)
-    output.suggest_next(_next_step(recording, robot_file, cable_count, out))
 
 
 def _cable_count(robot_file: Path | None, cables: int | None) -> int:
@@ -66,13 +79,16 @@ def _cable_count(robot_file: Path | None, cables: int | None) -> int:
     return cable_count
 
 
-def _next_step(recording: Path, robot_file: Path | None, cable_count: int, out: Path | None) -> str:
+def _next_step(
+    recording: Path, robot_file: Path | None, cable_count: int, tracker: Path | None, out: Path | None
+) -> str:
     """What is to be done with a proposal: write it, then check the recording with it."""
     log = shell_quoted(recording)
+    of_tracker = f" --tracker {shell_quoted(tracker)}" if tracker else ""
     if out is None:
         source = f"--cables {cable_count}" if robot_file is None else shell_quoted(robot_file)
-        return f"tautwire columns {log} {source} --out columns.toml"
-    table = shell_quoted(out)
+        return f"tautwire columns {log} {source}{of_tracker} --out columns.toml"
+    options = f"--columns {shell_quoted(out)}{of_tracker}"
     if robot_file is None:
-        return f"read it, then check the recording with your robot file: --columns {table}"
-    return f"read it, then tautwire check {shell_quoted(robot_file)} {log} --columns {table}"
+        return f"read it, then check the recording with your robot file: {options}"
+    return f"read it, then tautwire check {shell_quoted(robot_file)} {log} {options}"

@@ -132,6 +132,8 @@ def _claims(words: Mapping[str, str], cable_count: int) -> tuple[dict[str, list[
             unused[name] = f"looks like {kind}, and {unit} is not a known unit of it"
         elif kind not in numbered:
             claims.setdefault(kind, []).append(name)
+        elif not cable_count:
+            unused[name] = f"looks like {kind}, and a tracker's file has none"
         elif number is None:
             unused[name] = f"looks like {kind}, of no one cable"
         else:
@@ -147,18 +149,38 @@ def _claims(words: Mapping[str, str], cable_count: int) -> tuple[dict[str, list[
     return claims, unused
 
 
+def without_positions(proposal: ColumnProposal, tracker: Path) -> ColumnProposal:
+    """The proposal for a log beside a ``tracker``'s file, which has the positions: those of the log are unused."""
+    unused = {
+        each.name: f"looks like {each.column}, which is read from {one_line(tracker.name)}"
+        for each in proposal.columns
+        if each.column in AXES
+    }
+    unused |= {
+        name: f"is {name} of the log, beside that of {one_line(tracker.name)}: rename or remove it"
+        for name in sorted(proposal.standard_names.intersection(AXES))
+    }
+    columns = tuple(each for each in proposal.columns if each.column not in AXES)
+    return ColumnProposal(columns, proposal.standard_names.difference(AXES), {**proposal.unused, **unused})
+
+
 def proposal_text(path: Path, proposal: ColumnProposal, cable_count: int) -> str:
-    """The proposal as TOML that ``--columns`` reads; what it cannot tell is commented out, with the reason."""
-    lines = [f"# Columns of {one_line(path.name)}, proposed by their names: check them.", "[recording.columns]"]
+    """The proposal as TOML that ``--columns`` reads; what it cannot tell is commented out, with the reason.
+
+    A file of no cables is a tracker's, with the table of its own.
+    """
+    table = "[recording.columns]" if cable_count else "[recording.tracker.columns]"
+    lines = [f"# Columns of {one_line(path.name)}, proposed by their names: check them.", table]
     if proposal.standard_names:
         standard = sorted(proposal.standard_names, key=_order)
         lines.append(f"# read by their standard names: {', '.join(standard)}")
     lines += [each.line() for each in proposal.columns if each.column not in proposal.standard_names]
     told = {each.column for each in proposal.columns} | proposal.standard_names
-    required = ["time", *(f"winch_speed_{cable}" for cable in range(1, cable_count + 1))]
-    for column in required:
+    required = [f"winch_speed_{cable}" for cable in range(1, cable_count + 1)] or list(AXES)
+    for column in ("time", *required):
         if not told & {column, column.replace("winch_speed", "rope_length")}:
-            lines.append(f'# {column} = {{ name = "" }}  # none of the names tells it, and it is required')
+            need = "" if column in AXES else ", and it is required"
+            lines.append(f'# {column} = {{ name = "" }}  # none of the names tells it{need}')
     lines += [f"# not used: {name!a}: {reason}" for name, reason in proposal.unused.items()]
     return "\n".join(lines) + "\n"
 
