@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shlex
 from dataclasses import asdict
 from pathlib import Path
@@ -200,9 +201,37 @@ def test_matrices_of_matlab_keep_their_standard_names(tmp_path: Path, capsys: py
     text = table.read_text(encoding="utf-8")
     assert "# read by their standard names: winch_speed_1, winch_speed_2, winch_speed_3, x, y, z" in text
     assert "not used" not in text
-    assert tomlkit.parse(text).unwrap()["recording"]["columns"] == {"time": {"name": "log.t"}}
+    assert tomlkit.parse(text).unwrap()["recording"]["columns"] == {"time": {"name": "log.t", "unit": "s"}}
     read = read_recording(tmp_path / "log.mat", 3, table)
     np.testing.assert_array_equal(read.frame()["y"], frame["y"])
+
+
+@pytest.mark.parametrize("kind", ["csv", "mat", "parquet"])
+def test_columns_without_names_are_proposed_by_their_values(
+    kind: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    frame = pd.read_csv(FIT, nrows=2000)
+    counts = np.round(frame.filter(like="winch").cumsum() * 0.01 / -2.5e-5)
+    unnamed = pd.concat(
+        [1e3 * frame["time"], counts, frame.filter(like="tension"), 1e3 * frame[["x", "y", "z"]]], axis=1
+    )
+    unnamed.columns = pd.Index([f"data_{index}" for index in range(1, 11)])
+    log, table = tmp_path / f"log.{kind}", tmp_path / "columns.toml"
+    if kind == "csv":
+        text = unnamed.to_csv(index=False, sep=";", decimal=",")
+        log.write_text(f"Laboratory;12,5\n{text}# end\n", encoding="utf-8")
+    elif kind == "mat":
+        savemat(log, {"data": unnamed.to_numpy(), "rate": 100.0})
+    else:
+        unnamed.to_parquet(log)
+    assert run(["columns", str(log), ROBOT, "--out", str(table)]) == 0
+    proposal = table.read_text(encoding="utf-8")
+    assert proposal.count("by the coordinates about 2.5e-05") == 3
+    table.write_text(re.sub(r'(rope_length.*?") }', r"\1, factor = 2.5e-5 }", proposal), encoding="utf-8")
+    assert run(["check", ROBOT, str(log), "--columns", str(table)]) == 0
+    read = read_recording(log, 3, table)
+    np.testing.assert_allclose(read.position[:, 2], frame["z"], rtol=1e-12)
+    assert "no problems found" in capsys.readouterr().out
 
 
 @pytest.mark.parametrize("robot", [[ROBOT], ["--cables", "3"]])

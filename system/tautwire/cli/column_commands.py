@@ -14,6 +14,7 @@ from .console import AsJson, CommandOutput, Quiet, TrackerFile, shell_quoted
 
 if TYPE_CHECKING:
     from ..recordings.column_proposal import ColumnProposal
+    from ..robot.schema import Robot
 
 
 def columns(
@@ -21,7 +22,7 @@ def columns(
         Path, typer.Argument(metavar="RECORDING.csv", help="A recording; CSV, Parquet, .mat or a ROS bag.")
     ],
     robot_file: Annotated[
-        Path | None, typer.Argument(metavar="ROBOT.toml", help="The robot file, for the number of cables.")
+        Path | None, typer.Argument(metavar="ROBOT.toml", help="The robot file, for cables and start.")
     ] = None,
     cables: Annotated[
         int | None, typer.Option(help="Number of cables, without a robot file.", min=1, max=MAX_CABLES)
@@ -33,23 +34,24 @@ def columns(
 ) -> None:
     """Propose what the columns of a recording are.
 
-    By the words, numbers and units in their names; what is doubtful has a comment. Check it, then give it as --columns.
+    By the words, numbers and units in their names, and by their values where these decide; what is doubtful has a
+    comment. Check it, then give it as --columns.
     Beside a tracker's file the table has the columns of both.
 
     Example: tautwire columns log.csv robot.toml --out columns.toml
     """
     from ..atomic_output import atomic_file, refuse_other_formats, refuse_overwriting_inputs
-    from ..recordings.column_names import column_names
-    from ..recordings.column_proposal import proposal_text, propose_columns, without_positions
+    from ..recordings.column_proposal import proposal_text, without_positions
 
     output = CommandOutput(as_json, quiet)
-    cable_count = _cable_count(robot_file, cables)
+    robot = None if robot_file is None else read_robot(robot_file)
+    cable_count = _cable_count(robot, cables)
     refuse_other_formats(out, ".toml")
     refuse_overwriting_inputs([path for path in (recording, robot_file, tracker) if path], [out] if out else [])
-    proposal = propose_columns(column_names(recording), cable_count)
+    proposal = _proposed(recording, cable_count, robot)
     text, document = "", dict[str, object]()
     if tracker is not None:
-        proposal, of_tracker = without_positions(proposal, tracker), propose_columns(column_names(tracker), 0)
+        proposal, of_tracker = without_positions(proposal, tracker), _proposed(tracker, 0, robot)
         text, document = "\n" + proposal_text(tracker, of_tracker, 0), {"tracker": _listed(of_tracker)}
     text = proposal_text(recording, proposal, cable_count) + text
     if out is not None:
@@ -58,6 +60,17 @@ def columns(
     document = _listed(proposal) | document | ({"table": out} if out else {})
     output.result([text.rstrip("\n") if out is None else out], document)
     output.suggest_next(_next_step(recording, robot_file, cable_count, tracker, out))
+
+
+def _proposed(path: Path, cable_count: int, robot: Robot | None) -> ColumnProposal:
+    """The proposal by names and values."""
+    from ..recordings.column_names import column_names
+    from ..recordings.column_proposal import propose_columns
+    from ..recordings.column_samples import column_samples
+    from ..recordings.value_proposal import with_values
+
+    by_names = propose_columns(column_names(path), cable_count)
+    return with_values(by_names, column_samples(path), cable_count, robot)
 
 
 def _listed(proposal: ColumnProposal) -> dict[str, object]:
@@ -69,11 +82,11 @@ def _listed(proposal: ColumnProposal) -> dict[str, object]:
     }
 
 
-def _cable_count(robot_file: Path | None, cables: int | None) -> int:
+def _cable_count(robot: Robot | None, cables: int | None) -> int:
     """The number of cables, by the robot file or the option; raises InputError where both are missing or differ."""
-    if robot_file is None and cables is None:
+    if robot is None and cables is None:
         raise InputError("--cables", "is missing", "name the robot file, or give the number, as in --cables 4")
-    cable_count = cables if robot_file is None else read_robot(robot_file).cable_count
+    cable_count = cables if robot is None else robot.cable_count
     if cable_count is None or (cables is not None and cables != cable_count):
         raise InputError("--cables", f"is {cables}, the robot has {cable_count}", "omit one of the two")
     return cable_count

@@ -43,17 +43,28 @@ def column_names(path: Path) -> list[ColumnName]:
         return [ColumnName("time", "time", "time"), *own]
     if is_mat(path):
         return [ColumnName(name, standard, name) for name, standard in mat_column_names(path).items()]
-    names = parquet_column_names(path) if is_parquet(path) else _csv_column_names(path)
+    names = parquet_column_names(path) if is_parquet(path) else csv_layout(path).names
     return [ColumnName(name, name if is_column_name(name) else None, name) for name in names]
 
 
-def _csv_column_names(path: Path) -> tuple[str, ...]:
+@dataclass(frozen=True)
+class CsvLayout:
+    """A CSV file by its numbers: the ``names`` above them, and the ``lines``, samples from ``data_index`` on."""
+
+    names: tuple[str, ...]
+    separator: str
+    data_index: int
+    lines: list[str]
+
+
+def csv_layout(path: Path) -> CsvLayout:
+    """The names and the samples of a CSV file in any dialect; raises RecordingError where there are none."""
     if is_mdf(path):
         hint = "export it as CSV, or write the names of its channels into the table"
         raise RecordingError(str(path), "is MDF, of which no columns are proposed", hint)
     content, _ = read_encoded_text(path, RecordingError, "CSV", MAX_CSV_SIZE)
-    lines = content.decode("utf-8").splitlines()[:MAX_HEAD_LINES]
-    for index, line in enumerate(lines):
+    lines = content.decode("utf-8").splitlines()
+    for index, line in enumerate(lines[:MAX_HEAD_LINES]):
         if is_comment(line) or not line.strip():
             continue
         for separator in SEPARATORS:
@@ -61,7 +72,7 @@ def _csv_column_names(path: Path) -> tuple[str, ...]:
             if len(cells) > 1 and cells[0] and all(map(_is_sample, cells)):
                 names = _names_above(lines[:index], separator, len(cells))
                 if names:
-                    return names
+                    return CsvLayout(names, separator, index, lines)
     hint = "begin with a line that names the columns, and samples below it"
     raise RecordingError(str(path), "has no line of names above numbers", hint)
 

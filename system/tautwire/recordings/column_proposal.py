@@ -56,6 +56,10 @@ _FACTOR_WORDS = {
     "winch_speed": (("omega", "drehzahl"), "the drum's radius for rad/s, radius * pi / 30 for rpm"),
 }
 
+# Reasons and doubts that a proposal by values may remove.
+NOTHING_SAID = "no known word"
+NO_UNIT = "no unit in the name: the file's, or SI"
+OTHER_QUANTITY = "words or a unit of other quantities"
 _NOT_NAMED = "quantity not named"
 _PARTS = re.compile(r"[^\W\d_]+|[0-9]+")
 
@@ -112,8 +116,12 @@ def propose_columns(names: Sequence[ColumnName], cable_count: int) -> ColumnProp
             (name,) = claimants
             is_standard = column in standard
             columns.append(ProposedColumn(column, name) if is_standard else _proposed(column, name, words[name]))
-    columns.sort(key=lambda each: _order(each.column))
-    return ColumnProposal(tuple(columns), standard & {each.column for each in columns}, unused)
+    return ColumnProposal(sorted_columns(columns), standard & {each.column for each in columns}, unused)
+
+
+def sorted_columns(columns: Iterable[ProposedColumn]) -> tuple[ProposedColumn, ...]:
+    """The columns in the order of a table: time, those of cables by their numbers, and coordinates."""
+    return tuple(sorted(columns, key=lambda each: _order(each.column)))
 
 
 def _claims(words: Mapping[str, str], cable_count: int) -> tuple[dict[str, list[str]], dict[str, str]]:
@@ -127,7 +135,8 @@ def _claims(words: Mapping[str, str], cable_count: int) -> tuple[dict[str, list[
         if not name.strip() or not name.isprintable():
             unused[name] = "blank, or not printable"
         elif kind is None:
-            unused[name] = "no known word, or words of other quantities"
+            is_other = bool(unit) or _has_any(_words(text), (*OTHER_WORDS.split(), *AXES))
+            unused[name] = OTHER_QUANTITY if is_other else NOTHING_SAID
         elif unit and unit == _stated_unit(text) and not _is_unit_of(unit, kind):
             unused[name] = f"looks like {kind}, and {unit} is not a known unit of it"
         elif kind not in numbered:
@@ -170,7 +179,7 @@ def proposal_text(path: Path, proposal: ColumnProposal, cable_count: int) -> str
     A file of no cables is a tracker's, with the table of its own.
     """
     table = "[recording.columns]" if cable_count else "[recording.tracker.columns]"
-    lines = [f"# Columns of {one_line(path.name)}, proposed by their names: check them.", table]
+    lines = [f"# Columns of {one_line(path.name)}, proposed by names and values: check them.", table]
     if proposal.standard_names:
         standard = sorted(proposal.standard_names, key=_order)
         lines.append(f"# read by their standard names: {', '.join(standard)}")
@@ -268,7 +277,7 @@ def _proposed(column: str, name: str, words: str) -> ProposedColumn:
     elif factor or (not stated and _has_any(_words(words), known)):
         scale = f"add factor = {factor or factor_without_unit}"
     else:
-        scale = f"ends in {stated}, no unit of it" if stated else "no unit in the name: the file's, or SI"
+        scale = f"ends in {stated}, no unit of it" if stated else NO_UNIT
     signs = {"winch_speed": "positive has to reel in", "rope_length": "has to fall as it reels in"}
     remark = "; ".join(part for part in (scale, doubt, signs.get(kind, "")) if part)
     return ProposedColumn(column, name, unit.symbol if unit else "", remark)

@@ -93,6 +93,21 @@ def mat_column_names(path: str | Path) -> dict[str, str | None]:
         return {column.name: column.standard_name for column in columns}
 
 
+def mat_samples(path: str | Path) -> dict[str, NDArray[np.float64]]:
+    """Numbers of the columns in a MATLAB file by the laboratory's names, each (N,), rounded to float64.
+
+    Raises RecordingError as open_mat does.
+    """
+    file = str(path)
+    with _readable_mat(file):
+        level = mat_level(path)
+        columns, _ = mat_columns(list_arrays(path, level), file)
+        sources = {column.array.path: column.array for column in columns}
+        _require_readable_size(sources.values(), file)
+        content = read_arrays(path, level, sources.values())
+        return {column.name: np.asarray(column.values(content), dtype=np.float64) for column in columns}
+
+
 @contextmanager
 def _readable_mat(file: str) -> Iterator[None]:
     """Raises RecordingError for what scipy and h5py raise on a corrupt file, which may be anything."""
@@ -108,8 +123,9 @@ def _readable_mat(file: str) -> Iterator[None]:
 def mat_columns(arrays: Sequence[MatArray], file: str) -> tuple[list[MatColumn], list[str]]:
     """The columns in these arrays by the laboratory's names, and the paths of arrays that are not read.
 
-    Samples are as many as ``time`` has numbers, or else as most vectors. A matrix has a column for each of its columns
-    where it has as many rows as there are samples, or for each of its rows where it has as many columns.
+    Samples are as many as ``time`` has numbers, or else as most vectors, or as the longer side of most matrices. A
+    matrix has a column for each of its columns where it has as many rows as there are samples, or for each of its rows
+    where it has as many columns.
 
     Raises RecordingError where an array that is named as a column has another length, or a matrix could be read both
     ways.
@@ -131,10 +147,11 @@ def mat_columns(arrays: Sequence[MatArray], file: str) -> tuple[list[MatColumn],
 
 
 def _sample_count(arrays: Sequence[MatArray], file: str) -> int:
-    """Number of samples, that of ``time`` or else of most vectors."""
-    vectors = [array for array in arrays if array.is_numeric and len(array.shape) == 2 and min(array.shape) == 1]
+    """Number of samples, that of ``time`` or else of most vectors, of most matrices where there are no vectors."""
+    numeric = [array for array in arrays if array.is_numeric and len(array.shape) == 2 and math.prod(array.shape) > 1]
+    vectors = [array for array in numeric if min(array.shape) == 1]
     times = [array for array in vectors if _last_part(array) == "time"]
-    lengths = Counter(max(array.shape) for array in times or vectors)
+    lengths = Counter(max(array.shape) for array in times or vectors or numeric)
     count = lengths.most_common(1)[0][0] if lengths else 0
     require_samples(count, file)
     return count

@@ -1,0 +1,80 @@
+"""Recorded numbers by the laboratory's names, as they are written, for proposals that go by values."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from io import StringIO
+from pathlib import Path
+
+import numpy as np
+import pandas as pd  # type: ignore[import-untyped,unused-ignore]
+from numpy.typing import NDArray
+
+from .column_names import CsvLayout, csv_layout
+from .csv_lines import split_cells, without_comment_mark
+from .mat_file import is_mat, mat_samples
+from .parquet_file import is_parquet, parquet_samples
+from .recording_table import MISSING_CELLS
+from .ros_bag import is_bag
+from .units import is_any_unit
+
+Array = NDArray[np.float64]
+
+# Samples at the beginning of a CSV file, minutes of any drive's log.
+MAX_CSV_ROWS = 200_000
+
+
+@dataclass(frozen=True, eq=False)
+class ColumnSamples:
+    """Samples of columns by name in the file's order, each (N,), NaN where a cell holds no number.
+
+    ``has_units`` where a line of the file states units, which are those of the numbers.
+    """
+
+    values: Mapping[str, Array] = field(default_factory=dict)
+    has_units: bool = False
+
+
+def column_samples(path: Path) -> ColumnSamples:
+    """The samples of a recording's columns; none of a ROS bag, whose types and names tell what is what.
+
+    Raises RecordingError where ``column_names`` does.
+    """
+    if is_bag(path):
+        return ColumnSamples()
+    if is_mat(path):
+        return ColumnSamples(mat_samples(path))
+    return ColumnSamples(parquet_samples(path)) if is_parquet(path) else _csv_samples(path)
+
+
+def _csv_samples(path: Path) -> ColumnSamples:
+    layout = csv_layout(path)
+    rows = layout.lines[layout.data_index : layout.data_index + MAX_CSV_ROWS]
+    # Between other separators a comma is a decimal one.
+    is_comma_decimal = layout.separator != "," and any("," in row for row in rows)
+    frame = pd.read_csv(
+        StringIO("\n".join(rows)),
+        header=None,
+        names=range(len(layout.names)),
+        index_col=False,
+        usecols=range(len(layout.names)),
+        sep=r"\s+" if layout.separator == " " else layout.separator,
+        decimal="," if is_comma_decimal else ".",
+        comment="#",
+        skipinitialspace=True,
+        keep_default_na=False,
+        na_values=list(MISSING_CELLS),
+        on_bad_lines="skip",
+        low_memory=False,
+    )
+    numbers = (pd.to_numeric(frame[index], errors="coerce") for index in frame)
+    values = {name: column.to_numpy(dtype=float) for name, column in zip(layout.names, numbers, strict=True)}
+    return ColumnSamples(values, _has_units(layout))
+
+
+def _has_units(layout: CsvLayout) -> bool:
+    """Whether a line above the samples, other than that of the names, has known units as cells."""
+    head = (without_comment_mark(line) for line in layout.lines[: layout.data_index])
+    rows = (tuple(split_cells(line, layout.separator)) for line in head)
+    return any(any(map(is_any_unit, row)) for row in rows if len(row) == len(layout.names) and row != layout.names)
