@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import numpy as np
 import pandas as pd
 import pytest
 
@@ -101,3 +102,18 @@ def test_the_page_tells_of_files_that_are_not_there(absent: str, tmp_path: Path)
     options = [] if absent == "recording" else ["--columns", str(tmp_path / "absent.toml")]
     assert run(["check", robot, recording, *options, "--report", str(page)]) == 2
     assert "there is no such file" in page.read_text(encoding="utf-8")
+
+
+def test_the_path_of_a_tracker_slower_than_the_log_is_drawn_through_its_points(tmp_path: Path) -> None:
+    recorded, slow = pd.read_csv(FIT, nrows=800), tmp_path / "slow.csv"
+    is_measured = (recorded.index % 4 == 0) & ~recorded.index.isin(range(300, 400))
+    recorded.loc[~is_measured, ["x", "y", "z"]] = np.nan
+    recorded.to_csv(slow, index=False)
+    page = report_of(tmp_path, slow, 0)
+    scene = page.data()["choices"][0]["scene"]
+    (path,) = scene["paths"]
+    for columns in (path["columns"], scene["platform"]):
+        x, z = unpack_float32(columns[0]), unpack_float32(columns[2])
+        assert np.isfinite(x[:297]).all() and np.isfinite(x[400:797]).all() and np.isnan(x[297:400]).all()
+        assert z[8] == pytest.approx(recorded["z"][8], rel=1e-6)
+        assert z[10] == pytest.approx((recorded["z"][8] + recorded["z"][12]) / 2, rel=1e-6)

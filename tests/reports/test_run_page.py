@@ -179,3 +179,13 @@ def test_page_of_a_long_run_stays_small_and_keeps_peaks(eight: bool) -> None:
     assert position["unit"] == "mm"
     assert (drawn.min(), drawn.max()) == pytest.approx((1e3 * low, 1e3 * high), rel=1e-6)
     assert len(drawn) == len(unpack_float32(position["time"]))
+
+
+def test_a_tracker_slower_than_the_log_is_drawn_as_lines() -> None:
+    run = made_run(samples=401)
+    slow = np.where(np.arange(401)[:, None] % 4, np.nan, run.recording.position)
+    choice = Page(run_page(replace(run, recording=replace(run.recording, position=slow)), {})).data()["choices"][0]
+    (recorded, *_), channel = choice["scene"]["paths"], choice["channels"][0]
+    assert recorded["name"] == "recorded"
+    drawn = [recorded["columns"][0], channel["recorded"]["values"], channel["difference"]["values"]]
+    assert all(np.isfinite(unpack_float32(each)).mean() > 0.99 for each in drawn)

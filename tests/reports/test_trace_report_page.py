@@ -328,3 +328,16 @@ def test_correlated_estimates_are_listed() -> None:
     assert "damping of damping (all cables) and mass of payload: where one is too large the other is too small" in html
     assert "(-95 %)" in html and "linear_density of sag" not in html
     assert "err together" not in trace_page(made_trace(), LINKS)
+
+
+def test_residuals_of_a_tracker_slower_than_the_log_are_lines() -> None:
+    trace = made_trace(samples=801)
+    (fit, *_) = trace.comparisons
+    slow = np.where(np.arange(fit.recording.sample_count)[:, None] % 4, np.nan, fit.recording.position)
+    comparison = replace(fit, recording=replace(fit.recording, position=slow))
+    page = Page(trace_page(replace(trace, comparisons=(comparison,)), {}))
+    choice = page.data()["choices"][0]
+    (measured, *_) = choice["scene"]["paths"]
+    assert measured["name"] == "measured"
+    drawn = [choice["channels"][0]["after"], measured["columns"][0]]
+    assert all(np.isfinite(unpack_float32(each)).mean() > 0.99 for each in drawn)

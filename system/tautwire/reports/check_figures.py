@@ -13,7 +13,7 @@ from ..number_format import format_significant
 from ..recordings.alternative_readings import GeometryReading
 from ..recordings.recording import Recording
 from ..robot.schema import Robot
-from .downsampling import envelope_times, evenly_spaced_indices, min_max_envelope, pack_float32
+from .downsampling import bridge_short_gaps, envelope_times, evenly_spaced_indices, min_max_envelope, pack_float32
 from .robot_scene import RobotScene, ScenePath
 
 Array = NDArray[np.float64]
@@ -68,7 +68,7 @@ def robot_scene(robot: Robot, recording: Recording | None) -> RobotScene:
         platform = np.array([robot.platform.start], dtype=float)
         return RobotScene(np.zeros(1), platform, np.full((1, robot.cable_count), np.nan), ())
     rows = evenly_spaced_indices(recording.sample_count, MAX_PATH_POINTS)
-    platform = GeometryReading().positions(robot, recording.position[rows])
+    platform = bridge_short_gaps(recording.time, GeometryReading().positions(robot, recording.position))[rows]
     path = ScenePath("recorded", platform, "accent", 5)
     return RobotScene(recording.time[rows], platform, recording.tension[rows], (path,))
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .downsampling import pack_float32
+from .downsampling import bridge_short_gaps, pack_float32
 
 Array = NDArray[np.float64]
 
@@ -50,6 +50,14 @@ class RobotScene:
 def fill_unmeasured(points: Array, path: Array) -> Array:
     """Measured ``points`` (N, 3) with the coordinates of a ``path`` (N, 3) along axes that were not measured at all."""
     return np.where(np.isfinite(points).any(axis=0), points, path)
+
+
+def measured_path(time: Array, points: Array, path: Array) -> Array:
+    """The path through measured ``points`` (N, 3) at ``time`` (N,) in s, drawn beside another ``path`` (N, 3).
+
+    Between points their deviation from that path is linear, where no gap is; along axes that were not measured it is 0.
+    """
+    return path + bridge_short_gaps(time, fill_unmeasured(points, path) - path)
 
 
 def pack_columns(values: Array) -> list[str]:

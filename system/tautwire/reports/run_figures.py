@@ -12,13 +12,13 @@ from numpy.typing import NDArray
 
 from ..number_format import PAGE_UNITS, choose_unit, digits_for_range, format_significant
 from ..robot.schema import AXES
-from .downsampling import envelope_times, evenly_spaced_indices, min_max_envelope, pack_float32
+from .downsampling import bridge_short_gaps, envelope_times, evenly_spaced_indices, min_max_envelope, pack_float32
 from .robot_scene import (
     MAGNIFICATIONS,
     RobotScene,
     ScenePath,
     deviation_magnification,
-    fill_unmeasured,
+    measured_path,
     scene_data,
 )
 from .run_overview import ReportedRun
@@ -131,9 +131,10 @@ def _series_data(run: ReportedRun, series: OutputSeries, points: int) -> dict[st
     if series.recorded is None:
         return {**description, **curve, "recorded": None, "difference": None}
     sample_count = int(np.searchsorted(run.recording.time, run.overview.last_time, side="right"))
+    drawn = bridge_short_gaps(run.recording.time[:sample_count], series.recorded[:sample_count])
     recorded = {
         "time": pack_float32(envelope_times(run.recording.time[:sample_count], points)),
-        "values": pack_float32(series.scale * min_max_envelope(series.recorded[:sample_count], points)),
+        "values": pack_float32(series.scale * min_max_envelope(drawn, points)),
     }
     return {**description, **curve, "recorded": recorded, "difference": _difference_data(run, series, points)}
 
@@ -143,9 +144,10 @@ def _difference_data(run: ReportedRun, series: OutputSeries, points: int) -> dic
     if not math.isfinite(series.rms_difference):
         return None
     unit, unit_size = series.difference_unit
+    time = run.overview.time[: len(series.difference)]
     return {
-        "time": pack_float32(envelope_times(run.overview.time[: len(series.difference)], points)),
-        "values": pack_float32(min_max_envelope(series.difference / unit_size, points)),
+        "time": pack_float32(envelope_times(time, points)),
+        "values": pack_float32(min_max_envelope(bridge_short_gaps(time, series.difference) / unit_size, points)),
         "apart": format_significant(series.rms_difference / unit_size),
         "unit": unit,
     }
@@ -160,16 +162,16 @@ def _range_texts(values: Array, digits: int) -> list[str]:
 
 def _run_scene(run: ReportedRun) -> RobotScene:
     """The scene of the run, with the recorded path beside the co-simulated one."""
-    row_indices = evenly_spaced_indices(len(run.overview.rows), MAX_PATH_POINTS)
-    rows, sample_indices = (
-        run.overview.rows[row_indices],
-        np.minimum(row_indices * run.overview.group_size, run.recording.sample_count - 1),
-    )
-    platform = _columns_by_name(rows, run.column_indices("", AXES), AXES)
+    overview, recording, magnification = run.overview, run.recording, 1
+    row_indices = evenly_spaced_indices(len(overview.rows), MAX_PATH_POINTS)
+    rows = overview.rows[row_indices]
+    recorded_rows = np.minimum(np.arange(len(overview.rows)) * overview.group_size, recording.sample_count - 1)
+    sample_indices = recorded_rows[row_indices]
+    path = _columns_by_name(overview.rows, run.column_indices("", AXES), AXES)
+    platform = path[row_indices]
     paths = [ScenePath("co-simulated", platform, "accent", 5)]
-    recording, magnification = run.recording, 1
     if recording.has_position:
-        measured = fill_unmeasured(recording.position[sample_indices], platform)
+        measured = measured_path(overview.time, recording.position[recorded_rows], path)[row_indices]
         paths.insert(0, ScenePath("recorded", measured, "before", 2, "dot"))
         magnification = deviation_magnification(np.array(run.robot.anchors), platform, [measured - platform])
     return RobotScene(

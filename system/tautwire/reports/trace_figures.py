@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..estimation.trace_result import Comparison, Trace
 from ..number_format import format_significant
 from .downsampling import (
+    bridge_short_gaps,
     envelope_times,
     evenly_spaced_indices,
     min_max_envelope,
@@ -25,6 +26,7 @@ from .robot_scene import (
     ScenePath,
     deviation_magnification,
     fill_unmeasured,
+    measured_path,
     scene_data,
 )
 from .trace_texts import MeasuredOutput, axis_outputs, cable_outputs
@@ -106,8 +108,8 @@ def _channel_data(
         return {**description, "before": None, "after": None, "reach": None, "spectrum": None}
     return {
         **description,
-        "before": pack_float32(min_max_envelope(before, points)),
-        "after": pack_float32(min_max_envelope(after, points)),
+        "before": pack_float32(min_max_envelope(bridge_short_gaps(time, before), points)),
+        "after": pack_float32(min_max_envelope(bridge_short_gaps(time, after), points)),
         "reach": float(np.max(np.abs(after[np.isfinite(after)]), initial=0.0)),
         "spectrum": _spectrum_data(time, before, after, sigma),
     }
@@ -135,7 +137,7 @@ def _trace_scene(trace: Trace, comparison: Comparison) -> RobotScene:
         ScenePath("after", comparison.after.position[indices], "accent", 5),
     ]
     if recording.has_position:
-        measured = fill_unmeasured(recording.position, comparison.after.position)
+        measured = measured_path(recording.time, recording.position, comparison.after.position)
         paths.insert(0, ScenePath("measured", measured[indices], "measured", 2, "dot"))
     return RobotScene(
         time=recording.time[indices],
