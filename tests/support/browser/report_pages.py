@@ -9,14 +9,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautwire.linear import linearise
+from tautwire.recordings.recording import read_recording
+from tautwire.reports.check_page import CheckedFiles, check_page
 from tautwire.reports.modes_page import modes_page
 from tautwire.reports.run_page import run_page
 from tautwire.reports.trace_report_page import trace_page
 from tests.support.browser.browser import LAPTOP, Browser, Screen
-from tests.support.robots import example
+from tests.support.robots import EXAMPLES, example
 from tests.support.traces import HOSTILE, made_run, made_trace
 
-KINDS = ("trace", "run", "modes")
+KINDS = ("trace", "run", "modes", "check")
 DRAW_ALL = "window.dispatchEvent(new Event('beforeprint'))"
 
 
@@ -25,10 +27,15 @@ def report_pages(folder: Path) -> dict[str, Path]:
     robot, close = example("eight"), example("three")
     links = {"robot.toml": "robot.toml"}
     hostile = replace(made_trace(name=HOSTILE, samples=400), sentence=HOSTILE, notes=(HOSTILE,))
+    recording = read_recording(EXAMPLES / "three" / "fit.csv", 3).first(2000)
+    # A tracker at a quarter of the log's rate.
+    recording = replace(recording, position=np.where(np.arange(2000)[:, None] % 4, np.nan, recording.position))
+    problems = (("fit.csv", "speeds are in mm/s", "multiply them by 0.001"),)
     written = {
         "trace": trace_page(made_trace(samples=801), links),
         "run": run_page(made_run(), links),
         "modes": modes_page(robot, linearise(robot), links),
+        "check": check_page(CheckedFiles(close, recording, problems, ("a note",)), links),
         "close": modes_page(close, linearise(close), links),
         "hostile": trace_page(hostile, {HOSTILE: HOSTILE}),
     }
