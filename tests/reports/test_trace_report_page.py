@@ -55,7 +55,7 @@ def page(kind: str) -> Page:
     traces = {
         "three": lambda: made_trace(),
         "eight": lambda: made_trace(eight=True),
-        "hostile": lambda: replace(made_trace(name=HOSTILE, path=HOSTILE), sentence=HOSTILE, notes=(HOSTILE,)),
+        "hostile": lambda: replace(made_trace(name=HOSTILE, path=HOSTILE), sentence=HOSTILE, notes=(HOSTILE,) * 3),
         "none": lambda: nothing_found(made_trace()),
         "tensions only": lambda: without_positions(made_trace(check=False)),
     }

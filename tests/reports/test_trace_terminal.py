@@ -17,8 +17,9 @@ from tautwire.number_format import (
     format_percent,
     format_significant,
 )
-from tautwire.reports import trace_table
+from tautwire.reports import trace_page, trace_table
 from tautwire.reports.trace_texts import ROLES, comparison_by_role, explained_share, format_evidence
+from tests.support.pages import Page
 from tests.support.traces import HOSTILE, made_trace, nothing_found, without_positions
 
 
@@ -196,3 +197,10 @@ def test_share_explained_counts_from_the_noise_floor() -> None:
     assert explained_share(3.0, 3.0, 3.0) is None
     assert explained_share(math.nan, 1.0, 1.0) is None
     assert (format_percent(0.99991), format_percent(1.0), format_percent(None)) == ("> 99.9 %", "100 %", "-")
+
+
+def test_columns_that_were_not_read_are_noted_once_for_each_recording() -> None:
+    trace = made_trace(samples=200)
+    for text in (rendered(trace), Page(trace_page(trace, {})).text):
+        assert text.count("temperature") == len(trace.comparisons) == 2
+        assert "data/fit.csv: not read: temperature" in " ".join(text.split())

@@ -165,7 +165,10 @@ def made_trace(
         components=made_components(cables),
         resonances=(),
         alpha=0.01,
-        notes=("The winches stood still for 62 % of the fit recording: drum effects would hardly show.",),
+        notes=(
+            "The winches stood still for 62 % of the fit recording: drum effects would hardly show.",
+            *(note for each in comparisons for note in each.recording.notes),
+        ),
         seconds=12.34,
     )
 

@@ -313,10 +313,5 @@ def _noise_source(trace: Trace) -> str:
 
 
 def _note_lines(trace: Trace) -> list[str]:
-    """What there was no time for, notes of the trace, columns that were not read, and the computing time."""
-    unread = [
-        f"Columns of the {each.role} recording that were not read: {', '.join(each.recording.unknown_columns)}"
-        for each in trace.comparisons
-        if each.recording.unknown_columns
-    ]
-    return [*trace.untried, *trace.notes, *unread, f"The trace took {format_significant(trace.seconds)} s."]
+    """What there was no time for, notes of the trace, and the computing time."""
+    return [*trace.untried, *trace.notes, f"The trace took {format_significant(trace.seconds)} s."]

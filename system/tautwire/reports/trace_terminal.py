@@ -63,8 +63,8 @@ def trace_table(trace: Trace) -> RenderableType:
         blocks.append(_candidate_table(trace))
     if trace.untried:
         blocks.append(_paragraph("Untried", list(trace.untried)))
-    if notes := [*trace.notes, *_unread_columns(trace)]:
-        blocks.append(_paragraph("Notes", notes))
+    if trace.notes:
+        blocks.append(_paragraph("Notes", list(trace.notes)))
     return Group(*blocks)
 
 
@@ -161,14 +161,6 @@ def _candidate_cells(candidate: Candidate, cable_count: int) -> list[Text]:
         Text(format_significant(candidate.mean_square)),
         Text("taken" if candidate.accepted else ""),
         Text(one_line(values_text(candidate.name, candidate.form_values))),
-    ]
-
-
-def _unread_columns(trace: Trace) -> list[str]:
-    return [
-        f"columns of the {each.role} recording that were not read: {', '.join(each.recording.unknown_columns)}"
-        for each in trace.comparisons
-        if each.recording.unknown_columns
     ]
 
 
