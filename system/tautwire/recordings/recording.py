@@ -28,7 +28,7 @@ from .mdf_file import is_mdf, open_mdf
 from .parquet_file import is_parquet, open_parquet
 from .recording_table import MAX_MAGNITUDE, ColumnTable, ErrorSink, not_a_table_error, parse_header, row_errors
 from .ros_bag import is_bag, open_bag
-from .speed_gaps import bridge_speed_gaps
+from .winch_gaps import bridge_winch_gaps
 
 CABLE_COUNT_HINT = "give the robot's cable_count"
 
@@ -39,7 +39,7 @@ class Recording:
 
     ``time`` (N,) in s, strictly rising; ``winch_speed`` (N, n) in m/s, positive reels in; ``tension`` (N, n)
     in N and ``position`` (N, 3) in m, NaN where a cell or a column is missing. ``unknown_columns`` by name;
-    ``read_as`` says what of the file differs from the standard, and which winch speeds are interpolated.
+    ``read_as`` says what of the file differs from the standard, and which winch speeds or rope lengths are interpolated.
     ``rope_length`` (N, n) in m, smaller as it reels in, is NaN where no length of a cable was recorded; where it was,
     the winch speed is its rate. None where no cable has one.
     """
@@ -156,9 +156,9 @@ def read_recording(
 
     Columns are ``time`` (s), ``winch_speed_1`` ... (m/s), ``tension_1`` ... (N), ``x``, ``y``, ``z`` (m); where the
     length of a rope is recorded, ``rope_length_1`` ... (m, any zero, smaller as it reels in), its rate is the speed.
-    Units that a CSV or MDF file states are converted to these; gaps of a few samples in a speed are interpolated. The
-    recording's ``notes`` say so. ``columns`` are those of other names and scales: a robot's ``recorded_columns``, or a
-    TOML file with a table [recording.columns].
+    Units that a CSV or MDF file states are converted to these; gaps of a few samples in a speed or length are
+    interpolated. The recording's ``notes`` say so. ``columns`` are those of other names and scales: a robot's
+    ``recorded_columns``, or a TOML file with a table [recording.columns].
 
     Raises RecordingError, which names the line or row, where the file is not a valid recording; RobotFileError where
     ``columns`` are not valid; ArgumentError where ``path`` is no path or ``cable_count`` no whole number from 1 to 100.
@@ -195,7 +195,7 @@ def _validated_recording(table: CsvTable | ColumnTable, cable_count: int) -> Rec
     numbers = table.numbers()
     if numbers is None:
         raise _first_error(table)
-    numbers, gap_notes = bridge_speed_gaps(numbers)
+    numbers, gap_notes = bridge_winch_gaps(numbers)
     cables = range(1, cable_count + 1)
     recording = Recording(
         path=table.file,

@@ -15,8 +15,8 @@ from ..errors import RecordingError, format_value, raise_error
 from ..name_suggestions import closest_name
 from ..robot.schema import AXES, RecordedColumn
 from .clock_time import ClockFormat
-from .speed_gaps import MAX_GAP_SAMPLES, CellError, is_speed_used, without_bridged_gaps
 from .units import Number, Unit
+from .winch_gaps import MAX_GAP_SAMPLES, WINCH_COLUMNS, CellError, is_winch_column_used, without_bridged_gaps
 
 # A larger file is no recording of a cable robot, or does not fit into memory.
 MAX_COLUMNS = 10_000
@@ -139,8 +139,8 @@ _DECIMAL_COMMA = re.compile(r"[-+]?[0-9]+,[0-9]+([eE][-+]?[0-9]+)?")
 
 def row_errors(rows: Iterable[Row], header: Header, file: str) -> Iterator[RecordingError]:
     """Validation errors of all samples of a recording, in the file's order; parses every cell, so it is slow."""
-    speed_names = [name for name in header.known_names if name.startswith("winch_speed_")]
-    yield from without_bridged_gaps(_sample_errors(rows, header, file), speed_names)
+    winch_columns = [name for name in header.known_names if name.startswith(WINCH_COLUMNS)]
+    yield from without_bridged_gaps(_sample_errors(rows, header, file), winch_columns)
 
 
 def _sample_errors(rows: Iterable[Row], header: Header, file: str) -> Iterator[list[CellError]]:
@@ -156,8 +156,8 @@ def _sample_errors(rows: Iterable[Row], header: Header, file: str) -> Iterator[l
             if name not in header.unknown_names:
                 value = _parse_cell(row, header, name, cell.strip(" "))
                 if isinstance(value, RecordingError):
-                    is_missing_speed = name.startswith("winch_speed_") and cell.strip(" ") in MISSING_CELLS
-                    errors.append(CellError(value, name if is_missing_speed else None))
+                    is_bridgeable = name.startswith(WINCH_COLUMNS) and cell.strip(" ") in MISSING_CELLS
+                    errors.append(CellError(value, name if is_bridgeable else None))
                 elif name == "time":
                     time = value
         if time <= previous_time:
@@ -185,10 +185,10 @@ def _width_error(row: Row, width: int) -> RecordingError:
 def _parse_cell(row: Row, header: Header, name: str, cell: str) -> float | RecordingError:
     """The number in a cell, NaN where an output is missing; or what is wrong with it."""
     if cell in MISSING_CELLS:
-        if name == "time" or name.startswith("rope_length_") or is_speed_used(name, header.known_names):
+        if name == "time" or is_winch_column_used(name, header.known_names):
             problem = f"is {format_value(cell) if cell else 'empty'}, must be a number"
             hint = "write a number, or cut the recording before this sample"
-            if name.startswith("winch_speed_"):
+            if name.startswith(WINCH_COLUMNS):
                 hint += f"; at most {MAX_GAP_SAMPLES} in a row are interpolated, between numbers"
             return _cell_error(row, name, problem, hint)
         return math.nan

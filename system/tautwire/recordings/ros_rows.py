@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError, format_value
 from ..name_suggestions import join_names
-from .speed_gaps import MAX_GAP_SAMPLES
+from .winch_gaps import MAX_GAP_SAMPLES
 
 _INPUTS = ("winch_speed_", "rope_length_")
 _NANOSECONDS = 1e9  # in a second

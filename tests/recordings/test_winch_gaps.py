@@ -1,4 +1,4 @@
-"""Short gaps of winch speeds are interpolated with a note; longer ones, and those at the ends, are refused."""
+"""Short gaps of winch speeds and rope lengths are interpolated with a note; longer ones and ends are refused."""
 
 from __future__ import annotations
 
@@ -12,15 +12,17 @@ from hypothesis import strategies as st
 
 from tautwire.errors import RecordingError
 from tautwire.recordings.recording import read_recording, recording_errors, recording_from_frame
-from tautwire.recordings.speed_gaps import MAX_GAP_SAMPLES, bridge_speed_gaps
+from tautwire.recordings.winch_gaps import MAX_GAP_SAMPLES, bridge_winch_gaps
 
 COUNT = 20
 
 
 def table(missing: dict[str, list[int]]) -> pd.DataFrame:
-    """A recording of two cables, without some of its speeds; unevenly sampled."""
+    """A recording of two cables, without some of its numbers; unevenly sampled."""
     time = np.cumsum(0.01 + 0.001 * np.arange(COUNT))
     frame = pd.DataFrame({"time": time, "winch_speed_1": 2.0 * time, "winch_speed_2": time**2, "x": 1.0})
+    if "rope_length_2" in missing:
+        frame["rope_length_2"] = 3.0 - time
     for name, rows in missing.items():
         frame.loc[rows, name] = np.nan
     return frame
@@ -35,7 +37,7 @@ def written(folder: Path, frame: pd.DataFrame) -> Path:
 def test_a_gap_of_few_samples_that_lasts_long_stays() -> None:
     time = np.array([0.0, 0.01, 0.02, 0.03, 100.0, 200.0, 200.01, 200.02])
     speed = np.array([0.0, 0.0, 0.0, 0.0, np.nan, 9.0, 9.0, 9.0])
-    bridged, notes = bridge_speed_gaps({"time": time, "winch_speed_1": speed})
+    bridged, notes = bridge_winch_gaps({"time": time, "winch_speed_1": speed})
     assert np.isnan(bridged["winch_speed_1"][4]) and notes == ()
 
 
@@ -48,6 +50,26 @@ def test_a_short_gap_is_linear_in_time_and_noted(tmp_path: Path) -> None:
     assert "winch_speed_1 is interpolated in 6 samples without a number, from" in note
     assert f"from {whole['time'][3]:.6g} s" in note
     assert list(recording_errors(recording.path, 2)) == []
+
+
+@pytest.mark.parametrize("kind", ["file", "frame"])
+def test_a_short_gap_of_a_rope_length_is_linear_in_time_and_noted(kind: str, tmp_path: Path) -> None:
+    frame = table({}).rename(columns={"winch_speed_1": "rope_length_1"}).assign(winch_speed_1=np.nan)
+    frame.loc[[3, 7, 8, 9, 10, 11], "rope_length_1"] = np.nan
+    recording = read_recording(written(tmp_path, frame), 2) if kind == "file" else recording_from_frame(frame, 2)
+    assert recording.winch_speed[:, 0] == pytest.approx(np.full(COUNT, -2.0), rel=1e-9)
+    note, rates = recording.notes
+    assert "rope_length_1 is interpolated in 6 samples without a number, from" in note
+    assert "winch speeds are the rates" in rates
+
+
+@pytest.mark.parametrize("rows", [[0], [COUNT - 1], list(range(5, 6 + MAX_GAP_SAMPLES))])
+def test_longer_gaps_of_a_rope_length_and_those_at_the_ends_are_refused(rows: list[int], tmp_path: Path) -> None:
+    frame = table({"winch_speed_1": rows}).rename(columns={"winch_speed_1": "rope_length_1"})
+    with pytest.raises(RecordingError, match=r"column rope_length_1: is empty, .*at most 5 in a row are interpolated"):
+        read_recording(written(tmp_path, frame), 2)
+    with pytest.raises(RecordingError, match=f"row {rows[0] + 1}, column rope_length_1"):
+        recording_from_frame(frame, 2)
 
 
 def test_a_frame_is_bridged_as_a_file_is() -> None:
@@ -70,7 +92,8 @@ def test_longer_gaps_and_those_at_the_ends_are_refused(tmp_path: Path, rows: lis
 @settings(max_examples=80, deadline=None, suppress_health_check=[HealthCheck.function_scoped_fixture])
 @given(
     gaps=st.dictionaries(
-        st.sampled_from(["time", "winch_speed_1", "winch_speed_2"]), st.lists(st.integers(0, COUNT - 1), max_size=12)
+        st.sampled_from(["time", "winch_speed_1", "winch_speed_2", "rope_length_2"]),
+        st.lists(st.integers(0, COUNT - 1), max_size=12),
     )
 )
 def test_checking_tells_of_errors_exactly_where_reading_refuses(tmp_path: Path, gaps: dict[str, list[int]]) -> None:

@@ -1,4 +1,4 @@
-"""Short gaps of recorded winch speeds, a few samples long, which linear interpolation bridges."""
+"""Short gaps of recorded winch speeds and rope lengths, a few samples long, which linear interpolation bridges."""
 
 from __future__ import annotations
 
@@ -13,19 +13,20 @@ from ..errors import RecordingError
 # Samples in a row, and how much longer than they these may last; meanwhile a winch may have done anything.
 MAX_GAP_SAMPLES, MAX_GAP_STRETCH = 5, 1.5
 
-_SPEED = "winch_speed_"
+_SPEED, _LENGTH = "winch_speed_", "rope_length_"
+WINCH_COLUMNS = (_SPEED, _LENGTH)
 
 
-def bridge_speed_gaps(
+def bridge_winch_gaps(
     columns: Mapping[str, NDArray[np.float64]],
 ) -> tuple[dict[str, NDArray[np.float64]], tuple[str, ...]]:
-    """Interpolate winch speeds (m/s) linearly in time over gaps of at most ``MAX_GAP_SAMPLES``; and a note on each.
+    """Interpolate winch speeds (m/s) and rope lengths (m) linearly in time over gaps of at most ``MAX_GAP_SAMPLES``.
 
-    ``columns`` are (N,), NaN where nothing was recorded. Gaps at the ends and longer ones stay.
+    And a note on each. ``columns`` are (N,), NaN where nothing was recorded. Gaps at the ends and longer ones stay.
     """
     bridged, notes = dict(columns), []
     for name, values in columns.items():
-        if not is_speed_used(name, columns) or not np.isnan(values).any():
+        if not is_winch_column_used(name, columns) or not np.isnan(values).any():
             continue
         is_short = _in_short_gaps(np.isnan(values), columns["time"])
         if is_short.any():
@@ -37,9 +38,9 @@ def bridge_speed_gaps(
     return bridged, tuple(notes)
 
 
-def is_speed_used(name: str, names: Container[str]) -> bool:
-    """Whether a column is a winch speed that is read: beside the length of its rope it is not."""
-    return name.startswith(_SPEED) and name.replace(_SPEED, "rope_length_") not in names
+def is_winch_column_used(name: str, names: Container[str]) -> bool:
+    """Whether a column is a rope length or a winch speed that is read: a speed beside the length of its rope is not."""
+    return name.startswith(_LENGTH) or (name.startswith(_SPEED) and name.replace(_SPEED, _LENGTH) not in names)
 
 
 def _in_short_gaps(is_missing: NDArray[np.bool_], time: NDArray[np.float64]) -> NDArray[np.bool_]:
@@ -57,33 +58,33 @@ def _in_short_gaps(is_missing: NDArray[np.bool_], time: NDArray[np.float64]) -> 
 
 
 class CellError(NamedTuple):
-    """An error of a sample; ``missing_speed`` names the column where it is that of a winch speed without a number."""
+    """An error of a sample; ``bridgeable`` names the column of a winch where it is that of a cell without a number."""
 
     error: RecordingError
-    missing_speed: str | None = None
+    bridgeable: str | None = None
 
 
 def without_bridged_gaps(
-    samples: Iterable[Sequence[CellError]], speed_names: Iterable[str]
+    samples: Iterable[Sequence[CellError]], winch_columns: Iterable[str]
 ) -> Iterator[RecordingError]:
-    """Errors of the samples in their order, less those of missing winch speeds that are bridged."""
-    speeds = frozenset(speed_names)
+    """Errors of the samples in their order, less those of missing winch speeds and rope lengths that are bridged."""
+    columns = frozenset(winch_columns)
     held: list[CellError] = []
-    gap_lengths = dict.fromkeys(speeds, 0)
-    unseen = set(speeds)
+    gap_lengths = dict.fromkeys(columns, 0)
+    unseen = set(columns)
     for errors in samples:
-        missing = {cell.missing_speed for cell in errors}
-        for name in speeds - missing:
+        missing = {cell.bridgeable for cell in errors}
+        for name in columns - missing:
             if gap_lengths[name]:
-                held = [cell for cell in held if cell.missing_speed != name]
+                held = [cell for cell in held if cell.bridgeable != name]
             gap_lengths[name] = 0
             unseen.discard(name)
-        for name in speeds & missing:
+        for name in columns & missing:
             gap_lengths[name] += 1
         held += errors
-        too_long = unseen | {name for name in speeds if gap_lengths[name] > MAX_GAP_SAMPLES}
-        held = [CellError(cell.error) if cell.missing_speed in too_long else cell for cell in held]
-        if not any(cell.missing_speed for cell in held):
+        too_long = unseen | {name for name in columns if gap_lengths[name] > MAX_GAP_SAMPLES}
+        held = [CellError(cell.error) if cell.bridgeable in too_long else cell for cell in held]
+        if not any(cell.bridgeable for cell in held):
             yield from (cell.error for cell in held)
             held = []
     yield from (cell.error for cell in held)
