@@ -49,11 +49,23 @@ def column_samples(path: Path) -> ColumnSamples:
 
 
 def _csv_samples(path: Path) -> ColumnSamples:
+    """The samples of a CSV file; none where these are not valid CSV, which reading it tells."""
     layout = csv_layout(path)
+    try:
+        frame = _frame(layout)
+    except (ValueError, OverflowError):
+        return ColumnSamples()
+    numbers = (pd.to_numeric(frame[index], errors="coerce") for index in frame)
+    values = {name: column.to_numpy(dtype=float) for name, column in zip(layout.names, numbers, strict=True)}
+    return ColumnSamples(values, _has_units(layout))
+
+
+def _frame(layout: CsvLayout) -> pd.DataFrame:
+    """The first samples, the columns by their index."""
     rows = layout.lines[layout.data_index : layout.data_index + MAX_CSV_ROWS]
     # Between other separators a comma is a decimal one.
     is_comma_decimal = layout.separator != "," and any("," in row for row in rows)
-    frame = pd.read_csv(
+    return pd.read_csv(
         StringIO("\n".join(rows)),
         header=None,
         names=range(len(layout.names)),
@@ -68,9 +80,6 @@ def _csv_samples(path: Path) -> ColumnSamples:
         on_bad_lines="skip",
         low_memory=False,
     )
-    numbers = (pd.to_numeric(frame[index], errors="coerce") for index in frame)
-    values = {name: column.to_numpy(dtype=float) for name, column in zip(layout.names, numbers, strict=True)}
-    return ColumnSamples(values, _has_units(layout))
 
 
 def _has_units(layout: CsvLayout) -> bool:

@@ -55,15 +55,18 @@ def parquet_column_names(path: str | Path) -> tuple[str, ...]:
 
 
 def parquet_samples(path: str | Path) -> dict[str, NDArray[np.float64]]:
-    """Numbers of the columns in a Parquet file that have a numeric type, each (N,), NaN where a cell is null.
+    """Numbers of the columns in a Parquet file that have a numeric type and a name of their own, each (N,).
 
-    Raises RecordingError as open_parquet does.
+    NaN where a cell is null. Raises RecordingError as open_parquet does.
     """
     file = str(path)
     with _readable_parquet(file), pq.ParquetFile(path) as content:
         require_samples(content.metadata.num_rows, file)
-        fields = [each for each in content.schema_arrow if any(check(each.type) for check in _NUMERIC_TYPE_CHECKS)]
-        return {each.name: _read_column(content, each.name, f"{file}: column {each.name}") for each in fields}
+        numeric = [
+            each.name for each in content.schema_arrow if any(is_of(each.type) for is_of in _NUMERIC_TYPE_CHECKS)
+        ]
+        single = [name for name in numeric if content.schema_arrow.names.count(name) == 1]
+        return {name: _read_column(content, name, f"{file}: column {name}") for name in single}
 
 
 @contextmanager
