@@ -10,7 +10,7 @@ import pytest
 
 from tautwire.recordings.alternative_readings import GeometryReading, WindingReading
 from tautwire.recordings.consistency import recording_mistakes
-from tautwire.recordings.mistaken_tensions import TensionCheck, check_tensions
+from tautwire.recordings.mistaken_tensions import TensionCheck, check_tensions, force_balance
 from tautwire.recordings.recording import Recording, read_recording
 from tautwire.robot.schema import Robot
 from tests.support.recordings import recorded
@@ -207,3 +207,13 @@ def test_noise_is_not_taken_for_a_unit() -> None:
     robot, recording = shipped("three")
     noise = np.random.default_rng(2).normal(size=recording.tension.shape)
     assert checked(robot, replace(recording, tension=noise)) is None
+
+
+@pytest.mark.parametrize("rows_per_sample", [3, 4])
+def test_forces_balance_beside_a_tracker_slower_than_the_log(rows_per_sample: int) -> None:
+    robot, recording = shipped("three")
+    is_missing = np.arange(recording.sample_count)[:, None] % rows_per_sample > 0
+    slow = replace(recording, position=np.where(is_missing, np.nan, recording.position))
+    fast, balance = (force_balance(robot, each, GeometryReading(), WindingReading()) for each in (recording, slow))
+    assert fast is not None and balance is not None
+    assert balance.misfit((0, 1, 2)) < 1.5 * fast.misfit((0, 1, 2)) < 0.01

@@ -14,6 +14,7 @@ from ..robot.schema import AXES, Robot
 from .alternative_readings import NEGATE, REORDER, TIME_UNITS, GeometryReading, Mistake, WindingReading, convert
 from .mistaken_motion import MIN_IMPROVEMENT
 from .recording import Recording
+from .sensor_gaps import bridge_short_gaps
 from .units import UNITS
 from .white_noise_estimate import white_noise_deviation
 
@@ -208,9 +209,11 @@ def _block_means(
         return None
     starts = recording.time[: count * size : size] * TIME_UNITS[winding.time_unit]
     spans_gap = np.append(np.diff(starts) > MAX_BLOCK_STRETCH * size * interval, False)
+    # Of positions in some rows alone the mean would not be that of the block's middle, which a second difference needs.
+    used = slice(count * size)
     means = []
-    for values in (recording.position, recording.tension):
-        blocks = values[: count * size].reshape(count, size, -1)
+    for values in (bridge_short_gaps(recording.time[used], recording.position[used]), recording.tension[used]):
+        blocks = values.reshape(count, size, -1)
         counts = np.isfinite(blocks).sum(axis=1)
         mean = np.nansum(blocks, axis=1) / np.where(counts > 0, counts, np.nan)
         means.append(np.where(spans_gap[:, None], np.nan, mean))

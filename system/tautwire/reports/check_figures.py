@@ -12,8 +12,9 @@ from numpy.typing import NDArray
 from ..number_format import format_significant
 from ..recordings.alternative_readings import GeometryReading
 from ..recordings.recording import Recording
+from ..recordings.sensor_gaps import bridge_short_gaps
 from ..robot.schema import Robot
-from .downsampling import bridge_short_gaps, envelope_times, evenly_spaced_indices, min_max_envelope, pack_float32
+from .downsampling import envelope_times, evenly_spaced_indices, min_max_envelope, pack_float32
 from .robot_scene import RobotScene, ScenePath
 
 Array = NDArray[np.float64]

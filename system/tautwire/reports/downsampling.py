@@ -14,8 +14,6 @@ Array = NDArray[np.float64]
 MAX_WELCH_SEGMENT = 4096
 MAX_SPECTRUM_POINTS = 240
 MIN_SAMPLES = 32
-# Rows without a number of a sensor slower than the log are no gap; more of its own intervals are.
-MAX_DRAWN_INTERVALS = 5.0
 
 
 @dataclass(frozen=True)
@@ -36,23 +34,6 @@ def pack_float32(values: Array) -> str:
 def unpack_float32(text: str) -> Array:
     """The inverse of :func:`pack_float32`, to the precision of float32."""
     return np.frombuffer(base64.b64decode(text), dtype="<f4").astype(np.float64)
-
-
-def bridge_short_gaps(time: Array, values: Array) -> Array:
-    """Values (N,), or (N, k), on the lines through measured ones, NaN over more than five median intervals of these.
-
-    So that samples of a sensor slower than the log, which have no measured neighbours, are drawn.
-    """
-    if values.ndim > 1:
-        return np.column_stack([bridge_short_gaps(time, column) for column in values.T])
-    known = np.flatnonzero(np.isfinite(values))
-    if known.size in (0, 1, values.size):
-        return values
-    intervals = np.diff(time[known])
-    is_short = np.concatenate([[False], intervals <= MAX_DRAWN_INTERVALS * np.median(intervals), [False]])
-    is_between = is_short[np.searchsorted(known, np.arange(values.size))]
-    on_line = np.interp(time, time[known], values[known])
-    return np.where(np.isfinite(values), values, np.where(is_between, on_line, np.nan))
 
 
 def envelope_times(time: Array, max_points: int) -> Array:

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from .downsampling import bridge_short_gaps, pack_float32
+from ..recordings.sensor_gaps import bridge_short_gaps
+from .downsampling import pack_float32
 
 Array = NDArray[np.float64]
 

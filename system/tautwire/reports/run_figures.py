@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..number_format import PAGE_UNITS, choose_unit, digits_for_range, format_significant
+from ..recordings.sensor_gaps import bridge_short_gaps
 from ..robot.schema import AXES
-from .downsampling import bridge_short_gaps, envelope_times, evenly_spaced_indices, min_max_envelope, pack_float32
+from .downsampling import envelope_times, evenly_spaced_indices, min_max_envelope, pack_float32
 from .robot_scene import (
     MAGNIFICATIONS,
     RobotScene,

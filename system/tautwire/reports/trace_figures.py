@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from ..estimation.trace_result import Comparison, Trace
 from ..number_format import format_significant
+from ..recordings.sensor_gaps import bridge_short_gaps
 from .downsampling import (
-    bridge_short_gaps,
     envelope_times,
     evenly_spaced_indices,
     min_max_envelope,

@@ -1,11 +1,10 @@
-"""Samples of sensors slower than the log are drawn as lines through them; gaps of the sensor stay gaps."""
+"""Samples of sensors slower than the log are joined by lines; gaps of the sensor stay gaps."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from tautwire.reports.downsampling import bridge_short_gaps
-from tautwire.reports.robot_scene import measured_path
+from tautwire.recordings.sensor_gaps import bridge_short_gaps
 
 TIME = np.cumsum(np.where(np.arange(60) % 2, 0.01, 0.03))
 
@@ -30,12 +29,3 @@ def test_a_gap_of_more_than_five_intervals_of_the_sensor_stays() -> None:
 def test_columns_are_bridged_each_by_its_own_samples() -> None:
     drawn = bridge_short_gaps(TIME, np.column_stack([measured(), measured(4), measured(4, 8)]))
     assert np.isfinite(drawn).sum(axis=0).tolist() == [0, 1, 5]
-
-
-def test_what_is_measured_beside_a_curved_path_has_no_chords() -> None:
-    path = np.column_stack([np.sin(20.0 * TIME), np.cos(20.0 * TIME), np.ones(60)])
-    points = path + np.array([0.1, 0.2, 0.0])
-    points[np.arange(60) % 4 > 0] = np.nan
-    points[:, 2] = np.nan
-    drawn = measured_path(TIME, points, path)
-    np.testing.assert_allclose(drawn[:57] - path[:57], np.tile([0.1, 0.2, 0.0], (57, 1)), atol=1e-12)
