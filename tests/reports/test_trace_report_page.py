@@ -341,3 +341,20 @@ def test_residuals_of_a_tracker_slower_than_the_log_are_lines() -> None:
     assert measured["name"] == "measured"
     drawn = [choice["channels"][0]["after"], measured["columns"][0]]
     assert all(np.isfinite(unpack_float32(each)).mean() > 0.99 for each in drawn)
+
+
+def test_a_tracker_slower_than_the_log_has_the_spectrum_of_its_own_rate() -> None:
+    time = 0.01 * np.arange(16_000)
+    noise = np.where(np.arange(16_000) % 4, np.nan, 2.0 * np.random.default_rng(3).normal(size=16_000))
+    result = residual_spectra(time, noise, noise)
+    assert result is not None and result.frequency.max() == pytest.approx(12.5, rel=0.05)
+    assert np.median(result.after) == pytest.approx(white_noise_density(2.0, time[::4]), rel=0.1)
+    assert residual_spectra(time, np.where(time > 1.0, np.nan, noise), noise) is None
+    trace = made_trace(samples=1601)
+    (fit, *_) = trace.comparisons
+    slow = np.where(np.arange(1601)[:, None] % 4, np.nan, fit.recording.position)
+    comparison = replace(fit, recording=replace(fit.recording, position=slow))
+    channels = trace_page_data(replace(trace, comparisons=(comparison,)))["choices"][0]["channels"]
+    assert channels[0]["spectrum"]["floor"] == pytest.approx(
+        2.0 * channels[-1]["spectrum"]["floor"] * (channels[0]["sigma"] / channels[-1]["sigma"]), rel=1e-6
+    )

@@ -67,14 +67,20 @@ def evenly_spaced_indices(count: int, max_points: int) -> NDArray[np.int64]:
 
 
 def residual_spectra(time: Array, before: Array, after: Array) -> ResidualSpectra | None:
-    """Spectra of two residuals of one output by Welch's method; None where too few samples were measured."""
-    step = float(np.median(np.diff(time)))
-    even_times = np.arange(time[0], time[-1] + 0.5 * step, step)
-    if even_times.size < MIN_SAMPLES:
+    """Spectra of two residuals of one output by Welch's method, at the rate of the samples that were measured.
+
+    None where these are too few, or more than half are missing between them.
+    """
+    is_measured = np.isfinite(before) & np.isfinite(after)
+    measured_times = time[is_measured]
+    if measured_times.size < MIN_SAMPLES:
         return None
-    resampled = [_resample(time, values, even_times) for values in (before, after)]
-    if resampled[0] is None or resampled[1] is None:
+    step = float(np.median(np.diff(measured_times)))
+    if measured_times.size < (measured_times[-1] - measured_times[0]) / (2.0 * step):
         return None
+    even_times = np.arange(measured_times[0], measured_times[-1] + 0.5 * step, step)
+    # Linear across gaps.
+    resampled = [np.interp(even_times, measured_times, values[is_measured]) for values in (before, after)]
     segment_length = min(even_times.size, MAX_WELCH_SEGMENT, max(256, even_times.size // 4))
     frequency, power_before = welch(resampled[0], fs=1.0 / step, nperseg=segment_length)
     _, power_after = welch(resampled[1], fs=1.0 / step, nperseg=segment_length)
@@ -84,14 +90,6 @@ def residual_spectra(time: Array, before: Array, after: Array) -> ResidualSpectr
 def white_noise_density(sigma: float, time: Array) -> float:
     """The amplitude spectral density of white noise of standard deviation ``sigma``, sampled at ``time``."""
     return float(sigma * np.sqrt(2.0 * np.median(np.diff(time))))
-
-
-def _resample(time: Array, values: Array, even_times: Array) -> Array | None:
-    """Resamples values to even times, linearly across gaps; None where most of them are missing."""
-    finite = np.isfinite(values)
-    if finite.sum() < max(MIN_SAMPLES, values.size // 2):
-        return None
-    return np.interp(even_times, time[finite], values[finite])
 
 
 def _average_on_log_axis(frequency: Array, before: Array, after: Array) -> ResidualSpectra:

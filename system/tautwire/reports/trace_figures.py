@@ -123,7 +123,7 @@ def _spectrum_data(time: Array, before: Array, after: Array, sigma: float) -> di
         "frequency": pack_float32(spectra.frequency),
         "before": pack_float32(spectra.before),
         "after": pack_float32(spectra.after),
-        "floor": white_noise_density(sigma, time) if math.isfinite(sigma) else None,
+        "floor": white_noise_density(sigma, time[np.isfinite(after)]) if math.isfinite(sigma) else None,
     }
 
 
