@@ -275,12 +275,14 @@ def test_a_trackers_file_has_a_table_of_its_own_beside_the_log(
     log.frame().rename(columns={"time": "t", "x": "set X"}).drop(columns=["y"]).to_csv("log.csv", index=False)
     positions = {f"Rigid Body 1 {axis}": 1e3 * tracker.position[:, i] for i, axis in enumerate("XYZ")}
     marked = {f"{name} [mm]": values for name, values in positions.items()}
-    pd.DataFrame({"Time (s)": tracker.time, **marked, "Marker 1": 0.0}).to_csv("tracker.csv", index=False, sep=";")
+    pd.DataFrame({"Time (Seconds)": tracker.time, **marked, "Marker 1": 0.0}).to_csv(
+        "tracker.csv", index=False, sep=";"
+    )
     arguments = ["columns", "log.csv", ROBOT, "--tracker", "tracker.csv"]
     assert run(arguments) == 0
     captured = capsys.readouterr()
     assert tomlkit.parse(captured.out).unwrap()["recording"]["tracker"]["columns"] == {
-        "time": {"name": "Time (s)", "unit": "s"},
+        "time": {"name": "Time (Seconds)", "unit": "s"},
         **{axis: {"name": f"Rigid Body 1 {axis.upper()} [mm]", "unit": "mm"} for axis in "xyz"},
     }
     assert "# not used: 'z': is z of the log, beside that of tracker.csv: rename or remove it" in captured.out

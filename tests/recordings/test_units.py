@@ -38,3 +38,13 @@ def test_a_unit_may_stand_in_brackets_and_with_either_micro_sign(text: str) -> N
 def test_units_are_not_guessed(text: str, column: str) -> None:
     with pytest.raises(RecordingError, match=rf"fit\.csv: line 2, column {column}: is in '{text}', not a known unit"):
         require_unit(text, column, f"fit.csv: line 2, column {column}", 2)
+
+
+@pytest.mark.parametrize(
+    ("text", "column", "symbol"),
+    [("(Seconds)", "time", "s"), ("[milliseconds]", "time", "ms"), ("(Millimeters)", "x", "mm"), ("(metre)", "z", "m")],
+)
+def test_a_unit_in_brackets_may_be_a_word(text: str, column: str, symbol: str) -> None:
+    unit = find_unit(text, column)
+    assert unit is not None and unit.symbol == symbol
+    assert find_unit(text[1:-1], column) is None

@@ -67,6 +67,21 @@ _FORCE = (
 UNITS: Mapping[str, tuple[Unit, ...]] = {"time": _TIME, "length": _LENGTH, "speed": _SPEED, "force": _FORCE}
 
 _OTHER_SPELLINGS = {"sec": "s", "m*s^-1": "m/s", "m s^-1": "m/s", "m s-1": "m/s", "kp": "kgf", "lb": "lbf"}
+# Units in words, as trackers write them behind a name; without brackets such a word may be a name.
+_IN_WORDS = {
+    word + plural: symbol
+    for words, symbol in (
+        (("second",), "s"),
+        (("millisecond",), "ms"),
+        (("microsecond",), "us"),
+        (("meter", "metre"), "m"),
+        (("centimeter", "centimetre"), "cm"),
+        (("millimeter", "millimetre"), "mm"),
+        (("newton",), "N"),
+    )
+    for word in words
+    for plural in ("", "s")
+}
 _BRACKETS = re.compile(r"\[(.*)\]|\((.*)\)")
 _MICRO_SIGNS = str.maketrans({"\u00b5": "u", "\u03bc": "u", "\u00b7": "*", "\u22c5": "*"})
 
@@ -86,6 +101,7 @@ def find_unit(text: str, column: str) -> Unit | None:
     bare = text.strip() if brackets is None else (brackets.group(1) or brackets.group(2) or "").strip()
     symbol = bare.translate(_MICRO_SIGNS)
     symbol = _OTHER_SPELLINGS.get(symbol, symbol)
+    symbol = symbol if brackets is None else _IN_WORDS.get(symbol.lower(), symbol)
     return next((unit for unit in UNITS[quantity_of(column)] if unit.symbol == symbol), None)
 
 
