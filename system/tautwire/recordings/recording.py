@@ -39,7 +39,7 @@ class Recording:
 
     ``time`` (N,) in s, strictly rising; ``winch_speed`` (N, n) in m/s, positive reels in; ``tension`` (N, n)
     in N and ``position`` (N, 3) in m, NaN where a cell or a column is missing. ``unknown_columns`` by name;
-    ``read_as`` says what of the file differs from the standard, and which winch speeds or rope lengths are interpolated.
+    ``read_as`` says what of the file differs from the standard, and which of its numbers are interpolated.
     ``rope_length`` (N, n) in m, smaller as it reels in, is NaN where no length of a cable was recorded; where it was,
     the winch speed is its rate. None where no cable has one.
     """
