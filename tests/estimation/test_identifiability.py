@@ -7,10 +7,12 @@ import pytest
 
 from tautwire.estimation.estimation_data import DataSplit, split_data
 from tautwire.estimation.hypotheses import Hypothesis, hypotheses
-from tautwire.estimation.identifiability import analyse_identifiability
+from tautwire.estimation.identifiability import analyse_identifiability, separation_nats
 from tautwire.estimation.identification_context import IdentificationContext
+from tautwire.estimation.innovation_sensitivities import SensitivityColumn
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fitter
+from tautwire.estimation.score_test import ScoreStatistics
 from tautwire.estimation.trace_result import Detectable, Identifiability
 from tautwire.robot.schema import Robot
 from tautwire_fmu.laws.effects import DAMPING, MODULUS, PAYLOAD, RELAXATION, SLACK
@@ -100,3 +102,11 @@ def test_a_size_that_slopes_cannot_see_is_found_by_runs() -> None:
             fitter.judged(true, [hypothesis], evidence.validation).log_likelihood(evidence.validation.rows) - without
         )
     assert gains[0] > threshold > 5.0 * gains[1]
+
+
+def test_several_steps_are_separated_from_an_effect_at_once() -> None:
+    damping, payload = Hypothesis(DAMPING, ALL), Hypothesis(PAYLOAD, ())
+    columns = tuple(SensitivityColumn(h.effect.name, h.cables, h.form[0], 0) for h in (damping, payload))
+    statistics = ScoreStatistics(columns, np.zeros(2), np.array([[2.0, 1.0], [1.0, 2.0]]), np.zeros(2))
+    steps = np.array([[1.0, 0.0, 2.0, 0.0], [0.0, 1.0, 0.0, 0.0]])
+    assert separation_nats(statistics, steps, payload) == pytest.approx([0.75, 0.0, 3.0, 0.0])

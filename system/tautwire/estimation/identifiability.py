@@ -53,14 +53,11 @@ def analyse_identifiability(
     return Identifiability(tuple(detectable), tuple(sorted(confusable, key=lambda pair: pair.nats)))
 
 
-def separation_nats(statistics: ScoreStatistics, step: Array, other: Hypothesis, nuisance: Sequence[int] = ()) -> float:
-    """Separation in nats of a parameter step (columns, 1) from the best that another hypothesis can do instead."""
-    information = float(_projected_information(statistics.fisher_information, step, list(nuisance))[0, 0])
-    return (
-        0.5 * information * (1.0 - _explained_share(statistics, step, other, nuisance, information))
-        if information > 0.0
-        else 0.0
-    )
+def separation_nats(statistics: ScoreStatistics, steps: Array, other: Hypothesis) -> Array:
+    """Separations in nats (k,) of parameter steps (columns, k) from the best that another hypothesis can do instead."""
+    information = np.diag(_projected_information(statistics.fisher_information, steps, []))
+    separations: Array = 0.5 * information * (1.0 - _explained_shares(statistics, steps, other, []))
+    return separations
 
 
 def start_steps(statistics: ScoreStatistics, robot: Robot, hypothesis: Hypothesis) -> Array:
@@ -73,23 +70,21 @@ def start_steps(statistics: ScoreStatistics, robot: Robot, hypothesis: Hypothesi
     return combined
 
 
-def _explained_share(
-    statistics: ScoreStatistics, step: Array, other: Hypothesis, nuisance: Sequence[int], information: float
-) -> float:
-    """Share of a step's squared length that another hypothesis can explain, at its best grid point."""
-    largest_share = 0.0
+def _explained_shares(statistics: ScoreStatistics, steps: Array, other: Hypothesis, nuisance: list[int]) -> Array:
+    """Share of each step's squared length (k,) that another hypothesis can explain, at its best grid point."""
+    count = steps.shape[1]
+    largest_shares = np.zeros(count)
     for number in range(grid_size(other)):
         _, columns = parameter_columns(statistics, other, number)
         if columns.shape[1]:
-            projected = _projected_information(
-                statistics.fisher_information, np.hstack([step, columns]), list(nuisance)
+            projected = _projected_information(statistics.fisher_information, np.hstack([steps, columns]), nuisance)
+            cross_information, information = projected[count:, :count], np.diag(projected)[:count]
+            explained = np.sum(
+                cross_information * _scaled_least_squares(projected[count:, count:], cross_information), axis=0
             )
-            largest_share = max(
-                largest_share,
-                float(projected[0, 1:] @ _scaled_least_squares(projected[1:, 1:], projected[1:, :1])[:, 0])
-                / information,
-            )
-    return min(max(largest_share, 0.0), 1.0)
+            shares = np.divide(explained, information, out=np.zeros(count), where=information > 0.0)
+            largest_shares = np.maximum(largest_shares, shares)
+    return np.minimum(largest_shares, 1.0)
 
 
 def _column_indices(accepted: Sequence[Hypothesis]) -> list[list[int]]:
@@ -197,7 +192,7 @@ def _confusable_effect(
     information = float(_projected_information(statistics.fisher_information, tested.step, tested.nuisance)[0, 0])
     if information <= 0.0:
         return None
-    cosine = sqrt(_explained_share(statistics, tested.step, other, tested.nuisance, information))
+    cosine = sqrt(_explained_shares(statistics, tested.step, other, tested.nuisance)[0])
     if cosine < min_cosine:
         return None
     own, nats = tested.hypothesis, 0.5 * information * (1.0 - cosine**2)

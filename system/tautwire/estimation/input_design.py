@@ -223,10 +223,14 @@ class _DesignProblem:
             for one, move in start_directions.items()
             if float((move.T @ signatures.fisher_information @ move)[0, 0]) > 0.0
         ]
+        if not visible_effects:
+            return []
+        steps = np.hstack([start_directions[one] for one in visible_effects])
+        nats = np.array([separation_nats(signatures, steps, other) for other in visible_effects]).T.tolist()
         separations = [
-            EffectSeparation(one, other, separation_nats(signatures, start_directions[one], other))
-            for one in visible_effects
-            for other in visible_effects
+            EffectSeparation(one, other, value)
+            for one, row in zip(visible_effects, nats, strict=True)
+            for other, value in zip(visible_effects, row, strict=True)
             if one.effect is not other.effect
         ]
         return sorted(separations, key=lambda pair: pair.nats)
