@@ -66,6 +66,15 @@ class LinearisedSegment:
     values: Array
     sensitivities: Array
 
+    def integrated_forcing(self, rate_sensitivities: Array) -> Array:
+        """State forcing B (K, n, p) by Simpson's rule from sensitivities of the rates (K + 1, n, p) at the samples."""
+        begin, end = rate_sensitivities[:-1], rate_sensitivities[1:]
+        transition = self.transition[:, : begin.shape[1], : begin.shape[1]]
+        forcing: Array = (
+            self.step[:, None, None] / 6.0 * (transition @ begin + 2.0 * self.half_transition @ (begin + end) + end)
+        )
+        return forcing
+
     def propagate_sensitivities(
         self, state_sensitivities: Array, state_forcing: Array, output_forcing: Array
     ) -> tuple[Array, Array]:
@@ -250,26 +259,24 @@ class EffectSensitivities:
 
     def forcing_terms(self, run: LinearisedSegment) -> tuple[Array, Array]:
         """Forcing terms of the sensitivities along the next segment of the run: B (K, n, p) and D (K, m, p)."""
-        per_trial = [self._forcing_at_grid_point(run, number) for number in range(len(self._grid_points))]
-        state_forcing, output_forcing = (np.concatenate(parts, axis=2) for parts in zip(*per_trial, strict=True))
-        return state_forcing, output_forcing
+        per_trial = [self._derivatives_at_grid_point(run, number) for number in range(len(self._grid_points))]
+        rate_sensitivities, output_sensitivities = (
+            np.concatenate(parts, axis=2) for parts in zip(*per_trial, strict=True)
+        )
+        return run.integrated_forcing(rate_sensitivities), output_sensitivities[:-1]
 
-    def _forcing_at_grid_point(self, run: LinearisedSegment, trial: int) -> tuple[Array, Array]:
-        """Forcing terms along the predicted states, which the noise of what they predict has not touched."""
+    def _derivatives_at_grid_point(self, run: LinearisedSegment, trial: int) -> tuple[Array, Array]:
+        """Sensitivities of rates (K + 1, n, p) and outputs (K + 1, m, p) along the predicted states.
+
+        The noise of what they predict has not touched those.
+        """
         theta, count = self._parameter_values(trial)[:, None], run.states.shape[1]
         inputs = np.vstack([run.speeds, np.zeros((self._input_count - len(run.speeds), count))])
         effect_states, sensitivities = self._propagate_effect_states(run, theta, trial)
         instant = [_with_last_column_repeated(column) for column in (run.speeds[:, 1:], run.step[None, :], run.shift)]
         derivatives = self._forcing_function(count, run.states, effect_states, sensitivities, inputs, theta, *instant)
-        rate_sensitivities, output_sensitivities = (
-            by_sample(part, count)[:, :, self._moving_indices[trial]] for part in derivatives
-        )
-        begin, end = rate_sensitivities[:-1], rate_sensitivities[1:]
-        transition = run.transition[:, : begin.shape[1], : begin.shape[1]]
-        state_forcing = (
-            run.step[:, None, None] / 6.0 * (transition @ begin + 2.0 * run.half_transition @ (begin + end) + end)
-        )
-        return state_forcing, output_sensitivities[:-1]
+        by_rates, by_outputs = (by_sample(part, count)[:, :, self._moving_indices[trial]] for part in derivatives)
+        return by_rates, by_outputs
 
     def _propagate_effect_states(self, run: LinearisedSegment, theta: Array, trial: int) -> tuple[Array, Array]:
         """The effect's states (z, K + 1) and their sensitivities (z, p x (K + 1))."""

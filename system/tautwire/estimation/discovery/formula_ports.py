@@ -147,13 +147,7 @@ def series_sensitivities(
     by_outputs = np.stack(
         [_site_sensitivity(*case, output_sensitivities, initial_output_sensitivities) for case in site_series], axis=2
     )
-    begin, end = by_rates[:-1], by_rates[1:]
-    model_size = begin.shape[1]
-    transition = segment.transition[:, :model_size, :model_size]
-    integrated = (
-        segment.step[:, None, None] / 6.0 * (transition @ begin + 2.0 * segment.half_transition @ (begin + end) + end)
-    )
-    return integrated, by_outputs[:-1]
+    return segment.integrated_forcing(by_rates), by_outputs[:-1]
 
 
 @dataclass(frozen=True)
