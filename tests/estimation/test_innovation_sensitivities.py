@@ -4,8 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from casadi import DM, SX, vertcat
 
-from tautwire.estimation.innovation_sensitivities import EffectSensitivities, factorised, linearise_filter
+from tautwire.estimation.innovation_sensitivities import (
+    EffectSensitivities,
+    _sensitivity_pattern,
+    factorised,
+    linearise_filter,
+)
 from tautwire.estimation.likelihood import Likelihood
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.robot.schema import PER_CABLE_COMPONENTS, EffectSetting
@@ -103,3 +109,10 @@ def test_a_covariance_that_rounding_left_indefinite_is_factorised_all_the_same()
     assert np.all(np.isfinite(np.linalg.inv(covariance[:2])))
     assert np.all(np.isnan(factor[2]))
     np.testing.assert_array_equal(factorised(regular[None])[1][0], np.linalg.cholesky(regular))
+
+
+def test_states_are_sensitive_only_to_what_reaches_them() -> None:
+    states, parameters = SX.sym("z", 3), SX.sym("p", 2)
+    rates = vertcat(parameters[0] - states[0], states[0], -states[2])
+    pattern = _sensitivity_pattern(rates, states, parameters)
+    assert np.array_equal(np.array(DM(pattern, 1.0)), [[1.0, 0.0], [1.0, 0.0], [0.0, 0.0]])

@@ -23,7 +23,7 @@ from dataclasses import dataclass
 
 import casadi
 import numpy as np
-from casadi import SX, Function
+from casadi import SX, Function, Sparsity
 from numpy.typing import NDArray
 
 from tautwire_fmu.laws.effects import Effect
@@ -213,14 +213,12 @@ class EffectSensitivities:
         effect_indices = [index for index in range(len(model.state_names)) if index not in shared_indices]
         z, theta, p = model.states[effect_indices], model.parameters, model.parameters[: len(free)]
         next_speed, step, shift = SX.sym("later", cable_count), SX.sym("step"), SX.sym("shift", 3 + cable_count)
-        state_sensitivities = SX.sym("slopes", len(effect_indices), len(free))
+        state_sensitivities = SX.sym("slopes", _sensitivity_pattern(model.rates[effect_indices], z, p))
         outputs = delayed_outputs(model, cable_count, next_speed, step, shift)
         arguments = [model.states[shared_indices], z, state_sensitivities, model.inputs, theta]
 
         def total_derivative(expression: SX) -> SX:
-            return casadi.densify(
-                casadi.jacobian(expression, p) + casadi.mtimes(casadi.jacobian(expression, z), state_sensitivities)
-            )
+            return casadi.jacobian(expression, p) + casadi.mtimes(casadi.jacobian(expression, z), state_sensitivities)
 
         self._effect_state_count, self._parameter_count = len(effect_indices), len(free)
         self._forcing_function = CompiledFunction(
@@ -235,10 +233,7 @@ class EffectSensitivities:
             arguments,
             [casadi.densify(model.rates[effect_indices]), total_derivative(model.rates[effect_indices])],
         )
-        self._step_function = CompiledFunction(
-            _effect_state_step(rates, len(shared_indices), len(effect_indices), len(free), cable_count, theta.numel()),
-            carried=2,
-        )
+        self._step_function = CompiledFunction(_effect_state_step(rates, cable_count), carried=2)
         start_sensitivities = casadi.jacobian(model.start[shared_indices], p)
         self._start_function = Function(
             "start", [theta], [casadi.densify(model.start[effect_indices]), casadi.densify(start_sensitivities)]
@@ -325,14 +320,26 @@ def _moving_parameters(
     return [i for i, (_, name, _) in enumerate(nominal) if trial_index == 0 or name in moving]
 
 
-def _effect_state_step(
-    rates: Function, state_count: int, effect_state_count: int, parameter_count: int, cable_count: int, value_count: int
-) -> Function:
+def _sensitivity_pattern(rates: SX, states: SX, parameters: SX) -> Sparsity:
+    """Where sensitivities of states that begin at zero can ever differ from it.
+
+    Those of one cable's states to another cable's parameters never do, nor those to what no rate contains.
+    """
+    by_state = casadi.DM(casadi.jacobian_sparsity(rates, states), 1.0)
+    pattern = casadi.jacobian_sparsity(rates, parameters)
+    while True:
+        reached = pattern + casadi.mtimes(by_state, casadi.DM(pattern, 1.0)).sparsity()
+        if reached == pattern:
+            return pattern
+        pattern = reached
+
+
+def _effect_state_step(rates: Function, cable_count: int) -> Function:
     """One sample's step of the effect's states and their sensitivities, straight between two states of the run."""
-    z, sensitivities = SX.sym("z", effect_state_count), SX.sym("slopes", effect_state_count, parameter_count)
-    begin, end = SX.sym("begin", state_count), SX.sym("end", state_count)
-    speed, later = SX.sym("speed", cable_count), SX.sym("later", cable_count)
-    step, theta = SX.sym("step"), SX.sym("theta", value_count)
+    state_pattern, *effect_patterns, _, theta_pattern = (rates.sparsity_in(k) for k in range(rates.n_in()))
+    z, sensitivities = (SX.sym(name, pattern) for name, pattern in zip(("z", "slopes"), effect_patterns, strict=True))
+    begin, end, theta = SX.sym("begin", state_pattern), SX.sym("end", state_pattern), SX.sym("theta", theta_pattern)
+    speed, later, step = SX.sym("speed", cable_count), SX.sym("later", cable_count), SX.sym("step")
 
     def rates_at(fraction: float, effect_states: SX, effect_sensitivities: SX) -> list[SX]:
         state = begin + fraction * (end - begin)
