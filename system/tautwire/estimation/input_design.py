@@ -11,6 +11,7 @@ Storn and Price (1997), J. Global Optimization 11, 341-359.
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
+from concurrent.futures import Executor, ThreadPoolExecutor
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import ceil, log2, log10
@@ -36,6 +37,7 @@ from .measurement_noise import estimate_noise
 from .multisine import MultisinePath
 from .parameter_fit import Fitter
 from .score_test import effect_sensitivities, statistics_of_runs
+from .worker_pool import processors
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -119,9 +121,9 @@ def design_excitation(
     Raises ExcitationError where none is within the limits.
     """
     # On matrices as small as these, threads wait for each other longer than one of them computes.
-    with threadpool_limits(1):
+    with threadpool_limits(1), ThreadPoolExecutor(processors()) as threads:
         progress("compiling the filter", 0.0)
-        design = _design_problem(robot, tuple(effects), options)
+        design = _design_problem(robot, tuple(effects), options, threads)
         best, scores = _search(design, progress)
         if max(scores) <= INFEASIBLE_SCORE:
             raise ExcitationError(len(scores))
@@ -159,6 +161,7 @@ class _DesignProblem:
     likelihood: Likelihood
     sensitivities: tuple[EffectSensitivities, ...]
     fitter_for: Callable[[Noise], Fitter]
+    threads: Executor
 
     def score(self, decision_variables: Array) -> float:
         """Log10 of the smallest separation in nats."""
@@ -215,7 +218,7 @@ class _DesignProblem:
         every_row = np.ones(len(recording.time), dtype=bool)
         likelihood, values = fitter.likelihood(self.robot, (), DataSet(recording, self.robot.platform.start, every_row))
         runs = linearise_filter(likelihood, values, recording)
-        signatures = statistics_of_runs(runs, self.sensitivities, every_row)
+        signatures = statistics_of_runs(runs, self.sensitivities, every_row, threads=self.threads)
         start_directions = {one: start_steps(signatures, self.robot, one) for one in self.effects}
         # An effect that this motion would not show at all (slack, where no rope hangs) does not rank programs.
         visible_effects = [
@@ -236,13 +239,15 @@ class _DesignProblem:
         return sorted(separations, key=lambda pair: pair.nats)
 
 
-def _design_problem(robot: Robot, effects: tuple[Hypothesis, ...], options: DesignOptions) -> _DesignProblem:
+def _design_problem(
+    robot: Robot, effects: tuple[Hypothesis, ...], options: DesignOptions, threads: Executor
+) -> _DesignProblem:
     declared = robot.sensors
     noise = Noise(declared.position_noise or 0.0, declared.tension_noise or 0.0, declared.winch_speed_noise or 0.0, 0.0)
     likelihood = Likelihood(robot, (), noise, options.interval)
     sensitivities = effect_sensitivities(robot, robot.platform.start, effects, likelihood.model.state_names)
     # Declared noise is the same for all programs: they share what one fitter has compiled.
-    return _DesignProblem(robot, effects, options, likelihood, sensitivities, lru_cache(maxsize=1)(Fitter))
+    return _DesignProblem(robot, effects, options, likelihood, sensitivities, lru_cache(maxsize=1)(Fitter), threads)
 
 
 class _InfeasibleError(Exception):
