@@ -53,7 +53,7 @@ def recursion(keeps_covariances: bool) -> tuple[Moments, Record]:
     moments = Moments(START.copy(), START_COVARIANCE.copy(), np.zeros((PARAMETERS, SIZE)))
     record = Record(
         np.empty((COUNT + 1, SIZE)),
-        np.empty((COUNT * keeps_covariances, SIZE, SIZE)),
+        *np.zeros((2, COUNT * keeps_covariances, SIZE, SIZE)),
         *np.empty((2, COUNT, OUTPUTS)),
         np.empty((COUNT, PARAMETERS, OUTPUTS)),
     )
@@ -69,6 +69,7 @@ def test_states_covariances_and_likelihood_are_those_of_the_joint_update() -> No
     for k in range(COUNT):
         assert record.states[k] == pytest.approx(expected_state, rel=1e-10, abs=1e-12)
         assert record.covariances[k] == pytest.approx(expected_covariance, rel=1e-10, abs=1e-12)
+        assert np.array_equal(record.transitions[k], FULL_TRANSITION)
         seen = OBSERVED[k] > 0.0
         rows, noise = BY_STATE[seen], np.diag(WHITE_VARIANCES[seen])
         variance = rows @ expected_covariance @ rows.T + noise

@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from tautwire.estimation.compiled_filter import FilterInputs, FilterState
+from tautwire.estimation.compiled_filter import FilterInputs, FilterResults, FilterState
 from tautwire.estimation.likelihood import Likelihood
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.robot.schema import EffectSetting
@@ -124,18 +124,18 @@ def test_the_transition_of_a_sample_is_the_derivative_of_the_next_state(effect: 
     state, speeds = likelihood.start([])[0][:, None], np.full((8, 1), 0.02)
     unseen, moment = np.zeros((11, 1)), (speeds, 1.1 * speeds, np.full((1, 1), 0.01))
 
-    def moved(begun: np.ndarray) -> np.ndarray:
+    def run(begun: np.ndarray) -> FilterResults:
         size = len(begun)
         columns = (unseen, unseen, unseen, *moment, np.zeros((1, 1)))
         inputs = FilterInputs(columns, np.zeros((0, 1)), np.zeros((0, 1)), np.ones(11), 0.0)
         before = FilterState(begun.ravel(), np.eye(size), np.zeros((size, 0)))
-        return likelihood._filter_functions.run(before, inputs, keeps_covariances=False).end.state
+        return likelihood._filter_functions.run(before, inputs, keeps_covariances=True)
 
-    transition, _ = likelihood.jacobians(1, state, np.zeros((0, 1)), *moment, np.zeros((0, 1)))
+    transition = run(state).transitions[0]
     for place, width in ((0, 1e-7), (4, 1e-5), (6, 1e-7), (len(state) - 1, 1e-7)):
         step = np.zeros_like(state)
         step[place] = width
-        difference = (moved(state + step) - moved(state - step)) / (2.0 * width)
+        difference = (run(state + step).end.state - run(state - step).end.state) / (2.0 * width)
         assert np.max(np.abs(difference - transition[:, place])) < within * np.max(np.abs(difference))
 
 

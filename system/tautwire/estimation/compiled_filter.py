@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from ..robot.symbolic_model import SymbolicModel, constants_as_parameters
 from .covariance_recursion import Moments, Record, Samples, Step, run_recursion
 from .integration_steps import Substeps
-from .kalman_filter import Noise, filter_jacobians, output_function, simulation_function, time_update_function
+from .kalman_filter import Noise, output_function, rate_jacobian_function, simulation_function, time_update_function
 from .native_functions import BoundFunction, CompiledFunction
 
 Array = NDArray[np.float64]
@@ -50,13 +50,15 @@ class FilterState:
 
 @dataclass(frozen=True)
 class FilterResults:
-    """Predicted ``states`` (n, K + 1) and ``covariances`` (K, n, n), none unless they are kept; whitened innovations.
+    """Predicted ``states`` (n, K + 1) and whitened innovations.
 
+    ``covariances`` of the former and ``transitions`` to the next sample (K, n, n), none unless they are kept;
     ``values`` and ``log_variances`` (K, m), ``sensitivities`` (K, m, p); ``end`` is the state after the last sample.
     """
 
     states: Array
     covariances: Array
+    transitions: Array
     values: Array
     log_variances: Array
     sensitivities: Array
@@ -103,10 +105,9 @@ class CompiledFilter:
         return CompiledFunction(simulation_function(self.model, self._cable_count, self._substeps), carried=1)
 
     @cached_property
-    def jacobians(self) -> CompiledFunction:
-        """See :func:`tautwire.estimation.kalman_filter.filter_jacobians`."""
-        function = filter_jacobians(self.model, self._cable_count, self._noise, self._substeps, self._constant_count)
-        return CompiledFunction(function)
+    def rate_jacobian(self) -> CompiledFunction:
+        """See :func:`tautwire.estimation.kalman_filter.rate_jacobian_function`."""
+        return CompiledFunction(rate_jacobian_function(self.model, self._cable_count))
 
     @cached_property
     def given_constants(self) -> CompiledFilter:
@@ -126,9 +127,11 @@ class CompiledFilter:
             count, state[:, None], theta, speed, later, step, drift, density, inputs.disturbance
         )
         size, parameter_count = start.sensitivities.shape
+        kept_count = count if keeps_covariances else 0
         record = Record(
             np.empty((count + 1, size)),
-            np.empty((count if keeps_covariances else 0, size, size)),
+            np.empty((kept_count, size, size)),
+            np.zeros((kept_count, size, size)),
             np.empty((count, output_count)),
             np.empty((count, output_count)),
             np.empty((count, parameter_count, output_count)),
@@ -139,6 +142,7 @@ class CompiledFilter:
         return FilterResults(
             record.states.T,
             record.covariances,
+            record.transitions,
             record.values,
             record.log_variances,
             record.sensitivities.swapaxes(1, 2),

@@ -85,12 +85,14 @@ class Samples(NamedTuple):
 class Record(NamedTuple):
     """Predicted states and innovations that a run fills in.
 
-    ``states`` (K + 1, n), ``covariances`` (K, n, n) unless it is empty, ``values`` and ``log_variances`` (K, m) of the
-    innovations, and ``sensitivities`` (K, p, m) of these.
+    ``states`` (K + 1, n); unless they are empty, ``covariances`` and ``transitions`` to the next sample (K, n, n), the
+    latter zero before; ``values`` and ``log_variances`` (K, m) of the innovations, and ``sensitivities`` (K, p, m) of
+    these.
     """
 
     states: Any
     covariances: Any
+    transitions: Any
     values: Any
     log_variances: Any
     sensitivities: Any
@@ -112,6 +114,8 @@ def run_recursion(outputs: Step, update: Step, moments: Moments, samples: Sample
         _evaluate(outputs, k, output_places)
         _update_by_measurements(outputs.results, moments, samples, record, k)
         _evaluate(update, k, update_places)
+        if len(record.transitions):
+            _record_transition(update.results, record.transitions[k])
         _update_covariance_over_step(update.results, moments.covariance)
         _update_sensitivities_over_step(update.results, moments.sensitivities)
         moments.state[:] = update.results[0][0]
@@ -180,6 +184,15 @@ def _innovation_sensitivities(sensitivities: Any, results: tuple[Any, ...], i: i
             total += by_state[j, i] * sensitivities[a, j]
         slopes[a] = -total
     return slopes
+
+
+@_compiled
+def _record_transition(results: tuple[Any, ...], transition: Any) -> None:
+    by_state, decay = results[1], results[3][0]
+    from_count, moving_count = by_state.shape
+    transition[:moving_count, :from_count] = by_state.T
+    for r in range(moving_count, len(transition)):
+        transition[r, r] = decay[r]
 
 
 @_compiled

@@ -117,16 +117,15 @@ def linearise_filter(
         whitening = np.where(is_observed, np.linalg.inv(cholesky_factor), 0.0)
         gain = cross_covariance @ np.linalg.inv(covariance)
         corrections = np.einsum("kij,kjl,kl->ki", gain, cholesky_factor, innovations)
-        updated = predicted + corrections.T
-        jacobians = likelihood.jacobians(count, updated, theta, speed, later, step, likelihood.disturbance_arguments)
-        transition, half_transition = (by_sample(matrix, count) for matrix in jacobians)
+        updated = (predicted + corrections.T)[:size]
+        rate_jacobian = by_sample(likelihood.rate_jacobian(count, updated, theta, speed)[0], count)
         yield LinearisedSegment(
             segment.states[:size],
             np.hstack([speed, later[:, -1:]]),
             step[0],
             shift,
-            transition,
-            half_transition,
+            segment.transitions,
+            _half_transition(segment.transitions[:, :size, :size], rate_jacobian, step[0]),
             output_matrix,
             gain,
             whitening,
@@ -135,6 +134,13 @@ def linearise_filter(
             innovations,
             np.where(is_observed, segment.sensitivities, 0.0),
         )
+
+
+def _half_transition(transition: Array, rate_jacobian: Array, step: Array) -> Array:
+    """Transition from the middle of each step (K, n, n), from the cubic through both of its ends."""
+    identity = np.eye(transition.shape[1])
+    bend: Array = step[:, None, None] / 8.0 * (identity - transition) @ rate_jacobian
+    return 0.5 * (transition + identity) + bend
 
 
 # Integration steps of an effect's states in a sample; they can be stiffer than the robot.

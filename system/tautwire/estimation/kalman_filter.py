@@ -129,29 +129,15 @@ def _time_update_beside(
     return disturbance.appended_to(results, state, interval.step)
 
 
-def filter_jacobians(
-    model: SymbolicModel, cable_count: int, noise: Noise, substeps: Substeps, constant_count: int = 0
-) -> Function:
-    """Jacobians of a filter step by the updated state.
+def rate_jacobian_function(model: SymbolicModel, cable_count: int) -> Function:
+    """Jacobian of the rates of a model's states by these (n, n).
 
-    Arguments: state after the measurement update, parameters, speed, next speed, time step, disturbance, as for
-    :func:`time_update_function`. Results: derivatives of the state at the next sample (n, n), and of the model's states
-    in it by those half a step before it, from the cubic through both ends.
+    Arguments: state, parameters, speed.
     """
-    disturbance = DisturbanceSymbols(len(noise.rope_lengths), 3 + cable_count if noise.disturbance else 0)
-    model_size = model.states.numel()
-    updated = SX.sym("after", model_size + disturbance.count)
-    speed, later, step = SX.sym("speed", cable_count), SX.sym("later", cable_count), SX.sym("step")
-    interval = _Interval(speed, later, step, substeps)
-    _, transition, _ = _time_update_beside(disturbance, model, constant_count, updated, interval)
-    rate_jacobian = Function(
-        "bending", [model.states, model.inputs, model.parameters], [casadi.jacobian(model.rates, model.states)]
-    )
-    jacobian_at_update = rate_jacobian(updated[:model_size], casadi.vertcat(speed, SX(3, 1)), model.parameters)
-    identity, of_model = SX.eye(model_size), transition[:model_size, :model_size]
-    half_transition = 0.5 * (of_model + identity) + step / 8.0 * casadi.mtimes(identity - of_model, jacobian_at_update)
-    arguments = [updated, model.parameters, speed, later, step, disturbance.arguments]
-    return Function("filter_slopes", arguments, [casadi.densify(f) for f in (transition, half_transition)])
+    speed = SX.sym("speed", cable_count)
+    by_state = casadi.jacobian(model.rates, model.states)
+    (by_state,) = casadi.substitute([by_state], [model.inputs], [casadi.vertcat(speed, SX.zeros(3))])
+    return Function("rate_jacobian", [model.states, model.parameters, speed], [by_state])
 
 
 def simulation_function(model: SymbolicModel, cable_count: int, substeps: Substeps) -> Function:

@@ -71,14 +71,16 @@ class FilterSegment:
 
     ``columns`` are those of :class:`tautwire.estimation.compiled_filter.FilterInputs`;
     ``is_recorded`` tells which samples are the recording's, the others fill gaps. ``states`` (n, K + 1) and
-    ``covariances`` (K, n, n), none unless they are kept, are those predicted, with a disturbance's behind the model's;
-    ``values``, ``log_variances`` (K, m) and ``sensitivities`` (K, m, p) as in Innovations.
+    ``covariances`` (K, n, n) are those predicted, with a disturbance's behind the model's, and ``transitions``
+    (K, n, n) lead from the updated states to the next; of the latter two none unless they are kept. ``values``,
+    ``log_variances`` (K, m) and ``sensitivities`` (K, m, p) as in Innovations.
     """
 
     columns: tuple[Array, ...]
     is_recorded: NDArray[np.bool_]
     states: Array
     covariances: Array
+    transitions: Array
     values: Array
     log_variances: Array
     sensitivities: Array
@@ -148,9 +150,9 @@ class Likelihood:
         return self._filter_functions.outputs
 
     @property
-    def jacobians(self) -> CompiledFunction:
-        """See :func:`tautwire.estimation.kalman_filter.filter_jacobians`."""
-        return self._filter_functions.jacobians
+    def rate_jacobian(self) -> CompiledFunction:
+        """See :func:`tautwire.estimation.kalman_filter.rate_jacobian_function`."""
+        return self._filter_functions.rate_jacobian
 
     def start(self, parameters: Sequence[float] | Array) -> tuple[Array, Array]:
         """Initial state (n,) and covariance (n, n) of the filter, disturbance included."""
@@ -251,6 +253,7 @@ class Likelihood:
                 is_recorded[begin : begin + CHUNK_SAMPLES],
                 results.states,
                 results.covariances,
+                results.transitions,
                 results.values,
                 results.log_variances,
                 results.sensitivities,
