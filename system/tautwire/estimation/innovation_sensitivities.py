@@ -84,12 +84,12 @@ class LinearisedSegment:
         """
         output_changes = np.empty_like(output_forcing)
         # Nothing acts on the states of a disturbance.
-        unforced = self.transition.shape[1] - state_forcing.shape[1]
-        state_forcing = np.pad(state_forcing, ((0, 0), (0, unforced), (0, 0)))
+        forced = state_forcing.shape[1]
         sensitivities = np.pad(state_sensitivities, ((0, self.transition.shape[1] - len(state_sensitivities)), (0, 0)))
         for k in range(len(output_forcing)):
             output_changes[k] = self.output_matrix[k] @ sensitivities + output_forcing[k]
-            sensitivities = self.transition[k] @ (sensitivities - self.gain[k] @ output_changes[k]) + state_forcing[k]
+            sensitivities = self.transition[k] @ (sensitivities - self.gain[k] @ output_changes[k])
+            sensitivities[:forced] += state_forcing[k]
         return sensitivities, -(self.whitening @ output_changes)
 
 
