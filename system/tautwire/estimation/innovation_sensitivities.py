@@ -260,21 +260,25 @@ class EffectSensitivities:
 
     def forcing_terms(self, run: LinearisedSegment) -> tuple[Array, Array]:
         """Forcing terms of the sensitivities along the next segment of the run: B (K, n, p) and D (K, m, p)."""
-        per_trial = [self._derivatives_at_grid_point(run, number) for number in range(len(self._grid_points))]
+        inputs = np.pad(run.speeds, ((0, self._input_count - len(run.speeds)), (0, 0)))
+        instant = [_with_last_column_repeated(column) for column in (run.speeds[:, 1:], run.step[None, :], run.shift)]
+        per_trial = [
+            self._derivatives_at_grid_point(run, inputs, instant, number) for number in range(len(self._grid_points))
+        ]
         rate_sensitivities, output_sensitivities = (
             np.concatenate(parts, axis=2) for parts in zip(*per_trial, strict=True)
         )
         return run.integrated_forcing(rate_sensitivities), output_sensitivities[:-1]
 
-    def _derivatives_at_grid_point(self, run: LinearisedSegment, trial: int) -> tuple[Array, Array]:
+    def _derivatives_at_grid_point(
+        self, run: LinearisedSegment, inputs: Array, instant: Sequence[Array], trial: int
+    ) -> tuple[Array, Array]:
         """Sensitivities of rates (K + 1, n, p) and outputs (K + 1, m, p) along the predicted states.
 
         The noise of what they predict has not touched those.
         """
         theta, count = self._parameter_values(trial)[:, None], run.states.shape[1]
-        inputs = np.vstack([run.speeds, np.zeros((self._input_count - len(run.speeds), count))])
         effect_states, sensitivities = self._propagate_effect_states(run, theta, trial)
-        instant = [_with_last_column_repeated(column) for column in (run.speeds[:, 1:], run.step[None, :], run.shift)]
         derivatives = self._forcing_function(count, run.states, effect_states, sensitivities, inputs, theta, *instant)
         by_rates, by_outputs = (by_sample(part, count)[:, :, self._moving_indices[trial]] for part in derivatives)
         return by_rates, by_outputs
