@@ -15,9 +15,11 @@ from tautwire.errors import RecordingError, UnreachableError
 from tautwire.recordings.consistency import (
     MAX_REELING_MISMATCH,
     MIN_CHECKED_START_SHARE,
+    recording_mistakes,
     reeling_mismatch,
     require_matching_reeling,
     robot_size,
+    travel_error,
 )
 from tautwire.recordings.recording import Recording, read_recording
 from tautwire.recordings.start_position import start_position
@@ -106,6 +108,27 @@ def test_a_recording_without_positions_or_motion_is_no_other_robots() -> None:
     start = np.array(THREE.platform.start)
     require_matching_reeling(far, at_rest, start, "here")
     require_matching_reeling(far, unseen, start, "here")
+
+
+def test_counts_that_pass_for_metres_are_told_without_positions() -> None:
+    recording = of("three")
+    blind = replace(recording, position=np.full_like(recording.position, np.nan))
+    assert travel_error(THREE, blind) is None
+    counts = 1e4 * blind.wound_lengths()
+    moving = replace(blind, winch_speed=1e4 * blind.winch_speed, rope_length=-counts)
+    (error,) = recording_mistakes(THREE, moving)
+    winch, travel = int(np.argmax(np.max(np.abs(counts), axis=0))) + 1, float(np.max(np.abs(counts)))
+    assert error.problem == (
+        f"winch {winch} moves {travel:,.4g} m of rope, and the robot is no larger than {robot_size(THREE):.3g} m"
+    )
+    assert f"give rope_length_{winch} in m: for counts add factor = 2 pi * drum radius" in error.hint
+
+
+def test_time_in_milliseconds_is_told_without_positions() -> None:
+    recording = of("three")
+    late = replace(recording, position=np.full_like(recording.position, np.nan), time=1e3 * recording.time)
+    (error,) = recording_mistakes(THREE, late)
+    assert "check that time is in s" in error.hint
 
 
 @pytest.mark.parametrize("command", ["trace", "simulate", "check"])

@@ -88,6 +88,14 @@ def test_a_log_with_positions_is_refused(tmp_path: Path) -> None:
         with_tracker(replace(ROBOT, tracker=Tracker(COLUMNS)), recording, path)
 
 
+def test_a_log_of_counts_is_refused_before_its_tracker_is(tmp_path: Path) -> None:
+    log, _, path = split_files(tmp_path)
+    counts = replace(log, winch_speed=1e4 * log.winch_speed, rope_length=-1e4 * log.wound_lengths())
+    with pytest.raises(RecordingError, match=r"moves .* m of rope, and the robot is no larger than") as error:
+        with_tracker(replace(ROBOT, tracker=Tracker(COLUMNS)), counts, path)
+    assert "for counts add factor = 2 pi * drum radius / counts per turn" in error.value.hint
+
+
 def test_a_file_without_positions_is_refused(tmp_path: Path) -> None:
     _, log, _ = split_files(tmp_path)
     path = tmp_path / "other.csv"

@@ -18,6 +18,8 @@ Array = NDArray[np.float64]
 
 # Shares of the robot's size: a nearer start, or a shorter winch travel, is not checked.
 MIN_CHECKED_START_SHARE, MIN_REELED_SHARE = 0.1, 1e-3
+# In sizes of the robot: no winch moves more rope, counted from where it begins.
+MAX_TRAVEL_TO_SIZE = 3.0
 # Share of the winch travel: stretch, wrong drums and drift stay far below, another robot mismatches by all of it.
 MAX_REELING_MISMATCH = 0.5
 CHECKED_DURATION = 60.0  # s
@@ -46,20 +48,40 @@ def require_plausible(robot: Robot, recording: Recording) -> None:
 def recording_mistakes(robot: Robot, recording: Recording) -> tuple[RecordingError, ...]:
     """What the winch travel, the positions and the tensions say of mistakes in the recording or the robot file.
 
-    Empty where they say nothing, and for a robot that declares effects which are no part of either balance.
+    Empty where they say nothing. For a robot that declares effects which are no part of either balance only travel
+    beyond its size counts.
     """
+    travel = travel_error(robot, recording)
     if robot.formulas or any(setting.name in EFFECTS_IN_BALANCES for setting in robot.effects):
-        return ()
+        return (travel,) if travel else ()
     motion = check_motion(robot, recording)
     errors = []
     geometry, winding = GeometryReading(), WindingReading()
     if motion is not None and motion.readings:
         errors.append(_motion_error(recording.path, motion))
         geometry, winding = motion.readings[0].geometry, motion.readings[0].winding
+    elif travel is not None:
+        return (travel,)
     tensions = check_tensions(robot, recording, geometry, winding)
     if tensions is not None and tensions.mistakes:
         errors.append(_tension_error(recording.path, tensions))
     return tuple(errors)
+
+
+def travel_error(robot: Robot, recording: Recording) -> RecordingError | None:
+    """The error of a recording in which a winch moves more rope than fits into the robot, None where none does."""
+    travel, size = np.max(np.abs(recording.wound_lengths()), axis=0), robot_size(robot)
+    cable = int(np.argmax(travel)) + 1
+    if travel[cable - 1] <= MAX_TRAVEL_TO_SIZE * size:
+        return None
+    problem = f"winch {cable} moves {travel[cable - 1]:,.4g} m of rope, and the robot is no larger than {size:.3g} m"
+    hint = "check that time is in s and winch speeds are in m/s; [recording.columns] declares other units and factors"
+    if cable in recording.rope_lengths:
+        hint = (
+            f"give rope_length_{cable} in m: for counts add factor = 2 pi * drum radius / counts per turn to it in "
+            "[recording.columns]"
+        )
+    return RecordingError(recording.path, problem, hint)
 
 
 def _motion_error(path: str, motion: MotionCheck) -> RecordingError:

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError
 from ..robot.schema import Robot
+from .consistency import travel_error
 from .recording import Recording, read_tracker
 from .tracker_clock import TrackerClock, estimate_tracker_clock
 
@@ -27,8 +28,12 @@ def with_tracker(robot: Robot, log: Recording, path: str | Path) -> Recording:
     The robot's ``tracker`` says what the file's columns are, and may state its clock; otherwise that is estimated from
     the winch travel. ``read_as`` tells the clock.
 
-    Raises RecordingError where the log has positions, the file is not valid, or its clock cannot be found.
+    Raises RecordingError where the log has positions or moves more rope than fits into the robot, the file is not
+    valid, or its clock cannot be found.
     """
+    travel = travel_error(robot, log)
+    if travel is not None:
+        raise travel
     if log.has_position:
         hint = "declare other columns as x, y, z, rename them, or leave the tracker's file out"
         raise RecordingError(log.path, f"has positions of its own beside those of {path}", hint)

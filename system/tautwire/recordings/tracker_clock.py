@@ -77,7 +77,10 @@ def estimate_tracker_clock(robot: Robot, log: Recording, tracker: Recording) -> 
     fitting = sorted((each for each in alignments if each and each.misfit <= MAX_MISFIT), key=lambda each: each.misfit)
     if not fitting:
         problem = "its positions match the winch travel at no offset of its clock"
-        hint = f"check units, axes and origin, and that it is the tracker of this motion, {STATE_OFFSET_HINT}"
+        hint = (
+            "check units, factors and signs of the winches in [recording.columns], units, axes and origin of the "
+            f"tracker, and that it is that of this motion, {STATE_OFFSET_HINT}"
+        )
         raise RecordingError(tracker.path, problem, hint)
     best = fitting[0]
     _require_unique(tracker.path, best, fitting[1:])
