@@ -23,6 +23,7 @@ from tests.support.trackers import split
 
 FIT = EXAMPLES / "three" / "fit.csv"
 ROBOT = str(EXAMPLES / "three" / "robot.toml")
+PER_COUNT = "metres per count (2 pi * drum radius / counts per turn)"
 
 
 def standard() -> pd.DataFrame:
@@ -135,11 +136,11 @@ def test_other_quantities_are_not_used(name: str, tmp_path: Path) -> None:
         ("Drive2 [m/min]", "winch_speed_2", "m/min", "positive has to reel in"),
         ("motor_1_velocity", "winch_speed_1", "", "no unit in the name: the file's, or SI; positive has"),
         ("foo y", "y", "", "quantity not named"),
-        ("Encoder1 [counts]", "rope_length_1", "", "add factor = metres per count; has to fall"),
+        ("Encoder1 [counts]", "rope_length_1", "", f"add factor = {PER_COUNT}; has to fall"),
         ("Trommel2 Winkel [deg]", "rope_length_2", "", "add factor = radius * pi / 180; has to fall"),
         ("Drum2 angle [rad]", "rope_length_2", "", "add factor = the drum's radius; has to fall"),
-        ("enc_1", "rope_length_1", "", "add factor = metres per count, or the drum's radius for rad; has to fall"),
-        ("Geber 3", "rope_length_3", "", "add factor = metres per count, or the drum's radius for rad; has to fall"),
+        ("enc_1", "rope_length_1", "", f"add factor = {PER_COUNT}, or the drum's radius for rad; has to fall"),
+        ("Geber 3", "rope_length_3", "", f"add factor = {PER_COUNT}, or the drum's radius for rad; has to fall"),
         ("motor1 speed rpm", "winch_speed_1", "", "add factor = radius * pi / 30; positive"),
         ("Drehzahl 2 [1/min]", "winch_speed_2", "", "add factor = radius * pi / 30; positive"),
         ("Motor3 [rad/s]", "winch_speed_3", "", "add factor = the drum's radius; positive"),

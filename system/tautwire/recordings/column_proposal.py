@@ -36,7 +36,8 @@ OTHER_WORDS = """
     quat quaternion rot rotation orientation euler roll pitch yaw cycle period duration delay latency jitter
 """
 # Factors of the units that are no units of length or speed, which only the laboratory's numbers convert.
-_COUNTS = dict.fromkeys(("counts", "count", "cnt", "inc", "ticks", "pulses"), "metres per count")
+_PER_COUNT = "metres per count (2 pi * drum radius / counts per turn)"
+_COUNTS = dict.fromkeys(("counts", "count", "cnt", "inc", "ticks", "pulses"), _PER_COUNT)
 _FACTORS = {
     "rope_length": _COUNTS
     | {"rad": "the drum's radius"}
@@ -50,7 +51,7 @@ _FACTORS = {
 _FACTOR_WORDS = {
     "rope_length": (
         ("counts", "cnt", "enc", "encoder", "geber", "angle", "winkel"),
-        "metres per count, or the drum's radius for rad",
+        f"{_PER_COUNT}, or the drum's radius for rad",
     ),
     "tension": (("effort",), "1 / the drum's radius where it is a torque in N m"),
     "winch_speed": (("omega", "drehzahl"), "the drum's radius for rad/s, radius * pi / 30 for rpm"),

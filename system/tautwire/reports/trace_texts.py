@@ -178,7 +178,9 @@ def noise_sentence(trace: Trace) -> str:
         return "The residual of the extended model is white noise; that of the declared model is not."
     if before:
         return "The residual of the declared model is white noise; that of the final model is not."
-    return "The residual is more than white noise."
+    if trace.effects:
+        return "One-step predictions leave more than white noise, also those of the extended model."
+    return "One-step predictions leave more than white noise."
 
 
 def format_evidence(evidence: float) -> str:
