@@ -78,6 +78,19 @@ def test_beside_a_disturbance_a_further_effect_needs_a_share_of_the_first_ones_e
     assert [hypothesis.effect.name for hypothesis in select_effects(context).accepted] == names
 
 
+@pytest.mark.parametrize("has_disturbance", [False, True])
+def test_beside_a_disturbance_an_effect_needs_evidence_by_the_number_of_samples(has_disturbance: bool) -> None:
+    context = context_with(has_disturbance)
+    validation = context.split.validation
+
+    def threshold(count: int) -> float:
+        samples = replace(validation, rows=np.ones(count, dtype=bool))
+        return replace(context, split=replace(context.split, validation=samples)).evidence_threshold()
+
+    assert threshold(100) < 15.0
+    assert threshold(4000) == pytest.approx(40.0 if has_disturbance else threshold(100))
+
+
 @pytest.mark.parametrize(("has_disturbance", "names"), [(False, ["slack", "sag"]), (True, ["sag"])])
 def test_beside_a_disturbance_what_came_first_needs_as_much_evidence_beside_what_came_later(
     has_disturbance: bool, names: list[str], monkeypatch: pytest.MonkeyPatch

@@ -50,5 +50,11 @@ class IdentificationContext:
         return self.split.estimation.head(self.policy.fit)
 
     def evidence_threshold(self, others: int = 0) -> float:
-        """Log-likelihood ratio, ``ln(n / alpha)``, above which one of n hypotheses, and ``others``, is significant."""
-        return log((len(hypotheses(self.robot)) + others) / self.alpha)
+        """Log-likelihood ratio, ``ln(n / alpha)``, above which one of n hypotheses, and ``others``, is significant.
+
+        Beside a disturbance it also has to be more than the disturbance's own form may lack on validation data.
+        """
+        by_chance = log((len(hypotheses(self.robot)) + others) / self.alpha)
+        if not self.fitter.has_disturbance:
+            return by_chance
+        return max(by_chance, self.policy.selection.min_evidence_rate * float(self.split.validation.rows.sum()))
