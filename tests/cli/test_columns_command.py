@@ -76,6 +76,31 @@ def test_a_proposal_reads_the_recording_as_it_stands(name: str, tmp_path: Path) 
     assert "# not used: 'Setpoint 1'" in table.read_text(encoding="utf-8")
 
 
+@pytest.mark.parametrize("mark", ["", "# "])
+def test_a_line_of_units_tells_as_names_do(mark: str, tmp_path: Path) -> None:
+    frame = standard()
+    names = renamed("Drive {}", "Kraft {}", "{}", "Zeit")
+    log = pd.DataFrame({names[c]: frame[c] * (1e3 if c in "xyz" else 1.0) for c in frame})
+    head, _, rows = log.to_csv(index=False, sep=";").partition("\n")
+    units = ["s", *["m/s"] * 3, *["N"] * 3, *["mm"] * 3]
+    (tmp_path / "log.csv").write_text(f"{head}\n{mark}{';'.join(units)}\n{rows}", encoding="utf-8")
+    table = tmp_path / "columns.toml"
+    assert run(["columns", str(tmp_path / "log.csv"), ROBOT, "--out", str(table)]) == 0
+    text = table.read_text(encoding="utf-8")
+    assert 'x = { name = "X", unit = "mm" }\n' in text and "no unit" not in text
+    assert 'winch_speed_2 = { name = "Drive 2", unit = "m/s" }  # positive has to reel in' in text
+    read = read_recording(tmp_path / "log.csv", 3, table).frame()
+    np.testing.assert_allclose(read["z"], frame["z"], rtol=1e-12)
+
+
+def test_a_line_of_units_tells_which_columns_need_a_factor(tmp_path: Path) -> None:
+    text = "Zeit;Motor 1;Motor 2;X\ns;counts;rpm;mm\n1;2;3;4\n"
+    (tmp_path / "log.csv").write_text(text, encoding="utf-8")
+    proposal = {each.column: each for each in propose_columns(column_names(tmp_path / "log.csv"), 3).columns}
+    assert proposal["rope_length_1"].doubt == f"add factor = {PER_COUNT}; has to fall as it reels in"
+    assert proposal["winch_speed_2"].doubt.startswith("add factor = radius * pi / 30")
+
+
 def test_what_is_ambiguous_or_missing_is_a_comment(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log = tmp_path / "log.csv"
     log.write_text("t,Time,Drive1.Velocity,Enc2 cnt,blob\n0,0,1,2,3\n1,1,1,2,3\n", encoding="utf-8")

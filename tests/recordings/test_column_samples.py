@@ -29,14 +29,15 @@ def test_samples_of_a_csv_file_are_numbers_by_name(text: str, tmp_path: Path) ->
     expected = {"a": [1.5, 2.5], "b": [np.nan, np.nan], "c": [3.0, np.nan]}
     for name, numbers in expected.items():
         np.testing.assert_array_equal(samples.values[name], numbers)
-    assert not samples.has_units
+    assert not samples.units
 
 
 @pytest.mark.parametrize("units", ["s;mm;N\n", "# s;mm;N\n"])
 def test_a_line_of_units_is_told(units: str, tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text(f"a;b;c\n{units}1;2;3\n", encoding="utf-8")
     samples = column_samples(tmp_path / "log.csv")
-    assert samples.has_units and samples.values["c"].tolist() == [3.0]
+    assert samples.units == {"a": "s", "b": "mm", "c": "N"}
+    assert samples.values["c"].tolist() == [3.0]
 
 
 def test_a_csv_file_that_is_not_valid_has_no_samples(tmp_path: Path) -> None:

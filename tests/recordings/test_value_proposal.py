@@ -37,11 +37,11 @@ def recorded() -> dict[str, Array]:
 
 
 def proposed(
-    values: dict[str, Array], robot: Robot | None = None, cables: int = 3, has_units: bool = False
+    values: dict[str, Array], robot: Robot | None = None, cables: int = 3, units: dict[str, str] | None = None
 ) -> tuple[dict[str, dict[str, str]], dict[str, str]]:
     """The proposed columns, and the reasons for those that are not used."""
     names = [ColumnName(name, name if is_column_name(name) else None, name) for name in values]
-    proposal = with_values(propose_columns(names, cables), ColumnSamples(values, has_units), cables, robot)
+    proposal = with_values(propose_columns(names, cables), ColumnSamples(values, units or {}), cables, robot)
     return {each.column: asdict(each) for each in proposal.columns}, dict(proposal.unused)
 
 
@@ -144,5 +144,5 @@ def test_the_range_tells_metres_from_millimetres_without_a_robot(extent: float, 
 
 
 def test_units_in_the_file_stay(recorded: dict[str, Array], robot: Robot) -> None:
-    columns, _ = proposed(recorded_axes(recorded) | {"Col1": recorded["time"]}, robot, has_units=True)
+    columns, _ = proposed(recorded_axes(recorded) | {"Col1": recorded["time"]}, robot, units={"Col1": "s"})
     assert {each["unit"] for each in columns.values()} == {""}

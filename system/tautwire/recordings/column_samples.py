@@ -12,12 +12,10 @@ import pandas as pd  # type: ignore[import-untyped,unused-ignore]
 from numpy.typing import NDArray
 
 from .column_names import CsvLayout, csv_layout
-from .csv_lines import split_cells, without_comment_mark
 from .mat_file import is_mat, mat_samples
 from .parquet_file import is_parquet, parquet_samples
 from .recording_table import MISSING_CELLS
 from .ros_bag import is_bag
-from .units import is_any_unit
 
 Array = NDArray[np.float64]
 
@@ -29,11 +27,11 @@ MAX_CSV_ROWS = 200_000
 class ColumnSamples:
     """Samples of columns by name in the file's order, each (N,), NaN where a cell holds no number.
 
-    ``has_units`` where a line of the file states units, which are those of the numbers.
+    ``units`` by name are what a line of the file states.
     """
 
     values: Mapping[str, Array] = field(default_factory=dict)
-    has_units: bool = False
+    units: Mapping[str, str] = field(default_factory=dict)
 
 
 def column_samples(path: Path) -> ColumnSamples:
@@ -57,7 +55,7 @@ def _csv_samples(path: Path) -> ColumnSamples:
         return ColumnSamples()
     numbers = (pd.to_numeric(frame[index], errors="coerce") for index in frame)
     values = {name: column.to_numpy(dtype=float) for name, column in zip(layout.names, numbers, strict=True)}
-    return ColumnSamples(values, _has_units(layout))
+    return ColumnSamples(values, dict(zip(layout.names, layout.units, strict=False)))
 
 
 def _frame(layout: CsvLayout) -> pd.DataFrame:
@@ -80,10 +78,3 @@ def _frame(layout: CsvLayout) -> pd.DataFrame:
         on_bad_lines="skip",
         low_memory=False,
     )
-
-
-def _has_units(layout: CsvLayout) -> bool:
-    """Whether a line above the samples, other than that of the names, has known units as cells."""
-    head = (without_comment_mark(line) for line in layout.lines[: layout.data_index])
-    rows = (tuple(split_cells(line, layout.separator)) for line in head)
-    return any(any(map(is_any_unit, row)) for row in rows if len(row) == len(layout.names) and row != layout.names)

@@ -45,7 +45,7 @@ def with_values(
     values = samples.values
     unnamed = [name for name in values if proposal.unused.get(name) == NOTHING_SAID]
     told = {each.column.rpartition("_")[0] or each.column for each in proposal.columns}
-    known = proposal.columns if samples.has_units else _with_units(proposal.columns, values, robot)
+    known = proposal.columns if samples.units else _with_units(proposal.columns, values, robot)
     found = list(_found_columns(unnamed, values, told, cable_count, robot))
     used = {each.name for each in found}
     counts = [n for n in unnamed if n not in used and are_counts(values[n]) and _time_unit(values[n]) is None]
@@ -53,7 +53,7 @@ def with_values(
         found += _count_columns(counts, values, _positions([*known, *found], values, robot), robot)
     names, columns = ([getattr(each, key) for each in found] for key in ("name", "column"))
     found = [each for each in found if names.count(each.name) == columns.count(each.column) == 1]
-    found = [replace(each, unit="") for each in found] if samples.has_units else found
+    found = [replace(each, unit="") for each in found] if samples.units else found
     rescaled = {each.column for each in known if each.unit} & proposal.standard_names
     unused = {name: reason for name, reason in proposal.unused.items() if name not in {each.name for each in found}}
     return ColumnProposal(sorted_columns([*known, *found]), proposal.standard_names - rescaled, unused)
