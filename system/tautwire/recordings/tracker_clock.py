@@ -6,23 +6,23 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import correlate, correlation_lags
+from scipy.signal import correlation_lags
 
 from ..errors import RecordingError
 from ..robot.schema import Robot
 from .alternative_readings import GeometryReading
 from .recording import Recording
+from .travel_correlation import TRAVEL_WINDOW, correlated, lowest_valleys, travel_on_grid
 from .white_noise_estimate import white_noise_deviation
 
 Array = NDArray[np.float64]
 
 MIN_GRID_INTERVAL, MAX_GRID_POINTS = 0.02, 400_000  # s
-TRAVEL_WINDOW = 0.2  # s; travel over a shorter time drowns in a tracker's noise
 # Share of the motion of the log or of the tracker that both have to have recorded.
 MIN_MOTION_SHARE = 0.25
 MIN_MOTION_NOISE_RATIO = 20.0
 # Candidates whose coarse misfit is larger than the best by more are not refined.
-MAX_CANDIDATES, MAX_COARSE_DIFFERENCE = 8, 0.3
+MAX_COARSE_DIFFERENCE = 0.3
 MAX_ITERATIONS, TOLERANCE = 15, 1e-6  # s
 MIN_SAMPLES, MAX_SAMPLES = 20, 20_000
 # The rms of lengths less travel over that of lengths: beyond the first it is another motion or another unit.
@@ -133,13 +133,10 @@ def _candidate_offsets(log: Recording, times: Array, lengths: Array) -> list[flo
     span = (times[-1] - times[0]) + log.duration
     intervals = [float(np.median(np.diff(each))) for each in (times, log.time)]
     interval = max(MIN_GRID_INTERVAL, *intervals, span / MAX_GRID_POINTS)
-    reeled, is_reeled = _travel(log.time, log.wound_lengths(), interval)
-    shortened, is_shortened = _travel(times, lengths, interval)
+    reeled, is_reeled = travel_on_grid(log.time, log.wound_lengths(), interval)
+    shortened, is_shortened = travel_on_grid(times, lengths, interval)
     if not (is_reeled.any() and is_shortened.any()):
         return []
-
-    def correlated(first: Array, second: Array) -> Array:
-        return np.asarray(correlate(first, second, "full", "fft"))
 
     reeled_energy, shortened_energy = np.sum(reeled**2, axis=1), np.sum(shortened**2, axis=1)
     energy_of_log = correlated(is_shortened, reeled_energy)
@@ -150,40 +147,9 @@ def _candidate_offsets(log: Recording, times: Array, lengths: Array) -> list[flo
     is_shared = share >= MIN_MOTION_SHARE
     misfits = np.where(is_shared, 1.0 + 2.0 * product / np.where(is_shared, energy, 1.0), np.inf)
     lags = correlation_lags(len(shortened), len(reeled))
-    offsets = []
-    reach = round(TRAVEL_WINDOW / interval) + 1
     limit = float(misfits.min()) + MAX_COARSE_DIFFERENCE
-    for _ in range(MAX_CANDIDATES):
-        index = int(np.argmin(misfits))
-        if not misfits[index] <= limit < np.inf:
-            break
-        offsets.append(float(times[0] + lags[index] * interval))
-        # The whole valley around a minimum is one candidate.
-        misfits[_valley(misfits, index, reach)] = np.inf
-    return offsets
-
-
-def _valley(misfits: Array, index: int, reach: int) -> slice:
-    first, last = index, index
-    while first > 0 and (index - first < reach or misfits[first - 1] >= misfits[first]):
-        first -= 1
-    while last + 1 < len(misfits) and (last - index < reach or misfits[last + 1] >= misfits[last]):
-        last += 1
-    return slice(first, last + 1)
-
-
-def _travel(times: Array, lengths: Array, interval: float) -> tuple[Array, Array]:
-    """Differences of lengths (K, n) over the window on a uniform grid, and 1 where they are known, else both 0."""
-    grid = np.arange(times[0], times[-1], interval)
-    window = max(1, round(TRAVEL_WINDOW / interval))
-    if len(grid) <= window:
-        return np.zeros((1, lengths.shape[1])), np.zeros(1)
-    on_grid = np.column_stack([np.interp(grid, times, column) for column in lengths.T])
-    after = np.minimum(np.searchsorted(times, grid), len(times) - 1)
-    gaps = times[after] - times[np.maximum(after - 1, 0)]
-    is_known = gaps <= max(TRAVEL_WINDOW, 2.0 * interval)
-    known = (is_known[window:] & is_known[:-window]).astype(float)
-    return (on_grid[window:] - on_grid[:-window]) * known[:, None], known
+    reach = round(TRAVEL_WINDOW / interval) + 1
+    return [float(times[0] + lags[index] * interval) for index in lowest_valleys(misfits, limit, reach)]
 
 
 class _ClockFit:
