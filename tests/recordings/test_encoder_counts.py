@@ -1,4 +1,4 @@
-"""Counts are told by steps and range; the coordinates tell cable and scale of each, or nothing."""
+"""Counts are told by steps and range; the coordinates tell cable and scale of a column, or nothing."""
 
 from __future__ import annotations
 
@@ -7,7 +7,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tautwire import read_robot
-from tautwire.recordings.encoder_counts import are_counts, cables_and_scales
+from tautwire.recordings.encoder_counts import are_counts, rope_scales
 from tests.support.robots import EXAMPLES
 
 ROBOT = read_robot(EXAMPLES / "three" / "robot.toml")
@@ -40,21 +40,34 @@ def test_coordinates_tell_cable_and_scale_of_counts_where_they_were_measured() -
     lengths = np.linalg.norm(np.array(ROBOT.anchors) - places[:, None], axis=2)
     places[::3] = np.nan
     counts = [np.round(lengths[:, cable] / scale) + 7e5 for cable, scale in ((2, 1e-5), (0, -2e-5), (1, 3e-5))]
-    told = cables_and_scales(ROBOT, counts, places)
+    told = rope_scales(ROBOT, [*counts, np.sin(40.0 * PHASE)], places)
     assert told is not None
-    assert told[0].tolist() == [2, 0, 1]
-    assert told[1] == pytest.approx([1e-5, -2e-5, 3e-5], rel=1e-4)
+    assert told.cables.tolist() == [2, 0, 1, -1]
+    assert told.scales[:3] == pytest.approx([1e-5, -2e-5, 3e-5], rel=1e-4)
+    assert np.isnan(told.scales[3]) and np.nanmax(told.misfits) < 1e-8
 
 
-@pytest.mark.parametrize("case", ["one cable twice", "standing", "other motion", "no positions"])
+def test_a_scale_of_a_known_cable_is_told_where_that_fits() -> None:
+    places = position()
+    lengths = np.linalg.norm(np.array(ROBOT.anchors) - places[:, None], axis=2)
+    told = rope_scales(ROBOT, [lengths[:, 1] / 2e-5], places, [1])
+    assert told is not None and told.scales == pytest.approx([2e-5])
+    assert rope_scales(ROBOT, [lengths[:, 1] / 2e-5], places, [2]) is None
+
+
+@pytest.mark.parametrize(
+    "case", ["one cable twice", "two columns of one cable", "too few", "standing", "other motion", "no positions"]
+)
 def test_counts_that_the_coordinates_do_not_tell_have_no_cables(case: str) -> None:
     places = position()
     lengths = np.linalg.norm(np.array(ROBOT.anchors) - places[:, None], axis=2) / 1e-5
     counts = {
         "one cable twice": [lengths[:, 0], lengths[:, 0], lengths[:, 2]],
+        "two columns of one cable": [*lengths.T, 0.5 * lengths[:, 1]],
+        "too few": [lengths[:, 0], lengths[:, 1]],
         "standing": [np.zeros(500), lengths[:, 1], lengths[:, 2]],
         "other motion": [lengths[::-1, cable] for cable in range(3)],
         "no positions": list(lengths.T),
     }[case]
     places = np.full_like(places, np.nan) if case == "no positions" else places
-    assert cables_and_scales(ROBOT, counts, places) is None
+    assert rope_scales(ROBOT, counts, places) is None

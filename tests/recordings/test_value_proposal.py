@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from tautwire import read_robot
 from tautwire.recordings.column_names import ColumnName
-from tautwire.recordings.column_proposal import propose_columns
+from tautwire.recordings.column_proposal import ProposedColumn, propose_columns
 from tautwire.recordings.column_samples import ColumnSamples
 from tautwire.recordings.recording import read_recording
 from tautwire.recordings.recording_table import is_column_name
@@ -94,30 +94,8 @@ def test_columns_that_fit_a_start_twice_are_left_out(robot: Robot, recorded: dic
     assert proposed(twice, robot)[0] == {}
 
 
-def test_counts_are_rope_lengths_of_the_cables_that_the_coordinates_tell(
-    robot: Robot, recorded: dict[str, Array]
-) -> None:
-    speeds = np.array([recorded[f"winch_speed_{cable}"] for cable in (1, 2, 3)])
-    counts = np.round(np.cumsum(speeds, axis=1) * 0.01 / -2.5e-5)
-    own = {"data_1": counts[2], "data_2": counts[0], "data_3": counts[1]}
-    columns, unused = proposed(own | recorded_axes(recorded), robot)
-    assert [columns[f"rope_length_{cable}"]["name"] for cable in (1, 2, 3)] == ["data_2", "data_3", "data_1"]
-    doubt = columns["rope_length_1"]["doubt"]
-    assert "cable by the coordinates; add factor = metres per count, by the coordinates about 2.5e-05" in doubt
-    assert not unused
-    columns, _ = proposed(own)
-    assert columns["rope_length_1"]["name"] == "data_1" and columns["rope_length_1"]["unit"] == ""
-    assert "cables in the file's order; add factor = metres per count; has to fall" in columns["rope_length_1"]["doubt"]
-    assert proposed(own, cables=4)[0] == {}
-    assert proposed({**own, "Drive1 [m/s]": speeds[0]})[0].keys() == {"winch_speed_1"}
-
-
 def recorded_axes(recorded: dict[str, Array]) -> dict[str, Array]:
     return {f"pos {axis}": 1e3 * recorded[axis] for axis in "xyz"}
-
-
-def test_whole_numbers_of_a_small_range_are_no_counts() -> None:
-    assert proposed({f"Col{index}": np.round(900.0 * FALLING) for index in range(3)})[0] == {}
 
 
 def test_the_start_tells_units_that_names_do_not(robot: Robot, recorded: dict[str, Array]) -> None:
@@ -133,8 +111,8 @@ def test_the_start_tells_units_that_names_do_not(robot: Robot, recorded: dict[st
     assert proposed({name: recorded[name] for name in "xyz"}, robot)[0]["z"] == asdict_of("z")
 
 
-def asdict_of(name: str) -> dict[str, str]:
-    return {"column": name, "name": name, "unit": "", "doubt": ""}
+def asdict_of(name: str) -> dict[str, object]:
+    return asdict(ProposedColumn(name, name))
 
 
 @pytest.mark.parametrize(("extent", "unit"), [(2.0, "m"), (1500.0, "mm"), (40.0, "")])

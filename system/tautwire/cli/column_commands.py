@@ -14,6 +14,7 @@ from .console import AsJson, CommandOutput, Quiet, TrackerFile, shell_quoted
 
 if TYPE_CHECKING:
     from ..recordings.column_proposal import ColumnProposal
+    from ..recordings.winch_columns import ProposedFile
     from ..robot.schema import Robot
 
 
@@ -42,17 +43,21 @@ def columns(
     """
     from ..atomic_output import atomic_file, refuse_other_formats, refuse_overwriting_inputs
     from ..recordings.column_proposal import proposal_text, without_positions
+    from ..recordings.winch_columns import with_winch_scales
 
     output = CommandOutput(as_json, quiet)
     robot = None if robot_file is None else read_robot(robot_file)
     cable_count = _cable_count(robot, cables)
     refuse_other_formats(out, ".toml")
     refuse_overwriting_inputs([path for path in (recording, robot_file, tracker) if path], [out] if out else [])
-    proposal = _proposed(recording, cable_count, robot)
+    log = _proposed(recording, cable_count, robot)
+    of_tracker = None if tracker is None else _proposed(tracker, 0, robot)
+    proposal = with_winch_scales(log, cable_count, robot, of_tracker)
     text, document = "", dict[str, object]()
-    if tracker is not None:
-        proposal, of_tracker = without_positions(proposal, tracker), _proposed(tracker, 0, robot)
-        text, document = "\n" + proposal_text(tracker, of_tracker, 0), {"tracker": _listed(of_tracker)}
+    if tracker is not None and of_tracker is not None:
+        proposal = without_positions(proposal, tracker)
+        text = "\n" + proposal_text(tracker, of_tracker.proposal, 0)
+        document = {"tracker": _listed(of_tracker.proposal)}
     text = proposal_text(recording, proposal, cable_count) + text
     if out is not None:
         with atomic_file(out) as scratch:
@@ -62,15 +67,16 @@ def columns(
     output.suggest_next(_next_step(recording, robot_file, cable_count, tracker, out))
 
 
-def _proposed(path: Path, cable_count: int, robot: Robot | None) -> ColumnProposal:
-    """The proposal by names and values."""
+def _proposed(path: Path, cable_count: int, robot: Robot | None) -> ProposedFile:
+    """The proposal by names and values, and the samples."""
     from ..recordings.column_names import column_names
     from ..recordings.column_proposal import propose_columns
     from ..recordings.column_samples import column_samples
     from ..recordings.value_proposal import with_values
+    from ..recordings.winch_columns import ProposedFile
 
-    by_names = propose_columns(column_names(path), cable_count)
-    return with_values(by_names, column_samples(path), cable_count, robot)
+    by_names, samples = propose_columns(column_names(path), cable_count), column_samples(path)
+    return ProposedFile(with_values(by_names, samples, cable_count, robot), samples)
 
 
 def _listed(proposal: ColumnProposal) -> dict[str, object]:

@@ -60,6 +60,9 @@ _FACTOR_WORDS = {
 # Reasons and doubts that a proposal by values may remove.
 NOTHING_SAID = "no known word"
 NO_UNIT = "no unit in the name: the file's, or SI"
+# What stands before the factor that a column needs, and what its sign has to be.
+ADD_FACTOR = "add factor = "
+SIGNS = {"winch_speed": "positive has to reel in", "rope_length": "has to fall as it reels in"}
 OTHER_QUANTITY = "words or a unit of other quantities"
 _NOT_NAMED = "quantity not named"
 _PARTS = re.compile(r"[^\W\d_]+|[0-9]+")
@@ -67,17 +70,24 @@ _PARTS = re.compile(r"[^\W\d_]+|[0-9]+")
 
 @dataclass(frozen=True)
 class ProposedColumn:
-    """One line of a proposal: the standard ``column``, the laboratory's ``name``, its ``unit``, and the ``doubt``."""
+    """One line of a proposal: the standard ``column``, the laboratory's ``name``, its ``unit``, and the ``doubt``.
+
+    ``factor`` and ``sign`` are those that the numbers tell, None and 1 where they do not.
+    """
 
     column: str
     name: str
     unit: str = ""
     doubt: str = ""
+    factor: float | None = None
+    sign: int = 1
 
     def line(self) -> str:
         """The line of TOML, with the doubt as a comment behind it."""
         entries = [f"name = {json.dumps(self.name, ensure_ascii=False)}"]
         entries += [f'unit = "{self.unit}"'] if self.unit else []
+        entries += [f"factor = {self.factor!r}"] if self.factor is not None else []
+        entries += ["sign = -1"] if self.sign < 0 else []
         return f"{self.column} = {{ {', '.join(entries)} }}" + (f"  # {self.doubt}" if self.doubt else "")
 
 
@@ -276,9 +286,8 @@ def _proposed(column: str, name: str, words: str) -> ProposedColumn:
     if unit is not None:
         scale = "" if unit_in_name(words).endswith(stated) else "unit by the name's end"
     elif factor or (not stated and _has_any(_words(words), known)):
-        scale = f"add factor = {factor or factor_without_unit}"
+        scale = f"{ADD_FACTOR}{factor or factor_without_unit}"
     else:
         scale = f"ends in {stated}, no unit of it" if stated else NO_UNIT
-    signs = {"winch_speed": "positive has to reel in", "rope_length": "has to fall as it reels in"}
-    remark = "; ".join(part for part in (scale, doubt, signs.get(kind, "")) if part)
+    remark = "; ".join(part for part in (scale, doubt, SIGNS.get(kind, "")) if part)
     return ProposedColumn(column, name, unit.symbol if unit else "", remark)

@@ -1,8 +1,9 @@
-"""Encoder counts among recorded columns: what tells them, and the cable and the scale of each by the coordinates."""
+"""Encoder counts among recorded columns, and the cable and scale of columns that follow a rope's length."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -14,8 +15,9 @@ Array = NDArray[np.float64]
 
 # So many counts, of so many values, none further from the last than this share of all.
 MIN_COUNTS, MIN_VALUES, MAX_STEP = 10_000, 20, 0.2
-# Rope lengths by the coordinates leave this share of a column's variance, and another cable's so many times as much.
-MAX_MISFIT, MIN_CONTRAST = 0.01, 5.0
+# Of the variance of rope lengths by the coordinates a column leaves this share, and another so many times as much.
+MAX_MISFIT, MIN_CONTRAST, SMALLEST_MISFIT = 0.01, 5.0, 1e-12
+MAX_ROWS = 20_000
 
 
 def are_counts(values: Array) -> bool:
@@ -28,25 +30,62 @@ def are_counts(values: Array) -> bool:
     return bool(is_wide and steps.max() <= MAX_STEP * extent and np.ptp(steps) > 0.0)
 
 
-def cables_and_scales(robot: Robot, counts: Sequence[Array], position: Array) -> tuple[NDArray[np.intp], Array] | None:
-    """The cable of each column of counts (N,), from 0, and its scale in m per count, by positions (N, 3) in m.
+@dataclass(frozen=True, eq=False)
+class RopeScales:
+    """Of each column (k,): its cable from 0, -1 for none; metres of rope for one of its numbers; and the misfit.
 
-    By linear regression of rope lengths on counts; None where these do not tell the cables.
+    The misfit is the share of the variance of rope lengths that the regression leaves.
     """
-    rows = np.isfinite(position).all(axis=1) & np.isfinite(np.array(counts)).all(axis=0)
-    if np.count_nonzero(rows) < MIN_VALUES:
+
+    cables: NDArray[np.intp]
+    scales: Array
+    misfits: Array
+
+
+def rope_scales(
+    robot: Robot, columns: Sequence[Array], position: Array, cables: Sequence[int] | None = None
+) -> RopeScales | None:
+    """Linear regression of rope lengths on columns (N,) that follow them, by positions (N, 3) in m.
+
+    Of the ``cables`` from 0 that are known; else each cable has the column that alone fits it. None where these do not
+    fit.
+    """
+    rows = np.flatnonzero(np.isfinite(position).all(axis=1) & np.isfinite(np.array(columns)).all(axis=0))
+    if len(rows) < MIN_VALUES:
         return None
+    rows = rows[:: 1 + len(rows) // MAX_ROWS]
     lengths = np.linalg.norm(np.array(robot.anchors) - position[rows][:, None], axis=2)
     lengths -= lengths.mean(axis=0)
-    columns = np.array(counts)[:, rows]
-    columns -= columns.mean(axis=1, keepdims=True)
-    powers, covariances = (columns**2).sum(axis=1), columns @ lengths
-    if not (powers.all() and (lengths**2).sum(axis=0).all()):
+    signals = np.array(columns)[:, rows]
+    signals -= signals.mean(axis=1, keepdims=True)
+    powers, covariances = (signals**2).sum(axis=1), signals @ lengths
+    products = np.outer(powers, (lengths**2).sum(axis=0))
+    misfits = 1.0 - np.divide(covariances**2, products, out=np.zeros_like(products), where=products > 0.0)
+    # Below this the rounding of floats decides.
+    misfits = np.maximum(misfits, SMALLEST_MISFIT)
+    told = _cables_of(misfits) if cables is None else np.array(cables)
+    if told is None:
         return None
-    misfits = 1.0 - covariances**2 / np.outer(powers, (lengths**2).sum(axis=0))
-    order, cables = linear_sum_assignment(misfits)
-    best = misfits[order, cables]
-    others = np.where(np.eye(len(lengths.T), dtype=bool)[cables], np.inf, misfits).min(axis=1)
-    if (best > MAX_MISFIT).any() or (others < MIN_CONTRAST * best).any():
+    is_used = told >= 0
+    best = misfits[is_used, told[is_used]]
+    if (best > MAX_MISFIT).any():
         return None
-    return cables, covariances[order, cables] / powers
+    scales, left = np.full(len(told), np.nan), np.full(len(told), np.nan)
+    scales[is_used], left[is_used] = covariances[is_used, told[is_used]] / powers[is_used], best
+    return RopeScales(told, scales, left)
+
+
+def _cables_of(misfits: Array) -> NDArray[np.intp] | None:
+    """The cable of each column, -1 for none, by misfits (k, n); None where columns or cables compete."""
+    if len(misfits) < misfits.shape[1]:
+        return None
+    columns, cables = linear_sum_assignment(misfits)
+    best = misfits[columns, cables]
+    others = misfits.copy()
+    others[columns, cables] = np.inf
+    competing = np.minimum(others[columns].min(axis=1), others[:, cables].min(axis=0))
+    if (competing < MIN_CONTRAST * best).any():
+        return None
+    told = np.full(len(misfits), -1)
+    told[columns] = cables
+    return told

@@ -15,7 +15,6 @@ from ..robot.schema import AXES, Robot
 from ..robot.static_equilibrium import static_tensions
 from .column_proposal import NO_UNIT, NOTHING_SAID, ColumnProposal, ProposedColumn, sorted_columns
 from .column_samples import ColumnSamples
-from .encoder_counts import are_counts, cables_and_scales
 from .units import UNITS, Unit, quantity_of
 
 Array = NDArray[np.float64]
@@ -30,7 +29,7 @@ POSITION_TOLERANCE, TENSION_TOLERANCE, LENGTH_TOLERANCE = 0.02, 0.15, 0.02
 RANGES_IN_M, SMALLEST_SHARE = (0.1, 20.0), 0.005
 
 _TIME_UNITS = ("s", "ms", "us", "ns")
-_BY_VALUES = "by its values"
+BY_VALUES = "by its values"
 
 
 def with_values(
@@ -47,10 +46,6 @@ def with_values(
     told = {each.column.rpartition("_")[0] or each.column for each in proposal.columns}
     known = proposal.columns if samples.units else _with_units(proposal.columns, values, robot)
     found = list(_found_columns(unnamed, values, told, cable_count, robot))
-    used = {each.name for each in found}
-    counts = [n for n in unnamed if n not in used and are_counts(values[n]) and _time_unit(values[n]) is None]
-    if cable_count and len(counts) == cable_count and not told & {"rope_length", "winch_speed"}:
-        found += _count_columns(counts, values, _positions([*known, *found], values, robot), robot)
     names, columns = ([getattr(each, key) for each in found] for key in ("name", "column"))
     found = [each for each in found if names.count(each.name) == columns.count(each.column) == 1]
     found = [replace(each, unit="") for each in found] if samples.units else found
@@ -63,11 +58,11 @@ def _found_columns(
     unnamed: Sequence[str], values: Mapping[str, Array], told: set[str], cable_count: int, robot: Robot | None
 ) -> Iterator[ProposedColumn]:
     """Columns of kinds that no name tells, by their values."""
-    rising = {name: _time_unit(values[name]) for name in unnamed if not _counts_rows(values[name])}
+    rising = {name: time_unit(values[name]) for name in unnamed if not _counts_rows(values[name])}
     times = {name: unit_and_figure for name, unit_and_figure in rising.items() if unit_and_figure is not None}
     if "time" not in told and len(times) == 1:
         ((name, (symbol, figure)),) = times.items()
-        yield ProposedColumn("time", name, symbol, f"{_BY_VALUES}: {figure}")
+        yield ProposedColumn("time", name, symbol, f"{BY_VALUES}: {figure}")
     others = [name for name in unnamed if name not in times and np.isfinite(values[name]).any()]
     runs = _Runs(others, values)
     for kind, columns, expected, tolerance, unit_names in _expected_starts(robot, cable_count):
@@ -77,37 +72,8 @@ def _found_columns(
         if len(matches) == 1:
             names, unit, begins = matches[0]
             for column, name, begin, value in zip(columns, names, begins, expected, strict=True):
-                figure = f"{_BY_VALUES}: {_comparison(begin, value, unit)}, in the file's order"
+                figure = f"{BY_VALUES}: {_comparison(begin, value, unit)}, in the file's order"
                 yield ProposedColumn(column, name, unit.symbol, figure)
-
-
-def _count_columns(
-    names: Sequence[str], values: Mapping[str, Array], position: Array | None, robot: Robot | None
-) -> Iterator[ProposedColumn]:
-    """Columns of encoder counts as rope lengths, of the cables that the coordinates tell, or in the file's order."""
-    scales: list[str] = ["metres per count"] * len(names)
-    cables, order = list(range(len(names))), "cables in the file's order"
-    told = None if robot is None or position is None else cables_and_scales(robot, [values[n] for n in names], position)
-    if told is not None:
-        cables, order = told[0].tolist(), "cable by the coordinates"
-        scales = [f"metres per count, by the coordinates about {scale:.3g}" for scale in told[1]]
-    for cable, name, scale in zip(cables, names, scales, strict=True):
-        figure = f"whole numbers over a range of {np.ptp(_finite(values[name])):.0f}, as counts of an encoder"
-        doubt = f"{_BY_VALUES}: {figure}; {order}; add factor = {scale}; has to fall as it reels in"
-        yield ProposedColumn(f"rope_length_{cable + 1}", name, "", doubt)
-
-
-def _positions(columns: Sequence[ProposedColumn], values: Mapping[str, Array], robot: Robot | None) -> Array | None:
-    """Positions (N, 3) in m of these columns; None where a coordinate of the robot's has none, or no known unit."""
-    known = {each.column: each for each in columns if each.column in AXES and each.unit and each.name in values}
-    if robot is None or any(AXES[axis] not in known for axis in robot.axes_in_plane):
-        return None
-    position = np.tile(np.array(robot.platform.start, dtype=float), (len(next(iter(values.values()))), 1))
-    for axis in robot.axes_in_plane:
-        column = known[AXES[axis]]
-        (unit,) = _units("x", (column.unit,))
-        position[:, axis] = unit.to_si(values[column.name])
-    return position
 
 
 def _expected_starts(
@@ -172,8 +138,8 @@ def _with_units(
         if each.name in values and not each.unit and (NO_UNIT in each.doubt or not each.doubt)
     }
     units: dict[str, tuple[str, str]] = {}
-    time_unit = _time_unit(open_columns["time"]) if "time" in open_columns else None
-    units |= {"time": time_unit} if time_unit else {}
+    unit_of_time = time_unit(open_columns["time"]) if "time" in open_columns else None
+    units |= {"time": unit_of_time} if unit_of_time else {}
     axes = [axis for axis in AXES if axis in open_columns]
     position_unit = _position_unit([_finite(open_columns[axis]) for axis in axes], axes, robot) if axes else None
     units |= dict.fromkeys(axes, position_unit) if position_unit else {}
@@ -239,7 +205,7 @@ def _start_tensions(robot: Robot) -> Array | None:
     return None
 
 
-def _time_unit(values: Array) -> tuple[str, str] | None:
+def time_unit(values: Array) -> tuple[str, str] | None:
     """The unit of a time, and the figure; None where the numbers are none, or their unit is not clear."""
     if len(values) < MIN_ROWS or not np.isfinite(values).all():
         return None
