@@ -74,6 +74,10 @@ class AbsentColumnsError(RecordingError):
     """A recording has none of the columns that were declared by the laboratory's names."""
 
 
+class UnknownColumnsError(RecordingError):
+    """A recording has no winch column by a standard name, or a tracker's file no time."""
+
+
 class NumericalError(TautwireError):
     """A trace has no finite numbers to go on with; carries what linear algebra says of them."""
 

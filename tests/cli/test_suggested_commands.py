@@ -57,6 +57,29 @@ def test_the_last_line_names_a_command_that_is_one(
     get_command(app).commands[name].make_context(name, given)  # type: ignore[attr-defined]
 
 
+@pytest.mark.parametrize("unknown", ["log", "tracker"])
+def test_a_file_of_unknown_columns_is_refused_with_the_command_that_proposes_them(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], unknown: str
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    log = FIT if unknown == "tracker" else "my log.csv"
+    Path("my log.csv").write_text("t_ms,c1,c2\n0,1,2\n10,2,3\n", encoding="utf-8")
+    Path("tracker.csv").write_text("Zeit,X,Y,Z\n0,1,2,3\n10,2,3,4\n", encoding="utf-8")
+    assert run(["check", ROBOT, log, "--tracker", "tracker.csv"]) == 2
+    (problem,) = capsys.readouterr().out.splitlines()
+    command = problem.partition("what the columns are: tautwire ")[2]
+    assert shlex.split(command) == ["columns", log, ROBOT, "--tracker", "tracker.csv"]
+    assert run(shlex.split(command)) == 0
+
+
+def test_one_winch_that_is_missing_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text("time,winch_speed_1,rope_length_3\n0,1,2\n1,2,3\n", encoding="utf-8")
+    assert run(["check", ROBOT, str(log)]) == 2
+    (problem,) = capsys.readouterr().out.splitlines()
+    assert "the column winch_speed_2 is missing" in problem and "propose" not in problem
+
+
 def test_paths_with_spaces_are_one_word_of_the_suggested_command(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:

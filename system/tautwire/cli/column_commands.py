@@ -10,7 +10,7 @@ import typer
 
 from ..errors import InputError
 from ..robot.robot_file_reader import MAX_CABLES, read_robot
-from .console import AsJson, CommandOutput, Quiet, TrackerFile, shell_quoted
+from .console import AsJson, CommandOutput, Quiet, TrackerFile, columns_command, shell_quoted
 
 if TYPE_CHECKING:
     from ..recordings.column_proposal import ColumnProposal
@@ -102,12 +102,11 @@ def _next_step(
     recording: Path, robot_file: Path | None, cable_count: int, tracker: Path | None, out: Path | None
 ) -> str:
     """What is to be done with a proposal: write it, then check the recording with it."""
-    log = shell_quoted(recording)
-    of_tracker = f" --tracker {shell_quoted(tracker)}" if tracker else ""
     if out is None:
         source = f"--cables {cable_count}" if robot_file is None else shell_quoted(robot_file)
-        return f"tautwire columns {log} {source}{of_tracker} --out columns.toml"
+        return f"{columns_command(recording, source, tracker)} --out columns.toml"
+    of_tracker = f" --tracker {shell_quoted(tracker)}" if tracker else ""
     options = f"--columns {shell_quoted(out)}{of_tracker}"
     if robot_file is None:
         return f"read it, then check the recording with your robot file: {options}"
-    return f"read it, then tautwire check {shell_quoted(robot_file)} {log} {options}"
+    return f"read it, then tautwire check {shell_quoted(robot_file)} {shell_quoted(recording)} {options}"

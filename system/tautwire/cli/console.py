@@ -79,6 +79,12 @@ def shell_quoted(path: Path) -> str:
     return shlex.quote(str(path))
 
 
+def columns_command(recording: Path, source: str, tracker: Path | None = None) -> str:
+    """A proposal of a recording's columns as a shell command; ``source`` is the robot file or ``--cables``."""
+    of_tracker = f" --tracker {shell_quoted(tracker)}" if tracker else ""
+    return f"tautwire columns {shell_quoted(recording)} {source}{of_tracker}"
+
+
 def trace_command(robot_file: Path, recording: Path, columns: Path | None, tracker: Path | None = None) -> str:
     """A trace of the recording as a shell command, to be pasted."""
     files = {"--columns": columns, "--tracker": tracker}

@@ -9,10 +9,11 @@ from dataclasses import dataclass, replace
 from itertools import islice
 from pathlib import Path
 
-from ..errors import InputError, RecordingError, RobotFileError, one_line
+from ..errors import InputError, RecordingError, RobotFileError, UnknownColumnsError, one_line
 from ..estimation.preprocessing import prepare_recordings
 from ..fmus.fmu_slots import check_user_fmus
 from ..recordings.column_map import unit_errors
+from ..recordings.mdf_file import is_mdf
 from ..recordings.recording import Recording, read_recording, recording_errors
 from ..recordings.start_position import start_position
 from ..recordings.tracker import with_tracker
@@ -22,7 +23,7 @@ from ..robot.robot_file_reader import read_robot_with_sink, robot_file_text
 from ..robot.schema import Robot, fmu_slots
 from ..robot.static_equilibrium import static_tensions
 from ..toml_text import line_of_key
-from .console import with_columns
+from .console import columns_command, shell_quoted, with_columns
 
 MAX_PROBLEMS_PER_FILE = 1000
 # A recording may break a rule in each of its cells; alike errors are counted as one problem.
@@ -94,9 +95,12 @@ def check_files(
     recording_problems: list[Problem] = []
     progress("reading the recording", 0.0)
     reader = _with_columns(robot, columns_file, recording_problems)
-    recording = None if reader is None else _check_recording(recording_file, reader, recording_problems, notes)
+    command = columns_command(recording_file, shell_quoted(robot_file), tracker_file)
+    recording = None
+    if reader is not None:
+        recording = _check_recording(recording_file, reader, recording_problems, notes, command)
     if recording is not None and reader is not None and tracker_file is not None:
-        recording = _with_tracker(reader, recording, tracker_file, recording_problems, notes)
+        recording = _with_tracker(reader, recording, tracker_file, recording_problems, notes, command)
     if recording is not None and not problems:
         progress("checking both together", 0.0)
         _check_together(robot, recording, recording_problems, notes)
@@ -156,20 +160,35 @@ def _unit_errors(robot: Robot) -> Iterator[RobotFileError]:
     return unit_errors((*robot.recorded_columns, *robot.tracker.columns))
 
 
-def _check_recording(path: Path, robot: Robot, problems: list[Problem], notes: list[str]) -> Recording | None:
+def _check_recording(
+    path: Path, robot: Robot, problems: list[Problem], notes: list[str], command: str
+) -> Recording | None:
     with _collecting_problems(problems, path):
-        _list_errors(path, recording_errors(path, robot.cable_count, robot.recorded_columns), problems, notes)
+        errors = recording_errors(path, robot.cable_count, robot.recorded_columns)
+        _list_errors(path, _with_command(errors, path, command), problems, notes)
         if not problems:
             return read_recording(path, robot.cable_count, robot.recorded_columns)
     return None
 
 
+def _with_command(errors: Iterator[RecordingError], path: Path, command: str) -> Iterator[RecordingError]:
+    """The errors, of which that of unknown columns ends with the command that proposes what they are."""
+    for error in errors:
+        if isinstance(error, UnknownColumnsError) and not is_mdf(path):
+            yield RecordingError(
+                error.where, error.problem, f"let this propose what the columns are: {command}", error.line
+            )
+        else:
+            yield error
+
+
 def _with_tracker(
-    robot: Robot, recording: Recording, path: Path, problems: list[Problem], notes: list[str]
+    robot: Robot, recording: Recording, path: Path, problems: list[Problem], notes: list[str], command: str
 ) -> Recording | None:
     """The recording with a tracker's positions; None where there are problems."""
     with _collecting_problems(problems, path):
-        _list_errors(path, recording_errors(path, 0, robot.tracker.columns), problems, notes)
+        errors = recording_errors(path, 0, robot.tracker.columns)
+        _list_errors(path, _with_command(errors, path, command), problems, notes)
         if not problems:
             return with_tracker(robot, recording, path)
     return None

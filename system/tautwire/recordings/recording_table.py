@@ -11,8 +11,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from ..errors import RecordingError, format_value, raise_error
-from ..name_suggestions import closest_name
+from ..errors import RecordingError, UnknownColumnsError, format_value, raise_error
+from ..name_suggestions import closest_name, join_names
 from ..robot.schema import AXES, RecordedColumn
 from .clock_time import ClockFormat
 from .units import Number, Unit
@@ -93,15 +93,31 @@ def parse_header(
             problem = f"the column {name} belongs to no cable, the robot has cables 1 to {cable_count}"
             sink(RecordingError(where, problem, "give the robot file that belongs to this recording", line))
     unknown_names = tuple(name for name in names if name not in allowed_names)
-    for required in ("time", *(f"winch_speed_{cable}" for cable in range(1, cable_count + 1))):
-        if required not in names and required.replace("winch_speed", "rope_length") not in names:
-            similar = closest_name(required, unknown_names)
-            renamed = "" if similar is None else f"rename {format_value(similar)}, "
-            # The only file without cables is a tracker's.
-            table = "recording.columns], see tautwire columns" if cable_count else "recording.tracker.columns]"
-            hint = f"add it, {renamed}or declare its name in [{table}"
-            sink(RecordingError(where, f"the column {required} is missing", hint, line))
+    for error in _missing_column_errors(names, unknown_names, where, cable_count, line):
+        sink(error)
     return Header(names, unknown_names)
+
+
+def _missing_column_errors(
+    names: Sequence[str], unknown_names: Sequence[str], where: str, cable_count: int, line: int | None
+) -> Iterator[RecordingError]:
+    """The required columns that a recording lacks: each, or all in one error where there is none of any winch."""
+    winches = [f"winch_speed_{cable}" for cable in range(1, cable_count + 1)]
+    required = ["time", *winches]
+    missing = [each for each in required if not {each, each.replace("winch_speed", "rope_length")} & set(names)]
+    # The only file without cables is a tracker's.
+    table = "recording.columns], see tautwire columns" if cable_count else "recording.tracker.columns]"
+    if winches and missing[-len(winches) :] == winches:
+        has = f", it has {format_value(join_names(unknown_names), 120)}" if unknown_names else ""
+        problem = f"has none of the columns {join_names(missing)}{has}"
+        yield UnknownColumnsError(where, problem, f"declare their names in [{table}", line)
+        return
+    for each in missing:
+        similar = closest_name(each, unknown_names)
+        renamed = "" if similar is None else f"rename {format_value(similar)}, "
+        error_class = RecordingError if cable_count else UnknownColumnsError
+        hint = f"add it, {renamed}or declare its name in [{table}"
+        yield error_class(where, f"the column {each} is missing", hint, line)
 
 
 def require_samples(count: int, where: str) -> None:
