@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
-from tautwire.recordings.sensor_gaps import bridge_short_gaps
+from tautwire.recordings.sensor_gaps import bridge_short_gaps, slower_rate
 
 TIME = np.cumsum(np.where(np.arange(60) % 2, 0.01, 0.03))
 
@@ -29,3 +30,19 @@ def test_a_gap_of_more_than_five_intervals_of_the_sensor_stays() -> None:
 def test_columns_are_bridged_each_by_its_own_samples() -> None:
     drawn = bridge_short_gaps(TIME, np.column_stack([measured(), measured(4), measured(4, 8)]))
     assert np.isfinite(drawn).sum(axis=0).tolist() == [0, 1, 5]
+
+
+def test_a_sensor_that_is_evenly_slower_has_its_own_rate_whatever_its_gaps() -> None:
+    time = np.arange(4000) / 200.0
+    on_row = np.full(4000, np.nan)
+    on_row[np.round(np.arange(0.0, 19.99, 1.0 / 120.0) * 200.0).astype(int)] = 1.0
+    assert slower_rate(time, on_row) == pytest.approx(120.0, rel=1e-3)
+    on_row[1000:1500] = np.nan
+    assert slower_rate(time, on_row) == pytest.approx(120.0, rel=1e-3)
+
+
+@pytest.mark.parametrize("share", [0.0, 0.01, 0.05, 0.1, 0.4, 0.9, 1.0])
+def test_samples_that_are_missing_here_and_there_are_no_rate(share: float) -> None:
+    time = np.arange(4000) / 200.0
+    values = np.where(np.random.default_rng(3).random(4000) < share, np.nan, 1.0)
+    assert slower_rate(time, values) is None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -117,3 +118,28 @@ def test_the_path_of_a_tracker_slower_than_the_log_is_drawn_through_its_points(t
         assert np.isfinite(x[:297]).all() and np.isfinite(x[400:797]).all() and np.isnan(x[297:400]).all()
         assert z[8] == pytest.approx(recorded["z"][8], rel=1e-6)
         assert z[10] == pytest.approx((recorded["z"][8] + recorded["z"][12]) / 2, rel=1e-6)
+
+
+def table_of_columns(page: Path) -> dict[str, list[str]]:
+    """Unit, minimum, maximum, rate and missing share by column."""
+    table = page.read_text(encoding="utf-8").partition('<section id="read"')[2].partition("</table>")[0]
+    rows = [re.findall(r"<t[hd][^>]*>(.*?)</t[hd]>", row) for row in table.split("<tr")[2:]]
+    return {row[0]: [re.sub("<[^>]*>", "", cell).replace("\xa0", " ") for cell in row[1:]] for row in rows}
+
+
+def test_columns_are_those_that_were_recorded_each_at_its_own_rate(tmp_path: Path) -> None:
+    recorded, log = pd.read_csv(FIT, nrows=800), tmp_path / "log.csv"
+    recorded.loc[recorded.index % 4 != 0, ["x", "y", "z"]] = np.nan
+    recorded.loc[400:487, "tension_2"] = np.nan
+    speeds = recorded.filter(like="winch_speed")
+    lengths = -(speeds.cumsum() * 0.01).rename(columns=lambda name: name.replace("winch_speed", "rope_length"))
+    pd.concat([recorded.drop(columns=speeds), lengths.iloc[:, :2], speeds.iloc[:, 2:]], axis=1).assign(
+        status=1.0
+    ).to_csv(log, index=False)
+    page = report_of(tmp_path, log, 0)
+    rows = table_of_columns(tmp_path / "check.html")
+    assert {"rope_length_1", "rope_length_2", "winch_speed_3"} < rows.keys() and "winch_speed_1" not in rows
+    assert rows["rope_length_1"][0] == "m"
+    assert rows["x"][3:] == ["25.0 Hz", "0.4 %"]
+    assert rows["tension_2"][3:] == ["100 Hz", "11.0 %"]
+    assert page.text.lower().count("not read: status") == 1

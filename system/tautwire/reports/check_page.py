@@ -14,6 +14,7 @@ from ..recordings.alternative_readings import GeometryReading, WindingReading
 from ..recordings.mistaken_motion import LengthRegression, length_regression
 from ..recordings.mistaken_tensions import ForceBalance, force_balance
 from ..recordings.recording import Recording
+from ..recordings.sensor_gaps import bridge_short_gaps, slower_rate
 from ..robot.schema import AXES, Robot
 from .check_figures import CheckCurve, CheckPanel, panel_data, robot_scene
 from .page_rendering import Number, PageHeader, Row, render_page
@@ -77,7 +78,7 @@ def check_page(checked: CheckedFiles, links: Mapping[str, str]) -> str:
         tension_rows=[] if balance is None else _tension_rows(balance),
         balance="" if balance is None else _balance_text(balance),
         columns=[] if recording is None else _column_rows(recording),
-        sampling="" if recording is None else _dialect_text(recording),
+        sampling="" if recording is None else _reading_text(recording, checked.notes),
         notes=checked.notes,
     )
 
@@ -159,17 +160,41 @@ def _balance_text(balance: ForceBalance) -> str:
 
 
 def _column_rows(recording: Recording) -> list[Row]:
-    """The range of each column in SI units and the share of its cells without a number."""
-    units = {"time": "s", "winch": "m/s", "tension": "N"} | dict.fromkeys(AXES, "m")
+    """The range of each column in SI units, its rate, and the share of its samples that are missing.
+
+    A rope whose length was recorded has that in place of its speed, which is computed.
+    """
+    units = {"time": "s", "winch": "m/s", "rope": "m", "tension": "N"} | dict.fromkeys(AXES, "m")
+    rate = 1.0 / float(np.median(np.diff(recording.time)))
     rows: list[Row] = []
-    for name, values in recording.frame().items():
-        column = values.to_numpy()
-        finite = column[np.isfinite(column)]
+    for name, values in _recorded_columns(recording).items():
+        finite = values[np.isfinite(values)]
         ends = (float(finite.min()), float(finite.max())) if finite.size else (None, None)
-        missing = format_percent(1.0 - finite.size / column.size)
-        numbers = (Number(format_significant(end, 4)) for end in ends)
-        rows.append([str(name), units[str(name).split("_", maxsplit=1)[0]], *numbers, Number(missing)])
+        own_rate = slower_rate(recording.time, values)
+        samples = values if own_rate is None else bridge_short_gaps(recording.time, values)
+        shown_rate = format_significant((own_rate or rate) if finite.size else None)
+        rows.append(
+            [
+                name,
+                units[name.split("_", maxsplit=1)[0]],
+                *(Number(format_significant(end, 4)) for end in ends),
+                Number(shown_rate, "Hz" if finite.size else ""),
+                Number(format_percent(1.0 - float(np.isfinite(samples).mean()))),
+            ]
+        )
     return rows
+
+
+def _recorded_columns(recording: Recording) -> dict[str, Array]:
+    """The columns of a recording by name, each (N,), with the rope lengths that were recorded."""
+    columns: dict[str, Array] = {}
+    for name, values in recording.frame().items():
+        kind, _, number = str(name).rpartition("_")
+        if kind == "winch_speed" and recording.rope_length is not None and int(number) in recording.rope_lengths:
+            columns[f"rope_length_{number}"] = recording.rope_length[:, int(number) - 1]
+        else:
+            columns[str(name)] = values.to_numpy()
+    return columns
 
 
 def _sampling_text(recording: Recording) -> str:
@@ -184,12 +209,10 @@ def _sampling_text(recording: Recording) -> str:
     )
 
 
-def _dialect_text(recording: Recording) -> str:
-    read_as = f" {'; '.join(recording.read_as)}." if recording.read_as else ""
-    unknown = f" Not read: {', '.join(recording.unknown_columns)}." if recording.unknown_columns else ""
-    lengths = ", ".join(map(str, recording.rope_lengths))
-    rates = f" Winch speeds of cables {lengths} are rates of recorded rope lengths." if lengths else ""
-    return f"{_sampling_text(recording)} Ranges are in the units stated.{read_as}{unknown}{rates}"
+def _reading_text(recording: Recording, notes: tuple[str, ...]) -> str:
+    """Sampling, and what the notes do not say already of how the recording was read."""
+    unsaid = "".join(f" {note}." for note in recording.notes if note not in notes)
+    return f"{_sampling_text(recording)} Ranges are in the units stated.{unsaid}"
 
 
 def _rms(values: Array) -> float:
