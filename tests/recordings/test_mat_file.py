@@ -165,6 +165,16 @@ def test_what_cannot_be_right_is_refused(tmp_path: Path, level: str, changed: di
     assert words in refused(written(tmp_path / "fit.mat", content, level))
 
 
+@pytest.mark.parametrize("level", [level for level in LEVELS if "4" not in str(level)])
+@pytest.mark.parametrize("shape", [(1, 1, 7), (7, 2, 3)])
+def test_a_time_of_three_dimensions_is_refused_with_how_to_save_it(
+    tmp_path: Path, level: str, shape: tuple[int, ...]
+) -> None:
+    said = refused(written(tmp_path / "fit.mat", TABLE | {"time": np.zeros(shape)}, level))
+    assert f"'time': is {' x '.join(map(str, shape))}, must be a vector with one number per sample" in said
+    assert "save squeeze(time)" in said
+
+
 def element(kind: int, content: bytes) -> bytes:
     return struct.pack("<2I", kind, len(content)) + content + bytes(-len(content) % 8)
 

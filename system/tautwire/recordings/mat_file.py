@@ -134,6 +134,7 @@ def mat_columns(arrays: Sequence[MatArray], file: str) -> tuple[list[MatColumn],
         if array.is_table:
             problem = f"is a {format_value(array.class_name)}, an object that only MATLAB reads"
             raise RecordingError(f"{file}: {format_value(array.path)}", problem, _TABLE_HINT)
+    _require_vector_of_time(arrays, file)
     sample_count = _sample_count(arrays, file)
     columns: list[MatColumn] = []
     unread = []
@@ -144,6 +145,15 @@ def mat_columns(arrays: Sequence[MatArray], file: str) -> tuple[list[MatColumn],
             raise RecordingError(file, f"has more than {MAX_COLUMNS} columns", "keep those of the robot")
         unread += [] if array_columns else [array.path]
     return columns, unread
+
+
+def _require_vector_of_time(arrays: Sequence[MatArray], file: str) -> None:
+    """Raises RecordingError where ``time`` has more than two dimensions, which tells no number of samples."""
+    for array in arrays:
+        if _last_part(array) == "time" and array.is_numeric and len(array.shape) > 2:
+            problem = f"is {' x '.join(map(str, array.shape))}, must be a vector with one number per sample"
+            hint = "save squeeze(time), and other signals with a row for each sample"
+            raise RecordingError(f"{file}: {format_value(array.path)}", problem, hint)
 
 
 def _sample_count(arrays: Sequence[MatArray], file: str) -> int:
