@@ -62,8 +62,12 @@ def with_lines(change: Callable[[list[str]], list[str]]) -> Writer:
 
 
 def with_clock(form: str) -> Writer:
-    begin = pd.Timestamp("2026-05-04T23:59:50")
-    times = {"iso": lambda t: (begin + t).isoformat() + "Z", "clock": lambda t: f"10:00:{t.total_seconds():06.3f}"}
+    begin = pd.Timestamp("2026-05-04T23:59:58")
+    times = {
+        "iso": lambda t: (begin + t).isoformat() + "Z",
+        "clock": lambda t: f"10:00:{t.total_seconds():06.3f}",
+        "midnight": lambda t: str((begin + t).time()),
+    }
 
     def write(frame: Frame) -> str:
         shown = [times[form](pd.Timedelta(round(1e3 * (seconds - frame.time[0])), unit="ms")) for seconds in frame.time]
@@ -120,6 +124,7 @@ READ: dict[str, Writer] = {
     "columns in the text above": above("Recorded channels: time x y z"),
     "ISO 8601 over midnight": with_clock("iso"),
     "clock times": with_clock("clock"),
+    "clock times over midnight": with_clock("midnight"),
 }
 
 REFUSED: dict[str, tuple[Writer, str]] = {

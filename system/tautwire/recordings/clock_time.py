@@ -12,6 +12,8 @@ _CLOCK = rf"([0-9]{{1,3}}):([0-5][0-9]):([0-5][0-9]){_FRACTION}"
 _TIME_OF_DAY = re.compile(_CLOCK)
 _ISO_8601 = re.compile(rf"([0-9]{{4}})-([0-9]{{2}})-([0-9]{{2}})[T ]{_CLOCK}\s?(Z|[+-][0-9]{{2}}:?[0-5][0-9])?")
 
+_DAY = 86_400 * 10**9  # ns
+
 
 @dataclass(frozen=True)
 class ClockFormat:
@@ -23,7 +25,13 @@ class ClockFormat:
     def seconds(self, cell: str) -> float:
         """Seconds from the first sample; NaN where the cell is written in another style."""
         nanoseconds = _nanoseconds(cell, self.style)
-        return math.nan if nanoseconds is None else (nanoseconds - self.origin) / 1e9
+        if nanoseconds is None:
+            return math.nan
+        elapsed = nanoseconds - self.origin
+        # A time of day that is half a day before the first sample's is that of the next day.
+        if self.style == TIME_OF_DAY and elapsed < -_DAY // 2 and self.origin < _DAY:
+            elapsed += _DAY
+        return elapsed / 1e9
 
 
 TIME_OF_DAY = "hh:mm:ss"
@@ -52,7 +60,7 @@ def _nanoseconds(cell: str, style: str) -> int | None:
         day = date(int(match.group(1)), int(match.group(2)), int(match.group(3))).toordinal()
     except ValueError:
         return None
-    return day * 86_400 * 10**9 + _clock_nanoseconds(match.groups()[3:7]) - _offset_nanoseconds(match.group(8))
+    return day * _DAY + _clock_nanoseconds(match.groups()[3:7]) - _offset_nanoseconds(match.group(8))
 
 
 def _clock_nanoseconds(parts: tuple[str | None, ...]) -> int:
