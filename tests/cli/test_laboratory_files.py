@@ -121,6 +121,16 @@ READ: dict[str, Writer] = {
     "speeds in mm/s that say so": stated(SPEEDS, 1e3, "mm/s"),
     "micrometres in Latin-1": lambda frame: str(stated(AXES, 1e6, "\u00b5m")(frame)).encode("latin-1"),
     "a raw column beside the one that is read": lambda frame: text_of(frame.assign(**{"x (raw)": 0.0})),
+    "columns that nobody knows, of one name": with_lines(
+        lambda lines: [f"{lines[0]},aux,aux", *(f"{line},1,2" if line else "" for line in lines[1:])]
+    ),
+    "names in two lines": with_lines(
+        lambda lines: [
+            f"{',' * 10}Hook,,Box,",
+            f"{lines[0]},X,Y,X,Y",
+            *(f"{line},1,2,3,4" for line in lines[1:] if line),
+        ]
+    ),
     "columns in the text above": above("Recorded channels: time x y z"),
     "ISO 8601 over midnight": with_clock("iso"),
     "clock times": with_clock("clock"),

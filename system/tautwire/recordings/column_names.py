@@ -7,14 +7,14 @@ from dataclasses import dataclass
 from itertools import repeat
 from pathlib import Path
 
-from ..errors import RecordingError
+from ..errors import RecordingError, format_value
 from ..input_files import read_encoded_text
-from .clock_time import clock_format
-from .csv_lines import SEPARATORS, is_comment, is_number, split_cells, unit_in_name, without_comment_mark
+from .csv_lines import split_cells, unit_in_name, without_comment_mark
+from .csv_names import NamesLine, first_samples, names_above
 from .mat_file import is_mat, mat_column_names
 from .mdf_file import is_mdf
 from .parquet_file import is_parquet, parquet_column_names
-from .recording_table import MISSING_CELLS, is_column_name
+from .recording_table import is_column_name
 from .ros_bag import bag_columns, is_bag
 from .ros_column_words import column_words
 from .units import is_any_unit
@@ -78,34 +78,31 @@ def csv_layout(path: Path) -> CsvLayout:
         raise RecordingError(str(path), "is MDF, of which no columns are proposed", hint)
     content, _ = read_encoded_text(path, RecordingError, "CSV", MAX_CSV_SIZE)
     lines = content.decode("utf-8").splitlines()
-    for index, line in enumerate(lines[:MAX_HEAD_LINES]):
-        if is_comment(line) or not line.strip():
-            continue
-        for separator in SEPARATORS:
-            cells = split_cells(line, separator)
-            if len(cells) > 1 and cells[0] and all(map(_is_sample, cells)):
-                names = _names_above(lines[:index], separator, len(cells))
-                if names:
-                    return CsvLayout(names, separator, index, lines, _units_above(lines[:index], separator, names))
+    for sample in first_samples(lines[:MAX_HEAD_LINES]):
+        named = names_above(lines, sample)
+        if named is not None:
+            _require_unique(named, path)
+            units = _units_above(lines[: sample.index], sample.separator, named)
+            return CsvLayout(named.names, sample.separator, sample.index, lines, units)
     hint = "begin with a line that names the columns, and samples below it"
     raise RecordingError(str(path), "has no line of names above numbers", hint)
 
 
-def _is_sample(cell: str) -> bool:
-    return is_number(cell) or cell in MISSING_CELLS or clock_format(cell) is not None
+def _require_unique(named: NamesLine, path: Path) -> None:
+    """Raises RecordingError where a standard name repeats, which no number makes another."""
+    for name in named.names:
+        count = named.names.count(name)
+        if name and count > 1:
+            where = f"{path}: line {named.index + 1}"
+            problem = f"the column {format_value(name)} appears {count} times"
+            raise RecordingError(where, problem, "keep one of them", named.index + 1)
 
 
-def _names_above(lines: Sequence[str], separator: str, count: int) -> tuple[str, ...]:
-    """The cells of the first line with as many as the samples have."""
-    for line in lines:
-        cells = split_cells(without_comment_mark(line) if is_comment(line) else line, separator)
-        if len(cells) == count and len(set(cells)) == count and not all(map(is_number, cells)):
-            return tuple(cells)
-    return ()
-
-
-def _units_above(lines: Sequence[str], separator: str, names: Sequence[str]) -> tuple[str, ...]:
+def _units_above(lines: Sequence[str], separator: str, named: NamesLine) -> tuple[str, ...]:
     """The cells of the line, other than that of the names, that has known units."""
-    rows = (tuple(split_cells(without_comment_mark(line), separator)) for line in lines)
-    full_rows = (row for row in rows if len(row) == len(names) and row != names)
-    return next((row for row in full_rows if any(map(is_any_unit, row))), ())
+    rows = (
+        tuple(split_cells(without_comment_mark(line), separator))
+        for index, line in enumerate(lines)
+        if index != named.index
+    )
+    return next((row for row in rows if len(row) == len(named.names) and any(map(is_any_unit, row))), ())

@@ -20,6 +20,7 @@ from .csv_lines import (
     units_in_line,
     without_comment_mark,
 )
+from .csv_names import with_unique_names
 from .recording_table import MAX_COLUMNS
 from .units import Unit, find_unit
 
@@ -57,8 +58,12 @@ def as_text(content: bytes, start: int = 0) -> TextIOWrapper:
 def read_header(content: bytes, lines: Sequence[bytes], columns: ColumnMap, file: str) -> CsvHeader:
     """Read the header in the first lines of a file; raises RecordingError where it, or a unit in it, is not clear."""
     texts = [line.decode("utf-8").rstrip("\r\n") for line in lines]
+    texts, renamed_index = with_unique_names(texts, columns.standard_names)
     header = _find_header(texts, columns.standard_names, file)
-    cells, height = _header_cells(content, sum(map(len, lines[: header.index])), texts[header.index], header, file)
+    if header.index == renamed_index:
+        cells, height = _cells_of_line(texts[header.index], header), 1
+    else:
+        cells, height = _header_cells(content, sum(map(len, lines[: header.index])), texts[header.index], header, file)
     known = columns.standard_names
     recorded, cell_units = zip(*(_name_and_unit(cell, cells, known) for cell in cells or [""]), strict=True)
     names = columns.renamed(recorded, f"{file}: line {header.index + 1}", header.index + 1)
@@ -138,13 +143,17 @@ def _as_header(index: int, line: str, known: Mapping[str, str]) -> CsvHeader:
 def _header_cells(content: bytes, start: int, line: str, header: CsvHeader, file: str) -> tuple[list[str], int]:
     """Cells of the header, and how many lines it has: a name in quotation marks may hold line ends."""
     if header.is_comment or header.separator == " ":
-        return split_cells(without_comment_mark(line) if header.is_comment else line, header.separator), 1
+        return _cells_of_line(line, header), 1
     rows = csv.reader(as_text(content, start), delimiter=header.separator, skipinitialspace=True)
     try:
         return [cell.strip() for cell in next(rows)], rows.line_num
     except csv.Error as problem:
         where = f"{file}: line {header.index + 1}"
         raise RecordingError(where, f"is not valid CSV ({problem})", "write a header line") from problem
+
+
+def _cells_of_line(line: str, header: CsvHeader) -> list[str]:
+    return split_cells(without_comment_mark(line) if header.is_comment else line, header.separator)
 
 
 def _units_and_data(lines: Sequence[str], first: int, header: CsvHeader) -> tuple[int | None, int]:
