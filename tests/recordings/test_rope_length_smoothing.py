@@ -75,6 +75,17 @@ def test_lengths_without_noise_move_the_rope_as_it_moved() -> None:
     assert np.max(np.abs(errors(speeds)[50:-50])) < 2e-7
 
 
+def test_uneven_steps_and_missing_samples_leave_no_lasting_error() -> None:
+    is_kept = np.random.default_rng(3).random(len(TIMES)) > 0.1
+    is_kept[1995:2005] = False
+    times = TIMES[is_kept]
+    recording = log(lengths(times), times)
+    moved = with_smoothed_lengths(recording, [LengthSmoothing(1e-12, 0.0, 1.0)] * 2).wound_lengths()
+    error = moved + lengths(times) - lengths(times)[0]
+    # With the correction of even steps this would be 2e-4.
+    assert np.max(np.abs(error[times > TIMES[2010]])) < 5e-6
+
+
 def test_a_count_shows_in_the_smallest_step() -> None:
     assert length_noise(counted(COUNT)[:, 0]) == pytest.approx(COUNT / np.sqrt(12.0), rel=0.03)
     noisy = lengths()[:, 0] + 5e-5 * np.random.default_rng(2).standard_normal(len(TIMES))

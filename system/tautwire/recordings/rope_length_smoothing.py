@@ -70,7 +70,7 @@ def with_smoothed_lengths(recording: Recording, smoothing: Sequence[LengthSmooth
         if each is not None and np.isfinite(recording.rope_length[:, index]).all():
             time = recording.time - recording.time[0]
             spline = make_smoothing_spline(time, recording.rope_length[:, index], lam=each.penalty)
-            speeds[:, index] = _trapezoidal(-spline.derivative()(time))
+            speeds[:, index] = _trapezoidal(time, -spline(time), -spline.derivative()(time))
     return replace(recording, winch_speed=speeds)
 
 
@@ -113,8 +113,13 @@ def length_noise(lengths: Array) -> float:
     return max(resolution / 12.0**0.5, white_noise_deviation(lengths[:, None]) if len(steps) else 0.0)
 
 
-def _trapezoidal(rates: Array) -> Array:
-    """Values whose trapezoidal sums are the integral of a smooth function of time, to the fourth order (N,)."""
-    corrected = rates.copy()
-    corrected[1:-1] -= (rates[:-2] - 2.0 * rates[1:-1] + rates[2:]) / 12.0
+def _trapezoidal(time: Array, lengths: Array, rates: Array) -> Array:
+    """Values at times (N,) whose trapezoidal sums are the lengths (N,) less the first, by the rates (N,) of these.
+
+    What the rates' own sum errs in a step is taken back at both of its ends, and of all steps as a whole.
+    """
+    steps = np.diff(time)
+    errors = 0.5 * steps * (rates[1:] + rates[:-1]) - np.diff(lengths)
+    of_neighbours = np.append(errors, 0.0) + np.append(0.0, errors)
+    corrected: Array = rates - of_neighbours / (np.append(steps, 0.0) + np.append(0.0, steps))
     return corrected
