@@ -86,7 +86,7 @@ def test_uneven_steps_and_missing_samples_leave_no_lasting_error() -> None:
     assert np.max(np.abs(error[times > TIMES[2010]])) < 5e-6
 
 
-def test_a_count_shows_in_the_smallest_step() -> None:
+def test_a_count_shows_in_third_differences() -> None:
     assert length_noise(counted(COUNT)[:, 0]) == pytest.approx(COUNT / np.sqrt(12.0), rel=0.03)
     noisy = lengths()[:, 0] + 5e-5 * np.random.default_rng(2).standard_normal(len(TIMES))
     assert length_noise(noisy) == pytest.approx(5e-5, rel=0.1)
@@ -114,3 +114,17 @@ def test_speeds_that_were_recorded_stay() -> None:
 
 def test_a_winch_that_stands_has_no_error() -> None:
     assert length_smoothing(log(np.full((len(TIMES), 2), 2.0))) == (None, None)
+
+
+def test_a_steady_motion_is_no_count() -> None:
+    noise = 2e-6 * np.random.default_rng(4).standard_normal(len(TIMES))
+    assert length_noise(2.0 + 0.1 * TIMES + noise) == pytest.approx(2e-6, rel=0.1)
+    assert length_noise(2.0 + 0.1 * TIMES) < 1e-6
+
+
+def test_a_bridged_gap_has_no_smaller_counts() -> None:
+    slow = COUNT * np.round((2.0 + 0.003 * np.sin(2.0 * np.pi * 0.11 * TIMES)) / COUNT)
+    step = int(np.flatnonzero(np.diff(slow))[5])
+    bridged = slow.copy()
+    bridged[step - 2 : step + 4] = np.linspace(slow[step - 2], slow[step + 3], 6)
+    assert length_noise(bridged) == pytest.approx(length_noise(slow)) == pytest.approx(COUNT / np.sqrt(12.0))
