@@ -6,12 +6,14 @@ import numpy as np
 import pytest
 from casadi import DM, SX, vertcat
 
+from tautwire.estimation.disturbance import OrnsteinUhlenbeck
 from tautwire.estimation.innovation_sensitivities import (
     EffectSensitivities,
     _sensitivity_pattern,
     factorised,
     linearise_filter,
 )
+from tautwire.estimation.kalman_filter import Noise
 from tautwire.estimation.likelihood import Likelihood
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.robot.schema import PER_CABLE_COMPONENTS, EffectSetting
@@ -23,13 +25,14 @@ from tests.support.robots import example
 ROBOT = example("three")
 RECORDING = recorded("three", 1).first(600)
 NOISE = estimate_noise(ROBOT, RECORDING)
+LENGTHS = replace(NOISE, rope_lengths=(OrnsteinUhlenbeck(3e-4, 1.0),) * 3)
 INTERVAL = float(RECORDING.time[1] - RECORDING.time[0])
 EVERYWHERE = (1, 2, 3)
 
 
-def along(name: str, form: tuple[str, ...], trial: dict[str, float]) -> np.ndarray:
+def along(name: str, form: tuple[str, ...], trial: dict[str, float], noise: Noise = NOISE) -> np.ndarray:
     """Slopes of the innovations by an effect's parameters, cable by cable: (N, m, p)."""
-    likelihood = Likelihood(ROBOT, (), NOISE, INTERVAL)
+    likelihood = Likelihood(ROBOT, (), noise, INTERVAL)
     directions = EffectSensitivities(
         ROBOT, BY_NAME[name], [(cable,) for cable in EVERYWHERE], [form], [trial], likelihood.model.state_names
     )
@@ -40,7 +43,7 @@ def along(name: str, form: tuple[str, ...], trial: dict[str, float]) -> np.ndarr
     return np.concatenate(parts)
 
 
-def exact(name: str, parameter: str, trial: dict[str, float]) -> np.ndarray:
+def exact(name: str, parameter: str, trial: dict[str, float], noise: Noise = NOISE) -> np.ndarray:
     """The same for one parameter on all cables, by the filter's own sensitivities."""
     effect = BY_NAME[name]
     declared = {p.name: 0.0 for p in effect.parameters if p.neutral is None}
@@ -50,7 +53,7 @@ def exact(name: str, parameter: str, trial: dict[str, float]) -> np.ndarray:
     if effect.parameters[0].neutral is None:
         values = [float(getattr(ROBOT.cables[0], parameter))]
     return (
-        Likelihood(robot, [FreeParameter(0, parameter)], NOISE, INTERVAL).innovations(RECORDING, values).sensitivities
+        Likelihood(robot, [FreeParameter(0, parameter)], noise, INTERVAL).innovations(RECORDING, values).sensitivities
     )
 
 
@@ -79,6 +82,13 @@ def test_slopes_of_an_absent_effect_are_those_of_the_filter_itself(
     alike = np.sum(found * expected) / np.sqrt(np.sum(found**2) * np.sum(expected**2))
     assert alike > 0.999
     assert np.sum(found**2) == pytest.approx(np.sum(expected**2), rel=0.02)
+
+
+@pytest.mark.parametrize(("name", "parameter"), [("payload", "mass"), ("sensor_gain", "tension_gain")])
+def test_slopes_of_an_absent_effect_are_those_along_the_true_lengths(name: str, parameter: str) -> None:
+    expected = exact(name, parameter, {}, LENGTHS)[:, :, 0]
+    found = np.sum(along(name, (parameter,), {}, LENGTHS), axis=2)
+    assert np.sum((found - expected) ** 2) < 1e-7 * np.sum(expected**2)
 
 
 def test_what_was_not_seen_moves_nothing() -> None:

@@ -44,12 +44,13 @@ Array = NDArray[np.float64]
 class LinearisedSegment:
     """Linearised filter segment: K successive samples of a run.
 
-    ``states`` (n, K + 1) as predicted and winch ``speeds`` (cables, K + 1), of the next sample too; ``step`` (K) and
-    ``shift`` (m, K) in s. ``transition`` A (K, n, n), ``half_transition`` the same from half a step before the next
-    sample, ``output_matrix`` C (K, m, n), ``gain`` K (K, n, m); ``whitening`` (K, m, m) makes innovations independent
-    with unit variance and is zero where nothing was ``observed`` (K, m). ``transition``, ``output_matrix`` and ``gain``
-    have the states of a disturbance behind the model's n. ``is_recorded``, ``values`` and ``sensitivities`` as for
-    FilterSegment, values and sensitivities zero where nothing was observed.
+    ``states`` (n, K + 1) as predicted, their unstrained lengths the true ones where others were recorded; winch
+    ``speeds`` (cables, K + 1), of the next sample too; ``step`` (K) and ``shift`` (m, K) in s. ``transition`` A
+    (K, n, n), ``half_transition`` the same from half a step before the next sample, ``output_matrix`` C (K, m, n),
+    ``gain`` K (K, n, m); ``whitening`` (K, m, m) makes innovations independent with unit variance and is zero where
+    nothing was ``observed`` (K, m). ``transition``, ``output_matrix`` and ``gain`` have the states of a disturbance
+    behind the model's n. ``is_recorded``, ``values`` and ``sensitivities`` as for FilterSegment, values and
+    sensitivities zero where nothing was observed.
     """
 
     states: Array
@@ -117,10 +118,10 @@ def linearise_filter(
         whitening = np.where(is_observed, np.linalg.inv(cholesky_factor), 0.0)
         gain = cross_covariance @ np.linalg.inv(covariance)
         corrections = np.einsum("kij,kjl,kl->ki", gain, cholesky_factor, innovations)
-        updated = (predicted + corrections.T)[:size]
+        updated = likelihood.with_true_lengths(predicted + corrections.T)
         rate_jacobian = by_sample(likelihood.rate_jacobian(count, updated, theta, speed)[0], count)
         yield LinearisedSegment(
-            segment.states[:size],
+            likelihood.with_true_lengths(segment.states),
             np.hstack([speed, later[:, -1:]]),
             step[0],
             shift,

@@ -159,6 +159,16 @@ class Likelihood:
         state, _ = self._start(self._arguments(parameters))
         return state.ravel(), self._start_covariance()
 
+    def with_true_lengths(self, states: Array) -> Array:
+        """The model's states (n, K) of a filter's, with the errors of recorded lengths added to its unstrained lengths.
+
+        What acts on the ropes is computed from these, see :mod:`tautwire.estimation.disturbance_symbols`.
+        """
+        size, count = self.model.states.numel(), len(self.noise.rope_lengths)
+        model_states = states[:size].copy()
+        model_states[6 : 6 + count] += states[size : size + count]
+        return model_states
+
     def with_disturbance(self, disturbance: Disturbance) -> Likelihood:
         """The same likelihood under another disturbance; it has to have one."""
         other = copy(self)
