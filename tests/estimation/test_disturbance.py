@@ -107,6 +107,15 @@ def test_errors_of_lengths_with_a_memory_are_innovations_of_the_right_size(noise
     assert right.log_likelihood(rows) > 20.0 + max(each.log_likelihood(rows) for each in (smaller, larger))
 
 
+def test_errors_of_lengths_with_a_short_memory_move_the_platform_as_far_as_they_are_said_to() -> None:
+    recording, rms, bandwidth = PAIR[0], 3e-4, 8.0
+    errors = process(rms, bandwidth, recording, 5)
+    wrong = replace(recording, winch_speed=recording.winch_speed - np.gradient(errors, recording.time, axis=0))
+    values = likelihood_of(lengths_of(rms, bandwidth)).innovations(wrong, ()).values
+    # An error that decays within each step would leave 1.12 to 1.26.
+    assert np.mean(values[:, :3] ** 2, axis=0) == pytest.approx(1.0, abs=0.08)
+
+
 def test_an_undeclared_weight_is_followed_as_a_force_downwards() -> None:
     recording = recorded("three", 1, {"payload": {"mass": 30.0 / 9.81}})
     slow = Disturbance(OrnsteinUhlenbeck(30.0, 1e-3), *[OrnsteinUhlenbeck(0.0, 1.0)] * 2, NOISE.position, NOISE.tension)

@@ -1,8 +1,11 @@
 """States of a disturbance behind those of a robot's model, as CasADi expressions of a filter's step.
 
-Each decays, and noise is added to it; errors of recorded rope lengths and forces drive the model meanwhile:
+Each decays, and noise is added to it; errors e of recorded rope lengths and forces F drive the model meanwhile:
 
-    x(t + h) = f(x(t), d(t) e^(-a h / 2))        d(t + h) = e^(-a h) d(t) + w        var w = s^2 (1 - e^(-2 a h))
+    x(t + h) = f(x(t), e(t), F(t) e^(-a h / 2))      d(t + h) = e^(-a h) d(t) + w      var w = s^2 (1 - e^(-2 a h))
+
+The rms of a force is fitted, that of a length is given: held over a step, its error has the spectral density at zero
+``h s^2 coth(a h / 2)``, that of the process within ``(a h)^2 / 12``; decaying it would be less by ``e^(-a h)``.
 """
 
 from __future__ import annotations
@@ -70,7 +73,8 @@ class DisturbanceSymbols:
     def appended_to(self, time_update: Sequence[SX], state: SX, step: SX) -> tuple[SX, SX, SX]:
         """The time update of a driven model, with the states behind it, driven by the means over the step."""
         size = state.numel() - self.count
-        mean_decay, decay = self.decay(0.5 * step)[: self.driving_count], self.decay(step)
+        force_decay, decay = self.decay(0.5 * step)[self._length_count : self.driving_count], self.decay(step)
+        mean_decay = casadi.vertcat(SX.ones(self._length_count), force_decay)
         mean = mean_decay * state[size : size + self.driving_count]
         next_state, transition, sensitivities = casadi.substitute(list(time_update), [self._driving], [mean])
         own_count = sensitivities.shape[1] - self.driving_count
