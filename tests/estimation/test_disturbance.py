@@ -116,6 +116,20 @@ def test_errors_of_lengths_with_a_short_memory_move_the_platform_as_far_as_they_
     assert np.mean(values[:, :3] ** 2, axis=0) == pytest.approx(1.0, abs=0.08)
 
 
+def test_open_loop_errors_of_lengths_count_from_the_first_recorded_one() -> None:
+    recording, rms = PAIR[0].first(400), 3e-4
+    likelihood = likelihood_of(replace(lengths_of(rms, 0.1), position=0.0))
+    expected = np.mean(likelihood.open_loop_variances(recording, ())[100:, :3], axis=0)
+    squares = []
+    for seed in range(20):
+        errors = process(rms, 0.1, recording, seed)
+        wrong = replace(recording, winch_speed=recording.winch_speed - np.gradient(errors, recording.time, axis=0))
+        difference = likelihood.simulated_outputs(wrong, ()) - likelihood.simulated_outputs(recording, ())
+        squares.append(np.mean(difference[100:, :3] ** 2, axis=0))
+    # Of errors that began at zero, 1.43.
+    assert np.sum(np.mean(squares, axis=0)) == pytest.approx(np.sum(expected), rel=0.2)
+
+
 def test_an_undeclared_weight_is_followed_as_a_force_downwards() -> None:
     recording = recorded("three", 1, {"payload": {"mass": 30.0 / 9.81}})
     slow = Disturbance(OrnsteinUhlenbeck(30.0, 1e-3), *[OrnsteinUhlenbeck(0.0, 1.0)] * 2, NOISE.position, NOISE.tension)

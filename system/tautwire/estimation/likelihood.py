@@ -223,13 +223,12 @@ class Likelihood:
     def open_loop_variances(self, recording: Recording, parameters: Sequence[float] | Array) -> Array:
         """Variance of measured less simulated, shape (N, m), where the model is right and its start exact.
 
-        Noise of the sensors, and of the recorded winch speeds as it integrates.
+        Noise of the sensors, and of the recorded winch speeds as it integrates, or errors of the recorded rope lengths
+        against that of the first.
         """
         no_measurements = np.full(recording.measured().shape, np.nan)
-        zero_covariance = np.zeros_like(self._start_covariance())
-        filter_segments = self._filter(
-            recording, (no_measurements, np.zeros_like(no_measurements)), parameters, zero_covariance, 0.0
-        )
+        outputs = (no_measurements, np.zeros_like(no_measurements))
+        filter_segments = self._filter(recording, outputs, parameters, self._start_covariance_of_lengths(), 0.0)
         _, log_variances, *_ = _concatenated(filter_segments)
         variances: Array = np.exp(log_variances)
         return variances
@@ -288,14 +287,23 @@ class Likelihood:
         return np.array([*rates, *(process.rms**2 for process in processes)])[:, None]
 
     def _start_covariance(self) -> Array:
+        size, lengths = self.model.states.numel(), len(self.noise.rope_lengths)
+        covariance = self._start_covariance_of_lengths()
+        covariance[:size, :size] += initial_covariance(self.robot, self.noise, size, len(self.uncertain))
+        variances = [process.rms**2 for process in self.noise.processes(self.cable_count)[lengths:]]
+        covariance[size + lengths :, size + lengths :] = np.diag(variances)
+        return covariance
+
+    def _start_covariance_of_lengths(self) -> Array:
+        """The filter's initial covariance (n, n) where all is known but the errors of recorded lengths.
+
+        These count from the first, whose own error is no error of the length that statics gives.
+        """
         size = self.model.states.numel()
-        variances = [process.rms**2 for process in self.noise.processes(self.cable_count)]
-        covariance = np.diag(np.append(np.zeros(size), variances))
-        covariance[:size, :size] = initial_covariance(self.robot, self.noise, size, len(self.uncertain))
-        # Recorded lengths count from the first, whose own error is no error of the length that statics gives.
+        covariance = np.zeros([size + len(self.noise.processes(self.cable_count))] * 2)
         for cable, error in enumerate(self.noise.rope_lengths):
-            covariance[6 + cable, 6 + cable] += error.rms**2
-            covariance[6 + cable, size + cable] = covariance[size + cable, 6 + cable] = -(error.rms**2)
+            both = np.ix_([6 + cable, size + cable], [6 + cable, size + cable])
+            covariance[both] = error.rms**2 * np.array([[1.0, -1.0], [-1.0, 1.0]])
         return covariance
 
 
