@@ -116,6 +116,17 @@ def test_speeds_between_counts_are_used_where_no_lengths_were_recorded() -> None
     assert max(mean_squares(found)) < 1.05
 
 
+@pytest.mark.parametrize("lengths", [None, np.array([np.nan, 1.0, np.nan])])
+def test_lengths_that_only_one_recording_has_are_not_smoothed(lengths: np.ndarray | None) -> None:
+    fit, check = counted(1, 1e-4), counted(2, 1e-4)
+    assert check.rope_length is not None
+    found, *_ = prepare_data(
+        THREE, fit, replace(check, rope_length=None if lengths is None else lengths * check.rope_length), WorkerPool(1)
+    )
+    # Speeds of a noise that does not drift would leave 1.27 and 1.20 times the variance in CHECK.
+    assert max(mean_squares(found)) < 1.05
+
+
 def test_a_recording_that_also_validates_has_the_same_speeds_in_both() -> None:
     (found,) = prepare_data(THREE, counted(1, 1e-6), None, WorkerPool(1))
     assert found.split.estimation.recording is found.split.validation.recording

@@ -30,13 +30,14 @@ def speed_versions(
 
     Each under its own disturbance, with notes. Counts that are coarse add more noise than the motion that is taken
     back. Where the model is far off, its errors decide on the likelihood: unless speeds explain a share of them, those
-    of rope lengths come in both versions.
+    of rope lengths come in both versions. Where CHECK lacks a length, none is smoothed: one noise is of both.
     """
     as_recorded = (fitter, split, ())
     recorded, check = split.estimation.recording, split.validation.recording
     if not may_be_central_differences(recorded):
         return [as_recorded]
-    noise, with_speeds, description = _speeds_from_encoders(fitter.noise, smoothing)
+    are_of_both = all(each is None or known for each, known in zip(smoothing, _has_lengths(check), strict=True))
+    noise, with_speeds, description = _speeds_from_encoders(fitter.noise, smoothing if are_of_both else ())
     estimation = replace(split.estimation, recording=with_speeds(recorded))
     other = fitter if noise == fitter.noise else Fitter(noise, fitter.poll_interrupts, fitter.policy)
     other = with_fitted_disturbance(other, robot, (), estimation)
@@ -54,6 +55,12 @@ def speed_versions(
     note = f"{paths}: winch speeds are {description} differ by {size:.2g} m/s (rms), were used"
     corrected = (other, DataSplit(estimation, validation, split.notes), (note,))
     return [corrected] if gain >= decisive_gain else [as_recorded, corrected]
+
+
+def _has_lengths(check: Recording) -> list[bool]:
+    """Whether each cable's speed in CHECK is a length's rate, or zero: those of others drift, which errors do not."""
+    stands = ~np.any(check.winch_speed, axis=0)
+    return [bool(stands[cable - 1]) or cable in check.rope_lengths for cable in range(1, check.cable_count + 1)]
 
 
 def _speeds_from_encoders(
