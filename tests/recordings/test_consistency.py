@@ -124,6 +124,22 @@ def test_counts_that_pass_for_metres_are_told_without_positions() -> None:
     assert f"give rope_length_{winch} in m: for counts add factor = 2 pi * drum radius" in error.hint
 
 
+def test_a_platform_may_hang_far_below_its_start() -> None:
+    time, centre = 0.02 * np.arange(4001), np.mean(THREE.anchors, axis=0)
+    anchors = centre + 0.3 * (np.array(THREE.anchors) - centre)
+    cables = tuple(replace(c, anchor=tuple(a.tolist())) for c, a in zip(THREE.cables, anchors, strict=True))
+    start = tuple((centre - np.array([0.0, 0.0, 1.0])).tolist())
+    shaft = replace(THREE, cables=cables, platform=replace(THREE.platform, start=start))
+    depth = 1.0 + 60.0 * (1.0 - np.cos(2.0 * np.pi * time / time[-1]))
+    position = centre - depth[:, None] * np.array([0.0, 0.0, 1.0])
+    lengths = np.linalg.norm(anchors - position[:, None], axis=2)
+    speeds, unmeasured = -np.gradient(lengths, time, axis=0), np.full(lengths.shape, np.nan)
+    recording = Recording("shaft.csv", time, speeds, unmeasured, position)
+    assert np.max(np.abs(recording.wound_lengths())) > 3.0 * robot_size(shaft)
+    assert not recording_mistakes(shaft, recording)
+    assert travel_error(shaft, replace(recording, position=unmeasured)) is not None
+
+
 def test_time_in_milliseconds_is_told_without_positions() -> None:
     recording = of("three")
     late = replace(recording, position=np.full_like(recording.position, np.nan), time=1e3 * recording.time)

@@ -89,7 +89,7 @@ def test_a_log_with_positions_is_refused(tmp_path: Path) -> None:
 
 
 def test_a_log_of_counts_is_refused_before_its_tracker_is(tmp_path: Path) -> None:
-    log, _, path = split_files(tmp_path)
+    _, log, path = split_files(tmp_path)
     counts = replace(log, winch_speed=1e4 * log.winch_speed, rope_length=-1e4 * log.wound_lengths())
     with pytest.raises(RecordingError, match=r"moves .* m of rope, and the robot is no larger than") as error:
         with_tracker(replace(ROBOT, tracker=Tracker(COLUMNS)), counts, path)

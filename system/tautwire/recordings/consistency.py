@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from ..errors import RecordingError
 from ..robot.schema import Robot
 from .alternative_readings import GeometryReading, Mistake, WindingReading
-from .mistaken_motion import MotionCheck, check_motion
+from .mistaken_motion import MAX_MISFIT, MotionCheck, check_motion
 from .mistaken_tensions import TensionCheck, check_tensions
 from .recording import Recording
 
@@ -69,10 +69,16 @@ def recording_mistakes(robot: Robot, recording: Recording) -> tuple[RecordingErr
 
 
 def travel_error(robot: Robot, recording: Recording) -> RecordingError | None:
-    """The error of a recording in which a winch moves more rope than fits into the robot, None where none does."""
+    """The error of a recording in which a winch moves more rope than fits into the robot, None where none does.
+
+    None too where positions confirm it: a platform may hang far below where it starts.
+    """
     travel, size = np.max(np.abs(recording.wound_lengths()), axis=0), robot_size(robot)
     cable = int(np.argmax(travel)) + 1
     if travel[cable - 1] <= MAX_TRAVEL_TO_SIZE * size:
+        return None
+    motion = check_motion(robot, recording)
+    if motion is not None and motion.misfit <= MAX_MISFIT:
         return None
     problem = f"winch {cable} moves {travel[cable - 1]:,.4g} m of rope, and the robot is no larger than {size:.3g} m"
     hint = "check that time is in s and winch speeds are in m/s; [recording.columns] declares other units and factors"

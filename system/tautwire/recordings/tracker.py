@@ -28,12 +28,9 @@ def with_tracker(robot: Robot, log: Recording, path: str | Path) -> Recording:
     The robot's ``tracker`` says what the file's columns are, and may state its clock; otherwise that is estimated from
     the winch travel. ``read_as`` tells the clock.
 
-    Raises RecordingError where the log has positions or moves more rope than fits into the robot, the file is not
-    valid, or its clock cannot be found.
+    Raises RecordingError where the log has positions, the file is not valid, or its clock cannot be found, be it as the
+    log moves more rope than fits into the robot.
     """
-    travel = travel_error(robot, log)
-    if travel is not None:
-        raise travel
     if log.has_position:
         hint = "declare other columns as x, y, z, rename them, or leave the tracker's file out"
         raise RecordingError(log.path, f"has positions of its own beside those of {path}", hint)
@@ -43,7 +40,10 @@ def with_tracker(robot: Robot, log: Recording, path: str | Path) -> Recording:
         raise RecordingError(str(path), "has no positions", hint)
     declared = robot.tracker
     if declared.clock_offset is None:
-        clock = estimate_tracker_clock(robot, log, tracker)
+        try:
+            clock = estimate_tracker_clock(robot, log, tracker)
+        except RecordingError as error:
+            raise travel_error(robot, log) or error from None
         origin = f"from winch travel, +- {2e3 * clock.deviation:.2g} ms"
     else:
         clock = TrackerClock(declared.clock_offset, declared.clock_rate)
