@@ -137,6 +137,17 @@ def test_what_was_dropped_beside_another_does_not_come_back_in_its_place(monkeyp
     selection.eliminate()
 
 
+def test_what_is_accepted_again_has_the_evidence_with_which_it_came_last(monkeypatch: pytest.MonkeyPatch) -> None:
+    context = context_with(has_disturbance=False)
+    fit = Fit.without_parameters(context.robot)
+    damping = Hypothesis(BY_NAME["damping"], (1, 2, 3))
+    selection = stepwise_selection._StepwiseSelection(context, fit, context.fitter)
+    selection.evidences = {damping: 1000.0}
+    monkeypatch.setattr(stepwise_selection, "with_disturbance_beside", lambda context, chosen, fit: (context, fit))
+    selection._accept_beside([], CandidateScore(damping, fit, 80.0, 1.0))
+    assert selection.result().evidence == (80.0,)
+
+
 @pytest.mark.parametrize(("has_disturbance", "also_possible"), [(False, []), (True, ["relaxation"])])
 def test_beside_a_disturbance_what_had_more_evidence_in_the_same_round_is_also_possible(
     has_disturbance: bool, also_possible: list[str], monkeypatch: pytest.MonkeyPatch

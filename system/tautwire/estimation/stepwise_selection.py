@@ -208,9 +208,9 @@ class _StepwiseSelection:
                 self._accept(others, fit_model(self.context, others, without.robot))
                 pending, dropped = list(others), [*dropped, tested]
                 continue
-            number, scores = None, self._known_scores(others, tested)
+            known_scores, number = self._known_scores(others, tested), self._next_number()
+            scores = known_scores
             if scores is None:
-                number = self._next_number()
                 search_round = _search_round(self.context, number, without.robot, others, score)
                 scores, _ = score_candidates(self.context, search_round)
                 self.complete_rounds[tuple(others), tested] = scores
@@ -219,7 +219,7 @@ class _StepwiseSelection:
             # One that was not needed beside this one does not come back in its place.
             allowed = [t for t in alternatives if not any(t.hypothesis.overlaps(each) for each in dropped)]
             best = self._best_candidate([contender, *allowed], without.robot)
-            if number is not None:
+            if known_scores is None:
                 self.candidates += [t.candidate(number, t is best) for t in alternatives]
             if best is not None and best is not contender and swaps < policy.max_swaps:
                 self._accept_beside(others, best)
