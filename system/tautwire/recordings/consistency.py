@@ -101,7 +101,7 @@ def _motion_error(path: str, motion: MotionCheck) -> RecordingError:
 def _tension_error(path: str, tensions: TensionCheck) -> RecordingError:
     problem = (
         f"tensions do not match the platform's weight: they carry {_percentage(tensions.carried)} of it and are off by "
-        f"{_percentage(tensions.misfit)}, by {_percentage(tensions.mended_misfit)} if {_causes(tensions.mistakes)}"
+        f"{_percentage(tensions.misfit)}, by {_percentage(tensions.corrected_misfit)} if {_causes(tensions.mistakes)}"
     )
     return RecordingError(path, problem, _remedies(tensions.mistakes))
 

@@ -26,7 +26,7 @@ from .white_noise_estimate import white_noise_deviation
 Array = NDArray[np.float64]
 
 # A smaller misfit is for effects to explain, and a mistake has to divide a larger one by the factor, to a share.
-MAX_MISFIT, MIN_IMPROVEMENT, MAX_MENDED_MISFIT = 0.05, 4.0, 0.2
+MAX_MISFIT, MIN_IMPROVEMENT, MAX_CORRECTED_MISFIT = 0.05, 4.0, 0.2
 # Readings that misfit by no more than this times the best, and this more, explain a recording as well.
 EQUAL_RATIO, EQUAL_DIFFERENCE = 1.5, 0.005
 # Units err from the nearest one by less, drums included; cables whose winches show angles have one ratio.
@@ -103,9 +103,9 @@ def check_motion(robot: Robot, recording: Recording) -> MotionCheck | None:
     units = () if rows is None else _quasi_static_units(robot, recording, rows)
     if rows is None or not units:
         return None
-    time, wound, shown = recording.time[rows], recording.wound_lengths()[rows], recording.position[rows]
+    time, wound, recorded_positions = recording.time[rows], recording.wound_lengths()[rows], recording.position[rows]
     declared = WindingReading(signs=(1,) * robot.cable_count, order=tuple(range(robot.cable_count)))
-    lengths, travel = _centred(GeometryReading().directions(robot, shown)[0]), _centred(wound)
+    lengths, travel = _centred(GeometryReading().directions(robot, recorded_positions)[0]), _centred(wound)
     misfit = _misfit(lengths, travel, declared)
     if misfit <= MAX_MISFIT:
         return MotionCheck(misfit, ())
@@ -115,10 +115,10 @@ def check_motion(robot: Robot, recording: Recording) -> MotionCheck | None:
         readings += [_reading(GeometryReading(), winding, error, recording) for winding, error in clocks]
     best = _best(readings, misfit)
     if not best and "m" in units:
-        geometry = _with_fitted_origin(robot, shown, wound)
-        if not _is_start_nearer(robot, shown, geometry):
+        geometry = _with_fitted_origin(robot, recorded_positions, wound)
+        if not _is_start_nearer(robot, recorded_positions, geometry):
             return MotionCheck(misfit, ())
-        error = _misfit(_centred(geometry.directions(robot, shown)[0]), travel, declared)
+        error = _misfit(_centred(geometry.directions(robot, recorded_positions)[0]), travel, declared)
         best = _best([_reading(geometry, declared, error, recording)], misfit)
     return MotionCheck(misfit, best)
 
@@ -139,15 +139,15 @@ def _readings(
     return readings
 
 
-def _with_fitted_origin(robot: Robot, shown: Array, wound: Array) -> GeometryReading:
+def _with_fitted_origin(robot: Robot, recorded_positions: Array, wound: Array) -> GeometryReading:
     """The geometry with the origin of the positions, in the robot's plane, that fits the winch travel best."""
     axes = list(robot.axes_in_plane)
-    start = np.array(robot.platform.start) - GeometryReading().positions(robot, shown[:1])[0]
+    start = np.array(robot.platform.start) - GeometryReading().positions(robot, recorded_positions[:1])[0]
 
     def errors(coordinates: Array) -> Array:
         origin = np.zeros(len(AXES))
         origin[axes] = coordinates
-        lengths = GeometryReading(origin=tuple(origin)).directions(robot, shown)[0]
+        lengths = GeometryReading(origin=tuple(origin)).directions(robot, recorded_positions)[0]
         return np.asarray(_centred(lengths + wound).ravel())
 
     origin = np.zeros(len(AXES))
@@ -155,11 +155,11 @@ def _with_fitted_origin(robot: Robot, shown: Array, wound: Array) -> GeometryRea
     return GeometryReading(origin=tuple(origin.tolist()))
 
 
-def _is_start_nearer(robot: Robot, shown: Array, geometry: GeometryReading) -> bool:
+def _is_start_nearer(robot: Robot, recorded_positions: Array, geometry: GeometryReading) -> bool:
     """Whether positions that begin away from the declared start begin within half that distance in this geometry."""
     start, size = np.array(robot.platform.start), float(np.ptp([*robot.anchors, robot.platform.start], axis=0).max())
     before, after = (
-        float(np.linalg.norm(reading.positions(robot, shown[:1])[0] - start))
+        float(np.linalg.norm(reading.positions(robot, recorded_positions[:1])[0] - start))
         for reading in (GeometryReading(), geometry)
     )
     return before > MIN_START_SHARE * size and after < 0.5 * before
@@ -173,12 +173,12 @@ def _reading(geometry: GeometryReading, winding: WindingReading, misfit: float, 
 
 
 def _best(readings: list[MotionReading], declared_misfit: float) -> tuple[MotionReading, ...]:
-    limit = min(declared_misfit / MIN_IMPROVEMENT, MAX_MENDED_MISFIT)
-    mended = [reading for reading in readings if reading.misfit <= limit]
-    if not mended:
+    limit = min(declared_misfit / MIN_IMPROVEMENT, MAX_CORRECTED_MISFIT)
+    matching = [reading for reading in readings if reading.misfit <= limit]
+    if not matching:
         return ()
-    limit = EQUAL_RATIO * min(reading.misfit for reading in mended) + EQUAL_DIFFERENCE
-    equal = [reading for reading in mended if reading.misfit <= limit]
+    limit = EQUAL_RATIO * min(reading.misfit for reading in matching) + EQUAL_DIFFERENCE
+    equal = [reading for reading in matching if reading.misfit <= limit]
     fewest = min(reading.penalty for reading in equal)
     unique = {reading.mistakes: reading for reading in equal if reading.penalty == fewest}
     return tuple(sorted(unique.values(), key=lambda reading: reading.misfit))

@@ -78,7 +78,7 @@ class TensionCheck:
 
     carried: float
     misfit: float
-    mended_misfit: float
+    corrected_misfit: float
     mistakes: tuple[tuple[Mistake, ...], ...]
 
 
@@ -137,8 +137,8 @@ def check_tensions(
     readings = [reading for order in _likely_orders(balance) for reading in _unit_readings(balance, order)]
     fewest = min((len(tuple(reading.mistakes())) for reading in readings), default=0)
     mistakes = tuple(mistakes for r in readings if len(mistakes := tuple(r.mistakes())) == fewest) if fewest else ()
-    mended_misfit = min((balance.misfit(reading.order, reading.factor) for reading in readings), default=np.inf)
-    return TensionCheck(balance.carried(declared), balance.misfit(declared), mended_misfit, mistakes)
+    corrected_misfit = min((balance.misfit(reading.order, reading.factor) for reading in readings), default=np.inf)
+    return TensionCheck(balance.carried(declared), balance.misfit(declared), corrected_misfit, mistakes)
 
 
 def _likely_orders(balance: ForceBalance) -> list[tuple[int, ...]]:
@@ -178,19 +178,19 @@ def force_balance(
     acceleration = (in_metres[2:] - 2.0 * in_metres[1:-1] + in_metres[:-2]) / duration**2
     tensions = (tensions[2:] + 4.0 * tensions[1:-1] + tensions[:-2]) / 6.0
     directions = directions[1:-1]
-    whole = np.isfinite(acceleration).all(axis=1) & np.isfinite(tensions[:, has_load_cell]).all(axis=1)
-    if np.count_nonzero(whole) < MIN_BLOCKS:
+    is_complete = np.isfinite(acceleration).all(axis=1) & np.isfinite(tensions[:, has_load_cell]).all(axis=1)
+    if np.count_nonzero(is_complete) < MIN_BLOCKS:
         return None
-    tensions, directions = np.where(has_load_cell, tensions, 0.0)[whole], directions[whole]
+    tensions, directions = np.where(has_load_cell, tensions, 0.0)[is_complete], directions[is_complete]
     in_plane = np.isin(np.arange(len(AXES)), robot.axes_in_plane)
-    required = robot.platform.mass * (acceleration[whole] + np.array([0.0, 0.0, robot.gravity])) * in_plane
+    required = robot.platform.mass * (acceleration[is_complete] + np.array([0.0, 0.0, robot.gravity])) * in_plane
     projection = _without_directions(directions[:, :, np.logical_not(has_load_cell)])
     required = np.einsum("bij,bj->bi", projection, required)
     weight = robot.platform.mass * robot.gravity
     if not np.sqrt(np.mean(np.sum(required**2, axis=1))) > MIN_SEEN_SHARE * weight > 0.0:
         return None
     cells = tuple(map(bool, has_load_cell))
-    return ForceBalance(time[1:-1][whole], projection @ directions, tensions, required, cells)
+    return ForceBalance(time[1:-1][is_complete], projection @ directions, tensions, required, cells)
 
 
 def _block_means(
