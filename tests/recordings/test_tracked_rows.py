@@ -53,6 +53,13 @@ def test_gaps_of_the_tracker_are_not_bridged() -> None:
     assert told is not None and told.scales == pytest.approx(SCALES, rel=1e-3)
 
 
+def test_a_tracker_of_few_samples_a_second_tells_scales_too() -> None:
+    times = np.arange(0.0, 20.0, 0.25)
+    counts = lengths(motion(LOG)).T / SCALES[:, None]
+    told = scales_by_tracker(ROBOT, LOG, list(counts), (times + OFFSET, motion(times)), [0, 1, 2])
+    assert told is not None and told.scales == pytest.approx(SCALES, rel=5e-3)
+
+
 @pytest.mark.parametrize("case", ["another motion", "at rest", "a motion that fits with both signs", "no tracker"])
 def test_what_the_tracker_leaves_open_is_not_told(case: str) -> None:
     counts, tracker = list(lengths(motion(LOG)).T / SCALES[:, None]), tracked(0.0, 20.0)

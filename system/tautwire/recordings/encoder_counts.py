@@ -50,13 +50,15 @@ def rope_scales(
     Of the ``cables`` from 0 that are known; else each cable has the column that alone fits it. None where these do not
     fit.
     """
-    rows = np.flatnonzero(np.isfinite(position).all(axis=1) & np.isfinite(np.array(columns)).all(axis=0))
+    rows = np.flatnonzero(np.isfinite(position).all(axis=1))
+    for column in columns:
+        rows = rows[np.isfinite(column[rows])]
     if len(rows) < MIN_VALUES:
         return None
     rows = rows[:: 1 + len(rows) // MAX_ROWS]
     lengths = np.linalg.norm(np.array(robot.anchors) - position[rows][:, None], axis=2)
     lengths -= lengths.mean(axis=0)
-    signals = np.array(columns)[:, rows]
+    signals = np.array([column[rows] for column in columns])
     signals -= signals.mean(axis=1, keepdims=True)
     powers, covariances = (signals**2).sum(axis=1), signals @ lengths
     products = np.outer(powers, (lengths**2).sum(axis=0))

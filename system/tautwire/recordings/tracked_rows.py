@@ -16,7 +16,7 @@ from .travel_correlation import TRAVEL_WINDOW, correlated, lowest_valleys, trave
 Array = NDArray[np.float64]
 
 MIN_GRID_INTERVAL, MAX_GRID_POINTS = 0.02, 50_000  # s
-MIN_SAMPLES = 20
+MIN_SAMPLES, MAX_ROWS = 20, 50_000
 # Share of the motion of the log or of the tracker that both have to have recorded.
 MIN_MOTION_SHARE = 0.5
 # Coarse misfits up to this are refined; scales of two offsets differ beyond the second.
@@ -31,10 +31,10 @@ def scales_by_tracker(
     Offsets of the clock are compared by how well rope lengths regress on the columns, whatever the scale of each. None
     where no offset fits, or two fit with other scales.
     """
-    rows = np.isfinite(tracker[0]) & np.isfinite(tracker[1]).all(axis=1)
+    rows = _thinned(np.asarray(np.isfinite(tracker[0]) & np.isfinite(tracker[1]).all(axis=1)))
     times, positions = tracker[0][rows], tracker[1][rows]
-    measured = np.isfinite(log_time) & np.isfinite(np.array(columns)).all(axis=0)
-    log_time, signals = log_time[measured], np.array(columns)[:, measured]
+    rows = _thinned(np.asarray(np.isfinite([log_time, *columns]).all(axis=0)))
+    log_time, signals = log_time[rows], np.array([column[rows] for column in columns])
     is_rising = all(len(each) > MIN_SAMPLES and np.all(np.diff(each) > 0.0) for each in (times, log_time))
     if not is_rising:
         return None
@@ -59,6 +59,12 @@ def scales_by_tracker(
     return fits[0] if fits and not any(_contradicts(fits[0], other) for other in fits[1:]) else None
 
 
+def _thinned(is_measured: NDArray[np.bool_]) -> NDArray[np.intp]:
+    """Rows that were measured, of many evenly fewer."""
+    rows = np.flatnonzero(is_measured)
+    return rows[:: 1 + len(rows) // MAX_ROWS]
+
+
 def _contradicts(best: RopeScales, other: RopeScales) -> bool:
     """Whether another offset fits almost as well with other cables or scales."""
     if np.nanmean(other.misfits) > MIN_CONTRAST * np.nanmean(best.misfits):
@@ -71,7 +77,7 @@ def _at_rows(row_times: Array, times: Array, positions: Array) -> Array:
     """Positions (N, 3) at times (N,) by linear interpolation; NaN outside, and in gaps of the tracker."""
     at_rows = np.column_stack([np.interp(row_times, times, column) for column in positions.T])
     after = np.clip(np.searchsorted(times, row_times), 1, len(times) - 1)
-    is_known = times[after] - times[after - 1] <= TRAVEL_WINDOW
+    is_known = times[after] - times[after - 1] <= max(TRAVEL_WINDOW, 2.0 * float(np.median(np.diff(times))))
     at_rows[~is_known | (row_times < times[0]) | (row_times > times[-1])] = np.nan
     return at_rows
 
