@@ -40,6 +40,15 @@ def test_a_line_of_units_is_told(units: str, tmp_path: Path) -> None:
     assert samples.values["c"].tolist() == [3.0]
 
 
+def test_clock_times_are_seconds_from_the_first(tmp_path: Path) -> None:
+    text = "a;b;c\n2026-05-04T23:59:59.5;23:59:59,5;1\n2026-05-05T00:00:00;00:00:01;2\n?;;3\n"
+    (tmp_path / "log.csv").write_text(text, encoding="utf-8")
+    samples = column_samples(tmp_path / "log.csv")
+    assert samples.clocks == {"a", "b"}
+    np.testing.assert_array_equal(samples.values["a"], [0.0, 0.5, np.nan])
+    np.testing.assert_array_equal(samples.values["b"], [0.0, 1.5, np.nan])
+
+
 def test_a_csv_file_that_is_not_valid_has_no_samples(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text('a,b,c\n1,2,3\n"1,2,3\n', encoding="utf-8")
     assert column_samples(tmp_path / "log.csv").values == {}

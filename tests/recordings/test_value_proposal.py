@@ -121,6 +121,15 @@ def test_the_range_tells_metres_from_millimetres_without_a_robot(extent: float, 
     assert [columns[axis]["unit"] for axis in "xy"] == [unit, unit]
 
 
+@pytest.mark.parametrize("name", ["Zeit", "Col1", "time"])
+def test_clock_times_have_no_unit(name: str) -> None:
+    values = {name: 0.002 * np.arange(COUNT), "Col2": FALLING}
+    proposal = propose_columns([ColumnName(each, "time" if each == "time" else None, each) for each in values], 3)
+    (time,) = with_values(proposal, ColumnSamples(values, clocks=frozenset([name])), 3).columns
+    assert (time.column, time.name, time.unit) == ("time", name, "")
+    assert "no unit" not in time.doubt
+
+
 def test_units_in_the_file_stay(recorded: dict[str, Array], robot: Robot) -> None:
     columns, _ = proposed(recorded_axes(recorded) | {"Col1": recorded["time"]}, robot, units={"Col1": "s"})
     assert {each["unit"] for each in columns.values()} == {""}

@@ -166,3 +166,12 @@ def test_what_the_coordinates_do_not_fit_stays_as_its_name_has_it(robot: Robot, 
     assert {each.factor for each in columns.values()} == {None}
     assert all("add factor = metres per count" in each.doubt for each in columns.values())
     assert proposed({"enc_1": one} | axes(recorded), None)["rope_length_1"].factor is None
+
+
+def test_clock_times_are_in_seconds_whatever_their_doubt() -> None:
+    values = {"c0": 0.01 * np.arange(COUNT)}
+    names = [ColumnName("c0", None, "c0")]
+    samples = ColumnSamples(values, clocks=frozenset(values))
+    proposal = with_values(propose_columns(names, 0), samples, 0)
+    assert proposal.columns[0].doubt
+    np.testing.assert_array_equal(ProposedFile(proposal, samples).si_values("time"), values["c0"])

@@ -11,6 +11,7 @@ import numpy as np
 import pandas as pd  # type: ignore[import-untyped,unused-ignore]
 from numpy.typing import NDArray
 
+from .clock_time import ClockFormat, clock_format
 from .column_names import CsvLayout, csv_layout
 from .mat_file import is_mat, mat_samples
 from .parquet_file import is_parquet, parquet_samples
@@ -27,11 +28,12 @@ MAX_CSV_ROWS = 200_000
 class ColumnSamples:
     """Samples of columns by name in the file's order, each (N,), NaN where a cell holds no number.
 
-    ``units`` by name are what a line of the file states.
+    ``units`` by name are what a line of the file states; columns of ``clocks`` were clock times, and are in s.
     """
 
     values: Mapping[str, Array] = field(default_factory=dict)
     units: Mapping[str, str] = field(default_factory=dict)
+    clocks: frozenset[str] = frozenset()
 
 
 def column_samples(path: Path) -> ColumnSamples:
@@ -53,9 +55,18 @@ def _csv_samples(path: Path) -> ColumnSamples:
         frame = _frame(layout)
     except (ValueError, OverflowError):
         return ColumnSamples()
-    numbers = (pd.to_numeric(frame[index], errors="coerce") for index in frame)
-    values = {name: column.to_numpy(dtype=float) for name, column in zip(layout.names, numbers, strict=True)}
-    return ColumnSamples(values, dict(zip(layout.names, layout.units, strict=False)))
+    columns = {name: frame[index] for name, index in zip(layout.names, frame, strict=True)}
+    clocks = {name: clock_format(str(cells.iloc[0])) for name, cells in columns.items() if len(cells)}
+    values = {name: _numbers(cells, clocks.get(name)) for name, cells in columns.items()}
+    of_clock = frozenset(name for name, clock in clocks.items() if clock is not None)
+    return ColumnSamples(values, dict(zip(layout.names, layout.units, strict=False)), of_clock)
+
+
+def _numbers(cells: pd.Series, clock: ClockFormat | None) -> Array:
+    """The numbers of a column, NaN where a cell holds none; clock times in seconds from the first."""
+    if clock is not None:
+        return np.array([clock.seconds(str(cell)) for cell in cells])
+    return np.asarray(pd.to_numeric(cells, errors="coerce").to_numpy(dtype=float))
 
 
 def _frame(layout: CsvLayout) -> pd.DataFrame:

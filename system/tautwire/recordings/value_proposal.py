@@ -45,13 +45,20 @@ def with_values(
     unnamed = [name for name in values if proposal.unused.get(name) == NOTHING_SAID]
     told = {each.column.rpartition("_")[0] or each.column for each in proposal.columns}
     known = proposal.columns if samples.units else _with_units(proposal.columns, values, robot)
+    known = [_of_clock(each) if each.name in samples.clocks else each for each in known]
     found = list(_found_columns(unnamed, values, told, cable_count, robot))
     names, columns = ([getattr(each, key) for each in found] for key in ("name", "column"))
     found = [each for each in found if names.count(each.name) == columns.count(each.column) == 1]
     found = [replace(each, unit="") for each in found] if samples.units else found
+    found = [replace(each, unit="") if each.name in samples.clocks else each for each in found]
     rescaled = {each.column for each in known if each.unit} & proposal.standard_names
     unused = {name: reason for name, reason in proposal.unused.items() if name not in {each.name for each in found}}
     return ColumnProposal(sorted_columns([*known, *found]), proposal.standard_names - rescaled, unused)
+
+
+def _of_clock(column: ProposedColumn) -> ProposedColumn:
+    """A column of clock times, which have no unit."""
+    return replace(column, unit="", doubt="" if column.column == "time" else column.doubt)
 
 
 def _found_columns(

@@ -38,6 +38,8 @@ class ProposedFile:
         proposed = next((each for each in self.proposal.columns if each.column == column), None)
         if proposed is None or proposed.name not in self.samples.values:
             return None
+        if proposed.name in self.samples.clocks:
+            return self.samples.values[proposed.name]
         text = proposed.unit or self.samples.units.get(proposed.name, "")
         unit = find_unit(text, column)
         if unit is None and (text or proposed.doubt):
