@@ -40,8 +40,9 @@ def test_scales_are_told_at_any_offset_of_the_clock(span: tuple[float, float]) -
     known = scales_by_tracker(ROBOT, LOG, list(counts), tracked(*span), [0, 1, 2])
     assert known is not None and known.scales == pytest.approx(SCALES, rel=1e-3)
     order = [2, 0, 1]
-    told = scales_by_tracker(ROBOT, LOG, [*counts[order], np.sin(LOG)], tracked(*span), None)
-    assert told is not None and told.cables.tolist() == [*order, -1]
+    others = [np.sin(LOG), np.where(LOG[1003] == LOG, 1.0, 0.0)]
+    told = scales_by_tracker(ROBOT, LOG, [*counts[order], *others], tracked(*span), None)
+    assert told is not None and told.cables.tolist() == [*order, -1, -1]
     assert told.scales[:3] == pytest.approx(SCALES[order], rel=1e-3)
 
 

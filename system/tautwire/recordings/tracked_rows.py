@@ -16,7 +16,7 @@ from .travel_correlation import TRAVEL_WINDOW, correlated, lowest_valleys, trave
 Array = NDArray[np.float64]
 
 MIN_GRID_INTERVAL, MAX_GRID_POINTS = 0.02, 50_000  # s
-MIN_SAMPLES, MAX_ROWS = 20, 50_000
+MIN_SAMPLES, MAX_ROWS, TINY = 20, 50_000, np.finfo(float).tiny
 # Share of the motion of the log or of the tracker that both have to have recorded.
 MIN_MOTION_SHARE = 0.5
 # Coarse misfits up to this are refined; scales of two offsets differ beyond the second.
@@ -91,10 +91,8 @@ def _coarse_offsets(
     interval = max(MIN_GRID_INTERVAL, *steps, span / MAX_GRID_POINTS)
     of_log, is_logged = travel_on_grid(log_time, signals.T, interval)
     of_tracker, is_tracked = travel_on_grid(times, lengths, interval)
-    if not (of_log.any(axis=0).all() and of_tracker.any(axis=0).all()):
-        return [], interval
-    # Columns may have any scales, and each counts alike.
-    of_log, of_tracker = of_log / np.sqrt((of_log**2).sum(axis=0)), of_tracker / np.sqrt((of_tracker**2).sum(axis=0))
+    # Columns may have any scales, and each counts alike; one that does not move fits nothing.
+    of_log, of_tracker = (each / (np.linalg.norm(each, axis=0) + TINY) for each in (of_log, of_tracker))
     log_energies = [correlated(is_tracked, column**2) for column in of_log.T]
     tracker_energies = [correlated(column**2, is_logged) for column in of_tracker.T]
 
