@@ -1,0 +1,59 @@
+"""Rotations by unit quaternions (w, x, y, z) from the platform's frame to the world, for any kind of number."""
+
+from typing import Any, Sequence, Tuple
+
+from .mathematics import Mathematics
+from .vectors import Vector, add, cross, dot, scale
+
+Quaternion = Sequence[Any]
+Matrix = Tuple[Vector, Vector, Vector]
+
+IDENTITY: Quaternion = (1.0, 0.0, 0.0, 0.0)
+
+# Squared angle, in rad^2, below which the series to the sixth power replaces sine and cosine: it errs by 1e-19 there.
+MAX_SERIES_ANGLE_SQUARED = 1e-3
+
+
+def rotate(quaternion: Quaternion, vector: Vector) -> Vector:
+    """Rotation of a vector by a unit quaternion: ``R v = v + 2 w (u x v) + 2 u x (u x v)``."""
+    w, axis = quaternion[0], quaternion[1:]
+    doubled = scale(2.0, cross(axis, vector))
+    return add(vector, add(scale(w, doubled), cross(axis, doubled)))
+
+
+def rotate_back(quaternion: Quaternion, vector: Vector) -> Vector:
+    """Rotation of a vector by the inverse of a unit quaternion: ``R^T v``."""
+    w, x, y, z = quaternion
+    return rotate((w, -x, -y, -z), vector)
+
+
+def multiply(p: Quaternion, q: Quaternion) -> Quaternion:
+    """Hamilton product ``p q``: the rotation by ``q`` followed by that by ``p``."""
+    scalar = p[0] * q[0] - dot(p[1:], q[1:])
+    x, y, z = add(add(scale(p[0], q[1:]), scale(q[0], p[1:])), cross(p[1:], q[1:]))
+    return (scalar, x, y, z)
+
+
+def quaternion_of(m: Mathematics, rotation_vector: Vector) -> Quaternion:
+    """Unit quaternion of a rotation vector r in rad: ``(cos(|r| / 2), r sin(|r| / 2) / |r|)``.
+
+    Smooth and differentiable at no rotation, where a series replaces the quotient.
+    """
+    squared = dot(rotation_vector, rotation_vector)
+    is_large = squared - MAX_SERIES_ANGLE_SQUARED
+    angle = m.sqrt(m.where(is_large, squared, 1.0))
+    cosine_series = 1.0 - squared * (1.0 / 8.0 - squared * (1.0 / 384.0 - squared / 46080.0))
+    sine_series = 0.5 - squared * (1.0 / 48.0 - squared * (1.0 / 3840.0 - squared / 645120.0))
+    scalar = m.where(is_large, m.cos(0.5 * angle), cosine_series)
+    x, y, z = scale(m.where(is_large, m.sin(0.5 * angle) / angle, sine_series), rotation_vector)
+    return (scalar, x, y, z)
+
+
+def rotation_matrix(quaternion: Quaternion) -> Matrix:
+    """Rotation matrix R of a unit quaternion, by rows: ``v_world = R v_platform``."""
+    w, x, y, z = quaternion
+    return (
+        (1.0 - 2.0 * (y * y + z * z), 2.0 * (x * y - w * z), 2.0 * (x * z + w * y)),
+        (2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
+        (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
+    )
