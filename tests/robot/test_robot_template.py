@@ -10,6 +10,7 @@ from tautwire.cli import run
 from tautwire.cosimulation.robot_cosimulation import cosimulate
 from tautwire.fmus.packaging import build_fmus
 from tautwire.robot import robot_file_reader as reading
+from tautwire.robot.platform_reader import CABLE_KEYS, PLATFORM_KEYS
 from tautwire.robot.robot_file_reader import read_robot
 from tautwire.robot.robot_template import MAX_TEMPLATE_CABLES, MIN_TEMPLATE_CABLES, new_robot_text
 from tautwire.robot.static_equilibrium import static_tensions
@@ -49,7 +50,8 @@ def test_every_table_is_in_it() -> None:
     text = new_robot_text("hall")
     for key in reading.TOP_LEVEL_KEYS:
         assert re.search(rf"^(# )?(\[*{key}[\].]|{key} = )", text, re.MULTILINE), key
-    for key in (*reading.NOISE_RULES, *reading.OFFSET_RULES, *reading.WINCH_LIMIT_RULES):
+    keys = (*reading.NOISE_RULES, *reading.OFFSET_RULES, *reading.WINCH_LIMIT_RULES, *reading.CABLE_UNCERTAINTY_RULES)
+    for key in (*keys, "inertia", *PLATFORM_KEYS, *CABLE_KEYS, "swivel_axis"):
         assert re.search(rf"^(# )?{key} = ", text, re.MULTILINE), key
 
 

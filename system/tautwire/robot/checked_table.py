@@ -12,8 +12,14 @@ from ..validation import MAX_MAGNITUDE, NumberRule
 
 ErrorSink = Callable[[RobotFileError], None]
 KeyPath = tuple[str | int, ...]
+Point = tuple[float, float, float]
 
 MAX_KEY_LENGTH = 80
+# Of unit vectors and quaternions that were written with three digits or more, and that were normalised.
+MAX_NORM_ERROR, NORM_ROUNDING = 1e-3, 1e-15
+# Relative to the largest entry: what rounding to six digits leaves.
+MAX_ASYMMETRY = 1e-6
+NO_POINT = (math.nan, math.nan, math.nan)
 
 
 class CheckedTable:
@@ -64,20 +70,42 @@ class CheckedTable:
         """The number under a key; None where the key is absent."""
         return self.number(key, rule) if key in self.content else None
 
-    def point(self, key: str, meaning: str) -> tuple[float, float, float]:
-        """Three coordinates, in m."""
-        hint = f"give {meaning} as [x, y, z] in m"
-        value = self.content.get(key)
+    def point(self, key: str, meaning: str, default: Point | None = None) -> Point:
+        """Three coordinates, in m; those of ``default`` where the key is absent, if there is one."""
+        if default is not None and key not in self.content:
+            return default
+        x, y, z = self._numbers(key, 3, f"give {meaning} as [x, y, z] in m", is_point=True)
+        return (x, y, z)
+
+    def unit_vector(self, key: str, meaning: str, default: tuple[float, ...]) -> tuple[float, ...]:
+        """Numbers whose squares add up to one, as many as ``default`` has; normalised if only rounded."""
         if key not in self.content:
-            self.refuse(key, "is missing", hint)
-        elif not isinstance(value, list):
-            self.refuse(key, f"is {format_value(value)}, not a list of 3 numbers", hint)
-        elif len(value) != 3:
-            self.refuse(key, f"has {len(value)} entries, must have 3", hint)
-        else:
-            x, y, z = (self._coordinate(key, entry, each, hint) for entry, each in enumerate(value))
-            return (x, y, z)
-        return (math.nan, math.nan, math.nan)
+            return default
+        hint = f"give {meaning} as {len(default)} numbers whose squares add up to 1"
+        numbers = self._numbers(key, len(default), hint)
+        norm = math.hypot(*numbers)
+        if abs(norm - 1.0) > MAX_NORM_ERROR:
+            scaled = ", ".join(f"{number / norm:.6g}" for number in numbers) if norm > 0.0 else ""
+            problem = f"has norm {norm:.6g}, must have 1 within {MAX_NORM_ERROR:g}"
+            self.refuse(key, problem, hint + (f", such as [{scaled}]" if scaled else ""))
+        # What was normalised once stays as it is, so that files read back equal.
+        return numbers if abs(norm - 1.0) <= NORM_ROUNDING else tuple(number / norm for number in numbers)
+
+    def symmetric_matrix(self, key: str, meaning: str) -> tuple[Point, Point, Point]:
+        """Three rows of three numbers, symmetric."""
+        hint = f"give {meaning} as [[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]]"
+        rows = self.content[key]
+        if not isinstance(rows, list) or len(rows) != 3:
+            self.refuse(key, f"is {format_value(rows)}, not a list of 3 rows", hint)
+            return (NO_POINT, NO_POINT, NO_POINT)
+        xx, xy, xz, yx, yy, yz, zx, zy, zz = (
+            number for row in range(3) for number in self._numbers(key, 3, hint, row=row)
+        )
+        scale = max(map(abs, (xx, xy, xz, yx, yy, yz, zx, zy, zz)))
+        for names, above, below in (("xy", xy, yx), ("xz", xz, zx), ("yz", yz, zy)):
+            if abs(above - below) > MAX_ASYMMETRY * scale:
+                self.refuse(key, f"has {above:g} and {below:g} for {names}, must be symmetric", hint)
+        return ((xx, xy, xz), (xy, yy, yz), (xz, yz, zz))
 
     def text(self, key: str, hint: str) -> str | None:
         """The text under a key."""
@@ -121,6 +149,25 @@ class CheckedTable:
         problem = f"is {format_value(content)}, not a table"
         self.sink(RobotFileError(f"{self.file}: {path}", problem, "write it as a table", key_path))
         return None
+
+    def _numbers(
+        self, key: str, count: int, hint: str, is_point: bool = False, row: int | None = None
+    ) -> tuple[float, ...]:
+        """The ``count`` finite numbers of a list, or of a row of it; NaN where they are not what they must be."""
+        if key not in self.content:
+            self.refuse(key, "is missing", hint)
+            return (math.nan,) * count
+        value = self.content[key] if row is None else self.content[key][row]
+        if not isinstance(value, list):
+            self.refuse(key, f"is {format_value(value)}, not a list of {count} numbers", hint, row)
+        elif len(value) != count:
+            self.refuse(key, f"has {len(value)} entries, must have {count}", hint, row)
+        elif is_point:
+            return tuple(self._coordinate(key, entry, each, hint) for entry, each in enumerate(value))
+        else:
+            entries = enumerate(value)
+            return tuple(self._finite_number(key, each, hint, entry if row is None else row) for entry, each in entries)
+        return (math.nan,) * count
 
     def _finite_number(self, key: str, value: Any, hint: str, entry: int | None = None) -> float:
         if isinstance(value, bool) or not isinstance(value, int | float):

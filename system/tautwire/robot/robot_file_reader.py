@@ -3,11 +3,14 @@
 import math
 import os
 import re
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
 from typing import Any
 
 from tautwire_fmu.laws.cable import LAWS
+from tautwire_fmu.laws.rotation import rotate
+from tautwire_fmu.laws.vectors import add
 
 from ..errors import RobotFileError, format_value, one_line, raise_error
 from ..input_files import read_bytes, require_utf8_text, validate_path
@@ -16,11 +19,17 @@ from ..toml_text import parse_toml
 from ..validation import NumberRule
 from .checked_table import CheckedTable, ErrorSink
 from .effect_tables import read_cable_list, read_effects, read_formulas
+from .platform_reader import (
+    ADD_INERTIA,
+    CABLE_KEYS,
+    SENSOR_KEYS,
+    read_platform,
+    refuse_keys_of_rigid_bodies,
+)
 from .recorded_columns import read_recorded_columns, read_tracker_table
 from .schema import (
     Cable,
     Platform,
-    Point,
     RecordedColumn,
     Robot,
     Sensors,
@@ -49,7 +58,6 @@ MAX_CABLES = 100
 MIN_POINT_DISTANCE = 1e-6  # m; no two exit points can be built closer
 
 GRAVITY_RULE = NumberRule("the gravity along -z", "m/s^2", minimum=0.0, default=9.81)
-MASS_RULE = NumberRule("the platform's mass", "kg", positive=True)
 MIN_TENSION_RULE = NumberRule("the minimum tension", "N", minimum=0.0)
 MAX_TENSION_RULE = NumberRule("the maximum tension", "N", positive=True)
 PREFERRED_TENSION_RULE = NumberRule("the preferred tension", "N", minimum=0.0)
@@ -60,6 +68,7 @@ NOISE_RULES = {
     "position_noise": NumberRule("the standard deviation of one position", "m", minimum=0.0),
     "tension_noise": NumberRule("the standard deviation of one tension", "N", minimum=0.0),
     "winch_speed_noise": NumberRule("the standard deviation of one winch speed", "m/s", minimum=0.0),
+    "orientation_noise": NumberRule("the standard deviation of one rotation about each axis", "rad", minimum=0.0),
 }
 OFFSET_RULES = {
     "tension_offset_uncertainty": NumberRule(
@@ -72,12 +81,14 @@ OFFSET_RULES = {
         "the standard deviation of a load cell's gain about 1", "", minimum=0.0, default=0.0
     ),
 }
-MASS_UNCERTAINTY_RULE = NumberRule("the standard deviation of the true mass", "kg", minimum=0.0, default=0.0)
 CABLE_UNCERTAINTY_RULES = {
     "modulus_uncertainty": NumberRule("the standard deviation of the true modulus", "Pa", minimum=0.0, default=0.0),
     "damping_uncertainty": NumberRule("the standard deviation of the true damping", "Pa s", minimum=0.0, default=0.0),
     "anchor_uncertainty": NumberRule(
         "the standard deviation of each coordinate of the true exit point", "m", minimum=0.0, default=0.0
+    ),
+    "attachment_uncertainty": NumberRule(
+        "the standard deviation of each coordinate of the true attachment point", "m", minimum=0.0, default=0.0
     ),
 }
 MODULUS_RULE = NumberRule("the modulus of elasticity", "Pa", positive=True)
@@ -174,8 +185,8 @@ def _read_robot_table(root: CheckedTable, default_name: str) -> Robot:
     root.require_known(TOP_LEVEL_KEYS)
     name = _read_name(root, default_name)
     gravity = root.number("gravity", GRAVITY_RULE)
-    platform = _read_platform(root)
-    cables = _read_cables(root, platform.start)
+    platform = read_platform(root)
+    cables = _read_cables(root, platform)
     tension, sensors, effect = root.table("tension"), root.table("sensors"), root.table("effect")
     winch, fmu = root.table("winch"), root.table("fmu")
     return Robot(
@@ -183,7 +194,7 @@ def _read_robot_table(root: CheckedTable, default_name: str) -> Robot:
         gravity=gravity,
         platform=platform,
         tension=_read_tension_limits(tension) if tension else None,
-        sensors=_read_sensors(sensors) if sensors else Sensors(),
+        sensors=_read_sensors(sensors, platform.is_rigid_body) if sensors else Sensors(),
         cables=cables,
         effects=read_effects(effect, len(cables)) if effect else (),
         winch=_read_winch(winch) if winch else None,
@@ -204,20 +215,6 @@ def _read_name(root: CheckedTable, default: str) -> str:
     return name or default
 
 
-def _read_platform(root: CheckedTable) -> Platform:
-    table = root.table("platform")
-    if table is None:
-        if "platform" not in root.content:
-            root.refuse("platform", "is missing", "add a table [platform] with mass and start")
-        return Platform(math.nan, (math.nan, math.nan, math.nan))
-    table.require_known(("mass", "start", "mass_uncertainty"))
-    return Platform(
-        table.number("mass", MASS_RULE),
-        table.point("start", "where the run starts"),
-        table.number("mass_uncertainty", MASS_UNCERTAINTY_RULE),
-    )
-
-
 def _read_tension_limits(table: CheckedTable) -> TensionLimits:
     table.require_known(("minimum", "maximum", "preferred", "preferred_uncertainty"))
     minimum, maximum = table.number("minimum", MIN_TENSION_RULE), table.number("maximum", MAX_TENSION_RULE)
@@ -233,53 +230,67 @@ def _read_tension_limits(table: CheckedTable) -> TensionLimits:
     )
 
 
-def _read_sensors(table: CheckedTable) -> Sensors:
+def _read_sensors(table: CheckedTable, is_rigid: bool) -> Sensors:
     table.require_known([*NOISE_RULES, *OFFSET_RULES])
-    noises = {key: table.optional_number(key, rule) for key, rule in NOISE_RULES.items()}
-    offsets = {key: table.number(key, rule) for key, rule in OFFSET_RULES.items()}
+    if not is_rigid:
+        refuse_keys_of_rigid_bodies(table, SENSOR_KEYS)
     return Sensors(
-        noises["position_noise"],
-        noises["tension_noise"],
-        noises["winch_speed_noise"],
-        offsets["tension_offset_uncertainty"],
-        offsets["position_offset_uncertainty"],
-        offsets["tension_gain_uncertainty"],
+        **{key: table.optional_number(key, rule) for key, rule in NOISE_RULES.items()},
+        **{key: table.number(key, rule) for key, rule in OFFSET_RULES.items()},
     )
 
 
-def _read_cables(root: CheckedTable, start: Point) -> tuple[Cable, ...]:
+def _read_cables(root: CheckedTable, platform: Platform) -> tuple[Cable, ...]:
     entries = root.content.get("cable", [])
     tables = root.tables("cable") if "cable" in root.content else ()
-    if isinstance(entries, list) and len(entries) < 3:
-        problem = f"{len(entries)} given, a robot has three or more"
-        root.refuse("cable", problem, "add one table [[cable]] for each cable")
+    is_rigid = platform.is_rigid_body
+    if isinstance(entries, list) and len(entries) < (2 if is_rigid else 3):
+        problem = f"{len(entries)} given, a robot has {'two' if is_rigid else 'three'} or more"
+        hint = "add one table [[cable]] for each cable"
+        root.refuse("cable", problem, hint if is_rigid or len(entries) < 2 else f"{hint}, or {ADD_INERTIA}")
     if len(tables) > MAX_CABLES:
         root.refuse("cable", f"{len(tables)} given, at most {MAX_CABLES} are read", "leave out the others")
         tables = tables[:MAX_CABLES]
     cables = tuple(_read_cable(table) for table in tables)
-    for index, (table, cable) in enumerate(zip(tables, cables, strict=True)):
-        if math.dist(cable.anchor, start) < MIN_POINT_DISTANCE:
-            problem = f"is {list(cable.anchor)}, the same as platform.start"
-            table.refuse("anchor", problem, "move one of them")
-        for other in range(index):
-            if math.dist(cable.anchor, cables[other].anchor) < MIN_POINT_DISTANCE:
-                problem = f"is {list(cable.anchor)}, the same as that of cable {other + 1}"
-                table.refuse("anchor", problem, "give each cable its own exit point")
+    for table in () if is_rigid else tables:
+        refuse_keys_of_rigid_bodies(table, CABLE_KEYS)
+    _refuse_coincident_points(tables, cables, platform)
     return cables
 
 
+def _refuse_coincident_points(tables: Sequence[CheckedTable], cables: Sequence[Cable], platform: Platform) -> None:
+    """Reports cables without length at the start, and cables that another one repeats."""
+    is_rigid = platform.is_rigid_body
+    for index, (table, cable) in enumerate(zip(tables, cables, strict=True)):
+        end = add(platform.start, rotate(platform.start_orientation, cable.attachment))
+        if math.dist(cable.anchor, end) < MIN_POINT_DISTANCE:
+            problem = f"is {list(cable.anchor)}, the same as {'its attachment at ' if is_rigid else ''}platform.start"
+            table.refuse("anchor", problem, "move one of them")
+        for other in range(index):
+            are_attached_together = math.dist(cable.attachment, cables[other].attachment) < MIN_POINT_DISTANCE
+            if are_attached_together and math.dist(cable.anchor, cables[other].anchor) < MIN_POINT_DISTANCE:
+                problem = f"is {list(cable.anchor)}, the same as that of cable {other + 1}"
+                problem += " with the same attachment" if is_rigid else ""
+                table.refuse("anchor", problem, "give each cable its own exit point")
+
+
 def _read_cable(table: CheckedTable) -> Cable:
-    table.require_known(("anchor", "modulus", "area", "damping", "law", *CABLE_UNCERTAINTY_RULES))
+    keys = ("anchor", "attachment", "swivel_axis", "modulus", "area", "damping", "law", *CABLE_UNCERTAINTY_RULES)
+    table.require_known(keys)
     laws = " or ".join(f'"{law}"' for law in LAWS)
     law = table.text("law", f"write law = {laws}")
     if law is not None and law not in LAWS:
         table.refuse("law", f"is {format_value(law)}, must be {laws}", f"write {suggest_name(law, LAWS)}")
+    axis_meaning = "the direction along which the rope arrives at its exit pulley"
+    x, y, z = table.unit_vector("swivel_axis", axis_meaning, Cable.swivel_axis)
     return Cable(
         anchor=table.point("anchor", "the exit point on the frame"),
         modulus=table.number("modulus", MODULUS_RULE),
         area=table.number("area", AREA_RULE),
         damping=table.number("damping", DAMPING_RULE),
         law=law or "",
+        attachment=table.point("attachment", "the attachment point in the platform's frame", Cable.attachment),
+        swivel_axis=(x, y, z),
         **{key: table.number(key, rule) for key, rule in CABLE_UNCERTAINTY_RULES.items()},
     )
 

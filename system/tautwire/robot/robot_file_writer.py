@@ -20,7 +20,7 @@ from .schema import (
     Cable,
     EffectSetting,
     Formula,
-    Point,
+    Platform,
     RecordedColumn,
     Robot,
     Sensors,
@@ -39,17 +39,12 @@ def robot_text(robot: Robot) -> str:
             f"name = {json.dumps(robot.name, ensure_ascii=False)}",
             _number_line("gravity", robot.gravity, "m/s^2"),
         ],
-        [
-            "[platform]",
-            _number_line("mass", robot.platform.mass, "kg"),
-            _point_line("start", robot.platform.start, "m, where the run starts at rest"),
-            *_deviation_line("mass_uncertainty", robot.platform.mass_uncertainty, "kg"),
-        ],
+        _platform_block(robot.platform),
         _tension_block(robot.tension) if robot.tension else [],
         _sensor_block(robot.sensors),
         _winch_block(robot.winch) if robot.winch else [],
         _fmu_block(robot.fmus),
-        *(_cable_block(number, cable) for number, cable in enumerate(robot.cables, 1)),
+        *(_cable_block(n, cable, robot.platform.is_rigid_body) for n, cable in enumerate(robot.cables, 1)),
         *(_effect_block(robot, setting) for setting in robot.effects),
         *_formula_blocks(robot),
         _recorded_column_block(robot.recorded_columns, "[recording.columns]  # by the laboratory's names"),
@@ -101,8 +96,32 @@ def _deviation_line(key: str, value: float, unit: str) -> list[str]:
     return [_number_line(key, value, f"{unit}, standard deviation")] if value > 0.0 else []
 
 
-def _point_line(key: str, point: Point, comment: str) -> str:
-    return f"{key} = [{', '.join(repr(float(value)) for value in point)}]  # {comment}"
+def _list_line(key: str, numbers: Sequence[float], comment: str) -> str:
+    return f"{key} = {_listed(numbers)}  # {comment}"
+
+
+def _listed(numbers: Sequence[float]) -> str:
+    return f"[{', '.join(repr(float(value)) for value in numbers)}]"
+
+
+def _platform_block(platform: Platform) -> list[str]:
+    lines = [
+        "[platform]",
+        _number_line("mass", platform.mass, "kg"),
+        _list_line("start", platform.start, "m, where the run starts at rest"),
+    ]
+    if platform.inertia is not None:
+        rows = ", ".join(map(_listed, platform.inertia))
+        lines += [
+            f"inertia = [{rows}]  # kg m^2, about the centre of mass, in the platform's axes",
+            _list_line("centre_of_mass", platform.centre_of_mass, "m, in the platform's frame"),
+            _list_line("start_orientation", platform.start_orientation, "w, x, y, z, platform to world"),
+        ]
+    lines += _deviation_line("mass_uncertainty", platform.mass_uncertainty, "kg")
+    lines += _deviation_line("inertia_uncertainty", platform.inertia_uncertainty, "kg m^2, of each principal moment")
+    return lines + _deviation_line(
+        "centre_of_mass_uncertainty", platform.centre_of_mass_uncertainty, "m, of each coordinate"
+    )
 
 
 def _tension_block(tension: TensionLimits) -> list[str]:
@@ -124,6 +143,7 @@ def _sensor_block(sensors: Sensors) -> list[str]:
         ("position_noise", sensors.position_noise, "m"),
         ("tension_noise", sensors.tension_noise, "N"),
         ("winch_speed_noise", sensors.winch_speed_noise, "m/s"),
+        ("orientation_noise", sensors.orientation_noise, "rad, about each axis"),
     )
     lines = [_number_line(key, value, unit) for key, value, unit in noises if value is not None]
     lines += _deviation_line("tension_offset_uncertainty", sensors.tension_offset_uncertainty, "N")
@@ -149,10 +169,14 @@ def _fmu_block(fmus: Sequence[UserFmu]) -> list[str]:
     return ["[fmu]  # instead of the project's own", *lines] if lines else []
 
 
-def _cable_block(number: int, cable: Cable) -> list[str]:
+def _cable_block(number: int, cable: Cable, has_attachment: bool) -> list[str]:
+    attachment = _list_line("attachment", cable.attachment, "m, in the platform's frame")
+    swivel_axis = _list_line("swivel_axis", cable.swivel_axis, "along which the rope arrives at its pulley")
     return [
         f"[[cable]]  # cable {number}",
-        _point_line("anchor", cable.anchor, "m, exit point on the frame"),
+        _list_line("anchor", cable.anchor, "m, exit point on the frame"),
+        *([attachment] if has_attachment else []),
+        *([swivel_axis] if cable.swivel_axis != Cable.swivel_axis else []),
         _number_line("modulus", cable.modulus, "Pa"),
         _number_line("area", cable.area, "m^2"),
         _number_line("damping", cable.damping, "Pa s"),
@@ -160,6 +184,7 @@ def _cable_block(number: int, cable: Cable) -> list[str]:
         *_deviation_line("modulus_uncertainty", cable.modulus_uncertainty, "Pa"),
         *_deviation_line("damping_uncertainty", cable.damping_uncertainty, "Pa s"),
         *_deviation_line("anchor_uncertainty", cable.anchor_uncertainty, "m, of each coordinate"),
+        *_deviation_line("attachment_uncertainty", cable.attachment_uncertainty, "m, of each coordinate"),
     ]
 
 

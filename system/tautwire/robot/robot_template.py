@@ -19,8 +19,16 @@ mass = 50.0                       # kg, a point mass
 start = [0.0, 0.0, 2.0]           # m, where every run starts at rest
 # mass_uncertainty = 0.5          # kg, how far the true mass may be from that; a standard deviation, as all of these
 
-# With more than three cables statics leaves a choice: within these bounds, the start tensions are those nearest to the
-# preferred one. With three they are not used.
+# A platform that turns: with an inertia it is a rigid body, start is the origin of its frame, and each cable has an
+# attachment in that frame. Two cables are enough then.
+# inertia = [[4.0, 0.0, 0.0], [0.0, 4.0, 0.0], [0.0, 0.0, 6.0]]  # kg m^2, about the centre of mass, in its axes
+# centre_of_mass = [0.0, 0.0, 0.1]           # m, in the platform's frame; 0 when absent
+# start_orientation = [1.0, 0.0, 0.0, 0.0]   # unit quaternion w, x, y, z, platform to world; none when absent
+# inertia_uncertainty = 0.1                  # kg m^2, of each principal moment
+# centre_of_mass_uncertainty = 5e-3          # m, of each coordinate
+
+# With more than three cables (six, for a platform that turns) statics leaves a choice: within these bounds, the start
+# tensions are those nearest to the preferred one. With fewer they are not used.
 [tension]
 minimum = 50.0                    # N
 maximum = 5000.0                  # N
@@ -32,6 +40,7 @@ preferred = {preferred}                 # N
 position_noise = 2e-4             # m
 tension_noise = 1.0               # N
 winch_speed_noise = 1e-4          # m/s
+# orientation_noise = 1e-3        # rad, about each axis, of a platform that turns
 # tension_offset_uncertainty = 2.0    # N, constant error of a load cell
 # tension_gain_uncertainty = 0.004    # of a load cell's gain about 1
 # position_offset_uncertainty = 1e-3  # m, constant error of the tracker, on each axis
@@ -41,6 +50,8 @@ winch_speed_noise = 1e-4          # m/s
 TEMPLATE_CABLE = """
 [[cable]]  # cable {number}
 anchor = [{x}, {y}, {z}]  # m, where the cable leaves the frame
+# attachment = [0.2, 0.0, 0.0]    # m, in the frame of a platform that turns; its origin when absent
+# swivel_axis = [0.0, 0.0, 1.0]   # along which the rope arrives at its exit pulley; vertical when absent
 modulus = 1.0e11                  # Pa, E: steel rope about 1e11, braided polyethylene about 6e10
 area = 3.0e-6                     # m^2, S, the section that the modulus refers to
 damping = 1.0e9                   # Pa s, c; 0 when absent
@@ -48,6 +59,7 @@ law = "logarithmic"               # eps is ln(l/l_u); or "linear", l/l_u - 1
 # modulus_uncertainty = 2e9       # Pa
 # damping_uncertainty = 1e8       # Pa s
 # anchor_uncertainty = 2e-3       # m, of each coordinate
+# attachment_uncertainty = 1e-3   # m, of each coordinate
 """
 TEMPLATE_TAIL = """
 # Winches that follow a speed command with limited dynamics; without this table the rope runs exactly at that speed.

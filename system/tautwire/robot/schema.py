@@ -7,6 +7,7 @@ from pathlib import Path
 from ..validation import validate_instance
 
 Point = tuple[float, float, float]
+Quaternion = tuple[float, float, float, float]
 AXES = ("x", "y", "z")
 
 # Components that exist once per cable: an effect in them may apply to some cables only.
@@ -42,19 +43,33 @@ class Numbers(Mapping[str, float]):
 
 @dataclass(frozen=True)
 class Platform:
-    """The platform as a point mass: ``mass`` in kg; ``start``, where a run starts at rest, in m.
+    """The platform: a rigid body where it has an ``inertia``, else a point mass; ``mass`` in kg.
 
-    ``mass_uncertainty``: standard deviation of the true mass, in kg.
+    ``start`` is where a run starts at rest, in m: the origin of the platform's frame, turned from the world's by the
+    unit quaternion ``start_orientation`` (w, x, y, z; platform to world). ``inertia`` in kg m^2, by rows, is about the
+    ``centre_of_mass`` (m) and along the platform's axes. Standard deviations of the true values: ``mass_uncertainty``
+    (kg), ``inertia_uncertainty`` of each principal moment (kg m^2), ``centre_of_mass_uncertainty`` of each coordinate
+    (m).
     """
 
     mass: float
     start: Point
     mass_uncertainty: float = 0.0
+    inertia: tuple[Point, Point, Point] | None = None
+    centre_of_mass: Point = (0.0, 0.0, 0.0)
+    start_orientation: Quaternion = (1.0, 0.0, 0.0, 0.0)
+    inertia_uncertainty: float = 0.0
+    centre_of_mass_uncertainty: float = 0.0
+
+    @property
+    def is_rigid_body(self) -> bool:
+        """Whether the platform turns: a point mass does not."""
+        return self.inertia is not None
 
 
 @dataclass(frozen=True)
 class TensionLimits:
-    """Bounds and preferred value of the tension distribution, in N; used with more than three cables.
+    """Bounds and preferred value of the tension distribution, in N; used with more cables than degrees of freedom.
 
     ``preferred_uncertainty``: standard deviation of the true start tensions from those of the distribution.
     """
@@ -69,6 +84,7 @@ class TensionLimits:
 class Sensors:
     """Sensor noise, standard deviation of a sample: position in m, tension in N, winch speed in m/s; None if unknown.
 
+    ``orientation_noise``, in rad, is that of a rigid platform's rotation about each axis.
     ``tension_offset_uncertainty`` (N) and ``position_offset_uncertainty`` (m): standard deviations of the constant
     offset of each load cell, and of the tracker on each axis; ``tension_gain_uncertainty``, that of each load cell's
     gain about 1.
@@ -80,13 +96,16 @@ class Sensors:
     tension_offset_uncertainty: float = 0.0
     position_offset_uncertainty: float = 0.0
     tension_gain_uncertainty: float = 0.0
+    orientation_noise: float | None = None
 
 
 @dataclass(frozen=True)
 class Cable:
     """One cable: ``anchor`` in m, ``modulus`` in Pa, ``area`` in m^2, ``damping`` in Pa s; ``law``.
 
-    ``modulus_uncertainty``, ``damping_uncertainty`` and, for each coordinate, ``anchor_uncertainty``: standard
+    ``attachment`` is where it holds a rigid platform, in m in the platform's frame; ``swivel_axis`` the unit vector
+    along which the rope arrives at its exit pulley and about which that swivels. ``modulus_uncertainty``,
+    ``damping_uncertainty`` and, for each coordinate, ``anchor_uncertainty`` and ``attachment_uncertainty``: standard
     deviations of the true values, in the same units.
     """
 
@@ -98,6 +117,9 @@ class Cable:
     modulus_uncertainty: float = 0.0
     damping_uncertainty: float = 0.0
     anchor_uncertainty: float = 0.0
+    attachment: Point = (0.0, 0.0, 0.0)
+    attachment_uncertainty: float = 0.0
+    swivel_axis: Point = (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True)
@@ -253,6 +275,11 @@ class Robot:
     def anchors(self) -> tuple[Point, ...]:
         """Exit points of all cables, in m."""
         return tuple(cable.anchor for cable in self.cables)
+
+    @property
+    def attachments(self) -> tuple[Point, ...]:
+        """Attachment points of all cables in the platform's frame, in m; its origin for a point mass."""
+        return tuple(cable.attachment for cable in self.cables)
 
     @property
     def axes_in_plane(self) -> tuple[int, ...]:
