@@ -107,18 +107,23 @@ def integrate_hermite(
     """Integrate the Hermite polynomial through ``nodes`` from ``start`` to the weights' fraction of the step."""
     elapsed, step_squared = weights.fraction * step, step * step
     unaccelerated = [x + elapsed * v for x, v in zip(start.position, start.velocity)]
-    position = _apply_weights(unaccelerated, nodes, step_squared, step * step_squared, weights.position)
-    velocity = _apply_weights(start.velocity, nodes, step, step_squared, weights.velocity)
+    position = apply_weights(unaccelerated, nodes, step_squared, step * step_squared, weights.position)
+    velocity = apply_weights(start.velocity, nodes, step, step_squared, weights.velocity)
     if weights.acceleration:
-        acceleration = _apply_weights([0.0] * len(unaccelerated), nodes, 1.0, step, weights.acceleration)
+        acceleration = apply_weights([0.0] * len(unaccelerated), nodes, 1.0, step, weights.acceleration)
     else:
         acceleration = nodes[int(weights.fraction * (len(nodes) - 1))].acceleration
     return MotionState(position, velocity, acceleration)
 
 
-def _apply_weights(
-    start: Sequence[float], nodes: Sequence[AccelerationNode], scale: float, rate_scale: float, weights: WeightPairs
+def apply_weights(
+    start: Sequence[float],
+    nodes: Sequence[Tuple[Sequence[float], Sequence[float]]],
+    scale: float,
+    rate_scale: float,
+    weights: WeightPairs,
 ) -> Sequence[float]:
+    """``start`` and the weighted sum over ``nodes`` of value and rate, one number an axis."""
     if len(nodes) == 2:
         first, last = nodes
         (a0, j0), (a1, j1) = weights

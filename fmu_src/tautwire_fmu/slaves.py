@@ -7,6 +7,7 @@ the first, which may be deleted by then.
 from .cable_slave import Cable
 from .controller_slave import Controller
 from .point_mass_slave import PointMass
+from .rigid_body_slave import RigidBody
 from .winch_slave import Winch
 
-__all__ = ["Cable", "Controller", "PointMass", "Winch"]
+__all__ = ["Cable", "Controller", "PointMass", "RigidBody", "Winch"]
