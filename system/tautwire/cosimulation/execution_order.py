@@ -12,6 +12,7 @@ from ..fmus.fmu_variables import MIDDLE_PREFIX, MIDDLE_TIME, Port
 from .connected_instance import InstanceLayout
 from .connections import Connection
 from .direct_feedthrough import direct_feedthrough
+from .hermite_interpolation import derivative_chains
 
 Indices = NDArray[np.intp]
 
@@ -39,9 +40,10 @@ def convergence_order_of(instances: Sequence[InstanceLayout], connections: Seque
 def gauss_seidel_order(
     components: Mapping[str, Component], connections: Sequence[Connection], outputs: Sequence[Port]
 ) -> list[str]:
-    """Gauss-Seidel order: components with an output free of direct feedthrough first, adapted for fewer tear variables.
+    """Gauss-Seidel order: components with an output free of direct feedthrough first, adapted for fewer torn signals.
 
-    Each component in turn is moved to the end where that leaves fewer tear variables.
+    Each component in turn is moved to the end where that leaves fewer signals torn, or as many with more derivatives:
+    these are extrapolated best, and show the interpolation error. A signal is an output with its derivatives.
     """
     connected_inputs = {(c.target.component, c.target.variable) for c in connections}
 
@@ -52,10 +54,14 @@ def gauss_seidel_order(
             any((name, known) in connected_inputs for known in feedthrough[variable]) for variable in own_outputs
         )
 
+    def torn_signals(order: Sequence[str]) -> tuple[int, int]:
+        indices = tear_variables(order, connections, outputs)
+        return len(derivative_chains(components, outputs, set(indices.tolist()))), -len(indices)
+
     order = sorted(components, key=has_full_feedthrough)
     for name in tuple(order):
         candidate = [*(other for other in order if other != name), name]
-        if len(tear_variables(candidate, connections, outputs)) < len(tear_variables(order, connections, outputs)):
+        if torn_signals(candidate) < torn_signals(order):
             order = candidate
     return order
 
