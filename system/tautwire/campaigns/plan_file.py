@@ -13,7 +13,7 @@ from ..name_suggestions import suggest_name
 from ..recordings.recording import read_recording
 from ..robot.checked_table import CheckedTable
 from ..robot.robot_file_reader import robot_content, robot_from_content
-from ..robot.schema import Robot
+from ..robot.schema import Robot, require_point_mass
 from ..robot.trajectory import ANGLE_RULE, RADIUS_RULE, RISE_RULE
 from ..robot.trajectory import DURATION_RULE as OF_PATH
 from ..toml_text import parse_toml
@@ -171,7 +171,7 @@ def read_plan(path: str | Path) -> Plan:
     table.require_known(PLAN_KEYS)
     robot_file = file_relative_to_plan(table, table.text("robot", 'name the robot file, as in robot = "robot.toml"'))
     content = robot_content(robot_file)
-    robot = robot_from_content(content, robot_file)
+    robot = require_point_mass(str(robot_file), robot_from_content(content, robot_file))
     seed = whole_number(table, "seed", SEED_RULE)
     if "trace" in table.content:
         return Plan(str(robot_file), content, seed, "grid", paths=(), trace=_read_trace(table))

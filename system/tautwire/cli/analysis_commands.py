@@ -15,7 +15,7 @@ import typer
 from ..errors import InputError, UnreachableError
 from ..provenance import Provenance
 from ..robot.robot_file_reader import read_robot
-from ..robot.schema import Robot
+from ..robot.schema import Robot, require_point_mass
 from .console import (
     AsJson,
     CommandOutput,
@@ -25,7 +25,7 @@ from .console import (
     note_unused_tables,
     parse_position,
     progress_bar,
-    read_holdable_robot,
+    read_point_mass_robot,
     relative_links,
 )
 
@@ -63,7 +63,7 @@ def linearise(
     refuse_overwriting_inputs([robot_file], [path for path in (out, report) if path])
     refuse_same_output(out, report)
     output = CommandOutput(as_json, quiet)
-    robot = read_holdable_robot(robot_file)
+    robot = read_point_mass_robot(robot_file)
     try:
         with progress_bar(output) as progress:
             progress("linearising", 0.0)
@@ -142,7 +142,7 @@ def workspace(
     if plot is not None:
         require_figure_format(plot)
     output = CommandOutput(as_json, quiet)
-    robot = read_robot(robot_file)
+    robot = require_point_mass(str(robot_file), read_robot(robot_file))
     lower_corner = None if lower is None else parse_position(lower, "--lower")
     upper_corner = None if upper is None else parse_position(upper, "--upper")
     with progress_bar(output) as progress:

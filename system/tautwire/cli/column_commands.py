@@ -10,6 +10,7 @@ import typer
 
 from ..errors import InputError
 from ..robot.robot_file_reader import MAX_CABLES, read_robot
+from ..robot.schema import require_point_mass
 from .console import AsJson, CommandOutput, Quiet, TrackerFile, columns_command, shell_quoted
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ def columns(
     from ..recordings.winch_columns import with_winch_scales
 
     output = CommandOutput(as_json, quiet)
-    robot = None if robot_file is None else read_robot(robot_file)
+    robot = None if robot_file is None else require_point_mass(str(robot_file), read_robot(robot_file))
     cable_count = _cable_count(robot, cables)
     refuse_other_formats(out, ".toml")
     refuse_overwriting_inputs([path for path in (recording, robot_file, tracker) if path], [out] if out else [])

@@ -27,7 +27,7 @@ from rich.progress import (
 from ..errors import InputError, UnreachableError
 from ..provenance import Provenance, provenance_of
 from ..robot.robot_file_reader import read_columns_file, read_robot, read_tracker_file
-from ..robot.schema import Robot, UserFmu
+from ..robot.schema import Robot, UserFmu, require_point_mass
 from .progress_lines import progress_lines
 
 RobotFile = Annotated[Path, typer.Argument(metavar="ROBOT.toml", help="The robot file.")]
@@ -101,11 +101,16 @@ def read_holdable_robot(path: Path) -> Robot:
     return _require_holdable(read_robot(path), path)
 
 
+def read_point_mass_robot(path: Path) -> Robot:
+    """As read_holdable_robot, for what computes point masses only; raises RigidPlatformError for a rigid body."""
+    return _require_holdable(require_point_mass(str(path), read_robot(path)), path)
+
+
 def read_plausible_robot(path: Path) -> Robot:
-    """Reads a robot file; raises RobotFileError where its units seem to be others, else as read_holdable_robot."""
+    """Reads a robot file; raises RobotFileError where its units seem to be others, else as read_point_mass_robot."""
     from ..robot.implausible_units import implausible_units
 
-    robot = read_robot(path)
+    robot = require_point_mass(str(path), read_robot(path))
     for error in implausible_units(robot, str(path)):
         raise error
     return _require_holdable(robot, path)

@@ -24,7 +24,7 @@ from ..cosimulation.robot_wiring import PLATFORM, winch_input_ports
 from ..cosimulation.run_arguments import validate_fmus, validate_options
 from ..errors import InputError
 from ..fmus.packaging import RobotFmus, package_controller_fmu
-from ..robot.schema import AXES, Robot, validate_robot
+from ..robot.schema import AXES, Robot, validate_point_mass_robot
 from ..robot.trajectory import DURATION_RULE as OF_PATH
 from ..robot.trajectory import Trajectory, require_trajectory
 from ..validation import (
@@ -141,7 +141,7 @@ def cosimulate_closed_loop(
     """
     caller, options = "cosimulate_closed_loop", options or ClosedLoopOptions()
     validate_fmus(f"{caller}: fmus", fmus)
-    validate_robot(f"{caller}: robot", robot)
+    validate_point_mass_robot(f"{caller}: robot", robot)
     controller = designed(f"{caller}: controller", controller, robot.cable_count, options.aim, options.discretisation)
     _require_design(caller, robot, controller, trajectory)
     validate_number(f"{caller}: duration", duration, RUN_DURATION_RULE)
@@ -233,7 +233,7 @@ def _run(
 
 
 def _require_design(caller: str, robot: Robot, controller: Design, trajectory: Trajectory) -> None:
-    validate_robot(f"{caller}: robot", robot)
+    validate_point_mass_robot(f"{caller}: robot", robot)
     validate_attributes(
         f"{caller}: controller", controller, DESIGN_ATTRIBUTES, "controller", "give what design_controller returns"
     )

@@ -26,7 +26,7 @@ from tautwire_fmu.laws.point_mass import PointMassConstants, total_mass
 
 from ..errors import UnreachableError
 from ..robot.active_effects import platform_effects
-from ..robot.schema import Robot
+from ..robot.schema import Robot, require_point_mass
 from ..robot.static_equilibrium import load_on_tensions, static_tensions
 from ..robot.symbolic_model import SymbolicModel, symbolic_model
 from ..robot.trajectory import Trajectory, cable_directions, ideal_winch_speeds
@@ -59,6 +59,7 @@ def path_tensions(robot: Robot, trajectory: Trajectory, times: Array) -> Array:
 
     Raises UnreachableError where a cable would have to push.
     """
+    require_point_mass(robot.name, robot)
     start = static_tensions(robot)
     positions = trajectory.position(times)
     direction_matrix = cable_directions(robot, positions)

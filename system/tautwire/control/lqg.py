@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..linear import LinearPlant, linearise
-from ..robot.schema import AXES, Robot, validate_robot
+from ..robot.schema import AXES, Robot, validate_point_mass_robot
 from ..validation import validate_instance
 from .design import ControlAim, Knot, measurement_noise, regulator_signals
 from .sampled_plant import sampled_plant
@@ -101,7 +101,7 @@ def design_controller(robot: Robot, aim: ControlAim | None = None, at: Sequence[
     it stably, ArgumentError for an invalid argument. Source: Franklin, Powell and Workman (1998), Digital
     Control of Dynamic Systems, chapter 9.
     """
-    validate_robot("design_controller: robot", robot)
+    validate_point_mass_robot("design_controller: robot", robot)
     aim = (
         ControlAim()
         if aim is None

@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 from ..errors import ArgumentError, NumericalError, RecordingError
 from ..process_signals import defer_interrupts
 from ..recordings.recording import Recording, require_outputs
-from ..robot.schema import Robot, validate_robot
+from ..robot.schema import Robot, validate_point_mass_robot
 from ..validation import NumberRule, validate_callable, validate_instance, validate_integer, validate_number
 from .effect_estimates import parameter_correlations
 from .identification_context import IdentificationContext, Progress, no_progress
@@ -45,7 +45,7 @@ def validate_trace_arguments(
 
     Raises RecordingError where a recording has no measured output, or both are the same, ArgumentError for all else.
     """
-    validate_robot("trace: robot", robot)
+    validate_point_mass_robot("trace: robot", robot)
     validate_callable("trace: progress", progress)
     validated_false_alarm_rate("trace: alpha", alpha)
     validate_integer("trace: processes", processes, 1, "give the number of worker processes")

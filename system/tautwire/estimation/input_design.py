@@ -24,7 +24,7 @@ from threadpoolctl import threadpool_limits
 
 from ..errors import InputError, TautwireError
 from ..recordings.recording import Recording
-from ..robot.schema import Robot
+from ..robot.schema import Robot, require_point_mass
 from ..robot.static_equilibrium import static_tensions
 from ..robot.trajectory import ideal_winch_speeds
 from .estimation_data import DataSet
@@ -268,7 +268,7 @@ def default_limits(robot: Robot, speed: float | None = None, reach: float | None
 
     Without [tension] a tenth of the least static tension to three times the largest.
     """
-    tensions = static_tensions(robot)
+    tensions = static_tensions(require_point_mass(robot.name, robot))
     lengths = np.linalg.norm(np.array(robot.anchors) - np.array(robot.platform.start), axis=1)
     declared_speed = robot.winch.speed_limit if robot.winch else None
     return ExcitationLimits(

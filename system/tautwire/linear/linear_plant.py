@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 from scipy.linalg import matrix_balance
 
 from ..errors import InputError
-from ..robot.schema import Robot, validate_robot
+from ..robot.schema import Robot, validate_point_mass_robot
 from ..robot.static_equilibrium import static_tensions
 from ..robot.symbolic_model import SymbolicModel, freeze_drifting_states, symbolic_model
 from ..validation import NumberRule, validate_number
@@ -64,7 +64,7 @@ def linearise(robot: Robot, at: Sequence[float] | Array | None = None, swing: fl
     Raises UnreachableError where the cables cannot hold the platform, OperatingPointError where they do not hold
     it stably, or where the states of an effect never settle, ArgumentError for an invalid argument.
     """
-    validate_robot("linearise: robot", robot)
+    validate_point_mass_robot("linearise: robot", robot)
     validate_number("linearise: swing", swing, SWING_RULE)
     position = requested_position(robot, at)
     tensions = static_tensions(robot, position)

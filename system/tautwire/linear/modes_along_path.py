@@ -13,7 +13,7 @@ from scipy.optimize import linear_sum_assignment
 
 from ..array_validation import validate_array, validate_increasing
 from ..errors import ArgumentError
-from ..robot.schema import Robot, validate_robot
+from ..robot.schema import Robot, validate_point_mass_robot
 from ..robot.trajectory import Trajectory, require_trajectory
 from ..validation import validate_integer
 from .linear_plant import linearise
@@ -70,7 +70,7 @@ def modes_along(
     Raises ArgumentError for an invalid argument or a path of fewer than two points, and what
     :func:`tautwire.linear.linearise` raises.
     """
-    validate_robot("modes_along: robot", robot)
+    validate_point_mass_robot("modes_along: robot", robot)
     validate_integer("modes_along: points", points, 2, "give two or more")
     position_at, abscissa, is_timed = _path_positions(path, times, points)
     count = len(abscissa)

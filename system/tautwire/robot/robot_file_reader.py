@@ -234,9 +234,14 @@ def _read_sensors(table: CheckedTable, is_rigid: bool) -> Sensors:
     table.require_known([*NOISE_RULES, *OFFSET_RULES])
     if not is_rigid:
         refuse_keys_of_rigid_bodies(table, SENSOR_KEYS)
+    noises = {key: table.optional_number(key, rule) for key, rule in NOISE_RULES.items()}
+    offsets = {key: table.number(key, rule) for key, rule in OFFSET_RULES.items()}
     return Sensors(
-        **{key: table.optional_number(key, rule) for key, rule in NOISE_RULES.items()},
-        **{key: table.number(key, rule) for key, rule in OFFSET_RULES.items()},
+        position_noise=noises["position_noise"],
+        tension_noise=noises["tension_noise"],
+        winch_speed_noise=noises["winch_speed_noise"],
+        orientation_noise=noises["orientation_noise"],
+        **offsets,
     )
 
 

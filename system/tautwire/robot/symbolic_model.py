@@ -22,7 +22,7 @@ from tautwire_fmu.laws.vectors import add, scale
 
 from .measured_start import with_true_start
 from .robot_assembly import RobotAssembly, assemble_robot
-from .schema import AXES, EffectSetting, Robot
+from .schema import AXES, EffectSetting, Robot, require_point_mass
 from .symbolic_statics import symbolic_start_tensions
 from .uncertain_parameters import SensorErrors, UncertainParameter, limited_perturbation, perturbed_robot, sensor_errors
 
@@ -137,6 +137,7 @@ def symbolic_model(
     The static start follows the free parameters; with more than three cables, cables at a tension limit stay there.
     Not valid across a change of which cables are at a limit.
     """
+    require_point_mass(robot.name, robot)
     symbols = [SX.sym(f"{_owner_name(robot, f)}.{f.name}") for f in free_parameters]
     constants = [SX.sym(number.label) for number in uncertain_parameters]
     perturbations = [limited_perturbation(constant, casadi.sqrt) for constant in constants]

@@ -13,7 +13,7 @@ from ..array_validation import validate_array, validate_point
 from ..errors import ArgumentError
 from ..validation import NumberRule, validate_attributes, validate_number
 from .active_effects import has_routing_effects
-from .schema import Point, Robot, validate_robot
+from .schema import Point, Robot, validate_point_mass_robot
 from .static_equilibrium import unit_directions as rope_directions
 
 Array = NDArray[np.float64]
@@ -171,7 +171,7 @@ def ideal_winch_speeds(robot: Robot, trajectory: Trajectory, times: ArrayLike) -
     Raises ArgumentError for an invalid argument, a user's trajectory whose values are not finite (N, 3), or a
     trajectory through an exit point.
     """
-    validate_robot("ideal_winch_speeds: robot", robot)
+    validate_point_mass_robot("ideal_winch_speeds: robot", robot)
     require_trajectory("ideal_winch_speeds: trajectory", trajectory)
     instants = validate_array("ideal_winch_speeds: times", times, (None,), "finite times (N,) in s")
     positions, velocities = (

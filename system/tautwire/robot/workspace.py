@@ -16,7 +16,7 @@ from tautwire_fmu.laws.point_mass import PointMassConstants, total_mass
 from ..errors import InputError, UnreachableError
 from ..process_signals import defer_interrupts
 from .active_effects import cables_have_weight, platform_effects
-from .schema import Robot, TensionLimits
+from .schema import Robot, TensionLimits, require_point_mass
 from .static_equilibrium import DEFAULT_LIMITS, cable_routes, cable_weight_force, static_load, static_tensions
 
 Array = NDArray[np.float64]
@@ -82,6 +82,7 @@ def wrench_feasible_workspace(
     """
     if not (np.isfinite(acceleration) and acceleration >= 0.0):
         raise InputError("acceleration", f"{acceleration:g} m/s2 is negative or not finite", "give zero or more")
+    require_point_mass(robot.name, robot)
     axes = _grid(robot, lower, upper, spacing)
     shape = tuple(len(axis) for axis in axes)
     margin, min_tension, max_tension = (np.full(shape, np.nan) for _ in range(3))
@@ -111,6 +112,7 @@ def wrench_margin(robot: Robot, position: Array, acceleration: float = 0.0) -> f
 
     Raises UnreachableError where a cable has no length there.
     """
+    require_point_mass(robot.name, robot)
     routes = cable_routes(REAL, robot, position.tolist())
     direction_matrix = np.array([route.direction for route in routes]).T
     load_vector = np.array(static_load(REAL, robot, position.tolist()))

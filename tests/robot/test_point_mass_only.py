@@ -1,0 +1,72 @@
+"""What computes point masses only refuses rigid platforms, in one sentence, and reads no recording before it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import tautwire
+from tautwire.campaigns.plan_file import read_plan
+from tautwire.cli import run
+from tautwire.errors import RigidPlatformError
+from tautwire.estimation.input_design import default_limits
+from tautwire.estimation.preprocessing import prepare_recordings
+from tautwire.recordings.recording import Recording
+from tautwire.robot.robot_file_writer import write_robot
+from tautwire.robot.schema import Robot
+from tautwire.robot.symbolic_model import symbolic_model
+from tautwire.robot.trajectory import Line, ideal_winch_speeds
+from tautwire.robot.workspace import wrench_feasible_workspace, wrench_margin
+from tests.support.rigid_robots import suspended_robot
+
+PATH = Line((0.0, 0.0, 1.5), (0.1, 0.0, 1.5), 1.0)
+STANDING = Recording("standing", np.arange(3.0), np.zeros((3, 4)), np.full((3, 4), 100.0), np.zeros((3, 3)))
+COMPUTATIONS: dict[str, Callable[[Robot], object]] = {
+    "speeds": lambda robot: ideal_winch_speeds(robot, PATH, np.array([0.0, 0.5])),
+    "plant": tautwire.linearise,
+    "modes": lambda robot: tautwire.modes_along(robot, PATH),
+    "controller": tautwire.design_controller,
+    "model": symbolic_model,
+    "workspace": wrench_feasible_workspace,
+    "margin": lambda robot: wrench_margin(robot, np.array(robot.platform.start)),
+    "excitation": default_limits,
+    "recording": lambda robot: prepare_recordings(robot, STANDING, None),
+}
+
+
+@pytest.mark.parametrize("name", COMPUTATIONS)
+def test_a_rigid_platform_is_refused(name: str) -> None:
+    with pytest.raises(RigidPlatformError, match="rigid body, which cannot be computed here yet") as caught:
+        COMPUTATIONS[name](suspended_robot(4))
+    assert len(str(caught.value).splitlines()) == 1
+
+
+@pytest.mark.parametrize(
+    "command",
+    (
+        ["trace", "ROBOT", "hall.toml", "--out", "report"],
+        ["excite", "ROBOT", "--out", "out.csv"],
+        ["linearise", "ROBOT", "--out", "out.json"],
+        ["workspace", "ROBOT", "--out", "out.csv"],
+        ["columns", "hall.toml", "ROBOT"],
+    ),
+)
+def test_a_command_refuses_a_rigid_platform(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: list[str]
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    write_robot(suspended_robot(4), tmp_path / "hall.toml")
+    assert run([part.replace("ROBOT", "hall.toml") for part in command]) == 2
+    error = capsys.readouterr().err
+    assert "hall.toml: the platform is a rigid body, which cannot be computed here yet" in error
+    assert [path.name for path in tmp_path.iterdir()] == ["hall.toml"]
+
+
+def test_a_campaign_refuses_a_rigid_platform(tmp_path: Path) -> None:
+    write_robot(suspended_robot(4), tmp_path / "hall.toml")
+    (tmp_path / "plan.toml").write_text('robot = "hall.toml"\n', encoding="utf-8")
+    with pytest.raises(RigidPlatformError):
+        read_plan(tmp_path / "plan.toml")
