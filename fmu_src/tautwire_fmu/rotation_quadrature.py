@@ -20,7 +20,7 @@ from .laws.rotation import Matrix, Quaternion, multiply, quaternion_of, rotation
 from .laws.vectors import Vector, add, cross, dot, scale, subtract
 
 MAX_SWEEPS = 40
-ANGLE_TOLERANCE, MAX_ANGLE_ERROR = 1e-16, 1e-12  # rad
+ANGLE_TOLERANCE = 1e-16  # rad
 # rad^2: below it the series of k errs by 1e-19.
 MAX_SERIES_ANGLE_SQUARED = 1e-2
 ORIGIN = (0.0, 0.0, 0.0)
@@ -68,7 +68,7 @@ def integrate_rotation(inertia: law.Inertia, start: RotationState, loads: Sequen
     first_moment = _moment_with_rate(first.rotation, first.velocity, loads[0])
     angles = (_taylor(ORIGIN, first[1:], 0.5 * step), _taylor(ORIGIN, first[1:], step))
     velocities: Sequence[Vector] = [_taylor(first.velocity, (first.acceleration, ORIGIN), 0.5 * step)] * 2
-    change = MAX_ANGLE_ERROR
+    change = 1.0
     for _ in range(MAX_SWEEPS):
         quaternions = _quaternions(start.quaternion, angles)
         rotations = [rotation_matrix(quaternion) for quaternion in quaternions[3 - len(loads) :]]
@@ -92,7 +92,7 @@ def integrate_rotation(inertia: law.Inertia, start: RotationState, loads: Sequen
         # The next change is predicted by the ratio of the last two.
         if change * min(1.0, change / previous_change) <= ANGLE_TOLERANCE:
             break
-    if not change <= MAX_ANGLE_ERROR:
+    else:
         raise ArithmeticError(f"the rotation does not converge, the last change is {change:.1g} rad")
     middle, end = map(RotationState, _quaternions(start.quaternion, angles), momenta)
     if len(loads) == 3:

@@ -100,7 +100,7 @@ def test_so_is_one_of_an_fmi_3_fmu(tmp_path: Path, change: Mapping[str, str], po
 def test_an_fmi_3_fmu_fits(tmp_path: Path) -> None:
     own = UserFmu("winch_2", packed_3(tmp_path / "a.fmu", b""))
     check_user_fmus(replace(paper_robot(), fmus=(own,)))
-    assert notes_on_unstated_units((own,), 3) == ()
+    assert notes_on_unstated_units(replace(paper_robot(), fmus=(own,))) == ()
     require_step_support({"winch_2": own.path}, adaptive=True, equidistant=False)
     fixed = packed_3(tmp_path / "b.fmu", b"", {'canGetAndSetFMUState="true"': ""})
     with pytest.raises(SlotError, match="cannot save its state"):

@@ -36,7 +36,9 @@ class Attitude(NamedTuple):
 
 def transform(matrix: Matrix, vector: Vector) -> Vector:
     """The product of a matrix, given by its rows, and a vector."""
-    return (dot(matrix[0], vector), dot(matrix[1], vector), dot(matrix[2], vector))
+    (a, b, c), (d, e, f), (g, h, i) = matrix
+    x, y, z = vector
+    return (a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z)
 
 
 def transform_back(rotation: Matrix, vector: Vector) -> Vector:
@@ -67,12 +69,12 @@ def moment_matrix(arms: Sequence[Sequence[Any]], forces: Sequence[Sequence[Any]]
 
 def moment(rotation: Matrix, matrix: Matrix) -> Vector:
     """Moment ``sum of (R a_i) x F_i`` in the world's axes, in N m; ``matrix`` as :func:`moment_matrix` gives it."""
-    x, y, z = rotation
-    along_x, along_y, along_z = matrix
+    (a, b, c), (d, e, f), (g, h, i) = rotation
+    (xx, xy, xz), (yx, yy, yz), (zx, zy, zz) = matrix
     return (
-        dot(y, along_z) - dot(z, along_y),
-        dot(z, along_x) - dot(x, along_z),
-        dot(x, along_y) - dot(y, along_x),
+        (d * zx + e * zy + f * zz) - (g * yx + h * yy + i * yz),
+        (g * xx + h * xy + i * xz) - (a * zx + b * zy + c * zz),
+        (a * yx + b * yy + c * yz) - (d * xx + e * xy + f * xz),
     )
 
 

@@ -199,8 +199,9 @@ def _result_columns(robot: Robot) -> list[Column]:
     from ..cosimulation.robot_wiring import result_columns
     from ..fmus.fmu_slots import missing_user_fmu_ports
 
-    missing_ports = missing_user_fmu_ports({own.slot: own.path for own in robot.fmus}, robot.cable_count)
-    return result_columns(robot.cable_count, robot.winch_numbers, missing_ports)
+    is_rigid = robot.platform.is_rigid_body
+    missing_ports = missing_user_fmu_ports({own.slot: own.path for own in robot.fmus}, robot.cable_count, is_rigid)
+    return result_columns(robot.cable_count, robot.winch_numbers, missing_ports, is_rigid)
 
 
 def _print_statistics(

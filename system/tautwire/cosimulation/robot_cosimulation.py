@@ -41,7 +41,17 @@ from . import (
     simulate,
     simulate_isolated,
 )
-from .robot_wiring import CABLE_QUANTITIES, PLATFORM, RobotWiring, result_columns, wire_robot, with_connections
+from .robot_wiring import (
+    CABLE_QUANTITIES,
+    ORIENTATION_AXES,
+    PLATFORM,
+    POINT_COLUMNS,
+    TURNING_COLUMNS,
+    RobotWiring,
+    result_columns,
+    wire_robot,
+    with_connections,
+)
 from .run_arguments import validate_fmus, validate_options
 
 Array = NDArray[np.float64]
@@ -59,10 +69,12 @@ class CosimulationResult:
     """Result of a co-simulation of a robot with n cables at N times; SI units.
 
     ``statistics`` has steps, iterations and the energy residual of the coupling. ``time`` (N,); ``position`` and
-    ``velocity`` (N, 3); ``tension``, ``length``, ``elongation`` and ``strain``
+    ``velocity`` (N, 3), of the origin of the platform's frame; ``tension``, ``length``, ``elongation`` and ``strain``
     (N, n). ``elongation`` is the paper's r, see :func:`tautwire_fmu.laws.cable.reading`. ``winch_speed`` (N,) is the
     speed of the winch of a cable, counted from 1, where it has one. Columns of a result file that no FMU provides are
-    ``missing_columns``, their numbers not finite.
+    ``missing_columns``, their numbers not finite. ``orientation`` (N, 4), the unit quaternion w, x, y, z from the
+    platform's frame to the world, and ``angular_velocity`` (N, 3), in rad/s and the axes of the world, are None for a
+    point mass.
     """
 
     time: Array
@@ -75,6 +87,8 @@ class CosimulationResult:
     statistics: RunStatistics = field(default_factory=RunStatistics, compare=False)
     winch_speed: Mapping[int, Array] = field(default_factory=dict)
     missing_columns: tuple[str, ...] = ()
+    orientation: Array | None = None
+    angular_velocity: Array | None = None
 
     def measured(self) -> Array:
         """Measured outputs, shape (N, 3 + n): x, y, z, then the tensions."""
@@ -82,9 +96,10 @@ class CosimulationResult:
 
     def frame(self) -> pd.DataFrame:
         """The run as a table with the columns of a result file."""
+        turning = [each for each in (self.orientation, self.angular_velocity) if each is not None]
         cables = [getattr(self, name) for name in CABLE_QUANTITIES]
-        rows = np.column_stack([self.time, self.position, self.velocity, *cables, *self.winch_speed.values()])
-        columns = result_columns(self.tension.shape[1], tuple(self.winch_speed))
+        rows = np.column_stack([self.time, self.position, self.velocity, *turning, *cables, *self.winch_speed.values()])
+        columns = result_columns(self.tension.shape[1], tuple(self.winch_speed), is_rigid=bool(turning))
         return pd.DataFrame(rows, columns=[column.name for column in columns]).drop(columns=list(self.missing_columns))
 
 
@@ -142,27 +157,34 @@ def _is_parameter(component: Component, name: str) -> bool:
 
 
 def _require_platform_start(fmus: RobotFmus, platform: Component) -> None:
-    """Refuse a user's platform whose start position differs from that of the cables."""
-    if PLATFORM not in fmus.user_start_values:
-        return
-    block = platform.block([f"position.{axis}" for axis in AXES])
-    platform.read(block)
-    expected = np.array([fmus.user_start_values[PLATFORM][f"start.{axis}"] for axis in AXES])
-    if not np.max(np.abs(block.values - expected)) < START_TOLERANCE:
-        platform_text, expected_text = (
-            ", ".join(f"{value:.9g}" for value in position) for position in (block.values, expected)
-        )
-        hint = "start it there, or give it parameters start.x, start.y and start.z, which are then set"
-        raise SlotError(
-            fmus.platform, PLATFORM, None, f"it starts at {platform_text} m, the run at {expected_text} m", hint
-        )
+    """Refuse a user's platform whose start position or orientation differs from that of the cables."""
+    expected_values = fmus.user_start_values.get(PLATFORM, {})
+    for quantity, parameter, parts, unit in (
+        ("position", "start", AXES, " m"),
+        ("orientation", "start_orientation", ORIENTATION_AXES, ""),
+    ):
+        names = [f"{quantity}.{part}" for part in parts]
+        if f"{parameter}.{parts[0]}" not in expected_values or names[0] not in platform.variables:
+            continue
+        block = platform.block(names)
+        platform.read(block)
+        expected = np.array([expected_values[f"{parameter}.{part}"] for part in parts])
+        if not np.max(np.abs(block.values - expected)) < START_TOLERANCE:
+            found_text, expected_text = (
+                ", ".join(f"{each:.9g}" for each in values) for values in (block.values, expected)
+            )
+            problem = f"it starts at {found_text}{unit}, the run at {expected_text}{unit}"
+            parameters = f"{', '.join(f'{parameter}.{part}' for part in parts[:-1])} and {parameter}.{parts[-1]}"
+            hint = f"start it there, or give it parameters {parameters}, which are then set"
+            raise SlotError(fmus.platform, PLATFORM, None, problem, hint)
 
 
 def wire_fmus(fmus: RobotFmus) -> RobotWiring:
     """How a robot's FMUs are wired; raises SlotError where one of the user's cannot be read."""
-    count = len(fmus.cables)
+    count, is_rigid = len(fmus.cables), fmus.is_rigid
     user_fmus = {slot: fmus.by_component[slot] for slot in fmus.user_start_values}
-    return wire_robot(count, fmus.winch_numbers, missing_user_fmu_ports(user_fmus, count), fmus.has_position_sensor)
+    missing_ports = missing_user_fmu_ports(user_fmus, count, is_rigid)
+    return wire_robot(count, fmus.winch_numbers, missing_ports, fmus.has_position_sensor, is_rigid)
 
 
 def cosimulate(
@@ -287,8 +309,10 @@ def result_from_rows(time: Array, rows: Array, fmus: RobotFmus, wiring: RobotWir
     count, winches = len(fmus.cables), fmus.winch_numbers
     all_columns = np.full((len(rows), len(wiring.output_indices) + len(wiring.missing_columns)), np.nan)
     all_columns[:, wiring.output_indices] = rows
-    first_winch = 6 + len(CABLE_QUANTITIES) * count
-    tension, length, elongation, strain = np.split(all_columns[:, 6:first_winch], len(CABLE_QUANTITIES), axis=1)
+    first_cable = len(POINT_COLUMNS) + (len(TURNING_COLUMNS) if fmus.is_rigid else 0)
+    first_winch = first_cable + len(CABLE_QUANTITIES) * count
+    cables = all_columns[:, first_cable:first_winch]
+    tension, length, elongation, strain = np.split(cables, len(CABLE_QUANTITIES), axis=1)
     return CosimulationResult(
         time,
         all_columns[:, :3],
@@ -299,4 +323,6 @@ def result_from_rows(time: Array, rows: Array, fmus: RobotFmus, wiring: RobotWir
         strain,
         winch_speed=dict(zip(winches, all_columns[:, first_winch:].T, strict=True)),
         missing_columns=wiring.missing_columns,
+        orientation=all_columns[:, 6:10] if fmus.is_rigid else None,
+        angular_velocity=all_columns[:, 10:13] if fmus.is_rigid else None,
     )

@@ -24,7 +24,7 @@ from ..atomic_output import atomic_file
 from ..errors import one_line
 from ..fmus.fmi_binding import is_real_scalar
 from ..fmus.fmu_archive import read_model_description
-from ..fmus.fmu_slots import slot_ports
+from ..fmus.fmu_slots import SlotPort, slot_ports
 from ..fmus.packaging import RobotFmus
 from ..fmus.variable_units import SI_BASE_UNITS, definition_from_exponents, unit_definition, unit_of
 from ..robot.schema import Robot
@@ -83,7 +83,7 @@ def write_ssp(robot: Robot, fmus: RobotFmus, path: Path) -> Path:
     """
     wiring = wire_fmus(fmus)
     # Importers do not set midpoint inputs.
-    midpoint_wires = midpoint_connections(len(fmus.cables))
+    midpoint_wires = midpoint_connections(len(fmus.cables), fmus.is_rigid)
     wires = [wire for wire in wiring.connections if wire not in midpoint_wires]
     system_inputs = {_system_connector_name(port): port for port in wiring.external_inputs}
     system_outputs = {_system_connector_name(port): port for port in wiring.outputs}
@@ -103,13 +103,16 @@ def _ssp_components(fmus: RobotFmus, ports: Iterable[Port]) -> dict[str, _SspCom
     names: dict[str, dict[str, None]] = {name: {} for name in fmus.by_component}
     for port in ports:
         names[port.component][port.variable] = None
-    return {name: _ssp_component(name, path, names[name], len(fmus.cables)) for name, path in fmus.by_component.items()}
+    return {
+        name: _ssp_component(name, path, names[name], slot_ports(name, len(fmus.cables), fmus.is_rigid))
+        for name, path in fmus.by_component.items()
+    }
 
 
-def _ssp_component(name: str, path: Path, connectors: Iterable[str], cable_count: int) -> _SspComponent:
+def _ssp_component(name: str, path: Path, connectors: Iterable[str], ports: Iterable[SlotPort]) -> _SspComponent:
     description = read_model_description(path)
     variables = {variable.name: variable for variable in description.modelVariables}
-    default_units = {port.name: port.unit for port in slot_ports(name, cable_count)}
+    default_units = {port.name: port.unit for port in ports}
     units = {connector: unit_of(variables[connector]) or default_units[connector] for connector in connectors}
     return _SspComponent(name, path, description, variables, units)
 

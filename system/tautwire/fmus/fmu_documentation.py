@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any
 
 from fmpy.model_description import ModelDescription
 
-from tautwire_fmu.laws import cable, point_mass, sampled_control, winch_drive
+from tautwire_fmu.laws import cable, point_mass, rigid_body, sampled_control, winch_drive
 from tautwire_fmu.laws.effects import BY_NAME
 
 if TYPE_CHECKING:
@@ -23,9 +23,12 @@ if TYPE_CHECKING:
 LAWS: Mapping[str, ModuleType] = {
     "cable": cable,
     "point_mass": point_mass,
+    "rigid_body": rigid_body,
     "winch": winch_drive,
     "controller": sampled_control,
 }
+# Platforms of both kinds have the same icon.
+ICONS = {"rigid_body": "point_mass"}
 TABLES = {"Inputs": "input", "Outputs": "output", "Parameters": "parameter", "States": "local"}
 # Both travel inside every FMU.
 LICENSED_PACKAGES = ("tautwire", "pythonfmu")
@@ -40,7 +43,7 @@ def documentation_files(kind: str, data: Mapping[str, Any], description: ModelDe
     return {
         "documentation/index.html": documentation_page(kind, data, description).encode("utf-8"),
         "documentation/licenses/license.txt": license_text().encode("utf-8"),
-        "model.png": files(__package__).joinpath(f"icons/{kind}.png").read_bytes(),
+        "model.png": files(__package__).joinpath(f"icons/{ICONS.get(kind, kind)}.png").read_bytes(),
     }
 
 

@@ -44,23 +44,33 @@ class SlotError(InputError):
         self.args = (path, slot, port, problem, hint)
 
 
-def slot_ports(slot: str, cable_count: int) -> tuple[SlotPort, ...]:
-    """Ports that connect the component in a slot with the others, and those that a run records."""
+def slot_ports(slot: str, cable_count: int, is_rigid: bool = False) -> tuple[SlotPort, ...]:
+    """Ports that connect the component in a slot with the others, and those that a run records.
+
+    A platform that ``is_rigid`` has those of each attachment.
+    """
     kind = slot.partition("_")[0]
     if kind == "platform":
-        return _platform_ports(cable_count)
+        numbers = range(1, cable_count + 1)
+        motion = _rigid_motion_ports(numbers) if is_rigid else _motion_ports("output", "")
+        return (*motion, *_platform_inputs(numbers))
     return _cable_ports() if kind == "cable" else _winch_ports()
 
 
-def _platform_ports(cable_count: int) -> tuple[SlotPort, ...]:
-    numbers = range(1, cable_count + 1)
+def _rigid_motion_ports(numbers: Iterable[int]) -> tuple[SlotPort, ...]:
     return (
         *_vector_ports("position", "output", "m"),
         *_vector_ports("velocity", "output", "m/s"),
-        *_vector_ports("acceleration", "output", "m/s2", False),
+        *(SlotPort(f"orientation.{part}", "output", "1", False) for part in "wxyz"),
+        *_vector_ports("angular_velocity", "output", "rad/s", False),
+        *(port for i in numbers for port in _motion_ports("output", f"_{i}")),
+    )
+
+
+def _platform_inputs(numbers: Iterable[int]) -> tuple[SlotPort, ...]:
+    return (
         *(port for i in numbers for port in _vector_ports(f"force_{i}", "input", "N")),
         *(port for i in numbers for port in _vector_ports(f"force_rate_{i}", "input", "N/s", False)),
-        *_middle_motion_ports("output"),
         *(port for i in numbers for port in _vector_ports(f"middle_force_{i}", "input", "N", False)),
         *(port for i in numbers for port in _vector_ports(f"middle_force_rate_{i}", "input", "N/s", False)),
     )
@@ -68,9 +78,7 @@ def _platform_ports(cable_count: int) -> tuple[SlotPort, ...]:
 
 def _cable_ports() -> tuple[SlotPort, ...]:
     return (
-        *_vector_ports("position", "input", "m"),
-        *_vector_ports("velocity", "input", "m/s"),
-        *_vector_ports("acceleration", "input", "m/s2", False),
+        *_motion_ports("input", ""),
         SlotPort("winch_speed", "input", "m/s", True),
         SlotPort("winch_acceleration", "input", "m/s2", False),
         *_vector_ports("force", "output", "N"),
@@ -79,7 +87,6 @@ def _cable_ports() -> tuple[SlotPort, ...]:
         SlotPort("pull", "output", "N", False),
         *(SlotPort(name, "output", "m", False) for name in ("length", "elongation")),
         SlotPort("strain", "output", "1", False),
-        *_middle_motion_ports("input"),
         *_vector_ports("middle_force", "output", "N", False),
         *_vector_ports("middle_force_rate", "output", "N/s", False),
     )
@@ -101,16 +108,19 @@ def _vector_ports(name: str, causality: str, unit: str, required: bool = True) -
     return tuple(SlotPort(f"{name}.{axis}", causality, unit, required) for axis in AXES)
 
 
-def _middle_motion_ports(causality: str) -> tuple[SlotPort, ...]:
-    """Ports of the platform's motion in the middle of a step."""
+def _motion_ports(causality: str, suffix: str) -> tuple[SlotPort, ...]:
+    """Ports of the motion of a point of the platform, at the end of a step and in its middle."""
     return (
-        *_vector_ports("middle_position", causality, "m", False),
-        *_vector_ports("middle_velocity", causality, "m/s", False),
-        *_vector_ports("middle_acceleration", causality, "m/s2", False),
+        *_vector_ports(f"position{suffix}", causality, "m"),
+        *_vector_ports(f"velocity{suffix}", causality, "m/s"),
+        *_vector_ports(f"acceleration{suffix}", causality, "m/s2", False),
+        *_vector_ports(f"middle_position{suffix}", causality, "m", False),
+        *_vector_ports(f"middle_velocity{suffix}", causality, "m/s", False),
+        *_vector_ports(f"middle_acceleration{suffix}", causality, "m/s2", False),
     )
 
 
-def missing_user_fmu_ports(user_fmus: Mapping[str, Path], cable_count: int) -> frozenset[Port]:
+def missing_user_fmu_ports(user_fmus: Mapping[str, Path], cable_count: int, is_rigid: bool = False) -> frozenset[Port]:
     """Ports of the robot's wiring that user FMUs, by slot, do not have; raises SlotError where a file is no FMU.
 
     Rates of inputs need input_time: without it an FMU holds its inputs over a step and does not extrapolate.
@@ -118,19 +128,19 @@ def missing_user_fmu_ports(user_fmus: Mapping[str, Path], cable_count: int) -> f
     missing = set()
     for slot, path in user_fmus.items():
         variable_names = {variable.name for variable in _runnable_description(UserFmu(slot, path)).modelVariables}
-        for port in slot_ports(slot, cable_count):
+        for port in slot_ports(slot, cable_count, is_rigid):
             is_input_rate = port.causality == "input" and not port.required
             if port.name not in variable_names or (is_input_rate and INPUT_TIME not in variable_names):
                 missing.add(Port(slot, port.name))
     return frozenset(missing)
 
 
-def notes_on_unstated_units(fmus: Iterable[UserFmu], cable_count: int) -> tuple[str, ...]:
+def notes_on_unstated_units(robot: Robot) -> tuple[str, ...]:
     """Notes on user FMUs whose ports state no units."""
     notes = []
-    for user_fmu in fmus:
+    for user_fmu in robot.fmus:
         variables = {variable.name: variable for variable in _runnable_description(user_fmu).modelVariables}
-        ports_without_unit = [port for port in slot_ports(user_fmu.slot, cable_count) if port.name in variables]
+        ports_without_unit = [port for port in _robot_slot_ports(robot, user_fmu.slot) if port.name in variables]
         ports_without_unit = [port for port in ports_without_unit if unit_of(variables[port.name]) is None]
         if ports_without_unit:
             first = f"{ports_without_unit[0].name} for {ports_without_unit[0].unit}"
@@ -185,8 +195,12 @@ def check_user_fmus(robot: Robot) -> None:
                 problem = f"it is in slot {occupied_slot} and can be instantiated only once"
                 raise SlotError(user_fmu.path, user_fmu.slot, None, problem, "export it without that restriction")
         variables = {variable.name: variable for variable in description.modelVariables}
-        for port in slot_ports(user_fmu.slot, robot.cable_count):
+        for port in _robot_slot_ports(robot, user_fmu.slot):
             _check_port(user_fmu, description, variables.get(port.name), port)
+
+
+def _robot_slot_ports(robot: Robot, slot: str) -> tuple[SlotPort, ...]:
+    return slot_ports(slot, robot.cable_count, robot.platform.is_rigid_body)
 
 
 def _runnable_description(user_fmu: UserFmu, read_completely: bool = False) -> ModelDescription:

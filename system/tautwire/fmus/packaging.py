@@ -7,7 +7,7 @@ import itertools
 import json
 import shutil
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -15,13 +15,14 @@ from uuid import NAMESPACE_URL, uuid5
 
 import tautwire_fmu
 from tautwire_fmu.laws.effects import BY_NAME
+from tautwire_fmu.laws.rotation import rotate
 from tautwire_fmu.laws.winch_drive import NO_LIMIT
 
 from .. import __version__
 from ..process_signals import defer_interrupts
 from ..robot.active_effects import formula_texts, has_sensor_effects, platform_fmu_settings
 from ..robot.robot_assembly import assemble_robot
-from ..robot.schema import EffectSetting, Robot, validate_robot
+from ..robot.schema import EffectSetting, Point, Quaternion, Robot, validate_robot
 from ..robot.static_equilibrium import static_forces, static_tensions
 from ..validation import validate_callable, validate_folder
 from .fmu_archive import read_model_description
@@ -51,9 +52,10 @@ class RobotFmus:
 
     A winch is None where rope runs at the commanded speed. ``user_start_values`` are the slots with user FMUs; each
     is to start with these values, by the names of our parameters. ``has_position_sensor`` tells that the platform also
-    outputs its measured position. ``start_settings`` are parameters that our own FMUs start with in place of their
-    stored values, by component; names that are no parameter of it are ignored. ``relative_tolerance`` is that of the
-    FMUs' own integration, None for each one's own: a billionth of its states' scales for ours.
+    outputs its measured position, ``is_rigid`` that it turns. ``start_settings`` are parameters that our own FMUs start
+    with in place of their stored values, by component; names that are no parameter of it are ignored.
+    ``relative_tolerance`` is that of the FMUs' own integration, None for each one's own: a billionth of its states'
+    scales for ours.
     """
 
     cables: tuple[Path, ...]
@@ -63,6 +65,7 @@ class RobotFmus:
     has_position_sensor: bool = False
     start_settings: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
     relative_tolerance: float | None = None
+    is_rigid: bool = False
 
     @property
     def by_component(self) -> dict[str, Path]:
@@ -98,6 +101,8 @@ def build_fmus(robot: Robot, folder: str | Path, progress: Callable[[float], Non
     check_user_fmus(robot)
     folder.mkdir(parents=True, exist_ok=True)
     user_fmus = {fmu.slot: fmu.path for fmu in robot.fmus}
+    is_rigid = robot.platform.is_rigid_body
+    platform_slave = ("rigid_body", "RigidBody") if is_rigid else ("point_mass", "PointMass")
     fmu_count, built_counter = 1 + robot.cable_count + len(robot.winch_numbers), itertools.count(1)
 
     def build_or_use(module: str, base: str, name: str, data: dict[str, Any]) -> Path:
@@ -110,13 +115,14 @@ def build_fmus(robot: Robot, folder: str | Path, progress: Callable[[float], Non
         cables=tuple(
             build_or_use("cable", "Cable", f"cable_{i}", data) for i, data in enumerate(cable_resources(robot), start=1)
         ),
-        platform=build_or_use("point_mass", "PointMass", "platform", platform_resource(robot)),
+        platform=build_or_use(*platform_slave, "platform", platform_resource(robot)),
         winches=tuple(
             build_or_use("winch", "Winch", f"winch_{i}", winch_resource(robot, i)) if i in robot.winch_numbers else None
             for i in robot.cable_numbers
         ),
         user_start_values={slot: start_values(robot, slot) for slot in user_fmus},
         has_position_sensor="platform" not in user_fmus and has_sensor_effects(robot),
+        is_rigid=is_rigid,
     )
 
 
@@ -141,17 +147,28 @@ def with_user_fmus_copied(fmus: RobotFmus, folder: Path) -> RobotFmus:
 
 
 def start_values(robot: Robot, slot: str) -> dict[str, float]:
-    """Start values of a run, by our parameters: ``start.x`` ... in m, and of a cable ``start_tension`` in N."""
+    """Start values of a run, by our parameters.
+
+    ``start.x`` ... in m, where a cable holds the platform; of a cable ``start_tension`` in N, of a rigid platform also
+    ``start_orientation.w`` ...
+    """
     kind, _, number = slot.partition("_")
     if kind == "winch":
         return {}
-    start = {f"start.{axis}": value for axis, value in zip("xyz", robot.platform.start, strict=True)}
-    return start if kind == "platform" else start | {"start_tension": float(static_tensions(robot)[int(number) - 1])}
+    if kind == "cable":
+        index = int(number) - 1
+        start = start_attachments(robot)[index]
+        return _by_part("start", "xyz", start) | {"start_tension": float(static_tensions(robot)[index])}
+    orientation = _by_part("start_orientation", "wxyz", start_orientation(robot))
+    return _by_part("start", "xyz", robot.platform.start) | (orientation if robot.platform.is_rigid_body else {})
+
+
+def _by_part(name: str, parts: str, values: Sequence[float]) -> dict[str, float]:
+    return {f"{name}.{part}": value for part, value in zip(parts, values, strict=True)}
 
 
 def cable_resources(robot: Robot) -> list[dict[str, Any]]:
     """Resources ``cable.json`` of the cable FMUs."""
-    start = robot.platform.start
     return [
         {
             "description": f"cable {index} of {robot.name}",
@@ -167,16 +184,16 @@ def cable_resources(robot: Robot) -> list[dict[str, Any]]:
             "effects": [_effect_resource(s) for s in robot.effects_on_cable(index)],
             "formulas": formula_texts(robot.formulas_on(index)),
         }
-        for index, (cable, component) in enumerate(
-            zip(robot.cables, assemble_robot(robot).cables, strict=True), start=1
+        for index, (cable, component, start) in enumerate(
+            zip(robot.cables, assemble_robot(robot).cables, start_attachments(robot), strict=True), start=1
         )
     ]
 
 
 def platform_resource(robot: Robot) -> dict[str, Any]:
-    """Resource ``point_mass.json`` of the platform FMU."""
+    """Resource ``point_mass.json`` or ``rigid_body.json`` of the platform FMU."""
     forces = static_forces(robot)
-    return {
+    return _rotation_resource(robot) | {
         "description": f"platform of {robot.name}",
         "mass": robot.platform.mass,
         "gravity": robot.gravity,
@@ -185,6 +202,32 @@ def platform_resource(robot: Robot) -> dict[str, Any]:
         "start_forces": forces.tolist(),
         "effects": [_effect_resource(s) for s in platform_fmu_settings(robot)],
         "formulas": formula_texts(robot.formulas_on()),
+    }
+
+
+def start_orientation(robot: Robot) -> Quaternion:
+    """Orientation of the platform at the start, a unit quaternion."""
+    return robot.platform.start_orientation
+
+
+def start_attachments(robot: Robot) -> tuple[Point, ...]:
+    """Attachment points of all cables at the start, in m in the world."""
+    orientation = start_orientation(robot)
+    arms = (rotate(orientation, attachment) for attachment in robot.attachments)
+    x, y, z = robot.platform.start
+    return tuple((x + arm[0], y + arm[1], z + arm[2]) for arm in arms)
+
+
+def _rotation_resource(robot: Robot) -> dict[str, Any]:
+    """What a rigid platform has beside the values of a point mass."""
+    if robot.platform.inertia is None:
+        return {}
+    return {
+        "inertia": [list(row) for row in robot.platform.inertia],
+        "centre_of_mass": list(robot.platform.centre_of_mass),
+        "start_orientation": list(start_orientation(robot)),
+        "attachments": [list(attachment) for attachment in robot.attachments],
+        "start_attachments": [list(attachment) for attachment in start_attachments(robot)],
     }
 
 
