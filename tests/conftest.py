@@ -9,6 +9,7 @@ import pytest
 
 from tautwire.fmus.packaging import RobotFmus
 from tests.support.built_once import fmus_built_once
+from tests.support.rigid_robots import crane_robot
 from tests.support.robots import LIMITED, example, paper_robot, with_damping, with_winch
 
 if TYPE_CHECKING:
@@ -98,6 +99,12 @@ def winch_fmus(tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
 def eight_fmus(tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
     """The example with eight cables."""
     return fmus_built_once(with_damping(example("eight"), 3e8), "eight", tmp_path_factory)
+
+
+@pytest.fixture(scope="session")
+def crane_fmus(tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
+    """A rigid platform on eight cables."""
+    return fmus_built_once(crane_robot(), "crane", tmp_path_factory)
 
 
 @pytest.fixture(scope="module")

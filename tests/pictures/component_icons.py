@@ -38,6 +38,14 @@ def _platform(canvas: ImageDraw.ImageDraw) -> None:
     canvas.rectangle(_points(26, 54, 70, 84), fill=FILL, outline=INK, width=LINE)
 
 
+def _rigid_platform(canvas: ImageDraw.ImageDraw) -> None:
+    for corner, end in (((8, 10), (22, 56)), ((88, 10), (74, 48))):
+        canvas.line(_points(*corner, *end), fill=INK, width=LINE)
+    outline = _points(22, 56, 74, 48, 78, 78, 26, 86, 22, 56)
+    canvas.polygon(outline, fill=FILL)
+    canvas.line(outline, fill=INK, width=LINE, joint="curve")
+
+
 def _winch(canvas: ImageDraw.ImageDraw) -> None:
     canvas.line(_points(46, 16, 90, 16), fill=INK, width=LINE)
     canvas.ellipse(_points(14, 15, 78, 79), fill=FILL, outline=INK, width=LINE)
@@ -53,6 +61,7 @@ def _controller(canvas: ImageDraw.ImageDraw) -> None:
 ICONS: dict[str, Callable[[ImageDraw.ImageDraw], None]] = {
     "cable": _cable,
     "point_mass": _platform,
+    "rigid_body": _rigid_platform,
     "winch": _winch,
     "controller": _controller,
 }

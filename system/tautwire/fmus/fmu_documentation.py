@@ -27,8 +27,6 @@ LAWS: Mapping[str, ModuleType] = {
     "winch": winch_drive,
     "controller": sampled_control,
 }
-# Platforms of both kinds have the same icon.
-ICONS = {"rigid_body": "point_mass"}
 TABLES = {"Inputs": "input", "Outputs": "output", "Parameters": "parameter", "States": "local"}
 # Both travel inside every FMU.
 LICENSED_PACKAGES = ("tautwire", "pythonfmu")
@@ -43,7 +41,7 @@ def documentation_files(kind: str, data: Mapping[str, Any], description: ModelDe
     return {
         "documentation/index.html": documentation_page(kind, data, description).encode("utf-8"),
         "documentation/licenses/license.txt": license_text().encode("utf-8"),
-        "model.png": files(__package__).joinpath(f"icons/{ICONS.get(kind, kind)}.png").read_bytes(),
+        "model.png": files(__package__).joinpath(f"icons/{kind}.png").read_bytes(),
     }
 
 
