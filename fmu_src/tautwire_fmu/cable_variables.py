@@ -20,7 +20,9 @@ def _inputs(data: Dict[str, Any]) -> Tuple[Variable, ...]:
     return (
         INPUT_TIME,
         MIDDLE_TIME,
-        *vector_variables(Variable("position", "input", "m", "position of the platform", nominal=length), start),
+        *vector_variables(
+            Variable("position", "input", "m", "position of the cable's end on the platform", nominal=length), start
+        ),
         *vector_variables(Variable("velocity", "input", "m/s", "velocity of the platform, the rate of position")),
         *vector_variables(
             Variable("acceleration", "input", "m/s2", "acceleration of the platform, the rate of velocity")

@@ -168,7 +168,7 @@ def test_page_of_files_tells_every_number_of_every_effect() -> None:
 
 
 def test_page_of_files_tells_every_column_of_recordings_and_results() -> None:
-    columns = {*known_columns(1), *(column.name for column in result_columns(1, winches=(1,)))}
+    columns = {*known_columns(1), *(column.name for column in result_columns(1, winches=(1,), is_rigid=True))}
     assert of_cable(iter(columns)) - named_in("formats.md") == set()
     # One for phase_degrees, one for each uncertainty.
     assert {name.removesuffix("_uncertainty") for name in COLUMN_RULES} - named_in("formats.md") == set()
