@@ -45,6 +45,7 @@ class Cable(Slave):
         data = read_resource(kwargs["resources"], "cable.json")
         self.listed_effects = effects_from_resource(data)
         self.tension_law = law.LAWS[data["law"]]
+        self.swivel_axis = tuple(data["swivel_axis"])
         self.state_end = FIRST_STATE + 2 + sum(len(effect.states) for effect in self.listed_effects)
         effect_scales = (state.scale for effect in self.listed_effects for state in effect.states)
         self.scales = (LENGTH_SCALE, LENGTH_SCALE, *effect_scales)
@@ -67,7 +68,7 @@ class Cable(Slave):
         modulus, area, damping, start_tension, gravity = parameter_values[6:11]
         self.effects = active_effects(self.listed_effects, parameter_values[11:])
         self.tension_delay = stages.sensor_delays(REAL, self.effects)[0]
-        start_route = stages.route(REAL, self.effects, anchor, start)
+        start_route = stages.route(REAL, self.effects, anchor, start, self.swivel_axis)
         declared_constants = law.CableConstants(
             law=self.tension_law,
             anchor=anchor,
@@ -78,6 +79,7 @@ class Cable(Slave):
             start_tension=start_tension,
             start_direction=start_route.direction,
             gravity=gravity,
+            swivel_axis=self.swivel_axis,
         )
         self.constants, self.effects = law.fold_constant_effects(REAL, declared_constants, self.effects)
         if not self.started:

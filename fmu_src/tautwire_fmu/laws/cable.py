@@ -51,7 +51,8 @@ LAWS = {"logarithmic": LOGARITHMIC, "linear": LINEAR}
 class CableConstants(NamedTuple):
     """Constants of a cable by the robot file, and its static start; SI units.
 
-    ``start_direction`` and ``start_length`` are those of :func:`tautwire_fmu.laws.effect_stages.route` at the start.
+    ``start_direction`` and ``start_length`` are those of :func:`tautwire_fmu.laws.effect_stages.route` at the start,
+    ``swivel_axis`` is the unit vector that it takes.
     """
 
     law: TensionLaw
@@ -63,6 +64,7 @@ class CableConstants(NamedTuple):
     start_tension: Any
     start_direction: Vector
     gravity: Any
+    swivel_axis: Vector = stages.VERTICAL
 
 
 class CableState(NamedTuple):
@@ -146,7 +148,7 @@ def start_state(cable: CableConstants, effects: Sequence[ActiveEffect]) -> Cable
 def span(m: Mathematics, cable: CableConstants, inputs: CableInputs, effects: Sequence[ActiveEffect] = ()) -> Span:
     """Length, length rate and direction of the span; they depend on the platform's motion alone."""
     if effects:
-        direction, length, chord = stages.route(m, effects, cable.anchor, inputs.position)
+        direction, length, chord = stages.route(m, effects, cable.anchor, inputs.position, cable.swivel_axis)
     else:
         line = subtract(cable.anchor, inputs.position)
         length = chord = norm(m, line)

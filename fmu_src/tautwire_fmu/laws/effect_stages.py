@@ -4,7 +4,10 @@ from typing import Any, NamedTuple, Sequence, Tuple
 
 from .effects import ActiveEffect
 from .mathematics import Mathematics
+from .rotation import quaternion_to_vertical, rotate, rotate_back
 from .vectors import Vector, add, norm, scale, subtract
+
+VERTICAL = (0.0, 0.0, 1.0)
 
 Effects = Sequence[ActiveEffect]
 States = Sequence[Tuple[Any, ...]]
@@ -21,8 +24,11 @@ class Route(NamedTuple):
     chord: Any
 
 
-def route(m: Mathematics, effects: Effects, anchor: Vector, position: Vector) -> Route:
-    """Route straight to the declared exit point, or as the effects change it."""
+def route(m: Mathematics, effects: Effects, anchor: Vector, position: Vector, swivel_axis: Vector = VERTICAL) -> Route:
+    """Route straight to the declared exit point, or as the effects change it.
+
+    The exit pulley swivels about the unit vector ``swivel_axis``, along which the rope arrives there.
+    """
     for active in effects:
         if active.effect.exit_point is not None:
             anchor = add(anchor, active.effect.exit_point(m, active.values))
@@ -30,7 +36,12 @@ def route(m: Mathematics, effects: Effects, anchor: Vector, position: Vector) ->
     chord = norm(m, line)
     for active in effects:
         if active.effect.path is not None:
-            direction, length = active.effect.path(m, active.values, line)
+            if tuple(swivel_axis) == VERTICAL:
+                direction, length = active.effect.path(m, active.values, line)
+            else:
+                upright = quaternion_to_vertical(m, swivel_axis)
+                direction, length = active.effect.path(m, active.values, rotate(upright, line))
+                direction = rotate_back(upright, direction)
             return Route(direction, length, chord)
     return Route(scale(1.0 / chord, line), chord, chord)
 

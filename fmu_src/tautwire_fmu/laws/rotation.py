@@ -49,6 +49,15 @@ def quaternion_of(m: Mathematics, rotation_vector: Vector) -> Quaternion:
     return (scalar, x, y, z)
 
 
+def quaternion_to_vertical(m: Mathematics, axis: Vector) -> Quaternion:
+    """Unit quaternion of the shortest rotation that takes a unit vector to the vertical, from numbers."""
+    x, y, z = axis
+    if z <= -1.0:
+        return (0.0, 1.0, 0.0, 0.0)
+    scalar = m.sqrt(0.5 * (1.0 + z))
+    return (scalar, 0.5 * y / scalar, -0.5 * x / scalar, 0.0)
+
+
 def rotation_matrix(quaternion: Quaternion) -> Matrix:
     """Rotation matrix R of a unit quaternion, by rows: ``v_world = R v_platform``."""
     w, x, y, z = quaternion

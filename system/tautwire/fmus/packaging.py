@@ -174,6 +174,7 @@ def cable_resources(robot: Robot) -> list[dict[str, Any]]:
             "description": f"cable {index} of {robot.name}",
             "law": cable.law,
             "anchor": list(cable.anchor),
+            "swivel_axis": list(cable.swivel_axis),
             "start": list(start),
             "start_length": component.constants.start_length,
             "start_tension": float(component.constants.start_tension),
