@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
 from tautwire_fmu.laws.cable import LAWS, CableConstants
 from tautwire_fmu.laws.effects import ActiveEffect
@@ -15,7 +16,7 @@ from tautwire_fmu.laws.point_mass import PointMassConstants
 
 from .active_effects import cable_effects, platform_effects
 from .schema import Robot
-from .static_equilibrium import cable_routes, static_tensions
+from .static_equilibrium import cable_routes, start_orientation, static_tensions
 
 NUMPY_MATHEMATICS = Mathematics(
     log=np.log,
@@ -62,8 +63,27 @@ def assemble_robot(
     tensions = static_tensions(robot) if start_tensions is None else start_tensions
     if robot.initial_state:
         tensions = [tension + beside for tension, beside in zip(tensions, robot.initial_state.tensions, strict=True)]
-    routes = cable_routes(mathematics, robot, robot.platform.start)
-    cables = tuple(
+    orientation = start_orientation(robot) if robot.platform.is_rigid_body else robot.platform.start_orientation
+    cables = cable_components(robot, tensions, mathematics, robot.platform.start, orientation)
+    return RobotAssembly(
+        cables=cables,
+        platform=PointMassConstants(robot.platform.mass, robot.gravity),
+        platform_effects=platform_effects(robot),
+        start=robot.platform.start,
+        velocity=robot.initial_state.velocity if robot.initial_state else (0.0, 0.0, 0.0),
+    )
+
+
+def cable_components(
+    robot: Robot,
+    tensions: Sequence[Any] | NDArray[np.float64],
+    mathematics: Mathematics,
+    position: Sequence[Any],
+    orientation: Sequence[Any],
+) -> tuple[CableComponent, ...]:
+    """The cables of a robot that rests at a pose (m, unit quaternion) under tensions (n,) in N."""
+    routes = cable_routes(mathematics, robot, position, orientation)
+    return tuple(
         CableComponent(
             constants=CableConstants(
                 law=LAWS[cable.law],
@@ -75,15 +95,9 @@ def assemble_robot(
                 start_tension=tension,
                 start_direction=route.direction,
                 gravity=robot.gravity,
+                swivel_axis=cable.swivel_axis,
             ),
             effects=cable_effects(robot, index),
         )
         for index, (cable, route, tension) in enumerate(zip(robot.cables, routes, tensions, strict=True), start=1)
-    )
-    return RobotAssembly(
-        cables=cables,
-        platform=PointMassConstants(robot.platform.mass, robot.gravity),
-        platform_effects=platform_effects(robot),
-        start=robot.platform.start,
-        velocity=robot.initial_state.velocity if robot.initial_state else (0.0, 0.0, 0.0),
     )

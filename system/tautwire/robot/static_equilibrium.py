@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Sequence
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -12,14 +12,19 @@ from tautwire_fmu.laws import effect_stages as stages
 from tautwire_fmu.laws import point_mass
 from tautwire_fmu.laws.effect_stages import Route
 from tautwire_fmu.laws.mathematics import REAL, Mathematics
+from tautwire_fmu.laws.rotation import rotate
 from tautwire_fmu.laws.vectors import Vector, add, scale, subtract
 
 from ..errors import UnreachableError
 from .active_effects import cable_effects, cables_have_weight, platform_effects
-from .schema import Robot, TensionLimits
+from .schema import Quaternion, Robot, TensionLimits
 from .tension_distribution import distribute_tensions, least_limit_violations
 
+if TYPE_CHECKING:
+    from .rigid_equilibrium import StaticEquilibrium
+
 Array = NDArray[np.float64]
+Points = tuple[Sequence[Any], ...]
 
 
 DEFAULT_LIMITS = TensionLimits(minimum=0.0, maximum=float("inf"), preferred=0.0)
@@ -29,19 +34,32 @@ MAX_ITERATIONS = 50
 CONVERGENCE_TOLERANCE = 1e-14
 
 
-def cable_routes(mathematics: Mathematics, robot: Robot, position: Sequence[Any]) -> tuple[Route, ...]:
+def attachment_points(robot: Robot, position: Sequence[Any], orientation: Sequence[Any] | None = None) -> Points:
+    """Where the cables hold the platform in the world, in m; ``orientation`` is by default that of the robot file."""
+    if not robot.platform.is_rigid_body:
+        return (position,) * robot.cable_count
+    quaternion = robot.platform.start_orientation if orientation is None else orientation
+    return tuple(add(position, rotate(quaternion, attachment)) for attachment in robot.attachments)
+
+
+def cable_routes(
+    mathematics: Mathematics, robot: Robot, position: Sequence[Any], orientation: Sequence[Any] | None = None
+) -> tuple[Route, ...]:
     """Routes of the cables from the platform at a position (m) to their exit points, effects included.
+
+    A rigid platform has an ``orientation`` (unit quaternion), by default that of the robot file.
 
     Raises UnreachableError where a cable has no length there, or the platform is inside a pulley.
     """
     route_list = []
-    for index, anchor in enumerate(robot.anchors, start=1):
+    points = attachment_points(robot, position, orientation)
+    for index, (cable, point) in enumerate(zip(robot.cables, points, strict=True), start=1):
         try:
-            route = stages.route(mathematics, cable_effects(robot, index), anchor, position)
+            route = stages.route(mathematics, cable_effects(robot, index), cable.anchor, point, cable.swivel_axis)
         except (ArithmeticError, ValueError) as error:
-            raise _unreachable_error(robot, position, f"cable {index} has no length there", index) from error
+            raise unreachable_error(robot, position, f"cable {index} has no length there", index) from error
         if isinstance(route.length, float) and not route.length >= MIN_CABLE_LENGTH:
-            raise _unreachable_error(robot, position, f"cable {index} has no length there", index)
+            raise unreachable_error(robot, position, f"cable {index} has no length there", index)
         route_list.append(route)
     return tuple(route_list)
 
@@ -89,10 +107,13 @@ def static_tensions(robot: Robot, at: Array | None = None) -> Array:
 
     Solves ``sum T_i u_i = m g e_z``, with the loads of effects and the weight of cables. With more than three
     cables, the tensions nearest to the preferred one (least squares) within the limits of the robot file; without
-    limits there, nearest to zero and not negative. ``at`` is a position in m, by default the start.
+    limits there, nearest to zero and not negative. ``at`` is a position in m, by default the start. Of a rigid
+    platform they are those of :func:`tautwire.robot.rigid_equilibrium.static_equilibrium`.
 
     Raises UnreachableError where a cable would have to push or to break a limit.
     """
+    if robot.platform.is_rigid_body:
+        return _rigid_equilibrium(robot, at).tensions
     position = np.array(robot.platform.start if at is None else at, dtype=float)
     routes = cable_routes(REAL, robot, position.tolist())
     direction_matrix = np.array([route.direction for route in routes]).T
@@ -109,21 +130,48 @@ def static_tensions(robot: Robot, at: Array | None = None) -> Array:
             load_vector - np.array(cable_weight_force(REAL, robot, routes, tensions.tolist())),
         )
 
-    return _fixed_point(iterate, np.full(len(routes), float(np.linalg.norm(load_vector))))
+    return fixed_point(iterate, np.full(len(routes), float(np.linalg.norm(load_vector))))
+
+
+def start_orientation(robot: Robot) -> Quaternion:
+    """Orientation of the platform at the static start; identity for a point mass.
+
+    Raises UnreachableError where the cables cannot hold a rigid platform there.
+    """
+    is_rigid = robot.platform.is_rigid_body
+    return _rigid_equilibrium(robot).orientation if is_rigid else robot.platform.start_orientation
+
+
+def start_attachments(robot: Robot) -> Points:
+    """Where the cables hold the platform at the static start, in m."""
+    orientation = start_orientation(robot) if robot.platform.is_rigid_body else None
+    return attachment_points(robot, robot.platform.start, orientation)
 
 
 def static_forces(robot: Robot) -> Array:
     """Forces of the cables on the platform at its start, shape (n, 3), in N."""
-    routes = cable_routes(REAL, robot, robot.platform.start)
+    if robot.platform.is_rigid_body:
+        equilibrium = _rigid_equilibrium(robot)
+        orientation, tensions = equilibrium.orientation, equilibrium.tensions
+    else:
+        orientation, tensions = robot.platform.start_orientation, static_tensions(robot)
+    routes = cable_routes(REAL, robot, robot.platform.start, orientation)
     forces = []
-    for index, (route, tension) in enumerate(zip(routes, static_tensions(robot).tolist(), strict=True), start=1):
+    for index, (route, tension) in enumerate(zip(routes, tensions.tolist(), strict=True), start=1):
         weight_force = stages.end_forces(REAL, cable_effects(robot, index), robot.gravity, route, tension)[0]
         forces.append(add(scale(tension, route.direction), weight_force))
     return np.array(forces)
 
 
-def _fixed_point(iterate: Callable[[Array], Array], guess: Array) -> Array:
-    """Fixed-point iteration of a strong contraction: cables are light against their tensions."""
+def _rigid_equilibrium(robot: Robot, position: Array | None = None) -> StaticEquilibrium:
+    # It builds on this module's routes and loads.
+    from .rigid_equilibrium import static_equilibrium
+
+    return static_equilibrium(robot, position)
+
+
+def fixed_point(iterate: Callable[[Array], Array], guess: Array) -> Array:
+    """Tensions by fixed-point iteration, which is a strong contraction: cables are light against their tensions."""
     tensions = guess
     for _ in range(MAX_ITERATIONS):
         previous, tensions = tensions, iterate(tensions)
@@ -134,11 +182,11 @@ def _fixed_point(iterate: Callable[[Array], Array], guess: Array) -> Array:
 
 def _solve_three(robot: Robot, position: Array, direction_matrix: Array, load: Array) -> Array:
     if abs(np.linalg.det(direction_matrix)) < SINGULARITY_TOLERANCE:
-        raise _unreachable_error(robot, position, "the three cables lie in one plane there")
+        raise unreachable_error(robot, position, "the three cables lie in one plane there")
     tensions = np.asarray(np.linalg.solve(direction_matrix, load), dtype=np.float64)
     worst = int(np.argmin(tensions))
     if tensions[worst] < 0.0:
-        raise _unreachable_error(robot, position, "a cable cannot push", worst + 1, float(tensions[worst]))
+        raise unreachable_error(robot, position, "a cable cannot push", worst + 1, float(tensions[worst]))
     return tensions
 
 
@@ -149,14 +197,15 @@ def _distribute(robot: Robot, position: Array, direction_matrix: Array, load: Ar
         return tensions
     excess = least_limit_violations(direction_matrix, load, limits)
     if not np.all(np.isfinite(excess)):
-        raise _unreachable_error(robot, position, f"the {len(excess)} cables lie in one plane there")
+        raise unreachable_error(robot, position, f"the {len(excess)} cables lie in one plane there")
     worst = int(np.argmax(np.abs(excess)))
     bound = limits.minimum if excess[worst] < 0.0 else limits.maximum
     reason = f"no tensions between {limits.minimum:g} and {limits.maximum:g} N hold the platform there"
-    raise _unreachable_error(robot, position, reason, worst + 1, bound + float(excess[worst]))
+    raise unreachable_error(robot, position, reason, worst + 1, bound + float(excess[worst]))
 
 
-def _unreachable_error(
+def unreachable_error(
     robot: Robot, position: Iterable[Any], reason: str, cable: int | None = None, tension: float | None = None
 ) -> UnreachableError:
+    """The error about a position (m) that the cables cannot hold."""
     return UnreachableError(robot.name, tuple(map(float, position)), cable=cable, tension=tension, reason=reason)
