@@ -15,15 +15,14 @@ from uuid import NAMESPACE_URL, uuid5
 
 import tautwire_fmu
 from tautwire_fmu.laws.effects import BY_NAME
-from tautwire_fmu.laws.rotation import rotate
 from tautwire_fmu.laws.winch_drive import NO_LIMIT
 
 from .. import __version__
 from ..process_signals import defer_interrupts
 from ..robot.active_effects import formula_texts, has_sensor_effects, platform_fmu_settings
 from ..robot.robot_assembly import assemble_robot
-from ..robot.schema import EffectSetting, Point, Quaternion, Robot, validate_robot
-from ..robot.static_equilibrium import static_forces, static_tensions
+from ..robot.schema import EffectSetting, Robot, validate_robot
+from ..robot.static_equilibrium import start_attachments, start_orientation, static_forces, static_tensions
 from ..validation import validate_callable, validate_folder
 from .fmu_archive import read_model_description
 from .fmu_documentation import documentation_files
@@ -204,19 +203,6 @@ def platform_resource(robot: Robot) -> dict[str, Any]:
         "effects": [_effect_resource(s) for s in platform_fmu_settings(robot)],
         "formulas": formula_texts(robot.formulas_on()),
     }
-
-
-def start_orientation(robot: Robot) -> Quaternion:
-    """Orientation of the platform at the start, a unit quaternion."""
-    return robot.platform.start_orientation
-
-
-def start_attachments(robot: Robot) -> tuple[Point, ...]:
-    """Attachment points of all cables at the start, in m in the world."""
-    orientation = start_orientation(robot)
-    arms = (rotate(orientation, attachment) for attachment in robot.attachments)
-    x, y, z = robot.platform.start
-    return tuple((x + arm[0], y + arm[1], z + arm[2]) for arm in arms)
 
 
 def _rotation_resource(robot: Robot) -> dict[str, Any]:
