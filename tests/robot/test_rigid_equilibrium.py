@@ -147,8 +147,18 @@ def test_two_cables_hold_a_platform_in_their_plane_only_and_the_error_tells_the_
         static_equilibrium(aside)
     x, y, z = (float(part) for part in caught.value.hint.partition("[")[2].partition("]")[0].split(", "))
     assert abs(y) < 1e-9
-    near = static_equilibrium(replace(aside, platform=replace(aside.platform, start=(x, 0.0, z))), (x, 0.0, z))
-    assert near.moved_by < 0.2
+    near = static_equilibrium(aside, (x, 0.0, z))
+    assert near.moved_by < 0.2 and near.residual_force < 1e-6
+
+
+def test_two_cables_hold_a_surveyed_place_that_is_nearly_in_their_plane_and_tell_what_remains() -> None:
+    robot = suspended_robot(2)
+    surveyed = replace(robot, platform=replace(robot.platform, start=(0.0, 3e-4, 1.5)))
+    equilibrium = static_equilibrium(surveyed)
+    remaining = imbalance(surveyed, equilibrium.orientation, equilibrium.tensions)
+    assert 1e-3 < equilibrium.residual_force < 0.2
+    assert np.linalg.norm(remaining[:3]) == pytest.approx(equilibrium.residual_force, rel=1e-6)
+    assert np.allclose(equilibrium.tensions, static_tensions(robot), rtol=1e-3)
 
 
 @pytest.mark.parametrize("robot", (crane_robot(), shifted(crane_robot(), (0.1, 0.0, 0.3), (0.0, 0.1, 0.1))))

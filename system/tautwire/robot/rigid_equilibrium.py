@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import Bounds, minimize
+from scipy.optimize import Bounds, least_squares, minimize
 
 from tautwire_fmu.laws import effect_stages as stages
 from tautwire_fmu.laws.mathematics import REAL
@@ -41,6 +41,8 @@ Balance = tuple[Array, Array]
 FREEDOMS = 6
 # Wrench that may be left, relative to the load; moments are divided by the size of the platform.
 BALANCE_TOLERANCE = 1e-9
+# Force that two cables may leave, relative to the load: a survey knows no position better.
+MAX_RESIDUAL_RATIO = 1e-3
 # Singular values of the structure matrix below this share of the largest are zero.
 RANK_TOLERANCE = 1e-9
 MAX_NEWTON_STEPS, MAX_SEARCH_STEPS = 40, 200
@@ -52,12 +54,14 @@ MIN_SIZE_RATIO = 1e-3  # of the mean cable length, the least size of a platform 
 class StaticEquilibrium:
     """Static equilibrium: ``orientation`` as a unit quaternion, ``tensions`` (n,) in N.
 
-    ``moved_by`` is the angle in rad between the orientation and the declared one.
+    ``moved_by`` is the angle in rad between the orientation and the declared one. ``residual_force``, in N, is what
+    remains where two cables hold a position that is only nearly in their plane; it is at most a thousandth of the load.
     """
 
     orientation: Quaternion
     tensions: Array
     moved_by: float
+    residual_force: float
 
 
 def static_equilibrium(
@@ -76,11 +80,14 @@ def static_equilibrium(
     at = np.array(robot.platform.start if position is None else position, dtype=float)
     declared = robot.platform.start_orientation
     if robot.cable_count >= FREEDOMS or _is_balanced(*_balance(robot, at, declared, None)):
-        return StaticEquilibrium(declared, _tensions(robot, at, declared, rule), 0.0)
-    rotation_vector = _nearest_orientation(robot, at)
-    orientation = _turned(robot, rotation_vector)
+        rotation_vector = np.zeros(3)
+    else:
+        rotation_vector = _nearest_orientation(robot, at)
+    orientation = _turned(robot, rotation_vector) if np.any(rotation_vector) else declared
     tensions = _tensions(robot, at, orientation, rule)
-    return StaticEquilibrium(orientation, tensions, float(np.linalg.norm(rotation_vector)))
+    matrix, load = _balance(robot, at, orientation, tensions)
+    remaining = float(np.linalg.norm((matrix @ tensions - load)[:3]))
+    return StaticEquilibrium(orientation, tensions, float(np.linalg.norm(rotation_vector)), remaining)
 
 
 def platform_size(robot: Robot) -> float:
@@ -140,8 +147,8 @@ def _balancing_tensions(robot: Robot, position: Array, balance: Balance, rule: s
     left_vectors, singular_values, _ = np.linalg.svd(matrix, full_matrices=False)
     spanned = left_vectors[:, singular_values > RANK_TOLERANCE * singular_values[0]]
     remaining = load - spanned @ (spanned.T @ load)
-    # Cables with weight leave something until their tensions have converged.
-    tolerance = 1e-3 if cables_have_weight(robot) and robot.cable_count < FREEDOMS else 1e3 * BALANCE_TOLERANCE
+    # Two cables leave something, and so do cables with weight until their tensions have converged.
+    tolerance = MAX_RESIDUAL_RATIO if robot.cable_count < FREEDOMS else 1e3 * BALANCE_TOLERANCE
     if np.linalg.norm(remaining) > tolerance * max(float(np.linalg.norm(load)), 1e-300):
         raise unreachable_error(robot, position, _missing_closure(robot, remaining, spanned.shape[1]))
     matrix, load = spanned.T @ matrix, spanned.T @ load
@@ -197,14 +204,20 @@ def _nearest_orientation(robot: Robot, position: Array) -> Array:
 
     matrix, wrench = _balance(robot, position, robot.platform.start_orientation, None)
     start = np.concatenate([np.zeros(3), np.linalg.lstsq(matrix, wrench / load, rcond=RANK_TOLERANCE)[0]])
-    for bound in sorted({0.0, robot.tension.minimum / load if robot.tension else 0.0}, reverse=True):
+    bounds = {0.0, robot.tension.minimum / load if robot.tension else 0.0}
+    # Of two cables no orientation is left to choose.
+    for bound in sorted(bounds, reverse=True) if robot.cable_count > 2 else ():
         found = _newton(imbalance, _searched(imbalance, start, bound))
         if found is not None and np.min(found[3:]) >= bound - BALANCE_TOLERANCE:
             return found[:3]
     found = _newton(imbalance, start)
     if found is None:
-        raise _no_orientation_error(robot, position, imbalance(_searched(imbalance, start, 0.0)) * load, start, load)
+        found = _nearly_balanced(imbalance, start)
+        if np.linalg.norm(imbalance(found)) > MAX_RESIDUAL_RATIO:
+            raise _no_orientation_error(robot, position, imbalance(found) * load, start, load)
     worst = int(np.argmin(found[3:]))
+    if found[3 + worst] >= 0.0:
+        return found[:3]
     raise unreachable_error(robot, position, "a cable cannot push", worst + 1, load * float(found[3 + worst]))
 
 
@@ -236,6 +249,16 @@ def _searched(imbalance: Callable[[Array], Array], start: Array, bound: float) -
         options=options,
     )
     return np.asarray(result.x, dtype=np.float64)
+
+
+def _nearly_balanced(imbalance: Callable[[Array], Array], start: Array) -> Array:
+    """Rotation vector and tensions that leave the smallest wrench."""
+
+    def jacobian(variables: Array) -> Array:
+        return _differences(imbalance, variables)
+
+    found = least_squares(imbalance, start, jacobian, xtol=1e-14, ftol=1e-14, gtol=1e-14)
+    return np.asarray(found.x, dtype=np.float64)
 
 
 def _newton(imbalance: Callable[[Array], Array], start: Array) -> Array | None:
