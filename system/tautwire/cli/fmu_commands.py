@@ -54,6 +54,7 @@ def build(
     from ..cosimulation.ssp_archive import ssp_name, write_ssp
     from ..fmus.c_hosts import embeddable_python, find_compiler, make_for_c_hosts
     from ..fmus.packaging import build_fmus, with_user_fmus_copied
+    from ..robot.rigid_equilibrium import orientation_notes
 
     output = CommandOutput(as_json, quiet)
     robot = read_holdable_robot(robot_file)
@@ -71,6 +72,8 @@ def build(
                 progress("building for C hosts", index / len(project_slots))
                 make_for_c_hosts(fmus.by_component[slot])
         archive = write_ssp(robot, fmus, scratch / ssp_name(robot))
+    for note in orientation_notes(robot):
+        output.note(note)
     paths = [out / path.name for path in (*fmus.paths, archive)]
     output.result(
         paths, {"fmus": {slot: out / path.name for slot, path in fmus.by_component.items()}, "ssp": paths[-1]}

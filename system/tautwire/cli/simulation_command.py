@@ -155,8 +155,9 @@ def _simulate_recording(
         write_page(statistics, notes)
     written = {"result": files.out} | ({"report": report} if report else {})
     _print_statistics(statistics, notes, written, provenance, output)
-    next_command = trace_command(files.robot, files.speeds, files.columns)
-    output.suggest_next(f"{next_command}, if positions or tensions were measured too")
+    if not robot.platform.is_rigid_body:
+        next_command = trace_command(files.robot, files.speeds, files.columns)
+        output.suggest_next(f"{next_command}, if positions or tensions were measured too")
 
 
 def _simulate_closed_loop(

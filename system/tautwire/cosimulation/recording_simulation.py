@@ -18,6 +18,7 @@ from ..recordings.recording import Recording, read_recording
 from ..recordings.start_position import start_position
 from ..recordings.white_noise_estimate import white_noise_deviation
 from ..robot.measured_start import with_measured_start, with_true_start
+from ..robot.rigid_equilibrium import orientation_notes
 from ..robot.schema import Robot
 from . import (
     ComponentError,
@@ -101,7 +102,8 @@ def read_recorded_inputs(robot: Robot, path: Path, until: float | None = None) -
     if robot.winch_numbers:
         notes = (*notes, f"{path}: winch speeds are taken as commands of the winches")
     notes = (*notes, *notes_on_unstated_units(robot))
-    return RecordedInputs(with_true_start(with_measured_start(robot, start)), inputs, notes)
+    started = with_true_start(with_measured_start(robot, start))
+    return RecordedInputs(started, inputs, (*notes, *orientation_notes(started)))
 
 
 def simulate_recording(

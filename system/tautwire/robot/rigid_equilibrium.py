@@ -45,6 +45,8 @@ BALANCE_TOLERANCE = 1e-9
 MAX_RESIDUAL_RATIO = 1e-3
 # Singular values of the structure matrix below this share of the largest are zero.
 RANK_TOLERANCE = 1e-9
+# rad: a quaternion of four decimals errs by less.
+MIN_NOTED_ANGLE = 1e-4
 MAX_NEWTON_STEPS, MAX_SEARCH_STEPS = 40, 200
 DIFFERENCE_STEP = 1e-6  # rad and m, of central differences
 MIN_SIZE_RATIO = 1e-3  # of the mean cable length, the least size of a platform by which moments are divided
@@ -88,6 +90,21 @@ def static_equilibrium(
     matrix, load = _balance(robot, at, orientation, tensions)
     remaining = float(np.linalg.norm((matrix @ tensions - load)[:3]))
     return StaticEquilibrium(orientation, tensions, float(np.linalg.norm(rotation_vector)), remaining)
+
+
+def orientation_notes(robot: Robot) -> tuple[str, ...]:
+    """A note where the platform does not start at its declared orientation, as that is in no equilibrium."""
+    if not robot.platform.is_rigid_body:
+        return ()
+    equilibrium = static_equilibrium(robot)
+    if equilibrium.moved_by < MIN_NOTED_ANGLE:
+        return ()
+    orientation = ", ".join(f"{part:.6f}" for part in equilibrium.orientation)
+    angle = np.degrees(equilibrium.moved_by)
+    return (
+        f"{robot.name}: starts {angle:.3g} degrees from the declared orientation, where the {robot.cable_count} cables "
+        f"leave a moment, at start_orientation = [{orientation}]",
+    )
 
 
 def platform_size(robot: Robot) -> float:
