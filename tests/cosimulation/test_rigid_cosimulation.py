@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 
 from tautwire.cosimulation.robot_cosimulation import CosimulationResult, cosimulate
 from tautwire.fmus.packaging import RobotFmus, build_fmus
-from tautwire.robot.schema import Robot, UserFmu
+from tautwire.robot.schema import EffectSetting, Robot, UserFmu
 from tautwire.robot.static_equilibrium import start_orientation, static_tensions
 from tests.support.rigid_motion import RigidMotion, RigidRobot, integrated, rotation_matrices
 from tests.support.rigid_robots import crane_robot, suspended_robot
@@ -134,6 +134,31 @@ def test_a_users_platform_turns_in_the_slot(crane_fmus: RobotFmus, tmp_path: Pat
     own = build_fmus(replace(robot, fmus=(UserFmu("platform", crane_fmus.platform),)), tmp_path)
     ours, theirs = (cosimulate(fmus, CORNERS[:2], speeds) for fmus in (crane_fmus, own))
     assert np.array_equal(theirs.orientation, ours.orientation)
+
+
+def test_a_payload_sits_at_the_centre_of_mass(tmp_path: Path) -> None:
+    robot = suspended_robot(4)
+    heavier = replace(robot, platform=replace(robot.platform, mass=robot.platform.mass + 20.0))
+    loaded = robot.with_effect(EffectSetting("payload", {"mass": 20.0}))
+    time, speeds = np.array([0.0, 0.2, 0.4]), np.zeros((3, 4))
+    speeds[1, 0] = 0.5
+    runs = [
+        cosimulate(build_fmus(each, tmp_path / str(index)), time, speeds)
+        for index, each in enumerate((heavier, loaded))
+    ]
+    assert runs[1].position == pytest.approx(runs[0].position, abs=1e-12)
+    assert runs[1].orientation == pytest.approx(runs[0].orientation, abs=1e-12)
+
+
+def test_a_position_sensor_shows_the_origin_late_and_scaled(crane_fmus: RobotFmus, tmp_path: Path) -> None:
+    robot = crane_robot().with_effect(EffectSetting("sensor_gain", {"position_gain": 1.01}))
+    robot = robot.with_effect(EffectSetting("sensor_delay", {"position_delay": 0.02}))
+    time, speeds = np.array([0.0, 0.5, 0.54, 0.56]), np.zeros((4, 8))
+    speeds[1:] = ramp_speeds(crane_robot())[1]
+    shown = cosimulate(build_fmus(robot, tmp_path), time, speeds)
+    truth = cosimulate(crane_fmus, time, speeds)
+    assert shown.position[3] == pytest.approx(1.01 * truth.position[2], abs=1e-7)
+    assert shown.orientation == pytest.approx(truth.orientation, abs=1e-12)
 
 
 def lowest_mode(robot: Robot) -> Array:

@@ -5,7 +5,7 @@ import pytest
 from tautwire.cosimulation import Component, Connection, Port, WiringError
 from tautwire.cosimulation.connections import check_connections
 from tautwire.cosimulation.direct_feedthrough import dependency_groups
-from tautwire.cosimulation.robot_wiring import robot_connections
+from tautwire.cosimulation.robot_wiring import robot_connections, robot_power_bonds, wire_robot
 from tautwire.fmus.packaging import RobotFmus
 
 
@@ -65,3 +65,16 @@ def test_a_loop_without_delay_is_named(components: dict[str, Component]) -> None
     dependency_groups(components, loop[:3])
     with pytest.raises(WiringError, match="outputs form an algebraic loop"):
         dependency_groups(components, [*loop, wire("cable_2:force_rate.x", "cable_1:acceleration.z")])
+
+
+def test_a_rigid_platforms_lacking_derivatives_are_those_of_the_same_attachment() -> None:
+    lacking = [Port("platform", f"acceleration_2.{axis}") for axis in "xyz"]
+    wiring = wire_robot(2, missing_ports=lacking, is_rigid=True)
+    expected = {wire(f"platform:velocity_2.{axis}", f"cable_2:acceleration.{axis}") for axis in "xyz"}
+    assert set(wiring.derivative_connections) == expected
+
+
+def test_each_cable_exchanges_power_at_its_own_attachment() -> None:
+    bonds = robot_power_bonds(2, is_rigid=True)
+    flows = {(bond.flow.source.variable, bond.effort.target.variable) for bond in bonds}
+    assert flows == {(f"velocity_{i}.{axis}", f"force_{i}.{axis}") for i in (1, 2) for axis in "xyz"}
