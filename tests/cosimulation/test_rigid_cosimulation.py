@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import zipfile
 from dataclasses import replace
 from pathlib import Path
 
@@ -12,6 +13,7 @@ from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
 
 from tautwire.cosimulation.robot_cosimulation import CosimulationResult, cosimulate
+from tautwire.fmus.fmu_slots import SlotError
 from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.robot.schema import EffectSetting, Robot, UserFmu
 from tautwire.robot.static_equilibrium import start_orientation, static_tensions
@@ -134,6 +136,18 @@ def test_a_users_platform_turns_in_the_slot(crane_fmus: RobotFmus, tmp_path: Pat
     own = build_fmus(replace(robot, fmus=(UserFmu("platform", crane_fmus.platform),)), tmp_path)
     ours, theirs = (cosimulate(fmus, CORNERS[:2], speeds) for fmus in (crane_fmus, own))
     assert np.array_equal(theirs.orientation, ours.orientation)
+
+
+def test_a_users_platform_that_starts_turned_is_refused(crane_fmus: RobotFmus, tmp_path: Path) -> None:
+    fixed = tmp_path / "fixed.fmu"
+    with zipfile.ZipFile(crane_fmus.platform) as whole, zipfile.ZipFile(fixed, "w") as changed:
+        for entry in whole.namelist():
+            changed.writestr(entry, whole.read(entry).replace(b'name="start_orientation.', b'name="other.'))
+    expected = {"start.x": 0.3, "start.y": -0.2, "start.z": 1.5, "start_orientation.w": 0.6, "start_orientation.x": 0.8}
+    expected |= {"start_orientation.y": 0.0, "start_orientation.z": 0.0}
+    turned = replace(crane_fmus, platform=fixed, user_start_values={"platform": expected})
+    with pytest.raises(SlotError, match=r"it starts at 1, 0, 0, 0, the run at 0.6, 0.8, 0, 0.*start_orientation.z"):
+        cosimulate(turned, CORNERS[:2], np.zeros((2, 8)))
 
 
 def test_a_payload_sits_at_the_centre_of_mass(tmp_path: Path) -> None:
