@@ -4,13 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.linalg import eigh
 from scipy.spatial.transform import Rotation
 
 from tautwire.robot.kinematics import inverse_kinematics, length_jacobian
 from tautwire.robot.pose_stiffness import stiffness_matrix
 from tautwire.robot.rigid_equilibrium import static_equilibrium
 from tautwire.robot.schema import EffectSetting, Robot
-from tests.support.rigid_robots import crane_robot, suspended_robot
+from tests.support.rigid_robots import crane_robot, suspended_robot, underactuated_robot
 from tests.support.robots import example
 
 PULLEYS = EffectSetting("pulley", {"radius": 0.06}, tuple(range(1, 9)))
@@ -63,3 +64,22 @@ def test_tensions_count() -> None:
     robot = crane_robot()
     tensions = static_equilibrium(robot).tensions
     assert not np.allclose(stiffness_matrix(robot, tensions), stiffness_matrix(robot, 2.0 * tensions), rtol=1e-3)
+
+
+def test_free_modes_of_a_real_robot_are_those_of_an_independent_program_on_its_published_geometry() -> None:
+    robot = underactuated_robot()
+    equilibrium = static_equilibrium(robot)
+    assert equilibrium.moved_by < 1e-4
+    # Taut lengths that its authors computed for this pose, and the modes of the free swing.
+    lengths = [1.8693393672175875, 1.3900569185478946, 1.9408457217799175, 2.2697372719215845]
+    frequencies = [0.823150845872805, 1.1938873382695399]
+    assert inverse_kinematics(robot) == pytest.approx(lengths, abs=2e-4)
+    platform, (w, x, y, z) = robot.platform, equilibrium.orientation
+    turn = Rotation.from_quat((x, y, z, w)).as_matrix()
+    arm = turn @ np.array(platform.centre_of_mass)
+    cross = np.cross(np.eye(3), arm)
+    mass = platform.mass * np.block([[np.eye(3), cross.T], [cross, cross.T @ cross]])
+    mass[3:, 3:] += turn @ np.array(platform.inertia) @ turn.T
+    stiffness = stiffness_matrix(robot, equilibrium.tensions, None, equilibrium.orientation)
+    squares = eigh(0.5 * (stiffness + stiffness.T), mass, eigvals_only=True)
+    assert np.sqrt(squares[:2]) / (2.0 * np.pi) == pytest.approx(frequencies, rel=2e-4)

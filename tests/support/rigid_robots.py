@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from math import cos, pi, sin
 
-from tautwire.robot.schema import Cable, Platform, Robot, Sensors, TensionLimits
+from tautwire.robot.schema import Cable, EffectSetting, Platform, Robot, Sensors, TensionLimits
 
 MODULUS, AREA, DAMPING = 1e11, 1.2e-5, 1e8
 
@@ -63,3 +63,47 @@ def octahedral_robot() -> Robot:
     anchors, attachments = ring(3, 4.0, 5.0), ring(3, 0.8, 0.0, pi / 3.0)
     pairs = [(anchors[index], attachments[(index - side) % 3]) for index in range(3) for side in (0, 1)]
     return Robot("octahedral", 9.81, platform, None, Sensors(), tuple(cable(*pair) for pair in pairs))
+
+
+def underactuated_robot() -> Robot:
+    """The GRAB prototype of IRMA L@B, Bologna, on four cables over pulleys, as in run 3 of its ring-downs of May 2020.
+
+    Geometry as published in IRMA-LAB/cdpr_matlab. Mass is normalised and the ropes are stiff: free modes depend on
+    neither.
+    """
+    inertia = (
+        (0.0167263464, 0.000734458303, 0.000258209314),
+        (0.000734458303, 0.0226804556, -0.000685602376),
+        (0.000258209314, -0.000685602376, 0.0325218668),
+    )
+    anchors = (
+        (0.214846621, -1.31313273, 0.536696133),
+        (2.29024775, -1.15475982, 0.547874312),
+        (2.14790888, 0.976553877, 0.572550721),
+        (0.0485461734, 0.798900682, 0.52777841),
+    )
+    attachments = (
+        (-0.143573626, -0.219372012, 0.264011861),
+        (0.114745727, -0.233375978, 0.263645428),
+        (0.141832872, 0.220039829, 0.265532892),
+        (-0.120384639, 0.235736768, 0.265552408),
+    )
+    swivel_axes = (
+        (-0.999610383, -0.0177139515, -0.0215707569),
+        (-0.00575458704, -0.99942396, 0.0334459624),
+        (0.999973099, 0.00539592858, -0.00496847038),
+        (0.0195024963, 0.999679688, -0.0161298965),
+    )
+    platform = Platform(
+        1.0,
+        (1.639566652933393, -0.6209775548989755, -0.9684570782287503),
+        inertia=inertia,
+        centre_of_mass=(0.00175976789, -0.00234153575, 0.199741193),
+        start_orientation=(0.9726970831325978, -0.16425909015157467, -0.0998438402991798, 0.1300405449166708),
+    )
+    cables = tuple(
+        Cable(anchor, 1e9, 3e-4, 0.0, "logarithmic", attachment=attachment, swivel_axis=axis)
+        for anchor, attachment, axis in zip(anchors, attachments, swivel_axes, strict=True)
+    )
+    pulleys = EffectSetting("pulley", {"radius": 0.0224815216}, (1, 2, 3, 4))
+    return Robot("grab", 9.80665, platform, None, Sensors(), cables, (pulleys,))
