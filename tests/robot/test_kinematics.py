@@ -108,3 +108,12 @@ def test_too_few_lengths_are_refused() -> None:
     robot = suspended_robot(4)
     with pytest.raises(ArgumentError, match="do not determine 6 degrees of freedom"):
         forward_kinematics(robot, inverse_kinematics(robot))
+
+
+def test_invalid_poses_are_refused() -> None:
+    with pytest.raises(ArgumentError, match="orientation: has norm 2, must have 1"):
+        structure_matrix(crane_robot(), None, (2.0, 0.0, 0.0, 0.0))
+    with pytest.raises(ArgumentError, match=r"position: has the shape \(2,\), must have \(3,\)"):
+        inverse_kinematics(crane_robot(), [0.0, 1.0])
+    with pytest.raises(ArgumentError, match="robot: is 3, must be a Robot"):
+        structure_matrix(3)  # type: ignore[arg-type]

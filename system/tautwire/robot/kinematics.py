@@ -8,6 +8,7 @@ tensions, does not.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -20,7 +21,8 @@ from tautwire_fmu.laws.mathematics import REAL
 
 from ..array_validation import validate_array
 from ..errors import ArgumentError, UnreachableError
-from .schema import Point, Quaternion, Robot
+from ..validation import validate_integer
+from .schema import Point, Quaternion, Robot, validate_robot
 from .static_equilibrium import attachment_points, cable_routes
 
 Array = NDArray[np.float64]
@@ -32,13 +34,14 @@ START_DISTANCE_RATIO = 0.15  # of the mean cable length, standard deviation of s
 SAME_POSITION_RATIO, SAME_ANGLE = 1e-6, 1e-5
 # Minima whose residual is larger than this multiple of the smallest are no solutions; relative to the mean length.
 RESIDUAL_RATIO, RESIDUAL_FLOOR = 3.0, 1e-9
+MAX_QUATERNION_ERROR = 1e-9
 UNREACHABLE_RESIDUAL = 1e3  # m, of poses at which a cable has no length
 
 
 def structure_matrix(
     robot: Robot, position: Sequence[float] | Array | None = None, orientation: Sequence[float] | None = None
 ) -> Array:
-    """Structure matrix (wrench matrix) A at a pose, by default the start: ``A T`` is the wrench of tensions T.
+    """Structure matrix (wrench matrix) A at a pose, by default the start as declared: the wrench of tensions T is A T.
 
     Columns ``(u_i, b_i x u_i)``, shape (6, n): force, and moment about the origin of the platform's frame in m; ``u_i``
     the unit vector along the cable, ``b_i`` from the origin to its attachment, both in the world's axes. Of a point
@@ -46,7 +49,11 @@ def structure_matrix(
 
     Raises UnreachableError where a cable has no length.
     """
-    at, quaternion = _pose(robot, position, orientation)
+    return structure_matrix_at(robot, *validated_pose("structure_matrix", robot, position, orientation))
+
+
+def structure_matrix_at(robot: Robot, at: Array, quaternion: Quaternion) -> Array:
+    """As :func:`structure_matrix`, of arguments that need no validation."""
     directions = np.array([route.direction for route in cable_routes(REAL, robot, at.tolist(), quaternion)]).T
     if not robot.platform.is_rigid_body:
         return directions
@@ -71,7 +78,7 @@ def inverse_kinematics(
 
     Raises UnreachableError where a cable has no length.
     """
-    at, quaternion = _pose(robot, position, orientation)
+    at, quaternion = validated_pose("inverse_kinematics", robot, position, orientation)
     return np.array([route.length for route in cable_routes(REAL, robot, at.tolist(), quaternion)])
 
 
@@ -99,13 +106,15 @@ def forward_kinematics(
 
     Raises ArgumentError where the lengths are not (n,), or fewer than the degrees of freedom: then statics decides too.
     """
+    validate_robot("forward_kinematics: robot", robot)
+    validate_integer("forward_kinematics: starts", starts, 0, "give the number of further starts")
     required = validate_array("forward_kinematics: lengths", lengths, (robot.cable_count,), "one length a cable in m")
     is_rigid = robot.platform.is_rigid_body
     freedoms = 6 if is_rigid else 3
     if robot.cable_count < freedoms:
         problem = f"of {robot.cable_count} cables do not determine {freedoms} degrees of freedom"
         raise ArgumentError("forward_kinematics: lengths", lengths, problem, "use static_equilibrium at a position")
-    at, quaternion = _pose(robot, position, orientation)
+    at, quaternion = validated_pose("forward_kinematics", robot, position, orientation)
     scale, generator = float(np.mean(required)), np.random.default_rng(0)
     solutions: list[ForwardSolution] = []
     for index in range(1 + starts):
@@ -168,12 +177,21 @@ def _is_same(one: ForwardSolution, other: ForwardSolution, scale: float) -> bool
     return distance < SAME_POSITION_RATIO * scale and angle < SAME_ANGLE
 
 
-def _pose(
-    robot: Robot, position: Sequence[float] | Array | None, orientation: Sequence[float] | None
+def validated_pose(
+    caller: str, robot: Robot, position: Sequence[float] | Array | None, orientation: Sequence[float] | None
 ) -> tuple[Array, Quaternion]:
-    at = np.array(robot.platform.start if position is None else position, dtype=float)
-    w, x, y, z = robot.platform.start_orientation if orientation is None else orientation
-    return at, (w, x, y, z)
+    """A pose in m and as a unit quaternion, by default the start as declared; raises ArgumentError if it is invalid."""
+    platform = validate_robot(f"{caller}: robot", robot).platform
+    at = platform.start if position is None else position
+    array = validate_array(f"{caller}: position", at, (3,), "the position [x, y, z] in m")
+    if orientation is None:
+        return array, platform.start_orientation
+    where, meaning = f"{caller}: orientation", "the unit quaternion [w, x, y, z]"
+    w, x, y, z = validate_array(where, orientation, (4,), meaning).tolist()
+    norm = math.hypot(w, x, y, z)
+    if abs(norm - 1.0) > MAX_QUATERNION_ERROR:
+        raise ArgumentError(where, orientation, f"has norm {norm:.9g}, must have 1", f"give {meaning}")
+    return array, (w, x, y, z)
 
 
 def _rotation(quaternion: Quaternion) -> Rotation:

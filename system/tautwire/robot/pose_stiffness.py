@@ -13,6 +13,8 @@ from tautwire_fmu.laws.mathematics import COMPLEX_STEP, REAL, rate_of, with_rate
 from tautwire_fmu.laws.rotation import multiply, quaternion_of, rotate
 from tautwire_fmu.laws.vectors import add, cross, scale, subtract
 
+from ..array_validation import validate_array
+from .kinematics import validated_pose
 from .robot_assembly import CableComponent, cable_components
 from .schema import Quaternion, Robot
 from .static_equilibrium import attachment_points, static_load, static_tensions
@@ -33,14 +35,19 @@ def stiffness_matrix(
     stiffness by the ``tensions`` (n,) in N, by default those of static equilibrium at the position; the pose is by
     default the start. In equilibrium K is symmetric, but for forces of effects without potential.
 
-    Raises UnreachableError where the cables cannot hold the platform, or one has no length.
+    Raises UnreachableError where the cables cannot hold the platform, or one has no length; ArgumentError for an
+    invalid argument.
     """
-    at: list[float] = np.array(robot.platform.start if position is None else position, dtype=float).tolist()
-    w, x, y, z = robot.platform.start_orientation if orientation is None else orientation
-    carried = static_tensions(robot, np.array(at)) if tensions is None else np.asarray(tensions, dtype=float)
-    cables = cable_components(robot, carried.tolist(), REAL, at, (w, x, y, z))
+    array, quaternion = validated_pose("stiffness_matrix", robot, position, orientation)
+    at: list[float] = array.tolist()
+    if tensions is None:
+        carried = static_tensions(robot, array)
+    else:
+        expected = "one tension a cable in N"
+        carried = validate_array("stiffness_matrix: tensions", tensions, (robot.cable_count,), expected)
+    cables = cable_components(robot, carried.tolist(), REAL, at, quaternion)
     freedoms = 6 if robot.platform.is_rigid_body else 3
-    columns = [_wrench_rate(robot, cables, at, (w, x, y, z), direction) for direction in np.eye(freedoms, 6).tolist()]
+    columns = [_wrench_rate(robot, cables, at, quaternion, direction) for direction in np.eye(freedoms, 6).tolist()]
     return -np.array(columns)[:, :freedoms].T
 
 

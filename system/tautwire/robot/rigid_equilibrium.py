@@ -21,9 +21,9 @@ from tautwire_fmu.laws import effect_stages as stages
 from tautwire_fmu.laws.mathematics import REAL
 from tautwire_fmu.laws.rotation import multiply, quaternion_of, rotate
 
-from ..errors import UnreachableError
+from ..errors import ArgumentError, UnreachableError
 from .active_effects import cable_effects, cables_have_weight
-from .kinematics import structure_matrix
+from .kinematics import structure_matrix_at, validated_pose
 from .schema import Quaternion, Robot, TensionLimits
 from .static_equilibrium import (
     DEFAULT_LIMITS,
@@ -77,10 +77,12 @@ def static_equilibrium(
     six cables within the limits of the robot file.
 
     Raises UnreachableError where no orientation near the declared one is in equilibrium, or where a cable would have
-    to push or to break a limit.
+    to push or to break a limit; ArgumentError for an invalid argument.
     """
-    at = np.array(robot.platform.start if position is None else position, dtype=float)
-    declared = robot.platform.start_orientation
+    at, declared = validated_pose("static_equilibrium", robot, position, None)
+    if not robot.platform.is_rigid_body:
+        problem = "has a point mass, whose orientation is nothing"
+        raise ArgumentError("static_equilibrium: robot", robot, problem, "use static_tensions")
     if robot.cable_count >= FREEDOMS or _is_balanced(*_balance(robot, at, declared, None)):
         rotation_vector = np.zeros(3)
     else:
@@ -139,7 +141,7 @@ def load_wrench(robot: Robot, position: Array, orientation: Quaternion, tensions
 def _balance(robot: Robot, position: Array, orientation: Quaternion, tensions: Array | None) -> Balance:
     """Structure matrix and load wrench, their moments divided by the platform's size."""
     scale = np.array([1.0] * 3 + [1.0 / platform_size(robot)] * 3)
-    matrix = structure_matrix(robot, position, orientation)
+    matrix = structure_matrix_at(robot, position, orientation)
     return scale[:, None] * matrix, scale * load_wrench(robot, position, orientation, tensions)
 
 
@@ -256,15 +258,14 @@ def _searched(imbalance: Callable[[Array], Array], start: Array, bound: float) -
     balanced: Any = {"type": "eq", "fun": imbalance, "jac": lambda variables: _differences(imbalance, variables)}
     bounds: Any = Bounds([-np.pi] * 3 + [bound] * count, [np.pi] * 3 + [np.inf] * count)
     options: Any = {"maxiter": MAX_SEARCH_STEPS, "ftol": 1e-14}
-    result = minimize(
-        objective,
-        np.concatenate([start[:3], np.maximum(start[3:], bound)]),
-        jac=True,
-        bounds=bounds,
-        constraints=balanced,
-        method="SLSQP",
-        options=options,
-    )
+    guess = np.concatenate([start[:3], np.maximum(start[3:], bound)])
+    try:
+        result = minimize(
+            objective, guess, jac=True, bounds=bounds, constraints=balanced, method="SLSQP", options=options
+        )
+    except UnreachableError:
+        # A search that leaves the robot, or numbers, has found nothing.
+        return guess
     return np.asarray(result.x, dtype=np.float64)
 
 
