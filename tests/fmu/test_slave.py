@@ -1,6 +1,8 @@
 """The slaves through FMI: they are the laws, remember everything, and are good to any master."""
 
 import gc
+from dataclasses import replace
+from pathlib import Path
 
 import fmpy
 import numpy as np
@@ -9,7 +11,11 @@ from fmpy.fmi1 import FMICallException
 
 from tautwire.fmus.component import Component, ComponentError
 from tautwire.fmus.packaging import RobotFmus, build_fmus
+from tautwire.robot.kinematics import inverse_kinematics, structure_matrix
+from tautwire.robot.robot_assembly import assemble_robot
 from tautwire.robot.schema import EffectSetting
+from tautwire.robot.static_equilibrium import static_tensions, unit_directions
+from tautwire.robot.symbolic_model import CASADI_MATHEMATICS
 from tests.support.fmus import Hand, in_hand
 from tests.support.robots import paper_robot
 
@@ -39,6 +45,18 @@ def test_a_cable_shows_the_law(damped_fmus: RobotFmus) -> None:
     stress = 134.8e9 * np.log(now / lengths[0]) + 2.08e9 * (rate + 0.4) / now
     assert length == pytest.approx(now, rel=1e-15)
     assert tension == pytest.approx(np.pi * 0.002**2 * stress + start_tension, rel=1e-12)
+
+
+def test_a_rope_swivels_about_the_declared_axis(tmp_path: Path) -> None:
+    robot = paper_robot().with_effect(EffectSetting("pulley", {"radius": 0.4}, (1, 2, 3)))
+    tilted = replace(robot, cables=tuple(replace(cable, swivel_axis=(0.6, 0.0, 0.8)) for cable in robot.cables))
+    lengths, start = inverse_kinematics(tilted), tilted.platform.start
+    with in_hand(build_fmus(tilted, tmp_path).cables[0]) as cable:
+        assert cable.get("length") == pytest.approx([lengths[0]], rel=1e-14)
+    assert abs(lengths[0] - inverse_kinematics(robot)[0]) > 0.01
+    symbolic = assemble_robot(tilted, list(static_tensions(tilted)), CASADI_MATHEMATICS)
+    assert [float(each.constants.start_length) for each in symbolic.cables] == pytest.approx(lengths, rel=1e-14)
+    assert unit_directions(tilted) == pytest.approx(structure_matrix(tilted, start))
 
 
 def test_rates_are_the_derivatives_of_the_outputs(damped_fmus: RobotFmus) -> None:
