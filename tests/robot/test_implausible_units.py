@@ -11,6 +11,7 @@ import pytest
 from tautwire.robot.implausible_units import implausible_units
 from tautwire.robot.robot_file_reader import read_robot
 from tautwire.robot.schema import Robot
+from tests.support.rigid_robots import crane_robot
 from tests.support.robots import EXAMPLES, example
 
 
@@ -79,3 +80,19 @@ def test_a_file_in_gpa_is_told_by_check_and_trace_alike(tmp_path: Path) -> None:
     with pytest.raises(RobotFileError) as caught:
         read_plausible_robot(file)
     assert caught.value.problem == problem.problem and caught.value.hint == problem.hint
+
+
+def test_a_rigid_platform_larger_than_its_frame_is_in_millimetres() -> None:
+    robot = crane_robot()
+    assert not list(implausible_units(robot, "robot.toml"))
+    attachment = replace(robot.cables[2], attachment=(-500.0, -270.0, 0.0))
+    (error,) = implausible_units(
+        replace(robot, cables=(*robot.cables[:2], attachment, *robot.cables[3:])), "robot.toml"
+    )
+    assert error.where == "robot.toml: cable[3].attachment" and "mm" in error.hint
+    far = replace(robot, platform=replace(robot.platform, centre_of_mass=(0.0, 0.0, 260.0)))
+    (error,) = implausible_units(far, "robot.toml")
+    assert error.where == "robot.toml: platform.centre_of_mass"
+    heavy = replace(robot, platform=replace(robot.platform, inertia=((36.6e6, 0, 0), (0, 33.2e6, 0), (0, 0, 20.1e6))))
+    (error,) = implausible_units(heavy, "robot.toml")
+    assert error.where == "robot.toml: platform.inertia" and "kg mm^2" in error.hint

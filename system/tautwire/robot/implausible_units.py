@@ -12,18 +12,21 @@ MAX_MODULUS_IN_GPA = 1000.0  # of any fibre
 MAX_AREA = 0.05  # m^2, of a rope 25 cm thick
 MAX_COORDINATE = 2000.0  # m
 MAX_RETARDATION = 2.0  # s, damping by modulus; polymer ropes have some 1e-2
+MAX_SIZE_RATIO = 10.0  # of the platform, by the distance from it to the farthest exit point
 MAX_FREQUENCY = 5000.0  # Hz, of a platform on ropes
 
 
 def implausible_units(robot: Robot, file: str) -> Iterator[RobotFileError]:
     """Errors for numbers that no cable robot has, each with the unit that was probably meant.
 
-    They are modulus, area, damping and anchors of the cables; where each alone is plausible, an upper bound of the
-    highest modal frequency, ``sqrt(sum_i E_i A_i / L_i / m) / 2 pi``.
+    They are modulus, area, damping and anchors of the cables, and what makes a rigid platform larger than its frame;
+    where each alone is plausible, an upper bound of the highest modal frequency, ``sqrt(sum_i E_i A_i / L_i / m) / 2
+    pi``.
     """
     weight = robot.platform.mass * robot.gravity / robot.cable_count
     cables = enumerate(robot.cables, 1)
     errors = [error for number, cable in cables for error in _cable_errors(cable, number, weight, file)]
+    errors += _platform_errors(robot, file)
     yield from errors
     if any(abs(coordinate) > MAX_COORDINATE for coordinate in robot.platform.start):
         problem = f"is {max(map(abs, robot.platform.start)):g} m from the origin, no robot is larger than 2 km"
@@ -57,6 +60,24 @@ def _cable_errors(cable: Cable, number: int, weight: float, file: str) -> Iterat
         yield _error(
             file, ("cable", number - 1, "anchor"), problem, "write it in m, if this is in mm multiply by 0.001"
         )
+
+
+def _platform_errors(robot: Robot, file: str) -> Iterator[RobotFileError]:
+    """Errors for attachments, centre of mass and radius of gyration far beyond the exit points."""
+    platform = robot.platform
+    reach = MAX_SIZE_RATIO * max(math.dist(cable.anchor, platform.start) for cable in robot.cables)
+    points = [(("cable", index, "attachment"), cable.attachment) for index, cable in enumerate(robot.cables)]
+    for key_path, point in [*points, (("platform", "centre_of_mass"), platform.centre_of_mass)]:
+        distance = math.hypot(*point)
+        if distance > reach:
+            problem = f"is {distance:g} m from the platform's origin, robots of this frame have at most {reach:.3g}"
+            yield _error(file, key_path, problem, "write it in m, if this is in mm multiply by 0.001")
+    trace = sum(row[axis] for axis, row in enumerate(platform.inertia or ()))
+    radius = math.sqrt(0.5 * trace / platform.mass)
+    if radius > reach:
+        problem = f"puts the mass {radius:.3g} m from its centre, robots of this frame have at most {reach:.3g}"
+        hint = "write it in kg m^2, if this is in kg mm^2 multiply by 1e-6"
+        yield _error(file, ("platform", "inertia"), problem, hint)
 
 
 def _stiffness_errors(robot: Robot, file: str) -> Iterator[RobotFileError]:
