@@ -26,7 +26,11 @@ def test_vectors_stand_as_one(three_fmus: RobotFmus) -> None:
     rows = {port.name: port for port in group_vectors(ports)}
     assert "position.x" not in rows and "tension" in rows
     position = rows["position.x .y .z"]
-    assert (position.start, position.unit, position.description) == ("28.86, 0, 5", "m", "position of the platform")
+    assert (position.start, position.unit, position.description) == (
+        "28.86, 0, 5",
+        "m",
+        "position of the cable's end on the platform",
+    )
     assert sum(3 if name.endswith(".x .y .z") else 1 for name in rows) == len(ports)
 
 
