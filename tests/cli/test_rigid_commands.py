@@ -13,6 +13,7 @@ import pytest
 from tautwire.cli import run
 from tautwire.cosimulation.robot_wiring import robot_connections
 from tautwire.robot.robot_file_writer import write_robot
+from tests.support.pages import Page
 from tests.support.rigid_robots import suspended_robot
 
 
@@ -30,12 +31,16 @@ def test_simulate_writes_the_orientation_and_tells_that_of_the_start(
     robot, speeds, result = written_robot(tmp_path), tmp_path / "speeds.csv", tmp_path / "result.csv"
     commands = {f"winch_speed_{i}": [0.0, 0.3 * (i == 1), 0.0] for i in range(1, 4)}
     pd.DataFrame({"time": [0.0, 0.2, 0.4]} | commands).to_csv(speeds, index=False)
-    assert run(["simulate", str(robot), "--speeds", str(speeds), "--out", str(result)]) == 0
+    page = tmp_path / "run.html"
+    assert run(["simulate", str(robot), "--speeds", str(speeds), "--out", str(result), "--report", str(page)]) == 0
     frame = pd.read_csv(result)
     orientation = frame[["qw", "qx", "qy", "qz"]].to_numpy()
     assert np.linalg.norm(orientation, axis=1) == pytest.approx(1.0, abs=1e-14)
     assert orientation[0] == pytest.approx([1.0, 0.0, 0.0, 0.0], abs=1e-6)
     assert np.max(np.abs(orientation[-1, 1:])) > 1e-3
+    channels = Page(page.read_text(encoding="utf-8")).data()["choices"][0]["channels"]
+    shown = [(each["label"], each["unit"]) for each in channels if each["title"] == "Orientation"]
+    assert shown == [(part, "") for part in "wxyz"]
     printed = capsys.readouterr()
     assert "suspended: starts 1.15 degrees from the declared orientation" in printed.err
     assert "trace" not in printed.out + printed.err

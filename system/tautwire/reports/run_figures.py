@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..cosimulation.robot_wiring import ORIENTATION_AXES
 from ..number_format import PAGE_UNITS, choose_unit, digits_for_range, format_significant
 from ..recordings.sensor_gaps import bridge_short_gaps
 from ..robot.schema import AXES
@@ -76,14 +77,17 @@ def output_series(run: ReportedRun) -> list[OutputSeries]:
         ("Position", "", AXES, "mm", 1e3, positions),
         ("Tension", "tension_", cables, "N", 1.0, tensions),
         ("Velocity", "v", AXES, "m/s", 1.0, {}),
+        ("Orientation", "q", ORIENTATION_AXES, "", 1.0, {}),
+        ("Angular velocity", "w", AXES, "rad/s", 1.0, {}),
         ("Elongation", "elongation_", cables, "mm", 1e3, {}),
         ("Winch speed", "winch_speed_", cables, "m/s", 1.0, speeds),
     )
     series, (low, high) = [], run.overview.extremes()
     for title, prefix, names, unit, scale, recorded in quantities:
         for index, name in run.column_indices(prefix, names).items():
-            label = name if names is AXES else f"cable {name}"
-            digits = digits_for_range(float(low[index]), float(high[index])) if title == "Position" else 4
+            label = f"cable {name}" if names is cables else name
+            is_pose = title in ("Position", "Orientation")
+            digits = digits_for_range(float(low[index]), float(high[index])) if is_pose else 4
             compared = _compared(run, index, recorded.get(name))
             series.append(OutputSeries(index, title, label, unit, scale, digits, *compared))
     return series

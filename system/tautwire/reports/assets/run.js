@@ -6,10 +6,12 @@ function outputPanel(choice, place, isTall) {
   if (channel.range.length === 0) return { numbers: "", words: `${what}: no finite value.`, empty: "No finite value" };
   const colour = colours();
   const [low, high] = channel.range;
-  const hover = { hovertemplate: `%{y:.${channel.digits}~r} ${channel.unit}` };
+  // Quaternions have no unit.
+  const unit = channel.unit && ` ${channel.unit}`;
+  const hover = { hovertemplate: `%{y:.${channel.digits}~r}${unit}` };
   const traces = [lineTrace("co-simulated", channel.time, channel.values, colour.accent, hover)];
   const axes = { xaxis: axis(colour, "Time (s)", { hoverformat: ".4~g" }), yaxis: axis(colour, channel.unit) };
-  let words = `${what}: from ${low} to ${high} ${channel.unit}`;
+  let words = `${what}: from ${low} to ${high}${unit}`;
   if (channel.recorded) {
     const { time, values } = channel.recorded;
     traces[0].line = { color: colour.accent, width: 1.75 };
@@ -24,7 +26,7 @@ function outputPanel(choice, place, isTall) {
     axes.yaxis2 = axis(colour, unit, { domain: [0, 0.3], nticks: 4, zeroline: true, zerolinecolor: colour["strong-rule"] });
     words += `; recorded minus co-simulated has a root mean square of ${apart} ${unit}`;
   }
-  return { numbers: `${low} to ${high} ${channel.unit}`, words: `${words}.`, traces, layout: layout(colour, axes) };
+  return { numbers: `${low} to ${high}${unit}`, words: `${words}.`, traces, layout: layout(colour, axes) };
 }
 
 panelKinds.output = (choice, place) => outputPanel(choice, place, false);
