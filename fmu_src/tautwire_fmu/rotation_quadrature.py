@@ -68,7 +68,7 @@ def integrate_rotation(inertia: law.Inertia, start: RotationState, loads: Sequen
     first_moment = _moment_with_rate(first.rotation, first.velocity, loads[0])
     angles = (_taylor(ORIGIN, first[1:], 0.5 * step), _taylor(ORIGIN, first[1:], step))
     velocities: Sequence[Vector] = [_taylor(first.velocity, (first.acceleration, ORIGIN), 0.5 * step)] * 2
-    change = 1.0
+    change = ANGLE_TOLERANCE
     for _ in range(MAX_SWEEPS):
         quaternions = _quaternions(start.quaternion, angles)
         rotations = [rotation_matrix(quaternion) for quaternion in quaternions[3 - len(loads) :]]
@@ -89,7 +89,7 @@ def integrate_rotation(inertia: law.Inertia, start: RotationState, loads: Sequen
             apply_weights(ORIGIN, nodes, step, step * step, end_weights.velocity),
         )
         change = max(abs(a - b) for new, old in zip(angles, previous_angles) for a, b in zip(new, old))
-        # The next change is predicted by the ratio of the last two.
+        # The next change is predicted by the ratio of the last two, once there are two.
         if change * min(1.0, change / previous_change) <= ANGLE_TOLERANCE:
             break
     else:
