@@ -11,18 +11,16 @@ symmetric in time, so that energy does not drift. Orientations are products of u
 Source: Hairer, Lubich and Wanner (2006), Geometric Numerical Integration, sections IV.8, V.1 and V.4.
 """
 
-from typing import Any, NamedTuple, Sequence, Tuple
+from typing import NamedTuple, Sequence, Tuple
 
 from .hermite_quadrature import CUBIC_END, CUBIC_MIDDLE, QUINTIC_END, QUINTIC_MIDDLE, apply_weights
 from .laws import rigid_body as law
-from .laws.mathematics import COMPLEX_STEP, REAL, Mathematics, rates_of, vector_with_rates
-from .laws.rotation import Matrix, Quaternion, multiply, quaternion_of, rotation_matrix
-from .laws.vectors import Vector, add, cross, dot, scale, subtract
+from .laws.mathematics import COMPLEX_STEP, REAL, rates_of, vector_with_rates
+from .laws.rotation import Matrix, Quaternion, multiply, quaternion_of, rotation_matrix, rotation_vector_rate
+from .laws.vectors import Vector, add, scale, subtract
 
 MAX_SWEEPS = 40
 ANGLE_TOLERANCE = 1e-16  # rad
-# rad^2: below it the series of k errs by 1e-19.
-MAX_SERIES_ANGLE_SQUARED = 1e-2
 ORIGIN = (0.0, 0.0, 0.0)
 
 VectorPair = Tuple[Vector, Vector]
@@ -103,22 +101,6 @@ def integrate_rotation(inertia: law.Inertia, start: RotationState, loads: Sequen
         middle_attitude = _attitude(inertia, rotation, middle.momentum, moment)
     end = end._replace(quaternion=_normalised(end.quaternion))
     return Rotation(end, middle_attitude, attitude_of(inertia, end, loads[-1]))
-
-
-def rotation_vector_rate(m: Mathematics, angles: Vector, velocity: Vector) -> Vector:
-    """Rate of the rotation vector phi (rad) by an angular velocity, both in the axes of the body, in rad/s."""
-    first = cross(angles, velocity)
-    second = cross(angles, first)
-    return add(velocity, add(scale(0.5, first), scale(_second_order_factor(m, dot(angles, angles)), second)))
-
-
-def _second_order_factor(m: Mathematics, squared: Any) -> Any:
-    """k by the squared angle."""
-    if squared.real < MAX_SERIES_ANGLE_SQUARED:
-        tail = squared * (1.0 / 1209600.0 + squared / 47900160.0)
-        return 1.0 / 12.0 + squared * (1.0 / 720.0 + squared * (1.0 / 30240.0 + tail))
-    half_angle = 0.5 * m.sqrt(squared)
-    return (1.0 - half_angle * m.cos(half_angle) / m.sin(half_angle)) / squared
 
 
 def _angle_nodes(attitudes: Sequence[law.Attitude], angles: VectorPair) -> Sequence[VectorPair]:

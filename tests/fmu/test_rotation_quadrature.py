@@ -9,8 +9,8 @@ from scipy.integrate import solve_ivp
 
 from tautwire_fmu.laws.mathematics import REAL
 from tautwire_fmu.laws.rigid_body import inertia_of, moment_matrix
-from tautwire_fmu.laws.rotation import multiply, quaternion_of, rotation_matrix
-from tautwire_fmu.rotation_quadrature import Load, RotationState, integrate_rotation, rotation_vector_rate
+from tautwire_fmu.laws.rotation import multiply, quaternion_of, rotation_matrix, rotation_vector_rate
+from tautwire_fmu.rotation_quadrature import Load, RotationState, integrate_rotation
 
 Array = NDArray[np.float64]
 

@@ -193,7 +193,7 @@ def test_document_is_json_with_the_agreed_keys() -> None:
     assert set(document) == {
         *("position", "tensions", "frequencies_hz", "damping_ratios", "mode_shapes"),
         *("A", "B", "C", "D", "states", "inputs", "outputs"),
-        *("damped_frequencies_hz", "cable_shares", "notes"),
+        *("damped_frequencies_hz", "cable_shares", "translational_shares", "orientation", "notes"),
     }
     assert np.shape(document["A"]) == (14, 14) and len(document["states"]) == 14
     assert np.shape(document["B"]) == (14, 11) and len(document["inputs"]) == 11

@@ -12,6 +12,8 @@ IDENTITY: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
 # Squared angle, in rad^2, below which the series to the sixth power replaces sine and cosine: it errs by 1e-19 there.
 MAX_SERIES_ANGLE_SQUARED = 1e-3
+# The same of the rate of a rotation vector, whose closed form cancels.
+MAX_RATE_SERIES_ANGLE_SQUARED = 1e-2
 
 
 def rotate(quaternion: Quaternion, vector: Vector) -> Vector:
@@ -66,3 +68,23 @@ def rotation_matrix(quaternion: Quaternion) -> Matrix:
         (2.0 * (x * y + w * z), 1.0 - 2.0 * (x * x + z * z), 2.0 * (y * z - w * x)),
         (2.0 * (x * z - w * y), 2.0 * (y * z + w * x), 1.0 - 2.0 * (x * x + y * y)),
     )
+
+
+def rotation_vector_rate(m: Mathematics, rotation_vector: Vector, angular_velocity: Vector) -> Vector:
+    """Rate of a rotation vector r (rad) by the angular velocity (rad/s), both in the axes of the turned body.
+
+    ``dr/dt = omega + r x omega / 2 + k r x (r x omega)``, ``k = (1 - p / 2 cot(p / 2)) / p^2`` with ``p = |r|``. In the
+    axes from which r counts it is the same with ``-r`` in place of ``r``.
+
+    Source: Hairer, Lubich and Wanner (2006), Geometric Numerical Integration, section IV.7.
+    """
+    squared = dot(rotation_vector, rotation_vector)
+    is_large = squared - MAX_RATE_SERIES_ANGLE_SQUARED
+    safe = m.where(is_large, squared, 1.0)
+    half = 0.5 * m.sqrt(safe)
+    closed = (1.0 - half * m.cos(half) / m.sin(half)) / safe
+    tail = squared * (1.0 / 1209600.0 + squared / 47900160.0)
+    series = 1.0 / 12.0 + squared * (1.0 / 720.0 + squared * (1.0 / 30240.0 + tail))
+    first = cross(rotation_vector, angular_velocity)
+    second = cross(rotation_vector, first)
+    return add(angular_velocity, add(scale(0.5, first), scale(m.where(is_large, closed, series), second)))

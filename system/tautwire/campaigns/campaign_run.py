@@ -30,7 +30,6 @@ from ..errors import one_line
 from ..fmus.packaging import RobotFmus
 from ..linear import linearise
 from ..linear.linear_plant import LinearPlant
-from ..linear.modes import POSITION, VELOCITY
 from ..recordings.recording import Recording
 from ..recordings.start_position import with_start
 from ..robot.robot_file_reader import robot_from_content
@@ -226,7 +225,8 @@ def _nominal_robot(robot: Robot, plan: Plan) -> Robot:
 def _modal_outputs(robot: Robot, plant: LinearPlant) -> Row:
     """Natural frequencies, damping ratios, and the smallest eigenvalue of the stiffness at the platform."""
     modes, A, B = plant.modes, plant.system.A, plant.system.B
-    stiffness = -np.linalg.solve(B[VELOCITY, robot.cable_count :], A[VELOCITY, POSITION])
+    position, velocity = slice(0, 3), slice(3, 6)
+    stiffness = -np.linalg.solve(B[velocity, robot.cable_count :], A[velocity, position])
     min_stiffness = float(np.linalg.eigvalsh(0.5 * (stiffness + stiffness.T))[0])
     frequencies = {f"frequency_{mode}": float(modes.frequencies[mode - 1]) for mode in MODE_NUMBERS}
     damping_ratios = {f"damping_ratio_{mode}": float(modes.damping_ratios[mode - 1]) for mode in MODE_NUMBERS}

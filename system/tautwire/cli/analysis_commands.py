@@ -25,7 +25,7 @@ from .console import (
     note_unused_tables,
     parse_position,
     progress_bar,
-    read_point_mass_robot,
+    read_holdable_robot,
     relative_links,
 )
 
@@ -63,7 +63,7 @@ def linearise(
     refuse_overwriting_inputs([robot_file], [path for path in (out, report) if path])
     refuse_same_output(out, report)
     output = CommandOutput(as_json, quiet)
-    robot = read_point_mass_robot(robot_file)
+    robot = read_holdable_robot(robot_file)
     try:
         with progress_bar(output) as progress:
             progress("linearising", 0.0)

@@ -38,7 +38,8 @@ Array = NDArray[np.float64]
 DEFAULT_STEP = 0.02
 DEFAULT_TOLERANCE = 1e-6
 INPUT_VARIABLES = ("winch_speed", "speed_command")
-OUTPUT_VARIABLES = ("position", "measured_position", "velocity", "tension", "length", "winch_speed")
+OUTPUT_VARIABLES = ("position", "measured_position", "velocity", "angular_velocity", "tension", "length", "winch_speed")
+EXTERNAL_VARIABLES = ("external_force", "external_moment")
 EFFECT_PREFIX = "effect."
 MEASURED_PREFIX = "measured_"
 
@@ -162,21 +163,23 @@ def robot_signals(fmus: RobotFmus) -> PlantSignals:
     """The signals of :func:`tautwire.linear.linearise` in a robot's FMUs, and the states of the winches.
 
     Of a user's platform the states are its motion, of a user's winch its speed; there are none if a cable is a user's
-    FMU. Winch FMUs have the input ``speed_command_i`` and the output ``winch_speed_i``; an external force is an input
-    if the platform has one. Outputs that an FMU lacks are left out.
+    FMU, or the platform a rigid body, whose quaternion has one number too many. Winch FMUs have the input
+    ``speed_command_i`` and the output ``winch_speed_i``; an external force and moment are inputs if the platform has
+    them. Outputs that an FMU lacks are left out.
     """
     wiring = wire_fmus(fmus)
     platform = read_model_description(fmus.platform)
     variable_names = {variable.name for variable in platform.modelVariables}
-    force_ports = [Port(PLATFORM, f"external_force.{axis}") for axis in AXES]
+    wrench_ports = [Port(PLATFORM, f"{name}.{axis}") for name in EXTERNAL_VARIABLES for axis in AXES]
     inputs = [port for port in wiring.external_inputs if port.variable in INPUT_VARIABLES] + [
-        p for p in force_ports if p.variable in variable_names
+        p for p in wrench_ports if p.variable in variable_names
     ]
     outputs = [port for port in wiring.outputs if port.variable.partition(".")[0] in OUTPUT_VARIABLES]
+    has_hidden_states = fmus.is_rigid or any(cable in fmus.user_start_values for cable in _cable_names(fmus))
     return PlantSignals(
         inputs={_signal_name(port): port for port in inputs},
         outputs={_signal_name(port): port for port in outputs},
-        states=None if any(cable in fmus.user_start_values for cable in _cable_names(fmus)) else _state_ports(fmus),
+        states=None if has_hidden_states else _state_ports(fmus),
     )
 
 

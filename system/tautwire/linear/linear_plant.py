@@ -13,13 +13,14 @@ from numpy.typing import NDArray
 from scipy.linalg import matrix_balance
 
 from ..errors import InputError
-from ..robot.schema import Robot, validate_point_mass_robot
+from ..robot.rigid_equilibrium import static_equilibrium
+from ..robot.schema import Quaternion, Robot, validate_robot
 from ..robot.static_equilibrium import static_tensions
 from ..robot.symbolic_model import SymbolicModel, freeze_drifting_states, symbolic_model
 from ..validation import NumberRule, validate_number
-from .modes import POSITION, Modes, modes_of
+from .modes import Modes, modes_of
 from .nonsmooth import DEFAULT_SWING, OperatingPoint, validity_notes
-from .operating_point import equilibrium_state, requested_position
+from .operating_point import ACCELERATION_TOLERANCE, SURVEY_TOLERANCE, Pose, equilibrium_state, requested_position
 
 Array = NDArray[np.float64]
 
@@ -34,11 +35,13 @@ class LinearPlant:
     """A robot linearised about an operating point at rest; all signals are deviations from there, in SI units.
 
     ``system`` is a continuous ``control.StateSpace`` with named states (position, velocity, unstrained lengths,
-    states of effects), inputs (winch speeds, external force) and outputs (position, velocity, tensions, lengths).
+    states of effects), inputs (winch speeds, external force) and outputs (position, velocity, tensions, lengths). A
+    rigid body has a rotation behind its position, in rad about the world's axes, an angular velocity behind its
+    velocity and a moment behind the force.
     States of effects without equilibrium (the age of creep, a drum's angle) are frozen at the start and removed, and
-    sensors have no delay. ``position`` (3,) in m; ``tensions`` (n,) in N, and their ``tension_slopes`` (n, 3) by
-    position, in N/m; ``state`` is the operating point. ``notes`` state, one line each, what the linear plant leaves
-    out: slack, and nonsmooth laws so near that small motions meet them.
+    sensors have no delay. ``position`` (3,) in m, and ``orientation``, a unit quaternion; ``tensions`` (n,) in N, and
+    their ``tension_slopes`` by the pose (n, d), in N/m and N/rad; ``state`` is the operating point. ``notes`` state,
+    one line each, what the linear plant leaves out: slack, and nonsmooth laws so near that small motions meet them.
     """
 
     system: Any
@@ -48,6 +51,7 @@ class LinearPlant:
     state: Array
     modes: Modes
     notes: tuple[str, ...] = ()
+    orientation: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
 
 def linearise(robot: Robot, at: Sequence[float] | Array | None = None, swing: float = DEFAULT_SWING) -> LinearPlant:
@@ -64,25 +68,37 @@ def linearise(robot: Robot, at: Sequence[float] | Array | None = None, swing: fl
     Raises UnreachableError where the cables cannot hold the platform, OperatingPointError where they do not hold
     it stably, or where the states of an effect never settle, ArgumentError for an invalid argument.
     """
-    validate_point_mass_robot("linearise: robot", robot)
+    validate_robot("linearise: robot", robot)
     validate_number("linearise: swing", swing, SWING_RULE)
-    position = requested_position(robot, at)
-    tensions = static_tensions(robot, position)
-    model = freeze_drifting_states(symbolic_model(robot))
-    state = equilibrium_state(robot, model, position, tensions)
+    pose, tensions, tolerance = _pose_at_rest(robot, requested_position(robot, at))
+    model = freeze_drifting_states(symbolic_model(robot, reference_orientation=pose.orientation))
+    state = equilibrium_state(model, pose, tensions, tolerance)
     A, B, C, D, tension_jacobian = _jacobians(model, state)
-    tension_slopes = tension_jacobian[:, POSITION]
-    modes = modes_of(robot, position, tensions, tension_slopes, A, B)
+    tension_slopes = tension_jacobian[:, model.indices.pose]
+    modes = modes_of(pose, model.indices, tensions, tension_slopes, A, B)
     operating_point = OperatingPoint(robot, model, state, tensions, tension_slopes)
     return LinearPlant(
         _state_space(model, (A, B, C, D)),
-        position,
+        pose.position,
         tensions,
         tension_slopes,
         state,
         modes,
         validity_notes(operating_point, (A, B, C, D), modes, swing),
+        pose.orientation,
     )
+
+
+def _pose_at_rest(robot: Robot, position: Array) -> tuple[Pose, Array, float]:
+    """The pose at rest at a position (m), static tensions (n,) in N there, and what passes for rest."""
+    if not robot.platform.is_rigid_body:
+        pose = Pose(robot, position, robot.platform.start_orientation)
+        return pose, static_tensions(robot, position), ACCELERATION_TOLERANCE
+    at_rest = static_equilibrium(robot, position)
+    # Two cables hold a surveyed position only nearly; statics has judged that.
+    is_exact = at_rest.residual_force <= ACCELERATION_TOLERANCE * robot.platform.mass * max(robot.gravity, 1.0)
+    tolerance = ACCELERATION_TOLERANCE if is_exact else SURVEY_TOLERANCE
+    return Pose(robot, position, at_rest.orientation), at_rest.tensions, tolerance
 
 
 def _state_space(model: SymbolicModel, matrices: tuple[Array, Array, Array, Array]) -> Any:
@@ -178,12 +194,14 @@ def model_document(plant: LinearPlant) -> dict[str, Any]:
     system, modes = plant.system, plant.modes
     return {
         "position": plant.position.tolist(),
+        "orientation": list(plant.orientation),
         "tensions": plant.tensions.tolist(),
         "frequencies_hz": modes.frequencies.tolist(),
         "damping_ratios": modes.damping_ratios.tolist(),
         "damped_frequencies_hz": modes.damped_frequencies.tolist(),
         "mode_shapes": modes.shapes.tolist(),
         "cable_shares": modes.cable_shares.tolist(),
+        "translational_shares": modes.translational_shares.tolist(),
         **{name: np.asarray(getattr(system, name)).tolist() for name in ("A", "B", "C", "D")},
         "states": list(system.state_labels),
         "inputs": list(system.input_labels),

@@ -18,6 +18,7 @@ from ..robot.trajectory import Trajectory, require_trajectory
 from ..validation import validate_integer
 from .linear_plant import linearise
 from .modes import Modes, cable_shares
+from .operating_point import Pose
 
 Array = NDArray[np.float64]
 
@@ -41,9 +42,9 @@ class ModesAlong:
 
     ``abscissa`` (N,) is time in s, or distance travelled in m where ``is_timed`` is False; ``positions`` (N, 3) in m;
     ``frequencies`` and ``damped_frequencies`` (N, 3) in Hz; ``damping_ratios`` (N, 3); ``shapes`` (N, 3, 3), unit
-    columns; ``cable_shares`` (N, n, 3). ``modal_assurance`` (N - 1,) is the smallest modal assurance criterion,
-    ``(phi_a . phi_b)^2`` for unit shapes of a point mass, between neighbours: near 1 the tracking is certain, below
-    0.5 the path is too coarse there, or modes of equal frequency mix.
+    columns; ``cable_shares`` (N, n, 3) and ``translational_shares`` (N, 3) of energy. ``modal_assurance`` (N - 1,) is
+    the smallest modal assurance criterion, ``(phi_a . phi_b)^2`` for unit shapes of a point mass, between neighbours:
+    near 1 the tracking is certain, below 0.5 the path is too coarse there, or modes of equal frequency mix.
     """
 
     abscissa: Array
@@ -54,6 +55,7 @@ class ModesAlong:
     damped_frequencies: Array
     shapes: Array
     cable_shares: Array
+    translational_shares: Array
     modal_assurance: Array
 
 
@@ -77,7 +79,8 @@ def modes_along(
 
     def modes_at(coordinate: float) -> _LocalModes:
         plant = linearise(robot, position_at(coordinate), swing=0.0)
-        energies = partial(cable_shares, robot, plant.position, plant.tensions, plant.tension_slopes)
+        pose = Pose(robot, plant.position, plant.orientation)
+        energies = partial(cable_shares, pose, plant.tensions, plant.tension_slopes)
         return _LocalModes(plant.modes, energies)
 
     tracked_modes = _track_modes(modes_at, count)

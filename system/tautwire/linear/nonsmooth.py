@@ -13,7 +13,7 @@ from scipy.linalg import expm
 
 from ..robot.schema import Robot
 from ..robot.symbolic_model import SymbolicModel
-from .modes import POSITION, Modes
+from .modes import Modes
 from .operating_point import slack_cables
 
 Array = NDArray[np.float64]
@@ -27,7 +27,7 @@ SAMPLES_PER_PERIOD = 64
 
 @dataclass(frozen=True)
 class OperatingPoint:
-    """An operating point: ``state``, cable ``tensions`` (n,) in N, and their ``tension_slopes`` (n, 3) in N/m."""
+    """An operating point: ``state``, cable ``tensions`` (n,) in N, and their ``tension_slopes`` (n, d) by the pose."""
 
     robot: Robot
     model: SymbolicModel
@@ -64,7 +64,7 @@ def validity_notes(
 
 
 def _slack_swings(tensions: Array, tension_slopes: Array) -> Array:
-    """Smallest amplitude over all modes, in m, at which each cable goes slack; slopes (n, 3) in N/m."""
+    """Smallest amplitude over all modes, in m, at which each cable goes slack; slopes (n, d) in N/m, one a mode."""
     steepest = np.max(np.abs(tension_slopes), axis=1)
     return np.divide(tensions, steepest, out=np.full(len(tensions), np.inf), where=(steepest > 0.0) & (tensions > 0.0))
 
@@ -80,7 +80,7 @@ def _swing_notes(
     notes = []
     for mode, frequency in enumerate(modes.frequencies):
         offset = np.zeros(len(operating_point.state))
-        offset[POSITION] = amplitude * modes.shapes[:, mode]
+        offset[operating_point.model.indices.pose] = amplitude * modes.shapes[:, mode]
         deviations = _swing_deviations(
             operating_point, matrices, offset, np.linspace(0.0, 1.0 / frequency, SAMPLES_PER_PERIOD)
         )
@@ -97,7 +97,7 @@ def _swing_notes(
 def _swing_deviations(operating_point: OperatingPoint, matrices: Sequence[Array], offset: Array, times: Array) -> Array:
     """Relative deviation of the nonlinear from the linear tensions in a free oscillation, shape (n,)."""
     A, _, C, _ = matrices
-    model, tension_rows = operating_point.model, slice(6, 6 + operating_point.robot.cable_count)
+    model, tension_rows = operating_point.model, operating_point.model.indices.tensions
     zero_inputs = np.zeros(model.inputs.numel())
     laws = casadi.Function("laws", [model.states, model.inputs], [model.rates, model.outputs])
     step = expm(A * (times[1] - times[0]))
@@ -130,8 +130,9 @@ def _winch_notes(operating_point: OperatingPoint, matrices: Sequence[Array], spe
     """Notes on winches at ``speed`` (m/s) in either direction: immediate tension change and rate of rope length."""
     _, B, _, D = matrices
     model, count = operating_point.model, operating_point.robot.cable_count
+    indices = model.indices
     evaluate = casadi.Function(
-        "told", [model.states, model.inputs], [model.outputs[6 : 6 + count], model.rates[6 : 6 + count]]
+        "told", [model.states, model.inputs], [model.outputs[indices.tensions], model.rates[indices.lengths]]
     )
     tension, rate = (
         np.asarray(value).ravel() for value in evaluate(operating_point.state, np.zeros(model.inputs.numel()))
@@ -146,9 +147,13 @@ def _winch_notes(operating_point: OperatingPoint, matrices: Sequence[Array], spe
             floor = MIN_CHANGE_SHARE * np.max(operating_point.tensions)
             worst = max(
                 worst,
-                _relative_deviation(moved_tension[winch] - tension[winch], D[6 + winch, winch] * winch_speed, floor),
                 _relative_deviation(
-                    moved_rate[winch] - rate[winch], B[6 + winch, winch] * winch_speed, MIN_CHANGE_SHARE * speed
+                    moved_tension[winch] - tension[winch], D[indices.tensions][winch, winch] * winch_speed, floor
+                ),
+                _relative_deviation(
+                    moved_rate[winch] - rate[winch],
+                    B[indices.lengths][winch, winch] * winch_speed,
+                    MIN_CHANGE_SHARE * speed,
                 ),
             )
         if not worst <= MAX_RELATIVE_DEVIATION:

@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import cached_property
 
 import casadi
 import numpy as np
 from numpy.typing import NDArray
 
+from tautwire_fmu.laws.effect_stages import Route
 from tautwire_fmu.laws.mathematics import REAL
+from tautwire_fmu.laws.rotation import rotation_matrix
 
 from ..array_validation import validate_point
 from ..errors import TautwireError
-from ..robot.schema import Robot
+from ..robot.schema import Quaternion, Robot
 from ..robot.static_equilibrium import cable_routes, static_tensions
 from ..robot.symbolic_model import SymbolicModel
 
@@ -22,7 +26,8 @@ SLACK_FRACTION = 1e-9
 SLACK_LENGTH_FRACTIONS = (1e-6, 1e-5, 1e-4, 1e-3)
 MAX_ITERATIONS = 50
 NEWTON_TOLERANCE = 1e-10
-ACCELERATION_TOLERANCE = 1e-6
+# Of gravity: accelerations that pass for rest, and those of a platform that two cables hold at a surveyed position.
+ACCELERATION_TOLERANCE, SURVEY_TOLERANCE = 1e-6, 1e-2
 
 
 class OperatingPointError(TautwireError):
@@ -32,6 +37,64 @@ class OperatingPointError(TautwireError):
         self.position = tuple(float(coordinate) for coordinate in position)
         self.reason = reason
         super().__init__(f"{robot}: {reason} at [{format_position(position)}] m")
+
+
+@dataclass(frozen=True)
+class Pose:
+    """Pose of a robot's platform: ``position`` of its origin (3,) in m, and ``orientation``, a unit quaternion."""
+
+    robot: Robot
+    position: Array
+    orientation: Quaternion
+
+    @cached_property
+    def arms(self) -> Array:
+        """Centre of mass and attachments (1 + n, 3) from the origin, in the axes of the world, in m."""
+        points = [self.robot.platform.centre_of_mass, *(cable.attachment for cable in self.robot.cables)]
+        turned: Array = np.array(points) @ np.array(rotation_matrix(self.orientation)).T
+        return turned
+
+    @cached_property
+    def attachments(self) -> Array:
+        """Where the cables are attached (n, 3), in m."""
+        points: Array = self.position + self.arms[1:]
+        return points
+
+    @cached_property
+    def unit_directions(self) -> Array:
+        """Unit vectors of the cables at their attachments (3, n)."""
+        return np.array([route.direction for route in self.routes]).T
+
+    @cached_property
+    def routes(self) -> tuple[Route, ...]:
+        """Routes of the cables from their attachments to their exit points."""
+        return cable_routes(REAL, self.robot, self.position.tolist(), self.orientation)
+
+    @property
+    def chords(self) -> Array:
+        """Distances of the exit points from the attachments (n,), in m."""
+        distances: Array = np.linalg.norm(np.array(self.robot.anchors) - self.attachments, axis=1)
+        return distances
+
+    def displacements(self, shapes: Array) -> Array:
+        """Displacements (1 + n, 3, k) of centre of mass and attachments along ``shapes`` (d, k), to first order.
+
+        ``a + r x s`` with the arm s, the translation a in the first three rows and the rotation r in those below.
+        """
+        turned = np.cross(_rotations(shapes).T[None], self.arms[:, None]).transpose(0, 2, 1)
+        moved: Array = shapes[:3] + turned
+        return moved
+
+    def curvatures(self, shapes: Array) -> Array:
+        """Second-order terms ``r x (r x s)`` (1 + n, 3, k) of these, with the arm s from the centre of mass."""
+        rotations = _rotations(shapes).T[None]
+        from_centre = (self.arms - self.arms[0])[:, None]
+        return np.cross(rotations, np.cross(rotations, from_centre)).transpose(0, 2, 1)
+
+
+def _rotations(shapes: Array) -> Array:
+    """Rotation part (3, k) of shapes (d, k); zero for a point mass."""
+    return shapes[3:] if len(shapes) > 3 else np.zeros_like(shapes)
 
 
 def format_position(position: Sequence[float] | Array) -> str:
@@ -49,44 +112,43 @@ def slack_cables(tensions: Array) -> NDArray[np.intp]:
     return np.flatnonzero(tensions <= SLACK_FRACTION * np.max(tensions))
 
 
-def equilibrium_state(robot: Robot, model: SymbolicModel, position: Array, tensions: Array) -> Array:
-    """Equilibrium state of the model at a position (m) under static tensions (n,) in N.
+def equilibrium_state(
+    model: SymbolicModel, pose: Pose, tensions: Array, tolerance: float = ACCELERATION_TOLERANCE
+) -> Array:
+    """Equilibrium state of the model at a pose under static tensions (n,) in N; its rotations count from there.
 
-    A slack cable is a little longer than its span, so that its law is smooth there.
+    A slack cable is a little longer than its span, so that its law is smooth there. Accelerations up to ``tolerance``
+    of that of gravity pass for rest.
 
     Raises OperatingPointError where an effect never settles or something else moves the platform.
     """
     for slack_length in SLACK_LENGTH_FRACTIONS:
-        state = _solve_equilibrium(robot, model, position, tensions, slack_length)
+        state = _solve_equilibrium(model, pose, tensions, slack_length)
         rates, outputs = _evaluate_model(model, state)
         slack = slack_cables(tensions)
-        if np.all(outputs[6:][slack] <= SLACK_FRACTION * np.max(tensions)):
+        if np.all(outputs[model.indices.tensions][slack] <= SLACK_FRACTION * np.max(tensions)):
             break
-    residual_acceleration = float(np.max(np.abs(rates[3:6])))
-    if residual_acceleration > ACCELERATION_TOLERANCE * max(robot.gravity, 1.0):
-        raise OperatingPointError(
-            robot.name,
-            position,
-            f"the platform accelerates by {residual_acceleration:.3g} m/s2 under static tensions",
-        )
+    accelerations = np.abs(rates[model.indices.twist]).reshape(-1, 3).max(axis=1)
+    for acceleration, unit in zip(accelerations, ("m/s2", "rad/s2"), strict=False):
+        if acceleration > tolerance * max(pose.robot.gravity, 1.0):
+            problem = f"the platform accelerates by {acceleration:.3g} {unit} under static tensions"
+            raise OperatingPointError(pose.robot.name, pose.position, problem)
     return state
 
 
-def _solve_equilibrium(
-    robot: Robot, model: SymbolicModel, position: Array, tensions: Array, slack_length: float
-) -> Array:
+def _solve_equilibrium(model: SymbolicModel, pose: Pose, tensions: Array, slack_length: float) -> Array:
     """Newton's method on unstrained lengths and states of effects.
 
     Least-norm steps leave an undetermined state (hysteresis of strands) at its initial value.
     """
-    count = robot.cable_count
-    taut = np.setdiff1d(np.arange(count), slack_cables(tensions)).tolist()
+    lengths, first = model.indices.lengths, model.indices.lengths.start
+    taut = np.setdiff1d(np.arange(len(tensions)), slack_cables(tensions)).tolist()
     excess = model.span_tensions / casadi.DM(np.maximum(tensions, np.finfo(float).tiny)) - 1.0
-    residual = casadi.vertcat(excess[taut], model.rates[6 + count :])
-    jacobian = casadi.jacobian(residual, model.states[6:])
+    residual = casadi.vertcat(excess[taut], model.rates[lengths.stop :])
+    jacobian = casadi.jacobian(residual, model.states[first:])
     equations = casadi.Function("rest", [model.states, model.inputs], [residual, jacobian])
-    state = np.concatenate([position, np.zeros(model.states.numel() - 3)])
-    state[6 : 6 + count] = _initial_lengths(robot, position, tensions, slack_length)
+    state = np.concatenate([pose.position, np.zeros(model.states.numel() - 3)])
+    state[lengths] = _initial_lengths(pose, tensions, slack_length)
     zero_inputs = np.zeros(model.inputs.numel())
     for _ in range(MAX_ITERATIONS):
         residual_value, jacobian_value = (np.asarray(value, dtype=float) for value in equations(state, zero_inputs))
@@ -94,15 +156,16 @@ def _solve_equilibrium(
             break
         if np.max(np.abs(residual_value), initial=0.0) <= NEWTON_TOLERANCE:
             return state
-        state[6:] -= np.linalg.lstsq(jacobian_value, residual_value.ravel(), rcond=None)[0]
-    raise OperatingPointError(robot.name, position, "no equilibrium found; the states of an effect may never converge")
+        state[first:] -= np.linalg.lstsq(jacobian_value, residual_value.ravel(), rcond=None)[0]
+    problem = "no equilibrium found; the states of an effect may never converge"
+    raise OperatingPointError(pose.robot.name, pose.position, problem)
 
 
-def _initial_lengths(robot: Robot, position: Array, tensions: Array, slack_length: float) -> Array:
+def _initial_lengths(pose: Pose, tensions: Array, slack_length: float) -> Array:
     """Unstrained lengths by the inverse of the logarithmic law with the declared stiffness, in m."""
-    lengths: Array = np.array([line.length for line in cable_routes(REAL, robot, position.tolist())])
-    stiffness = np.array([cable.modulus * cable.area for cable in robot.cables])
-    unstrained_lengths: Array = lengths * np.exp((static_tensions(robot) - tensions) / stiffness)
+    lengths: Array = np.array([route.length for route in pose.routes])
+    stiffness = np.array([cable.modulus * cable.area for cable in pose.robot.cables])
+    unstrained_lengths: Array = lengths * np.exp((static_tensions(pose.robot) - tensions) / stiffness)
     unstrained_lengths[slack_cables(tensions)] *= 1.0 + slack_length
     return unstrained_lengths
 

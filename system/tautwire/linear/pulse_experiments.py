@@ -227,7 +227,8 @@ def _require_smooth(experiment: PulseExperiment, nonlinearity: Array) -> None:
         raise IdentificationError(
             f"nonsmooth at rest: responses to pulses of {experiment.inputs[worst]} up and down differ by "
             f"{nonlinearity[worst]:.0%}, however small",
-            "start them where no cable is about to become slack and nothing is about to slip",
+            "start them where no cable is about to become slack and nothing is about to slip; if they are stiff, begin "
+            "with a shorter step",
         )
 
 

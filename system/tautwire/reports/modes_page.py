@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..linear import LinearPlant
+from ..linear.operating_point import Pose
 from ..number_format import format_percent, format_significant
 from ..provenance import Provenance
 from ..robot.schema import Robot
@@ -22,14 +23,23 @@ from .robot_scene import RobotScene, ScenePath, pack_columns, scene_data
 Array = NDArray[np.float64]
 
 # Outputs whose gains are drawn, by the prefix of their names.
-GAIN_OUTPUT_TITLES = {"position": "Position", "tension": "Tension"}
+GAIN_OUTPUT_TITLES = {"position": "Position", "rotation": "Rotation", "tension": "Tension"}
 # Unit of an input or output on the page, and its size in SI units.
 SIGNAL_UNITS = {
     "position": ("mm", 1e-3),
+    "rotation": ("mrad", 1e-3),
     "tension": ("N", 1.0),
     "winch_speed": ("mm/s", 1e-3),
     "external_force": ("N", 1.0),
+    "external_moment": ("N m", 1.0),
 }
+POINT_SHAPE_TITLES = ("Shape along x", "Along y", "Along z")
+BODY_SHAPE_TITLES = ("About x", "About y", "About z", "Translation")
+POINT_SHAPE_TEXT = "and mode shape as a unit vector."
+BODY_SHAPE_TEXT = (
+    "and mode shape: the motion of the origin, and the turning in rad, by which an attachment or the centre of mass "
+    "moves by 1 m at most. Translation is the share of the centre of mass in the kinetic energy."
+)
 SWING_AMPLITUDE = 1e-3  # m, for which the change of tension is stated
 DRAWN_SWING_SHARE = 0.08  # of the robot's size, as drawn
 FRAME_COUNT = 73
@@ -63,11 +73,20 @@ def _mode_data(robot: Robot, plant: LinearPlant, mode: int) -> dict[str, Any]:
     swing = np.cos(2.0 * np.pi * phase)[:, None]
     shape = plant.modes.shapes[:, mode]
     size = float(np.max(np.ptp(np.vstack((np.array(robot.anchors), plant.position)), axis=0)))
-    platform = plant.position + DRAWN_SWING_SHARE * size * swing * shape
+    platform = plant.position + DRAWN_SWING_SHARE * size * swing * shape[:3]
+    pose = Pose(robot, plant.position, plant.orientation)
+    moved = DRAWN_SWING_SHARE * size * swing[:, :, None] * pose.displacements(shape[:, None])[1:, :, 0]
+    attachments = pose.attachments + moved if robot.platform.is_rigid_body else None
     tension_change = SWING_AMPLITUDE * swing * (plant.tension_slopes @ shape)
     max_tension_change = float(np.max(np.abs(tension_change), initial=0.0)) or 1.0
     scene = scene_data(
-        RobotScene(100.0 * phase, platform, tension_change, (ScenePath("swing", platform, "accent", 5),))
+        RobotScene(
+            100.0 * phase,
+            platform,
+            tension_change,
+            (ScenePath("swing", platform, "accent", 5),),
+            attachments=attachments,
+        )
     )
     label = f"{mode + 1}: {format_significant(float(plant.modes.frequencies[mode]))} Hz"
     animation = {
@@ -139,6 +158,8 @@ def modes_page(robot: Robot, plant: LinearPlant, links: Mapping[str, str], prove
         plant=plant,
         position=", ".join(format_significant(float(value), 4) for value in plant.position),
         modes=_mode_rows(plant),
+        shape_text=BODY_SHAPE_TEXT if robot.platform.is_rigid_body else POINT_SHAPE_TEXT,
+        shape_titles=[*POINT_SHAPE_TITLES, *(BODY_SHAPE_TITLES if robot.platform.is_rigid_body else ())],
         mode_labels=[choice["label"] for choice in figures["choices"]],
         cables=_cable_rows(plant),
         inputs=[signal_label(name) for name in plant.system.input_labels],
@@ -169,8 +190,8 @@ def _modes_sentence(plant: LinearPlant) -> str:
 
 
 def _mode_rows(plant: LinearPlant) -> list[Row]:
-    """Frequency, damping ratio, damped frequency and shape of each mode."""
-    modes = plant.modes
+    """Frequency, damping ratio, damped frequency and shape of each mode; of a rigid body its translational share."""
+    modes, is_rigid = plant.modes, len(plant.modes.shapes) > len(POINT_SHAPE_TITLES)
     return [
         [
             f"Mode {mode + 1}",
@@ -178,6 +199,7 @@ def _mode_rows(plant: LinearPlant) -> list[Row]:
             Number(f"{format_significant(100.0 * float(modes.damping_ratios[mode]))} %"),
             "overdamped" if damped_frequency == 0.0 else f"{format_significant(float(damped_frequency), 4)} Hz",
             *(Number(f"{round(float(value), 3) + 0.0:.3f}") for value in modes.shapes[:, mode]),
+            *([Number(format_percent(float(modes.translational_shares[mode])))] if is_rigid else []),
         ]
         for mode, damped_frequency in enumerate(modes.damped_frequencies)
     ]

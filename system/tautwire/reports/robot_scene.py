@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial import ConvexHull
 
 from ..recordings.sensor_gaps import bridge_short_gaps
 from .downsampling import pack_float32
@@ -19,6 +20,8 @@ MAX_PLAYBACK_TIME = 60.0
 MAGNIFICATIONS = (1, 10, 100, 1000)
 # Deviations are magnified until the largest reaches this share of the robot's size, or of the path's extent.
 MAX_SHARE_OF_ROBOT_SIZE, MAX_SHARE_OF_PATH_SIZE = 0.03, 0.15
+# Of the largest extent: a body that is thinner is drawn flat, and faces that turn by less are one.
+FLATNESS = 1e-6
 
 
 @dataclass(frozen=True)
@@ -37,7 +40,8 @@ class RobotScene:
     """The frames of the slider: ``platform`` (N, 3) in m and ``tension`` (N, n) in N at ``time`` (N,) in s.
 
     Deviations of ``paths`` from the platform's own are drawn ``magnification`` times larger. ``measured_tension`` has
-    the shape of ``tension``, None where there is none.
+    the shape of ``tension``, None where there is none. ``attachments`` (N, n, 3) in m are where the cables hold a rigid
+    body, None for a point mass.
     """
 
     time: Array
@@ -46,6 +50,7 @@ class RobotScene:
     paths: tuple[ScenePath, ...]
     measured_tension: Array | None = None
     magnification: int = 1
+    attachments: Array | None = None
 
 
 def fill_unmeasured(points: Array, path: Array) -> Array:
@@ -66,6 +71,27 @@ def pack_columns(values: Array) -> list[str]:
     return [pack_float32(column) for column in values.T]
 
 
+def hull_edges(points: Array) -> list[tuple[int, int]]:
+    """Edges of the convex hull of points (n, 3), as pairs of indices: of a body, a polygon or a segment."""
+    arms = points - points.mean(axis=0)
+    _, extents, axes = np.linalg.svd(arms, full_matrices=False)
+    dimension = int(np.sum(extents > FLATNESS * max(float(extents[0]), np.finfo(float).tiny)))
+    flat = arms @ axes[:dimension].T
+    if dimension < 2:
+        ends = (int(np.argmin(flat)), int(np.argmax(flat))) if dimension else (0, 0)
+        return [ends] if ends[0] != ends[1] else []
+    hull = ConvexHull(flat)
+    if dimension == 2:
+        return sorted((int(min(pair)), int(max(pair))) for pair in hull.simplices)
+    normals: dict[tuple[int, int], list[Array]] = {}
+    for triangle, normal in zip(hull.simplices, hull.equations[:, :3], strict=True):
+        for first, second in ((0, 1), (1, 2), (0, 2)):
+            low, high = sorted((int(triangle[first]), int(triangle[second])))
+            normals.setdefault((low, high), []).append(normal)
+    # Between two triangles of one face there is no edge.
+    return sorted(edge for edge, (a, b) in normals.items() if float(a @ b) < 1.0 - FLATNESS)
+
+
 def scene_data(scene: RobotScene) -> dict[str, Any]:
     """The JSON data of a scene for ``scene.js``."""
     finite = scene.tension[np.isfinite(scene.tension)]
@@ -77,6 +103,8 @@ def scene_data(scene: RobotScene) -> dict[str, Any]:
         "pace": min(1.0, MAX_PLAYBACK_TIME / duration) if duration > 0.0 else 1.0,
         "cycle": False,
         "platform": pack_columns(scene.platform),
+        "attachments": _attachments_data(scene.attachments),
+        "edges": [] if scene.attachments is None else hull_edges(_first_finite(scene.attachments)),
         "paths": [
             {"name": p.name, "columns": pack_columns(p.points), "colour": p.colour, "width": p.width, "dash": p.dash}
             for p in scene.paths
@@ -88,6 +116,16 @@ def scene_data(scene: RobotScene) -> dict[str, Any]:
         "tensionUnit": "N",
         "magnify": scene.magnification,
     }
+
+
+def _attachments_data(attachments: Array | None) -> list[list[str]] | None:
+    return None if attachments is None else [pack_columns(point) for point in attachments.transpose(1, 0, 2)]
+
+
+def _first_finite(attachments: Array) -> Array:
+    """The attachments (n, 3) in the first frame in which all are known."""
+    is_known = np.isfinite(attachments).all(axis=(1, 2))
+    return np.asarray(attachments[int(np.argmax(is_known))] if is_known.any() else np.zeros(attachments.shape[1:]))
 
 
 def deviation_magnification(anchors: Array, path: Array, deviations: Sequence[Array]) -> int:

@@ -13,16 +13,18 @@ from numpy.typing import NDArray
 
 from tautwire_fmu.laws import cable as cable_law
 from tautwire_fmu.laws import effect_stages as stages
-from tautwire_fmu.laws import point_mass as platform_law
 from tautwire_fmu.laws.effects import State
 from tautwire_fmu.laws.formula import ELAPSED_TIME
 from tautwire_fmu.laws.formula import FORMULA_EFFECT_NAME as FORMULA_NAME
 from tautwire_fmu.laws.mathematics import Mathematics
+from tautwire_fmu.laws.rotation import Quaternion
 from tautwire_fmu.laws.vectors import add, scale
 
 from .measured_start import with_true_start
+from .platform_symbols import PlatformSymbols, StateIndices, platform_symbols, vector_of
 from .robot_assembly import RobotAssembly, assemble_robot
-from .schema import AXES, EffectSetting, Robot, require_point_mass
+from .schema import EffectSetting, Robot, require_point_mass
+from .static_equilibrium import start_orientation, static_tensions
 from .symbolic_statics import symbolic_start_tensions
 from .uncertain_parameters import SensorErrors, UncertainParameter, limited_perturbation, perturbed_robot, sensor_errors
 
@@ -60,8 +62,9 @@ class FreeParameter:
 class SymbolicModel:
     """The equations of a robot as a state-space model of SX columns.
 
-    States: position, velocity, unstrained lengths, and those states of effects that something depends on. Inputs:
-    winch speeds, external force. Outputs: measured position and tensions without sensor delay, velocity, lengths.
+    States: pose and twist of the platform, unstrained lengths, and those states of effects that something depends on.
+    Inputs: winch speeds, external wrench. Outputs: measured pose, twist, measured tensions, lengths, without sensor
+    delay. The pose of a point mass is its position; :class:`tautwire.robot.platform_symbols.RigidBodySymbols`.
     ``sensor_delays`` (3 + n) of positions and tensions in s; ``span_tensions`` (n) of the free spans in N. ``start``
     is the state in static equilibrium; ``drifting`` are the indices of states without equilibrium; ``parameters``
     are the free ones.
@@ -79,6 +82,7 @@ class SymbolicModel:
     state_names: tuple[str, ...]
     input_names: tuple[str, ...]
     output_names: tuple[str, ...]
+    indices: StateIndices
 
 
 @dataclass(frozen=True)
@@ -89,20 +93,18 @@ class _Variables:
     the declared anchors give, whatever the uncertain ones are.
     """
 
-    position: SX
-    velocity: SX
+    platform: PlatformSymbols
     unstrained_lengths: SX
     winch_speeds: SX
-    external_force: SX
     length_shifts: SX = field(default_factory=SX)
 
     @property
     def states(self) -> SX:
-        return casadi.vertcat(self.position, self.velocity, self.unstrained_lengths)
+        return casadi.vertcat(self.platform.pose, self.platform.twist, self.unstrained_lengths)
 
     @property
     def inputs(self) -> SX:
-        return casadi.vertcat(self.winch_speeds, self.external_force)
+        return casadi.vertcat(self.winch_speeds, self.platform.external_wrench)
 
 
 @dataclass(frozen=True)
@@ -129,15 +131,20 @@ class _EffectState:
 
 
 def symbolic_model(
-    robot: Robot, free_parameters: Sequence[FreeParameter] = (), uncertain_parameters: Sequence[UncertainParameter] = ()
+    robot: Robot,
+    free_parameters: Sequence[FreeParameter] = (),
+    uncertain_parameters: Sequence[UncertainParameter] = (),
+    reference_orientation: Quaternion | None = None,
 ) -> SymbolicModel:
     """Assembles the equations of a robot with some parameters of its effects as symbols.
 
     Each of ``uncertain_parameters`` is one more state, after all others: in standard deviations, zero at the start.
     The static start follows the free parameters; with more than three cables, cables at a tension limit stay there.
-    Not valid across a change of which cables are at a limit.
+    Not valid across a change of which cables are at a limit. Rotations of a rigid body count from the
+    ``reference_orientation``, by default that of the start.
     """
-    require_point_mass(robot.name, robot)
+    if free_parameters or uncertain_parameters:
+        require_point_mass(robot.name, robot)
     symbols = [SX.sym(f"{_owner_name(robot, f)}.{f.name}") for f in free_parameters]
     constants = [SX.sym(number.label) for number in uncertain_parameters]
     perturbations = [limited_perturbation(constant, casadi.sqrt) for constant in constants]
@@ -145,60 +152,70 @@ def symbolic_model(
         perturbed_robot(robot, uncertain_parameters, perturbations), free_parameters, symbols
     )
     symbolic_robot = with_true_start(symbolic_robot, CASADI_MATHEMATICS)
-    start_tensions = symbolic_start_tensions(with_true_start(robot), symbolic_robot, CASADI_MATHEMATICS)
+    start_tensions = (
+        list(map(SX, static_tensions(robot).tolist()))
+        if robot.platform.is_rigid_body
+        else symbolic_start_tensions(with_true_start(robot), symbolic_robot, CASADI_MATHEMATICS)
+    )
     assembly = assemble_robot(symbolic_robot, start_tensions, CASADI_MATHEMATICS)
     count = len(assembly.cables)
+    reference = start_orientation(symbolic_robot) if reference_orientation is None else reference_orientation
+    platform = platform_symbols(CASADI_MATHEMATICS, symbolic_robot, assembly.platform, reference)
     variables = _Variables(
-        position=SX.sym("position", 3),
-        velocity=SX.sym("velocity", 3),
+        platform,
         unstrained_lengths=SX.sym("unstrained_length", count),
         winch_speeds=SX.sym("winch_speed", count),
-        external_force=SX.sym("external_force", 3),
     )
     variables = replace(variables, length_shifts=_length_shifts(assembly, constants))
     effect_states, equations = _minimal_equations(assembly, variables)
-    no_rates = SX(len(constants), 1)
+    no_rates, indices = SX(len(constants), 1), StateIndices(platform.pose.numel(), count)
     first_effect_state = variables.states.numel()
     return SymbolicModel(
         states=casadi.vertcat(variables.states, *(each.symbol for each in effect_states), *constants),
         inputs=variables.inputs,
         parameters=casadi.vertcat(*symbols) if symbols else SX(0, 1),
         rates=casadi.vertcat(equations.rates, no_rates),
-        outputs=_shown(equations.outputs, sensor_errors(uncertain_parameters, perturbations, count)),
+        outputs=_shown(equations.outputs, indices, sensor_errors(uncertain_parameters, perturbations, count)),
         span_tensions=equations.span_tensions,
         sensor_delays=_sensor_delays(assembly),
-        start=casadi.vertcat(_nominal_start(_initial_state(assembly, len(effect_states)), constants), no_rates),
+        start=casadi.vertcat(
+            _nominal_start(_initial_state(assembly, platform, len(effect_states)), constants), no_rates
+        ),
         drifting=tuple(first_effect_state + i for i, each in enumerate(effect_states) if each.state.drifts),
         state_names=(
-            *_axis_names("position"),
-            *_axis_names("velocity"),
+            *platform.pose_names,
+            *platform.twist_names,
             *_numbered_names("unstrained_length", count),
             *(each.name for each in effect_states),
             *(f"uncertain {number.label}" for number in uncertain_parameters),
         ),
-        input_names=(*_numbered_names("winch_speed", count), *_axis_names("external_force")),
+        input_names=(*_numbered_names("winch_speed", count), *platform.wrench_names),
         output_names=(
-            *_axis_names("position"),
-            *_axis_names("velocity"),
+            *platform.pose_names,
+            *platform.twist_names,
             *_numbered_names("tension", count),
             *_numbered_names("length", count),
         ),
+        indices=indices,
     )
 
 
-def _shown(outputs: SX, errors: SensorErrors) -> SX:
+def _shown(outputs: SX, indices: StateIndices, errors: SensorErrors) -> SX:
     """The outputs as sensors with constant errors show them; velocities and lengths are not measured."""
     shown = casadi.vertsplit(outputs)
-    measured_rows = [*range(3), *range(6, 3 + len(errors.gains))]
+    measured_rows = [*range(3), *range(indices.tensions.start, indices.tensions.stop)]
     for row, gain, offset in zip(measured_rows, errors.gains, errors.offsets, strict=True):
         shown[row] = (shown[row] if isinstance(gain, float) else gain * shown[row]) + offset
     return casadi.vertcat(*shown)
 
 
-def _initial_state(assembly: RobotAssembly, effect_state_count: int) -> SX:
+def _initial_state(assembly: RobotAssembly, platform: PlatformSymbols, effect_state_count: int) -> SX:
     lengths = [SX(component.constants.start_length) for component in assembly.cables]
     start = casadi.vertcat(*map(SX, assembly.start))
-    return casadi.vertcat(start, SX(list(assembly.velocity)), *lengths, SX(effect_state_count, 1))
+    # A rigid body starts at its reference orientation, and does not turn.
+    no_rotation = SX(platform.pose.numel() - 3, 1)
+    motion = casadi.vertcat(start, no_rotation, SX(list(assembly.velocity)), no_rotation)
+    return casadi.vertcat(motion, *lengths, SX(effect_state_count, 1))
 
 
 def _length_shifts(assembly: RobotAssembly, constants: Sequence[SX]) -> SX:
@@ -317,38 +334,37 @@ def _owner_name(robot: Robot, parameter: FreeParameter) -> str:
 
 
 def _equations(assembly: RobotAssembly, variables: _Variables, effect_states: list[SX]) -> _Equations:
-    position, velocity = _components(variables.position), _components(variables.velocity)
-    force: Sequence[SX] = _components(variables.external_force)
     readings = []
     cable_rates = []
     effect_rates: list[SX] = []
-    symbols = iter(effect_states)
+    symbols, platform = iter(effect_states), variables.platform
     for index, component in enumerate(assembly.cables):
         states = tuple(tuple(next(symbols) for _ in a.effect.states) for a in component.effects)
         unstrained_length = variables.unstrained_lengths[index] + variables.length_shifts[index]
         state = cable_law.CableState(unstrained_length, 0.0, states)
-        inputs = cable_law.CableInputs(position, velocity, variables.winch_speeds[index])
+        inputs = cable_law.CableInputs(*platform.attachment_motion(index), variables.winch_speeds[index])
         arguments = (CASADI_MATHEMATICS, component.constants, component.effects, state)
         span = cable_law.span(CASADI_MATHEMATICS, component.constants, inputs, component.effects)
         motion = cable_law.cable_motion(*arguments, span, inputs.winch_speed)
-        reading = cable_law.cable_outputs(*arguments, motion)
         rate = cable_law.state_rates(*arguments, motion)
-        force = add(force, reading.force)
-        readings.append(reading)
+        readings.append(cable_law.cable_outputs(*arguments, motion))
         cable_rates.append(rate.unstrained_length)
         effect_rates += [r for rates in rate.effects for r in rates]
     platform_states = tuple(tuple(next(symbols) for _ in a.effect.states) for a in assembly.platform_effects)
     # On the platform only formulas have states: the time since the start.
     effect_rates += [SX(1.0) for states in platform_states for _ in states]
     effects = assembly.platform_effects
-    force = add(force, platform_law.wrench(CASADI_MATHEMATICS, effects, platform_states, position, velocity))
-    acceleration = platform_law.acceleration(CASADI_MATHEMATICS, assembly.platform, effects, platform_states, force)
-    measured = scale(stages.sensor_gains(CASADI_MATHEMATICS, effects)[1], position)
+    measured = scale(stages.sensor_gains(CASADI_MATHEMATICS, effects)[1], vector_of(platform.pose))
     measured = add(measured, stages.sensor_offsets(CASADI_MATHEMATICS, effects)[1])
+    platform_rates = platform.rates([reading.force for reading in readings], effects, platform_states)
     return _Equations(
-        rates=casadi.vertcat(variables.velocity, *acceleration, *cable_rates, *effect_rates),
+        rates=casadi.vertcat(platform_rates, *cable_rates, *effect_rates),
         outputs=casadi.vertcat(
-            *measured, variables.velocity, *(r.tension for r in readings), *(r.length for r in readings)
+            *measured,
+            platform.pose[3:],
+            platform.twist,
+            *(r.tension for r in readings),
+            *(r.length for r in readings),
         ),
         span_tensions=casadi.vertcat(*(r.span_tension for r in readings)),
     )
@@ -359,14 +375,6 @@ def _sensor_delays(assembly: RobotAssembly) -> SX:
     position_delay = stages.sensor_delays(CASADI_MATHEMATICS, assembly.platform_effects)[1]
     tension_delays = [stages.sensor_delays(CASADI_MATHEMATICS, component.effects)[0] for component in assembly.cables]
     return casadi.vertcat(*[SX(position_delay)] * 3, *map(SX, tension_delays))
-
-
-def _components(column: SX) -> tuple[SX, SX, SX]:
-    return (column[0], column[1], column[2])
-
-
-def _axis_names(name: str) -> tuple[str, ...]:
-    return tuple(f"{name}.{axis}" for axis in AXES)
 
 
 def _numbered_names(name: str, count: int) -> tuple[str, ...]:

@@ -96,14 +96,29 @@ function positionAt(scene, place) {
   return scene.platform.map((column) => series(column)[place]);
 }
 
+/** Where a cable holds the platform: a point mass itself, or one of the body's attachments. */
+function attachmentAt(scene, cable, place) {
+  return scene.attachments ? scene.attachments[cable].map((column) => series(column)[place]) : positionAt(scene, place);
+}
+
 /** Lines from every anchor to the platform, a gap after each, and the tension along each. */
 function cableLines(scene, place) {
-  const end = positionAt(scene, place);
   const lines = { x: [], y: [], z: [], tension: [] };
   report.anchors.forEach((anchor, cable) => {
+    const end = attachmentAt(scene, cable, place);
     const tension = series(scene.tension[cable])[place];
     ["x", "y", "z"].forEach((name, k) => lines[name].push(anchor[k], end[k], null));
     lines.tension.push(tension, tension, tension);
+  });
+  return lines;
+}
+
+/** Edges of the hull of a body's attachments, a gap after each; nothing of a point mass. */
+function bodyLines(scene, place) {
+  const lines = { x: [], y: [], z: [] };
+  scene.edges.forEach((edge) => {
+    const [first, second] = edge.map((cable) => attachmentAt(scene, cable, place));
+    axisNames.forEach((name, k) => lines[name].push(first[k], second[k], null));
   });
   return lines;
 }
@@ -151,7 +166,11 @@ function pointTraces(scene, place, colour) {
     marker: { size: 7, color: colour.accent, line: { color: colour.surface, width: 2 } },
     hovertemplate: "platform<br>%{x:.4f}, %{y:.4f}, %{z:.4f} m<extra></extra>",
   };
-  return [anchors, platform];
+  const body = {
+    type: "scatter3d", mode: "lines", name: "platform", ...bodyLines(scene, place), hoverinfo: "skip",
+    connectgaps: false, line: { width: 5, color: colour.accent },
+  };
+  return [anchors, platform, ...(scene.edges.length ? [body] : [])];
 }
 
 function sceneLayout(colour, scene, times) {
@@ -183,15 +202,18 @@ function drawScene(choice, place, times, view) {
   return drawn;
 }
 
-/** Move what the slider moves: the cables, the first trace, and the platform, the third. */
+/** Move what the slider moves: the cables, the first trace, and the platform, the third and, of a body, the fourth. */
 function moveRobot(choice, place, times, view) {
   if (!has3d) return drawScene(choice, place, times, view);
   const lines = cableLines(choice.scene, place);
   const [x, y, z] = positionAt(choice.scene, place).map((value) => [value]);
+  const edges = choice.scene.edges.length ? [bodyLines(choice.scene, place)] : [];
   return Plotly.restyle(sceneFigure, {
-    x: [lines.x, x], y: [lines.y, y], z: [lines.z, z],
-    ...(hasTension(choice.scene) ? { "line.color": [lines.tension, undefined] } : {}),
-  }, [0, 2]);
+    x: [lines.x, x, ...edges.map((body) => body.x)],
+    y: [lines.y, y, ...edges.map((body) => body.y)],
+    z: [lines.z, z, ...edges.map((body) => body.z)],
+    ...(hasTension(choice.scene) ? { "line.color": [lines.tension, undefined, ...edges.map(() => undefined)] } : {}),
+  }, [0, 2, ...edges.map(() => 3)]);
 }
 
 /** Tensions of all cables at one time, in words. */
