@@ -6,11 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.stats import t as students_t
 
 from tautwire.estimation.cosimulation_validation import cosimulate_data_set, noise_floor
 from tautwire.estimation.disturbance_posterior import disturbance_prior
 from tautwire.estimation.estimation_data import DataSplit, split_data
-from tautwire.estimation.explained_shares import missed_with_effects, missed_without_effects, simulated_outputs
+from tautwire.estimation.explained_shares import (
+    amplitude_spread,
+    missed_with_effects,
+    missed_without_effects,
+    simulated_outputs,
+)
 from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fitter
@@ -46,6 +52,26 @@ def test_simulated_outputs_are_those_of_the_fmus(
     by_fmus = cosimulate_data_set(robot, SPLIT.validation).measured()
     assert np.max(np.abs(simulated[:, :3] - by_fmus[:, :3])) < max_position_error
     assert np.max(np.abs(simulated[:, 3:] - by_fmus[:, 3:])) < 2e4 * max_position_error
+
+
+def test_an_effect_that_grows_has_another_amplitude_on_each_stretch() -> None:
+    """A load from zero to twice that of the effect: by stretches of an eighth its factors are 1/8 to 15/8."""
+    signature = np.ones((8000, 2))
+    residual = np.linspace(-1.0, 1.0, 8000)[:, None] * signature
+    every = np.ones(8000, dtype=bool)
+    factors = (2.0 * np.arange(8) + 1.0) / 8.0
+    expected = students_t.ppf(0.975, 7) * np.std(factors, ddof=1) / np.sqrt(8.0)
+    assert amplitude_spread(residual, signature, every, 8) == pytest.approx(expected, rel=1e-3)
+    assert amplitude_spread(0.0 * residual, signature, every, 8) == 0.0
+    noise = np.random.default_rng(1).normal(size=(8000, 2))
+    assert amplitude_spread(noise, signature, every, 8) < 0.03
+
+
+def test_what_was_not_measured_or_does_not_count_tells_nothing_of_the_amplitude() -> None:
+    signature, rows = np.ones((800, 2)), np.arange(800) >= 100
+    residual = np.where(rows[:, None], 0.0, 9.0) * signature
+    residual[:, 1] = np.nan
+    assert amplitude_spread(residual, signature, rows, 8) == 0.0
 
 
 def test_the_effect_that_is_there_leaves_little_of_what_the_robot_without_it_misses() -> None:

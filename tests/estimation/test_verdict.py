@@ -32,7 +32,7 @@ def hypothesis(name: str) -> Hypothesis:
 def shares(left: float, missed: float, **of_effects: tuple[float, float]) -> ExplainedShares:
     """Shares with (share, size) of each effect; what is left has its part of the mean square of what is missed."""
     parts, sizes = ([pair[k] for pair in of_effects.values()] for k in (0, 1))
-    return ExplainedShares(tuple(parts), tuple(sizes), left, missed, missed * left**0.5)
+    return ExplainedShares(tuple(parts), tuple(sizes), (0.0,) * len(parts), left, missed, missed * left**0.5)
 
 
 def verdict(of: ExplainedShares, *names: str) -> tuple[str, str]:
@@ -78,6 +78,14 @@ def test_a_listed_effect_gets_no_credit_for_what_is_not_on_the_list(names: tuple
     assert word == "unexplained"
     assert REMAINING in sentence
     assert all(name in sentence for name in names)
+
+
+def test_an_effect_whose_size_changes_from_stretch_to_stretch_gets_no_name() -> None:
+    of = shares(0.45, 60.0, payload=(0.55, 40.0))
+    assert verdict(of, "payload")[0] == "effects"
+    word, sentence = verdict(replace(of, spreads=(0.47,)), "payload")
+    assert word == "unexplained"
+    assert "Of it 55 % would go to payload, which would have to change from stretch to stretch." in sentence
 
 
 @pytest.mark.parametrize(("share", "size"), [(0.01, 9.0), (0.04, 9.0), (0.3, 0.5)])

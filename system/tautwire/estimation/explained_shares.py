@@ -6,8 +6,10 @@ an error and ``s^2`` of noise, of positions and tensions,
     M = sum over both of max(e^2 / s^2 - 1, 0)        share = (M without the effect - M) / (M without any effect)
 
 at most what all effects explain together. Shares need not sum to one: what two effects explain together counts for
-both. Without an effect all else stays
-as it is, the initial state included. An effect that acts on several cables with a value each is one effect.
+both. Without an effect all else stays as it is, the initial state included. An effect that acts on several cables with
+a value each is one effect.
+
+An effect is the same from beginning to end; what is only like it now and then would need another size on each stretch.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 from scipy.signal import periodogram
+from scipy.stats import t as students_t
 
 from ..cosimulation.robot_cosimulation import CosimulationResult
 from ..recordings.recording import Recording
@@ -40,12 +43,14 @@ Array = NDArray[np.float64]
 class ExplainedShares:
     """Shares of the effects and of what is left, from 0 to 1, and sizes in standard deviations of one sample's noise.
 
-    ``sizes`` are those of what each effect changes in the outputs; ``size_missed`` is that of what the robot without
-    effects misses beside noise, its uncertain numbers at their best, ``size_left`` that of what is left.
+    ``sizes`` are those of what each effect changes in the outputs, ``spreads`` how much they differ by stretch, see
+    :func:`amplitude_spread`; ``size_missed`` is the size of what the robot without effects misses beside noise, its
+    uncertain numbers at their best, ``size_left`` that of what is left.
     """
 
     effects: tuple[float, ...]
     sizes: tuple[float, ...]
+    spreads: tuple[float, ...]
     left: float
     size_missed: float
     size_left: float
@@ -53,11 +58,16 @@ class ExplainedShares:
     def substantial(self, policy: SizePolicy) -> list[int]:
         """Indices of the effects that matter, the largest first.
 
-        Their shares are worth a name, and more than the form of the largest may leave; their sizes are beyond noise.
+        Their shares are worth a name, and more than the form of the largest may leave; their sizes are beyond noise,
+        and about the same on all stretches.
         """
-        ranked = sorted(range(len(self.effects)), key=lambda index: -self.effects[index])
+        ranked = sorted(self.steady(policy), key=lambda index: -self.effects[index])
         least = max(policy.min_share, policy.max_left_share_of_form * max(self.effects, default=0.0))
         return [i for i in ranked if self.effects[i] >= least and self.sizes[i] >= policy.min_size]
+
+    def steady(self, policy: SizePolicy) -> list[int]:
+        """Indices of the effects that have about the same size on all stretches."""
+        return [index for index, spread in enumerate(self.spreads) if spread <= policy.max_amplitude_spread]
 
 
 def explained_shares(
@@ -82,15 +92,37 @@ def explained_shares(
     left = _missed(recording, after.after.measured(), floor)
     total = max(missed, left, np.finfo(float).tiny)
     outputs = [outputs_without[hypothesis.effect.name] for hypothesis in accepted]
+    residual, noise = recording.measured() - complete, np.append(floor.axes, floor.cables)
     # Without one effect the others may miss more than the robot without any.
     explained = 1.0 - left / total
     return ExplainedShares(
         tuple(float(np.clip((_missed(recording, each, floor) - left) / total, 0.0, explained)) for each in outputs),
         tuple(_size(each - complete, recording, floor) for each in outputs),
+        tuple(
+            amplitude_spread(residual / noise, (complete - each) / noise, data.rows, context.policy.stability.stretches)
+            for each in outputs
+        ),
         float(np.clip(left / total, 0.0, 1.0)),
         missed**0.5,
         left**0.5,
     )
+
+
+def amplitude_spread(residual: Array, signature: Array, rows: NDArray[np.bool_], stretch_count: int) -> float:
+    """Half-width of the 95 % interval of an effect's amplitude, relative to it, by its spread over stretches.
+
+    With the residual r and what the effect changes, d, (N, m) both over noise, of the B stretches of the ``rows`` (N,)
+
+        c_b = sum of r d on stretch b        w = t sqrt(B / (B - 1) sum_b (c_b - mean of c)^2) / sum of d^2
+
+    with t Student's of B - 1 degrees. NaN entries of r do not count.
+    """
+    is_counted = np.isfinite(residual) & rows[:, None]
+    products = np.where(is_counted, residual * signature, 0.0).sum(axis=1)[rows]
+    energy = float(np.sum(np.where(is_counted, signature, 0.0) ** 2))
+    by_stretch = np.array([part.sum() for part in np.array_split(products, stretch_count)])
+    spread = np.sqrt(stretch_count * np.var(by_stretch) * stretch_count / (stretch_count - 1))
+    return float(students_t.ppf(0.975, stretch_count - 1) * spread / max(energy, np.finfo(float).tiny))
 
 
 def missed_without_effects(context: IdentificationContext, declared: Fitter, data: DataSet, floor: Errors) -> float:

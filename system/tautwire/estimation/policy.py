@@ -216,6 +216,9 @@ class SizePolicy:
     max_left_share_of_form: float = 0.05
     # Least share that all effects together explain, where much is left: below, nothing on the list explains it.
     min_explained_share: float = 0.25
+    # Half-width of an effect's amplitude over stretches, relative to it, above which it is none: a tank that fills was
+    # a payload with 0.47; effects of the list had 0.15 at most in a dozen lifelike recordings.
+    max_amplitude_spread: float = 0.3
     # Standard deviations within which an uncertain number of the robot without effects is taken at its best.
     max_calibration_sigmas: float = 3.0
     # Size of what is missed in co-simulation, in standard deviations of one sample's noise, that passes for a random

@@ -79,7 +79,9 @@ def verdict_beside_disturbance(
         uncertain = f"{_per_cent(others)} lies within stated uncertainties, and " if is_stated else ""
         lacks = f"The model lacks {named}; {uncertain}{_per_cent(shares.left)} remains{kind}."
         return "effects", f"{lacks} The error is then {remaining}."
-    closest = f" Of it {_per_cent(1.0 - shares.left)} would go to {_sum_up(names)}." if names else ""
+    is_steady = len(shares.steady(policy)) == len(accepted)
+    varies = "" if is_steady else ", which would have to change from stretch to stretch"
+    closest = f" Of it {_per_cent(1.0 - shares.left)} would go to {_sum_up(names)}{varies}." if names else ""
     return "unexplained", f"No known effect explains a substantial share of the residual: {remaining}.{closest}"
 
 
