@@ -69,6 +69,14 @@ def digits_for_range(low: float, high: float) -> int:
     return min(MAX_DIGITS, INTEGER_DIGITS + max(0, math.ceil(math.log10(size / width))))
 
 
+def digits_beside(value: float, reference: float | None) -> int:
+    """Number of significant digits that show three of a value's difference from a ``reference``, if there is one."""
+    if reference is None or value == reference or not math.isfinite(value) or value == 0.0:
+        return 3
+    places = math.floor(math.log10(abs(value))) - math.floor(math.log10(abs(value - reference)))
+    return min(MAX_DIGITS, 3 + max(0, places))
+
+
 def format_engineering(value: float | None, unit: str, digits: int = 3) -> str:
     """Formats a value in an SI unit with a fitting prefix, as in "102 GPa"."""
     if value is None or not math.isfinite(value):

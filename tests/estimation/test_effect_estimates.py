@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tautwire.estimation.effect_estimates import parameter_correlations
+from tautwire.estimation.effect_estimates import parameter_correlations, with_readable_values
 from tautwire.estimation.hypotheses import with_values
 from tautwire.estimation.parameter_fit import Fit
 from tautwire.estimation.trace_result import Estimate, FittedParameter, FoundEffect
@@ -42,6 +44,20 @@ def correlation_of(fit: Fit) -> float:
     (found,) = parameter_correlations(fit, effects)
     assert found.between == (FittedParameter("payload", (), "mass"), gain)
     return found.value
+
+
+def test_fitted_values_have_the_digits_that_their_intervals_are_worth() -> None:
+    declared = example("three")
+    robot = declared.with_effect(EffectSetting("payload", {"mass": 3.2012345678901234}))
+    heavier = replace(robot, platform=replace(robot.platform, mass=301.23456789012345))
+    estimate = Estimate(3.2012345678901234, "kg", 3.18, 3.22, None)
+    readable = with_readable_values(
+        heavier, declared, [FoundEffect("payload", "platform", (), {"mass": estimate}, 9.0)]
+    )
+    assert readable.effects[0].values["mass"] == 3.20123
+    assert readable.platform.mass == 301.2345679
+    assert readable.cables == declared.cables
+    assert with_readable_values(robot, declared, ()) == robot
 
 
 def test_correlations_are_those_of_each_two_parameters_beside_what_else_was_fitted() -> None:

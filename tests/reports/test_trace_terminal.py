@@ -18,7 +18,7 @@ from tautwire.number_format import (
     format_significant,
 )
 from tautwire.reports import trace_page, trace_table
-from tautwire.reports.trace_texts import ROLES, comparison_by_role, explained_share, format_evidence
+from tautwire.reports.trace_texts import ROLES, comparison_by_role, explained_share, format_evidence, values_text
 from tests.support.pages import Page
 from tests.support.traces import HOSTILE, made_trace, nothing_found, without_positions
 
@@ -156,6 +156,19 @@ def test_markup_and_control_characters_in_texts_do_nothing() -> None:
 )
 def test_units_are_those_of_an_engineer(value: float | None, unit: str, text: str) -> None:
     assert format_engineering(value, unit) == text
+
+
+@pytest.mark.parametrize(
+    ("effect", "values", "text"),
+    [
+        ("drum", {"radius_ratio": 1.00398213}, "radius_ratio 1.00398"),
+        ("drum", {"radius_ratio": 0.936}, "radius_ratio 0.9360"),
+        ("drum", {"radius_ratio": 1.0}, "radius_ratio 1.00"),
+        ("damping", {"damping": 2.1034e9}, "damping 2.10 GPa s"),
+    ],
+)
+def test_a_ratio_near_one_shows_by_how_much_it_differs(effect: str, values: dict[str, float], text: str) -> None:
+    assert values_text(effect, values) == text
 
 
 def test_unknown_units_are_left_alone() -> None:

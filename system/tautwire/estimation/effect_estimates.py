@@ -26,6 +26,9 @@ from .trace_result import Correlation, Estimate, FittedParameter, FoundEffect
 
 Array = NDArray[np.float64]
 
+# Of an interval's half-width, in the values of a robot as found.
+READABLE_DIGITS = 4
+
 
 def estimated_effects(context: IdentificationContext, selection: SelectionResult) -> tuple[FoundEffect, ...]:
     """Estimates of the accepted effects of the list, in order, on the estimation data that they were fitted to."""
@@ -90,6 +93,42 @@ def _neutral_values(declared: Robot, selection: SelectionResult) -> Array:
                 neutral = declared_value(declared, parameter, hypothesis.cables) or 0.0
             values[indices[FittedParameter(hypothesis.effect.name, hypothesis.cables, parameter.name)]] = neutral
     return values
+
+
+def with_readable_values(robot: Robot, declared: Robot, effects: Sequence[FoundEffect]) -> Robot:
+    """The robot with its fitted numbers to as many digits as they are worth.
+
+    Values of ``effects`` to a thousandth of their intervals' half-widths, other numbers that are not as ``declared`` to
+    ten significant digits.
+    """
+    widths = {
+        (effect.name, effect.cables, name): 0.5 * (estimate.high - estimate.low)
+        for effect in effects
+        for name, estimate in effect.parameters.items()
+    }
+    settings = []
+    for setting in robot.effects:
+        keys = {name: (setting.name, setting.cables, name) for name in setting.values}
+        values = {name: _rounded(value, widths.get(keys[name], 0.0)) for name, value in setting.values.items()}
+        settings.append(replace(setting, values=values))
+    platform = replace(robot.platform, mass=_unless_declared(robot.platform.mass, declared.platform.mass))
+    cables = []
+    for cable, before in zip(robot.cables, declared.cables, strict=True):
+        x, y, z = map(_unless_declared, cable.anchor, before.anchor)
+        modulus, damping = (_unless_declared(getattr(cable, n), getattr(before, n)) for n in ("modulus", "damping"))
+        cables.append(replace(cable, modulus=modulus, damping=damping, anchor=(x, y, z)))
+    return replace(robot, effects=tuple(settings), platform=platform, cables=tuple(cables))
+
+
+def _rounded(value: float, half_width: float) -> float:
+    """A value to a thousandth of a half-width; as it is where that is zero or not finite."""
+    if not (np.isfinite(half_width) and half_width > 0.0 and np.isfinite(value)):
+        return value
+    return round(value, READABLE_DIGITS - 1 - int(np.floor(np.log10(half_width))))
+
+
+def _unless_declared(value: float, declared: float) -> float:
+    return value if value == declared else float(f"{value:.10g}")
 
 
 def effects_by_size(

@@ -15,7 +15,7 @@ from ..process_signals import defer_interrupts
 from ..recordings.recording import Recording, require_outputs
 from ..robot.schema import Robot, validate_point_mass_robot
 from ..validation import NumberRule, validate_callable, validate_instance, validate_integer, validate_number
-from .effect_estimates import parameter_correlations
+from .effect_estimates import parameter_correlations, with_readable_values
 from .identification_context import IdentificationContext, Progress, no_progress
 from .identification_stages import SEARCHES, STAGES
 from .identification_state import Identification
@@ -165,7 +165,7 @@ def _result(state: Identification) -> Trace:
         verdict=verdict,
         sentence=sentence,
         robot_before=context.robot,
-        robot_after=final,
+        robot_after=with_readable_values(final, context.robot, (*effects, *state.small_effects)),
         effects=effects,
         correlations=parameter_correlations(state.selection.fit, effects),
         also_possible=state.selection.confusable if state.effects_hold else (),

@@ -29,6 +29,7 @@ from .trace_texts import (
     explained_share,
     format_estimate,
     format_evidence,
+    localisation_sentence,
     noise_sentence,
     separating_commands,
     undetectable_effects,
@@ -44,7 +45,7 @@ def trace_table(trace: Trace) -> RenderableType:
         Text(f"{VERDICTS[trace.verdict]}: {one_line(trace.sentence)}", style="bold"),
         Text(noise_sentence(trace) + "\n"),
         _error_table(trace),
-        _paragraph("Where, before any effect is fitted", [trace.components.sentence]),
+        _paragraph("Where, before any effect is fitted", [localisation_sentence(trace)]),
     ]
     if trace.effects:
         blocks.append(_effect_table(trace))

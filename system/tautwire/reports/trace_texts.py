@@ -10,8 +10,9 @@ from itertools import groupby
 from tautwire_fmu.laws.effects import BY_NAME
 
 from ..estimation.hypotheses import hypotheses
+from ..estimation.localisation.component_residuals import ComponentResidual
 from ..estimation.trace_result import Candidate, Comparison, Detectable, Errors, Estimate, Trace
-from ..number_format import ABSENT_TEXT, format_engineering, format_in_common_unit, format_significant
+from ..number_format import ABSENT_TEXT, digits_beside, format_engineering, format_in_common_unit, format_significant
 from ..robot.schema import AXES
 
 ROLES = ("fit", "check")
@@ -90,10 +91,35 @@ def parameter_unit(effect: str, parameter: str) -> str:
 
 
 def values_text(effect: str, values: Mapping[str, float]) -> str:
-    """Parameter values of an effect on one line, as in "damping 2.10 GPa s"."""
-    return ", ".join(
-        f"{name} {format_engineering(value, parameter_unit(effect, name))}" for name, value in values.items()
-    )
+    """Parameter values of an effect on one line, as in "damping 2.10 GPa s".
+
+    Of a ratio near 1, or another value near its neutral one, three digits of the difference are shown.
+    """
+    definition = BY_NAME.get(effect)
+    neutral = {each.name: each.neutral for each in definition.parameters} if definition else {}
+    texts = [
+        format_engineering(value, parameter_unit(effect, name), digits_beside(value, neutral.get(name)))
+        for name, value in values.items()
+    ]
+    return ", ".join(f"{name} {text}" for name, text in zip(values, texts, strict=True))
+
+
+def localisation_sentence(trace: Trace) -> str:
+    """What single components deviate by; and, where the effects act in others as well, why these do not."""
+    residuals = trace.components.residuals
+    within_noise = {int(each.component.split()[1]) for each in residuals if _is_cable_within_noise(each)}
+    hidden = [effect for effect in trace.effects if set(effect.cables) & within_noise]
+    if not hidden or len(within_noise) == sum(each.component.startswith("cable ") for each in residuals):
+        return trace.components.sentence
+    names = " and ".join(dict.fromkeys(effect.name for effect in hidden))
+    cables = sorted(within_noise & {cable for effect in hidden for cable in effect.cables})
+    where = cables_text(cables, trace.robot_before.cable_count)
+    explanation = f"The {names} found acts in {where} too: there a cable alone shows no more than noise."
+    return f"{trace.components.sentence} {explanation}"
+
+
+def _is_cable_within_noise(residual: ComponentResidual) -> bool:
+    return residual.component.startswith("cable ") and not residual.is_significant
 
 
 @dataclass(frozen=True)
