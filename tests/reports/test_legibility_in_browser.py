@@ -166,3 +166,17 @@ def test_nothing_is_cut_on_paper(browser: Browser, pages: dict[str, Path], kind:
     assert browser.run(hidden)
     assert browser.run("return document.querySelector('.on-paper').naturalWidth") > 300
     assert browser.run("return document.querySelectorAll('details:not([open])').length") == 0
+
+
+def test_printing_leaves_folded_what_was_folded_and_open_what_was_open(
+    browser: Browser, pages: dict[str, Path]
+) -> None:
+    opened(browser, pages["trace"])
+    are_open = "return [...document.querySelectorAll('details')].map((each) => each.open)"
+    browser.run("document.querySelector('details').open = true")
+    before = browser.run(are_open)
+    assert before[0] and not all(before)
+    browser.run("window.dispatchEvent(new Event('beforeprint'))")
+    assert all(browser.run(are_open))
+    browser.run("window.dispatchEvent(new Event('afterprint'))")
+    assert browser.run(are_open) == before

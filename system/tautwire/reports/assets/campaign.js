@@ -75,6 +75,7 @@ function startCampaign() {
   for (const figure of document.querySelectorAll("figure")) watcher.observe(figure);
   window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => redraw("figure"));
   window.addEventListener("beforeprint", preparePrint);
+  window.addEventListener("afterprint", finishPrint);
   if (againstInput) againstInput.addEventListener("change", () => redraw("figure[data-kind=against]"));
   const chosenNow = radio("choice", (value) => {
     state.choice = Number(value);

@@ -31,12 +31,23 @@ function redraw(selector, except = null) {
   }
 }
 
-/** Draw all that is not drawn yet, and open what is folded. */
+/** Draw all that is not drawn yet, and open what is folded until the page has been printed. */
 function preparePrint() {
   [...stale].forEach(drawFigure);
   document.querySelectorAll(".js-plotly-plot").forEach(fitPaper);
-  for (const folded of document.querySelectorAll("details")) folded.open = true;
+  for (const folded of document.querySelectorAll("details:not([open])")) {
+    folded.open = true;
+    folded.dataset.openedToPrint = "";
+  }
   if (sceneFigure && has3d) showPicture(sceneFigure);
+}
+
+/** Fold again what was opened to be printed. */
+function finishPrint() {
+  for (const opened of document.querySelectorAll("details[data-opened-to-print]")) {
+    opened.open = false;
+    delete opened.dataset.openedToPrint;
+  }
 }
 
 /** Lay a picture over a scene in 3D, whose own drawing area browsers leave blank on paper. */
@@ -161,6 +172,7 @@ function start() {
   document.getElementById("play").addEventListener("click", () => (state.timer ? stop() : play()));
   window.matchMedia("(prefers-color-scheme: dark)").addEventListener("change", () => redraw("figure"));
   window.addEventListener("beforeprint", preparePrint);
+  window.addEventListener("afterprint", finishPrint);
   state.scale = radio("scale", (value) => {
     state.scale = value;
     redraw("figure[data-kind=residual]");
