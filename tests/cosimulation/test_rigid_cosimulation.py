@@ -18,7 +18,7 @@ from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.robot.schema import EffectSetting, Robot, UserFmu
 from tautwire.robot.static_equilibrium import start_orientation, static_tensions
 from tests.support.rigid_motion import RigidMotion, RigidRobot, integrated, rotation_matrices
-from tests.support.rigid_robots import crane_robot, suspended_robot
+from tests.support.rigid_robots import crane_robot, suspended_robot, underactuated_robot
 from tests.support.robots import paper_robot
 
 Array = NDArray[np.float64]
@@ -214,3 +214,29 @@ def test_the_energy_of_a_free_swing_stays(periods: int, bound: float, tmp_path: 
     kinetic, energy = RigidRobot(robot, static_tensions(robot)).energy(motion, result.length)
     assert np.max(kinetic[4:]) > 0.5
     assert np.ptp(energy[3:]) < bound * np.max(kinetic[4:])
+
+
+def frequencies(signals: Array, interval: float, count: int) -> Array:
+    """Frequencies in Hz of so many undamped sines in signals (N, k), ascending, by the matrix pencil."""
+    half = len(signals) // 2
+    rows = [signals[index : index + half] for index in range(len(signals) - half)]
+    basis = np.linalg.svd(np.concatenate(rows, axis=1), full_matrices=False)[0][:, : 2 * count + 2]
+    poles = np.linalg.eigvals(np.linalg.lstsq(basis[:-1], basis[1:], rcond=None)[0])
+    found = np.abs(np.angle(poles)) / (2.0 * np.pi * interval)
+    return np.unique(np.round(found[found > 0.1], 6))
+
+
+@pytest.mark.validate
+def test_a_real_platform_swings_at_the_frequencies_of_an_independent_program(tmp_path: Path) -> None:
+    robot = underactuated_robot()
+    time = np.concatenate([[0.0, 0.1, 0.2, 0.3, 0.4], np.arange(0.5, 16.0, 0.1)])
+    speeds = np.zeros((len(time), 4))
+    # What the winches take they give back, as the modes depend on the place.
+    speeds[1] = [0.002, -0.001, 0.0015, -0.002]
+    speeds[3] = -speeds[1]
+    result = cosimulate(build_fmus(robot, tmp_path), time, speeds, 0.005)
+    assert result.orientation is not None
+    poses = np.hstack([result.position, result.orientation])[5:]
+    poses -= poses.mean(axis=0)
+    found = frequencies(poses / poses.std(axis=0), 0.1, 2)
+    assert found[found < 2.0] == pytest.approx([0.823150845872805, 1.1938873382695399], rel=3e-4)
