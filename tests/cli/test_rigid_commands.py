@@ -12,9 +12,11 @@ import pytest
 
 from tautwire.cli import run
 from tautwire.cosimulation.robot_wiring import robot_connections
+from tautwire.reports.downsampling import unpack_float32
 from tautwire.robot.robot_file_writer import write_robot
+from tautwire.robot.static_equilibrium import start_attachments
 from tests.support.pages import Page
-from tests.support.rigid_robots import suspended_robot
+from tests.support.rigid_robots import crane_robot, suspended_robot
 
 
 def written_robot(folder: Path) -> Path:
@@ -44,6 +46,22 @@ def test_simulate_writes_the_orientation_and_tells_that_of_the_start(
     printed = capsys.readouterr()
     assert "suspended: starts 1.15 degrees from the declared orientation" in printed.err
     assert "trace" not in printed.out + printed.err
+
+
+def test_pages_draw_each_cable_to_its_attachment(tmp_path: Path) -> None:
+    robot, speeds, page, modes = (tmp_path / name for name in ("robot.toml", "speeds.csv", "run.html", "modes.html"))
+    write_robot(crane_robot(), robot)
+    standing = {f"winch_speed_{i}": [0.0, 0.0] for i in range(1, 9)}
+    pd.DataFrame({"time": [0.0, 0.1]} | standing).to_csv(speeds, index=False)
+    out = [str(tmp_path / name) for name in ("run.csv", "model.json")]
+    assert run(["simulate", str(robot), "--speeds", str(speeds), "--out", out[0], "--report", str(page)]) == 0
+    assert run(["linearise", str(robot), "--out", out[1], "--report", str(modes)]) == 0
+    scenes = [Page(each.read_text(encoding="utf-8")).data()["choices"][0]["scene"] for each in (page, modes)]
+    for scene, place in zip(scenes, (-1, 18), strict=True):
+        # A quarter of a period after the largest swing a mode passes through rest.
+        drawn = np.array([[unpack_float32(column)[place] for column in point] for point in scene["attachments"]])
+        assert np.max(np.abs(drawn - start_attachments(crane_robot()))) < 1e-6
+        assert len(scene["edges"]) >= 12
 
 
 def test_build_connects_each_cable_with_its_attachment(tmp_path: Path) -> None:
