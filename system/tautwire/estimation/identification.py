@@ -20,6 +20,7 @@ from .identification_context import IdentificationContext, Progress, no_progress
 from .identification_stages import SEARCHES, STAGES
 from .identification_state import Identification
 from .localisation.component_residuals import FaultLocalisation
+from .localisation.fault_isolation import reconciled_with_effects
 from .policy import DEFAULT_POLICY, IdentificationPolicy
 from .preprocessing import prepare_data
 from .residual_analysis import largest_autocorrelations
@@ -159,7 +160,7 @@ def _result(state: Identification) -> Trace:
     innovations = context.fitter.innovations(final, validation)
     verdict, sentence = state.verdict
     calibration_notes = [] if verdict == "unexplained" else _calibration_notes(state)
-    localisation = _localisation(state)
+    localisation = reconciled_with_effects(_localisation(state), [(each.name, each.cables) for each in effects])
     white_before = state.is_white_before
     return Trace(
         verdict=verdict,

@@ -3,8 +3,13 @@
 import numpy as np
 import pytest
 
-from tautwire.estimation.localisation.component_residuals import ComponentResidual
-from tautwire.estimation.localisation.fault_isolation import isolate_fault, isolation_verdict, numbered
+from tautwire.estimation.localisation.component_residuals import ComponentResidual, FaultLocalisation
+from tautwire.estimation.localisation.fault_isolation import (
+    isolate_fault,
+    isolation_verdict,
+    numbered,
+    reconciled_with_effects,
+)
 
 FINE = {1: False, 2: False, 3: False}
 SECOND = {1: False, 2: True, 3: False}
@@ -64,3 +69,37 @@ def test_where_nothing_was_looked_at_the_sentence_says_so() -> None:
 
 def test_names_are_counted() -> None:
     assert [numbered("cable", [2]), numbered("exit point", [1, 3])] == ["cable 2", "exit points 1, 3"]
+
+
+def localised(*tensions: float, force: float = 1.3) -> FaultLocalisation:
+    """The localisation by rms of the tensions of cables 1, 2 and so on, and of a force; 1.3 is noise."""
+    cables = [part(f"cable {number}", "tension", rms) for number, rms in enumerate(tensions, 1)]
+    platform = [part("platform", "force x", force)]
+    return FaultLocalisation(np.zeros(3), (*cables, *platform), *isolation_verdict(cables, platform), ())
+
+
+def test_an_effect_of_all_cables_that_stands_out_at_one_puts_all_in_question() -> None:
+    told = reconciled_with_effects(localised(1.2, 14.1), [("modulus", (1, 2))])
+    assert told.faulty_component == "cables 1, 2, most of all cable 2"
+    assert told.sentence == (
+        "Cable 2's tension deviates by 14 N rms (expected 1.3 N); the platform's force balance is within noise. "
+        "In question: cables 1, 2, most of all cable 2; modulus acts on them and shows at none of the others alone."
+    )
+
+
+@pytest.mark.parametrize(
+    ("localisation", "effects"),
+    [(localised(1.2, 1.3), [("drum", (1,))]), (localised(1.2, 1.3, force=9.0), [("sensor_offset", (1,))])],
+)
+def test_an_effect_that_no_component_shows_is_told_by_all_outputs(
+    localisation: FaultLocalisation, effects: list[tuple[str, tuple[int, ...]]]
+) -> None:
+    told = reconciled_with_effects(localisation, effects)
+    assert told.sentence.startswith(localisation.sentence)
+    assert f"{effects[0][0]} is told by all outputs together, not by one component." in told.sentence
+
+
+@pytest.mark.parametrize("effects", [[], [("drum", (2,))]])
+def test_what_agrees_with_the_effects_stays(effects: list[tuple[str, tuple[int, ...]]]) -> None:
+    localisation = localised(1.2, 14.1)
+    assert reconciled_with_effects(localisation, effects) == localisation

@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import replace
 
-from .component_residuals import PLATFORM, ComponentResidual
+from .component_residuals import PLATFORM, ComponentResidual, FaultLocalisation
 
 UNDETERMINED = "cannot tell"
 NO_COMPONENT = "nothing"
@@ -91,6 +92,32 @@ def isolation_verdict(
         if evidence
         else _verdict_without_evidence(faulty_component),
     )
+
+
+def reconciled_with_effects(
+    localisation: FaultLocalisation, effects: Sequence[tuple[str, Sequence[int]]]
+) -> FaultLocalisation:
+    """The localisation with a conclusion that agrees with the effects found: names with cables, none for the platform.
+
+    A component alone shows less than all outputs together, so an effect of several cables may stand out at one of them.
+    """
+    cables = sorted({cable for _, of_effect in effects for cable in of_effect})
+    deviating = [part.component for part in localisation.residuals if part.is_significant]
+    at_cables = [int(component.split()[1]) for component in deviating if component != PLATFORM]
+    if not effects or not localisation.residuals:
+        return localisation
+    if at_cables and set(at_cables) < set(cables):
+        names = list(dict.fromkeys(name for name, of_effect in effects if of_effect))
+        verbs = "acts on them and shows" if len(names) == 1 else "act on them and show"
+        component = f"{numbered('cable', cables)}, most of all {numbered('cable', at_cables)}"
+        evidence = localisation.sentence.rpartition(". ")[0]
+        sentence = f"{evidence}. In question: {component}; {' and '.join(names)} {verbs} at none of the others alone."
+        return replace(localisation, faulty_component=component, sentence=sentence)
+    if not deviating or bool(at_cables) != bool(cables):
+        names = list(dict.fromkeys(name for name, _ in effects))
+        addition = f"That the model lacks {' and '.join(names)} is told by all outputs together, not by one component."
+        return replace(localisation, sentence=f"{localisation.sentence} {addition}")
+    return localisation
 
 
 def _verdict_without_evidence(faulty_component: str) -> str:
