@@ -27,24 +27,6 @@ def test_each_component_has_its_figures_and_a_bar() -> None:
         assert words in page.text
 
 
-def test_an_effect_in_cables_that_show_nothing_alone_is_no_contradiction() -> None:
-    trace = made_trace(samples=200)
-    quiet = [
-        replace(each, rms=each.expected_rms)
-        if each.component == "cable 2"
-        else replace(each, rms=9.0 * each.expected_rms)
-        for each in trace.components.residuals
-    ]
-    told = replace(trace, components=replace(trace.components, residuals=tuple(quiet)))
-    expected = (
-        f"{trace.components.sentence} The damping found acts in cable 2 too: there a cable alone shows no more than"
-    )
-    assert expected in localisation(told).text
-    assert trace_document(told)["where"]["sentence"].startswith(expected)
-    alone = replace(told, effects=(replace(trace.effects[0], cables=(1, 3)),))
-    assert trace_document(alone)["where"]["sentence"] == trace.components.sentence
-
-
 def test_the_worst_comes_first() -> None:
     text = localisation(made_trace(samples=200)).text
     assert text.index("cable 1") < text.index("force x")

@@ -20,7 +20,7 @@ from ..robot.schema import AXES
 from ..validation import validate_folder, validate_instance
 from .residual_file import RESIDUAL_FILE, write_residuals
 from .trace_report_page import trace_page
-from .trace_texts import ROLES, comparison_by_role, localisation_sentence
+from .trace_texts import ROLES, comparison_by_role
 
 
 def trace_document(trace: Trace) -> dict[str, Any]:
@@ -49,7 +49,7 @@ def trace_document(trace: Trace) -> dict[str, Any]:
         "components": [_component(part) for part in components.ranking],
         "where": {
             "component": components.faulty_component,
-            "sentence": localisation_sentence(trace),
+            "sentence": components.sentence,
             "untold": components.limitations,
         },
         "resonance": [

@@ -29,7 +29,6 @@ from .trace_texts import (
     explained_share,
     format_estimate,
     format_evidence,
-    localisation_sentence,
     noise_sentence,
     separating_commands,
     undetectable_effects,
@@ -45,7 +44,7 @@ def trace_table(trace: Trace) -> RenderableType:
         Text(f"{VERDICTS[trace.verdict]}: {one_line(trace.sentence)}", style="bold"),
         Text(noise_sentence(trace) + "\n"),
         _error_table(trace),
-        _paragraph("Where, before any effect is fitted", [localisation_sentence(trace)]),
+        _paragraph("Where, before any effect is fitted", [trace.components.sentence]),
     ]
     if trace.effects:
         blocks.append(_effect_table(trace))

@@ -10,7 +10,6 @@ from itertools import groupby
 from tautwire_fmu.laws.effects import BY_NAME
 
 from ..estimation.hypotheses import hypotheses
-from ..estimation.localisation.component_residuals import ComponentResidual
 from ..estimation.trace_result import Candidate, Comparison, Detectable, Errors, Estimate, Trace
 from ..number_format import ABSENT_TEXT, digits_beside, format_engineering, format_in_common_unit, format_significant
 from ..robot.schema import AXES
@@ -102,24 +101,6 @@ def values_text(effect: str, values: Mapping[str, float]) -> str:
         for name, value in values.items()
     ]
     return ", ".join(f"{name} {text}" for name, text in zip(values, texts, strict=True))
-
-
-def localisation_sentence(trace: Trace) -> str:
-    """What single components deviate by; and, where the effects act in others as well, why these do not."""
-    residuals = trace.components.residuals
-    within_noise = {int(each.component.split()[1]) for each in residuals if _is_cable_within_noise(each)}
-    hidden = [effect for effect in trace.effects if set(effect.cables) & within_noise]
-    if not hidden or len(within_noise) == sum(each.component.startswith("cable ") for each in residuals):
-        return trace.components.sentence
-    names = " and ".join(dict.fromkeys(effect.name for effect in hidden))
-    cables = sorted(within_noise & {cable for effect in hidden for cable in effect.cables})
-    where = cables_text(cables, trace.robot_before.cable_count)
-    explanation = f"The {names} found acts in {where} too: there a cable alone shows no more than noise."
-    return f"{trace.components.sentence} {explanation}"
-
-
-def _is_cable_within_noise(residual: ComponentResidual) -> bool:
-    return residual.component.startswith("cable ") and not residual.is_significant
 
 
 @dataclass(frozen=True)

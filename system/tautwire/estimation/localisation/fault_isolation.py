@@ -113,7 +113,8 @@ def reconciled_with_effects(
         evidence = localisation.sentence.rpartition(". ")[0]
         sentence = f"{evidence}. In question: {component}; {' and '.join(names)} {verbs} at none of the others alone."
         return replace(localisation, faulty_component=component, sentence=sentence)
-    if not deviating or bool(at_cables) != bool(cables):
+    is_elsewhere = bool(at_cables) != bool(cables) and "load cell" not in localisation.faulty_component
+    if not deviating or is_elsewhere:
         names = list(dict.fromkeys(name for name, _ in effects))
         addition = f"That the model lacks {' and '.join(names)} is told by all outputs together, not by one component."
         return replace(localisation, sentence=f"{localisation.sentence} {addition}")
