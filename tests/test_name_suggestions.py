@@ -36,7 +36,7 @@ def test_a_hint_names_what_is_likely_meant_or_all_that_is_known(name: str, known
     [
         (
             "[platform]\ncolour = 3\n",
-            "platform.colour: is not a known key; write one of mass, start, mass_uncertainty, or",
+            "platform.colour: is not a known key; write one of mass, start, mass_uncertainty, inertia, ",
         ),
         (
             "[fmu]\ncable_9 = 'a.fmu'\n[platform]\n",
@@ -57,13 +57,13 @@ def test_a_robot_file_with_an_unknown_key_gets_a_suggestion(tmp_path: Path, adde
 @pytest.mark.parametrize(
     ("cells", "hint"),
     [
-        (["Time", "winch_speed_1"], "add it, rename 'Time', or declare"),
-        (["time", "winch_speed1"], "add it, rename 'winch_speed1', or declare"),
-        (["time", "motor_speed_2", "remark"], "add it, or declare"),
-        (["time", f"winch_speed_{'9' * 5000}"], "add it, or declare"),
+        (["Time", "winch_speed_1"], "add it, rename 'Time', or declare its name"),
+        (["time", "winch_speed1"], "add it, rename 'winch_speed1', or declare its name"),
+        (["time", "motor_speed_2", "remark"], "declare their names"),
+        (["time", f"winch_speed_{'9' * 5000}"], "declare their names"),
     ],
 )
 def test_a_missing_column_is_not_taken_for_one_of_another_cable(cells: list[str], hint: str) -> None:
     faults: list[str] = []
     parse_header(cells, "here", 1, lambda error: faults.append(error.hint))
-    assert faults == [f"{hint} its name in [recording.columns], see tautwire columns"]
+    assert faults == [f"{hint} in [recording.columns], see tautwire columns"]

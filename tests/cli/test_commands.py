@@ -130,7 +130,9 @@ def test_trace_finds_the_damping_of_the_shipped_robot(
     )
     assert (out / "index.html").stat().st_size > 10_000
     again = read_robot(out / "robot.toml")
-    assert again.effects[0].values["damping"] == found["value"]
+    assert again.effects[0].values["damping"] == pytest.approx(
+        found["value"], abs=1e-3 * (found["high"] - found["low"])
+    )
     result = tmp_path / "again.csv"
     assert run(["simulate", str(out / "robot.toml"), "--speeds", str(short[1]), "--out", str(result)]) == 0
     gap = pd.read_csv(result)["tension_1"] - pd.read_csv(short[1])["tension_1"]

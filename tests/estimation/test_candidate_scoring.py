@@ -63,7 +63,7 @@ def test_candidates_get_disturbances_of_their_own_unless_fit_and_check_agree_on_
         return float(robot.effects[0].name == best_on_fit)
 
     refitted: list[Hypothesis] = []
-    fitter: Any = SimpleNamespace(log_likelihood=log_likelihood)
+    fitter: Any = SimpleNamespace(log_likelihood=log_likelihood, has_disturbance=True)
     context = IdentificationContext(robot, fitter, split, time_limit=limit)
     for name, nats in evidence.items():
         hypothesis = Hypothesis(BY_NAME[name], (1, 2, 3) if name == "relaxation" else ())

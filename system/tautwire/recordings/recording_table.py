@@ -107,7 +107,8 @@ def _missing_column_errors(
     missing = [each for each in required if not {each, each.replace("winch_speed", "rope_length")} & set(names)]
     # The only file without cables is a tracker's.
     table = "recording.columns], see tautwire columns" if cable_count else "recording.tracker.columns]"
-    if winches and missing[-len(winches) :] == winches:
+    has_similar = any(closest_name(each, unknown_names) for each in winches)
+    if winches and missing[-len(winches) :] == winches and not has_similar:
         has = f", it has {format_value(join_names(unknown_names), 120)}" if unknown_names else ""
         problem = f"has none of the columns {join_names(missing)}{has}"
         yield UnknownColumnsError(where, problem, f"declare their names in [{table}", line)
