@@ -8,7 +8,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from tautwire.estimation.effect_estimates import parameter_correlations, with_readable_values
+from tautwire.estimation.effect_estimates import (
+    parameter_correlations,
+    series_stiffness_notes,
+    with_readable_values,
+)
 from tautwire.estimation.hypotheses import with_values
 from tautwire.estimation.parameter_fit import Fit
 from tautwire.estimation.trace_result import Estimate, FittedParameter, FoundEffect
@@ -109,3 +113,12 @@ def test_a_correlation_is_that_of_fits_to_many_recordings() -> None:
     # By both together: a sum of squares of 2 per recording, which correlated errors weighed apart would not give.
     squares = sum(float(e @ np.linalg.inv(fit.covariance) @ e) for fit in fits for e in [fit.values - VALUES])
     assert 0.35 < squares / (2 * SEEDS) < 2.2
+
+
+@pytest.mark.parametrize(
+    ("cables", "high", "is_told"), [((1, 2, 3), 9.5e10, True), ((1, 2), 9.5e10, False), ((1, 2, 3), 1.1e11, False)]
+)
+def test_softer_ropes_everywhere_may_be_mounts(cables: tuple[int, ...], high: float, is_told: bool) -> None:
+    softer = {"modulus": Estimate(9.3e10, "Pa", 9.2e10, high, 1.022e11)}
+    notes = series_stiffness_notes([FoundEffect("modulus", "cable", cables, softer, 100.0)], 3)
+    assert any("in series with the ropes" in note for note in notes) == is_told

@@ -149,6 +149,26 @@ def effects_by_evidence(
     return large, tuple(effect for effect in effects if effect not in large)
 
 
+def series_stiffness_notes(effects: Sequence[FoundEffect], cable_count: int) -> tuple[str, ...]:
+    """A note where all ropes are softer than declared: what stands in series with them looks nearly the same.
+
+    A mount's stiffness is constant, a rope's is EA / L.
+    """
+    softer = {
+        cable
+        for effect in effects
+        for estimate in (effect.parameters.get("modulus"),)
+        if effect.name == "modulus" and estimate and estimate.declared and estimate.high < estimate.declared
+        for cable in effect.cables
+    }
+    if len(softer) < cable_count:
+        return ()
+    return (
+        "frame or pulley mounts that give way in series with the ropes look like a lower modulus of all cables; only "
+        "their stiffness is the same at any rope length, which a motion through longer and shorter ropes shows",
+    )
+
+
 def parameter_correlations(fit: Fit, effects: Sequence[FoundEffect]) -> tuple[Correlation, ...]:
     """Correlations of each two parameters of some effects, whatever else was fitted beside them.
 

@@ -15,7 +15,7 @@ from ..process_signals import defer_interrupts
 from ..recordings.recording import Recording, require_outputs
 from ..robot.schema import Robot, validate_point_mass_robot
 from ..validation import NumberRule, validate_callable, validate_instance, validate_integer, validate_number
-from .effect_estimates import parameter_correlations, with_readable_values
+from .effect_estimates import parameter_correlations, series_stiffness_notes, with_readable_values
 from .identification_context import IdentificationContext, Progress, no_progress
 from .identification_stages import SEARCHES, STAGES
 from .identification_state import Identification
@@ -186,6 +186,7 @@ def _result(state: Identification) -> Trace:
             *prepared.notes,
             *state.unexplained.notes,
             *_disturbance_notes(state),
+            *series_stiffness_notes(effects, context.robot.cable_count),
             *_initial_state_notes(state),
             *calibration_notes,
         ),
