@@ -61,6 +61,25 @@ class Provenance:
         return json.dumps(document, indent=1) + "\n"
 
 
+def csv_metadata_path(table: Path) -> Path:
+    """Where the metadata of a CSV file stands: beside it, where "CSV on the Web" looks for it."""
+    return table.with_name(table.name + CSV_METADATA_SUFFIX)
+
+
+def refuse_foreign_csv_metadata(table: Path | None) -> None:
+    """Raises InputError where metadata beside a CSV file to be written would replace a file that is not Tautwire's."""
+    path = None if table is None else csv_metadata_path(table)
+    if path is None or not path.is_file():
+        return
+    try:
+        (note,) = json.loads(path.read_bytes())["notes"]
+        is_ours = set(note["provenance"]) >= {"version", "created"}
+    except (ValueError, KeyError, TypeError):
+        is_ours = False
+    if not is_ours:
+        raise InputError(str(path), "is not Tautwire's, and metadata would replace it", "choose another --out")
+
+
 def provenance_of(inputs: Sequence[str | Path] | Mapping[str, Path] = (), command: str | None = None) -> Provenance:
     """Provenance of a result that is about to be computed from files; a mapping gives names to them.
 

@@ -14,7 +14,7 @@ import pytest
 
 from tautwire.cosimulation import result_file
 from tautwire.cosimulation.result_file import BLOCK_BYTES, Column, open_result_file
-from tautwire.errors import TautwireError
+from tautwire.errors import InputError, TautwireError
 from tautwire.provenance import PROVENANCE_KEY, Provenance
 
 COLUMNS = [Column("time", "s"), Column("x", "m"), Column("tension_1", "N")]
@@ -46,6 +46,23 @@ def test_its_provenance_is_metadata_and_no_line_of_its_own(tmp_path: Path, name:
         (note,) = json.loads((tmp_path / "result.csv-metadata.json").read_text(encoding="utf-8"))["notes"]
         stored = note["provenance"]
     assert stored == made.document()
+    with open_result_file(tmp_path / name, COLUMNS, made) as result:
+        result.add(0.0, np.array([3.0, 4.0]))
+    assert read(tmp_path / name)["x"].tolist() == [3.0]
+
+
+@pytest.mark.parametrize("text", ['{"@context": "http://www.w3.org/ns/csvw", "url": "result.csv"}', "[1]", "\xff{"])
+def test_metadata_of_its_owner_is_not_replaced(tmp_path: Path, text: str) -> None:
+    owned = tmp_path / "result.csv-metadata.json"
+    owned.write_text(text, encoding="latin-1")
+    made = Provenance("0.1.0", None, "2026-01-02T03:04:05Z", {})
+    with (
+        pytest.raises(InputError, match="is not Tautwire's"),
+        open_result_file(tmp_path / "result.csv", COLUMNS, made),
+    ):
+        pytest.fail("was not refused before the run")
+    assert owned.read_text(encoding="latin-1") == text
+    assert [path.name for path in tmp_path.iterdir()] == [owned.name]
 
 
 @pytest.mark.parametrize("name", [*NAMES, "result.PARQUET", "result"])

@@ -132,12 +132,14 @@ def workspace(
     Example: tautwire workspace robot.toml --out workspace.csv --plot workspace.png
     """
     from ..atomic_output import refuse_other_formats, refuse_overwriting_inputs, refuse_same_output
+    from ..provenance import refuse_foreign_csv_metadata
     from ..reports.workspace_figure import require_figure_format
     from ..robot.workspace import wrench_feasible_workspace
 
     require_output(out, as_json, "workspace.csv")
     refuse_same_output(out, plot, "--plot")
     refuse_other_formats(out, ".csv")
+    refuse_foreign_csv_metadata(out)
     refuse_overwriting_inputs([robot_file], [path for path in (out, plot) if path])
     if plot is not None:
         require_figure_format(plot)

@@ -277,9 +277,11 @@ def excite(
     from ..atomic_output import atomic_file, refuse_other_formats, refuse_overwriting_inputs
     from ..cosimulation.result_file import write_csv_metadata
     from ..estimation.input_design import DesignOptions, default_limits, design_excitation, effects_by_name
+    from ..provenance import refuse_foreign_csv_metadata
 
     output = CommandOutput(as_json, quiet)
     refuse_other_formats(out, ".csv")
+    refuse_foreign_csv_metadata(out)
     refuse_overwriting_inputs([robot_file], [out])
     robot = read_point_mass_robot(robot_file)
     selected_effects = effects_by_name(robot, effects)

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from ..atomic_output import atomic_file
 from ..errors import TautwireError
-from ..provenance import CSV_METADATA_SUFFIX, Provenance
+from ..provenance import Provenance, csv_metadata_path, refuse_foreign_csv_metadata
 
 Array = NDArray[np.float64]
 WriteRows = Callable[[Array], None]
@@ -70,11 +70,13 @@ def open_result_file(
     It is Parquet where the name ends in ``.parquet``, with each column's unit in its field's metadata and the
     provenance in its schema's, else CSV, with its metadata beside it.
 
-    Raises InputError where ``target`` cannot be written; a TautwireError of the block, once there are rows, as one
-    that says where these are. After anything else nothing is left.
+    Raises InputError where ``target`` or its metadata cannot be written; a TautwireError of the block, once there are
+    rows, as one that says where these are. After anything else nothing is left.
     """
     failure: TautwireError | None = None
     is_parquet = target.suffix.lower() == PARQUET_SUFFIX
+    if provenance is not None and not is_parquet:
+        refuse_foreign_csv_metadata(target)
     writer = partial(_parquet_writer, provenance=provenance) if is_parquet else _csv_writer
     with atomic_file(target) as scratch, writer(scratch, columns) as write:
         result = ResultFile(len(columns), write)
@@ -94,10 +96,12 @@ def open_result_file(
 def write_csv_metadata(target: Path, provenance: Provenance | None) -> None:
     """Writes the provenance of a CSV file beside it, where "CSV on the Web" looks for it; nothing where it is None.
 
-    In the CSV file itself it would be a line that other programs do not expect.
+    In the CSV file itself it would be a line that other programs do not expect. Raises InputError where another file
+    stands there.
     """
     if provenance is not None:
-        with atomic_file(target.with_name(target.name + CSV_METADATA_SUFFIX)) as scratch:
+        refuse_foreign_csv_metadata(target)
+        with atomic_file(csv_metadata_path(target)) as scratch:
             scratch.write_text(provenance.csv_metadata(target.name), encoding="utf-8")
 
 
