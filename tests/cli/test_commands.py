@@ -153,7 +153,7 @@ def test_trace_without_a_check_recording_judges_on_the_second_half(
     assert any("no check recording" in note for note in report["notes"])
 
 
-COMMANDS = [str(command.callback.__name__) for command in app.registered_commands if command.callback]
+COMMANDS = [str(command.name) for command in app.registered_commands]
 
 
 @pytest.mark.parametrize("command", COMMANDS)

@@ -20,7 +20,7 @@ from .column_commands import columns
 from .console import INTERRUPTED, flush_or_discard, open_closed_streams, print_error
 from .fmu_commands import build, fmus
 from .identification_commands import excite, material, trace
-from .robot_file_commands import check, example, new
+from .robot_file_commands import check, example, import_, new
 from .simulation_command import simulate
 
 # The base class of usage errors; newer typer hides it in a private module.
@@ -32,6 +32,7 @@ EXIT_SUCCESS, EXIT_FAILURE, EXIT_WRONG_INPUT = 0, 1, 2
 COMMANDS = (
     new,
     example,
+    import_,
     check,
     columns,
     build,
@@ -45,6 +46,11 @@ COMMANDS = (
     campaign,
     paper,
 )
+
+
+def command_name(command: Callable[..., None]) -> str:
+    """The name of a command: its function's, without the underscore behind a word of Python's."""
+    return command.__name__.rstrip("_")
 
 
 def _split_docstring(command: Callable[..., None]) -> tuple[str, str]:
@@ -66,7 +72,7 @@ app = typer.Typer(
     rich_markup_mode=None,
 )
 for command in COMMANDS:
-    app.command(help=help_text(command))(command)
+    app.command(name=command_name(command), help=help_text(command))(command)
 
 
 def _print_version(requested: bool) -> None:
@@ -126,7 +132,7 @@ def _is_usage_error(error: InputError) -> bool:
 
 def _example_suffix(arguments: list[str]) -> str:
     """The example of the requested command, to end an error message with; that of help for an unknown command."""
-    examples = {command.__name__: _split_docstring(command)[1] for command in COMMANDS}
+    examples = {command_name(command): _split_docstring(command)[1] for command in COMMANDS}
     example = next((examples[word] for word in arguments if word in examples), "tautwire --help")
     return f"; example: {example}"
 

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import math
 import os
 import shutil
 from collections.abc import Sequence
-from dataclasses import asdict
+from dataclasses import asdict, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -104,6 +105,47 @@ def example(
             shutil.copyfile(Path(__file__).parents[1] / "examples" / name / file, scratch / file)
     output.result(paths, {"robot": robot, "recordings": [fit, check_recording], "plan": plan})
     output.suggest_next(f"tautwire check {shell_quoted(robot)} {shell_quoted(fit)}")
+
+
+def import_(
+    context: typer.Context,
+    folder: Annotated[Path, typer.Argument(metavar="FOLDER", help="A CASPR model: NAME_bodies.xml, NAME_cables.xml.")],
+    out: Annotated[Path, typer.Option(metavar="ROBOT.toml", help="Output file.")],
+    cables: Annotated[
+        str | None, typer.Option(metavar="SET", help="Cable set; by default the one that the model names.")
+    ] = None,
+    modulus: Annotated[float | None, typer.Option(help="Modulus of ropes that CASPR takes as ideal, Pa.")] = None,
+    area: Annotated[float | None, typer.Option(help="Area of the ropes, m^2.")] = None,
+    damping: Annotated[float | None, typer.Option(help="Damping of the ropes, Pa s.")] = None,
+    as_json: AsJson = False,
+    quiet: Quiet = False,
+) -> None:
+    """Import a robot of CASPR as a robot file.
+
+    It says what it assumes, as most models have ideal ropes, and what it leaves out.
+
+    Example: tautwire import CoGiRo --out cogiro.toml
+    """
+    from ..atomic_output import atomic_file, refuse_other_formats, refuse_overwriting_inputs
+    from ..robot.caspr_import import Rope, read_caspr_robot
+    from ..robot.robot_file_writer import robot_text
+
+    output, files = CommandOutput(as_json, quiet), sorted(folder.glob("*.xml"))
+    refuse_other_formats(out, ROBOT_FILE_SUFFIX)
+    refuse_overwriting_inputs(files, [out])
+    stated = {"modulus": modulus, "area": area, "damping": damping}
+    for name, value in stated.items():
+        if value is not None and not (math.isfinite(value) and value >= 0.0 and (value > 0.0 or name == "damping")):
+            raise InputError(f"--{name}", f"{value} is not positive", "give a number in SI units")
+    rope = replace(Rope(), **{name: value for name, value in stated.items() if value is not None})
+    imported = read_caspr_robot(folder, cables, rope)
+    lines = [command_provenance(context, *files).comment(), *(f"# {note}" for note in imported.notes), ""]
+    with atomic_file(out) as scratch:
+        scratch.write_text("\n".join([*lines, robot_text(imported.robot)]), encoding="utf-8")
+    for note in imported.notes:
+        output.note(note)
+    output.result([out], {"robot": out, "notes": imported.notes})
+    output.suggest_next(f"tautwire linearise {shell_quoted(out)} --out model.json --report modes.html")
 
 
 def check(
