@@ -9,7 +9,7 @@ from math import cos, pi, sin, sqrt
 import numpy as np
 import pytest
 
-from tautwire.linear import linearise
+from tautwire.linear import linearise, modes_along
 from tautwire.linear.modes import cable_energies
 from tautwire.linear.operating_point import Pose
 from tautwire.robot.pose_stiffness import stiffness_matrix
@@ -98,3 +98,23 @@ def test_free_modes_of_a_measured_robot_follow_from_its_geometry(number: int) ->
     assert frequencies == pytest.approx(run["computed_hz"], rel=1e-4)
     measured = [(f, seen) for f, seen in zip(frequencies, run["measured_hz"], strict=True) if seen is not None]
     assert np.median([abs(f / seen - 1.0) for f, seen in measured]) < 0.05
+
+
+def test_modes_along_a_path_are_those_of_its_points() -> None:
+    robot = ROBOTS["crane"]
+    points = np.linspace(robot.platform.start, np.add(robot.platform.start, (0.6, -0.4, 0.2)), 5)
+    along = modes_along(robot, points)
+    for found, shapes, point in zip(along.frequencies, along.shapes, points, strict=True):
+        here = linearise(robot, point)
+        assert np.sort(found) == pytest.approx(here.modes.frequencies)
+        moved = Pose(robot, point, here.orientation).displacements(shapes)
+        assert np.linalg.norm(moved, axis=1).max(axis=0) == pytest.approx(np.ones(6))
+    assert along.modal_assurance.min() > 0.9
+
+
+def test_modes_of_equal_frequency_keep_their_directions_along_a_path() -> None:
+    """By symmetry two pairs of modes of the octahedral robot have equal frequencies anywhere on its axis."""
+    points = np.linspace((0.0, 0.0, 1.4), (0.0, 0.0, 1.6), 4)
+    along = modes_along(ROBOTS["octahedral"], points)
+    assert along.modal_assurance.min() > 0.999
+    assert np.all(np.abs(along.translational_shares.sum(axis=1) - 3.0) < 1e-9)

@@ -34,7 +34,6 @@ def uncertain(robot: Robot) -> Robot:
 
 COMPUTATIONS: dict[str, Callable[[Robot], object]] = {
     "speeds": lambda robot: ideal_winch_speeds(robot, PATH, np.array([0.0, 0.5])),
-    "modes": lambda robot: tautwire.modes_along(robot, PATH),
     "controller": tautwire.design_controller,
     "model": lambda robot: symbolic_model(robot, (), uncertain_parameters(robot)),
     "workspace": wrench_feasible_workspace,

@@ -60,11 +60,11 @@ def modes_of(pose: Pose, indices: StateIndices, tensions: Array, tension_slopes:
         damped_frequencies=damped / (2.0 * np.pi),
         shapes=shapes,
         cable_shares=cable_shares(pose, tensions, tension_slopes, shapes),
-        translational_shares=_translational_shares(pose, mass, shapes),
+        translational_shares=translational_shares(pose, mass, shapes),
     )
 
 
-def _translational_shares(pose: Pose, mass: Array, shapes: Array) -> Array:
+def translational_shares(pose: Pose, mass: Array, shapes: Array) -> Array:
     """Shares (k,) of the centre of mass in the kinetic energy ``phi' M phi`` of motions along ``shapes`` (d, k)."""
     of_centre = pose.displacements(shapes)[0]
     shares: Array = mass[0, 0] * np.sum(of_centre**2, axis=0) / np.sum(shapes * (mass @ shapes), axis=0)

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, fields, replace
-from functools import partial
 from itertools import pairwise
 
 import numpy as np
@@ -13,11 +12,11 @@ from scipy.optimize import linear_sum_assignment
 
 from ..array_validation import validate_array, validate_increasing
 from ..errors import ArgumentError
-from ..robot.schema import Robot, validate_point_mass_robot
+from ..robot.schema import Robot, validate_robot
 from ..robot.trajectory import Trajectory, require_trajectory
 from ..validation import validate_integer
-from .linear_plant import linearise
-from .modes import Modes, cable_shares
+from .linear_plant import LinearPlant, linearise
+from .modes import Modes, cable_shares, translational_shares
 from .operating_point import Pose
 
 Array = NDArray[np.float64]
@@ -30,10 +29,19 @@ FREQUENCY_TOLERANCE = 1e-3
 
 @dataclass(frozen=True)
 class _LocalModes:
-    """Modes at one position, and the function that gives the cables' energy shares there."""
+    """Modes at one position, with the root W (d, d) of the mass matrix ``W' W`` there.
+
+    ``with_shapes`` gives the modes with other shapes of the same motions.
+    """
 
     modes: Modes
-    energy_shares: Callable[[Array], Array]
+    mass_root: Array
+    with_shapes: Callable[[Array], Modes]
+
+    def fields(self, shapes: Array) -> Array:
+        """Unit columns (d, k) of ``W phi``, which are orthogonal for the modes of this position."""
+        weighted: Array = self.mass_root @ shapes
+        return weighted / np.linalg.norm(weighted, axis=0)
 
 
 @dataclass(frozen=True)
@@ -41,10 +49,11 @@ class ModesAlong:
     """Modes at N points of a path; column k of every array is one tracked mode, by frequency at the first point.
 
     ``abscissa`` (N,) is time in s, or distance travelled in m where ``is_timed`` is False; ``positions`` (N, 3) in m;
-    ``frequencies`` and ``damped_frequencies`` (N, 3) in Hz; ``damping_ratios`` (N, 3); ``shapes`` (N, 3, 3), unit
-    columns; ``cable_shares`` (N, n, 3) and ``translational_shares`` (N, 3) of energy. ``modal_assurance`` (N - 1,) is
-    the smallest modal assurance criterion, ``(phi_a . phi_b)^2`` for unit shapes of a point mass, between neighbours:
-    near 1 the tracking is certain, below 0.5 the path is too coarse there, or modes of equal frequency mix.
+    ``frequencies`` and ``damped_frequencies`` (N, d) in Hz; ``damping_ratios`` (N, d); ``shapes`` (N, d, d) as
+    :class:`tautwire.linear.Modes` has them; ``cable_shares`` (N, n, d) and ``translational_shares`` (N, d) of energy.
+    ``modal_assurance`` (N - 1,) is the smallest modal assurance criterion, ``(phi_a' M phi_b)^2`` over the same of each
+    with itself, between neighbours: near 1 the tracking is certain, below 0.5 the path is too coarse there, or modes of
+    equal frequency mix.
     """
 
     abscissa: Array
@@ -67,29 +76,48 @@ def modes_along(
     ``path`` is a trajectory, taken at ``times`` (N,) in s or at ``points`` equidistant times of its duration, or
     positions (N, 3) in m, optionally with ``times``. Modes are matched by shape; between neighbours whose shapes differ
     much the path is bisected, up to six times. Shapes of modes whose frequencies differ by less than 0.1 % are not
-    unique: they are rotated to match the previous ones, so that modes that come so near cross.
+    unique: they are rotated to match the previous ones, so that modes that come so near cross. A rigid platform keeps
+    its start orientation, or hangs in equilibrium where fewer than six cables hold it.
 
     Raises ArgumentError for an invalid argument or a path of fewer than two points, and what
     :func:`tautwire.linear.linearise` raises.
     """
-    validate_point_mass_robot("modes_along: robot", robot)
+    validate_robot("modes_along: robot", robot)
     validate_integer("modes_along: points", points, 2, "give two or more")
     position_at, abscissa, is_timed = _path_positions(path, times, points)
     count = len(abscissa)
 
     def modes_at(coordinate: float) -> _LocalModes:
-        plant = linearise(robot, position_at(coordinate), swing=0.0)
-        pose = Pose(robot, plant.position, plant.orientation)
-        energies = partial(cable_shares, pose, plant.tensions, plant.tension_slopes)
-        return _LocalModes(plant.modes, energies)
+        return _local_modes(robot, linearise(robot, position_at(coordinate), swing=0.0))
 
-    tracked_modes = _track_modes(modes_at, count)
+    local_modes = [modes_at(float(index)) for index in range(count)]
+    tracked_modes = _track_modes(modes_at, local_modes)
     stacked = {field.name: np.array([getattr(modes, field.name) for modes in tracked_modes]) for field in fields(Modes)}
-    assurance = [np.min(_modal_assurance(a, b).diagonal()) for a, b in pairwise(tracked_modes)]
+    assurance = [
+        np.min(_modal_assurance(local, a, b).diagonal())
+        for local, (a, b) in zip(local_modes[1:], pairwise(tracked_modes), strict=True)
+    ]
     positions = np.array([position_at(float(index)) for index in range(count)])
     return ModesAlong(
         abscissa=abscissa, is_timed=is_timed, positions=positions, modal_assurance=np.array(assurance), **stacked
     )
+
+
+def _local_modes(robot: Robot, plant: LinearPlant) -> _LocalModes:
+    pose, degrees = Pose(robot, plant.position, plant.orientation), len(plant.modes.shapes)
+    mass = np.linalg.inv(plant.system.B[degrees : 2 * degrees, robot.cable_count :])
+    mass_root: Array = np.asarray(np.linalg.cholesky(0.5 * (mass + mass.T)), dtype=np.float64).T
+
+    def with_shapes(shapes: Array) -> Modes:
+        shapes = shapes / np.linalg.norm(pose.displacements(shapes), axis=1).max(axis=0)
+        return replace(
+            plant.modes,
+            shapes=shapes,
+            cable_shares=cable_shares(pose, plant.tensions, plant.tension_slopes, shapes),
+            translational_shares=translational_shares(pose, mass, shapes),
+        )
+
+    return _LocalModes(plant.modes, mass_root, with_shapes)
 
 
 def _path_positions(
@@ -120,9 +148,9 @@ def _path_positions(
     )
 
 
-def _track_modes(modes_at: Callable[[float], _LocalModes], count: int) -> list[Modes]:
+def _track_modes(modes_at: Callable[[float], _LocalModes], local_modes: Sequence[_LocalModes]) -> list[Modes]:
     """Modes at 0 ... count - 1, tracked in both directions from where the frequencies differ most."""
-    local_modes = [modes_at(float(index)) for index in range(count)]
+    count = len(local_modes)
     first = int(np.argmax([_min_relative_gap(local.modes.frequencies) for local in local_modes]))
     tracked = {first: local_modes[first].modes}
     for sign, indices in ((1, range(first + 1, count)), (-1, range(first - 1, -1, -1))):
@@ -145,7 +173,7 @@ def _track_interval(
 ) -> Modes:
     """The modes at ``end`` in the order and with the signs of the ``previous`` ones at ``begin``."""
     rotated = _rotate_degenerate(following, previous)
-    assurance = _modal_assurance(previous, rotated)
+    assurance = _modal_assurance(following, previous, rotated)
     rows, columns = linear_sum_assignment(-assurance)
     if bisections == 0 or np.min(assurance[rows, columns]) > MIN_MODAL_ASSURANCE:
         return _align_signs(_reorder(rotated, columns), previous)
@@ -154,9 +182,9 @@ def _track_interval(
     return _track_interval(modes_at, middle_modes, middle, following, end, bisections - 1)
 
 
-def _modal_assurance(a: Modes, b: Modes) -> Array:
-    """Modal assurance criterion (MAC) of each mode of one set with each of another; the mass is isotropic."""
-    assurance: Array = (a.shapes.T @ b.shapes) ** 2
+def _modal_assurance(local: _LocalModes, a: Modes, b: Modes) -> Array:
+    """Modal assurance criterion (MAC) of each mode of one set with each of another, weighted by the local mass."""
+    assurance: Array = (local.fields(a.shapes).T @ local.fields(b.shapes)) ** 2
     return assurance
 
 
@@ -175,16 +203,18 @@ def _rotate_degenerate(local: _LocalModes, reference: Modes) -> Modes:
 
     Each gets the frequency whose rank its Rayleigh quotient has.
     """
-    modes, shapes = local.modes, local.modes.shapes.copy()
+    modes, shapes, goal = local.modes, local.fields(local.modes.shapes), local.fields(reference.shapes)
     order = np.arange(len(modes.frequencies))
     for group in _degenerate_groups(modes.frequencies):
-        _, columns = linear_sum_assignment(-((shapes[:, group].T @ reference.shapes) ** 2))
-        left_vectors, _, right_vectors = np.linalg.svd(shapes[:, group].T @ reference.shapes[:, columns])
+        _, columns = linear_sum_assignment(-((shapes[:, group].T @ goal) ** 2))
+        left_vectors, _, right_vectors = np.linalg.svd(shapes[:, group].T @ goal[:, columns])
         rotation = left_vectors @ right_vectors
         shapes[:, group] = shapes[:, group] @ rotation
         quotients = (rotation**2).T @ modes.frequencies[group] ** 2
         order[group] = np.array(group)[np.argsort(np.argsort(quotients))]
-    return replace(_reorder(modes, order), shapes=shapes, cable_shares=local.energy_shares(shapes))
+    rotated = local.with_shapes(np.asarray(np.linalg.solve(local.mass_root, shapes), dtype=np.float64))
+    named = ("shapes", "cable_shares", "translational_shares")
+    return replace(_reorder(modes, order), **{name: getattr(rotated, name) for name in named})
 
 
 def _degenerate_groups(frequencies: Array) -> list[list[int]]:
