@@ -40,8 +40,8 @@ LONG = {
     "campaign": (["plan.toml", "--out", "out"], "tautwire.campaigns.campaign_runner.run_campaign"),
     "paper": (["--out", "out"], "tautwire.paper.write_paper"),
 }
-# It only writes a text.
-AT_ONCE = {"columns", "example", "new"}
+# They only read or write a text.
+AT_ONCE = {"columns", "example", "import_", "new"}
 
 
 @pytest.fixture
