@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -9,6 +11,8 @@ from .errors import ArgumentError, describe_value
 
 Array = NDArray[np.float64]
 Shape = tuple[int | None, ...]
+
+MAX_QUATERNION_ERROR = 1e-9
 
 
 def validate_array(where: str, value: object, shape: Shape, meaning: str) -> Array:
@@ -60,6 +64,16 @@ def validate_point(where: str, value: object) -> tuple[float, float, float]:
     """A point as three finite coordinates in m; raises ArgumentError otherwise."""
     x, y, z = validate_array(where, value, (3,), "three finite coordinates x, y, z in m").tolist()
     return (x, y, z)
+
+
+def validate_quaternion(where: str, value: object) -> tuple[float, float, float, float]:
+    """A unit quaternion w, x, y, z; raises ArgumentError otherwise."""
+    meaning = "the unit quaternion [w, x, y, z]"
+    w, x, y, z = validate_array(where, value, (4,), meaning).tolist()
+    norm = math.hypot(w, x, y, z)
+    if abs(norm - 1.0) > MAX_QUATERNION_ERROR:
+        raise ArgumentError(where, value, f"has norm {norm:.9g}, must have 1", f"give {meaning}")
+    return (w, x, y, z)
 
 
 def _format_shape(shape: Shape) -> str:

@@ -118,3 +118,15 @@ def test_modes_of_equal_frequency_keep_their_directions_along_a_path() -> None:
     along = modes_along(ROBOTS["octahedral"], points)
     assert along.modal_assurance.min() > 0.999
     assert np.all(np.abs(along.translational_shares.sum(axis=1) - 3.0) < 1e-9)
+
+
+def test_a_turned_platform_is_the_same_robot_there() -> None:
+    """Its stiffness is that of statics there, though the ropes were cut for the start."""
+    robot = crane_robot()
+    orientation = (cos(0.1), 0.0, 0.0, sin(0.1))
+    plant = linearise(robot, (0.1, 0.2, 1.6), orientation=orientation)
+    assert plant.orientation == orientation
+    mass = np.linalg.inv(plant.system.B[6:12, 8:])
+    expected = stiffness_matrix(robot, plant.tensions, (0.1, 0.2, 1.6), orientation)
+    # The start tension of another place changes the lengths that the stiffness belongs to, by their strain.
+    assert np.max(np.abs(-mass @ plant.system.A[6:12, :6] - expected)) < 2e-3 * np.max(np.abs(expected))

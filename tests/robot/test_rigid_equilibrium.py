@@ -241,3 +241,12 @@ def test_attachments_at_the_origin_are_a_point_mass() -> None:
     rigid = shifted(rigid, (0.0, 0.0, 0.0))
     point = replace(rigid, platform=replace(rigid.platform, inertia=None))
     assert np.allclose(static_tensions(rigid), static_tensions(point), rtol=1e-12)
+
+
+def test_an_orientation_of_the_callers_is_held_as_a_declared_one_would_be() -> None:
+    turned = shifted(crane_robot(), crane_robot().platform.centre_of_mass, (0.05, -0.08, 0.2))
+    declared = static_equilibrium(turned)
+    asked = static_equilibrium(crane_robot(), orientation=turned.platform.start_orientation)
+    assert asked.orientation == declared.orientation and asked.moved_by == 0.0
+    assert np.array_equal(asked.tensions, declared.tensions)
+    assert np.linalg.norm(imbalance(crane_robot(), asked.orientation, asked.tensions)) < 1e-6

@@ -54,8 +54,16 @@ class LinearPlant:
     orientation: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
 
-def linearise(robot: Robot, at: Sequence[float] | Array | None = None, swing: float = DEFAULT_SWING) -> LinearPlant:
+def linearise(
+    robot: Robot,
+    at: Sequence[float] | Array | None = None,
+    swing: float = DEFAULT_SWING,
+    orientation: Sequence[float] | None = None,
+) -> LinearPlant:
     """Linearises the robot at rest at a position, three coordinates in m, by default the start, with exact derivatives.
+
+    The ``orientation`` of a rigid platform is a unit quaternion, by default that of the robot file; with fewer than six
+    cables it is the nearest one in equilibrium.
 
     ``dx/dt = A x + B u, y = C x + D u``: u are n winch speeds (m/s) and an external force (N), y is position (m),
     velocity (m/s), tensions (N) and lengths (m).
@@ -70,7 +78,7 @@ def linearise(robot: Robot, at: Sequence[float] | Array | None = None, swing: fl
     """
     validate_robot("linearise: robot", robot)
     validate_number("linearise: swing", swing, SWING_RULE)
-    pose, tensions, tolerance = _pose_at_rest(robot, requested_position(robot, at))
+    pose, tensions, tolerance = _pose_at_rest(robot, requested_position(robot, at), orientation)
     model = freeze_drifting_states(symbolic_model(robot, reference_orientation=pose.orientation))
     state = equilibrium_state(model, pose, tensions, tolerance)
     A, B, C, D, tension_jacobian = _jacobians(model, state)
@@ -89,12 +97,12 @@ def linearise(robot: Robot, at: Sequence[float] | Array | None = None, swing: fl
     )
 
 
-def _pose_at_rest(robot: Robot, position: Array) -> tuple[Pose, Array, float]:
+def _pose_at_rest(robot: Robot, position: Array, orientation: Sequence[float] | None) -> tuple[Pose, Array, float]:
     """The pose at rest at a position (m), static tensions (n,) in N there, and what passes for rest."""
     if not robot.platform.is_rigid_body:
         pose = Pose(robot, position, robot.platform.start_orientation)
         return pose, static_tensions(robot, position), ACCELERATION_TOLERANCE
-    at_rest = static_equilibrium(robot, position)
+    at_rest = static_equilibrium(robot, position, orientation=orientation)
     # Two cables hold a surveyed position only nearly; statics has judged that.
     is_exact = at_rest.residual_force <= ACCELERATION_TOLERANCE * robot.platform.mass * max(robot.gravity, 1.0)
     tolerance = ACCELERATION_TOLERANCE if is_exact else SURVEY_TOLERANCE

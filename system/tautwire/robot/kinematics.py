@@ -8,7 +8,6 @@ tensions, does not.
 
 from __future__ import annotations
 
-import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -19,7 +18,7 @@ from scipy.spatial.transform import Rotation
 
 from tautwire_fmu.laws.mathematics import REAL
 
-from ..array_validation import validate_array
+from ..array_validation import validate_array, validate_quaternion
 from ..errors import ArgumentError, UnreachableError
 from ..validation import validate_integer
 from .schema import Point, Quaternion, Robot, validate_robot
@@ -34,7 +33,6 @@ START_DISTANCE_RATIO = 0.15  # of the mean cable length, standard deviation of s
 SAME_POSITION_RATIO, SAME_ANGLE = 1e-6, 1e-5
 # Minima whose residual is larger than this multiple of the smallest are no solutions; relative to the mean length.
 RESIDUAL_RATIO, RESIDUAL_FLOOR = 3.0, 1e-9
-MAX_QUATERNION_ERROR = 1e-9
 UNREACHABLE_RESIDUAL = 1e3  # m, of poses at which a cable has no length
 
 
@@ -186,12 +184,7 @@ def validated_pose(
     array = validate_array(f"{caller}: position", at, (3,), "the position [x, y, z] in m")
     if orientation is None:
         return array, platform.start_orientation
-    where, meaning = f"{caller}: orientation", "the unit quaternion [w, x, y, z]"
-    w, x, y, z = validate_array(where, orientation, (4,), meaning).tolist()
-    norm = math.hypot(w, x, y, z)
-    if abs(norm - 1.0) > MAX_QUATERNION_ERROR:
-        raise ArgumentError(where, orientation, f"has norm {norm:.9g}, must have 1", f"give {meaning}")
-    return array, (w, x, y, z)
+    return array, validate_quaternion(f"{caller}: orientation", orientation)
 
 
 def _rotation(quaternion: Quaternion) -> Rotation:

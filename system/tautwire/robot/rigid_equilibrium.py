@@ -67,31 +67,35 @@ class StaticEquilibrium:
 
 
 def static_equilibrium(
-    robot: Robot, position: Sequence[float] | Array | None = None, rule: str = "nearest"
+    robot: Robot,
+    position: Sequence[float] | Array | None = None,
+    rule: str = "nearest",
+    orientation: Sequence[float] | None = None,
 ) -> StaticEquilibrium:
     """Static equilibrium of a rigid platform at a position in m, by default the start.
 
-    Where the declared orientation leaves a moment and fewer than six cables hold the platform, the nearest orientation
-    in equilibrium is taken, with no tension below the minimum of the robot file if there is one such. Tensions that
-    are not unique are distributed by a ``rule`` of :data:`tautwire.robot.tension_distribution.RULES`, with more than
-    six cables within the limits of the robot file.
+    The ``orientation`` is a unit quaternion, by default the declared one. Where it leaves a moment and fewer than six
+    cables hold the platform, the nearest orientation in equilibrium is taken, with no tension below the minimum of the
+    robot file if there is one such. Tensions that are not unique are distributed by a ``rule`` of
+    :data:`tautwire.robot.tension_distribution.RULES`, with more than six cables within the limits of the robot file.
 
     Raises UnreachableError where no orientation near the declared one is in equilibrium, or where a cable would have
     to push or to break a limit; ArgumentError for an invalid argument.
     """
-    at, declared = validated_pose("static_equilibrium", robot, position, None)
+    at, declared = validated_pose("static_equilibrium", robot, position, orientation)
     if not robot.platform.is_rigid_body:
         problem = "has a point mass, whose orientation is nothing"
         raise ArgumentError("static_equilibrium: robot", robot, problem, "use static_tensions")
+    robot = replace(robot, platform=replace(robot.platform, start_orientation=declared))
     if robot.cable_count >= FREEDOMS or _is_balanced(*_balance(robot, at, declared, None)):
         rotation_vector = np.zeros(3)
     else:
         rotation_vector = _nearest_orientation(robot, at)
-    orientation = _turned(robot, rotation_vector) if np.any(rotation_vector) else declared
-    tensions = _tensions(robot, at, orientation, rule)
-    matrix, load = _balance(robot, at, orientation, tensions)
+    turned = _turned(robot, rotation_vector) if np.any(rotation_vector) else declared
+    tensions = _tensions(robot, at, turned, rule)
+    matrix, load = _balance(robot, at, turned, tensions)
     remaining = float(np.linalg.norm((matrix @ tensions - load)[:3]))
-    return StaticEquilibrium(orientation, tensions, float(np.linalg.norm(rotation_vector)), remaining)
+    return StaticEquilibrium(turned, tensions, float(np.linalg.norm(rotation_vector)), remaining)
 
 
 def orientation_notes(robot: Robot) -> tuple[str, ...]:
