@@ -308,3 +308,24 @@ def test_check_takes_the_folder_with_a_proposed_table(tmp_path: Path, capsys: py
     assert run(["check", str(robot), str(path), "--columns", str(table), "--report", str(page)]) == 0
     assert f"{path}: no problems found" in capsys.readouterr().out
     assert f"{path}/run.mcap" in page.read_text(encoding="utf-8")
+
+
+def test_a_quaternion_between_rows_is_interpolated_as_one_rotation_whatever_its_signs(tmp_path: Path) -> None:
+    times = np.arange(20) / 20.0
+    angles = np.linspace(0.0, 6.0, 20)
+    signs = np.where(np.arange(20) % 2, -1.0, 1.0)
+    late = 0.02
+    turned = [
+        (
+            START + t + late,
+            pose(START + t + late, [0.0, 0.0, 1.0], sign * np.array([np.cos(a / 2), 0.0, 0.0, np.sin(a / 2)])),
+        )
+        for t, a, sign in zip(times, angles, signs, strict=True)
+    ]
+    path = bag(tmp_path, {"/joint_states": states_at(times), "/pose": ("geometry_msgs/PoseStamped", turned)})
+    names = [RecordedColumn(f"q{part}", f"/pose/pose.orientation.{part}") for part in "wxyz"]
+    recording = read(path, *SPEED_TABLE, *names)
+    w, x, y, z = recording.orientation[1:].T
+    assert np.abs(x).max() == np.abs(y).max() == 0.0
+    expected = np.interp(times[1:], times + late, angles)
+    assert np.abs(np.unwrap(2.0 * np.arctan2(z, w)) - expected).max() < 1e-3

@@ -42,9 +42,10 @@ def joint_state(time: float, speeds: Sequence[float], efforts: Sequence[float] =
     )
 
 
-def pose(time: float, position: Sequence[float]) -> Any:
-    """A PoseStamped of a position."""
-    turned = message("geometry_msgs/Quaternion", 0.0, 0.0, 0.0, 1.0)
+def pose(time: float, position: Sequence[float], quaternion: Sequence[float] = (1.0, 0.0, 0.0, 0.0)) -> Any:
+    """A PoseStamped of a position, and of a quaternion w, x, y, z."""
+    w, x, y, z = quaternion
+    turned = message("geometry_msgs/Quaternion", x, y, z, w)
     where = message("geometry_msgs/Point", *position)
     return message("geometry_msgs/PoseStamped", header(time), message("geometry_msgs/Pose", where, turned))
 

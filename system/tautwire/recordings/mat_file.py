@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError, format_value, raise_error
 from ..input_files import readable_file
-from ..robot.schema import AXES
+from ..robot.schema import AXES, QUATERNION_COLUMNS
 from .column_map import ColumnMap
 from .mat_array import MAX_BYTES, MatArray
 from .mat_contents import list_arrays, mat_level, read_arrays
@@ -28,6 +28,7 @@ _TABLE_HINT = (
     "or s.time = ts.Time, s.x = ts.Data of a timeseries, then save('fit.mat', '-struct', 's')"
 )
 _MATRICES = ("winch_speed", "rope_length", "tension", "position")
+_POSE_MATRICES = {"position": AXES, "orientation": QUATERNION_COLUMNS}
 _MAX_EXACT_INTEGER = 2**53
 
 
@@ -169,7 +170,7 @@ def _sample_count(arrays: Sequence[MatArray], file: str) -> int:
 
 def _columns_of(array: MatArray, sample_count: int, file: str) -> Iterator[MatColumn]:
     last_part = _last_part(array)
-    is_matrix = last_part in _MATRICES
+    is_matrix = last_part in _MATRICES or _is_quaternion(array, sample_count)
     is_known = is_matrix or is_column_name(last_part)
     problem = _shape_problem(array, sample_count, last_part)
     if problem:
@@ -183,8 +184,15 @@ def _columns_of(array: MatArray, sample_count: int, file: str) -> Iterator[MatCo
         if is_matrix or column_count > 1:
             name = f"{array.path}_{index + 1}"
         if is_matrix:
-            standard_name = AXES[index] if last_part == "position" else f"{last_part}_{index + 1}"
+            pose_names = _POSE_MATRICES.get(last_part)
+            standard_name = pose_names[index] if pose_names else f"{last_part}_{index + 1}"
         yield MatColumn(name, standard_name, array, index, is_transposed)
+
+
+def _is_quaternion(array: MatArray, sample_count: int) -> bool:
+    """Whether an array holds a quaternion per sample; an orientation of other size is not read."""
+    is_orientation = _last_part(array) == "orientation" and array.is_numeric and not array.is_complex
+    return is_orientation and sorted(array.shape) == sorted((sample_count, len(QUATERNION_COLUMNS)))
 
 
 def _shape_problem(array: MatArray, sample_count: int, last_part: str) -> tuple[str, str] | None:

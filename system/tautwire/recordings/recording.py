@@ -1,7 +1,7 @@
 """Recordings: measured winch speeds, tensions and positions, sample by sample."""
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 
 import numpy as np
@@ -19,13 +19,14 @@ from ..errors import (
 )
 from ..input_files import validate_path
 from ..robot.robot_file_reader import MAX_CABLES, read_columns_file
-from ..robot.schema import AXES, RecordedColumn
+from ..robot.schema import AXES, QUATERNION_COLUMNS, RecordedColumn
 from ..validation import validate_instance, validate_integer
 from .column_map import ColumnMap, column_map
 from .csv_file import CsvTable, open_csv
 from .mat_file import is_mat, open_mat
 from .mdf_file import is_mdf, open_mdf
 from .parquet_file import is_parquet, open_parquet
+from .quaternion_columns import are_valid, unit_quaternions
 from .recording_table import MAX_MAGNITUDE, ColumnTable, ErrorSink, not_a_table_error, parse_header, row_errors
 from .ros_bag import is_bag, open_bag
 from .winch_gaps import bridge_winch_gaps
@@ -41,7 +42,8 @@ class Recording:
     in N and ``position`` (N, 3) in m, NaN where a cell or a column is missing. ``unknown_columns`` by name;
     ``read_as`` says what of the file differs from the standard, and which of its numbers are interpolated.
     ``rope_length`` (N, n) in m, smaller as it reels in, is NaN where no length of a cable was recorded; where it was,
-    the winch speed is its rate. None where no cable has one.
+    the winch speed is its rate. None where no cable has one. ``orientation`` (N, 4) is the unit quaternion w, x, y, z
+    from the platform's frame to the world, its sign continuous along time; NaN where it was not measured, the default.
     """
 
     path: str
@@ -52,6 +54,11 @@ class Recording:
     unknown_columns: tuple[str, ...] = ()
     read_as: tuple[str, ...] = ()
     rope_length: NDArray[np.float64] | None = None
+    orientation: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 4)))
+
+    def __post_init__(self) -> None:
+        if not self.has_orientation:
+            object.__setattr__(self, "orientation", np.full((len(self.time), 4), np.nan))
 
     @property
     def cable_count(self) -> int:
@@ -79,6 +86,11 @@ class Recording:
     def has_position(self) -> bool:
         """Whether any coordinate of any sample was measured."""
         return bool(np.isfinite(self.position).any())
+
+    @property
+    def has_orientation(self) -> bool:
+        """Whether the orientation was measured in any sample."""
+        return bool(np.isfinite(self.orientation).any())
 
     @property
     def has_tension(self) -> bool:
@@ -113,6 +125,7 @@ class Recording:
             winch_speed=self.winch_speed[rows],
             tension=self.tension[rows],
             position=self.position[rows],
+            orientation=self.orientation[rows],
             rope_length=None if self.rope_length is None else self.rope_length[rows],
         )
 
@@ -140,13 +153,19 @@ class Recording:
             np.array_equal(self.time, other.time)
             and np.array_equal(self.winch_speed, other.winch_speed)
             and np.array_equal(self.measured(), other.measured(), equal_nan=True)
+            and np.array_equal(self.orientation, other.orientation, equal_nan=True)
         )
 
     def frame(self) -> pd.DataFrame:
-        """The recording as a table with the columns of a recording file; all of them, NaN where missing."""
+        """The recording as a table with the columns of a recording file, NaN where missing; orientation if measured."""
         speeds = [f"winch_speed_{cable}" for cable in range(1, self.cable_count + 1)]
-        rows = np.column_stack([self.time, self.winch_speed, self.measured()])
-        return pd.DataFrame(rows, columns=["time", *speeds, *self.channel_names])
+        tensions = [f"tension_{cable}" for cable in range(1, self.cable_count + 1)]
+        frame = pd.DataFrame(
+            np.column_stack([self.time, self.winch_speed, self.position, self.tension]),
+            columns=["time", *speeds, *AXES, *tensions],
+        )
+        quaternion = dict(zip(QUATERNION_COLUMNS, self.orientation.T, strict=True))
+        return frame.assign(**quaternion) if self.has_orientation else frame
 
 
 def read_recording(
@@ -154,8 +173,9 @@ def read_recording(
 ) -> Recording:
     """Read a recording from CSV, Parquet, MDF, MATLAB or a ROS bag, of n = ``cable_count`` cables, N samples.
 
-    Columns are ``time`` (s), ``winch_speed_1`` ... (m/s), ``tension_1`` ... (N), ``x``, ``y``, ``z`` (m); where the
-    length of a rope is recorded, ``rope_length_1`` ... (m, any zero, smaller as it reels in), its rate is the speed.
+    Columns are ``time`` (s), ``winch_speed_1`` ... (m/s), ``tension_1`` ... (N), ``x``, ``y``, ``z`` (m), and ``qw``,
+    ``qx``, ``qy``, ``qz`` (unit quaternion, platform to world); where the length of a rope is recorded,
+    ``rope_length_1`` ... (m, any zero, smaller as it reels in), its rate is the speed.
     Units that a CSV or MDF file states are converted to these; gaps of a few samples in a speed or length are
     interpolated. The recording's ``notes`` say so. ``columns`` are those of other names and scales: a robot's
     ``recorded_columns``, or a TOML file with a table [recording.columns].
@@ -172,7 +192,7 @@ def read_recording(
 
 
 def read_tracker(path: str | Path, columns: Sequence[RecordedColumn] = ()) -> Recording:
-    """Read a tracker's file, with the columns time, x, y, z in the formats of recordings: a recording of no cables.
+    """Read a tracker's file, with the columns time, x, y, z, and qw to qz where it has them: a recording of no cables.
 
     Raises RecordingError where the file is not valid, RobotFileError where ``columns`` are not.
     """
@@ -203,13 +223,14 @@ def _validated_recording(table: CsvTable | ColumnTable, cable_count: int) -> Rec
         winch_speed=_winch_speeds(numbers, cables),
         tension=_stacked_columns(numbers, [f"tension_{cable}" for cable in cables]),
         position=_stacked_columns(numbers, AXES),
+        orientation=_stacked_columns(numbers, QUATERNION_COLUMNS),
         unknown_columns=table.header.unknown_names,
         rope_length=_stacked_columns(numbers, [f"rope_length_{cable}" for cable in cables]),
         read_as=(*((f"read {table.header.dialect}",) if table.header.dialect else ()), *gap_notes),
     )
     if not _is_valid(recording):
         raise _first_error(table)
-    return recording
+    return replace(recording, orientation=unit_quaternions(recording.orientation))
 
 
 def _winch_speeds(numbers: Mapping[str, NDArray[np.float64]], cables: Iterable[int]) -> NDArray[np.float64]:
@@ -301,6 +322,7 @@ def _is_valid(recording: Recording) -> bool:
         and all(np.isfinite(signals).all() for signals in inputs)
         and not any((np.abs(signals) > MAX_MAGNITUDE).any() for signals in (*inputs, *outputs))
         and (np.diff(recording.time) > 0.0).all()
+        and are_valid(recording.orientation)
     )
 
 

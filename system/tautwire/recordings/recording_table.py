@@ -13,8 +13,9 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError, UnknownColumnsError, format_value, raise_error
 from ..name_suggestions import closest_name, join_names
-from ..robot.schema import AXES, RecordedColumn
+from ..robot.schema import AXES, QUATERNION_COLUMNS, RecordedColumn
 from .clock_time import ClockFormat
+from .quaternion_columns import missing_quaternion_columns, quaternion_problem
 from .units import Number, Unit
 from .winch_gaps import MAX_GAP_SAMPLES, WINCH_COLUMNS, CellError, is_winch_column_used, without_bridged_gaps
 
@@ -76,7 +77,8 @@ def parse_header(
 ) -> Header:
     """Parse the header in these cells; raises RecordingError unless time and every winch have a column.
 
-    A winch has its speed, or the length of its rope. A tracker's file has no cables, and columns of any are not read.
+    A winch has its speed, or the length of its rope; a quaternion has all four columns or none. A tracker's file has no
+    cables, and columns of any are not read.
 
     Errors go to the ``sink``; where it does not raise, so do those that follow.
     """
@@ -119,6 +121,11 @@ def _missing_column_errors(
         error_class = RecordingError if cable_count else UnknownColumnsError
         hint = f"add it, {renamed}or declare its name in [{table}"
         yield error_class(where, f"the column {each} is missing", hint, line)
+    lacking = missing_quaternion_columns(names)
+    if lacking:
+        problem = f"the orientation has no column {join_names(lacking)}, of {join_names(QUATERNION_COLUMNS)}"
+        hint = "add it, declare its name in [recording.columns], or rename the others so that they are not read"
+        yield RecordingError(where, problem, hint, line)
 
 
 def require_samples(count: int, where: str) -> None:
@@ -132,12 +139,12 @@ def known_columns(cable_count: int) -> frozenset[str]:
     """Names of all columns that a recording may have."""
     cables = range(1, cable_count + 1)
     cable_columns = (f"{kind}_{cable}" for kind in ("winch_speed", "rope_length", "tension") for cable in cables)
-    return frozenset(("time", *AXES, *cable_columns))
+    return frozenset(("time", *AXES, *QUATERNION_COLUMNS, *cable_columns))
 
 
 def is_column_name(name: str) -> bool:
     """Whether a column of a recording of some robot may have this name, whatever its number of cables."""
-    return name == "time" or name in AXES or _CABLE_COLUMN.fullmatch(name) is not None
+    return name == "time" or name in (*AXES, *QUATERNION_COLUMNS) or _CABLE_COLUMN.fullmatch(name) is not None
 
 
 class Row(NamedTuple):
@@ -168,7 +175,7 @@ def _sample_errors(rows: Iterable[Row], header: Header, file: str) -> Iterator[l
         if len(row.cells) != len(header.names):
             yield [CellError(_width_error(row, len(header.names)))]
             continue
-        errors, time = [], math.nan
+        errors, time, quaternion = [], math.nan, dict[str, float]()
         for name, cell in zip(header.names, row.cells, strict=True):
             if name not in header.unknown_names:
                 value = _parse_cell(row, header, name, cell.strip(" "))
@@ -177,9 +184,14 @@ def _sample_errors(rows: Iterable[Row], header: Header, file: str) -> Iterator[l
                     errors.append(CellError(value, name if is_bridgeable else None))
                 elif name == "time":
                     time = value
+                elif name in QUATERNION_COLUMNS:
+                    quaternion[name] = value
         if time <= previous_time:
             problem = f"is {time!r} after {previous_time!r}, must rise from sample to sample"
             errors.append(CellError(_cell_error(row, "time", problem, "sort the samples and remove duplicates")))
+        problem_and_hint = quaternion_problem(quaternion) if len(quaternion) == len(QUATERNION_COLUMNS) else None
+        if problem_and_hint:
+            errors.append(CellError(RecordingError(row.where, *problem_and_hint, row.number)))
         previous_time = time if time > previous_time else previous_time
         yield errors
     if count < 2:

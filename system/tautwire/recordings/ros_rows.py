@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError, format_value
 from ..name_suggestions import join_names
+from ..robot.schema import QUATERNION_COLUMNS
+from .quaternion_columns import with_continuous_signs
 from .winch_gaps import MAX_GAP_SAMPLES
 
 _INPUTS = ("winch_speed_", "rope_length_")
@@ -49,7 +51,7 @@ def align_on_winch_rows(numbers: Mapping[str, SampledNumber], file: str) -> Rows
 
     Raises RecordingError where none are covered by all, or an output has no sample near any row.
     """
-    series = {name: number.sorted() for name, number in numbers.items()}
+    series = _with_continuous_signs({name: number.sorted() for name, number in numbers.items()})
     names = sorted((name for name in series if name.startswith(_INPUTS)), key=lambda name: int(name.rpartition("_")[2]))
     inputs = [series[name] for name in names]
     if not inputs:
@@ -71,6 +73,16 @@ def align_on_winch_rows(numbers: Mapping[str, SampledNumber], file: str) -> Rows
             raise _clock_error(each, base, file)
     repeated = sum(len(numbers[name].times) - len(each.times) for name, each in series.items())
     return Rows(columns, f"with a row for each sample of {base.name} by its {base.clock}{_in_words(columns, repeated)}")
+
+
+def _with_continuous_signs(series: Mapping[str, SampledNumber]) -> dict[str, SampledNumber]:
+    """Series in which a quaternion changes its sign nowhere, so that it can be interpolated."""
+    parts = [series[name] for name in QUATERNION_COLUMNS if name in series]
+    if len(parts) < len(QUATERNION_COLUMNS) or not all(np.array_equal(each.times, parts[0].times) for each in parts):
+        return dict(series)
+    values = with_continuous_signs(np.column_stack([each.values for each in parts])).T
+    turned = zip(QUATERNION_COLUMNS, parts, values, strict=True)
+    return {**series, **{name: replace(part, values=column) for name, part, column in turned}}
 
 
 def _in_words(columns: Mapping[str, NDArray[np.float64]], repeated: int) -> str:

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError, format_value
 from ..name_suggestions import join_names
-from ..robot.schema import AXES
+from ..robot.schema import AXES, QUATERNION_COLUMNS
 
 STANDARD_GRAVITY = 9.80665  # m/s^2, of the kilogram-force
 POUND_FORCE = 4.4482216152605  # N
@@ -64,9 +64,16 @@ _FORCE = (
     Unit("g", STANDARD_GRAVITY, 1e3),
     Unit("lbf", POUND_FORCE),
 )
-UNITS: Mapping[str, tuple[Unit, ...]] = {"time": _TIME, "length": _LENGTH, "speed": _SPEED, "force": _FORCE}
+_RATIO = (Unit("1"),)
+UNITS: Mapping[str, tuple[Unit, ...]] = {
+    "time": _TIME,
+    "length": _LENGTH,
+    "speed": _SPEED,
+    "force": _FORCE,
+    "ratio": _RATIO,
+}
 
-_OTHER_SPELLINGS = {"sec": "s", "m*s^-1": "m/s", "m s^-1": "m/s", "m s-1": "m/s", "kp": "kgf", "lb": "lbf"}
+_OTHER_SPELLINGS = {"sec": "s", "m*s^-1": "m/s", "m s^-1": "m/s", "m s-1": "m/s", "kp": "kgf", "lb": "lbf", "-": "1"}
 # Units in words, as trackers write them behind a name; without brackets such a word may be a name.
 _IN_WORDS = {
     word + plural: symbol
@@ -90,6 +97,8 @@ def quantity_of(column: str) -> str:
     """Physical quantity of a known column of a recording, a key of ``UNITS``."""
     if column == "time":
         return "time"
+    if column in QUATERNION_COLUMNS:
+        return "ratio"
     if column in AXES or column.startswith("rope_length_"):
         return "length"
     return "speed" if column.startswith("winch_speed_") else "force"
@@ -112,9 +121,10 @@ def is_any_unit(text: str) -> bool:
 
 def require_unit(text: str, column: str, where: str, line: int | None = None) -> Unit:
     """The unit of a known column that is written so; raises RecordingError, about ``where``, if it is not listed."""
-    unit = find_unit(text, column)
+    unit, quantity = find_unit(text, column), quantity_of(column)
+    if unit is None and quantity == "ratio" and not text.strip():
+        return _RATIO[0]
     if unit is None:
-        quantity = quantity_of(column)
         problem = f"is in {format_value(text)}, not a known unit of {quantity}" if text.strip() else "has no unit"
         symbols = ", ".join(unit.symbol for unit in UNITS[quantity])
         raise RecordingError(where, problem, f"write one of {symbols}", line)

@@ -9,9 +9,10 @@ from ..errors import format_value
 from ..name_suggestions import suggest_name
 from ..validation import NumberRule
 from .checked_table import CheckedTable
-from .schema import AXES, RecordedColumn, Tracker
+from .schema import AXES, QUATERNION_COLUMNS, RecordedColumn, Tracker
 
 CABLE_COLUMNS = ("winch_speed", "rope_length", "tension")
+POSE_COLUMNS = (*AXES, *QUATERNION_COLUMNS)
 COLUMN_NUMBERS = {
     "factor": NumberRule("the factor by which the column is multiplied", "", default=1.0),
     "sign": NumberRule("the sign of the column, 1 or -1", "", -1.0, 1.0, default=1.0),
@@ -85,12 +86,12 @@ def _is_column(table: CheckedTable, key: str, cable_count: int) -> bool:
     """Whether a key is the name of a standard column, or of those of all cables; refuses it otherwise."""
     match = _NUMBERED.fullmatch(key)
     for_all = tuple(f"{kind}_{_EVERY_CABLE}" for kind in CABLE_COLUMNS if cable_count)
-    if key in ("time", *AXES, *for_all):
+    if key in ("time", *POSE_COLUMNS, *for_all):
         return True
     if match is None or match.group(2).startswith("0"):
         numbers = [digits for digits in re.findall("[0-9]+", key) if 0 < int(digits[:6]) <= cable_count]
         numbered = [f"{kind}_{int(digits)}" for kind in CABLE_COLUMNS for digits in numbers]
-        names = ("time", *AXES, *for_all, *numbered)
+        names = ("time", *POSE_COLUMNS, *for_all, *numbered)
         table.refuse(key, "is not a column of a recording", f"write {suggest_name(key, names)}")
         return False
     if cable_count == 0:

@@ -10,6 +10,7 @@ from ..validation import validate_instance
 Point = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 AXES = ("x", "y", "z")
+QUATERNION_COLUMNS = ("qw", "qx", "qy", "qz")
 
 # Components that exist once per cable: an effect in them may apply to some cables only.
 PER_CABLE_COMPONENTS = ("cable", "winch", "sensor")
