@@ -2,6 +2,7 @@
 
 import ast
 from collections.abc import Iterator
+from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
 import pytest
@@ -62,6 +63,20 @@ def upward_imports(system: Path) -> list[str]:
     return results
 
 
+def import_circle(system: Path) -> list[tuple[str, ...]]:
+    """Modules that import each other in a circle, also inside of functions; empty where there is none."""
+    files = {file.relative_to(system).with_suffix("").parts: file for file in (system / "tautwire").rglob("*.py")}
+    imports = {
+        name: {module for _, imported in imported_modules(file, system) for module in (imported, imported[:-1])}
+        for name, file in files.items()
+    }
+    try:
+        TopologicalSorter({name: (modules & set(files)) - {name} for name, modules in imports.items()}).prepare()
+    except CycleError as error:
+        return list(error.args[1])
+    return []
+
+
 def test_every_module_and_package_of_the_root_has_a_layer():
     names = {path.stem for path in (SYSTEM / "tautwire").iterdir() if path.suffix == ".py" or list(path.glob("*.py"))}
     assert names - {"__init__"} == set(LAYER_OF)
@@ -85,6 +100,18 @@ def test_an_import_of_a_higher_layer_is_found(tmp_path, statement):
     room.mkdir(parents=True)
     (room / "schema.py").write_text(statement, encoding="utf-8")
     assert len(upward_imports(tmp_path)) == 1
+
+
+def test_no_modules_import_each_other_in_a_circle():
+    assert import_circle(SYSTEM) == []
+
+
+def test_a_circle_through_an_import_inside_of_a_function_is_found(tmp_path):
+    room = tmp_path / "tautwire" / "robot"
+    room.mkdir(parents=True)
+    (room / "kinematics.py").write_text("from .statics import tensions", encoding="utf-8")
+    (room / "statics.py").write_text("def late():\n    from . import kinematics", encoding="utf-8")
+    assert {name[-1] for name in import_circle(tmp_path)} == {"kinematics", "statics"}
 
 
 def test_what_travels_in_fmus_imports_nothing_of_the_system():

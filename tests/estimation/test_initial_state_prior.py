@@ -10,7 +10,8 @@ from tautwire.estimation.kalman_filter import Noise
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.recordings.recording import Recording
 from tautwire.robot.robot_file_reader import read_robot
-from tautwire.robot.robot_file_writer import robot_text, write_robot
+from tautwire.robot.robot_file_text import robot_text
+from tautwire.robot.robot_file_writer import write_robot
 from tautwire.robot.schema import InitialState
 from tautwire.robot.static_equilibrium import static_tensions
 from tautwire.robot.symbolic_model import symbolic_model

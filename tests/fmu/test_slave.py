@@ -11,10 +11,11 @@ from fmpy.fmi1 import FMICallException
 
 from tautwire.fmus.component import Component, ComponentError
 from tautwire.fmus.packaging import RobotFmus, build_fmus
+from tautwire.robot.cable_routes import unit_directions
 from tautwire.robot.kinematics import inverse_kinematics, structure_matrix
 from tautwire.robot.robot_assembly import assemble_robot
 from tautwire.robot.schema import EffectSetting
-from tautwire.robot.static_equilibrium import static_tensions, unit_directions
+from tautwire.robot.static_equilibrium import static_tensions
 from tautwire.robot.symbolic_model import CASADI_MATHEMATICS
 from tests.support.fmus import Hand, in_hand
 from tests.support.robots import paper_robot

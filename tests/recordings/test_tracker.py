@@ -12,7 +12,7 @@ from tautwire.errors import RecordingError, RobotFileError
 from tautwire.recordings.recording import Recording, read_recording
 from tautwire.recordings.tracker import positions_at_rows, with_tracker
 from tautwire.robot.robot_file_reader import read_columns_file, read_tracker_file, robot_from_text
-from tautwire.robot.robot_file_writer import robot_text
+from tautwire.robot.robot_file_text import robot_text
 from tautwire.robot.schema import RecordedColumn, Tracker
 from tests.support.robots import EXAMPLES, example
 from tests.support.trackers import split

@@ -13,10 +13,12 @@ from scipy.integrate import trapezoid
 from tautwire.control import path_tensions
 from tautwire.errors import RobotFileError, UnreachableError
 from tautwire.linear import linearise
+from tautwire.robot.cable_routes import cable_routes, unit_directions
 from tautwire.robot.robot_file_reader import read_robot
-from tautwire.robot.robot_file_writer import robot_text, write_robot
+from tautwire.robot.robot_file_text import robot_text
+from tautwire.robot.robot_file_writer import write_robot
 from tautwire.robot.schema import PER_CABLE_COMPONENTS, EffectSetting, Platform, Robot
-from tautwire.robot.static_equilibrium import cable_routes, static_forces, static_tensions, unit_directions
+from tautwire.robot.static_equilibrium import static_forces, static_tensions
 from tautwire.robot.symbolic_model import FreeParameter, SymbolicModel, symbolic_model
 from tautwire.robot.trajectory import Line, ideal_winch_speeds
 from tautwire_fmu.laws.effects import ALL, BY_NAME, Effect

@@ -9,7 +9,8 @@ import pytest
 
 from tautwire.errors import RobotFileError
 from tautwire.robot.robot_file_reader import read_robot
-from tautwire.robot.robot_file_writer import robot_text, write_robot
+from tautwire.robot.robot_file_text import robot_text
+from tautwire.robot.robot_file_writer import write_robot
 from tautwire.robot.schema import Formula, Robot
 from tests.support.robots import example
 

@@ -9,9 +9,9 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from tautwire.errors import ArgumentError
+from tautwire.robot.cable_routes import unit_directions
 from tautwire.robot.kinematics import forward_kinematics, inverse_kinematics, length_jacobian, structure_matrix
 from tautwire.robot.schema import EffectSetting, Robot
-from tautwire.robot.static_equilibrium import unit_directions
 from tests.support.rigid_robots import crane_robot, octahedral_robot, suspended_robot
 from tests.support.robots import example
 

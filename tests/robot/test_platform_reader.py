@@ -15,7 +15,8 @@ from scipy.spatial.transform import Rotation
 from tautwire.errors import RobotFileError
 from tautwire.robot.robot_file_editor import edited_robot_text
 from tautwire.robot.robot_file_reader import read_robot, read_robot_with_sink, robot_from_text
-from tautwire.robot.robot_file_writer import robot_text, write_robot
+from tautwire.robot.robot_file_text import robot_text
+from tautwire.robot.robot_file_writer import write_robot
 from tautwire.robot.schema import Robot
 from tests.support.rigid_robots import crane_robot, suspended_robot
 from tests.support.robots import EXAMPLES

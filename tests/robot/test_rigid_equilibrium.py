@@ -10,16 +10,11 @@ from scipy.optimize import linprog, minimize
 from scipy.spatial.transform import Rotation
 
 from tautwire.errors import UnreachableError
+from tautwire.robot.cable_routes import attachment_points
 from tautwire.robot.kinematics import structure_matrix
 from tautwire.robot.rigid_equilibrium import load_wrench, static_equilibrium
 from tautwire.robot.schema import EffectSetting, Point, Robot, TensionLimits
-from tautwire.robot.static_equilibrium import (
-    attachment_points,
-    start_attachments,
-    start_orientation,
-    static_forces,
-    static_tensions,
-)
+from tautwire.robot.static_equilibrium import start_attachments, start_orientation, static_forces, static_tensions
 from tests.support.rigid_robots import cable, crane_robot, octahedral_robot, suspended_robot
 
 

@@ -10,7 +10,8 @@ import pytest
 from tautwire.provenance import Provenance
 from tautwire.robot.robot_file_editor import edited_robot_text
 from tautwire.robot.robot_file_reader import read_robot, robot_from_text
-from tautwire.robot.robot_file_writer import completed_robot, write_robot
+from tautwire.robot.robot_file_text import completed_robot
+from tautwire.robot.robot_file_writer import write_robot
 from tautwire.robot.schema import EffectSetting, Formula, Robot, UserFmu
 from tests.support.robots import EXAMPLES
 

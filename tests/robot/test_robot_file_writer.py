@@ -12,7 +12,8 @@ from hypothesis import strategies as st
 
 from tautwire.errors import RobotFileError
 from tautwire.robot.robot_file_reader import read_robot
-from tautwire.robot.robot_file_writer import robot_text, write_robot
+from tautwire.robot.robot_file_text import robot_text
+from tautwire.robot.robot_file_writer import write_robot
 from tautwire.robot.schema import (
     PER_CABLE_COMPONENTS,
     Cable,

@@ -5,8 +5,9 @@ import pytest
 from scipy.optimize import minimize
 
 from tautwire.errors import UnreachableError
+from tautwire.robot.cable_routes import unit_directions
 from tautwire.robot.schema import EffectSetting, TensionLimits
-from tautwire.robot.static_equilibrium import static_tensions, unit_directions
+from tautwire.robot.static_equilibrium import static_tensions
 from tests.support.robots import NAMES, example, paper_robot
 
 

@@ -14,7 +14,7 @@ from casadi import DM, Function
 from tautwire.estimation import Trace, trace
 from tautwire.recordings.recording import Recording
 from tautwire.robot.robot_file_reader import read_robot
-from tautwire.robot.robot_file_writer import robot_text
+from tautwire.robot.robot_file_text import robot_text
 from tautwire.robot.schema import Robot
 from tautwire.robot.symbolic_model import symbolic_model
 from tautwire.robot.uncertain_parameters import (

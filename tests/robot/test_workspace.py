@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from tautwire.errors import InputError, UnreachableError
+from tautwire.robot.cable_routes import unit_directions
 from tautwire.robot.schema import Cable, EffectSetting, Platform, Robot, Sensors, TensionLimits
-from tautwire.robot.static_equilibrium import static_tensions, unit_directions
+from tautwire.robot.static_equilibrium import static_tensions
 from tautwire.robot.tension_distribution import distribute_tensions
 from tautwire.robot.workspace import wrench_feasible_workspace, wrench_margin
 from tests.support.robots import NAMES, example, paper_robot

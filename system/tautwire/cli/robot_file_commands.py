@@ -128,7 +128,7 @@ def import_(
     """
     from ..atomic_output import atomic_file, refuse_other_formats, refuse_overwriting_inputs
     from ..robot.caspr_import import Rope, read_caspr_robot
-    from ..robot.robot_file_writer import robot_text
+    from ..robot.robot_file_text import robot_text
 
     output, files = CommandOutput(as_json, quiet), sorted(folder.glob("*.xml"))
     refuse_other_formats(out, ROBOT_FILE_SUFFIX)

@@ -27,7 +27,8 @@ from tautwire_fmu.laws.point_mass import PointMassConstants, total_mass
 from ..errors import UnreachableError
 from ..robot.active_effects import platform_effects
 from ..robot.schema import Robot, require_point_mass
-from ..robot.static_equilibrium import load_on_tensions, static_tensions
+from ..robot.static_equilibrium import static_tensions
+from ..robot.static_load import load_on_tensions
 from ..robot.symbolic_model import SymbolicModel, symbolic_model
 from ..robot.trajectory import Trajectory, cable_directions, ideal_winch_speeds
 from .design import StretchError

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from ..errors import RecordingError
 from ..recordings.recording import Recording
 from ..recordings.start_position import start_position, with_start
+from ..robot.cable_routes import unit_directions
 from ..robot.schema import Robot
-from ..robot.static_equilibrium import static_tensions, unit_directions
+from ..robot.static_equilibrium import static_tensions
 from .kalman_filter import Noise
 from .policy import DEFAULT_POLICY
 from .preprocessing_policy import InitialStatePolicy

@@ -16,8 +16,9 @@ from tautwire_fmu.laws.rotation import rotation_matrix
 
 from ..array_validation import validate_point
 from ..errors import TautwireError
+from ..robot.cable_routes import cable_routes
 from ..robot.schema import Quaternion, Robot
-from ..robot.static_equilibrium import cable_routes, static_tensions
+from ..robot.static_equilibrium import static_tensions
 from ..robot.symbolic_model import SymbolicModel
 
 Array = NDArray[np.float64]

@@ -21,8 +21,8 @@ from tautwire_fmu.laws.mathematics import REAL
 from ..array_validation import validate_array, validate_quaternion
 from ..errors import ArgumentError, UnreachableError
 from ..validation import validate_integer
+from .cable_routes import attachment_points, cable_routes
 from .schema import Point, Quaternion, Robot, validate_robot
-from .static_equilibrium import attachment_points, cable_routes
 
 Array = NDArray[np.float64]
 

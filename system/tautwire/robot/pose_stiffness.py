@@ -14,10 +14,12 @@ from tautwire_fmu.laws.rotation import multiply, quaternion_of, rotate
 from tautwire_fmu.laws.vectors import add, cross, scale, subtract
 
 from ..array_validation import validate_array
+from .cable_routes import attachment_points
 from .kinematics import validated_pose
 from .robot_assembly import CableComponent, cable_components
 from .schema import Quaternion, Robot
-from .static_equilibrium import attachment_points, static_load, static_tensions
+from .static_equilibrium import static_tensions
+from .static_load import static_load
 
 Array = NDArray[np.float64]
 

@@ -23,17 +23,11 @@ from tautwire_fmu.laws.rotation import multiply, quaternion_of, rotate
 
 from ..errors import ArgumentError, UnreachableError
 from .active_effects import cable_effects, cables_have_weight
+from .cable_routes import attachment_points, cable_routes, unreachable_error
 from .kinematics import structure_matrix_at, validated_pose
 from .schema import Quaternion, Robot, TensionLimits
-from .static_equilibrium import (
-    DEFAULT_LIMITS,
-    attachment_points,
-    cable_routes,
-    fixed_point,
-    static_load,
-    unreachable_error,
-)
-from .tension_distribution import distribute_by_rule, least_limit_violations
+from .static_load import fixed_point, static_load
+from .tension_distribution import DEFAULT_LIMITS, distribute_by_rule, least_limit_violations
 
 Array = NDArray[np.float64]
 Balance = tuple[Array, Array]

@@ -15,8 +15,9 @@ from tautwire_fmu.laws.mathematics import REAL, Mathematics
 from tautwire_fmu.laws.point_mass import PointMassConstants
 
 from .active_effects import cable_effects, platform_effects
+from .cable_routes import cable_routes
 from .schema import Robot
-from .static_equilibrium import cable_routes, start_orientation, static_tensions
+from .static_equilibrium import start_orientation, static_tensions
 
 NUMPY_MATHEMATICS = Mathematics(
     log=np.log,

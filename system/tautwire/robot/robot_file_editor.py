@@ -13,7 +13,7 @@ from ..errors import RobotFileError
 from ..provenance import COMMENT_STARTS
 from ..toml_text import parse_toml
 from .robot_file_reader import robot_file_text, robot_from_text
-from .robot_file_writer import completed_robot, robot_text
+from .robot_file_text import completed_robot, robot_text
 from .schema import Robot
 
 # Tables that are lists, or whose order counts; all others are edited key by key.

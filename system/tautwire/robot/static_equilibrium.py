@@ -1,105 +1,24 @@
-"""Static equilibrium at a position: the cables' routes, the load on them, and the tensions that balance it."""
+"""Static equilibrium at a position: the tensions that balance the load on the cables."""
 
 from __future__ import annotations
-
-from collections.abc import Callable, Iterable, Sequence
-from typing import TYPE_CHECKING, Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from tautwire_fmu.laws import effect_stages as stages
-from tautwire_fmu.laws import point_mass
-from tautwire_fmu.laws.effect_stages import Route
-from tautwire_fmu.laws.mathematics import REAL, Mathematics
-from tautwire_fmu.laws.rotation import rotate
-from tautwire_fmu.laws.vectors import Vector, add, scale, subtract
+from tautwire_fmu.laws.mathematics import REAL
+from tautwire_fmu.laws.vectors import add, scale
 
-from ..errors import UnreachableError
-from .active_effects import cable_effects, cables_have_weight, platform_effects
-from .schema import Quaternion, Robot, TensionLimits
-from .tension_distribution import distribute_tensions, least_limit_violations
-
-if TYPE_CHECKING:
-    from .rigid_equilibrium import StaticEquilibrium
+from .active_effects import cable_effects, cables_have_weight
+from .cable_routes import Points, attachment_points, cable_routes, unreachable_error
+from .rigid_equilibrium import static_equilibrium
+from .schema import Quaternion, Robot
+from .static_load import cable_weight_force, fixed_point, static_load
+from .tension_distribution import DEFAULT_LIMITS, distribute_tensions, least_limit_violations
 
 Array = NDArray[np.float64]
-Points = tuple[Sequence[Any], ...]
 
-
-DEFAULT_LIMITS = TensionLimits(minimum=0.0, maximum=float("inf"), preferred=0.0)
 SINGULARITY_TOLERANCE = 1e-9
-MIN_CABLE_LENGTH = 1e-6
-MAX_ITERATIONS = 50
-CONVERGENCE_TOLERANCE = 1e-14
-
-
-def attachment_points(robot: Robot, position: Sequence[Any], orientation: Sequence[Any] | None = None) -> Points:
-    """Where the cables hold the platform in the world, in m; ``orientation`` is by default that of the robot file."""
-    if not robot.platform.is_rigid_body:
-        return (position,) * robot.cable_count
-    quaternion = robot.platform.start_orientation if orientation is None else orientation
-    return tuple(add(position, rotate(quaternion, attachment)) for attachment in robot.attachments)
-
-
-def cable_routes(
-    mathematics: Mathematics, robot: Robot, position: Sequence[Any], orientation: Sequence[Any] | None = None
-) -> tuple[Route, ...]:
-    """Routes of the cables from the platform at a position (m) to their exit points, effects included.
-
-    A rigid platform has an ``orientation`` (unit quaternion), by default that of the robot file.
-
-    Raises UnreachableError where a cable has no length there, or the platform is inside a pulley.
-    """
-    route_list = []
-    points = attachment_points(robot, position, orientation)
-    for index, (cable, point) in enumerate(zip(robot.cables, points, strict=True), start=1):
-        try:
-            route = stages.route(mathematics, cable_effects(robot, index), cable.anchor, point, cable.swivel_axis)
-        except (ArithmeticError, ValueError) as error:
-            raise unreachable_error(robot, position, f"cable {index} has no length there", index) from error
-        if isinstance(route.length, float) and not route.length >= MIN_CABLE_LENGTH:
-            raise unreachable_error(robot, position, f"cable {index} has no length there", index)
-        route_list.append(route)
-    return tuple(route_list)
-
-
-def unit_directions(robot: Robot, at: Array | None = None) -> Array:
-    """Unit vectors of the cables at the platform, by default at its start, shape (3, n)."""
-    position = np.array(robot.platform.start if at is None else at, dtype=float)
-    return np.array([route.direction for route in cable_routes(REAL, robot, position.tolist())]).T
-
-
-def total_weight(robot: Robot, mathematics: Mathematics = REAL) -> Any:
-    """Weight of the platform with payload, in N."""
-    constants = point_mass.PointMassConstants(robot.platform.mass, robot.gravity)
-    return point_mass.total_mass(mathematics, constants, platform_effects(robot)) * robot.gravity
-
-
-def static_load(mathematics: Mathematics, robot: Robot, position: Sequence[Any]) -> Vector:
-    """Static load on the cables, in N: the platform's weight less the forces of effects."""
-    effects = platform_effects(robot)
-    effect_force = point_mass.wrench(mathematics, effects, point_mass.start_states(effects), position, (0.0, 0.0, 0.0))
-    return subtract((0.0, 0.0, total_weight(robot, mathematics)), effect_force)
-
-
-def cable_weight_force(
-    mathematics: Mathematics, robot: Robot, routes: Sequence[Route], tensions: Sequence[Any]
-) -> Vector:
-    """Force of cables under tensions (N) on the platform on top of these tensions, in N."""
-    total: Vector = (0.0, 0.0, 0.0)
-    for index, (route, tension) in enumerate(zip(routes, tensions, strict=True), start=1):
-        total = add(
-            total, stages.end_forces(mathematics, cable_effects(robot, index), robot.gravity, route, tension)[0]
-        )
-    return total
-
-
-def load_on_tensions(robot: Robot, position: Sequence[float], tensions: Array) -> Array:
-    """Load that tensions (n,) in N along the cables balance at a position (m), (3,) in N."""
-    routes = cable_routes(REAL, robot, position)
-    weight_force = cable_weight_force(REAL, robot, routes, tensions.tolist())
-    return np.array(subtract(static_load(REAL, robot, position), weight_force), dtype=float)
 
 
 def static_tensions(robot: Robot, at: Array | None = None) -> Array:
@@ -113,7 +32,7 @@ def static_tensions(robot: Robot, at: Array | None = None) -> Array:
     Raises UnreachableError where a cable would have to push or to break a limit.
     """
     if robot.platform.is_rigid_body:
-        return _rigid_equilibrium(robot, at).tensions
+        return static_equilibrium(robot, at).tensions
     position = np.array(robot.platform.start if at is None else at, dtype=float)
     routes = cable_routes(REAL, robot, position.tolist())
     direction_matrix = np.array([route.direction for route in routes]).T
@@ -139,7 +58,7 @@ def start_orientation(robot: Robot) -> Quaternion:
     Raises UnreachableError where the cables cannot hold a rigid platform there.
     """
     is_rigid = robot.platform.is_rigid_body
-    return _rigid_equilibrium(robot).orientation if is_rigid else robot.platform.start_orientation
+    return static_equilibrium(robot).orientation if is_rigid else robot.platform.start_orientation
 
 
 def start_attachments(robot: Robot) -> Points:
@@ -151,7 +70,7 @@ def start_attachments(robot: Robot) -> Points:
 def static_forces(robot: Robot) -> Array:
     """Forces of the cables on the platform at its start, shape (n, 3), in N."""
     if robot.platform.is_rigid_body:
-        equilibrium = _rigid_equilibrium(robot)
+        equilibrium = static_equilibrium(robot)
         orientation, tensions = equilibrium.orientation, equilibrium.tensions
     else:
         orientation, tensions = robot.platform.start_orientation, static_tensions(robot)
@@ -161,23 +80,6 @@ def static_forces(robot: Robot) -> Array:
         weight_force = stages.end_forces(REAL, cable_effects(robot, index), robot.gravity, route, tension)[0]
         forces.append(add(scale(tension, route.direction), weight_force))
     return np.array(forces)
-
-
-def _rigid_equilibrium(robot: Robot, position: Array | None = None) -> StaticEquilibrium:
-    # It builds on this module's routes and loads.
-    from .rigid_equilibrium import static_equilibrium
-
-    return static_equilibrium(robot, position)
-
-
-def fixed_point(iterate: Callable[[Array], Array], guess: Array) -> Array:
-    """Tensions by fixed-point iteration, which is a strong contraction: cables are light against their tensions."""
-    tensions = guess
-    for _ in range(MAX_ITERATIONS):
-        previous, tensions = tensions, iterate(tensions)
-        if np.max(np.abs(tensions - previous)) <= CONVERGENCE_TOLERANCE * np.max(tensions):
-            break
-    return tensions
 
 
 def _solve_three(robot: Robot, position: Array, direction_matrix: Array, load: Array) -> Array:
@@ -202,10 +104,3 @@ def _distribute(robot: Robot, position: Array, direction_matrix: Array, load: Ar
     bound = limits.minimum if excess[worst] < 0.0 else limits.maximum
     reason = f"no tensions between {limits.minimum:g} and {limits.maximum:g} N hold the platform there"
     raise unreachable_error(robot, position, reason, worst + 1, bound + float(excess[worst]))
-
-
-def unreachable_error(
-    robot: Robot, position: Iterable[Any], reason: str, cable: int | None = None, tension: float | None = None
-) -> UnreachableError:
-    """The error about a position (m) that the cables cannot hold."""
-    return UnreachableError(robot.name, tuple(map(float, position)), cable=cable, tension=tension, reason=reason)

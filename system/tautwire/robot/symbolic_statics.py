@@ -10,16 +10,11 @@ from numpy.typing import NDArray
 from tautwire_fmu.laws.mathematics import Mathematics
 
 from .active_effects import cables_have_weight
+from .cable_routes import cable_routes, unit_directions
 from .schema import Robot
-from .static_equilibrium import (
-    DEFAULT_LIMITS,
-    SINGULARITY_TOLERANCE,
-    cable_routes,
-    cable_weight_force,
-    static_load,
-    static_tensions,
-    unit_directions,
-)
+from .static_equilibrium import SINGULARITY_TOLERANCE, static_tensions
+from .static_load import cable_weight_force, static_load
+from .tension_distribution import DEFAULT_LIMITS
 
 Array = NDArray[np.float64]
 

@@ -19,6 +19,7 @@ from .schema import TensionLimits
 Array = NDArray[np.float64]
 
 BALANCE_TOLERANCE = 1e-6
+DEFAULT_LIMITS = TensionLimits(minimum=0.0, maximum=float("inf"), preferred=0.0)
 RULES = ("nearest", "least_norm", "barycentre", "closed_form")
 
 

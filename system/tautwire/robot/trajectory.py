@@ -13,8 +13,8 @@ from ..array_validation import validate_array, validate_point
 from ..errors import ArgumentError
 from ..validation import NumberRule, validate_attributes, validate_number
 from .active_effects import has_routing_effects
+from .cable_routes import unit_directions as rope_directions
 from .schema import Point, Robot, validate_point_mass_robot
-from .static_equilibrium import unit_directions as rope_directions
 
 Array = NDArray[np.float64]
 

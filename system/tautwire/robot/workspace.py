@@ -16,8 +16,11 @@ from tautwire_fmu.laws.point_mass import PointMassConstants, total_mass
 from ..errors import InputError, UnreachableError
 from ..process_signals import defer_interrupts
 from .active_effects import cables_have_weight, platform_effects
+from .cable_routes import cable_routes
 from .schema import Robot, TensionLimits, require_point_mass
-from .static_equilibrium import DEFAULT_LIMITS, cable_routes, cable_weight_force, static_load, static_tensions
+from .static_equilibrium import static_tensions
+from .static_load import cable_weight_force, static_load
+from .tension_distribution import DEFAULT_LIMITS
 
 Array = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ import pytest
 
 from tautwire.robot.reference_simulation import integrate
 from tautwire.robot.robot_file_reader import read_robot
-from tautwire.robot.robot_file_writer import robot_text
+from tautwire.robot.robot_file_text import robot_text
 from tautwire.robot.schema import EffectSetting
 from tautwire_fmu.laws.cable import LINEAR, CableConstants, CableInputs, CableState, cable_motion, cable_outputs, span
 from tautwire_fmu.laws.effects import ALL, BY_NAME, UNLISTED, ActiveEffect
