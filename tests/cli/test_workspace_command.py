@@ -5,6 +5,8 @@ import pandas as pd
 import pytest
 
 from tautwire.cli import run
+from tautwire.robot.robot_file_writer import write_robot
+from tests.support.rigid_robots import crane_robot
 from tests.support.robots import EXAMPLES
 
 CAROCA = str(EXAMPLES / "caroca" / "robot.toml")
@@ -39,6 +41,53 @@ def test_what_is_wrong_is_one_line_and_nothing_written(
     captured = capsys.readouterr()
     assert message in captured.err and captured.err.count("\n") == 1
     assert list(tmp_path.iterdir()) == []
+
+
+def written_crane(folder: Path) -> str:
+    write_robot(crane_robot(), folder / "crane.toml")
+    return str(folder / "crane.toml")
+
+
+def test_the_orientations_at_a_position_of_a_rigid_platform(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    table, figure = tmp_path / "turns.csv", tmp_path / "turns.svg"
+    ranges = ["--at", "0,0,1.5", "--rotation-range", "0.2,0,0.4", "--spacing", "0.2", "--orientation", "1,0,0,0"]
+    assert run(["workspace", written_crane(tmp_path), "--out", str(table), "--plot", str(figure), *ranges]) == 0
+    turns = pd.read_csv(table)
+    assert list(turns)[:4] == ["rotation_x", "rotation_y", "rotation_z", "feasible"]
+    assert list(turns)[-2:] == ["cables_interfere", "platform_interferes"]
+    assert len(turns) == 3 * 5 and f"{turns.feasible.sum()} of 15 orientations" in capsys.readouterr().out
+    assert "<svg" in figure.read_text(encoding="utf-8")
+
+
+def test_a_range_of_rotations_makes_the_workspace_smaller(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    robot, counts = written_crane(tmp_path), []
+    arguments = ["workspace", robot, "--json", "--spacing", "3", "--acceleration", "1", "--angular-acceleration", "1"]
+    for rotations in ("0,0,0", "0.3,0.3,0.3"):
+        assert run([*arguments, "--rotation-range", rotations]) == 0
+        counts.append(json.loads(capsys.readouterr().out)["feasible"])
+    assert 0 < counts[1] < counts[0]
+    assert run([*arguments, "--criterion", "wrench-closure", "--quiet"]) == 0
+    assert json.loads(capsys.readouterr().out)["feasible"] == 0
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        (["--criterion", "wrench"], "criterion: 'wrench' is none"),
+        (["--at", "0,0,1"], "--at: is given without rotations"),
+        (["--at", "0,0,1", "--lower", "0,0,0", "--rotation-range", "1,1,1"], "--at: is given with a box"),
+        (["--rotation-range", "1,1"], "--rotation-range: '1,1' is not 3 numbers"),
+        (["--rotation-range", "1,1,4"], "three rotations from 0 to pi rad"),
+        (["--orientation", "1,0,0,1"], "--orientation: has norm 1.41421"),
+    ],
+)
+def test_what_a_rigid_platform_cannot_have_is_one_line(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], arguments: list[str], message: str
+) -> None:
+    assert run(["workspace", written_crane(tmp_path), "--out", str(tmp_path / "w.csv"), *arguments]) == 2
+    captured = capsys.readouterr()
+    assert message in captured.err and captured.err.count("\n") == 1
+    assert not (tmp_path / "w.csv").exists()
 
 
 def test_table_and_figure_are_not_written_to_one_file(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

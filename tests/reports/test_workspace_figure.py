@@ -6,7 +6,9 @@ import pytest
 
 from tautwire.errors import InputError
 from tautwire.reports.workspace_figure import require_figure_format, workspace_figure
-from tautwire.robot.workspace import wrench_feasible_workspace
+from tautwire.robot.pose_grid import orientation_grid
+from tautwire.robot.workspace import workspace_on, wrench_feasible_workspace
+from tests.support.rigid_robots import crane_robot
 from tests.support.robots import example
 
 
@@ -30,6 +32,18 @@ def test_a_workspace_without_a_feasible_position_is_drawn_too() -> None:
     workspace = wrench_feasible_workspace(robot, (3.0, 3.0, 1.0), (5.0, 5.0, 2.0), 1.0)
     assert not workspace.feasible.any()
     workspace_figure(robot, workspace).savefig(BytesIO())
+
+
+def test_slices_of_orientations_are_hatched_where_cables_touch() -> None:
+    robot = crane_robot()
+    workspace = workspace_on(orientation_grid(robot, (0.6, 0.0, 1.2), spacing=0.6), robot, "static")
+    figure = workspace_figure(robot, workspace)
+    panel = figure.axes[1]
+    assert (panel.get_xlabel(), panel.get_ylabel()) == ("rotation about x, rad", "rotation about z, rad")
+    assert workspace.interference is not None
+    touching = workspace.interference[0] | workspace.interference[1]
+    assert len(panel.patches) == touching.sum() > 0
+    assert "Static workspace of crane (hatched" in figure.get_suptitle()
 
 
 def test_a_file_without_a_figures_suffix_is_refused() -> None:

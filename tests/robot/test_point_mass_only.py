@@ -21,7 +21,6 @@ from tautwire.robot.schema import Robot
 from tautwire.robot.symbolic_model import symbolic_model
 from tautwire.robot.trajectory import Line, ideal_winch_speeds
 from tautwire.robot.uncertain_parameters import uncertain_parameters
-from tautwire.robot.workspace import wrench_feasible_workspace, wrench_margin
 from tests.support.rigid_robots import suspended_robot
 
 PATH = Line((0.0, 0.0, 1.5), (0.1, 0.0, 1.5), 1.0)
@@ -36,8 +35,6 @@ COMPUTATIONS: dict[str, Callable[[Robot], object]] = {
     "speeds": lambda robot: ideal_winch_speeds(robot, PATH, np.array([0.0, 0.5])),
     "controller": tautwire.design_controller,
     "model": lambda robot: symbolic_model(robot, (), uncertain_parameters(robot)),
-    "workspace": wrench_feasible_workspace,
-    "margin": lambda robot: wrench_margin(robot, np.array(robot.platform.start)),
     "excitation": default_limits,
     "recording": lambda robot: prepare_recordings(robot, STANDING, None),
 }
@@ -55,7 +52,6 @@ def test_a_rigid_platform_is_refused(name: str) -> None:
     (
         ["trace", "ROBOT", "hall.toml", "--out", "report"],
         ["excite", "ROBOT", "--out", "out.csv"],
-        ["workspace", "ROBOT", "--out", "out.csv"],
         ["columns", "hall.toml", "ROBOT"],
     ),
 )

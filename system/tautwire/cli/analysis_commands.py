@@ -1,4 +1,4 @@
-"""The commands ``linearise`` and ``workspace``: the linear plant, and the wrench-feasible workspace."""
+"""The commands ``linearise`` and ``workspace``: the linear plant, and where the cables can hold the platform."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import typer
 from ..errors import InputError, UnreachableError
 from ..provenance import Provenance
 from ..robot.robot_file_reader import read_robot
-from ..robot.schema import Robot, require_point_mass
+from ..robot.schema import Robot
 from .console import (
     AsJson,
     CommandOutput,
@@ -23,6 +23,7 @@ from .console import (
     RobotFile,
     command_provenance,
     note_unused_tables,
+    parse_numbers,
     parse_position,
     progress_bar,
     read_holdable_robot,
@@ -31,7 +32,12 @@ from .console import (
 
 if TYPE_CHECKING:
     from ..linear.linear_plant import LinearPlant
+    from ..robot.pose_grid import PoseGrid
     from ..robot.workspace import Workspace
+
+QUATERNION_NORM_TOLERANCE = 1e-3
+COMPUTING = "computing the workspace"
+CRITERION_WORDS = {"wrench-closure": "in wrench closure", "static": "in static equilibrium"}
 
 
 def linearise(
@@ -120,21 +126,39 @@ def workspace(
         str | None, typer.Option(metavar="X,Y,Z", help="Lower corner, m; by default of all exit points and the start.")
     ] = None,
     upper: Annotated[str | None, typer.Option(metavar="X,Y,Z", help="Upper corner, m.")] = None,
-    spacing: Annotated[float | None, typer.Option(help="Grid spacing, m; by default a twentieth of the box.")] = None,
+    spacing: Annotated[
+        float | None, typer.Option(help="Grid spacing, m, with --at rad; by default a twentieth of the longest side.")
+    ] = None,
     acceleration: Annotated[float, typer.Option(help="Acceleration to provide along each axis, m/s^2.")] = 0.0,
+    angular_acceleration: Annotated[
+        float, typer.Option(help="Angular acceleration to provide about each axis of the platform, rad/s^2.")
+    ] = 0.0,
+    criterion: Annotated[
+        str, typer.Option(help="wrench-feasible, wrench-closure or static.", show_default=True)
+    ] = "wrench-feasible",
+    orientation: Annotated[
+        str | None, typer.Option(metavar="W,X,Y,Z", help="Orientation of the platform; by default that of the file.")
+    ] = None,
+    rotation_range: Annotated[
+        str, typer.Option(metavar="RX,RY,RZ", help="Rotations from it, rad, both ways; all have to be possible.")
+    ] = "0,0,0",
+    at: Annotated[
+        str | None, typer.Option(metavar="X,Y,Z", help="Position, m: the grid is over the --rotation-range there.")
+    ] = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Compute the wrench-feasible workspace of a robot.
+    """Compute the workspace of a robot: where its cables, which only pull, can hold the platform.
 
-    Margins and static tensions on a grid.
+    Margins and static tensions on a grid of positions, or with --at of orientations at one position.
 
     Example: tautwire workspace robot.toml --out workspace.csv --plot workspace.png
     """
     from ..atomic_output import refuse_other_formats, refuse_overwriting_inputs, refuse_same_output
     from ..provenance import refuse_foreign_csv_metadata
     from ..reports.workspace_figure import require_figure_format
-    from ..robot.workspace import wrench_feasible_workspace
+    from ..robot.workspace import workspace_on
+    from ..robot.workspace_criteria import RequiredMotion
 
     require_output(out, as_json, "workspace.csv")
     refuse_same_output(out, plot, "--plot")
@@ -144,16 +168,17 @@ def workspace(
     if plot is not None:
         require_figure_format(plot)
     output = CommandOutput(as_json, quiet)
-    robot = require_point_mass(str(robot_file), read_robot(robot_file))
-    lower_corner = None if lower is None else parse_position(lower, "--lower")
-    upper_corner = None if upper is None else parse_position(upper, "--upper")
+    robot = read_robot(robot_file)
+    grid = _pose_grid(robot, at, (lower, upper, spacing), orientation, rotation_range)
     with progress_bar(output) as progress:
-        grid_progress = partial(progress, "computing the workspace")
-        feasibility = wrench_feasible_workspace(robot, lower_corner, upper_corner, spacing, acceleration, grid_progress)
+        motion, grid_progress = RequiredMotion(acceleration, angular_acceleration), partial(progress, COMPUTING)
+        feasibility = workspace_on(grid, robot, criterion, motion, grid_progress)
     provenance = command_provenance(context, robot_file)
     written = _write_workspace(feasibility, out, robot, plot, provenance)
     counts = {"feasible": int(feasibility.feasible.sum()), "positions": int(feasibility.feasible.size)}
-    summary_line = "{feasible} of {positions} positions are wrench-feasible".format_map(counts)
+    kind = CRITERION_WORDS.get(criterion, criterion)
+    points = "positions" if at is None else "orientations"
+    summary_line = f"{counts['feasible']} of {counts['positions']} {points} are {kind}"
     # Without a table file, JSON output holds the rows.
     output.result(
         [summary_line, *written.values()],
@@ -164,6 +189,38 @@ def workspace(
             "provenance": provenance.document(),
         },
     )
+
+
+def _pose_grid(
+    robot: Robot,
+    at: str | None,
+    box: tuple[str | None, str | None, float | None],
+    orientation: str | None,
+    rotation_range: str,
+) -> PoseGrid:
+    """The grid by the options of the command; ``box`` is its lower and upper corner and its spacing."""
+    from ..robot.pose_grid import orientation_grid, position_grid
+
+    lower, upper, spacing = box
+    turned = None if orientation is None else _parse_quaternion(orientation)
+    rotations = parse_numbers(rotation_range, 3, "--rotation-range", "0.2,0.2,0.5")
+    if at is None:
+        lower_corner = None if lower is None else parse_position(lower, "--lower")
+        upper_corner = None if upper is None else parse_position(upper, "--upper")
+        return position_grid(robot, lower_corner, upper_corner, spacing, turned, rotations)
+    if lower is not None or upper is not None:
+        raise InputError("--at", "is given with a box of positions", "give --at, or --lower and --upper")
+    if not any(rotations):
+        raise InputError("--at", "is given without rotations", "add --rotation-range, such as 0.5,0.5,1")
+    return orientation_grid(robot, rotations, parse_position(at), spacing, turned)
+
+
+def _parse_quaternion(text: str) -> list[float]:
+    numbers = parse_numbers(text, 4, "--orientation", "1,0,0,0")
+    norm = math.hypot(*numbers)
+    if abs(norm - 1.0) > QUATERNION_NORM_TOLERANCE:
+        raise InputError("--orientation", f"has norm {norm:.6g}, must have 1", "give the unit quaternion w,x,y,z")
+    return [number / norm for number in numbers]
 
 
 def _write_workspace(

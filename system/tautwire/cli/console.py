@@ -152,13 +152,24 @@ def relative_links(page: Path, *files: Path) -> dict[str, str]:
 def parse_position(text: str, option: str = "--at") -> tuple[float, float, float]:
     """Parses three finite numbers separated by commas; raises InputError that names the option."""
     hint = f"give three numbers in m, such as {option} 10,5.5,4"
-    try:
-        x, y, z = (float(part) for part in text.split(","))
-    except ValueError:
-        raise InputError(option, f"{text!r} is not a position", hint) from None
-    if not all(map(math.isfinite, (x, y, z))):
-        raise InputError(option, f"{text!r} is not a position", hint)
+    x, y, z = _parsed_numbers(text, 3, InputError(option, f"{text!r} is not a position", hint))
     return x, y, z
+
+
+def parse_numbers(text: str, count: int, option: str, example: str) -> tuple[float, ...]:
+    """Parses finite numbers separated by commas; raises InputError that names the option and shows an example."""
+    problem = f"{text!r} is not {count} numbers"
+    return _parsed_numbers(text, count, InputError(option, problem, f"write them as in {option} {example}"))
+
+
+def _parsed_numbers(text: str, count: int, error: InputError) -> tuple[float, ...]:
+    try:
+        numbers = tuple(float(part) for part in text.split(","))
+    except ValueError:
+        raise error from None
+    if len(numbers) != count or not all(map(math.isfinite, numbers)):
+        raise error
+    return numbers
 
 
 @contextmanager

@@ -52,6 +52,13 @@ def static_tensions(robot: Robot, at: Array | None = None) -> Array:
     return fixed_point(iterate, np.full(len(routes), float(np.linalg.norm(load_vector))))
 
 
+def tensions_at(robot: Robot, position: Array, orientation: Quaternion) -> Array:
+    """As :func:`static_tensions`, at an orientation too; of fewer than six cables the equilibrium nearest to it."""
+    if robot.platform.is_rigid_body:
+        return static_equilibrium(robot, position, orientation=orientation).tensions
+    return static_tensions(robot, position)
+
+
 def start_orientation(robot: Robot) -> Quaternion:
     """Orientation of the platform at the static start; identity for a point mass.
 

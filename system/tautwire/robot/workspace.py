@@ -1,62 +1,66 @@
-"""The wrench-feasible workspace: where the cables, which only pull, can hold the platform."""
+"""Workspaces: at which poses the cables, which only pull, can hold the platform."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from itertools import combinations, product
 
 import numpy as np
 import pandas as pd
 from numpy.typing import NDArray
 
-from tautwire_fmu.laws.mathematics import REAL
-from tautwire_fmu.laws.point_mass import PointMassConstants, total_mass
-
 from ..errors import InputError, UnreachableError
+from ..name_suggestions import suggest_name
 from ..process_signals import defer_interrupts
-from .active_effects import cables_have_weight, platform_effects
-from .cable_routes import cable_routes
-from .schema import Robot, TensionLimits, require_point_mass
-from .static_equilibrium import static_tensions
-from .static_load import cable_weight_force, static_load
-from .tension_distribution import DEFAULT_LIMITS
+from .cable_interference import cables_interfere, platform_interferes
+from .pose_grid import Axes, PoseGrid, PositionGrid, position_grid
+from .schema import Quaternion, Robot
+from .static_equilibrium import tensions_at
+from .workspace_criteria import CRITERIA, RequiredMotion, degrees_of_freedom, wrench_feasible_margin
 
 Array = NDArray[np.float64]
 
-DEFAULT_INTERVALS = 20
-MAX_POINTS = 1_000_000
-PARALLEL_TOLERANCE = 1e-9
-# Relative to the required force: smaller margins are zero up to rounding.
-ZERO_MARGIN_TOLERANCE = 1e-12
+AT_REST = RequiredMotion()
 
 
 @dataclass(frozen=True)
 class Workspace:
-    """The wrench-feasible workspace on a grid of positions.
+    """A workspace on a grid of poses, by one of the criteria of :data:`tautwire.robot.workspace_criteria.CRITERIA`.
 
-    ``axes`` are the coordinates of the grid along x, y and z in m, N_x, N_y and N_z of them; all else has the shape
-    (N_x, N_y, N_z). ``margin`` in N: the smallest force, in the worst direction, that on top of the required ones
-    exceeds what the cables can exert; negative where they cannot exert the required ones, by the shortfall.
-    ``min_tension`` and ``max_tension`` are of the static tensions, in N. NaN: tensions without equilibrium, and all at
-    an exit point.
+    ``axes`` are the coordinates of the grid, N_x, N_y and N_z of them, by their ``axis_names`` (m, or rad); all else
+    has the shape (N_x, N_y, N_z). ``margin`` in N: of the wrench-feasible workspace the smallest wrench, in the worst
+    direction, that on top of the required ones exceeds what the cables can exert; negative where they cannot exert the
+    required ones, by the shortfall. ``min_tension`` and ``max_tension`` are of the static tensions, in N. All are those
+    of the worst orientation. NaN: tensions without equilibrium, the margin without wrench closure, all at an exit
+    point. ``interference`` tells of a rigid platform where cables touch each other, and where one runs through the
+    platform.
     """
 
-    axes: tuple[Array, Array, Array]
+    axes: Axes
     margin: Array
     min_tension: Array
     max_tension: Array
+    axis_names: tuple[str, str, str] = ("x", "y", "z")
+    centre: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    criterion: str = "wrench-feasible"
+    interference: tuple[NDArray[np.bool_], NDArray[np.bool_]] | None = None
 
     @property
     def feasible(self) -> NDArray[np.bool_]:
-        """Where the cables can exert the required forces."""
+        """Which points of the grid belong to the workspace, interference aside."""
         return self.margin >= 0.0
 
     def frame(self) -> pd.DataFrame:
-        """One row per position: x, y, z, feasible (0 or 1), margin, lowest_tension, highest_tension."""
+        """One row per point: x, y, z or the rotations, feasible (0 or 1), margin, lowest_tension, highest_tension.
+
+        Of a rigid platform also cables_interfere and platform_interferes (0 or 1).
+        """
         coordinates = np.meshgrid(*self.axes, indexing="ij")
         columns = [*coordinates, self.feasible.astype(int), self.margin, self.min_tension, self.max_tension]
-        names = ("x", "y", "z", "feasible", "margin", "lowest_tension", "highest_tension")
+        names = [*self.axis_names, "feasible", "margin", "lowest_tension", "highest_tension"]
+        if self.interference is not None:
+            columns += [each.astype(int) for each in self.interference]
+            names += ["cables_interfere", "platform_interferes"]
         return pd.DataFrame({name: values.ravel() for name, values in zip(names, columns, strict=True)})
 
 
@@ -68,128 +72,102 @@ def wrench_feasible_workspace(
     acceleration: float = 0.0,
     progress: Callable[[float], None] | None = None,
 ) -> Workspace:
-    """Computes the wrench-feasible workspace on a grid that contains the robot's start.
+    """The wrench-feasible workspace on a grid of positions, at the declared orientation; see :func:`workspace_on`.
 
-    ``lower`` and ``upper`` are corners of a box in m, by default about all exit points and the start; ``spacing`` in
-    m, by default a twentieth of its longest side. Required are the weight and every acceleration whose components are
-    at most ``acceleration``, in m/s^2. The tensions keep within the limits of the robot file where there are more
-    than three cables; else they are only not negative. ``progress`` receives the completed fraction.
-
-    The forces that the cables can exert are ``{U T : T_min <= T_i <= T_max}``, a polytope with faces normal to every
-    ``n = u_i x u_j``. The margin is the minimum of ``h(n) - n . w`` over faces and required forces w, with
-    ``h(n) = sum_k max(T_min n . u_k, T_max n . u_k)``.
+    ``lower``, ``upper`` and ``spacing`` as of :func:`tautwire.robot.pose_grid.position_grid`. Required are the weight
+    and every acceleration whose components are at most ``acceleration``, in m/s^2. The tensions keep within the limits
+    of the robot file where there are more cables than degrees of freedom; else they are only not negative.
 
     Raises InputError for an invalid box, spacing or acceleration.
-
-    Source: Bouchard, Gosselin and Moore (2010), Journal of Mechanisms and Robotics 2(1), 011013.
     """
-    if not (np.isfinite(acceleration) and acceleration >= 0.0):
-        raise InputError("acceleration", f"{acceleration:g} m/s2 is negative or not finite", "give zero or more")
-    require_point_mass(robot.name, robot)
-    axes = _grid(robot, lower, upper, spacing)
-    shape = tuple(len(axis) for axis in axes)
+    motion = RequiredMotion(acceleration)
+    return workspace_on(position_grid(robot, lower, upper, spacing), robot, motion=motion, progress=progress)
+
+
+def workspace_on(
+    grid: PoseGrid,
+    robot: Robot,
+    criterion: str = "wrench-feasible",
+    motion: RequiredMotion = AT_REST,
+    progress: Callable[[float], None] | None = None,
+) -> Workspace:
+    """The workspace on a grid of poses, by a ``criterion`` of :data:`tautwire.robot.workspace_criteria.CRITERIA`.
+
+    ``wrench-feasible``: tensions within bounds exert the weight's wrench and those of the required ``motion``;
+    ``wrench-closure``: tensions without an upper bound exert every wrench; ``static``: static equilibrium within
+    bounds, of fewer than six cables in an orientation near that of the grid. ``progress`` receives the completed
+    fraction.
+
+    Raises InputError for another criterion, or one that so few cables never meet.
+    """
+    _require_criterion(robot, grid, criterion)
+    shape = tuple(len(axis) for axis in grid.axes)
     margin, min_tension, max_tension = (np.full(shape, np.nan) for _ in range(3))
+    cables_touch, platform_touches = (np.zeros(shape, dtype=np.bool_) for _ in range(2))
     with defer_interrupts() as raise_interrupt:
         for count, index in enumerate(np.ndindex(*shape)):
             raise_interrupt()
             if progress is not None:
                 progress(count / margin.size)
-            position = np.array([axis[k] for axis, k in zip(axes, index, strict=True)])
-            margin[index], min_tension[index], max_tension[index] = _evaluate_position(robot, position, acceleration)
-    return Workspace(axes, margin, min_tension, max_tension)
-
-
-def _evaluate_position(robot: Robot, position: Array, acceleration: float) -> tuple[float, float, float]:
-    """Margin, lowest and highest static tension at a position in m, all in N; NaN as in :class:`Workspace`."""
-    margin = np.nan
-    try:
-        margin = wrench_margin(robot, position, acceleration)
-        tensions = static_tensions(robot, position)
-    except UnreachableError:
-        return margin, np.nan, np.nan
-    return margin, float(np.min(tensions)), float(np.max(tensions))
+            coordinates = np.array([axis[k] for axis, k in zip(grid.axes, index, strict=True)])
+            position, orientations = grid.poses(coordinates)
+            poses = [(position, orientation) for orientation in orientations]
+            margin[index], min_tension[index], max_tension[index] = np.array(
+                [_evaluate_pose(robot, *pose, criterion, motion) for pose in poses]
+            ).min(axis=0) * (1.0, 1.0, -1.0)
+            if robot.platform.is_rigid_body:
+                cables_touch[index] = any(_interferes(cables_interfere, robot, *pose) for pose in poses)
+                platform_touches[index] = any(_interferes(platform_interferes, robot, *pose) for pose in poses)
+    interference = (cables_touch, platform_touches) if robot.platform.is_rigid_body else None
+    return Workspace(grid.axes, margin, min_tension, max_tension, grid.axis_names, grid.centre, criterion, interference)
 
 
 def wrench_margin(robot: Robot, position: Array, acceleration: float = 0.0) -> float:
-    """The margin of :class:`Workspace` at a position in m, in N.
+    """The margin of :func:`wrench_feasible_workspace` at a position in m, in N.
 
     Raises UnreachableError where a cable has no length there.
     """
-    require_point_mass(robot.name, robot)
-    routes = cable_routes(REAL, robot, position.tolist())
-    direction_matrix = np.array([route.direction for route in routes]).T
-    load_vector = np.array(static_load(REAL, robot, position.tolist()))
-    if cables_have_weight(robot):
-        load_vector = load_vector - np.array(
-            cable_weight_force(REAL, robot, routes, [float(np.linalg.norm(load_vector))] * len(routes))
-        )
-    constants = PointMassConstants(robot.platform.mass, robot.gravity)
-    mass = float(total_mass(REAL, constants, platform_effects(robot)))
-    signs = np.array(list(product((-1.0, 1.0), repeat=3)) if acceleration else [(0.0, 0.0, 0.0)])
-    limits = (robot.tension or DEFAULT_LIMITS) if robot.cable_count > 3 else DEFAULT_LIMITS
-    return _polytope_margin(direction_matrix, limits, load_vector + mass * acceleration * signs)
+    _require_enough_cables(robot, "wrench-feasible")
+    return wrench_feasible_margin(robot, position, robot.platform.start_orientation, RequiredMotion(acceleration))
 
 
-def _polytope_margin(direction_matrix: Array, limits: TensionLimits, required: Array) -> float:
-    normals = _face_normals(direction_matrix)
-    projections = normals @ direction_matrix
-    # Infinity times zero is not zero: a cable in the plane of a face does not contribute.
-    extreme_tensions = np.where(
-        projections > PARALLEL_TOLERANCE,
-        limits.maximum,
-        np.where(projections < -PARALLEL_TOLERANCE, limits.minimum, 0.0),
-    )
-    support = np.sum(np.where(extreme_tensions == 0.0, 0.0, extreme_tensions) * projections, axis=1)
-    margins = support[:, None] - normals @ required.T
-    margins[np.abs(margins) < ZERO_MARGIN_TOLERANCE * np.max(np.abs(required), initial=1.0)] = 0.0
-    return float(np.min(margins))
+def _require_criterion(robot: Robot, grid: PoseGrid, criterion: str) -> None:
+    if criterion not in CRITERIA:
+        raise InputError("criterion", f"{criterion!r} is none", f"write {suggest_name(criterion, tuple(CRITERIA))}")
+    if criterion != "static":
+        _require_enough_cables(robot, criterion)
+    if criterion == "wrench-closure" and robot.cable_count == degrees_of_freedom(robot):
+        problem = f"{robot.cable_count} cables, which only pull, never exert every wrench"
+        raise InputError(robot.name, problem, "compute the wrench-feasible or the static workspace")
+    is_turned = not isinstance(grid, PositionGrid) or len(grid.orientations) > 1
+    if is_turned and robot.cable_count < degrees_of_freedom(robot):
+        problem = f"{robot.cable_count} cables leave no orientation to choose"
+        raise InputError(robot.name, problem, "compute the static workspace without a range of rotations")
 
 
-def _face_normals(direction_matrix: Array) -> Array:
-    """Unit normals of all faces, in both directions; of all planes through the cables if they are collinear."""
-    cross_products = np.array(
-        [
-            np.cross(direction_matrix[:, i], direction_matrix[:, j])
-            for i, j in combinations(range(direction_matrix.shape[1]), 2)
-        ]
-    )
-    sizes = np.linalg.norm(cross_products, axis=1)
-    normals = cross_products[sizes > PARALLEL_TOLERANCE] / sizes[sizes > PARALLEL_TOLERANCE, None]
-    if not len(normals):
-        normals = np.linalg.svd(direction_matrix)[0][:, 1:].T
-    return np.vstack([normals, -normals])
+def _require_enough_cables(robot: Robot, criterion: str) -> None:
+    if robot.cable_count < degrees_of_freedom(robot):
+        problem = f"{robot.cable_count} cables cannot exert a moment of every direction: no pose is {criterion}"
+        raise InputError(robot.name, problem, "compute the static workspace, with --criterion static")
 
 
-def _grid(
-    robot: Robot, lower: Sequence[float] | None, upper: Sequence[float] | None, spacing: float | None
-) -> tuple[Array, Array, Array]:
-    start = np.array(robot.platform.start)
-    points = np.vstack([robot.anchors, start])
-    lower_corner = np.min(points, axis=0) if lower is None else np.asarray(lower, dtype=float)
-    upper_corner = np.max(points, axis=0) if upper is None else np.asarray(upper, dtype=float)
-    if (
-        lower_corner.shape != (3,)
-        or upper_corner.shape != (3,)
-        or not np.all(np.isfinite([lower_corner, upper_corner]))
-        or np.any(lower_corner > upper_corner)
-    ):
-        corners = f"{lower_corner.tolist()} to {upper_corner.tolist()}"
-        raise InputError("box", f"{corners} is none", "give three finite coordinates in m each, the lower ones first")
-    longest = float(np.max(upper_corner - lower_corner))
-    step = longest / DEFAULT_INTERVALS if spacing is None else spacing
-    if not (np.isfinite(step) and step > 0.0):
-        raise InputError("spacing", f"{step:g} m is not positive", "give a distance in m")
-    axes = [_grid_axis(a, b, s, step) for a, b, s in zip(lower_corner, upper_corner, start, strict=True)]
-    count = int(np.prod([len(axis) for axis in axes], dtype=float))
-    if count > MAX_POINTS:
-        raise InputError("spacing", f"{step:g} m makes {count} points, more than {MAX_POINTS}", "give a larger one")
-    return axes[0], axes[1], axes[2]
+def _evaluate_pose(
+    robot: Robot, position: Array, orientation: Quaternion, criterion: str, motion: RequiredMotion
+) -> tuple[float, float, float]:
+    """Margin, lowest and negative highest static tension at a pose, in N; NaN as in :class:`Workspace`."""
+    margin = np.nan
+    try:
+        margin = CRITERIA[criterion](robot, position, orientation, motion)
+        tensions = tensions_at(robot, position, orientation)
+    except UnreachableError:
+        return margin, np.nan, np.nan
+    return margin, float(np.min(tensions)), -float(np.max(tensions))
 
 
-def _grid_axis(lower: float, upper: float, start: float, step: float) -> Array:
-    """Grid points from ``lower`` to ``upper``, one of them at the start if it lies between."""
-    base = start if lower <= start <= upper else lower
-    rounding = 1e-9
-    below, above = int((base - lower) / step + rounding), int((upper - base) / step + rounding)
-    points: Array = base + step * np.arange(-below, above + 1, dtype=float)
-    return points
+def _interferes(
+    test: Callable[[Robot, Array, Quaternion], bool], robot: Robot, position: Array, orientation: Quaternion
+) -> bool:
+    try:
+        return test(robot, position, orientation)
+    except UnreachableError:
+        return False
