@@ -14,6 +14,7 @@ FILES = (
     "atomic_output",
     "input_files",
     "json_document",
+    "machine_code_cache",
     "name_suggestions",
     "number_format",
     "process_signals",

@@ -47,6 +47,18 @@ class ArgumentError(InputError):
         self.value = value
 
 
+class ToolchainError(TautwireError):
+    """FMUs cannot be compiled here: ``problem`` says why, ``hint`` what to do."""
+
+    def __init__(self, problem: str, hint: str) -> None:
+        super().__init__(problem, hint)
+        self.problem = problem
+        self.hint = hint
+
+    def __str__(self) -> str:
+        return one_line(f"{self.problem}; {self.hint}")
+
+
 class RobotFileError(InputError):
     """A robot file cannot be read or declares something impossible.
 

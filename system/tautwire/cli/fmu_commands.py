@@ -15,6 +15,7 @@ from rich.console import Console
 from rich.table import Table
 from rich.text import Text
 
+from ..errors import InputError
 from ..robot.schema import fmu_slots
 from .console import (
     AsJson,
@@ -35,12 +36,19 @@ C_HOSTS_HELP = (
     "Build FMUs that also run in importers that are not Python processes; needs a C compiler, and Python's headers "
     "and shared library (Debian: gcc, python3-dev)."
 )
+NATIVE_HELP = (
+    'Build FMUs of machine code, which need no Python: by ziglang (pip install "tautwire[native]"), else by the '
+    "machine's C compiler."
+)
+PLATFORMS_HELP = "Platforms of --native FMUs: linux64, win64, darwin64, aarch64-linux, aarch64-darwin, or all."
 
 
 def build(
     robot_file: RobotFile,
     out: Annotated[Path, typer.Option(help="Output folder of the FMUs.")] = Path("build"),
     for_c_hosts: Annotated[bool, typer.Option("--for-c-hosts", help=C_HOSTS_HELP)] = False,
+    native: Annotated[bool, typer.Option("--native", help=NATIVE_HELP)] = False,
+    platforms: Annotated[str, typer.Option(metavar="LIST", help=PLATFORMS_HELP)] = "",
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -61,11 +69,14 @@ def build(
     refuse_overwriting_inputs(
         [fmu.path for fmu in robot.fmus], [out / f"{slot}.fmu" for slot in fmu_slots(robot.cable_count)]
     )
+    _refuse_mixed_kinds(for_c_hosts, native, platforms)
     if for_c_hosts:
         embeddable_python()
         find_compiler()
+    targets = [name.strip() for name in platforms.split(",") if name.strip()]
     with atomic_folder(out) as scratch, progress_bar(output) as progress:
-        fmus = with_user_fmus_copied(build_fmus(robot, scratch, partial(progress, "building")), scratch)
+        built = build_fmus(robot, scratch, partial(progress, "building"), native, targets)
+        fmus = with_user_fmus_copied(built, scratch)
         if for_c_hosts:
             project_slots = sorted(fmus.by_component.keys() - fmus.user_start_values.keys())
             for index, slot in enumerate(project_slots):
@@ -79,6 +90,13 @@ def build(
         paths, {"fmus": {slot: out / path.name for slot, path in fmus.by_component.items()}, "ssp": paths[-1]}
     )
     output.suggest_next(f"tautwire fmus {shell_quoted(robot_file)}, for their ports; or load {paths[-1]} in your tool")
+
+
+def _refuse_mixed_kinds(for_c_hosts: bool, native: bool, platforms: str) -> None:
+    if native and for_c_hosts:
+        raise InputError("--for-c-hosts", "is given beside --native, which any program can run", "leave it out")
+    if platforms and not native:
+        raise InputError("--platforms", "is given without --native", "add --native")
 
 
 def fmus(robot_file: RobotFile, as_json: AsJson = False, quiet: Quiet = False) -> None:

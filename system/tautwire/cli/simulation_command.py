@@ -38,6 +38,7 @@ CONTROLLER_HELP = (
     "A controller in place of --speeds: an FMU, a state space (.json), or Python (.py), which is executed; with --path."
 )
 OWN_FMU_HELP = "A user FMU for a slot, such as platform=mine.fmu, cable_2=... or winch_1=...; may be repeated."
+NATIVE_HELP = "Run the FMUs as machine code; needs ziglang or a C compiler."
 
 
 @dataclass(frozen=True)
@@ -76,6 +77,7 @@ def simulate(
     until: Annotated[float | None, typer.Option(help="Stop at this time, s.")] = None,
     patience: Annotated[float, typer.Option(help="Timeout of one FMU call, s.")] = 60.0,
     fmu: Annotated[list[str] | None, typer.Option(metavar="SLOT=FILE", help=OWN_FMU_HELP)] = None,
+    native: Annotated[bool, typer.Option("--native", help=NATIVE_HELP)] = False,
     report: Annotated[Path | None, typer.Option(metavar="PAGE.html", help="Output page of the run, in 3D.")] = None,
     as_json: AsJson = False,
     quiet: Quiet = False,
@@ -104,7 +106,7 @@ def simulate(
         _refuse_mixed_inputs(files, tolerance)
     refuse_overwriting_inputs([*files.inputs, *(own.path for own in robot.fmus)], [out, *([report] if report else [])])
     refuse_same_output(out, report)
-    options = SimulationOptions(step, tolerance, until, patience)
+    options = SimulationOptions(step, tolerance, until, patience, native)
     # Only after reading, since a file that cannot be read has its own message.
     describe_origin = partial(command_provenance, context, *files.inputs, fmus=robot.fmus)
     (_simulate_recording if is_open_loop else _simulate_closed_loop)(robot, files, options, describe_origin, output)
@@ -185,7 +187,7 @@ def _simulate_closed_loop(
         open_result_file(files.out, _result_columns(robot), provenance) as result,
         progress_bar(output) as progress,
     ):
-        fmus = build_fmus(robot, Path(folder), partial(progress, "building"))
+        fmus = build_fmus(robot, Path(folder), partial(progress, "building"), native=options.native)
         loop_options = ClosedLoopOptions(
             step=options.step, progress=partial(progress, "co-simulating"), patience=options.call_timeout
         )

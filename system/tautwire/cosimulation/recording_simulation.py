@@ -117,7 +117,7 @@ def simulate_recording(
     Raises ComponentError where an FMU fails: the recorder has what came before.
     """
     with TemporaryDirectory(prefix="tautwire-simulate-") as folder:
-        fmus = build_fmus(recorded.robot, Path(folder), partial(progress, "building"))
+        fmus = build_fmus(recorded.robot, Path(folder), partial(progress, "building"), native=options.native)
         statistics, run_notes = _run_with_error_estimate(fmus, recorded.inputs, recorder, options, progress)
     return statistics, (*recorded.notes, *run_notes, *statistics.warnings())
 

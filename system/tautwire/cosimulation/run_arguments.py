@@ -19,13 +19,15 @@ CALL_TIMEOUT_RULE = NumberRule("the timeout of one FMU call, or infinity,", "s",
 class SimulationOptions:
     """Options of a run: the longest macro ``step`` (s), or the global error ``tolerance`` (m) of adaptive steps.
 
-    The run ends at ``until`` (s) where one is given; an FMU call that takes ``call_timeout`` (s) fails.
+    The run ends at ``until`` (s) where one is given; an FMU call that takes ``call_timeout`` (s) fails. With ``native``
+    the FMUs are machine code.
     """
 
     step: float
     tolerance: float | None = None
     until: float | None = None
     call_timeout: float | None = None
+    native: bool = False
 
 
 def validate_fmus(argument: str, fmus: RobotFmus) -> None:

@@ -8,7 +8,7 @@ Source: LLVM Language Reference Manual; Andersson et al. (2019), CasADi, Mathema
 With ten thousand instructions it is ten times as fast as CasADi's interpreter, and compiled in a tenth of a second;
 with a hundred thousand four times as fast, and compiled in one. Optimising it would take longer than most fits do. Far
 larger functions leave the processor's caches, and are interpreted. Constants are data, not code: functions that differ
-in nothing else share theirs, which :mod:`tautwire.estimation.machine_code_cache` keeps on disk.
+in nothing else share theirs, which :mod:`tautwire.machine_code_cache` keeps on disk.
 """
 
 from __future__ import annotations
@@ -26,7 +26,7 @@ from casadi import Function
 from numpy.typing import NDArray
 
 from ..errors import TautwireError
-from .machine_code_cache import cached_machine_code
+from ..machine_code_cache import cached_machine_code
 
 # Instructions of one part.
 MAX_PART_INSTRUCTIONS = 4_000

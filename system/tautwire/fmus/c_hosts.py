@@ -28,7 +28,7 @@ from importlib.resources import files
 from pathlib import Path
 
 from ..atomic_output import atomic_file
-from ..errors import TautwireError, one_line
+from ..errors import ToolchainError
 from .fmu_archive import require_valid_archive
 
 BINARIES = "binaries/linux64/"
@@ -43,16 +43,8 @@ LIBPYTHON_HINT = (
 )
 
 
-class CHostError(TautwireError):
-    """FMUs for C hosts cannot be built here or from this file: ``problem`` says why, ``hint`` what to do."""
-
-    def __init__(self, problem: str, hint: str) -> None:
-        super().__init__(problem, hint)
-        self.problem = problem
-        self.hint = hint
-
-    def __str__(self) -> str:
-        return one_line(f"{self.problem}; {self.hint}")
+class CHostError(ToolchainError):
+    """FMUs for C hosts cannot be built here or from this file."""
 
 
 @dataclass(frozen=True)

@@ -84,20 +84,29 @@ class RobotFmus:
         return tuple(index for index, path in enumerate(self.winches, start=1) if path is not None)
 
 
-def build_fmus(robot: Robot, folder: str | Path, progress: Callable[[float], None] | None = None) -> RobotFmus:
+def build_fmus(
+    robot: Robot,
+    folder: str | Path,
+    progress: Callable[[float], None] | None = None,
+    native: bool = False,
+    platforms: Sequence[str] = (),
+) -> RobotFmus:
     """Write ``platform.fmu``, ``cable_1.fmu`` ... and, where there are winches, ``winch_1.fmu`` ... into ``folder``.
 
-    FMI 2.0 co-simulation; the data of a component lie inside as a JSON resource. User FMUs stay where they are.
+    FMI 2.0 co-simulation; the data of a component lie inside as a JSON resource. ``native`` FMUs are machine code for
+    ``platforms``, by default this machine's, with their source, and need no Python. User FMUs stay where they are.
     The folder is created if absent, and has to stay while the FMUs are run. ``progress`` gets the fraction completed,
     from 0 to 1. Returns the paths of the FMUs.
 
-    Raises SlotError where a user FMU does not fit, UnreachableError where the cables cannot hold the
-    platform at the start, ArgumentError where an argument is none of these, OSError where the disk refuses.
+    Raises SlotError where a user FMU does not fit, UnreachableError where the cables cannot hold the platform at the
+    start, NativeBuildError where native FMUs cannot be compiled, ArgumentError where an argument is none of these,
+    OSError where the disk refuses.
     """
     validate_robot("build_fmus: robot", robot)
     folder = validate_folder("build_fmus: folder", folder)
     validate_callable("build_fmus: progress", progress)
     check_user_fmus(robot)
+    write_fmu = native_fmu_writer(platforms) if native else _build_fmu
     folder.mkdir(parents=True, exist_ok=True)
     user_fmus = {fmu.slot: fmu.path for fmu in robot.fmus}
     is_rigid = robot.platform.is_rigid_body
@@ -105,7 +114,7 @@ def build_fmus(robot: Robot, folder: str | Path, progress: Callable[[float], Non
     fmu_count, built_counter = 1 + robot.cable_count + len(robot.winch_numbers), itertools.count(1)
 
     def build_or_use(module: str, base: str, name: str, data: dict[str, Any]) -> Path:
-        path = user_fmus[name] if name in user_fmus else _build_fmu(module, base, name, data, folder)
+        path = user_fmus[name] if name in user_fmus else write_fmu(module, base, name, data, folder)
         if progress is not None:
             progress(next(built_counter) / fmu_count)
         return path
@@ -123,6 +132,30 @@ def build_fmus(robot: Robot, folder: str | Path, progress: Callable[[float], Non
         has_position_sensor="platform" not in user_fmus and has_sensor_effects(robot),
         is_rigid=is_rigid,
     )
+
+
+def native_fmu_writer(platforms: Sequence[str] = ()) -> Callable[[str, str, str, dict[str, Any], Path], Path]:
+    """Function that writes native FMUs for some platforms, by default this machine's, as :func:`_build_fmu` does.
+
+    Raises NativeBuildError where there is no compiler, or none for these platforms.
+    """
+    # Imported here: most FMUs are not native, and pythonfmu's slaves come with it.
+    from .native.c_toolchain import NativeBuildError, find_toolchain, target_platforms
+    from .native.component_sources import COMPONENTS
+    from .native.native_archive import write_native_fmu
+
+    toolchain = find_toolchain()
+    targets = target_platforms([platforms] if isinstance(platforms, str) else platforms, toolchain)
+
+    def write_fmu(module: str, base: str, name: str, data: dict[str, Any], folder: Path) -> Path:
+        if module not in COMPONENTS:
+            raise NativeBuildError(f"{name} has no native FMU", "build it without --native")
+        with tempfile.TemporaryDirectory(prefix="tautwire-build-") as scratch:
+            built = Path(scratch) / f"{name}.fmu"
+            write_native_fmu(module, base, data | {"model_name": name}, targets, toolchain, built)
+            return _put_atomically(shutil.move, built, folder / built.name)
+
+    return write_fmu
 
 
 def package_controller_fmu(data: dict[str, Any], folder: Path) -> Path:

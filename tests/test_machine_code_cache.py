@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 from casadi import SX, Function
 
-from tautwire.estimation.machine_code_cache import CACHE_VARIABLE, DIGEST_BYTES, cached_machine_code
 from tautwire.estimation.native_functions import CompiledFunction
+from tautwire.machine_code_cache import CACHE_VARIABLE, DIGEST_BYTES, cached_machine_code
 
 ARGUMENT = np.linspace(-1.0, 1.0, 7)[None, :]
 

@@ -1,0 +1,135 @@
+/* A cable: motion of its end and winch speed in, tension and force out. The law is in the equations. */
+
+#define POSITION 2
+#define FIRST_MIDDLE_INPUT (POSITION + MOTION_SIZE)
+#define FIRST_OUTPUT 22
+#define TENSION 25
+#define FIRST_RATE 30
+#define TENSION_RATE 33
+#define MIDDLE_FORCE 34
+#define TENSION_DELAY 4
+#define SHOWN_TENSION 3
+#define SHOWN_TENSION_RATE 3
+
+static const double *parameters_of(const Slave *slave) { return slave->state.real + FIRST_PARAMETER; }
+
+static int derive_start(Slave *slave, double *start_states) {
+  return cable_start(parameters_of(slave), slave->start, start_states);
+}
+
+/* Motion that acts on the cable after a fraction of a step. */
+static int motion_at(const Slave *slave, double step, double fraction, int at_end, double *motion) {
+  const double *inputs = slave->state.real + POSITION;
+  double elapsed = step * fraction;
+  if (!at_end) return extrapolated_motion(inputs, &elapsed, motion);
+  if (fraction == 1.0) {
+    memcpy(motion, inputs, MOTION_SIZE * sizeof(double));
+    return 1;
+  }
+  if (!interpolated_motion(slave->state.previous_inputs + POSITION, inputs, &step, &fraction, motion)) return 0;
+  if (slave->has_middle_inputs && fraction == 0.5)
+    memcpy(motion, slave->state.real + FIRST_MIDDLE_INPUT, 9 * sizeof(double));
+  return 1;
+}
+
+static int state_rates(const Slave *slave, double step, double fraction, int at_end, const double *states,
+                       double *rates) {
+  double motion[MOTION_SIZE];
+  const double *now = motion;
+  if (fraction == 0.0)
+    now = inputs_at_start(slave, at_end) + POSITION;
+  else if (!motion_at(slave, step, fraction, at_end, motion))
+    return 0;
+  return cable_rates(now, states, parameters_of(slave), slave->start, rates);
+}
+
+static int shown_at(const Slave *slave, const double *motion, const double *states, double *shown, double *rates) {
+  return cable_outputs(motion, states, parameters_of(slave), slave->start, shown, rates);
+}
+
+#if STATE_COUNT > 2
+#include "dormand_prince.c"
+#else
+/* States in the middle and at the end by the classical Runge-Kutta method. */
+static int runge_kutta_step(const Slave *slave, double step, int at_end, const double *state, double *middle,
+                            double *end) {
+  double k1[STATE_COUNT], k2[STATE_COUNT], k3[STATE_COUNT], k4[STATE_COUNT], inner[STATE_COUNT];
+  int k;
+  if (!state_rates(slave, step, 0.0, at_end, state, k1)) return 0;
+  for (k = 0; k < STATE_COUNT; k++) inner[k] = state[k] + 0.5 * step * k1[k];
+  if (!state_rates(slave, step, 0.5, at_end, inner, k2)) return 0;
+  for (k = 0; k < STATE_COUNT; k++) inner[k] = state[k] + 0.5 * step * k2[k];
+  if (!state_rates(slave, step, 0.5, at_end, inner, k3)) return 0;
+  for (k = 0; k < STATE_COUNT; k++) inner[k] = state[k] + step * k3[k];
+  if (!state_rates(slave, step, 1.0, at_end, inner, k4)) return 0;
+  for (k = 0; k < STATE_COUNT; k++) {
+    end[k] = state[k] + step / 6.0 * (k1[k] + 2.0 * (k2[k] + k3[k]) + k4[k]);
+    middle[k] = 0.5 * (state[k] + end[k]) + 0.125 * step * (k1[k] - k4[k]);
+  }
+  return 1;
+}
+#endif
+
+static int append_tension(Slave *slave, const double *times, const double *first, const double *last) {
+  double segment[SEGMENT_SIZE];
+  memcpy(segment, times, 2 * sizeof(double));
+  memcpy(segment + 2, first, 2 * sizeof(double));
+  memcpy(segment + 4, last, 2 * sizeof(double));
+  return append_segment(&slave->delay_line, segment, slave->start[TENSION_DELAY]);
+}
+
+/* Appends the tension of this step to the delay line of the load cell. */
+static int record_tension(Slave *slave, double step, int at_end, const double *states[3], const double *middle_motion) {
+  double motion[MOTION_SIZE], shown[8], rates[4], samples[3][2], times[3];
+  const double *motions[3];
+  int k;
+  motions[0] = inputs_at_start(slave, at_end) + POSITION;
+  motions[1] = middle_motion;
+  motions[2] = motion;
+  if (!motion_at(slave, step, 1.0, at_end, motion)) return 0;
+  for (k = 0; k < 3; k++) {
+    if (!shown_at(slave, motions[k], states[k], shown, rates)) return 0;
+    samples[k][0] = shown[SHOWN_TENSION];
+    samples[k][1] = rates[SHOWN_TENSION_RATE];
+    times[k] = slave->state.time + 0.5 * k * step;
+  }
+  return append_tension(slave, times, samples[0], samples[1]) && append_tension(slave, times + 1, samples[1], samples[2]);
+}
+
+static int advance(Slave *slave, double step, int at_end) {
+  double *real = slave->state.real, start[STATE_COUNT], middle[STATE_COUNT], end[STATE_COUNT];
+  double middle_motion[MOTION_SIZE], shown[8], rates[4];
+  const double *states[3];
+  memcpy(start, real + FIRST_STATE, sizeof start);
+#if STATE_COUNT > 2
+  if (!integrate_dormand_prince(slave, step, at_end, start, middle, end)) return 0;
+#else
+  if (!runge_kutta_step(slave, step, at_end, start, middle, end)) return 0;
+#endif
+  if (!motion_at(slave, step, 0.5, at_end, middle_motion)) return 0;
+  if (!shown_at(slave, middle_motion, middle, shown, rates)) return 0;
+  states[0] = start;
+  states[1] = middle;
+  states[2] = end;
+  if (slave->start[TENSION_DELAY] > 0.0 && !record_tension(slave, step, at_end, states, middle_motion)) return 0;
+  memcpy(real + MIDDLE_FORCE, shown, 3 * sizeof(double));
+  memcpy(real + MIDDLE_FORCE + 3, rates, 3 * sizeof(double));
+  memcpy(real + FIRST_STATE, end, sizeof end);
+  return 1;
+}
+
+static int refresh(Slave *slave) {
+  double *real = slave->state.real, motion[MOTION_SIZE], delayed[1][2];
+  if (!extrapolated_motion(real + POSITION, &slave->state.elapsed, motion)) return 0;
+  if (!shown_at(slave, motion, real + FIRST_STATE, real + FIRST_OUTPUT, real + FIRST_RATE)) return 0;
+  if (!slave->state.started) {
+    memcpy(real + MIDDLE_FORCE, real + FIRST_OUTPUT, 3 * sizeof(double));
+    memcpy(real + MIDDLE_FORCE + 3, real + FIRST_RATE, 3 * sizeof(double));
+  }
+  if (slave->start[TENSION_DELAY] > 0.0 && slave->delay_line.count) {
+    delayed_values(&slave->delay_line, slave->start[TENSION_DELAY], delayed);
+    real[TENSION] = delayed[0][0];
+    real[TENSION_RATE] = delayed[0][1];
+  }
+  return 1;
+}

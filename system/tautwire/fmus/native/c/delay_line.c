@@ -1,0 +1,75 @@
+/* Delay line of a sensor: segments of a signal between communication points, as far back as the sensor lags.
+
+   A segment is its start and end time, then value and derivatives of each axis at the start, then those at the end. */
+
+#define SEGMENT_SIZE (2 + 2 * SIGNAL_AXES * SIGNAL_DERIVATIVES)
+
+typedef struct {
+  size_t count, capacity;
+  double *segments;
+} DelayLine;
+
+static int reserve_segments(DelayLine *line, size_t count) {
+  size_t capacity = line->capacity ? line->capacity : 16;
+  double *segments;
+  if (count <= line->capacity) return 1;
+  while (capacity < count) capacity *= 2;
+  segments = (double *)realloc(line->segments, capacity * SEGMENT_SIZE * sizeof(double));
+  if (!segments) return 0;
+  line->segments = segments;
+  line->capacity = capacity;
+  return 1;
+}
+
+static int copy_delay_line(DelayLine *target, const DelayLine *source) {
+  if (!reserve_segments(target, source->count)) return 0;
+  target->count = source->count;
+  if (source->count) memcpy(target->segments, source->segments, source->count * SEGMENT_SIZE * sizeof(double));
+  return 1;
+}
+
+static void free_delay_line(DelayLine *line) {
+  free(line->segments);
+  line->segments = NULL;
+  line->count = line->capacity = 0;
+}
+
+/* Appends a segment and drops those that are older than the lag; 0 where memory is exhausted. */
+static int append_segment(DelayLine *line, const double *segment, double lag) {
+  size_t first = 0;
+  while (first < line->count && line->segments[first * SEGMENT_SIZE + 1] < segment[1] - lag) first++;
+  if (first) {
+    line->count -= first;
+    memmove(line->segments, line->segments + first * SEGMENT_SIZE, line->count * SEGMENT_SIZE * sizeof(double));
+  }
+  if (!reserve_segments(line, line->count + 1)) return 0;
+  memcpy(line->segments + line->count * SEGMENT_SIZE, segment, SEGMENT_SIZE * sizeof(double));
+  line->count++;
+  return 1;
+}
+
+/* Value and rate of each axis a lag before the end of a delay line that has segments; constant before its start. */
+static void delayed_values(const DelayLine *line, double lag, double (*results)[2]) {
+  const double *segment = line->segments;
+  const double *last = line->segments + (line->count - 1) * SEGMENT_SIZE;
+  double time = last[1] - lag, step, fraction, values[3];
+  int axis;
+  while (segment != last && time > segment[1]) segment += SEGMENT_SIZE;
+  step = segment[1] - segment[0];
+  fraction = (time - segment[0]) / step;
+  for (axis = 0; axis < SIGNAL_AXES; axis++) {
+    const double *first = segment + 2 + axis * SIGNAL_DERIVATIVES;
+    if (time < segment[0]) {
+      results[axis][0] = first[0];
+      results[axis][1] = 0.0;
+      continue;
+    }
+#if SIGNAL_DERIVATIVES == 2
+    cubic(first, first + SIGNAL_AXES * SIGNAL_DERIVATIVES, &step, &fraction, values);
+#else
+    quintic(first, first + SIGNAL_AXES * SIGNAL_DERIVATIVES, &step, &fraction, values);
+#endif
+    results[axis][0] = values[0];
+    results[axis][1] = values[1];
+  }
+}

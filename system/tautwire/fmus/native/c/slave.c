@@ -1,0 +1,245 @@
+/* Time-stamped inputs, steps that are rolled back where the law has no value, and complete saved states. */
+
+#define MESSAGE_SIZE 4000
+#define STATE_MAGIC 0x7461757477697265ULL
+
+typedef struct {
+  State state;
+  DelayLine delay_line;
+} SavedState;
+
+typedef struct {
+  uint64_t magic, model, segments, checksum;
+} StateHeader;
+
+static void log_message(const Slave *slave, int status, const char *message) {
+  if (slave->log) slave->log(slave->owner, status, message);
+}
+
+/* Logs what happened with all inputs by name. */
+static void log_with_inputs(const Slave *slave, int status, const char *what) {
+  char message[MESSAGE_SIZE];
+  int used = snprintf(message, sizeof message, "%s; inputs", what), k;
+  for (k = 0; k < INPUT_COUNT && used < (int)sizeof message - 100; k++)
+    used += snprintf(message + used, sizeof message - (size_t)used, " %s=%.9g", variable_names[k], slave->state.real[k]);
+  log_message(slave, status, message);
+}
+
+/* Derives what follows from the parameters; before the first step the start state does. */
+static void parameters_changed(Slave *slave) {
+  double states[STATE_COUNT];
+  slave->parameters_valid = derive_start(slave, states);
+  if (slave->parameters_valid && !slave->state.started)
+    memcpy(slave->state.real + FIRST_STATE, states, sizeof states);
+}
+
+static void reset_slave(Slave *slave) {
+  free_delay_line(&slave->delay_line);
+  memset(&slave->state, 0, sizeof slave->state);
+  memcpy(slave->state.real, model_start, sizeof slave->state.real);
+  slave->relative_tolerance = RELATIVE_TOLERANCE;
+  slave->outputs_stale = 1;
+  parameters_changed(slave);
+}
+
+static void set_tolerance(Slave *slave, double tolerance) {
+  if (tolerance > 0.0) slave->relative_tolerance = fmin(fmax(tolerance, MIN_RELATIVE_TOLERANCE), MAX_RELATIVE_TOLERANCE);
+}
+
+static int are_known(const Slave *slave, const unsigned int *references, size_t count) {
+  char message[100];
+  size_t k;
+  for (k = 0; k < count; k++)
+    if (references[k] >= VARIABLE_COUNT) {
+      snprintf(message, sizeof message, "no real variable has the value reference %u", references[k]);
+      log_message(slave, STATUS_ERROR, message);
+      return 0;
+    }
+  return 1;
+}
+
+static int is_within_bounds(const Slave *slave, unsigned int reference, double value) {
+  char message[300];
+  double lowest = minima[reference - FIRST_PARAMETER], highest = maxima[reference - FIRST_PARAMETER];
+  if (value >= lowest && value <= highest) return 1;
+  snprintf(message, sizeof message, "%s is %.17g, it has to be finite, at least %g and at most %g",
+           variable_names[reference], value, lowest, highest);
+  log_message(slave, STATUS_ERROR, message);
+  return 0;
+}
+
+static int set_variables(Slave *slave, const unsigned int *references, size_t count, const double *values) {
+  State *state = &slave->state;
+  int sets_parameter = 0;
+  size_t k;
+  if (!are_known(slave, references, count)) return STATUS_ERROR;
+  for (k = 0; k < count; k++)
+    if (references[k] >= FIRST_PARAMETER) {
+      if (!is_within_bounds(slave, references[k], values[k])) return STATUS_ERROR;
+      sets_parameter = 1;
+    }
+  for (k = 0; k < count; k++)
+    if (references[k] == 0 && values[k] != state->real[0]) {
+      memcpy(state->previous_inputs, state->real, sizeof state->previous_inputs);
+      state->has_previous_inputs = 1;
+    }
+  for (k = 0; k < count; k++) state->real[references[k]] = values[k];
+  if (sets_parameter) parameters_changed(slave);
+  if (count) {
+    slave->outputs_stale = 1;
+    state->elapsed = 0.0;
+  }
+  return STATUS_OK;
+}
+
+/* Computes the outputs; where the law has no value for the inputs, all become NaN. */
+static void refresh_outputs(Slave *slave) {
+  int k;
+  if (!slave->outputs_stale) return;
+  slave->outputs_stale = 0;
+  if (slave->parameters_valid && refresh(slave)) return;
+  for (k = 0; k < VARIABLE_COUNT; k++)
+    if (is_output[k] && (k < FIRST_STATE || k >= FIRST_STATE + STATE_COUNT)) slave->state.real[k] = NAN;
+  log_with_inputs(slave, STATUS_WARNING, "no outputs: the law has no value");
+}
+
+static int get_variables(Slave *slave, const unsigned int *references, size_t count, double *values) {
+  size_t k;
+  refresh_outputs(slave);
+  if (!are_known(slave, references, count)) return STATUS_ERROR;
+  for (k = 0; k < count; k++) values[k] = slave->state.real[references[k]];
+  return STATUS_OK;
+}
+
+static int check_inputs(const Slave *slave) {
+  if (!slave->parameters_valid) {
+    log_message(slave, STATUS_ERROR, "the law has no value for these parameters");
+    return STATUS_ERROR;
+  }
+  if (are_finite(slave->state.real, INPUT_COUNT)) return STATUS_OK;
+  log_with_inputs(slave, STATUS_ERROR, "inputs have to be finite");
+  return STATUS_ERROR;
+}
+
+static int middle_inputs_hold(const State *state, double time, double step) {
+#ifdef MIDDLE_TIME
+  return fabs(state->real[MIDDLE_TIME] - time - 0.5 * step) < 1e-3 * step;
+#else
+  (void)state, (void)time, (void)step;
+  return 0;
+#endif
+}
+
+static int do_step(Slave *slave, double time, double step) {
+  State *state = &slave->state, before;
+  DelayLine delay_before = {0, 0, NULL};
+  char message[200];
+  int at_end;
+  if (!(step > 0.0 && is_finite(step) && is_finite(time))) {
+    snprintf(message, sizeof message, "step of %.17g s at %.17g s: must be positive", step, time);
+    log_message(slave, STATUS_ERROR, message);
+    return STATUS_ERROR;
+  }
+  if (check_inputs(slave) != STATUS_OK) return STATUS_ERROR;
+  if (!copy_delay_line(&delay_before, &slave->delay_line)) return STATUS_ERROR;
+  before = *state;
+  at_end = state->has_previous_inputs && state->real[0] > time + 0.5 * step;
+  slave->has_middle_inputs = at_end && middle_inputs_hold(state, time, step);
+  state->time = time;
+  slave->outputs_stale = 1;
+  if (!advance(slave, step, at_end) || !are_finite(state->real + FIRST_STATE, STATE_COUNT)) {
+    *state = before;
+    free_delay_line(&slave->delay_line);
+    slave->delay_line = delay_before;
+    snprintf(message, sizeof message, "step of %.9g s at %.9g s: the law has no value", step, time);
+    log_with_inputs(slave, STATUS_DISCARD, message);
+    return STATUS_DISCARD;
+  }
+  free_delay_line(&delay_before);
+  state->started = 1;
+  state->elapsed = at_end ? 0.0 : step;
+  return STATUS_OK;
+}
+
+static void free_saved_state(SavedState *saved) {
+  if (!saved) return;
+  free_delay_line(&saved->delay_line);
+  free(saved);
+}
+
+/* Saves into `saved`, or anew where that is NULL; NULL where memory is exhausted. */
+static SavedState *save_state(const Slave *slave, SavedState *saved) {
+  SavedState *target = saved ? saved : (SavedState *)calloc(1, sizeof *target);
+  if (!target) return NULL;
+  target->state = slave->state;
+  if (copy_delay_line(&target->delay_line, &slave->delay_line)) return target;
+  if (!saved) free_saved_state(target);
+  return NULL;
+}
+
+static int restore_state(Slave *slave, const SavedState *saved) {
+  int is_other = memcmp(slave->state.real + FIRST_PARAMETER, saved->state.real + FIRST_PARAMETER,
+                        (VARIABLE_COUNT - FIRST_PARAMETER) * sizeof(double)) != 0;
+  if (!copy_delay_line(&slave->delay_line, &saved->delay_line)) return STATUS_ERROR;
+  slave->state = saved->state;
+  slave->outputs_stale = 1;
+  if (is_other) parameters_changed(slave);
+  return STATUS_OK;
+}
+
+/* Hash of bytes (FNV-1a, 64 bits). */
+static uint64_t hash_bytes(const void *bytes, size_t count, uint64_t hash) {
+  const unsigned char *byte = (const unsigned char *)bytes;
+  size_t k;
+  for (k = 0; k < count; k++) hash = (hash ^ byte[k]) * 0x100000001b3ULL;
+  return hash;
+}
+
+static size_t segment_bytes(size_t count) { return count * SEGMENT_SIZE * sizeof(double); }
+
+static size_t serialised_size(const SavedState *saved) {
+  return sizeof(StateHeader) + sizeof(State) + segment_bytes(saved->delay_line.count);
+}
+
+static StateHeader state_header(const State *state, const double *segments, size_t count) {
+  StateHeader header;
+  header.magic = STATE_MAGIC;
+  header.model = hash_bytes(MODEL_STRUCTURE, strlen(MODEL_STRUCTURE), 0xcbf29ce484222325ULL);
+  header.segments = count;
+  header.checksum = hash_bytes(state, sizeof *state, header.model);
+  header.checksum = hash_bytes(segments, segment_bytes(count), header.checksum);
+  return header;
+}
+
+static void serialise_state(const SavedState *saved, char *bytes) {
+  StateHeader header = state_header(&saved->state, saved->delay_line.segments, saved->delay_line.count);
+  memcpy(bytes, &header, sizeof header);
+  memcpy(bytes + sizeof header, &saved->state, sizeof saved->state);
+  if (header.segments)
+    memcpy(bytes + sizeof header + sizeof(State), saved->delay_line.segments, segment_bytes(saved->delay_line.count));
+}
+
+/* State from its bytes; NULL where they are none of this model's. */
+static SavedState *deserialise_state(const char *bytes, size_t size) {
+  StateHeader header, expected;
+  SavedState *saved = NULL;
+  size_t fixed = sizeof header + sizeof(State);
+  if (size < fixed || (size - fixed) % segment_bytes(1)) return NULL;
+  memcpy(&header, bytes, sizeof header);
+  if (header.segments != (size - fixed) / segment_bytes(1)) return NULL;
+  saved = (SavedState *)calloc(1, sizeof *saved);
+  if (!saved) return NULL;
+  memcpy(&saved->state, bytes + sizeof header, sizeof saved->state);
+  if (!reserve_segments(&saved->delay_line, (size_t)header.segments)) {
+    free_saved_state(saved);
+    return NULL;
+  }
+  saved->delay_line.count = (size_t)header.segments;
+  if (size > fixed) memcpy(saved->delay_line.segments, bytes + fixed, size - fixed);
+  expected = state_header(&saved->state, saved->delay_line.segments, saved->delay_line.count);
+  if (memcmp(&expected, &header, sizeof header)) {
+    free_saved_state(saved);
+    return NULL;
+  }
+  return saved;
+}

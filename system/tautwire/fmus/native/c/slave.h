@@ -1,0 +1,36 @@
+/* An instance: variables, earlier inputs, time since them, and what its component derives from the parameters. */
+
+typedef struct {
+  double real[VARIABLE_COUNT];
+  double previous_inputs[INPUT_COUNT];
+  double elapsed;
+  double time;
+  int32_t has_previous_inputs;
+  int32_t started;
+} State;
+
+typedef void (*Log)(void *owner, int status, const char *message);
+
+typedef struct {
+  State state;
+  DelayLine delay_line;
+  double start[START_SIZE];
+  double relative_tolerance;
+  int parameters_valid;
+  int outputs_stale;
+  int has_middle_inputs;
+  Log log;
+  void *owner;
+} Slave;
+
+enum { STATUS_OK, STATUS_WARNING, STATUS_DISCARD, STATUS_ERROR };
+
+/* Each component has these; they return 0 where its law has no value. */
+static int derive_start(Slave *slave, double *start_states);
+static int advance(Slave *slave, double step, int at_end);
+static int refresh(Slave *slave);
+
+/* Inputs that hold at the start of a step. */
+static const double *inputs_at_start(const Slave *slave, int at_end) {
+  return at_end ? slave->state.previous_inputs : slave->state.real;
+}

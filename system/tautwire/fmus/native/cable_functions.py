@@ -1,0 +1,113 @@
+"""Functions of a native cable: its start, the rates of its states, and its outputs with their rates."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+from tautwire_fmu.effect_variables import active_effects, effects_from_resource
+from tautwire_fmu.laws import cable as law
+from tautwire_fmu.laws import effect_stages as stages
+from tautwire_fmu.laws.effects import ActiveEffect, Effect
+from tautwire_fmu.laws.mathematics import Mathematics
+
+from .interpolation_functions import MOTION_SIZE
+from .traced_functions import Columns, TracedFunction, rates_along, trace_function
+
+DECLARED_PARAMETERS = 11
+START_SIZE = 5
+
+
+def cable_functions(data: Mapping[str, Any]) -> tuple[TracedFunction, ...]:
+    """``cable_start``, ``cable_rates`` and ``cable_outputs`` of the law and the effects of a cable's resource.
+
+    ``start`` are what follows from the parameters: length, direction and sensor delay.
+    """
+    effects = effects_from_resource(dict(data))
+    states = 2 + sum(len(effect.states) for effect in effects)
+    parameters = DECLARED_PARAMETERS + sum(len(effect.parameters) for effect in effects)
+    cable = _Cable(effects, law.LAWS[data["law"]], tuple(data["swivel_axis"]))
+    known = {"states": states, "parameters": parameters, "start": START_SIZE}
+    return (
+        trace_function("cable_start", {"parameters": parameters}, cable.start),
+        trace_function("cable_rates", {"motion": MOTION_SIZE, **known}, cable.rates),
+        trace_function("cable_outputs", {"motion": MOTION_SIZE, **known}, cable.outputs),
+    )
+
+
+class _Cable:
+    """Equations of a cable as functions of its columns."""
+
+    def __init__(self, effects: Sequence[Effect], tension_law: law.TensionLaw, swivel_axis: tuple[float, ...]) -> None:
+        self.listed_effects = effects
+        self.tension_law = tension_law
+        self.swivel_axis = swivel_axis
+
+    def start(self, m: Mathematics, columns: Columns) -> Columns:
+        """Length and direction at the start and the load cell's delay, and the states there."""
+        parameters = columns["parameters"]
+        effects = active_effects(self.listed_effects, parameters[DECLARED_PARAMETERS:])
+        route = stages.route(m, effects, parameters[0:3], parameters[3:6], self.swivel_axis)
+        start = [route.length, *route.direction, stages.sensor_delays(m, effects)[0]]
+        constants, effects = self._constants(m, parameters, start)
+        return {"start": start, "states": _flat_state(law.start_state(constants, effects))}
+
+    def rates(self, m: Mathematics, columns: Columns) -> Columns:
+        """Rates of the states."""
+        constants, effects = self._constants(m, columns["parameters"], columns["start"])
+        state, inputs = _state(effects, columns["states"]), _inputs(columns["motion"])
+        line = law.span(m, constants, inputs, effects)
+        motion = law.cable_motion(m, constants, effects, state, line, inputs.winch_speed)
+        return {"rates": _flat_state(law.state_rates(m, constants, effects, state, motion))}
+
+    def outputs(self, m: Mathematics, columns: Columns) -> Columns:
+        """Outputs in the order of the FMU's variables, then the rates of force and tension."""
+        constants, effects = self._constants(m, columns["parameters"], columns["start"])
+        state, inputs = _state(effects, columns["states"]), _inputs(columns["motion"])
+        line = law.span(m, constants, inputs, effects)
+        motion = law.cable_motion(m, constants, effects, state, line, inputs.winch_speed)
+        state_rates = _flat_state(law.state_rates(m, constants, effects, state, motion))
+        shown = law.cable_outputs(m, constants, effects, state, motion)
+        varying = [*columns["motion"][:6], columns["motion"][9], *columns["states"]]
+        varying_rates = [*columns["motion"][3:9], columns["motion"][10], *state_rates]
+        return {
+            "outputs": [*shown.force, shown.tension, shown.length, shown.elongation, shown.strain, shown.pull],
+            "output_rates": rates_along([*shown.force, shown.tension], varying, varying_rates),
+        }
+
+    def _constants(
+        self, m: Mathematics, parameters: Sequence[Any], start: Sequence[Any]
+    ) -> tuple[law.CableConstants, tuple[ActiveEffect, ...]]:
+        modulus, area, damping, start_tension, gravity = parameters[6:DECLARED_PARAMETERS]
+        declared = law.CableConstants(
+            law=self.tension_law,
+            anchor=parameters[0:3],
+            modulus=modulus,
+            area=area,
+            damping=damping,
+            start_length=start[0],
+            start_tension=start_tension,
+            start_direction=start[1:4],
+            gravity=gravity,
+            swivel_axis=self.swivel_axis,
+        )
+        effects = active_effects(self.listed_effects, parameters[DECLARED_PARAMETERS:])
+        return law.fold_constant_effects(m, declared, effects)
+
+
+def _inputs(motion: Sequence[Any]) -> law.CableInputs:
+    return law.CableInputs(motion[0:3], motion[3:6], motion[9])
+
+
+def _state(effects: Sequence[ActiveEffect], states: Sequence[Any]) -> law.CableState:
+    effect_states = []
+    first = 2
+    for active in effects:
+        count = len(active.effect.states)
+        effect_states.append(tuple(states[first : first + count]))
+        first += count
+    return law.CableState(states[0], states[1], tuple(effect_states))
+
+
+def _flat_state(state: law.CableState) -> list[Any]:
+    return [state.unstrained_length, state.wound_length, *(each for own in state.effects for each in own)]

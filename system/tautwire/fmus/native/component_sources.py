@@ -1,0 +1,264 @@
+"""C source of a native FMU: the structure of its component, its start values, its equations, and the slave around."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import re
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+from typing import Any
+
+from tautwire_fmu import dormand_prince as integration
+from tautwire_fmu.cable_slave import LENGTH_SCALE
+from tautwire_fmu.effect_variables import effects_from_resource
+from tautwire_fmu.model_description import Variable
+from tautwire_fmu.slave import MIDDLE_TIME, Slave
+
+from .cable_functions import START_SIZE, cable_functions
+from .interpolation_functions import (
+    MOTION_SIZE,
+    cubic_function,
+    motion_functions,
+    quadrature_functions,
+    quintic_function,
+)
+from .platform_functions import POINT_MASS_PARAMETERS, SENSOR_SIZE, mass_functions
+from .traced_functions import LARGEST_NUMBER, TracedFunction, c_source
+from .winch_functions import DRIVE_SIZE, winch_functions
+
+ENTRY_FILE = "all.c"
+CODE_FILE = "code.c"
+START_FILE = "start_values.c"
+STRUCTURE_FILE = "structure.h"
+EQUATIONS_FILE = "equations.c"
+# The input whose rate another input is, by the names without axis.
+RATE_NAMES = {
+    "position": "velocity",
+    "velocity": "acceleration",
+    "winch_speed": "winch_acceleration",
+    "speed_command": "speed_command_rate",
+}
+VALUES_A_LINE = 5
+
+
+@dataclass(frozen=True)
+class ComponentSources:
+    """C files of a native FMU by name.
+
+    ``code.c`` and what it includes depend on the structure alone: law, effects, formulas and number of cables. All
+    other numbers are start values, in ``start_values.c``; ``all.c`` includes both.
+    """
+
+    files: Mapping[str, str]
+
+
+@dataclass(frozen=True)
+class _Component:
+    """What a component contributes: C files, macros, and constants beside the variables."""
+
+    c_files: tuple[str, ...]
+    macros: Mapping[str, Any]
+    constants: Sequence[float] = ()
+    state_scales: Sequence[float] = ()
+
+
+def component_sources(kind: str, slave: Slave, data: Mapping[str, Any], guid: str) -> ComponentSources:
+    """C source of a component by its resource ``data``, with the variables of its Python ``slave``."""
+    component = COMPONENTS[kind](slave, data)
+    names = ["numbers.h", "delay_line.c", "dormand_prince.c", "slave.h", "slave.c", "fmi2.c", *component.c_files]
+    sources = {name: files(__package__).joinpath(f"c/{name}").read_text(encoding="utf-8") for name in names}
+    structure = _structure(slave, component)
+    return ComponentSources(
+        {
+            **sources,
+            STRUCTURE_FILE: structure,
+            EQUATIONS_FILE: _equations(kind, _equation_structure(data)),
+            CODE_FILE: _code(component),
+            START_FILE: _start_values(slave, component, guid),
+            ENTRY_FILE: _entry(data["model_name"]),
+        }
+    )
+
+
+def _cable(slave: Slave, data: Mapping[str, Any]) -> _Component:
+    effects = effects_from_resource(dict(data))
+    scales = (LENGTH_SCALE, LENGTH_SCALE, *(state.scale for effect in effects for state in effect.states))
+    macros = {"MOTION_SIZE": MOTION_SIZE, "START_SIZE": START_SIZE, "SIGNAL_AXES": 1, "SIGNAL_DERIVATIVES": 2}
+    return _Component(("cable.c",), macros, state_scales=scales)
+
+
+def _point_mass(slave: Slave, data: Mapping[str, Any]) -> _Component:
+    names = [variable.name for variable in slave.variables]
+    start_velocity = data.get("start_velocity", (0.0, 0.0, 0.0))
+    macros = _platform_macros(slave, data) | {"FIRST_FORCE": names.index("force_1.x")}
+    return _Component(("platform.c", "point_mass.c"), macros, start_velocity)
+
+
+def _platform_macros(slave: Slave, data: Mapping[str, Any]) -> dict[str, Any]:
+    names = [variable.name for variable in slave.variables]
+    effects = effects_from_resource(dict(data))
+    macros: dict[str, Any] = {
+        "FORCE_COUNT": len(data["start_forces"]) + 1,
+        "HAS_MOTION_DEPENDENT_FORCE": int(any(effect.wrench is not None for effect in effects)),
+        "START_SIZE": SENSOR_SIZE,
+        "SIGNAL_AXES": 3,
+        "SIGNAL_DERIVATIVES": 3,
+    }
+    if "measured_position.x" in names:
+        macros["MEASURED_POSITION"] = names.index("measured_position.x")
+    if any(effect.states for effect in effects):
+        macros["TIME_INDEX"] = slave.time_index
+    return macros
+
+
+def _winch(slave: Slave, data: Mapping[str, Any]) -> _Component:
+    macros = {"START_SIZE": DRIVE_SIZE, "SIGNAL_AXES": 1, "SIGNAL_DERIVATIVES": 2}
+    return _Component(("winch.c",), macros)
+
+
+COMPONENTS: Mapping[str, Callable[[Slave, Mapping[str, Any]], _Component]] = {
+    "cable": _cable,
+    "point_mass": _point_mass,
+    "winch": _winch,
+}
+# Of a resource all that equations depend on; effects do by their names.
+EQUATION_KEYS = ("law", "swivel_axis", "effects", "formulas")
+
+
+def _equation_structure(data: Mapping[str, Any]) -> str:
+    names = [{"name": effect["name"]} for effect in data.get("effects", ())]
+    return json.dumps({name: data.get(name) for name in EQUATION_KEYS} | {"effects": names})
+
+
+@cache
+def _equations(kind: str, structure: str) -> str:
+    """C source of the equations of a kind of component; ``structure`` is that part of its resource, as JSON."""
+    data = json.loads(structure)
+    functions: tuple[TracedFunction, ...]
+    if kind == "cable":
+        functions = (*cable_functions(data), *motion_functions())
+    elif kind == "point_mass":
+        functions = (*mass_functions(data, POINT_MASS_PARAMETERS), *quadrature_functions(), quintic_function())
+    else:
+        functions = winch_functions()
+    return c_source((*functions, cubic_function()))
+
+
+def _structure(slave: Slave, component: _Component) -> str:
+    """Counts and tables of the variables, and the tableau of the adaptive integration."""
+    variables, parameters = slave.variables, slave.variables[slave.first_parameter :]
+    names = [variable.name for variable in variables]
+    macros: dict[str, Any] = {
+        "VARIABLE_COUNT": len(variables),
+        "INPUT_COUNT": slave.input_count,
+        "FIRST_PARAMETER": slave.first_parameter,
+        "FIRST_STATE": slave.states.start,
+        "STATE_COUNT": slave.states.stop - slave.states.start,
+        **component.macros,
+        **{name: repr(getattr(integration, name)) for name in INTEGRATION_CONSTANTS},
+    }
+    if MIDDLE_TIME.name in names:
+        macros["MIDDLE_TIME"] = names.index(MIDDLE_TIME.name)
+    digest = hashlib.sha256(json.dumps([names, macros], sort_keys=True).encode()).hexdigest()[:16]
+    macros["MODEL_STRUCTURE"] = f'"{digest}"'
+    unused_scale = [1.0] * (slave.states.stop - slave.states.start)
+    return "\n".join(
+        [
+            "/* Written by Tautwire: the structure of this component. */",
+            *(f"#define {name} {value}" for name, value in macros.items()),
+            _table("char *const", "variable_names", [f'"{name}"' for name in names]),
+            _table("char", "is_output", [str(int(variable.causality == "output")) for variable in variables]),
+            _table("unsigned int", "rate_references", [str(each) for each in rate_references(variables)]),
+            _numbers("minima", [_bound(each.minimum, -LARGEST_NUMBER) for each in parameters]),
+            _numbers("maxima", [_bound(each.maximum, LARGEST_NUMBER) for each in parameters]),
+            _numbers("state_scales", component.state_scales or unused_scale),
+            _numbers("stage_times", integration.STAGE_TIMES),
+            _numbers("solution_weights", integration.SOLUTION_WEIGHTS),
+            _numbers("error_weights", integration.ERROR_WEIGHTS),
+            _stage_weights(),
+            "",
+        ]
+    )
+
+
+INTEGRATION_CONSTANTS = (
+    "RELATIVE_TOLERANCE",
+    "MIN_RELATIVE_TOLERANCE",
+    "MAX_RELATIVE_TOLERANCE",
+    "MIN_STEP_FRACTION",
+    "SAFETY_FACTOR",
+    "MIN_STEP_FACTOR",
+    "MAX_STEP_FACTOR",
+)
+
+
+def rate_references(variables: Sequence[Variable]) -> list[int]:
+    """Of each variable the reference of its rate, the number of variables where it has none."""
+    references = {variable.name: index for index, variable in enumerate(variables)}
+    rates = {variable.rate_of: variable.name for variable in variables if variable.rate_of is not None}
+    names = [rates.get(v.name, _input_rate_name(v.name)) for v in variables]
+    return [references.get(name, len(variables)) for name in names]
+
+
+def _input_rate_name(name: str) -> str:
+    base, dot, axis = name.partition(".")
+    load = re.fullmatch(r"((?:external_)?(?:force|moment))(_\d+)?", base)
+    rate = f"{load[1]}_rate{load[2] or ''}" if load else RATE_NAMES.get(base, "")
+    return f"{rate}{dot}{axis}"
+
+
+def _bound(value: float | None, absent: float) -> float:
+    return absent if value is None else value
+
+
+def _code(component: _Component) -> str:
+    """The translation unit of everything but the start values."""
+    common = ("numbers.h", STRUCTURE_FILE, EQUATIONS_FILE, "delay_line.c", "slave.h")
+    names = (*common, *component.c_files, "slave.c", "fmi2.c")
+    declarations = (
+        "#ifndef MODEL_SCOPE\n#define MODEL_SCOPE extern\n"
+        "extern const char model_guid[];\nextern const double model_start[], model_constants[];\n#endif\n"
+    )
+    return declarations + "".join(f'#include "{name}"\n' for name in names)
+
+
+def _start_values(slave: Slave, component: _Component, guid: str) -> str:
+    return "\n".join(
+        [
+            "/* Written by Tautwire: the start values of this component. */",
+            "#ifndef MODEL_SCOPE\n#define MODEL_SCOPE\n"
+            "extern const char model_guid[];\nextern const double model_start[], model_constants[];\n#endif",
+            f'MODEL_SCOPE const char model_guid[] = "{guid}";',
+            _numbers("model_start", slave.real, "MODEL_SCOPE"),
+            _numbers("model_constants", component.constants or [0.0], "MODEL_SCOPE"),
+            "",
+        ]
+    )
+
+
+def _entry(name: str) -> str:
+    """The single translation unit of a source FMU; its functions have the model identifier as a prefix."""
+    return (
+        "/* Written by Tautwire: all of this FMU in one translation unit. */\n"
+        f"#ifndef FMI2_OVERRIDE_FUNCTION_PREFIX\n#define FMI2_FUNCTION_PREFIX {name}_\n#endif\n"
+        f'#define MODEL_SCOPE static\n#include "{START_FILE}"\n#include "{CODE_FILE}"\n'
+    )
+
+
+def _stage_weights() -> str:
+    count = max(map(len, integration.STAGE_WEIGHTS))
+    rows = [", ".join(map(repr, [*row, *[0.0] * (count - len(row))])) for row in integration.STAGE_WEIGHTS]
+    lines = "".join(f"  {{{row}}},\n" for row in rows)
+    return f"static const double stage_weights[][{count}] = {{\n{lines}}};"
+
+
+def _numbers(name: str, values: Sequence[float], scope: str = "static") -> str:
+    return _table("double", name, [repr(float(value)) for value in values], scope)
+
+
+def _table(element: str, name: str, values: Sequence[str], scope: str = "static") -> str:
+    lines = "".join(f"  {', '.join(values[k : k + VALUES_A_LINE])},\n" for k in range(0, len(values), VALUES_A_LINE))
+    return f"{scope} const {element} {name}[] = {{\n{lines}}};"

@@ -1,0 +1,56 @@
+"""Compilers of native FMUs."""
+
+from __future__ import annotations
+
+import importlib.util
+import zipfile
+from pathlib import Path
+
+import pytest
+
+from tautwire.errors import ArgumentError
+from tautwire.fmus.native.c_toolchain import (
+    PLATFORMS,
+    THIS_PLATFORM,
+    NativeBuildError,
+    Toolchain,
+    compile_library,
+    target_platforms,
+)
+from tautwire.fmus.packaging import build_fmus
+from tests.support.robots import paper_robot
+
+SYSTEM_COMPILER = Toolchain(("cc",), "cc", is_cross_compiler=False)
+MAGIC = {"linux": b"\x7fELF", "win": b"MZ", "darwin": b"\xcf\xfa\xed\xfe"}
+
+
+def test_unknown_platforms_are_refused() -> None:
+    with pytest.raises(ArgumentError, match=r"'amiga' is none.*linux64"):
+        target_platforms(["linux64", "amiga"], SYSTEM_COMPILER)
+
+
+def test_the_systems_compiler_compiles_for_this_platform_only() -> None:
+    assert [platform.name for platform in target_platforms([], SYSTEM_COMPILER)] == [THIS_PLATFORM]
+    other = next(name for name in PLATFORMS if name != THIS_PLATFORM)
+    with pytest.raises(NativeBuildError, match=r"cc does not compile for .*ziglang|tautwire\[native\]"):
+        target_platforms([other], SYSTEM_COMPILER)
+
+
+def test_what_a_compiler_refuses_is_told_in_one_line() -> None:
+    platform = PLATFORMS[THIS_PLATFORM]
+    sources = {"code.c": "int x = ;", "start_values.c": "", "mark.c": str(Path(__file__))}
+    with pytest.raises(NativeBuildError, match=r"cannot compile.*error") as caught:
+        compile_library(sources, platform, SYSTEM_COMPILER)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.validate
+@pytest.mark.skipif(importlib.util.find_spec("ziglang") is None, reason="no ziglang")
+def test_one_archive_holds_all_platforms(tmp_path: Path) -> None:
+    fmus = build_fmus(paper_robot(), tmp_path, native=True, platforms=["all"])
+    for path in fmus.paths:
+        with zipfile.ZipFile(path) as archive:
+            libraries = {name: archive.read(name) for name in archive.namelist() if name.startswith("binaries/")}
+        assert [name.split("/")[1] for name in libraries] == list(PLATFORMS)
+        for name, content in libraries.items():
+            assert content.startswith(next(magic for system, magic in MAGIC.items() if system in name))

@@ -1,0 +1,202 @@
+"""Native FMUs beside those of Python: the same variables, the same numbers, the same refusals."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import zipfile
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.fmi1 import FMICallException
+from fmpy.model_description import ModelDescription
+from fmpy.validation import validate_fmu
+
+from tautwire.cosimulation.robot_cosimulation import cosimulate
+from tautwire.fmus.packaging import RobotFmus, build_fmus
+from tests.support.effect_cases import CASES, PAIRS, Case, same
+from tests.support.effects import with_effects
+from tests.support.fmus import Hand, in_hand
+from tests.support.native import both_kinds, both_runs, largest_difference
+from tests.support.robots import LIMITED, example, gentle_speeds, paper_robot, with_winch
+
+SAME = 1e-10
+DELAYED = same("sensor_delay", tension_delay=0.023)
+FMI_DISCARD, FMI_ERROR = 2, 3
+
+
+@pytest.fixture(scope="module")
+def complete_fmus(tmp_path_factory: pytest.TempPathFactory) -> tuple[RobotFmus, RobotFmus]:
+    """A robot on winches with every effect, of Python and native."""
+    robot = with_winch(with_effects(example("three"), *CASES), LIMITED)
+    return both_kinds(robot, tmp_path_factory.mktemp("complete"))
+
+
+@pytest.fixture(scope="module")
+def plain_fmus(tmp_path_factory: pytest.TempPathFactory) -> RobotFmus:
+    """The paper's robot, native."""
+    return build_fmus(paper_robot(), tmp_path_factory.mktemp("plain"), native=True)
+
+
+def described_variables(description: ModelDescription) -> list[tuple[object, ...]]:
+    return [
+        (v.name, v.valueReference, v.causality, v.variability, v.initial, v.start, v.unit, v.min, v.max, v.nominal)
+        for v in description.modelVariables
+    ]
+
+
+def dependencies(description: ModelDescription) -> list[tuple[str, list[str]]]:
+    return [(u.variable.name, [known.name for known in u.dependencies or []]) for u in description.outputs]
+
+
+def test_variables_are_those_of_the_python_fmus(complete_fmus: tuple[RobotFmus, RobotFmus]) -> None:
+    for python, native in zip(complete_fmus[0].paths, complete_fmus[1].paths, strict=True):
+        one, other = (fmpy.read_model_description(str(path)) for path in (python, native))
+        assert described_variables(one) == described_variables(other)
+        assert dependencies(one) == dependencies(other)
+        assert not other.coSimulation.needsExecutionTool
+
+
+def test_nothing_is_wrong_with_native_fmus(complete_fmus: tuple[RobotFmus, RobotFmus]) -> None:
+    assert [validate_fmu(str(path)) for path in complete_fmus[1].paths] == [[]] * 7
+
+
+def test_all_effects_together_run_as_in_python(complete_fmus: tuple[RobotFmus, RobotFmus]) -> None:
+    time, speed = gentle_speeds(example("three"), 0.5, 0.02)
+    python, native = (cosimulate(fmus, time, speed) for fmus in complete_fmus)
+    assert largest_difference(python, native) < SAME
+
+
+@pytest.mark.validate
+@pytest.mark.parametrize("cases", [*((case,) for case in CASES), *PAIRS], ids=lambda cases: "+".join(map(str, cases)))
+def test_each_effect_runs_as_in_python(cases: tuple[Case, ...], tmp_path: Path) -> None:
+    time, speed = gentle_speeds(example("three"), 1.0, 0.02)
+    python, native = both_runs(with_effects(example("three"), *cases), tmp_path, time, speed)
+    assert largest_difference(python, native) < SAME
+
+
+def go_on(cable: Hand) -> list[float]:
+    shown = []
+    for k in range(4):
+        cable.set(input_time=0.03 + 0.01 * k, position__z=5.0 + 0.01 * k, winch_speed=0.1 * k)
+        cable.step(0.02 + 0.01 * k, 0.01)
+        shown += cable.get("tension", "tension_rate", "middle_force.x", "unstrained_length")
+    return shown
+
+
+def begin(cable: Hand) -> None:
+    cable.set(winch_speed=0.3)
+    cable.run()
+    cable.step(0.0, 0.01)
+    cable.step(0.01, 0.01)
+
+
+def test_saved_and_serialised_states_go_on_with_the_same_bits(complete_fmus: tuple[RobotFmus, RobotFmus]) -> None:
+    with in_hand(complete_fmus[1].cables[2]) as cable:
+        begin(cable)
+        saved = cable.fmu.getFMUstate()
+        content = cable.fmu.serializeFMUstate(saved)
+        first = go_on(cable)
+        cable.fmu.setFMUstate(saved)
+        assert go_on(cable) == first
+        cable.fmu.freeFMUstate(saved)
+    with in_hand(complete_fmus[1].cables[2]) as other:
+        other.run()
+        other.fmu.setFMUstate(other.fmu.deSerializeFMUstate(content))
+        assert go_on(other) == first
+    assert first[0] != first[4]
+
+
+@pytest.mark.parametrize("damage", ["shorter", "longer", "changed", "of another model"])
+def test_serialised_states_that_are_damaged_are_refused(
+    damage: str, complete_fmus: tuple[RobotFmus, RobotFmus], plain_fmus: RobotFmus
+) -> None:
+    with in_hand(complete_fmus[1].cables[2]) as cable, in_hand(plain_fmus.cables[0]) as plain:
+        begin(cable)
+        begin(plain)
+        content = cable.fmu.serializeFMUstate(cable.fmu.getFMUstate())
+        changed = content[:100] + bytes([content[100] ^ 1]) + content[101:]
+        other = plain.fmu.serializeFMUstate(plain.fmu.getFMUstate())
+        damaged = {"shorter": content[:-8], "longer": content + content[-48:], "changed": changed}.get(damage, other)
+        with pytest.raises(FMICallException) as caught:
+            cable.fmu.deSerializeFMUstate(damaged)
+        assert caught.value.status == FMI_ERROR
+
+
+def test_a_rope_reeled_in_past_its_end_discards_the_step_and_keeps_the_state(plain_fmus: RobotFmus) -> None:
+    with in_hand(plain_fmus.cables[0]) as cable:
+        cable.run()
+        cable.set(unstrained_length=-1.0)
+        assert all(np.isnan(cable.get("tension", "force.x", "pull")))
+        with pytest.raises(FMICallException) as caught:
+            cable.step(0.0, 0.01)
+        assert caught.value.status == FMI_DISCARD
+        assert cable.get("unstrained_length", "wound_length") == [-1.0, 0.0]
+
+
+def test_parameters_outside_their_bounds_and_inputs_not_finite_are_refused(plain_fmus: RobotFmus) -> None:
+    with in_hand(plain_fmus.cables[0]) as cable:
+        for value in (-1.0, float("nan"), float("inf")):
+            with pytest.raises(FMICallException):
+                cable.set(modulus=value)
+        assert cable.get("modulus")[0] == paper_robot().cables[0].modulus
+        cable.set(winch_speed=float("nan"))
+        with pytest.raises(FMICallException):
+            cable.run()
+        cable.set(winch_speed=0.0)
+        cable.run()
+        cable.set(position__x=float("inf"))
+        with pytest.raises(FMICallException):
+            cable.step(0.0, 0.01)
+
+
+def test_derivatives_of_inputs_are_the_inputs_that_are_their_rates(plain_fmus: RobotFmus) -> None:
+    shown = []
+    for by_derivative in (False, True):
+        with in_hand(plain_fmus.cables[0]) as cable:
+            cable.run()
+            if by_derivative:
+                references = [cable.references[name] for name in ("winch_speed", "position.x", "position.x")]
+                cable.fmu.setRealInputDerivatives(references, [1, 1, 2], [0.3, 0.1, -2.0])
+            else:
+                cable.set(winch_acceleration=0.3, velocity__x=0.1, acceleration__x=-2.0)
+            cable.step(0.0, 0.02)
+            shown.append(cable.get("tension", "force.x", "wound_length"))
+    assert shown[0] == shown[1]
+    assert shown[0][2] == pytest.approx(0.3 * 0.02**2 / 2, rel=1e-12)
+
+
+def test_parameters_that_are_set_move_the_start(complete_fmus: tuple[RobotFmus, RobotFmus]) -> None:
+    lengths = []
+    for fmus in complete_fmus:
+        with in_hand(fmus.cables[0]) as cable:
+            cable.set(effect__anchor__z=0.5, effect__pulley__radius=0.2)
+            lengths.append(cable.get("unstrained_length", "length", "tension"))
+            cable.run()
+    assert lengths[0] == pytest.approx(lengths[1], rel=1e-13)
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
+def test_a_plain_c_compiler_takes_the_source_in_the_archive(plain_fmus: RobotFmus, tmp_path: Path) -> None:
+    with zipfile.ZipFile(plain_fmus.platform) as archive:
+        archive.extractall(tmp_path)
+    headers = Path(fmpy.__file__).parent / "c-code"
+    library = tmp_path / "platform.so"
+    call = ["gcc", "-std=c99", "-pedantic-errors", "-O1", "-fPIC", "-shared", "-o", str(library), f"-I{headers}"]
+    subprocess.run([*call, str(tmp_path / "sources" / "all.c"), "-lm"], check=True)
+    names = subprocess.run(["nm", "-D", "--defined-only", str(library)], capture_output=True, text=True, check=True)
+    defined = {line.split()[-1] for line in names.stdout.splitlines()}
+    assert {name for name in defined if not name.startswith("_")} == {n for n in defined if n.startswith("fmi2")}
+    binary = next((tmp_path / "binaries").rglob("platform.so"))
+    shutil.copyfile(library, binary)
+    with in_hand(plain_fmus.platform) as built:
+        built.run()
+        built.step(0.0, 0.01)
+        expected = built.get("position.x", "position.z", "velocity.z")
+    hand = Hand(tmp_path, str(tmp_path))
+    hand.run()
+    hand.step(0.0, 0.01)
+    assert hand.get("position.x", "position.z", "velocity.z") == pytest.approx(expected, rel=1e-12)
+    hand.fmu.freeInstance()
