@@ -33,7 +33,8 @@ if TYPE_CHECKING:
     from .recordings.recording import read_recording, recording_from_frame
     from .reports import write_report
     from .robot.robot_file_reader import read_robot
-    from .robot.trajectory import Line, ideal_winch_speeds
+    from .robot.trajectory import Line
+    from .robot.winch_speeds import ideal_winch_speeds
 else:
 
     def __getattr__(name: str) -> Any:
@@ -71,7 +72,7 @@ _MODULES = {
     "cosimulate": ".cosimulation.robot_cosimulation",
     "cosimulate_closed_loop": ".control",
     "design_controller": ".control",
-    "ideal_winch_speeds": ".robot.trajectory",
+    "ideal_winch_speeds": ".robot.winch_speeds",
     "linearise": ".linear",
     "modes_along": ".linear",
     "modes_along_figure": ".linear",

@@ -25,7 +25,8 @@ from tautwire.errors import InputError, UnreachableError
 from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.robot.robot_file_reader import read_robot
 from tautwire.robot.schema import Robot
-from tautwire.robot.trajectory import CAROCA_HELIX, PAPER_HELIX, Helix, Line, Trajectory, ideal_winch_speeds
+from tautwire.robot.trajectory import CAROCA_HELIX, PAPER_HELIX, Helix, Line, Trajectory
+from tautwire.robot.winch_speeds import ideal_winch_speeds
 from tests.support.robots import paper_robot
 from tests.support.winch_ramp import WinchRamp
 

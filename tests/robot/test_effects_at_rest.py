@@ -20,7 +20,8 @@ from tautwire.robot.robot_file_writer import write_robot
 from tautwire.robot.schema import PER_CABLE_COMPONENTS, EffectSetting, Platform, Robot
 from tautwire.robot.static_equilibrium import static_forces, static_tensions
 from tautwire.robot.symbolic_model import FreeParameter, SymbolicModel, symbolic_model
-from tautwire.robot.trajectory import Line, ideal_winch_speeds
+from tautwire.robot.trajectory import Line
+from tautwire.robot.winch_speeds import ideal_winch_speeds
 from tautwire_fmu.laws.effects import ALL, BY_NAME, Effect
 from tautwire_fmu.laws.mathematics import REAL
 from tests.rig import Rig, StillProgram

@@ -19,11 +19,9 @@ from tautwire.recordings.recording import Recording
 from tautwire.robot.robot_file_writer import write_robot
 from tautwire.robot.schema import Robot
 from tautwire.robot.symbolic_model import symbolic_model
-from tautwire.robot.trajectory import Line, ideal_winch_speeds
 from tautwire.robot.uncertain_parameters import uncertain_parameters
 from tests.support.rigid_robots import suspended_robot
 
-PATH = Line((0.0, 0.0, 1.5), (0.1, 0.0, 1.5), 1.0)
 STANDING = Recording("standing", np.arange(3.0), np.zeros((3, 4)), np.full((3, 4), 100.0), np.zeros((3, 3)))
 
 
@@ -32,7 +30,6 @@ def uncertain(robot: Robot) -> Robot:
 
 
 COMPUTATIONS: dict[str, Callable[[Robot], object]] = {
-    "speeds": lambda robot: ideal_winch_speeds(robot, PATH, np.array([0.0, 0.5])),
     "controller": tautwire.design_controller,
     "model": lambda robot: symbolic_model(robot, (), uncertain_parameters(robot)),
     "excitation": default_limits,

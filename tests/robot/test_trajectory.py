@@ -9,7 +9,8 @@ import numpy as np
 import pytest
 
 from tautwire.robot.schema import Cable, Platform, Robot, Sensors
-from tautwire.robot.trajectory import CAROCA_HELIX, PAPER_HELIX, Helix, Line, Trajectory, ideal_winch_speeds
+from tautwire.robot.trajectory import CAROCA_HELIX, PAPER_HELIX, Helix, Line, Trajectory
+from tautwire.robot.winch_speeds import ideal_winch_speeds
 
 LINE = Line((1.0, 2.0, 3.0), (2.0, 0.0, 3.5), 4.0)
 PATHS = [LINE, PAPER_HELIX, CAROCA_HELIX, Helix((1.0, 2.0, 3.0), 0.5, -2.0, -pi, 3.0)]

@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautwire.robot.schema import Robot
-from tautwire.robot.trajectory import cable_directions
 
 Array = NDArray[np.float64]
 
@@ -43,7 +42,7 @@ class WinchRamp:
 
     def velocity(self, times: Array) -> Array:
         """The rate of position, (N, 3) in m/s: ``u_i . v = V_i``."""
-        unit = cable_directions(self.robot, self.position(times))
+        unit = self._unit_vectors(self.position(times))
         return _solved(unit, self.speeds(times))
 
     def acceleration(self, times: Array) -> Array:
@@ -52,7 +51,12 @@ class WinchRamp:
         lengths = np.linalg.norm(np.array(self.robot.anchors) - position[:, None], axis=2)
         turned = (np.sum(velocity**2, axis=1)[:, None] - self.speeds(times) ** 2) / lengths
         rising = (times[:, None] >= 0.0) & (times[:, None] < self.limit / np.abs(self.rates))
-        return _solved(cable_directions(self.robot, position), np.where(rising, self.rates, 0.0) + turned)
+        return _solved(self._unit_vectors(position), np.where(rising, self.rates, 0.0) + turned)
+
+    def _unit_vectors(self, position: Array) -> Array:
+        """Along the cables to the exit points, (N, 3, 3)."""
+        spans = np.array(self.robot.anchors).T - position[:, :, None]
+        return np.asarray(spans / np.linalg.norm(spans, axis=1, keepdims=True))
 
     def _wound(self, times: Array) -> Array:
         """Rope reeled in, (N, 3) in m."""

@@ -35,7 +35,8 @@ from ..recordings.start_position import with_start
 from ..robot.robot_file_reader import robot_from_content
 from ..robot.schema import AXES, Point, Robot
 from ..robot.static_equilibrium import static_tensions
-from ..robot.trajectory import Helix, Line, Trajectory, ideal_winch_speeds
+from ..robot.trajectory import Helix, Line, Trajectory
+from ..robot.winch_speeds import ideal_winch_speeds
 from .campaign_plan import OPEN_LOOP, Compute, PathPlan, Plan
 from .dataset_schema import FAILURE_COLUMN, MODE_NUMBERS, Row, series_columns
 from .fmu_cache import FmuBundle, build_bundle, cached_fmus

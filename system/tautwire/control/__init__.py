@@ -22,12 +22,13 @@ from .design import (
     measurement_noise,
 )
 from .external_controller import ControllerError, fmu_controller, function_controller, state_space_controller
-from .feedforward import Reference, elastic_reference, path_tensions, rigid_reference
+from .feedforward import Reference, elastic_reference, rigid_reference
 from .gain_scheduling import ScheduledController, schedule_controller
 from .hinf_loop_shaping import RobustAim, RobustController, design_robust, schedule_robust
 from .input_shaping import ShapedTrajectory, Shaper, shape_along, shaped, shaper, shaper_for_modes
 from .lqg import Controller, design_controller
 from .path_controller import PathController
+from .path_dynamics import path_tensions
 from .sampled_plant import ramp_plant, sampled_plant
 from .stability_margins import Margins, Range, margins_of, margins_over, robot_with, speed_controller
 

@@ -4,11 +4,12 @@ The model-based compensation that Baklouti et al. 2017 ask for (section 4.1.1) a
 laws are inverted: in each step, of length d from the middle of one sample to the next, the winch speeds V and the
 remaining state s (unstrained lengths, states of effects) solve
 
-    s_j+1 = s_j + d f(p, v, (s_j + s_j+1) / 2, V)         p, v of the path in the middle of the step
-    a(p_j+1, v_j+1, s_j+1, V) = acceleration of the path at its end
-    N (T(p_j+1, v_j+1, s_j+1, V) - T_0) = 0               N the self-stress of redundant cables
+    s_j+1 = s_j + d f(x, t, (s_j + s_j+1) / 2, V)         pose x and twist t of the path in the middle of the step
+    P a(x_j+1, t_j+1, s_j+1, V) = P dt/dt                 P what the tensions can move, at the end of the step
+    N (T(x_j+1, t_j+1, s_j+1, V) - T_j+1) = 0             N the self-stress of redundant cables, T_j+1 along the path
 
-so every effect of the robot file is compensated too.
+so every effect of the robot file is compensated too. A rigid platform on fewer than six cables is moved through poses
+in equilibrium: the cables then exert the wrench nearest to the one that moves it.
 """
 
 from __future__ import annotations
@@ -19,19 +20,13 @@ import casadi
 import numpy as np
 from casadi import SX
 from numpy.typing import NDArray
-from scipy.linalg import null_space
 
-from tautwire_fmu.laws.mathematics import REAL
-from tautwire_fmu.laws.point_mass import PointMassConstants, total_mass
-
-from ..errors import UnreachableError
-from ..robot.active_effects import platform_effects
-from ..robot.schema import Robot, require_point_mass
-from ..robot.static_equilibrium import static_tensions
-from ..robot.static_load import load_on_tensions
-from ..robot.symbolic_model import SymbolicModel, symbolic_model
-from ..robot.trajectory import Trajectory, cable_directions, ideal_winch_speeds
+from ..robot.pose_path import PoseSamples, pose_path, sample_poses
+from ..robot.schema import Robot
+from ..robot.trajectory import Trajectory
+from ..robot.winch_speeds import winch_speeds_at
 from .design import StretchError
+from .path_dynamics import START_RULE, PathDynamics, PathLaws, path_dynamics
 
 Array = NDArray[np.float64]
 
@@ -43,8 +38,9 @@ SUBSTEPS = 4
 class Reference:
     """Reference of a controller at each of N samples: winch speeds (N, n) in m/s, and expected measurements.
 
-    ``rigid`` (N, n) are the speeds for inelastic cables; ``expected`` (N, 3 + n): position in m, tensions in N.
-    ``at_rest`` (n,) are the expected tensions before the start, in N.
+    ``rigid`` (N, n) are the speeds for inelastic cables; ``expected`` (N, 3 + n): position in m, tensions in N, and of
+    a rigid platform (N, 7 + n) with a unit quaternion behind the position. ``at_rest`` (n,) are the expected tensions
+    before the start, in N.
     """
 
     speeds: Array
@@ -53,131 +49,112 @@ class Reference:
     at_rest: Array
 
 
-def path_tensions(robot: Robot, trajectory: Trajectory, times: Array) -> Array:
-    """Inverse dynamics: tensions that carry the platform along a path, shape (N, n), in N.
-
-    ``T = T_0 + U^+ (w + m a - U T_0)``, ``w`` the static load: of all that move it, those nearest to the start's.
-
-    Raises UnreachableError where a cable would have to push.
-    """
-    require_point_mass(robot.name, robot)
-    start = static_tensions(robot)
-    positions = trajectory.position(times)
-    direction_matrix = cable_directions(robot, positions)
-    constants = PointMassConstants(robot.platform.mass, robot.gravity)
-    mass = total_mass(REAL, constants, platform_effects(robot))
-    static_loads = np.array([load_on_tensions(robot, position, start) for position in positions.tolist()])
-    load = mass * trajectory.acceleration(times) + static_loads
-    change = np.linalg.pinv(direction_matrix) @ (load - direction_matrix @ start)[:, :, None]
-    tensions: Array = start + change[:, :, 0]
-    if np.min(tensions) < 0.0:
-        sample, cable = np.unravel_index(np.argmin(tensions), tensions.shape)
-        raise UnreachableError(
-            robot.name,
-            position=tuple(positions[sample]),
-            cable=int(cable) + 1,
-            tension=float(tensions[sample, cable]),
-            hint=f"choose a slower path, or one that the cables can hold (it fails at {times[sample]:g} s)",
-        )
-    return tensions
-
-
-def rigid_reference(robot: Robot, trajectory: Trajectory, times: Array) -> Reference:
+def rigid_reference(robot: Robot, trajectory: Trajectory, times: Array, rule: str = START_RULE) -> Reference:
     """Rigid reference: winch speeds of inelastic cables along a path, and the tensions that carry the platform there.
 
-    Raises UnreachableError where a cable would have to push.
+    ``rule`` distributes the tensions as in :func:`path_tensions`.
+
+    Raises UnreachableError where a cable would have to push, or no tensions are within the limits.
     """
-    speeds = ideal_winch_speeds(robot, trajectory, times)
-    expected = np.hstack([trajectory.position(times), path_tensions(robot, trajectory, times)])
-    return Reference(speeds, speeds, expected, path_tensions(robot, trajectory, times[:1] - 1.0)[0])
+    path, laws = pose_path(robot, trajectory), PathLaws.of(robot)
+    poses, at_rest = (sample_poses("rigid_reference", robot, path, at) for at in (times, times[:1] - 1.0))
+    speeds = winch_speeds_at(robot, poses)
+    tensions = path_dynamics(robot, laws, poses, times, rule).tensions
+    start_tensions = path_dynamics(robot, laws, at_rest, times[:1], rule).tensions[0]
+    return Reference(speeds, speeds, np.hstack([_measured_pose(robot, poses), tensions]), start_tensions)
 
 
-@dataclass(frozen=True)
-class _PathSamples:
-    """Samples of the path at the middle and at the end of J steps, each (J, 3)."""
-
-    middle: tuple[Array, Array]
-    end: tuple[Array, Array, Array]
-
-
-def elastic_reference(robot: Robot, trajectory: Trajectory, times: Array) -> Reference:
+def elastic_reference(robot: Robot, trajectory: Trajectory, times: Array, rule: str = START_RULE) -> Reference:
     """Elastic reference: winch speeds with which the elastic model follows a path, and the measurements then expected.
 
     ``times`` (N,) in s, equidistant; speeds are linear in between. Each is the mean over the sample around it, so the
     rope length is right also where the path's acceleration jumps. They start with those of inelastic cables, and the
-    path is at rest before.
+    path is at rest before. ``rule`` distributes the tensions as in :func:`path_tensions`.
 
-    Raises UnreachableError where a cable would have to push, StretchError where no speeds are found.
+    Raises UnreachableError where a cable would have to push or no tensions are within the limits, StretchError where no
+    speeds are found.
     """
-    path_tensions(robot, trajectory, times)
+    path, laws = pose_path(robot, trajectory), PathLaws.of(robot)
     period = float(times[1] - times[0])
-    ends = times[0] - 0.5 * period + period / SUBSTEPS * np.arange(1, SUBSTEPS * len(times) + 1)
-    path_samples = _sample_path(trajectory, ends, period / SUBSTEPS)
-    speeds, expected = _simulate_inverse(
-        robot, path_samples, ideal_winch_speeds(robot, trajectory, ends), period / SUBSTEPS
+    step = period / SUBSTEPS
+    ends = times[0] - 0.5 * period + step * np.arange(1, SUBSTEPS * len(times) + 1)
+    middle, end, at_samples = (
+        sample_poses("elastic_reference", robot, path, at) for at in (ends - 0.5 * step, ends, times)
     )
+    dynamics = path_dynamics(robot, laws, end, ends, rule)
+    speeds, outputs = _simulate_inverse(robot, laws, (middle, end), dynamics, step)
     if not np.all(np.isfinite(speeds)):
         failure_time = float(ends[np.argmin(np.all(np.isfinite(speeds), axis=1))])
         raise StretchError(robot.name, failure_time, "follow it with the speeds of inelastic cables, rigid_reference")
     means = speeds.reshape(len(times), SUBSTEPS, -1).mean(axis=1)
-    ideal = ideal_winch_speeds(robot, trajectory, times)
+    ideal = winch_speeds_at(robot, at_samples)
     # The second sample makes up for the rope that the first half sample lacks.
     means[1] += means[0] - 0.5 * ideal[0]
     means[0] = ideal[0]
-    return Reference(means, ideal, expected[SUBSTEPS // 2 - 1 :: SUBSTEPS], expected[0, 3:])
+    shown = outputs[SUBSTEPS // 2 - 1 :: SUBSTEPS]
+    expected = np.hstack([shown[:, :3], _measured_pose(robot, at_samples)[:, 3:], shown[:, 3:]])
+    return Reference(means, ideal, expected, outputs[0, 3:])
 
 
-def _sample_path(trajectory: Trajectory, ends: Array, step: float) -> _PathSamples:
-    middles = ends - 0.5 * step
-    return _PathSamples(
-        (trajectory.position(middles), trajectory.velocity(middles)),
-        (trajectory.position(ends), trajectory.velocity(ends), trajectory.acceleration(ends)),
-    )
+def _measured_pose(robot: Robot, poses: PoseSamples) -> Array:
+    """Position, and of a rigid platform its orientation behind it, (N, 3) or (N, 7)."""
+    return np.hstack([poses.position, poses.orientation]) if robot.platform.is_rigid_body else poses.position
 
 
 def _simulate_inverse(
-    robot: Robot, path_samples: _PathSamples, rigid_speeds: Array, step: float
+    robot: Robot, laws: PathLaws, poses: tuple[PoseSamples, PoseSamples], dynamics: PathDynamics, step: float
 ) -> tuple[Array, Array]:
-    """Winch speeds in each step (J, n), and measurements at its end (J, 3 + n)."""
-    model = symbolic_model(robot)
-    count = robot.cable_count
-    null_vectors = np.array([null_space(unit).ravel() for unit in cable_directions(robot, path_samples.end[0])])
-    path_data = np.hstack(
-        [*path_samples.middle, *path_samples.end, rigid_speeds, null_vectors.reshape(len(rigid_speeds), -1)]
-    )
-    start = np.asarray(casadi.evalf(model.start[6:])).ravel()
-    march = _inverse_step(robot, model, step, path_data.shape[1]).mapaccum(len(path_data))
-    _, trajectory_values = march(start, path_data.T)
+    """Winch speeds in each step (J, n), and position and tensions as measured at its end (J, 3 + n)."""
+    count, model = robot.cable_count, laws.model
+    _, end = poses
+    targets = np.einsum("kin,kn->ki", dynamics.null_rows, dynamics.tensions)
+    # CasADi stores matrices column by column.
+    rows = [np.swapaxes(each, 1, 2).reshape(len(targets), -1) for each in (dynamics.motion_rows, dynamics.null_rows)]
+    parts = [
+        *(part for each in poses for part in (each.position, each.orientation, each.twist)),
+        end.acceleration,
+        winch_speeds_at(robot, end),
+        *rows,
+        targets,
+    ]
+    widths = [part.shape[1] for part in parts]
+    start = np.asarray(casadi.evalf(model.start[model.indices.lengths.start :])).ravel()
+    march = _inverse_step(robot, laws, step, widths).mapaccum(len(targets))
+    _, trajectory_values = march(start, np.hstack(parts).T)
     values = np.asarray(trajectory_values).T
     return values[:, :count], values[:, count:]
 
 
-def _inverse_step(robot: Robot, model: SymbolicModel, step: float, width: int) -> casadi.Function:
+def _inverse_step(robot: Robot, laws: PathLaws, step: float, widths: list[int]) -> casadi.Function:
     """Function of one step: from the initial state and the path to the final state, winch speeds and measurements."""
-    count, size = robot.cable_count, model.states.numel() - 6
+    model, count = laws.model, robot.cable_count
+    d, lengths = model.indices.degrees_of_freedom, model.indices.lengths
+    size = model.states.numel() - lengths.start
     state, end_state, path_data, speeds = (
-        SX.sym(name, length) for name, length in (("s", size), ("t", size), ("g", width), ("v", count))
+        SX.sym(name, length) for name, length in (("s", size), ("t", size), ("g", sum(widths)), ("v", count))
     )
-    p, v, p_end, v_end, a_end, guess, null_entries = casadi.vertsplit(
-        path_data, [0, 3, 6, 9, 12, 15, 15 + count, width]
+    p, q, t, p_end, q_end, t_end, a_end, guess, motion_entries, null_entries, target = casadi.vertsplit(
+        path_data, np.cumsum([0, *widths]).tolist()
     )
-    inputs = casadi.vertcat(speeds, SX(3, 1))
-    laws = casadi.Function("laws", [model.states, model.inputs], [model.rates, model.outputs, model.span_tensions])
-    middle_rates, _, _ = laws(casadi.vertcat(p, v, 0.5 * (state + end_state)), inputs)
-    rates, outputs, tensions = laws(casadi.vertcat(p_end, v_end, end_state), inputs)
-    null_basis = casadi.reshape(null_entries, count - 3, count) if count > 3 else SX(0, count)
+    inputs = casadi.vertcat(speeds, SX(d, 1))
+    middle_rates, _, _ = laws.laws(laws.state(p, t, 0.5 * (state + end_state)), inputs, q)
+    rates, outputs, tensions = laws.laws(laws.state(p_end, t_end, end_state), inputs, q_end)
+    rank = motion_entries.numel() // d
+    motion_rows = casadi.reshape(motion_entries, rank, d)
+    null_rows = casadi.reshape(null_entries, count - rank, count)
     equations = casadi.vertcat(
-        end_state - state - step * middle_rates[6:],
-        rates[3:6] - a_end,
-        casadi.mtimes(null_basis, tensions - static_tensions(robot)),
+        end_state - state - step * middle_rates[lengths.start :],
+        casadi.mtimes(motion_rows, rates[model.indices.twist] - a_end),
+        casadi.mtimes(null_rows, tensions) - target,
     )
     residual = casadi.Function(
         "residual", [casadi.vertcat(end_state, speeds), casadi.vertcat(state, path_data)], [equations]
     )
-    solve = casadi.rootfinder("solve", "newton", residual, {"error_on_fail": False})
+    options = {"error_on_fail": False, "show_eval_warnings": False}
+    solve = casadi.rootfinder("solve", "newton", residual, options)
     solution = solve(casadi.vertcat(state, guess), casadi.vertcat(state, path_data))
-    sensor_outputs = casadi.vertcat(outputs[:3], outputs[6 : 6 + count])
     solved_state, speed = casadi.vertsplit(solution, [0, size, size + count])
+    sensor_outputs = casadi.vertcat(outputs[:3], outputs[model.indices.tensions])
     evaluate_sensors = casadi.Function("show", [end_state, speeds, path_data], [sensor_outputs])
     return casadi.Function(
         "step",

@@ -26,7 +26,7 @@ from ..errors import InputError, TautwireError
 from ..recordings.recording import Recording
 from ..robot.schema import Robot, require_point_mass
 from ..robot.static_equilibrium import static_tensions
-from ..robot.trajectory import ideal_winch_speeds
+from ..robot.winch_speeds import ideal_winch_speeds
 from .estimation_data import DataSet
 from .hypotheses import Hypothesis, hypotheses
 from .identifiability import separation_nats, start_steps

@@ -25,7 +25,8 @@ from numpy.typing import NDArray
 
 from ..robot.schema import Robot
 from ..robot.static_equilibrium import static_tensions
-from ..robot.trajectory import Trajectory, ideal_winch_speeds
+from ..robot.trajectory import Trajectory
+from ..robot.winch_speeds import ideal_winch_speeds
 from .simulation_records import reeled_length
 
 Array = NDArray[np.float64]

@@ -18,7 +18,8 @@ from ..errors import TautwireError
 from ..fmus.packaging import build_fmus
 from ..recordings.start_position import with_start
 from ..robot.schema import Robot
-from ..robot.trajectory import Trajectory, ideal_winch_speeds
+from ..robot.trajectory import Trajectory
+from ..robot.winch_speeds import ideal_winch_speeds
 from .paper_parameters import WinchRamp
 
 Array = NDArray[np.float64]

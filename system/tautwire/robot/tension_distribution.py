@@ -23,13 +23,16 @@ DEFAULT_LIMITS = TensionLimits(minimum=0.0, maximum=float("inf"), preferred=0.0)
 RULES = ("nearest", "least_norm", "barycentre", "closed_form")
 
 
-def distribute_tensions(unit_directions: Array, load: Array, limits: TensionLimits) -> Array | None:
+def distribute_tensions(
+    unit_directions: Array, load: Array, limits: TensionLimits, preferred: Array | None = None
+) -> Array | None:
     """Tension distribution: the feasible tensions nearest to the preferred one that balance a load, shape (n,), in N.
 
     ``min |T - T_p|^2`` with ``U T = w``, ``T_min <= T_i <= T_max``. Their dependence on ``U`` and ``w`` is
     continuous, as the objective is strictly convex. ``unit_directions`` U (3, n) points from the platform to the exit
     points, ``load`` w (3,) is in N; of a rigid platform, U is the structure matrix and w the load wrench, with as many
-    rows, moments divided by a length. None if no tensions are feasible.
+    rows, moments divided by a length. ``preferred`` T_p (n,) is by default that of the limits for all cables. None if
+    no tensions are feasible.
     """
     count = unit_directions.shape[1]
     problem: Any = {"h": casadi.Sparsity.dense(count, count), "a": casadi.Sparsity.dense(len(load), count)}
@@ -37,7 +40,7 @@ def distribute_tensions(unit_directions: Array, load: Array, limits: TensionLimi
     scale = max(float(np.linalg.norm(load)), 1.0)
     solution = solver(
         h=np.eye(count),
-        g=-np.full(count, limits.preferred / scale),
+        g=-(np.full(count, limits.preferred) if preferred is None else preferred) / scale,
         a=unit_directions,
         lba=load / scale,
         uba=load / scale,

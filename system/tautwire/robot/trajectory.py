@@ -1,4 +1,4 @@
-"""Reference paths of the platform, and the winch speeds that follow them with inelastic cables."""
+"""Reference paths of the platform: the interface, straight lines and helices from rest to rest."""
 
 from __future__ import annotations
 
@@ -7,14 +7,12 @@ from math import pi
 from typing import Protocol, cast
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from ..array_validation import validate_array, validate_point
+from ..array_validation import validate_point
 from ..errors import ArgumentError
 from ..validation import NumberRule, validate_attributes, validate_number
-from .active_effects import has_routing_effects
-from .cable_routes import unit_directions as rope_directions
-from .schema import Point, Robot, validate_point_mass_robot
+from .schema import Point
 
 Array = NDArray[np.float64]
 
@@ -151,48 +149,6 @@ def quintic_law(times: Array, duration: float) -> tuple[Array, Array, Array]:
         fraction**3 * (10.0 + fraction * (6.0 * fraction - 15.0)),
         30.0 * fraction**2 * remainder**2 / duration,
         60.0 * fraction * remainder * (remainder - fraction) / duration**2,
-    )
-
-
-def cable_directions(robot: Robot, positions: Array) -> Array:
-    """Unit vectors of the cables at the platform; positions (N, 3) in m give (N, 3, n)."""
-    if has_routing_effects(robot):
-        return np.array([rope_directions(robot, position) for position in np.asarray(positions, dtype=float)])
-    spans = np.array(robot.anchors).T - np.asarray(positions, dtype=float)[:, :, None]
-    directions: Array = spans / np.linalg.norm(spans, axis=1, keepdims=True)
-    return directions
-
-
-def ideal_winch_speeds(robot: Robot, trajectory: Trajectory, times: ArrayLike) -> Array:
-    """Winch speeds of inelastic cables along a trajectory, at ``times`` (N,) in s; positive reels in.
-
-    ``V_i = -dl_i/dt = u_i . v``, shape (N, n), in m/s; ``u_i`` from the platform along the cable, ``v`` the velocity.
-
-    Raises ArgumentError for an invalid argument, a user's trajectory whose values are not finite (N, 3), or a
-    trajectory through an exit point.
-    """
-    validate_point_mass_robot("ideal_winch_speeds: robot", robot)
-    require_trajectory("ideal_winch_speeds: trajectory", trajectory)
-    instants = validate_array("ideal_winch_speeds: times", times, (None,), "finite times (N,) in s")
-    positions, velocities = (
-        _evaluate_path("ideal_winch_speeds", trajectory, name, instants) for name in ("position", "velocity")
-    )
-    with np.errstate(invalid="ignore", divide="ignore"):
-        directions = cable_directions(robot, positions)
-    speeds: Array = np.einsum("kai,ka->ki", directions, velocities)
-    undefined = np.argwhere(~np.isfinite(speeds))
-    if len(undefined):
-        row, cable = undefined[0]
-        problem = f"has no winch speed of cable {cable + 1} at {instants[row]:g} s: it leads through the exit point"
-        raise ArgumentError("ideal_winch_speeds: trajectory", trajectory, problem, "lead the path past all exit points")
-    return speeds
-
-
-def _evaluate_path(where: str, trajectory: Trajectory, quantity: str, times: Array) -> Array:
-    """A quantity of a trajectory, possibly the user's, at times (N,): finite numbers (N, 3); raises ArgumentError."""
-    meaning = f"a path whose {quantity}(times) has a finite row x, y, z for each of the {len(times)} times"
-    return validate_array(
-        f"{where}: trajectory.{quantity}", getattr(trajectory, quantity)(times), (len(times), 3), meaning
     )
 
 
