@@ -8,10 +8,13 @@ from .model_description import Variable
 
 
 def effect_variables(settings: Sequence[Dict[str, Any]]) -> Tuple[Variable, ...]:
-    """Tunable FMI parameters, one for every parameter of every effect that is switched on."""
+    """Tunable FMI parameters, one for every parameter of every effect that is switched on.
+
+    An effect that a platform has for one ``cable`` has its number behind the name, as in ``effect.attachment_2.x``.
+    """
     return tuple(
         Variable(
-            f"effect.{setting['name']}.{parameter.name}",
+            f"effect.{setting_name(setting)}.{parameter.name}",
             "parameter",
             parameter.unit,
             parameter.description,
@@ -23,6 +26,11 @@ def effect_variables(settings: Sequence[Dict[str, Any]]) -> Tuple[Variable, ...]
         for setting in settings
         for parameter in BY_NAME[setting["name"]].parameters
     )
+
+
+def setting_name(setting: Dict[str, Any]) -> str:
+    """Name of an effect that is switched on, with the number of the cable for which a platform has it."""
+    return f"{setting['name']}_{setting['cable']}" if "cable" in setting else str(setting["name"])
 
 
 def effects_from_resource(data: Dict[str, Any]) -> Tuple[Effect, ...]:

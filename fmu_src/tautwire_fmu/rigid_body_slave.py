@@ -5,11 +5,13 @@ from typing import Any, List, Optional, Sequence, Tuple
 
 from .hermite_quadrature import MotionState
 from .laws import rigid_body as law
+from .laws import rigid_body_effects as body_stages
+from .laws.mathematics import REAL, Mathematics
 from .laws.rotation import rotation_matrix
 from .laws.vectors import Vector, add, cross, scale, subtract
 from .platform_slave import PlatformSlave
 from .rigid_body_variables import INERTIA_ENTRIES, rigid_body_variables
-from .rotation_quadrature import ORIGIN, Load, RotationState, attitude_of, integrate_rotation
+from .rotation_quadrature import ORIGIN, Body, Load, RotationState, attitude_of, integrate_rotation
 from .slave import read_resource
 
 EXTERNAL_MOMENT = 2
@@ -28,6 +30,8 @@ class RigidBody(PlatformSlave):
         variables = rigid_body_variables(data)
         names = [variable.name for variable in variables]
         self.cable_count = len(data["attachments"])
+        # Cable whose attachment an effect shifts, counted from 1; None for an effect on the platform.
+        self.shifted_cables = [setting.get("cable") for setting in data["effects"]]
         self.first_effect_parameter = FIRST_ATTACHMENT + 3 * self.cable_count
         self.first_output = names.index("position.x")
         self.angular_output = names.index("angular_velocity.x")
@@ -48,19 +52,35 @@ class RigidBody(PlatformSlave):
     def parameters_changed(self) -> None:
         super().parameters_changed()
         values = self.real[self.first_parameter : self.first_parameter + self.first_effect_parameter]
-        centre = values[CENTRE_OF_MASS:FIRST_ATTACHMENT]
-        points = [ORIGIN, *(values[k : k + 3] for k in range(FIRST_ATTACHMENT, len(values), 3))]
-        self.arms = [subtract(point, centre) for point in points]
+        body = self._constants(values)
+        self.arms = [subtract(point, body.centre_of_mass) for point in (ORIGIN, *body.attachments)]
         # The external force, the last one, acts at the origin.
         self.arms_by_axis = tuple(zip(*self.arms[1:], self.arms[0]))
-        entries = dict(zip(INERTIA_ENTRIES, values[INERTIA:CENTRE_OF_MASS]))
-        x, y, z = (tuple(entries["".join(sorted(row + column))] for column in "xyz") for row in "xyz")
         self.start_load_cache = ((), None)
-        self.problem = _inertia_problem((x, y, z)) or _quaternion_problem(values[START_ORIENTATION:INERTIA])
+        self.problem = _inertia_problem(body.inertia) or _quaternion_problem(values[START_ORIENTATION:INERTIA])
         if not self.problem:
-            self.inertia = law.inertia_of((x, y, z))
+            self.body = Body(
+                law.inertia_of(body.inertia),
+                self._moment_of_effects if body_stages.has_moment(self.effects) else None,
+            )
             if not self.started:
                 self.real[self.states] = self._start_state(values)
+
+    def _constants(self, values: Sequence[float]) -> body_stages.BodyConstants:
+        """Constants of the body by its parameters, effects included."""
+        entries = dict(zip(INERTIA_ENTRIES, values[INERTIA:CENTRE_OF_MASS]))
+        x, y, z = (tuple(entries["".join(sorted(row + column))] for column in "xyz") for row in "xyz")
+        attachments = [values[k : k + 3] for k in range(FIRST_ATTACHMENT, len(values), 3)]
+        centre = values[CENTRE_OF_MASS:FIRST_ATTACHMENT]
+        body = body_stages.BodyConstants(values[0], (x, y, z), law.principal_axes((x, y, z)), centre, attachments)
+        of_cables = [
+            [active for active, shifted in zip(self.effects, self.shifted_cables) if shifted == cable]
+            for cable in range(1, self.cable_count + 1)
+        ]
+        return body_stages.constants_with_effects(REAL, body, self.effects, of_cables)
+
+    def _moment_of_effects(self, m: Mathematics, angular_velocity: Vector) -> Vector:
+        return body_stages.moment_of_effects(m, self.effects, angular_velocity)
 
     def _start_state(self, values: Sequence[float]) -> List[float]:
         """Quaternion, position and velocity of the centre of mass, and angular momentum at the start."""
@@ -71,7 +91,7 @@ class RigidBody(PlatformSlave):
         angular_velocity = self.start_angular_velocity
         velocity = add(self.start_velocity, cross(angular_velocity, to_centre))
         in_body = law.transform_back(rotation, angular_velocity)
-        momentum = law.transform(rotation, law.transform(self.inertia.matrix, in_body))
+        momentum = law.transform(rotation, law.transform(self.body.inertia.matrix, in_body))
         return [*quaternion, *add(values[2:5], to_centre), *velocity, *momentum]
 
     def exit_initialization_mode(self) -> None:
@@ -84,11 +104,11 @@ class RigidBody(PlatformSlave):
         self._require_valid_parameters()
         rotation_state, mass = self._present_state()
         loads = self._loads(step, inputs_at_end)
-        rotation = integrate_rotation(self.inertia, rotation_state, loads, step)
+        rotation = integrate_rotation(self.body, rotation_state, loads, step)
         nodes, middle, end = self.translate(mass, step, inputs_at_end)
         self.real[self.states] = [*rotation.end.quaternion, *end.position, *end.velocity, *rotation.end.momentum]
         if self.position_delay > 0.0:
-            start_attitude = attitude_of(self.inertia, rotation_state, loads[0])
+            start_attitude = attitude_of(self.body, rotation_state, loads[0])
             before = _motion(start_attitude, mass._replace(acceleration=nodes[0].acceleration), self.arms[:1])
             after = _motion(rotation.end_attitude, end, self.arms[:1])
             self.record_path(step, *(MotionState(each[:3], each[3:6], each[6:]) for each in (before, after)))
@@ -119,7 +139,7 @@ class RigidBody(PlatformSlave):
         """Motion under the present forces."""
         rotation_state, mass = self._present_state()
         load = self._extrapolated(self._load(self.real), self.elapsed)
-        attitude = attitude_of(self.inertia, rotation_state, load)
+        attitude = attitude_of(self.body, rotation_state, load)
         acceleration = self.present_acceleration(mass.position, mass.velocity)
         return [*_motion(attitude, mass._replace(acceleration=acceleration), self.arms), *_turning(attitude)]
 

@@ -11,11 +11,11 @@ symmetric in time, so that energy does not drift. Orientations are products of u
 Source: Hairer, Lubich and Wanner (2006), Geometric Numerical Integration, sections IV.8, V.1 and V.4.
 """
 
-from typing import NamedTuple, Sequence, Tuple
+from typing import Callable, NamedTuple, Optional, Sequence, Tuple
 
 from .hermite_quadrature import CUBIC_END, CUBIC_MIDDLE, QUINTIC_END, QUINTIC_MIDDLE, apply_weights
 from .laws import rigid_body as law
-from .laws.mathematics import COMPLEX_STEP, REAL, rates_of, vector_with_rates
+from .laws.mathematics import COMPLEX_STEP, REAL, Mathematics, rates_of, vector_with_rates
 from .laws.rotation import Matrix, Quaternion, multiply, quaternion_of, rotation_matrix, rotation_vector_rate
 from .laws.vectors import Vector, add, scale, subtract
 
@@ -24,6 +24,13 @@ ANGLE_TOLERANCE = 1e-16  # rad
 ORIGIN = (0.0, 0.0, 0.0)
 
 VectorPair = Tuple[Vector, Vector]
+
+
+class Body(NamedTuple):
+    """Inertia of a body, and the moment of effects (N m) by the angular velocity (rad/s), in the world's axes."""
+
+    inertia: law.Inertia
+    moment_of_effects: Optional[Callable[[Mathematics, Vector], Vector]] = None
 
 
 class Load(NamedTuple):
@@ -50,36 +57,38 @@ class Rotation(NamedTuple):
     end_attitude: law.Attitude
 
 
-def attitude_of(inertia: law.Inertia, state: RotationState, load: Load) -> law.Attitude:
+def attitude_of(body: Body, state: RotationState, load: Load) -> law.Attitude:
     """Attitude of a body under a load."""
     rotation = rotation_matrix(state.quaternion)
-    return _attitude(inertia, rotation, state.momentum, _moment(rotation, load))
+    velocity = law.angular_velocity(body.inertia, rotation, state.momentum)
+    return _attitude(body, rotation, state.momentum, _moment(body, rotation, velocity, load))
 
 
-def integrate_rotation(inertia: law.Inertia, start: RotationState, loads: Sequence[Load], step: float) -> Rotation:
+def integrate_rotation(body: Body, start: RotationState, loads: Sequence[Load], step: float) -> Rotation:
     """Rotation over a step under ``loads`` at both ends, or at both ends and in the middle.
 
     Fixed-point sweeps solve for the later nodes. Raises ArithmeticError where the step is too long for them.
     """
     middle_weights, end_weights = (QUINTIC_MIDDLE, QUINTIC_END) if len(loads) == 3 else (CUBIC_MIDDLE, CUBIC_END)
-    first = attitude_of(inertia, start, loads[0])
-    first_moment = _moment_with_rate(first.rotation, first.velocity, loads[0])
+    first = attitude_of(body, start, loads[0])
+    first_moment = _moment_with_rate(body, first, loads[0])
     angles = (_taylor(ORIGIN, first[1:], 0.5 * step), _taylor(ORIGIN, first[1:], step))
-    velocities: Sequence[Vector] = [_taylor(first.velocity, (first.acceleration, ORIGIN), 0.5 * step)] * 2
+    velocity = _taylor(first.velocity, (first.acceleration, ORIGIN), 0.5 * step)
+    attitudes = [first._replace(velocity=velocity)] * (len(loads) - 1)
     change = ANGLE_TOLERANCE
     for _ in range(MAX_SWEEPS):
         quaternions = _quaternions(start.quaternion, angles)
         rotations = [rotation_matrix(quaternion) for quaternion in quaternions[3 - len(loads) :]]
-        moments = [first_moment, *map(_moment_with_rate, rotations, velocities, loads[1:])]
+        attitudes = [attitude._replace(rotation=each) for attitude, each in zip(attitudes, rotations)]
+        moments = [first_moment, *(_moment_with_rate(body, *each) for each in zip(attitudes, loads[1:]))]
         momenta = [
             apply_weights(start.momentum, moments, step, step * step, weights.velocity)
             for weights in (middle_weights, end_weights)
         ]
         attitudes = [
-            _attitude(inertia, rotation, momentum, moment)
+            _attitude(body, rotation, momentum, moment)
             for rotation, momentum, (moment, _) in zip(rotations, momenta[3 - len(loads) :], moments[1:])
         ]
-        velocities = [attitude.velocity for attitude in attitudes]
         nodes = _angle_nodes([first, *attitudes], angles)
         previous_angles, previous_change = angles, change
         angles = (
@@ -94,13 +103,13 @@ def integrate_rotation(inertia: law.Inertia, start: RotationState, loads: Sequen
         raise ArithmeticError(f"the rotation does not converge, the last change is {change:.1g} rad")
     middle, end = map(RotationState, _quaternions(start.quaternion, angles), momenta)
     if len(loads) == 3:
-        middle_attitude = attitude_of(inertia, middle, loads[1])
+        middle_attitude = attitude_of(body, middle, loads[1])
     else:
         rotation = rotation_matrix(middle.quaternion)
         moment = apply_weights(ORIGIN, moments, 1.0, step, middle_weights.acceleration)
-        middle_attitude = _attitude(inertia, rotation, middle.momentum, moment)
+        middle_attitude = _attitude(body, rotation, middle.momentum, moment)
     end = end._replace(quaternion=_normalised(end.quaternion))
-    return Rotation(end, middle_attitude, attitude_of(inertia, end, loads[-1]))
+    return Rotation(end, middle_attitude, attitude_of(body, end, loads[-1]))
 
 
 def _angle_nodes(attitudes: Sequence[law.Attitude], angles: VectorPair) -> Sequence[VectorPair]:
@@ -134,16 +143,25 @@ def _taylor(value: Vector, rates: VectorPair, elapsed: float) -> Vector:
     return add(value, add(scale(elapsed, rates[0]), scale(0.5 * elapsed * elapsed, rates[1])))
 
 
-def _attitude(inertia: law.Inertia, rotation: Matrix, momentum: Vector, moment: Vector) -> law.Attitude:
-    velocity = law.angular_velocity(inertia, rotation, momentum)
-    return law.Attitude(rotation, velocity, law.angular_acceleration(inertia, rotation, velocity, moment))
+def _attitude(body: Body, rotation: Matrix, momentum: Vector, moment: Vector) -> law.Attitude:
+    velocity = law.angular_velocity(body.inertia, rotation, momentum)
+    return law.Attitude(rotation, velocity, law.angular_acceleration(body.inertia, rotation, velocity, moment))
 
 
-def _moment(rotation: Matrix, load: Load) -> Vector:
-    return add(law.moment(rotation, load.forces), load.moment)
+def _moment(body: Body, rotation: Matrix, velocity: Vector, load: Load) -> Vector:
+    """Moment about the centre of mass in the world's axes."""
+    moment = add(law.moment(rotation, load.forces), load.moment)
+    if body.moment_of_effects is None:
+        return moment
+    return add(moment, body.moment_of_effects(REAL, law.transform(rotation, velocity)))
 
 
-def _moment_with_rate(rotation: Matrix, velocity: Vector, load: Load) -> VectorPair:
+def _moment_with_rate(body: Body, attitude: law.Attitude, load: Load) -> VectorPair:
     """Moment about the centre of mass in the world's axes, and its rate."""
+    rotation, velocity, acceleration = attitude
     rate = add(law.moment(rotation, load.force_rates), law.moment(law.rotation_rate(rotation, velocity), load.forces))
-    return _moment(rotation, load), add(rate, load.moment_rate)
+    rate = add(rate, load.moment_rate)
+    if body.moment_of_effects is not None:
+        world = law.transform(rotation, velocity), law.transform(rotation, acceleration)
+        rate = add(rate, rates_of(body.moment_of_effects(COMPLEX_STEP, vector_with_rates(*world))))
+    return _moment(body, rotation, velocity, load), rate

@@ -7,10 +7,11 @@ import pytest
 from numpy.typing import NDArray
 from scipy.integrate import solve_ivp
 
-from tautwire_fmu.laws.mathematics import REAL
+from tautwire_fmu.laws.mathematics import REAL, Mathematics
 from tautwire_fmu.laws.rigid_body import inertia_of, moment_matrix
 from tautwire_fmu.laws.rotation import multiply, quaternion_of, rotation_matrix, rotation_vector_rate
-from tautwire_fmu.rotation_quadrature import Load, RotationState, integrate_rotation
+from tautwire_fmu.laws.vectors import Vector, dot, scale
+from tautwire_fmu.rotation_quadrature import Body, Load, RotationState, integrate_rotation
 
 Array = NDArray[np.float64]
 
@@ -32,17 +33,22 @@ def load_at(time: float) -> Load:
     )
 
 
-def end_state(step: float, duration: float, middle: bool) -> Array:
+def resisting_moment(m: Mathematics, velocity: Vector) -> Vector:
+    """A moment against the turning that grows faster than the angular velocity."""
+    return scale(-0.5 * m.sqrt(1.0 + dot(velocity, velocity)), velocity)
+
+
+def end_state(step: float, duration: float, middle: bool, resists: bool = False) -> Array:
     """Rotation matrix and angular momentum, shape (12,)."""
-    inertia, state = inertia_of(INERTIA.tolist()), START
+    body, state = Body(inertia_of(INERTIA.tolist()), resisting_moment if resists else None), START
     for index in range(round(duration / step)):
         time = index * step
         loads = [load_at(time + fraction * step) for fraction in ((0.0, 0.5, 1.0) if middle else (0.0, 1.0))]
-        state = integrate_rotation(inertia, state, loads, step).end
+        state = integrate_rotation(body, state, loads, step).end
     return np.array([*np.ravel(rotation_matrix(state.quaternion)), *state.momentum])
 
 
-def exact_end_state(duration: float) -> Array:
+def exact_end_state(duration: float, resists: bool = False) -> Array:
     """As :func:`end_state`, by the rotation matrix and its rate."""
 
     def rates(time: float, state: Array) -> Array:
@@ -50,6 +56,7 @@ def exact_end_state(duration: float) -> Array:
         velocity = rotation @ np.linalg.solve(INERTIA, rotation.T @ momentum)
         forces = (1.0 + 0.3 * np.sin(3.0 * time)) * FORCES
         moment = np.cross(ARMS @ rotation.T, forces).sum(axis=0) + time * MOMENT
+        moment -= resists * 0.5 * np.sqrt(1.0 + velocity @ velocity) * velocity
         return np.array([*np.cross(velocity, rotation.T).T.ravel(), *moment])
 
     start = np.array([*np.ravel(rotation_matrix(START.quaternion)), *START.momentum])
@@ -64,13 +71,21 @@ def test_the_order_is_four_and_with_forces_in_the_middle_six(middle: bool, order
     assert np.log2(coarse / fine) == pytest.approx(order, abs=0.3)
 
 
+@pytest.mark.parametrize(("middle", "order"), [(False, 4), (True, 6)])
+def test_a_moment_by_the_angular_velocity_keeps_the_order(middle: bool, order: int) -> None:
+    exact = exact_end_state(1.0, resists=True)
+    assert np.max(np.abs(exact - exact_end_state(1.0))) > 0.01
+    coarse, fine = (np.max(np.abs(end_state(step, 1.0, middle, True) - exact)) for step in (0.1, 0.05))
+    assert np.log2(coarse / fine) == pytest.approx(order, abs=0.3)
+
+
 @pytest.mark.parametrize("step", [0.3, 0.01])
 def test_a_free_top_keeps_momentum_energy_and_the_quaternions_length(step: float) -> None:
-    inertia, state = inertia_of(INERTIA.tolist()), START
+    body, state = Body(inertia_of(INERTIA.tolist())), START
     free = Load(((0.0,) * 3,) * 3, ((0.0,) * 3,) * 3)
     energies, lengths = [], []
     for _ in range(1000):
-        rotation = integrate_rotation(inertia, state, [free] * 3, step)
+        rotation = integrate_rotation(body, state, [free] * 3, step)
         state = rotation.end
         velocity = np.array(rotation.end_attitude.velocity)
         energies.append(0.5 * velocity @ INERTIA @ velocity)
@@ -92,6 +107,6 @@ def test_the_rotation_vectors_rate_is_that_of_the_rotation(size: float) -> None:
 
 
 def test_a_step_that_is_too_long_is_refused() -> None:
-    inertia = inertia_of(INERTIA.tolist())
+    body = Body(inertia_of(INERTIA.tolist()))
     with pytest.raises((ArithmeticError, ValueError)):
-        integrate_rotation(inertia, START, [load_at(0.0), load_at(3.0), load_at(6.0)], 6.0)
+        integrate_rotation(body, START, [load_at(0.0), load_at(3.0), load_at(6.0)], 6.0)

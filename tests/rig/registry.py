@@ -6,7 +6,7 @@ from tests.rig.constants import Damping, Modulus, Payload
 from tests.rig.effect import Effect
 from tests.rig.material import Creep, Hysteresis, Pushing, Relaxation, Slack, Stiffening, Thermal
 from tests.rig.outside import Drag, SensorDelay, SensorGain, SensorOffset
-from tests.rig.route import Anchor, Frame, Pulley, Sag
+from tests.rig.route import Anchor, Frame, Pulley, Sag, TransverseDamping
 from tests.rig.unlisted import Bungee, Filling, Gusts, Magnet, Shaker, Sideways, Slipping, Swing, Wave
 from tests.rig.winch import Drum, Friction
 
@@ -28,6 +28,7 @@ EFFECTS: dict[str, type[Effect]] = {
     "sensor_delay": SensorDelay,
     "sensor_gain": SensorGain,
     "sensor_offset": SensorOffset,
+    "transverse_damping": TransverseDamping,
     "unlisted_bungee": Bungee,
     "unlisted_filling": Filling,
     "unlisted_frame": Frame,

@@ -56,6 +56,18 @@ class Pulley(Effect):
 
 
 @dataclass(kw_only=True)
+class TransverseDamping(Effect):
+    """A rope's end that resists motion across the rope: F = -d (1 - u u') v; d `damping` in N s/m."""
+
+    damping: float
+
+    def load(self, moment: Moment) -> None:
+        """Resist what of the velocity is perpendicular to each rope."""
+        across = np.eye(3) - np.einsum("ki,kj->kij", moment.direction, moment.direction)
+        moment.force = moment.force - self.damping * np.einsum("k,kij,j->i", self.mask, across, moment.velocity)
+
+
+@dataclass(kw_only=True)
 class Sag(Effect):
     """A rope with weight w = `linear_density` g (N/m of chord) hangs as a parabola.
 

@@ -44,6 +44,7 @@ CASES: list[tuple[str, dict[str, Any], dict[str, Any]]] = [
     ("friction", {"coefficient": 0.05}, {"coefficient": 0.0}),
     ("drag", {"drag_area": 5.0, "wind": [2.0, 1.0, 0.0]}, {"drag_area": 0.0}),
     ("slack", {"softness": 500.0}, {"softness": 1e-3}),
+    ("transverse_damping", {"damping": 100.0}, {"damping": 0.0}),
     ("sensor_delay", {"seconds": 0.02}, {"seconds": 0.0}),
     ("sensor_gain", {"gain": 1.02, "cables": [3]}, {"gain": 1.0}),
     ("sensor_offset", {"force": 20.0, "cables": [2]}, {"place": [0.0, 0.0, 0.0]}),

@@ -122,6 +122,28 @@ def test_a_point_mass_has_nothing_of_a_rigid_body(after: str, line: str) -> None
     assert "point mass" in error.problem and "give [platform] an inertia" in error.hint
 
 
+@pytest.mark.parametrize(
+    ("table", "where"),
+    (
+        ("[effect.centre_of_mass]\nx = 0.01", "effect.centre_of_mass"),
+        ("[effect.attachment]\nx = 0.01", "effect.attachment"),
+        ("[effect.inertia]\nfactor_x = 1.2", "effect.inertia"),
+        ("[effect.rotational_drag]\ndamping = 2.0", "effect.rotational_drag"),
+        ("[effect.payload]\nmass = 2.0\nz = 0.1", "effect.payload.z"),
+    ),
+)
+def test_a_point_mass_has_no_effects_of_a_rigid_body(table: str, where: str) -> None:
+    error = refused(f"{POINT_MASS}\n{table}\n")
+    assert error.where.endswith(f"robot.toml: {where}")
+    assert "point mass" in error.problem and "give [platform] an inertia" in error.hint
+    assert where.split(".")[1] in {setting.name for setting in read(f"{HEAD}{CABLES}\n{table}\n").effects}
+
+
+def test_ropes_resist_motion_across_them_on_any_platform() -> None:
+    for text in (POINT_MASS, HEAD + CABLES):
+        assert read(f"{text}\n[effect.transverse_damping]\ndamping = 5.0\n").effects[0].values["damping"] == 5.0
+
+
 def test_a_point_mass_needs_three_cables_and_a_rigid_platform_two() -> None:
     without_inertia = "\n".join(line for line in (HEAD + CABLES).splitlines() if not line.startswith(("ine", "att")))
     assert "three or more" in refused(without_inertia).problem

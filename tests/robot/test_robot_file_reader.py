@@ -118,7 +118,7 @@ def test_effect_may_hold_with_other_numbers_for_other_cables(tmp_path: Path) -> 
     assert robot.effects == (
         EffectSetting("modulus", {"modulus": 5e10}, (1, 3)),
         EffectSetting("modulus", {"modulus": 7e10}, (2,)),
-        EffectSetting("payload", {"mass": -3.0}),
+        EffectSetting("payload", {"mass": -3.0, "x": 0.0, "y": 0.0, "z": 0.0}),
     )
     assert [setting.values["modulus"] for setting in robot.effects_on_cable(2)] == [7e10]
     assert robot.effects_elsewhere() == robot.effects[2:]

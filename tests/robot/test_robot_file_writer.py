@@ -123,10 +123,16 @@ NAMES = st.text(st.characters(exclude_categories=("C", "Z")), min_size=1, max_si
 
 @st.composite
 def effect_settings(draw: st.DrawFn, cable_count: int) -> list[EffectSetting]:
-    """Settings as files may hold them: each effect at most once for each cable."""
+    """Settings as files of point masses may hold them: each effect at most once for each cable."""
     drawn = []
-    for effect in draw(st.lists(st.sampled_from(ALL), unique=True, max_size=3)):
-        numbers = st.fixed_dictionaries({p.name: st.floats(p.minimum, p.maximum) for p in effect.parameters})
+    of_point_masses = [effect for effect in ALL if not effect.needs_rigid_body]
+    for effect in draw(st.lists(st.sampled_from(of_point_masses), unique=True, max_size=3)):
+        numbers = st.fixed_dictionaries(
+            {
+                p.name: st.just(p.neutral) if p.needs_rigid_body else st.floats(p.minimum, p.maximum)
+                for p in effect.parameters
+            }
+        )
         if effect.component not in PER_CABLE_COMPONENTS:
             drawn.append(EffectSetting(effect.name, draw(numbers)))
             continue

@@ -67,6 +67,7 @@ CASES = (
         {"drag_area": 5.0, "wind_x": 2.0, "wind_y": 1.0, "wind_z": 0.5},
     ),
     same("slack", softness=300.0),
+    same("transverse_damping", damping=40.0),
     Case("sensor_gain", {"gain": 1.02}, {"tension_gain": 1.02}, (3,)),
     Case("sensor_gain", {"gain": 1.001, "outputs": "position"}, {"position_gain": 1.001}),
     Case("sensor_offset", {"force": -20.0}, {"tension_offset": -20.0}, (2,)),

@@ -84,12 +84,16 @@ class CableInputs(NamedTuple):
 
 
 class Span(NamedTuple):
-    """Free span between platform and exit point, without sag; see :class:`tautwire_fmu.laws.effect_stages.Route`."""
+    """Free span between platform and exit point, without sag; see :class:`tautwire_fmu.laws.effect_stages.Route`.
+
+    ``velocity`` is that of its end at the platform.
+    """
 
     direction: Vector
     length: Any
     chord: Any
     length_rate: Any
+    velocity: Vector
 
 
 class CableMotion(NamedTuple):
@@ -153,7 +157,7 @@ def span(m: Mathematics, cable: CableConstants, inputs: CableInputs, effects: Se
         line = subtract(cable.anchor, inputs.position)
         length = chord = norm(m, line)
         direction = scale(1.0 / length, line)
-    return Span(direction, length, chord, -dot(direction, inputs.velocity))
+    return Span(direction, length, chord, -dot(direction, inputs.velocity), inputs.velocity)
 
 
 def cable_motion(
@@ -229,6 +233,7 @@ def cable_outputs(
         log_platform_ratio, log_cell_ratio = stages.transmission(m, effects, motion)
         end_force, end_tension = stages.end_forces(m, effects, cable.gravity, line, tension)
         force = add(scale(tension * m.exp(log_platform_ratio), line.direction), end_force)
+        force = add(force, stages.lateral_force(m, effects, line))
         cell_tension = (tension + end_tension) * m.exp(log_cell_ratio)
         measured_tension = cell_tension * stages.sensor_gains(m, effects)[0] + stages.sensor_offsets(m, effects)[0]
     else:

@@ -135,6 +135,15 @@ def end_forces(m: Mathematics, effects: Effects, gravity: Any, line: Any, tensio
     return platform_force, cell_tension
 
 
+def lateral_force(m: Mathematics, effects: Effects, line: Any) -> Vector:
+    """Force across the rope on the platform, in N."""
+    total: Vector = (0.0, 0.0, 0.0)
+    for active in effects:
+        if active.effect.lateral_force is not None:
+            total = add(total, active.effect.lateral_force(m, active.values, line))
+    return total
+
+
 def transmission(m: Mathematics, effects: Effects, motion: Any) -> Tuple[Any, Any]:
     """Logarithms of the tensions at the platform and at the load cell over that of the span."""
     at_platform: Any = 0.0

@@ -6,17 +6,21 @@
 
 The z axis points up. R turns the platform's axes into those of the world. In the platform's frame b_i is the attachment
 of cable i and c the centre of mass; I is the inertia about c. L is the angular momentum about the centre of mass in the
-axes of the world, so that it stays constant where no moment acts. Masses and forces that effects add act at the centre
-of mass, an external force at the origin of the platform's frame.
+axes of the world, so that it stays constant where no moment acts. Forces that effects add act at the centre of mass,
+which masses that they add may shift; an external force acts at the origin of the platform's frame.
 
 Source: Goldstein, Poole and Safko (2002), Classical Mechanics, 3rd edition, sections 1.2, 4.9 and 5.5.
 """
 
+import math
+from itertools import permutations
 from operator import mul
-from typing import Any, NamedTuple, Sequence, Tuple
+from typing import Any, List, NamedTuple, Sequence, Tuple
 
 from .rotation import Matrix
 from .vectors import Vector, add, cross, dot, subtract
+
+MAX_JACOBI_SWEEPS = 30
 
 
 class Inertia(NamedTuple):
@@ -55,6 +59,39 @@ def inertia_of(matrix: Matrix) -> Inertia:
     determinant = dot(first, rows[0])
     x, y, z = (tuple(entry / determinant for entry in row) for row in rows)
     return Inertia(matrix, (x, y, z))
+
+
+def principal_axes(matrix: Sequence[Sequence[float]]) -> Matrix:
+    """Principal axes of an inertia, a symmetric matrix of floats: unit vectors by rows, nearest to x, y and z.
+
+    By Jacobi's method, which leaves the axes of a diagonal matrix as they are. Source: Golub and Van Loan (2013),
+    Matrix Computations, section 8.5.
+    """
+    entries = [list(map(float, row)) for row in matrix]
+    axes = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
+    for _ in range(MAX_JACOBI_SWEEPS):
+        for p, q in ((0, 1), (0, 2), (1, 2)):
+            if entries[p][q] == 0.0:
+                continue
+            ratio = (entries[q][q] - entries[p][p]) / (2.0 * entries[p][q])
+            tangent = math.copysign(1.0, ratio) / (abs(ratio) + math.hypot(ratio, 1.0))
+            cosine = 1.0 / math.hypot(tangent, 1.0)
+            sine = tangent * cosine
+            _turn_rows(entries, p, q, cosine, sine)
+            entries = [list(column) for column in zip(*entries)]
+            _turn_rows(entries, p, q, cosine, sine)
+            entries[p][q] = entries[q][p] = 0.0
+            _turn_rows(axes, p, q, cosine, sine)
+    nearest = max(permutations(axes), key=lambda rows: sum(abs(row[k]) for k, row in enumerate(rows)))
+    x, y, z = (tuple(math.copysign(1.0, row[k]) * entry for entry in row) for k, row in enumerate(nearest))
+    return (x, y, z)
+
+
+def _turn_rows(matrix: List[List[float]], p: int, q: int, cosine: float, sine: float) -> None:
+    """Replace two rows of a matrix by their rotation in the plane of both."""
+    first, second = matrix[p], matrix[q]
+    matrix[p] = [cosine * a - sine * b for a, b in zip(first, second)]
+    matrix[q] = [sine * a + cosine * b for a, b in zip(first, second)]
 
 
 def moment_matrix(arms: Sequence[Sequence[Any]], forces: Sequence[Sequence[Any]]) -> Matrix:

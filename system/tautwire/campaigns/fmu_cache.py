@@ -12,6 +12,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from tautwire_fmu.effect_variables import setting_name
+
 from ..fmus.packaging import RobotFmus, build_fmus, cable_resources, platform_resource, start_values, winch_resource
 from ..robot.active_effects import has_sensor_effects
 from ..robot.schema import Robot
@@ -96,7 +98,7 @@ def _write_atomically(files: Mapping[str, bytes], target: Path) -> None:
 
 
 def _component_structure(data: Mapping[str, Any]) -> list[Any]:
-    effects = [effect["name"] for effect in data.get("effects", ())]
+    effects = [setting_name(effect) for effect in data.get("effects", ())]
     return [data.get("law"), effects, data.get("formulas"), sorted(data)]
 
 
@@ -108,4 +110,4 @@ def _fmu_parameters(data: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
         elif name in ("anchor", "start"):
             yield from ((f"{name}.{axis}", float(each)) for axis, each in zip("xyz", value, strict=True))
     for effect in data.get("effects", ()):
-        yield from ((f"effect.{effect['name']}.{name}", float(value)) for name, value in effect["values"].items())
+        yield from ((f"effect.{setting_name(effect)}.{name}", float(value)) for name, value in effect["values"].items())

@@ -66,7 +66,7 @@ class SearchRound:
 
     def larger_models(self) -> dict[Hypothesis, tuple[Robot, ...]]:
         """Larger forms of the accepted hypotheses, and each on its cables one by one, with starting values."""
-        larger = [*with_larger_forms(self.accepted), *split_by_cable(self.accepted)]
+        larger = [*with_larger_forms(self.accepted, self.robot), *split_by_cable(self.accepted)]
         return {h: (self.robot.with_effect(h.setting(self.robot)),) for h in larger}
 
     def refits(

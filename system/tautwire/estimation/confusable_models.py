@@ -34,7 +34,8 @@ def replace_by_confusable_models(context: IdentificationContext, selection: Sele
         return selection
     best = selection
     log_likelihood = context.fitter.log_likelihood(selection.fit.robot, selection.accepted, validation)
-    alternatives = [*_unlisted_alternatives(robot, selection.accepted, is_adequate), *_larger_forms(selection.accepted)]
+    unlisted = _unlisted_alternatives(robot, selection.accepted, is_adequate)
+    alternatives = [*unlisted, *_larger_forms(selection.accepted, robot)]
     for number, chosen in enumerate(alternatives):
         context.progress(f"alternatives: {chosen[-1].label(robot)}", number / len(alternatives))
         fit = _fit_alternative(context, selection, chosen)
@@ -58,13 +59,13 @@ def _leaves_white_residuals(context: IdentificationContext, robot: Robot, chosen
     return residuals_are_white(innovations, validation.rows, context.policy.residual_analysis)
 
 
-def _larger_forms(accepted: Sequence[Hypothesis]) -> Iterator[tuple[Hypothesis, ...]]:
+def _larger_forms(accepted: Sequence[Hypothesis], robot: Robot) -> Iterator[tuple[Hypothesis, ...]]:
     """One more form of each accepted effect beside parts of the others."""
     for old in accepted:
         others = [hypothesis for hypothesis in accepted if hypothesis is not old]
         for size in range(len(others)):
             for part in combinations(others, size):
-                for larger in with_larger_forms([old]):
+                for larger in with_larger_forms([old], robot):
                     yield (*part, larger)
 
 

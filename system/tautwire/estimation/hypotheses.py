@@ -5,13 +5,13 @@ from __future__ import annotations
 from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from tautwire_fmu.laws.effects import ALL, ANCHOR, BY_NAME, Effect, Parameter
+from tautwire_fmu.laws.effects import ALL, ANCHOR, ATTACHMENT, BY_NAME, Effect, Parameter
 
 from ..robot.schema import PER_CABLE_COMPONENTS, EffectSetting, Robot
 from ..robot.symbolic_model import FORMULA_INDEX, FreeParameter
 
-# All exit points moved alike are the platform's start and its sensor moved, the other way.
-SINGLE_CABLE_EFFECTS = (ANCHOR,)
+# All exit points moved alike are the platform's start and its sensor moved, the other way; all attachments its frame.
+SINGLE_CABLE_EFFECTS = (ANCHOR, ATTACHMENT)
 # Forms of the platform's position sensors, whichever cables are named.
 PLATFORM_SENSOR_FORMS = (
     ("position_gain",),
@@ -84,7 +84,7 @@ def hypotheses(robot: Robot) -> tuple[Hypothesis, ...]:
     """All single effects that could act on a robot, each in its forms that contain no smaller one."""
     candidates: list[Hypothesis] = []
     for effect in ALL:
-        for form in _minimal_forms(effect.forms):
+        for form in _minimal_forms(effect.forms_on(robot.platform.is_rigid_body)):
             if effect.component not in PER_CABLE_COMPONENTS:
                 candidates.append(Hypothesis(effect, (), form))
                 continue
@@ -95,11 +95,11 @@ def hypotheses(robot: Robot) -> tuple[Hypothesis, ...]:
     return tuple(candidates)
 
 
-def with_larger_forms(accepted: Sequence[Hypothesis]) -> list[Hypothesis]:
+def with_larger_forms(accepted: Sequence[Hypothesis], robot: Robot) -> list[Hypothesis]:
     """Each accepted hypothesis with one more form of its effect."""
     larger = []
     for old in accepted:
-        for form in old.effect.forms:
+        for form in old.effect.forms_on(robot.platform.is_rigid_body):
             names = tuple(p.name for p in old.effect.parameters if p.name in (*old.form, *form))
             if set(names) != set(old.form):
                 larger.append(Hypothesis(old.effect, old.cables, names))

@@ -19,7 +19,13 @@ from tautwire_fmu.laws.winch_drive import NO_LIMIT
 
 from .. import __version__
 from ..process_signals import defer_interrupts
-from ..robot.active_effects import formula_texts, has_sensor_effects, platform_fmu_settings
+from ..robot.active_effects import (
+    attachment_settings,
+    cable_settings,
+    formula_texts,
+    has_sensor_effects,
+    platform_fmu_settings,
+)
 from ..robot.robot_assembly import assemble_robot
 from ..robot.schema import EffectSetting, Robot, validate_robot
 from ..robot.static_equilibrium import start_attachments, start_orientation, static_forces, static_tensions
@@ -214,7 +220,7 @@ def cable_resources(robot: Robot) -> list[dict[str, Any]]:
             "area": cable.area,
             "damping": cable.damping,
             "gravity": robot.gravity,
-            "effects": [_effect_resource(s) for s in robot.effects_on_cable(index)],
+            "effects": [_effect_resource(s) for s in cable_settings(robot, index)],
             "formulas": formula_texts(robot.formulas_on(index)),
         }
         for index, (cable, component, start) in enumerate(
@@ -233,7 +239,7 @@ def platform_resource(robot: Robot) -> dict[str, Any]:
         "start": list(robot.platform.start),
         "start_velocity": list(assemble_robot(robot).velocity),
         "start_forces": forces.tolist(),
-        "effects": [_effect_resource(s) for s in platform_fmu_settings(robot)],
+        "effects": [*map(_effect_resource, platform_fmu_settings(robot)), *_attachment_resources(robot)],
         "formulas": formula_texts(robot.formulas_on()),
     }
 
@@ -260,6 +266,17 @@ def winch_resource(robot: Robot, cable: int) -> dict[str, Any]:
 
 def _effect_resource(setting: EffectSetting) -> dict[str, Any]:
     return {"name": setting.name, "values": BY_NAME[setting.name].completed_values(setting.values)}
+
+
+def _attachment_resources(robot: Robot) -> list[dict[str, Any]]:
+    """The effects that shift attachments, each once for every cable."""
+    if not robot.platform.is_rigid_body:
+        return []
+    return [
+        _effect_resource(setting) | {"cable": cable}
+        for cable in robot.cable_numbers
+        for setting in attachment_settings(robot, cable)
+    ]
 
 
 def _build_fmu(module: str, base: str, name: str, data: dict[str, Any], folder: Path) -> Path:

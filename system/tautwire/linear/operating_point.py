@@ -16,6 +16,7 @@ from tautwire_fmu.laws.rotation import rotation_matrix
 
 from ..array_validation import validate_point
 from ..errors import TautwireError
+from ..robot.active_effects import attachments, centre_of_mass
 from ..robot.cable_routes import cable_routes
 from ..robot.schema import Quaternion, Robot
 from ..robot.static_equilibrium import static_tensions
@@ -51,7 +52,7 @@ class Pose:
     @cached_property
     def arms(self) -> Array:
         """Centre of mass and attachments (1 + n, 3) from the origin, in the axes of the world, in m."""
-        points = [self.robot.platform.centre_of_mass, *(cable.attachment for cable in self.robot.cables)]
+        points = [centre_of_mass(self.robot), *attachments(self.robot)]
         turned: Array = np.array(points) @ np.array(rotation_matrix(self.orientation)).T
         return turned
 

@@ -5,11 +5,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from tautwire_fmu.laws import effect_stages as stages
+from tautwire_fmu.laws import rigid_body_effects as body_stages
 from tautwire_fmu.laws.effects import BY_NAME, ActiveEffect
 from tautwire_fmu.laws.formula import formula_effect
-from tautwire_fmu.laws.mathematics import REAL
+from tautwire_fmu.laws.mathematics import REAL, Mathematics
+from tautwire_fmu.laws.rigid_body import principal_axes
+from tautwire_fmu.laws.rigid_body_effects import BodyConstants
+from tautwire_fmu.laws.rotation import Matrix
+from tautwire_fmu.laws.vectors import Vector
 
-from .schema import EffectSetting, Formula, Robot
+from .schema import EffectSetting, Formula, Platform, Robot
+
+IDENTITY_MATRIX = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 def active_effect(setting: EffectSetting) -> ActiveEffect:
@@ -18,9 +25,19 @@ def active_effect(setting: EffectSetting) -> ActiveEffect:
     return ActiveEffect(effect, effect.values(**effect.completed_values(setting.values)))
 
 
+def cable_settings(robot: Robot, cable: int) -> tuple[EffectSetting, ...]:
+    """The effect settings that act in a cable, its winch or its load cell; ``cable`` counts from 1."""
+    return tuple(s for s in robot.effects_on_cable(cable) if BY_NAME[s.name].attachment is None)
+
+
 def cable_effects(robot: Robot, cable: int) -> tuple[ActiveEffect, ...]:
-    """The effects and formulas that act on a cable, its winch or its load cell; ``cable`` counts from 1."""
-    return (*map(active_effect, robot.effects_on_cable(cable)), *_formula_effects(robot.formulas_on(cable)))
+    """The effects of :func:`cable_settings` and the formulas in the cable, as the laws take them."""
+    return (*map(active_effect, cable_settings(robot, cable)), *_formula_effects(robot.formulas_on(cable)))
+
+
+def attachment_settings(robot: Robot, cable: int) -> tuple[EffectSetting, ...]:
+    """The effect settings that shift the attachment of a cable on a rigid platform; ``cable`` counts from 1."""
+    return tuple(s for s in robot.effects_on_cable(cable) if BY_NAME[s.name].attachment is not None)
 
 
 def platform_effects(robot: Robot) -> tuple[ActiveEffect, ...]:
@@ -62,6 +79,50 @@ def has_routing_effects(robot: Robot) -> bool:
 def cables_have_weight(robot: Robot) -> bool:
     """Whether the cables have weight, so that their ends carry more than the tension."""
     return any(BY_NAME[setting.name].ends is not None for setting in robot.effects)
+
+
+def body_constants(robot: Robot, mathematics: Mathematics = REAL, axes: Matrix | None = None) -> BodyConstants:
+    """Constants of a rigid platform with its effects; ``mathematics`` are the functions for the effects' parameters.
+
+    ``axes`` are the principal axes, by default those of the declared inertia, which then has to be of numbers.
+    """
+    platform = robot.platform
+    assert platform.inertia is not None
+    declared = BodyConstants(
+        platform.mass,
+        platform.inertia,
+        platform_axes(platform) if axes is None else axes,
+        platform.centre_of_mass,
+        robot.attachments,
+    )
+    shifting = [tuple(map(active_effect, settings)) for settings in _attachment_settings(robot)]
+    return body_stages.constants_with_effects(mathematics, declared, platform_effects(robot), shifting)
+
+
+def centre_of_mass(robot: Robot, mathematics: Mathematics = REAL) -> Vector:
+    """Centre of mass of the platform with its effects, in its frame, in m; its origin for a point mass."""
+    if not robot.platform.is_rigid_body:
+        return robot.platform.centre_of_mass
+    # Principal axes do not matter to it, and of symbols there are none.
+    return body_constants(robot, mathematics, IDENTITY_MATRIX).centre_of_mass
+
+
+def attachments(robot: Robot, mathematics: Mathematics = REAL) -> tuple[Vector, ...]:
+    """Attachments of all cables on a rigid platform with the effects that shift them, in its frame, in m."""
+    return tuple(
+        body_stages.shifted_attachment(mathematics, declared, tuple(map(active_effect, settings)))
+        for declared, settings in zip(robot.attachments, _attachment_settings(robot), strict=True)
+    )
+
+
+def platform_axes(platform: Platform) -> Matrix:
+    """Principal axes of a rigid platform in its frame, unit vectors by rows."""
+    assert platform.inertia is not None
+    return principal_axes(platform.inertia)
+
+
+def _attachment_settings(robot: Robot) -> list[tuple[EffectSetting, ...]]:
+    return [attachment_settings(robot, cable) for cable in robot.cable_numbers]
 
 
 def formula_texts(formulas: Sequence[Formula]) -> dict[str, list[str]]:

@@ -15,7 +15,7 @@ from tautwire_fmu.laws.rotation import rotate
 from tautwire_fmu.laws.vectors import add
 
 from ..errors import UnreachableError
-from .active_effects import cable_effects
+from .active_effects import attachments, cable_effects
 from .schema import Robot
 
 Array = NDArray[np.float64]
@@ -29,7 +29,7 @@ def attachment_points(robot: Robot, position: Sequence[Any], orientation: Sequen
     if not robot.platform.is_rigid_body:
         return (position,) * robot.cable_count
     quaternion = robot.platform.start_orientation if orientation is None else orientation
-    return tuple(add(position, rotate(quaternion, attachment)) for attachment in robot.attachments)
+    return tuple(add(position, rotate(quaternion, attachment)) for attachment in attachments(robot))
 
 
 def cable_routes(

@@ -12,12 +12,18 @@ from ..errors import format_value
 from ..name_suggestions import suggest_name
 from ..validation import NumberRule
 from .checked_table import CheckedTable
+from .platform_reader import refuse_keys_of_rigid_bodies
 from .schema import PER_CABLE_COMPONENTS, EffectSetting, Formula
 
 
-def read_effects(table: CheckedTable, cable_count: int) -> tuple[EffectSetting, ...]:
-    """Reads the effect settings of ``[effect]`` in a robot file; errors go to the table's sink."""
+def read_effects(table: CheckedTable, cable_count: int, is_rigid: bool) -> tuple[EffectSetting, ...]:
+    """Reads the effect settings of ``[effect]`` in a robot file; errors go to the table's sink.
+
+    Of a platform that is not ``is_rigid``, a point mass, effects and parameters of rigid bodies are refused.
+    """
     settings: list[EffectSetting] = []
+    if not is_rigid:
+        refuse_keys_of_rigid_bodies(table, tuple(name for name in BY_NAME if BY_NAME[name].needs_rigid_body))
     for name in table.content:
         if name not in BY_NAME:
             table.refuse(name, "is not a known effect", f"write {suggest_name(name, BY_NAME)}, or remove it")
@@ -25,6 +31,9 @@ def read_effects(table: CheckedTable, cable_count: int) -> tuple[EffectSetting, 
         tables_by_cable: dict[int, str] = {}
         for effect_table in table.table_or_tables(name):
             setting = _read_effect(effect_table, BY_NAME[name], cable_count)
+            if not (is_rigid or BY_NAME[name].needs_rigid_body):
+                rigid_keys = tuple(p.name for p in BY_NAME[name].parameters if p.needs_rigid_body)
+                refuse_keys_of_rigid_bodies(effect_table, rigid_keys)
             # Effects that act on no cable count as cable 0, so that they too are set once.
             for cable in setting.cables or (0,):
                 if cable in tables_by_cable:

@@ -23,6 +23,7 @@ from tautwire_fmu.laws import rigid_body as turning
 from tautwire_fmu.laws.effects import ActiveEffect
 from tautwire_fmu.laws.mathematics import Mathematics
 from tautwire_fmu.laws.point_mass import PointMassConstants
+from tautwire_fmu.laws.rigid_body_effects import BodyConstants, moment_of_effects
 from tautwire_fmu.laws.rotation import (
     Matrix,
     Quaternion,
@@ -33,7 +34,8 @@ from tautwire_fmu.laws.rotation import (
 )
 from tautwire_fmu.laws.vectors import Vector, add, subtract
 
-from .schema import AXES, Platform, Robot
+from .active_effects import body_constants
+from .schema import AXES, Robot
 
 States = Sequence[tuple[SX, ...]]
 
@@ -97,12 +99,20 @@ class PlatformSymbols(Protocol):
 
 
 def platform_symbols(
-    mathematics: Mathematics, robot: Robot, constants: PointMassConstants, reference_orientation: Quaternion
+    mathematics: Mathematics,
+    robot: Robot,
+    constants: PointMassConstants,
+    reference_orientation: Quaternion,
+    principal_axes: Matrix | None = None,
 ) -> PlatformSymbols:
-    """Symbols of a robot's platform; rotations of a rigid body count from the reference."""
+    """Symbols of a robot's platform; rotations of a rigid body count from the reference.
+
+    ``principal_axes`` are those of a rigid body, by default those of an inertia of numbers.
+    """
     if not robot.platform.is_rigid_body:
         return PointMassSymbols(mathematics, constants)
-    return RigidBodySymbols(mathematics, constants, robot.platform, robot.attachments, reference_orientation)
+    body = body_constants(robot, mathematics, principal_axes)
+    return RigidBodySymbols(mathematics, constants, body, reference_orientation)
 
 
 @dataclass(frozen=True)
@@ -137,13 +147,12 @@ class PointMassSymbols:
 class RigidBodySymbols:
     """Symbols of a rigid body: pose and twist of the origin of its frame, external force there and external moment.
 
-    ``attachments`` are in the platform's frame, in m.
+    The constants of the ``body`` are those with effects.
     """
 
     mathematics: Mathematics
     constants: PointMassConstants
-    platform: Platform
-    attachments: tuple[Vector, ...]
+    body: BodyConstants
     reference_orientation: Quaternion
     pose: SX = field(default_factory=partial(SX.sym, "pose", 6))
     twist: SX = field(default_factory=partial(SX.sym, "twist", 6))
@@ -154,17 +163,17 @@ class RigidBodySymbols:
 
     def attachment_motion(self, index: int) -> tuple[Vector, Vector]:
         """See :class:`PlatformSymbols`."""
-        return self._point_motion(self.attachments[index])
+        return self._point_motion(self.body.attachments[index])
 
     def rates(self, forces: Sequence[Vector], effects: Sequence[ActiveEffect], states: States) -> SX:
         """See :class:`PlatformSymbols`: Newton's and Euler's equations about the centre of mass."""
-        m, centre, rotation, velocity = self.mathematics, self.platform.centre_of_mass, self._rotation, self._velocity
-        assert self.platform.inertia is not None
-        inertia = turning.inertia_of(self.platform.inertia)
+        m, centre, rotation, velocity = self.mathematics, self.body.centre_of_mass, self._rotation, self._velocity
+        inertia = turning.inertia_of(self.body.inertia)
         all_forces = [vector_of(self.external_wrench[:3]), *forces]
-        arms = [subtract(point, centre) for point in ((0.0, 0.0, 0.0), *self.attachments)]
+        arms = [subtract(point, centre) for point in ((0.0, 0.0, 0.0), *self.body.attachments)]
         moments = turning.moment_matrix(tuple(zip(*arms, strict=True)), tuple(zip(*all_forces, strict=True)))
         moment = add(turning.moment(rotation, moments), vector_of(self.external_wrench[3:]))
+        moment = add(moment, moment_of_effects(m, effects, vector_of(self.twist[3:])))
         force: Vector = (SX(0.0), SX(0.0), SX(0.0))
         for each in all_forces:
             force = add(force, each)

@@ -14,6 +14,7 @@ from tautwire_fmu.laws.rotation import multiply, quaternion_of, rotate
 from tautwire_fmu.laws.vectors import add, cross, scale, subtract
 
 from ..array_validation import validate_array
+from .active_effects import centre_of_mass
 from .cable_routes import attachment_points
 from .kinematics import validated_pose
 from .robot_assembly import CableComponent, cable_components
@@ -67,7 +68,7 @@ def _wrench_rate(
     turned = multiply(rotation, orientation)
     load = static_load(m, robot, moved)
     force: Any = scale(-1.0, load)
-    moment: Any = cross(rotate(turned, robot.platform.centre_of_mass), force)
+    moment: Any = cross(rotate(turned, centre_of_mass(robot)), force)
     for component, point in zip(cables, attachment_points(robot, moved, turned), strict=True):
         cable_force = _cable_force(component, point)
         force = add(force, cable_force)

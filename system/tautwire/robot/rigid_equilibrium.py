@@ -2,8 +2,8 @@
 
     A(R) T = (w, R c x w)
 
-A is the structure matrix about the origin of the platform's frame, c the centre of mass in that frame, and w the load:
-weight with payload less the forces of effects, all of which act at the centre of mass. With six cables or more the
+A is the structure matrix about the origin of the platform's frame, c the centre of mass in that frame with payload, and
+w the load: weight less the forces of effects, all of which act at the centre of mass. With six cables or more the
 orientation is the declared one. With fewer it is the nearest to the declared one for which tensions exist.
 """
 
@@ -22,7 +22,7 @@ from tautwire_fmu.laws.mathematics import REAL
 from tautwire_fmu.laws.rotation import multiply, quaternion_of, rotate
 
 from ..errors import ArgumentError, UnreachableError
-from .active_effects import cable_effects, cables_have_weight
+from .active_effects import cable_effects, cables_have_weight, centre_of_mass
 from .cable_routes import attachment_points, cable_routes, unreachable_error
 from .kinematics import structure_matrix_at, validated_pose
 from .schema import Quaternion, Robot, TensionLimits
@@ -122,7 +122,7 @@ def load_wrench(robot: Robot, position: Array, orientation: Quaternion, tensions
     that would carry the weight of the platform each.
     """
     force = np.array(static_load(REAL, robot, position.tolist()), dtype=float)
-    arm = np.array(rotate(orientation, robot.platform.centre_of_mass))
+    arm = np.array(rotate(orientation, centre_of_mass(robot)), dtype=float)
     wrench = np.concatenate([force, np.cross(arm, force)])
     if not cables_have_weight(robot):
         return wrench

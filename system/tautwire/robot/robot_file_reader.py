@@ -196,7 +196,7 @@ def _read_robot_table(root: CheckedTable, default_name: str) -> Robot:
         tension=_read_tension_limits(tension) if tension else None,
         sensors=_read_sensors(sensors, platform.is_rigid_body) if sensors else Sensors(),
         cables=cables,
-        effects=read_effects(effect, len(cables)) if effect else (),
+        effects=read_effects(effect, len(cables), platform.is_rigid_body) if effect else (),
         winch=_read_winch(winch) if winch else None,
         fmus=_read_fmus(fmu, len(cables)) if fmu else (),
         formulas=read_formulas(root, partial(read_cable_list, cable_count=len(cables))),

@@ -20,6 +20,7 @@ from tautwire_fmu.laws.mathematics import Mathematics
 from tautwire_fmu.laws.rotation import Quaternion
 from tautwire_fmu.laws.vectors import add, scale
 
+from .active_effects import platform_axes
 from .measured_start import with_true_start
 from .platform_symbols import PlatformSymbols, StateIndices, platform_symbols, vector_of
 from .robot_assembly import RobotAssembly, assemble_robot
@@ -160,7 +161,8 @@ def symbolic_model(
     assembly = assemble_robot(symbolic_robot, start_tensions, CASADI_MATHEMATICS)
     count = len(assembly.cables)
     reference = start_orientation(symbolic_robot) if reference_orientation is None else reference_orientation
-    platform = platform_symbols(CASADI_MATHEMATICS, symbolic_robot, assembly.platform, reference)
+    axes = platform_axes(robot.platform) if robot.platform.is_rigid_body else None
+    platform = platform_symbols(CASADI_MATHEMATICS, symbolic_robot, assembly.platform, reference, axes)
     variables = _Variables(
         platform,
         unstrained_lengths=SX.sym("unstrained_length", count),

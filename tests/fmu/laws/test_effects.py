@@ -21,12 +21,16 @@ from tautwire_fmu.laws.cable import (
 from tautwire_fmu.laws.effects import ALL, ActiveEffect, Effect, Parameter
 from tautwire_fmu.laws.mathematics import COMPLEX_STEP, REAL, Mathematics, rate_of, with_rate
 from tautwire_fmu.laws.point_mass import PointMassConstants, acceleration, wrench
+from tautwire_fmu.laws.rigid_body import principal_axes
+from tautwire_fmu.laws.rigid_body_effects import BodyConstants, constants_with_effects, moment_of_effects
 from tautwire_fmu.laws.vectors import add
 from tautwire_fmu.units import UNITS
 from tests.support.effect_cases import CASES, Case
 
 CABLE = CableConstants(LAWS["logarithmic"], (3.0, 0.0, 4.0), 1e11, 1.2e-5, 5e8, 5.0, 900.0, (0.6, 0.0, 0.8), 9.81)
 PLATFORM = PointMassConstants(80.0, 9.81)
+INERTIA = ((4.0, 0.2, -0.1), (0.2, 5.0, 0.3), (-0.1, 0.3, 6.0))
+BODY = BodyConstants(80.0, INERTIA, principal_axes(INERTIA), (0.1, -0.2, 0.3), ((0.5, 0.4, 0.0),))
 STATE = (4.9735, 0.01)
 INPUTS = CableInputs((0.01, -0.02, 0.03), (0.1, 0.2, -0.3), 0.15)
 # What moves at an instant, as rates of position, velocity, winch speed and state.
@@ -61,6 +65,8 @@ def shown(effects: tuple[ActiveEffect, ...], inner: float = 0.0) -> tuple[Any, .
         cable_outputs(REAL, CABLE, effects, state, moving),
         state_rates(REAL, CABLE, effects, state, moving)[:2],
         acceleration(REAL, PLATFORM, effects, none, force),
+        constants_with_effects(REAL, BODY, effects, [effects]),
+        moment_of_effects(REAL, effects, (0.3, -0.2, 0.5)),
         stages.sensor_gains(REAL, effects),
         stages.sensor_offsets(REAL, effects),
         stages.sensor_delays(REAL, effects),
@@ -120,7 +126,9 @@ def test_the_order_of_effects_does_not_matter() -> None:
     assert forward[0].force == pytest.approx(backward[0].force, rel=1e-12)
     assert forward[1] == pytest.approx(backward[1], rel=1e-12)
     assert forward[2] == pytest.approx(backward[2], rel=1e-12)
-    assert forward[3:] == backward[3:]
+    for one, other in zip(forward[3], backward[3], strict=True):
+        assert np.array(one) == pytest.approx(np.array(other), rel=1e-12)
+    assert forward[4:] == backward[4:]
 
 
 def test_creep_follows_the_tension_that_the_rope_carries_whatever_makes_it() -> None:

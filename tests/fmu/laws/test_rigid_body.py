@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import permutations
+
 import numpy as np
 import pytest
 
@@ -49,3 +51,20 @@ def test_a_points_velocity_and_acceleration_are_those_of_a_turning_body() -> Non
     assert velocity == pytest.approx(ROTATION @ np.cross(VELOCITY, arm), rel=1e-13)
     centripetal = np.cross(VELOCITY, np.cross(VELOCITY, arm))
     assert second == pytest.approx(ROTATION @ (np.cross(acceleration, arm) + centripetal), rel=1e-13)
+
+
+def test_principal_axes_are_those_of_the_matrix_nearest_to_the_platforms_axes() -> None:
+    random = np.random.default_rng(5)
+    for _ in range(50):
+        turn = np.linalg.qr(random.normal(size=(3, 3)))[0]
+        matrix = turn @ np.diag(random.uniform(1.0, 30.0, 3)) @ turn.T
+        axes = np.array(law.principal_axes(matrix.tolist()))
+        assert axes @ axes.T == pytest.approx(np.eye(3), abs=1e-14)
+        assert np.linalg.norm(axes @ matrix @ axes.T - np.diag(np.diag(axes @ matrix @ axes.T))) < 1e-12
+        nearness = [np.trace(np.abs(axes[list(order)])) for order in permutations(range(3))]
+        assert nearness[0] == max(nearness) and np.all(np.diag(axes) >= 0.0)
+
+
+@pytest.mark.parametrize("moments", [(1.0, 2.0, 3.0), (3.0, 1.0, 2.0), (5.0, 5.0, 5.0), (4.0, 4.0, 6.0)])
+def test_principal_axes_of_a_diagonal_inertia_are_the_coordinate_axes(moments: tuple[float, ...]) -> None:
+    assert np.array_equal(law.principal_axes(np.diag(moments).tolist()), np.eye(3))

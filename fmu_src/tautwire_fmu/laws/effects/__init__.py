@@ -3,6 +3,8 @@
 from typing import Dict, Tuple
 
 from .anchor import ANCHOR
+from .attachment import ATTACHMENT
+from .centre_of_mass import CENTRE_OF_MASS
 from .creep import CREEP
 from .damping import DAMPING
 from .drag import DRAG
@@ -11,16 +13,19 @@ from .effect import ActiveEffect, Effect, Parameter, State
 from .frame import FRAME
 from .friction import FRICTION
 from .hysteresis import HYSTERESIS
+from .inertia import INERTIA
 from .modulus import MODULUS
 from .payload import PAYLOAD
 from .pulley import PULLEY
 from .relaxation import RELAXATION
+from .rotational_drag import ROTATIONAL_DRAG
 from .sag import SAG
 from .sensor_delay import SENSOR_DELAY
 from .sensor_gain import SENSOR_GAIN
 from .sensor_offset import SENSOR_OFFSET
 from .slack import SLACK
 from .thermal import THERMAL
+from .transverse_damping import TRANSVERSE_DAMPING
 
 ALL: Tuple[Effect, ...] = (
     DAMPING,
@@ -40,6 +45,11 @@ ALL: Tuple[Effect, ...] = (
     SENSOR_DELAY,
     SENSOR_GAIN,
     SENSOR_OFFSET,
+    CENTRE_OF_MASS,
+    ATTACHMENT,
+    INERTIA,
+    ROTATIONAL_DRAG,
+    TRANSVERSE_DAMPING,
 )
 
 # Effects outside the list: a trace that selects one has discovered it.

@@ -12,7 +12,7 @@ class Parameter(NamedTuple):
     nothing or zero is declared; neither is the neutral value. ``multistart_values`` are the starts of a multi-start fit
     where one start could end in a local optimum: of parameters that act only while others are not neutral.
     ``grid_values`` are further starting values for the grid search over a parameter whose score at neutral is zero or
-    misleading.
+    misleading. One that ``needs_rigid_body`` is not for robots whose platform is a point mass.
     """
 
     name: str
@@ -25,6 +25,7 @@ class Parameter(NamedTuple):
     start_ratio: float = 1.0
     multistart_values: Tuple[float, ...] = ()
     grid_values: Tuple[float, ...] = ()
+    needs_rigid_body: bool = False
 
 
 class State(NamedTuple):
@@ -52,6 +53,7 @@ class Effect(NamedTuple):
     stage                further arguments                              gives
     ==================== ============================================== ==============================================
     ``exit_point``                                                      m, vector from the declared exit point
+    ``attachment``                                                      m, vector from the declared attachment
     ``path``             ``line`` (m, platform to exit point)           unit vector at the platform, and length in m
     ``stiffness``        ``states, cable``                              Pa added to the modulus, Pa added at no strain
     ``viscosity``        ``cable``                                      Pa s, added to the damping
@@ -62,13 +64,21 @@ class Effect(NamedTuple):
     ``tension``          ``states, cable, motion``                      N, added in the rope
     ``softening``        ``cable, pull``                                N, added to ``max(pull, 0)``
     ``ends``             ``gravity, line, tension``                     N, vector on the platform; N at the load cell
+    ``lateral_force``    ``line``                                       N, vector on the platform
     ``transmission``     ``motion``                                     ln(tension / that of the span) at platform, cell
     ``inertia``          ``states``                                     kg, added on the platform
+    ``mass_position``                                                   m, vector from the centre of mass to these kg
+    ``centre_of_mass``                                                  m, vector from the declared centre of mass
+    ``inertia_factors``                                                 factors of the three principal moments
     ``wrench``           ``states, position, velocity``                 N, vector on the platform
+    ``moment``           ``angular_velocity``                           N m, vector on the platform
     ``gain``                                                            factors of measured tension and position
     ``offset``                                                          N and m, added to these: a number, a vector
     ``delay``                                                           s, of measured tension and position
     ==================== ============================================== ==============================================
+
+    ``attachment``, ``mass_position`` and ``centre_of_mass`` are in the platform's frame, other vectors in the world's.
+    ``line`` is a :class:`tautwire_fmu.laws.cable.Span`, but in ``path``.
 
     ``values`` is the class of the parameters (a NamedTuple, one field a parameter, in order). ``state_rates`` gives a
     tuple, one rate a state, from ``m, values, states, cable, motion``. ``forms`` are the sets of parameters that a fit
@@ -85,6 +95,7 @@ class Effect(NamedTuple):
     states: Tuple[State, ...] = ()
     state_rates: Optional[Callable[..., Any]] = None
     exit_point: Optional[Callable[..., Any]] = None
+    attachment: Optional[Callable[..., Any]] = None
     path: Optional[Callable[..., Any]] = None
     stiffness: Optional[Callable[..., Any]] = None
     viscosity: Optional[Callable[..., Any]] = None
@@ -95,9 +106,14 @@ class Effect(NamedTuple):
     tension: Optional[Callable[..., Any]] = None
     softening: Optional[Callable[..., Any]] = None
     ends: Optional[Callable[..., Any]] = None
+    lateral_force: Optional[Callable[..., Any]] = None
     transmission: Optional[Callable[..., Any]] = None
     inertia: Optional[Callable[..., Any]] = None
+    mass_position: Optional[Callable[..., Any]] = None
+    centre_of_mass: Optional[Callable[..., Any]] = None
+    inertia_factors: Optional[Callable[..., Any]] = None
     wrench: Optional[Callable[..., Any]] = None
+    moment: Optional[Callable[..., Any]] = None
     gain: Optional[Callable[..., Any]] = None
     offset: Optional[Callable[..., Any]] = None
     delay: Optional[Callable[..., Any]] = None
@@ -107,6 +123,16 @@ class Effect(NamedTuple):
         """Whether the effect only replaces a rope's modulus and damping by other constants."""
         used_stages = {name for name in self._fields[self._fields.index("states") :] if getattr(self, name)}
         return bool(used_stages) and used_stages <= {"stiffness", "viscosity"}
+
+    @property
+    def needs_rigid_body(self) -> bool:
+        """Whether the effect has nothing for a platform that is a point mass."""
+        return bool(self.parameters) and all(parameter.needs_rigid_body for parameter in self.parameters)
+
+    def forms_on(self, is_rigid_body: bool) -> Tuple[Tuple[str, ...], ...]:
+        """The forms that act on a platform that is a rigid body, or on one that is a point mass."""
+        excluded = {parameter.name for parameter in self.parameters if parameter.needs_rigid_body and not is_rigid_body}
+        return tuple(form for form in self.forms if not excluded & set(form))
 
     def completed_values(self, specified_values: Mapping[str, Any]) -> Dict[str, Any]:
         """Values of all parameters by name, neutral where not specified; KeyError where a required one is missing."""
