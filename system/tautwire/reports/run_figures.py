@@ -15,6 +15,7 @@ from tautwire_fmu.laws.rotation import rotate
 from ..cosimulation.robot_wiring import ORIENTATION_AXES
 from ..number_format import PAGE_UNITS, choose_unit, digits_for_range, format_significant
 from ..recordings.sensor_gaps import bridge_short_gaps
+from ..robot.active_effects import attachments
 from ..robot.schema import AXES
 from .downsampling import envelope_times, evenly_spaced_indices, min_max_envelope, pack_float32
 from .robot_scene import (
@@ -199,7 +200,7 @@ def _attachments(run: ReportedRun, rows: Array, platform: Array) -> Array | None
     if not run.robot.platform.is_rigid_body:
         return None
     parts = _columns_by_name(rows, run.column_indices("q", ORIENTATION_AXES), ORIENTATION_AXES).T
-    points = [rotate(parts, attachment) for attachment in run.robot.attachments]
+    points = [rotate(parts, attachment) for attachment in attachments(run.robot)]
     turned: Array = np.array(points).transpose(2, 0, 1)
     return platform[:, None] + turned
 

@@ -11,6 +11,7 @@ from scipy.spatial import ConvexHull, QhullError
 from tautwire_fmu.laws.mathematics import REAL
 from tautwire_fmu.laws.rotation import rotate
 
+from .active_effects import attachments
 from .cable_routes import attachment_points, cable_routes
 from .schema import Quaternion, Robot
 
@@ -48,16 +49,16 @@ def platform_interferes(robot: Robot, position: Array, orientation: Quaternion) 
 
     Raises UnreachableError where a cable has no length.
     """
-    attachments = np.array(robot.attachments)
+    points: Array = np.array(attachments(robot))
     try:
         # Each face as its outward normal n and offset d, n . x + d <= 0 inside.
-        faces = ConvexHull(attachments).equations
+        faces = ConvexHull(points).equations
     except (QhullError, ValueError):
         return False
-    scale = TOUCH_TOLERANCE * float(np.ptp(attachments))
+    scale = TOUCH_TOLERANCE * float(np.ptp(points))
     w, x, y, z = orientation
     routes = cable_routes(REAL, robot, position.tolist(), orientation)
-    for attachment, route in zip(attachments, routes, strict=True):
+    for attachment, route in zip(points, routes, strict=True):
         direction = np.array(rotate((w, -x, -y, -z), route.direction))
         touched = np.abs(faces[:, :3] @ attachment + faces[:, 3]) <= scale
         if np.all(faces[touched, :3] @ direction < -TOUCH_TOLERANCE):

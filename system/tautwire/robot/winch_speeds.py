@@ -7,7 +7,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..array_validation import validate_array
 from ..errors import ArgumentError
-from .active_effects import has_routing_effects
+from .active_effects import attachments, has_routing_effects
 from .kinematics import structure_matrix_at
 from .pose_path import PoseSamples, pose_path, sample_poses
 from .pose_trajectory import rotation_matrices
@@ -28,7 +28,7 @@ def structure_matrices(robot: Robot, poses: PoseSamples) -> Array:
         quaternions = [(w, x, y, z) for w, x, y, z in poses.orientation.tolist()]
         pairs = zip(poses.position, quaternions, strict=True)
         return np.array([structure_matrix_at(robot, position, quaternion) for position, quaternion in pairs])
-    arms = rotation_matrices(poses.orientation) @ np.array(robot.attachments).T
+    arms = rotation_matrices(poses.orientation) @ np.array(attachments(robot)).T
     spans = np.array(robot.anchors).T - poses.position[:, :, None] - arms
     directions: Array = spans / np.linalg.norm(spans, axis=1, keepdims=True)
     if not robot.platform.is_rigid_body:

@@ -14,7 +14,7 @@ from tautwire_fmu.laws.point_mass import PointMassConstants, total_mass
 from tautwire_fmu.laws.rotation import rotate
 
 from ..errors import InputError
-from .active_effects import cables_have_weight, platform_effects
+from .active_effects import body_constants, cables_have_weight, platform_effects
 from .cable_routes import cable_routes
 from .kinematics import structure_matrix_at
 from .rigid_equilibrium import FREEDOMS, load_wrench, platform_size
@@ -118,8 +118,9 @@ def _required_wrenches(robot: Robot, position: Array, orientation: Quaternion, m
     forces = force * _corners(motion.acceleration)
     if not robot.platform.is_rigid_body:
         return _point_load(robot, position, orientation) + forces
-    arm = np.array(rotate(orientation, robot.platform.centre_of_mass))
-    turning = motion.angular_acceleration * _corners(motion.angular_acceleration) @ np.array(robot.platform.inertia)
+    body = body_constants(robot)
+    arm = np.array(rotate(orientation, body.centre_of_mass))
+    turning = motion.angular_acceleration * _corners(motion.angular_acceleration) @ np.array(body.inertia)
     moments = np.array([rotate(orientation, moment) for moment in turning.tolist()])
     corners = [np.concatenate([f, np.cross(arm, f) + m]) for f in forces for m in moments]
     return _scale(robot) * (load_wrench(robot, position, orientation) + np.array(corners))
