@@ -25,6 +25,7 @@ from tautwire.robot.uncertain_parameters import (
     uncertain_parameters,
 )
 from tests.support.recordings import recorded
+from tests.support.rigid_robots import crane_robot
 from tests.support.robots import example
 
 STIFFER = {"modulus": {"modulus": 1.03 * 1.022e11}}
@@ -76,6 +77,31 @@ def test_numbers_move_by_their_own_standard_deviations() -> None:
     assert sensor_errors(numbers, moves, 3).offsets[3:] == tuple(
         5.0 * by_label[f"offset of tension {cable}"] for cable in (1, 2, 3)
     )
+
+
+def test_constants_of_a_rigid_platform_move_by_theirs() -> None:
+    robot = crane_robot()
+    platform = replace(robot.platform, inertia_uncertainty=0.5, centre_of_mass_uncertainty=0.01)
+    cables = (replace(robot.cables[0], attachment_uncertainty=0.002), *robot.cables[1:])
+    robot = replace(robot, platform=platform, cables=cables)
+    numbers = uncertain_parameters(robot)
+    assert [number.label for number in numbers] == [
+        *(f"principal moment {axis}" for axis in "xyz"),
+        *(f"centre of mass {axis}" for axis in "xyz"),
+        *(f"attachment {axis} of cable 1" for axis in "xyz"),
+    ]
+    moved = perturbed_robot(robot, numbers, [2.0, -1.0, 3.0, 1.0, 0.0, -2.0, 0.0, 4.0, 0.0])
+    assert moved.platform.centre_of_mass == pytest.approx(np.add(platform.centre_of_mass, [0.01, 0.0, -0.02]))
+    assert moved.cables[0].attachment == pytest.approx(np.add(robot.cables[0].attachment, [0.0, 0.008, 0.0]))
+    assert moved.cables[1:] == robot.cables[1:]
+    moments, axes = np.linalg.eigh(np.array(platform.inertia))
+    nearest = np.argmax(np.abs(axes), axis=0)
+    change = np.array([1.0, -0.5, 1.5])[nearest]
+    assert np.array(moved.platform.inertia) == pytest.approx((axes * (moments + change)) @ axes.T, abs=1e-12)
+    declared = [number.declared(robot) for number in numbers]
+    assert declared[:3] == pytest.approx(moments[np.argsort(nearest)], rel=1e-12)
+    assert declared[3:] == [*platform.centre_of_mass, *robot.cables[0].attachment]
+    assert is_surveyed(robot)
 
 
 def surveyed_roughly(anchor: float, gain: float) -> Robot:

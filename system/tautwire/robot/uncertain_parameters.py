@@ -11,16 +11,23 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
-from .schema import AXES, Robot
+import numpy as np
+
+from .active_effects import platform_axes
+from .schema import AXES, Platform, Point, Robot
 
 MODULUS, DAMPING, MASS = "modulus", "damping", "mass"
-ANCHOR = "anchor"
+ANCHOR, ATTACHMENT = "anchor", "attachment"
+INERTIA, CENTRE_OF_MASS = "inertia", "centre_of_mass"
 TENSION_OFFSET, TENSION_GAIN, POSITION_OFFSET = "tension_offset", "tension_gain", "position_offset"
 UNITS = {
     MODULUS: "Pa",
     DAMPING: "Pa s",
     MASS: "kg",
     ANCHOR: "m",
+    ATTACHMENT: "m",
+    INERTIA: "kg m^2",
+    CENTRE_OF_MASS: "m",
     TENSION_OFFSET: "N",
     TENSION_GAIN: "",
     POSITION_OFFSET: "m",
@@ -49,7 +56,10 @@ def limited_perturbation(state: Any, square_root: Callable[[Any], Any]) -> Any:
 
 @dataclass(frozen=True)
 class UncertainParameter:
-    """An uncertain parameter: its kind, cable (from 1, 0 for none), standard deviation in SI units, axis (from 0)."""
+    """An uncertain parameter: its kind, cable (from 1, 0 for none), standard deviation in SI units, axis (from 0).
+
+    Of an inertia the axis is the principal one nearest to that axis of the platform.
+    """
 
     kind: str
     cable: int
@@ -67,8 +77,13 @@ class UncertainParameter:
             return robot.platform.mass
         if self.kind in (MODULUS, DAMPING):
             return float(getattr(robot.cables[self.cable - 1], self.kind))
-        if self.kind == ANCHOR:
-            return robot.cables[self.cable - 1].anchor[self.axis]
+        if self.kind in (ANCHOR, ATTACHMENT):
+            return float(getattr(robot.cables[self.cable - 1], self.kind)[self.axis])
+        if self.kind == CENTRE_OF_MASS:
+            return robot.platform.centre_of_mass[self.axis]
+        if self.kind == INERTIA:
+            axis = np.array(platform_axes(robot.platform)[self.axis])
+            return float(axis @ np.array(robot.platform.inertia) @ axis)
         return 1.0 if self.kind == TENSION_GAIN else 0.0
 
     @property
@@ -78,8 +93,12 @@ class UncertainParameter:
             return MASS
         if self.kind == POSITION_OFFSET:
             return f"offset of {AXES[self.axis]}"
-        if self.kind == ANCHOR:
-            return f"anchor {AXES[self.axis]} of cable {self.cable}"
+        if self.kind in (ANCHOR, ATTACHMENT):
+            return f"{self.kind} {AXES[self.axis]} of cable {self.cable}"
+        if self.kind == CENTRE_OF_MASS:
+            return f"centre of mass {AXES[self.axis]}"
+        if self.kind == INERTIA:
+            return f"principal moment {AXES[self.axis]}"
         names = {TENSION_OFFSET: "offset of tension", TENSION_GAIN: "gain of tension"}
         return f"{names.get(self.kind, f'{self.kind} of cable')} {self.cable}"
 
@@ -91,11 +110,18 @@ def uncertain_parameters(robot: Robot) -> tuple[UncertainParameter, ...]:
     in the plane, and could push the platform out of it.
     """
     sensors, in_plane = robot.sensors, robot.axes_in_plane
-    parameters = [UncertainParameter(MASS, 0, robot.platform.mass_uncertainty)]
+    platform = robot.platform
+    parameters = [UncertainParameter(MASS, 0, platform.mass_uncertainty)]
+    for kind, deviation in (
+        (INERTIA, platform.inertia_uncertainty),
+        (CENTRE_OF_MASS, platform.centre_of_mass_uncertainty),
+    ):
+        parameters += [UncertainParameter(kind, 0, deviation, axis) for axis in range(3)]
     for index, cable in enumerate(robot.cables, start=1):
         parameters.append(UncertainParameter(MODULUS, index, cable.modulus_uncertainty))
         parameters.append(UncertainParameter(DAMPING, index, cable.damping_uncertainty))
         parameters += [UncertainParameter(ANCHOR, index, cable.anchor_uncertainty, axis) for axis in in_plane]
+        parameters += [UncertainParameter(ATTACHMENT, index, cable.attachment_uncertainty, axis) for axis in range(3)]
         parameters.append(UncertainParameter(TENSION_OFFSET, index, sensors.tension_offset_uncertainty))
         parameters.append(UncertainParameter(TENSION_GAIN, index, sensors.tension_gain_uncertainty))
     parameters += [
@@ -114,11 +140,32 @@ def perturbed_robot(robot: Robot, parameters: Sequence[UncertainParameter], pert
         elif parameter.kind in (MODULUS, DAMPING):
             cable = cables[parameter.cable - 1]
             cables[parameter.cable - 1] = replace(cable, **{parameter.kind: getattr(cable, parameter.kind) + change})
-        elif parameter.kind == ANCHOR:
+        elif parameter.kind == CENTRE_OF_MASS:
+            platform = replace(platform, centre_of_mass=_moved(platform.centre_of_mass, parameter.axis, change))
+        elif parameter.kind == INERTIA:
+            axis = platform_axes(robot.platform)[parameter.axis]
+            platform = replace(platform, inertia=_with_moment_added(platform, axis, change))
+        elif parameter.kind in (ANCHOR, ATTACHMENT):
             cable = cables[parameter.cable - 1]
-            x, y, z = (value + change if axis == parameter.axis else value for axis, value in enumerate(cable.anchor))
-            cables[parameter.cable - 1] = replace(cable, anchor=(x, y, z))
+            changed: dict[str, Any] = {parameter.kind: _moved(getattr(cable, parameter.kind), parameter.axis, change)}
+            cables[parameter.cable - 1] = replace(cable, **changed)
     return replace(robot, platform=platform, cables=tuple(cables))
+
+
+def _moved(point: Point, axis: int, change: Any) -> Point:
+    """A point with one coordinate changed."""
+    x, y, z = (value + change if index == axis else value for index, value in enumerate(point))
+    return (x, y, z)
+
+
+def _with_moment_added(platform: Platform, axis: Sequence[float], change: Any) -> tuple[Point, Point, Point]:
+    """The inertia with a change of its moment about one principal axis, a unit vector."""
+    assert platform.inertia is not None
+    x, y, z = (
+        tuple(entry + row * column * change for entry, column in zip(entries, axis, strict=True))
+        for entries, row in zip(platform.inertia, axis, strict=True)
+    )
+    return (x, y, z)
 
 
 @dataclass(frozen=True)
@@ -147,5 +194,5 @@ def sensor_errors(
 
 
 def is_surveyed(robot: Robot) -> bool:
-    """Whether the robot file states how well a survey knows exit points or load cells: a real robot's does."""
-    return any(parameter.kind in (ANCHOR, TENSION_GAIN) for parameter in uncertain_parameters(robot))
+    """Whether the robot file states how well a survey knows points or load cells: a real robot's does."""
+    return any(parameter.kind in (ANCHOR, ATTACHMENT, TENSION_GAIN) for parameter in uncertain_parameters(robot))
