@@ -124,7 +124,8 @@ def test_open_loop_errors_of_lengths_count_from_the_first_recorded_one() -> None
     for seed in range(20):
         errors = process(rms, 0.1, recording, seed)
         wrong = replace(recording, winch_speed=recording.winch_speed - np.gradient(errors, recording.time, axis=0))
-        difference = likelihood.simulated_outputs(wrong, ()) - likelihood.simulated_outputs(recording, ())
+        begun_wrong, begun_right = (likelihood.simulated_outputs(each, ()).position for each in (wrong, recording))
+        difference = begun_wrong - begun_right
         squares.append(np.mean(difference[100:, :3] ** 2, axis=0))
     # Of errors that began at zero, 1.43.
     assert np.sum(np.mean(squares, axis=0)) == pytest.approx(np.sum(expected), rel=0.2)

@@ -26,7 +26,7 @@ def test_the_rebuilt_fmus_give_the_error_after() -> None:
     found = traced()
     assert found.verdict == "effects"
     for comparison in found.comparisons:
-        again = output_errors(comparison.recording, comparison.after.measured())
+        again = output_errors(comparison.recording, comparison.after)
         assert again.tension_rms == comparison.errors_after.tension_rms
         assert again.tension_rms < 1.2 * found.noise_floor.tension_rms < comparison.errors_before.tension_rms
     assert found.robot_after.effects[0].name == "damping"

@@ -58,7 +58,7 @@ def runs(name: str, *recordings: Recording) -> list[tuple[bool, float, float]]:
         begun = with_initial_state(fitter, robot, sample)
         assert "the estimated initial state has tensions of" in initial_state_note(begun, sample.recording.path)[0]
         error, floor = (
-            output_errors(sample.recording, cosimulate_data_set(begun, sample).measured()),
+            output_errors(sample.recording, cosimulate_data_set(begun, sample)),
             noise_floor(fitter, robot, sample),
         )
         quiet = residuals_are_white(fitter.innovations(robot, sample), sample.rows)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import solve_ivp
 
-from tautwire.estimation.measurement_model import delayed_outputs, measurement_model
+from tautwire.estimation.measurement_model import SensorInstant, delayed_outputs, measurement_model
 from tautwire.robot.schema import EffectSetting
 from tautwire.robot.symbolic_model import FreeParameter, SymbolicModel, symbolic_model
 from tests.support.robots import example
@@ -58,7 +58,8 @@ def shown(model: SymbolicModel, state: np.ndarray) -> np.ndarray:
 def sensed(model: SymbolicModel, state: np.ndarray, theta: np.ndarray = THETA, shift: float = 0.0) -> list[np.ndarray]:
     inputs = [*SPEEDS, 0.0, 0.0, 0.0]
     return [
-        np.array(found) for found in measurement_model(model, 3)(state, inputs, theta, LATER, STEP, np.full(6, shift))
+        np.array(found)
+        for found in measurement_model(model, 3)(state, inputs, theta, LATER, STEP, np.full(6, shift), [])
     ]
 
 
@@ -110,9 +111,9 @@ def test_slopes_are_those_of_what_is_shown() -> None:
 
 def test_the_expression_is_that_of_the_function() -> None:
     model = model_of()
-    later, step, shift = casadi.SX.sym("later", 3), casadi.SX.sym("step"), casadi.SX.sym("shift", 6)
-    expression = delayed_outputs(model, 3, later, step, shift)
-    function = casadi.Function("late", [model.states, model.inputs, model.parameters, later, step, shift], [expression])
+    instant = SensorInstant.of(model)
+    expression = delayed_outputs(model, 3, instant)
+    function = casadi.Function("late", [model.states, model.inputs, model.parameters, *instant.symbols], [expression])
     state = moving_state(model)
-    found = np.array(function(state, [*SPEEDS, 0, 0, 0], THETA, LATER, STEP, np.zeros(6)))
+    found = np.array(function(state, [*SPEEDS, 0, 0, 0], THETA, LATER, STEP, np.zeros(6), []))
     assert found == pytest.approx(sensed(model, state)[0], rel=1e-13)

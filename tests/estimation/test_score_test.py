@@ -46,7 +46,7 @@ def test_what_is_there_has_the_largest_score_and_its_values() -> None:
 def test_sensitivities_of_effects_serve_one_run_after_another() -> None:
     likelihood, values = Fitter(NOISE).likelihood(ROBOT, (), SAMPLE)
     relaxation = [h for h in hypotheses(ROBOT) if h.effect.name == "relaxation"]
-    effects = effect_sensitivities(ROBOT, SAMPLE.start, relaxation, likelihood.model.state_names)
+    effects = effect_sensitivities(SAMPLE.placed(ROBOT), relaxation, likelihood.model.state_names)
     first, second = (
         statistics_of_runs(linearise_filter(likelihood, values, SAMPLE.recording), effects, SAMPLE.rows)
         for _ in range(2)
@@ -58,7 +58,7 @@ def test_sensitivities_of_effects_serve_one_run_after_another() -> None:
 def test_threads_compute_the_same_statistics() -> None:
     likelihood, values = Fitter(NOISE).likelihood(ROBOT, (), SAMPLE)
     chosen = [h for h in hypotheses(ROBOT) if h.effect.name in ("relaxation", "payload")]
-    effects = effect_sensitivities(ROBOT, SAMPLE.start, chosen, likelihood.model.state_names)
+    effects = effect_sensitivities(SAMPLE.placed(ROBOT), chosen, likelihood.model.state_names)
     with ThreadPoolExecutor(2) as threads:
         alone, shared = (
             statistics_of_runs(
@@ -76,7 +76,7 @@ def test_a_column_of_all_cables_is_the_sum_of_those_of_each() -> None:
     together, apart = (
         statistics_of_runs(
             linearise_filter(likelihood, values, SAMPLE.recording),
-            effect_sensitivities(ROBOT, SAMPLE.start, chosen, likelihood.model.state_names),
+            effect_sensitivities(SAMPLE.placed(ROBOT), chosen, likelihood.model.state_names),
             SAMPLE.rows,
         )
         for chosen in ([on_all], [on_all, on_one])

@@ -14,12 +14,9 @@ from tautwire.campaigns.plan_file import read_plan
 from tautwire.cli import run
 from tautwire.errors import RigidPlatformError
 from tautwire.estimation.input_design import default_limits
-from tautwire.estimation.preprocessing import prepare_recordings
 from tautwire.recordings.recording import Recording
 from tautwire.robot.robot_file_writer import write_robot
 from tautwire.robot.schema import Robot
-from tautwire.robot.symbolic_model import symbolic_model
-from tautwire.robot.uncertain_parameters import uncertain_parameters
 from tests.support.rigid_robots import suspended_robot
 
 STANDING = Recording("standing", np.arange(3.0), np.zeros((3, 4)), np.full((3, 4), 100.0), np.zeros((3, 3)))
@@ -31,9 +28,7 @@ def uncertain(robot: Robot) -> Robot:
 
 COMPUTATIONS: dict[str, Callable[[Robot], object]] = {
     "controller": tautwire.design_controller,
-    "model": lambda robot: symbolic_model(robot, (), uncertain_parameters(robot)),
     "excitation": default_limits,
-    "recording": lambda robot: prepare_recordings(robot, STANDING, None),
 }
 
 
@@ -47,7 +42,6 @@ def test_a_rigid_platform_is_refused(name: str) -> None:
 @pytest.mark.parametrize(
     "command",
     (
-        ["trace", "ROBOT", "hall.toml", "--out", "report"],
         ["excite", "ROBOT", "--out", "out.csv"],
         ["columns", "hall.toml", "ROBOT"],
     ),

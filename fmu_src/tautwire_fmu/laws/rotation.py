@@ -12,6 +12,8 @@ IDENTITY: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
 # Squared angle, in rad^2, below which the series to the sixth power replaces sine and cosine: it errs by 1e-19 there.
 MAX_SERIES_ANGLE_SQUARED = 1e-3
+# Squared sine of half the angle below which a series to the eighth power replaces its inverse: it errs by 1e-16.
+MAX_SERIES_SINE_SQUARED = 1e-3
 # The same of the rate of a rotation vector, whose closed form cancels.
 MAX_RATE_SERIES_ANGLE_SQUARED = 1e-2
 
@@ -49,6 +51,23 @@ def quaternion_of(m: Mathematics, rotation_vector: Vector) -> Quaternion:
     scalar = m.where(is_large, m.cos(0.5 * angle), cosine_series)
     x, y, z = scale(m.where(is_large, m.sin(0.5 * angle) / angle, sine_series), rotation_vector)
     return (scalar, x, y, z)
+
+
+def rotation_vector_of(m: Mathematics, quaternion: Quaternion) -> Vector:
+    """Rotation vector in rad, of at most half a turn, of a unit quaternion of either sign: ``2 atan2(|v|, w) v / |v|``.
+
+    Smooth and differentiable at no rotation, where a series replaces the quotient.
+    """
+    w = quaternion[0]
+    sign = m.where(w, 1.0, -1.0)
+    scalar, axis = sign * w, scale(sign, quaternion[1:])
+    squared = dot(axis, axis)
+    is_large = squared - MAX_SERIES_SINE_SQUARED
+    sine = m.sqrt(m.where(is_large, squared, 1.0))
+    ratio = squared / m.where(is_large, 1.0, scalar * scalar)
+    tail = ratio * (1.0 / 7.0 - ratio / 9.0)
+    series = (2.0 / m.where(is_large, 1.0, scalar)) * (1.0 - ratio * (1.0 / 3.0 - ratio * (1.0 / 5.0 - tail)))
+    return scale(m.where(is_large, 2.0 * m.atan2(sine, scalar) / sine, series), axis)
 
 
 def quaternion_to_vertical(m: Mathematics, axis: Vector) -> Quaternion:

@@ -107,10 +107,10 @@ def read_point_mass_robot(path: Path) -> Robot:
 
 
 def read_plausible_robot(path: Path) -> Robot:
-    """Reads a robot file; raises RobotFileError where its units seem to be others, else as read_point_mass_robot."""
+    """Reads a robot file; raises RobotFileError where its units seem to be others, else as read_holdable_robot."""
     from ..robot.implausible_units import implausible_units
 
-    robot = require_point_mass(str(path), read_robot(path))
+    robot = read_robot(path)
     for error in implausible_units(robot, str(path)):
         raise error
     return _require_holdable(robot, path)

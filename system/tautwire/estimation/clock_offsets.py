@@ -34,19 +34,18 @@ UNIFORM_SAMPLING_TOLERANCE = 1e-3
 
 @dataclass(frozen=True)
 class ChannelGroup:
-    """Output channels that share a clock: their name, and the columns from ``start`` to before ``stop``."""
+    """Output channels that share a clock, and their name: those of the tracker, pose, or those of the load cells."""
 
     name: str
-    start: int
-    stop: int | None
+    is_tracker: bool
 
-    @property
-    def columns(self) -> slice:
-        """The columns as an index."""
-        return slice(self.start, self.stop)
+    def columns(self, cable_count: int, output_count: int) -> list[int]:
+        """The columns among the outputs."""
+        tensions = range(3, 3 + cable_count)
+        return [column for column in range(output_count) if (column not in tensions) == self.is_tracker]
 
 
-CHANNEL_GROUPS = (ChannelGroup("positions", 0, 3), ChannelGroup("tensions", 3, None))
+CHANNEL_GROUPS = (ChannelGroup("positions", True), ChannelGroup("tensions", False))
 
 
 @dataclass(frozen=True)
@@ -158,7 +157,8 @@ def _offset_steps(fitter: Fitter, robot: Robot, sample: DataSet) -> dict[Channel
         output_sensitivities = np.zeros((*segment.observed.shape, len(CHANNEL_GROUPS)))
         output_rates = _output_rates(likelihood, segment)
         for number, channels in enumerate(CHANNEL_GROUPS):
-            output_sensitivities[:, channels.columns, number] = -output_rates[:, channels.columns]
+            columns = channels.columns(robot.cable_count, output_rates.shape[1])
+            output_sensitivities[:, columns, number] = -output_rates[:, columns]
         state_sensitivities, innovation_sensitivities = segment.propagate_sensitivities(
             state_sensitivities,
             np.zeros((len(output_sensitivities), len(state_sensitivities), len(CHANNEL_GROUPS))),
@@ -168,11 +168,11 @@ def _offset_steps(fitter: Fitter, robot: Robot, sample: DataSet) -> dict[Channel
         informations.append(np.sum(innovation_sensitivities**2, axis=1))
         squares.append(segment.values[segment.observed] ** 2)
     score, information = np.concatenate(scores), np.concatenate(informations)
-    columns = [sample.recording.measured()[:, channels.columns] for channels in CHANNEL_GROUPS]
+    is_seen = {True: sample.recording.has_position, False: sample.recording.has_tension}
     return {
         channels: _gauss_newton_step(score[:, number], information[:, number], np.concatenate(squares))
         for number, channels in enumerate(CHANNEL_GROUPS)
-        if np.isfinite(columns[number]).any()
+        if is_seen[channels.is_tracker]
     }
 
 
@@ -189,15 +189,16 @@ def _gauss_newton_step(score: Array, information: Array, squares: Array) -> Cloc
 
 def _output_rates(likelihood: Likelihood, segment: LinearisedSegment) -> Array:
     """Rates (K, m) of the predicted outputs along a segment of the filter's run."""
-    model, count = likelihood.model, likelihood.cable_count
-    expression = casadi.vertcat(model.outputs[:3], model.outputs[6 : 6 + count])
+    model, count, indices = likelihood.model, likelihood.cable_count, likelihood.model.indices
+    expression = casadi.vertcat(model.outputs[:3], model.outputs[indices.tensions], model.outputs[indices.pose][3:])
     outputs = casadi.Function("outputs", [model.states, model.inputs], [expression])
     speeds = np.vstack([segment.speeds, np.zeros((model.inputs.numel() - count, segment.speeds.shape[1]))])
     values = np.array(outputs(segment.states, speeds))
     # After the last sample of a recording the step is zero.
     time = np.append(0.0, np.cumsum(np.where(segment.step > 0.0, segment.step, 1.0)))
     rates: Array = np.gradient(values, time, axis=1)[:, :-1].T
-    rates[:, :3] = segment.states[3:6, :-1].T
+    motion = segment.states[indices.twist, :-1].T
+    rates[:, :3], rates[:, 3 + count :] = motion[:, :3], motion[:, 3:]
     return rates
 
 
@@ -219,20 +220,23 @@ def shifted(recording: Recording, seconds: float, channels: ChannelGroup) -> Rec
         raise RecordingError(
             recording.path, f"{description}, and the sampling is not uniform", "synchronise the clocks"
         )
-    measured = recording.measured()
+    measured = np.hstack([recording.measured(), recording.orientation])
+    columns = channels.columns(recording.cable_count, measured.shape[1])
     whole_steps = int(np.round(seconds / interval))
     kernel = np.sinc(np.arange(-TAPS_PER_SIDE, TAPS_PER_SIDE + 1) - (seconds / interval - whole_steps)) * np.kaiser(
         2 * TAPS_PER_SIDE + 1, KAISER_BETA
     )
     margin = TAPS_PER_SIDE + abs(whole_steps)
-    for column in measured[:, channels.columns].T:
+    for column in columns:
         padded = np.full(int(grid_rows[-1]) + 1 + 2 * margin, np.nan)
-        padded[margin + grid_rows] = column
-        column[:] = np.correlate(padded, kernel / np.sum(kernel), mode="valid")[
+        padded[margin + grid_rows] = measured[:, column]
+        measured[:, column] = np.correlate(padded, kernel / np.sum(kernel), mode="valid")[
             abs(whole_steps) + whole_steps + grid_rows
         ]
-    if not np.isfinite(measured[:, channels.columns]).any():
+    if not np.isfinite(measured[:, columns]).any():
         raise RecordingError(
             recording.path, f"{description}, and are too sparse to be resampled", "synchronise the clocks"
         )
-    return replace(recording, position=measured[:, :3], tension=measured[:, 3:])
+    position, tension, quaternions = np.split(measured, [3, 3 + recording.cable_count], axis=1)
+    lengths = np.linalg.norm(quaternions, axis=1, keepdims=True)
+    return replace(recording, position=position, tension=tension, orientation=quaternions / lengths)

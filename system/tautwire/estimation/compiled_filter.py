@@ -26,10 +26,10 @@ Array = NDArray[np.float64]
 class FilterInputs:
     """Inputs of a filter over K samples.
 
-    ``measured``, ``observed`` and ``shift`` (m, K), speed and next speed (cables, K), time step and drift (1, K) as
-    ``columns``; the same for all samples are ``parameters`` (p, 1), ``disturbance`` (see
-    :func:`tautwire.estimation.kalman_filter.time_update_function`), variances of white noise (m,), and the density of
-    acceleration noise.
+    ``measured``, ``observed`` and ``shift`` (m, K), speed and next speed (cables, K), time step and drift (1, K), and
+    measured rotation (3, K), empty for a point mass, as ``columns``; the same for all samples are ``parameters``
+    (p, 1), ``disturbance`` (see :func:`tautwire.estimation.kalman_filter.time_update_function`), variances of white
+    noise (m,), and the density of acceleration noise.
     """
 
     columns: tuple[Array, ...]
@@ -117,12 +117,12 @@ class CompiledFilter:
 
     def run(self, start: FilterState, inputs: FilterInputs, keeps_covariances: bool) -> FilterResults:
         """Run over K samples."""
-        measured, observed, shift, speed, later, step, drift = inputs.columns
+        measured, observed, shift, speed, later, step, drift, rotation = inputs.columns
         output_count, count = measured.shape
         state, covariance = start.state.copy(), start.covariance.copy()
         sensitivities = np.ascontiguousarray(start.sensitivities.T).copy()
         theta, density = inputs.parameters, np.full((1, 1), inputs.acceleration_noise_density)
-        outputs = self.outputs.bind(count, state[:, None], theta, shift, speed, later, step)
+        outputs = self.outputs.bind(count, state[:, None], theta, shift, speed, later, step, rotation)
         time_update = self._time_update.bind(
             count, state[:, None], theta, speed, later, step, drift, density, inputs.disturbance
         )

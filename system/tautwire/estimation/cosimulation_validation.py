@@ -15,6 +15,7 @@ from ..fmus.packaging import build_fmus
 from ..recordings.recording import Recording
 from ..robot.schema import Robot
 from .estimation_data import DataSet
+from .measured_outputs import Outputs, measured_outputs, output_residuals
 from .parameter_fit import Fitter
 from .policy import DEFAULT_POLICY, CosimulationPolicy
 from .smoothed_states import calibrate, with_initial_state
@@ -77,37 +78,40 @@ def compare_cosimulations(
     """
     recordings = [calibrate(fitter, robot, sample).without_sensor_errors(sample.recording) for sample in data_sets]
     comparisons = tuple(
-        Comparison(
-            role, recording, b, a, output_errors(recording, b.measured()), output_errors(recording, a.measured())
-        )
+        Comparison(role, recording, b, a, output_errors(recording, b), output_errors(recording, a))
         for role, recording, b, a in zip(ROLES, recordings, runs_before, runs_after, strict=False)
     )
     return comparisons, [noise_floor(fitter, robot, sample) for sample in data_sets]
 
 
-def output_errors(recording: Recording, outputs: Array) -> Errors:
-    """Root-mean-square errors: measured less simulated ``outputs`` (N, m)."""
-    return _root_mean_squares((recording.measured() - outputs) ** 2)
+def output_errors(recording: Recording, outputs: Outputs) -> Errors:
+    """Root-mean-square errors: measured less simulated."""
+    return _root_mean_squares(output_residuals(recording, outputs) ** 2, recording.cable_count)
 
 
 def noise_floor(fitter: Fitter, robot: Robot, data: DataSet) -> Errors:
     """Noise floor: the errors that noise of the sensors and winch speeds alone would leave in a simulation."""
     variances = fitter.open_loop_variances(robot, data)
-    return _root_mean_squares(np.where(np.isfinite(data.recording.measured()), variances, np.nan))
+    measured = measured_outputs(data.recording, robot.platform.is_rigid_body)
+    return _root_mean_squares(np.where(np.isfinite(measured), variances, np.nan), robot.cable_count)
 
 
 def is_near_noise_floor(after: Errors, noise_floor_errors: Errors, max_ratio: float) -> bool:
     """Whether the errors of a co-simulation are at most a multiple of the noise floor."""
-    pairs = ((after.position_rms, noise_floor_errors.position_rms), (after.tension_rms, noise_floor_errors.tension_rms))
+    pairs = zip(after.by_kind, noise_floor_errors.by_kind, strict=True)
     return all(not error > max_ratio * least for error, least in pairs)
 
 
-def _root_mean_squares(squares: Array) -> Errors:
+def _root_mean_squares(squares: Array, cable_count: int) -> Errors:
+    """Errors from squares (N, m) of the outputs' errors."""
+    positions, tensions, rotations = np.split(squares, [3, 3 + cable_count], axis=1)
     return Errors(
-        position_rms=_root_mean(squares[:, :3]),
-        tension_rms=_root_mean(squares[:, 3:]),
-        axes=np.array([_root_mean(column) for column in squares[:, :3].T]),
-        cables=np.array([_root_mean(column) for column in squares[:, 3:].T]),
+        position_rms=_root_mean(positions),
+        tension_rms=_root_mean(tensions),
+        axes=np.array([_root_mean(column) for column in positions.T]),
+        cables=np.array([_root_mean(column) for column in tensions.T]),
+        orientation_rms=_root_mean(rotations),
+        rotations=np.array([_root_mean(column) for column in rotations.T]),
     )
 
 

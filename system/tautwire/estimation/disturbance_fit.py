@@ -16,18 +16,17 @@ from numpy.typing import NDArray
 from ..robot.schema import Robot
 from .disturbance import Disturbance
 from .disturbance_posterior import (
-    NUMBER_COUNT,
     DisturbancePrior,
     Evaluation,
     ParameterBox,
     Posterior,
     ascended,
-    disturbance_of,
     disturbance_prior,
     logs_of,
 )
 from .estimation_data import DataSet
 from .hypotheses import Hypothesis, with_values
+from .measured_outputs import measured_outputs
 from .parameter_fit import Fit, Fitter, parameter_bounds, parameter_scales
 from .policy import DEFAULT_POLICY
 from .preprocessing_policy import DisturbancePolicy
@@ -73,9 +72,10 @@ def joint_fit(fitter: Fitter, fit: Fit, chosen: Collection[Hypothesis], data: Da
     best = ascended(posterior, start, policy, policy.max_iterations)
     values = posterior.values_at(best.coordinates)
     _, information = posterior.score(best)
-    covariance = np.linalg.pinv(information)[NUMBER_COUNT:, NUMBER_COUNT:] * np.outer(units, units)
+    of_values = slice(prior.number_count, None)
+    covariance = np.linalg.pinv(information)[of_values, of_values] * np.outer(units, units)
     robot = with_values(fit.robot, fit.free, dict(zip(fit.free, values.tolist(), strict=True)))
-    return fitter.with_disturbance(disturbance_of(best.logs)), Fit(robot, fit.free, values, covariance)
+    return fitter.with_disturbance(prior.disturbance_of(best.logs)), Fit(robot, fit.free, values, covariance)
 
 
 def with_improved_disturbance(fitter: Fitter, robot: Robot, chosen: Collection[Hypothesis], data: DataSet) -> Fitter:
@@ -99,7 +99,8 @@ def marginal_log_likelihood(
     maximised = with_improved_disturbance if is_coarse else with_fitted_disturbance
     fitter = maximised(fitter, robot, chosen, data)
     numbers = disturbance_prior(robot, fitter.noise, fitter.policy.disturbance).log_deviations
-    value_count = int(np.count_nonzero(np.isfinite(data.recording.measured()[data.rows])))
+    measured = measured_outputs(data.recording, robot.platform.is_rigid_body)
+    value_count = int(np.count_nonzero(np.isfinite(measured[data.rows])))
     return fitter.log_likelihood(robot, chosen, data) - 0.5 * len(numbers) * log(max(value_count, 1))
 
 
@@ -154,7 +155,8 @@ def fit_disturbance(
     known = [logs_of(each) for each in (own, other) if each not in (None, median)]
     fresh = _fresh_starts(posterior.prior, policy) if effort.searches or not known else []
     best = [max(posterior.evaluations(starts), key=_value) for starts in (known, fresh) if starts]
-    return disturbance_of(max((_maximised(posterior, start, policy, effort) for start in best), key=_value).logs)
+    reached = max((_maximised(posterior, start, policy, effort) for start in best), key=_value)
+    return posterior.prior.disturbance_of(reached.logs)
 
 
 def _maximised(posterior: Posterior, current: Evaluation, policy: DisturbancePolicy, effort: Effort) -> Evaluation:
@@ -186,6 +188,6 @@ def _fresh_starts(prior: DisturbancePrior, policy: DisturbancePolicy) -> list[Ar
     starts = [logs_of(prior.median)]
     for factor in policy.start_factors:
         logs = starts[0].copy()
-        logs[[0, 2, 4]] += log(factor)
+        logs[prior.sizes] += log(factor)
         starts.append(logs)
     return starts

@@ -34,37 +34,50 @@ from .preprocessing_policy import DisturbancePolicy
 Array = NDArray[np.float64]
 
 CONCURRENT_EVALUATIONS = 2
-# Indices of the processes' bandwidths among the logs of a disturbance's numbers.
-BANDWIDTHS = [1, 3, 5]
-NUMBER_COUNT = 8
 DIFFERENCE_STEP = 1e-3
 
 
 @dataclass(frozen=True)
 class DisturbancePrior:
-    """Weak prior of a disturbance: its median, and standard deviations of the logs of its numbers (8,)."""
+    """Weak prior of a disturbance: its median, and standard deviations of the logs of its numbers (k,)."""
 
     median: Disturbance
     log_deviations: tuple[float, ...]
 
     def penalty(self, logs: Array) -> Array:
-        """Deviations from the median in standard deviations (8,)."""
+        """Deviations from the median in standard deviations (k,)."""
         deviations: Array = (logs - logs_of(self.median)) / np.array(self.log_deviations)
         return deviations
 
+    @property
+    def number_count(self) -> int:
+        """Number k of a disturbance's numbers: 8, or 11 where the platform turns."""
+        return len(self.log_deviations)
+
+    @property
+    def sizes(self) -> list[int]:
+        """Indices of the processes' sizes among the numbers, each before its bandwidth."""
+        sensor_kinds = (self.number_count - 2) // 3
+        return list(range(0, 2 + 2 * sensor_kinds, 2))
+
+    def disturbance_of(self, logs: Array) -> Disturbance:
+        """The disturbance whose numbers have these logs (k,)."""
+        numbers = np.exp(logs).tolist()
+        first_noise = 2 * len(self.sizes)
+        force, position, tension, *rotation = (OrnsteinUhlenbeck(*numbers[k : k + 2]) for k in self.sizes)
+        white = numbers[first_noise:]
+        disturbance = Disturbance(force, position, tension, white[0], white[1], moment_arm=self.median.moment_arm)
+        return replace(disturbance, rotation=rotation[0], rotation_noise=white[2]) if rotation else disturbance
+
 
 def logs_of(disturbance: Disturbance) -> Array:
-    """Logs of a disturbance's numbers (8,)."""
-    pairs = [(each.rms, each.bandwidth) for each in (disturbance.force, disturbance.position, disturbance.tension)]
-    numbers = [number for pair in pairs for number in pair]
-    return np.log([*numbers, disturbance.position_noise, disturbance.tension_noise])
-
-
-def disturbance_of(logs: Array) -> Disturbance:
-    """The disturbance whose numbers have these logs (8,)."""
-    numbers = np.exp(logs).tolist()
-    force, position, tension = (OrnsteinUhlenbeck(*numbers[k : k + 2]) for k in (0, 2, 4))
-    return Disturbance(force, position, tension, numbers[6], numbers[7])
+    """Logs of a disturbance's numbers (k,): size and bandwidth of each process, then white noise."""
+    processes = [disturbance.force, disturbance.position, disturbance.tension]
+    white = [disturbance.position_noise, disturbance.tension_noise]
+    if disturbance.rotation is not None:
+        processes.append(disturbance.rotation)
+        white.append(disturbance.rotation_noise)
+    return np.log([*(number for each in processes for number in (each.rms, each.bandwidth)), *white])
 
 
 def disturbance_prior(
@@ -80,8 +93,12 @@ def disturbance_prior(
         white * noise.position,
         white * noise.tension,
     )
+    if noise.rotation is not None:
+        rotation = OrnsteinUhlenbeck(share * noise.rotation, policy.bandwidth)
+        median = replace(median, rotation=rotation, rotation_noise=white * noise.rotation, moment_arm=noise.moment_arm)
     size, bandwidth, sensor = (log(f) for f in (policy.size_factor, policy.bandwidth_factor, policy.noise_factor))
-    return DisturbancePrior(median, (*[size, bandwidth] * 3, sensor, sensor))
+    kinds = 2 if noise.rotation is None else 3
+    return DisturbancePrior(median, (*[size, bandwidth] * (1 + kinds), *[sensor] * kinds))
 
 
 @dataclass(frozen=True)
@@ -110,8 +127,8 @@ class Evaluation:
 
     @property
     def logs(self) -> Array:
-        """Logs of the disturbance's numbers (8,)."""
-        return self.coordinates[:NUMBER_COUNT]
+        """Logs of the disturbance's numbers (k,)."""
+        return self.coordinates[: len(self.coordinates) - len(self.slopes_by_parameters)]
 
 
 @dataclass(frozen=True)
@@ -137,9 +154,9 @@ class Posterior:
 
         What hardly changes while a recording lasts is no disturbance, but an offset or a weight.
         """
-        lower, upper = np.full(NUMBER_COUNT, -np.inf), np.full(NUMBER_COUNT, np.inf)
+        lower, upper = (np.full(self.prior.number_count, bound) for bound in (-np.inf, np.inf))
         time = self.data.recording.time
-        lower[BANDWIDTHS] = -log(float(time[-1] - time[0]))
+        lower[[size + 1 for size in self.prior.sizes]] = -log(float(time[-1] - time[0]))
         values = self.values[: len(self.box.units)]
         of_parameters = ((bound - values) / self.box.units for bound in (self.box.lower, self.box.upper))
         low, high = (np.append(bound, own) for bound, own in zip((lower, upper), of_parameters, strict=True))
@@ -149,14 +166,14 @@ class Posterior:
         """The parameters (p,) at some coordinates."""
         if not len(self.box.units):
             return self.values
-        moved = self.values + self.box.units * coordinates[NUMBER_COUNT:]
+        moved = self.values + self.box.units * coordinates[self.prior.number_count :]
         return np.clip(moved, self.box.lower, self.box.upper)
 
     def evaluation(self, coordinates: Array) -> Evaluation:
         """Its evaluation at some coordinates, or at the bounds that these exceed."""
         coordinates = np.clip(coordinates, *self.bounds)
-        logs = coordinates[:NUMBER_COUNT]
-        likelihood = self.likelihood.with_disturbance(disturbance_of(logs))
+        logs = coordinates[: self.prior.number_count]
+        likelihood = self.likelihood.with_disturbance(self.prior.disturbance_of(logs))
         innovations = likelihood.innovations(self.data.recording, self.values_at(coordinates))
         mask = innovations.observed & self.data.rows[:, None]
         value = innovations.log_likelihood(self.data.rows) - 0.5 * float(np.sum(self.prior.penalty(logs) ** 2))
@@ -172,7 +189,7 @@ class Posterior:
 
     def score(self, evaluation: Evaluation) -> tuple[Array, Array]:
         """Gradient and Fisher information by the coordinates; by logs from finite differences."""
-        moves = DIFFERENCE_STEP * np.eye(NUMBER_COUNT, len(evaluation.coordinates))
+        moves = DIFFERENCE_STEP * np.eye(self.prior.number_count, len(evaluation.coordinates))
         moved = self.evaluations(evaluation.coordinates + moves)
         slopes = np.array([each.innovations - evaluation.innovations for each in moved]) / DIFFERENCE_STEP
         log_slopes = np.array([each.log_variances - evaluation.log_variances for each in moved]) / DIFFERENCE_STEP
@@ -181,7 +198,7 @@ class Posterior:
         gradient = -slopes @ evaluation.innovations - 0.5 * np.sum(log_slopes, axis=1)
         unscaled = slopes + 0.5 * evaluation.innovations * log_slopes
         information = unscaled @ unscaled.T + 0.5 * log_slopes @ log_slopes.T
-        deviations, numbers = np.array(self.prior.log_deviations), np.arange(NUMBER_COUNT)
+        deviations, numbers = np.array(self.prior.log_deviations), np.arange(self.prior.number_count)
         information[numbers, numbers] += deviations**-2
         gradient[numbers] -= self.prior.penalty(evaluation.logs) / deviations
         return gradient, information

@@ -16,21 +16,20 @@ from dataclasses import replace
 import casadi
 from casadi import SX
 
+from ..robot.platform_symbols import StateIndices
 from ..robot.symbolic_model import SymbolicModel
-
-FORCE_COUNT = 3
 
 
 class DisturbanceSymbols:
-    """States of a disturbance: errors of recorded rope lengths, forces, and errors of the outputs; any may be absent.
+    """States of a disturbance: errors of recorded rope lengths, wrench, and errors of the outputs; any may be absent.
 
     ``arguments`` are their decay rates (1/s) and variances; the first ``driving_count`` states act on the robot.
     """
 
-    def __init__(self, length_count: int, output_count: int) -> None:
-        self._lengths = slice(6, 6 + length_count)
+    def __init__(self, indices: StateIndices, length_count: int, output_count: int) -> None:
+        self._lengths = slice(indices.lengths.start, indices.lengths.start + length_count)
         self._length_count, self._output_count = length_count, output_count
-        self._force_count = FORCE_COUNT if output_count else 0
+        self._force_count = indices.degrees_of_freedom if output_count else 0
         self.driving_count = length_count + self._force_count
         self.count = self.driving_count + output_count
         self._decay_rates, self._variances = SX.sym("decay_rate", self.count), SX.sym("variance", self.count)
@@ -62,7 +61,7 @@ class DisturbanceSymbols:
         return self._variances * (1.0 - casadi.exp(-2.0 * self._decay_rates * step))
 
     def driven(self, model: SymbolicModel) -> SymbolicModel:
-        """The model with constant errors of lengths, and a constant force on the platform, as its last parameters."""
+        """The model with constant errors of lengths, and a constant wrench on the platform, as its last parameters."""
         inputs = SX(model.inputs)
         inputs[model.inputs.numel() - self._force_count :] += self._driving[self._length_count :]
         states = SX(model.states)

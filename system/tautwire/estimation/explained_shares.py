@@ -1,9 +1,9 @@
 """Shares of what the declared robot misses: how much each effect explains, and how much is left.
 
 Misses are those of simulations on unseen data, beyond what the sensors' noise leaves. With the mean squares ``e^2`` of
-an error and ``s^2`` of noise, of positions and tensions,
+an error and ``s^2`` of noise, of positions, tensions and orientation,
 
-    M = sum over both of max(e^2 / s^2 - 1, 0)        share = (M without the effect - M) / (M without any effect)
+    M = sum over these of max(e^2 / s^2 - 1, 0)        share = (M without the effect - M) / (M without any effect)
 
 at most what all effects explain together. Shares need not sum to one: what two effects explain together counts for
 both. Without an effect all else stays as it is, the initial state included. An effect that acts on several cables with
@@ -31,6 +31,7 @@ from .estimation_data import DataSet
 from .hypotheses import Hypothesis
 from .identification_context import IdentificationContext
 from .likelihood import Likelihood
+from .measured_outputs import Outputs, SimulatedOutputs, measured_outputs, output_names, output_residuals
 from .parameter_fit import Fitter
 from .policy import SizePolicy
 from .smoothed_states import calibrate, with_initial_state
@@ -89,18 +90,19 @@ def explained_shares(
     complete, *without = (simulated_outputs(context.fitter, each, data) for each in robots)
     recording, outputs_without = after.recording, dict(zip(names, without, strict=True))
     missed = missed_without_effects(context, declared, data, floor)
-    left = _missed(recording, after.after.measured(), floor)
+    left = _missed(recording, after.after, floor)
     total = max(missed, left, np.finfo(float).tiny)
     outputs = [outputs_without[hypothesis.effect.name] for hypothesis in accepted]
-    residual, noise = recording.measured() - complete, np.append(floor.axes, floor.cables)
+    residual, noise = output_residuals(recording, complete), floor.by_output
+    changes = [output_residuals(complete, each) for each in outputs]
     # Without one effect the others may miss more than the robot without any.
     explained = 1.0 - left / total
     return ExplainedShares(
         tuple(float(np.clip((_missed(recording, each, floor) - left) / total, 0.0, explained)) for each in outputs),
-        tuple(_size(each - complete, recording, floor) for each in outputs),
+        tuple(_size(change, recording, floor) for change in changes),
         tuple(
-            amplitude_spread(residual / noise, (complete - each) / noise, data.rows, context.policy.stability.stretches)
-            for each in outputs
+            amplitude_spread(residual / noise, change / noise, data.rows, context.policy.stability.stretches)
+            for change in changes
         ),
         float(np.clip(left / total, 0.0, 1.0)),
         missed**0.5,
@@ -145,8 +147,8 @@ def missed_with_effects(fitter: Fitter, robot: Robot, data: DataSet, floor: Erro
     return _missed(recording, simulated_outputs(fitter, with_initial_state(fitter, robot, data), data), floor)
 
 
-def simulated_outputs(fitter: Fitter, robot: Robot, data: DataSet) -> Array:
-    """Simulated outputs (N, m) of a robot, from its initial state, over a recording's winch speeds.
+def simulated_outputs(fitter: Fitter, robot: Robot, data: DataSet) -> SimulatedOutputs:
+    """Simulated outputs of a robot, from its initial state, over a recording's winch speeds.
 
     They are those of the co-simulated FMUs within the accuracy of integration, in a tenth of the time.
     """
@@ -159,7 +161,7 @@ def sensor_noise_floor(fitter: Fitter, robot: Robot, data: DataSet) -> Errors:
     """Errors that noise of the sensors and winch speeds alone would leave, without a force on the platform."""
     noise = fitter.noise
     if noise.disturbance:
-        limited = sensor_noise_only(noise.disturbance, noise.position, noise.tension)
+        limited = sensor_noise_only(noise.disturbance, noise.position, noise.tension, noise.rotation)
         fitter = fitter.with_disturbance(limited)
     return noise_floor(fitter, robot, data)
 
@@ -169,16 +171,17 @@ def _without_effect(robot: Robot, name: str, accepted: Sequence[Hypothesis]) -> 
     return replace(robot, effects=tuple(s for s in robot.effects if (s.name, s.cables) not in removed))
 
 
-def _missed(recording: Recording, outputs: Array, floor: Errors) -> float:
+def _missed(recording: Recording, outputs: Outputs, floor: Errors) -> float:
     errors = output_errors(recording, outputs)
-    pairs = ((errors.position_rms, floor.position_rms), (errors.tension_rms, floor.tension_rms))
+    pairs = zip(errors.by_kind, floor.by_kind, strict=True)
     return float(sum(max((error / least) ** 2 - 1.0, 0.0) for error, least in pairs if error == error))
 
 
 def _size(change: Array, recording: Recording, floor: Errors) -> float:
     """Size of a change of the outputs (N, m), where they were measured, over the noise of one sample."""
-    squares = np.where(np.isfinite(recording.measured()), change, np.nan) ** 2
-    parts = ((squares[:, :3], floor.position_rms), (squares[:, 3:], floor.tension_rms))
+    measured = measured_outputs(recording, is_rigid=len(floor.rotations) > 0)
+    squares = np.where(np.isfinite(measured), change, np.nan) ** 2
+    parts = zip(np.split(squares, [3, 3 + recording.cable_count], axis=1), floor.by_kind, strict=True)
     means = [float(np.nanmean(part)) / least**2 for part, least in parts if np.isfinite(part).any()]
     return float(sum(means) ** 0.5)
 
@@ -200,8 +203,7 @@ class RemainingError:
 
 def remaining_error(recording: Recording, motion: CosimulationResult, floor: Errors) -> RemainingError:
     """The output whose error exceeds its noise most, with the strongest line of the error's spectrum."""
-    residual = recording.measured() - motion.measured()
-    noise = np.append(floor.axes, floor.cables)
+    residual, noise = output_residuals(recording, motion), floor.by_output
     rms = np.array([np.sqrt(np.mean(c[np.isfinite(c)] ** 2)) if np.isfinite(c).any() else 0.0 for c in residual.T])
     index = int(np.argmax(np.nan_to_num(rms / noise)))
     is_measured = np.isfinite(residual[:, index])
@@ -210,5 +212,6 @@ def remaining_error(recording: Recording, motion: CosimulationResult, floor: Err
     evenly_sampled = np.interp(grid, time[is_measured], residual[is_measured, index])
     frequency, power = periodogram(evenly_sampled, fs=1.0 / (grid[1] - grid[0]), window="hann")
     strongest = float(frequency[1 + int(np.argmax(power[1:]))])
-    scale, unit = (1e3, "mm") if index < 3 else (1.0, "N")
-    return RemainingError(recording.channel_names[index], scale * float(rms[index]), unit, strongest)
+    names = output_names(recording.cable_count, is_rigid=True)
+    scale, unit = (1e3, "mm") if index < 3 else (1.0, "N") if index < 3 + recording.cable_count else (1e3, "mrad")
+    return RemainingError(names[index], scale * float(rms[index]), unit, strongest)

@@ -13,7 +13,7 @@ from threadpoolctl import threadpool_limits
 from ..errors import ArgumentError, NumericalError, RecordingError
 from ..process_signals import defer_interrupts
 from ..recordings.recording import Recording, require_outputs
-from ..robot.schema import Robot, validate_point_mass_robot
+from ..robot.schema import Robot, validate_robot
 from ..validation import NumberRule, validate_callable, validate_instance, validate_integer, validate_number
 from .effect_estimates import parameter_correlations, series_stiffness_notes, with_readable_values
 from .identification_context import IdentificationContext, Progress, no_progress
@@ -46,7 +46,7 @@ def validate_trace_arguments(
 
     Raises RecordingError where a recording has no measured output, or both are the same, ArgumentError for all else.
     """
-    validate_point_mass_robot("trace: robot", robot)
+    validate_robot("trace: robot", robot)
     validate_callable("trace: progress", progress)
     validated_false_alarm_rate("trace: alpha", alpha)
     validate_integer("trace: processes", processes, 1, "give the number of worker processes")
@@ -230,7 +230,7 @@ def _disturbance_notes(state: Identification) -> list[str]:
     small = [f"{each.name} ({100.0 * (each.share or 0.0):.1f} % of what is missed)" for each in state.small_effects]
     unstable = ", ".join(dict.fromkeys(f"{name} of {each.name}" for each in state.effects for name in each.unstable))
     return [
-        disturbance.sentence(fit.has_position, fit.has_tension),
+        disturbance.sentence(fit.has_position, fit.has_tension, fit.has_orientation),
         *([f"established, but too small to matter: {', '.join(small)}"] if small else []),
         *([f"the two recordings do not agree on {unstable}; intervals hold what both show"] if unstable else []),
     ]

@@ -12,9 +12,14 @@ from ..errors import RecordingError
 from ..recordings.recording import Recording
 from ..recordings.start_position import start_position, with_start
 from ..robot.cable_routes import unit_directions
+from ..robot.kinematics import structure_matrix
+from ..robot.platform_symbols import StateIndices
+from ..robot.rigid_equilibrium import platform_size
 from ..robot.schema import Robot
-from ..robot.static_equilibrium import static_tensions
+from ..robot.static_equilibrium import start_orientation, static_tensions
 from .kalman_filter import Noise
+from .measured_outputs import measured_outputs
+from .measurement_noise import rotation_scale
 from .policy import DEFAULT_POLICY
 from .preprocessing_policy import InitialStatePolicy
 
@@ -26,19 +31,20 @@ RANK_TOLERANCE = 1e-9
 def initial_covariance(robot: Robot, noise: Noise, state_count: int, constant_count: int = 0) -> Array:
     """Prior covariance (state_count, state_count) of the initial state.
 
-    Beside positions, velocities and lengths only the last ``constant_count`` states are uncertain.
+    Beside pose, twist and lengths only the last ``constant_count`` states are uncertain.
 
     Self-stress, the tensions in the null space of redundant robots' structure matrix, has the standard deviation
     ``noise.self_stress``: with ``U`` the ropes' directions and ``F = l / (E S)``, unstrained lengths by
     ``s^2 F (I - U^+ U) F``.
     """
-    count = robot.cable_count
-    lengths = slice(6, 6 + count)
-    covariance = np.zeros((state_count, state_count))
-    position_variance = np.full(3, noise.start_position**2 + noise.start_stretch**2)
-    covariance[:3, :3] = np.diag(position_variance)
-    covariance[3:6, 3:6] = np.diag(np.full(3, noise.start_velocity**2))
-    covariance[lengths, lengths] = np.diag(np.full(count, noise.start_position**2 + noise.start_stretch**2))
+    count, turning = robot.cable_count, 3 if robot.platform.is_rigid_body else 0
+    indices = StateIndices(3 + turning, count)
+    length_variance = noise.start_position**2 + noise.start_stretch**2
+    variances = np.zeros(state_count)
+    variances[indices.pose] = [length_variance] * 3 + [noise.start_rotation**2] * turning
+    variances[indices.twist] = [noise.start_velocity**2] * 3 + [noise.start_angular_velocity**2] * turning
+    variances[indices.lengths] = length_variance
+    covariance, lengths = np.diag(variances), indices.lengths
     covariance[state_count - constant_count :, state_count - constant_count :] = np.eye(constant_count)
     if noise.self_stress > 0.0:
         length_modes = _cable_compliances(robot)[:, None] * self_stress_projection(robot)
@@ -48,11 +54,17 @@ def initial_covariance(robot: Robot, noise: Noise, state_count: int, constant_co
 
 def self_stress_projection(robot: Robot) -> Array:
     """Projection (n, n) of tensions on self-stress, the null space of the structure matrix; zero where it is empty."""
-    direction_matrix = unit_directions(robot)
-    projection: Array = (
-        np.eye(robot.cable_count) - np.linalg.pinv(direction_matrix, rcond=RANK_TOLERANCE) @ direction_matrix
-    )
+    matrix = start_structure_matrix(robot)
+    projection: Array = np.eye(robot.cable_count) - np.linalg.pinv(matrix, rcond=RANK_TOLERANCE) @ matrix
     return projection
+
+
+def start_structure_matrix(robot: Robot) -> Array:
+    """Structure matrix at the start, (3, n); of a platform that turns (6, n), moments over its size."""
+    if not robot.platform.is_rigid_body:
+        return unit_directions(robot)
+    matrix = structure_matrix(robot, orientation=start_orientation(robot))
+    return np.vstack([matrix[:3], matrix[3:] / platform_size(robot)])
 
 
 def self_stress_deviation(
@@ -88,10 +100,20 @@ def _cable_compliances(robot: Robot) -> Array:
 
 @dataclass(frozen=True)
 class InitialMotion:
-    """Initial ``speed`` of the platform (m/s), and ``amplitude`` of its oscillation about equilibrium (m)."""
+    """Initial ``speed`` of the platform (m/s), and ``amplitude`` of its oscillation about equilibrium (m).
+
+    Of one that turns also its angular speed ``turning`` (rad/s), and the amplitude of its rotation, ``angle`` (rad).
+    """
 
     speed: float
     amplitude: float
+    turning: float = 0.0
+    angle: float = 0.0
+
+    @property
+    def description(self) -> str:
+        """Speeds in words."""
+        return f"{self.speed:.3g} m/s" + (f" and {self.turning:.3g} rad/s" if self.turning > 0.0 else "")
 
 
 def with_motion_at_start(
@@ -112,16 +134,18 @@ def with_motion_at_start(
             continue
         shortest_cable = min(float(np.linalg.norm(np.subtract(a, robot.platform.start))) for a in robot.anchors)
         if motion.amplitude > policy.max_amplitude_ratio * shortest_cable:
-            problem = f"starts in motion, {motion.speed:.3g} m/s, and vibrates by {motion.amplitude:.3g} m"
+            problem = f"starts in motion, {motion.description}, and vibrates by {motion.amplitude:.3g} m"
             hint = "begin the recording at rest: the ropes have their reference length at the static start"
             raise RecordingError(recording.path, problem, hint)
         noise = replace(
             noise,
             start_velocity=max(noise.start_velocity, policy.prior_widening * motion.speed),
             start_stretch=max(noise.start_stretch, policy.prior_widening * motion.amplitude),
+            start_angular_velocity=max(noise.start_angular_velocity, policy.prior_widening * motion.turning),
+            start_rotation=max(noise.start_rotation, policy.prior_widening * motion.angle),
         )
         notes.append(
-            f"{recording.path} starts in motion, at about {motion.speed:.3g} m/s: initial position, velocity and "
+            f"{recording.path} starts in motion, at about {motion.description}: initial position, velocity and "
             "tensions were estimated beside every effect; internal states of ropes (relaxation, creep) start at rest"
         )
     return noise, tuple(notes)
@@ -136,37 +160,54 @@ def initial_motion(
     """Initial motion of a recording; None where it is at rest within noise.
 
     Winch speeds alone would move a platform on stiff ropes at ``v`` with ``U' v = V``. The residual of the positions is
-    fitted by ``e_0 + e_1 t + e_2 t^2``; the velocity is ``v + e_1``, significant at eight sigma from zero.
+    fitted by ``e_0 + e_1 t + e_2 t^2``; the velocity is ``v + e_1``, significant at eight sigma from zero. Rotations
+    count as positions of points in the platform's distance.
     """
     time = recording.time - recording.time[0]
-    velocity_map = np.linalg.pinv(unit_directions(robot), rcond=RANK_TOLERANCE)
+    velocity_map = np.linalg.pinv(start_structure_matrix(robot), rcond=RANK_TOLERANCE)
+    pose, pose_noise, size = _scaled_pose(robot, noise, recording)
     winch_led_velocity = recording.winch_speed @ velocity_map
     displacement = _cumulative_integral(time, winch_led_velocity)
     initial_winch_speed, initial_velocity = recording.winch_speed[0], winch_led_velocity[0]
     velocity_noise = noise.winch_speed * np.linalg.norm(velocity_map, axis=0)
     is_early = time <= 2.0 * policy.velocity_window
     measured_axes = [
-        axis
-        for axis, column in enumerate(recording.position.T)
-        if np.sum(np.isfinite(column[is_early])) >= policy.min_window_samples
+        axis for axis, column in enumerate(pose.T) if np.sum(np.isfinite(column[is_early])) >= policy.min_window_samples
     ]
     if not measured_axes:
         is_moving = (
             bool(np.any(np.abs(initial_winch_speed) > policy.min_velocity_sigmas * noise.winch_speed))
             and noise.winch_speed > 0.0
         )
-        return InitialMotion(float(np.linalg.norm(initial_velocity)), 0.0) if is_moving else None
-    output_noise = noise.of_outputs(recording.cable_count)
-    velocity, significant, amplitudes = np.zeros(3), False, [0.0]
+        return _motion_of(initial_velocity, np.zeros_like(initial_velocity), size) if is_moving else None
+    velocity, significant, amplitudes = np.zeros(pose.shape[1]), False, np.zeros(pose.shape[1])
     for axis in measured_axes:
-        residual = recording.position[:, axis] - displacement[:, axis]
-        slope, deviation = _initial_slope(time, residual, output_noise[axis], policy)
+        residual = pose[:, axis] - displacement[:, axis]
+        slope, deviation = _initial_slope(time, residual, pose_noise[axis], policy)
         velocity[axis] = initial_velocity[axis] + slope
         significant |= bool(
             abs(velocity[axis]) > policy.min_velocity_sigmas * np.hypot(deviation, velocity_noise[axis])
         )
-        amplitudes.append(_oscillation_amplitude(time, residual, output_noise[axis], policy))
-    return InitialMotion(float(np.linalg.norm(velocity)), max(amplitudes)) if significant else None
+        amplitudes[axis] = _oscillation_amplitude(time, residual, pose_noise[axis], policy)
+    return _motion_of(velocity, amplitudes, size) if significant else None
+
+
+def _scaled_pose(robot: Robot, noise: Noise, recording: Recording) -> tuple[Array, Array, float]:
+    """Measured pose (N, d) in m, rotations times the platform's size, its noise (d,) in m, and that size in m."""
+    outputs, deviations = measured_outputs(recording, robot.platform.is_rigid_body), noise.of_outputs(robot.cable_count)
+    size, tensions = rotation_scale(robot), slice(3, 3 + robot.cable_count)
+    pose = np.hstack([outputs[:, :3], size * outputs[:, tensions.stop :]])
+    return pose, np.array([*deviations[:3], *(size * each for each in deviations[tensions.stop :])]), size
+
+
+def _motion_of(velocity: Array, amplitudes: Array, size: float) -> InitialMotion:
+    """Motion by scaled velocities and amplitudes (d,) in m/s and m."""
+    return InitialMotion(
+        float(np.linalg.norm(velocity[:3])),
+        float(np.max(amplitudes[:3])),
+        float(np.linalg.norm(velocity[3:])) / size,
+        float(np.max(amplitudes[3:], initial=0.0)) / size,
+    )
 
 
 def _cumulative_integral(time: Array, rates: Array) -> Array:

@@ -34,7 +34,7 @@ from ..robot.symbolic_model import FreeParameter, symbolic_model
 from ..robot.uncertain_parameters import uncertain_parameters
 from .hypotheses import PLATFORM_SENSOR_FORMS, Hypothesis
 from .likelihood import Likelihood
-from .measurement_model import delayed_outputs
+from .measurement_model import SensorInstant, delayed_outputs
 from .native_functions import CompiledFunction, by_sample
 
 Array = NDArray[np.float64]
@@ -45,7 +45,8 @@ class LinearisedSegment:
     """Linearised filter segment: K successive samples of a run.
 
     ``states`` (n, K + 1) as predicted, their unstrained lengths the true ones where others were recorded; winch
-    ``speeds`` (cables, K + 1), of the next sample too; ``step`` (K) and ``shift`` (m, K) in s. ``transition`` A
+    ``speeds`` (cables, K + 1), of the next sample too; ``step`` (K) and ``shift`` (m, K) in s; ``rotation`` (3, K) as
+    measured, empty for a point mass. ``transition`` A
     (K, n, n), ``half_transition`` the same from half a step before the next sample, ``output_matrix`` C (K, m, n),
     ``gain`` K (K, n, m); ``whitening`` (K, m, m) makes innovations independent with unit variance and is zero where
     nothing was ``observed`` (K, m). ``transition``, ``output_matrix`` and ``gain`` have the states of a disturbance
@@ -57,6 +58,7 @@ class LinearisedSegment:
     speeds: Array
     step: Array
     shift: Array
+    rotation: Array
     transition: Array
     half_transition: Array
     output_matrix: Array
@@ -106,12 +108,13 @@ def linearise_filter(
     size = likelihood.model.states.numel()
     variances = likelihood.noise.white_variances(likelihood.cable_count)
     for segment in likelihood.segments(recording, values, acceleration_noise_density):
-        measured, observed, shift, speed, later, step, _ = segment.columns
+        measured, observed, shift, speed, later, step, _, rotation = segment.columns
         count = measured.shape[1]
         predicted = segment.states[:, :-1]
         is_observed = observed.T[:, :, None] > 0.0
         innovations = np.where(is_observed[:, :, 0], segment.values, 0.0)
-        output_matrix = by_sample(likelihood.outputs(count, predicted, theta, shift, speed, later, step)[1], count)
+        outputs = likelihood.outputs(count, predicted, theta, shift, speed, later, step, rotation)
+        output_matrix = by_sample(outputs[1], count)
         cross_covariance = segment.covariances @ np.where(is_observed, output_matrix, 0.0).swapaxes(1, 2)
         covariance = np.where(is_observed, output_matrix, 0.0) @ cross_covariance + np.diag(variances)
         covariance, cholesky_factor = factorised(covariance)
@@ -125,6 +128,7 @@ def linearise_filter(
             np.hstack([speed, later[:, -1:]]),
             step[0],
             shift,
+            rotation,
             segment.transitions,
             _half_transition(segment.transitions[:, :size, :size], rate_jacobian, step[0]),
             output_matrix,
@@ -215,13 +219,14 @@ class EffectSensitivities:
         state_names: Sequence[str],
         cable_count: int,
     ) -> None:
-        model = symbolic_model(extended_robot, [*free, *fixed], uncertain_parameters(extended_robot))
+        uncertain, reference = uncertain_parameters(extended_robot), extended_robot.platform.start_orientation
+        model = symbolic_model(extended_robot, [*free, *fixed], uncertain, reference)
         shared_indices = [model.state_names.index(name) for name in state_names]
         effect_indices = [index for index in range(len(model.state_names)) if index not in shared_indices]
         z, theta, p = model.states[effect_indices], model.parameters, model.parameters[: len(free)]
-        next_speed, step, shift = SX.sym("later", cable_count), SX.sym("step"), SX.sym("shift", 3 + cable_count)
+        instant = SensorInstant.of(model)
         state_sensitivities = SX.sym("slopes", _sensitivity_pattern(model.rates[effect_indices], z, p))
-        outputs = delayed_outputs(model, cable_count, next_speed, step, shift)
+        outputs = delayed_outputs(model, cable_count, instant)
         arguments = [model.states[shared_indices], z, state_sensitivities, model.inputs, theta]
 
         def total_derivative(expression: SX) -> SX:
@@ -231,7 +236,7 @@ class EffectSensitivities:
         self._forcing_function = CompiledFunction(
             Function(
                 "moved",
-                [*arguments, next_speed, step, shift],
+                [*arguments, *instant.symbols],
                 [total_derivative(model.rates[shared_indices]), total_derivative(outputs)],
             )
         )
@@ -262,7 +267,8 @@ class EffectSensitivities:
     def forcing_terms(self, run: LinearisedSegment) -> tuple[Array, Array]:
         """Forcing terms of the sensitivities along the next segment of the run: B (K, n, p) and D (K, m, p)."""
         inputs = np.pad(run.speeds, ((0, self._input_count - len(run.speeds)), (0, 0)))
-        instant = [_with_last_column_repeated(column) for column in (run.speeds[:, 1:], run.step[None, :], run.shift)]
+        columns = (run.speeds[:, 1:], run.step[None, :], run.shift, run.rotation)
+        instant = [_with_last_column_repeated(column) for column in columns]
         per_trial = [
             self._derivatives_at_grid_point(run, inputs, instant, number) for number in range(len(self._grid_points))
         ]
@@ -347,14 +353,15 @@ def _sensitivity_pattern(rates: SX, states: SX, parameters: SX) -> Sparsity:
 
 def _effect_state_step(rates: Function, cable_count: int) -> Function:
     """One sample's step of the effect's states and their sensitivities, straight between two states of the run."""
-    state_pattern, *effect_patterns, _, theta_pattern = (rates.sparsity_in(k) for k in range(rates.n_in()))
+    state_pattern, *effect_patterns, input_pattern, theta_pattern = map(rates.sparsity_in, range(rates.n_in()))
+    input_count = input_pattern.size1()
     z, sensitivities = (SX.sym(name, pattern) for name, pattern in zip(("z", "slopes"), effect_patterns, strict=True))
     begin, end, theta = SX.sym("begin", state_pattern), SX.sym("end", state_pattern), SX.sym("theta", theta_pattern)
     speed, later, step = SX.sym("speed", cable_count), SX.sym("later", cable_count), SX.sym("step")
 
     def rates_at(fraction: float, effect_states: SX, effect_sensitivities: SX) -> list[SX]:
         state = begin + fraction * (end - begin)
-        inputs = casadi.vertcat(speed + fraction * (later - speed), SX(3, 1))
+        inputs = casadi.vertcat(speed + fraction * (later - speed), SX(input_count - cable_count, 1))
         return list(rates(state, effect_states, effect_sensitivities, inputs, theta))
 
     next_states, next_sensitivities = z, sensitivities

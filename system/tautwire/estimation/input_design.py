@@ -205,12 +205,12 @@ class _DesignProblem:
         if np.max(np.abs(speed)) > limits.speed:
             return None
         unmeasured = np.full(speed.shape, np.nan)
-        template = Recording("program", time, speed, unmeasured, unmeasured[:, :3])
+        template = Recording("program", time, speed, unmeasured, np.full((len(time), 3), np.nan))
         outputs = self.likelihood.simulated_outputs(template, ())
-        tension = outputs[:, 3:]
-        if not (limits.min_tension <= np.min(tension) and np.max(tension) <= limits.max_tension):
+        if not (limits.min_tension <= np.min(outputs.tension) and np.max(outputs.tension) <= limits.max_tension):
             return None
-        return replace(template, position=outputs[:, :3], tension=tension)
+        recording = replace(template, position=outputs.position, tension=outputs.tension)
+        return recording if outputs.orientation is None else replace(recording, orientation=outputs.orientation)
 
     def separations(self, recording: Recording) -> list[EffectSeparation]:
         """Separations of each effect from each other along a program, the closest first."""
@@ -244,8 +244,10 @@ def _design_problem(
 ) -> _DesignProblem:
     declared = robot.sensors
     noise = Noise(declared.position_noise or 0.0, declared.tension_noise or 0.0, declared.winch_speed_noise or 0.0, 0.0)
+    if robot.platform.is_rigid_body:
+        noise = replace(noise, rotation=declared.orientation_noise or 0.0)
     likelihood = Likelihood(robot, (), noise, options.interval)
-    sensitivities = effect_sensitivities(robot, robot.platform.start, effects, likelihood.model.state_names)
+    sensitivities = effect_sensitivities(robot, effects, likelihood.model.state_names)
     # Declared noise is the same for all programs: they share what one fitter has compiled.
     return _DesignProblem(robot, effects, options, likelihood, sensitivities, lru_cache(maxsize=1)(Fitter), threads)
 

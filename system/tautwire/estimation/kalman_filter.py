@@ -17,16 +17,18 @@ from ..robot.symbolic_model import SymbolicModel, constants_as_parameters
 from .disturbance import Disturbance, OrnsteinUhlenbeck
 from .disturbance_symbols import DisturbanceSymbols
 from .integration_steps import Substeps
-from .measurement_model import measurement_model
+from .measurement_model import SensorInstant, measurement_model, output_count
 
 
 @dataclass(frozen=True)
 class Noise:
     """Noise levels as standard deviations: position (m), tension (N), winch speed (m/s), and start position (m).
 
+    Of a platform that turns, ``rotation`` (rad) about each axis, ``start_rotation`` (rad), ``start_angular_velocity``
+    (rad/s); ``moment_arm`` (m) turns random accelerations and forces into those about an axis. Without that, None.
     ``rope_lengths`` (n) are errors with a memory (m) of cables whose rope length was recorded in place of a speed. Of a
     start that is not known at rest: its velocity (m/s), how far it is from equilibrium (m), and tensions that hold
-    nothing (N). ``own`` are those of single outputs (3 + n) where they differ from the others of their kind. With a
+    nothing (N). ``own`` are those of single outputs (m) where they differ from the others of their kind. With a
     ``disturbance``, which has a white noise of its own, those of outputs are not used by the filter.
     """
 
@@ -37,20 +39,25 @@ class Noise:
     start_velocity: float = 0.0
     start_stretch: float = 0.0
     self_stress: float = 0.0
+    rotation: float | None = None
+    start_rotation: float = 0.0
+    start_angular_velocity: float = 0.0
+    moment_arm: float = 1.0
     rope_lengths: tuple[OrnsteinUhlenbeck, ...] = ()
     own: tuple[float, ...] = ()
     disturbance: Disturbance | None = None
 
     def of_outputs(self, cable_count: int) -> tuple[float, ...]:
-        """Of x, y, z and each tension."""
-        return self.own or (*[self.position] * 3, *[self.tension] * cable_count)
+        """Of x, y, z, each tension, and where the platform turns its rotation about each axis (m)."""
+        rotations = () if self.rotation is None else (self.rotation,) * 3
+        return self.own or (*[self.position] * 3, *[self.tension] * cable_count, *rotations)
 
     def processes(self, cable_count: int) -> tuple[OrnsteinUhlenbeck, ...]:
         """One for each state behind the model's: errors of recorded rope lengths, and those of the disturbance."""
         return (*self.rope_lengths, *(self.disturbance.processes(cable_count) if self.disturbance else ()))
 
     def white_variances(self, cable_count: int) -> NDArray[np.float64]:
-        """Variances (3 + n,) of the white noise of x, y, z and each tension."""
+        """Variances (m,) of the white noise of x, y, z, each tension, and each rotation."""
         if self.disturbance:
             return self.disturbance.white_variances(cable_count)
         return np.square(self.of_outputs(cable_count))
@@ -59,19 +66,20 @@ class Noise:
 def output_function(model: SymbolicModel, cable_count: int, noise: Noise, has_sensitivities: bool = True) -> Function:
     """Outputs of a predicted state, of disturbance states behind the model's too, with their derivatives.
 
-    Arguments: state, parameters, shift, speed, next speed, time step. Results: x, y, z and the tensions as shown
-    ``shift`` (s) later (m,), and their derivatives by the state (m, n) and by the parameters (m, p). Without
-    sensitivities p is 0, whatever parameters the model has.
+    Arguments: state, parameters, shift, speed, next speed, time step, measured rotation. Results: x, y, z, tensions and
+    rotation from the measured one as shown ``shift`` (s) later (m,), and their derivatives by the state (m, n) and by
+    the parameters (m, p). Without sensitivities p is 0, whatever parameters the model has.
     """
-    disturbance = DisturbanceSymbols(len(noise.rope_lengths), 3 + cable_count if noise.disturbance else 0)
-    state, shift = SX.sym("state", model.states.numel() + disturbance.count), SX.sym("shift", 3 + cable_count)
-    speed, later, step = SX.sym("speed", cable_count), SX.sym("later", cable_count), SX.sym("step")
-    instant = [casadi.vertcat(speed, SX(3, 1)), model.parameters, later, step, shift]
+    disturbance = disturbance_symbols(model, noise)
+    state, instant_symbols = SX.sym("state", model.states.numel() + disturbance.count), SensorInstant.of(model)
+    speed = SX.sym("speed", cable_count)
+    instant = [with_no_wrench(model, speed), model.parameters, *instant_symbols.symbols]
     model_state = disturbance.with_true_lengths(state, model.states.numel())
     outputs = measurement_model(model, cable_count).call([model_state, *instant])
     expected, by_state, by_parameters = disturbance.added_to(outputs, state)
     count = model.parameters.numel() if has_sensitivities else 0
-    arguments = [state, model.parameters, shift, speed, later, step]
+    later, step, shift, measured_rotation = instant_symbols.symbols
+    arguments = [state, model.parameters, shift, speed, later, step, measured_rotation]
     return Function("outputs", arguments, [expected, by_state, by_parameters[:, :count]])
 
 
@@ -93,7 +101,7 @@ def time_update_function(
     and by the parameters (d, p); the factors by which states decay, and the variances that are added to them (n,). The
     model's last ``constant_count`` states are constant.
     """
-    disturbance = DisturbanceSymbols(len(noise.rope_lengths), 3 + cable_count if noise.disturbance else 0)
+    disturbance = disturbance_symbols(model, noise)
     model_size = model.states.numel()
     state = SX.sym("state", model_size + disturbance.count)
     speed, later, step = SX.sym("speed", cable_count), SX.sym("later", cable_count), SX.sym("step")
@@ -101,10 +109,14 @@ def time_update_function(
     interval = _Interval(speed, later, step, substeps)
     moved, transition, direct_sensitivity = _time_update_beside(disturbance, model, constant_count, state, interval)
     process_noise = SX(state.numel(), 1)
-    process_noise[3:6] = acceleration_noise_density**2 * step
+    first_velocity = model.indices.twist.start
+    process_noise[first_velocity : first_velocity + 3] = acceleration_noise_density**2 * step
+    process_noise[first_velocity + 3 : model.indices.twist.stop] = (
+        acceleration_noise_density**2 * step / noise.moment_arm**2
+    )
     for cable in range(cable_count):
         is_length = bool(noise.rope_lengths) and noise.rope_lengths[cable].rms > 0.0
-        process_noise[6 + cable] = 0.0 if is_length else noise.winch_speed**2 * drift
+        process_noise[model.indices.lengths.start + cable] = 0.0 if is_length else noise.winch_speed**2 * drift
     process_noise[model_size:] = disturbance.process_noise(step)
     moving = model_size - constant_count
     count = model.parameters.numel() if has_sensitivities else 0
@@ -136,22 +148,32 @@ def rate_jacobian_function(model: SymbolicModel, cable_count: int) -> Function:
     """
     speed = SX.sym("speed", cable_count)
     by_state = casadi.jacobian(model.rates, model.states)
-    (by_state,) = casadi.substitute([by_state], [model.inputs], [casadi.vertcat(speed, SX.zeros(3))])
+    (by_state,) = casadi.substitute([by_state], [model.inputs], [casadi.densify(with_no_wrench(model, speed))])
     return Function("rate_jacobian", [model.states, model.parameters, speed], [by_state])
 
 
 def simulation_function(model: SymbolicModel, cable_count: int, substeps: Substeps) -> Function:
     """Step of a simulation without noise: the state moves as in :func:`time_update_function`.
 
-    Arguments: state, parameters, speed, next speed, time step. Results: state at the next sample (n,), and x, y, z and
-    the tensions of this one without delay (m,).
+    Arguments: state, parameters, speed, next speed, time step. Results: state at the next sample (n,), and x, y, z,
+    the tensions and the rotation vector of this one without delay (m,).
     """
     speed, later, step = SX.sym("speed", cable_count), SX.sym("later", cable_count), SX.sym("step")
     trajectory = _trajectory(model, model.parameters, model.states, _Interval(speed, later, step, substeps))
-    no_force = SX.zeros(model.inputs.numel() - cable_count)
-    (outputs,) = casadi.substitute([model.outputs], [model.inputs], [casadi.vertcat(speed, no_force)])
-    shown = casadi.vertcat(outputs[:3], outputs[6 : 6 + cable_count])
+    (outputs,) = casadi.substitute([model.outputs], [model.inputs], [casadi.densify(with_no_wrench(model, speed))])
+    indices = model.indices
+    shown = casadi.vertcat(outputs[:3], outputs[indices.tensions], outputs[indices.pose][3:])
     return Function("simulation", [model.states, model.parameters, speed, later, step], [trajectory[-1], shown])
+
+
+def disturbance_symbols(model: SymbolicModel, noise: Noise) -> DisturbanceSymbols:
+    """Symbols of the states behind those of a model."""
+    return DisturbanceSymbols(model.indices, len(noise.rope_lengths), output_count(model) if noise.disturbance else 0)
+
+
+def with_no_wrench(model: SymbolicModel, speed: SX) -> SX:
+    """The inputs of a model at some winch speeds, without an external wrench."""
+    return casadi.vertcat(speed, SX(model.inputs.numel() - speed.numel(), 1))
 
 
 @dataclass(frozen=True)
@@ -217,7 +239,7 @@ def _sensitivities(model: SymbolicModel, theta: SX, trajectory: list[SX], interv
     substep = interval.step / substeps.slope
     for index, (begin, end) in enumerate(interval.parts(substeps.slope)):
         middle = _interpolated(trajectory, (index + 0.5) / substeps.slope)
-        inputs = casadi.vertcat(0.5 * (begin + end), SX(3, 1))
+        inputs = with_no_wrench(model, 0.5 * (begin + end))
         by_state, by_parameters = rate_jacobians(middle, inputs, theta)
         gamma = _integrated_exponential(by_state, substep / 2**substeps.doublings, substeps.order)
         for _ in range(substeps.doublings):
@@ -247,8 +269,7 @@ def _integrated_exponential(rate_jacobian: SX, step: SX, order: int) -> SX:
 def _runge_kutta_step(model: SymbolicModel, cable_count: int) -> Function:
     rates = Function("rates", [model.states, model.inputs, model.parameters], [model.rates])
     begin, end, step = SX.sym("begin", cable_count), SX.sym("end", cable_count), SX.sym("step")
-    no_force = SX(3, 1)
-    at_begin, at_end = casadi.vertcat(begin, no_force), casadi.vertcat(end, no_force)
+    at_begin, at_end = with_no_wrench(model, begin), with_no_wrench(model, end)
     middle = 0.5 * (at_begin + at_end)
     k1 = rates(model.states, at_begin, model.parameters)
     k2 = rates(model.states + 0.5 * step * k1, middle, model.parameters)

@@ -28,6 +28,8 @@ from .disturbance import Disturbance
 from .initial_state_prior import initial_covariance
 from .integration_steps import substeps_of_robot
 from .kalman_filter import Noise
+from .measured_outputs import SimulatedOutputs, measured_outputs, orientations, require_small_rotations
+from .measurement_model import output_count, rotation_count
 from .native_functions import CompiledFunction
 
 Array = NDArray[np.float64]
@@ -102,12 +104,12 @@ class Likelihood:
     ) -> None:
         self.poll_interrupts = poll_interrupts
         self.uncertain = uncertain_parameters(robot)
-        model = symbolic_model(robot, free, self.uncertain)
+        model = symbolic_model(robot, free, self.uncertain, robot.platform.start_orientation)
         self.robot = robot
         self.noise = noise
         self.cable_count = robot.cable_count
         state_count = model.states.numel()
-        has_effect_states = state_count > 6 + robot.cable_count + len(self.uncertain)
+        has_effect_states = state_count > model.indices.lengths.stop + len(self.uncertain)
         substeps = substeps_of_robot(robot, sample_time, state_count, has_effect_states)
         self._filter_functions = CompiledFilter(model, len(self.uncertain), robot.cable_count, noise, substeps)
         self._held_constants = np.zeros(0)
@@ -125,13 +127,14 @@ class Likelihood:
         ``acceleration_noise_density`` (m/s^2 per root hertz) adds process noise, an unknown white acceleration of the
         platform: a fit that starts far from the solution then follows the data instead of losing phase.
         """
+        self._require_small_rotations(recording)
         measured, shift = self._aligned_outputs(recording, parameters)
         observed = np.isfinite(measured)
         filter_segments = self._filter(
             recording, (measured, shift), parameters, self._start_covariance(), acceleration_noise_density
         )
         values, log_variances, sensitivities, last_state = _concatenated(filter_segments)
-        recorded = np.isfinite(recording.measured())
+        recorded = np.isfinite(self._measured(recording))
         values[~recorded] = np.nan
         log_variances[~recorded] = np.nan
         _fill_unaligned(values, log_variances, sensitivities, recorded & ~observed)
@@ -164,9 +167,9 @@ class Likelihood:
 
         What acts on the ropes is computed from these, see :mod:`tautwire.estimation.disturbance_symbols`.
         """
-        size, count = self.model.states.numel(), len(self.noise.rope_lengths)
+        size, count, first = self.model.states.numel(), len(self.noise.rope_lengths), self.model.indices.lengths.start
         model_states = states[:size].copy()
-        model_states[6 : 6 + count] += states[size : size + count]
+        model_states[first : first + count] += states[size : size + count]
         return model_states
 
     def with_disturbance(self, disturbance: Disturbance) -> Likelihood:
@@ -203,9 +206,9 @@ class Likelihood:
             recording, outputs, parameters, covariance, acceleration_noise_density, keeps_covariances
         )
 
-    def simulated_outputs(self, recording: Recording, parameters: Sequence[float] | Array) -> Array:
-        """Simulated outputs without noise, as late as the sensors show them, over a recording's winch speeds (N, m)."""
-        nothing = np.zeros_like(recording.measured())
+    def simulated_outputs(self, recording: Recording, parameters: Sequence[float] | Array) -> SimulatedOutputs:
+        """Simulated outputs without noise, as late as the sensors show them, over a recording's winch speeds."""
+        nothing = np.zeros((recording.sample_count, output_count(self.model)))
         columns, is_recorded = _filter_columns(recording, nothing, nothing)
         theta, (speed, later, step) = self._arguments(parameters), columns[3:6]
         start, _ = self._filter_functions.start(theta)
@@ -214,11 +217,25 @@ class Likelihood:
         )
         lags = np.array(self._filter_functions.lags(theta)).ravel()
         time, shown = recording.time, outputs[:, is_recorded]
-        return np.array([np.interp(time - lag, time, column) for lag, column in zip(lags, shown, strict=True)]).T
+        rows = np.array([np.interp(time - lag, time, column) for lag, column in zip(lags, shown, strict=True)]).T
+        tensions, reference = slice(3, 3 + self.cable_count), self.model.reference_orientation
+        turned = orientations(rows[:, tensions.stop :], reference) if self._is_rigid else None
+        return SimulatedOutputs(rows[:, :3], rows[:, tensions], turned)
+
+    @property
+    def _is_rigid(self) -> bool:
+        return rotation_count(self.model) > 0
+
+    def _measured(self, recording: Recording) -> Array:
+        return measured_outputs(recording, self._is_rigid, self.model.reference_orientation)
+
+    def _require_small_rotations(self, recording: Recording) -> None:
+        if self._is_rigid:
+            require_small_rotations(recording, self.model.reference_orientation)
 
     def _aligned_outputs(self, recording: Recording, parameters: Sequence[float] | Array) -> tuple[Array, Array]:
         lags = np.array(self._filter_functions.lags(self._arguments(parameters))).ravel()
-        return align_delayed_outputs(recording.time, recording.measured(), lags)
+        return align_delayed_outputs(recording.time, self._measured(recording), lags)
 
     def open_loop_variances(self, recording: Recording, parameters: Sequence[float] | Array) -> Array:
         """Variance of measured less simulated, shape (N, m), where the model is right and its start exact.
@@ -226,7 +243,7 @@ class Likelihood:
         Noise of the sensors, and of the recorded winch speeds as it integrates, or errors of the recorded rope lengths
         against that of the first.
         """
-        no_measurements = np.full(recording.measured().shape, np.nan)
+        no_measurements = np.full((recording.sample_count, output_count(self.model)), np.nan)
         outputs = (no_measurements, np.zeros_like(no_measurements))
         filter_segments = self._filter(recording, outputs, parameters, self._start_covariance_of_lengths(), 0.0)
         _, log_variances, *_ = _concatenated(filter_segments)
@@ -242,7 +259,7 @@ class Likelihood:
         acceleration_noise_density: float,
         keeps_covariances: bool = False,
     ) -> Iterator[FilterSegment]:
-        columns, is_recorded = _filter_columns(recording, *outputs)
+        columns, is_recorded = _filter_columns(recording, *outputs, rotation_count(self.model))
         theta = self._arguments(parameters)
         state, sensitivities = self._start(theta)
         now = FilterState(state.ravel(), start_covariance, sensitivities)
@@ -302,7 +319,7 @@ class Likelihood:
         size = self.model.states.numel()
         covariance = np.zeros([size + len(self.noise.processes(self.cable_count))] * 2)
         for cable, error in enumerate(self.noise.rope_lengths):
-            both = np.ix_([6 + cable, size + cable], [6 + cable, size + cable])
+            both = np.ix_(*[[self.model.indices.lengths.start + cable, size + cable]] * 2)
             covariance[both] = error.rms**2 * np.array([[1.0, -1.0], [-1.0, 1.0]])
         return covariance
 
@@ -343,10 +360,13 @@ def align_delayed_outputs(time: Array, measured: Array, lags: Array) -> tuple[Ar
     return values, shift
 
 
-def _filter_columns(recording: Recording, measured: Array, shift: Array) -> tuple[tuple[Array, ...], NDArray[np.bool_]]:
+def _filter_columns(
+    recording: Recording, measured: Array, shift: Array, rotation_columns: int = 0
+) -> tuple[tuple[Array, ...], NDArray[np.bool_]]:
     """The filter's inputs, a column a sample, and whether each is one of the recording's samples.
 
-    A gap in time is filled with samples without measurements, so that no step is longer than usual.
+    The last ``rotation_columns`` of what was measured are rotation vectors, from which what is measured is zero. A gap
+    in time is filled with samples without measurements, so that no step is longer than usual.
     """
     steps = np.diff(recording.time)
     step_counts = np.maximum(np.ceil(steps / (MAX_STEP_TO_MEDIAN * np.median(steps))), 1).astype(int)
@@ -364,5 +384,17 @@ def _filter_columns(recording: Recording, measured: Array, shift: Array) -> tupl
     speeds = (speed, np.hstack([speed[:, 1:], speed[:, -1:]]))
     is_recorded = np.zeros(len(time), dtype=bool)
     is_recorded[rows] = True
-    columns = (measured_columns, observed_columns, shift_columns, *speeds, step[None, :], drift[None, :])
+    rotation = _without_gaps(measured_columns, observed_columns, rotation_columns)
+    columns = (measured_columns, observed_columns, shift_columns, *speeds, step[None, :], drift[None, :], rotation)
     return tuple(np.asfortranarray(column) for column in columns), is_recorded
+
+
+def _without_gaps(measured: Array, observed: Array, count: int) -> Array:
+    """The last ``count`` rows (count, K) of what was measured, interpolated in gaps, and zero there from now on."""
+    first = len(measured) - count
+    rotation, samples = measured[first:].copy(), np.arange(measured.shape[1])
+    measured[first:] = 0.0
+    for row, is_observed in zip(rotation, observed[first:] > 0.0, strict=True):
+        if np.any(is_observed):
+            row[:] = np.interp(samples, samples[is_observed], row[is_observed])
+    return rotation

@@ -8,6 +8,10 @@ with the rates ``f`` and their Jacobians ``F`` and ``f_u`` at ``x``. Its derivat
 back with ``F`` and ``f_p`` as they are at ``x``:
 
     y_x = h_x (I - d F (I - d F / 2))        y_p = h_p - d h_x (I - d F / 2) f_p - dy/dt dd/dp
+
+An orientation is an output by its difference to the measured one q, ``log(exp(r) q^-1)`` with the state's rotation
+vector r, as in a multiplicative extended Kalman filter: what is measured of that is zero, whatever the orientation.
+Source: Markley (2003), Journal of Guidance, Control, and Dynamics 26(2), 311-317.
 """
 
 from __future__ import annotations
@@ -17,7 +21,11 @@ from dataclasses import dataclass
 import casadi
 from casadi import SX, Function
 
-from ..robot.symbolic_model import SymbolicModel
+from tautwire_fmu.laws.rotation import multiply, quaternion_of, rotation_vector_of
+from tautwire_fmu.laws.vectors import Vector, scale
+
+from ..robot.platform_symbols import vector_of
+from ..robot.symbolic_model import CASADI_MATHEMATICS, SymbolicModel
 
 
 @dataclass(frozen=True)
@@ -31,46 +39,91 @@ class _Motion:
     by_parameters: SX
 
 
-def delayed_outputs(model: SymbolicModel, cable_count: int, next_speed: SX, step: SX, shift: SX) -> SX:
+@dataclass(frozen=True)
+class SensorInstant:
+    """What outputs depend on beside the model: a sample's instant, its symbols in the order of their columns.
+
+    ``next_speed`` (n) are the winch speeds at the next sample, in ``step`` seconds; a sensor shows the state ``shift``
+    (m) seconds later; ``measured_rotation`` (3) is what the tracker shows of a platform that turns, as a rotation
+    vector in rad, empty for a point mass.
+    """
+
+    next_speed: SX
+    step: SX
+    shift: SX
+    measured_rotation: SX
+
+    @classmethod
+    def of(cls, model: SymbolicModel) -> SensorInstant:
+        """New symbols for a model."""
+        return cls(
+            SX.sym("later", model.indices.cable_count),
+            SX.sym("step"),
+            SX.sym("shift", output_count(model)),
+            SX.sym("measured_rotation", rotation_count(model)),
+        )
+
+    @property
+    def symbols(self) -> list[SX]:
+        """All of them."""
+        return [self.next_speed, self.step, self.shift, self.measured_rotation]
+
+
+def output_count(model: SymbolicModel) -> int:
+    """Number m of outputs: x, y, z, tensions, and where the platform turns its rotation about each axis."""
+    return int(model.sensor_delays.numel())
+
+
+def rotation_count(model: SymbolicModel) -> int:
+    """Number of rotations among the outputs: three where the platform turns, else none."""
+    return model.indices.degrees_of_freedom - 3
+
+
+def delayed_outputs(model: SymbolicModel, cable_count: int, instant: SensorInstant) -> SX:
     """Outputs of the sensors ``shift`` (s) after this sample: of a state ``lag - shift`` before it, where they lag.
 
-    That is at most half a sample. ``next_speed`` are the winch speeds at the next sample, in ``step`` seconds.
+    That is at most half a sample.
     """
-    motion, delays = _motion(model, cable_count, next_speed, step), model.sensor_delays - shift
-    outputs = casadi.vertsplit(_sensor_outputs(model, cable_count))
+    motion = _motion(model, cable_count, instant.next_speed, instant.step)
+    delays = model.sensor_delays - instant.shift
+    outputs = casadi.vertsplit(_sensor_outputs(model, instant.measured_rotation))
     for index in _lagging_sensors(model):
-        read = Function("read", [model.states, model.inputs, model.parameters], [outputs[index]])
-        outputs[index] = read(*_delayed_arguments(model, motion, delays[index]), model.parameters)
+        arguments = [model.states, model.inputs, model.parameters, instant.measured_rotation]
+        read = Function("read", arguments, [outputs[index]])
+        outputs[index] = read(*_delayed_arguments(model, motion, delays[index]), *arguments[2:])
     return casadi.vertcat(*outputs)
 
 
 def measurement_model(model: SymbolicModel, cable_count: int) -> Function:
     """Measurement model: outputs of the sensors with their derivatives.
 
-    Arguments: state, inputs, parameters, next winch speeds, time step, shift. Results: as :func:`delayed_outputs`, and
-    its derivatives by the state (m, n) and by the parameters (m, p).
+    Arguments: state, inputs, parameters, and the symbols of a :class:`SensorInstant`. Results: as
+    :func:`delayed_outputs`, and its derivatives by the state (m, n) and by the parameters (m, p).
     """
-    later, step, shift = SX.sym("later", cable_count), SX.sym("step"), SX.sym("shift", 3 + cable_count)
+    instant = SensorInstant.of(model)
     arguments = [model.states, model.inputs, model.parameters]
-    outputs = _sensor_outputs(model, cable_count)
+    outputs = _sensor_outputs(model, instant.measured_rotation)
     results = [outputs, casadi.jacobian(outputs, model.states), casadi.jacobian(outputs, model.parameters)]
     if _lagging_sensors(model):
-        motion, delays = _motion(model, cable_count, later, step), model.sensor_delays - shift
-        lag_sensitivities = casadi.jacobian(model.sensor_delays, model.parameters)
+        motion = _motion(model, cable_count, instant.next_speed, instant.step)
         rows = list(zip(*map(casadi.vertsplit, results), strict=True))
         for index in _lagging_sensors(model):
-            rows[index] = _delayed_row(model, outputs[index], motion, delays[index], lag_sensitivities[index, :])
+            rows[index] = _delayed_row(model, instant, motion, index, outputs[index])
         results = [casadi.vertcat(*column) for column in zip(*rows, strict=True)]
-    return Function("sensing", [*arguments, later, step, shift], results)
+    return Function("sensing", [*arguments, *instant.symbols], results)
 
 
 def _delayed_row(
-    model: SymbolicModel, output: SX, motion: _Motion, delay: SX, delay_sensitivity: SX
+    model: SymbolicModel, instant: SensorInstant, motion: _Motion, index: int, output: SX
 ) -> tuple[SX, SX, SX]:
     """One sensor's delayed output with its derivatives."""
-    arguments = [model.states, model.inputs, model.parameters]
-    read = Function("read", arguments, [output, *(casadi.jacobian(output, symbol) for symbol in arguments)])
-    value, by_state, by_inputs, by_parameters = read(*_delayed_arguments(model, motion, delay), model.parameters)
+    delay = model.sensor_delays[index] - instant.shift[index]
+    delay_sensitivity = casadi.jacobian(model.sensor_delays[index], model.parameters)
+    variables, fixed = [model.states, model.inputs, model.parameters], instant.measured_rotation
+    results = [output, *(casadi.jacobian(output, symbol) for symbol in variables)]
+    read = Function("read", [*variables, fixed], results)
+    delayed = _delayed_arguments(model, motion, delay)
+    value, by_state, by_inputs, by_parameters = read(*delayed, model.parameters, fixed)
     half_delayed = by_state - 0.5 * delay * casadi.mtimes(by_state, motion.by_state)
     delayed_by_state = by_state - delay * casadi.mtimes(half_delayed, motion.by_state)
     output_rate = casadi.mtimes(by_state, motion.rates - delay * motion.acceleration) + casadi.mtimes(
@@ -103,8 +156,20 @@ def _motion(model: SymbolicModel, cable_count: int, next_speed: SX, step: SX) ->
     )
 
 
-def _sensor_outputs(model: SymbolicModel, cable_count: int) -> SX:
-    return casadi.vertcat(model.outputs[:3], model.outputs[6 : 6 + cable_count])
+def _sensor_outputs(model: SymbolicModel, measured_rotation: SX) -> SX:
+    """Positions, tensions, and the small rotation that takes the measured orientation to the state's, in rad."""
+    outputs = [model.outputs[:3], model.outputs[model.indices.tensions]]
+    if rotation_count(model):
+        rotation = model.outputs[model.indices.pose][3:]
+        outputs += rotation_between(vector_of(measured_rotation), vector_of(rotation))
+    return casadi.vertcat(*outputs)
+
+
+def rotation_between(start: Vector, end: Vector) -> Vector:
+    """Rotation vector, in rad, from one rotation vector's orientation to another's: ``log(exp(end) exp(-start))``."""
+    turned = quaternion_of(CASADI_MATHEMATICS, end)
+    back = quaternion_of(CASADI_MATHEMATICS, scale(-1.0, start))
+    return rotation_vector_of(CASADI_MATHEMATICS, multiply(turned, back))
 
 
 def _lagging_sensors(model: SymbolicModel) -> list[int]:

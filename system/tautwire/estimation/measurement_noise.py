@@ -12,8 +12,10 @@ from scipy.signal import spectrogram
 
 from ..recordings.recording import Recording
 from ..recordings.white_noise_estimate import white_noise_deviation
+from ..robot.rigid_equilibrium import platform_size
 from ..robot.schema import Robot
 from .kalman_filter import Noise
+from .measured_outputs import measured_outputs, output_names, rotation_vectors
 from .policy import DEFAULT_POLICY
 from .preprocessing_policy import NoiseCheckPolicy
 
@@ -56,6 +58,7 @@ def is_flat(levels: Sequence[Array], max_band_ratio: float) -> bool:
 
 INITIAL_POSITION_SIGMAS = 3.0
 UNMEASURED_INITIAL_DEVIATION = 1e-3
+UNMEASURED_ROTATION_NOISE = 1e-3
 
 
 def estimate_noise(robot: Robot, recording: Recording) -> Noise:
@@ -65,12 +68,32 @@ def estimate_noise(robot: Robot, recording: Recording) -> Noise:
     """
     position = robot.sensors.position_noise or white_noise_deviation(recording.position)
     speed = robot.sensors.winch_speed_noise
+    rotation = _rotation_noise(robot, recording) if robot.platform.is_rigid_body else None
     return Noise(
         position=position,
         tension=robot.sensors.tension_noise or white_noise_deviation(recording.tension),
         winch_speed=white_noise_deviation(recording.winch_speed) if speed is None else speed,
+        rotation=rotation,
+        moment_arm=rotation_scale(robot),
+        start_rotation=INITIAL_POSITION_SIGMAS * (rotation or 0.0)
+        if recording.has_orientation
+        else UNMEASURED_INITIAL_DEVIATION / rotation_scale(robot),
         start_position=INITIAL_POSITION_SIGMAS * position if recording.has_position else UNMEASURED_INITIAL_DEVIATION,
     )
+
+
+def _rotation_noise(robot: Robot, recording: Recording) -> float:
+    """Standard deviation of a measured rotation about each axis, in rad."""
+    if robot.sensors.orientation_noise:
+        return robot.sensors.orientation_noise
+    if not recording.has_orientation:
+        return UNMEASURED_ROTATION_NOISE
+    return white_noise_deviation(rotation_vectors(recording.orientation))
+
+
+def rotation_scale(robot: Robot) -> float:
+    """Length in m by which forces and motion of a platform become moments and rotations; 1 for a point mass."""
+    return platform_size(robot) if robot.platform.is_rigid_body else 1.0
 
 
 @dataclass(frozen=True)
@@ -96,10 +119,13 @@ def check_noise(
     """
     checked = CheckedNoise(noise)
     positions, tensions = range(3), range(3, 3 + robot.cable_count)
+    rotations = range(tensions.stop, tensions.stop + 3)
     if robot.sensors.position_noise is not None:
         checked = _check_sensor_kind(checked, recordings, positions, "m", policy)
     if robot.sensors.tension_noise is not None:
         checked = _check_sensor_kind(checked, recordings, tensions, "N", policy)
+    if robot.platform.is_rigid_body and robot.sensors.orientation_noise is not None:
+        checked = _check_sensor_kind(checked, recordings, rotations, "rad", policy)
     speed_levels = [level for r in recordings for c in r.winch_speed.T if (level := noise_levels(c)) is not None]
     if not robot.sensors.winch_speed_noise or not speed_levels:
         return checked
@@ -120,14 +146,14 @@ def _check_sensor_kind(
     deviations = list(declared)
     levels = {}
     for column in columns:
-        spectra = [level for r in recordings if (level := noise_levels(r.measured()[:, column])) is not None]
+        spectra = [level for r in recordings if (level := noise_levels(_signal(r, column))) is not None]
         if spectra:
             levels[column] = np.mean(spectra, axis=0)
     if not levels:
         return checked
     flat = is_flat(list(levels.values()), policy.max_band_ratio)
     for column, level in levels.items():
-        name = recordings[0].channel_names[column]
+        name = output_names(recordings[0].cable_count, is_rigid=True)[column]
         floor = float(np.sqrt(np.mean(level) if flat else np.min(level)))
         if not flat and floor < declared[column] / policy.min_colour_ratio:
             standstill = _standstill_statistics(recordings, column, checked.noise.winch_speed, policy)
@@ -158,6 +184,11 @@ def _check_sensor_kind(
     return CheckedNoise(replace(checked.noise, own=tuple(deviations)), is_coloured, (*checked.notes, *notes))
 
 
+def _signal(recording: Recording, column: int) -> Array:
+    """One output (N,); of orientations a rotation from the first."""
+    return measured_outputs(recording, is_rigid=True)[:, column]
+
+
 def _replacement_finding(declared: float, measured: float, unit: str) -> str:
     return f"declared noise {declared:.3g} {unit}, spectral noise floor {measured:.3g} {unit}: the latter is used"
 
@@ -168,7 +199,7 @@ def _standstill_statistics(
     """Standard deviation and lag-one autocorrelation in the longest standstill; None without one long enough."""
     longest = np.zeros(0)
     for recording in recordings:
-        signal = recording.measured()[:, column]
+        signal = _signal(recording, column)
         at_rest = np.all(np.abs(recording.winch_speed) <= policy.standstill_sigmas * winch_speed_noise, axis=1)
         is_at_standstill = at_rest & np.isfinite(signal)
         edges = np.flatnonzero(np.diff(np.concatenate([[0], is_at_standstill.astype(int), [0]])))

@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 
 from .estimation_data import DataSet
 from .likelihood import Likelihood
+from .measured_outputs import measured_outputs
 
 Array = NDArray[np.float64]
 
@@ -28,7 +29,7 @@ def compressed_residuals(
 
     A sample that a sensor delay leaves without a state counts as noise, as in the likelihood's innovations.
     """
-    is_measured = np.isfinite(sample.recording.measured())
+    is_measured = np.isfinite(measured_outputs(sample.recording, likelihood.robot.platform.is_rigid_body))
     count = len(values)
     fisher_information, score, sum_of_squares = np.zeros((count, count)), np.zeros(count), 0.0
     next_row = 0

@@ -13,7 +13,6 @@ from scipy.optimize import least_squares
 from tautwire_fmu.laws.effects import BY_NAME, Parameter
 
 from ..errors import TautwireError, UnreachableError
-from ..robot.measured_start import with_measured_start
 from ..robot.schema import Robot
 from ..robot.symbolic_model import FORMULA_INDEX, FreeParameter
 from .disturbance import NEUTRAL, Disturbance
@@ -184,7 +183,7 @@ class Fitter:
     def _compiled_likelihood(self, robot: Robot, free: Sequence[FreeParameter], data: DataSet) -> Likelihood:
         self.poll_interrupts()
         interval = float(np.median(np.diff(data.recording.time)))
-        robot = with_measured_start(robot, data.start)
+        robot = data.placed(robot)
         structure = with_values(robot, free, dict.fromkeys(free, 0.0))
         key = (structure, tuple(free), round(interval, 9))
         if key not in self._compiled:

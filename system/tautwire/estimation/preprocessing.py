@@ -24,7 +24,7 @@ from ..recordings.outliers import without_outliers
 from ..recordings.recording import Recording, require_outputs
 from ..recordings.rope_length_smoothing import LengthSmoothing, length_smoothing
 from ..recordings.standing_winches import without_noise_of_standing_winches
-from ..robot.schema import Robot, require_point_mass
+from ..robot.schema import Robot
 from ..robot.uncertain_parameters import is_surveyed
 from .clock_offsets import with_clocks_set
 from .disturbance_fit import with_fitted_disturbance
@@ -95,7 +95,6 @@ def prepare_recordings(
     Raises RecordingError where a recording has no output that carries information, has samples that are too far apart,
     or is not to be trusted.
     """
-    require_point_mass(robot.name, robot)
     cleaned: list[Recording] = []
     notes: tuple[str, ...] = ()
     for recording in (fit,) if check is None else (fit, check):

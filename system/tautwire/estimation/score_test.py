@@ -22,7 +22,6 @@ from numpy.typing import NDArray
 
 from tautwire_fmu.laws.effects import Effect
 
-from ..robot.measured_start import with_measured_start
 from ..robot.schema import Robot
 from .estimation_data import DataSet
 from .hypotheses import PLATFORM_SENSOR_FORMS, Hypothesis, free_parameters
@@ -114,7 +113,7 @@ def score_statistics(
     free = free_parameters(robot, accepted)
     settings = [robot.effects[f.effect_index] for f in free]
     columns = [SensitivityColumn(s.name, s.cables, f.name, 0) for s, f in zip(settings, free, strict=True)]
-    effects = effect_sensitivities(robot, data.start, hypotheses, likelihood.model.state_names)
+    effects = effect_sensitivities(data.placed(robot), hypotheses, likelihood.model.state_names)
     runs = linearise_filter(likelihood, values, data.recording, acceleration_noise_density)
     return statistics_of_runs(runs, effects, data.rows, columns, values)
 
@@ -174,10 +173,9 @@ def _without_non_finite(statistics: ScoreStatistics) -> ScoreStatistics:
 
 
 def effect_sensitivities(
-    robot: Robot, start: tuple[float, float, float], hypotheses: Sequence[Hypothesis], state_names: Sequence[str]
+    robot_at_start: Robot, hypotheses: Sequence[Hypothesis], state_names: Sequence[str]
 ) -> tuple[EffectSensitivities, ...]:
-    """Sensitivities to each effect of some hypotheses, of a robot that starts at ``start`` (m) with those states."""
-    robot_at_start = with_measured_start(robot, start)
+    """Sensitivities to each effect of some hypotheses, of a robot placed at its start with those states."""
     found = []
     for effect in dict.fromkeys(hypothesis.effect for hypothesis in hypotheses):
         of_effect = [hypothesis for hypothesis in hypotheses if hypothesis.effect is effect]

@@ -22,7 +22,7 @@ from numpy.typing import NDArray
 from ..errors import UnreachableError
 from ..recordings.recording import Recording
 from ..recordings.start_position import with_start
-from ..robot.measured_start import with_measured_start, with_true_start
+from ..robot.measured_start import with_true_start
 from ..robot.schema import InitialState, Robot
 from ..robot.static_equilibrium import static_tensions
 from ..robot.symbolic_model import SymbolicModel
@@ -42,6 +42,7 @@ from .hypotheses import Hypothesis
 from .innovation_sensitivities import linearise_filter
 from .kalman_filter import Noise
 from .likelihood import Likelihood
+from .measured_outputs import orientations
 from .parameter_fit import NORMAL_QUANTILE_95, Fitter
 from .trace_result import FoundEffect
 
@@ -99,7 +100,7 @@ class Calibration:
 
     def without_sensor_errors(self, recording: Recording) -> Recording:
         """The recording without the estimated constant errors of its sensors."""
-        errors = sensor_errors(self.parameters, self.estimates.tolist(), recording.tension.shape[1])
+        errors = sensor_errors(self.parameters, self.estimates.tolist(), recording.cable_count)
         gains, offsets = np.array(errors.gains), np.array(errors.offsets)
         if np.all(gains == 1.0) and not np.any(offsets):
             return recording
@@ -182,12 +183,13 @@ def calibrated_robot(fitter: Fitter, robot: Robot, sample: DataSet) -> Robot:
 
 def is_initial_state_uncertain(noise: Noise) -> bool:
     """Whether the initial state is uncertain beyond the sensors' noise."""
-    return max(noise.start_velocity, noise.start_stretch, noise.self_stress) > 0.0
+    deviations = (noise.start_velocity, noise.start_stretch, noise.self_stress, noise.start_angular_velocity)
+    return max(deviations) > 0.0
 
 
 def with_initial_state(fitter: Fitter, robot: Robot, sample: DataSet) -> Robot:
     """The robot with the smoothed initial state of a recording; at rest where the recording starts at rest."""
-    robot_at_start = with_true_start(with_measured_start(robot, sample.start))
+    robot_at_start = with_true_start(sample.placed(robot))
     if not is_initial_state_uncertain(fitter.noise):
         return robot_at_start
     likelihood, values = fitter.likelihood(robot, (), sample)
@@ -195,11 +197,19 @@ def with_initial_state(fitter: Fitter, robot: Robot, sample: DataSet) -> Robot:
     in_plane, start = robot.axes_in_plane, robot_at_start.platform.start
     # Ropes in a plane cannot hold the platform beside it, where noise shows it.
     x, y, z = (float(state[axis]) if axis in in_plane else start[axis] for axis in range(3))
-    vx, vy, vz = state[3:6].tolist()
+    indices, model = likelihood.model.indices, likelihood.model
+    vx, vy, vz, *turning = state[indices.twist].tolist()
     smoothed_robot = with_start(robot_at_start, (x, y, z))
     velocity = (vx, vy, vz) if fitter.noise.start_velocity > 0.0 else (0.0, 0.0, 0.0)
-    extra_tensions = _static_tensions_of(likelihood.model, state, robot.cable_count) - static_tensions(smoothed_robot)
-    return replace(smoothed_robot, initial_state=InitialState(velocity, tuple(extra_tensions.tolist())))
+    initial_state = InitialState(velocity, (0.0,) * robot.cable_count)
+    if turning:
+        w, x, y, z = orientations(state[indices.pose][None, 3:], model.reference_orientation)[0].tolist()
+        wx, wy, wz = turning
+        initial_state = replace(initial_state, orientation=(w, x, y, z), angular_velocity=(wx, wy, wz))
+        platform = replace(smoothed_robot.platform, start_orientation=(w, x, y, z))
+        smoothed_robot = replace(smoothed_robot, platform=platform)
+    extra_tensions = _static_tensions_of(model, state, robot.cable_count) - static_tensions(smoothed_robot)
+    return replace(smoothed_robot, initial_state=replace(initial_state, tensions=tuple(extra_tensions.tolist())))
 
 
 def initial_state_note(robot: Robot, path: str) -> tuple[str, ...]:
@@ -232,7 +242,7 @@ def _smoothed_initial_state(likelihood: Likelihood, values: list[float], sample:
 def _static_tensions_of(model: SymbolicModel, state: Array, cable_count: int) -> Array:
     """Static tensions of the ropes (n,) in N with platform and winches held at a state's position."""
     static_state = state[: model.states.numel()].copy()
-    static_state[3:6] = 0.0
+    static_state[model.indices.twist] = 0.0
     tensions = casadi.Function("tensions", [model.states, model.inputs], [model.span_tensions])
-    result: Array = np.array(tensions(static_state, np.zeros(cable_count + 3))).ravel()
+    result: Array = np.array(tensions(static_state, np.zeros(model.inputs.numel()))).ravel()
     return result

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Literal
 
 import numpy as np
@@ -92,20 +92,33 @@ class Candidate:
 class Errors:
     """Root mean squares of residuals: positions in m over each axis and all, tensions in N over each cable and all.
 
-    NaN where nothing was measured; ``axes`` has shape (3,), ``cables`` (n,).
+    NaN where nothing was measured; ``axes`` has shape (3,), ``cables`` (n,). Of a platform that turns also those of the
+    rotations between measured and simulated orientation, in rad about each axis, ``rotations`` (3,), and about all.
     """
 
     position_rms: float
     tension_rms: float
     axes: Array
     cables: Array
+    orientation_rms: float = float("nan")
+    rotations: Array = field(default_factory=lambda: np.zeros(0))
+
+    @property
+    def by_kind(self) -> tuple[float, float, float]:
+        """Those of positions, tensions and rotations."""
+        return self.position_rms, self.tension_rms, self.orientation_rms
+
+    @property
+    def by_output(self) -> Array:
+        """Those of each output, (m,)."""
+        return np.concatenate([self.axes, self.cables, self.rotations])
 
 
 @dataclass(frozen=True)
 class Comparison:
     """One recording beside the co-simulations of the robot before and after; ``role`` is "fit" or "check".
 
-    ``innovations`` (N, 3 + n) are the whitened one-step prediction errors under the robot after, NaN where nothing was
+    ``innovations`` (N, m) are the whitened one-step prediction errors under the robot after, NaN where nothing was
     measured.
     """
 
@@ -178,13 +191,13 @@ class Trace:
 
     ``correlations`` are those of each two parameters of the effects. ``noise_floor`` is what noise of the sensors and
     of the recorded winch speeds would leave; ``normalised_innovation_variance`` is the mean square of the whitened
-    innovations of each output (x, y, z, tensions) under the final model on unseen data, shape (3 + n,), 1 where the
-    residual is white noise, and ``autocorrelations`` the largest correlation of each with itself, and what noise stays
-    below, as :func:`residual_analysis.largest_autocorrelations` gives them. ``identifiability`` is what those data
-    could have shown beside the effects; empty where the model leaves more than noise. ``components`` tells where the
-    fit recording errs, before any effect is fitted. ``disturbance`` is what had to be assumed beside white noise; with
-    one, ``left_share`` is the part of what was missed that no effect explains, and ``small_effects`` are those that
-    explain too little to matter. ``untried`` are sentences on what there was no time for.
+    innovations of each output (x, y, z, tensions, rotations) under the final model on unseen data, shape (m,), 1 where
+    the residual is white noise, and ``autocorrelations`` the largest correlation of each with itself, and what noise
+    stays below, as :func:`residual_analysis.largest_autocorrelations` gives them. ``identifiability`` is what those
+    data could have shown beside the effects; empty where the model leaves more than noise. ``components`` tells where
+    the fit recording errs, before any effect is fitted. ``disturbance`` is what had to be assumed beside white noise;
+    with one, ``left_share`` is the part of what was missed that no effect explains, and ``small_effects`` are those
+    that explain too little to matter. ``untried`` are sentences on what there was no time for.
     """
 
     verdict: Verdict

@@ -252,6 +252,7 @@ def _rotation_resource(robot: Robot) -> dict[str, Any]:
         "inertia": [list(row) for row in robot.platform.inertia],
         "centre_of_mass": list(robot.platform.centre_of_mass),
         "start_orientation": list(start_orientation(robot)),
+        "start_angular_velocity": list(assemble_robot(robot).angular_velocity),
         "attachments": [list(attachment) for attachment in robot.attachments],
         "start_attachments": [list(attachment) for attachment in start_attachments(robot)],
     }

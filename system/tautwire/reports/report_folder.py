@@ -10,6 +10,7 @@ from typing import Any
 
 from ..estimation.disturbance import Disturbance
 from ..estimation.localisation.component_residuals import ComponentResidual
+from ..estimation.measured_outputs import output_names
 from ..estimation.trace_result import Detectable, Errors, FoundEffect, Trace
 from ..fmus.packaging import RobotFmus, build_fmus, with_user_fmus_copied
 from ..json_document import json_value, write_json
@@ -83,6 +84,8 @@ def _disturbance(disturbance: Disturbance | None, recording: Recording) -> dict[
         "tension": disturbance.tension if disturbance and recording.has_tension else None,
         "position": disturbance.position if disturbance and recording.has_position else None,
     }
+    if recording.has_orientation:
+        processes["orientation"] = disturbance.rotation if disturbance else None
     sizes = {f"{name}_rms": process.rms if process else None for name, process in processes.items()}
     force, *others = ((name, process.bandwidth if process else None) for name, process in processes.items())
     return {**sizes, "bandwidth_hz": force[1], **{f"{name}_bandwidth_hz": bandwidth for name, bandwidth in others}}
@@ -117,9 +120,14 @@ def _errors_by_role(trace: Trace, field: str) -> dict[str, Any]:
 
 
 def _errors(errors: Errors | None, cable_count: int) -> dict[str, Any]:
-    """Root mean square errors in m and N; all None where ``errors`` is None."""
+    """Root mean square errors in m, N and rad; all None where ``errors`` is None, without rad for a point mass."""
     axes: Iterable[float] = errors.axes if errors else [math.nan] * len(AXES)
-    return {
+    turning = (
+        {"orientation_rms": errors.orientation_rms, "rotations": dict(zip(AXES, errors.rotations, strict=True))}
+        if errors is not None and len(errors.rotations)
+        else {}
+    )
+    return turning | {
         "position_rms": errors.position_rms if errors else None,
         "tension_rms": errors.tension_rms if errors else None,
         "axes": dict(zip(AXES, axes, strict=True)),
@@ -128,7 +136,7 @@ def _errors(errors: Errors | None, cable_count: int) -> dict[str, Any]:
 
 
 def _by_output(trace: Trace, values: Iterable[float]) -> dict[str, float]:
-    names = [*AXES, *(f"tension_{cable}" for cable in trace.robot_before.cable_numbers)]
+    names = output_names(trace.robot_before.cable_count, trace.robot_before.platform.is_rigid_body)
     return dict(zip(names, values, strict=True))
 
 

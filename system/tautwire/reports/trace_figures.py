@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from ..estimation.measured_outputs import output_residuals
 from ..estimation.trace_result import Comparison, Trace
 from ..number_format import format_significant
 from ..recordings.sensor_gaps import bridge_short_gaps
@@ -29,7 +30,7 @@ from .robot_scene import (
     measured_path,
     scene_data,
 )
-from .trace_texts import MeasuredOutput, axis_outputs, cable_outputs
+from .trace_texts import MeasuredOutput, output_groups
 
 Array = NDArray[np.float64]
 
@@ -49,8 +50,8 @@ def trace_page_data(trace: Trace) -> dict[str, Any]:
 
 
 def measured_outputs(trace: Trace) -> list[MeasuredOutput]:
-    """All measured outputs in the order of a recording: axes, then cables."""
-    return [*axis_outputs(), *cable_outputs(trace.robot_before.cable_count)]
+    """All measured outputs in the order of the residuals: axes, cables, then rotations."""
+    return [output for _, parts in output_groups(trace.robot_before) for output in parts]
 
 
 def noise_deviation(trace: Trace, output: MeasuredOutput) -> tuple[float, bool]:
@@ -59,7 +60,8 @@ def noise_deviation(trace: Trace, output: MeasuredOutput) -> tuple[float, bool]:
     Where it does not, the trace's noise floor of that output is returned.
     """
     sensors = trace.robot_before.sensors
-    declared = sensors.position_noise if output.errors_key[0] == "axes" else sensors.tension_noise
+    by_field = {"axes": sensors.position_noise, "cables": sensors.tension_noise, "rotations": sensors.orientation_noise}
+    declared = by_field[output.errors_key[0]]
     if declared is not None:
         return output.scale * declared, True
     return output.error_of(trace.noise_floor), False
@@ -91,9 +93,10 @@ def _channel_data(
 ) -> dict[str, Any]:
     """Residuals of one output, measured minus model, and their spectra; None where it was not measured."""
     time = comparison.recording.time
-    measured = comparison.recording.measured()[:, index]
-    before = output.scale * (measured - comparison.before.measured()[:, index])
-    after = output.scale * (measured - comparison.after.measured()[:, index])
+    before, after = (
+        output.scale * output_residuals(comparison.recording, run)[:, index]
+        for run in (comparison.before, comparison.after)
+    )
     sigma, _ = noise_deviation(trace, output)
     description = {
         "label": output.label,

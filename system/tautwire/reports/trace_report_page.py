@@ -20,14 +20,10 @@ from . import inline_charts as charts
 from .page_rendering import Label, Number, PageHeader, Row, render_page
 from .trace_figures import ROLE_LABELS, measured_outputs, noise_deviation, trace_page_data
 from .trace_texts import (
-    POSITION,
     ROLES,
-    TENSION,
     VERDICTS,
     MeasuredOutput,
     alternative_texts,
-    axis_outputs,
-    cable_outputs,
     cables_text,
     candidates_by_round,
     comparison_by_role,
@@ -36,6 +32,7 @@ from .trace_texts import (
     format_estimate,
     format_evidence,
     noise_sentence,
+    output_groups,
     separating_commands,
     undetectable_effects,
     values_text,
@@ -100,7 +97,7 @@ def trace_page(trace: Trace, links: Mapping[str, str], provenance: Provenance | 
 
 def _total_error_rows(trace: Trace) -> list[Row]:
     """Errors before and after over all axes and all cables, for each recording."""
-    outputs = [output for output in (POSITION, TENSION) if _is_measured(trace, output)]
+    outputs = [total for total, _ in output_groups(trace.robot_before) if _is_measured(trace, total)]
     return [row for role in ROLES for row in _error_rows(trace, role, outputs, f"{role.capitalize()}, ")]
 
 
@@ -133,7 +130,7 @@ def _error_rows(trace: Trace, role: str, outputs: Sequence[MeasuredOutput], pref
 
 def _shared_scale(trace: Trace, output: MeasuredOutput) -> tuple[float, float]:
     """One scale for all charts of a unit: from below the minimum to above the maximum."""
-    scale_outputs = [*axis_outputs(), POSITION, *cable_outputs(trace.robot_before.cable_count), TENSION]
+    scale_outputs = [each for total, parts in output_groups(trace.robot_before) for each in (*parts, total)]
     errors = [trace.noise_floor]
     for each in trace.comparisons:
         errors += [each.errors_before, each.errors_after]
@@ -297,7 +294,8 @@ def _panels_by_quantity(trace: Trace) -> dict[str, list[tuple[int, str]]]:
     outputs = [(index, output) for index, output in enumerate(measured_outputs(trace)) if _is_measured(trace, output)]
     return {
         title: [(index, output.label) for index, output in outputs if output.errors_key[0] == field]
-        for title, field in (("Position", "axes"), ("Tension", "cables"))
+        for title, field in (("Position", "axes"), ("Tension", "cables"), ("Orientation", "rotations"))
+        if field != "rotations" or trace.robot_before.platform.is_rigid_body
     }
 
 

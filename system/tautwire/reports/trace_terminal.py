@@ -14,14 +14,10 @@ from ..errors import one_line
 from ..estimation.trace_result import Candidate, Trace
 from ..number_format import format_percent, format_significant
 from .trace_texts import (
-    POSITION,
     ROLES,
-    TENSION,
     VERDICTS,
     MeasuredOutput,
     alternative_texts,
-    axis_outputs,
-    cable_outputs,
     cables_text,
     candidates_by_round,
     comparison_by_role,
@@ -30,6 +26,7 @@ from .trace_texts import (
     format_estimate,
     format_evidence,
     noise_sentence,
+    output_groups,
     separating_commands,
     undetectable_effects,
     values_text,
@@ -85,10 +82,7 @@ def _error_table(trace: Trace) -> Table:
         table.add_column("\nafter", justify="right", no_wrap=True)
     table.add_column("noise\nfloor", justify="right", no_wrap=True)
     table.add_column(f"{roles[-1]}:\nexplained" if roles else "explained", justify="right", no_wrap=True)
-    for total_output, part_outputs in (
-        (POSITION, axis_outputs()),
-        (TENSION, cable_outputs(trace.robot_before.cable_count)),
-    ):
+    for total_output, part_outputs in output_groups(trace.robot_before):
         for output in (total_output, *part_outputs):
             label = output.label if output is total_output else f"  {output.label}"
             table.add_row(label, output.unit, *_error_cells(trace, output, roles))

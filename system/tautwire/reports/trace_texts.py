@@ -12,7 +12,7 @@ from tautwire_fmu.laws.effects import BY_NAME
 from ..estimation.hypotheses import hypotheses
 from ..estimation.trace_result import Candidate, Comparison, Detectable, Errors, Estimate, Trace
 from ..number_format import ABSENT_TEXT, digits_beside, format_engineering, format_in_common_unit, format_significant
-from ..robot.schema import AXES
+from ..robot.schema import AXES, Robot
 
 ROLES = ("fit", "check")
 VERDICTS = {
@@ -22,6 +22,7 @@ VERDICTS = {
     "unexplained": "Not explained",
 }
 MILLIMETRES_PER_METRE = 1e3
+MILLIRADIANS_PER_RADIAN = 1e3
 # An error below this multiple of the noise floor leaves nothing for a model to explain.
 NOISE_FLOOR_MARGIN = 1.05
 
@@ -41,11 +42,14 @@ class MeasuredOutput:
             return math.nan
         name, index = self.errors_key
         field = getattr(errors, name)
+        if index is not None and index >= len(field):
+            return math.nan
         return self.scale * float(field if index is None else field[index])
 
 
 POSITION = MeasuredOutput("position", "mm", MILLIMETRES_PER_METRE, ("position_rms", None))
 TENSION = MeasuredOutput("tension", "N", 1.0, ("tension_rms", None))
+ORIENTATION = MeasuredOutput("orientation", "mrad", MILLIRADIANS_PER_RADIAN, ("orientation_rms", None))
 
 
 def axis_outputs() -> list[MeasuredOutput]:
@@ -56,6 +60,21 @@ def axis_outputs() -> list[MeasuredOutput]:
 def cable_outputs(cable_count: int) -> list[MeasuredOutput]:
     """One output for each cable."""
     return [MeasuredOutput(f"cable {index + 1}", "N", 1.0, ("cables", index)) for index in range(cable_count)]
+
+
+def rotation_outputs(robot: Robot) -> list[MeasuredOutput]:
+    """One output for each axis about which a platform turns; none for a point mass."""
+    return [
+        MeasuredOutput(f"about {axis}", "mrad", MILLIRADIANS_PER_RADIAN, ("rotations", index))
+        for index, axis in enumerate(AXES)
+        if robot.platform.is_rigid_body
+    ]
+
+
+def output_groups(robot: Robot) -> list[tuple[MeasuredOutput, list[MeasuredOutput]]]:
+    """Totals, each with its outputs: positions, tensions, and where the platform turns its orientation."""
+    groups = [(POSITION, axis_outputs()), (TENSION, cable_outputs(robot.cable_count))]
+    return [*groups, *([(ORIENTATION, rotation_outputs(robot))] if robot.platform.is_rigid_body else [])]
 
 
 def comparison_by_role(trace: Trace, role: str) -> Comparison | None:

@@ -10,7 +10,7 @@ from tautwire_fmu.laws.mathematics import REAL, Mathematics
 from tautwire_fmu.laws.vectors import Vector, add, scale
 
 from .active_effects import platform_effects
-from .schema import Point, Robot
+from .schema import Point, Quaternion, Robot
 
 
 def shown_position(robot: Robot, position: Vector, mathematics: Mathematics = REAL) -> Vector:
@@ -22,8 +22,13 @@ def shown_position(robot: Robot, position: Vector, mathematics: Mathematics = RE
     return add(scale(gain, position), offset)
 
 
-def with_measured_start(robot: Robot, start: Point) -> Robot:
-    """The robot at the start of a recording, in m: by axis as declared, or another one, as the sensor shows it."""
+def with_measured_start(robot: Robot, start: Point, orientation: Quaternion | None = None) -> Robot:
+    """The robot at the start of a recording, in m: by axis as declared, or another one, as the sensor shows it.
+
+    An ``orientation`` that is not None takes the place of the declared one.
+    """
+    if orientation is not None:
+        robot = replace(robot, platform=replace(robot.platform, start_orientation=orientation))
     if start == robot.platform.start:
         return robot
     x, y, z = (measured != declared for measured, declared in zip(start, robot.platform.start, strict=True))

@@ -43,19 +43,23 @@ class CableComponent:
 
 @dataclass(frozen=True)
 class RobotAssembly:
-    """A robot as the laws take it; positions in m, the initial velocity in m/s."""
+    """A robot as the laws take it; positions in m, the initial velocity in m/s, and angular velocity in rad/s."""
 
     cables: tuple[CableComponent, ...]
     platform: PointMassConstants
     platform_effects: tuple[ActiveEffect, ...]
     start: tuple[float, float, float]
     velocity: tuple[float, float, float]
+    angular_velocity: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 def assemble_robot(
-    robot: Robot, start_tensions: Sequence[Any] | None = None, mathematics: Mathematics = REAL
+    robot: Robot,
+    start_tensions: Sequence[Any] | None = None,
+    mathematics: Mathematics = REAL,
+    orientation: Sequence[Any] | None = None,
 ) -> RobotAssembly:
-    """Assembles constants and effects; start tensions are by default those of static equilibrium.
+    """Assembles constants and effects; start tensions and orientation are by default those of static equilibrium.
 
     ``mathematics`` are the functions for the effects' parameters.
 
@@ -64,7 +68,8 @@ def assemble_robot(
     tensions = static_tensions(robot) if start_tensions is None else start_tensions
     if robot.initial_state:
         tensions = [tension + beside for tension, beside in zip(tensions, robot.initial_state.tensions, strict=True)]
-    orientation = start_orientation(robot) if robot.platform.is_rigid_body else robot.platform.start_orientation
+    if orientation is None:
+        orientation = start_orientation(robot)
     cables = cable_components(robot, tensions, mathematics, robot.platform.start, orientation)
     return RobotAssembly(
         cables=cables,
@@ -72,6 +77,7 @@ def assemble_robot(
         platform_effects=platform_effects(robot),
         start=robot.platform.start,
         velocity=robot.initial_state.velocity if robot.initial_state else (0.0, 0.0, 0.0),
+        angular_velocity=robot.initial_state.angular_velocity if robot.initial_state else (0.0, 0.0, 0.0),
     )
 
 

@@ -172,10 +172,16 @@ class EffectSetting:
 
 @dataclass(frozen=True)
 class InitialState:
-    """Initial state of a run that is not at rest: ``velocity`` (m/s), ``tensions`` on top of the static ones (N)."""
+    """Initial state of a run that is not at rest: ``velocity`` (m/s), ``tensions`` on top of the static ones (N).
+
+    Of a platform that turns also its ``angular_velocity`` (rad/s, in the axes of the world), and its ``orientation``
+    where that is none of static equilibrium.
+    """
 
     velocity: Point
     tensions: tuple[float, ...]
+    angular_velocity: Point = (0.0, 0.0, 0.0)
+    orientation: Quaternion | None = None
 
 
 @dataclass(frozen=True)

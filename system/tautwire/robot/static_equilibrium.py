@@ -60,10 +60,12 @@ def tensions_at(robot: Robot, position: Array, orientation: Quaternion) -> Array
 
 
 def start_orientation(robot: Robot) -> Quaternion:
-    """Orientation of the platform at the static start; identity for a point mass.
+    """Orientation of the platform at the static start, or where a run begins; identity for a point mass.
 
     Raises UnreachableError where the cables cannot hold a rigid platform there.
     """
+    if robot.initial_state is not None and robot.initial_state.orientation is not None:
+        return robot.initial_state.orientation
     is_rigid = robot.platform.is_rigid_body
     return static_equilibrium(robot).orientation if is_rigid else robot.platform.start_orientation
 

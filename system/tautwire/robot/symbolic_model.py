@@ -24,9 +24,9 @@ from .active_effects import platform_axes
 from .measured_start import with_true_start
 from .platform_symbols import PlatformSymbols, StateIndices, platform_symbols, vector_of
 from .robot_assembly import RobotAssembly, assemble_robot
-from .schema import EffectSetting, Robot, require_point_mass
-from .static_equilibrium import start_orientation, static_tensions
-from .symbolic_statics import symbolic_start_tensions
+from .schema import EffectSetting, Robot
+from .static_equilibrium import start_orientation
+from .symbolic_statics import symbolic_statics
 from .uncertain_parameters import SensorErrors, UncertainParameter, limited_perturbation, perturbed_robot, sensor_errors
 
 Array = NDArray[np.float64]
@@ -66,9 +66,9 @@ class SymbolicModel:
     States: pose and twist of the platform, unstrained lengths, and those states of effects that something depends on.
     Inputs: winch speeds, external wrench. Outputs: measured pose, twist, measured tensions, lengths, without sensor
     delay. The pose of a point mass is its position; :class:`tautwire.robot.platform_symbols.RigidBodySymbols`.
-    ``sensor_delays`` (3 + n) of positions and tensions in s; ``span_tensions`` (n) of the free spans in N. ``start``
-    is the state in static equilibrium; ``drifting`` are the indices of states without equilibrium; ``parameters``
-    are the free ones.
+    ``sensor_delays`` (m) of positions, tensions and rotations in s; ``span_tensions`` (n) of the free spans in N.
+    ``start`` is the state in static equilibrium; ``drifting`` are the indices of states without equilibrium;
+    ``parameters`` are the free ones. ``reference_orientation`` is the one from which rotations of a rigid body count.
     """
 
     states: SX
@@ -84,6 +84,7 @@ class SymbolicModel:
     input_names: tuple[str, ...]
     output_names: tuple[str, ...]
     indices: StateIndices
+    reference_orientation: Quaternion
 
 
 @dataclass(frozen=True)
@@ -140,12 +141,10 @@ def symbolic_model(
     """Assembles the equations of a robot with some parameters of its effects as symbols.
 
     Each of ``uncertain_parameters`` is one more state, after all others: in standard deviations, zero at the start.
-    The static start follows the free parameters; with more than three cables, cables at a tension limit stay there.
-    Not valid across a change of which cables are at a limit. Rotations of a rigid body count from the
+    The static start follows the free parameters; with more cables than degrees of freedom, cables at a tension limit
+    stay there. Not valid across a change of which cables are at a limit. Rotations of a rigid body count from the
     ``reference_orientation``, by default that of the start.
     """
-    if free_parameters or uncertain_parameters:
-        require_point_mass(robot.name, robot)
     symbols = [SX.sym(f"{_owner_name(robot, f)}.{f.name}") for f in free_parameters]
     constants = [SX.sym(number.label) for number in uncertain_parameters]
     perturbations = [limited_perturbation(constant, casadi.sqrt) for constant in constants]
@@ -153,14 +152,11 @@ def symbolic_model(
         perturbed_robot(robot, uncertain_parameters, perturbations), free_parameters, symbols
     )
     symbolic_robot = with_true_start(symbolic_robot, CASADI_MATHEMATICS)
-    start_tensions = (
-        list(map(SX, static_tensions(robot).tolist()))
-        if robot.platform.is_rigid_body
-        else symbolic_start_tensions(with_true_start(robot), symbolic_robot, CASADI_MATHEMATICS)
-    )
-    assembly = assemble_robot(symbolic_robot, start_tensions, CASADI_MATHEMATICS)
+    nominal = with_true_start(robot)
+    reference = start_orientation(nominal) if reference_orientation is None else reference_orientation
+    statics = symbolic_statics(nominal, symbolic_robot, reference, CASADI_MATHEMATICS)
+    assembly = assemble_robot(symbolic_robot, statics.tensions, CASADI_MATHEMATICS, statics.orientation)
     count = len(assembly.cables)
-    reference = start_orientation(symbolic_robot) if reference_orientation is None else reference_orientation
     axes = platform_axes(robot.platform) if robot.platform.is_rigid_body else None
     platform = platform_symbols(CASADI_MATHEMATICS, symbolic_robot, assembly.platform, reference, axes)
     variables = _Variables(
@@ -179,9 +175,9 @@ def symbolic_model(
         rates=casadi.vertcat(equations.rates, no_rates),
         outputs=_shown(equations.outputs, indices, sensor_errors(uncertain_parameters, perturbations, count)),
         span_tensions=equations.span_tensions,
-        sensor_delays=_sensor_delays(assembly),
+        sensor_delays=_sensor_delays(assembly, platform.pose.numel() - 3),
         start=casadi.vertcat(
-            _nominal_start(_initial_state(assembly, platform, len(effect_states)), constants), no_rates
+            _nominal_start(_initial_state(assembly, statics.rotation, len(effect_states)), constants), no_rates
         ),
         drifting=tuple(first_effect_state + i for i, each in enumerate(effect_states) if each.state.drifts),
         state_names=(
@@ -199,6 +195,7 @@ def symbolic_model(
             *_numbered_names("length", count),
         ),
         indices=indices,
+        reference_orientation=reference,
     )
 
 
@@ -211,12 +208,11 @@ def _shown(outputs: SX, indices: StateIndices, errors: SensorErrors) -> SX:
     return casadi.vertcat(*shown)
 
 
-def _initial_state(assembly: RobotAssembly, platform: PlatformSymbols, effect_state_count: int) -> SX:
+def _initial_state(assembly: RobotAssembly, rotation: SX, effect_state_count: int) -> SX:
     lengths = [SX(component.constants.start_length) for component in assembly.cables]
     start = casadi.vertcat(*map(SX, assembly.start))
-    # A rigid body starts at its reference orientation, and does not turn.
-    no_rotation = SX(platform.pose.numel() - 3, 1)
-    motion = casadi.vertcat(start, no_rotation, SX(list(assembly.velocity)), no_rotation)
+    turning = SX(list(assembly.angular_velocity)[: rotation.numel()])
+    motion = casadi.vertcat(start, rotation, SX(list(assembly.velocity)), turning)
     return casadi.vertcat(motion, *lengths, SX(effect_state_count, 1))
 
 
@@ -372,11 +368,11 @@ def _equations(assembly: RobotAssembly, variables: _Variables, effect_states: li
     )
 
 
-def _sensor_delays(assembly: RobotAssembly) -> SX:
-    """Delays of the measured x, y, z and tensions, in s."""
+def _sensor_delays(assembly: RobotAssembly, rotation_count: int) -> SX:
+    """Delays of the measured x, y, z, tensions and rotations, in s: a tracker that lags does so with its whole pose."""
     position_delay = stages.sensor_delays(CASADI_MATHEMATICS, assembly.platform_effects)[1]
     tension_delays = [stages.sensor_delays(CASADI_MATHEMATICS, component.effects)[0] for component in assembly.cables]
-    return casadi.vertcat(*[SX(position_delay)] * 3, *map(SX, tension_delays))
+    return casadi.vertcat(*[SX(position_delay)] * 3, *map(SX, tension_delays), *[SX(position_delay)] * rotation_count)
 
 
 def _numbered_names(name: str, count: int) -> tuple[str, ...]:

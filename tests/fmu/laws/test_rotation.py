@@ -9,7 +9,15 @@ from scipy.spatial.transform import Rotation
 
 from tautwire.robot.symbolic_model import CASADI_MATHEMATICS
 from tautwire_fmu.laws.mathematics import COMPLEX_STEP, REAL, rate_of, with_rate
-from tautwire_fmu.laws.rotation import IDENTITY, multiply, quaternion_of, rotate, rotate_back, rotation_matrix
+from tautwire_fmu.laws.rotation import (
+    IDENTITY,
+    multiply,
+    quaternion_of,
+    rotate,
+    rotate_back,
+    rotation_matrix,
+    rotation_vector_of,
+)
 
 VECTOR = (0.3, -1.2, 2.5)
 TURNS = ((0.4, -1.1, 0.7), (3.0, 0.5, -0.2))
@@ -55,3 +63,21 @@ def test_symbols_have_finite_derivatives_at_every_angle(angle: float) -> None:
         for direction in np.eye(3).tolist()
     ]
     assert np.allclose(np.array(jacobian(at)).T, exact, rtol=0.0, atol=1e-14)
+
+
+@pytest.mark.parametrize("angle", (*ANGLES, 0.0632, 0.0633))
+@pytest.mark.parametrize("sign", (1.0, -1.0))
+def test_a_quaternion_of_either_sign_has_the_rotation_vector_it_was_made_of(angle: float, sign: float) -> None:
+    vector = (angle * np.array(VECTOR) / np.linalg.norm(VECTOR)).tolist()
+    quaternion = [sign * part for part in quaternion_of(REAL, vector)]
+    assert np.allclose(rotation_vector_of(REAL, quaternion), vector, rtol=1e-14, atol=0.0)
+
+
+@pytest.mark.parametrize("angle", (1e-9, 0.0632, 1.0))
+def test_a_rotation_vector_differentiates_through_its_quaternion(angle: float) -> None:
+    turn = casadi.SX.sym("turn", 3)
+    parts = quaternion_of(CASADI_MATHEMATICS, (turn[0], turn[1], turn[2]))
+    back = casadi.vertcat(*rotation_vector_of(CASADI_MATHEMATICS, parts))
+    jacobian = casadi.Function("jacobian", [turn], [casadi.jacobian(back, turn)])
+    vector = angle * np.array(VECTOR) / np.linalg.norm(VECTOR)
+    assert np.allclose(np.array(jacobian(vector)), np.eye(3), rtol=0.0, atol=1e-9)

@@ -23,7 +23,7 @@ from ...robot.schema import Formula, Robot
 from ...robot.symbolic_model import FORMULA_INDEX, FreeParameter, symbolic_model
 from ...robot.uncertain_parameters import uncertain_parameters
 from ..innovation_sensitivities import LinearisedSegment
-from ..measurement_model import delayed_outputs
+from ..measurement_model import SensorInstant, delayed_outputs
 from ..native_functions import CompiledFunction, by_sample
 
 Array = NDArray[np.float64]
@@ -118,7 +118,8 @@ class FormulaPorts:
         And the same to a unit at the start, through the static tensions.
         """
         speeds = np.vstack([segment.speeds, np.zeros((3, len(time)))])
-        step_inputs = [np.hstack([c, c[:, -1:]]) for c in (segment.speeds[:, 1:], segment.step[None, :], segment.shift)]
+        columns = (segment.speeds[:, 1:], segment.step[None, :], segment.shift, segment.rotation)
+        step_inputs = [np.hstack([column, column[:, -1:]]) for column in columns]
         results = self._sensitivities(len(time), segment.states, time[None, :], speeds, *step_inputs)
         shaped = [by_sample(part, len(time)) for part in results]
         return shaped[0], shaped[1], shaped[2], shaped[3]
@@ -216,8 +217,8 @@ def _build_sensitivities(robot: Robot, numbers: Sequence[str], state_names: Sequ
     model = symbolic_model(robot, free, uncertain_parameters(robot))
     count = robot.cable_count
     state_indices = [model.state_names.index(name) for name in state_names]
-    next_speeds, step, shift = SX.sym("next_speeds", count), SX.sym("step"), SX.sym("shift", 3 + count)
-    outputs = delayed_outputs(model, count, next_speeds, step, shift)
+    instant = SensorInstant.of(model)
+    outputs = delayed_outputs(model, count, instant)
     time = SX.sym("time")
     omitted_states = [index for index in range(model.states.numel()) if index not in state_indices]
     external_forces = model.inputs[count:]
@@ -229,7 +230,7 @@ def _build_sensitivities(robot: Robot, numbers: Sequence[str], state_names: Sequ
         initial_sensitivities = casadi.horzcat(by_number[:, :3] - by_force, SX(expression.numel(), 1 + count))
         results.append((slopes, initial_sensitivities))
     (rate_sensitivities, initial_rate_sensitivities), (output_sensitivities, initial_output_sensitivities) = results
-    arguments = [model.states[state_indices], time, model.inputs, next_speeds, step, shift]
+    arguments = [model.states[state_indices], time, model.inputs, *instant.symbols]
     expressions = [rate_sensitivities, output_sensitivities, initial_rate_sensitivities, initial_output_sensitivities]
     placeholders = [model.parameters, *([model.states[omitted_states]] if omitted_states else [])]
     substitutes = [SX.zeros(len(numbers)), *([time] if omitted_states else [])]

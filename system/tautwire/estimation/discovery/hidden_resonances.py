@@ -25,7 +25,6 @@ from tautwire_fmu.laws.formula import FORCE_TARGETS
 
 from ...errors import TautwireError
 from ...linear import linearise
-from ...robot.measured_start import with_measured_start
 from ...robot.schema import Robot
 from ..estimation_data import DataSet, DataSplit
 from ..innovation_sensitivities import LinearisedSegment, linearise_filter
@@ -140,7 +139,7 @@ def _gain_spectra_of(
     """Gain spectra of one data set on the platform, and in the ropes."""
     likelihood, values = fitter.likelihood(robot, (), data)
     noise_density = _sufficient_noise_density(likelihood, values, data, policy)
-    robot_at_start = with_measured_start(robot, data.start)
+    robot_at_start = data.placed(robot)
 
     def run() -> tuple[Iterator[LinearisedSegment], FormulaPorts]:
         segments = linearise_filter(likelihood, values, data.recording, noise_density)

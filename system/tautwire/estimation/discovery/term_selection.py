@@ -17,7 +17,6 @@ from math import log
 import numpy as np
 from numpy.typing import NDArray
 
-from ...robot.measured_start import with_measured_start
 from ...robot.schema import Robot
 from ...robot.symbolic_model import FORMULA_INDEX
 from ..estimation_data import DataSet
@@ -54,7 +53,7 @@ class NormalEquations:
 def run_signal_ranges(robot: Robot, accepted: Sequence[Hypothesis], fitter: Fitter, sample: DataSet) -> SignalRanges:
     """Ranges of the signals that formulas may use, along the run of a model over a recording."""
     likelihood, values = fitter.likelihood(robot, accepted, sample)
-    ports = FormulaPorts(with_measured_start(robot, sample.start), likelihood.model.state_names)
+    ports = FormulaPorts(sample.placed(robot), likelihood.model.state_names)
     return signal_ranges([ports.signals(run) for run in linearise_filter(likelihood, values, sample.recording)])
 
 
@@ -65,7 +64,7 @@ def term_normal_equations(
     likelihood, values = fitter.likelihood(robot, accepted, sample)
     free = free_parameters(robot, accepted)
     nuisance_columns = [index for index, parameter in enumerate(free) if parameter.effect_index != FORMULA_INDEX]
-    ports = FormulaPorts(with_measured_start(robot, sample.start), likelihood.model.state_names)
+    ports = FormulaPorts(sample.placed(robot), likelihood.model.state_names)
     size = len(nuisance_columns) + len(terms)
     fisher_information, score, count = np.zeros((size, size)), np.zeros(size), 0
     segments = linearise_filter(likelihood, values, sample.recording)

@@ -12,6 +12,8 @@ from .formula_discovery import Discovery, discover_formula
 from .hidden_resonances import find_resonances
 from .policy import FormulaPolicy
 
+NOT_TRIED = "formulas and hidden oscillators were not tried: that is done for point masses only"
+
 
 @dataclass(frozen=True)
 class UnexplainedResidual:
@@ -23,7 +25,12 @@ class UnexplainedResidual:
 
 
 def explain_residual(context: IdentificationContext, selection: SelectionResult) -> UnexplainedResidual:
-    """Analyse the residual of a robot that known effects do not explain; ``selection`` are those that come closest."""
+    """Analyse the residual of a robot that known effects do not explain; ``selection`` are those that come closest.
+
+    Of a platform that turns nothing is analysed, and a note says so.
+    """
+    if context.robot.platform.is_rigid_body:
+        return UnexplainedResidual(notes=(NOT_TRIED,))
     robot, fitter, evidence, workers = context.robot, context.fitter, context.split, context.workers
     policy = context.policy.discovery
     beside = (selection.fit.robot, selection.accepted, fitter, evidence)

@@ -45,7 +45,7 @@ def localise_residual(
     limitations = _limitations(robot, recording)
     if recording.sample_count < sample.recording.sample_count:
         limitations.append(f"only the first {recording.duration:.4g} s were analysed")
-    if not _has_path(robot, recording):
+    if robot.platform.is_rigid_body or not _has_path(robot, recording):
         return FaultLocalisation(recording.time, (), *isolation_verdict((), ()), tuple(limitations))
     robot_at_start = with_start(robot.as_modelled(), sample.start)
     path = smooth_path(recording, robot_at_start.platform.start, noise.of_outputs(robot.cable_count)[:3])
@@ -132,6 +132,8 @@ def _has_path(robot: Robot, recording: Recording) -> bool:
 
 def _limitations(robot: Robot, recording: Recording) -> list[str]:
     """Limitations of a recording, in words."""
+    if robot.platform.is_rigid_body:
+        return ["components were not tested one by one: that is done for point masses only"]
     if not _has_path(robot, recording):
         return ["positions are missing: neither the cables nor the platform can be simulated alone"]
     unmeasured = [
