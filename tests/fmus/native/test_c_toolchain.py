@@ -18,10 +18,12 @@ from tautwire.fmus.native.c_toolchain import (
     target_platforms,
 )
 from tautwire.fmus.packaging import build_fmus
-from tests.support.robots import paper_robot
+from tests.support.effect_cases import CASES
+from tests.support.effects import with_effects
+from tests.support.robots import LIMITED, example, with_winch
 
 SYSTEM_COMPILER = Toolchain(("cc",), "cc", is_cross_compiler=False)
-MAGIC = {"linux": b"\x7fELF", "win": b"MZ", "darwin": b"\xcf\xfa\xed\xfe"}
+MAGIC = {".so": b"\x7fELF", ".dll": b"MZ", ".dylib": b"\xcf\xfa\xed\xfe"}
 
 
 def test_unknown_platforms_are_refused() -> None:
@@ -47,10 +49,12 @@ def test_what_a_compiler_refuses_is_told_in_one_line() -> None:
 @pytest.mark.validate
 @pytest.mark.skipif(importlib.util.find_spec("ziglang") is None, reason="no ziglang")
 def test_one_archive_holds_all_platforms(tmp_path: Path) -> None:
-    fmus = build_fmus(paper_robot(), tmp_path, native=True, platforms=["all"])
+    robot = with_winch(with_effects(example("three"), *CASES), LIMITED)
+    fmus = build_fmus(robot, tmp_path, native=True, platforms=["all"])
     for path in fmus.paths:
         with zipfile.ZipFile(path) as archive:
             libraries = {name: archive.read(name) for name in archive.namelist() if name.startswith("binaries/")}
         assert [name.split("/")[1] for name in libraries] == list(PLATFORMS)
+        assert b"KERNEL32" not in libraries[f"binaries/win64/{path.stem}.dll"]
         for name, content in libraries.items():
-            assert content.startswith(next(magic for system, magic in MAGIC.items() if system in name))
+            assert content.startswith(MAGIC[Path(name).suffix])

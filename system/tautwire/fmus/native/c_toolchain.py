@@ -12,6 +12,7 @@ import tempfile
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
+from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
@@ -24,24 +25,33 @@ from .component_sources import CODE_FILE, START_FILE
 
 # No contraction to fused operations, so that all compilers round alike; nothing visible but the functions of FMI.
 COMPILER_FLAGS = ("-std=c99", "-O2", "-ffp-contract=off", "-fPIC", "-fvisibility=hidden", "-w")
+# The FMI standard's own header files, as fmpy has them.
+HEADERS = Path(fmpy.__file__).parent / "c-code"
 ZIG_HINT = 'pip install "tautwire[native]"'
+WINDOWS_RUNTIME, WINDOWS_IMPORTS, IMPORT_LIBRARY = "windows_runtime.c", "ucrtbase.def", "ucrtbase.lib"
+WINDOWS_LINK_FLAGS = ("-nostdlib", WINDOWS_RUNTIME, IMPORT_LIBRARY, "-Wl,-e,DllMainCRTStartup")
 
 
 @dataclass(frozen=True)
 class TargetPlatform:
-    """A platform: its folder among an FMU's binaries, the target of ziglang, the suffix of its libraries, and flags."""
+    """A platform: its folder among an FMU's binaries, the target of ziglang, and how its libraries are linked."""
 
     name: str
     target: str
     suffix: str
     link_flags: tuple[str, ...] = ("-lm",)
 
+    @property
+    def is_windows(self) -> bool:
+        """Whether libraries get a runtime of their own: that of ziglang takes minutes to compile."""
+        return self.suffix == ".dll"
+
 
 PLATFORMS: Mapping[str, TargetPlatform] = {
     platform.name: platform
     for platform in (
         TargetPlatform("linux64", "x86_64-linux-gnu.2.17", ".so"),
-        TargetPlatform("win64", "x86_64-windows-gnu", ".dll", ()),
+        TargetPlatform("win64", "x86_64-windows-gnu", ".dll", WINDOWS_LINK_FLAGS),
         TargetPlatform("darwin64", "x86_64-macos.11.0", ".dylib"),
         TargetPlatform("aarch64-linux", "aarch64-linux-gnu.2.17", ".so"),
         TargetPlatform("aarch64-darwin", "aarch64-macos.11.0", ".dylib"),
@@ -105,32 +115,45 @@ def compile_library(sources: Mapping[str, str], platform: TargetPlatform, toolch
     """
     command = toolchain.command_for(platform)
     shared = {name: text for name, text in sources.items() if name != START_FILE}
-    origin = [toolchain.version, command, COMPILER_FLAGS, platform.link_flags]
+    runtime = _windows_runtime() if platform.is_windows else {}
+    origin = [toolchain.version, command, COMPILER_FLAGS, platform.link_flags, runtime]
 
     def compile_code() -> bytes:
-        return _run(command, ["-c", CODE_FILE], shared)
+        return _run([*command, *COMPILER_FLAGS, f"-I{HEADERS}", "-c", CODE_FILE], shared)
 
     def link() -> bytes:
         code = cached_machine_code(_key("object", origin, shared), compile_code)
-        objects = {"code.o": code, START_FILE: sources[START_FILE]}
-        return _run(command, ["-shared", START_FILE, "code.o", *platform.link_flags], objects)
+        objects: dict[str, Any] = {"code.o": code, START_FILE: sources[START_FILE], **runtime}
+        if runtime:
+            objects[IMPORT_LIBRARY] = _import_library(toolchain, runtime)
+        flags = (*COMPILER_FLAGS, "-s", "-shared")
+        return _run([*command, *flags, START_FILE, "code.o", *platform.link_flags], objects)
 
     return cached_machine_code(_key("library", origin, sources), link)
+
+
+def _windows_runtime() -> dict[str, str]:
+    names = (WINDOWS_RUNTIME, WINDOWS_IMPORTS)
+    return {name: files(__package__).joinpath(f"c/{name}").read_text(encoding="utf-8") for name in names}
+
+
+def _import_library(toolchain: Toolchain, runtime: Mapping[str, str]) -> bytes:
+    return _run([toolchain.command[0], "dlltool", "-m", "i386:x86-64", "-d", WINDOWS_IMPORTS], runtime, "-l")
 
 
 def _key(kind: str, origin: Sequence[object], sources: Mapping[str, str]) -> bytes:
     return json.dumps([kind, origin, dict(sources)], sort_keys=True).encode()
 
 
-def _run(command: Sequence[str], arguments: Sequence[str], sources: Mapping[str, Any]) -> bytes:
+def _run(command: Sequence[str], sources: Mapping[str, Any], output_option: str = "-o") -> bytes:
     """What a compiler writes from files, each text or bytes, in a folder of their own."""
     with tempfile.TemporaryDirectory(prefix="tautwire-build-") as scratch:
         for name, content in sources.items():
             (Path(scratch) / name).write_bytes(content.encode() if isinstance(content, str) else content)
         output = Path(scratch) / "output"
-        headers = Path(fmpy.__file__).parent / "c-code"
-        complete = [*command, *COMPILER_FLAGS, f"-I{headers}", *arguments, "-o", str(output)]
-        completed = subprocess.run(complete, cwd=scratch, capture_output=True, check=False)
+        completed = subprocess.run(
+            [*command, output_option, str(output)], cwd=scratch, capture_output=True, check=False
+        )
         if completed.returncode != 0 or not output.is_file():
             lines = completed.stderr.decode(errors="replace").splitlines()
             reason = next((line for line in lines if "error" in line), f"exit status {completed.returncode}")

@@ -26,6 +26,7 @@ from .interpolation_functions import (
     quintic_function,
 )
 from .platform_functions import POINT_MASS_PARAMETERS, SENSOR_SIZE, mass_functions
+from .rigid_body_functions import rigid_body_functions, start_size
 from .traced_functions import LARGEST_NUMBER, TracedFunction, c_source
 from .winch_functions import DRIVE_SIZE, winch_functions
 
@@ -97,6 +98,22 @@ def _point_mass(slave: Slave, data: Mapping[str, Any]) -> _Component:
     return _Component(("platform.c", "point_mass.c"), macros, start_velocity)
 
 
+def _rigid_body(slave: Slave, data: Mapping[str, Any]) -> _Component:
+    names = [variable.name for variable in slave.variables]
+    origin = (0.0, 0.0, 0.0)
+    constants = (*data.get("start_velocity", origin), *data.get("start_angular_velocity", origin))
+    cable_count = len(data["attachments"])
+    macros = _platform_macros(slave, data) | {
+        "FIRST_FORCE": names.index("force_1.x"),
+        "FIRST_OUTPUT": names.index("position.x"),
+        "FIRST_ATTACHMENT_OUTPUT": names.index("position_1.x"),
+        "MIDDLE_OUTPUT": names.index("middle_position_1.x"),
+        "CABLE_COUNT": cable_count,
+        "START_SIZE": start_size(cable_count),
+    }
+    return _Component(("platform.c", "principal_axes.c", "rigid_body.c"), macros, constants)
+
+
 def _platform_macros(slave: Slave, data: Mapping[str, Any]) -> dict[str, Any]:
     names = [variable.name for variable in slave.variables]
     effects = effects_from_resource(dict(data))
@@ -122,15 +139,18 @@ def _winch(slave: Slave, data: Mapping[str, Any]) -> _Component:
 COMPONENTS: Mapping[str, Callable[[Slave, Mapping[str, Any]], _Component]] = {
     "cable": _cable,
     "point_mass": _point_mass,
+    "rigid_body": _rigid_body,
     "winch": _winch,
 }
 # Of a resource all that equations depend on; effects do by their names.
-EQUATION_KEYS = ("law", "swivel_axis", "effects", "formulas")
+EQUATION_KEYS = ("law", "swivel_axis", "effects", "formulas", "attachments")
 
 
 def _equation_structure(data: Mapping[str, Any]) -> str:
-    names = [{"name": effect["name"]} for effect in data.get("effects", ())]
-    return json.dumps({name: data.get(name) for name in EQUATION_KEYS} | {"effects": names})
+    effects = [{**effect, "values": None} for effect in data.get("effects", ())]
+    attachments = [None for _ in data.get("attachments", ())]
+    structure = {name: data.get(name) for name in EQUATION_KEYS}
+    return json.dumps({**structure, "effects": effects, "attachments": attachments}, sort_keys=True)
 
 
 @cache
@@ -142,6 +162,8 @@ def _equations(kind: str, structure: str) -> str:
         functions = (*cable_functions(data), *motion_functions())
     elif kind == "point_mass":
         functions = (*mass_functions(data, POINT_MASS_PARAMETERS), *quadrature_functions(), quintic_function())
+    elif kind == "rigid_body":
+        functions = (*rigid_body_functions(data), *quadrature_functions(), quintic_function())
     else:
         functions = winch_functions()
     return c_source((*functions, cubic_function()))

@@ -119,6 +119,16 @@ def rates_along(values: Sequence[Any], variables: Sequence[SX], rates: Sequence[
     return casadi.vertsplit(casadi.densify(derivative))
 
 
+def derivative_along(
+    function: Callable[[Mathematics, list[SX]], Sequence[Any]], values: Sequence[Any], rates: Sequence[Any]
+) -> list[SX]:
+    """Rates of a function's results at ``values``, which need not be symbols, where these change at ``rates``."""
+    symbols = SX.sym("value", len(values))
+    results = column(function(Recorder().mathematics(), casadi.vertsplit(symbols)))
+    derivative = casadi.jtimes(results, symbols, column(rates))
+    return casadi.vertsplit(casadi.densify(casadi.substitute(derivative, symbols, column(values))))
+
+
 def c_source(functions: Sequence[TracedFunction]) -> str:
     """C source of traced functions: of each a static one that returns whether all is defined, and every output finite.
 

@@ -1,0 +1,161 @@
+/* The platform as a rigid body: cable forces in, motion of its frame and of each attachment out. */
+
+#define EXTERNAL_MOMENT 2
+#define INERTIA 9
+#define MASS_STATE (FIRST_STATE + 4)
+#define MOMENTUM_STATE (FIRST_STATE + 10)
+#define ARMS 5
+#define ATTITUDE_SIZE 15
+#define LOAD_SIZE 24
+#define POINT_SIZE 9
+#define POINTS_SIZE (POINT_SIZE * (1 + CABLE_COUNT) + 6)
+#define MAX_ROTATION_SWEEPS 40
+#define ANGLE_TOLERANCE 1e-16
+
+/* Loads at the start, in the middle where it is known, and at the end of a step. */
+typedef struct {
+  int count;
+  double loads[3 * LOAD_SIZE];
+} StepLoads;
+
+typedef struct {
+  double first[ATTITUDE_SIZE];
+  double middle[ATTITUDE_SIZE];
+  double end[ATTITUDE_SIZE];
+  double quaternion[4];
+  double momentum[3];
+} Rotation;
+
+static int derive_start(Slave *slave, double *start_states) {
+  double axes[9];
+  principal_axes(parameters_of(slave) + INERTIA, axes);
+  return body_start(parameters_of(slave), axes, model_constants, slave->start, start_states);
+}
+
+/* Rows are the sums of each force component times the arms; the external force, the last one, acts at the origin. */
+static void moment_matrix(const Slave *slave, const double *forces, int stride, double *matrix) {
+  const double *arms = slave->start + ARMS;
+  int force, row, column;
+  memset(matrix, 0, 9 * sizeof(double));
+  for (force = 0; force < FORCE_COUNT; force++) {
+    const double *arm = force == FORCE_COUNT - 1 ? arms : arms + 3 * (force + 1);
+    for (row = 0; row < 3; row++)
+      for (column = 0; column < 3; column++) matrix[3 * row + column] += arm[column] * forces[stride * force + row];
+  }
+}
+
+static void load_of(const Slave *slave, const double *inputs, double *load) {
+  moment_matrix(slave, inputs + FIRST_FORCE, 6, load);
+  moment_matrix(slave, inputs + FIRST_FORCE + 3, 6, load + 9);
+  memcpy(load + 18, inputs + EXTERNAL_MOMENT, 6 * sizeof(double));
+}
+
+/* Load in the middle: cable forces as set, external force and moment interpolated. */
+static void middle_load(const Slave *slave, double step, double *load) {
+  double forces[6 * FORCE_COUNT];
+  memcpy(forces, slave->state.real + FIRST_MIDDLE_FORCE, 6 * CABLE_COUNT * sizeof(double));
+  middle_of_inputs(slave, EXTERNAL_FORCE, step, forces + 6 * CABLE_COUNT);
+  moment_matrix(slave, forces, 6, load);
+  moment_matrix(slave, forces + 3, 6, load + 9);
+  middle_of_inputs(slave, EXTERNAL_MOMENT, step, load + 18);
+}
+
+static void extrapolate_load(const double *load, double elapsed, double *later) {
+  int k;
+  memcpy(later, load, LOAD_SIZE * sizeof(double));
+  for (k = 0; k < 9; k++) later[k] += elapsed * load[9 + k];
+  for (k = 18; k < 21; k++) later[k] += elapsed * load[k + 3];
+}
+
+static void step_loads(const Slave *slave, double step, int at_end, StepLoads *all) {
+  all->count = 2;
+  load_of(slave, inputs_at_start(slave, at_end), all->loads);
+  if (!at_end) {
+    extrapolate_load(all->loads, step, all->loads + LOAD_SIZE);
+    return;
+  }
+  if (slave->has_middle_inputs) middle_load(slave, step, all->loads + LOAD_SIZE * (all->count++ - 1));
+  load_of(slave, slave->state.real, all->loads + LOAD_SIZE * (all->count - 1));
+}
+
+static double largest_change(const double *angles, const double *previous) {
+  double change = 0.0;
+  int k;
+  for (k = 0; k < 6; k++) change = fmax(change, fabs(angles[k] - previous[k]));
+  return change;
+}
+
+/* Attitudes, angles and momenta from which the sweeps over a step begin. */
+static void begin_sweeps(const double *first, double step, double *attitudes, double *angles) {
+  int k;
+  for (k = 0; k < 3; k++) {
+    angles[k] = 0.5 * step * first[9 + k] + 0.125 * step * step * first[12 + k];
+    angles[3 + k] = step * first[9 + k] + 0.5 * step * step * first[12 + k];
+  }
+  memcpy(attitudes, first, ATTITUDE_SIZE * sizeof(double));
+  for (k = 0; k < 3; k++) attitudes[9 + k] += 0.5 * step * first[12 + k];
+  memcpy(attitudes + ATTITUDE_SIZE, attitudes, ATTITUDE_SIZE * sizeof(double));
+}
+
+/* Rotation over a step by fixed-point sweeps, as rotation_quadrature.py does it; 0 where they do not converge. */
+static int rotate_body(const Slave *slave, const StepLoads *all, double step, Rotation *result) {
+  const double *real = slave->state.real, *quaternion = real + FIRST_STATE, *momentum = real + MOMENTUM_STATE;
+  const double *later = all->loads + LOAD_SIZE, *values = parameters_of(slave), *start = slave->start;
+  double moments[18], attitudes[2 * ATTITUDE_SIZE], momenta[6], angles[6], new_angles[6], new_attitudes[2 * ATTITUDE_SIZE];
+  double change = ANGLE_TOLERANCE, previous_change;
+  int sweep, is_long = all->count == 3;
+  if (!body_attitude(quaternion, momentum, all->loads, values, start, result->first)) return 0;
+  if (!body_moment(result->first, all->loads, values, start, moments)) return 0;
+  begin_sweeps(result->first, step, attitudes, angles);
+  for (sweep = 0;; sweep++) {
+    if (sweep == MAX_ROTATION_SWEEPS) return 0;
+    if (!(is_long ? three_node_sweep : two_node_sweep)(quaternion, momentum, result->first, moments, angles, attitudes,
+                                                       later, &step, values, start, new_attitudes, moments + 6, momenta,
+                                                       new_angles))
+      return 0;
+    previous_change = change;
+    change = largest_change(new_angles, angles);
+    memcpy(attitudes, new_attitudes, (is_long ? 2 : 1) * ATTITUDE_SIZE * sizeof(double));
+    memcpy(angles, new_angles, sizeof angles);
+    if (change * fmin(1.0, change / previous_change) <= ANGLE_TOLERANCE) break;
+  }
+  memcpy(result->momentum, momenta + 3, sizeof result->momentum);
+  return (is_long ? three_node_rotation : two_node_rotation)(quaternion, momenta, angles, moments, later, &step, values,
+                                                             start, result->quaternion, result->middle, result->end);
+}
+
+static int advance(Slave *slave, double step, int at_end) {
+  double *real = slave->state.real, mass[9], before[POINTS_SIZE], middle[POINTS_SIZE], after[POINTS_SIZE];
+  StepLoads all;
+  Rotation rotation;
+  Translation translation;
+  step_loads(slave, step, at_end, &all);
+  if (!rotate_body(slave, &all, step, &rotation)) return 0;
+  memcpy(mass, real + MASS_STATE, MASS_SIZE * sizeof(double));
+  if (!translate(slave, mass, step, at_end, &translation)) return 0;
+  memcpy(mass + 6, translation.start_acceleration, 3 * sizeof(double));
+  if (!body_points(rotation.first, mass, slave->start, before)) return 0;
+  if (!body_points(rotation.middle, translation.middle, slave->start, middle)) return 0;
+  if (!body_points(rotation.end, translation.end, slave->start, after)) return 0;
+  if (!record_path(slave, step, before, after)) return 0;
+  memcpy(real + FIRST_STATE, rotation.quaternion, sizeof rotation.quaternion);
+  memcpy(real + MASS_STATE, translation.end, MASS_SIZE * sizeof(double));
+  memcpy(real + MOMENTUM_STATE, rotation.momentum, sizeof rotation.momentum);
+  memcpy(real + MIDDLE_OUTPUT, middle + POINT_SIZE, POINT_SIZE * CABLE_COUNT * sizeof(double));
+  return 1;
+}
+
+static int refresh(Slave *slave) {
+  double *real = slave->state.real, load[LOAD_SIZE], now[LOAD_SIZE], attitude[ATTITUDE_SIZE], mass[9];
+  load_of(slave, real, load);
+  extrapolate_load(load, slave->state.elapsed, now);
+  if (!body_attitude(real + FIRST_STATE, real + MOMENTUM_STATE, now, parameters_of(slave), slave->start, attitude))
+    return 0;
+  memcpy(mass, real + MASS_STATE, MASS_SIZE * sizeof(double));
+  if (!present_acceleration(slave, mass, mass + 6)) return 0;
+  if (!body_points(attitude, mass, slave->start, real + FIRST_OUTPUT)) return 0;
+  if (!slave->state.started)
+    memcpy(real + MIDDLE_OUTPUT, real + FIRST_ATTACHMENT_OUTPUT, POINT_SIZE * CABLE_COUNT * sizeof(double));
+  refresh_measured_position(slave, real + FIRST_OUTPUT);
+  return 1;
+}
