@@ -76,6 +76,27 @@ def with_clock(form: str) -> Writer:
     return write
 
 
+def turned(frame: Frame) -> str:
+    """Positions in a tracker's frame that is turned by 30 degrees about z."""
+    cosine, sine = np.cos(np.radians(30.0)), np.sin(np.radians(30.0))
+    return text_of(frame.assign(x=cosine * frame.x - sine * frame.y, y=sine * frame.x + cosine * frame.y))
+
+
+def tared(frame: Frame) -> str:
+    return text_of(frame.assign(**{cell: frame[cell] - frame[cell][:10].mean() for cell in CELLS}))
+
+
+def as_lengths(factor: float) -> Writer:
+    """The lengths that encoders tell, in place of speeds."""
+
+    def write(frame: Frame) -> str:
+        reeled = (frame[SPEEDS].rolling(2).mean().mul(frame["time"].diff(), axis=0)).fillna(0.0).cumsum()
+        lengths = {f"rope_length_{cable}": -factor * reeled[name] for cable, name in enumerate(SPEEDS, 1)}
+        return text_of(frame.drop(columns=SPEEDS).assign(**lengths).round(9))
+
+    return write
+
+
 def tracker_late(frame: Frame) -> str:
     rows = round(0.8 / (frame.time[1] - frame.time[0]))
     late = frame[[*AXES, *CELLS]].shift(-rows)
@@ -150,13 +171,39 @@ REFUSED: dict[str, tuple[Writer, str]] = {
     "axes in another order": (reordered(AXES, [2, 0, 1]), "x, y, z are the recording's y, z, x"),
     "another origin": (
         lambda f: text_of(f.assign(**{a: f[a] - f[a][0] for a in AXES})),
-        "x, y, z have another origin, about [29.",
+        "x, y, z have another origin, about [29",
+    ),
+    "time in days, as spreadsheets have it": (scaled(["time"], 1.0 / 86_400.0), "time is in d"),
+    "speeds of a drum in revolutions per minute": (scaled(SPEEDS, 191.0), "drums with a radius of 0.005"),
+    "speeds of a drum in turns": (scaled(SPEEDS, 3.183), "0.04999 m if in turns/s"),
+    "speeds of a motor before its gear": (scaled(SPEEDS, 2387.0), "1 of theirs is 0.000418"),
+    "speeds in counts": (scaled(SPEEDS, 13_038.0), "m/s, as of an encoder's counts"),
+    "rope lengths in counts": (as_lengths(1.63e5), " m, as of an encoder's counts"),
+    "rope lengths in feet": (as_lengths(3.28084), "rope_length_1 to rope_length_3 are in ft"),
+    "angles of drums in degrees": (as_lengths(1146.0), "0.04999 m if in deg"),
+    "positions in inches": (scaled(AXES, 39.37008), "x, y, z are in in"),
+    "positions in feet": (scaled(AXES, 3.28084), "x, y, z are in ft"),
+    "positions in um": (scaled(AXES, 1e6), "x, y, z are in um"),
+    "one coordinate in mm": (scaled(["z"], 1e3), "z is in mm"),
+    "z downwards": (lambda f: text_of(f.assign(z=-f.z)), "x, y, z are the recording's x, y, -z"),
+    "y upwards": (lambda f: text_of(f.assign(y=f.z, z=-f.y)), "x, y, z are the recording's x, -z, y"),
+    "left-handed axes": (lambda f: text_of(f.assign(y=f.z, z=f.y)), "x, y, z are the recording's x, z, y"),
+    "a tracker's frame that is turned": (turned, "x, y, z are in a frame that is turned by about "),
+    "a tracker's frame in mm, z downwards": (
+        lambda f: text_of(f.assign(x=1e3 * (f.x + 30.0), y=-1e3 * f.y, z=-1e3 * (f.z - 2.0))),
+        "x, y, z are in mm and the robot file's x, y, z are the recording's x, -y, -z and x, y, z have another origin",
     ),
     "clocks apart": (tracker_late, "the winches' clock is 0."),
     "tensions in kN": (scaled(CELLS, 1e-3), "tension_1 to tension_3 are in kN"),
     "tensions in kg": (scaled(CELLS, 1.0 / 9.80665), "tension_1 to tension_3 are in kg"),
     "tensions in g": (scaled(CELLS, 1e3 / 9.80665), "tension_1 to tension_3 are in g"),
     "tensions of the other sign": (scaled(CELLS, -1.0), "tension_1 to tension_3 have the other sign"),
+    "tensions in daN": (scaled(CELLS, 0.1), "tension_1 to tension_3 are in daN"),
+    "tensions in counts of a converter": (scaled(CELLS, 6.5536), "1 of tension_1 to tension_3 is about 0.153 N"),
+    "tensions in mV/V": (scaled(CELLS, 4e-4), "1 of tension_1 to tension_3 is about 2.5"),
+    "one tension in kN": (scaled(CELLS[1:2], 1e-3), "tension_2 alone is in kN"),
+    "one tension of the other sign": (scaled(CELLS[1:2], -1.0), "tension_2 alone has the other sign"),
+    "load cells tared under load": (tared, "were tared at the start, where statics gives 159"),
     "load cells swapped": (reordered(CELLS, [1, 0, 2]), "are tension_2, tension_1, tension_3"),
     "commas for separators and decimals": (lambda f: text_of(f, ",", ",").replace('"', ""), "cells, the header has"),
     "no header": (lambda frame: text_of(frame, header=False), "the header is missing"),

@@ -42,6 +42,13 @@ def another_origin(recording: Recording) -> Recording:
     return replace(recording, position=recording.position - recording.position[0])
 
 
+def turned(recording: Recording) -> Recording:
+    """Positions in a frame that is turned by 30 degrees about z."""
+    cosine, sine = np.cos(np.radians(30.0)), np.sin(np.radians(30.0))
+    turn = np.array([[cosine, sine, 0.0], [-sine, cosine, 0.0], [0.0, 0.0, 1.0]])
+    return replace(recording, position=recording.position @ turn.T)
+
+
 def tracker_late(recording: Recording) -> Recording:
     """The tracker's samples, each 0.8 s after the winches' of the same row."""
     rows = round(0.8 / float(np.median(np.diff(recording.time))))
@@ -72,6 +79,14 @@ MISTAKES: dict[str, tuple[Change, str, str]] = {
     "z downwards": (positions([1.0, -1.0, -1.0]), "x, y, z are the recording's x, -y, -z", "write the columns"),
     "another origin": (another_origin, "x, y, z have another origin, about [", "add that vector"),
     "clocks apart": (tracker_late, "the winches' clock is 0.7", "subtract that from the winches' times"),
+    "time in days": (time_in(86_400.0), "if time is in d", "multiply time by 8.64e+04"),
+    "counts a second": (speeds(1.3e4), "1 of theirs is 7.", "or declare that as factor"),
+    "turns a second": (speeds(1.0 / (2.0 * np.pi * RADIUS)), "m if in turns/s", "what is recorded in one turn"),
+    "positions in inches": (positions(1.0 / 0.0254), "if x, y, z are in in", "multiply x, y, z by 0.0254"),
+    "positions in feet": (positions(1.0 / 0.3048), "if x, y, z are in ft", "multiply x, y, z by 0.3048"),
+    "one axis in mm": (positions([1.0, 1.0, 1e3]), "if z is in mm", "multiply z by 0.001"),
+    "a frame that is turned": (turned, "x, y, z are in a frame that is turned by about", "write R (x, y, z) + ["),
+    "another frame": (both(another_origin, positions([1e3, -1e3, -1e3])), "are in mm and the robot file's", "add that"),
     "ms and mm": (both(time_in(1e-3), positions(1e3)), "x, y, z are in mm and time is in ms", "and multiply time"),
 }
 
@@ -104,6 +119,16 @@ def test_the_radius_of_drums_whose_angle_was_recorded_is_measured() -> None:
     check = check_motion(robot, speeds(1.0 / RADIUS)(recording))
     assert check is not None
     assert check.readings[0].winding.radius == pytest.approx(RADIUS, rel=5e-3)
+
+
+@pytest.mark.parametrize("name", ["three", "caroca", "eight"])
+def test_a_frame_is_told_with_the_rotation_that_turns_it_back(name: str) -> None:
+    robot, recording = shipped(name)
+    check = check_motion(robot, turned(recording))
+    assert check is not None
+    back = check.readings[0].geometry.positions(robot, turned(recording).position)
+    size = np.ptp([*robot.anchors, robot.platform.start], axis=0).max()
+    assert np.nanmax(np.abs(back - recording.position)) < 5e-3 * size
 
 
 def test_a_rope_length_in_mm_is_told_by_its_column() -> None:

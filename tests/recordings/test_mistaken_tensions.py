@@ -10,9 +10,11 @@ import pytest
 
 from tautwire.recordings.alternative_readings import GeometryReading, WindingReading
 from tautwire.recordings.consistency import recording_mistakes
-from tautwire.recordings.mistaken_tensions import TensionCheck, check_tensions, force_balance
+from tautwire.recordings.mistaken_tensions import TensionCheck, check_tensions
 from tautwire.recordings.recording import Recording, read_recording
+from tautwire.recordings.weight_balance import force_balance
 from tautwire.robot.schema import Robot
+from tautwire.robot.static_equilibrium import static_tensions
 from tests.support.recordings import recorded
 from tests.support.robots import EXAMPLES, example
 
@@ -61,6 +63,52 @@ def test_swapped_load_cells_are_told(name: str) -> None:
     order = [1, 0, *range(2, robot.cable_count)]
     (error,) = recording_mistakes(robot, replace(recording, tension=recording.tension[:, order]))
     assert f"load cells of cables 1 to {robot.cable_count} are tension_2, tension_1, tension_3" in error.problem
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize(
+    ("factor", "cause", "remedy"),
+    [
+        (1e-3, "if tension_2 alone is in kN", "multiply it by 1000, or declare the unit: tension_2 [kN]"),
+        (-1.0, "if tension_2 alone has the other sign", "multiply by -1"),
+    ],
+)
+def test_one_load_cell_in_another_unit_or_of_the_other_sign_is_told(
+    name: str, factor: float, cause: str, remedy: str
+) -> None:
+    robot, recording = shipped(name)
+    factors = np.where(np.arange(robot.cable_count) == 1, factor, 1.0)
+    (error,) = recording_mistakes(robot, tensions(recording, factors))
+    assert cause in error.problem and remedy in error.hint
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("newtons", [0.15, 2500.0])
+def test_numbers_of_an_amplifier_are_told_with_their_factor(name: str, newtons: float) -> None:
+    robot, recording = shipped(name)
+    (error,) = recording_mistakes(robot, tensions(recording, 1.0 / newtons))
+    told = float(error.problem.split(" is about ")[1].split(" N")[0])
+    assert told == pytest.approx(newtons, rel=0.1) and "declare factor, and offset" in error.hint
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_load_cells_that_were_tared_under_load_are_told_with_the_tensions_of_statics(name: str) -> None:
+    robot, recording = shipped(name)
+    tared = replace(recording, tension=recording.tension - recording.tension[:10].mean(axis=0))
+    (error,) = recording_mistakes(robot, tared)
+    assert "were tared at the start" in error.problem
+    offsets = [float(text) for text in error.hint.split("offset = ")[1].split(" in [")[0].split(", ")]
+    assert offsets == pytest.approx(-static_tensions(robot), rel=1e-3)
+
+
+@pytest.mark.parametrize(
+    "effects",
+    [{"sensor_gain": {"gain": 1.3, "outputs": "tension", "cables": [2]}}, {"payload": {"mass": 90.0}}],
+    ids=str,
+)
+def test_effects_are_not_taken_for_odd_load_cells(effects: dict[str, Any]) -> None:
+    robot = example("three").as_modelled()
+    assert recording_mistakes(robot, recorded("three", 3, effects)) == ()
 
 
 def test_load_cells_in_a_circle_are_told() -> None:

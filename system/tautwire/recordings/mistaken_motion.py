@@ -2,43 +2,38 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
-from itertools import permutations, product
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import least_squares, linear_sum_assignment
 
 from ..robot.schema import AXES, Robot
 from .alternative_readings import (
-    LENGTH_UNITS,
-    SPEED_UNITS,
+    ANCHOR_UNITS,
     TIME_UNITS,
     GeometryReading,
     Mistake,
     WindingReading,
-    likely_drum_radii,
 )
+from .candidate_readings import SAMPLE_INTERVALS, are_of_one_system, geometry_readings, winding_readings
+from .frame_alignment import aligned_frames
 from .recording import Recording
 from .white_noise_estimate import white_noise_deviation
 
 Array = NDArray[np.float64]
 
-# A smaller misfit is for effects to explain, and a mistake has to divide a larger one by the factor, to a share.
+# A smaller misfit is for effects to explain, and a mistake has to divide a larger one by the factor, to a share, which
+# is that of several.
 MAX_MISFIT, MIN_IMPROVEMENT, MAX_CORRECTED_MISFIT = 0.05, 4.0, 0.2
 # Readings that misfit by no more than this times the best, and this more, explain a recording as well.
 EQUAL_RATIO, EQUAL_DIFFERENCE = 1.5, 0.005
-# Units err from the nearest one by less, drums included; cables whose winches show angles have one ratio.
-MIN_UNIT_RATIO = 1.25
-MAX_RATIO_SPREAD = 0.03
 # Share of the robot's size that positions of another origin begin away from the declared start.
 MIN_START_SHARE = 0.02
 # Share of the lowest natural frequency up to which the platform follows the winches.
 MAX_QUASI_STATIC_SHARE = 0.5
 MIN_MOTION_NOISE_RATIO = 20.0
 MAX_ROWS, ROWS_USED = 8000, 1000
-SAMPLE_INTERVALS = (5e-5, 0.5)  # s, of recordings
 MIN_CLOCK_OFFSET, MAX_CLOCK_OFFSET = 0.5, 10.0  # s
 
 
@@ -100,7 +95,7 @@ def check_motion(robot: Robot, recording: Recording) -> MotionCheck | None:
     positions are known along too few axes.
     """
     rows = _moving_rows(robot, recording)
-    units = () if rows is None else _quasi_static_units(robot, recording, rows)
+    units = {} if rows is None else _quasi_static_units(robot, recording, rows)
     if rows is None or not units:
         return None
     time, wound, recorded_positions = recording.time[rows], recording.wound_lengths()[rows], recording.position[rows]
@@ -110,49 +105,35 @@ def check_motion(robot: Robot, recording: Recording) -> MotionCheck | None:
     if misfit <= MAX_MISFIT:
         return MotionCheck(misfit, ())
     readings = _readings(robot, recording, rows, units)
-    if "m" in units:
+    if "m" not in units.get("s", ()):
+        # Of a fast motion every longer unit of time makes a slow one: it alone has to explain the recording.
+        readings = [each for each in readings if each.winding.time_unit == "s" or len(each.mistakes) == 1]
+    else:
         clocks = _clock_readings(lengths, declared, time, wound)
         readings += [_reading(GeometryReading(), winding, error, recording) for winding, error in clocks]
-    best = _best(readings, misfit)
-    if not best and "m" in units:
-        geometry = _with_fitted_origin(robot, recorded_positions, wound)
-        if not _is_start_nearer(robot, recorded_positions, geometry):
-            return MotionCheck(misfit, ())
-        error = _misfit(_centred(geometry.directions(robot, recorded_positions)[0]), travel, declared)
-        best = _best([_reading(geometry, declared, error, recording)], misfit)
-    return MotionCheck(misfit, best)
+        for geometry in aligned_frames(robot, recorded_positions, wound):
+            if _is_start_nearer(robot, recorded_positions, geometry):
+                error = _misfit(_centred(geometry.directions(robot, recorded_positions)[0]), travel, declared)
+                if error <= MAX_MISFIT:
+                    readings.append(_reading(geometry, declared, error, recording))
+    return MotionCheck(misfit, _best(readings, misfit))
 
 
 def _readings(
-    robot: Robot, recording: Recording, rows: NDArray[np.int64], anchor_units: Sequence[str]
+    robot: Robot, recording: Recording, rows: NDArray[np.int64], units: Mapping[str, Sequence[str]]
 ) -> list[MotionReading]:
-    """Readings of geometry and winding, with their misfits, for anchors in these units."""
+    """Readings of geometry and winding, with their misfits, for these units of time and anchors."""
     travel, interval = _centred(recording.wound_lengths()[rows]), float(np.median(np.diff(recording.time)))
     readings = []
-    for geometry in _geometries():
-        if geometry.anchor_unit in anchor_units:
+    for geometry in geometry_readings(robot):
+        if any(geometry.anchor_unit in anchor_units for anchor_units in units.values()):
             lengths = _centred(geometry.directions(robot, recording.position[rows])[0])
             readings += [
                 _reading(geometry, winding, _misfit(lengths, travel, winding), recording)
-                for winding in _windings(lengths, travel, interval)
+                for winding in winding_readings(lengths, travel, interval)
+                if geometry.anchor_unit in units.get(winding.time_unit, ()) and are_of_one_system(geometry, winding)
             ]
     return readings
-
-
-def _with_fitted_origin(robot: Robot, recorded_positions: Array, wound: Array) -> GeometryReading:
-    """The geometry with the origin of the positions, in the robot's plane, that fits the winch travel best."""
-    axes = list(robot.axes_in_plane)
-    start = np.array(robot.platform.start) - GeometryReading().positions(robot, recorded_positions[:1])[0]
-
-    def errors(coordinates: Array) -> Array:
-        origin = np.zeros(len(AXES))
-        origin[axes] = coordinates
-        lengths = GeometryReading(origin=tuple(origin)).directions(robot, recorded_positions)[0]
-        return np.asarray(_centred(lengths + wound).ravel())
-
-    origin = np.zeros(len(AXES))
-    origin[axes] = least_squares(errors, start[axes], loss="soft_l1").x
-    return GeometryReading(origin=tuple(origin.tolist()))
 
 
 def _is_start_nearer(robot: Robot, recorded_positions: Array, geometry: GeometryReading) -> bool:
@@ -173,8 +154,12 @@ def _reading(geometry: GeometryReading, winding: WindingReading, misfit: float, 
 
 
 def _best(readings: list[MotionReading], declared_misfit: float) -> tuple[MotionReading, ...]:
-    limit = min(declared_misfit / MIN_IMPROVEMENT, MAX_CORRECTED_MISFIT)
-    matching = [reading for reading in readings if reading.misfit <= limit]
+    limit = declared_misfit / MIN_IMPROVEMENT
+    matching = [
+        reading
+        for reading in readings
+        if reading.misfit <= min(limit, MAX_CORRECTED_MISFIT / max(1, len(reading.mistakes)))
+    ]
     if not matching:
         return ()
     limit = EQUAL_RATIO * min(reading.misfit for reading in matching) + EQUAL_DIFFERENCE
@@ -182,44 +167,6 @@ def _best(readings: list[MotionReading], declared_misfit: float) -> tuple[Motion
     fewest = min(reading.penalty for reading in equal)
     unique = {reading.mistakes: reading for reading in equal if reading.penalty == fewest}
     return tuple(sorted(unique.values(), key=lambda reading: reading.misfit))
-
-
-def _geometries() -> Iterator[GeometryReading]:
-    """The declared reading first; then other units, signed axes, and both."""
-    for axes, signs in product(permutations(range(3)), product((1, -1), repeat=3)):
-        for unit in LENGTH_UNITS:
-            yield GeometryReading(unit, "m", axes, signs)
-    for unit in ("cm", "mm"):
-        yield GeometryReading(anchor_unit=unit)
-
-
-def _windings(lengths: Array, wound: Array, interval: float) -> Iterator[WindingReading]:
-    """Units, signs and orders that the slopes of centred lengths on centred travel suggest, each (N, n)."""
-    count = lengths.shape[1]
-    with np.errstate(divide="ignore", invalid="ignore"):
-        slopes = np.nan_to_num(-(lengths.T @ wound) / np.sum(wound**2, axis=0))
-        energies = np.sqrt(np.outer(np.sum(lengths**2, axis=0), np.sum(wound**2, axis=0)))
-        correlations = np.nan_to_num((lengths.T @ wound) / energies)
-    assigned = tuple(int(column) for column in linear_sum_assignment(-(correlations**2))[1])
-    for order in dict.fromkeys((tuple(range(count)), assigned)):
-        by_cable = slopes[np.arange(count), order]
-        moving = np.abs(by_cable[by_cable != 0.0])
-        if not moving.size:
-            continue
-        signs = tuple(-1 if slope < 0.0 else 1 for slope in by_cable)
-        ratio = float(np.median(moving))
-        units = [
-            (time_unit, speed_unit)
-            for time_unit, speed_unit in product(TIME_UNITS, SPEED_UNITS)
-            if 1.0 / MIN_UNIT_RATIO < ratio / (TIME_UNITS[time_unit] * SPEED_UNITS[speed_unit]) < MIN_UNIT_RATIO
-        ]
-        for time_unit, speed_unit in units:
-            yield WindingReading(time_unit, speed_unit, signs, order)
-        if not units and np.ptp(moving) <= MAX_RATIO_SPREAD * ratio:
-            for time_unit, size in TIME_UNITS.items():
-                is_interval = SAMPLE_INTERVALS[0] <= interval * size <= SAMPLE_INTERVALS[1]
-                if is_interval and likely_drum_radii(ratio / size):
-                    yield WindingReading(time_unit, None, signs, order, ratio / size)
 
 
 def _clock_readings(
@@ -261,17 +208,21 @@ def _moving_rows(robot: Robot, recording: Recording) -> NDArray[np.int64] | None
     return rows[:: max(1, rows.size // ROWS_USED)]
 
 
-def _quasi_static_units(robot: Robot, recording: Recording, rows: NDArray[np.int64]) -> tuple[str, ...]:
-    """Units of anchors with which the winches move too slowly, in their stretch of rows, to excite the lowest mode.
+def _quasi_static_units(robot: Robot, recording: Recording, rows: NDArray[np.int64]) -> dict[str, tuple[str, ...]]:
+    """Units of anchors, by that of time, with which the winches move too slowly to excite the lowest mode.
 
-    Its frequency is that of ropes ``E A / L`` under the tension ``m g / n`` each, at the start; that of the winches is
-    the rms of their speed over that of their travel.
+    Its frequency is that of ropes ``E A / L`` under the tension ``m g / n`` each, at the start; that of the winches, in
+    their stretch of rows, is the rms of their speed over that of their travel.
     """
     stretch = slice(rows[0], rows[-1] + 1)
     travel = _centred(recording.wound_lengths()[stretch])
     frequency = np.sqrt(np.sum(recording.winch_speed[stretch] ** 2) / max(float(np.sum(travel**2)), 1e-300))
-    frequencies = {unit: _lowest_natural_frequency(robot, GeometryReading(anchor_unit=unit)) for unit in LENGTH_UNITS}
-    return tuple(unit for unit, natural in frequencies.items() if frequency <= MAX_QUASI_STATIC_SHARE * natural)
+    natural = {unit: _lowest_natural_frequency(robot, GeometryReading(anchor_unit=unit)) for unit in ANCHOR_UNITS}
+    by_time = {
+        time_unit: tuple(unit for unit in natural if frequency / size <= MAX_QUASI_STATIC_SHARE * natural[unit])
+        for time_unit, size in TIME_UNITS.items()
+    }
+    return {time_unit: units for time_unit, units in by_time.items() if units}
 
 
 def _lowest_natural_frequency(robot: Robot, geometry: GeometryReading) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import combinations, permutations
@@ -10,13 +9,12 @@ from itertools import combinations, permutations
 import numpy as np
 from numpy.typing import NDArray
 
-from ..robot.schema import AXES, Robot
-from .alternative_readings import NEGATE, REORDER, TIME_UNITS, GeometryReading, Mistake, WindingReading, convert
+from ..robot.schema import Robot
+from .alternative_readings import NEGATE, REORDER, GeometryReading, Mistake, WindingReading, convert
 from .mistaken_motion import MIN_IMPROVEMENT
+from .odd_load_cells import likely_cell_readings
 from .recording import Recording
-from .sensor_gaps import bridge_short_gaps
-from .units import UNITS
-from .white_noise_estimate import white_noise_deviation
+from .weight_balance import FORCE_UNITS, ForceBalance, force_balance
 
 Array = NDArray[np.float64]
 
@@ -26,19 +24,8 @@ MAX_ORDER_MISFIT, MAX_SCALED_MISFIT = 0.015, 0.3
 MIN_DIRECTION_DEVIATION = 0.01
 EQUAL_RATIO = 1.5
 # How far payloads and gains may be off, and by how much where the unit is of the size of a wrong mass.
-MAX_UNIT_RATIO, MAX_NEAR_UNIT_RATIO, NEAR_UNITS = 1.3, 1.1, ("kg", "lbf")
-MIN_SIGNAL_NOISE_RATIO = 5.0
-BLOCK_DURATION = 0.25  # s; forces are averaged over it
-MAX_BLOCK_STRETCH = 1.5  # a longer block spans a gap
-MIN_BLOCKS = 4
-MAX_BLOCKS = 400
-MIN_SEEN_SHARE = 0.1  # of the weight, in the directions that load cells see
+MAX_UNIT_RATIO, MAX_NEAR_UNIT_RATIO, NEAR_UNITS = 1.3, 1.1, ("daN", "kg", "lbf")
 MAX_PERMUTED_CABLES = 5
-MAX_UNSEEN_TRAVEL = 0.05  # of a rope: without positions the platform counts as at the start until it was reeled
-
-FORCE_UNITS = {
-    unit.symbol: unit.to_si(1.0) for unit in UNITS["force"] if unit.symbol in ("N", "kN", "mN", "kg", "g", "lbf")
-}
 
 
 @dataclass(frozen=True)
@@ -82,45 +69,6 @@ class TensionCheck:
     mistakes: tuple[tuple[Mistake, ...], ...]
 
 
-@dataclass(frozen=True)
-class ForceBalance:
-    """B blocks of the balance ``sum_i T_i u_i = m (a + g)``, without the directions of cables that have no load cell.
-
-    ``directions`` (B, 3, n), ``tensions`` (B, n) as read, 0 where there is no load cell, ``required`` (B, 3) in N;
-    ``time`` (B,) in s of the middles.
-    """
-
-    time: Array
-    directions: Array
-    tensions: Array
-    required: Array
-    has_load_cell: tuple[bool, ...]
-
-    def balanced_tensions(self) -> Array:
-        """The balanced tensions nearest to the measured ones, (B, n) in N, NaN where there is no load cell."""
-        unbalanced = self.required - self._forces(tuple(range(len(self.has_load_cell))))
-        corrections = np.einsum("bic,bc->bi", np.linalg.pinv(self.directions), unbalanced)
-        return np.where(self.has_load_cell, self.tensions + corrections, np.nan)
-
-    def carried(self, order: tuple[int, ...]) -> float:
-        """The part of the required force that the tensions, read in this order, carry; 1 where they are right."""
-        return float(np.sum(self._forces(order) * self.required) / np.sum(self.required**2))
-
-    def misfit(self, order: tuple[int, ...], factor: float = 1.0) -> float:
-        """Rms of what is not balanced, over that of the required force."""
-        unbalanced = factor * self._forces(order) - self.required
-        return float(np.sqrt(np.sum(unbalanced**2) / np.sum(self.required**2)))
-
-    def best_factor(self, order: tuple[int, ...]) -> float:
-        """The factor on all tensions that balances best; 0 where none does."""
-        forces = self._forces(order)
-        energy = float(np.sum(forces**2))
-        return float(np.sum(forces * self.required)) / energy if energy > 0.0 else 0.0
-
-    def _forces(self, order: tuple[int, ...]) -> Array:
-        return np.asarray(np.einsum("bci,bi->bc", self.directions, self.tensions[:, order]))
-
-
 def check_tensions(
     robot: Robot, recording: Recording, geometry: GeometryReading, winding: WindingReading
 ) -> TensionCheck | None:
@@ -134,10 +82,15 @@ def check_tensions(
     if balance is None:
         return None
     declared = tuple(range(robot.cable_count))
+    is_as_read = geometry == GeometryReading() and winding == WindingReading()
     readings = [reading for order in _likely_orders(balance) for reading in _unit_readings(balance, order)]
     fewest = min((len(tuple(reading.mistakes())) for reading in readings), default=0)
     mistakes = tuple(mistakes for r in readings if len(mistakes := tuple(r.mistakes())) == fewest) if fewest else ()
     corrected_misfit = min((balance.misfit(reading.order, reading.factor) for reading in readings), default=np.inf)
+    if not mistakes and is_as_read:
+        cells = likely_cell_readings(robot, recording, balance)
+        mistakes = tuple((cell.mistake,) for cell in cells)
+        corrected_misfit = min((cell.misfit for cell in cells), default=corrected_misfit)
     return TensionCheck(balance.carried(declared), balance.misfit(declared), corrected_misfit, mistakes)
 
 
@@ -161,77 +114,6 @@ def _unit_readings(balance: ForceBalance, order: tuple[int, ...]) -> Iterator[Te
         limit = MAX_NEAR_UNIT_RATIO if unit in NEAR_UNITS else MAX_UNIT_RATIO
         if 1.0 / limit < abs(factor) / size < limit:
             yield TensionReading(unit, -1 if factor < 0.0 else 1, order)
-
-
-def force_balance(
-    robot: Robot, recording: Recording, geometry: GeometryReading, winding: WindingReading
-) -> ForceBalance | None:
-    """The balance of forces in blocks of a quarter second; None where too few are whole, or no direction is left."""
-    has_load_cell = np.asarray(np.isfinite(recording.tension).any(axis=0))
-    block_means = _block_means(robot, recording, winding)
-    if block_means is None or not _is_more_than_noise(recording.tension):
-        return None
-    time, positions, tensions, duration = block_means
-    directions = geometry.directions(robot, positions)[1].transpose(0, 2, 1)
-    in_metres = geometry.positions(robot, positions)
-    # The second difference of means is the acceleration seen through a B-spline, and so are the forces beside it.
-    acceleration = (in_metres[2:] - 2.0 * in_metres[1:-1] + in_metres[:-2]) / duration**2
-    tensions = (tensions[2:] + 4.0 * tensions[1:-1] + tensions[:-2]) / 6.0
-    directions = directions[1:-1]
-    is_complete = np.isfinite(acceleration).all(axis=1) & np.isfinite(tensions[:, has_load_cell]).all(axis=1)
-    if np.count_nonzero(is_complete) < MIN_BLOCKS:
-        return None
-    tensions, directions = np.where(has_load_cell, tensions, 0.0)[is_complete], directions[is_complete]
-    in_plane = np.isin(np.arange(len(AXES)), robot.axes_in_plane)
-    required = robot.platform.mass * (acceleration[is_complete] + np.array([0.0, 0.0, robot.gravity])) * in_plane
-    projection = _without_directions(directions[:, :, np.logical_not(has_load_cell)])
-    required = np.einsum("bij,bj->bi", projection, required)
-    weight = robot.platform.mass * robot.gravity
-    if not np.sqrt(np.mean(np.sum(required**2, axis=1))) > MIN_SEEN_SHARE * weight > 0.0:
-        return None
-    cells = tuple(map(bool, has_load_cell))
-    return ForceBalance(time[1:-1][is_complete], projection @ directions, tensions, required, cells)
-
-
-def _block_means(
-    robot: Robot, recording: Recording, winding: WindingReading
-) -> tuple[Array, Array, Array, float] | None:
-    """Middles of blocks (B,) in s, means of positions (B, 3) and tensions (B, n), and the duration of a block in s."""
-    interval = float(np.median(np.diff(recording.time))) * TIME_UNITS[winding.time_unit]
-    size = max(1, round(BLOCK_DURATION / interval))
-    rows = min(recording.sample_count, MAX_BLOCKS * size)
-    if not np.isfinite(recording.position[:, robot.axes_in_plane]).any(axis=0).all():
-        travel = np.abs(winding.factor * recording.wound_lengths()).max(axis=1)
-        lengths = [math.dist(anchor, robot.platform.start) for anchor in robot.anchors]
-        rows = min(rows, int(np.argmax(travel > MAX_UNSEEN_TRAVEL * min(lengths))) or rows)
-    count = rows // size
-    if count < MIN_BLOCKS:
-        return None
-    starts = recording.time[: count * size : size] * TIME_UNITS[winding.time_unit]
-    spans_gap = np.append(np.diff(starts) > MAX_BLOCK_STRETCH * size * interval, False)
-    # Of positions in some rows alone the mean would not be that of the block's middle, which a second difference needs.
-    used = slice(count * size)
-    means = []
-    for values in (bridge_short_gaps(recording.time[used], recording.position[used]), recording.tension[used]):
-        blocks = values.reshape(count, size, -1)
-        counts = np.isfinite(blocks).sum(axis=1)
-        mean = np.nansum(blocks, axis=1) / np.where(counts > 0, counts, np.nan)
-        means.append(np.where(spans_gap[:, None], np.nan, mean))
-    return starts + 0.5 * size * interval, means[0], means[1], size * interval
-
-
-def _is_more_than_noise(tension: Array) -> bool:
-    """Whether load cells show forces: the rest after taring at a standstill is noise and drift."""
-    measured = tension[np.isfinite(tension)]
-    if not measured.size:
-        return False
-    noise = white_noise_deviation(tension)
-    return bool(np.median(np.abs(measured)) > MIN_SIGNAL_NOISE_RATIO * (noise if np.isfinite(noise) else 0.0))
-
-
-def _without_directions(directions: Array) -> Array:
-    """Projections (B, 3, 3) onto what is perpendicular to unit vectors (B, 3, k)."""
-    return np.asarray(np.eye(3) - directions @ np.linalg.pinv(directions))
 
 
 def _orders(has_load_cell: tuple[bool, ...]) -> Iterator[tuple[int, ...]]:

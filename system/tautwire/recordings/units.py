@@ -16,7 +16,7 @@ from ..robot.schema import AXES, QUATERNION_COLUMNS
 
 STANDARD_GRAVITY = 9.80665  # m/s^2, of the kilogram-force
 POUND_FORCE = 4.4482216152605  # N
-INCH = 0.0254  # m
+INCH, FOOT = 0.0254, 0.3048  # m
 
 Number = TypeVar("Number", float, NDArray[np.float64])
 
@@ -42,8 +42,23 @@ class Unit:
         return shown * self.factor / self.divisor
 
 
-_TIME = (Unit("s"), Unit("ms", divisor=1e3), Unit("us", divisor=1e6), Unit("ns", divisor=1e9), Unit("min", 60.0))
-_LENGTH = (Unit("m"), Unit("mm", divisor=1e3), Unit("cm", divisor=1e2), Unit("um", divisor=1e6), Unit("in", INCH))
+_TIME = (
+    Unit("s"),
+    Unit("ms", divisor=1e3),
+    Unit("us", divisor=1e6),
+    Unit("ns", divisor=1e9),
+    Unit("min", 60.0),
+    Unit("h", 3600.0),
+    Unit("d", 86_400.0),
+)
+_LENGTH = (
+    Unit("m"),
+    Unit("mm", divisor=1e3),
+    Unit("cm", divisor=1e2),
+    Unit("um", divisor=1e6),
+    Unit("in", INCH),
+    Unit("ft", FOOT),
+)
 _SPEED = (
     Unit("m/s"),
     Unit("mm/s", divisor=1e3),
@@ -52,6 +67,7 @@ _SPEED = (
     Unit("mm/min", divisor=6e4),
     Unit("km/h", divisor=3.6),
     Unit("in/s", INCH),
+    Unit("ft/s", FOOT),
 )
 _FORCE = (
     Unit("N"),
@@ -73,22 +89,35 @@ UNITS: Mapping[str, tuple[Unit, ...]] = {
     "ratio": _RATIO,
 }
 
-_OTHER_SPELLINGS = {"sec": "s", "m*s^-1": "m/s", "m s^-1": "m/s", "m s-1": "m/s", "kp": "kgf", "lb": "lbf", "-": "1"}
+_OTHER_SPELLINGS = {
+    "sec": "s",
+    "msec": "ms",
+    "m*s^-1": "m/s",
+    "m s^-1": "m/s",
+    "m s-1": "m/s",
+    "inch": "in",
+    "kp": "kgf",
+    "lb": "lbf",
+    "-": "1",
+}
 # Units in words, as trackers write them behind a name; without brackets such a word may be a name.
 _IN_WORDS = {
     word + plural: symbol
     for words, symbol in (
         (("second",), "s"),
+        (("hour",), "h"),
+        (("day",), "d"),
         (("millisecond",), "ms"),
         (("microsecond",), "us"),
         (("meter", "metre"), "m"),
         (("centimeter", "centimetre"), "cm"),
         (("millimeter", "millimetre"), "mm"),
         (("newton",), "N"),
+        (("kilonewton",), "kN"),
     )
     for word in words
     for plural in ("", "s")
-}
+} | {"inches": "in", "foot": "ft", "feet": "ft"}
 _BRACKETS = re.compile(r"\[(.*)\]|\((.*)\)")
 _MICRO_SIGNS = str.maketrans({"\u00b5": "u", "\u03bc": "u", "\u00b7": "*", "\u22c5": "*"})
 

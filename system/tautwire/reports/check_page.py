@@ -12,9 +12,9 @@ from ..number_format import format_percent, format_significant
 from ..provenance import Provenance
 from ..recordings.alternative_readings import GeometryReading, WindingReading
 from ..recordings.mistaken_motion import LengthRegression, length_regression
-from ..recordings.mistaken_tensions import ForceBalance, force_balance
 from ..recordings.recording import Recording
 from ..recordings.sensor_gaps import bridge_short_gaps, slower_rate
+from ..recordings.weight_balance import ForceBalance, force_balance
 from ..robot.schema import AXES, Robot
 from .check_figures import CheckCurve, CheckPanel, panel_data, robot_scene
 from .page_rendering import Number, PageHeader, Row, render_page

@@ -1,0 +1,83 @@
+"""Candidate readings of a recording: units, axes, signs and orders that its winch travel and positions may have."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from itertools import permutations, product
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import linear_sum_assignment
+
+from ..robot.schema import Robot
+from .alternative_readings import (
+    ANCHOR_UNITS,
+    LENGTH_UNITS,
+    SPEED_UNITS,
+    TIME_UNITS,
+    GeometryReading,
+    WindingReading,
+)
+
+Array = NDArray[np.float64]
+
+# Units err from the nearest one by less, drums included; within the second none but the unit is likely.
+MIN_UNIT_RATIO, MAX_UNIT_ERROR = 1.25, 0.01
+# Cables whose winches show angles have one ratio.
+MAX_RATIO_SPREAD = 0.03
+# Ratios of geometric to wound lengths that drums and ropes that give may have, whatever the unit.
+GIVING_ROPES = (0.5, 4.0)
+LONG_TIME_UNITS = ("min", "h", "d")
+SAMPLE_INTERVALS = (5e-5, 0.5)  # s, of recordings
+
+
+def geometry_readings(robot: Robot) -> Iterator[GeometryReading]:
+    """The declared reading first; then other units, signed axes, and both, or one axis in another unit."""
+    for axes, signs in product(permutations(range(3)), product((1, -1), repeat=3)):
+        for unit in LENGTH_UNITS:
+            yield GeometryReading(unit, "m", axes, signs)
+    for unit in ANCHOR_UNITS[1:]:
+        yield GeometryReading(anchor_unit=unit)
+    for unit, odd_axis, odd_unit in product(LENGTH_UNITS, robot.axes_in_plane, LENGTH_UNITS):
+        if unit != odd_unit:
+            yield GeometryReading(unit, odd_axis=odd_axis, odd_unit=odd_unit)
+
+
+def winding_readings(lengths: Array, wound: Array, interval: float) -> Iterator[WindingReading]:
+    """Units, signs and orders that the slopes of centred lengths on centred travel suggest, each (N, n)."""
+    count = lengths.shape[1]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        slopes = np.nan_to_num(-(lengths.T @ wound) / np.sum(wound**2, axis=0))
+        energies = np.sqrt(np.outer(np.sum(lengths**2, axis=0), np.sum(wound**2, axis=0)))
+        correlations = np.nan_to_num((lengths.T @ wound) / energies)
+    assigned = tuple(int(column) for column in linear_sum_assignment(-(correlations**2))[1])
+    for order in dict.fromkeys((tuple(range(count)), assigned)):
+        by_cable = slopes[np.arange(count), order]
+        moving = np.abs(by_cable[by_cable != 0.0])
+        if not moving.size:
+            continue
+        signs = tuple(-1 if slope < 0.0 else 1 for slope in by_cable)
+        ratio = float(np.median(moving))
+        units = [
+            (time_unit, speed_unit)
+            for time_unit, speed_unit in product(TIME_UNITS, SPEED_UNITS)
+            if (speed_unit == "m/s" or time_unit not in LONG_TIME_UNITS)
+            and 1.0 / MIN_UNIT_RATIO < ratio / (TIME_UNITS[time_unit] * SPEED_UNITS[speed_unit]) < MIN_UNIT_RATIO
+        ]
+        for time_unit, speed_unit in units:
+            yield WindingReading(time_unit, speed_unit, signs, order)
+        sizes = [TIME_UNITS[time_unit] * SPEED_UNITS[speed_unit] for time_unit, speed_unit in units]
+        is_unit = any(abs(ratio / size - 1.0) <= MAX_UNIT_ERROR for size in sizes)
+        is_of_ropes = GIVING_ROPES[0] < ratio < GIVING_ROPES[1]
+        if not is_unit and not is_of_ropes and np.ptp(moving) <= MAX_RATIO_SPREAD * ratio:
+            for time_unit, size in TIME_UNITS.items():
+                if SAMPLE_INTERVALS[0] <= interval * size <= SAMPLE_INTERVALS[1]:
+                    yield WindingReading(time_unit, None, signs, order, ratio / size)
+
+
+def are_of_one_system(geometry: GeometryReading, winding: WindingReading) -> bool:
+    """Whether positions and winches may be in these units at once: rare ones of both only where they are alike."""
+    if winding.speed_unit in ("in/s", "ft/s") and geometry.position_unit == "m":
+        return geometry == GeometryReading()
+    is_rare = geometry.odd_axis is not None or geometry.position_unit in ("um", "in", "ft")
+    return not is_rare or winding.speed_unit in ("m/s", f"{geometry.position_unit}/s")
