@@ -71,7 +71,8 @@ def test_an_unknown_example_is_refused_with_the_names_of_all(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert run(["example", "four"]) == 2
+    names = ", ".join(EXAMPLES)
     assert capsys.readouterr().err == (
-        "tautwire: NAME: 'four' is not an example; give one of three, eight, caroca; example: tautwire example three\n"
+        f"tautwire: NAME: 'four' is not an example; give one of {names}; example: tautwire example three\n"
     )
     assert list(tmp_path.iterdir()) == []

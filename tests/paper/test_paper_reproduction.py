@@ -28,6 +28,7 @@ FIGURE_NAMES = {name for names in SECTION_FIGURES.values() for name in names} | 
     "beyond_drum",
     "beyond_relaxation",
     "beyond_redundant",
+    "beyond_platforms",
 }
 KEYS = ["id", "section", "quantity", "unit", "paper", "printed_parameters", "corrected_parameters", "verdict", "why"]
 # What the corrected parameters give, with what the runs may be off by.

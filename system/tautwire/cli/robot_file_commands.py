@@ -37,6 +37,10 @@ EXAMPLES = {
     "three": "three cables of some 70 m, 300 kg; its recordings have more damping than the robot file",
     "eight": "eight cables in a hall, 60 kg; its recordings have nothing that the robot file lacks",
     "caroca": "three cables of some 4 m, 100 kg; its recordings have a payload that the robot file lacks",
+    "cogiro": "CoGiRo, eight cables and a platform that turns, 91 kg; its recordings have a payload",
+    "caroca8": "CAROCA with eight cables and a platform that turns, 150 kg; its centre of mass is elsewhere",
+    "fast": "the cabin of FAST on six cables of some 300 m, 30 t; its recordings have more damping",
+    "ipanema": "IPAnema 1, eight cables from above and below, 25 kg; nothing is missing",
 }
 EXAMPLE_FILES = ("robot.toml", "fit.csv", "check.csv", "plan.toml")
 

@@ -1,4 +1,4 @@
-"""Studies beyond the paper, with figures: a rope on a drum, a relaxing rope, and a redundant robot."""
+"""Studies beyond the paper, with figures: a rope on a drum, a relaxing rope, a redundant robot, real platforms."""
 
 from __future__ import annotations
 
@@ -12,6 +12,7 @@ from ..control.feedforward import elastic_reference
 from ..materials import RobotMaterial, with_material
 from ..robot.schema import Cable, Robot, TensionLimits
 from ..robot.trajectory import Helix
+from . import rigid_platforms
 from .drum_winding import QuasiStaticMotion, follow_path
 from .figure_style import GRID_COLOUR, LINE_COLOURS, PaperFigure, label_panel, legend_above, panel_grid
 from .helix_runs import TENSION_LAWS
@@ -83,6 +84,7 @@ def cases(parameters: PaperParameters, rope: RobotMaterial) -> Iterator[tuple[st
     yield "eight/rigid", rigid
     speeds = elastic_reference(eight_cables, path, rigid.time).speeds
     yield "eight/distributed", replace(rigid, winch_speed=speeds)
+    yield from rigid_platforms.cases(parameters)
 
 
 def redundant_robot(robot: Robot, path: Helix) -> Robot:
@@ -141,11 +143,13 @@ class ExtensionFigure:
     paragraph: str
 
 
-def draw_extensions(records: Records, sizes: SizeStudy) -> Iterator[ExtensionFigure]:
-    """Draw all three figures beyond the paper."""
+def draw_extensions(parameters: PaperParameters, records: Records, sizes: SizeStudy) -> Iterator[ExtensionFigure]:
+    """Draw all four figures beyond the paper."""
     yield ExtensionFigure(_draw_size_study(sizes), _size_study_text(sizes))
     yield ExtensionFigure(_draw_relaxation(records), _relaxation_text(records))
     yield ExtensionFigure(_draw_redundant(records), _redundant_text(records))
+    text = rigid_platforms.platforms_text(parameters, records)
+    yield ExtensionFigure(rigid_platforms.draw_platforms(records), text)
 
 
 def _draw_size_study(sizes: SizeStudy) -> PaperFigure:

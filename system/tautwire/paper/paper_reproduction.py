@@ -65,7 +65,7 @@ def write_paper(folder: Path, progress: Progress, provenance: Provenance | None 
     progress("comparing ropes on a drum", 0.0)
     size_study = beyond.compare_sizes(runs.parameters, runs.records)
     with figure_style():
-        extensions = tuple(draw_extensions(runs.records, size_study))
+        extensions = tuple(draw_extensions(runs.parameters, runs.records, size_study))
         figures = [
             *draw_rope_tests({name: each.rope_tests for name, each in reproduction.runs.items()}),
             *draw_time_figures(runs.records),
