@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from control import StateSpace
@@ -174,15 +175,48 @@ def build_controller_fmu(
 
     Raises UnreachableError where the path requires a cable to push, ArgumentError for an invalid argument.
     """
-    _require_design("build_controller_fmu", robot, controller, trajectory)
-    validate_number("build_controller_fmu: duration", duration, RUN_DURATION_RULE)
-    target_folder = validate_folder("build_controller_fmu: folder", folder)
+    data, target_folder = _controller_resource(
+        "build_controller_fmu", robot, controller, trajectory, duration, folder, reference
+    )
+    return package_controller_fmu(data, target_folder)
+
+
+def build_native_controller_fmu(
+    robot: Robot,
+    controller: Design,
+    trajectory: Trajectory,
+    duration: float,
+    folder: str | Path,
+    reference: Reference | None = None,
+) -> Path:
+    """As :func:`build_controller_fmu`, as machine code for this machine, with its source, that needs no Python.
+
+    Raises NativeBuildError where it cannot be compiled, else what :func:`build_controller_fmu` raises.
+    """
+    data, target_folder = _controller_resource(
+        "build_native_controller_fmu", robot, controller, trajectory, duration, folder, reference
+    )
+    return package_controller_fmu(data, target_folder, native=True)
+
+
+def _controller_resource(
+    caller: str,
+    robot: Robot,
+    controller: Design,
+    trajectory: Trajectory,
+    duration: float,
+    folder: str | Path,
+    reference: Reference | None,
+) -> tuple[dict[str, Any], Path]:
+    """Resource of a controller FMU, and the folder that it goes to."""
+    _require_design(caller, robot, controller, trajectory)
+    validate_number(f"{caller}: duration", duration, RUN_DURATION_RULE)
+    target_folder = validate_folder(f"{caller}: folder", folder)
     times = sample_times(controller.aim.period, duration)
     if reference is not None:
-        _require_reference("build_controller_fmu", reference, len(times), robot.cable_count)
-    return package_controller_fmu(
-        controller_data(robot, controller, reference or elastic_reference(robot, trajectory, times)), target_folder
-    )
+        _require_reference(caller, reference, len(times), robot.cable_count)
+    data = controller_data(robot, controller, reference or elastic_reference(robot, trajectory, times))
+    return data, target_folder
 
 
 def cosimulate_with_controller(

@@ -164,10 +164,11 @@ def native_fmu_writer(platforms: Sequence[str] = ()) -> Callable[[str, str, str,
     return write_fmu
 
 
-def package_controller_fmu(data: dict[str, Any], folder: Path) -> Path:
+def package_controller_fmu(data: dict[str, Any], folder: Path, native: bool = False) -> Path:
     """Write ``controller.fmu`` into ``folder``; ``data`` is its resource ``controller.json``."""
     folder.mkdir(parents=True, exist_ok=True)
-    return _build_fmu("controller", "Controller", "controller", data, folder)
+    write_fmu = native_fmu_writer((), 2) if native else _build_fmu
+    return write_fmu("controller", "Controller", "controller", data, folder)
 
 
 def with_user_fmus_copied(fmus: RobotFmus, folder: Path) -> RobotFmus:

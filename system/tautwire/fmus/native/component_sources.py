@@ -14,6 +14,7 @@ from typing import Any
 from tautwire_fmu import dormand_prince as integration
 from tautwire_fmu.cable_slave import LENGTH_SCALE
 from tautwire_fmu.effect_variables import effects_from_resource
+from tautwire_fmu.laws.sampled_control import plan_from_resource
 from tautwire_fmu.model_description import Variable
 from tautwire_fmu.slave import MIDDLE_TIME, Slave
 
@@ -136,11 +137,26 @@ def _winch(slave: Slave, data: Mapping[str, Any]) -> _Component:
     return _Component(("winch.c",), macros)
 
 
+def _controller(slave: Slave, data: Mapping[str, Any]) -> _Component:
+    plan = plan_from_resource(dict(data))
+    cables, order = len(plan.compliances), len(plan.gains[0].A)
+    macros = {"CABLES": cables, "ORDER": order, "START_SIZE": 1, "SIGNAL_AXES": 1, "SIGNAL_DERIVATIVES": 2}
+    gains = [entry for each in plan.gains for matrix in each for row in matrix for entry in row]
+    tables = (plan.speeds, plan.stretches, plan.expected)
+    constants = [
+        *(plan.period, plan.yield_time, float(plan.tares), len(plan.knots), *map(len, tables)),
+        *(*plan.at_rest, *plan.compliances, *plan.knots, *gains),
+        *(entry for table in tables for row in table for entry in row),
+    ]
+    return _Component(("sampled_control.c", "controller.c"), macros, constants)
+
+
 COMPONENTS: Mapping[str, Callable[[Slave, Mapping[str, Any]], _Component]] = {
     "cable": _cable,
     "point_mass": _point_mass,
     "rigid_body": _rigid_body,
     "winch": _winch,
+    "controller": _controller,
 }
 # Of a resource all that equations depend on; effects do by their names.
 EQUATION_KEYS = ("law", "swivel_axis", "effects", "formulas", "attachments")
@@ -165,7 +181,7 @@ def _equations(kind: str, structure: str) -> str:
     elif kind == "rigid_body":
         functions = (*rigid_body_functions(data), *quadrature_functions(), quintic_function())
     else:
-        functions = winch_functions()
+        functions = winch_functions() if kind == "winch" else ()
     return c_source((*functions, cubic_function()))
 
 
