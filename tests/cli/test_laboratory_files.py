@@ -283,6 +283,37 @@ def test_one_speed_that_is_missing_is_interpolated_and_told(tmp_path: Path) -> N
     assert recording.winch_speed[100, 1] == pytest.approx(neighbours, rel=1e-12)
 
 
+def lost_positions(value: float) -> Writer:
+    """A tracker that writes one number for all coordinates where it has lost the platform."""
+    return lambda frame: text_of(
+        frame.assign(**{axis: frame[axis].where(frame.index % 400 < 370, value) for axis in AXES})
+    )
+
+
+@pytest.mark.parametrize("value", [0.0, -9999.0])
+def test_placeholders_of_a_tracker_are_left_out_and_told(value: float, tmp_path: Path) -> None:
+    laboratory, frame = Laboratory(tmp_path), standard()
+    checked = check_files(laboratory.robot(ROBOT), laboratory.recording(lost_positions(value)(frame)))
+    assert checked.problems == () and any("60 samples at" in note for note in checked.notes)
+    position = read_recording(tmp_path / "log.csv", 3).position
+    is_lost = frame.index % 400 >= 370
+    assert np.isnan(position[is_lost]).all() and position[~is_lost] == pytest.approx(frame[AXES].to_numpy()[~is_lost])
+
+
+def test_an_encoder_whose_range_ends_is_read_on_and_told(tmp_path: Path) -> None:
+    laboratory, frame = Laboratory(tmp_path), standard()
+    counts = pd.read_csv(io.StringIO(str(as_lengths(1.63e5)(frame))))
+    for cable in (1, 2, 3):
+        recorded = np.round(counts[f"rope_length_{cable}"] + 32_000.0).astype(int)
+        counts[f"rope_length_{cable}"] = (recorded + 2**15) % 2**16 - 2**15
+    columns = '\n[recording.columns]\n"rope_length_{}" = { name = "rope_length_{}", factor = 6.13497e-6 }\n'
+    checked = check_files(laboratory.robot(ROBOT + columns), laboratory.recording(text_of(counts)))
+    assert checked.problems == () and any("begins anew after 65536" in note for note in checked.notes)
+    assert checked.recording is not None
+    speed, expected = checked.recording.winch_speed, frame[SPEEDS].to_numpy()
+    assert np.sqrt(np.mean((speed - expected) ** 2)) < 0.02 * np.sqrt(np.mean(expected**2))
+
+
 @pytest.mark.parametrize("file", REFUSED)
 def test_it_is_refused_with_its_cause(file: str, tmp_path: Path) -> None:
     write, cause = REFUSED[file]

@@ -23,9 +23,11 @@ from ..robot.schema import AXES, QUATERNION_COLUMNS, RecordedColumn
 from ..validation import validate_instance, validate_integer
 from .column_map import ColumnMap, column_map
 from .csv_file import CsvTable, open_csv
+from .encoder_wrap import without_wraps
 from .mat_file import is_mat, open_mat
 from .mdf_file import is_mdf, open_mdf
 from .parquet_file import is_parquet, open_parquet
+from .placeholder_values import without_placeholders
 from .quaternion_columns import are_valid, unit_quaternions
 from .recording_table import MAX_MAGNITUDE, ColumnTable, ErrorSink, not_a_table_error, parse_header, row_errors
 from .ros_bag import is_bag, open_bag
@@ -216,7 +218,10 @@ def _validated_recording(table: CsvTable | ColumnTable, cable_count: int) -> Rec
     if numbers is None:
         raise _first_error(table)
     numbers, gap_notes = bridge_winch_gaps(numbers)
+    numbers, wrap_notes = without_wraps(numbers, table.header)
+    numbers, placeholder_notes = without_placeholders(numbers)
     cables = range(1, cable_count + 1)
+    dialect = (f"read {table.header.dialect}",) if table.header.dialect else ()
     recording = Recording(
         path=table.file,
         time=_stacked_columns(numbers, ["time"])[:, 0],
@@ -226,7 +231,7 @@ def _validated_recording(table: CsvTable | ColumnTable, cable_count: int) -> Rec
         orientation=_stacked_columns(numbers, QUATERNION_COLUMNS),
         unknown_columns=table.header.unknown_names,
         rope_length=_stacked_columns(numbers, [f"rope_length_{cable}" for cable in cables]),
-        read_as=(*((f"read {table.header.dialect}",) if table.header.dialect else ()), *gap_notes),
+        read_as=(*dialect, *gap_notes, *wrap_notes, *placeholder_notes),
     )
     if not _is_valid(recording):
         raise _first_error(table)

@@ -109,9 +109,16 @@ def _balance_under(
 
 def _is_balance_closed(mixed: Array, force: Array, max_ratio: float) -> bool:
     """Whether simulated tensions close the balance: the missing force, and its variation, become that much less."""
-    centred = [values - np.nanmean(values, axis=0) for values in (mixed, force)]
+    centred = [_centred(values) for values in (mixed, force)]
     pairs = ((mixed, force), (centred[0], centred[1]))
     return all(root_mean_square(after) < max_ratio * root_mean_square(before) for after, before in pairs)
+
+
+def _centred(values: Array) -> Array:
+    """Values (N, k) without the mean of each column, NaN where one has none."""
+    is_known = np.isfinite(values)
+    sums, counts = np.sum(values, axis=0, where=is_known), np.maximum(is_known.sum(axis=0), 1)
+    return np.asarray(values - sums / counts)
 
 
 def _may_be_exit_point(cable: ComponentResidual, run: CableSimulation, platform: Sequence[ComponentResidual]) -> bool:

@@ -1,0 +1,77 @@
+"""Placeholders among positions and tensions: one value that a sensor writes while it measures nothing."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..robot.schema import AXES
+
+Array = NDArray[np.float64]
+
+# A jump to a placeholder and back is so many times as large as a quantile of the steps.
+STEP_QUANTILE, MIN_JUMP_RATIO = 0.9, 10.0
+MIN_REPEATS = 2
+MAX_SHARE = 0.5
+
+
+def without_placeholders(columns: Mapping[str, Array]) -> tuple[dict[str, Array], tuple[str, ...]]:
+    """Positions and tensions (N,) without placeholders, as NaN, and a note on each.
+
+    A placeholder is one value, repeated exactly in a run or in several, to which the coordinates together, or a tension
+    alone, jump and from which they jump back; that of a tension is outside what the cell shows otherwise.
+    """
+    changed, notes = dict(columns), []
+    axes = [name for name in AXES if name in columns]
+    for names in (axes, *([name] for name in columns if name.startswith("tension_"))):
+        rows = _placeholder_rows([columns[name] for name in names]) if names else np.array([], dtype=bool)
+        if not rows.any() or (names != axes and not _is_outside(columns[names[0]], rows)):
+            continue
+        shown = ", ".join(f"{columns[name][rows][0]:.6g}" for name in names)
+        count = f"{rows.sum()} samples at {shown}"
+        notes.append(f"{', '.join(names)}: {count} are where nothing was measured, and not used")
+        for name in names:
+            changed[name] = np.where(rows, np.nan, columns[name])
+    return changed, tuple(notes)
+
+
+def _placeholder_rows(columns: Sequence[Array]) -> NDArray[np.bool_]:
+    """Rows (N,) of the value that has the longest runs between jumps; none where a run has no jump at an end."""
+    none = np.zeros(len(columns[0]), dtype=bool)
+    measured = [column for column in columns if np.isfinite(column).any()]
+    if not measured:
+        return none
+    values = np.column_stack(measured)
+    steps = np.max(np.abs(np.diff(values, axis=0)), axis=1, initial=0.0)
+    moving = steps[np.isfinite(steps) & (steps > 0.0)]
+    if not moving.size:
+        return none
+    limit = MIN_JUMP_RATIO * float(np.quantile(moving, STEP_QUANTILE))
+    edges = np.concatenate([[0], np.flatnonzero(steps != 0.0) + 1, [len(values)]])
+    runs = [
+        (first, last)
+        for first, last in pairwise(edges)
+        if last - first >= MIN_REPEATS and _is_between_jumps(steps, first, last, limit)
+    ]
+    if not runs:
+        return none
+    longest = values[max(runs, key=lambda run: run[1] - run[0])[0]]
+    rows = np.all(values == longest, axis=1)
+    return rows if np.mean(rows) <= MAX_SHARE else none
+
+
+def _is_between_jumps(steps: Array, first: int, last: int, limit: float) -> bool:
+    """Whether a run of rows begins and ends with a jump, or with the recording, and does not span it."""
+    before = steps[first - 1] > limit if first > 0 else True
+    after = steps[last - 1] > limit if last <= len(steps) else True
+    return bool(before and after and (first > 0 or last <= len(steps)))
+
+
+def _is_outside(column: Array, rows: NDArray[np.bool_]) -> bool:
+    """Whether a placeholder is outside the range of the other values, by more than this."""
+    others, value = column[~rows & np.isfinite(column)], float(column[rows][0])
+    middle, extent = 0.5 * (others.max() + others.min()), float(np.ptp(others))
+    return abs(value - middle) > 1.5 * extent and value != 0.0
