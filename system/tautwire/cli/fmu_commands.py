@@ -49,6 +49,7 @@ def build(
     for_c_hosts: Annotated[bool, typer.Option("--for-c-hosts", help=C_HOSTS_HELP)] = False,
     native: Annotated[bool, typer.Option("--native", help=NATIVE_HELP)] = False,
     platforms: Annotated[str, typer.Option(metavar="LIST", help=PLATFORMS_HELP)] = "",
+    fmi: Annotated[int, typer.Option(help="Version of FMI, 2 or 3; the latter for --native FMUs.")] = 2,
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
@@ -69,13 +70,13 @@ def build(
     refuse_overwriting_inputs(
         [fmu.path for fmu in robot.fmus], [out / f"{slot}.fmu" for slot in fmu_slots(robot.cable_count)]
     )
-    _refuse_mixed_kinds(for_c_hosts, native, platforms)
+    _refuse_mixed_kinds(for_c_hosts, native, platforms, fmi)
     if for_c_hosts:
         embeddable_python()
         find_compiler()
     targets = [name.strip() for name in platforms.split(",") if name.strip()]
     with atomic_folder(out) as scratch, progress_bar(output) as progress:
-        built = build_fmus(robot, scratch, partial(progress, "building"), native, targets)
+        built = build_fmus(robot, scratch, partial(progress, "building"), native, targets, fmi)
         fmus = with_user_fmus_copied(built, scratch)
         if for_c_hosts:
             project_slots = sorted(fmus.by_component.keys() - fmus.user_start_values.keys())
@@ -92,11 +93,13 @@ def build(
     output.suggest_next(f"tautwire fmus {shell_quoted(robot_file)}, for their ports; or load {paths[-1]} in your tool")
 
 
-def _refuse_mixed_kinds(for_c_hosts: bool, native: bool, platforms: str) -> None:
+def _refuse_mixed_kinds(for_c_hosts: bool, native: bool, platforms: str, fmi: int) -> None:
     if native and for_c_hosts:
         raise InputError("--for-c-hosts", "is given beside --native, which any program can run", "leave it out")
     if platforms and not native:
         raise InputError("--platforms", "is given without --native", "add --native")
+    if fmi != 2 and not (native and fmi == 3):
+        raise InputError("--fmi", f"is {fmi}" + ("" if native else " without --native"), "give 2, or --native --fmi 3")
 
 
 def fmus(robot_file: RobotFile, as_json: AsJson = False, quiet: Quiet = False) -> None:

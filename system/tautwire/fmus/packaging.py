@@ -96,11 +96,13 @@ def build_fmus(
     progress: Callable[[float], None] | None = None,
     native: bool = False,
     platforms: Sequence[str] = (),
+    fmi: int = 2,
 ) -> RobotFmus:
     """Write ``platform.fmu``, ``cable_1.fmu`` ... and, where there are winches, ``winch_1.fmu`` ... into ``folder``.
 
     FMI 2.0 co-simulation; the data of a component lie inside as a JSON resource. ``native`` FMUs are machine code for
-    ``platforms``, by default this machine's, with their source, and need no Python. User FMUs stay where they are.
+    ``platforms``, by default this machine's, with their source, and need no Python; they can also be of ``fmi`` 3, the
+    major version. User FMUs stay where they are.
     The folder is created if absent, and has to stay while the FMUs are run. ``progress`` gets the fraction completed,
     from 0 to 1. Returns the paths of the FMUs.
 
@@ -112,7 +114,7 @@ def build_fmus(
     folder = validate_folder("build_fmus: folder", folder)
     validate_callable("build_fmus: progress", progress)
     check_user_fmus(robot)
-    write_fmu = native_fmu_writer(platforms) if native else _build_fmu
+    write_fmu = native_fmu_writer(platforms, fmi) if native else _build_fmu
     folder.mkdir(parents=True, exist_ok=True)
     user_fmus = {fmu.slot: fmu.path for fmu in robot.fmus}
     is_rigid = robot.platform.is_rigid_body
@@ -140,25 +142,24 @@ def build_fmus(
     )
 
 
-def native_fmu_writer(platforms: Sequence[str] = ()) -> Callable[[str, str, str, dict[str, Any], Path], Path]:
+def native_fmu_writer(platforms: Sequence[str], fmi: int) -> Callable[[str, str, str, dict[str, Any], Path], Path]:
     """Function that writes native FMUs for some platforms, by default this machine's, as :func:`_build_fmu` does.
 
     Raises NativeBuildError where there is no compiler, or none for these platforms.
     """
     # Imported here: most FMUs are not native, and pythonfmu's slaves come with it.
-    from .native.c_toolchain import NativeBuildError, find_toolchain, target_platforms
+    from .native.c_toolchain import NativeBuildError
     from .native.component_sources import COMPONENTS
-    from .native.native_archive import write_native_fmu
+    from .native.native_archive import native_target, write_native_fmu
 
-    toolchain = find_toolchain()
-    targets = target_platforms([platforms] if isinstance(platforms, str) else platforms, toolchain)
+    target = native_target([platforms] if isinstance(platforms, str) else platforms, fmi)
 
     def write_fmu(module: str, base: str, name: str, data: dict[str, Any], folder: Path) -> Path:
         if module not in COMPONENTS:
             raise NativeBuildError(f"{name} has no native FMU", "build it without --native")
         with tempfile.TemporaryDirectory(prefix="tautwire-build-") as scratch:
             built = Path(scratch) / f"{name}.fmu"
-            write_native_fmu(module, base, data | {"model_name": name}, targets, toolchain, built)
+            write_native_fmu(module, base, data | {"model_name": name}, target, built)
             return _put_atomically(shutil.move, built, folder / built.name)
 
     return write_fmu

@@ -34,9 +34,13 @@ WINDOWS_LINK_FLAGS = ("-nostdlib", WINDOWS_RUNTIME, IMPORT_LIBRARY, "-Wl,-e,DllM
 
 @dataclass(frozen=True)
 class TargetPlatform:
-    """A platform: its folder among an FMU's binaries, the target of ziglang, and how its libraries are linked."""
+    """A platform: the target of ziglang, and how its libraries are linked.
+
+    ``name`` is the folder of its libraries in an archive of FMI 2.0, ``tuple_name`` in one of FMI 3.0.
+    """
 
     name: str
+    tuple_name: str
     target: str
     suffix: str
     link_flags: tuple[str, ...] = ("-lm",)
@@ -50,11 +54,11 @@ class TargetPlatform:
 PLATFORMS: Mapping[str, TargetPlatform] = {
     platform.name: platform
     for platform in (
-        TargetPlatform("linux64", "x86_64-linux-gnu.2.17", ".so"),
-        TargetPlatform("win64", "x86_64-windows-gnu", ".dll", WINDOWS_LINK_FLAGS),
-        TargetPlatform("darwin64", "x86_64-macos.11.0", ".dylib"),
-        TargetPlatform("aarch64-linux", "aarch64-linux-gnu.2.17", ".so"),
-        TargetPlatform("aarch64-darwin", "aarch64-macos.11.0", ".dylib"),
+        TargetPlatform("linux64", "x86_64-linux", "x86_64-linux-gnu.2.17", ".so"),
+        TargetPlatform("win64", "x86_64-windows", "x86_64-windows-gnu", ".dll", WINDOWS_LINK_FLAGS),
+        TargetPlatform("darwin64", "x86_64-darwin", "x86_64-macos.11.0", ".dylib"),
+        TargetPlatform("aarch64-linux", "aarch64-linux", "aarch64-linux-gnu.2.17", ".so"),
+        TargetPlatform("aarch64-darwin", "aarch64-darwin", "aarch64-macos.11.0", ".dylib"),
     )
 }
 THIS_PLATFORM = fmpy.platform

@@ -36,6 +36,7 @@ CODE_FILE = "code.c"
 START_FILE = "start_values.c"
 STRUCTURE_FILE = "structure.h"
 EQUATIONS_FILE = "equations.c"
+FMI_FILES = {2: ("fmi2.c",), 3: ("fmi3.c", "fmi3_absent.c")}
 # The input whose rate another input is, by the names without axis.
 RATE_NAMES = {
     "position": "velocity",
@@ -67,10 +68,13 @@ class _Component:
     state_scales: Sequence[float] = ()
 
 
-def component_sources(kind: str, slave: Slave, data: Mapping[str, Any], guid: str) -> ComponentSources:
-    """C source of a component by its resource ``data``, with the variables of its Python ``slave``."""
+def component_sources(kind: str, slave: Slave, data: Mapping[str, Any], guid: str, fmi: int) -> ComponentSources:
+    """C source of a component by its resource ``data``, with the variables of its Python ``slave``.
+
+    ``fmi`` is the major version of FMI.
+    """
     component = COMPONENTS[kind](slave, data)
-    names = ["numbers.h", "delay_line.c", "dormand_prince.c", "slave.h", "slave.c", "fmi2.c", *component.c_files]
+    names = ["numbers.h", "delay_line.c", "dormand_prince.c", "slave.h", "slave.c", *FMI_FILES[fmi], *component.c_files]
     sources = {name: files(__package__).joinpath(f"c/{name}").read_text(encoding="utf-8") for name in names}
     structure = _structure(slave, component)
     return ComponentSources(
@@ -78,9 +82,9 @@ def component_sources(kind: str, slave: Slave, data: Mapping[str, Any], guid: st
             **sources,
             STRUCTURE_FILE: structure,
             EQUATIONS_FILE: _equations(kind, _equation_structure(data)),
-            CODE_FILE: _code(component),
+            CODE_FILE: _code(component, fmi),
             START_FILE: _start_values(slave, component, guid),
-            ENTRY_FILE: _entry(data["model_name"]),
+            ENTRY_FILE: _entry(data["model_name"], fmi),
         }
     )
 
@@ -252,10 +256,10 @@ def _bound(value: float | None, absent: float) -> float:
     return absent if value is None else value
 
 
-def _code(component: _Component) -> str:
+def _code(component: _Component, fmi: int) -> str:
     """The translation unit of everything but the start values."""
     common = ("numbers.h", STRUCTURE_FILE, EQUATIONS_FILE, "delay_line.c", "slave.h")
-    names = (*common, *component.c_files, "slave.c", "fmi2.c")
+    names = (*common, *component.c_files, "slave.c", f"fmi{fmi}.c")
     declarations = (
         "#ifndef MODEL_SCOPE\n#define MODEL_SCOPE extern\n"
         "extern const char model_guid[];\nextern const double model_start[], model_constants[];\n#endif\n"
@@ -277,11 +281,11 @@ def _start_values(slave: Slave, component: _Component, guid: str) -> str:
     )
 
 
-def _entry(name: str) -> str:
+def _entry(name: str, fmi: int) -> str:
     """The single translation unit of a source FMU; its functions have the model identifier as a prefix."""
     return (
         "/* Written by Tautwire: all of this FMU in one translation unit. */\n"
-        f"#ifndef FMI2_OVERRIDE_FUNCTION_PREFIX\n#define FMI2_FUNCTION_PREFIX {name}_\n#endif\n"
+        f"#ifndef FMI{fmi}_OVERRIDE_FUNCTION_PREFIX\n#define FMI{fmi}_FUNCTION_PREFIX {name}_\n#endif\n"
         f'#define MODEL_SCOPE static\n#include "{START_FILE}"\n#include "{CODE_FILE}"\n'
     )
 

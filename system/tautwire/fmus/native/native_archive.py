@@ -6,6 +6,7 @@ import json
 import tempfile
 import zipfile
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 from uuid import NAMESPACE_URL, uuid5
@@ -15,42 +16,71 @@ from tautwire_fmu import slaves
 from tautwire_fmu.slave import Slave
 
 from ... import __version__
+from ...errors import ArgumentError
 from ..fmu_archive import DESCRIPTION_FILE, read_model_description
 from ..fmu_documentation import documentation_files
-from .c_toolchain import TargetPlatform, Toolchain, compile_library
+from .c_toolchain import TargetPlatform, Toolchain, compile_library, find_toolchain, target_platforms
 from .component_sources import ENTRY_FILE, component_sources, rate_references
+from .fmi3_description import build_description, fmi3_description
 
+FMI_VERSIONS = (2, 3)
 # Old enough for every archive, and the same in all builds.
 ENTRY_DATE = (1980, 1, 1, 0, 0, 0)
 
 
-def write_native_fmu(
-    kind: str, base: str, data: Mapping[str, Any], platforms: Sequence[TargetPlatform], toolchain: Toolchain, path: Path
-) -> None:
+@dataclass(frozen=True)
+class NativeTarget:
+    """What native FMUs are built for: platforms, the compiler, and the major version of FMI."""
+
+    platforms: tuple[TargetPlatform, ...]
+    toolchain: Toolchain
+    fmi: int = 2
+
+    def library(self, platform: TargetPlatform, name: str) -> str:
+        """Path of a library in the archive."""
+        folder = platform.name if self.fmi == 2 else platform.tuple_name
+        return f"binaries/{folder}/{name}{platform.suffix}"
+
+
+def native_target(platforms: Sequence[str] = (), fmi: int = 2) -> NativeTarget:
+    """Target by the names of platforms, see :func:`tautwire.fmus.native.c_toolchain.target_platforms`."""
+    if fmi not in FMI_VERSIONS:
+        raise ArgumentError("build_fmus: fmi", fmi, f"is {fmi!r}", f"give one of {FMI_VERSIONS}")
+    toolchain = find_toolchain()
+    return NativeTarget(target_platforms(platforms, toolchain), toolchain, fmi)
+
+
+def write_native_fmu(kind: str, base: str, data: Mapping[str, Any], target: NativeTarget, path: Path) -> None:
     """Write the native FMU of a component; ``base`` is the class of its Python slave, ``data`` the slave's resource.
 
     Raises NativeBuildError where the compiler refuses.
     """
     unidentified = dict(data) | {"guid": "", "version": __version__}
     slave = python_slave(kind, base, unidentified)
-    anonymous = component_sources(kind, slave, unidentified, "").files
-    guid = str(uuid5(NAMESPACE_URL, json.dumps([anonymous, unidentified], sort_keys=True)))
-    slave.guid = guid
-    sources = component_sources(kind, slave, unidentified, guid).files
+    anonymous = component_sources(kind, slave, unidentified, "", target.fmi).files
+    slave.guid = str(uuid5(NAMESPACE_URL, json.dumps([anonymous, unidentified], sort_keys=True)))
+    sources = component_sources(kind, slave, unidentified, slave.guid, target.fmi).files
     name = unidentified["model_name"]
     libraries = {
-        f"binaries/{platform.name}/{name}{platform.suffix}": compile_library(sources, platform, toolchain)
-        for platform in platforms
+        target.library(platform, name): compile_library(sources, platform, target.toolchain)
+        for platform in target.platforms
     }
-    description = tostring(native_description(slave), encoding="utf-8", xml_declaration=True)
-    contents: dict[str, bytes] = {
-        DESCRIPTION_FILE: description,
+    contents = {
+        DESCRIPTION_FILE: _xml(native_description(slave, target.fmi)),
         **{f"sources/{file}": text.encode() for file, text in sources.items()},
         **libraries,
     }
+    if target.fmi == 3:
+        contents["sources/buildDescription.xml"] = _xml(build_description(name, ENTRY_FILE))
     _write_archive(path, contents)
     additions = documentation_files(kind, unidentified, read_model_description(path))
     _write_archive(path, contents | additions)
+
+
+def _xml(root: Element) -> bytes:
+    indent(root, "\t")
+    text: bytes = tostring(root, encoding="utf-8", xml_declaration=True)
+    return text
 
 
 def python_slave(kind: str, base: str, data: Mapping[str, Any]) -> Slave:
@@ -61,7 +91,7 @@ def python_slave(kind: str, base: str, data: Mapping[str, Any]) -> Slave:
     return slave
 
 
-def native_description(slave: Slave) -> Element:
+def native_description(slave: Slave, fmi: int) -> Element:
     """Model description of the Python slave, with what its native twin can do and its sources."""
     root = slave.to_xml()
     cosimulation = root.find("CoSimulation")
@@ -82,8 +112,7 @@ def native_description(slave: Slave) -> Element:
     SubElement(source_files, "File", {"name": ENTRY_FILE})
     if "generationDateAndTime" in root.attrib:
         del root.attrib["generationDateAndTime"]
-    indent(root, "\t")
-    return root
+    return root if fmi == 2 else fmi3_description(root)
 
 
 def _output_derivative_order(slave: Slave) -> int:

@@ -186,12 +186,6 @@ fmi2Status fmi2GetDirectionalDerivative(fmi2Component c, const fmi2ValueReferenc
   return refuse((Instance *)c, "this FMU provides no directional derivatives");
 }
 
-/* The rate variable that is the derivative of some order of a variable; VARIABLE_COUNT where there is none. */
-static unsigned int derivative_of(unsigned int reference, fmi2Integer order) {
-  while (order-- > 0 && reference < VARIABLE_COUNT) reference = rate_references[reference];
-  return reference;
-}
-
 fmi2Status fmi2SetRealInputDerivatives(fmi2Component c, const fmi2ValueReference references[], size_t count,
                                        const fmi2Integer orders[], const fmi2Real values[]) {
   Instance *instance = (Instance *)c;

@@ -243,3 +243,9 @@ static SavedState *deserialise_state(const char *bytes, size_t size) {
   }
   return saved;
 }
+
+/* The rate variable that is the derivative of some order of a variable; VARIABLE_COUNT where there is none. */
+static unsigned int derivative_of(unsigned int reference, int order) {
+  while (order-- > 0 && reference < VARIABLE_COUNT) reference = rate_references[reference];
+  return reference;
+}

@@ -1,0 +1,202 @@
+/* FMI 3.0 co-simulation functions. */
+
+#include "fmi3Functions.h"
+
+#define TIME_REFERENCE VARIABLE_COUNT
+
+typedef struct {
+  Slave slave;
+  double now;
+  int is_initialized;
+  fmi3LogMessageCallback log;
+  fmi3InstanceEnvironment environment;
+  fmi3Boolean logging_on;
+} Instance3;
+
+static const char *const categories[] = {"logAll", "logStatusWarning", "logStatusDiscard", "logStatusError"};
+
+static void log_to_importer(void *owner, int status, const char *message) {
+  Instance3 *instance = (Instance3 *)owner;
+  if (instance->log && (instance->logging_on || status == STATUS_ERROR))
+    instance->log(instance->environment, (fmi3Status)status, categories[status], message);
+}
+
+static fmi3Status refuse(fmi3Instance c, const char *message) {
+  log_message(&((Instance3 *)c)->slave, STATUS_ERROR, message);
+  return fmi3Error;
+}
+
+const char *fmi3GetVersion(void) { return fmi3Version; }
+
+fmi3Status fmi3SetDebugLogging(fmi3Instance c, fmi3Boolean on, size_t count, const fmi3String names[]) {
+  (void)count, (void)names;
+  ((Instance3 *)c)->logging_on = on;
+  return fmi3OK;
+}
+
+fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
+                                         fmi3Boolean logging_on, fmi3Boolean event_mode, fmi3Boolean early_return,
+                                         const fmi3ValueReference intermediate[], size_t count,
+                                         fmi3InstanceEnvironment environment, fmi3LogMessageCallback log,
+                                         fmi3IntermediateUpdateCallback update) {
+  Instance3 *instance = (Instance3 *)calloc(1, sizeof *instance);
+  (void)name, (void)resources, (void)visible, (void)event_mode, (void)early_return, (void)intermediate, (void)update;
+  if (!instance) return NULL;
+  instance->log = log;
+  instance->environment = environment;
+  instance->logging_on = logging_on;
+  instance->slave.log = log_to_importer;
+  instance->slave.owner = instance;
+  if (count || !token || strcmp(token, model_guid)) {
+    refuse(instance, count ? "this FMU has no intermediate variables" : "the token is not that of this FMU");
+    free(instance);
+    return NULL;
+  }
+  reset_slave(&instance->slave);
+  return instance;
+}
+
+void fmi3FreeInstance(fmi3Instance c) {
+  if (!c) return;
+  free_delay_line(&((Instance3 *)c)->slave.delay_line);
+  free(c);
+}
+
+fmi3Status fmi3EnterInitializationMode(fmi3Instance c, fmi3Boolean has_tolerance, fmi3Float64 tolerance,
+                                       fmi3Float64 start, fmi3Boolean has_stop, fmi3Float64 stop) {
+  Instance3 *instance = (Instance3 *)c;
+  (void)has_stop, (void)stop;
+  instance->now = instance->slave.state.time = start;
+  if (has_tolerance) set_tolerance(&instance->slave, tolerance);
+  return fmi3OK;
+}
+
+fmi3Status fmi3ExitInitializationMode(fmi3Instance c) {
+  Instance3 *instance = (Instance3 *)c;
+  if (check_inputs(&instance->slave) != STATUS_OK) return fmi3Error;
+  instance->is_initialized = 1;
+  return fmi3OK;
+}
+
+fmi3Status fmi3Terminate(fmi3Instance c) {
+  (void)c;
+  return fmi3OK;
+}
+
+fmi3Status fmi3Reset(fmi3Instance c) {
+  Instance3 *instance = (Instance3 *)c;
+  reset_slave(&instance->slave);
+  instance->is_initialized = 0;
+  instance->now = 0.0;
+  return fmi3OK;
+}
+
+fmi3Status fmi3GetFloat64(fmi3Instance c, const fmi3ValueReference references[], size_t count, fmi3Float64 values[],
+                          size_t value_count) {
+  Instance3 *instance = (Instance3 *)c;
+  size_t k;
+  if (value_count != count) return refuse(c, "as many values as references are needed");
+  for (k = 0; k < count && references[k] != TIME_REFERENCE; k++)
+    ;
+  if (k == count) return (fmi3Status)get_variables(&instance->slave, references, count, values);
+  for (k = 0; k < count; k++) {
+    values[k] = instance->now;
+    if (references[k] != TIME_REFERENCE && get_variables(&instance->slave, references + k, 1, values + k)) return fmi3Error;
+  }
+  return fmi3OK;
+}
+
+fmi3Status fmi3SetFloat64(fmi3Instance c, const fmi3ValueReference references[], size_t count,
+                          const fmi3Float64 values[], size_t value_count) {
+  if (value_count != count) return refuse(c, "as many values as references are needed");
+  return (fmi3Status)set_variables(&((Instance3 *)c)->slave, references, count, values);
+}
+
+#define OTHER_TYPE(name)                                                                                              \
+  fmi3Status fmi3Get##name(fmi3Instance c, const fmi3ValueReference references[], size_t count, fmi3##name values[],  \
+                           size_t value_count) {                                                                      \
+    (void)references, (void)values, (void)value_count;                                                                \
+    return count ? refuse(c, "this FMU has Float64 variables only") : fmi3OK;                                         \
+  }                                                                                                                   \
+  fmi3Status fmi3Set##name(fmi3Instance c, const fmi3ValueReference references[], size_t count,                       \
+                           const fmi3##name values[], size_t value_count) {                                           \
+    (void)references, (void)values, (void)value_count;                                                                \
+    return count ? refuse(c, "this FMU has Float64 variables only") : fmi3OK;                                         \
+  }
+
+OTHER_TYPE(Float32)
+OTHER_TYPE(Int8)
+OTHER_TYPE(UInt8)
+OTHER_TYPE(Int16)
+OTHER_TYPE(UInt16)
+OTHER_TYPE(Int32)
+OTHER_TYPE(UInt32)
+OTHER_TYPE(Int64)
+OTHER_TYPE(UInt64)
+OTHER_TYPE(Boolean)
+OTHER_TYPE(String)
+
+fmi3Status fmi3GetFMUState(fmi3Instance c, fmi3FMUState *saved) {
+  *saved = save_state(&((Instance3 *)c)->slave, (SavedState *)*saved);
+  return *saved ? fmi3OK : refuse(c, "no memory for a saved state");
+}
+
+fmi3Status fmi3SetFMUState(fmi3Instance c, fmi3FMUState saved) {
+  if (!saved) return refuse(c, "no saved state was given");
+  return (fmi3Status)restore_state(&((Instance3 *)c)->slave, (const SavedState *)saved);
+}
+
+fmi3Status fmi3FreeFMUState(fmi3Instance c, fmi3FMUState *saved) {
+  (void)c;
+  if (!saved) return fmi3OK;
+  free_saved_state((SavedState *)*saved);
+  *saved = NULL;
+  return fmi3OK;
+}
+
+fmi3Status fmi3SerializedFMUStateSize(fmi3Instance c, fmi3FMUState saved, size_t *size) {
+  (void)c;
+  *size = serialised_size((const SavedState *)saved);
+  return fmi3OK;
+}
+
+fmi3Status fmi3SerializeFMUState(fmi3Instance c, fmi3FMUState saved, fmi3Byte bytes[], size_t size) {
+  if (size < serialised_size((const SavedState *)saved)) return refuse(c, "too few bytes for a saved state");
+  serialise_state((const SavedState *)saved, (char *)bytes);
+  return fmi3OK;
+}
+
+fmi3Status fmi3DeserializeFMUState(fmi3Instance c, const fmi3Byte bytes[], size_t size, fmi3FMUState *saved) {
+  SavedState *state = deserialise_state((const char *)bytes, size);
+  if (!state) return refuse(c, "a saved state that was no state of this FMU");
+  *saved = state;
+  return fmi3OK;
+}
+
+fmi3Status fmi3GetOutputDerivatives(fmi3Instance c, const fmi3ValueReference references[], size_t count,
+                                    const fmi3Int32 orders[], fmi3Float64 values[], size_t value_count) {
+  size_t k;
+  if (value_count != count) return refuse(c, "as many values as references are needed");
+  for (k = 0; k < count; k++) {
+    unsigned int rate = derivative_of(references[k], orders[k]);
+    if (orders[k] < 1 || rate >= VARIABLE_COUNT) return refuse(c, "this output has no derivative of this order");
+    if (get_variables(&((Instance3 *)c)->slave, &rate, 1, values + k) != STATUS_OK) return fmi3Error;
+  }
+  return fmi3OK;
+}
+
+fmi3Status fmi3DoStep(fmi3Instance c, fmi3Float64 time, fmi3Float64 step, fmi3Boolean no_rollback,
+                      fmi3Boolean *event_needed, fmi3Boolean *terminate, fmi3Boolean *early_return,
+                      fmi3Float64 *last_time) {
+  Instance3 *instance = (Instance3 *)c;
+  int status;
+  (void)no_rollback;
+  *event_needed = *terminate = *early_return = fmi3False;
+  *last_time = time;
+  if (!instance->is_initialized) return refuse(c, "a step before the end of initialization");
+  status = do_step(&instance->slave, time, step);
+  if (status == STATUS_OK) *last_time = instance->now = time + step;
+  return (fmi3Status)status;
+}
+
+#include "fmi3_absent.c"

@@ -1,0 +1,111 @@
+"""Native FMUs of FMI 3.0: the variables, the numbers and the states of those of FMI 2.0."""
+
+from __future__ import annotations
+
+import shutil
+import subprocess
+import zipfile
+from pathlib import Path
+
+import fmpy
+import numpy as np
+import pytest
+from fmpy.fmi3 import FMU3Slave
+from fmpy.validation import validate_fmu
+
+from tautwire.cosimulation.robot_cosimulation import cosimulate
+from tautwire.errors import ArgumentError
+from tautwire.fmus.packaging import RobotFmus, build_fmus
+from tests.support.effect_cases import same
+from tests.support.effects import with_effects
+from tests.support.robots import LIMITED, example, gentle_speeds, paper_robot, with_winch
+
+ROBOT = with_winch(
+    with_effects(example("three"), same("hysteresis", force=60.0, yield_strain=1e-4), same("drag", drag_area=5.0)),
+    LIMITED,
+)
+
+
+@pytest.fixture(scope="module")
+def both_versions(tmp_path_factory: pytest.TempPathFactory) -> tuple[RobotFmus, RobotFmus]:
+    folder = tmp_path_factory.mktemp("versions")
+    fmi2, fmi3 = (build_fmus(ROBOT, folder / str(fmi), native=True, fmi=fmi) for fmi in (2, 3))
+    return fmi2, fmi3
+
+
+def test_variables_are_the_same_and_time_is_behind_them(both_versions: tuple[RobotFmus, RobotFmus]) -> None:
+    for path, other in zip(*(fmus.paths for fmus in both_versions), strict=True):
+        former, latter = (fmpy.read_model_description(str(each)).modelVariables for each in (path, other))
+        assert latter[-1].causality == "independent"
+        for one, two in zip(former, latter[:-1], strict=True):
+            assert (one.name, one.valueReference, one.unit, one.nominal) == (
+                two.name,
+                two.valueReference,
+                two.unit,
+                two.nominal,
+            )
+            assert (one.causality, one.start) == (two.causality, two.start)
+            names = [each.derivative.name if each.derivative else None for each in (one, two)]
+            assert names[0] == names[1]
+
+
+def test_nothing_is_wrong_with_them(both_versions: tuple[RobotFmus, RobotFmus]) -> None:
+    assert [validate_fmu(str(path)) for path in both_versions[1].paths] == [[]] * 7
+
+
+def test_the_master_gets_the_same_bits_from_either_version(both_versions: tuple[RobotFmus, RobotFmus]) -> None:
+    time, speed = gentle_speeds(ROBOT, 0.3, 0.02)
+    one, other = (cosimulate(fmus, time, speed).frame().to_numpy() for fmus in both_versions)
+    assert np.array_equal(one, other)
+
+
+def test_a_serialised_state_goes_on_in_another_instance(
+    both_versions: tuple[RobotFmus, RobotFmus], tmp_path: Path
+) -> None:
+    path = both_versions[1].cables[0]
+    fmpy.extract(str(path), str(tmp_path))
+    description = fmpy.read_model_description(str(path))
+    references = {variable.name: variable.valueReference for variable in description.modelVariables}
+    shown = [references[name] for name in ("tension", "effect.hysteresis.memory", "time")]
+
+    def instance() -> FMU3Slave:
+        name = description.coSimulation.modelIdentifier
+        fmu = FMU3Slave(guid=description.guid, unzipDirectory=str(tmp_path), modelIdentifier=name)
+        fmu.instantiate()
+        fmu.enterInitializationMode()
+        fmu.exitInitializationMode()
+        return fmu
+
+    first = instance()
+    first.setFloat64([references["winch_speed"]], [0.3])
+    first.doStep(0.0, 0.01)
+    content = first.serializeFMUState(first.getFMUState())
+    first.doStep(0.01, 0.01)
+    expected = first.getFloat64(shown)
+    second = instance()
+    state = second.deserializeFMUState(content)
+    second.setFMUState(state)
+    second.doStep(0.01, 0.01)
+    assert second.getFloat64(shown) == expected
+    assert expected[2] == 0.02 and expected[1] != 0.0
+
+
+@pytest.mark.skipif(shutil.which("gcc") is None, reason="no gcc")
+def test_a_plain_c_compiler_takes_its_source(both_versions: tuple[RobotFmus, RobotFmus], tmp_path: Path) -> None:
+    with zipfile.ZipFile(both_versions[1].winches[0] or "") as archive:
+        archive.extractall(tmp_path)
+    description = fmpy.read_model_description(str(tmp_path))
+    (configuration,) = description.buildConfigurations
+    assert configuration.sourceFileSets[0].sourceFiles == ["all.c"]
+    headers = Path(fmpy.__file__).parent / "c-code"
+    call = ["gcc", "-std=c99", "-pedantic-errors", "-c", "-o", str(tmp_path / "all.o"), f"-I{headers}"]
+    subprocess.run([*call, str(tmp_path / "sources" / "all.c")], check=True)
+    symbols = subprocess.run(["nm", "-g", "--defined-only", str(tmp_path / "all.o")], capture_output=True, check=True)
+    names = [line.split()[-1] for line in symbols.stdout.decode().splitlines()]
+    assert len(names) > 50
+    assert all(name.startswith("winch_1_fmi3") for name in names)
+
+
+def test_other_versions_are_refused(tmp_path: Path) -> None:
+    with pytest.raises(ArgumentError, match="fmi"):
+        build_fmus(paper_robot(), tmp_path, native=True, fmi=1)
