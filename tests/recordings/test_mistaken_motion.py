@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,10 +12,14 @@ import pytest
 
 from tautwire.errors import RecordingError
 from tautwire.recordings.consistency import recording_mistakes, require_plausible
+from tautwire.recordings.geometry_reading import recorded_poses
 from tautwire.recordings.mistaken_motion import MAX_MISFIT, check_motion
 from tautwire.recordings.recording import Recording, read_recording
+from tautwire.robot.kinematics import inverse_kinematics
 from tautwire.robot.schema import EffectSetting, Robot
+from tests.support.pose_recordings import noisy, rotation_of, swinging_recording, wandering_recording
 from tests.support.recordings import recorded
+from tests.support.rigid_robots import crane_robot, octahedral_robot, underactuated_robot
 from tests.support.robots import EXAMPLES, example
 
 Change = Callable[[Recording], Recording]
@@ -126,7 +131,7 @@ def test_a_frame_is_told_with_the_rotation_that_turns_it_back(name: str) -> None
     robot, recording = shipped(name)
     check = check_motion(robot, turned(recording))
     assert check is not None
-    back = check.readings[0].geometry.positions(robot, turned(recording).position)
+    back = check.readings[0].geometry.positions(robot, recorded_poses(turned(recording)))
     size = np.ptp([*robot.anchors, robot.platform.start], axis=0).max()
     assert np.nanmax(np.abs(back - recording.position)) < 5e-3 * size
 
@@ -308,3 +313,130 @@ def test_a_planar_robot_whose_tracker_calls_its_plane_x_y_is_told() -> None:
     robot = planar(example("caroca").as_modelled())
     (error,) = recording_mistakes(robot, positions(1.0, (0, 2, 1))(planar_recording(robot)))
     assert "the robot file's x, y, z are the recording's x, z, y" in error.problem
+
+
+def quaternions(columns: tuple[int, ...], signs: tuple[int, ...] = (1, 1, 1, 1)) -> Change:
+    return lambda recording: replace(recording, orientation=(recording.orientation * signs)[:, columns])
+
+
+def of_centre_of_mass(recording: Recording) -> Recording:
+    arm = rotation_of(recording.orientation).apply(CRANE.platform.centre_of_mass)
+    return replace(recording, position=recording.position + arm)
+
+
+def y_upwards(recording: Recording) -> Recording:
+    orientation = recording.orientation[:, [0, 1, 3, 2]] * [1, 1, 1, -1]
+    return replace(recording, position=recording.position[:, [0, 2, 1]] * [1, 1, -1], orientation=orientation)
+
+
+CRANE = crane_robot()
+SCALAR_LAST, INVERSE = quaternions((1, 2, 3, 0)), quaternions((0, 1, 2, 3), (1, -1, -1, -1))
+LAST = 'qw = "qz", qx = "qw", qy = "qx", qz = "qy"'
+NEGATIVE = 'qx = { name = "qx", sign = -1 }, qy = { name = "qy", sign = -1 }, qz = { name = "qz", sign = -1 }'
+POSE_MISTAKES: dict[str, tuple[Change, str, str]] = {
+    "scalar last": (SCALAR_LAST, "if the quaternion is written as x, y, z, w", LAST),
+    "world to platform": (INVERSE, "if the quaternion turns from the world's frame to the platform's", NEGATIVE),
+    "both": (
+        both(INVERSE, SCALAR_LAST),
+        "is written as x, y, z, w and turns from the world's frame to the platform's",
+        'qw = "qz", qx = { name = "qw", sign = -1 }, qy = { name = "qx", sign = -1 }, qz = { name = "qy", sign = -1 }',
+    ),
+    "mm": (positions(1e3), "if x, y, z are in mm", "multiply x, y, z by 0.001"),
+    "mm, world to platform": (both(positions(1e3), INVERSE), "are in mm and the quaternion turns from the w", NEGATIVE),
+    "centre of mass": (of_centre_of_mass, "if x, y, z are those of the centre of mass", "record the frame's origin"),
+    "y upwards": (y_upwards, "robot file's x, y, z are the recording's x, -z, y", "and qx, -qz, qy as qx, qy, qz"),
+    "another origin": (another_origin, "x, y, z have another origin, about [", "add that vector"),
+    "time in ms": (time_in(1e-3), "if time is in ms", "multiply time by 0.001"),
+    "all signs": (speeds(-1.0), "winch_speed_1 to winch_speed_8 have the other sign", "multiply by -1"),
+    "winches swapped": (speeds_swapped, "winches of cables 1 to 8 are winch_speed_2, winch_speed_1", "rename"),
+}
+
+
+@pytest.mark.parametrize("mistake", POSE_MISTAKES)
+def test_a_mistake_in_poses_is_told_with_its_cause_and_its_remedy(mistake: str) -> None:
+    change, cause, remedy = POSE_MISTAKES[mistake]
+    (error,) = recording_mistakes(CRANE, change(noisy(wandering_recording(CRANE))))
+    assert cause in error.problem and remedy in error.hint
+    assert error.problem.startswith("winch travel does not match the poses: it is off by ")
+
+
+@pytest.mark.parametrize("mistake", ["scalar last", "world to platform"])
+def test_a_small_rotation_tells_mistaken_quaternions(mistake: str) -> None:
+    change, cause, _ = POSE_MISTAKES[mistake]
+    recording = noisy(wandering_recording(CRANE, travel=0.5, angle=0.012))
+    if mistake == "world to platform":
+        check = check_motion(CRANE, change(recording))
+        assert check is not None and check.misfit < MAX_MISFIT
+    (error,) = recording_mistakes(CRANE, change(recording))
+    assert cause in error.problem
+
+
+@pytest.mark.parametrize("unit", ["mm", "cm"])
+def test_attachments_in_another_unit_are_told(unit: str) -> None:
+    factor = {"mm": 1e3, "cm": 1e2}[unit]
+    cables = tuple(
+        replace(cable, attachment=tuple(factor * coordinate for coordinate in cable.attachment))
+        for cable in CRANE.cables
+    )
+    (error,) = recording_mistakes(replace(CRANE, cables=cables), noisy(wandering_recording(CRANE)))
+    assert f"if attachments in the robot file are in {unit}" in error.problem
+    assert f"multiply their coordinates by {1.0 / factor:g}" in error.hint
+
+
+@pytest.mark.parametrize("robot", [crane_robot(), octahedral_robot()], ids=lambda robot: robot.name)
+@pytest.mark.parametrize("start", ["at the declared start", "in motion"])
+def test_a_correct_recording_of_poses_is_not_refused(robot: Robot, start: str) -> None:
+    recording = noisy(wandering_recording(robot))
+    recording = recording.part(137, 450) if start == "in motion" else recording
+    require_plausible(robot, recording)
+    check = check_motion(robot, recording)
+    assert check is not None and check.misfit < 0.004
+
+
+@pytest.mark.parametrize("gain", [0.92, 1.08])
+def test_drums_of_rigid_platforms_are_not_taken_for_mistakes(gain: float) -> None:
+    recording = noisy(wandering_recording(CRANE))
+    assert recording_mistakes(CRANE, speeds(gain)(recording)) == ()
+    assert recording_mistakes(CRANE, speeds([gain, *[1.0] * 7])(recording)) == ()
+
+
+def test_poses_without_orientation_are_not_judged_by_the_winches() -> None:
+    recording = wandering_recording(CRANE)
+    unturned = replace(recording, orientation=np.full((recording.sample_count, 4), np.nan))
+    assert check_motion(CRANE, speeds(-1.0)(unturned)) is None
+    assert recording_mistakes(CRANE, unturned) == ()
+
+
+def test_a_platform_that_swings_on_standing_winches_tells_mistaken_quaternions() -> None:
+    robot = replace(underactuated_robot(), effects=())
+    recording = swinging_recording(robot)
+    assert recording_mistakes(robot, recording) == ()
+    for mistake in ("scalar last", "world to platform"):
+        change, cause, remedy = POSE_MISTAKES[mistake]
+        (error,) = recording_mistakes(robot, change(recording))
+        assert cause in error.problem and remedy in error.hint
+
+
+def test_the_told_columns_mend_the_recording(tmp_path: Path) -> None:
+    frame = both(INVERSE, SCALAR_LAST)(noisy(wandering_recording(CRANE))).frame()
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    (error,) = recording_mistakes(CRANE, read_recording(tmp_path / "log.csv", 8))
+    lines = error.hint.removeprefix("declare in [recording.columns] ").replace(", q", "\nq")
+    (tmp_path / "columns.toml").write_text(f"[recording.columns]\n{lines}\n")
+    assert recording_mistakes(CRANE, read_recording(tmp_path / "log.csv", 8, tmp_path / "columns.toml")) == ()
+
+
+def test_ropes_on_pulleys_are_checked_and_have_no_mistake() -> None:
+    """Lengths by inverse kinematics, of pulleys of 0.2 m that swivel about axes of their own."""
+    cables = tuple(replace(cable, swivel_axis=(0.6, 0.0, 0.8)) for cable in CRANE.cables)
+    robot = replace(CRANE, cables=cables).with_effect(EffectSetting("pulley", {"radius": 0.2}, CRANE.cable_numbers))
+    recording = wandering_recording(CRANE, duration=6.0)
+    poses = zip(recording.position, recording.orientation, strict=True)
+    lengths = np.array([inverse_kinematics(robot, position, quaternion) for position, quaternion in poses])
+    wound = replace(recording, winch_speed=-np.gradient(lengths, recording.time, axis=0))
+    without_tension = replace(wound, tension=np.full(lengths.shape, np.nan))
+    check = check_motion(robot, without_tension)
+    assert check is not None and check.misfit < 1e-3
+    assert recording_mistakes(robot, without_tension) == ()
+    (error,) = recording_mistakes(robot, speeds(-1.0)(without_tension))
+    assert "have the other sign" in error.problem

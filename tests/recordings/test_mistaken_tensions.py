@@ -8,14 +8,17 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tautwire.recordings.alternative_readings import GeometryReading, WindingReading
+from tautwire.recordings.alternative_readings import WindingReading
 from tautwire.recordings.consistency import recording_mistakes
+from tautwire.recordings.geometry_reading import GeometryReading
 from tautwire.recordings.mistaken_tensions import TensionCheck, check_tensions
 from tautwire.recordings.recording import Recording, read_recording
 from tautwire.recordings.weight_balance import force_balance
 from tautwire.robot.schema import Robot
 from tautwire.robot.static_equilibrium import static_tensions
+from tests.support.pose_recordings import noisy, wandering_recording
 from tests.support.recordings import recorded
+from tests.support.rigid_robots import crane_robot, octahedral_robot
 from tests.support.robots import EXAMPLES, example
 
 NAMES = ["three", "caroca", "eight"]
@@ -265,3 +268,51 @@ def test_forces_balance_beside_a_tracker_slower_than_the_log(rows_per_sample: in
     fast, balance = (force_balance(robot, each, GeometryReading(), WindingReading()) for each in (recording, slow))
     assert fast is not None and balance is not None
     assert balance.misfit((0, 1, 2)) < 1.5 * fast.misfit((0, 1, 2)) < 0.01
+
+
+CRANE = crane_robot()
+
+
+@pytest.mark.parametrize("robot", [CRANE, octahedral_robot()], ids=lambda robot: robot.name)
+def test_forces_and_moments_on_a_rigid_platform_balance(robot: Robot) -> None:
+    recording = noisy(wandering_recording(robot))
+    check = checked(robot, recording)
+    assert check is not None and check.mistakes == ()
+    assert check.carried == pytest.approx(1.0, abs=1e-3) and check.misfit < 4e-3
+    balance = force_balance(robot, recording, GeometryReading(), WindingReading())
+    assert balance is not None and balance.directions.shape[1:] == (6, robot.cable_count)
+    assert balance.balanced_tensions() == pytest.approx(balance.tensions, abs=6.0)
+
+
+@pytest.mark.parametrize(
+    ("factor", "cause"), [(1e-3, "are in kN"), (1.0 / 9.80665, "are in kg"), (-1.0, "have the other sign")]
+)
+def test_a_unit_or_a_sign_of_a_rigid_platforms_load_cells_is_told(factor: float, cause: str) -> None:
+    (error,) = recording_mistakes(CRANE, tensions(noisy(wandering_recording(CRANE)), factor))
+    assert f"if tension_1 to tension_8 {cause}" in error.problem
+
+
+@pytest.mark.parametrize("angle", [0.2, 0.0])
+def test_moments_tell_swapped_load_cells(angle: float) -> None:
+    recording = noisy(wandering_recording(CRANE, travel=0.5, angle=angle))
+    swapped = replace(recording, tension=recording.tension[:, [0, 1, 3, 2, 4, 5, 6, 7]])
+    (error,) = recording_mistakes(CRANE, swapped)
+    assert "cables 1 to 8 are tension_1, tension_2, tension_4, tension_3, tension_5" in error.problem
+
+
+def test_a_cable_without_load_cell_may_exert_any_moment() -> None:
+    recording = noisy(wandering_recording(CRANE))
+    tension = recording.tension.copy()
+    tension[:, 4] = np.nan
+    check = checked(CRANE, replace(recording, tension=tension))
+    assert check is not None and check.mistakes == () and check.misfit < 4e-3
+
+
+def test_without_orientation_forces_alone_tell_a_unit() -> None:
+    recording = noisy(wandering_recording(CRANE))
+    unturned = replace(recording, orientation=np.full((recording.sample_count, 4), np.nan))
+    balance = force_balance(CRANE, unturned, GeometryReading(), WindingReading())
+    assert balance is not None and balance.directions.shape[1:] == (3, 8)
+    assert recording_mistakes(CRANE, unturned) == ()
+    (error,) = recording_mistakes(CRANE, tensions(unturned, 1e-3))
+    assert "are in kN" in error.problem

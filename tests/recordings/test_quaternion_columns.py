@@ -12,7 +12,7 @@ from scipy.io import savemat
 from scipy.spatial.transform import Rotation
 
 from tautwire.errors import RecordingError
-from tautwire.recordings.quaternion_columns import with_continuous_signs
+from tautwire.recordings.quaternion_columns import rotation_vectors, with_continuous_signs
 from tautwire.recordings.recording import (
     Recording,
     read_recording,
@@ -170,3 +170,14 @@ def test_signs_go_on_behind_samples_without_orientation() -> None:
     expected = np.array([[1.0, 0.0, 0.0, 0.0], lost, [1.0, 0.0, 0.0, 0.0], [0.8, 0.6, 0.0, 0.0]])
     assert np.array_equal(with_continuous_signs(quaternions), expected, equal_nan=True)
     assert with_continuous_signs(np.empty((0, 4))).shape == (0, 4)
+
+
+def test_rotation_vectors_count_from_the_first_orientation_that_was_measured() -> None:
+    small = Rotation.from_rotvec(np.outer(np.arange(4.0), [0.1, -0.2, 0.05]))
+    start = Rotation.from_rotvec([0.4, 0.9, -1.3])
+    quaternions = (small * start).as_quat()[:, [3, 0, 1, 2]]
+    lost = np.full((1, 4), np.nan)
+    vectors = rotation_vectors(np.vstack([lost, quaternions[:2], lost, -quaternions[2:]]))
+    assert np.isnan(vectors[[0, 3]]).all()
+    assert vectors[[1, 2, 4, 5]] == pytest.approx(small.as_rotvec(), abs=1e-12)
+    assert np.isnan(rotation_vectors(lost)).all()

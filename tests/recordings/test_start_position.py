@@ -5,8 +5,10 @@ import pytest
 
 from tautwire.errors import UnreachableError
 from tautwire.recordings.recording import Recording
-from tautwire.recordings.start_position import start_position, with_start
+from tautwire.recordings.start_position import start_pose, start_position, with_start
+from tests.support.pose_recordings import noisy, rotation_of, wandering_recording
 from tests.support.recordings import recorded
+from tests.support.rigid_robots import crane_robot, octahedral_robot, suspended_robot
 from tests.support.robots import example
 
 ROBOT = example("three")
@@ -61,3 +63,40 @@ def test_a_planar_robot_starts_in_its_plane_wherever_noise_shows_it() -> None:
 def test_a_start_that_the_cables_cannot_hold_names_the_recording() -> None:
     with pytest.raises(UnreachableError, match=r"three-1\.csv: first positions: .*cable \d would need -"):
         start_position(ROBOT, NOISE, moved([-60.0, 0.0, 0.0]))
+
+
+CRANE = crane_robot()
+TURNED = replace(CRANE, platform=replace(CRANE.platform, start_orientation=(0.99875, 0.0, 0.0, 0.05)))
+
+
+def test_noise_alone_does_not_turn_the_start() -> None:
+    pose, notes = start_pose(CRANE, NOISE, noisy(wandering_recording(CRANE, travel=0.0, angle=0.0)))
+    assert pose.orientation == CRANE.platform.start_orientation
+    assert notes == ()
+
+
+def test_a_platform_on_eight_cables_starts_turned_as_it_was_recorded() -> None:
+    pose, notes = start_pose(TURNED, NOISE, noisy(wandering_recording(CRANE)))
+    recorded_turn = (
+        rotation_of(np.array(pose.orientation)) * rotation_of(np.array(CRANE.platform.start_orientation)).inv()
+    )
+    assert recorded_turn.magnitude() < 0.02
+    assert notes[-1].startswith("log.csv starts turned by 5.") and "degrees from the robot file's start" in notes[-1]
+    placed = with_start(TURNED, pose.position, pose.orientation)
+    assert placed.platform.start_orientation == pose.orientation and placed.cables == TURNED.cables
+
+
+def test_the_turned_start_has_to_be_held() -> None:
+    robot = octahedral_robot()
+    recording = wandering_recording(robot, travel=0.0)
+    turned = np.tile([np.cos(0.7), 0.0, 0.0, np.sin(0.7)], (recording.sample_count, 1))
+    with pytest.raises(UnreachableError, match=r"log\.csv: first orientations.*cable 3 would need -"):
+        start_pose(robot, NOISE, replace(recording, orientation=turned))
+
+
+def test_statics_decides_how_a_platform_on_four_cables_starts_turned() -> None:
+    robot = suspended_robot(4)
+    recording = wandering_recording(robot, travel=0.0)
+    turned = np.tile([0.8, 0.0, 0.0, 0.6], (recording.sample_count, 1))
+    pose, notes = start_pose(robot, NOISE, replace(recording, orientation=turned))
+    assert pose.orientation == robot.platform.start_orientation and notes == ()

@@ -14,6 +14,8 @@ from tautwire.cli.input_checks import check_files
 from tautwire.reports.check_page import CheckedFiles, check_page
 from tautwire.reports.downsampling import unpack_float32
 from tests.support.pages import MAX_PAGE_BYTES, Page
+from tests.support.pose_recordings import noisy, rotation_of, wandering_recording
+from tests.support.rigid_robots import crane_robot
 from tests.support.robots import EXAMPLES
 from tests.support.traces import HOSTILE
 
@@ -143,3 +145,30 @@ def test_columns_are_those_that_were_recorded_each_at_its_own_rate(tmp_path: Pat
     assert rows["x"][3:] == ["25.0 Hz", "0.4 %"]
     assert rows["tension_2"][3:] == ["100 Hz", "11.0 %"]
     assert page.text.lower().count("not read: status") == 1
+
+
+def test_page_of_a_rigid_platform_shows_its_rotation_and_its_attachments(tmp_path: Path) -> None:
+    robot, recording = crane_robot(), noisy(wandering_recording(crane_robot()))
+    content = check_page(CheckedFiles(robot, recording, (), ()), {})
+    page = Page(content)
+    assert sections(page) == ["robot", "speeds", "orientation", "lengths", "tensions", "read"]
+    assert len(content) < MAX_PAGE_BYTES and "unbalanced, moments included" in page.text
+    choice = page.data()["choices"][0]
+    panels = [each for each in choice["channels"] if each["title"] == "Rotation"]
+    assert [(each["label"], each["unit"]) for each in panels] == [(f"about {axis}", "mrad") for axis in "xyz"]
+    turned = rotation_of(recording.orientation) * rotation_of(recording.orientation[0]).inv()
+    for axis, panel in enumerate(panels):
+        drawn = unpack_float32(panel["curves"][0]["y"])
+        assert drawn.max() == pytest.approx(1e3 * turned.as_rotvec()[:, axis].max(), rel=1e-5)
+    scene = choice["scene"]
+    assert len(scene["attachments"]) == 8 and scene["edges"]
+    shown = np.array([unpack_float32(column) for column in scene["attachments"][2]])[:, 0]
+    expected = recording.position[0] + rotation_of(recording.orientation[0]).apply(robot.attachments[2])
+    assert shown == pytest.approx(expected, rel=1e-6)
+
+
+def test_page_of_a_rigid_platform_alone_draws_it_at_its_start() -> None:
+    robot = crane_robot()
+    scene = Page(check_page(CheckedFiles(robot, None, (), ()), {})).data()["choices"][0]["scene"]
+    shown = [[float(unpack_float32(column)[0]) for column in point] for point in scene["attachments"]]
+    assert np.array(shown) == pytest.approx(np.array(robot.attachments) + robot.platform.start, rel=1e-6)

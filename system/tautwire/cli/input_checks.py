@@ -14,6 +14,7 @@ from ..estimation.preprocessing import prepare_recordings
 from ..fmus.fmu_slots import check_user_fmus
 from ..recordings.column_map import unit_errors
 from ..recordings.mdf_file import is_mdf
+from ..recordings.mistaken_orientation import orientation_notes
 from ..recordings.recording import Recording, read_recording, recording_errors
 from ..recordings.start_position import start_position
 from ..recordings.tracker import with_tracker
@@ -31,7 +32,7 @@ MAX_COUNTED_ERRORS = 100_000
 # Finding the line of each problem takes time, so line numbers are left out where the file is long.
 MAX_ROBOT_FILE_PROBLEMS = 50
 MAX_CHARACTERS_FOR_LINE_NUMBERS = 50_000  # characters
-MIN_CABLE_COUNT = 3
+MIN_CABLE_COUNT, MIN_RIGID_CABLE_COUNT = 3, 2
 # Keys that do not affect whether the cables hold the platform at the start.
 KEYS_WITHOUT_INFLUENCE_ON_STATICS = frozenset((("name",), ("sensors",), ("winch",), ("fmu",), ("recording",)))
 
@@ -89,7 +90,7 @@ def check_files(
     robot = _check_robot_file(robot_file, problems, notes)
     if recording_file is None:
         return CheckResult(tuple(problems), tuple(notes), robot)
-    if robot is None or robot.cable_count < MIN_CABLE_COUNT:
+    if robot is None or robot.cable_count < _min_cable_count(robot):
         notes.append(f"{recording_file} was not checked: the number of cables is unknown")
         return CheckResult(tuple(problems), tuple(notes), robot)
     recording_problems: list[Problem] = []
@@ -105,6 +106,10 @@ def check_files(
         progress("checking both together", 0.0)
         _check_together(robot, recording, recording_problems, notes)
     return CheckResult((*problems, *recording_problems), tuple(notes), robot, recording)
+
+
+def _min_cable_count(robot: Robot) -> int:
+    return MIN_RIGID_CABLE_COUNT if robot.platform.is_rigid_body else MIN_CABLE_COUNT
 
 
 def _check_robot_file(path: Path, problems: list[Problem], notes: list[str]) -> Robot | None:
@@ -235,7 +240,7 @@ def _grouped_problem(path: Path, group: _AlikeErrors) -> Problem:
 
 def _check_together(robot: Robot, recording: Recording, problems: list[Problem], notes: list[str]) -> None:
     path = Path(recording.path)
-    notes.extend(recording.notes)
+    notes.extend((*recording.notes, *orientation_notes(robot, recording)))
     if not (recording.has_position or recording.has_tension):
         notes.append(f"{path}: no tension and no position was measured; simulate accepts it, trace does not")
         return

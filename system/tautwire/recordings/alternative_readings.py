@@ -1,4 +1,4 @@
-"""How a recording may be read: units, signs, order, axes and origin other than the format's, and what each changes."""
+"""How time and winch columns may be read: units, signs, order and clock other than the format's."""
 
 from __future__ import annotations
 
@@ -6,13 +6,9 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from ..robot.schema import AXES, Robot
 from .recording import Recording
 from .units import UNITS
-
-Array = NDArray[np.float64]
 
 DRUM_RADII = (0.005, 0.5)  # m
 NEGATE = "multiply by -1, or declare sign = -1 in [recording.columns]"
@@ -23,7 +19,6 @@ TIME_UNITS = {unit.symbol: unit.to_si(1.0) for unit in UNITS["time"]}
 SPEED_UNITS = {unit.symbol: unit.to_si(1.0) for unit in UNITS["speed"]}
 LENGTH_UNITS = {unit.symbol: unit.to_si(1.0) for unit in UNITS["length"]}
 ANCHOR_UNITS = ("m", "cm", "mm")
-IDENTITY = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
 
 
 @dataclass(frozen=True)
@@ -32,79 +27,6 @@ class Mistake:
 
     cause: str
     remedy: str
-
-
-@dataclass(frozen=True)
-class GeometryReading:
-    """How positions and anchors are read: units, axes with their signs, and the frame of the positions.
-
-    ``p = rotation @ (signs * shown[axes] * unit) + origin``, in the robot file's frame. The recorded ``odd_axis`` is in
-    a unit of its own.
-    """
-
-    position_unit: str = "m"
-    anchor_unit: str = "m"
-    axes: tuple[int, ...] = (0, 1, 2)
-    signs: tuple[int, ...] = (1, 1, 1)
-    origin: tuple[float, ...] = (0.0, 0.0, 0.0)
-    rotation: tuple[tuple[float, ...], ...] = IDENTITY
-    odd_axis: int | None = None
-    odd_unit: str = "m"
-
-    def positions(self, robot: Robot, shown: Array) -> Array:
-        """Positions (N, 3) in m in the robot file's frame; a coordinate that was not measured is the start's."""
-        start = np.array(robot.platform.start) * LENGTH_UNITS[self.anchor_unit]
-        sizes = np.full(len(AXES), LENGTH_UNITS[self.position_unit])
-        if self.odd_axis is not None:
-            sizes[self.odd_axis] = LENGTH_UNITS[self.odd_unit]
-        read = (shown * sizes)[:, self.axes] * self.signs
-        for axis in range(len(AXES)):
-            if axis not in robot.axes_in_plane or not np.isfinite(read[:, axis]).any():
-                read[:, axis] = start[axis]
-        return read @ np.transpose(self.rotation) + self.origin
-
-    def directions(self, robot: Robot, shown: Array) -> tuple[Array, Array]:
-        """Rope lengths (N, n) in m, and unit vectors (N, n, 3) from the platform to the anchors."""
-        anchors = np.array(robot.anchors) * LENGTH_UNITS[self.anchor_unit]
-        vectors = anchors - self.positions(robot, shown)[:, None]
-        lengths = np.linalg.norm(vectors, axis=2)
-        return lengths, vectors / np.maximum(lengths, 1e-12)[..., None]
-
-    def mistakes(self) -> Iterator[Mistake]:
-        """What this reading changes."""
-        others = [axis for index, axis in enumerate(AXES) if index != self.odd_axis]
-        if self.position_unit != "m":
-            unit, names = self.position_unit, ", ".join(others)
-            yield Mistake(f"{names} are in {unit}", convert(names, unit, LENGTH_UNITS[unit], others[0]))
-        if self.odd_axis is not None and self.odd_unit != "m":
-            unit, name = self.odd_unit, AXES[self.odd_axis]
-            yield Mistake(f"{name} is in {unit}", convert(name, unit, LENGTH_UNITS[unit], name))
-        if self.anchor_unit != "m":
-            unit = self.anchor_unit
-            yield Mistake(
-                f"anchors in the robot file are in {unit}", f"multiply its coordinates by {LENGTH_UNITS[unit]:g}"
-            )
-        shown = [("-" if sign < 0 else "") + AXES[axis] for axis, sign in zip(self.axes, self.signs, strict=True)]
-        if shown != list(AXES):
-            yield Mistake(
-                f"the robot file's x, y, z are the recording's {', '.join(shown)}",
-                f"write the columns {', '.join(shown)} as x, y, z",
-            )
-        offset = ", ".join(f"{coordinate:.3g}" for coordinate in self.origin)
-        if self.rotation != IDENTITY:
-            yield self._turned_frame(offset)
-        elif any(self.origin):
-            yield Mistake(
-                f"x, y, z have another origin, about [{offset}] m in the robot file's frame", "add that vector"
-            )
-
-    def _turned_frame(self, offset: str) -> Mistake:
-        angle = np.degrees(np.arccos(np.clip((np.trace(self.rotation) - 1.0) / 2.0, -1.0, 1.0)))
-        rows = ", ".join("[" + ", ".join(f"{entry:.4g}" for entry in row) + "]" for row in self.rotation)
-        return Mistake(
-            f"x, y, z are in a frame that is turned by about {angle:.3g} degrees, with its origin at [{offset}] m",
-            f"write R (x, y, z) + [{offset}] as x, y, z, in m, with R = [{rows}] or what a survey of the tracker says",
-        )
 
 
 @dataclass(frozen=True)

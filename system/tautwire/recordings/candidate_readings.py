@@ -10,14 +10,8 @@ from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
 from ..robot.schema import Robot
-from .alternative_readings import (
-    ANCHOR_UNITS,
-    LENGTH_UNITS,
-    SPEED_UNITS,
-    TIME_UNITS,
-    GeometryReading,
-    WindingReading,
-)
+from .alternative_readings import ANCHOR_UNITS, LENGTH_UNITS, SPEED_UNITS, TIME_UNITS, WindingReading
+from .geometry_reading import GeometryReading, QuaternionReading
 
 Array = NDArray[np.float64]
 
@@ -32,7 +26,10 @@ SAMPLE_INTERVALS = (5e-5, 0.5)  # s, of recordings
 
 
 def geometry_readings(robot: Robot) -> Iterator[GeometryReading]:
-    """The declared reading first; then other units, signed axes, and both, or one axis in another unit."""
+    """The declared reading first; then other units, signed axes, and both, or one axis in another unit.
+
+    Of rigid platforms also other poses, and attachments in another unit.
+    """
     for axes, signs in product(permutations(range(3)), product((1, -1), repeat=3)):
         for unit in LENGTH_UNITS:
             yield GeometryReading(unit, "m", axes, signs)
@@ -41,6 +38,22 @@ def geometry_readings(robot: Robot) -> Iterator[GeometryReading]:
     for unit, odd_axis, odd_unit in product(LENGTH_UNITS, robot.axes_in_plane, LENGTH_UNITS):
         if unit != odd_unit:
             yield GeometryReading(unit, odd_axis=odd_axis, odd_unit=odd_unit)
+    if robot.platform.is_rigid_body:
+        for unit in ANCHOR_UNITS:
+            yield from pose_readings(robot, unit)
+        for unit, attachment_unit in product(ANCHOR_UNITS, ANCHOR_UNITS[1:]):
+            yield GeometryReading(unit, attachment_unit=attachment_unit)
+
+
+def pose_readings(robot: Robot, position_unit: str = "m") -> Iterator[GeometryReading]:
+    """Readings of a rigid platform's pose: the order and the sense of quaternions, and positions of its centre of mass.
+
+    The declared one is not among them.
+    """
+    for is_centre, is_last, is_inverse in product((False, True), repeat=3):
+        if (is_centre or is_last or is_inverse) and not (is_centre and not any(robot.platform.centre_of_mass)):
+            quaternion = QuaternionReading(is_last, is_inverse)
+            yield GeometryReading(position_unit, quaternion=quaternion, is_centre_of_mass=is_centre)
 
 
 def winding_readings(lengths: Array, wound: Array, interval: float) -> Iterator[WindingReading]:
@@ -77,6 +90,9 @@ def winding_readings(lengths: Array, wound: Array, interval: float) -> Iterator[
 
 def are_of_one_system(geometry: GeometryReading, winding: WindingReading) -> bool:
     """Whether positions and winches may be in these units at once: rare ones of both only where they are alike."""
+    if geometry.attachment_unit != "m":
+        # Beside distant anchors, poses and winches in a thousandth of the unit fit almost as well.
+        return winding.factor == 1.0
     if winding.speed_unit in ("in/s", "ft/s") and geometry.position_unit == "m":
         return geometry == GeometryReading()
     is_rare = geometry.odd_axis is not None or geometry.position_unit in ("um", "in", "ft")

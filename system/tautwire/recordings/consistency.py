@@ -1,4 +1,4 @@
-"""Consistency of a recording and a robot: start position, winch travel, and the balance of forces."""
+"""Consistency of a recording and a robot: start, winch travel, and the balance of forces and moments."""
 
 from __future__ import annotations
 
@@ -9,8 +9,10 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError
 from ..robot.schema import Robot
-from .alternative_readings import GeometryReading, Mistake, WindingReading
+from .alternative_readings import Mistake, WindingReading
+from .geometry_reading import GeometryReading, recorded_poses
 from .mistaken_motion import MAX_MISFIT, MotionCheck, check_motion
+from .mistaken_orientation import start_orientation_error
 from .mistaken_tensions import TensionCheck, check_tensions
 from .recording import Recording
 
@@ -25,7 +27,10 @@ MAX_REELING_MISMATCH = 0.5
 CHECKED_DURATION = 60.0  # s
 # Their contributions to lengths, forces and readings are not computed here.
 EFFECTS_IN_BALANCES = frozenset(
-    ("anchor", "drum", "frame", "pulley", "payload", "sensor_delay", "sensor_gain", "sensor_offset")
+    (
+        *("drum", "frame", "payload", "sensor_delay", "sensor_gain", "sensor_offset"),
+        *("attachment", "centre_of_mass", "inertia"),
+    )
 )
 # Rows at rest at the start, and the quantile of rows without outliers of the tracker.
 ROWS_AT_REST, INLIER_QUANTILE = 5, 0.95
@@ -46,7 +51,7 @@ def require_plausible(robot: Robot, recording: Recording) -> None:
 
 
 def recording_mistakes(robot: Robot, recording: Recording) -> tuple[RecordingError, ...]:
-    """What the winch travel, the positions and the tensions say of mistakes in the recording or the robot file.
+    """What the winch travel, the poses and the tensions say of mistakes in the recording or the robot file.
 
     Empty where they say nothing. For a robot that declares effects which are no part of either balance only travel
     beyond its size counts.
@@ -58,10 +63,12 @@ def recording_mistakes(robot: Robot, recording: Recording) -> tuple[RecordingErr
     errors = []
     geometry, winding = GeometryReading(), WindingReading()
     if motion is not None and motion.readings:
-        errors.append(_motion_error(recording.path, motion))
+        errors.append(_motion_error(robot, recording.path, motion))
         geometry, winding = motion.readings[0].geometry, motion.readings[0].winding
     elif travel is not None:
         return (travel,)
+    elif start := start_orientation_error(robot, recording):
+        return (start,)
     tensions = check_tensions(robot, recording, geometry, winding)
     if tensions is not None and tensions.mistakes:
         errors.append(_tension_error(recording.path, tensions))
@@ -90,9 +97,10 @@ def travel_error(robot: Robot, recording: Recording) -> RecordingError | None:
     return RecordingError(recording.path, problem, hint)
 
 
-def _motion_error(path: str, motion: MotionCheck) -> RecordingError:
+def _motion_error(robot: Robot, path: str, motion: MotionCheck) -> RecordingError:
+    shown = "poses" if robot.platform.is_rigid_body else "positions"
     problem = (
-        f"winch travel does not match the positions: it is off by {_percentage(motion.misfit)}, by "
+        f"winch travel does not match the {shown}: it is off by {_percentage(motion.misfit)}, by "
         f"{_percentage(motion.readings[0].misfit)} if {_causes([r.mistakes for r in motion.readings])}"
     )
     return RecordingError(path, problem, _remedies([reading.mistakes for reading in motion.readings]))
@@ -138,7 +146,7 @@ def require_start_within_robot(robot: Robot, start: Array, where: str) -> None:
 def require_matching_reeling(robot: Robot, recording: Recording, start: Array, where: str) -> None:
     """Refuse a recording that starts far away and whose winch travel does not match its positions.
 
-    Rope lengths are ``|a_i - p|``. Raises RecordingError.
+    Raises RecordingError.
     """
     size = robot_size(robot)
     if _start_distance(robot, start) < MIN_CHECKED_START_SHARE * size:
@@ -158,9 +166,11 @@ def reeling_mismatch(robot: Robot, recording: Recording) -> tuple[float, float]:
     """
     time, reeled = recording.time, recording.wound_lengths()
     rows = np.isfinite(recording.position).all(axis=1) & (time <= time[0] + CHECKED_DURATION)
+    if robot.platform.is_rigid_body and recording.has_orientation:
+        rows &= np.isfinite(recording.orientation).all(axis=1)
     if not rows.any():
         return 0.0, 0.0
-    lengths = np.linalg.norm(np.array(robot.anchors) - recording.position[rows][:, None], axis=2)
+    lengths = GeometryReading().directions(robot, recorded_poses(recording, np.flatnonzero(rows)))[0]
     reeled_length = reeled[rows] - reeled[rows][0]
     errors = reeled_length + lengths - np.median(lengths[:ROWS_AT_REST], axis=0)
     mean_squares = np.mean(errors**2, axis=1)

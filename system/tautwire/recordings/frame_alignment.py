@@ -12,7 +12,8 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from ..robot.schema import AXES, Robot
-from .alternative_readings import LENGTH_UNITS, GeometryReading
+from .alternative_readings import LENGTH_UNITS
+from .geometry_reading import GeometryReading, RecordedPoses
 
 Array = NDArray[np.float64]
 
@@ -22,20 +23,22 @@ MIN_SINGULAR_RATIO = 0.02
 MAX_SCALE_ERROR = 0.05
 # Axes that are nearer to those of the robot file, or to others of the tracker, are these.
 MAX_AXES_ERROR = np.radians(3.0)
+INSIDE_PULLEY = 1e6  # m, an error of lengths where a position has none
 
 
-def aligned_frames(robot: Robot, recorded: Array, wound: Array) -> Iterator[GeometryReading]:
-    """Frames of recorded positions (M, 3) in which they follow the lengths (M, n) that the winches wound.
+def aligned_frames(robot: Robot, poses: RecordedPoses, wound: Array) -> Iterator[GeometryReading]:
+    """Frames of recorded poses (M,) in which they follow the lengths (M, n) that the winches wound.
 
     Positions by forward kinematics from the declared start give unit, axes and rotation by Procrustes analysis
     (Umeyama 1991); the origin, and a rotation that is none of the axes alone, then fit the lengths. First with the axes
-    as they are, then as they fit. None along a line, of no unit, or where a coordinate in the robot's plane is missing.
+    as they are, then as they fit, which of a rigid platform is not tried. None along a line, of no unit, or where a
+    coordinate in the robot's plane is missing.
     """
-    rows = slice(None, None, max(1, len(recorded) // ROWS_USED))
-    recorded, wound = recorded[rows], wound[rows]
-    yield _with_fitted_frame(robot, GeometryReading(), recorded, wound, is_turned=False)
-    in_plane = list(robot.axes_in_plane)
-    if not np.isfinite(recorded[:, in_plane]).all():
+    rows = slice(None, None, max(1, len(wound) // ROWS_USED))
+    poses, wound = RecordedPoses(poses.position[rows], poses.orientation[rows]), wound[rows]
+    yield _with_fitted_frame(robot, GeometryReading(), poses, wound, is_turned=False)
+    recorded, in_plane = poses.position, list(robot.axes_in_plane)
+    if robot.platform.is_rigid_body or not np.isfinite(recorded[:, in_plane]).all():
         return
     scale, axes = _procrustes(recorded[:, in_plane], _forward_kinematics(robot, wound)[:, in_plane])
     unit = min(LENGTH_UNITS, key=lambda symbol: abs(np.log(max(scale, 1e-300) / LENGTH_UNITS[symbol])))
@@ -44,7 +47,7 @@ def aligned_frames(robot: Robot, recorded: Array, wound: Array) -> Iterator[Geom
     turned = np.eye(len(AXES))
     turned[np.ix_(in_plane, in_plane)] = axes
     geometry, error = _nearest_axes(turned, unit)
-    yield _with_fitted_frame(robot, geometry, recorded, wound, is_turned=error > MAX_AXES_ERROR)
+    yield _with_fitted_frame(robot, geometry, poses, wound, is_turned=error > MAX_AXES_ERROR)
 
 
 def _forward_kinematics(robot: Robot, wound: Array) -> Array:
@@ -94,7 +97,7 @@ def _nearest_axes(orthogonal: Array, unit: str) -> tuple[GeometryReading, float]
 
 
 def _with_fitted_frame(
-    robot: Robot, geometry: GeometryReading, recorded: Array, wound: Array, is_turned: bool
+    robot: Robot, geometry: GeometryReading, poses: RecordedPoses, wound: Array, is_turned: bool
 ) -> GeometryReading:
     """The geometry with the origin in the robot's plane, and the rotation if it is turned, that fit lengths best."""
     axes = list(robot.axes_in_plane)
@@ -109,9 +112,9 @@ def _with_fitted_frame(
         return replace(geometry, origin=tuple(origin.tolist()), rotation=rotation)
 
     def errors(parameters: Array) -> Array:
-        lengths = frame(parameters).directions(robot, recorded)[0] + wound
-        return np.asarray((lengths - lengths.mean(axis=0)).ravel())
+        lengths = frame(parameters).directions(robot, poses)[0] + wound
+        return np.nan_to_num((lengths - lengths.mean(axis=0)).ravel(), nan=INSIDE_PULLEY)
 
-    at_start = frame(np.concatenate([np.zeros(len(axes)), turned[free]])).positions(robot, recorded[:1])[0]
+    at_start = frame(np.concatenate([np.zeros(len(axes)), turned[free]])).positions(robot, poses)[0]
     start = (np.array(robot.platform.start) - at_start)[axes]
     return frame(least_squares(errors, np.concatenate([start, turned[free]]), loss="soft_l1").x)

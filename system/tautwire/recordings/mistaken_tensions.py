@@ -1,4 +1,4 @@
-"""Mistakes in units, signs or order of load cells, told by the balance of forces on the platform."""
+"""Mistakes in units, signs or order of load cells, told by the balance of forces and moments on the platform."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..robot.schema import Robot
-from .alternative_readings import NEGATE, REORDER, GeometryReading, Mistake, WindingReading, convert
+from .alternative_readings import NEGATE, REORDER, Mistake, WindingReading, convert
+from .geometry_reading import GeometryReading
 from .mistaken_motion import MIN_IMPROVEMENT
 from .odd_load_cells import likely_cell_readings
 from .recording import Recording
@@ -74,9 +75,10 @@ def check_tensions(
 ) -> TensionCheck | None:
     """Test the load cells by the balance of forces on the platform, ``sum_i T_i u_i = m (a + g)``.
 
-    Forces are averaged over a quarter second; a cable without load cell may pull as it likes. The misfit is the rms of
-    what is not balanced, over that of weight and inertia. Another order of load cells is told by the misfit that is
-    left whatever the unit, another unit or sign by the factor that balances best. None where too little was measured.
+    Of a rigid platform whose orientation was recorded the moments about its centre of mass have to balance too. Forces
+    are averaged over a quarter second; a cable without load cell may pull as it likes. The misfit is the rms of what is
+    not balanced, over that of weight and inertia. Another order of load cells is told by the misfit that is left
+    whatever the unit, another unit or sign by the factor that balances best. None where too little was measured.
     """
     balance = force_balance(robot, recording, geometry, winding)
     if balance is None:

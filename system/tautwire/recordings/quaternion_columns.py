@@ -6,6 +6,7 @@ from collections.abc import Container, Mapping
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 from ..robot.schema import QUATERNION_COLUMNS
 
@@ -55,6 +56,19 @@ def with_continuous_signs(recorded: Array) -> Array:
     continuous = recorded.copy()
     continuous[is_known] = known * np.cumprod(np.concatenate([np.ones(min(len(known), 1)), changes]))[:, None]
     return continuous
+
+
+def rotation_vectors(quaternions: Array) -> Array:
+    """Rotation vectors (N, 3) in rad and in the world's axes, from the first of unit quaternions (N, 4) to each.
+
+    NaN where there is no quaternion; beyond half a turn, those of the shorter way.
+    """
+    is_known = np.isfinite(quaternions).all(axis=1)
+    vectors = np.full((len(quaternions), 3), np.nan)
+    if is_known.any():
+        rotations = Rotation.from_quat(quaternions[is_known][:, [1, 2, 3, 0]])
+        vectors[is_known] = (rotations * rotations[0].inv()).as_rotvec()
+    return vectors
 
 
 def missing_quaternion_columns(names: Container[str]) -> tuple[str, ...]:

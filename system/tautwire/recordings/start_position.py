@@ -1,35 +1,53 @@
-"""The start position of a recording, and the robot placed there."""
+"""The start of a recording, and the robot placed there."""
 
 from __future__ import annotations
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from math import hypot
 
 import numpy as np
 
 from ..errors import UnreachableError
 from ..robot.measured_start import shown_position
-from ..robot.schema import AXES, Robot
+from ..robot.schema import AXES, Point, Quaternion, Robot
 from ..robot.static_equilibrium import static_tensions
 from .consistency import CONSISTENCY_HINT, describe_start, require_matching_reeling, require_start_within_robot
+from .mistaken_orientation import angle_between
 from .recording import Recording
+from .white_noise_estimate import white_noise_deviation
 
 START_SIGNIFICANCE = 6.0
 # The robot starts at rest: its first samples are of one position.
 START_ROWS, MAX_START_SAMPLES = 10, 5
+# Fewer cables leave the orientation of a rigid platform to statics.
+RIGID_FREEDOMS = 6
 
 
-def start_position(
-    robot: Robot, position_noise: float, recording: Recording
-) -> tuple[tuple[float, float, float], tuple[str, ...]]:
-    """The start position of a recording, and a note if it differs significantly from the robot file's start.
+@dataclass(frozen=True)
+class StartPose:
+    """Where a recording starts: ``position`` in m, and ``orientation``, a unit quaternion, platform to world."""
 
-    It is the robot file's, or one as the position sensor shows it, with the sensor's errors; an axis without positions
-    starts as declared, and so does the one across the plane of a planar robot.
+    position: Point
+    orientation: Quaternion
+
+
+def start_position(robot: Robot, position_noise: float, recording: Recording) -> tuple[Point, tuple[str, ...]]:
+    """The position of :func:`start_pose`, and its notes."""
+    pose, notes = start_pose(robot, position_noise, recording)
+    return pose.position, notes
+
+
+def start_pose(robot: Robot, position_noise: float, recording: Recording) -> tuple[StartPose, tuple[str, ...]]:
+    """The start of a recording, and a note if it differs significantly from the robot file's start.
+
+    Its position is the robot file's, or one as the position sensor shows it, with the sensor's errors; an axis without
+    positions starts as declared, and so does the one across the plane of a planar robot. Its orientation is the robot
+    file's, or that of the first samples where six cables or more hold a rigid platform: fewer decide it by statics.
 
     Raises RecordingError where the recording cannot be this robot's, UnreachableError where the cables cannot hold the
     platform there; both name the recording.
     """
+    orientation, orientation_notes = _start_orientation(robot, recording)
     expected = np.array(shown_position(robot, robot.platform.start), dtype=float)
     offset, uncertainty = np.zeros(3), np.full(3, np.inf)
     for axis in robot.axes_in_plane:
@@ -41,25 +59,56 @@ def start_position(
                 position_noise / len(valid_samples) ** 0.5, robot.sensors.position_offset_uncertainty
             )
     if np.all(np.abs(offset) <= START_SIGNIFICANCE * uncertainty):
-        return robot.platform.start, ()
+        position, notes = robot.platform.start, orientation_notes
+        if orientation_notes:
+            _require_holdable(with_start(robot, position, orientation), recording)
+        return StartPose(position, orientation), notes
     start = np.where(np.isfinite(uncertainty), expected + offset, robot.platform.start)
     x, y, z = start.tolist()
     where = f"{recording.path}: first positions"
     require_start_within_robot(robot, start, where)
-    try:
-        static_tensions(with_start(robot, (x, y, z)))
-    except UnreachableError as error:
-        reason = f"it is {describe_start(robot, start)}; {error.reason}"
-        raise UnreachableError(where, error.position, error.cable, error.tension, reason, CONSISTENCY_HINT) from error
+    _require_holdable(with_start(robot, (x, y, z), orientation), recording, f"it is {describe_start(robot, start)}; ")
     require_matching_reeling(robot, recording, start, where)
     coordinates = ", ".join(f"{axis} {value:.6g}" for axis, value in zip(AXES, (x, y, z), strict=True))
     note = (
         f"{recording.path} starts at {coordinates} m, not at the robot file's start; the run starts there too, unless "
         "the zero of the position sensor is wrong"
     )
-    return (x, y, z), (note,)
+    return StartPose((x, y, z), orientation), (note, *orientation_notes)
 
 
-def with_start(robot: Robot, start: tuple[float, float, float]) -> Robot:
-    """The robot at another start."""
-    return robot if start == robot.platform.start else replace(robot, platform=replace(robot.platform, start=start))
+def _require_holdable(robot: Robot, recording: Recording, described: str = "") -> None:
+    """Raises UnreachableError, about a recording, where the cables cannot hold the platform at the start."""
+    try:
+        static_tensions(robot)
+    except UnreachableError as error:
+        where = f"{recording.path}: first {'positions' if described else 'orientations'}"
+        reason = f"{described}{error.reason}"
+        raise UnreachableError(where, error.position, error.cable, error.tension, reason, CONSISTENCY_HINT) from error
+
+
+def _start_orientation(robot: Robot, recording: Recording) -> tuple[Quaternion, tuple[str, ...]]:
+    """The orientation at the start, and a note if it differs significantly from the robot file's."""
+    declared, measured = robot.platform.start_orientation, recording.orientation[:START_ROWS]
+    samples = measured[np.isfinite(measured).all(axis=1)][:MAX_START_SAMPLES]
+    if not robot.platform.is_rigid_body or robot.cable_count < RIGID_FREEDOMS or not len(samples):
+        return declared, ()
+    mean = samples.mean(axis=0) / np.linalg.norm(samples.mean(axis=0))
+    angle = angle_between(mean, declared)
+    # A small rotation changes each of the last three numbers by half its angle.
+    noise = robot.sensors.orientation_noise or 2.0 * white_noise_deviation(recording.orientation)
+    if angle <= START_SIGNIFICANCE * noise / len(samples) ** 0.5:
+        return declared, ()
+    w, x, y, z = mean.tolist()
+    numbers = ", ".join(f"{part:.6f}" for part in mean)
+    note = (
+        f"{recording.path} starts turned by {np.degrees(angle):.3g} degrees from the robot file's start_orientation; "
+        f"the run starts so too, at [{numbers}]"
+    )
+    return (w, x, y, z), (note,)
+
+
+def with_start(robot: Robot, start: Point, orientation: Quaternion | None = None) -> Robot:
+    """The robot at another start, and with another orientation there if one is given."""
+    platform = replace(robot.platform, start=start, start_orientation=orientation or robot.platform.start_orientation)
+    return robot if platform == robot.platform else replace(robot, platform=platform)

@@ -10,7 +10,7 @@ from scipy.signal import correlation_lags
 
 from ..errors import RecordingError
 from ..robot.schema import Robot
-from .alternative_readings import GeometryReading
+from .geometry_reading import GeometryReading, recorded_poses
 from .recording import Recording
 from .travel_correlation import TRAVEL_WINDOW, correlated, lowest_valleys, travel_on_grid
 from .white_noise_estimate import white_noise_deviation
@@ -70,7 +70,7 @@ def estimate_tracker_clock(robot: Robot, log: Recording, tracker: Recording) -> 
     """
     rows = _measured_rows(robot, tracker)
     times, positions = tracker.time[rows], tracker.position[rows]
-    lengths = GeometryReading().directions(robot, positions)[0]
+    lengths = GeometryReading().directions(robot, recorded_poses(tracker, rows))[0]
     _require_motion(log, tracker, positions)
     fit = _ClockFit(robot, log, times, lengths)
     alignments = [fit.refined(offset) for offset in _candidate_offsets(log, times, lengths)]

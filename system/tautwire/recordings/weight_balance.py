@@ -1,4 +1,4 @@
-"""The balance of forces on the platform, in blocks of a recording: what load cells should carry, and what they do."""
+"""The balance of forces and moments on the platform, in blocks of a recording: what load cells should carry."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..robot.schema import AXES, Robot
-from .alternative_readings import TIME_UNITS, GeometryReading, WindingReading
+from .alternative_readings import TIME_UNITS, WindingReading
+from .geometry_reading import GeometryReading, RecordedPoses
+from .inertial_wrench import balance_matrices, inertial_wrenches
 from .recording import Recording
 from .sensor_gaps import bridge_short_gaps
 from .units import UNITS
@@ -34,8 +36,9 @@ FORCE_UNITS = {
 class ForceBalance:
     """B blocks of the balance ``sum_i T_i u_i = m (a + g)``, without the directions of cables that have no load cell.
 
-    ``directions`` (B, 3, n), ``tensions`` (B, n) as read, 0 where there is no load cell, ``required`` (B, 3) in N;
-    ``time`` (B,) in s of the middles.
+    ``directions`` (B, d, n), ``tensions`` (B, n) as read, 0 where there is no load cell, ``required`` (B, d) in N;
+    ``time`` (B,) in s of the middles. d is 3, or 6 of a rigid platform whose orientation was recorded: the last three
+    are moments about its centre of mass over its size.
     """
 
     time: Array
@@ -44,6 +47,11 @@ class ForceBalance:
     required: Array
     has_load_cell: tuple[bool, ...]
 
+    @property
+    def has_moments(self) -> bool:
+        """Whether moments are balanced beside forces."""
+        return self.directions.shape[1] > len(AXES)
+
     def balanced_tensions(self) -> Array:
         """The balanced tensions nearest to the measured ones, (B, n) in N, NaN where there is no load cell."""
         unbalanced = self.required - self._forces(tuple(range(len(self.has_load_cell))))
@@ -51,11 +59,11 @@ class ForceBalance:
         return np.where(self.has_load_cell, self.tensions + corrections, np.nan)
 
     def carried(self, order: tuple[int, ...]) -> float:
-        """The part of the required force that the tensions, read in this order, carry; 1 where they are right."""
+        """The part of the required wrench that the tensions, read in this order, carry; 1 where they are right."""
         return float(np.sum(self._forces(order) * self.required) / np.sum(self.required**2))
 
     def misfit(self, order: tuple[int, ...], factor: float = 1.0) -> float:
-        """Rms of what is not balanced, over that of the required force."""
+        """Rms of what is not balanced, over that of the required wrench."""
         unbalanced = factor * self._forces(order) - self.required
         return float(np.sqrt(np.sum(unbalanced**2) / np.sum(self.required**2)))
 
@@ -72,25 +80,22 @@ class ForceBalance:
 def force_balance(
     robot: Robot, recording: Recording, geometry: GeometryReading, winding: WindingReading
 ) -> ForceBalance | None:
-    """The balance of forces in blocks of a quarter second; None where too few are whole, or no direction is left."""
+    """The balance of forces and moments in blocks of a quarter second; None where too few are whole or seen."""
     has_load_cell = np.asarray(np.isfinite(recording.tension).any(axis=0))
     block_means = _block_means(robot, recording, winding)
     if block_means is None or not _is_more_than_noise(recording.tension):
         return None
-    time, positions, tensions, duration = block_means
-    directions = geometry.directions(robot, positions)[1].transpose(0, 2, 1)
-    in_metres = geometry.positions(robot, positions)
+    time, poses, tensions, duration = block_means
     # The second difference of means is the acceleration seen through a B-spline, and so are the forces beside it.
-    acceleration = (in_metres[2:] - 2.0 * in_metres[1:-1] + in_metres[:-2]) / duration**2
+    required = inertial_wrenches(robot, geometry, poses, duration)
     tensions = (tensions[2:] + 4.0 * tensions[1:-1] + tensions[:-2]) / 6.0
-    directions = directions[1:-1]
-    is_complete = np.isfinite(acceleration).all(axis=1) & np.isfinite(tensions[:, has_load_cell]).all(axis=1)
+    directions = balance_matrices(robot, geometry, poses)[1:-1]
+    is_complete = np.isfinite(required).all(axis=1) & np.isfinite(tensions[:, has_load_cell]).all(axis=1)
     if np.count_nonzero(is_complete) < MIN_BLOCKS:
         return None
     tensions, directions = np.where(has_load_cell, tensions, 0.0)[is_complete], directions[is_complete]
-    in_plane = np.isin(np.arange(len(AXES)), robot.axes_in_plane)
-    required = robot.platform.mass * (acceleration[is_complete] + np.array([0.0, 0.0, robot.gravity])) * in_plane
     projection = _without_directions(directions[:, :, np.logical_not(has_load_cell)])
+    required = required[is_complete]
     required = np.einsum("bij,bj->bi", projection, required)
     weight = robot.platform.mass * robot.gravity
     if not np.sqrt(np.mean(np.sum(required**2, axis=1))) > MIN_SEEN_SHARE * weight > 0.0:
@@ -101,8 +106,8 @@ def force_balance(
 
 def _block_means(
     robot: Robot, recording: Recording, winding: WindingReading
-) -> tuple[Array, Array, Array, float] | None:
-    """Middles of blocks (B,) in s, means of positions (B, 3) and tensions (B, n), and the duration of a block in s."""
+) -> tuple[Array, RecordedPoses, Array, float] | None:
+    """Middles of blocks (B,) in s, means of poses (B,) and tensions (B, n), and the duration of a block in s."""
     interval = float(np.median(np.diff(recording.time))) * TIME_UNITS[winding.time_unit]
     size = max(1, round(BLOCK_DURATION / interval))
     rows = min(recording.sample_count, MAX_BLOCKS * size)
@@ -118,12 +123,16 @@ def _block_means(
     # Of positions in some rows alone the mean would not be that of the block's middle, which a second difference needs.
     used = slice(count * size)
     means = []
-    for values in (bridge_short_gaps(recording.time[used], recording.position[used]), recording.tension[used]):
+    poses = (
+        bridge_short_gaps(recording.time[used], each[used]) for each in (recording.position, recording.orientation)
+    )
+    for values in (*poses, recording.tension[used]):
         blocks = values.reshape(count, size, -1)
         counts = np.isfinite(blocks).sum(axis=1)
         mean = np.nansum(blocks, axis=1) / np.where(counts > 0, counts, np.nan)
         means.append(np.where(spans_gap[:, None], np.nan, mean))
-    return starts + 0.5 * size * interval, means[0], means[1], size * interval
+    orientation = means[1] / np.linalg.norm(means[1], axis=1, keepdims=True)
+    return starts + 0.5 * size * interval, RecordedPoses(means[0], orientation), means[2], size * interval
 
 
 def _is_more_than_noise(tension: Array) -> bool:
@@ -136,5 +145,5 @@ def _is_more_than_noise(tension: Array) -> bool:
 
 
 def _without_directions(directions: Array) -> Array:
-    """Projections (B, 3, 3) onto what is perpendicular to unit vectors (B, 3, k)."""
-    return np.asarray(np.eye(3) - directions @ np.linalg.pinv(directions))
+    """Projections (B, d, d) onto what is perpendicular to vectors (B, d, k)."""
+    return np.asarray(np.eye(directions.shape[1]) - directions @ np.linalg.pinv(directions))

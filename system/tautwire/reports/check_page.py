@@ -10,12 +10,14 @@ from numpy.typing import NDArray
 
 from ..number_format import format_percent, format_significant
 from ..provenance import Provenance
-from ..recordings.alternative_readings import GeometryReading, WindingReading
-from ..recordings.mistaken_motion import LengthRegression, length_regression
+from ..recordings.alternative_readings import WindingReading
+from ..recordings.geometry_reading import GeometryReading
+from ..recordings.motion_regression import LengthRegression, length_regression
+from ..recordings.quaternion_columns import rotation_vectors
 from ..recordings.recording import Recording
 from ..recordings.sensor_gaps import bridge_short_gaps, slower_rate
 from ..recordings.weight_balance import ForceBalance, force_balance
-from ..robot.schema import AXES, Robot
+from ..robot.schema import AXES, QUATERNION_COLUMNS, Robot
 from .check_figures import CheckCurve, CheckPanel, panel_data, robot_scene
 from .page_rendering import Number, PageHeader, Row, render_page
 from .robot_scene import MAGNIFICATIONS, scene_data
@@ -55,6 +57,7 @@ def check_page(checked: CheckedFiles, links: Mapping[str, str]) -> str:
     groups = {
         "speeds": [] if recording is None else _speed_panels(recording),
         "lengths": [] if regression is None else _length_panels(regression),
+        "orientation": [] if recording is None else _orientation_panels(recording),
         "tensions": [] if balance is None else _tension_panels(balance),
     }
     panels = [panel for group in groups.values() for panel in group]
@@ -116,6 +119,23 @@ def _length_panels(regression: LengthRegression) -> list[CheckPanel]:
     return panels
 
 
+def _orientation_panels(recording: Recording) -> list[CheckPanel]:
+    if not recording.has_orientation:
+        return []
+    vectors = 1e3 * rotation_vectors(recording.orientation)
+    return [
+        CheckPanel(
+            "Rotation",
+            f"about {axis}",
+            "mrad",
+            "Time (s)",
+            (CheckCurve("recorded", recording.time, angles),),
+            f"rms {format_significant(_rms(angles[np.isfinite(angles)]))} mrad",
+        )
+        for axis, angles in zip(AXES, vectors.T, strict=True)
+    ]
+
+
 def _tension_panels(balance: ForceBalance) -> list[CheckPanel]:
     panels, balanced = [], balance.balanced_tensions()
     for cable, has_load_cell in enumerate(balance.has_load_cell):
@@ -155,7 +175,7 @@ def _balance_text(balance: ForceBalance) -> str:
     declared = tuple(range(len(balance.has_load_cell)))
     return (
         f"The tensions carry {format_percent(balance.carried(declared))} of weight and inertia and leave "
-        f"{format_percent(balance.misfit(declared))} unbalanced."
+        f"{format_percent(balance.misfit(declared))} unbalanced{', moments included' if balance.has_moments else ''}."
     )
 
 
@@ -164,7 +184,11 @@ def _column_rows(recording: Recording) -> list[Row]:
 
     A rope whose length was recorded has that in place of its speed, which is computed.
     """
-    units = {"time": "s", "winch": "m/s", "rope": "m", "tension": "N"} | dict.fromkeys(AXES, "m")
+    units = (
+        {"time": "s", "winch": "m/s", "rope": "m", "tension": "N"}
+        | dict.fromkeys(AXES, "m")
+        | dict.fromkeys(QUATERNION_COLUMNS, "1")
+    )
     rate = 1.0 / float(np.median(np.diff(recording.time)))
     rows: list[Row] = []
     for name, values in _recorded_columns(recording).items():

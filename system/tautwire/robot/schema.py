@@ -291,7 +291,9 @@ class Robot:
 
     @property
     def axes_in_plane(self) -> tuple[int, ...]:
-        """Axes along which not all anchors and the start have one coordinate: two where the robot lies in a plane."""
+        """Axes along which not all anchors and the start have one coordinate: two of a point mass in a plane."""
+        if self.platform.is_rigid_body:
+            return tuple(range(len(AXES)))
         points = [self.platform.start, *self.anchors]
         return tuple(axis for axis in range(len(AXES)) if len({point[axis] for point in points}) > 1)
 
