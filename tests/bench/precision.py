@@ -47,9 +47,9 @@ class Curve:
         return min((point.seconds for point in self.points if point.error <= error), default=np.inf)
 
 
-def by_tautwire(folder: Path) -> list[Curve]:
-    """Our master, by steps of one length and by a tolerance."""
-    fmus = build_fmus(paper_robot(), folder)
+def by_tautwire(folder: Path, native: bool = False) -> list[Curve]:
+    """Our master, by steps of one length and by a tolerance, with FMUs of Python or native ones."""
+    fmus = build_fmus(paper_robot(), folder, native=native)
     exact = exact_end(paper_robot())
 
     def run(stepping: Callable[[], StepSizeControl], setting: str) -> Point:
@@ -58,7 +58,8 @@ def by_tautwire(folder: Path) -> list[Curve]:
 
     fixed = tuple(run(partial(FixedStep, step), f"{1e3 * step:g} ms") for step in STEPS)
     chosen = tuple(run(partial(AdaptiveStep, tolerance, 7.0), f"{tolerance:g} m") for tolerance in TOLERANCES)
-    return [Curve("Tautwire, --step", fixed), Curve("Tautwire, --tolerance", chosen)]
+    kind = "Tautwire, native FMUs" if native else "Tautwire"
+    return [Curve(f"{kind}, --step", fixed), Curve(f"{kind}, --tolerance", chosen)]
 
 
 def in_memory() -> list[Curve]:
@@ -75,19 +76,23 @@ def in_memory() -> list[Curve]:
     return curves
 
 
-def turn_about(folder: Path, step: float, tolerance: float) -> float:
-    """Our processor time with a fixed step over that of DOP853 with a tolerance, in turn; the best of each."""
+def turn_about(folder: Path, step: float, tolerance: float) -> tuple[float, float]:
+    """Our processor time with a fixed step over that of DOP853 with a tolerance, in turn; the best of each.
+
+    With FMUs of Python, and with native ones.
+    """
     robot = paper_robot()
-    fmus = build_fmus(robot, folder)
+    python, native = (build_fmus(robot, folder / str(kind), native=kind) for kind in (False, True))
     turns = [
         (
-            by_fmus(fmus, FixedStep(step), process_time)[1],
+            by_fmus(python, FixedStep(step), process_time)[1],
+            by_fmus(native, FixedStep(step), process_time)[1],
             by_solve_ivp(robot, "DOP853", tolerance, process_time)[1],
         )
         for _ in range(TURNS)
     ]
-    ours, theirs = np.min(turns, axis=0)
-    return float(ours / theirs)
+    by_python, by_native, theirs = np.min(turns, axis=0)
+    return float(by_python / theirs), float(by_native / theirs)
 
 
 def by_importers(folder: Path) -> list[Curve]:

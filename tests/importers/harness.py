@@ -74,9 +74,9 @@ IMPORTERS = (
 )
 
 
-def prepare(robot: Robot, folder: Path) -> None:
-    """Write FMUs, driver, archive and ``run.json`` into ``folder``."""
-    fmus = build_fmus(robot, folder)
+def prepare(robot: Robot, folder: Path, native: bool = False) -> None:
+    """Write FMUs, driver, archive and ``run.json`` into ``folder``; the driver is of Python even beside native FMUs."""
+    fmus = build_fmus(robot, folder, native=native)
     files = {PLATFORM: fmus.platform.name}
     files |= {cable_name(number): path.name for number, path in enumerate(fmus.cables, start=1)}
     wires = [

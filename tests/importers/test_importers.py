@@ -12,11 +12,11 @@ from tests.importers.ramps import LIMIT, RAMP, acceleration, speed, winches
 from tests.support.robots import paper_robot
 
 
-@pytest.fixture(scope="module")
-def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The run as all clients find it."""
+@pytest.fixture(scope="module", params=["python", "native"])
+def folder(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """The run as all clients find it, with FMUs of either kind."""
     place = tmp_path_factory.mktemp("importers")
-    prepare(paper_robot(), place)
+    prepare(paper_robot(), place, native=request.param == "native")
     return place
 
 
