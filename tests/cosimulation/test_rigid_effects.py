@@ -1,99 +1,73 @@
-"""Effects of rigid platforms in the co-simulated FMUs against robots that are declared as the effects make them."""
+"""Effects of rigid platforms in the co-simulated FMUs and in statics, against the rig's own equations."""
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
-from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from tautwire.cosimulation.robot_cosimulation import CosimulationResult, cosimulate
+from tautwire.cosimulation.robot_cosimulation import cosimulate
 from tautwire.fmus.packaging import build_fmus
-from tautwire.robot.schema import EffectSetting, Robot
+from tautwire.robot.schema import Robot
 from tautwire.robot.static_equilibrium import start_orientation, static_tensions
+from tests.rig import Rig, SampledProgram, StillProgram
+from tests.rig.record import readings
+from tests.support.effect_cases import RIGID_CASES, Case, same
+from tests.support.effects import EXACT, with_effects
+from tests.support.rig_robots import rig_of
 from tests.support.rigid_robots import crane_robot, suspended_robot
 
-Array = NDArray[np.float64]
-
+ROBOTS = [crane_robot(), suspended_robot(4)]
 TIME = np.array([0.0, 0.2, 0.4, 0.8])
+QUICK = [case for case in RIGID_CASES if case.name in ("centre_of_mass", "rotational_drag")]
 
 
-def run(robot: Robot, folder: Path) -> CosimulationResult:
-    """A jerk of two winches, and what follows it."""
+def by_the_rig(robot: Robot, case: Case) -> Robot:
+    """The robot with the orientation at which it starts with the effect, which the rig then keeps."""
+    return replace(
+        robot, platform=replace(robot.platform, start_orientation=start_orientation(with_effects(robot, case)))
+    )
+
+
+@pytest.mark.parametrize("case", RIGID_CASES, ids=str)
+@pytest.mark.parametrize("robot", ROBOTS, ids=lambda robot: robot.name)
+def test_statics_are_those_of_the_rig(robot: Robot, case: Case) -> None:
+    rig = Rig(rig_of(by_the_rig(robot, case)), {case.name: case.for_rig()}, StillProgram(robot.cable_count))
+    assert static_tensions(with_effects(robot, case)) == pytest.approx(rig.start_tension, rel=1e-6)
+
+
+@pytest.mark.parametrize("case", [RIGID_CASES[0], same("payload", mass=6.0, x=0.1, y=-0.05)], ids=str)
+def test_the_orientation_at_the_start_is_that_of_the_rig(case: Case) -> None:
+    robot = suspended_robot(4)
+    rig = Rig(rig_of(robot), {case.name: case.for_rig()}, StillProgram(4))
+    assert rig.turning is not None
+    w, x, y, z = start_orientation(with_effects(robot, case))
+    error = Rotation.from_quat((x, y, z, w)) * Rotation.from_matrix(rig.turning.start).inv()
+    assert Rotation.from_matrix(rig.turning.start).magnitude() > 0.01
+    assert error.magnitude() < 1e-6
+
+
+@pytest.mark.parametrize(
+    ("robot", "case"),
+    [
+        pytest.param(robot, case, marks=() if case in QUICK and robot is ROBOTS[1] else pytest.mark.validate)
+        for robot in ROBOTS
+        for case in RIGID_CASES
+    ],
+    ids=lambda value: getattr(value, "name", str(value)),
+)
+def test_effects_in_the_fmus_are_those_of_the_rig(robot: Robot, case: Case, tmp_path: Path) -> None:
     speeds = np.zeros((len(TIME), robot.cable_count))
     speeds[1, :2] = [0.05, -0.02]
-    return cosimulate(build_fmus(robot, folder), TIME, speeds, 0.01)
-
-
-def pose(result: CosimulationResult) -> tuple[Array, Array]:
-    assert result.orientation is not None
-    return result.position, Rotation.from_quat(result.orientation[:, [1, 2, 3, 0]]).as_matrix()
-
-
-def with_centre(robot: Robot) -> tuple[Robot, Robot]:
-    x, y, z = robot.platform.centre_of_mass
-    declared = replace(robot, platform=replace(robot.platform, centre_of_mass=(x + 0.02, y - 0.01, z + 0.03)))
-    return robot.with_effect(EffectSetting("centre_of_mass", {"x": 0.02, "y": -0.01, "z": 0.03})), declared
-
-
-def with_attachment(robot: Robot) -> tuple[Robot, Robot]:
-    x, y, z = robot.cables[1].attachment
-    moved = replace(robot.cables[1], attachment=(x + 0.02, y, z - 0.03))
-    declared = replace(robot, cables=(robot.cables[0], moved, *robot.cables[2:]))
-    return robot.with_effect(EffectSetting("attachment", {"x": 0.02, "z": -0.03}, (2,))), declared
-
-
-def with_inertia(robot: Robot) -> tuple[Robot, Robot]:
-    declared = np.array(robot.platform.inertia)
-    moments, axes = np.linalg.eigh(declared)
-    order = np.argmax(np.abs(axes), axis=0)
-    factors = np.array([1.5, 0.8, 1.2])
-    changed = (axes * (moments * factors[order])) @ axes.T
-    x, y, z = (tuple(row) for row in changed.tolist())
-    values = dict(zip(("factor_x", "factor_y", "factor_z"), factors.tolist(), strict=True))
-    platform = replace(robot.platform, inertia=(x, y, z))
-    return robot.with_effect(EffectSetting("inertia", values)), replace(robot, platform=platform)
-
-
-def with_payload(robot: Robot) -> tuple[Robot, Robot]:
-    platform, mass, arm = robot.platform, 6.0, np.array([0.1, -0.05, 0.3])
-    total = platform.mass + mass
-    x, y, z = np.add(platform.centre_of_mass, mass / total * arm).tolist()
-    reduced = platform.mass * mass / total
-    inertia = np.array(platform.inertia) + reduced * (arm @ arm * np.eye(3) - np.outer(arm, arm))
-    a, b, c = (tuple(row) for row in inertia.tolist())
-    declared = replace(platform, mass=total, centre_of_mass=(x, y, z), inertia=(a, b, c))
-    values = {"mass": mass, "x": 0.1, "y": -0.05, "z": 0.3}
-    return robot.with_effect(EffectSetting("payload", values)), replace(robot, platform=declared)
-
-
-CHANGES = [with_centre, with_attachment, with_inertia, with_payload]
-
-
-@pytest.mark.parametrize("changed", CHANGES)
-@pytest.mark.parametrize("robot", [crane_robot(), suspended_robot(4)], ids=lambda robot: robot.name)
-def test_statics_take_the_constants_that_effects_make(
-    robot: Robot, changed: Callable[[Robot], tuple[Robot, Robot]]
-) -> None:
-    effect, declared = changed(robot)
-    assert static_tensions(effect) == pytest.approx(static_tensions(declared), rel=1e-7)
-    assert start_orientation(effect) == pytest.approx(start_orientation(declared), abs=1e-8)
-
-
-@pytest.mark.validate
-@pytest.mark.parametrize("changed", CHANGES)
-@pytest.mark.parametrize("robot", [crane_robot(), suspended_robot(4)], ids=lambda robot: robot.name)
-def test_an_effect_that_changes_a_constant_is_the_robot_with_that_constant(
-    robot: Robot, changed: Callable[[Robot], tuple[Robot, Robot]], tmp_path: Path
-) -> None:
-    effect, declared = changed(robot)
-    found, expected = run(effect, tmp_path / "effect"), run(declared, tmp_path / "declared")
-    assert pose(found)[0] == pytest.approx(pose(expected)[0], abs=1e-8)
-    assert pose(found)[1] == pytest.approx(pose(expected)[1], abs=1e-7)
-    assert found.tension == pytest.approx(expected.tension, abs=1e-3)
-    plain = run(robot, tmp_path / "plain")
-    assert max(np.max(np.abs(a - b)) for a, b in zip(pose(found), pose(plain), strict=True)) > 1e-6
+    found = cosimulate(build_fmus(with_effects(robot, case), tmp_path), TIME, speeds, 0.005)
+    rig = Rig(rig_of(by_the_rig(robot, case)), {case.name: case.for_rig()}, SampledProgram(TIME, speeds))
+    exact = readings(rig, TIME, EXACT)
+    assert found.orientation is not None and exact.rotation is not None
+    rotation = Rotation.from_quat(found.orientation[:, [1, 2, 3, 0]]).as_matrix()
+    assert np.ptp(exact.rotation, axis=0).max() > 1e-4
+    assert found.position == pytest.approx(exact.position, abs=1e-8)
+    assert rotation == pytest.approx(exact.rotation, abs=1e-7)
+    assert found.tension == pytest.approx(exact.tension, abs=1e-3)

@@ -1,8 +1,9 @@
-"""An independent simulator of a point mass on cables; it shares no code with the project it checks."""
+"""An independent simulator of a point mass or a rigid body on cables; it shares no code with the project it checks."""
 
 from tests.rig.drive import Drive
 from tests.rig.effect import Effect
 from tests.rig.mechanics import Rig
+from tests.rig.pose_program import PoseProgram, pose_wander
 from tests.rig.program import (
     PathProgram,
     Program,
@@ -13,7 +14,7 @@ from tests.rig.program import (
 from tests.rig.record import Accuracy, make_recording, write_recording
 from tests.rig.registry import EFFECTS
 from tests.rig.robot import Noise, Robot, TensionLimits, load_robot, robot_from
-from tests.rig.robots import eight_robot, paper_robot, robot_of, symmetric_robot, with_law
+from tests.rig.robots import crane, eight_robot, paper_robot, robot_of, swing, symmetric_robot, with_law
 from tests.rig.solve import Run, simulate
 from tests.rig.wander import wander
 
@@ -24,6 +25,7 @@ __all__ = [
     "Effect",
     "Noise",
     "PathProgram",
+    "PoseProgram",
     "Program",
     "RampProgram",
     "Rig",
@@ -32,13 +34,16 @@ __all__ = [
     "SampledProgram",
     "StillProgram",
     "TensionLimits",
+    "crane",
     "eight_robot",
     "load_robot",
     "make_recording",
     "paper_robot",
+    "pose_wander",
     "robot_from",
     "robot_of",
     "simulate",
+    "swing",
     "symmetric_robot",
     "wander",
     "with_law",

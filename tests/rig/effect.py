@@ -15,6 +15,14 @@ if TYPE_CHECKING:
     from tests.rig.mechanics import Rig
 
 
+NEXT, LAST = [1, 2, 0], [2, 0, 1]
+
+
+def cross(a: Vector, b: Vector) -> Vector:
+    """The vector product of vectors, or of rows; several times faster than NumPy's."""
+    return np.asarray(a[..., NEXT] * b[..., LAST] - a[..., LAST] * b[..., NEXT], float)
+
+
 class Moment:
     """All that the rig knows at one instant; the stages fill it from top to bottom. One row per cable."""
 
@@ -25,6 +33,12 @@ class Moment:
     wound: Vector  # rope taken in: integral of V/l (logarithmic) or of V (linear)
     state: Vector  # the whole state, of which each effect owns the slice `effect.part`
     rates: Vector  # its time derivative
+    rotation: Vector  # of a platform that turns: matrix from its axes to the world's
+    turning: Vector  # its angular velocity, rad/s
+    arms: Vector  # from the origin of the platform's frame to each attachment, m; zero for a point mass
+    centre: Vector  # to its centre of mass
+    ends: Vector  # of the ropes at the platform, m
+    end_velocity: Vector
     exits: Vector  # where the ropes leave the frame, m
     exit_velocity: Vector
     speed: Vector  # rope speed at the exit, positive reels in, m/s
@@ -40,7 +54,15 @@ class Moment:
     pull: Vector  # on the platform, N
     cell: Vector  # at the load cell, N
     force: Vector  # on the platform, N
-    acceleration: Vector
+    torque: Vector  # about the origin of its frame, N m
+    acceleration: Vector  # of that origin
+
+    def push(self, force: Vector, arm: Vector) -> None:
+        """Add a force at the end of an arm, or forces at the ends of as many (rows)."""
+        self.force = self.force + (force if force.ndim == 1 else force.sum(axis=0))
+        if arm.any():
+            torque = cross(arm, force)
+            self.torque = self.torque + (torque if torque.ndim == 1 else torque.sum(axis=0))
 
 
 @dataclass(kw_only=True)
@@ -48,11 +70,15 @@ class Effect:
     """One physical effect; a subclass overrides the stages that it takes part in."""
 
     kinked: ClassVar[bool] = False  # whether slopes jump at instants that nobody knows beforehand
+    of_points: ClassVar[bool] = False  # whether a platform that turns cannot have it
+    of_bodies: ClassVar[bool] = False  # whether a point mass cannot
 
     cables: Sequence[int] | None = None  # counted from 1; None means all
 
     def attach(self, rig: Rig) -> None:
         """Note the rig and which cables are meant; called once, before statics."""
+        if (self.of_points and rig.robot.body) or (self.of_bodies and not rig.robot.body):
+            raise ValueError(f"{type(self).__name__} is not for this kind of platform")
         self.rig = rig
         self.on: NDArray[np.bool_] = np.zeros(rig.robot.count, bool)
         self.on[:] = self.cables is None
@@ -102,7 +128,7 @@ class Effect:
         """Make pull on the platform or load cell differ from the tension of the span."""
 
     def load(self, moment: Moment) -> None:
-        """Put a further force on the platform."""
+        """Put a further force on the platform: `force` at the origin of its frame, or by `push`."""
 
     def couple(self, moment: Moment) -> None:
         """Hang a further body on the platform, once all forces are known."""

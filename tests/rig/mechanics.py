@@ -1,6 +1,6 @@
-"""Equations of motion of a point mass on cables, with any set of effects switched on.
+"""Equations of motion of a point mass or a rigid body on cables, with any set of effects switched on.
 
-State: displacement of the platform from its start, its velocity, and the rope wound in by each winch.
+State: displacement of the platform from its start, its velocity, the rope wound in by each winch, and how it turns.
 With l_u = l_0 at the start and dl_u/dt = -V l_u/l, ln l_u = ln l_0 - w where dw/dt = V/l, so
 
     logarithmic law   T = E S (ln(l/l_0) + w)   + c S (dl/dt + V)/l + T0,  dw/dt = V/l
@@ -16,11 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from tests.rig.effect import STAGES, Effect, Moment
+from tests.rig.effect import STAGES, Effect, Moment, cross
+from tests.rig.hanging import hanging
 from tests.rig.program import Program
 from tests.rig.registry import EFFECTS
 from tests.rig.robot import Robot, Vector
-from tests.rig.statics import start_tensions
+from tests.rig.statics import holds, start_tensions
+from tests.rig.turning import STATES, Turning, cayley
 
 # Parameters of an effect; a sequence where it acts more than once, as on different cables.
 Settings = Mapping[str, Mapping[str, Any] | Sequence[Mapping[str, Any]]]
@@ -49,6 +51,7 @@ class Rig:
         for effect in self.effects:
             effect.attach(self)
             self.robot = effect.declare(self.robot)
+        self.turning = Turning(self.robot, self.robot.body) if self.robot.body else None
         self._lay_out_state()
         self.hooks = {
             stage: [
@@ -66,6 +69,9 @@ class Rig:
 
     def _lay_out_state(self) -> None:
         size = 6 + self.robot.count
+        if self.turning:
+            self.turning.part = slice(size, size + STATES)
+            size += STATES
         for effect in self.effects:
             effect.part = slice(size, size + effect.size())
             size = effect.part.stop
@@ -73,22 +79,46 @@ class Rig:
 
     def _settle(self) -> None:
         """Find start lengths and start tensions: static equilibrium at the start, effects included."""
-        moment = self._place(0.0, np.zeros(self.size))
-        moment.pull = np.zeros(self.robot.count)
-        moment.force = self.weight.copy()
-        self._apply("load", moment)
-        load = moment.force + sum((effect.resting() for effect in self.effects), np.zeros(3))
+        if self.turning and self.robot.count < 6 and not holds(*self._balance(np.zeros(3))):
+            self.turning.start = self.turning.start @ cayley(hanging(self._balance, self.robot.count))
+        moment = self._resting(np.zeros(3))
         self.start_length = moment.length
         self.start_direction = moment.direction
-        self.start_tension = start_tensions(moment.direction, load, self.robot.tension)
+        if self.turning:
+            matrix, load = self._balance(np.zeros(3))
+            self.start_tension = start_tensions(matrix.T, load, self.robot.tension)
+        else:
+            self.start_tension = start_tensions(moment.direction, moment.force, self.robot.tension)
         for effect in self.effects:
             effect.settle()
 
-    def begin(self, velocity: Vector | None = None) -> Vector:
-        """The state at the start; at rest unless a velocity is given, m/s."""
+    def _resting(self, gibbs: Vector) -> Moment:
+        """All forces but the ropes' on a platform at rest at its start, turned by a Gibbs vector."""
+        state = np.zeros(self.size)
+        if self.turning:
+            state[self.turning.part][:3] = gibbs
+        moment = self._place(0.0, state)
+        moment.pull = np.zeros(self.robot.count)
+        moment.force, moment.torque = np.zeros(3), np.zeros(3)
+        moment.push(self.weight, moment.centre)
+        self._apply("load", moment)
+        moment.force = moment.force + sum((effect.resting() for effect in self.effects), np.zeros(3))
+        return moment
+
+    def _balance(self, gibbs: Vector) -> tuple[Vector, Vector]:
+        """What unit tensions and all else do to a resting platform: forces, and moments by its size; (6, n) and (6)."""
+        assert self.turning is not None
+        moment, size = self._resting(gibbs), self.turning.size
+        torques = np.cross(moment.arms, moment.direction) / size
+        return np.vstack([moment.direction.T, torques.T]), np.concatenate([moment.force, moment.torque / size])
+
+    def begin(self, velocity: Vector | None = None, turning: Vector | None = None) -> Vector:
+        """The state at the start; at rest unless a velocity is given, m/s, or an angular one in the world's axes."""
         state = np.zeros(self.size)
         if velocity is not None:
             state[3:6] = velocity
+        if turning is not None and self.turning is not None:
+            state[self.turning.part][3:] = turning @ self.turning.start
         for effect in self.effects:
             state[effect.part] = effect.begin()
         return state
@@ -103,8 +133,14 @@ class Rig:
         self._strain(moment)
         self._pull(moment)
         moment.force = moment.pull @ moment.direction + self.weight
+        if self.turning:
+            torques = cross(moment.arms, moment.pull[:, None] * moment.direction)
+            moment.torque = torques.sum(axis=0) + cross(moment.centre, self.weight)
         self._apply("load", moment)
-        moment.acceleration = moment.force / self.robot.mass
+        if self.turning:
+            self.turning.accelerate(moment)
+        else:
+            moment.acceleration = moment.force / self.robot.mass
         self._apply("couple", moment)
         moment.rates[0:3] = moment.velocity
         moment.rates[3:6] = moment.acceleration
@@ -128,10 +164,15 @@ class Rig:
         moment.position = self.robot.start + state[0:3]
         moment.velocity = state[3:6]
         moment.wound = state[6 : 6 + self.robot.count]
+        if self.turning:
+            self.turning.place(moment)
+        else:
+            moment.arms = moment.centre = np.zeros(3)
+            moment.ends, moment.end_velocity = moment.position, moment.velocity
         moment.exits = self.robot.anchors
         moment.exit_velocity = np.zeros(3)
         self._apply("exits", moment)
-        span = moment.exits - moment.position
+        span = moment.exits - moment.ends
         moment.chord = np.sqrt(np.einsum("ij,ij->i", span, span))
         moment.length = moment.chord
         moment.direction = span / moment.chord[:, None]
@@ -154,7 +195,7 @@ class Rig:
         moment.speed = self.program.speed(moment.time)
         moment.travel = self.program.travel(moment.time)
         self._apply("winding", moment)
-        moment.rate = ((moment.exit_velocity - moment.velocity) * moment.direction).sum(axis=1)
+        moment.rate = ((moment.exit_velocity - moment.end_velocity) * moment.direction).sum(axis=1)
         moment.strain_rate = (moment.rate + moment.speed) / moment.length - moment.free_rate
         moment.tension = moment.tension + self.viscous * moment.strain_rate
         self._apply("viscous", moment)

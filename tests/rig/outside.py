@@ -1,19 +1,20 @@
-"""Air around the platform, and sensors that lag, scale or have a wrong zero."""
+"""What resists the platform around it, and sensors that lag, scale or have a wrong zero."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
-from tests.rig.effect import Effect, Moment
+from tests.rig.effect import Effect, Moment, cross
 from tests.rig.robot import Vector
 
 
 @dataclass(kw_only=True)
 class Drag(Effect):
-    """Air drag F = -rho/2 (C A) |v - w| (v - w), N; the start is in equilibrium with a steady wind.
+    """Air drag F = -rho/2 (C A) |v - w| (v - w), N, at the centre of mass; the start is in equilibrium with a wind.
 
     `drag_area` C A in m^2, `density` rho in kg/m^3, `wind` w in m/s; `exponent` p other than 2: |v - w|^(p - 1), v in
     m/s.
@@ -26,9 +27,30 @@ class Drag(Effect):
 
     def load(self, moment: Moment) -> None:
         """Brake the platform."""
-        relative = moment.velocity - np.asarray(self.wind, float)
+        velocity = moment.velocity + cross(moment.turning, moment.centre) if self.rig.turning else moment.velocity
+        relative = velocity - np.asarray(self.wind, float)
         speed = np.sqrt(relative @ relative) ** (self.exponent - 1.0)
-        moment.force = moment.force - 0.5 * self.density * self.drag_area * speed * relative
+        moment.push(-0.5 * self.density * self.drag_area * speed * relative, moment.centre)
+
+
+@dataclass(kw_only=True)
+class RotationalDrag(Effect):
+    """A moment against the turning of the platform: M = -d w; d `damping` in N m s.
+
+    With another exponent p than 1: |w/r|^(p - 1) times that, r `reference` in rad/s.
+    """
+
+    of_bodies: ClassVar[bool] = True
+
+    damping: float
+    exponent: float = 1.0
+    reference: float = 0.1
+
+    def load(self, moment: Moment) -> None:
+        """Brake the turning."""
+        speed = np.linalg.norm(moment.turning) / self.reference
+        resistance = self.damping * speed ** (self.exponent - 1.0) if self.exponent != 1.0 else self.damping
+        moment.torque = moment.torque - resistance * moment.turning
 
 
 @dataclass(kw_only=True)

@@ -125,7 +125,7 @@ class PathProgram:
 
     def path(self, time: float) -> tuple[Vector, Vector]:
         """Planned position and velocity."""
-        share, share_rate = self._envelope(time)
+        share, share_rate = smooth_rise(time, self.rise)
         angles = self.angular[:, None] * time + self.phases
         offset = self.shift + (self.amplitudes * np.sin(angles)).sum(axis=0)
         offset_rate = (self.amplitudes * self.angular[:, None] * np.cos(angles)).sum(axis=0)
@@ -142,9 +142,11 @@ class PathProgram:
         planned = np.linalg.norm(self.anchors - self.path(time)[0], axis=1)
         return np.linalg.norm(self.anchors - self.start, axis=1) - planned
 
-    def _envelope(self, time: float) -> tuple[float, float]:
-        if time >= self.rise:
-            return 1.0, 0.0
-        part = time / self.rise
-        share = part**3 * (10.0 - 15.0 * part + 6.0 * part**2)
-        return share, 30.0 * part**2 * (1.0 - part) ** 2 / self.rise
+
+def smooth_rise(time: float, rise: float) -> tuple[float, float]:
+    """What rises from 0 to 1 within `rise` seconds, two derivatives vanishing at both ends, and its rate."""
+    if time >= rise:
+        return 1.0, 0.0
+    part = time / rise
+    share = part**3 * (10.0 - 15.0 * part + 6.0 * part**2)
+    return share, 30.0 * part**2 * (1.0 - part) ** 2 / rise

@@ -7,6 +7,7 @@ from pathlib import Path
 
 import numpy as np
 import pandas as pd
+from scipy.spatial.transform import Rotation
 
 from tests.rig.mechanics import Rig, Settings
 from tests.rig.program import Program
@@ -41,26 +42,60 @@ def make_recording(
 ) -> pd.DataFrame:
     """Sample a run at `rate` (Hz); the true program drives the robot, the encoder records it with noise."""
     times = np.arange(round(duration * rate) + 1) / rate
-    tension, position = outputs(Rig(robot, effects, program), times, accuracy)
+    seen = readings(Rig(robot, effects, program), times, accuracy)
+    tension, position, rotation = seen.tension, seen.position, seen.rotation
     speed = np.array([program.speed(float(time)) for time in times])
     if noise:
         random = np.random.default_rng(seed)
         speed = speed + random.normal(scale=robot.noise.winch_speed, size=speed.shape)
         tension = tension + random.normal(scale=robot.noise.tension, size=tension.shape)
         position = position + random.normal(scale=robot.noise.position, size=position.shape)
+        if rotation is not None:
+            rotation = turned(rotation, random.normal(scale=robot.noise.orientation, size=position.shape))
     columns = {"time": times}
     columns.update({f"winch_speed_{cable + 1}": speed[:, cable] for cable in range(robot.count)})
     columns.update({f"tension_{cable + 1}": tension[:, cable] for cable in range(robot.count)})
     columns.update({axis: position[:, index] for index, axis in enumerate("xyz")})
+    if rotation is not None:
+        columns.update(quaternion_columns(rotation))
     return pd.DataFrame(columns)
 
 
+def turned(rotation: Vector, vectors: Vector) -> Vector:
+    """Rotation matrices (samples, 3, 3) turned further by rotation vectors (samples, 3) in the world's axes, rad."""
+    return np.asarray(Rotation.from_rotvec(vectors).as_matrix() @ rotation, float)
+
+
+def quaternion_columns(rotation: Vector) -> dict[str, Vector]:
+    """The columns qw, qx, qy, qz of rotation matrices (samples, 3, 3)."""
+    quaternions = Rotation.from_matrix(rotation).as_quat()
+    return {f"q{part}": quaternions[:, index] for part, index in (("w", 3), ("x", 0), ("y", 1), ("z", 2))}
+
+
+@dataclass(frozen=True)
+class Readings:
+    """What perfect sensors give: load cells (samples, n) in N, position (samples, 3) in m.
+
+    Of a platform that turns also its rotation matrices (samples, 3, 3), which no sensor of the rig shows late.
+    """
+
+    tension: Vector
+    position: Vector
+    rotation: Vector | None = None
+
+
 def outputs(rig: Rig, times: Vector, accuracy: Accuracy | None = None) -> tuple[Vector, Vector]:
-    """What perfect sensors give: load cells (samples, n) in N and position (samples, 3) in m."""
+    """Load cells and position of :func:`readings`."""
+    seen = readings(rig, times, accuracy)
+    return seen.tension, seen.position
+
+
+def readings(rig: Rig, times: Vector, accuracy: Accuracy | None = None) -> Readings:
+    """What perfect sensors give at rising times."""
     lags = lags_of(rig)
     # A lagging sensor shows the start until its lag has passed.
     asked = {lag: np.maximum(times - lag, 0.0) for lag in np.unique(np.concatenate(list(lags.values())))}
-    instants = np.unique(np.concatenate(list(asked.values())))
+    instants = np.unique(np.concatenate([times, *asked.values()] if rig.turning else list(asked.values())))
     if accuracy is None:
         accuracy = KINKED if any(effect.kinked for effect in rig.effects) else SMOOTH
     states = integrate(rig, rig.begin(), instants, accuracy.method, accuracy.rtol, accuracy.atol)
@@ -75,7 +110,9 @@ def outputs(rig: Rig, times: Vector, accuracy: Accuracy | None = None) -> tuple[
     tension, position = lagged(cells, lags["tension"]), lagged(places, lags["position"])
     for effect in rig.effects:
         tension, position = effect.sense(tension, position)
-    return tension, position
+    if not rig.turning:
+        return Readings(tension, position)
+    return Readings(tension, position, np.array([moments[row].rotation for row in np.searchsorted(instants, times)]))
 
 
 def lags_of(rig: Rig) -> dict[str, Vector]:

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
-from tests.rig.constants import Damping, Modulus, Payload
+from tests.rig.constants import Attachment, CentreOfMass, Damping, Inertia, Modulus, Payload
 from tests.rig.effect import Effect
 from tests.rig.material import Creep, Hysteresis, Pushing, Relaxation, Slack, Stiffening, Thermal
-from tests.rig.outside import Drag, SensorDelay, SensorGain, SensorOffset
+from tests.rig.outside import Drag, RotationalDrag, SensorDelay, SensorGain, SensorOffset
 from tests.rig.route import Anchor, Frame, Pulley, Sag, TransverseDamping
 from tests.rig.unlisted import Bungee, Filling, Gusts, Magnet, Shaker, Sideways, Slipping, Swing, Wave
 from tests.rig.winch import Drum, Friction
@@ -29,6 +29,10 @@ EFFECTS: dict[str, type[Effect]] = {
     "sensor_gain": SensorGain,
     "sensor_offset": SensorOffset,
     "transverse_damping": TransverseDamping,
+    "centre_of_mass": CentreOfMass,
+    "attachment": Attachment,
+    "inertia": Inertia,
+    "rotational_drag": RotationalDrag,
     "unlisted_bungee": Bungee,
     "unlisted_filling": Filling,
     "unlisted_frame": Frame,

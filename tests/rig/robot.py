@@ -10,6 +10,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -30,16 +31,35 @@ class TensionLimits:
 
 @dataclass(frozen=True)
 class Noise:
-    """Standard deviation of one sample: position m, tension N, winch speed m/s."""
+    """Standard deviation of one sample: position m, tension N, winch speed m/s, orientation about each axis rad."""
 
     position: float = 0.0
     tension: float = 0.0
     winch_speed: float = 0.0
+    orientation: float = 0.0
+
+
+@dataclass(frozen=True)
+class Body:
+    """What a platform that turns has beside a point mass, in its own frame; m and kg m^2.
+
+    `inertia` (3, 3) is about the `centre` of mass, `orientation` the rotation matrix of the start; `points` are masses
+    carried, in kg, with their places from the centre.
+    """
+
+    inertia: Vector
+    centre: Vector
+    attachments: Vector
+    orientation: Vector = field(default_factory=lambda: np.eye(3))
+    points: tuple[tuple[float, Vector], ...] = ()
 
 
 @dataclass(frozen=True)
 class Robot:
-    """A point mass on n cables; one row or entry per cable, SI units, z up."""
+    """A point mass, or a `body`, on n cables; one row or entry per cable, SI units, z up.
+
+    `start` is the origin of a body's frame.
+    """
 
     gravity: float
     mass: float
@@ -52,6 +72,7 @@ class Robot:
     tension: TensionLimits = field(default_factory=TensionLimits)
     noise: Noise = field(default_factory=Noise)
     name: str = "robot"
+    body: Body | None = None
 
     @property
     def count(self) -> int:
@@ -60,7 +81,7 @@ class Robot:
 
 
 LIMITS = ("minimum", "maximum", "preferred")
-NOISES = ("position_noise", "tension_noise", "winch_speed_noise")
+NOISES = ("position_noise", "tension_noise", "winch_speed_noise", "orientation_noise")
 
 
 def robot_from(content: Mapping[str, Any]) -> Robot:
@@ -84,6 +105,21 @@ def robot_from(content: Mapping[str, Any]) -> Robot:
         linear=np.array([cable.get("law", "logarithmic") == "linear" for cable in cables]),
         tension=TensionLimits(**{key: float(limits[key]) for key in LIMITS if key in limits}),
         noise=Noise(**{key.removesuffix("_noise"): float(value) for key, value in sensors.items() if key in NOISES}),
+        body=_body_from(content),
+    )
+
+
+def _body_from(content: Mapping[str, Any]) -> Body | None:
+    """What the robot file says of a platform that turns."""
+    platform = content["platform"]
+    if "inertia" not in platform:
+        return None
+    w, x, y, z = platform.get("start_orientation", (1.0, 0.0, 0.0, 0.0))
+    return Body(
+        inertia=np.array(platform["inertia"], float),
+        centre=np.array(platform.get("centre_of_mass", (0.0, 0.0, 0.0)), float),
+        attachments=np.array([cable.get("attachment", (0.0, 0.0, 0.0)) for cable in content["cable"]], float),
+        orientation=np.asarray(Rotation.from_quat((x, y, z, w)).as_matrix(), float),
     )
 
 

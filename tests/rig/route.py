@@ -41,7 +41,7 @@ class Pulley(Effect):
     def geometry(self, moment: Moment) -> None:
         """Rope length with its wrapped part; directions along the tangents."""
         upright = Rotation.from_rotvec([-self.tilt, 0.0, 0.0]).as_matrix()
-        away = (moment.position - moment.exits) @ upright.T
+        away = (moment.ends - moment.exits) @ upright.T
         flat = np.hypot(away[:, 0], away[:, 1])
         outward = away[:, :2] / flat[:, None]
         across = flat - self.radius
@@ -57,14 +57,22 @@ class Pulley(Effect):
 
 @dataclass(kw_only=True)
 class TransverseDamping(Effect):
-    """A rope's end that resists motion across the rope: F = -d (1 - u u') v; d `damping` in N s/m."""
+    """A rope's end that resists motion across the rope: F = -d (1 - u u') v; d `damping` in N s/m.
+
+    With another exponent p than 1: |(1 - u u') v/r|^(p - 1) times that, r `reference` in m/s.
+    """
 
     damping: float
+    exponent: float = 1.0
+    reference: float = 0.1
 
     def load(self, moment: Moment) -> None:
         """Resist what of the velocity is perpendicular to each rope."""
-        across = np.eye(3) - np.einsum("ki,kj->kij", moment.direction, moment.direction)
-        moment.force = moment.force - self.damping * np.einsum("k,kij,j->i", self.mask, across, moment.velocity)
+        ends = np.broadcast_to(moment.end_velocity, moment.direction.shape)
+        across = ends - np.sum(ends * moment.direction, axis=1, keepdims=True) * moment.direction
+        size = np.linalg.norm(across, axis=1, keepdims=True) / self.reference
+        resistance = self.damping * size ** (self.exponent - 1.0) if self.exponent != 1.0 else self.damping
+        moment.push(-self.mask[:, None] * resistance * across, moment.arms)
 
 
 @dataclass(kw_only=True)
@@ -126,7 +134,8 @@ class Sag(Effect):
 
     def load(self, moment: Moment) -> None:
         """The platform holds the other half."""
-        moment.force = moment.force - np.array([0.0, 0.0, self._half_weight(moment).sum()])
+        down = np.array([0.0, 0.0, -1.0])
+        moment.push(self._half_weight(moment)[:, None] * down, moment.arms)
 
 
 @dataclass(kw_only=True)

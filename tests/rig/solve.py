@@ -19,7 +19,10 @@ Method = Literal["RK23", "RK45", "DOP853", "Radau", "BDF", "LSODA"]
 
 @dataclass(frozen=True)
 class Run:
-    """True quantities, one row per instant; tension is the span's, cell what the load cell feels."""
+    """True quantities, one row per instant; tension is the span's, cell what the load cell feels.
+
+    Of a platform that turns also its rotation matrices and angular velocity (rad/s).
+    """
 
     time: Vector
     position: Vector
@@ -32,6 +35,8 @@ class Run:
     direction: Vector
     state: Vector
     rig: Rig
+    rotation: Vector | None = None
+    turning: Vector | None = None
 
 
 def simulate(
@@ -43,11 +48,12 @@ def simulate(
     method: Method = "DOP853",
     rtol: float = 1e-10,
     atol: float = 1e-12,
+    turning: Sequence[float] | Vector | None = None,
 ) -> Run:
-    """Run from the start at t = 0; `velocity` is an initial one, m/s (at rest unless given)."""
+    """Run from the start at t = 0; `velocity` is an initial one, m/s, `turning` an angular one, rad/s; else at rest."""
     rig = Rig(robot, effects, program)
     instants = np.asarray(times, float)
-    start = rig.begin(None if velocity is None else np.asarray(velocity, float))
+    start = rig.begin(*(None if each is None else np.asarray(each, float) for each in (velocity, turning)))
     states = integrate(rig, start, instants, method, rtol, atol)
     moments = [rig.evaluate(float(time), state) for time, state in zip(instants, states, strict=True)]
 
@@ -55,7 +61,8 @@ def simulate(
         return np.array([getattr(moment, name) for moment in moments])
 
     fields = ("position", "velocity", "tension", "pull", "cell", "length", "strain", "direction", "state")
-    return Run(time=instants, rig=rig, **{name: stack(name) for name in fields})
+    turned = ("rotation", "turning") if rig.turning else ()
+    return Run(time=instants, rig=rig, **{name: stack(name) for name in (*fields, *turned)})
 
 
 def integrate(

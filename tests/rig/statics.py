@@ -11,10 +11,11 @@ from tests.rig.robot import TensionLimits, Vector
 def start_tensions(directions: Vector, load: Vector, limits: TensionLimits) -> Vector:
     """Tensions T with sum T_i u_i = -load, N; `directions` holds u_i by rows, `load` in N.
 
-    Ropes in one plane hold a load in that plane.
+    Ropes in one plane hold a load in that plane. Of a platform that turns, rows and load have moments behind the
+    forces, divided by a length.
     """
     basis = span_of(directions)
-    if np.linalg.norm(load - basis.T @ (basis @ load)) > 1e-9 * np.linalg.norm(load):
+    if not holds(directions.T, load):
         raise ValueError("the ropes lie in a plane and the load does not")
     within, wanted = directions @ basis.T, basis @ load
     if len(directions) == len(basis):
@@ -24,6 +25,12 @@ def start_tensions(directions: Vector, load: Vector, limits: TensionLimits) -> V
     if np.any(tensions <= 0):
         raise ValueError(f"not every cable pulls at the start: {tensions} N")
     return tensions
+
+
+def holds(matrix: Vector, load: Vector) -> bool:
+    """Whether cables, by columns, could hold a load if they could push."""
+    basis = span_of(matrix.T)
+    return bool(np.linalg.norm(load - basis.T @ (basis @ load)) <= 1e-9 * np.linalg.norm(load))
 
 
 def nearest_to_preferred(directions: Vector, load: Vector, limits: TensionLimits) -> Vector:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import ClassVar
 
 import numpy as np
 
@@ -128,6 +129,8 @@ class Swing(Effect):
     S = (-g n_z - n.F/m + |d|^2/b)/(1/m_s + 1/m); `viscosity` (N s/m) resists d. It hangs still at the start.
     """
 
+    of_points: ClassVar[bool] = True
+
     mass: float
     length: float
     viscosity: float = 0.0
@@ -165,6 +168,8 @@ class Filling(Effect):
 
     (M + m) a = F - m g z, with M the platform's mass.
     """
+
+    of_points: ClassVar[bool] = True
 
     rate: float
 

@@ -79,6 +79,27 @@ CASES = (
     Case("sensor_delay", {"seconds": 0.023}, {"tension_delay": 0.023}),
     Case("sensor_delay", {"seconds": 0.05, "outputs": "position"}, {"position_delay": 0.05}),
 )
+# On platforms that turn: those that only they can have, and those whose forces act at a point of theirs.
+RIGID_CASES = (
+    same("centre_of_mass", x=0.02, y=-0.01, z=0.03),
+    same("attachment", 2, x=0.02, y=0.01, z=-0.03),
+    same("inertia", factor_x=1.5, factor_y=0.8, factor_z=1.2),
+    same("rotational_drag", damping=20.0),
+    same("transverse_damping", damping=30.0),
+    same("transverse_damping", 1, 3, damping=60.0),
+    same("payload", mass=6.0, x=0.1, y=-0.05, z=0.3),
+    same("payload", mass=6.0),
+    Case(
+        "drag",
+        {"drag_area": 3.0, "wind": [2.0, 1.0, 0.5]},
+        {"drag_area": 3.0, "wind_x": 2.0, "wind_y": 1.0, "wind_z": 0.5},
+    ),
+    same("sag", linear_density=0.1),
+    same("pulley", radius=0.05),
+    same("anchor", 1, x=0.05, y=0.02, z=-0.1),
+    same("damping", damping=5e8),
+    same("relaxation", modulus=3e10, time=0.5),
+)
 PAIRS = (
     (same("anchor", 1, 2, x=0.05, y=0.2, z=-0.1), same("pulley", radius=0.15)),
     (same("modulus", modulus=0.9e11), same("creep", compliance=1e-12, time=5.0)),

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from tautwire.robot.schema import Robot, Winch
@@ -14,7 +16,7 @@ RAMP = np.array([0.3, 0.25, -0.25])
 
 def rig_of(robot: Robot) -> RigRobot:
     """The same robot as the rig declares it."""
-    content = {
+    content: dict[str, Any] = {
         "name": robot.name,
         "gravity": robot.gravity,
         "platform": {"mass": robot.platform.mass, "start": list(robot.platform.start)},
@@ -26,6 +28,14 @@ def rig_of(robot: Robot) -> RigRobot:
     }
     if robot.tension is not None:
         content["tension"] = vars(robot.tension)
+    if robot.platform.is_rigid_body:
+        content["platform"] |= {
+            "inertia": robot.platform.inertia,
+            "centre_of_mass": robot.platform.centre_of_mass,
+            "start_orientation": robot.platform.start_orientation,
+        }
+        for entry, cable in zip(content["cable"], robot.cables, strict=True):
+            entry["attachment"] = cable.attachment
     return robot_from(content)
 
 

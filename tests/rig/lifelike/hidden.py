@@ -109,6 +109,12 @@ def _slipping(s: float, site: Site) -> Settings:
     return {"slip": s * site.design.length, "times": times, "cables": [site.cable]}
 
 
+def _transverse(s: float, site: Site) -> Settings:
+    """Resistance across the ropes, in shares of what would damp the slowest mode critically."""
+    slowest = 2.0 * np.pi * float(natural_frequencies(site.design.robot).min())
+    return {"damping": 2.0 * s * site.design.robot.mass * slowest / site.design.robot.count}
+
+
 def _hysteresis(s: float, site: Site, **others: float) -> Settings:
     return {"force": s * site.design.usual_tension, "yield_strain": 0.05 * site.strain, **others}
 
@@ -187,6 +193,7 @@ RIGHT = (
         60.0,
         lambda s, w: {"force": w.sign * s * w.survey.tension_offset, "cables": [w.cable]},
     ),
+    Hidden("transverse_damping", "transverse_damping", "right", 0.01, 3.0, _transverse),
 )
 
 WRONG = (
@@ -255,6 +262,14 @@ WRONG = (
         0.03,
         0.2,
         lambda s, w: {"gain": 1 + w.sign * s, "bend": 0.3 * s, "cables": [w.cable]},
+    ),
+    Hidden(
+        "transverse_damping-quadratic",
+        "transverse_damping",
+        "wrong",
+        0.01,
+        3.0,
+        lambda s, w: {**_transverse(s, w), "exponent": 2.0, "reference": w.speed},
     ),
 )
 
