@@ -1,4 +1,4 @@
-"""FMI slave of the sampled controller: position and tensions in, winch speeds out.
+"""FMI slave of the sampled controller: measured pose and tensions in, winch speeds out.
 
 It samples its inputs itself, at the start and every period after. Between samples the speeds are ramps; their rates are
 discrete variables, which jump at the samples.
@@ -13,6 +13,7 @@ from .slave import INPUT_TIME, Slave, read_resource
 FIRST_MEASUREMENT = 1
 # In periods: a sample nearer than this counts as reached, whatever rounding did.
 SAMPLE_TIME_TOLERANCE = 1e-6
+ORIENTATION_TEXT = "measured orientation, unit quaternion, platform to world"
 
 
 class Controller(Slave):
@@ -22,10 +23,11 @@ class Controller(Slave):
         data = read_resource(kwargs["resources"], "controller.json")
         self.plan = law.plan_from_resource(data)
         self.cable_count = len(self.plan.compliances)
-        self.sensors = slice(FIRST_MEASUREMENT, FIRST_MEASUREMENT + 3 + self.cable_count)
+        sensor_count = self.plan.pose_size + self.cable_count
+        self.sensors = slice(FIRST_MEASUREMENT, FIRST_MEASUREMENT + sensor_count)
         self.first_output = self.sensors.stop
         first_state = self.first_output + 2 * self.cable_count
-        self.state_sizes = (2, len(self.plan.gains[0].A), *(self.cable_count,) * 5, 3 + self.cable_count)
+        self.state_sizes = (2, len(self.plan.gains[0].A), *(self.cable_count,) * 5, sensor_count)
         super().__init__(
             data, _variables(data, self.state_sizes), slice(first_state, first_state + sum(self.state_sizes)), **kwargs
         )
@@ -87,10 +89,15 @@ def _variables(data: Dict[str, Any], sizes: Sequence[int]) -> Tuple[Variable, ..
 
 
 def _inputs(data: Dict[str, Any]) -> Tuple[Variable, ...]:
-    position, tensions = data["expected"][0][:3], data["expected"][0][3:]
+    expected, size = data["expected"][0], len(data["expected"][0]) - len(data["compliances"])
+    position, orientation, tensions = expected[:3], expected[3:size], expected[size:]
     return (
         INPUT_TIME,
         *vector_variables(Variable("position", "input", "m", "measured position of the platform"), tuple(position)),
+        *(
+            Variable(f"orientation.{part}", "input", "1", f"{ORIENTATION_TEXT}, {part} part", float(value))
+            for part, value in zip("wxyz", orientation)
+        ),
         *(
             Variable(f"tension_{i}", "input", "N", f"measured tension of cable {i}", float(tension), nominal=1e3)
             for i, tension in enumerate(tensions, start=1)
@@ -111,7 +118,7 @@ def _outputs(cables: int) -> Tuple[Variable, ...]:
 
 
 def _states(sizes: Sequence[int]) -> Tuple[Variable, ...]:
-    _, states, cables, *_ = sizes
+    _, states, cables, *_, sensors = sizes
 
     def numbered_states(name: str, unit: str, count: int, description: str) -> Tuple[Variable, ...]:
         return tuple(Variable(f"{name}_{i}", "local", unit, f"state: {description}") for i in range(1, count + 1))
@@ -126,6 +133,10 @@ def _states(sizes: Sequence[int]) -> Tuple[Variable, ...]:
         *numbered_states("earlier_tension", "N", cables, "tension two samples before"),
         *numbered_states("scale", "1", cables, "tension at the start over the one expected"),
         *(Variable(f"seen_position.{axis}", "local", "m", "state: position at the last sample") for axis in "xyz"),
+        *(
+            Variable(f"seen_orientation.{part}", "local", "1", "state: orientation at the last sample")
+            for part in "wxyz"[: sensors - 3 - cables]
+        ),
         *numbered_states("seen_tension", "N", cables, "tension at the last sample"),
     )
 

@@ -9,8 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-import tautwire
-from tautwire.campaigns.plan_file import read_plan
 from tautwire.cli import run
 from tautwire.errors import RigidPlatformError
 from tautwire.estimation.input_design import default_limits
@@ -27,7 +25,6 @@ def uncertain(robot: Robot) -> Robot:
 
 
 COMPUTATIONS: dict[str, Callable[[Robot], object]] = {
-    "controller": tautwire.design_controller,
     "excitation": default_limits,
 }
 
@@ -55,10 +52,3 @@ def test_a_command_refuses_a_rigid_platform(
     error = capsys.readouterr().err
     assert "hall.toml: the platform is a rigid body, which cannot be computed here yet" in error
     assert [path.name for path in tmp_path.iterdir()] == ["hall.toml"]
-
-
-def test_a_campaign_refuses_a_rigid_platform(tmp_path: Path) -> None:
-    write_robot(suspended_robot(4), tmp_path / "hall.toml")
-    (tmp_path / "plan.toml").write_text('robot = "hall.toml"\n', encoding="utf-8")
-    with pytest.raises(RigidPlatformError):
-        read_plan(tmp_path / "plan.toml")

@@ -107,3 +107,14 @@ def underactuated_robot() -> Robot:
     )
     pulleys = EffectSetting("pulley", {"radius": 0.0224815216}, (1, 2, 3, 4))
     return Robot("grab", 9.80665, platform, None, Sensors(), cables, (pulleys,))
+
+
+def hall_robot() -> Robot:
+    """Four cables without symmetry, so that the winches reach every free mode of the platform."""
+    inertia = ((3.0, 0.1, -0.05), (0.1, 4.2, 0.08), (-0.05, 0.08, 5.5))
+    platform = Platform(60.0, (0.2, -0.1, 1.6), inertia=inertia, centre_of_mass=(0.03, -0.02, -0.25))
+    anchors = ((-3.8, -2.9, 4.9), (-3.5, 3.1, 5.2), (4.1, 2.6, 5.0), (3.7, -3.2, 4.6))
+    attachments = ((-0.5, -0.3, 0.15), (-0.35, 0.45, 0.2), (0.55, 0.3, 0.1), (0.4, -0.4, 0.2))
+    cables = tuple(cable(*pair) for pair in zip(anchors, attachments, strict=True))
+    # Of the orientations in equilibrium the nearest one with this tension at least: the very nearest has a slack cable.
+    return Robot("hall", 9.81, platform, TensionLimits(80.0, 3000.0, 200.0), Sensors(), cables)

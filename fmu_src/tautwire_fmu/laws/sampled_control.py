@@ -10,6 +10,9 @@ reference measurements and y the measurements, ``w_k = V_k - F_k``:
 ``x_k`` depends on samples before k only: one sample of computation delay. M is the anti-windup gain: it feeds the
 limited acceleration back to the state. Between the knots of a gain schedule all matrices are interpolated linearly.
 
+Of a platform that turns, y and r have a unit quaternion behind the position; ``y_k - r_k`` then has the rotation vector
+of ``q_y q_r^-1`` there, in rad in the axes of the world, whatever the signs of both.
+
 A cable's tension T is kept below a limit L by a bound on the demand beyond the feedforward, the one that would
 take T to L as a mode of angular frequency 1 / tau and damping ratio 0.7, ``a <= (l / E S) ((L - T) / tau - 1.4 dT/dt)
 / tau``, from T as measured a sample before; likewise from below. Where the static tension exceeds L the cable yields.
@@ -23,16 +26,20 @@ Source: Astrom and Rundqwist (1989), Integrator windup and how to avoid it, Amer
 from operator import mul
 from typing import Any, Dict, List, NamedTuple, Sequence
 
+from .mathematics import REAL
+from .rotation import multiply, rotation_vector_of
+
 Vector = Sequence[float]
 Matrix = Sequence[Vector]
 
 # Twice the damping ratio with which a tension approaches its limit.
 TWICE_TENSION_DAMPING_RATIO = 1.4
+POSITION_SIZE = 3
 MIN_TENSION_SCALE, MAX_TENSION_SCALE = 0.5, 2.0
 
 
 class Gains(NamedTuple):
-    """Controller matrices A, B, C, D and M as rows; p states, n cables, 3 + n sensors: B has 3 + 2 n columns."""
+    """Controller matrices A, B, C, D and M as rows; p states, n cables, d degrees of freedom: B has d + 2 n columns."""
 
     A: Matrix
     B: Matrix
@@ -45,9 +52,9 @@ class ControlPlan(NamedTuple):
     """Controller designed for a path.
 
     ``period`` h in s; at each of N samples ``speeds`` (n) for inelastic cables and ``stretches`` (n), which cancel
-    stretch and make F of these, in m/s, and ``expected`` r (3 + n), position in m and tensions in N; ``at_rest`` (n)
-    are the tensions before the start. ``knots`` are the samples at which ``gains`` hold. ``compliances`` (n) are
-    l / (E S), in m/N, and ``yield_time`` is tau, in s.
+    stretch and make F of these, in m/s, and ``expected`` r, the pose and tensions in N: (3 + n) with the position in m,
+    (7 + n) with a unit quaternion behind it. ``at_rest`` (n) are the tensions before the start. ``knots`` are the
+    samples at which ``gains`` hold. ``compliances`` (n) are l / (E S), in m/N, and ``yield_time`` is tau, in s.
     """
 
     period: float
@@ -60,6 +67,11 @@ class ControlPlan(NamedTuple):
     compliances: Vector
     yield_time: float
     tares: bool
+
+    @property
+    def pose_size(self) -> int:
+        """How many numbers of a measurement are the pose: 3, or 7 with an orientation."""
+        return len(self.expected[0]) - len(self.compliances)
 
 
 class Limits(NamedTuple):
@@ -108,7 +120,7 @@ def initial_controller_state(plan: ControlPlan, limits: Limits) -> ControllerSta
     scales = [1.0] * len(plan.compliances)
     start_speeds = [_clamp(speed, -limits.speed, limits.speed) for speed in _feedforward_speeds(plan, scales, 0)]
     state = [0.0] * len(plan.gains[0].A)
-    tensions = plan.expected[0][3:]
+    tensions = plan.expected[0][plan.pose_size :]
     initial_state = ControllerState(0, state, start_speeds, start_speeds, tensions, tensions, scales)
     return initial_state._replace(end=_limited_end_speeds(plan, limits, initial_state))
 
@@ -118,11 +130,11 @@ def next_controller_state(
 ) -> ControllerState:
     """Controller state of the next sample, from the measurements at the start of this one.
 
-    ``measured`` is the position in m, then the tensions in N.
+    ``measured`` is the position in m, of a platform that turns its orientation, then the tensions in N.
     """
-    k, scales = controller_state.sample, controller_state.scales
+    k, scales, tensions = controller_state.sample, controller_state.scales, measured[plan.pose_size :]
     if plan.tares and k == 0:
-        scales = [_tension_scale(deviations, expected) for deviations, expected in zip(measured[3:], plan.at_rest)]
+        scales = [_tension_scale(tension, expected) for tension, expected in zip(tensions, plan.at_rest)]
     gains = gains_at(plan, k)
     speed_deviations = _difference(controller_state.begin, _feedforward_speeds(plan, scales, k))
     demanded_accelerations = _demanded_accelerations(gains, controller_state.state, speed_deviations)
@@ -131,12 +143,11 @@ def next_controller_state(
         (b - a) / plan.period - wanted
         for a, b, wanted in zip(speed_deviations, next_speed_deviations, demanded_accelerations)
     ]
-    seen = _difference(measured, _expected_measurements(plan, scales, k)) + speed_deviations
+    seen = _measured_deviations(plan, measured, _expected_measurements(plan, scales, k)) + speed_deviations
     state = [
         _dot(row, controller_state.state) + _dot(input_row, seen) + _dot(anti_windup_row, saturation_errors)
         for row, input_row, anti_windup_row in zip(gains.A, gains.B, gains.M)
     ]
-    tensions = measured[3:]
     # At the first sample there is no rate: the stored tensions were only expected.
     earlier_tensions = controller_state.tensions if k > 0 else tensions
     next_state = ControllerState(
@@ -176,8 +187,9 @@ def state_after_demanded_speeds(
     For laws other than that of the gains; ``measured`` is as for :func:`next_controller_state`.
     """
     k, begin = controller_state.sample + 1, controller_state.end
-    earlier_tensions = controller_state.tensions if k > 1 else measured[3:]
-    next_state = controller_state._replace(sample=k, begin=begin, tensions=measured[3:], earlier=earlier_tensions)
+    tensions = measured[plan.pose_size :]
+    earlier_tensions = controller_state.tensions if k > 1 else tensions
+    next_state = controller_state._replace(sample=k, begin=begin, tensions=tensions, earlier=earlier_tensions)
     feedforward_changes = _difference(
         _feedforward_speeds(plan, next_state.scales, k + 1), _feedforward_speeds(plan, next_state.scales, k)
     )
@@ -234,7 +246,18 @@ def _feedforward_speeds(plan: ControlPlan, scales: Vector, k: int) -> List[float
 def _expected_measurements(plan: ControlPlan, scales: Vector, k: int) -> List[float]:
     """Reference measurements at a sample, tensions scaled by the tare."""
     row = _row_or_last(plan.expected, k)
-    return [*row[:3], *map(mul, scales, row[3:])]
+    return [*row[: plan.pose_size], *map(mul, scales, row[plan.pose_size :])]
+
+
+def _measured_deviations(plan: ControlPlan, measured: Vector, expected: Vector) -> List[float]:
+    """Measured minus expected position, rotation where there is an orientation, and tensions."""
+    size = plan.pose_size
+    position, tensions = _difference(measured[:3], expected[:3]), _difference(measured[size:], expected[size:])
+    if size == POSITION_SIZE:
+        return position + tensions
+    w, x, y, z = expected[POSITION_SIZE:size]
+    turned = multiply(measured[POSITION_SIZE:size], (w, -x, -y, -z))
+    return [*position, *rotation_vector_of(REAL, turned), *tensions]
 
 
 def _tension_scale(measured: float, expected: float) -> float:

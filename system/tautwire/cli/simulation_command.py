@@ -179,7 +179,7 @@ def _simulate_closed_loop(
 
     assert files.controller is not None and files.path is not None
     trajectory = path_trajectory(robot, read_path_file(files.path, robot))
-    law = read_controller(files.controller, robot.cable_count)
+    law = read_controller(files.controller, robot.cable_count, robot.platform.is_rigid_body)
     provenance = describe_origin()
     duration = trajectory.duration + SETTLING_TIME if options.until is None else options.until
     with (

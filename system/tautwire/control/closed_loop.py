@@ -21,11 +21,11 @@ from ..cosimulation.robot_cosimulation import (
     run_cosimulation,
     wire_fmus,
 )
-from ..cosimulation.robot_wiring import PLATFORM, winch_input_ports
+from ..cosimulation.robot_wiring import ORIENTATION_AXES, PLATFORM, measured_output_indices, winch_input_ports
 from ..cosimulation.run_arguments import validate_fmus, validate_options
-from ..errors import InputError
+from ..errors import ArgumentError, InputError
 from ..fmus.packaging import RobotFmus, package_controller_fmu
-from ..robot.schema import AXES, Robot, validate_point_mass_robot
+from ..robot.schema import AXES, Robot, validate_robot
 from ..robot.trajectory import DURATION_RULE as OF_PATH
 from ..robot.trajectory import Trajectory, require_trajectory
 from ..validation import (
@@ -46,20 +46,21 @@ Array = NDArray[np.float64]
 CONTROLLER_NAME = "controller"
 RUN_DURATION_RULE = OF_PATH._replace(meaning="the duration of the run")
 DESIGN_ATTRIBUTES = ("aim", "cable_count", "uses_feedback", "knots")
-FORCE_PORTS = tuple(
-    Port(PLATFORM, f"{name}.{axis}") for axis in AXES for name in ("external_force", "external_force_rate")
+FORCE_PORTS, MOMENT_PORTS = (
+    tuple(Port(PLATFORM, f"{name}{rate}.{axis}") for axis in AXES for rate in ("", "_rate"))
+    for name in ("external_force", "external_moment")
 )
 
 
 @dataclass(frozen=True)
-class SampledForce:
-    """An external force on the platform as a zero-order hold: ``forces`` (N, 3) in N, each held to the next sample."""
+class SampledLoad:
+    """A load on the platform as a zero-order hold: ``loads`` (N, 3) in N or N m, each held to the next sample."""
 
-    forces: Array
+    loads: Array
 
     def interval(self, index: int, time: float, step: float, outputs: Array) -> tuple[Array, Array]:
         """See :class:`tautwire.cosimulation.Source`."""
-        input_values = np.column_stack([self.forces[index], np.zeros(3)]).ravel()
+        input_values = np.column_stack([self.loads[index], np.zeros(3)]).ravel()
         return input_values, input_values
 
 
@@ -96,14 +97,15 @@ def sample_times(period: float, duration: float) -> Array:
 class RunOptions:
     """Options of a run with a controller: ``step`` bounds the macro step in s.
 
-    ``external_force`` (N, 3) in N acts on the platform, held from sample to sample; ``progress`` and ``patience``
-    are as for :func:`tautwire.cosimulate`.
+    ``external_force`` (N, 3) in N acts on the platform, held from sample to sample, and so does ``external_moment``
+    (N, 3) in N m on one that turns; ``progress`` and ``patience`` are as for :func:`tautwire.cosimulate`.
     """
 
     step: float = DEFAULT_STEP
     external_force: ArrayLike | None = None
     progress: Progress | None = None
     patience: float | None = None
+    external_moment: ArrayLike | None = None
 
 
 @dataclass(frozen=True)
@@ -142,8 +144,8 @@ def cosimulate_closed_loop(
     """
     caller, options = "cosimulate_closed_loop", options or ClosedLoopOptions()
     validate_fmus(f"{caller}: fmus", fmus)
-    validate_point_mass_robot(f"{caller}: robot", robot)
-    controller = designed(f"{caller}: controller", controller, robot.cable_count, options.aim, options.discretisation)
+    validate_robot(f"{caller}: robot", robot)
+    controller = designed(f"{caller}: controller", controller, robot, options.aim, options.discretisation)
     _require_design(caller, robot, controller, trajectory)
     validate_number(f"{caller}: duration", duration, RUN_DURATION_RULE)
     if options.seed is not None:
@@ -153,11 +155,11 @@ def cosimulate_closed_loop(
     validate_options(caller, options.step, None, options.progress, options.patience)
     times = sample_times(controller.aim.period, duration)
     if options.reference is not None:
-        _require_reference(caller, options.reference, len(times), robot.cable_count)
-    force = _external_force(caller, options, len(times))
+        _require_reference(caller, options.reference, len(times), robot)
+    loads, ports = _external_loads(caller, options, len(times), fmus.is_rigid)
     with path_source(robot, controller, trajectory, times, options.seed, options.reference) as source:
-        extra = AdditionalComponents(external_inputs=FORCE_PORTS) if force else NO_ADDITIONAL_COMPONENTS
-        return _run(fmus, JoinedSources((source, *force)) if force else source, times, options, extra)
+        extra = AdditionalComponents(external_inputs=ports) if loads else NO_ADDITIONAL_COMPONENTS
+        return _run(fmus, JoinedSources((source, *loads)) if loads else source, times, options, extra)
 
 
 def build_controller_fmu(
@@ -171,7 +173,7 @@ def build_controller_fmu(
     """Writes ``controller.fmu`` into ``folder``: the controller with its path until ``duration`` (s), where it rests.
 
     ``reference`` is at the controller's samples, by default that of the elastic model. Its inputs are the measured
-    position and tensions, its outputs winch speeds and their rates.
+    pose and tensions, its outputs winch speeds and their rates.
 
     Raises UnreachableError where the path requires a cable to push, ArgumentError for an invalid argument.
     """
@@ -214,7 +216,7 @@ def _controller_resource(
     target_folder = validate_folder(f"{caller}: folder", folder)
     times = sample_times(controller.aim.period, duration)
     if reference is not None:
-        _require_reference(caller, reference, len(times), robot.cable_count)
+        _require_reference(caller, reference, len(times), robot)
     data = controller_data(robot, controller, reference or elastic_reference(robot, trajectory, times))
     return data, target_folder
 
@@ -234,17 +236,19 @@ def cosimulate_with_controller(
     components = {CONTROLLER_NAME: validate_file(f"{caller}: controller", controller)}
     instants = validate_increasing(f"{caller}: time", time, TIME_MEANING)
     validate_options(caller, options.step, None, options.progress, options.patience)
-    force = _external_force(caller, options, len(instants))
+    loads, ports = _external_loads(caller, options, len(instants), fmus.is_rigid)
     zero_input = ZeroInput(len(winch_input_ports(len(fmus.cables))))
-    extra = AdditionalComponents(components, controller_wires(fmus), FORCE_PORTS if force else ())
-    return _run(fmus, JoinedSources((zero_input, *force)), instants, options, extra)
+    extra = AdditionalComponents(components, controller_wires(fmus), ports)
+    return _run(fmus, JoinedSources((zero_input, *loads)), instants, options, extra)
 
 
 def controller_wires(fmus: RobotFmus) -> tuple[Connection, ...]:
     """Connections from the measured outputs to the controller, and from it to the winch inputs."""
     count, wiring = len(fmus.cables), wire_fmus(fmus)
-    input_names = [*(f"position.{axis}" for axis in AXES), *(f"tension_{i}" for i in range(1, count + 1))]
-    measured_ports = [*wiring.outputs[:3], *wiring.outputs[6 : 6 + count]]
+    orientation = [f"orientation.{part}" for part in ORIENTATION_AXES] if fmus.is_rigid else []
+    tensions = [f"tension_{i}" for i in range(1, count + 1)]
+    input_names = [*(f"position.{axis}" for axis in AXES), *orientation, *tensions]
+    measured_ports = [wiring.outputs[index] for index in measured_output_indices(count, fmus.is_rigid)]
     output_names = [f"{name}_{i}" for i in range(1, count + 1) for name in ("winch_speed", "winch_acceleration")]
     target_ports = winch_input_ports(count, fmus.winch_numbers)
     return (
@@ -267,26 +271,38 @@ def _run(
 
 
 def _require_design(caller: str, robot: Robot, controller: Design, trajectory: Trajectory) -> None:
-    validate_point_mass_robot(f"{caller}: robot", robot)
+    validate_robot(f"{caller}: robot", robot)
     validate_attributes(
         f"{caller}: controller", controller, DESIGN_ATTRIBUTES, "controller", "give what design_controller returns"
     )
     require_trajectory(f"{caller}: trajectory", trajectory)
 
 
-def _external_force(caller: str, options: RunOptions, count: int) -> tuple[SampledForce, ...]:
-    """The external force as a source of inputs, empty where there is none."""
-    if options.external_force is None:
-        return ()
-    meaning = "finite forces in N, a row for each sample and columns x, y, z"
-    return (SampledForce(validate_array(f"{caller}: external_force", options.external_force, (count, 3), meaning)),)
+def _external_loads(
+    caller: str, options: RunOptions, count: int, is_rigid: bool
+) -> tuple[tuple[SampledLoad, ...], tuple[Port, ...]]:
+    """External force and moment as sources of inputs, and their ports; empty where there are none."""
+    sources: tuple[SampledLoad, ...] = ()
+    ports: tuple[Port, ...] = ()
+    if options.external_force is not None:
+        meaning = "finite forces in N, a row for each sample and columns x, y, z"
+        forces = validate_array(f"{caller}: external_force", options.external_force, (count, 3), meaning)
+        sources, ports = (SampledLoad(forces),), FORCE_PORTS
+    if options.external_moment is not None:
+        where, meaning = f"{caller}: external_moment", "finite moments in N m, a row for each sample, columns x, y, z"
+        if not is_rigid:
+            raise ArgumentError(where, options.external_moment, "acts on a point mass", "leave it out")
+        moments = validate_array(where, options.external_moment, (count, 3), meaning)
+        sources, ports = (*sources, SampledLoad(moments)), (*ports, *MOMENT_PORTS)
+    return sources, ports
 
 
-def _require_reference(caller: str, reference: Reference, count: int, cables: int) -> None:
-    where = f"{caller}: reference"
+def _require_reference(caller: str, reference: Reference, count: int, robot: Robot) -> None:
+    where, cables = f"{caller}: reference", robot.cable_count
+    pose_size = 7 if robot.platform.is_rigid_body else 3
     validate_instance(where, reference, Reference, "give what elastic_reference returns")
     meaning = f"that of the controller's {count} samples, sample_times(period, duration)"
-    for part, width in {"speeds": cables, "rigid": cables, "expected": 3 + cables}.items():
+    for part, width in {"speeds": cables, "rigid": cables, "expected": pose_size + cables}.items():
         validate_array(f"{where}.{part}", getattr(reference, part), (count, width), meaning)
 
 
@@ -297,6 +313,9 @@ def _require_cables(fmus: RobotFmus, robot: Robot, controller: Design) -> None:
             f"has {robot.cable_count} cables, the controller {controller.cable_count}, the FMUs {len(fmus.cables)}"
         )
         raise InputError(robot.name, problem, "give those of one robot")
+    if fmus.is_rigid != robot.platform.is_rigid_body:
+        turning = "that turns" if fmus.is_rigid else "that is a point mass"
+        raise InputError(robot.name, f"has another platform than the FMUs, {turning}", "give those of one robot")
 
 
 def _require_tensions(fmus: RobotFmus, robot: Robot) -> None:

@@ -23,11 +23,13 @@ class ControllerFileError(InputError):
     """A file does not contain a controller."""
 
 
-def read_controller(path: Path, cable_count: int) -> Any:
+def read_controller(path: Path, cable_count: int, is_rigid: bool = False) -> Any:
     """Reads a controller for :func:`cosimulate_closed_loop`: the path of an ``.fmu``, a design or a function.
 
     ``.json`` has ``A``, ``B``, ``C``, ``D``, ``dt`` and optionally ``inputs`` and ``outputs``; ``.py`` is executed and
     has a function ``controller(time, measured)``.
+
+    The robot's platform is a point mass, or turns if it ``is_rigid``.
 
     Raises ControllerFileError where a file has other content, ArgumentError where there is none.
     """
@@ -38,10 +40,10 @@ def read_controller(path: Path, cable_count: int) -> Any:
     file = validate_file("--controller", path)
     if suffix == ".fmu":
         return file
-    return _read_state_space(file, cable_count) if suffix == ".json" else _read_function(file)
+    return _read_state_space(file, cable_count, is_rigid) if suffix == ".json" else _read_function(file)
 
 
-def _read_state_space(path: Path, cable_count: int) -> RegulatorDesign:
+def _read_state_space(path: Path, cable_count: int, is_rigid: bool) -> RegulatorDesign:
     content = read_bytes(path, ControllerFileError, MAX_FILE_SIZE)
     require_utf8_text(content, str(path), ControllerFileError, "JSON")
     hint = "write A, B, C, D as lists of rows, and dt in s, 0 if continuous"
@@ -61,7 +63,7 @@ def _read_state_space(path: Path, cable_count: int) -> RegulatorDesign:
     except Exception as error:
         raise ControllerFileError(str(path), f"is not a state space ({error})", hint) from error
     try:
-        return state_space_controller(system, cable_count)
+        return state_space_controller(system, cable_count, is_rigid=is_rigid)
     except ArgumentError as error:
         raise ControllerFileError(str(path), error.problem, error.hint) from error
 

@@ -10,6 +10,7 @@ import numpy as np
 from fmpy.model_description import ScalarVariable
 from numpy.typing import NDArray
 
+from ..cosimulation.robot_wiring import ORIENTATION_AXES
 from ..errors import InputError
 from ..fmus.component import INSTANCE_TYPES, Component, VariableBlock
 from ..fmus.fmi_binding import is_real_scalar, type_name
@@ -32,7 +33,7 @@ class ControllerFmuError(InputError):
 
 
 class Sample(NamedTuple):
-    """A controller's sample at ``time`` (s): measured and expected (3 + n,), and reference ``speeds`` (n,) to come."""
+    """A controller's sample at ``time`` (s): measured and expected pose and tensions, and ``speeds`` (n,) to come."""
 
     time: float
     period: float
@@ -49,14 +50,14 @@ class ControllerFmu:
     Raises ControllerFmuError where a variable does not match, ArchiveError where the file is not an FMU.
     """
 
-    def __init__(self, path: Path, cable_count: int) -> None:
+    def __init__(self, path: Path, cable_count: int, is_rigid: bool = False) -> None:
         self.path = path
         description = read_model_description(path)
         if description.fmiVersion not in INSTANCE_TYPES or description.coSimulation is None:
             problem = f"it is FMI {description.fmiVersion}, or not for co-simulation"
             raise ControllerFmuError(path, None, problem, "export it as FMI 2.0 or 3.0 co-simulation")
         variables: list[ScalarVariable] = description.modelVariables
-        self._signals = _input_signals(cable_count)
+        self._signals = _input_signals(cable_count, is_rigid)
         self.inputs = _matched(path, variables, "input", self._signals)
         speeds, rates = (_numbered(name, cable_count) for name in ("winch_speed", "winch_acceleration"))
         self.outputs = _matched(path, variables, "output", [*speeds, *rates])
@@ -106,9 +107,10 @@ def _numbered(name: str, cable_count: int) -> list[str]:
     return [f"{name}_{number}" for number in range(1, cable_count + 1)]
 
 
-def _input_signals(cable_count: int) -> list[str]:
+def _input_signals(cable_count: int, is_rigid: bool) -> list[str]:
     """Names of the signals that a controller may have as inputs: measured ones, then those of the reference."""
-    measured = [*(f"position_{axis}" for axis in AXES), *_numbered("tension", cable_count)]
+    orientation = [f"orientation_{part}" for part in ORIENTATION_AXES] if is_rigid else []
+    measured = [*(f"position_{axis}" for axis in AXES), *orientation, *_numbered("tension", cable_count)]
     return [
         *measured,
         *(f"reference_{name}" for name in measured),

@@ -10,21 +10,26 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import ArgumentError, InputError
+from ..linear import LinearPlant
+from ..linear.operating_point import slack_cables
 from ..robot.schema import AXES, Robot
 from ..validation import NumberRule, validate_number
 
 # Assumed if the robot file declares no sensors.
 POSITION_NOISE = 1e-4
+ORIENTATION_NOISE = 2e-4
 TENSION_NOISE = 1.0
 AIM_RULES = {
     "period": NumberRule("the sample period", "s", positive=True),
     "position": NumberRule("a deviation of position", "m", positive=True),
+    "rotation": NumberRule("a deviation of orientation", "rad", positive=True),
     "tension": NumberRule("a share of the mean static tension", "", positive=True),
     "winch_speed": NumberRule("a winch speed", "m/s", positive=True),
     "winch_acceleration": NumberRule("a winch acceleration", "m/s^2", positive=True),
     "integral_time": NumberRule("a time", "s", positive=True),
     "speed_limit": NumberRule("the largest winch speed", "m/s", positive=True),
     "acceleration_disturbance": NumberRule("a wander of velocity", "m/s^2", positive=True),
+    "angular_acceleration_disturbance": NumberRule("a wander of angular velocity", "rad/s^2", positive=True),
     "speed_disturbance": NumberRule("a wander of rope", "m/s", positive=True),
     "acceleration_limit": NumberRule("the largest winch acceleration", "m/s^2", positive=True),
     "lowest_tension": NumberRule("the minimum tension", "N", minimum=0.0),
@@ -61,13 +66,14 @@ Array = NDArray[np.float64]
 class ControlAim:
     """Weights and limits of a controller; weights are deviations of equal cost (Bryson's rule).
 
-    ``period`` in s; ``position`` in m; ``tension`` as a share of the mean static tension; ``winch_speed`` in
-    m/s and ``winch_acceleration`` in m/s^2, beyond the ideal ones; ``integral_time`` in s, after which a
-    lasting error of position costs as much.
+    ``period`` in s; ``position`` in m; ``rotation`` in rad, of a platform that turns; ``tension`` as a share of the
+    mean static tension; ``winch_speed`` in m/s and ``winch_acceleration`` in m/s^2, beyond the ideal ones;
+    ``integral_time`` in s, after which a lasting error of position costs as much.
 
-    The observer expects velocity to wander by ``acceleration_disturbance`` (m/s^2) and rope by
-    ``speed_disturbance`` (m/s) within a second. A larger ``speed_disturbance`` makes the loop more robust
-    against a wrong modulus or payload, a smaller one calmer under noise (loop transfer recovery).
+    The observer expects velocity to wander by ``acceleration_disturbance`` (m/s^2), angular velocity by
+    ``angular_acceleration_disturbance`` (rad/s^2) and rope by ``speed_disturbance`` (m/s) within a second. A larger
+    ``speed_disturbance`` makes the loop more robust against a wrong modulus or payload, a smaller one calmer under
+    noise (loop transfer recovery).
 
     Limits of every design: ``speed_limit`` in m/s and ``acceleration_limit`` in m/s^2 bound the commands of each winch,
     in addition to those of the robot file. No cable is let out below ``lowest_tension`` or reeled in above
@@ -93,6 +99,8 @@ class ControlAim:
     highest_tension: float | None = None
     yield_time: float = 0.06
     tare: bool = True
+    rotation: float = 4e-3
+    angular_acceleration_disturbance: float = 0.4
 
     def __post_init__(self) -> None:
         for name, rule in AIM_RULES.items():
@@ -106,17 +114,42 @@ class ControlAim:
 
 
 def measurement_noise(robot: Robot) -> Array:
-    """Standard deviation of one sample of x, y, z (m) and the tensions (N), shape (3 + n,)."""
-    position, tension = robot.sensors.position_noise, robot.sensors.tension_noise
-    return np.repeat([position or POSITION_NOISE, tension or TENSION_NOISE], [3, robot.cable_count])
+    """Standard deviation of one sample of x, y, z (m) and the tensions (N), shape (3 + n,).
+
+    Of a platform that turns those of the rotation about each axis (rad) follow the position, shape (6 + n,).
+    """
+    sensors, turning = robot.sensors, 3 if robot.platform.is_rigid_body else 0
+    noise = (
+        sensors.position_noise or POSITION_NOISE,
+        sensors.orientation_noise or ORIENTATION_NOISE,
+        sensors.tension_noise or TENSION_NOISE,
+    )
+    return np.repeat(noise, [3, turning, robot.cable_count])
+
+
+def require_taut(robot: Robot, linear: LinearPlant) -> None:
+    """Refuses a plant with a slack cable, whose length no sensor tells; raises InputError."""
+    slack = [str(index + 1) for index in slack_cables(linear.tensions)]
+    if slack:
+        problem = f"has no tension in cable {', '.join(slack)} where the controller is to be designed"
+        hint = "choose a pose that holds all cables taut, or give [tension] a minimum"
+        raise InputError(robot.name, problem, hint)
+
+
+def integrated_freedoms(cable_count: int, degrees_of_freedom: int) -> int:
+    """How many coordinates of the pose, in their order, feedback can hold at its reference: all, or the position.
+
+    Fewer cables than degrees of freedom leave the orientation to statics.
+    """
+    return degrees_of_freedom if cable_count >= degrees_of_freedom else len(AXES)
 
 
 @dataclass(frozen=True)
 class Knot:
     """A point of a gain schedule at ``time`` (s) of the path; n cables, q states.
 
-    ``regulator`` is a sampled ``control.StateSpace`` from deviations of position, tensions and winch speeds from the
-    path to winch accelerations; only winch speeds feed through. ``tracking`` (q, n) is the anti-windup gain: from the
+    ``regulator`` is a sampled ``control.StateSpace`` from deviations of pose, tensions and winch speeds from the path
+    to winch accelerations; only winch speeds feed through. ``tracking`` (q, n) is the anti-windup gain: from the
     difference of actual and commanded acceleration to the state.
     """
 
@@ -191,14 +224,20 @@ class Feedforward:
         return (Knot(0.0, regulator, np.zeros((0, count))),)
 
 
-def regulator_signals(count: int) -> dict[str, Any]:
+def regulator_signals(count: int, degrees_of_freedom: int = 3) -> dict[str, Any]:
     """Names of a regulator's inputs and outputs, and of the regulator."""
     numbers = range(1, count + 1)
     return {
         "inputs": [
-            *(f"position_{axis}" for axis in AXES),
+            *pose_signals(degrees_of_freedom),
             *(f"{name}_{index}" for name in ("tension", "winch_speed") for index in numbers),
         ],
         "outputs": [f"winch_acceleration_{index}" for index in numbers],
         "name": "regulator",
     }
+
+
+def pose_signals(degrees_of_freedom: int) -> list[str]:
+    """Names of the measured deviations of a pose: position in m, and of a rigid body rotation in rad."""
+    names = [f"{name}_{axis}" for name in ("position", "rotation") for axis in AXES]
+    return names[:degrees_of_freedom]

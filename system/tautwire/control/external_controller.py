@@ -37,7 +37,7 @@ DISCRETISATIONS = ("tustin", "zoh")
 
 
 class ControllerError(TautwireError):
-    """A controller failed at ``time`` (s), from ``measured`` (3 + n,); ``problem`` says how."""
+    """A controller failed at ``time`` (s), from ``measured``, pose and tensions; ``problem`` says how."""
 
     def __init__(self, time: float, measured: Sequence[float], problem: str) -> None:
         super().__init__(time, measured, problem)
@@ -63,12 +63,17 @@ class SpeedController(Feedforward):
 
 
 def state_space_controller(
-    system: StateSpace, cable_count: int, aim: ControlAim | None = None, discretisation: str = "tustin"
+    system: StateSpace,
+    cable_count: int,
+    aim: ControlAim | None = None,
+    discretisation: str = "tustin",
+    is_rigid: bool = False,
 ) -> RegulatorDesign:
     """Sampled-data controller from a linear one: deviations from the path in, deviations of the winch speeds out.
 
     Inputs are ``position_x`` to ``position_z`` in m, ``tension_i`` in N and ``winch_speed_i`` in m/s, measured minus
-    reference; those that ``system`` labels, in any order, otherwise positions and tensions in this order. Outputs are
+    reference, and of a platform that ``is_rigid`` ``rotation_x`` to ``rotation_z`` in rad, about the axes of the world;
+    those that ``system`` labels, in any order, otherwise pose and tensions in this order. Outputs are
     all ``winch_speed_i``, beyond those of the reference. The sign of the feedback is included. A discrete ``dt`` is the
     sample period, a continuous system is discretised at ``aim.period`` by ``tustin`` or ``zoh`` (zero-order hold).
 
@@ -77,9 +82,10 @@ def state_space_controller(
     where = "state_space_controller: system"
     validate_instance(where, system, StateSpace, "convert it by control.ss")
     system, aim = _discrete(where, system, aim or ControlAim(), discretisation)
-    signals = regulator_signals(cable_count)
-    inputs = _signal_indices(where, "input", system.input_labels, "u", signals["inputs"], 3 + cable_count)
-    speeds = signals["inputs"][3 + cable_count :]
+    freedoms = 6 if is_rigid else 3
+    signals, sensors = regulator_signals(cable_count, freedoms), freedoms + cable_count
+    inputs = _signal_indices(where, "input", system.input_labels, "u", signals["inputs"], sensors)
+    speeds = signals["inputs"][sensors:]
     outputs = _signal_indices(where, "output", system.output_labels, "y", speeds, cable_count)
     if len(outputs) < cable_count:
         missing = ", ".join(name for i, name in enumerate(speeds) if i not in outputs)
@@ -94,7 +100,7 @@ def state_space_controller(
         np.block([[system.A, np.zeros((size, cable_count))], [C, np.zeros_like(identity)]]),
         np.vstack([system.B, D]) @ selection,
         np.hstack([np.zeros((cable_count, size)), identity / aim.period]),
-        np.hstack([np.zeros((cable_count, 3 + cable_count)), -identity / aim.period]),
+        np.hstack([np.zeros((cable_count, sensors)), -identity / aim.period]),
         aim.period,
         remove_useless_states=False,
         **signals,
@@ -105,7 +111,8 @@ def state_space_controller(
 def function_controller(function: SpeedLaw, cable_count: int, aim: ControlAim | None = None) -> SpeedController:
     """Sampled-data controller from a function ``(time, measured) -> speeds``, called once every ``aim.period``.
 
-    ``time`` in s; ``measured`` (3 + n,): x, y, z in m, then the tensions in N. ``speeds`` (n,) of the winches in m/s,
+    ``time`` in s; ``measured`` (3 + n,): x, y, z in m, then the tensions in N; of a platform that turns (7 + n,), with
+    its unit quaternion w, x, y, z behind the position. ``speeds`` (n,) of the winches in m/s,
     positive reels in; not deviations. Limits are those of ``aim`` and the robot file. A run raises ControllerError
     where the function raises an exception, or returns other than n finite numbers.
 
@@ -117,34 +124,36 @@ def function_controller(function: SpeedLaw, cable_count: int, aim: ControlAim | 
     return SpeedController(cable_count, _without_tare(aim), function)
 
 
-def fmu_controller(path: str | Path, cable_count: int, aim: ControlAim | None = None) -> SpeedController:
+def fmu_controller(
+    path: str | Path, cable_count: int, aim: ControlAim | None = None, is_rigid: bool = False
+) -> SpeedController:
     """Sampled-data controller from a co-simulation FMU, FMI 2.0 or 3.0, stepped by ``aim.period``.
 
-    Its inputs, by name, are measured, ``position_x`` and ``tension_i``, or expected on the path, with ``reference_``
-    before these names; ``reference_winch_speed_i`` are the path's speeds when the demanded ones are reached. Outputs
-    ``winch_speed_i`` after the step are the demanded speeds; outputs ``winch_acceleration_i`` are added for a period.
-    Case and separators do not matter: ``position.x`` and ``Tension[1]`` are such names too. ``speeds_from.inputs`` and
+    Its inputs, by name, are measured, ``position_x`` and ``tension_i``, of a platform that ``is_rigid`` also
+    ``orientation_w`` to ``orientation_z``, or expected on the path, with ``reference_`` before these names;
+    ``reference_winch_speed_i`` are the path's speeds when the demanded ones are reached. Outputs ``winch_speed_i``
+    after the step are the demanded speeds; outputs ``winch_acceleration_i`` are added for a period. Case and separators
+    do not matter: ``position.x`` and ``Tension[1]`` are such names too. ``speeds_from.inputs`` and
     ``speeds_from.outputs`` of the result are the matched variables with their signals.
 
     Raises ControllerFmuError where a variable does not match, ArchiveError where the file is not an FMU.
     """
     file = validate_file("fmu_controller: path", path)
-    return SpeedController(cable_count, _without_tare(aim), ControllerFmu(file, cable_count))
+    return SpeedController(cable_count, _without_tare(aim), ControllerFmu(file, cable_count, is_rigid))
 
 
-def designed(
-    where: str, controller: object, cable_count: int, aim: ControlAim | None, discretisation: str
-) -> Design | Any:
+def designed(where: str, controller: object, robot: Robot, aim: ControlAim | None, discretisation: str) -> Design | Any:
     """The controller as a design; what is not a known kind of controller is returned as it is."""
     if aim is not None:
         validate_instance(where.replace("controller", "aim"), aim, ControlAim, "give a ControlAim")
+    cable_count, is_rigid = robot.cable_count, robot.platform.is_rigid_body
     if isinstance(controller, StateSpace):
-        return state_space_controller(controller, cable_count, aim, discretisation)
+        return state_space_controller(controller, cable_count, aim, discretisation, is_rigid)
     if isinstance(controller, control.InputOutputSystem | control.LTI):
         problem = f"is {describe_value(controller)}, not a StateSpace"
         raise ArgumentError(where, controller, problem, "convert it by control.ss")
     if isinstance(controller, str | Path):
-        return fmu_controller(validate_file(where, controller), cable_count, aim)
+        return fmu_controller(validate_file(where, controller), cable_count, aim, is_rigid)
     if callable(controller) and not isinstance(controller, type):
         return function_controller(controller, cable_count, aim)
     return controller

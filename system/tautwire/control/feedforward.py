@@ -32,6 +32,9 @@ Array = NDArray[np.float64]
 
 # Per sample; even, so that one ends at the sample itself.
 SUBSTEPS = 4
+MAX_NEWTON_STEPS = 20
+# In m, m/s^2 and N: above what rounding leaves of stiff ropes; the last step is quadratically nearer.
+NEWTON_TOLERANCE = 1e-9
 
 
 @dataclass(frozen=True)
@@ -111,7 +114,7 @@ def _simulate_inverse(
     # CasADi stores matrices column by column.
     rows = [np.swapaxes(each, 1, 2).reshape(len(targets), -1) for each in (dynamics.motion_rows, dynamics.null_rows)]
     parts = [
-        *(part for each in poses for part in (each.position, each.orientation, each.twist)),
+        *(part for each in poses for part in (laws.pose_states(each), each.twist)),
         end.acceleration,
         winch_speeds_at(robot, end),
         *rows,
@@ -133,12 +136,12 @@ def _inverse_step(robot: Robot, laws: PathLaws, step: float, widths: list[int]) 
     state, end_state, path_data, speeds = (
         SX.sym(name, length) for name, length in (("s", size), ("t", size), ("g", sum(widths)), ("v", count))
     )
-    p, q, t, p_end, q_end, t_end, a_end, guess, motion_entries, null_entries, target = casadi.vertsplit(
+    x, t, x_end, t_end, a_end, guess, motion_entries, null_entries, target = casadi.vertsplit(
         path_data, np.cumsum([0, *widths]).tolist()
     )
     inputs = casadi.vertcat(speeds, SX(d, 1))
-    middle_rates, _, _ = laws.laws(laws.state(p, t, 0.5 * (state + end_state)), inputs, q)
-    rates, outputs, tensions = laws.laws(laws.state(p_end, t_end, end_state), inputs, q_end)
+    middle_rates, _, _ = laws.laws(casadi.vertcat(x, t, 0.5 * (state + end_state)), inputs)
+    rates, outputs, tensions = laws.laws(casadi.vertcat(x_end, t_end, end_state), inputs)
     rank = motion_entries.numel() // d
     motion_rows = casadi.reshape(motion_entries, rank, d)
     null_rows = casadi.reshape(null_entries, count - rank, count)
@@ -150,9 +153,19 @@ def _inverse_step(robot: Robot, laws: PathLaws, step: float, widths: list[int]) 
     residual = casadi.Function(
         "residual", [casadi.vertcat(end_state, speeds), casadi.vertcat(state, path_data)], [equations]
     )
-    options = {"error_on_fail": False, "show_eval_warnings": False}
+    # A line search does not end where rounding leaves no descent, and from the step before none is needed.
+    options = {
+        "error_on_fail": False,
+        "show_eval_warnings": False,
+        "line_search": False,
+        "abstol": NEWTON_TOLERANCE,
+        "max_iter": MAX_NEWTON_STEPS,
+    }
     solve = casadi.rootfinder("solve", "newton", residual, options)
-    solution = solve(casadi.vertcat(state, guess), casadi.vertcat(state, path_data))
+    # Reeled by inelastic cables' speeds, so that no cable of the guess is slack, where its law has no slope.
+    reeled, _, _ = laws.laws(casadi.vertcat(x, t, state), casadi.vertcat(guess, SX(d, 1)))
+    guessed = casadi.vertcat(state + step * reeled[lengths.start :], guess)
+    solution = solve(guessed, casadi.vertcat(state, path_data))
     solved_state, speed = casadi.vertsplit(solution, [0, size, size + count])
     sensor_outputs = casadi.vertcat(outputs[:3], outputs[model.indices.tensions])
     evaluate_sensors = casadi.Function("show", [end_state, speeds, path_data], [sensor_outputs])

@@ -6,16 +6,22 @@ gains give continuous accelerations.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Protocol
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..linear import LinearPlant
+from ..robot.pose_trajectory import turns
 from ..robot.schema import Robot
 from ..robot.trajectory import Trajectory
 from .design import ControlAim, Design, Knot
 from .lqg import design_controller
+
+Array = NDArray[np.float64]
+DesignPose = tuple[Sequence[float], Sequence[float] | None]
 
 DESIGN_POINTS = 9
 
@@ -64,6 +70,13 @@ class ScheduledController:
         )
 
 
+def design_poses(trajectory: Trajectory, times: Array) -> list[DesignPose]:
+    """Positions of a path at times, with its orientations where it has some."""
+    positions = trajectory.position(times).tolist()
+    orientations = trajectory.orientation(times).tolist() if turns(trajectory) else [None] * len(times)
+    return list(zip(positions, orientations, strict=True))
+
+
 def schedule_controller(
     robot: Robot, trajectory: Trajectory, aim: ControlAim | None = None, points: int = DESIGN_POINTS
 ) -> ScheduledController:
@@ -72,5 +85,5 @@ def schedule_controller(
     Raises what :func:`tautwire.linear.linearise` raises.
     """
     times = np.linspace(0.0, trajectory.duration, points)
-    controllers = [design_controller(robot, aim, at) for at in trajectory.position(times).tolist()]
+    controllers = [design_controller(robot, aim, *pose) for pose in design_poses(trajectory, times)]
     return ScheduledController(tuple(times.tolist()), tuple(controllers))

@@ -25,10 +25,11 @@ from slycot import sb10ad
 from threadpoolctl import threadpool_limits
 
 from ..linear import LinearPlant, linearise
+from ..robot.rigid_equilibrium import platform_size
 from ..robot.schema import Robot
 from ..robot.trajectory import Trajectory
-from .design import ControlAim, Knot, MarginError, RegulatorDesign, regulator_signals
-from .gain_scheduling import DESIGN_POINTS, ScheduledController
+from .design import ControlAim, Knot, MarginError, RegulatorDesign, integrated_freedoms, regulator_signals, require_taut
+from .gain_scheduling import DESIGN_POINTS, DesignPose, ScheduledController, design_poses
 from .sampled_plant import ramp_plant
 from .stability_margins import Margins, Range, margins_of
 
@@ -128,9 +129,9 @@ class RobustAim:
 
 @dataclass(frozen=True)
 class RobustController(RegulatorDesign):
-    """A robust controller with q states, the first three of which are integrals of position.
+    """A robust controller with q states, the first of which are integrals of the pose, or of the position alone.
 
-    ``linear`` is the plant in the middle of the range; ``bandwidth``, that of position, is a multiple of the lowest
+    ``linear`` is the plant in the middle of the range; ``bandwidth``, that of the pose, is a multiple of the lowest
     mode; ``margins`` are the worst over the range.
     """
 
@@ -145,16 +146,18 @@ def design_robust(
     parameter_range: Range | None = None,
     robust: RobustAim | None = None,
     at: Sequence[float] | None = None,
+    orientation: Sequence[float] | None = None,
 ) -> RobustController:
     """Designs the fastest loop whose disk margins hold over a range, at a position (m), by default the start.
 
-    The default range is :meth:`Range.of` the robot.
+    The default range is :meth:`Range.of` the robot. The ``orientation`` of a rigid platform is a unit quaternion, by
+    default that of the robot file.
 
     Raises MarginError where no design does, and what :func:`tautwire.linear.linearise` raises.
     """
     start = robot.platform.start if at is None else at
     (design,) = _fastest_designs(
-        robot, np.array([start]), aim or ControlAim(), parameter_range or Range.of(robot), robust or RobustAim()
+        robot, [(start, orientation)], aim or ControlAim(), parameter_range or Range.of(robot), robust or RobustAim()
     )
     return design
 
@@ -172,25 +175,30 @@ def schedule_robust(
     Raises MarginError where no design does, and what :func:`tautwire.linear.linearise` raises.
     """
     times = np.linspace(0.0, trajectory.duration, points)
-    positions = trajectory.position(times)
     designs = _fastest_designs(
-        robot, positions, aim or ControlAim(), parameter_range or Range.of(robot), robust or RobustAim()
+        robot,
+        design_poses(trajectory, times),
+        aim or ControlAim(),
+        parameter_range or Range.of(robot),
+        robust or RobustAim(),
     )
     return ScheduledController(tuple(times.tolist()), tuple(designs))
 
 
 def _fastest_designs(
-    robot: Robot, positions: Array, aim: ControlAim, parameter_range: Range, robust: RobustAim
+    robot: Robot, poses: Sequence[DesignPose], aim: ControlAim, parameter_range: Range, robust: RobustAim
 ) -> list[RobustController]:
-    """Designs of one bandwidth at all positions, the largest at which all have the required margin."""
-    nominal_plants = [linearise(parameter_range.middle(robot), position) for position in positions]
-    range_plants = [
-        [linearise(each, position) for _, _, each in parameter_range.robots(robot)] for position in positions
+    """Designs of one bandwidth at all poses, the largest at which all have the required margin."""
+    robots = [parameter_range.middle(robot), *(each for _, _, each in parameter_range.robots(robot))]
+    plants = [
+        [linearise(each, position, orientation=orientation) for each in robots] for position, orientation in poses
     ]
+    for nominal_plant, *_ in plants:
+        require_taut(robot, nominal_plant)
     best_margin = 0.0
     for bandwidth in RELATIVE_BANDWIDTHS:
         designs: list[RobustController] = []
-        for nominal_plant, varied_plants in zip(nominal_plants, range_plants, strict=True):
+        for nominal_plant, *varied_plants in plants:
             design = _design_at(robot, nominal_plant, varied_plants, aim, robust, bandwidth)
             if design.margins.min_disk < robust.margin:
                 best_margin = max(best_margin, design.margins.min_disk)
@@ -211,9 +219,8 @@ def _design_at(
 ) -> RobustController:
     """A design with its worst margins over some plants, up to the first that falls short."""
     regulator = _shape_regulator(robot, linear, aim.period, bandwidth, robust)
-    tracking = back_calculation(
-        regulator, BACK_CALCULATION_FACTOR * robust.integral * _lowest_frequency(linear) * aim.period
-    )
+    share = BACK_CALCULATION_FACTOR * robust.integral * _lowest_frequency(linear) * aim.period
+    tracking = back_calculation(regulator, share, integrated_freedoms(robot.cable_count, linear.degrees_of_freedom))
     knot = Knot(0.0, regulator, tracking)
     worst = margins_of(plants[0], knot)
     for plant in plants[1:]:
@@ -223,18 +230,19 @@ def _design_at(
     return RobustController(aim, regulator, tracking, linear, bandwidth, worst)
 
 
-def back_calculation(regulator: Any, share: float) -> Array:
+def back_calculation(regulator: Any, share: float, integrated: int) -> Array:
     """Anti-windup gain of the integrals, (q, n): a ``share`` of what makes the commanded speed the limited one.
 
-    The other states of the regulator are stable by themselves.
+    The first ``integrated`` states are the integrals. The other states of the regulator are stable by themselves.
     """
     count = regulator.noutputs
-    others = slice(3, regulator.nstates - count)
+    sums, others = slice(0, integrated), slice(integrated, regulator.nstates - count)
     speed_rows = regulator.A[-count:]
-    steady_state = np.linalg.solve(np.eye(others.stop - 3) - regulator.A[others, others], regulator.A[others, :3])
-    steady_gain = speed_rows[:, :3] + speed_rows[:, others] @ steady_state
+    identity = np.eye(others.stop - integrated)
+    steady_state = np.linalg.solve(identity - regulator.A[others, others], regulator.A[others, sums])
+    steady_gain = speed_rows[:, sums] + speed_rows[:, others] @ steady_state
     gain = np.zeros((regulator.nstates, count))
-    gain[:3] = share * regulator.dt * np.linalg.pinv(steady_gain)
+    gain[sums] = share * regulator.dt * np.linalg.pinv(steady_gain)
     return gain
 
 
@@ -244,20 +252,22 @@ def _lowest_frequency(linear: LinearPlant) -> float:
 
 
 def _shape_regulator(robot: Robot, linear: LinearPlant, period: float, bandwidth: float, robust: RobustAim) -> Any:
-    """Regulator of one loop shape: scaled position and tensions, and winches that respond two samples later."""
-    count = len(linear.tensions)
+    """Regulator of one loop shape: scaled pose and tensions, and winches that respond two samples later."""
+    count, freedoms = len(linear.tensions), linear.degrees_of_freedom
+    integrated = integrated_freedoms(count, freedoms)
     lowest_frequency = _lowest_frequency(linear)
     lengths = np.linalg.norm(np.array(robot.anchors) - linear.position, axis=1)
     stiffness = float(np.mean([cable.modulus * cable.area for cable in robot.cables] / lengths))
-    signal_weights = np.repeat(
-        [bandwidth * lowest_frequency, robust.damping * lowest_frequency / stiffness], [3, count]
-    )
+    # A rotation weighs as much as the attachments' displacement by it.
+    speed = bandwidth * lowest_frequency
+    pose_weights = np.repeat([speed, speed * platform_size(robot)], [3, freedoms - 3])
+    signal_weights = np.append(pose_weights, np.full(count, robust.damping * lowest_frequency / stiffness))
     plant = ramp_plant(linear, period)
     scaled = control.ss(plant.A, plant.B, signal_weights[:, None] * plant.C, signal_weights[:, None] * plant.D, period)
-    # Position also by its integral: (s + w) / s.
-    corner = robust.integral * lowest_frequency
-    position_selector = np.eye(3 + count, 3)
-    weights = control.ss(np.zeros((3, 3)), corner * position_selector.T, position_selector, np.eye(3 + count))
+    # The pose also by its integral: (s + w) / s.
+    corner, sensors = robust.integral * lowest_frequency, freedoms + count
+    selector = np.eye(sensors, integrated)
+    weights = control.ss(np.zeros((integrated, integrated)), corner * selector.T, selector, np.eye(sensors))
     synthesised = synthesise_controller(scaled * _delay_system(count, period), weights)
     return _as_regulator(
         control.ss(
@@ -290,5 +300,5 @@ def _as_regulator(speed_controller: Any, count: int) -> Any:
         np.hstack([none((count, size)), identity_rate]),
         np.hstack([none((count, sensors)), -identity_rate]),
         period,
-        **regulator_signals(count),
+        **regulator_signals(count, sensors - count),
     )

@@ -22,8 +22,11 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from ..errors import InputError
-from ..linear import modes_along
+from ..errors import InputError, describe_value
+from ..linear import linearise, modes_along
+from ..linear.modes_along_path import ModesAlong
+from ..robot.pose_path import pose_path, sample_poses
+from ..robot.pose_trajectory import OrientationTrajectory, PoseTrajectory, turns
 from ..robot.schema import Robot
 from ..robot.trajectory import Trajectory
 
@@ -34,6 +37,9 @@ _DelayedEvaluation = Callable[[Callable[[Array], Array], Array], Array]
 
 EI_TOLERATED_VIBRATION = 0.05
 SHAPER_POINTS = 9
+# Of the largest residual vibration: a mode with less is left as it is.
+MIN_RESIDUAL_SHARE = 0.02
+SAMPLES_PER_PERIOD = 20
 
 
 @dataclass(frozen=True)
@@ -150,22 +156,69 @@ class ShapedTrajectory:
         return curve(clipped), within[:, None] * curve(clipped, 1), within[:, None] * curve(clipped, 2)
 
 
-def shaped(trajectory: Trajectory, impulses: Shaper) -> ShapedTrajectory:
-    """A trajectory under one constant shaper."""
-    return ShapedTrajectory(trajectory, np.zeros(1), impulses.amplitudes[None], impulses.delays[None])
+def shaped(trajectory: Trajectory, impulses: Shaper) -> ShapedTrajectory | PoseTrajectory:
+    """A trajectory under one constant shaper; of one that turns, both translation and rotation.
+
+    Raises InputError where a trajectory turns and is no :class:`tautwire.robot.pose_trajectory.PoseTrajectory`.
+    """
+    return _shaped_pose(trajectory, np.zeros(1), impulses.amplitudes[None], impulses.delays[None])
 
 
 def shape_along(
     robot: Robot, trajectory: Trajectory, kind: ShaperKind = "ZV", points: int = SHAPER_POINTS
-) -> ShapedTrajectory:
-    """A trajectory under shapers for all three modes, which vary with the platform's position.
+) -> ShapedTrajectory | PoseTrajectory:
+    """A trajectory under shapers for the modes, which vary with the platform's pose.
 
-    Raises what :func:`tautwire.linear.modes_along` raises.
+    They are all three of a point mass. Of a rigid platform they are those whose vibration the trajectory would leave
+    behind, each at least a fiftieth of the largest.
+
+    Raises what :func:`tautwire.linear.modes_along` raises, UnreachableError where fewer than six cables cannot hold the
+    platform along the path, and InputError as :func:`shaped` does.
     """
     times = np.linspace(0.0, trajectory.duration, points)
     modes = modes_along(robot, trajectory, times)
-    shapers = [shaper_for_modes(f, z, kind) for f, z in zip(modes.frequencies, modes.damping_ratios, strict=True)]
+    frequencies, ratios = modes.frequencies, modes.damping_ratios
+    if robot.platform.is_rigid_body:
+        left = residual_amplitudes(robot, trajectory, modes)
+        matters = left >= MIN_RESIDUAL_SHARE * np.max(left)
+        frequencies, ratios = frequencies[:, matters], ratios[:, matters]
+    shapers = [shaper_for_modes(f, z, kind) for f, z in zip(frequencies, ratios, strict=True)]
     delays = np.array([each.delays for each in shapers])
     amplitudes = np.array([each.amplitudes for each in shapers])
     # Half of the impulses have passed when the platform is there.
-    return ShapedTrajectory(trajectory, times + 0.5 * np.max(delays, axis=1), amplitudes, delays)
+    return _shaped_pose(trajectory, times + 0.5 * np.max(delays, axis=1), amplitudes, delays)
+
+
+def residual_amplitudes(robot: Robot, trajectory: Trajectory, modes: ModesAlong) -> Array:
+    """Vibration that a trajectory leaves behind in each of its modes, undamped, (d,) in m of its largest displacement.
+
+    ``|integral of phi' M a exp(-i w t)| / (w phi' M phi)`` with the mode in the middle of the path, a the acceleration
+    of the pose.
+    """
+    middle = len(modes.positions) // 2
+    path, omega, shapes = pose_path(robot, trajectory), 2.0 * np.pi * modes.frequencies[middle], modes.shapes[middle]
+    count = int(np.ceil(SAMPLES_PER_PERIOD * trajectory.duration * np.max(modes.frequencies[middle]))) + SHAPER_POINTS
+    times = np.linspace(0.0, trajectory.duration, count)
+    at_middle = sample_poses("residual_amplitudes", robot, path, modes.abscissa[middle : middle + 1])
+    plant = linearise(robot, at_middle.position[0], 0.0, at_middle.orientation[0])
+    d = plant.degrees_of_freedom
+    mass = np.linalg.inv(plant.system.B[d : 2 * d, robot.cable_count :])
+    accelerations = sample_poses("residual_amplitudes", robot, path, times).acceleration
+    forcing = accelerations @ mass @ shapes / np.sum(shapes * (mass @ shapes), axis=0)
+    amplitudes: Array = np.abs(np.trapezoid(forcing * np.exp(-1j * np.outer(times, omega)), times, axis=0)) / omega
+    return amplitudes
+
+
+def _shaped_pose(
+    trajectory: Trajectory, times: Array, amplitudes: Array, delays: Array
+) -> ShapedTrajectory | PoseTrajectory:
+    if not turns(trajectory):
+        return ShapedTrajectory(trajectory, times, amplitudes, delays)
+    if not isinstance(trajectory, PoseTrajectory):
+        hint = "give a PoseTrajectory of a translation and an orientation by its rotation vector"
+        raise InputError("trajectory", f"turns, but is {describe_value(trajectory)}", hint)
+    translation, rotation = (
+        ShapedTrajectory(part, times, amplitudes, delays)
+        for part in (trajectory.translation, trajectory.rotation.rotation_vector)
+    )
+    return PoseTrajectory(translation, OrientationTrajectory(trajectory.rotation.start, rotation))

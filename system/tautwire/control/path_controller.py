@@ -8,11 +8,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from tautwire_fmu.laws import sampled_control as law
+from tautwire_fmu.laws.mathematics import REAL
+from tautwire_fmu.laws.rotation import multiply, quaternion_of
 from tautwire_fmu.laws.sampled_control import ControllerState, Limits
 from tautwire_fmu.laws.winch_drive import NO_LIMIT
 
+from ..cosimulation.robot_wiring import measured_output_indices
 from ..errors import InputError
 from ..robot.schema import Robot
+from ..robot.static_equilibrium import start_attachments
 from ..robot.trajectory import Trajectory
 from .design import Design, Knot, measurement_noise
 from .feedforward import Reference, elastic_reference
@@ -23,9 +27,15 @@ Array = NDArray[np.float64]
 def controller_data(robot: Robot, design: Design, reference: Reference) -> dict[str, Any]:
     """The content of a controller's resource: lists and numbers, as the law of the FMU takes them.
 
-    Raises InputError where a regulator acts on position or tension without a sample of delay.
+    Raises InputError where a regulator acts on pose or tension without a sample of delay, or measures another pose.
     """
-    period = design.aim.period
+    period, knots = design.aim.period, design.knots()
+    measured_count = len(measurement_noise(robot))
+    for regulator in (knot.regulator for knot in knots if knot.regulator.nstates):
+        if regulator.ninputs - regulator.noutputs != measured_count:
+            pose = "positions and rotations" if robot.platform.is_rigid_body else "positions"
+            problem = f"measures {regulator.ninputs - regulator.noutputs} signals, {robot.name} shows {measured_count}"
+            raise InputError(regulator.name, problem, f"design it for {pose} and {robot.cable_count} tensions")
     return {
         "description": f"controller of {robot.name}",
         "period": period,
@@ -33,7 +43,7 @@ def controller_data(robot: Robot, design: Design, reference: Reference) -> dict[
         "stretches": (reference.speeds - reference.rigid).tolist(),
         "expected": reference.expected.tolist(),
         "at_rest": reference.at_rest.tolist(),
-        "knots": [_knot_data(knot, period) for knot in design.knots()],
+        "knots": [_knot_data(knot, period) for knot in knots],
         "compliances": cable_compliances(robot).tolist(),
         "yield_time": design.aim.yield_time,
         "tares": design.uses_feedback and design.aim.tare,
@@ -58,7 +68,7 @@ def control_limits(robot: Robot, design: Design) -> Limits:
 
 def cable_compliances(robot: Robot) -> Array:
     """Compliance of each cable at the start, ``l / (E S)``, shape (n,), in m/N."""
-    lengths = np.linalg.norm(np.array(robot.anchors) - robot.platform.start, axis=1)
+    lengths = np.linalg.norm(np.array(robot.anchors) - np.array(start_attachments(robot)), axis=1)
     stiffness = np.array([cable.modulus * cable.area for cable in robot.cables])
     result: Array = lengths / stiffness
     return result
@@ -104,10 +114,11 @@ class PathController:
         self.reference = reference
         self.plan = law.plan_from_resource(controller_data(robot, controller, reference))
         self.limits = control_limits(robot, controller)
-        self.noise = np.zeros_like(reference.expected)
+        noise = measurement_noise(robot)
+        self.noise = np.zeros((len(reference.expected), len(noise)))
         if seed is not None:
-            standard_noise = np.random.default_rng(seed).standard_normal(self.noise.shape)
-            self.noise = standard_noise * measurement_noise(robot)
+            self.noise = np.random.default_rng(seed).standard_normal(self.noise.shape) * noise
+        self._sensors = measured_output_indices(robot.cable_count, robot.platform.is_rigid_body)
         self.times = times
         self._controller_state = law.initial_controller_state(self.plan, self.limits)
         self._measurement: list[float] | None = None
@@ -140,6 +151,15 @@ class PathController:
         if self._measurement is not None:
             self._controller_state = self._next_state(self._controller_state, self._measurement)
             self._speeds.append(self._controller_state.end)
-        count = self.controller.cable_count
-        measured = np.concatenate([outputs[:3], outputs[6 : 6 + count]])
-        self._measurement = (measured + self.noise[index]).tolist()
+        self._measurement = _with_noise(outputs[self._sensors].tolist(), self.noise[index].tolist())
+
+
+def _with_noise(measured: list[float], noise: list[float]) -> list[float]:
+    """Measurements with noise, of an orientation by a rotation vector in the axes of the world."""
+    if len(measured) == len(noise):
+        return [value + error for value, error in zip(measured, noise, strict=True)]
+    position, orientation, tensions = measured[:3], measured[3:7], measured[7:]
+    turned = multiply(quaternion_of(REAL, noise[3:6]), orientation)
+    rest = zip([*position, *tensions], [*noise[:3], *noise[6:]], strict=True)
+    x, y, z, *noisy_tensions = (value + error for value, error in rest)
+    return [x, y, z, *turned, *noisy_tensions]

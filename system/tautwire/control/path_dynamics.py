@@ -20,6 +20,7 @@ from numpy.typing import NDArray
 from ..errors import ArgumentError, UnreachableError
 from ..name_suggestions import suggest_name
 from ..robot.pose_path import PoseSamples, pose_path, sample_poses
+from ..robot.pose_trajectory import rotation_vectors_between
 from ..robot.rigid_equilibrium import platform_size
 from ..robot.schema import Robot, TensionLimits
 from ..robot.static_equilibrium import static_tensions
@@ -40,10 +41,7 @@ PUSH_TOLERANCE = 1e-9
 
 @dataclass(frozen=True)
 class PathLaws:
-    """The laws at the poses of a path: ``model``, whose rotations count from the ``orientation`` of each pose.
-
-    ``laws`` are a function from states, inputs and the orientation to the rates, the outputs and the span tensions.
-    """
+    """The laws as a function of states and inputs: rates, outputs and span tensions of a ``model``."""
 
     model: SymbolicModel
     laws: casadi.Function
@@ -51,15 +49,16 @@ class PathLaws:
     @classmethod
     def of(cls, robot: Robot) -> PathLaws:
         """Those of a robot."""
-        orientation = SX.sym("orientation", 4)
-        model = symbolic_model(robot, reference_orientation=tuple(casadi.vertsplit(orientation)))
+        model = symbolic_model(robot)
         results = [model.rates, model.outputs, model.span_tensions]
-        return cls(model, casadi.Function("laws", [model.states, model.inputs, orientation], results))
+        return cls(model, casadi.Function("laws", [model.states, model.inputs], results))
 
-    def state(self, position: SX, twist: SX, remaining_states: SX) -> SX:
-        """The state at a pose from which rotations count, with lengths and states of effects."""
-        no_rotation = SX(self.model.indices.degrees_of_freedom - 3, 1)
-        return casadi.vertcat(position, no_rotation, twist, remaining_states)
+    def pose_states(self, poses: PoseSamples) -> Array:
+        """Poses as states of the model (N, d): of a rigid body a rotation vector follows the position."""
+        if self.model.indices.degrees_of_freedom == 3:
+            return poses.position
+        reference = np.array(self.model.reference_orientation, dtype=float)
+        return np.hstack([poses.position, rotation_vectors_between(poses.orientation, reference)])
 
 
 @dataclass(frozen=True)
@@ -111,21 +110,19 @@ def path_dynamics(robot: Robot, laws: PathLaws, poses: PoseSamples, times: Array
 def _required_wrenches(robot: Robot, laws: PathLaws, poses: PoseSamples, matrices: Array) -> tuple[Array, Array]:
     """The wrenches (N, d) of the tensions along the cables, and the mass matrices (N, d, d)."""
     model, count, d = laws.model, robot.cable_count, laws.model.indices.degrees_of_freedom
-    position, orientation, twist, speeds = (
-        SX.sym(name, size) for name, size in (("p", 3), ("q", 4), ("v", d), ("s", count))
-    )
+    pose, twist, speeds = (SX.sym(name, size) for name, size in (("x", d), ("v", d), ("s", count)))
     start = SX(casadi.evalf(model.start[2 * d :]))
     inputs, wrench = casadi.vertcat(speeds, SX(d, 1)), SX.sym("wrench", d)
     # Ropes as long as their spans carry the start tensions, so that no large numbers cancel.
-    lengths = laws.laws(laws.state(position, twist, start), inputs, orientation)[1][-count:]
-    state = laws.state(position, twist, casadi.vertcat(lengths, start[count:]))
-    rates, _, tensions = laws.laws(state, casadi.vertcat(speeds, wrench), orientation)
+    lengths = laws.laws(casadi.vertcat(pose, twist, start), inputs)[1][-count:]
+    state = casadi.vertcat(pose, twist, lengths, start[count:])
+    rates, _, tensions = laws.laws(state, casadi.vertcat(speeds, wrench))
     acceleration = rates[d : 2 * d]
     inverse_mass = casadi.jacobian(acceleration, wrench)
     no_wrench = [casadi.substitute(each, wrench, SX.zeros(d)) for each in (acceleration, inverse_mass, tensions)]
-    evaluate = casadi.Function("dynamics", [position, orientation, twist, speeds], no_wrench)
+    evaluate = casadi.Function("dynamics", [pose, twist, speeds], no_wrench)
     columns = evaluate.map(len(poses.position))(
-        poses.position.T, poses.orientation.T, poses.twist.T, winch_speeds_at(robot, poses).T
+        laws.pose_states(poses).T, poses.twist.T, winch_speeds_at(robot, poses).T
     )
     accelerations, inverse_masses, model_tensions = (np.asarray(each, dtype=float).T for each in columns)
     # Matrices are stored side by side, so that each is transposed; mass matrices are symmetric.

@@ -9,17 +9,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..linear import LinearPlant
+from ..robot.platform_symbols import StateIndices
 
 Array = NDArray[np.float64]
 
 
 def sensor_output_indices(linear: LinearPlant) -> list[int]:
-    """Indices of position and tensions among the plant's outputs."""
-    return [*range(3), *range(6, 6 + len(linear.tensions))]
+    """Indices of pose and tensions among the plant's outputs."""
+    indices = StateIndices(linear.degrees_of_freedom, len(linear.tensions))
+    outputs = range(linear.system.noutputs)
+    return [*outputs[indices.pose], *outputs[indices.tensions]]
 
 
 def sampled_plant(linear: LinearPlant, period: float) -> Any:
-    """Discrete plant from winch accelerations, held for ``period`` (s), to position, tensions and winch speeds.
+    """Discrete plant from winch accelerations, held for ``period`` (s), to pose, tensions and winch speeds.
 
     A ``control.StateSpace`` with states (plant, winch speeds): inputs held over a sample are then ramps of speed.
     """
@@ -40,7 +43,7 @@ def sampled_plant(linear: LinearPlant, period: float) -> Any:
 
 
 def ramp_plant(linear: LinearPlant, period: float) -> Any:
-    """Discrete plant from winch speeds to position and tensions at the samples: ``control.StateSpace``, (3 + n, n)."""
+    """Discrete plant from winch speeds to pose and tensions at the samples: ``control.StateSpace``, (d + n, n)."""
     system, count = linear.system, len(linear.tensions)
     sensor_rows = sensor_output_indices(linear)
     driven = control.ss(

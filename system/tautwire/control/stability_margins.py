@@ -96,13 +96,17 @@ class Range:
 
 
 def robot_with(robot: Robot, modulus: float, payload: float) -> Robot:
-    """The robot with another modulus (Pa) of all cables, and its mass times ``payload``."""
+    """The robot with another modulus (Pa) of all cables, and its mass and inertia times ``payload``."""
     cables = tuple(replace(cable, modulus=modulus) for cable in robot.cables)
-    return replace(robot, cables=cables, platform=replace(robot.platform, mass=payload * robot.platform.mass))
+    platform = replace(robot.platform, mass=payload * robot.platform.mass)
+    if platform.inertia is not None:
+        xx, yy, zz = ((payload * x, payload * y, payload * z) for x, y, z in platform.inertia)
+        platform = replace(platform, inertia=(xx, yy, zz))
+    return replace(robot, cables=cables, platform=platform)
 
 
 def speed_controller(regulator: Any) -> Any:
-    """A regulator with integrated winch speeds: ``control.StateSpace`` from position and tensions to winch speeds."""
+    """A regulator with integrated winch speeds: ``control.StateSpace`` from pose and tensions to winch speeds."""
     count, sensors = regulator.noutputs, regulator.ninputs - regulator.noutputs
     period, states = regulator.dt, regulator.nstates
     feedthrough = regulator.D[:, sensors:]
@@ -140,17 +144,23 @@ def margins_of(linear: LinearPlant, knot: Knot) -> Margins:
 
 
 def margins_over(
-    robot: Robot, knots: Sequence[Knot], positions: Array, parameter_range: Range | None = None, points: int = 3
+    robot: Robot,
+    knots: Sequence[Knot],
+    positions: Array,
+    parameter_range: Range | None = None,
+    points: int = 3,
+    orientations: Array | None = None,
 ) -> Margins:
-    """The worst margins over a range of robots, of each knot at its position (K, 3) in m.
+    """The worst margins over a range of robots, of each knot at its position (K, 3) in m, and orientation (K, 4).
 
     Raises what :func:`tautwire.linear.linearise` raises.
     """
     robots = [each for _, _, each in parameter_range.robots(robot, points)] if parameter_range else [robot]
+    held = [None] * len(positions) if orientations is None else orientations.tolist()
     all_margins = [
-        margins_of(linearise(each, position), knot)
+        margins_of(linearise(each, position, orientation=orientation), knot)
         for each in robots
-        for knot, position in zip(knots, positions, strict=True)
+        for knot, position, orientation in zip(knots, positions, held, strict=True)
     ]
     worst = all_margins[0]
     for other in all_margins[1:]:

@@ -186,6 +186,13 @@ def recorded_ports(
     return [*platform, *cables, *(Port(winch_name(index), "winch_speed") for index in winches)]
 
 
+def measured_output_indices(cable_count: int, is_rigid: bool = False) -> list[int]:
+    """Indices of what a controller measures among :func:`recorded_ports`: position, orientation and tensions."""
+    first_cable = len(POINT_COLUMNS) + (len(TURNING_COLUMNS) if is_rigid else 0)
+    orientation = range(len(POINT_COLUMNS), len(POINT_COLUMNS) + len(ORIENTATION_AXES)) if is_rigid else ()
+    return [*range(len(AXES)), *orientation, *range(first_cable, first_cable + cable_count)]
+
+
 def result_columns(
     cable_count: int, winches: Collection[int] = (), missing_ports: Collection[Port] = (), is_rigid: bool = False
 ) -> list[Column]:

@@ -53,12 +53,17 @@ class LinearPlant:
     notes: tuple[str, ...] = ()
     orientation: Quaternion = (1.0, 0.0, 0.0, 0.0)
 
+    @property
+    def degrees_of_freedom(self) -> int:
+        """Those of the platform, d: 6 of a rigid body, 3 of a point mass."""
+        return len(self.modes.shapes)
+
 
 def linearise(
     robot: Robot,
     at: Sequence[float] | Array | None = None,
     swing: float = DEFAULT_SWING,
-    orientation: Sequence[float] | None = None,
+    orientation: Sequence[float] | Array | None = None,
 ) -> LinearPlant:
     """Linearises the robot at rest at a position, three coordinates in m, by default the start, with exact derivatives.
 
@@ -97,7 +102,9 @@ def linearise(
     )
 
 
-def _pose_at_rest(robot: Robot, position: Array, orientation: Sequence[float] | None) -> tuple[Pose, Array, float]:
+def _pose_at_rest(
+    robot: Robot, position: Array, orientation: Sequence[float] | Array | None
+) -> tuple[Pose, Array, float]:
     """The pose at rest at a position (m), static tensions (n,) in N there, and what passes for rest."""
     if not robot.platform.is_rigid_body:
         pose = Pose(robot, position, robot.platform.start_orientation)

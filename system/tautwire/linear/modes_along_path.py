@@ -12,6 +12,7 @@ from scipy.optimize import linear_sum_assignment
 
 from ..array_validation import validate_array, validate_increasing
 from ..errors import ArgumentError
+from ..robot.pose_trajectory import turns
 from ..robot.schema import Robot, validate_robot
 from ..robot.trajectory import Trajectory, require_trajectory
 from ..validation import validate_integer
@@ -20,6 +21,7 @@ from .modes import Modes, cable_shares, translational_shares
 from .operating_point import Pose
 
 Array = NDArray[np.float64]
+_PathPose = tuple[Array, Array | None]
 
 DEFAULT_POINTS = 101
 MIN_MODAL_ASSURANCE = 0.9
@@ -76,19 +78,20 @@ def modes_along(
     ``path`` is a trajectory, taken at ``times`` (N,) in s or at ``points`` equidistant times of its duration, or
     positions (N, 3) in m, optionally with ``times``. Modes are matched by shape; between neighbours whose shapes differ
     much the path is bisected, up to six times. Shapes of modes whose frequencies differ by less than 0.1 % are not
-    unique: they are rotated to match the previous ones, so that modes that come so near cross. A rigid platform keeps
-    its start orientation, or hangs in equilibrium where fewer than six cables hold it.
+    unique: they are rotated to match the previous ones, so that modes that come so near cross. A rigid platform has the
+    orientation of the trajectory, or keeps its start orientation; fewer than six cables hold it in equilibrium.
 
     Raises ArgumentError for an invalid argument or a path of fewer than two points, and what
     :func:`tautwire.linear.linearise` raises.
     """
     validate_robot("modes_along: robot", robot)
     validate_integer("modes_along: points", points, 2, "give two or more")
-    position_at, abscissa, is_timed = _path_positions(path, times, points)
+    pose_at, abscissa, is_timed = _path_poses(path, times, points)
     count = len(abscissa)
 
     def modes_at(coordinate: float) -> _LocalModes:
-        return _local_modes(robot, linearise(robot, position_at(coordinate), swing=0.0))
+        position, orientation = pose_at(coordinate)
+        return _local_modes(robot, linearise(robot, position, 0.0, orientation))
 
     local_modes = [modes_at(float(index)) for index in range(count)]
     tracked_modes = _track_modes(modes_at, local_modes)
@@ -97,7 +100,7 @@ def modes_along(
         np.min(_modal_assurance(local, a, b).diagonal())
         for local, (a, b) in zip(local_modes[1:], pairwise(tracked_modes), strict=True)
     ]
-    positions = np.array([position_at(float(index)) for index in range(count)])
+    positions = np.array([pose_at(float(index))[0] for index in range(count)])
     return ModesAlong(
         abscissa=abscissa, is_timed=is_timed, positions=positions, modal_assurance=np.array(assurance), **stacked
     )
@@ -120,10 +123,10 @@ def _local_modes(robot: Robot, plant: LinearPlant) -> _LocalModes:
     return _LocalModes(plant.modes, mass_root, with_shapes)
 
 
-def _path_positions(
+def _path_poses(
     path: Trajectory | ArrayLike, times: ArrayLike | None, points: int
-) -> tuple[Callable[[float], Array], Array, bool]:
-    """The position as a function of the (fractional) point number, the abscissa, and whether that is time."""
+) -> tuple[Callable[[float], _PathPose], Array, bool]:
+    """The pose as a function of the (fractional) point number, the abscissa, and whether that is time."""
     if not hasattr(path, "__len__"):
         trajectory = require_trajectory("modes_along: path", path)
         requested_times = np.linspace(0.0, trajectory.duration, points) if times is None else times
@@ -131,7 +134,13 @@ def _path_positions(
             "modes_along: times", requested_times, "finite times (N,) in s that rise, two or more"
         )
         numbers = np.arange(len(instants))
-        return (lambda where: trajectory.position(np.array([np.interp(where, numbers, instants)]))[0]), instants, True
+
+        def pose_at(where: float) -> _PathPose:
+            time = np.array([np.interp(where, numbers, instants)])
+            orientation = trajectory.orientation(time)[0] if turns(trajectory) else None
+            return trajectory.position(time)[0], orientation
+
+        return pose_at, instants, True
     positions = validate_array("modes_along: path", path, (None, 3), "a path, or finite positions (N, 3) in m")
     if len(positions) < 2:
         raise ArgumentError("modes_along: path", path, f"has {len(positions)} places", "give two or more")
@@ -142,7 +151,7 @@ def _path_positions(
         meaning = f"one time for each of {len(positions)} positions, in s"
         abscissa = validate_array("modes_along: times", times, (len(positions),), meaning)
     return (
-        (lambda where: np.array([np.interp(where, numbers, axis) for axis in positions.T])),
+        (lambda where: (np.array([np.interp(where, numbers, axis) for axis in positions.T]), None)),
         abscissa,
         times is not None,
     )

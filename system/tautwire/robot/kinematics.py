@@ -37,7 +37,7 @@ UNREACHABLE_RESIDUAL = 1e3  # m, of poses at which a cable has no length
 
 
 def structure_matrix(
-    robot: Robot, position: Sequence[float] | Array | None = None, orientation: Sequence[float] | None = None
+    robot: Robot, position: Sequence[float] | Array | None = None, orientation: Sequence[float] | Array | None = None
 ) -> Array:
     """Structure matrix (wrench matrix) A at a pose, by default the start as declared: the wrench of tensions T is A T.
 
@@ -60,7 +60,7 @@ def structure_matrix_at(robot: Robot, at: Array, quaternion: Quaternion) -> Arra
 
 
 def length_jacobian(
-    robot: Robot, position: Sequence[float] | Array | None = None, orientation: Sequence[float] | None = None
+    robot: Robot, position: Sequence[float] | Array | None = None, orientation: Sequence[float] | Array | None = None
 ) -> Array:
     """Jacobian of the cable lengths with respect to the twist at a pose: ``dl/dt = J t``, ``J = -A^T``, shape (n, 6).
 
@@ -70,7 +70,7 @@ def length_jacobian(
 
 
 def inverse_kinematics(
-    robot: Robot, position: Sequence[float] | Array | None = None, orientation: Sequence[float] | None = None
+    robot: Robot, position: Sequence[float] | Array | None = None, orientation: Sequence[float] | Array | None = None
 ) -> Array:
     """Inverse kinematics: the lengths of taut, straight cables at a pose, with those on pulleys, shape (n,), in m.
 
@@ -93,7 +93,7 @@ def forward_kinematics(
     robot: Robot,
     lengths: Sequence[float] | Array,
     position: Sequence[float] | Array | None = None,
-    orientation: Sequence[float] | None = None,
+    orientation: Sequence[float] | Array | None = None,
     starts: int = DEFAULT_STARTS,
 ) -> tuple[ForwardSolution, ...]:
     """Forward kinematics: all distinct poses near a guess whose cable lengths fit ``lengths`` (n,) in m best.
@@ -176,7 +176,7 @@ def _is_same(one: ForwardSolution, other: ForwardSolution, scale: float) -> bool
 
 
 def validated_pose(
-    caller: str, robot: Robot, position: Sequence[float] | Array | None, orientation: Sequence[float] | None
+    caller: str, robot: Robot, position: Sequence[float] | Array | None, orientation: Sequence[float] | Array | None
 ) -> tuple[Array, Quaternion]:
     """A pose in m and as a unit quaternion, by default the start as declared; raises ArgumentError if it is invalid."""
     platform = validate_robot(f"{caller}: robot", robot).platform

@@ -64,7 +64,7 @@ def static_equilibrium(
     robot: Robot,
     position: Sequence[float] | Array | None = None,
     rule: str = "nearest",
-    orientation: Sequence[float] | None = None,
+    orientation: Sequence[float] | Array | None = None,
 ) -> StaticEquilibrium:
     """Static equilibrium of a rigid platform at a position in m, by default the start.
 
