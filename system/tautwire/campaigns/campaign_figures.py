@@ -17,7 +17,7 @@ from ..reports.downsampling import evenly_spaced_indices, pack_float32
 from .campaign_dataset import SERIES_FOLDER, part_files
 from .campaign_plan import Input, Plan
 from .campaign_summary import Summary, column_values, rows_by_variant
-from .dataset_schema import RowColumn, series_columns
+from .dataset_schema import ORIENTATION_COLUMNS, RowColumn, series_columns
 
 Array = NDArray[np.float64]
 
@@ -84,7 +84,7 @@ def figure_data(plan: Plan, cable_count: int, results: CampaignResults) -> dict[
         quantiles = {each.name: each.quantiles for each in spreads}
         bands: dict[str, Any] = {"time": "", "bands": []}
         if plan.paths and plan.compute.series > 1:
-            names = series_columns(cable_count)
+            names = series_columns(cable_count, plan.is_rigid)
             bands = _band_data(quantile_bands(plan, results.folder, variant, names), names)
         outputs = [
             _spread_data(rows, thinned_rows, each, quantiles, is_grid) for each in numeric_outputs(results.columns)
@@ -127,7 +127,9 @@ def column_label(name: str) -> str:
 def channel_description(name: str) -> tuple[str, str, str]:
     """Title, label and unit of a time series."""
     prefix, _, cable = name.rpartition("_")
-    return ("Tension", f"cable {cable}", "N") if prefix else ("Position", name, "m")
+    if prefix:
+        return "Tension", f"cable {cable}", "N"
+    return ("Orientation", name, "1") if name in ORIENTATION_COLUMNS else ("Position", name, "m")
 
 
 def _band_data(bands: QuantileBands, names: Sequence[str]) -> dict[str, Any]:

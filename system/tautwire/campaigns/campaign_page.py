@@ -42,7 +42,9 @@ OUTPUT_GROUPS = {
     "frequency": "Frequency",
     "damping_ratio": "Damping ratio",
     "stiffness": "Stiffness",
+    "end_q": "End orientation",
     "end": "End position",
+    "path_error_angle": "Orientation error",
     "path_error": "Path error",
     "tension": "Tension",
 }
@@ -149,7 +151,7 @@ def _band_panels(plan: Plan, robot: Robot) -> dict[str, list[tuple[int, str]]]:
     """Channel indices and labels of the bands over time, by quantity; empty where nothing moves."""
     groups: dict[str, list[tuple[int, str]]] = {}
     if plan.paths and plan.compute.series > 1:
-        for index, name in enumerate(series_columns(robot.cable_count)):
+        for index, name in enumerate(series_columns(robot.cable_count, plan.is_rigid)):
             title, label, _ = channel_description(name)
             groups.setdefault(title, []).append((index, label))
     return groups

@@ -15,7 +15,7 @@ from scipy import stats
 
 from .. import __version__
 from ..errors import InputError, TautwireError
-from ..robot.schema import Point
+from ..robot.schema import Point, Quaternion
 
 NORMAL, UNIFORM, TRIANGULAR, LOGNORMAL = "normal", "uniform", "triangular", "lognormal"
 LIST, LINSPACE = "list", "linspace"
@@ -155,8 +155,9 @@ class Correlation:
 class PathPlan:
     """A path: ``kind`` is "line", "helix" or "recording"; ``numbers`` are those of its kind in SI units.
 
-    ``start`` is where a line starts, None for the robot's start; ``recording`` is a file of winch speeds, and
-    ``digest`` is that of its content.
+    ``start`` is where a line starts, None for the robot's start; so are the unit quaternions ``start_orientation`` and
+    ``end_orientation``, None where the path does not turn. ``recording`` is a file of winch speeds, and ``digest`` is
+    that of its content.
     """
 
     name: str
@@ -166,6 +167,8 @@ class PathPlan:
     end: Point | None = None
     recording: str = ""
     digest: str = ""
+    start_orientation: Quaternion | None = None
+    end_orientation: Quaternion | None = None
 
 
 @dataclass(frozen=True)
@@ -225,6 +228,11 @@ class Plan:
     def keys(self) -> tuple[str, ...]:
         """The inputs' keys."""
         return tuple(each.key for each in self.inputs)
+
+    @property
+    def is_rigid(self) -> bool:
+        """Whether the platform turns."""
+        return "inertia" in self.content.get("platform", {})
 
     def digest(self) -> str:
         """Digest that differs between plans with different rows; contents of files count, their locations do not."""

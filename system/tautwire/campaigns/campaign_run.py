@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import ceil, log
 from pathlib import Path
 from typing import Any
@@ -32,13 +32,16 @@ from ..linear import linearise
 from ..linear.linear_plant import LinearPlant
 from ..recordings.recording import Recording
 from ..recordings.start_position import with_start
+from ..robot.platform_symbols import StateIndices
+from ..robot.pose_path import pose_path, sample_poses
+from ..robot.pose_trajectory import PoseTrajectory, rotation_vectors_between, slerp
 from ..robot.robot_file_reader import robot_from_content
-from ..robot.schema import AXES, Point, Robot
+from ..robot.schema import AXES, Robot
 from ..robot.static_equilibrium import static_tensions
 from ..robot.trajectory import Helix, Line, Trajectory
 from ..robot.winch_speeds import ideal_winch_speeds
 from .campaign_plan import OPEN_LOOP, Compute, PathPlan, Plan
-from .dataset_schema import FAILURE_COLUMN, MODE_NUMBERS, Row, series_columns
+from .dataset_schema import FAILURE_COLUMN, ORIENTATION_COLUMNS, Row, mode_numbers, series_columns
 from .fmu_cache import FmuBundle, build_bundle, cached_fmus
 from .parameter_space import with_values
 
@@ -52,7 +55,8 @@ MAX_REASON_LENGTH = 2000
 class ReferenceInput:
     """Reference input of a run: ``time`` (N,) in s with ``winch_speeds`` (N, n), or ``design`` with its ``reference``.
 
-    ``desired_position`` (N, 3) is the path in m, None for a recording; ``nominal_robot`` is the model for the design.
+    ``desired_position`` (N, 3) is the path in m, None for a recording, and ``desired_orientation`` (N, 4) that of a
+    rigid platform; ``nominal_robot`` is the model for the design.
     """
 
     nominal_robot: Robot
@@ -62,14 +66,18 @@ class ReferenceInput:
     winch_speeds: Array | None = None
     design: Design | None = None
     reference: Reference | None = None
+    desired_orientation: Array | None = None
 
 
-def path_start(robot: Robot, path: PathPlan) -> Point:
-    """Start position of a run along a path."""
+def at_path_start(robot: Robot, path: PathPlan) -> Robot:
+    """The robot at the start of a path."""
+    start, orientation = path.start or robot.platform.start, path.start_orientation
     if path.kind == "helix":
         x, y, z = path_trajectory(robot, path).position(np.zeros(1))[0].tolist()
-        return (x, y, z)
-    return path.start or robot.platform.start
+        start = (x, y, z)
+    if orientation is not None:
+        robot = replace(robot, platform=replace(robot.platform, start_orientation=orientation))
+    return with_start(robot, start)
 
 
 def build_reference_input(
@@ -79,7 +87,7 @@ def build_reference_input(
 
     Raises UnreachableError where the path asks a cable to push, and what designs of controllers raise.
     """
-    nominal_robot = with_start(robot, path_start(robot, path))
+    nominal_robot = at_path_start(robot, path)
     if path.kind == "recording":
         recording = recordings[path.name]
         count = int(np.searchsorted(recording.time, recording.time[0] + path.numbers["duration"], side="right"))
@@ -87,14 +95,22 @@ def build_reference_input(
         return ReferenceInput(nominal_robot, time, None, None, recording.winch_speed[:count])
     trajectory = path_trajectory(nominal_robot, path)
     duration = path.numbers["duration"] + compute.settle
-    if controller == OPEN_LOOP:
+    design = None if controller == OPEN_LOOP else _designed_controller(nominal_robot, trajectory, controller)
+    if design is None:
         time = np.linspace(0.0, duration, ceil(duration / compute.step) + 1)
-        winch_speeds = ideal_winch_speeds(nominal_robot, trajectory, time)
-        return ReferenceInput(nominal_robot, time, trajectory.position(time), trajectory, winch_speeds)
-    design = _designed_controller(nominal_robot, trajectory, controller)
-    time = sample_times(design.aim.period, duration)
-    reference = elastic_reference(nominal_robot, trajectory, time)
-    return ReferenceInput(nominal_robot, time, trajectory.position(time), trajectory, None, design, reference)
+    else:
+        time = sample_times(design.aim.period, duration)
+    poses = sample_poses(path.name, nominal_robot, pose_path(nominal_robot, trajectory), time)
+    return ReferenceInput(
+        nominal_robot,
+        time,
+        poses.position,
+        trajectory,
+        ideal_winch_speeds(nominal_robot, trajectory, time) if design is None else None,
+        design,
+        None if design is None else elastic_reference(nominal_robot, trajectory, time),
+        poses.orientation if nominal_robot.platform.is_rigid_body else None,
+    )
 
 
 def _designed_controller(robot: Robot, trajectory: Trajectory, controller: str) -> Design:
@@ -106,12 +122,17 @@ def _designed_controller(robot: Robot, trajectory: Trajectory, controller: str) 
 
 
 def path_trajectory(robot: Robot, path: PathPlan) -> Trajectory:
-    """The trajectory of a line or a helix; a line without a start begins where the platform does."""
-    numbers = path.numbers
-    end = path.end or robot.platform.start
+    """The trajectory of a line or a helix; where it states no start, it begins where the platform does."""
+    numbers, platform = path.numbers, robot.platform
+    duration, end = numbers["duration"], path.end or platform.start
+    translation: Trajectory = Line(path.start or platform.start, end, duration)
     if path.kind == "helix":
-        return Helix(end, numbers["radius"], numbers["rise"], numbers["angle"], numbers["duration"])
-    return Line(path.start or robot.platform.start, end, numbers["duration"])
+        translation = Helix(end, numbers["radius"], numbers["rise"], numbers["angle"], duration)
+    start_orientation = path.start_orientation or platform.start_orientation
+    if path.end_orientation is None:
+        # A path without orientation keeps that of the start, where fewer than six cables allow it.
+        return translation
+    return PoseTrajectory(translation, slerp(start_orientation, path.end_orientation, duration))
 
 
 @dataclass(frozen=True)
@@ -150,7 +171,7 @@ def build_context(plan: Plan, recordings: Mapping[str, Recording]) -> CampaignCo
     if not plan.paths:
         return CampaignContext(plan, recordings)
     robot = robot_from_content(dict(plan.content), plan.file)
-    bundle = build_bundle(with_start(robot, path_start(robot, plan.paths[0])))
+    bundle = build_bundle(at_path_start(robot, plan.paths[0]))
     reference_inputs = {
         variant: build_reference_input(robot, plan.paths[path], controller, plan.compute, recordings)
         for variant, (path, controller) in enumerate(plan.variants)
@@ -198,7 +219,7 @@ def _run_stages(context: CampaignContext, job: Job, fmu_folder: Path) -> Iterabl
     robot = robot_from_content(with_values(plan.content, dict(zip(plan.keys, job.values, strict=True))), plan.file)
     path_index, controller = plan.variants[job.variant]
     if path_index >= 0:
-        robot = with_start(robot, path_start(robot, plan.paths[path_index]))
+        robot = at_path_start(robot, plan.paths[path_index])
     if plan.compute.statics:
         yield {"held": False}, {}
         tensions = static_tensions(robot)
@@ -226,11 +247,14 @@ def _nominal_robot(robot: Robot, plan: Plan) -> Robot:
 def _modal_outputs(robot: Robot, plant: LinearPlant) -> Row:
     """Natural frequencies, damping ratios, and the smallest eigenvalue of the stiffness at the platform."""
     modes, A, B = plant.modes, plant.system.A, plant.system.B
-    position, velocity = slice(0, 3), slice(3, 6)
-    stiffness = -np.linalg.solve(B[velocity, robot.cable_count :], A[velocity, position])
+    indices, numbers = StateIndices(plant.degrees_of_freedom, robot.cable_count), mode_numbers(len(modes.shapes) > 3)
+    stiffness = -np.linalg.solve(B[indices.twist, robot.cable_count :], A[indices.twist, indices.pose])
+    if robot.platform.is_rigid_body:
+        # Against a force at the origin of the platform's frame, free to turn.
+        stiffness = np.linalg.inv(np.linalg.inv(stiffness)[:3, :3])
     min_stiffness = float(np.linalg.eigvalsh(0.5 * (stiffness + stiffness.T))[0])
-    frequencies = {f"frequency_{mode}": float(modes.frequencies[mode - 1]) for mode in MODE_NUMBERS}
-    damping_ratios = {f"damping_ratio_{mode}": float(modes.damping_ratios[mode - 1]) for mode in MODE_NUMBERS}
+    frequencies = {f"frequency_{mode}": float(modes.frequencies[mode - 1]) for mode in numbers}
+    damping_ratios = {f"damping_ratio_{mode}": float(modes.damping_ratios[mode - 1]) for mode in numbers}
     return {**frequencies, **damping_ratios, "stiffness_least": min_stiffness}
 
 
@@ -251,12 +275,16 @@ def _simulate(fmus: RobotFmus, reference_input: ReferenceInput, plan: Plan, job:
 
 
 def _motion_outputs(robot: Robot, reference_input: ReferenceInput, motion: CosimulationResult) -> Row:
-    """Outputs of a motion: end position, path error, and the range of tensions."""
+    """Outputs of a motion: end pose, path error, and the range of tensions."""
     row: dict[str, Any] = {f"end_{axis}": float(each) for axis, each in zip(AXES, motion.position[-1], strict=True)}
+    if motion.orientation is not None:
+        parts = zip(ORIENTATION_COLUMNS, motion.orientation[-1].tolist(), strict=True)
+        row |= {f"end_{part}": value for part, value in parts}
     if reference_input.desired_position is not None:
-        path_error = np.linalg.norm(motion.position - reference_input.desired_position, axis=1)
-        errors = {"end": path_error[-1], "largest": path_error.max(), "rms": np.sqrt(np.mean(path_error**2))}
-        row |= {f"path_error_{name}": float(value) for name, value in errors.items()}
+        row |= _error_outputs("path_error", np.linalg.norm(motion.position - reference_input.desired_position, axis=1))
+    if motion.orientation is not None and reference_input.desired_orientation is not None:
+        rotations = rotation_vectors_between(motion.orientation, reference_input.desired_orientation)
+        row |= _error_outputs("path_error_angle", np.linalg.norm(rotations, axis=1))
     min_tension, max_tension = motion.tension.min(axis=0), motion.tension.max(axis=0)
     for cable in robot.cable_numbers:
         row |= {f"tension_{cable}_least": float(min_tension[cable - 1])}
@@ -269,6 +297,12 @@ def _motion_outputs(robot: Robot, reference_input: ReferenceInput, motion: Cosim
     return row
 
 
+def _error_outputs(prefix: str, errors: Array) -> Row:
+    """Error at the end, largest error, and root mean square, over time."""
+    values = {"end": errors[-1], "largest": errors.max(), "rms": np.sqrt(np.mean(errors**2))}
+    return {f"{prefix}_{name}": float(value) for name, value in values.items()}
+
+
 def _slack_tension(robot: Robot) -> Array:
     """Tension (n,) in N of a cable that nothing pulls at: zero, or ``s ln 2`` of the effect slack's softness s."""
     tension = np.zeros(robot.cable_count)
@@ -279,12 +313,13 @@ def _slack_tension(robot: Robot) -> Array:
 
 
 def _resampled_series(motion: CosimulationResult, point_count: int) -> Series:
-    """Positions and tensions at evenly spaced times, from the start of a motion to its end."""
+    """Poses and tensions at evenly spaced times, from the start of a motion to its end."""
     if point_count < 2:
         return {}
     time = np.linspace(motion.time[0], motion.time[-1], point_count)
-    outputs = motion.measured()
-    names = series_columns(motion.tension.shape[1])
+    is_rigid = motion.orientation is not None
+    parts = [motion.position, *([] if motion.orientation is None else [motion.orientation]), motion.tension]
+    outputs, names = np.hstack(parts), series_columns(motion.tension.shape[1], is_rigid)
     return {"time": time} | {
         name: np.interp(time, motion.time, column) for name, column in zip(names, outputs.T, strict=True)
     }

@@ -7,18 +7,21 @@ import json
 import os
 import shutil
 import tempfile
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 from tautwire_fmu.effect_variables import setting_name
+from tautwire_fmu.rigid_body_variables import INERTIA_ENTRIES
 
 from ..fmus.packaging import RobotFmus, build_fmus, cable_resources, platform_resource, start_values, winch_resource
 from ..robot.active_effects import has_sensor_effects
 from ..robot.schema import Robot
 
 FMU_SUFFIX = ".fmu"
+# Vectors that FMUs have as parameters, and their parts.
+VECTOR_PARTS = {"anchor": "xyz", "start": "xyz", "centre_of_mass": "xyz", "start_orientation": "wxyz"}
 
 
 @dataclass(frozen=True)
@@ -79,6 +82,7 @@ def cached_fmus(robot: Robot, bundle: FmuBundle, cache_folder: Path) -> RobotFmu
         user_start_values={slot: start_values(robot, slot) for slot in user_fmus},
         has_position_sensor="platform" not in user_fmus and has_sensor_effects(robot),
         start_settings={name: dict(_fmu_parameters(data)) for name, data in component_data(robot).items()},
+        is_rigid=robot.platform.is_rigid_body,
     )
 
 
@@ -99,7 +103,8 @@ def _write_atomically(files: Mapping[str, bytes], target: Path) -> None:
 
 def _component_structure(data: Mapping[str, Any]) -> list[Any]:
     effects = [setting_name(effect) for effect in data.get("effects", ())]
-    return [data.get("law"), effects, data.get("formulas"), sorted(data)]
+    # A swivel axis is no parameter of a cable's FMU.
+    return [data.get("law"), effects, data.get("formulas"), data.get("swivel_axis"), sorted(data)]
 
 
 def _fmu_parameters(data: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
@@ -107,7 +112,19 @@ def _fmu_parameters(data: Mapping[str, Any]) -> Iterator[tuple[str, float]]:
     for name, value in data.items():
         if isinstance(value, int | float):
             yield name, float(value)
-        elif name in ("anchor", "start"):
-            yield from ((f"{name}.{axis}", float(each)) for axis, each in zip("xyz", value, strict=True))
+        elif name in VECTOR_PARTS:
+            yield from _vector_parameters(name, VECTOR_PARTS[name], value)
+        elif name == "attachments":
+            for number, point in enumerate(value, start=1):
+                yield from _vector_parameters(f"attachment_{number}", "xyz", point)
+        elif name == "inertia":
+            yield from (
+                (f"inertia.{entry}", float(value["xyz".index(entry[0])]["xyz".index(entry[1])]))
+                for entry in INERTIA_ENTRIES
+            )
     for effect in data.get("effects", ()):
         yield from ((f"effect.{setting_name(effect)}.{name}", float(value)) for name, value in effect["values"].items())
+
+
+def _vector_parameters(name: str, parts: str, values: Sequence[float]) -> Iterator[tuple[str, float]]:
+    yield from ((f"{name}.{part}", float(value)) for part, value in zip(parts, values, strict=True))

@@ -12,15 +12,16 @@ from ..errors import format_value
 from ..robot.checked_table import CheckedTable
 from .campaign_plan import DISTRIBUTION_KINDS, LINSPACE, LIST, PARAMETER_NAMES, Distribution, Input, parameter_problem
 
-KEY_STEP_PATTERN = re.compile(r"(?P<name>[A-Za-z0-9_-]+)(?:\[(?P<entry>\d+|\*)\])?\Z")
+KEY_STEP_PATTERN = re.compile(r"(?P<name>[A-Za-z0-9_-]+)(?:\[(?P<entry>\d+|\*)\])?(?:\[(?P<column>\d+)\])?\Z")
 ALL_ENTRIES = "*"
 
 
 class KeyStep(NamedTuple):
-    """One step of a key path: a key, and the entry of a list, counted from 1, where there is one."""
+    """One step of a key path: a key, the entry of a list, and the ``column`` of a matrix in that row, from 1."""
 
     name: str
     entry: str = ""
+    column: str = ""
 
 
 class KeyPathError(ValueError):
@@ -37,7 +38,7 @@ def parse_key_path(path: str) -> tuple[KeyStep, ...]:
     matches = [KEY_STEP_PATTERN.match(part) for part in path.split(".")]
     if not all(matches):
         raise KeyPathError("is not a key path", "write it as cable.modulus, cable[2].modulus or platform.start[1]")
-    return tuple(KeyStep(match["name"], match["entry"] or "") for match in matches if match)
+    return tuple(KeyStep(match["name"], match["entry"] or "", match["column"] or "") for match in matches if match)
 
 
 def expand_key_path(content: Mapping[str, Any], path: str) -> tuple[str, ...]:
@@ -49,7 +50,7 @@ def expand_key_path(content: Mapping[str, Any], path: str) -> tuple[str, ...]:
             if not isinstance(entries, list):
                 raise KeyPathError(f"{step.name} is not a list in the robot file", f"leave [{ALL_ENTRIES}] out")
             entry_paths = [
-                _format_key_path((*steps[:index], KeyStep(step.name, str(i)), *steps[index + 1 :]))
+                _format_key_path((*steps[:index], step._replace(entry=str(i)), *steps[index + 1 :]))
                 for i in _entry_numbers(entries)
             ]
             return tuple(each for one in entry_paths for each in expand_key_path(content, one))
@@ -87,15 +88,32 @@ def _set_value(table: dict[str, Any], steps: Sequence[KeyStep], value: float | s
 def _set_last_value(table: dict[str, Any], step: KeyStep, value: float | str) -> None:
     current = table.get(step.name)
     if step.entry:
+        if current is None:
+            raise KeyPathError(f"{step.name} is not in the robot file", f"write {step.name} there, or another key here")
         if not isinstance(current, list):
             raise KeyPathError(f"{step.name} is not a list in the robot file", f"leave [{step.entry}] out")
-        _entry(current, step)
-        current[int(step.entry) - 1] = value
+        row = _entry(current, step)
+        if step.column:
+            _set_matrix_entry(current, step, value)
+        elif isinstance(row, list):
+            hint = f"name one entry of the matrix, as in {step.name}[{step.entry}][1]"
+            raise KeyPathError(f"{step.name}[{step.entry}] is not a number in the robot file", hint)
+        else:
+            current[int(step.entry) - 1] = value
     elif isinstance(current, list | dict):
         hint = f"name one entry, as in {step.name}[1]" if isinstance(current, list) else "name a key inside it"
         raise KeyPathError(f"{step.name} is not a number in the robot file", hint)
     else:
         table[step.name] = value
+
+
+def _set_matrix_entry(rows: list[Any], step: KeyStep, value: float | str) -> None:
+    """Sets an entry of a matrix and the one across its diagonal: all matrices of a robot file are symmetric."""
+    across = KeyStep(step.name, step.column)
+    row, column = int(step.entry) - 1, int(step.column) - 1
+    if not isinstance(_entry(rows, step), list) or not isinstance(_entry(rows, across), list):
+        raise KeyPathError(f"{step.name} is not a matrix in the robot file", f"leave [{step.column}] out")
+    rows[row][column] = rows[column][row] = value
 
 
 def _entry(entries: Sequence[Any], step: KeyStep) -> Any:
@@ -118,7 +136,9 @@ def _entry_numbers(entries: Sequence[Any]) -> range:
 
 
 def _format_key_path(steps: Sequence[KeyStep]) -> str:
-    return ".".join(f"{step.name}[{step.entry}]" if step.entry else step.name for step in steps)
+    return ".".join(
+        step.name + "".join(f"[{number}]" for number in (step.entry, step.column) if number) for step in steps
+    )
 
 
 def read_parameter_space(table: CheckedTable, content: Mapping[str, Any]) -> tuple[Input, ...]:

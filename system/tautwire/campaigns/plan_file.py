@@ -13,7 +13,7 @@ from ..name_suggestions import suggest_name
 from ..recordings.recording import read_recording
 from ..robot.checked_table import CheckedTable
 from ..robot.robot_file_reader import robot_content, robot_from_content
-from ..robot.schema import Robot, require_point_mass
+from ..robot.schema import Platform, Quaternion, Robot
 from ..robot.trajectory import ANGLE_RULE, RADIUS_RULE, RISE_RULE
 from ..robot.trajectory import DURATION_RULE as OF_PATH
 from ..toml_text import parse_toml
@@ -58,6 +58,7 @@ PLAN_KEYS = (
     "trace",
 )
 SIMULATION_KEYS = ("sample", "vary", "found", "correlation", "path", "controllers", "believes", "compute")
+ORIENTATION_KEYS = ("start_orientation", "end_orientation")
 MAX_PLAN_SIZE = 1_000_000  # bytes
 MAX_RUNS = 10_000_000
 RECORDING_SUFFIXES = (".csv", ".parquet", ".mf4", ".mdf", ".mat", ".mcap")
@@ -117,7 +118,7 @@ def read_paths(table: CheckedTable, robot: Robot, inputs: tuple[Input, ...]) -> 
         if path.name in [each.name for each in paths]:
             path_table.refuse("name", f"is {format_value(path.name)} again", "give each path its own name")
         start_varies = any(each.key.startswith("platform.start") for each in inputs)
-        if start_varies and (path.kind == "helix" or path.start is not None):
+        if start_varies and (path.kind == "helix" or path.start is not None or path.start_orientation is not None):
             path_table.refuse("", "has a start of its own, but platform.start varies", "leave start out of a line")
         paths.append(path)
     return tuple(paths)
@@ -133,14 +134,16 @@ def _read_path(table: CheckedTable, default: str, robot: Robot) -> PathPlan:
         hint = "give end and duration (a line), centre, radius, rise, angle and duration (a helix), or recording"
         table.refuse("", "is no path" if not kind_keys else f"has {' and '.join(kind_keys)}", hint)
     if kind_keys == ["end"]:
-        table.require_known(("name", "start", "end", "duration"))
+        table.require_known(("name", "start", "end", "duration", *ORIENTATION_KEYS))
         start = table.point("start", "where the line starts") if "start" in table.content else None
         end = table.point("end", "where the line ends")
-        return PathPlan(name, "line", {"duration": table.number("duration", DURATION_RULE)}, start, end)
+        line = PathPlan(name, "line", {"duration": table.number("duration", DURATION_RULE)}, start, end)
+        return _with_orientations(table, robot, line)
     if kind_keys == ["radius"]:
-        table.require_known(("name", "centre", *HELIX_RULES))
+        table.require_known(("name", "centre", *HELIX_RULES, *ORIENTATION_KEYS))
         numbers = {key: table.number(key, rule) for key, rule in HELIX_RULES.items()}
-        return PathPlan(name, "helix", numbers, table.point("centre", "the centre of the helix at its start"))
+        helix = PathPlan(name, "helix", numbers, table.point("centre", "the centre of the helix at its start"))
+        return _with_orientations(table, robot, helix)
     table.require_known(("name", "recording", "until"))
     file = file_relative_to_plan(table, table.text("recording", "name a recording with winch speeds"))
     recording = read_recording(file, robot.cable_count, robot.recorded_columns)
@@ -149,6 +152,19 @@ def _read_path(table: CheckedTable, default: str, robot: Robot) -> PathPlan:
     if until < second_time:
         table.refuse("until", f"is {until!r}, before the recording's second sample", f"write {second_time:g} or more")
     return PathPlan(name, "recording", {"duration": min(until, duration)}, None, None, str(file), file_digest(file))
+
+
+def _with_orientations(table: CheckedTable, robot: Robot, path: PathPlan) -> PathPlan:
+    """The path with the orientations of its table, which only a platform that turns may have."""
+    orientations: dict[str, Quaternion] = {}
+    for key in (key for key in ORIENTATION_KEYS if key in table.content):
+        if not robot.platform.is_rigid_body:
+            hint = f"remove {key}, or give [platform] of the robot file an inertia"
+            table.refuse(key, "turns the platform, which is a point mass", hint)
+        w, x, y, z = table.unit_vector(key, "the unit quaternion [w, x, y, z]", Platform.start_orientation)
+        orientations[key] = (w, x, y, z)
+    start, end = (orientations.get(key) for key in ORIENTATION_KEYS)
+    return replace(path, start_orientation=start, end_orientation=end)
 
 
 def read_path_file(path: str | Path, robot: Robot) -> PathPlan:
@@ -171,7 +187,7 @@ def read_plan(path: str | Path) -> Plan:
     table.require_known(PLAN_KEYS)
     robot_file = file_relative_to_plan(table, table.text("robot", 'name the robot file, as in robot = "robot.toml"'))
     content = robot_content(robot_file)
-    robot = require_point_mass(str(robot_file), robot_from_content(content, robot_file))
+    robot = robot_from_content(content, robot_file)
     seed = whole_number(table, "seed", SEED_RULE)
     if "trace" in table.content:
         return Plan(str(robot_file), content, seed, "grid", paths=(), trace=_read_trace(table))
