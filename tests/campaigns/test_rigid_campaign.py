@@ -82,7 +82,7 @@ def test_a_run_along_a_turning_path_has_its_orientations(tmp_path: Path) -> None
     result = run_job(context, job, tmp_path / "fmus")
     assert result.row["path_error_angle_largest"] < 1e-3 and result.row["path_error_largest"] < 1e-3
     end = [result.row[f"end_q{part}"] for part in "wxyz"]
-    assert end == pytest.approx([0.99995, 0.0, 0.0, 0.01], abs=1e-5)
+    assert end == pytest.approx([0.99995, 0.0, 0.0, 0.01], abs=2e-4)
     assert tuple(result.series) == ("time", *series_columns(8, True))
     assert result.series["qz"][-1] == pytest.approx(end[3])
     names = {column.name for column in row_columns(plan, 8)}

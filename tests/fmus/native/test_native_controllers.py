@@ -16,10 +16,14 @@ from tautwire.control import (
     build_controller_fmu,
     build_native_controller_fmu,
     design_controller,
+    rigid_reference,
+    sample_times,
     schedule_controller,
 )
+from tautwire.robot.pose_trajectory import PoseTrajectory, slerp
 from tautwire.robot.trajectory import Line
 from tests.support.fmus import in_hand
+from tests.support.rigid_robots import crane_robot
 from tests.support.robots import example
 
 PATH = Line((28.86, 0.0, 5.0), (29.5, 0.7, 6.2), 2.0)
@@ -31,7 +35,7 @@ def walk(path: Path, steps: tuple[float, ...]) -> NDArray[np.float64]:
     random, rows, time = np.random.default_rng(3), [], 0.0
     with in_hand(path) as hand:
         names = list(hand.references)
-        sensors = [name for name in names if name.startswith(("position.", "tension_"))]
+        sensors = [name for name in names if name.startswith(("position.", "orientation.", "tension_"))]
         start = np.array(hand.get(*sensors))
         hand.set(**{n.replace(".", "__"): v for n, v in zip(sensors, start * 1.02, strict=True)})
         hand.run()
@@ -59,6 +63,18 @@ def test_a_controller_asks_for_the_same_speeds_as_in_python(kind: str, tmp_path:
     one, other = walk(python, steps), walk(native, steps)
     assert np.max(np.abs(one - other) / np.maximum(np.max(np.abs(one), axis=0), 1.0)) < 1e-10
     assert validate_fmu(str(native)) == []
+
+
+def test_a_controller_of_a_platform_that_turns_asks_for_the_same_speeds(tmp_path: Path) -> None:
+    robot = crane_robot()
+    x, y, z = robot.platform.start
+    line, turn = Line((x, y, z), (x, y, z + 0.1), 1.0), slerp((1.0, 0.0, 0.0, 0.0), (0.6, 0.0, 0.0, 0.8), 1.0)
+    design, path = design_controller(robot), PoseTrajectory(line, turn)
+    reference = rigid_reference(robot, path, sample_times(0.01, 0.3))
+    python = build_controller_fmu(robot, design, path, 0.3, tmp_path / "python", reference)
+    native = build_native_controller_fmu(robot, design, path, 0.3, tmp_path / "native", reference)
+    one, other = (walk(file, (0.01, 0.0025, 0.0075, *[0.01] * 20)) for file in (python, native))
+    assert np.max(np.abs(one - other) / np.maximum(np.max(np.abs(one), axis=0), 1.0)) < 1e-10
 
 
 def test_it_is_saved_between_its_samples(tmp_path: Path) -> None:

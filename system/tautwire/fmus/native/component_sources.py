@@ -144,7 +144,8 @@ def _winch(slave: Slave, data: Mapping[str, Any]) -> _Component:
 def _controller(slave: Slave, data: Mapping[str, Any]) -> _Component:
     plan = plan_from_resource(dict(data))
     cables, order = len(plan.compliances), len(plan.gains[0].A)
-    macros = {"CABLES": cables, "ORDER": order, "START_SIZE": 1, "SIGNAL_AXES": 1, "SIGNAL_DERIVATIVES": 2}
+    macros = {"CABLES": cables, "ORDER": order, "POSE_SIZE": plan.pose_size, "START_SIZE": 1}
+    macros |= {"SIGNAL_AXES": 1, "SIGNAL_DERIVATIVES": 2}
     gains = [entry for each in plan.gains for matrix in each for row in matrix for entry in row]
     tables = (plan.speeds, plan.stretches, plan.expected)
     constants = [

@@ -1,4 +1,4 @@
-/* The sampled controller: position and tensions in, winch speeds out. */
+/* The sampled controller: measured pose and tensions in, winch speeds out. */
 
 #define FIRST_MEASUREMENT 1
 #define FIRST_OUTPUT (FIRST_MEASUREMENT + MEASURED)

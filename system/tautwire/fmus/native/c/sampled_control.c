@@ -1,7 +1,11 @@
-/* Sampled-data controller on a path, as sampled_control.py has it; the plan lies in model_constants. */
+/* Sampled-data controller on a path, as sampled_control.py has it; the plan lies in model_constants.
 
-#define MEASURED (3 + CABLES)
-#define SEEN (MEASURED + CABLES)
+   A measurement is a pose of POSE_SIZE numbers, the position and with seven a quaternion, then the tensions. */
+
+#define MEASURED (POSE_SIZE + CABLES)
+#define FREEDOMS (POSE_SIZE == 7 ? 6 : 3)
+#define DEVIATIONS (FREEDOMS + CABLES)
+#define SEEN (DEVIATIONS + CABLES)
 #define GAIN_A 0
 #define GAIN_B (GAIN_A + ORDER * ORDER)
 #define GAIN_C (GAIN_B + ORDER * SEEN)
@@ -115,6 +119,20 @@ static void limit_end_speeds(const Limits *limits, Controller *controller) {
   }
 }
 
+#if POSE_SIZE == 7
+/* Rotation vector, of at most half a turn, of the quaternion q times the inverse of r, whatever the signs of both. */
+static void rotation_between(const double *q, const double *r, double *vector) {
+  double w = q[0] * r[0] + q[1] * r[1] + q[2] * r[2] + q[3] * r[3], sine, factor;
+  int k;
+  vector[0] = r[0] * q[1] - q[0] * r[1] - (q[2] * r[3] - q[3] * r[2]);
+  vector[1] = r[0] * q[2] - q[0] * r[2] - (q[3] * r[1] - q[1] * r[3]);
+  vector[2] = r[0] * q[3] - q[0] * r[3] - (q[1] * r[2] - q[2] * r[1]);
+  sine = sqrt(vector[0] * vector[0] + vector[1] * vector[1] + vector[2] * vector[2]);
+  factor = sine > 1e-8 * fabs(w) ? 2.0 * atan2(sine, fabs(w)) / sine : 2.0 / fabs(w);
+  for (k = 0; k < 3; k++) vector[k] *= w > 0.0 ? factor : -factor;
+}
+#endif
+
 static void begin_path(const Limits *limits, Controller *controller) {
   int k;
   memset(controller, 0, sizeof *controller);
@@ -122,7 +140,7 @@ static void begin_path(const Limits *limits, Controller *controller) {
   feedforward_speeds(controller->scales, 0.0, controller->begin);
   for (k = 0; k < CABLES; k++) {
     controller->begin[k] = clamp(controller->begin[k], -limits->speed, limits->speed);
-    controller->tensions[k] = controller->earlier[k] = expected_row(0.0)[3 + k];
+    controller->tensions[k] = controller->earlier[k] = expected_row(0.0)[POSE_SIZE + k];
   }
   limit_end_speeds(limits, controller);
 }
@@ -137,7 +155,7 @@ static void next_sample(const Limits *limits, Controller *controller) {
   if (model_constants[TARES] > 0.0 && sample == 0.0)
     for (k = 0; k < CABLES; k++) {
       double at_rest = model_constants[AT_REST + k];
-      double scale = at_rest > 0.0 ? controller->measured[3 + k] / at_rest : 1.0;
+      double scale = at_rest > 0.0 ? controller->measured[POSE_SIZE + k] / at_rest : 1.0;
       controller->scales[k] = clamp(scale, MIN_TENSION_SCALE, MAX_TENSION_SCALE);
     }
   speed_deviations(controller->begin, controller->scales, sample, deviations);
@@ -145,9 +163,13 @@ static void next_sample(const Limits *limits, Controller *controller) {
   demanded_accelerations(&gains, controller->state, deviations, errors);
   for (k = 0; k < CABLES; k++) errors[k] = (next_deviations[k] - deviations[k]) / model_constants[PLAN_PERIOD] - errors[k];
   for (k = 0; k < 3; k++) seen[k] = controller->measured[k] - expected[k];
+#if POSE_SIZE == 7
+  rotation_between(controller->measured + 3, expected + 3, seen + 3);
+#endif
   for (k = 0; k < CABLES; k++) {
-    seen[3 + k] = controller->measured[3 + k] - controller->scales[k] * expected[3 + k];
-    seen[MEASURED + k] = deviations[k];
+    double expected_tension = controller->scales[k] * expected[POSE_SIZE + k];
+    seen[FREEDOMS + k] = controller->measured[POSE_SIZE + k] - expected_tension;
+    seen[DEVIATIONS + k] = deviations[k];
   }
   add_product(&gains, GAIN_A, ORDER, ORDER, controller->state, state);
   add_product(&gains, GAIN_B, ORDER, SEEN, seen, state);
@@ -155,8 +177,8 @@ static void next_sample(const Limits *limits, Controller *controller) {
   memcpy(controller->state, state, sizeof state);
   memcpy(controller->begin, controller->end, sizeof controller->begin);
   /* At the first sample there is no rate: the stored tensions were only expected. */
-  memcpy(controller->earlier, sample > 0.0 ? controller->tensions : controller->measured + 3, sizeof controller->earlier);
-  memcpy(controller->tensions, controller->measured + 3, sizeof controller->tensions);
+  memcpy(controller->earlier, sample > 0.0 ? controller->tensions : controller->measured + POSE_SIZE, sizeof controller->earlier);
+  memcpy(controller->tensions, controller->measured + POSE_SIZE, sizeof controller->tensions);
   controller->sample = sample + 1.0;
   limit_end_speeds(limits, controller);
 }
