@@ -110,6 +110,9 @@ def test_trace_finds_the_damping_of_the_shipped_robot(
     assert effect["cables"] == [1, 2, 3]
     found = effect["parameters"]["damping"]
     assert found["low"] < 2.08e9 < found["high"]
+    assert effect["share"] > 0.95
+    assert report["left_share"] < 0.05
+    assert effect["share"] + report["left_share"] <= 1.0 + 1e-12
     for role in ("fit", "check"):
         after, floor = report["error_after"][role], report["noise_floor"]
         assert after["position_rms"] < 1.2 * floor["position_rms"]

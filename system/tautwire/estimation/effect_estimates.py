@@ -149,6 +149,16 @@ def effects_by_evidence(
     return large, tuple(effect for effect in effects if effect not in large)
 
 
+def effects_with_shares(
+    effects: Sequence[FoundEffect], accepted: Sequence[Hypothesis], shares: ExplainedShares
+) -> tuple[FoundEffect, ...]:
+    """The effects with their shares, the largest first."""
+    by_hypothesis = zip(accepted, shares.effects, strict=True)
+    by_key = {(hypothesis.effect.name, hypothesis.cables): share for hypothesis, share in by_hypothesis}
+    with_shares = [replace(effect, share=by_key[effect.name, effect.cables]) for effect in effects]
+    return tuple(sorted(with_shares, key=lambda effect: -(effect.share or 0.0)))
+
+
 def series_stiffness_notes(effects: Sequence[FoundEffect], cable_count: int) -> tuple[str, ...]:
     """A note where all ropes are softer than declared: what stands in series with them looks nearly the same.
 

@@ -17,7 +17,7 @@ from .cosimulation_validation import (
 )
 from .declared_start import with_declared_start
 from .discovery.unexplained_residual import UnexplainedResidual, explain_residual
-from .effect_estimates import effects_by_evidence, effects_by_size, estimated_effects
+from .effect_estimates import effects_by_evidence, effects_by_size, effects_with_shares, estimated_effects
 from .explained_shares import ExplainedShares, explained_shares, remaining_error, sensor_noise_floor
 from .identifiability import analyse_identifiability
 from .identification_state import Identification
@@ -183,6 +183,20 @@ def estimate_intervals(state: Identification) -> Identification:
     return _with_calibrations(replace(state, effects=large, small_effects=small))
 
 
+def share_out_what_was_missed(state: Identification) -> Identification:
+    """Give effects of exact form their shares too, which decide nothing there."""
+    if not state.effects_hold or state.shares:
+        return state
+    state.context.progress("shares", 0.0)
+    selection, data, after = state.selection, state.prepared.data_sets[-1], state.comparisons[-1]
+    robot = state.final_robot
+    shares = explained_shares(state.context, state.prepared.fitter, robot, selection.accepted, data, after)
+    effects, small_effects = (
+        effects_with_shares(each, selection.accepted, shares) for each in (state.effects, state.small_effects)
+    )
+    return replace(state, shares=shares, effects=effects, small_effects=small_effects)
+
+
 def analyse_detectability(state: Identification) -> Identification:
     """Tell what the recordings could have shown, where the model leaves white noise."""
     if not (state.effects_hold or state.verdict[0] == "none"):
@@ -209,6 +223,7 @@ STAGES: tuple[Callable[[Identification], Identification], ...] = (
     select_beside_disturbance,
     judge,
     estimate_intervals,
+    share_out_what_was_missed,
     analyse_detectability,
 )
 
@@ -223,6 +238,7 @@ SEARCHES: Mapping[Callable[[Identification], Identification], tuple[Callable[[Ti
     explain_by_formula: (attrgetter("discovery"), "formulas and resonances"),
     select_beside_disturbance: (attrgetter("second_search"), "effects whose form is not quite nature's"),
     estimate_intervals: (attrgetter("refinement"), "estimates of the parameters"),
+    share_out_what_was_missed: (attrgetter("refinement"), "shares of what was missed"),
     analyse_detectability: (attrgetter("refinement"), "telling what the recordings could have shown"),
 }
 

@@ -26,7 +26,8 @@ class Identification:
     ``corrected`` are the data to take where no effects explain those as recorded. ``final_robot`` is the best
     model that the FMUs confirm, with uncertain numbers as FIT has them, the declared one until then. ``effects_hold``
     tells whether the FMUs confirm the selection, ``discovery`` is a formula that they confirm. ``shares`` are there
-    where a disturbance is a part of the model, ``calibrations`` by recording where effects have intervals.
+    where a disturbance is a part of the model, and decide, or once effects of exact form are established;
+    ``calibrations`` by recording where effects have intervals.
     """
 
     context: IdentificationContext

@@ -34,8 +34,8 @@ class Estimate:
 class FoundEffect:
     """An effect that was accepted; ``evidence`` is the natural log of its likelihood ratio on unseen data.
 
-    ``share`` is the part of what was missed that it explains, where a disturbance was assumed; ``unstable`` are names
-    of parameters on which both recordings, each by itself, do not agree.
+    ``share`` is the part of what was missed that it explains; ``unstable`` are names of parameters on which both
+    recordings, each by itself, do not agree.
     """
 
     name: str
@@ -195,9 +195,10 @@ class Trace:
     the residual is white noise, and ``autocorrelations`` the largest correlation of each with itself, and what noise
     stays below, as :func:`residual_analysis.largest_autocorrelations` gives them. ``identifiability`` is what those
     data could have shown beside the effects; empty where the model leaves more than noise. ``components`` tells where
-    the fit recording errs, before any effect is fitted. ``disturbance`` is what had to be assumed beside white noise;
-    with one, ``left_share`` is the part of what was missed that no effect explains, and ``small_effects`` are those
-    that explain too little to matter. ``untried`` are sentences on what there was no time for.
+    the fit recording errs, before any effect is fitted. ``disturbance`` is what had to be assumed beside white noise.
+    ``left_share`` is the part of what was missed that no effect explains, where effects were established or a
+    disturbance assumed, and ``small_effects`` are those that explain too little to matter. ``untried`` are
+    sentences on what there was no time for.
     """
 
     verdict: Verdict
