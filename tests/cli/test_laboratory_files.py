@@ -118,6 +118,14 @@ READ: dict[str, Writer] = {
     "a column that nobody knows": lambda frame: text_of(frame.assign(status="ok")),
     "semicolons": lambda frame: text_of(frame, ";"),
     "semicolons and decimal commas": lambda frame: text_of(frame, ";", ","),
+    "bars": lambda frame: text_of(frame, "|"),
+    "no end of the last line": lambda frame: text_of(frame).rstrip("\n"),
+    "columns of equal width": with_lines(
+        lambda lines: [",".join(f"{cell:>20}" for cell in line.split(",")) if line else "" for line in lines]
+    ),
+    "the separator in the first line": lambda frame: "sep=;\n" + text_of(frame, ";"),
+    "a column of row numbers": lambda frame: str(frame.to_csv(lineterminator="\n")),
+    "positions in inches that say so": stated(AXES, 1.0 / 0.0254, "inches"),
     "tabs": lambda frame: text_of(frame, "\t"),
     "tabs and decimal commas": lambda frame: text_of(frame, "\t", ","),
     "spaces": lambda frame: text_of(frame, " "),
@@ -213,9 +221,80 @@ REFUSED: dict[str, tuple[Writer, str]] = {
         "line 2: has 9 units, the header has 10 columns",
     ),
     "words in the first sample": (
-        with_lines(lambda lines: [lines[0], ",".join(["null"] * 10), *lines[1:]]),
-        "is 'null', not a number",
+        with_lines(lambda lines: [lines[0], ",".join(["init"] * 10), *lines[1:]]),
+        "is 'init', not a number",
     ),
+    "a first sample without numbers": (
+        with_lines(lambda lines: [lines[0], ",".join(["null"] * 10), *lines[1:]]),
+        "column time: is 'null', must be a number",
+    ),
+    "times since 1970 in ns": (
+        lambda f: text_of(f.assign(time=[1_780_000_000 * 10**9 + round(1e9 * t) for t in f.time])),
+        "as ns since 1970 are (and 799 more like it, last in line 801); write time [ns] in the header",
+    ),
+    "times since 1970 in us": (
+        lambda f: text_of(f.assign(time=[1_780_000_000 * 10**6 + round(1e6 * t) for t in f.time])),
+        "as us since 1970 are",
+    ),
+    "times with too few digits": (
+        lambda f: text_of(f.assign(time=f.time.round(1))),
+        "of times that are rounded write more digits",
+    ),
+    "a clock that was set back": (
+        lambda f: text_of(f.assign(time=f.time.where(f.index < 500, f.time - 1.005))),
+        "where the clock was set or a second run begins, cut the recording there",
+    ),
+    "two runs, each with its header": (
+        with_lines(lambda lines: lines[:400] + lines[:300]),
+        "repeats the names of the columns; cut the file there",
+    ),
+    "thousands with commas": (
+        lambda f: text_of(f.assign(tension_1=[f"{10.0 * value:,.3f}" for value in f.tension_1])),
+        "write it with a decimal point, without separators of thousands",
+    ),
+    "thousands with points": (
+        lambda f: text_of(
+            f.assign(tension_1=[f"{10.0 * v:,.3f}".translate(str.maketrans(",.", ".,")) for v in f.tension_1]), ";", ","
+        ),
+        "write it with a decimal comma, without separators of thousands",
+    ),
+    "numbers of Fortran": (
+        lambda f: text_of(f.assign(x=[f"{value:.9E}".replace("E", "D") for value in f.x])),
+        "E+01",
+    ),
+    "a minus of typesetters": (
+        lambda f: text_of(f.assign(y=[f"{value:.6f}".replace("-", "\u2212") for value in f.y])),
+        "write it as -0.",
+    ),
+    "units in cells": (
+        lambda f: text_of(f.assign(z=[f"{value:.6f} m" for value in f.z])),
+        ", and the unit in the header",
+    ),
+    "an angle's unit": (
+        stated(SPEEDS, 191.0, "rpm"),
+        "leave the unit out, and declare factor = 2 pi / 60 times the drum's radius",
+    ),
+    "an amplifier's unit": (stated(CELLS, 4e-4, "mV/V"), "declare factor = the load cell's N for one"),
+    "infinite numbers": (lambda f: text_of(f.assign(y=f.y.where(f.index < 790, np.inf)).fillna("")), "must be finite"),
+    "cables from 0": (
+        lambda f: text_of(f.rename(columns={name: f"{name[:-1]}{int(name[-1]) - 1}" for name in (*SPEEDS, *CELLS)})),
+        "count cables from 1",
+    ),
+    "German names": (
+        lambda f: text_of(
+            f.set_axis(["Zeit [s]", *(f"Position {k} [m]" for k in range(1, 7)), "x", "y", "z"], axis=1), ";", ","
+        ),
+        "has none of the columns time, winch_speed_1 ... winch_speed_3, it has 'Zeit [s], Position 1 [m]",
+    ),
+    "a page of HTML": (lambda f: f"<html>{f[:5].to_html()}</html>", "is HTML or XML, not a table in CSV"),
+    "a list in JSON": (lambda f: str(f[:5].to_json(orient="records")), "is JSON, not a table in CSV"),
+    "samples in columns": (lambda f: f[:50].T.to_csv(header=False), "has none of the columns winch_speed_1"),
+    "a last line that is cut": (lambda f: text_of(f)[:-30], "cells, the header has 10; complete the line or remove it"),
+    "a log with room for more": (
+        lambda f: text_of(f).encode() + bytes(500),
+        "is binary (it has a zero byte), not text",
+    ),
+    "sums below the samples": (lambda f: text_of(f) + "Mean" + ",0" * 9 + "\n", "column time: is 'Mean', not a number"),
     "a winch without speed": (lambda f: text_of(f.rename(columns={"winch_speed_2": "v2"})), "winch_speed_2 is missing"),
     "a second column of a name": (lambda f: text_of(f.rename(columns={"y": "x"})), "'x' appears twice"),
     "a fourth cable": (lambda f: text_of(f.assign(tension_4=1.0)), "tension_4 belongs to no cable"),
@@ -288,6 +367,15 @@ def lost_positions(value: float) -> Writer:
     return lambda frame: text_of(
         frame.assign(**{axis: frame[axis].where(frame.index % 400 < 370, value) for axis in AXES})
     )
+
+
+@pytest.mark.parametrize("word", ["NULL", "#N/A", "n/a", "-", "-nan(ind)", "1.#QNAN", "NaN "])
+def test_what_programs_write_for_a_missing_number_is_one(word: str, tmp_path: Path) -> None:
+    laboratory, frame = Laboratory(tmp_path), standard().astype(object)
+    frame.loc[200:229, AXES] = word
+    assert laboratory.problems(text_of(frame)) == []
+    position = read_recording(tmp_path / "log.csv", 3).position
+    assert np.array_equal(np.flatnonzero(np.isnan(position).all(axis=1)), np.arange(200, 230))
 
 
 @pytest.mark.parametrize("value", [0.0, -9999.0])

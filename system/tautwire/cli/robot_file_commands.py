@@ -217,7 +217,8 @@ def check(
         output.suggest_next(f"tautwire build {shell_quoted(robot_file)} --out build/")
     else:
         next_command = trace_command(robot_file, recording, columns, tracker)
-        output.suggest_next(f"{next_command}; with a second recording of the robot add --check SECOND.csv")
+        second = "--check SECOND.csv" if tracker is None else "--check SECOND.csv --check-tracker ITS_TRACKER.csv"
+        output.suggest_next(f"{next_command}; with a second recording of the robot add {second}")
 
 
 def _write_report(result: CheckResult, target: Path, inputs: Sequence[Path], provenance: Provenance) -> bool:

@@ -20,6 +20,10 @@ from .units import units_in_words
 # Lines in which the header and the first sample are looked for.
 MAX_HEAD_LINES = 500
 
+# Beginnings of files that name another format.
+MARKUPS = {b"<": "HTML or XML", b"{\\rtf": "rich text", b"{": "JSON", b"[{": "JSON", b"[[": "JSON"}
+MAX_MARKUP_HEAD = 1000
+
 _LINE = re.compile(rb"[^\r\n]*(?:\r\n|\r|\n|\Z)")
 _THOUSANDS = re.compile(rb"[-+]?[1-9][0-9]{0,2},[0-9]{3}")
 
@@ -67,6 +71,7 @@ def read_csv_text(file: str, max_size: int, columns: ColumnMap) -> CsvText:
     content, encoding = read_encoded_text(file, RecordingError, "CSV", max_size)
     if not content or content.isspace():
         raise RecordingError(file, "is empty", "write a header line and two or more samples")
+    _require_no_markup(content, file)
     lines = [match.group() for match in islice(_LINE.finditer(content), MAX_HEAD_LINES)]
     header = read_header(content, lines, columns, file)
     if encoding == "Latin-1" and not header.is_certain:
@@ -85,6 +90,14 @@ def read_csv_text(file: str, max_size: int, columns: ColumnMap) -> CsvText:
     # Nothing is copied of a file in the standard dialect, which may be long.
     text = text if source.is_standard else _rewritten(text, source)
     return replace(text, header=replace(text.header, dialect=_in_words(text.header, source)))
+
+
+def _require_no_markup(content: bytes, file: str) -> None:
+    """Raises RecordingError where the text is that of another kind of file, as some programs export tables."""
+    head = content[:MAX_MARKUP_HEAD].lstrip().lower()
+    for mark, kind in MARKUPS.items():
+        if head.startswith(mark):
+            raise RecordingError(file, f"is {kind}, not a table in CSV", "export it as CSV")
 
 
 def _rewritten(text: CsvText, source: _Source) -> CsvText:

@@ -1,6 +1,7 @@
 """Recordings in CSV files: one header line, then one line per sample."""
 
 import csv
+import re
 from collections.abc import Container, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from io import BytesIO
@@ -33,18 +34,28 @@ class CsvTable:
 
     def numbers(self) -> Mapping[str, NDArray[np.float64]] | None:
         """The known columns, each (N,), NaN where a cell is missing; None where this is not a table of numbers."""
-        header, content = self.header, self.content
         # Where the first row has more cells than the header, pandas would take some for an index.
         if not self._is_rectangular(row_count=1):
             return None
+        frame = self._frame(self.content)
+        if frame is None and b" " in self.content:
+            frame = self._frame(re.sub(rb" +(?=[\r\n" + re.escape(self.separator.encode()) + rb"])", b"", self.content))
+        if frame is None:
+            return None
+        if not self._is_rectangular(len(frame)):
+            return None
+        return {name: self._column(name, frame[name]) for name in self.header.known_names}
+
+    def _frame(self, content: bytes) -> pd.DataFrame | None:
+        """The table by pandas, which knows a missing cell only without spaces; None where a cell is no number."""
         try:
-            frame = pd.read_csv(
+            return pd.read_csv(
                 BytesIO(content),
                 header=0,
                 sep=self.separator,
-                decimal=header.decimal_mark,
-                names=list(header.names),
-                dtype={name: str if name in self._texts() else np.float64 for name in header.names},
+                decimal=self.header.decimal_mark,
+                names=list(self.header.names),
+                dtype={name: str if name in self._texts() else np.float64 for name in self.header.names},
                 encoding="utf-8",
                 skipinitialspace=True,
                 keep_default_na=False,
@@ -53,9 +64,6 @@ class CsvTable:
             )
         except (ValueError, OverflowError):
             return None
-        if not self._is_rectangular(len(frame)):
-            return None
-        return {name: self._column(name, frame[name]) for name in header.known_names}
 
     def _texts(self) -> Container[str]:
         """Columns that pandas does not parse."""

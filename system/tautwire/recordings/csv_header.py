@@ -20,9 +20,12 @@ from .csv_lines import (
     units_in_line,
     without_comment_mark,
 )
-from .csv_names import with_unique_names
+from .csv_names import first_samples, with_unique_names
 from .recording_table import MAX_COLUMNS
 from .units import Unit, find_unit
+
+# Of each separator that makes numbers of the first lines.
+MAX_FIRST_SAMPLES = 8
 
 
 @dataclass(frozen=True)
@@ -105,10 +108,11 @@ def _find_header(lines: Sequence[str], known: Mapping[str, str], file: str) -> C
     guesses: list[CsvHeader] = []
     comments: list[CsvHeader] = []
     certain: list[CsvHeader] = []
+    sampled = {sample.separator: sample.count for sample in first_samples(lines)[:MAX_FIRST_SAMPLES]}
     for index, line in enumerate(lines):
         if not line.strip():
             continue
-        header = _as_header(index, line, known)
+        header = _as_header(index, line, known, sampled)
         if header.is_certain:
             (comments if header.is_comment else certain).append(header)
         guesses.append(header)
@@ -122,18 +126,22 @@ def _find_header(lines: Sequence[str], known: Mapping[str, str], file: str) -> C
     return comments[0] if comments else max(guesses, key=lambda header: (not header.is_comment, header.known_count))
 
 
-def _as_header(index: int, line: str, known: Mapping[str, str]) -> CsvHeader:
-    """A line as a header, with the separator by which it names most of the known columns."""
+def _as_header(index: int, line: str, known: Mapping[str, str], sampled: Mapping[str, int]) -> CsvHeader:
+    """A line as a header, with the separator by which it names most of the known columns.
+
+    Without ``time`` the separator is that by which it has as many cells as the samples, ``sampled`` by separator.
+    """
     commented = is_comment(line)
     text = without_comment_mark(line) if commented else line
     standard = frozenset(known.values())
-    best, most = CsvHeader(index, ",", standard, 0, commented, False), (-1, 0)
+    best, most = CsvHeader(index, ",", standard, 0, commented, False), (-1, -1, 0)
     for separator in SEPARATORS:
         cells = split_cells(text, separator)
         recorded = {split_unit(cell, known)[0] for cell in cells[:MAX_COLUMNS]}
         names = {known[name] for name in recorded & known.keys()}
         # Of a line that names nothing known, most cells tell the separator; every sentence has spaces.
-        rank = (len(names), len(cells) if not names and separator != " " else 0)
+        fits_samples = "time" in names or sampled.get(separator) == len(cells)
+        rank = (int(fits_samples), len(names), len(cells) if not names and separator != " " else 0)
         if rank > most:
             is_certain = "time" in names and len(names) > 1
             best, most = CsvHeader(index, separator, standard, len(names), commented, is_certain), rank

@@ -11,7 +11,7 @@ from .recording_table import MISSING_CELLS
 from .units import find_unit, is_any_unit
 
 # In the order of preference where two explain a header equally well.
-SEPARATORS = {";": "semicolons", "\t": "tabs", ",": "commas", " ": "spaces"}
+SEPARATORS = {";": "semicolons", "\t": "tabs", "|": "bars", ",": "commas", " ": "spaces"}
 
 # Characters; what is longer is neither a name with a unit nor a number, and would take long to match.
 MAX_CELL_LENGTH = 200
@@ -76,7 +76,10 @@ def units_in_line(line: str, separator: str, names: Sequence[str], known: Contai
     """
     if not is_comment(line):
         cells = _cells_of(line, separator, len(names))
-        is_data = any(is_number(cell) or clock_format(cell) or cell in MISSING_CELLS[1:] for cell in cells)
+        # A dash is also the unit of a number without one.
+        is_data = any(
+            is_number(cell) or clock_format(cell) or (cell in MISSING_CELLS and cell.strip("-")) for cell in cells
+        )
         return cells if not is_data and any(map(is_any_unit, cells)) else []
     text = _UNITS_LABEL.sub("", without_comment_mark(line))
     for other in (separator, *SEPARATORS):

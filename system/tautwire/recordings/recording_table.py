@@ -15,6 +15,7 @@ from ..errors import RecordingError, UnknownColumnsError, format_value, raise_er
 from ..name_suggestions import closest_name, join_names
 from ..robot.schema import AXES, QUATERNION_COLUMNS, RecordedColumn
 from .clock_time import ClockFormat
+from .number_hints import hint_for_number
 from .quaternion_columns import missing_quaternion_columns, quaternion_problem
 from .units import Number, Unit
 from .winch_gaps import MAX_GAP_SAMPLES, WINCH_COLUMNS, CellError, is_winch_column_used, without_bridged_gaps
@@ -93,7 +94,10 @@ def parse_header(
         cable_match = _CABLE_COLUMN.fullmatch(name)
         if cable_match and cable_count and not 1 <= int(cable_match.group(1)) <= cable_count:
             problem = f"the column {name} belongs to no cable, the robot has cables 1 to {cable_count}"
-            sink(RecordingError(where, problem, "give the robot file that belongs to this recording", line))
+            hint = "give the robot file that belongs to this recording"
+            if int(cable_match.group(1)) == 0:
+                hint = "count cables from 1, or declare each name so in [recording.columns], as tautwire columns does"
+            sink(RecordingError(where, problem, hint, line))
     unknown_names = tuple(name for name in names if name not in allowed_names)
     for error in _missing_column_errors(names, unknown_names, where, cable_count, line):
         sink(error)
@@ -156,9 +160,12 @@ class Row(NamedTuple):
 
 
 MAX_MAGNITUDE = 1e12  # beyond any quantity of a cable robot in SI units
-MISSING_CELLS = ("", "nan", "NaN", "NAN", "NA")  # what loggers write where a sensor dropped out
-
-_DECIMAL_COMMA = re.compile(r"[-+]?[0-9]+,[0-9]+([eE][-+]?[0-9]+)?")
+# What loggers, spreadsheets and databases write where a sensor dropped out.
+_NOT_A_NUMBER = ("nan", "NaN", "NAN", "-nan", "-NaN", "-nan(ind)", "1.#QNAN", "-1.#QNAN", "1.#IND", "-1.#IND")
+MISSING_CELLS = ("", *_NOT_A_NUMBER, "NA", "N/A", "n/a", "#N/A", "<NA>", "NULL", "null", "None", "-", "--")
+# A time beyond this many seconds is an epoch in a smaller unit; in s, epochs of today are 1.8e9.
+_MAX_EPOCH = 1e10
+_EPOCH_UNITS = {"ms": 1e3, "us": 1e6, "ns": 1e9}
 
 
 def row_errors(rows: Iterable[Row], header: Header, file: str) -> Iterator[RecordingError]:
@@ -171,6 +178,10 @@ def _sample_errors(rows: Iterable[Row], header: Header, file: str) -> Iterator[l
     """Validation errors of each sample, and at the end of their number."""
     count, previous_time = 0, -math.inf
     for row in rows:
+        if tuple(cell.strip() for cell in row.cells) == header.names:
+            hint = "cut the file there, a second recording begins, or remove the line"
+            yield [CellError(RecordingError(row.where, "repeats the names of the columns", hint, row.number))]
+            continue
         count += 1
         if len(row.cells) != len(header.names):
             yield [CellError(_width_error(row, len(header.names)))]
@@ -187,8 +198,7 @@ def _sample_errors(rows: Iterable[Row], header: Header, file: str) -> Iterator[l
                 elif name in QUATERNION_COLUMNS:
                     quaternion[name] = value
         if time <= previous_time:
-            problem = f"is {time!r} after {previous_time!r}, must rise from sample to sample"
-            errors.append(CellError(_cell_error(row, "time", problem, "sort the samples and remove duplicates")))
+            errors.append(CellError(_time_error(row, time, previous_time)))
         problem_and_hint = quaternion_problem(quaternion) if len(quaternion) == len(QUATERNION_COLUMNS) else None
         if problem_and_hint:
             errors.append(CellError(RecordingError(row.where, *problem_and_hint, row.number)))
@@ -197,6 +207,15 @@ def _sample_errors(rows: Iterable[Row], header: Header, file: str) -> Iterator[l
     if count < 2:
         samples = "1 sample" if count else "no samples"
         yield [CellError(RecordingError(file, f"has {samples}, must have at least 2", "record for longer"))]
+
+
+def _time_error(row: Row, time: float, previous_time: float) -> RecordingError:
+    """The error of a time that does not rise: it repeats, goes back, or begins anew."""
+    problem = f"is {time!r} after {previous_time!r}, must rise from sample to sample"
+    hint = "sort the samples; where the clock was set or a second run begins, cut the recording there"
+    if time == previous_time:
+        hint = "remove duplicates; of times that are rounded write more digits"
+    return _cell_error(row, "time", problem, hint)
 
 
 def not_a_table_error(file: str) -> RecordingError:
@@ -230,6 +249,14 @@ def _parse_cell(row: Row, header: Header, name: str, cell: str) -> float | Recor
     if math.isnan(number):
         return _cell_error(row, name, *_not_a_number(header, name, cell, hint))
     problem = f"is {format_value(cell)}, must be at most {MAX_MAGNITUDE:g} in magnitude"
+    epoch = next(
+        (unit for unit, size in _EPOCH_UNITS.items() if name == "time" and 0.0 < number / size < _MAX_EPOCH), None
+    )
+    if epoch is not None:
+        problem = f"is {format_value(cell)}, as {epoch} since 1970 are"
+        return _cell_error(
+            row, name, problem, f'write time [{epoch}] in the header, or unit = "{epoch}" in [recording.columns]'
+        )
     return _cell_error(row, name, problem, "give it in SI units")
 
 
@@ -239,10 +266,8 @@ def _not_a_number(header: Header, name: str, cell: str, hint: str) -> tuple[str,
         return f"is {format_value(cell)}, not a time in {header.clock.style}", "write all times as the first"
     if name == "time" and (":" in cell or cell.count("-") > 1):
         hint = "write seconds, hh:mm:ss, or ISO 8601 as in 2024-05-31T12:00:00.25Z"
-    elif header.decimal_mark == "," and "." in cell:
-        hint = "write it with a decimal comma, as others in this file, and without separators of thousands"
-    elif _DECIMAL_COMMA.fullmatch(cell):
-        hint = "write it with a decimal point"
+    else:
+        hint = hint_for_number(cell, header.decimal_mark) or hint
     return f"is {format_value(cell)}, not a number", hint
 
 

@@ -118,6 +118,15 @@ _IN_WORDS = {
     for word in words
     for plural in ("", "s")
 } | {"inches": "in", "foot": "ft", "feet": "ft"}
+# Units of what is proportional to a quantity: by the factor that makes SI units of them.
+_SCALED_UNITS = {
+    "the drum's radius": ("rad", "rad/s"),
+    "pi / 180 times the drum's radius": ("deg", "deg/s", "\u00b0", "\u00b0/s"),
+    "2 pi times the drum's radius": ("rev", "rev/s", "turns", "turns/s", "rps"),
+    "2 pi / 60 times the drum's radius": ("rpm", "1/min", "rev/min", "min^-1", "min-1", "u/min"),
+    "2 pi times the drum's radius / counts per turn": ("counts", "count", "cnt", "inc", "ticks", "counts/s"),
+}
+_SCALED_FORCES = {"the load cell's N for one": ("v", "mv", "mv/v", "ma", "counts", "count", "lsb", "bit", "digits")}
 _BRACKETS = re.compile(r"\[(.*)\]|\((.*)\)")
 _MICRO_SIGNS = str.maketrans({"\u00b5": "u", "\u03bc": "u", "\u00b7": "*", "\u22c5": "*"})
 
@@ -155,8 +164,12 @@ def require_unit(text: str, column: str, where: str, line: int | None = None) ->
         return _RATIO[0]
     if unit is None:
         problem = f"is in {format_value(text)}, not a known unit of {quantity}" if text.strip() else "has no unit"
-        symbols = ", ".join(unit.symbol for unit in UNITS[quantity])
-        raise RecordingError(where, problem, f"write one of {symbols}", line)
+        hint = f"write one of {', '.join(unit.symbol for unit in UNITS[quantity])}"
+        scaled = _SCALED_UNITS if quantity in ("length", "speed") else _SCALED_FORCES if quantity == "force" else {}
+        per_one = next((each for each, symbols in scaled.items() if text.strip(" []()").lower() in symbols), "")
+        if per_one:
+            hint = f"leave the unit out, and declare factor = {per_one} in [recording.columns]"
+        raise RecordingError(where, problem, hint, line)
     return unit
 
 
