@@ -11,6 +11,7 @@ from scipy.spatial.transform import Rotation
 from tautwire.cli import run
 from tautwire.robot.caspr_import import CasprError, Rope, read_caspr_robot
 from tautwire.robot.robot_file_reader import read_robot
+from tautwire.robot.static_equilibrium import static_tensions
 from tautwire_fmu.laws.rotation import rotation_matrix
 
 MASS, CENTRE = 40.0, (0.02, -0.01, 0.3)
@@ -64,6 +65,19 @@ def test_geometry_mass_and_limits_are_taken_over(tmp_path: Path) -> None:
     assert [(each.anchor, each.attachment) for each in robot.cables] == ENDS
     assert robot.tension is not None
     assert (robot.tension.minimum, robot.tension.maximum, robot.tension.preferred) == (11.0, 1011.0, 111.0)
+
+
+def test_the_preferred_tension_leaves_no_cable_slack(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    # The weight makes four cables from above carry more than four from below.
+    corners = [(x, y, z) for x in (-1.0, 1.0) for y in (-1.0, 1.0) for z in (-1.0, 1.0)]
+    ends = [((0.5 + 2.0 * x, 2.0 * y, 1.0 + 0.5 * z), (0.2 * x, -0.2 * y, -0.1 * z)) for x, y, z in corners]
+    monkeypatch.setattr("tests.robot.test_caspr_import.ENDS", ends)
+    imported = read_caspr_robot(model(tmp_path, bodies(pose="0 0 1 0 0 0")))
+    limits = imported.robot.tension
+    assert limits is not None and limits.preferred > 111.0
+    assert static_tensions(imported.robot).min() > limits.minimum + 0.01 * (limits.maximum - limits.minimum)
+    share = (limits.preferred - limits.minimum) / (limits.maximum - limits.minimum)
+    assert any(f"{limits.preferred:g} N, {100.0 * share:.0f} % up" in note for note in imported.notes)
 
 
 def test_an_inertia_about_the_joint_is_shifted_to_the_centre_of_mass(tmp_path: Path) -> None:

@@ -11,7 +11,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from xml.etree import ElementTree
 from xml.etree.ElementTree import Element
@@ -20,8 +20,9 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
-from ..errors import InputError
+from ..errors import InputError, UnreachableError
 from .schema import Cable, EffectSetting, Platform, Point, Quaternion, Robot, Sensors, TensionLimits
+from .static_equilibrium import static_tensions
 
 Array = NDArray[np.float64]
 
@@ -30,8 +31,9 @@ GRAVITY = 9.81  # m/s^2, as in CASPR
 # Numbers behind the position in a joint's initial values.
 JOINTS = {"SPATIAL_EULER_XYZ": 3, "SPATIAL_QUATERNION": 4}
 CABLE_KINDS = ("cable_ideal", "cable_linear_spring")
-# Of the range between the limits, added to the lower one.
-PREFERRED_SHARE = 0.1
+# Of the range between the limits, above the lower one: where a cable counts as taut, and preferred tensions.
+TAUT_SHARE = 0.01
+PREFERRED_SHARES = (0.1, 0.2, 0.3, 0.4, 0.5)
 
 
 class CasprError(InputError):
@@ -83,7 +85,7 @@ def read_caspr_robot(folder: str | Path, cable_set: str | None = None, rope: Rop
         if element.tag not in CABLE_KINDS:
             raise _error(source, f"{_named(element)} is a {element.tag}", f"only {' and '.join(CABLE_KINDS)} are read")
     ends = [_cable_ends(element, platform.centre_of_mass, source) for element in elements]
-    robot = Robot(
+    declared = Robot(
         name=name,
         gravity=GRAVITY,
         platform=platform,
@@ -92,6 +94,7 @@ def read_caspr_robot(folder: str | Path, cable_set: str | None = None, rope: Rop
         cables=tuple(_cable(each, element, rope, source) for each, element in zip(ends, elements, strict=True)),
         effects=_pulleys(ends),
     )
+    robot = _with_taut_cables(declared)
     return ImportedRobot(robot, (*notes, *_assumptions(elements, rope, robot), *_left_out(source, cables, chosen)))
 
 
@@ -222,7 +225,23 @@ def _tension_limits(elements: Sequence[Element], folder: Path) -> TensionLimits:
     """The limits within which all cables may be."""
     low = max(_numbers(each, "properties/force_min", 1, folder)[0] for each in elements)
     high = min(_numbers(each, "properties/force_max", 1, folder)[0] for each in elements)
-    return TensionLimits(float(low), float(high), float(low + PREFERRED_SHARE * (high - low)))
+    return TensionLimits(float(low), float(high), float(low + PREFERRED_SHARES[0] * (high - low)))
+
+
+def _with_taut_cables(robot: Robot) -> Robot:
+    """The robot with the least preferred tension that leaves no cable at its lower limit; as it is if there is none."""
+    limits = robot.tension
+    assert limits is not None
+    span = limits.maximum - limits.minimum
+    for share in PREFERRED_SHARES:
+        tried = replace(robot, tension=replace(limits, preferred=limits.minimum + share * span))
+        try:
+            lowest = float(np.min(static_tensions(tried)))
+        except UnreachableError:
+            return robot
+        if lowest > limits.minimum + TAUT_SHARE * span:
+            return tried
+    return robot
 
 
 def _assumptions(elements: Sequence[Element], rope: Rope, robot: Robot) -> list[str]:
@@ -232,7 +251,8 @@ def _assumptions(elements: Sequence[Element], rope: Rope, robot: Robot) -> list[
     if any(element.tag == "cable_ideal" for element in elements):
         elasticity = f"modulus {rope.modulus:g} Pa, {elasticity}"
     notes = [f"assumed, as CASPR has none: {elasticity}; gravity {GRAVITY:g} m/s^2, along -z"]
-    notes.append(f"assumed: a preferred tension of {limits.preferred:g} N, a tenth of the way up between the limits")
+    share = (limits.preferred - limits.minimum) / max(limits.maximum - limits.minimum, 1e-300)
+    notes.append(f"assumed: a preferred tension of {limits.preferred:g} N, {100.0 * share:.0f} % up between the limits")
     forces = {(e.findtext("properties/force_min"), e.findtext("properties/force_max")) for e in elements}
     if len(forces) > 1:
         notes.append(f"limits differ by cable: {limits.minimum:g} to {limits.maximum:g} N are those that all allow")
