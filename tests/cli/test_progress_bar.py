@@ -40,8 +40,8 @@ LONG = {
     "campaign": (["plan.toml", "--out", "out"], "tautwire.campaigns.campaign_runner.run_campaign"),
     "paper": (["--out", "out"], "tautwire.paper.write_paper"),
 }
-# They only read or write a text.
-AT_ONCE = {"columns", "example", "import_", "new"}
+# They only read or write a text, or compute one pose.
+AT_ONCE = {"columns", "example", "import_", "new", "pose"}
 
 
 @pytest.fixture

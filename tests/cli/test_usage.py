@@ -14,6 +14,7 @@ ROBOT = str(EXAMPLES / "three" / "robot.toml")
 EXAMPLES_OF = {
     "linearise": "tautwire linearise robot.toml --at ",
     "workspace": "tautwire workspace robot.toml --out ",
+    "pose": "tautwire pose robot.toml --at ",
     "simulate": "tautwire simulate robot.toml --speeds ",
     "excite": "tautwire excite robot.toml --effects ",
     "new": "tautwire new hall --cables ",
@@ -30,6 +31,8 @@ EXAMPLES_OF = {
     [
         ["linearise", ROBOT],
         ["linearise", ROBOT, "--out", "m.json", "--at", "1,2"],
+        ["pose", ROBOT, "--rule", "fair"],
+        ["pose", ROBOT, "--lengths", "1,2"],
         ["workspace", ROBOT],
         ["workspace", ROBOT, "--out", "w.csv", "--lower", "here"],
         ["simulate", ROBOT, "--speeds", "s.csv", "--out", "r.csv", "--step", "0"],

@@ -25,6 +25,7 @@ from .console import (
     note_unused_tables,
     parse_numbers,
     parse_position,
+    parse_quaternion,
     progress_bar,
     read_holdable_robot,
     relative_links,
@@ -35,7 +36,6 @@ if TYPE_CHECKING:
     from ..robot.pose_grid import PoseGrid
     from ..robot.workspace import Workspace
 
-QUATERNION_NORM_TOLERANCE = 1e-3
 COMPUTING = "computing the workspace"
 CRITERION_WORDS = {"wrench-closure": "in wrench closure", "static": "in static equilibrium"}
 
@@ -202,7 +202,7 @@ def _pose_grid(
     from ..robot.pose_grid import orientation_grid, position_grid
 
     lower, upper, spacing = box
-    turned = None if orientation is None else _parse_quaternion(orientation)
+    turned = None if orientation is None else parse_quaternion(orientation)
     rotations = parse_numbers(rotation_range, 3, "--rotation-range", "0.2,0.2,0.5")
     if at is None:
         lower_corner = None if lower is None else parse_position(lower, "--lower")
@@ -213,14 +213,6 @@ def _pose_grid(
     if not any(rotations):
         raise InputError("--at", "is given without rotations", "add --rotation-range, such as 0.5,0.5,1")
     return orientation_grid(robot, rotations, parse_position(at), spacing, turned)
-
-
-def _parse_quaternion(text: str) -> list[float]:
-    numbers = parse_numbers(text, 4, "--orientation", "1,0,0,0")
-    norm = math.hypot(*numbers)
-    if abs(norm - 1.0) > QUATERNION_NORM_TOLERANCE:
-        raise InputError("--orientation", f"has norm {norm:.6g}, must have 1", "give the unit quaternion w,x,y,z")
-    return [number / norm for number in numbers]
 
 
 def _write_workspace(

@@ -20,6 +20,7 @@ from .column_commands import columns
 from .console import INTERRUPTED, flush_or_discard, open_closed_streams, print_error
 from .fmu_commands import build, fmus
 from .identification_commands import excite, material, trace
+from .pose_command import pose
 from .robot_file_commands import check, example, import_, new
 from .simulation_command import simulate
 
@@ -38,6 +39,7 @@ COMMANDS = (
     build,
     fmus,
     simulate,
+    pose,
     linearise,
     workspace,
     trace,

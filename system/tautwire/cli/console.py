@@ -92,6 +92,7 @@ def trace_command(robot_file: Path, recording: Path, columns: Path | None, track
     return f"tautwire trace {shell_quoted(robot_file)} {shell_quoted(recording)}{options} --out report/"
 
 
+QUATERNION_NORM_TOLERANCE = 1e-3
 DEFAULT_OUTPUT = CommandOutput()
 INTERRUPTED = "interrupted; nothing was written"
 
@@ -160,6 +161,15 @@ def parse_numbers(text: str, count: int, option: str, example: str) -> tuple[flo
     """Parses finite numbers separated by commas; raises InputError that names the option and shows an example."""
     problem = f"{text!r} is not {count} numbers"
     return _parsed_numbers(text, count, InputError(option, problem, f"write them as in {option} {example}"))
+
+
+def parse_quaternion(text: str) -> list[float]:
+    """Parses a unit quaternion w,x,y,z, which may be rounded; raises InputError that names ``--orientation``."""
+    numbers = parse_numbers(text, 4, "--orientation", "1,0,0,0")
+    norm = math.hypot(*numbers)
+    if abs(norm - 1.0) > QUATERNION_NORM_TOLERANCE:
+        raise InputError("--orientation", f"has norm {norm:.6g}, must have 1", "give the unit quaternion w,x,y,z")
+    return [number / norm for number in numbers]
 
 
 def _parsed_numbers(text: str, count: int, error: InputError) -> tuple[float, ...]:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import partial
+
 import numpy as np
 from numpy.typing import NDArray
 
@@ -14,30 +16,31 @@ from .cable_routes import Points, attachment_points, cable_routes, unreachable_e
 from .rigid_equilibrium import static_equilibrium
 from .schema import Quaternion, Robot
 from .static_load import cable_weight_force, fixed_point, static_load
-from .tension_distribution import DEFAULT_LIMITS, distribute_tensions, least_limit_violations
+from .tension_distribution import DEFAULT_LIMITS, distribute_by_rule, least_limit_violations
 
 Array = NDArray[np.float64]
 
 SINGULARITY_TOLERANCE = 1e-9
 
 
-def static_tensions(robot: Robot, at: Array | None = None) -> Array:
+def static_tensions(robot: Robot, at: Array | None = None, rule: str = "nearest") -> Array:
     """Static tensions that hold the platform in equilibrium, shape (n,), in N.
 
     Solves ``sum T_i u_i = m g e_z``, with the loads of effects and the weight of cables. With more than three
-    cables, the tensions nearest to the preferred one (least squares) within the limits of the robot file; without
-    limits there, nearest to zero and not negative. ``at`` is a position in m, by default the start. Of a rigid
+    cables, by default those nearest to the preferred tension (least squares) within the limits of the robot file;
+    without limits there, nearest to zero and not negative; or by another ``rule`` of
+    :data:`tautwire.robot.tension_distribution.RULES`. ``at`` is a position in m, by default the start. Of a rigid
     platform they are those of :func:`tautwire.robot.rigid_equilibrium.static_equilibrium`.
 
     Raises UnreachableError where a cable would have to push or to break a limit.
     """
     if robot.platform.is_rigid_body:
-        return static_equilibrium(robot, at).tensions
+        return static_equilibrium(robot, at, rule).tensions
     position = np.array(robot.platform.start if at is None else at, dtype=float)
     routes = cable_routes(REAL, robot, position.tolist())
     direction_matrix = np.array([route.direction for route in routes]).T
     load_vector = np.array(static_load(REAL, robot, position.tolist()), dtype=float)
-    solver = _solve_three if len(robot.cables) == 3 else _distribute
+    solver = _solve_three if len(robot.cables) == 3 else partial(_distribute, rule=rule)
     if not cables_have_weight(robot):
         return solver(robot, position, direction_matrix, load_vector)
 
@@ -52,11 +55,11 @@ def static_tensions(robot: Robot, at: Array | None = None) -> Array:
     return fixed_point(iterate, np.full(len(routes), float(np.linalg.norm(load_vector))))
 
 
-def tensions_at(robot: Robot, position: Array, orientation: Quaternion) -> Array:
+def tensions_at(robot: Robot, position: Array, orientation: Quaternion, rule: str = "nearest") -> Array:
     """As :func:`static_tensions`, at an orientation too; of fewer than six cables the equilibrium nearest to it."""
     if robot.platform.is_rigid_body:
-        return static_equilibrium(robot, position, orientation=orientation).tensions
-    return static_tensions(robot, position)
+        return static_equilibrium(robot, position, rule, orientation).tensions
+    return static_tensions(robot, position, rule)
 
 
 def start_orientation(robot: Robot) -> Quaternion:
@@ -101,9 +104,9 @@ def _solve_three(robot: Robot, position: Array, direction_matrix: Array, load: A
     return tensions
 
 
-def _distribute(robot: Robot, position: Array, direction_matrix: Array, load: Array) -> Array:
+def _distribute(robot: Robot, position: Array, direction_matrix: Array, load: Array, rule: str) -> Array:
     limits = robot.tension or DEFAULT_LIMITS
-    tensions = distribute_tensions(direction_matrix, load, limits)
+    tensions = distribute_by_rule(direction_matrix, load, limits, rule)
     if tensions is not None:
         return tensions
     excess = least_limit_violations(direction_matrix, load, limits)
