@@ -35,6 +35,18 @@ def varied(plan: Plan, values: tuple[float | str, ...] = VALUES) -> Robot:
     return robot_from_content(with_values(plan.content, dict(zip(plan.keys, values, strict=True))), plan.file)
 
 
+def test_native_fmus_are_other_ones_and_run_as_those_of_python(tmp_path: Path) -> None:
+    robot = example("three")
+    native = replace(robot, native_fmus=True)
+    assert structure_digest(native) != structure_digest(robot)
+    time, speed = np.array([0.0, 0.1, 0.2]), np.array([[0.0] * 3, [0.05] * 3, [0.0] * 3])
+    runs = []
+    for kind, each in (("python", robot), ("native", native)):
+        changed = replace(each, platform=replace(each.platform, mass=310.0))
+        runs.append(cosimulate(cached_fmus(changed, build_bundle(each), tmp_path / kind), time, speed))
+    assert runs[1].position == pytest.approx(runs[0].position, abs=1e-11)
+
+
 def test_statics_and_modes_are_those_of_the_varied_robot(tmp_path: Path) -> None:
     plan = read(tmp_path, AT_REST)
     row = run_job(build_context(plan, {}), Job(3, 3, 0, VALUES), tmp_path).row

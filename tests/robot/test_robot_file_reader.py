@@ -232,6 +232,7 @@ def test_refuses_a_wrong_effect(tmp_path: Path, effect: str, key: str, words: li
         ("[fmu]\ncable_4 = 'a.fmu'", "fmu.cable_4", ["not a known key", "cable_1 ... cable_3"]),
         ("[fmu]\nplatform = 3", "fmu.platform", ["3", "not text", "mine.fmu"]),
         ("[fmu]\nplatform = ' '", "fmu.platform", ["path"]),
+        ("[fmu]\nnative = 'yes'", "fmu.native", ["'yes'", "true or false"]),
         ('[fmu]\nplatform = "a\\u0000b"', "fmu.platform", ["path"]),
     ],
 )

@@ -28,6 +28,7 @@ from tautwire.robot.schema import (
 )
 from tautwire_fmu.laws.cable import LAWS
 from tautwire_fmu.laws.effects import ALL
+from tests.support.robots import example
 
 HALL = Robot(
     name="hall",
@@ -48,6 +49,15 @@ def test_written_text_is_commented() -> None:
     assert "mass = 80.0  # kg" in text
     assert "[effect.modulus]" in text
     assert "cables = [2]" in text
+
+
+def test_native_fmus_are_written_and_read_back(tmp_path: Path) -> None:
+    robot = replace(example("three"), native_fmus=True)
+    target = tmp_path / "three.toml"
+    write_robot(robot, target)
+    assert "native = true" in target.read_text(encoding="utf-8")
+    assert read_robot(target).native_fmus
+    assert "[fmu]" not in robot_text(example("three"))
 
 
 def test_writing_replaces_whole_files_only(tmp_path: Path) -> None:

@@ -36,7 +36,8 @@ def structure_digest(robot: Robot) -> str:
     """Digest of what decides which FMUs a robot needs: laws, effects and formulas, not the numbers in them."""
     components = {name: _component_structure(data) for name, data in component_data(robot).items()}
     user_fmus = {fmu.slot: str(fmu.path) for fmu in robot.fmus}
-    return hashlib.sha256(json.dumps([components, user_fmus], sort_keys=True).encode()).hexdigest()[:16]
+    structure = json.dumps([components, user_fmus, robot.native_fmus], sort_keys=True)
+    return hashlib.sha256(structure.encode()).hexdigest()[:16]
 
 
 def component_data(robot: Robot) -> dict[str, dict[str, Any]]:

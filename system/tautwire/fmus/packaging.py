@@ -102,7 +102,7 @@ def build_fmus(
 
     FMI 2.0 co-simulation; the data of a component lie inside as a JSON resource. ``native`` FMUs are machine code for
     ``platforms``, by default this machine's, with their source, and need no Python; they can also be of ``fmi`` 3, the
-    major version. User FMUs stay where they are.
+    major version. So are those of a robot that asks for ``native_fmus``. User FMUs stay where they are.
     The folder is created if absent, and has to stay while the FMUs are run. ``progress`` gets the fraction completed,
     from 0 to 1. Returns the paths of the FMUs.
 
@@ -114,7 +114,7 @@ def build_fmus(
     folder = validate_folder("build_fmus: folder", folder)
     validate_callable("build_fmus: progress", progress)
     check_user_fmus(robot)
-    write_fmu = native_fmu_writer(platforms, fmi) if native else _build_fmu
+    write_fmu = native_fmu_writer(platforms, fmi) if native or robot.native_fmus else _build_fmu
     folder.mkdir(parents=True, exist_ok=True)
     user_fmus = {fmu.slot: fmu.path for fmu in robot.fmus}
     is_rigid = robot.platform.is_rigid_body

@@ -53,6 +53,7 @@ TOP_LEVEL_KEYS = (
     "formula",
     "recording",
 )
+NATIVE_KEY = "native"
 MAX_FILE_BYTES = 10_000_000  # bytes
 MAX_CABLES = 100
 MIN_POINT_DISTANCE = 1e-6  # m; no two exit points can be built closer
@@ -202,6 +203,7 @@ def _read_robot_table(root: CheckedTable, default_name: str) -> Robot:
         formulas=read_formulas(root, partial(read_cable_list, cable_count=len(cables))),
         recorded_columns=read_recorded_columns(root, len(cables)),
         tracker=read_tracker_table(root),
+        native_fmus=_read_native_fmus(fmu) if fmu else False,
     )
 
 
@@ -312,10 +314,10 @@ def _read_winch(table: CheckedTable) -> Winch:
 
 
 def _read_fmus(table: CheckedTable, cable_count: int) -> tuple[UserFmu, ...]:
-    table.require_known(fmu_slots(cable_count))
+    table.require_known((*fmu_slots(cable_count), NATIVE_KEY))
     hint = 'name an FMU, as in platform = "mine.fmu"'
     fmus = []
-    for slot in table.content:
+    for slot in [key for key in table.content if key != NATIVE_KEY]:
         name = table.text(slot, hint)
         if name is None:
             continue
@@ -324,3 +326,10 @@ def _read_fmus(table: CheckedTable, cable_count: int) -> tuple[UserFmu, ...]:
         # Absolute, so that the robot file may be written to another folder.
         fmus.append(UserFmu(slot, Path(os.path.abspath(Path(table.file).parent / name))))
     return tuple(fmus)
+
+
+def _read_native_fmus(table: CheckedTable) -> bool:
+    value = table.content.get(NATIVE_KEY, False)
+    if not isinstance(value, bool):
+        table.refuse(NATIVE_KEY, f"is {format_value(value)}, must be true or false", "give true for machine code")
+    return value is True

@@ -21,7 +21,6 @@ from .schema import (
     Sensors,
     TensionLimits,
     Tracker,
-    UserFmu,
     Winch,
 )
 
@@ -38,7 +37,7 @@ def robot_text(robot: Robot) -> str:
         _tension_block(robot.tension) if robot.tension else [],
         _sensor_block(robot.sensors),
         _winch_block(robot.winch) if robot.winch else [],
-        _fmu_block(robot.fmus),
+        _fmu_block(robot),
         *(_cable_block(n, cable, robot.platform.is_rigid_body) for n, cable in enumerate(robot.cables, 1)),
         *(_effect_block(robot, setting) for setting in robot.effects),
         *_formula_blocks(robot),
@@ -131,9 +130,11 @@ def _winch_block(winch: Winch) -> list[str]:
     ]
 
 
-def _fmu_block(fmus: Sequence[UserFmu]) -> list[str]:
-    lines = [f"{fmu.slot} = {json.dumps(str(fmu.path), ensure_ascii=False)}" for fmu in fmus]
-    return ["[fmu]  # instead of the project's own", *lines] if lines else []
+def _fmu_block(robot: Robot) -> list[str]:
+    lines = [f"{fmu.slot} = {json.dumps(str(fmu.path), ensure_ascii=False)}" for fmu in robot.fmus]
+    heading = "[fmu]  # instead of the project's own" if lines else "[fmu]"
+    native_lines = ["native = true  # machine code"] if robot.native_fmus else []
+    return [heading, *native_lines, *lines] if native_lines or lines else []
 
 
 def _cable_block(number: int, cable: Cable, has_attachment: bool) -> list[str]:

@@ -86,6 +86,7 @@ TEMPLATE_TAIL = """
 # User FMUs instead of the project's, relative to this file.
 # [fmu]
 # platform = "mine.fmu"
+# native = true                   # the project's own as machine code
 
 # Recordings' columns by the laboratory's names; "tautwire columns" proposes this table.
 # [recording.columns]

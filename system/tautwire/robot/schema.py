@@ -239,8 +239,9 @@ class Robot:
     """A cable-driven parallel robot as declared; ``gravity`` in m/s^2.
 
     Without a ``winch`` the rope runs at the commanded speed. Settings of one effect are adjacent in ``effects``, as
-    in a file; otherwise their order is kept. An ``initial_state`` belongs to a run, no file has one; nor a start
-    that ``start_is_measured``, by axis, which is as the position sensor shows it.
+    in a file; otherwise their order is kept. ``native_fmus`` asks for our own FMUs as machine code. An
+    ``initial_state`` belongs to a run, no file has one; nor a start that ``start_is_measured``, by axis, which is as
+    the position sensor shows it.
     """
 
     name: str
@@ -255,6 +256,7 @@ class Robot:
     formulas: tuple[Formula, ...] = ()
     recorded_columns: tuple[RecordedColumn, ...] = ()
     tracker: Tracker = Tracker()
+    native_fmus: bool = False
     initial_state: InitialState | None = None
     start_is_measured: tuple[bool, bool, bool] = (False, False, False)
 
