@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from casadi import SX, Function, mtimes
+from casadi import SX, Function, horzcat, mtimes, vertcat
 from numpy.typing import NDArray
 
-from tautwire.estimation.covariance_recursion import Moments, Record, Samples, Step, run_recursion
+from tautwire.estimation.covariance_recursion import Moments, Record, Samples, run_recursion
 from tautwire.estimation.native_functions import BoundFunction, CompiledFunction
+from tautwire.estimation.step_integration import Division, Integration, Step
 
 Array = NDArray[np.float64]
 
@@ -33,15 +34,39 @@ FULL_TRANSITION[:MOVING, :FROM] = TRANSITION
 START, START_COVARIANCE = GENERATOR.normal(size=SIZE), np.diag([1.0, 2.0, 0.5, 0.1, 0.3])
 
 
-def bound(count: int, state: Array) -> tuple[BoundFunction, BoundFunction]:
-    x = SX.sym("x", SIZE)
+def bound(count: int, state: Array) -> tuple[BoundFunction, Integration, BoundFunction, list[BoundFunction]]:
+    """Functions of a sample of a second; rates are constant in it, and their Jacobian is that of one part.
+
+    The constants are two parameters, a driving state, an uncertain constant, and the states before.
+    """
+    x, constants, number = SX.sym("x", SIZE), SX.sym("constants", PARAMETERS + 2 + MOVING), SX.sym("number")
     outputs = Function("outputs", [x], [mtimes(SX(BY_STATE), x), SX(BY_STATE), SX(BY_PARAMETERS)])
-    update = Function(
-        "update",
-        [x],
-        [mtimes(SX(FULL_TRANSITION), x), SX(TRANSITION), SX(DIRECT), SX(DECAY), SX(PROCESS_NOISE)],
+    theta = vertcat(SX(PARAMETERS, 1), x[3], x[2])
+    prepared = [vertcat(theta, x[:MOVING]), SX(MOVING, PARAMETERS + 2), SX(1)]
+    moving, rates = SX.sym("moving", MOVING), SX(TRANSITION[:, :MOVING]) - SX.eye(MOVING)
+    other = (
+        SX(TRANSITION[:, MOVING]) * constants[PARAMETERS + 1] + SX(TRANSITION[:, MOVING + 1]) * constants[PARAMETERS]
     )
-    return CompiledFunction(outputs).bind(count, state[:, None]), CompiledFunction(update).bind(count, state[:, None])
+    moved = moving + 0.5 * (mtimes(rates, constants[PARAMETERS + 2 :]) + other)
+    by_constants = horzcat(SX(DIRECT), SX(TRANSITION[:, MOVING + 1]), SX(TRANSITION[:, MOVING]), SX(MOVING, MOVING))
+    process = Function("process", [number], [SX(DECAY), SX(PROCESS_NOISE)])
+    buffers = [np.zeros((1, size)) for size in (MOVING, MOVING, PARAMETERS + 2 + MOVING, 1)]
+    preparation = CompiledFunction(Function("preparation", [x], prepared)).bind(count, state[:, None])
+    part = Function("part", [moving, constants, number], [moved])
+    slope = Function("slope", [moving, constants, number], [rates, by_constants])
+    of_part = CompiledFunction(part).bind(count, buffers[0].T, buffers[2].T, buffers[3])
+    of_slope = CompiledFunction(slope).bind(count, buffers[1].T, buffers[2].T, buffers[3])
+    integration = Integration(
+        *(step(each) for each in (preparation, of_part, of_slope)),
+        Division(2, 1, 1, 0),
+        *buffers,
+        np.ones(count),
+        np.zeros((FROM, MOVING)),
+        np.zeros((PARAMETERS, MOVING)),
+    )
+    of_outputs = CompiledFunction(outputs).bind(count, state[:, None])
+    of_process = CompiledFunction(process).bind(count, np.zeros((1, count)))
+    return of_outputs, integration, of_process, [preparation, of_part, of_slope]
 
 
 def step(function: BoundFunction) -> Step:
@@ -57,9 +82,9 @@ def recursion(keeps_covariances: bool) -> tuple[Moments, Record]:
         *np.empty((2, COUNT, OUTPUTS)),
         np.empty((COUNT, PARAMETERS, OUTPUTS)),
     )
-    outputs, update = bound(COUNT, moments.state)
+    outputs, integration, process, _owners = bound(COUNT, moments.state)
     samples = Samples(MEASURED, OBSERVED, WHITE_VARIANCES)
-    run_recursion(step(outputs), step(update), moments, samples, record)
+    run_recursion(step(outputs), integration, step(process), moments, samples, record)
     return moments, record
 
 
@@ -69,7 +94,7 @@ def test_states_covariances_and_likelihood_are_those_of_the_joint_update() -> No
     for k in range(COUNT):
         assert record.states[k] == pytest.approx(expected_state, rel=1e-10, abs=1e-12)
         assert record.covariances[k] == pytest.approx(expected_covariance, rel=1e-10, abs=1e-12)
-        assert np.array_equal(record.transitions[k], FULL_TRANSITION)
+        assert record.transitions[k] == pytest.approx(FULL_TRANSITION, abs=1e-14)
         seen = OBSERVED[k] > 0.0
         rows, noise = BY_STATE[seen], np.diag(WHITE_VARIANCES[seen])
         variance = rows @ expected_covariance @ rows.T + noise

@@ -8,7 +8,7 @@ import pytest
 from casadi import SX, Function
 
 from tautwire.estimation.integration_steps import Substeps
-from tautwire.estimation.kalman_filter import output_function, time_update_function
+from tautwire.estimation.kalman_filter import output_function, preparation_function, slope_function, trajectory_function
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.native_functions import CompiledFunction, by_sample
 from tautwire.robot.symbolic_model import FreeParameter, symbolic_model
@@ -108,16 +108,17 @@ def test_the_filter_functions_of_every_effect_are_casadis_to_the_last_bit(case: 
     start = np.array(Function("start", [model.parameters], [model.start])(theta))
     speeds = (recording.winch_speed[:count].T, recording.winch_speed[1 : count + 1].T)
     step = np.diff(recording.time[: count + 1])[None, :]
-    first = (start, theta)
+    substeps = Substeps(5, 1)
+    (constants,) = preparation_function(model, noise).call([start, theta, 0.02, []])[:1]
+    moving, zero = (start, np.array(constants)), np.zeros((1, 1))
     for function, columns in (
-        (output_function(model, 3, noise), (np.zeros((6, 1)), *speeds, step)),
-        (
-            time_update_function(model, 3, noise, Substeps(5, 1)),
-            (*speeds, step, np.full((1, 1), 1e-4), np.zeros((1, 1)), np.zeros((0, 1))),
-        ),
+        (output_function(model, 3, noise), (start, theta, np.zeros((6, 1)), *speeds, step, np.zeros((0, 1)))),
+        (preparation_function(model, noise), (start, theta, step, np.zeros((0, 1)))),
+        (trajectory_function(model, 3, noise, substeps), (*moving, *speeds, step, zero)),
+        (slope_function(model, 3, noise, substeps), (*moving, *speeds, zero)),
     ):
-        arguments = [np.tile(a, count) if a.shape[1] == 1 else a for a in (*first, *columns)]
-        ours = CompiledFunction(function)(count, *first, *columns)
+        arguments = [np.tile(a, count) if a.shape[1] == 1 else a for a in columns]
+        ours = CompiledFunction(function)(count, *columns)
         for a, b in zip(ours, function.map(count).call(arguments), strict=True):
             np.testing.assert_array_equal(a, np.array(b))
             assert np.all(np.isfinite(a))

@@ -6,7 +6,7 @@ Likelihoods that differ in numbers alone share it.
 from __future__ import annotations
 
 import sys
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 from functools import cached_property
 
 import casadi
@@ -14,10 +14,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..robot.symbolic_model import SymbolicModel, constants_as_parameters
-from .covariance_recursion import Moments, Record, Samples, Step, run_recursion
+from .covariance_recursion import Moments, Record, Samples, run_recursion
 from .integration_steps import Substeps
-from .kalman_filter import Noise, output_function, rate_jacobian_function, simulation_function, time_update_function
+from .kalman_filter import (
+    Noise,
+    output_function,
+    preparation_function,
+    process_function,
+    rate_jacobian_function,
+    simulation_function,
+    slope_function,
+    trajectory_function,
+)
 from .native_functions import BoundFunction, CompiledFunction
+from .step_integration import Division, Integration, Step
 
 Array = NDArray[np.float64]
 
@@ -28,7 +38,7 @@ class FilterInputs:
 
     ``measured``, ``observed`` and ``shift`` (m, K), speed and next speed (cables, K), time step and drift (1, K), and
     measured rotation (3, K), empty for a point mass, as ``columns``; the same for all samples are ``parameters``
-    (p, 1), ``disturbance`` (see :func:`tautwire.estimation.kalman_filter.time_update_function`), variances of white
+    (p, 1), ``disturbance`` (see :func:`tautwire.estimation.kalman_filter.process_function`), variances of white
     noise (m,), and the density of acceleration noise.
     """
 
@@ -91,7 +101,8 @@ class CompiledFilter:
     @property
     def instruction_count(self) -> int:
         """Instructions of its functions, in proportion to which it takes memory."""
-        return self.outputs.instruction_count + self._time_update.instruction_count
+        functions = (self.outputs, self._preparation, self._trajectory, self._slopes, self._process)
+        return sum(function.instruction_count for function in functions)
 
     @cached_property
     def outputs(self) -> CompiledFunction:
@@ -123,8 +134,26 @@ class CompiledFilter:
         sensitivities = np.ascontiguousarray(start.sensitivities.T).copy()
         theta, density = inputs.parameters, np.full((1, 1), inputs.acceleration_noise_density)
         outputs = self.outputs.bind(count, state[:, None], theta, shift, speed, later, step, rotation)
-        time_update = self._time_update.bind(
-            count, state[:, None], theta, speed, later, step, drift, density, inputs.disturbance
+        preparation = self._preparation.bind(count, state[:, None], theta, step, inputs.disturbance)
+        constants, index = np.zeros_like(preparation.results[0]), np.zeros((1, 1))
+        moving, middle = np.zeros((2, 1, self.model.states.numel() - self._constant_count))
+        part = self._trajectory.bind(count, moving.T, constants.T, speed, later, step, index)
+        slope = self._slopes.bind(count, middle.T, constants.T, speed, later, index)
+        process = self._process.bind(count, step, drift, density, inputs.disturbance)
+        parameter_rows = start.sensitivities.shape[1]
+        driving_count = preparation.results[2].shape[1]
+        integration = Integration(
+            _step(preparation),
+            _step(part),
+            _step(slope),
+            Division(*astuple(self._substeps)),
+            moving,
+            middle,
+            constants,
+            index,
+            np.ascontiguousarray(step[0]),
+            np.empty((self.model.states.numel() + driving_count, moving.shape[1])),
+            np.empty((parameter_rows, moving.shape[1])),
         )
         size, parameter_count = start.sensitivities.shape
         kept_count = count if keeps_covariances else 0
@@ -138,7 +167,7 @@ class CompiledFilter:
         )
         moments = Moments(state, covariance, sensitivities)
         samples = Samples(np.ascontiguousarray(measured.T), np.ascontiguousarray(observed.T), inputs.white_variances)
-        run_recursion(_step(outputs), _step(time_update), moments, samples, record)
+        run_recursion(_step(outputs), integration, _step(process), moments, samples, record)
         return FilterResults(
             record.states.T,
             record.covariances,
@@ -150,10 +179,23 @@ class CompiledFilter:
         )
 
     @cached_property
-    def _time_update(self) -> CompiledFunction:
-        function = time_update_function(
-            self.model, self._cable_count, self._noise, self._substeps, self._constant_count, self._has_sensitivities
-        )
+    def _preparation(self) -> CompiledFunction:
+        function = preparation_function(self.model, self._noise, self._constant_count)
+        return CompiledFunction(function, max_compiled=sys.maxsize)
+
+    @cached_property
+    def _trajectory(self) -> CompiledFunction:
+        arguments = (self.model, self._cable_count, self._noise, self._substeps, self._constant_count)
+        return CompiledFunction(trajectory_function(*arguments), max_compiled=sys.maxsize)
+
+    @cached_property
+    def _slopes(self) -> CompiledFunction:
+        arguments = (self.model, self._cable_count, self._noise, self._substeps, self._constant_count)
+        return CompiledFunction(slope_function(*arguments), max_compiled=sys.maxsize)
+
+    @cached_property
+    def _process(self) -> CompiledFunction:
+        function = process_function(self.model, self._cable_count, self._noise)
         return CompiledFunction(function, max_compiled=sys.maxsize)
 
 

@@ -18,52 +18,11 @@ Source: Bierman (1977), Factorization Methods for Discrete Sequential Estimation
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from typing import Any, NamedTuple, TypeVar, cast
+from typing import Any, NamedTuple
 
 import numpy as np
-from llvmlite import ir
-from numba import njit, types
-from numba.extending import intrinsic
 
-AnyFunction = TypeVar("AnyFunction", bound=Callable[..., Any])
-
-
-def _type_call(_: Any, address: Any, places: Any, strides: Any) -> Any:
-    """Calls ``run(1, places, strides)`` of a compiled function at its address."""
-
-    def generate(context: Any, builder: Any, __: Any, arguments: Any) -> Any:
-        word = ir.IntType(64)
-        run_type = ir.FunctionType(ir.VoidType(), [word, word, word])
-        run = builder.inttoptr(arguments[0], run_type.as_pointer())
-        builder.call(run, [word(1), *arguments[1:]])
-        return context.get_dummy_value()
-
-    return types.void(types.int64, types.int64, types.int64), generate
-
-
-_call: Any = intrinsic(_type_call)
-
-
-def _compiled(function: AnyFunction) -> AnyFunction:
-    """The function compiled at its first call; kept on disk where there is a folder that can be written."""
-    try:
-        compiled: Any = njit(nogil=True, cache=True, error_model="numpy")(function)
-    except RuntimeError:
-        compiled = njit(nogil=True, error_model="numpy")(function)
-    return cast(AnyFunction, compiled)
-
-
-class Step(NamedTuple):
-    """Compiled function of a sample, as :class:`tautwire.estimation.native_functions.BoundFunction` has it.
-
-    That one has to live as long as this.
-    """
-
-    address: int
-    places: Any
-    strides: Any
-    results: tuple[Any, ...]
+from .step_integration import Integration, Step, compiled, evaluate, integrate_step
 
 
 class Moments(NamedTuple):
@@ -98,38 +57,36 @@ class Record(NamedTuple):
     sensitivities: Any
 
 
-@_compiled
-def run_recursion(outputs: Step, update: Step, moments: Moments, samples: Samples, record: Record) -> None:
+@compiled
+def run_recursion(
+    outputs: Step, integration: Integration, process: Step, moments: Moments, samples: Samples, record: Record
+) -> None:
     """Run over the K samples; all arrays are in C order.
 
-    For the state, ``outputs`` has the results expected (1, m), by state (n, m) and by parameters (p, m); ``update``
-    moved (1, n), transition (c, d), direct (p, d), decay and process noise (1, n): the first d states move by the
-    first c.
+    For the state, ``outputs`` has the results expected (1, m), by state (n, m) and by parameters (p, m); ``process``
+    decay and process noise (1, n). The first states move as the integration has it; behind those that are constant,
+    the others only decay.
     """
-    output_places, update_places = np.empty_like(outputs.places), np.empty_like(update.places)
+    output_places, process_places = np.empty_like(outputs.places), np.empty_like(process.places)
     for k in range(len(samples.measured)):
         record.states[k] = moments.state
         if len(record.covariances):
             record.covariances[k] = moments.covariance
-        _evaluate(outputs, k, output_places)
+        evaluate(outputs, k, output_places)
         _update_by_measurements(outputs.results, moments, samples, record, k)
-        _evaluate(update, k, update_places)
+        integrate_step(integration, moments.state, k)
+        evaluate(process, k, process_places)
+        decay, process_noise = process.results[0][0], process.results[1][0]
         if len(record.transitions):
-            _record_transition(update.results, record.transitions[k])
-        _update_covariance_over_step(update.results, moments.covariance)
-        _update_sensitivities_over_step(update.results, moments.sensitivities)
-        moments.state[:] = update.results[0][0]
+            _record_transition(integration.transition, decay, record.transitions[k])
+        _update_covariance_over_step(integration.transition, decay, process_noise, moments.covariance)
+        _update_sensitivities_over_step(integration, decay, moments.sensitivities)
+        moments.state[:] *= decay
+        moments.state[: integration.moving.shape[1]] = integration.moving[0]
     record.states[len(samples.measured)] = moments.state
 
 
-@_compiled
-def _evaluate(step: Step, k: int, places: Any) -> None:
-    """Evaluate at sample k; ``places`` belong to the caller, so that they live as long as the call."""
-    places[:] = step.places + 8 * k * step.strides
-    _call(step.address, places.ctypes.data, step.strides.ctypes.data)
-
-
-@_compiled
+@compiled
 def _update_by_measurements(
     results: tuple[Any, ...], moments: Moments, samples: Samples, record: Record, k: int
 ) -> None:
@@ -161,7 +118,7 @@ def _update_by_measurements(
     moments.state[:] += correction
 
 
-@_compiled
+@compiled
 def _cross_covariance(covariance: Any, by_state: Any, i: int) -> Any:
     """Covariance of the state with output i, ``P h'`` (n); most slopes of an output are zero."""
     products = np.zeros(len(covariance))
@@ -173,7 +130,7 @@ def _cross_covariance(covariance: Any, by_state: Any, i: int) -> Any:
     return products
 
 
-@_compiled
+@compiled
 def _innovation_sensitivities(sensitivities: Any, results: tuple[Any, ...], i: int) -> Any:
     """Derivatives (p) of the innovation of output i by the parameters."""
     by_state, by_parameters = results[1], results[2]
@@ -186,18 +143,16 @@ def _innovation_sensitivities(sensitivities: Any, results: tuple[Any, ...], i: i
     return slopes
 
 
-@_compiled
-def _record_transition(results: tuple[Any, ...], transition: Any) -> None:
-    by_state, decay = results[1], results[3][0]
+@compiled
+def _record_transition(by_state: Any, decay: Any, transition: Any) -> None:
     from_count, moving_count = by_state.shape
     transition[:moving_count, :from_count] = by_state.T
     for r in range(moving_count, len(transition)):
         transition[r, r] = decay[r]
 
 
-@_compiled
-def _update_covariance_over_step(results: tuple[Any, ...], covariance: Any) -> None:
-    transition, decay, process_noise = results[1], results[3][0], results[4][0]
+@compiled
+def _update_covariance_over_step(transition: Any, decay: Any, process_noise: Any, covariance: Any) -> None:
     from_count, moving_count = transition.shape
     size = len(covariance)
     for r in range(moving_count):
@@ -224,9 +179,9 @@ def _update_covariance_over_step(results: tuple[Any, ...], covariance: Any) -> N
         covariance[r, r] += process_noise[r]
 
 
-@_compiled
-def _update_sensitivities_over_step(results: tuple[Any, ...], sensitivities: Any) -> None:
-    transition, direct, decay = results[1], results[2], results[3][0]
+@compiled
+def _update_sensitivities_over_step(integration: Integration, decay: Any, sensitivities: Any) -> None:
+    transition, direct = integration.transition, integration.direct
     from_count, moving_count = transition.shape
     for a in range(len(sensitivities)):
         moved = direct[a].copy()

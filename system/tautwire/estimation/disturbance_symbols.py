@@ -62,27 +62,24 @@ class DisturbanceSymbols:
 
     def driven(self, model: SymbolicModel) -> SymbolicModel:
         """The model with constant errors of lengths, and a constant wrench on the platform, as its last parameters."""
+        if not self.count:
+            return model
         inputs = SX(model.inputs)
         inputs[model.inputs.numel() - self._force_count :] += self._driving[self._length_count :]
         states = SX(model.states)
         states[self._lengths] += self._driving[: self._length_count]
-        (rates,) = casadi.substitute([model.rates], [model.states, model.inputs], [states, inputs])
-        return replace(model, rates=rates, parameters=casadi.vertcat(model.parameters, self._driving))
+        expressions = [model.rates, model.rates_by_statics]
+        rates, by_statics = casadi.substitute(expressions, [model.states, model.inputs], [states, inputs])
+        parameters = casadi.vertcat(model.parameters, self._driving)
+        return replace(model, rates=rates, rates_by_statics=by_statics, parameters=parameters)
 
-    def appended_to(self, time_update: Sequence[SX], state: SX, step: SX) -> tuple[SX, SX, SX]:
-        """The time update of a driven model, with the states behind it, driven by the means over the step."""
+    def mean_driving(self, state: SX, step: SX) -> SX:
+        """Means over a step of what drives the model, of the states behind it."""
         size = state.numel() - self.count
-        force_decay, decay = self.decay(0.5 * step)[self._length_count : self.driving_count], self.decay(step)
-        mean_decay = casadi.vertcat(SX.ones(self._length_count), force_decay)
-        mean = mean_decay * state[size : size + self.driving_count]
-        next_state, transition, sensitivities = casadi.substitute(list(time_update), [self._driving], [mean])
-        own_count = sensitivities.shape[1] - self.driving_count
-        by_driving = casadi.mtimes(sensitivities[:, own_count:], casadi.diag(mean_decay))
-        return (
-            casadi.vertcat(next_state, decay * state[size:]),
-            casadi.vertcat(
-                casadi.horzcat(transition, by_driving, SX(size, self._output_count)),
-                casadi.horzcat(SX(self.count, size), casadi.diag(decay)),
-            ),
-            casadi.vertcat(sensitivities[:, :own_count], SX(self.count, own_count)),
-        )
+        mean: SX = self.mean_decay(step) * state[size : size + self.driving_count]
+        return mean
+
+    def mean_decay(self, step: SX) -> SX:
+        """What the states that drive the model are multiplied by, for their means over a step."""
+        force_decay = self.decay(0.5 * step)[self._length_count : self.driving_count]
+        return casadi.vertcat(SX.ones(self._length_count), force_decay)

@@ -5,7 +5,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import casadi
@@ -83,62 +83,82 @@ def output_function(model: SymbolicModel, cable_count: int, noise: Noise, has_se
     return Function("outputs", arguments, [expected, by_state, by_parameters[:, :count]])
 
 
-def time_update_function(
-    model: SymbolicModel,
-    cable_count: int,
-    noise: Noise,
-    substeps: Substeps,
-    constant_count: int = 0,
-    has_sensitivities: bool = True,
-) -> Function:
-    """Time update of a filter: the state at the next sample, its derivatives, and process noise.
+def process_function(model: SymbolicModel, cable_count: int, noise: Noise) -> Function:
+    """Decay and process noise of a filter's states over a step.
 
-    Arguments: state, parameters, speed, next speed, time step, drift, acceleration noise density, disturbance. Drift
-    (s^2) times the variance of a winch speed is what its noise adds to the variance of each unstrained length; the
-    disturbance has decay rates (1/s) and variances of the states behind the model's, and is empty where there are none.
-
-    Results: the next state (n,); the derivatives of those d states that do not only decay, by the first c states (d, c)
-    and by the parameters (d, p); the factors by which states decay, and the variances that are added to them (n,). The
-    model's last ``constant_count`` states are constant.
+    Arguments: time step, drift, acceleration noise density, disturbance. Drift (s^2) times the variance of a winch
+    speed is what its noise adds to the variance of each unstrained length; the disturbance has decay rates (1/s) and
+    variances of the states behind the model's, and is empty where there are none. Results: the factors by which states
+    decay, and the variances that are added to them (n,).
     """
-    disturbance = disturbance_symbols(model, noise)
+    disturbance, indices = disturbance_symbols(model, noise), model.indices
     model_size = model.states.numel()
-    state = SX.sym("state", model_size + disturbance.count)
-    speed, later, step = SX.sym("speed", cable_count), SX.sym("later", cable_count), SX.sym("step")
-    drift, acceleration_noise_density = SX.sym("drift"), SX.sym("acceleration_noise_density")
-    interval = _Interval(speed, later, step, substeps)
-    moved, transition, direct_sensitivity = _time_update_beside(disturbance, model, constant_count, state, interval)
-    process_noise = SX(state.numel(), 1)
-    first_velocity = model.indices.twist.start
-    process_noise[first_velocity : first_velocity + 3] = acceleration_noise_density**2 * step
-    process_noise[first_velocity + 3 : model.indices.twist.stop] = (
-        acceleration_noise_density**2 * step / noise.moment_arm**2
-    )
+    step, drift, density = SX.sym("step"), SX.sym("drift"), SX.sym("acceleration_noise_density")
+    process_noise = SX(model_size + disturbance.count, 1)
+    first_velocity = indices.twist.start
+    process_noise[first_velocity : first_velocity + 3] = density**2 * step
+    process_noise[first_velocity + 3 : indices.twist.stop] = density**2 * step / noise.moment_arm**2
     for cable in range(cable_count):
         is_length = bool(noise.rope_lengths) and noise.rope_lengths[cable].rms > 0.0
-        process_noise[model.indices.lengths.start + cable] = 0.0 if is_length else noise.winch_speed**2 * drift
+        process_noise[indices.lengths.start + cable] = 0.0 if is_length else noise.winch_speed**2 * drift
     process_noise[model_size:] = disturbance.process_noise(step)
-    moving = model_size - constant_count
-    count = model.parameters.numel() if has_sensitivities else 0
-    arguments = [state, model.parameters, speed, later, step, drift, acceleration_noise_density, disturbance.arguments]
-    results = [
-        moved,
-        transition[:moving, : model_size + disturbance.driving_count],
-        direct_sensitivity[:moving, :count],
-        casadi.vertcat(SX.ones(model_size), disturbance.decay(step)),
-        process_noise,
-    ]
-    return Function("time_update", arguments, results)
+    decay = casadi.vertcat(SX.ones(model_size), disturbance.decay(step))
+    return Function("process", [step, drift, density, disturbance.arguments], [decay, process_noise])
 
 
-def _time_update_beside(
-    disturbance: DisturbanceSymbols, model: SymbolicModel, constant_count: int, state: SX, interval: _Interval
-) -> tuple[SX, SX, SX]:
-    """As :func:`_time_update`, of the states behind the model's too."""
-    if not disturbance.count:
-        return _time_update(model, constant_count, state, interval)
-    results = _time_update(disturbance.driven(model), constant_count, state[: model.states.numel()], interval)
-    return disturbance.appended_to(results, state, interval.step)
+def preparation_function(model: SymbolicModel, noise: Noise, constant_count: int = 0) -> Function:
+    """What stays the same while a step is integrated: parameters, disturbance and constants, and the static start.
+
+    Arguments: state, parameters, time step, disturbance. Results: the constants of :func:`trajectory_function` (q,);
+    the derivatives of the static start, which are the last s of them, by the others (s, q - s); and what the
+    disturbances that drive the model are multiplied by, for their means over the step (d,).
+    """
+    disturbance = disturbance_symbols(model, noise)
+    state, step = SX.sym("state", model.states.numel() + disturbance.count), SX.sym("step")
+    reduced = constants_as_parameters(disturbance.driven(model), constant_count)
+    moving = model.states.numel() - constant_count
+    driving = disturbance.mean_driving(state, step)
+    theta = casadi.vertcat(model.parameters, driving, state[moving : model.states.numel()])
+    statics, by_theta = _statics_at(reduced, theta)
+    results = [casadi.vertcat(theta, statics), by_theta, disturbance.mean_decay(step)]
+    return Function("preparation", [state, model.parameters, step, disturbance.arguments], results)
+
+
+def trajectory_function(
+    model: SymbolicModel, cable_count: int, noise: Noise, substeps: Substeps, constant_count: int = 0
+) -> Function:
+    """One of the equal parts of a step: moves the moving states by the method of Runge and Kutta.
+
+    Arguments: moving states, constants as :func:`preparation_function` gives them, speed, next speed, time step, and
+    the number of the part, from 0. Result: the moving states at its end.
+    """
+    driven = disturbance_symbols(model, noise).driven(model)
+    reduced = _with_statics_as_parameters(constants_as_parameters(driven, constant_count))
+    speed, later, step = SX.sym("speed", cable_count), SX.sym("later", cable_count), SX.sym("step")
+    index, count = SX.sym("index"), substeps.state
+    begin, end = (speed + (index + k) / count * (later - speed) for k in (0, 1))
+    runge_kutta_step = _runge_kutta_step(reduced, cable_count)
+    moved = runge_kutta_step(reduced.states, reduced.parameters, begin, end, step / count)
+    arguments = [reduced.states, reduced.parameters, speed, later, step, index]
+    return Function("trajectory", arguments, [casadi.densify(moved)])
+
+
+def slope_function(
+    model: SymbolicModel, cable_count: int, noise: Noise, substeps: Substeps, constant_count: int = 0
+) -> Function:
+    """Jacobians of the rates of the moving states in the middle of one of the parts of a step.
+
+    Arguments: moving states, constants as :func:`preparation_function` gives them, speed, next speed, and the number of
+    the part, from 0. Results: Jacobians by the moving states (n, n), and by the constants (n, q).
+    """
+    driven = disturbance_symbols(model, noise).driven(model)
+    reduced = _with_statics_as_parameters(constants_as_parameters(driven, constant_count))
+    speed, later, index = SX.sym("speed", cable_count), SX.sym("later", cable_count), SX.sym("index")
+    middle = speed + (index + 0.5) / substeps.slope * (later - speed)
+    jacobians = [casadi.jacobian(reduced.rates, symbol) for symbol in (reduced.states, reduced.parameters)]
+    slopes = Function("slope", [reduced.states, reduced.inputs, reduced.parameters], jacobians)
+    results = slopes(reduced.states, with_no_wrench(reduced, middle), reduced.parameters)
+    return Function("slopes", [reduced.states, reduced.parameters, speed, later, index], list(results))
 
 
 def rate_jacobian_function(model: SymbolicModel, cable_count: int) -> Function:
@@ -153,13 +173,14 @@ def rate_jacobian_function(model: SymbolicModel, cable_count: int) -> Function:
 
 
 def simulation_function(model: SymbolicModel, cable_count: int, substeps: Substeps) -> Function:
-    """Step of a simulation without noise: the state moves as in :func:`time_update_function`.
+    """Step of a simulation without noise: the state moves as in :func:`trajectory_function`.
 
     Arguments: state, parameters, speed, next speed, time step. Results: state at the next sample (n,), and x, y, z,
     the tensions and the rotation vector of this one without delay (m,).
     """
     speed, later, step = SX.sym("speed", cable_count), SX.sym("later", cable_count), SX.sym("step")
-    trajectory = _trajectory(model, model.parameters, model.states, _Interval(speed, later, step, substeps))
+    extended, theta = _with_statics_as_parameters(model), casadi.vertcat(model.parameters, model.static_values)
+    trajectory = _trajectory(extended, theta, model.states, _Interval(speed, later, step, substeps))
     (outputs,) = casadi.substitute([model.outputs], [model.inputs], [casadi.densify(with_no_wrench(model, speed))])
     indices = model.indices
     shown = casadi.vertcat(outputs[:3], outputs[indices.tensions], outputs[indices.pose][3:])
@@ -191,30 +212,18 @@ class _Interval:
         return list(pairwise(points))
 
 
-def _time_update(model: SymbolicModel, constant_count: int, state: SX, interval: _Interval) -> tuple[SX, SX, SX]:
-    """State after one sample, and its derivatives by the state before and by the parameters.
+def _statics_at(model: SymbolicModel, theta: SX) -> tuple[SX, SX]:
+    """Numbers of the static start that depend on parameters with the values ``theta``, and their derivatives."""
+    by_theta = casadi.jacobian(model.static_values, model.parameters)
+    statics = Function("statics", [model.parameters], [model.static_values, by_theta])
+    values, slopes = statics(theta)
+    return values, slopes
 
-    The derivatives weigh errors and may be coarser than the state, whose own error would pose as an effect: with the
-    Jacobians ``F`` and ``f_p`` of the rates in the middle of a part of the step, to the fourth order or a higher one
 
-        Gamma = h (I + h F / 2 (I + h F / 3 (I + h F / 4)))        A = I + F Gamma        B = Gamma f_p
-
-    Over twice the time that is ``Gamma + A Gamma``: decays which are far quicker than the step then die, where the
-    series would blow up. The last ``constant_count`` states are parameters to that: series of the others take half the
-    operations.
-    """
-    moving, parameter_count = model.states.numel() - constant_count, model.parameters.numel()
-    reduced = constants_as_parameters(model, constant_count)
-    theta = casadi.vertcat(model.parameters, state[moving:])
-    trajectory = _trajectory(reduced, theta, state[:moving], interval)
-    transition, sensitivities = _sensitivities(reduced, theta, trajectory, interval)
-    return (
-        casadi.vertcat(trajectory[-1], state[moving:]),
-        casadi.vertcat(
-            casadi.horzcat(transition, sensitivities[:, parameter_count:]),
-            casadi.horzcat(SX(constant_count, moving), SX.eye(constant_count)),
-        ),
-        casadi.vertcat(sensitivities[:, :parameter_count], SX(constant_count, parameter_count)),
+def _with_statics_as_parameters(model: SymbolicModel) -> SymbolicModel:
+    """The model with its static start as further parameters, for rates that are evaluated many times in a sample."""
+    return replace(
+        model, rates=model.rates_by_statics, parameters=casadi.vertcat(model.parameters, model.static_symbols)
     )
 
 
@@ -225,45 +234,6 @@ def _trajectory(model: SymbolicModel, theta: SX, state: SX, interval: _Interval)
     for begin, end in interval.parts(steps):
         trajectory.append(runge_kutta_step(trajectory[-1], theta, begin, end, interval.step / steps))
     return trajectory
-
-
-def _sensitivities(model: SymbolicModel, theta: SX, trajectory: list[SX], interval: _Interval) -> tuple[SX, SX]:
-    """Derivatives of the end of a trajectory by its begin and by the parameters, whose values are ``theta``."""
-    rate_jacobians = Function(
-        "slope",
-        [model.states, model.inputs, model.parameters],
-        [casadi.jacobian(model.rates, symbol) for symbol in (model.states, model.parameters)],
-    )
-    count, substeps = trajectory[0].numel(), interval.substeps
-    transition, sensitivities = SX.eye(count), SX(count, theta.numel())
-    substep = interval.step / substeps.slope
-    for index, (begin, end) in enumerate(interval.parts(substeps.slope)):
-        middle = _interpolated(trajectory, (index + 0.5) / substeps.slope)
-        inputs = with_no_wrench(model, 0.5 * (begin + end))
-        by_state, by_parameters = rate_jacobians(middle, inputs, theta)
-        gamma = _integrated_exponential(by_state, substep / 2**substeps.doublings, substeps.order)
-        for _ in range(substeps.doublings):
-            gamma = 2.0 * gamma + casadi.mtimes(casadi.mtimes(by_state, gamma), gamma)
-        substep_transition = SX.eye(count) + casadi.mtimes(by_state, gamma)
-        transition = casadi.mtimes(substep_transition, transition)
-        sensitivities = casadi.mtimes(substep_transition, sensitivities) + casadi.mtimes(gamma, by_parameters)
-    return transition, sensitivities
-
-
-def _interpolated(trajectory: list[SX], fraction: float) -> SX:
-    """Linear interpolation in a trajectory of equal steps."""
-    steps = len(trajectory) - 1
-    interval = min(int(fraction * steps), steps - 1)
-    return trajectory[interval] + (fraction * steps - interval) * (trajectory[interval + 1] - trajectory[interval])
-
-
-def _integrated_exponential(rate_jacobian: SX, step: SX, order: int) -> SX:
-    """Integral of the matrix exponential over a step, as a series: what a constant rate adds to the state."""
-    identity = SX.eye(rate_jacobian.shape[0])
-    series = identity
-    for term in range(order, 1, -1):
-        series = identity + (step / term) * casadi.mtimes(rate_jacobian, series)
-    return step * series
 
 
 def _runge_kutta_step(model: SymbolicModel, cable_count: int) -> Function:

@@ -26,7 +26,7 @@ from .platform_symbols import PlatformSymbols, StateIndices, platform_symbols, v
 from .robot_assembly import RobotAssembly, assemble_robot
 from .schema import EffectSetting, Robot
 from .static_equilibrium import start_orientation
-from .symbolic_statics import symbolic_statics
+from .symbolic_statics import HeldStatics, held_statics, symbolic_statics
 from .uncertain_parameters import SensorErrors, UncertainParameter, limited_perturbation, perturbed_robot, sensor_errors
 
 Array = NDArray[np.float64]
@@ -69,6 +69,8 @@ class SymbolicModel:
     ``sensor_delays`` (m) of positions, tensions and rotations in s; ``span_tensions`` (n) of the free spans in N.
     ``start`` is the state in static equilibrium; ``drifting`` are the indices of states without equilibrium;
     ``parameters`` are the free ones. ``reference_orientation`` is the one from which rotations of a rigid body count.
+    ``rates_by_statics`` are the rates with those numbers of the static start that depend on parameters or uncertain
+    states as symbols of their own, ``static_symbols``; ``static_values`` are these, the same all through a sample.
     """
 
     states: SX
@@ -85,6 +87,9 @@ class SymbolicModel:
     output_names: tuple[str, ...]
     indices: StateIndices
     reference_orientation: Quaternion
+    rates_by_statics: SX
+    static_symbols: SX
+    static_values: SX
 
 
 @dataclass(frozen=True)
@@ -164,8 +169,10 @@ def symbolic_model(
         unstrained_lengths=SX.sym("unstrained_length", count),
         winch_speeds=SX.sym("winch_speed", count),
     )
-    variables = replace(variables, length_shifts=_length_shifts(assembly, constants))
-    effect_states, equations = _minimal_equations(assembly, variables)
+    held = held_statics(assembly.cables, _length_shifts(assembly, constants), [*symbols, *constants])
+    variables = replace(variables, length_shifts=held.length_shifts)
+    effect_states, equations = _minimal_equations(replace(assembly, cables=held.cables), variables)
+    rates_by_statics, equations = equations.rates, _with_static_values(equations, held)
     no_rates, indices = SX(len(constants), 1), StateIndices(platform.pose.numel(), count)
     first_effect_state = variables.states.numel()
     return SymbolicModel(
@@ -196,7 +203,18 @@ def symbolic_model(
         ),
         indices=indices,
         reference_orientation=reference,
+        rates_by_statics=casadi.vertcat(rates_by_statics, no_rates),
+        static_symbols=held.symbols,
+        static_values=held.values,
     )
+
+
+def _with_static_values(equations: _Equations, held: HeldStatics) -> _Equations:
+    """The equations as functions of states, inputs and parameters alone."""
+    if not held.symbols.numel():
+        return equations
+    expressions = [equations.rates, equations.outputs, equations.span_tensions]
+    return _Equations(*casadi.substitute(expressions, [held.symbols], [held.values]))
 
 
 def _shown(outputs: SX, indices: StateIndices, errors: SensorErrors) -> SX:
@@ -237,6 +255,7 @@ def constants_as_parameters(model: SymbolicModel, count: int) -> SymbolicModel:
         states=model.states[:first],
         parameters=casadi.vertcat(model.parameters, model.states[first:]),
         rates=model.rates[:first],
+        rates_by_statics=model.rates_by_statics[:first],
         start=model.start[:first],
         state_names=model.state_names[:first],
     )
@@ -249,11 +268,15 @@ def freeze_drifting_states(model: SymbolicModel) -> SymbolicModel:
     settling_indices = [index for index in range(model.states.numel()) if index not in model.drifting]
     frozen_states = model.states[list(model.drifting)]
     expressions = [model.rates[settling_indices], model.outputs, model.span_tensions]
-    rates, outputs, tensions = casadi.substitute(expressions, [frozen_states], [SX.zeros(*frozen_states.shape)])
+    expressions.append(model.rates_by_statics[settling_indices])
+    rates, outputs, tensions, by_statics = casadi.substitute(
+        expressions, [frozen_states], [SX.zeros(*frozen_states.shape)]
+    )
     return replace(
         model,
         states=model.states[settling_indices],
         rates=rates,
+        rates_by_statics=by_statics,
         outputs=outputs,
         span_tensions=tensions,
         start=model.start[settling_indices],

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import casadi
 import numpy as np
@@ -13,12 +14,13 @@ from numpy.typing import NDArray
 from tautwire_fmu.laws import effect_stages as stages
 from tautwire_fmu.laws.effect_stages import Route
 from tautwire_fmu.laws.mathematics import REAL, Mathematics
-from tautwire_fmu.laws.rotation import Quaternion, multiply, rotate, rotation_vector_of
+from tautwire_fmu.laws.rotation import Quaternion, multiply, quaternion_of, rotate, rotation_vector_of
 from tautwire_fmu.laws.vectors import Vector, cross, scale, subtract
 
 from .active_effects import cable_effects, cables_have_weight, centre_of_mass
 from .cable_routes import attachment_points, cable_routes
 from .rigid_equilibrium import platform_size
+from .robot_assembly import CableComponent
 from .schema import Robot
 from .static_equilibrium import SINGULARITY_TOLERANCE, start_orientation, static_tensions
 from .static_load import static_load
@@ -29,6 +31,12 @@ Array = NDArray[np.float64]
 LIMIT_TOLERANCE = 1e-6
 # Where cables have weight: each iteration gains some three digits.
 WEIGHT_ITERATIONS = 6
+# Fewer cables leave an orientation to its equilibrium.
+FREEDOMS = 6
+NEWTON_STEPS = 8
+RANK_TOLERANCE = 1e-9
+# rad: of a root that is the nearest, what multipliers leave of its rotation.
+STATIONARITY_TOLERANCE = 1e-5
 
 
 @dataclass(frozen=True)
@@ -50,13 +58,131 @@ def symbolic_statics(
 
     Cables at a tension limit stay there, the others share the remaining load.
     """
+    if nominal.platform.is_rigid_body and nominal.cable_count < FREEDOMS:
+        return _equilibrium_on_few_cables(nominal, symbolic_robot, reference, mathematics)
     orientation = start_orientation(nominal)
     tensions = _start_tensions(nominal, symbolic_robot, orientation, mathematics)
     if not nominal.platform.is_rigid_body:
         return SymbolicStatics(tensions, SX(0, 1), orientation)
+    return SymbolicStatics(tensions, SX(list(_rotation_from(reference, orientation))), orientation)
+
+
+def _rotation_from(reference: Quaternion, orientation: Quaternion, mathematics: Mathematics = REAL) -> Vector:
+    """Rotation vector, in rad, from one orientation to another."""
     w, x, y, z = reference
-    turned = rotation_vector_of(REAL, multiply(orientation, (w, -x, -y, -z)))
-    return SymbolicStatics(tensions, SX(list(turned)), orientation)
+    return rotation_vector_of(mathematics, multiply(orientation, (w, -x, -y, -z)))
+
+
+def _equilibrium_on_few_cables(
+    nominal: Robot, symbolic_robot: Robot, reference: Quaternion, mathematics: Mathematics
+) -> SymbolicStatics:
+    """Static start of a platform whose orientation follows from its equilibrium.
+
+    Of all equilibria the nearest to the declared orientation is taken. With the rotation vector r from it, tensions T
+    in shares of the load, multipliers l, and what the balance lacks, g, it is a root of
+
+        F(z) = (r + g_r' l, g_T' l, g),   z = (r, T, l)        z <- z - F_z^+ (F(z) - F(z_0))
+
+    These Newton steps begin at the numbers' own root z_0, where the Jacobian is taken: their first derivatives are
+    exact after one, and each further one gains as many digits as parameters are near those of the numbers.
+    """
+    declared, tensions = nominal.platform.start_orientation, static_tensions(nominal)
+    equilibrium = start_orientation(replace(nominal, initial_state=None))
+    load = float(np.linalg.norm(np.array(static_load(REAL, nominal, nominal.platform.start), dtype=float)))
+    start = np.concatenate([np.array(_rotation_from(declared, equilibrium)), tensions / load])
+    unknowns = SX.sym("unknowns", len(start))
+    lacking, of_numbers = (
+        _imbalance(nominal, each, unknowns[:3], load * unknowns[3:], mathematics) / load
+        for each in (symbolic_robot, nominal)
+    )
+    root = _continued_root(unknowns, lacking, of_numbers, start)
+    orientation: Quaternion = multiply(quaternion_of(mathematics, (root[0], root[1], root[2])), declared)
+    if nominal.initial_state is not None and nominal.initial_state.orientation is not None:
+        orientation = nominal.initial_state.orientation
+    rotation = _rotation_from(reference, orientation, mathematics)
+    return SymbolicStatics(casadi.vertsplit(load * root[3:]), casadi.vertcat(*map(SX, rotation)), orientation)
+
+
+def _imbalance(nominal: Robot, robot: Robot, rotation: SX, tensions: SX, mathematics: Mathematics) -> SX:
+    """Wrench (6,) that tensions leave at a rotation from the declared orientation, moments over the platform's size."""
+    turned = quaternion_of(mathematics, (rotation[0], rotation[1], rotation[2]))
+    orientation = multiply(turned, nominal.platform.start_orientation)
+    arms = _relative_arms(nominal, robot, orientation)
+    routes = cable_routes(mathematics, robot, robot.platform.start, orientation)
+    weights = _cable_weights(mathematics, robot, routes, casadi.vertsplit(tensions))
+    pulls = casadi.mtimes(_wrenches(arms, [route.direction for route in routes]), tensions)
+    return pulls + casadi.sum2(_wrenches(arms, weights)) - _load_wrench(nominal, robot, orientation, mathematics)
+
+
+def _continued_root(unknowns: SX, lacking: SX, of_numbers: SX, start: Array) -> SX:
+    """The unknowns at which the balance lacks nothing and the rotation is smallest, from the root for the numbers."""
+    multipliers = SX.sym("multipliers", lacking.numel())
+    jacobian = np.array(casadi.Function("jacobian", [unknowns], [casadi.jacobian(of_numbers, unknowns)])(start))
+    rotation = np.append(start[:3], np.zeros(len(start) - 3))
+    at_root = np.linalg.lstsq(jacobian.T, -rotation, rcond=RANK_TOLERANCE)[0]
+    equations, numbers, point, variables = lacking, of_numbers, start, unknowns
+    # With fewer cables than three, or a tension that is at its bound, the nearest root is found by its distance.
+    if np.linalg.norm(jacobian.T @ at_root + rotation) <= STATIONARITY_TOLERANCE and len(start) > FREEDOMS - 1:
+        variables, point = casadi.vertcat(unknowns, multipliers), np.concatenate([start, at_root])
+        equations, numbers = (_stationarity(unknowns, multipliers, each) for each in (lacking, of_numbers))
+    inverse = np.linalg.pinv(
+        np.array(casadi.Function("slope", [variables], [casadi.jacobian(numbers, variables)])(point)), RANK_TOLERANCE
+    )
+    residual = np.array(casadi.Function("residual", [variables], [numbers])(point)).ravel()
+    root = SX(point)
+    for _ in range(NEWTON_STEPS):
+        (left,) = casadi.substitute([equations], [variables], [root])
+        root = root - casadi.mtimes(SX(inverse), left - residual)
+    return root[: unknowns.numel()]
+
+
+def _stationarity(unknowns: SX, multipliers: SX, lacking: SX) -> SX:
+    """Gradient of half the squared rotation with a constraint, and the constraint."""
+    rotation = unknowns[:3]
+    function = 0.5 * casadi.dot(rotation, rotation) + casadi.dot(multipliers, lacking)
+    return casadi.vertcat(casadi.gradient(function, unknowns), lacking)
+
+
+@dataclass(frozen=True)
+class HeldStatics:
+    """Cables whose static start, and whose length shifts (n,), are symbols where they depend on others; their values.
+
+    The start is the same all through a sample, and is not to be computed again with each of the rates.
+    """
+
+    cables: tuple[CableComponent, ...]
+    length_shifts: SX
+    symbols: SX
+    values: SX
+
+
+def held_statics(cables: Sequence[CableComponent], length_shifts: SX, others: Sequence[SX]) -> HeldStatics:
+    """Holds what depends on ``others``; numbers stay numbers."""
+    held: list[tuple[SX, SX]] = []
+    symbols = casadi.vertcat(*others) if others else SX(0, 1)
+
+    def hold(name: str, value: Any) -> SX:
+        expression = SX(value)
+        if not casadi.depends_on(expression, symbols):
+            return expression
+        held.append((SX.sym(name), expression))
+        return held[-1][0]
+
+    components = []
+    for number, component in enumerate(cables, start=1):
+        constants = component.constants
+        x, y, z = (hold(f"start_direction_{number}", part) for part in constants.start_direction)
+        held_constants = constants._replace(
+            start_length=hold(f"start_length_{number}", constants.start_length),
+            start_tension=hold(f"start_tension_{number}", constants.start_tension),
+            start_direction=(x, y, z),
+        )
+        components.append(replace(component, constants=held_constants))
+    shifts = casadi.vertcat(*(hold("length_shift", shift) for shift in casadi.vertsplit(length_shifts)))
+    held_symbols, values = ([pair[k] for pair in held] for k in (0, 1))
+    if not held:
+        return HeldStatics(tuple(components), shifts, SX(0, 1), SX(0, 1))
+    return HeldStatics(tuple(components), shifts, casadi.vertcat(*held_symbols), casadi.vertcat(*values))
 
 
 def _start_tensions(

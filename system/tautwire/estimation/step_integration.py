@@ -1,0 +1,225 @@
+"""Integration of a model over a step, with derivatives, compiled by Numba: loops over a model's compiled functions.
+
+The state moves in small parts by the method of Runge and Kutta. The derivatives weigh errors and may be coarser than
+the state, whose own error would pose as an effect: with the Jacobians ``F`` and ``f_p`` of the rates in the middle of a
+larger part of length h, to some order,
+
+    Gamma = h (I + h F / 2 (I + h F / 3 (I + h F / 4)))        A = I + F Gamma        B = Gamma f_p
+
+Over twice the time that is ``Gamma + A Gamma``: decays which are far quicker than the step then die, where the series
+would blow up. Loops in machine code take a fraction of the time of the same operations written out one by one, which
+outgrow the processor's caches.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any, NamedTuple, TypeVar, cast
+
+import numpy as np
+from llvmlite import ir
+from numba import njit, types
+from numba.extending import intrinsic
+
+AnyFunction = TypeVar("AnyFunction", bound=Callable[..., Any])
+
+
+def _type_call(_: Any, address: Any, places: Any, strides: Any) -> Any:
+    """Calls ``run(1, places, strides)`` of a compiled function at its address."""
+
+    def generate(context: Any, builder: Any, __: Any, arguments: Any) -> Any:
+        word = ir.IntType(64)
+        run_type = ir.FunctionType(ir.VoidType(), [word, word, word])
+        run = builder.inttoptr(arguments[0], run_type.as_pointer())
+        builder.call(run, [word(1), *arguments[1:]])
+        return context.get_dummy_value()
+
+    return types.void(types.int64, types.int64, types.int64), generate
+
+
+_call: Any = intrinsic(_type_call)
+
+
+def compiled(function: AnyFunction) -> AnyFunction:
+    """The function compiled at its first call; kept on disk where there is a folder that can be written."""
+    try:
+        machine_code: Any = njit(nogil=True, cache=True, error_model="numpy")(function)
+    except RuntimeError:
+        machine_code = njit(nogil=True, error_model="numpy")(function)
+    return cast(AnyFunction, machine_code)
+
+
+class Step(NamedTuple):
+    """Compiled function of a sample, as :class:`tautwire.estimation.native_functions.BoundFunction` has it.
+
+    That one has to live as long as this.
+    """
+
+    address: int
+    places: Any
+    strides: Any
+    results: tuple[Any, ...]
+
+
+class Division(NamedTuple):
+    """How a step is divided: parts for the state, and for the derivatives, their series' order and doublings."""
+
+    state: int
+    slope: int
+    order: int
+    doublings: int
+
+
+class Integration(NamedTuple):
+    """Functions that a step is integrated by, what they read, and what comes out.
+
+    ``preparation`` gives the constants (1, q) of the others: parameters, driving disturbances, uncertain constants, and
+    the static start, with the derivatives of the latter by the former (q - s, s), and factors (1, d) of the former's
+    driving disturbances. ``part`` takes ``moving`` states (1, n) over the part ``index`` (1, 1) of a step; ``slope``
+    gives the Jacobians of the rates at a ``middle`` (1, n) of a part by states (n, n) and by constants (q, n).
+    ``steps`` (K,) are in s. Results: ``moving``, and derivatives of it by the states before, uncertain constants and
+    driving disturbances, ``transition`` (n + c + d, n), and by parameters, ``direct`` (p, n).
+    """
+
+    preparation: Step
+    part: Step
+    slope: Step
+    division: Division
+    moving: Any
+    middle: Any
+    constants: Any
+    index: Any
+    steps: Any
+    transition: Any
+    direct: Any
+
+
+@compiled
+def evaluate(step: Step, k: int, places: Any) -> None:
+    """Evaluate at sample k; ``places`` belong to the caller, so that they live as long as the call."""
+    places[:] = step.places + 8 * k * step.strides
+    _call(step.address, places.ctypes.data, step.strides.ctypes.data)
+
+
+@compiled
+def integrate_step(integration: Integration, state: Any, k: int) -> None:
+    """Integrate over the step from sample k, from a filter's ``state``, whose first states are the moving ones."""
+    evaluate(integration.preparation, k, np.empty_like(integration.preparation.places))
+    integration.constants[:] = integration.preparation.results[0]
+    middles = _move(integration, state, k)
+    _differentiate(integration, middles, k)
+
+
+@compiled
+def _move(integration: Integration, state: Any, k: int) -> Any:
+    """Move the moving states to the end of the step; returns them in the middle of each larger part, (parts, n)."""
+    moving, parts, middle_count = integration.moving[0], integration.division.state, integration.division.slope
+    middles, places = np.empty((middle_count, len(moving))), np.empty_like(integration.part.places)
+    moving[:] = state[: len(moving)]
+    for part in range(parts):
+        integration.index[0, 0] = part
+        evaluate(integration.part, k, places)
+        reached = integration.part.results[0][0]
+        for j in range(middle_count):
+            at = (j + 0.5) / middle_count * parts
+            if min(int(at), parts - 1) == part:
+                for r in range(len(moving)):
+                    middles[j, r] = moving[r] + (at - part) * (reached[r] - moving[r])
+        moving[:] = reached
+    return middles
+
+
+@compiled
+def _differentiate(integration: Integration, middles: Any, k: int) -> None:
+    """Derivatives of the end of the step, from the Jacobians in the middle of each larger part."""
+    division, size, count = integration.division, middles.shape[1], integration.constants.shape[1]
+    part = integration.steps[k] / division.slope
+    transition, by_constants = np.eye(size), np.zeros((count, size))
+    places = np.empty_like(integration.slope.places)
+    for j in range(division.slope):
+        integration.index[0, 0] = j
+        integration.middle[0] = middles[j]
+        evaluate(integration.slope, k, places)
+        jacobian, slopes = integration.slope.results
+        gamma = _integrated_exponential(jacobian, part, division)
+        over_part = _rates(jacobian, gamma)
+        for r in range(size):
+            over_part[r, r] += 1.0
+        transition = _product(over_part, transition)
+        by_constants = _product_of_transposed(by_constants, over_part) + _product_of_transposed(slopes, gamma)
+    _fill_in(integration, transition, by_constants)
+
+
+@compiled
+def _integrated_exponential(jacobian: Any, part: float, division: Division) -> Any:
+    """Integral of the matrix exponential over a part: what a constant rate adds to the state."""
+    step = part / 2**division.doublings
+    series = np.eye(len(jacobian))
+    for term in range(division.order, 1, -1):
+        series = (step / term) * _rates(jacobian, series)
+        for r in range(len(jacobian)):
+            series[r, r] += 1.0
+    gamma = step * series
+    for _ in range(division.doublings):
+        gamma = 2.0 * gamma + _product(_rates(jacobian, gamma), gamma)
+    return gamma
+
+
+@compiled
+def _fill_in(integration: Integration, transition: Any, by_constants: Any) -> None:
+    """Sort derivatives by constants, those of the static start by what it depends on, into the results."""
+    by_theta, factors = integration.preparation.results[1], integration.preparation.results[2][0]
+    theta_count, size, driving = len(by_theta), len(transition), len(factors)
+    for i in range(theta_count):
+        for s in range(by_theta.shape[1]):
+            slope = by_theta[i, s]
+            if slope != 0.0:
+                by_constants[i] += slope * by_constants[theta_count + s]
+    result = integration.transition
+    result[:size] = transition.T
+    constant_count = len(result) - size - driving
+    first_constant = theta_count - constant_count
+    result[size : size + constant_count] = by_constants[first_constant:theta_count]
+    for i in range(driving):
+        result[size + constant_count + i] = factors[i] * by_constants[first_constant - driving + i]
+    integration.direct[:] = by_constants[: len(integration.direct)]
+
+
+@compiled
+def _rates(jacobian: Any, matrix: Any) -> Any:
+    """Product of a Jacobian, stored by columns and mostly zeros, and a matrix."""
+    result = np.zeros_like(matrix)
+    for r in range(len(jacobian)):
+        for c in range(len(jacobian)):
+            slope = jacobian[c, r]
+            if slope != 0.0:
+                for j in range(matrix.shape[1]):
+                    result[r, j] += slope * matrix[c, j]
+    return result
+
+
+@compiled
+def _product(first: Any, second: Any) -> Any:
+    result = np.zeros_like(second)
+    for r in range(len(first)):
+        for c in range(len(second)):
+            factor = first[r, c]
+            if factor != 0.0:
+                for j in range(second.shape[1]):
+                    result[r, j] += factor * second[c, j]
+    return result
+
+
+@compiled
+def _product_of_transposed(columns: Any, matrix: Any) -> Any:
+    """Product of a matrix and of one that is stored by columns, by columns too."""
+    result = np.zeros((len(columns), len(matrix)))
+    for i in range(len(columns)):
+        if not np.any(columns[i]):
+            continue
+        for r in range(len(matrix)):
+            total = 0.0
+            for c in range(matrix.shape[1]):
+                total += columns[i, c] * matrix[r, c]
+            result[i, r] = total
+    return result
