@@ -9,7 +9,7 @@ from tautwire.robot.kinematics import inverse_kinematics, structure_matrix
 from tautwire.robot.pose_stiffness import stiffness_matrix
 from tautwire.robot.rigid_equilibrium import static_equilibrium
 from tautwire.robot.schema import EffectSetting, Robot
-from tautwire.robot.static_pose import forward_kinematics_of_ropes, rope_lengths, static_pose
+from tautwire.robot.static_pose import static_pose
 from tautwire.robot.workspace import wrench_margin
 from tests.support.rigid_robots import crane_robot, suspended_robot
 from tests.support.robots import example
@@ -52,18 +52,6 @@ def test_sagging_ropes_are_longer_by_the_arc_of_a_parabola() -> None:
     ratio = 0.4 * robot.gravity * straight / (2.0 * held.tensions)
     assert held.lengths == pytest.approx(straight * (1.0 + level**2 * ratio**2 / 6.0), rel=1e-9)
     assert np.min(held.lengths - straight) > 1e-4
-
-
-@pytest.mark.parametrize("robot", (crane_robot(), heavy(crane_robot())), ids=("straight", "sagging"))
-def test_lengths_lead_back_to_the_pose(robot: Robot) -> None:
-    held = static_pose(robot, POSITION, TILTED)
-    poses = forward_kinematics_of_ropes(robot, held.lengths, POSITION)
-    nearest = min(poses, key=lambda pose: float(np.linalg.norm(np.subtract(pose.position, POSITION))))
-    assert nearest.position == pytest.approx(POSITION, abs=1e-9)
-    assert abs(np.dot(nearest.orientation, TILTED)) == pytest.approx(1.0, abs=1e-14)
-    assert nearest.residual < 1e-9
-    at, quaternion = np.array(nearest.position), nearest.orientation
-    assert rope_lengths(robot, at, quaternion, held.tensions) == pytest.approx(held.lengths, abs=1e-9)
 
 
 def test_four_cables_hang_in_equilibrium_and_have_no_margin() -> None:

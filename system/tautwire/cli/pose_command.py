@@ -49,7 +49,8 @@ def pose(
 
     Example: tautwire pose robot.toml --at 10,5.5,4 --rule least_norm
     """
-    from ..robot.static_pose import forward_kinematics_of_ropes, static_pose
+    from ..robot.forward_statics import forward_kinematics_of_ropes
+    from ..robot.static_pose import static_pose
     from ..robot.tension_distribution import RULES
 
     if rule not in RULES:

@@ -111,7 +111,9 @@ def forward_kinematics(
     freedoms = 6 if is_rigid else 3
     if robot.cable_count < freedoms:
         problem = f"of {robot.cable_count} cables do not determine {freedoms} degrees of freedom"
-        raise ArgumentError("forward_kinematics: lengths", lengths, problem, "use static_equilibrium at a position")
+        raise ArgumentError(
+            "forward_kinematics: lengths", lengths, problem, "use forward_kinematics_of_ropes, where statics decides"
+        )
     at, quaternion = validated_pose("forward_kinematics", robot, position, orientation)
     scale, generator = float(np.mean(required)), np.random.default_rng(0)
     solutions: list[ForwardSolution] = []
@@ -120,7 +122,7 @@ def forward_kinematics(
         start = at + START_DISTANCE_RATIO * scale * offset[:3]
         turned = Rotation.from_rotvec(START_ANGLE * offset[3:]) if is_rigid else Rotation.identity()
         solution = _nearest_pose(robot, required, start, turned * _rotation(quaternion))
-        if solution is not None and not any(_is_same(solution, other, scale) for other in solutions):
+        if solution is not None and not any(is_same_pose(solution, other, scale) for other in solutions):
             solutions.append(solution)
     solutions.sort(key=lambda each: each.residual)
     limit = max(RESIDUAL_RATIO * solutions[0].residual, RESIDUAL_FLOOR * scale) if solutions else 0.0
@@ -169,7 +171,8 @@ def _left_jacobian(rotation_vector: Array) -> Array:
     return matrix
 
 
-def _is_same(one: ForwardSolution, other: ForwardSolution, scale: float) -> bool:
+def is_same_pose(one: ForwardSolution, other: ForwardSolution, scale: float) -> bool:
+    """Whether two solutions are one, but for rounding beside a length ``scale`` in m."""
     distance = float(np.linalg.norm(np.subtract(one.position, other.position)))
     angle = float((_rotation(one.orientation) * _rotation(other.orientation).inv()).magnitude())
     return distance < SAME_POSITION_RATIO * scale and angle < SAME_ANGLE

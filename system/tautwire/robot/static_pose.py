@@ -11,16 +11,8 @@ from numpy.typing import NDArray
 from tautwire_fmu.laws import cable as cable_law
 from tautwire_fmu.laws.mathematics import REAL
 
-from ..errors import UnreachableError
-from .active_effects import cables_have_weight
 from .cable_routes import attachment_points
-from .kinematics import (
-    ForwardSolution,
-    forward_kinematics,
-    inverse_kinematics,
-    structure_matrix_at,
-    validated_pose,
-)
+from .kinematics import structure_matrix_at, validated_pose
 from .pose_stiffness import stiffness_matrix
 from .rigid_equilibrium import static_equilibrium
 from .robot_assembly import cable_components
@@ -29,9 +21,6 @@ from .static_equilibrium import tensions_at
 from .workspace_criteria import RequiredMotion, degrees_of_freedom, wrench_feasible_margin
 
 Array = NDArray[np.float64]
-
-# Fixed-point iteration of a pose with sag; relative to the longest rope.
-MAX_SAG_ITERATIONS, SAG_TOLERANCE = 50, 1e-12
 
 
 @dataclass(frozen=True)
@@ -100,43 +89,3 @@ def rope_lengths(robot: Robot, position: Array, orientation: Quaternion, tension
         span = cable_law.span(REAL, constants, cable_law.CableInputs(point, (0.0, 0.0, 0.0), 0.0), effects)
         lengths.append(float(cable_law.cable_motion(REAL, constants, effects, state, span, 0.0).arc))
     return np.array(lengths)
-
-
-def forward_kinematics_of_ropes(
-    robot: Robot,
-    lengths: Sequence[float] | Array,
-    position: Sequence[float] | Array | None = None,
-    orientation: Sequence[float] | None = None,
-) -> tuple[ForwardSolution, ...]:
-    """Forward kinematics of ropes that may sag: the poses near a guess, by default the start, with lengths (n,) in m.
-
-    Without the effect ``sag`` those of :func:`tautwire.robot.kinematics.forward_kinematics`. With it, the lengths are
-    less what the ropes are longer than straight ones under their static tensions, by fixed-point iteration; poses that
-    the cables cannot hold are left out.
-
-    Raises ArgumentError for invalid lengths.
-    """
-    straight = forward_kinematics(robot, lengths, position, orientation)
-    if not cables_have_weight(robot):
-        return straight
-    hanging = (_with_sag(robot, np.asarray(lengths, dtype=float), each) for each in straight)
-    return tuple(each for each in hanging if each is not None)
-
-
-def _with_sag(robot: Robot, lengths: Array, straight: ForwardSolution) -> ForwardSolution | None:
-    solution = straight
-    for _ in range(MAX_SAG_ITERATIONS):
-        at, quaternion = np.array(solution.position), solution.orientation
-        try:
-            arcs = rope_lengths(robot, at, quaternion, tensions_at(robot, at, quaternion))
-        except UnreachableError:
-            return None
-        excess = arcs - inverse_kinematics(robot, at, quaternion)
-        found = forward_kinematics(robot, lengths - excess, at, quaternion, starts=0)
-        if not found:
-            return None
-        previous, solution = solution, found[0]
-        moved = np.linalg.norm(np.subtract(solution.position, previous.position))
-        if moved <= SAG_TOLERANCE * float(np.max(lengths)):
-            return solution
-    return None
