@@ -9,7 +9,7 @@ from typing import Any
 
 import pytest
 
-from tautwire_fmu.laws.effects import BY_NAME
+from tautwire_fmu.laws.effects import ALL, BY_NAME
 from tests.bench.trace import lifelike_cases as lifelike_module
 from tests.bench.trace import recordings as recordings_module
 from tests.bench.trace import tables
@@ -17,12 +17,13 @@ from tests.bench.trace.cases import Case
 from tests.bench.trace.document import page
 from tests.bench.trace.lifelike_cases import NEVER_PLANAR, LifelikeCase, lifelike_cases
 from tests.bench.trace.line import Line, NamedEffect, line_from
+from tests.bench.trace.platform_cases import platform_cases
 from tests.bench.trace.recordings import material
 from tests.bench.trace.run import finished
 from tests.bench.trace.score import held, named, outcome, scored
 from tests.bench.trace.selection import case_called, lifelike_alarm_cases
 from tests.rig.lifelike.case import lifelike
-from tests.rig.lifelike.hidden import HIDDEN
+from tests.rig.lifelike.hidden import HIDDEN, HIDDEN_ON_PLATFORMS, ON_PLATFORMS
 
 BY_KEY = {case.key: case for case in lifelike_cases()}
 DAMPING, FORM = BY_KEY["lifelike-damping-3"], BY_KEY["lifelike-friction-linear-3"]
@@ -63,6 +64,21 @@ def test_the_cases_hide_everything_that_the_rig_can_hide() -> None:
         assert not (case.planar and set(case.hide) & set(NEVER_PLANAR))
     assert {case.cables for case in cases if case.hide} == {3, 4, 6, 8}
     assert len({case.own_seed for case in (*cases, *lifelike_alarm_cases(200))}) == len(cases) + 200  # type: ignore[attr-defined]
+
+
+def test_platforms_hide_all_that_only_they_have_and_what_others_have_too() -> None:
+    cases = platform_cases()
+    assert len({case.key for case in cases}) == len({case.own_seed for case in cases}) == len(cases)
+    hidden = {key for case in cases for key in case.hide}
+    assert {part.key for part in ON_PLATFORMS} <= hidden
+    assert {part.name for part in map(HIDDEN_ON_PLATFORMS.get, hidden) if part} >= {
+        effect.name for effect in ALL if effect.needs_rigid_body
+    }
+    for exact in (True, False):
+        for kind in ("listed", "unlisted", "empty"):
+            assert {case.cables for case in cases if case.exact == exact and case.kind == kind} == {4, 8}
+    assert all(case.turning for case in cases)
+    assert case_called("platform-exact-inertia-8").names == {"inertia"}
 
 
 def test_a_lifelike_case_is_found_by_its_name() -> None:

@@ -67,8 +67,10 @@ def turned(rotation: Vector, vectors: Vector) -> Vector:
 
 
 def quaternion_columns(rotation: Vector) -> dict[str, Vector]:
-    """The columns qw, qx, qy, qz of rotation matrices (samples, 3, 3)."""
-    quaternions = Rotation.from_matrix(rotation).as_quat()
+    """The columns qw, qx, qy, qz of rotation matrices (samples, 3, 3); nan where these are."""
+    quaternions = np.full((len(rotation), 4), np.nan)
+    seen = np.isfinite(rotation).all(axis=(1, 2))
+    quaternions[seen] = Rotation.from_matrix(rotation[seen]).as_quat()
     return {f"q{part}": quaternions[:, index] for part, index in (("w", 3), ("x", 0), ("y", 1), ("z", 2))}
 
 

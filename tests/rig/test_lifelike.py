@@ -70,7 +70,8 @@ def test_fixed_steps_give_what_the_accurate_integration_gives() -> None:
     times = np.arange(round(2 * 10.0 / step) + 1) * 0.5 * step
     speeds, travels = (np.array([way(t) for t in times]) for way in (smooth.speed, smooth.travel))
     effects = {"friction": {"coefficient": 0.02}}
-    cells, places = march(Rig(robot, effects, TabulatedProgram(0.5 * step, speeds, travels)), step, round(10.0 / step))
+    rig = Rig(robot, effects, TabulatedProgram(0.5 * step, speeds, travels))
+    cells, places, _ = march(rig, step, round(10.0 / step))
     exact = simulate(robot, effects, smooth, [0.0, 5.0, 10.0])
     middle = len(places) // 2
     assert places[[0, middle, -1]] == pytest.approx(exact.position, abs=2e-6)

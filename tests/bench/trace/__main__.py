@@ -15,6 +15,7 @@ from .figure import confusion_figure, save
 from .lifelike_cases import ALARM as LIFELIKE_ALARM
 from .lifelike_cases import lifelike_cases
 from .line import Line, read_lines
+from .platform_cases import platform_cases
 from .run import finished, run
 from .score import Scored, outcome, scored
 from .selection import ALARM, alarm_cases, chosen, code_version, lifelike_alarm_cases
@@ -32,6 +33,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--quick", action="store_true", help="a look: robot three, middle size")
     parser.add_argument("--empty", type=int, default=0, metavar="N", help="false alarms on N empty recordings instead")
     parser.add_argument("--lifelike", action="store_true", help="robots as they are, also with --empty")
+    parser.add_argument("--platforms", action="store_true", help="platforms that turn, exact and lifelike")
     parser.add_argument("--list", action="store_true", help="name the cases and stop")
     parser.add_argument("--show", action="store_true", help="trace nothing; show the answers of the last tracer asked")
     parser.add_argument("--folder", type=Path, default=ROOT / "build" / "bench-trace", help="where answers are kept")
@@ -55,6 +57,8 @@ def cases_of(asked: argparse.Namespace) -> Sequence[Case]:
     """All that the call is about."""
     if asked.empty:
         return lifelike_alarm_cases(asked.empty) if asked.lifelike else alarm_cases(asked.empty)
+    if asked.platforms:
+        return platform_cases()
     return lifelike_cases() if asked.lifelike else quick_cases() if asked.quick else main_cases()
 
 

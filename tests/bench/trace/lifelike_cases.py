@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 from zlib import crc32
 
-from tests.rig.lifelike.hidden import HIDDEN, PAIRS, RIGHT, UNLISTED, WRONG, names_of
+from tests.rig.lifelike.hidden import HIDDEN_ON_PLATFORMS, PAIRS, RIGHT, UNLISTED, WRONG, names_of
 
 from .cases import Case, Kind
 
@@ -25,21 +25,28 @@ NEVER_PLANAR = ("pulley-tilted", "sag-steep", "swing")
 
 @dataclass(frozen=True)
 class LifelikeCase(Case):
-    """One lifelike robot; `hide` are keys of the rig's HIDDEN, `cables` and `planar` are by lot where they are None."""
+    """One lifelike robot; `hide` are keys of the rig's HIDDEN, `cables` and `planar` are by lot where they are None.
+
+    One `turning` has a platform that turns, an `exact` one nothing uncertain or little.
+    """
 
     hide: tuple[str, ...] = ()
     cables: int | None = None
     planar: bool | None = None
+    turning: bool = False
+    exact: bool = False
 
     @property
     def names(self) -> frozenset[str]:
         """What it hides, by the names of effects."""
-        return frozenset(names_of([HIDDEN[key] for key in self.hide]))
+        return frozenset(names_of([HIDDEN_ON_PLATFORMS[key] for key in self.hide]))
 
     @property
     def exact_names(self) -> frozenset[str]:
         """Those whose form is that of the list, so that intervals can be held against the truth."""
-        return frozenset(HIDDEN[key].name for key in self.hide if HIDDEN[key].manner == "right")
+        return frozenset(
+            part.name for part in map(HIDDEN_ON_PLATFORMS.__getitem__, self.hide) if part.manner == "right"
+        )
 
     @property
     def own_seed(self) -> int:

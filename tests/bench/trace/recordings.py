@@ -36,7 +36,15 @@ def material(case: Case, folder: Path) -> Material:
         return Material(example(case.robot), *recordings(case, folder), {})
     place = folder / case.fingerprint({})
     if not (place / "truth.json").exists():
-        lifelike(case.own_seed, case.hide, cables=case.cables, planar=case.planar).write(place)
+        made = lifelike(
+            case.own_seed,
+            case.hide,
+            cables=case.cables,
+            planar=case.planar,
+            turning=case.turning,
+            exact=case.exact,
+        )
+        made.write(place)
     robot = read_robot(place / "robot.toml")
     fit, check = (read_recording(place / f"{role}.csv", len(robot.cables)) for role in ROLES)
     return Material(robot, fit, check, json.loads((place / "truth.json").read_text(encoding="utf-8")))

@@ -11,6 +11,7 @@ from tests.support.robots import EXAMPLES
 from .cases import Case, empty_cases, main_cases, quick_cases
 from .lifelike_cases import ALARM as LIFELIKE_ALARM
 from .lifelike_cases import lifelike_cases, lifelike_empty_cases
+from .platform_cases import platform_cases
 
 ALARM = "alarm"
 MOST_EMPTY = 100_000
@@ -37,7 +38,7 @@ def case_called(key: str) -> Case:
         return lifelike_alarm_cases(int(key.removeprefix(LIFELIKE_ALARM)) + 1)[-1]
     if key.startswith(f"{ALARM}-"):
         return alarm_cases(int(key.removeprefix(f"{ALARM}-")) + 1)[-1]
-    return {case.key: case for case in (*main_cases(), *quick_cases(), *lifelike_cases())}[key]
+    return {case.key: case for case in (*main_cases(), *quick_cases(), *lifelike_cases(), *platform_cases())}[key]
 
 
 def chosen(cases: Sequence[Case], only: Sequence[str]) -> tuple[Case, ...]:

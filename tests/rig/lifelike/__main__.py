@@ -1,6 +1,7 @@
 """``python -m tests.rig.lifelike FOLDER [--first N] KEYS...``: a folder with a case for each KEY.
 
-Keys: none, friction, modulus+damping, swing and the like; 8:pulley asks for eight cables, 4p:pulley for a planar robot.
+Keys: none, friction, modulus+damping, swing and the like; 8:pulley asks for eight cables, 4p:pulley for a planar robot,
+8r:pulley and 4r:pulley for a platform that turns, 8e:pulley for one of which nothing is uncertain or little.
 """
 
 from __future__ import annotations
@@ -25,8 +26,10 @@ def main() -> None:
         case = lifelike(
             number,
             [part for part in hide.split("+") if part != "none"],
-            cables=int(cables.removesuffix("p")) if cables else None,
+            cables=int(cables.rstrip("pre")) if cables else None,
             planar=cables.endswith("p") if cables else None,
+            turning=cables.endswith(("r", "e")),
+            exact=cables.endswith("e"),
         )
         case.write(place)
         print(place, case.truth["size_of_hidden_rms"]["check"], case.truth["size_of_little_rms"]["check"], flush=True)

@@ -12,10 +12,11 @@ import numpy as np
 import pandas as pd
 
 from tests.rig.lifelike.design import Design, design
-from tests.rig.lifelike.hidden import HIDDEN, Hidden, Site, names_of
-from tests.rig.lifelike.little import little_of
+from tests.rig.lifelike.hidden import HIDDEN, HIDDEN_ON_PLATFORMS, Hidden, Site, names_of
+from tests.rig.lifelike.little import little_of, no_little
+from tests.rig.lifelike.platform_design import platform_design
 from tests.rig.lifelike.recording import Lot, Outputs, Session
-from tests.rig.lifelike.survey import robot_file, survey_of, true_robot
+from tests.rig.lifelike.survey import NOTHING_UNKNOWN, robot_file, survey_of, true_robot
 from tests.rig.record import write_recording
 
 ROLES = ("fit", "check")
@@ -56,17 +57,22 @@ def lifelike(
     planar: bool | None = None,
     duration: float = DURATION,
     rate: float = RATE,
+    turning: bool = False,
+    exact: bool = False,
 ) -> Case:
     """A robot by lot that hides the things of these keys (see HIDDEN), or nothing, in two recordings.
 
+    With `turning` it has a platform that turns, on 4 or 8 cables (see HIDDEN_ON_PLATFORMS). Of an `exact` one nothing
+    is uncertain, and there is nothing little but white noise.
+
     Robots on which they do not show enough, or ropes come loose, are drawn anew. ValueError if none of a dozen will do.
     """
-    parts = tuple(HIDDEN[key] for key in hide)
+    parts = tuple((HIDDEN_ON_PLATFORMS if turning else HIDDEN)[key] for key in hide)
     for number in range(ROBOTS):
         random = np.random.default_rng([seed, number])
-        made = design(random, cables, planar)
+        made = platform_design(random, cables or 8) if turning else design(random, cables, planar)
         try:
-            return _case(seed, random, made, parts, duration, rate)
+            return _case(seed, random, made, parts, duration, rate, exact)
         except UnsuitableError:
             continue
     raise ValueError(f"no robot of seed {seed} shows {'+'.join(hide)}")
@@ -97,10 +103,16 @@ class _Hiding:
 
 
 def _case(
-    seed: int, random: np.random.Generator, made: Design, parts: tuple[Hidden, ...], duration: float, rate: float
+    seed: int,
+    random: np.random.Generator,
+    made: Design,
+    parts: tuple[Hidden, ...],
+    duration: float,
+    rate: float,
+    exact: bool,
 ) -> Case:
-    survey = survey_of(random, made)
-    little = little_of(random, made, survey, names_of(parts))
+    survey = NOTHING_UNKNOWN if exact else survey_of(random, made)
+    little = no_little() if exact else little_of(random, made, survey, names_of(parts))
     if little.counts:
         noise = replace(made.robot.noise, winch_speed=float(f"{0.2 * little.counts * rate:.2g}"))
         made = replace(made, robot=replace(made.robot, noise=noise))
@@ -185,8 +197,10 @@ def _ratio(size: tuple[float, float], little: tuple[float, float]) -> float:
 
 
 def _with_memory(lot: Lot, size: tuple[float, float]) -> tuple[float, float]:
-    """Together with the part of the sensors' noise that has a memory."""
-    return float(np.hypot(size[0], lot.little.place.rms)), float(np.hypot(size[1], lot.little.cell.rms))
+    """Together with the part of the sensors' noise that has a memory, or where all is exact a tenth of all noise."""
+    noise, little = lot.design.robot.noise, lot.little
+    place, cell = little.place.rms or 0.1 * noise.position, little.cell.rms or 0.1 * noise.tension
+    return float(np.hypot(size[0], place)), float(np.hypot(size[1], cell))
 
 
 def _called(parts: tuple[Hidden, ...]) -> dict[str, Any]:

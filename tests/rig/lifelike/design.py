@@ -6,13 +6,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from tests.rig.program import PathProgram
+from tests.rig.pose_program import pose_wander
+from tests.rig.program import Program
 from tests.rig.robot import Noise, Robot, TensionLimits, Vector
 from tests.rig.statics import start_tensions
 from tests.rig.wander import natural_frequencies, wander
 
 GRAVITY = 9.81
 HIGHEST_MODE = 12.0
+# rad, by which platforms turn where their cables can turn them.
+TILT = 0.15
 # Exit points above and below, by the number of cables.
 LEVELS = {3: ((3, 0),), 4: ((4, 0),), 5: ((3, 2),), 6: ((3, 3), (4, 2)), 7: ((4, 3),), 8: ((4, 4),)}
 PLANAR_LEVELS = {2: (2, 0), 3: (2, 1), 4: (2, 2)}
@@ -48,8 +51,17 @@ class Design:
         lowest = 4.0 * self.width**0.25
         return lowest, 3.0 * lowest
 
-    def program(self, seed: int) -> PathProgram:
+    @property
+    def size(self) -> float:
+        """Of a platform that turns: by how much an angle moves its attachments, m; else zero."""
+        body = self.robot.body
+        return 0.0 if body is None else float(np.linalg.norm(body.attachments, axis=1).mean())
+
+    def program(self, seed: int) -> Program:
         """A rich way for its winches."""
+        if self.robot.body is not None:
+            tilt = TILT if self.robot.count >= 6 else 0.0
+            return pose_wander(self.robot, seed, 0.06 * self.width, tilt, slow=self.slow, shake=0.15)
         return wander(self.robot, seed, 0.08 * self.width, slow=self.slow, shake=0.15)
 
 

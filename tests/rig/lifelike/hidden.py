@@ -12,7 +12,8 @@ import numpy as np
 from tests.rig.lifelike.design import Design
 from tests.rig.lifelike.little import usual_speed
 from tests.rig.lifelike.survey import Survey
-from tests.rig.wander import natural_frequencies
+from tests.rig.modes import frequencies_of
+from tests.rig.registry import EFFECTS
 
 Manner = Literal["right", "wrong", "unlisted"]
 Settings = dict[str, Any]
@@ -99,7 +100,7 @@ def _gusts(s: float, site: Site) -> Settings:
 def _frame(s: float, site: Site) -> Settings:
     """A frame that gives way by a share of what the ropes give way, three times as fast as the ropes' modes."""
     constant = site.modulus * float(site.design.robot.area[0]) / site.design.length / s
-    angular = 6.0 * np.pi * float(natural_frequencies(site.design.robot).max())
+    angular = 6.0 * np.pi * float(frequencies_of(site.design.robot).max())
     mass = constant / angular**2
     return {"stiffness_constant": constant, "viscosity": 0.1 * angular * mass, "mass": mass}
 
@@ -111,8 +112,21 @@ def _slipping(s: float, site: Site) -> Settings:
 
 def _transverse(s: float, site: Site) -> Settings:
     """Resistance across the ropes, in shares of what would damp the slowest mode critically."""
-    slowest = 2.0 * np.pi * float(natural_frequencies(site.design.robot).min())
+    slowest = 2.0 * np.pi * float(frequencies_of(site.design.robot).min())
     return {"damping": 2.0 * s * site.design.robot.mass * slowest / site.design.robot.count}
+
+
+def _aside(s: float, site: Site) -> Settings:
+    """A shift by a share of the platform's size."""
+    x, y, z = (s * site.sign * site.design.size * np.array([0.6, -0.5, 0.62])).tolist()
+    return {"x": x, "y": y, "z": z}
+
+
+def _turning(s: float, site: Site) -> Settings:
+    """Resistance to turning, in shares of what would damp the slowest mode critically."""
+    body, slowest = site.design.robot.body, 2.0 * np.pi * float(frequencies_of(site.design.robot).min())
+    assert body is not None
+    return {"damping": 2.0 * s * float(np.linalg.eigvalsh(body.inertia).mean()) * slowest}
 
 
 def _hysteresis(s: float, site: Site, **others: float) -> Settings:
@@ -354,7 +368,41 @@ PAIRS = (
     ("creep", "payload"),
 )
 
+# Only on platforms that turn.
+ON_PLATFORMS = (
+    Hidden("centre_of_mass", "centre_of_mass", "right", 0.05, 0.6, _aside),
+    Hidden("attachment", "attachment", "right", 0.01, 0.5, lambda s, w: {**_aside(s, w), "cables": [w.cable]}),
+    Hidden(
+        "inertia",
+        "inertia",
+        "right",
+        0.15,
+        3.0,
+        lambda s, w: {"factor_x": 1 + s, "factor_y": 1 + 0.5 * s, "factor_z": 1 + 0.8 * s},
+    ),
+    Hidden("rotational_drag", "rotational_drag", "right", 0.01, 5.0, _turning),
+    Hidden(
+        "payload-aside",
+        "payload",
+        "right",
+        0.03,
+        0.4,
+        lambda s, w: {"mass": s * w.design.robot.mass, "x": 0.5 * w.design.size, "z": -0.4 * w.design.size},
+    ),
+    Hidden(
+        "rotational_drag-quadratic",
+        "rotational_drag",
+        "wrong",
+        0.01,
+        20.0,
+        lambda s, w: {**_turning(s, w), "exponent": 2.0, "reference": w.speed / w.design.size},
+    ),
+)
+
 HIDDEN: Mapping[str, Hidden] = MappingProxyType({one.key: one for one in (*RIGHT, *WRONG, *UNLISTED)})
+HIDDEN_ON_PLATFORMS: Mapping[str, Hidden] = MappingProxyType(
+    {one.key: one for one in (*RIGHT, *WRONG, *UNLISTED, *ON_PLATFORMS) if not EFFECTS[one.name].of_points}
+)
 
 
 def names_of(parts: Sequence[Hidden]) -> tuple[str, ...]:

@@ -67,16 +67,25 @@ class Little:
         if design.planar:
             force[:, 1], sway[:, 1] = 0.0, 0.0
         growth = drifting(random, (rows, count), self.rope_warmth)
+        tension = ornstein_uhlenbeck(random, (rows, count), half_step, self.tension_rms, self.tension_bandwidth)
+        moment = self.force_rms * design.size
+        torque = ornstein_uhlenbeck(random, (rows, 3), half_step, moment, self.force_bandwidth) if moment else None
         trembling = Trembling(
             half_step=half_step,
             force=force,
-            tension=ornstein_uhlenbeck(random, (rows, count), half_step, self.tension_rms, self.tension_bandwidth),
+            tension=tension,
+            torque=torque,
             sway=sway,
             sway_rate=np.gradient(sway, half_step, axis=0),
             growth=growth,
             growth_rate=np.gradient(growth, half_step, axis=0),
         )
         return [trembling, Belt(stiffness_constant=self.belt)] if self.belt else [trembling]
+
+
+def no_little() -> Little:
+    """Nothing but white noise."""
+    return Little({}, 0.0, 1.0, 0.0, 1.0, Memory(0.0, 1.0), Memory(0.0, 1.0))
 
 
 def little_of(random: np.random.Generator, design: Design, survey: Survey, without: tuple[str, ...]) -> Little:

@@ -12,8 +12,8 @@ import numpy as np
 
 from tests.rig.effect import Moment
 from tests.rig.mechanics import Rig
+from tests.rig.modes import frequencies_of
 from tests.rig.robot import Robot, Vector
-from tests.rig.wander import natural_frequencies
 
 MOST_TURN = 0.3
 
@@ -38,18 +38,23 @@ class TabulatedProgram:
 
 def steps_for(robot: Robot, interval: float) -> int:
     """Steps between two samples."""
-    highest = 2.0 * np.pi * float(natural_frequencies(robot).max())
+    highest = 2.0 * np.pi * float(frequencies_of(robot).max())
     return max(1, int(np.ceil(highest * interval / MOST_TURN)))
 
 
-def march(rig: Rig, step: float, count: int) -> tuple[Vector, Vector]:
-    """Load cells (count + 1, n) in N and positions (count + 1, 3) in m after each step, from rest at 0."""
-    state = rig.begin()
+def march(rig: Rig, step: float, count: int) -> tuple[Vector, Vector, Vector | None]:
+    """Load cells (count + 1, n) in N and positions (count + 1, 3) in m after each step, from rest at 0.
+
+    Of a platform that turns also its rotation matrices (count + 1, 3, 3).
+    """
+    state, rotations = rig.begin(), np.empty((count + 1, 3, 3)) if rig.turning else None
     cells, places = np.empty((count + 1, rig.robot.count)), np.empty((count + 1, 3))
     for index in range(count + 1):
         time = index * step
         first: Moment = rig.evaluate(time, state)
         cells[index], places[index] = first.cell, first.position
+        if rotations is not None:
+            rotations[index] = first.rotation
         if index == count:
             break
         middle = time + 0.5 * step
@@ -59,4 +64,4 @@ def march(rig: Rig, step: float, count: int) -> tuple[Vector, Vector]:
         state = state + step / 6.0 * (first.rates + 2.0 * (second + third) + fourth)
     if not np.all(np.isfinite(cells)):
         raise ValueError("the integration ran away")
-    return cells, places
+    return cells, places, rotations

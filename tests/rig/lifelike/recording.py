@@ -9,16 +9,17 @@ import numpy as np
 import pandas as pd
 from scipy.interpolate import CubicSpline
 from scipy.ndimage import gaussian_filter1d
+from scipy.spatial.transform import Rotation
 
 from tests.rig.effect import Effect
 from tests.rig.lifelike.design import Design
 from tests.rig.lifelike.little import Little
 from tests.rig.lifelike.march import TabulatedProgram, march, steps_for
-from tests.rig.lifelike.sensors import counted, differentiated, drifting, noisy, tracked
+from tests.rig.lifelike.sensors import Memory, counted, differentiated, drifting, noisy, tracked
 from tests.rig.lifelike.surroundings import played
 from tests.rig.lifelike.survey import Survey, Truth
 from tests.rig.mechanics import Rig, Settings
-from tests.rig.record import lags_of
+from tests.rig.record import lags_of, quaternion_columns, turned
 from tests.rig.robot import Vector
 
 # A drum leaves a backlash within some hundredths of a second, not at once.
@@ -38,15 +39,24 @@ class Lot:
 
 @dataclass(frozen=True)
 class Outputs:
-    """What perfect sensors would give at each sample: load cells (N) and position (m)."""
+    """What perfect sensors would give at each sample: load cells (N) and position (m).
+
+    Of a platform that turns also rotation matrices (samples, 3, 3), and its `size`, by which angles count as m.
+    """
 
     tension: Vector
     position: Vector
+    rotation: Vector | None = None
+    size: float = 0.0
 
     def apart(self, other: Outputs) -> tuple[float, float]:
         """Root mean square of the difference, over samples and components: (position in m, tension in N)."""
+        turned = 0.0
+        if self.rotation is not None and other.rotation is not None:
+            difference = Rotation.from_matrix(self.rotation) * Rotation.from_matrix(other.rotation).inv()
+            turned = self.size**2 * float(np.mean(difference.as_rotvec() ** 2))
         return (
-            float(np.sqrt(np.mean((self.position - other.position) ** 2))),
+            float(np.sqrt(np.mean((self.position - other.position) ** 2) + turned)),
             float(np.sqrt(np.mean((self.tension - other.tension) ** 2))),
         )
 
@@ -115,13 +125,14 @@ class Session:
             around = self.lot.little.surroundings(self.random(1), self.lot.design, self.half_step, rows)
         rig = Rig(self.lot.truth.robot, settings, self.drum if little else self.motor, around)
         step = 2.0 * self.half_step
-        cells, places = march(rig, step, self.substeps * (self.samples - 1))
+        cells, places, rotations = march(rig, step, self.substeps * (self.samples - 1))
         fine = np.arange(len(cells)) * step
         times, lags = np.arange(self.samples) * self.interval, lags_of(rig)
         tension, position = _late(fine, cells, times, lags["tension"]), _late(fine, places, times, lags["position"])
         for effect in rig.effects:
             tension, position = effect.sense(tension, position)
-        return Outputs(tension, position)
+        rotation = None if rotations is None else rotations[:: self.substeps]
+        return Outputs(tension, position, rotation, self.lot.design.size)
 
     def log(self, outputs: Outputs) -> pd.DataFrame:
         """What the log says: sensors with their faults and noise."""
@@ -136,7 +147,19 @@ class Session:
         columns.update({f"tension_{index + 1}": column for index, column in enumerate(tension.T)})
         unseen = "y" if lot.design.planar and lot.little.blind else ""
         columns.update({axis: position[:, index] for index, axis in enumerate("xyz") if axis != unseen})
+        if outputs.rotation is not None:
+            columns.update(quaternion_columns(self._seen(random, outputs.rotation, position)))
         return pd.DataFrame(columns)
+
+    def _seen(self, random: np.random.Generator, rotation: Vector, position: Vector) -> Vector:
+        """Rotation matrices as the tracker shows them; missing where the position is."""
+        noise, little = self.lot.design.robot.noise, self.lot.little
+        # The tracker's noise with a memory is as large beside the white one in angles as it is in positions.
+        memory = Memory(little.place.rms * noise.orientation / noise.position, little.place.bandwidth)
+        errors = noisy(random, np.zeros_like(position), self.interval, noise.orientation, memory)
+        shown = turned(rotation, errors)
+        shown[np.isnan(position).any(axis=1)] = np.nan
+        return shown
 
     def _winches(self, random: np.random.Generator) -> dict[str, Vector]:
         """Speeds, or lengths, or both."""

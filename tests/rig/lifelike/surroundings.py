@@ -15,7 +15,7 @@ class Trembling(Effect):
     """A random force on the platform, random tensions and a frame that sways, from tables with one row per half step.
 
     `force` (rows, 3) in N, `tension` (rows, n) in N, `sway` of all exit points and its rate (rows, 3) in m and m/s,
-    and the ropes' free strain and its rate (rows, n).
+    the ropes' free strain and its rate (rows, n), and on a platform that turns `torque` (rows, 3) in N m.
     """
 
     half_step: float
@@ -25,6 +25,7 @@ class Trembling(Effect):
     sway_rate: Vector
     growth: Vector
     growth_rate: Vector
+    torque: Vector | None = None
 
     def _row(self, time: float) -> int:
         return round(time / self.half_step)
@@ -49,6 +50,8 @@ class Trembling(Effect):
         """Push the platform."""
         if moment.time > 0.0:
             moment.force = moment.force + self.force[self._row(moment.time)]
+            if self.torque is not None:
+                moment.torque = moment.torque + self.torque[self._row(moment.time)]
 
 
 @dataclass(kw_only=True)
