@@ -45,6 +45,13 @@ LOGS = {
         {"time": 1e3, "winch": 1e3, "tension": 1e-3, "xyz": 1e3},
         ";",
     ),
+    "German, joined words": (
+        renamed("Seilgeschwindigkeit {} [mm/s]", "Seilkraft {} [kN]", "Position {} [mm]", "Zeit [s]"),
+        {"winch": 1e3, "tension": 1e-3, "xyz": 1e3},
+        ";",
+    ),
+    "French": (renamed("Vitesse treuil {} (m/s)", "Tension c\u00e2ble {} (N)", "{} (m)", "Temps (s)"), {}, ";"),
+    "Spanish": (renamed("Velocidad {} (m/s)", "Fuerza {} (N)", "Posicion {} (m)", "Tiempo (s)"), {}, ";"),
     "units before the numbers": (
         renamed("v_mm/s_{}", "F_kN_{}", "pos_{}", "t_ms"),
         {"time": 1e3, "winch": 1e3, "tension": 1e-3},

@@ -53,14 +53,18 @@ def correlation_of(fit: Fit) -> float:
 def test_fitted_values_have_the_digits_that_their_intervals_are_worth() -> None:
     declared = example("three")
     robot = declared.with_effect(EffectSetting("payload", {"mass": 3.2012345678901234}))
-    heavier = replace(robot, platform=replace(robot.platform, mass=301.23456789012345))
+    platform = replace(robot.platform, mass=301.23456789012345, mass_uncertainty=0.09112844503160293)
+    first, *others = robot.cables
+    cables = (replace(first, modulus_uncertainty=166439269.67097053, anchor_uncertainty=0.0018586813816403576), *others)
+    heavier = replace(robot, platform=platform, cables=cables)
     estimate = Estimate(3.2012345678901234, "kg", 3.18, 3.22, None)
     readable = with_readable_values(
         heavier, declared, [FoundEffect("payload", "platform", (), {"mass": estimate}, 9.0)]
     )
     assert readable.effects[0].values["mass"] == 3.20123
-    assert readable.platform.mass == 301.2345679
-    assert readable.cables == declared.cables
+    assert (readable.platform.mass, readable.platform.mass_uncertainty) == (301.2345679, 0.09113)
+    assert (readable.cables[0].modulus_uncertainty, readable.cables[0].anchor_uncertainty) == (166400000.0, 0.001859)
+    assert readable.cables[1:] == declared.cables[1:]
     assert with_readable_values(robot, declared, ()) == robot
 
 

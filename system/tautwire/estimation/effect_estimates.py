@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import replace
+from functools import partial
 from itertools import combinations
 
 import numpy as np
@@ -99,7 +100,7 @@ def with_readable_values(robot: Robot, declared: Robot, effects: Sequence[FoundE
     """The robot with its fitted numbers to as many digits as they are worth.
 
     Values of ``effects`` to a thousandth of their intervals' half-widths, other numbers that are not as ``declared`` to
-    ten significant digits.
+    ten significant digits, and standard deviations to four.
     """
     widths = {
         (effect.name, effect.cables, name): 0.5 * (estimate.high - estimate.low)
@@ -111,12 +112,27 @@ def with_readable_values(robot: Robot, declared: Robot, effects: Sequence[FoundE
         keys = {name: (setting.name, setting.cables, name) for name in setting.values}
         values = {name: _rounded(value, widths.get(keys[name], 0.0)) for name, value in setting.values.items()}
         settings.append(replace(setting, values=values))
-    platform = replace(robot.platform, mass=_unless_declared(robot.platform.mass, declared.platform.mass))
+    platform = replace(
+        robot.platform,
+        mass=_unless_declared(robot.platform.mass, declared.platform.mass),
+        mass_uncertainty=_unless_declared(robot.platform.mass_uncertainty, declared.platform.mass_uncertainty, 4),
+    )
     cables = []
     for cable, before in zip(robot.cables, declared.cables, strict=True):
         x, y, z = map(_unless_declared, cable.anchor, before.anchor)
         modulus, damping = (_unless_declared(getattr(cable, n), getattr(before, n)) for n in ("modulus", "damping"))
-        cables.append(replace(cable, modulus=modulus, damping=damping, anchor=(x, y, z)))
+        deviation = partial(_unless_declared, digits=4)
+        cables.append(
+            replace(
+                cable,
+                modulus=modulus,
+                damping=damping,
+                anchor=(x, y, z),
+                modulus_uncertainty=deviation(cable.modulus_uncertainty, before.modulus_uncertainty),
+                damping_uncertainty=deviation(cable.damping_uncertainty, before.damping_uncertainty),
+                anchor_uncertainty=deviation(cable.anchor_uncertainty, before.anchor_uncertainty),
+            )
+        )
     return replace(robot, effects=tuple(settings), platform=platform, cables=tuple(cables))
 
 
@@ -127,8 +143,9 @@ def _rounded(value: float, half_width: float) -> float:
     return round(value, READABLE_DIGITS - 1 - int(np.floor(np.log10(half_width))))
 
 
-def _unless_declared(value: float, declared: float) -> float:
-    return value if value == declared else float(f"{value:.10g}")
+def _unless_declared(value: float, declared: float, digits: int = 10) -> float:
+    """A number to so many significant digits, or as it is declared."""
+    return value if value == declared else float(f"{value:.{digits}g}")
 
 
 def effects_by_size(

@@ -18,14 +18,22 @@ from .units import find_unit
 
 # Words of laboratories for each kind of column, the most specific first; a word is a part of a name in lower case.
 WORDS = (
-    ("time", ("t", "ts", "time", "timestamp", "zeit", "temps", "seconds")),
-    ("tension", ("tension", "force", "effort", "kraft", "loadcell", "load", "cell", "f", "ft")),
-    ("winch_speed", ("velocity", "vel", "speed", "omega", "v", "geschwindigkeit", "drehzahl")),
-    ("rope_length", ("length", "encoder", "enc", "geber", "counts", "cnt", "laenge", "länge", "angle", "winkel")),
+    ("time", ("t", "ts", "time", "timestamp", "zeit", "temps", "tiempo", "tempo", "seconds")),
+    ("tension", ("tension", "force", "effort", "kraft", "fuerza", "forza", "loadcell", "load", "cell", "f", "ft")),
+    (
+        "winch_speed",
+        ("velocity", "vel", "speed", "omega", "v", "geschwindigkeit", "drehzahl", "vitesse", "velocidad", "velocita"),
+    ),
+    (
+        "rope_length",
+        ("length", "encoder", "enc", "geber", "counts", "cnt", "laenge", "länge", "angle", "winkel", "longueur"),
+    ),
 )
+# German names join the words of rope and winch to that of the quantity.
+_COMPOUND = re.compile(r"^(seil|winden|trommel|antriebs?|motor)(kraft|geschwindigkeit|drehzahl|laenge|länge|winkel)$")
 # Words of what is measured at, without the quantity.
-DRIVE_WORDS = ("winch", "drive", "motor", "drum", "trommel", "winde", "antrieb")
-ROPE_WORDS = ("rope", "seil", "cable")
+DRIVE_WORDS = ("winch", "drive", "motor", "drum", "trommel", "winde", "winden", "antrieb", "antriebs", "treuil")
+ROPE_WORDS = ("rope", "seil", "cable", "câble")
 # Words that a name of a coordinate may have beside x, y or z.
 POSITION_WORDS = ("pos", "position", "rigid", "body", "tracker", "platform", "tcp", "marker")
 # Words of columns that no standard column is for, though they may have a word of one.
@@ -235,7 +243,11 @@ def _factor(unit: str, kind: str) -> str:
 def _words(name: str) -> list[str]:
     """Words of a name in lower case, without its unit: parted at capitals, digits and marks."""
     parted = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name.removesuffix(_stated_unit(name)))
-    return [part.lower() for part in _PARTS.findall(parted)]
+    parts = [part.lower() for part in _PARTS.findall(parted)]
+    compounds = [_COMPOUND.fullmatch(part) for part in parts]
+    return [
+        word for part, match in zip(parts, compounds, strict=True) for word in (match.groups() if match else (part,))
+    ]
 
 
 def _kind(name: str) -> tuple[str | None, str]:

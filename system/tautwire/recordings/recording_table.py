@@ -96,7 +96,8 @@ def parse_header(
             problem = f"the column {name} belongs to no cable, the robot has cables 1 to {cable_count}"
             hint = "give the robot file that belongs to this recording"
             if int(cable_match.group(1)) == 0:
-                hint = "count cables from 1, or declare each name so in [recording.columns], as tautwire columns does"
+                first, second = f"{name[:-1]}1", f"{name[:-1]}2"
+                hint = f"count cables from 1: rename {name} {first}, {first} {second}, and so on"
             sink(RecordingError(where, problem, hint, line))
     unknown_names = tuple(name for name in names if name not in allowed_names)
     for error in _missing_column_errors(names, unknown_names, where, cable_count, line):
