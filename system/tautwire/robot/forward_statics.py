@@ -16,9 +16,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import least_squares
 
-from tautwire_fmu.laws.mathematics import REAL
-from tautwire_fmu.laws.rotation import multiply, quaternion_of
-
 from ..array_validation import validate_array
 from ..errors import UnreachableError
 from .active_effects import cables_have_weight
@@ -32,6 +29,7 @@ from .kinematics import (
     inverse_kinematics,
     is_same_pose,
     structure_matrix_at,
+    turned_orientation,
     validated_pose,
 )
 from .rigid_equilibrium import FREEDOMS, load_wrench, platform_size
@@ -106,7 +104,9 @@ def _poses_in_equilibrium(
     for index in range(1 + DEFAULT_STARTS):
         offset = np.zeros(FREEDOMS) if index == 0 else generator.standard_normal(FREEDOMS)
         start = position + START_DISTANCE_RATIO * scale * offset[:3]
-        solution = _pose_in_equilibrium(robot, required, start, _turned(orientation, START_ANGLE * offset[3:]))
+        solution = _pose_in_equilibrium(
+            robot, required, start, turned_orientation(orientation, START_ANGLE * offset[3:])
+        )
         if solution is not None and not any(is_same_pose(solution, other, scale) for other in solutions):
             solutions.append(solution)
     return tuple(sorted(solutions, key=lambda each: each.residual))
@@ -121,7 +121,7 @@ def _pose_in_equilibrium(
     units = np.array([1.0] * 3 + [1.0 / platform_size(robot)] * 3) / load
 
     def pose_at(variables: Array) -> tuple[Array, Quaternion]:
-        return start + scale * variables[:3], _turned(start_orientation, variables[3:6])
+        return start + scale * variables[:3], turned_orientation(start_orientation, variables[3:6])
 
     def residuals(variables: Array) -> Array:
         at, quaternion = pose_at(variables)
@@ -144,8 +144,3 @@ def _pose_in_equilibrium(
     at, quaternion = pose_at(result.x)
     x, y, z = at.tolist()
     return ForwardSolution((x, y, z), quaternion, residual)
-
-
-def _turned(orientation: Quaternion, rotation_vector: Array) -> Quaternion:
-    w, x, y, z = multiply(quaternion_of(REAL, rotation_vector.tolist()), orientation)
-    return (float(w), float(x), float(y), float(z))

@@ -17,6 +17,7 @@ from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
 from tautwire_fmu.laws.mathematics import REAL
+from tautwire_fmu.laws.rotation import multiply, quaternion_of
 
 from ..array_validation import validate_array, validate_quaternion
 from ..errors import ArgumentError, UnreachableError
@@ -188,6 +189,14 @@ def validated_pose(
     if orientation is None:
         return array, platform.start_orientation
     return array, validate_quaternion(f"{caller}: orientation", orientation)
+
+
+def turned_orientation(orientation: Quaternion, rotation_vector: Array) -> Quaternion:
+    """An orientation turned by a rotation vector (3,) in rad, in the axes of the world."""
+    if not np.any(rotation_vector):
+        return orientation
+    w, x, y, z = multiply(quaternion_of(REAL, rotation_vector.tolist()), orientation)
+    return (float(w), float(x), float(y), float(z))
 
 
 def _rotation(quaternion: Quaternion) -> Rotation:

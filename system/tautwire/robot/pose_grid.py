@@ -10,11 +10,8 @@ from typing import Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from tautwire_fmu.laws.mathematics import REAL
-from tautwire_fmu.laws.rotation import multiply, quaternion_of
-
 from ..errors import InputError
-from .kinematics import validated_pose
+from .kinematics import turned_orientation, validated_pose
 from .schema import Quaternion, Robot
 
 Array = NDArray[np.float64]
@@ -70,7 +67,7 @@ class OrientationGrid:
 
     def poses(self, coordinates: Array) -> tuple[Array, tuple[Quaternion, ...]]:
         """The position, and the turned orientation."""
-        return self.position, (_turned(self.orientation, coordinates),)
+        return self.position, (turned_orientation(self.orientation, coordinates),)
 
 
 def position_grid(
@@ -96,7 +93,7 @@ def position_grid(
     start = robot.platform.start
     corners = _box(robot, lower, upper)
     axes = _axes(*corners, np.array(start), spacing, "m")
-    return PositionGrid(axes, start, tuple(_turned(declared, np.array(each)) for each in rotations))
+    return PositionGrid(axes, start, tuple(turned_orientation(declared, np.array(each)) for each in rotations))
 
 
 def orientation_grid(
@@ -128,13 +125,6 @@ def _validated_range(robot: Robot, rotation_range: Sequence[float]) -> list[floa
     if np.any(ranges > 0.0) and not robot.platform.is_rigid_body:
         raise InputError(robot.name, "has a point mass, which does not turn", "give [platform] an inertia")
     return [float(each) for each in ranges]
-
-
-def _turned(orientation: Quaternion, rotation_vector: Array) -> Quaternion:
-    if not np.any(rotation_vector):
-        return orientation
-    w, x, y, z = multiply(quaternion_of(REAL, rotation_vector.tolist()), orientation)
-    return (float(w), float(x), float(y), float(z))
 
 
 def _box(robot: Robot, lower: Sequence[float] | None, upper: Sequence[float] | None) -> tuple[Array, Array]:

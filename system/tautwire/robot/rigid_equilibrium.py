@@ -19,12 +19,12 @@ from scipy.optimize import Bounds, least_squares, minimize
 
 from tautwire_fmu.laws import effect_stages as stages
 from tautwire_fmu.laws.mathematics import REAL
-from tautwire_fmu.laws.rotation import multiply, quaternion_of, rotate
+from tautwire_fmu.laws.rotation import rotate
 
 from ..errors import ArgumentError, UnreachableError
 from .active_effects import cable_effects, cables_have_weight, centre_of_mass
 from .cable_routes import attachment_points, cable_routes, unreachable_error
-from .kinematics import structure_matrix_at, validated_pose
+from .kinematics import structure_matrix_at, turned_orientation, validated_pose
 from .schema import Quaternion, Robot, TensionLimits
 from .static_load import fixed_point, static_load
 from .tension_distribution import DEFAULT_LIMITS, distribute_by_rule, least_limit_violations
@@ -85,7 +85,7 @@ def static_equilibrium(
         rotation_vector = np.zeros(3)
     else:
         rotation_vector = _nearest_orientation(robot, at)
-    turned = _turned(robot, rotation_vector) if np.any(rotation_vector) else declared
+    turned = turned_orientation(declared, rotation_vector)
     tensions = _tensions(robot, at, turned, rule)
     matrix, load = _balance(robot, at, turned, tensions)
     remaining = float(np.linalg.norm((matrix @ tensions - load)[:3]))
@@ -203,12 +203,6 @@ def _limit_error(robot: Robot, position: Array, matrix: Array, load: Array, limi
     return unreachable_error(robot, position, reason, worst + 1, bound + float(excess[worst]))
 
 
-def _turned(robot: Robot, rotation_vector: Array) -> Quaternion:
-    """The declared orientation turned by a rotation vector in rad in the world's axes."""
-    w, x, y, z = multiply(quaternion_of(REAL, rotation_vector.tolist()), robot.platform.start_orientation)
-    return (w, x, y, z)
-
-
 def _nearest_orientation(robot: Robot, position: Array) -> Array:
     """Rotation vector, in rad, from the declared orientation to the nearest one in equilibrium.
 
@@ -241,7 +235,9 @@ def _nearest_orientation(robot: Robot, position: Array) -> Array:
 def _imbalance(robot: Robot, position: Array, variables: Array, load: float) -> Array:
     """Wrench that remains, in shares of the load, with a rotation vector (rad) and tensions in shares of the load."""
     tensions = load * variables[3:]
-    matrix, wrench = _balance(robot, position, _turned(robot, variables[:3]), tensions)
+    matrix, wrench = _balance(
+        robot, position, turned_orientation(robot.platform.start_orientation, variables[:3]), tensions
+    )
     remaining: Array = (matrix @ tensions - wrench) / load
     return remaining
 
