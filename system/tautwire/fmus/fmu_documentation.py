@@ -28,19 +28,24 @@ LAWS: Mapping[str, ModuleType] = {
     "controller": sampled_control,
 }
 TABLES = {"Inputs": "input", "Outputs": "output", "Parameters": "parameter", "States": "local"}
-# Both travel inside every FMU.
+# What travels inside an FMU of Python.
 LICENSED_PACKAGES = ("tautwire", "pythonfmu")
 CODE_PATTERN = re.compile(r"(?::\w+:)?(`{1,2})~?(.+?)\1", re.DOTALL)
 
 
-def documentation_files(kind: str, data: Mapping[str, Any], description: ModelDescription) -> dict[str, bytes]:
+def documentation_files(
+    kind: str,
+    data: Mapping[str, Any],
+    description: ModelDescription,
+    packages: tuple[str, ...] = LICENSED_PACKAGES,
+) -> dict[str, bytes]:
     """Contents by path in the archive: ``documentation/index.html``, the licenses, and the icon ``model.png``.
 
-    ``kind`` is a key of :data:`LAWS`, ``data`` the resource of the FMU.
+    ``kind`` is a key of :data:`LAWS`, ``data`` the resource of the FMU, ``packages`` those whose code is in it.
     """
     return {
         "documentation/index.html": documentation_page(kind, data, description).encode("utf-8"),
-        "documentation/licenses/license.txt": license_text().encode("utf-8"),
+        "documentation/licenses/license.txt": license_text(packages).encode("utf-8"),
         "model.png": files(__package__).joinpath(f"icons/{kind}.png").read_bytes(),
     }
 
@@ -65,9 +70,9 @@ def documentation_page(kind: str, data: Mapping[str, Any], description: ModelDes
 
 
 @cache
-def license_text() -> str:
-    """License texts of Tautwire and of pythonfmu."""
-    return "\n\n".join(f"{package}\n\n{_package_license(package)}" for package in LICENSED_PACKAGES)
+def license_text(packages: tuple[str, ...] = LICENSED_PACKAGES) -> str:
+    """License texts of the packages whose code is in an FMU."""
+    return "\n\n".join(f"{package}\n\n{_package_license(package)}" for package in packages)
 
 
 @cache

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import importlib.util
+import shutil
 import zipfile
 from pathlib import Path
 
 import pytest
 
 from tautwire.errors import ArgumentError
+from tautwire.fmus.native import native_archive
 from tautwire.fmus.native.c_toolchain import (
     PLATFORMS,
     THIS_PLATFORM,
@@ -20,7 +22,8 @@ from tautwire.fmus.native.c_toolchain import (
 from tautwire.fmus.packaging import build_fmus
 from tests.support.effect_cases import CASES
 from tests.support.effects import with_effects
-from tests.support.robots import LIMITED, example, with_winch
+from tests.support.native import both_runs, largest_difference
+from tests.support.robots import LIMITED, example, gentle_speeds, with_winch
 
 SYSTEM_COMPILER = Toolchain(("cc",), "cc", is_cross_compiler=False)
 MAGIC = {".so": b"\x7fELF", ".dll": b"MZ", ".dylib": b"\xcf\xfa\xed\xfe"}
@@ -44,6 +47,16 @@ def test_what_a_compiler_refuses_is_told_in_one_line() -> None:
     with pytest.raises(NativeBuildError, match=r"cannot compile.*error") as caught:
         compile_library(sources, platform, SYSTEM_COMPILER)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.validate
+@pytest.mark.skipif(shutil.which("cc") is None, reason="no C compiler")
+def test_fmus_by_the_systems_compiler_run_as_those_of_python(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(native_archive, "find_toolchain", lambda: SYSTEM_COMPILER)
+    robot = example("three")
+    time, speed = gentle_speeds(robot, 0.2, 0.02)
+    python, native = both_runs(robot, tmp_path, time, speed)
+    assert largest_difference(python, native) < 1e-10
 
 
 @pytest.mark.validate

@@ -3,10 +3,13 @@
 from __future__ import annotations
 
 import json
+import os
 import tempfile
 import zipfile
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
 from typing import Any
 from uuid import NAMESPACE_URL, uuid5
@@ -24,6 +27,8 @@ from .component_sources import ENTRY_FILE, component_sources, rate_references
 from .fmi3_description import build_description, fmi3_description
 
 FMI_VERSIONS = (2, 3)
+# CasADi's generated code is free of its license, by its own word.
+LICENSED_PACKAGES = ("tautwire",)
 # Old enough for every archive, and the same in all builds.
 ENTRY_DATE = (1980, 1, 1, 0, 0, 0)
 
@@ -61,10 +66,10 @@ def write_native_fmu(kind: str, base: str, data: Mapping[str, Any], target: Nati
     slave.guid = str(uuid5(NAMESPACE_URL, json.dumps([anonymous, unidentified], sort_keys=True)))
     sources = component_sources(kind, slave, unidentified, slave.guid, target.fmi).files
     name = unidentified["model_name"]
-    libraries = {
-        target.library(platform, name): compile_library(sources, platform, target.toolchain)
-        for platform in target.platforms
-    }
+    compile_for = partial(compile_library, sources, toolchain=target.toolchain)
+    with ThreadPoolExecutor(os.cpu_count()) as threads:
+        compiled = list(threads.map(compile_for, target.platforms))
+    libraries = dict(zip((target.library(platform, name) for platform in target.platforms), compiled, strict=True))
     contents = {
         DESCRIPTION_FILE: _xml(native_description(slave, target.fmi)),
         **{f"sources/{file}": text.encode() for file, text in sources.items()},
@@ -73,7 +78,7 @@ def write_native_fmu(kind: str, base: str, data: Mapping[str, Any], target: Nati
     if target.fmi == 3:
         contents["sources/buildDescription.xml"] = _xml(build_description(name, ENTRY_FILE))
     _write_archive(path, contents)
-    additions = documentation_files(kind, unidentified, read_model_description(path))
+    additions = documentation_files(kind, unidentified, read_model_description(path), LICENSED_PACKAGES)
     _write_archive(path, contents | additions)
 
 
