@@ -10,7 +10,16 @@ from pathlib import Path
 from typing import Any
 from zlib import crc32
 
-from tests.rig.lifelike.hidden import HIDDEN_ON_PLATFORMS, PAIRS, RIGHT, UNLISTED, WRONG, names_of
+from tests.rig.lifelike.hidden import (
+    HIDDEN,
+    HIDDEN_ON_PLATFORMS,
+    PAIRS,
+    RIGHT,
+    UNLISTED,
+    WRONG,
+    Hidden,
+    names_of,
+)
 
 from .cases import Case, Kind
 
@@ -37,16 +46,20 @@ class LifelikeCase(Case):
     exact: bool = False
 
     @property
+    def parts_hidden(self) -> list[Hidden]:
+        """What it hides, by the rig's own keys."""
+        known = HIDDEN_ON_PLATFORMS if self.turning else HIDDEN
+        return [known[key] for key in self.hide]
+
+    @property
     def names(self) -> frozenset[str]:
         """What it hides, by the names of effects."""
-        return frozenset(names_of([HIDDEN_ON_PLATFORMS[key] for key in self.hide]))
+        return frozenset(names_of(self.parts_hidden))
 
     @property
     def exact_names(self) -> frozenset[str]:
         """Those whose form is that of the list, so that intervals can be held against the truth."""
-        return frozenset(
-            part.name for part in map(HIDDEN_ON_PLATFORMS.__getitem__, self.hide) if part.manner == "right"
-        )
+        return frozenset(part.name for part in self.parts_hidden if part.manner == "right")
 
     @property
     def own_seed(self) -> int:
