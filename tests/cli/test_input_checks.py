@@ -237,6 +237,15 @@ def test_notes_say_what_a_trace_would_do(tmp_path: Path) -> None:
     assert "east" in notes and "tension_2" in notes
 
 
+@pytest.mark.parametrize("key", ["mass_uncertainty = 1.0", ""], ids=["stated", "none"])
+def test_a_robot_whose_numbers_are_all_exact_is_told_how_to_state_uncertainties(key: str, tmp_path: Path) -> None:
+    text = (EXAMPLES / "three" / "robot.toml").read_text(encoding="utf-8")
+    robot = written(tmp_path, text.replace("[sensors]", f"{key}\n\n[sensors]", 1))
+    checked = check_files(robot, EXAMPLES / "three" / "fit.csv")
+    is_told = any("state mass_uncertainty, modulus_uncertainty, damping_uncertainty" in note for note in checked.notes)
+    assert checked.problems == () and is_told == (not key)
+
+
 def test_a_recording_of_speeds_alone_is_fine_for_simulate(tmp_path: Path) -> None:
     place = tmp_path / "speeds.csv"
     pd.read_csv(THREE / "fit.csv")[["time", *(f"winch_speed_{i}" for i in (1, 2, 3))]].to_csv(place, index=False)

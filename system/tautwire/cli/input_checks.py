@@ -23,6 +23,7 @@ from ..robot.implausible_units import implausible_units
 from ..robot.robot_file_reader import read_robot_with_sink, robot_file_text
 from ..robot.schema import Robot, fmu_slots
 from ..robot.static_equilibrium import static_tensions
+from ..robot.uncertain_parameters import uncertain_parameters
 from ..toml_text import line_of_key
 from .console import columns_command, shell_quoted, with_columns
 
@@ -248,7 +249,16 @@ def _check_together(robot: Robot, recording: Recording, problems: list[Problem],
         prepared_notes = prepare_recordings(robot.as_modelled(), recording, None).notes
         noise = robot.sensors.position_noise or white_noise_deviation(recording.position)
         notes.extend(start_position(robot, noise, recording)[1])
+        notes.extend(_without_uncertainties(robot))
         notes.extend(prepared_notes)
+
+
+def _without_uncertainties(robot: Robot) -> tuple[str, ...]:
+    """A note where no number of the robot file has an uncertainty, so that a trace takes all of them as exact."""
+    if uncertain_parameters(robot):
+        return ()
+    keys = "mass_uncertainty, modulus_uncertainty, damping_uncertainty, anchor_uncertainty"
+    return (f"no number of the robot has an uncertainty: a trace takes them as exact; state {keys} where they are not",)
 
 
 def _collect_up_to(errors: list[RobotFileError], max_count: int) -> Callable[[RobotFileError], None]:
