@@ -77,7 +77,7 @@ def main(docs: Path | None) -> None:
             feedbacks[place] = designs(move)
             results, runs[place] = compared(move, feedbacks[place], Path(scratch) / str(place))
             parts.append(f"### {move.name}\n\n{run_table(results)}\n")
-    helix, _, _, caroca = moves()
+    helix, _, _, caroca, _ = moves()
     parts.append(f"### Margins, three cables\n\n{margin_table(helix.robot, helix.path, feedbacks[0])}\n")
     parts.append(f"### Margins, CAROCA\n\n{margin_table(caroca.robot, caroca.path, feedbacks[3])}\n")
     text = "\n".join(parts)

@@ -27,8 +27,12 @@ from tautwire.control import (
 )
 from tautwire.cosimulation.robot_cosimulation import CosimulationResult
 from tautwire.fmus.packaging import RobotFmus, build_fmus
+from tautwire.robot.kinematics import inverse_kinematics
+from tautwire.robot.pose_path import pose_path, sample_poses
+from tautwire.robot.pose_trajectory import PoseTrajectory, rotation_vectors_between, slerp
 from tautwire.robot.schema import Robot
 from tautwire.robot.trajectory import CAROCA_HELIX, PAPER_HELIX, Line, Trajectory
+from tautwire_fmu.laws.rotation import multiply
 from tests.support.robots import example
 from tests.support.winch_ramp import WinchRamp
 
@@ -73,7 +77,7 @@ class Controlled:
 
 @dataclass(frozen=True)
 class Measured:
-    """Of a run: distances from the path in m, times in s, tensions in N, effort in m/s^2."""
+    """Of a run: distances from the path in m, largest angle in rad, times in s, tensions in N, effort in m/s^2."""
 
     rms: float
     peak: float
@@ -82,6 +86,7 @@ class Measured:
     highest: float
     lowest: float
     effort: float
+    angle: float = 0.0
 
     def worst(self, other: Measured) -> Measured:
         """Of two runs, number by number."""
@@ -90,8 +95,8 @@ class Measured:
 
 
 def moves() -> list[Move]:
-    """The paper's helix and ramp on its three-cable robot, a force step there, CAROCA's helix."""
-    three, caroca = example("three"), example("caroca")
+    """The paper's helix and ramp on its three-cable robot, a force step there, CAROCA's helix, and a turn of CoGiRo."""
+    three, caroca, cogiro = (example(name) for name in ("three", "caroca", "cogiro"))
     start = three.platform.start
     push = np.zeros((len(sample_times(PERIOD, 9.0)), 3))
     push[100:] = -0.05 * three.platform.mass * three.gravity * np.array([1.0, 0.0, 1.0]) / np.sqrt(2.0)
@@ -100,12 +105,24 @@ def moves() -> list[Move]:
         Move("Ramp of the paper, three cables", three, WinchRamp(three, 12.0), 10.0, 4.0, 1e-3, 7.0),
         Move("Force of 5 % of the weight, three cables", three, Line(start, start, 1.0), 9.0, 1.0, 1e-3, 7.0, push),
         Move("Helix of the paper, CAROCA", caroca, CAROCA_HELIX, 7.0, 4.0, 2e-4, 6.0),
+        Move("Line and turn by 0.2 rad, CoGiRo", cogiro, _line_and_turn(cogiro), 4.0, 2.0, 2e-4, 3.0),
     ]
 
 
+def _line_and_turn(robot: Robot) -> PoseTrajectory:
+    """Half a metre, and a turn about a tilted axis meanwhile."""
+    x, y, z = robot.platform.start
+    start = robot.platform.start_orientation
+    w, a, b, c = multiply((np.cos(0.1), 0.48 * np.sin(0.1), 0.64 * np.sin(0.1), 0.6 * np.sin(0.1)), start)
+    return PoseTrajectory(Line((x, y, z), (x + 0.3, y - 0.3, z + 0.26), 2.0), slerp(start, (w, a, b, c), 2.0))
+
+
 def designs(move: Move) -> dict[str, Design]:
-    """The feedback designs for a move."""
-    results: dict[str, Design] = {LQG: design_controller(move.robot), ROBUST: design_robust(move.robot)}
+    """The feedback designs for a move; the robust ones, which take minutes with eight cables, of point masses only."""
+    results: dict[str, Design] = {LQG: design_controller(move.robot)}
+    if move.robot.platform.is_rigid_body:
+        return results | {f"{LQG}, scheduled": schedule_controller(move.robot, move.path)}
+    results[ROBUST] = design_robust(move.robot)
     if move.push is None:
         results[f"{LQG}, scheduled"] = schedule_controller(move.robot, move.path)
         results[f"{ROBUST}, scheduled"] = schedule_robust(move.robot, move.path)
@@ -132,7 +149,7 @@ def controlled(move: Move, feedback: dict[str, Design]) -> dict[str, Controlled]
 def robots(move: Move, folder: Path) -> Iterator[tuple[bool, RobotFmus]]:
     """FMUs of the robot as declared, then of those at the corners of the range; tells which is which."""
     yield True, build_fmus(move.robot, folder / "declared")
-    for modulus, payload, robot in Range().robots(move.robot, 2):
+    for modulus, payload, robot in Range.of(move.robot).robots(move.robot, 2):
         yield False, build_fmus(robot, folder / f"{modulus:g}-{payload:g}")
 
 
@@ -150,14 +167,20 @@ def run(move: Move, controller: Controlled, fmus: RobotFmus) -> CosimulationResu
 
 def measured(move: Move, controller: Controlled, motion: CosimulationResult) -> Measured:
     """The numbers of a run; settling counts from the end of the move, as the controller has shaped it."""
-    away = motion.position - controller.path.position(motion.time)
+    poses = sample_poses("bench", move.robot, pose_path(move.robot, controller.path), motion.time)
+    away = motion.position - poses.position
     distance = np.linalg.norm(away, axis=1)
     late = max(controller.path.duration - move.path.duration, 0.0)
     outside = np.flatnonzero(distance > move.near)
     settled = 0.0 if not len(outside) else motion.time[outside[-1]] - move.settles - late
     wound = motion.elongation - motion.length
-    anchors = np.array(move.robot.anchors)
-    ideal = np.linalg.norm(anchors - controller.path.position(motion.time)[:, None], axis=2)
+    orientations = [(w, x, y, z) for w, x, y, z in poses.orientation.tolist()]
+    pairs = zip(poses.position, orientations, strict=True)
+    ideal = np.array([inverse_kinematics(move.robot, *pair) for pair in pairs])
+    angle = 0.0
+    if motion.orientation is not None:
+        angles = np.linalg.norm(rotation_vectors_between(motion.orientation, poses.orientation), axis=1)
+        angle = float(np.max(angles))
     beyond = np.diff(wound + ideal, 2, axis=0) / PERIOD**2
     return Measured(
         rms=float(np.sqrt(np.mean(distance**2))),
@@ -167,6 +190,7 @@ def measured(move: Move, controller: Controlled, motion: CosimulationResult) -> 
         highest=float(np.max(motion.tension)),
         lowest=float(np.min(motion.tension)),
         effort=float(np.sqrt(np.mean(beyond**2))),
+        angle=angle,
     )
 
 

@@ -39,10 +39,13 @@ def table(heads: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 def run_table(results: Mapping[str, tuple[Measured, Measured]]) -> str:
     """What was measured of each controller, on the robot as declared and the worst over the others."""
     heads = ["controller", "robot", "rms", "peak", "settling", "swing left", "tension", "effort"]
+    has_angles = any(found.angle > 0.0 for pair in results.values() for found in pair)
+    heads += ["peak angle"] * has_angles
     rows = []
     for name, pair in results.items():
         for robot, found in zip(("declared", "worst of range"), pair, strict=True):
-            rows.append([name if robot == "declared" else "", robot, *_cells(found)])
+            angle = [f"{length(found.angle)} mrad"] * has_angles
+            rows.append([name if robot == "declared" else "", robot, *_cells(found), *angle])
     return table(heads, rows)
 
 
@@ -54,7 +57,7 @@ def _cells(found: Measured) -> list[str]:
 
 
 def length(metres: float) -> str:
-    """In mm, to two digits or to a micrometre."""
+    """In mm, or of an angle in mrad, to two digits or to a micrometre."""
     if metres < 1e-6:
         return "<0.001"
     return f"{round(1e3 * metres, 3):.2g}" if metres < 1e-2 else f"{1e3 * metres:.1f}"

@@ -11,7 +11,9 @@ import pytest
 
 from tautwire.cli.application import run
 from tautwire.control import Feedforward, build_controller_fmu
+from tautwire.robot.robot_file_writer import write_robot
 from tautwire.robot.trajectory import Line
+from tests.support.rigid_robots import crane_robot
 from tests.support.robots import EXAMPLES, example
 
 ROBOT = str(EXAMPLES / "three" / "robot.toml")
@@ -85,3 +87,18 @@ def test_options_that_do_not_go_together_are_refused(
     assert run(["simulate", ROBOT, *options, "--out", "result.csv"]) == 2
     said = capsys.readouterr().err
     assert all(word in said for word in words), said
+
+
+def test_a_platform_that_turns_follows_a_path_with_an_orientation(tmp_path: Path) -> None:
+    robot, x, y, z = tmp_path / "crane.toml", *crane_robot().platform.start
+    write_robot(crane_robot(), robot)
+    lines = f"end = [{x}, {y}, {z + 0.002}]\nend_orientation = [0.99995, 0.0, 0.0, 0.01]\nduration = 0.1\n"
+    (tmp_path / "path.toml").write_text(lines, encoding="utf-8")
+    state_space = {"A": [], "B": [], "C": [], "D": np.zeros((8, 14)).tolist(), "dt": 0.01}
+    (tmp_path / "law.json").write_text(json.dumps(state_space), encoding="utf-8")
+    files = ["--controller", str(tmp_path / "law.json"), "--path", str(tmp_path / "path.toml")]
+    out = tmp_path / "result.csv"
+    assert run(["simulate", str(robot), *files, "--until", "0.15", "--out", str(out)]) == 0
+    result = pd.read_csv(out)
+    assert result["qz"].iloc[-1] == pytest.approx(0.01, abs=2e-4)
+    assert result["z"].iloc[-1] == pytest.approx(z + 0.002, abs=5e-4)

@@ -16,19 +16,25 @@ from tautwire.control import (
     ControlAim,
     Controller,
     Feedforward,
+    Range,
+    RobustAim,
     RunOptions,
     build_controller_fmu,
     cosimulate_closed_loop,
     cosimulate_with_controller,
     design_controller,
+    design_robust,
     elastic_reference,
     fmu_controller,
     margins_of,
+    margins_over,
     path_tensions,
     rigid_reference,
     sample_times,
     schedule_controller,
     shape_along,
+    shaped,
+    shaper,
     state_space_controller,
 )
 from tautwire.control.input_shaping import residual_amplitudes
@@ -285,3 +291,32 @@ def test_feedback_damps_the_free_modes_of_four_cables(tmp_path: Path) -> None:
         assert motion.angular_velocity is not None
         rates.append(np.abs(motion.angular_velocity[motion.time > 5.0]).max())
     assert rates[1] < 0.2 * rates[0]
+
+
+def test_a_plant_with_a_slack_cable_is_refused() -> None:
+    robot = replace(hall_robot(), tension=None)
+    with pytest.raises(InputError, match="hall: has no tension in cable 2 where the controller is to be designed"):
+        design_controller(robot)
+
+
+def test_a_shaped_pose_is_the_weighted_mean_of_delayed_ones() -> None:
+    robot, times = crane_robot(), np.linspace(0.0, 2.0, 21)
+    path, impulses = turning_path(robot), shaper(2.0, 0.01)
+    both = shaped(path, impulses)
+    assert isinstance(both, PoseTrajectory) and both.duration == pytest.approx(path.duration + impulses.delays[-1])
+    pairs = zip(impulses.amplitudes, impulses.delays, strict=True)
+    vectors = sum(a * Rotation.from_quat(path.orientation(times - d)[:, [1, 2, 3, 0]]).as_rotvec() for a, d in pairs)
+    shown = Rotation.from_quat(both.orientation(times)[:, [1, 2, 3, 0]]).as_rotvec()
+    assert shown == pytest.approx(vectors, abs=1e-12)
+    fine = 1e-5
+    later, earlier = (both.position(times + sign * fine) for sign in (1.0, -1.0))
+    assert both.velocity(times) == pytest.approx((later - earlier) / (2.0 * fine), abs=1e-8)
+
+
+@pytest.mark.validate
+def test_the_robust_design_keeps_its_margin_over_the_range_on_a_platform_that_turns() -> None:
+    robot, demanded = octahedral_robot(), RobustAim(margin=0.5)
+    design = design_robust(robot, ControlAim(period=0.005), Range.of(robot), demanded)
+    assert design.margins.min_disk >= 0.5
+    worst = margins_over(robot, design.knots(), np.array([robot.platform.start]), Range.of(robot), points=2)
+    assert worst.min_disk >= 0.5 - 1e-9 and worst.spectral_radius < 1.0
