@@ -14,6 +14,8 @@ from matplotlib.figure import Figure
 from tautwire.cosimulation import AdaptiveStep, FixedStep, StepSizeControl
 from tautwire.fmus.packaging import build_fmus
 from tests.importers.harness import IMPORTERS, NotInstallableError, exact_end, prepare, run_client
+from tests.support.effect_cases import same
+from tests.support.effects import with_effects
 from tests.support.robots import paper_robot
 
 from .ramp import by_fmus, by_solve_ivp
@@ -93,6 +95,15 @@ def turn_about(folder: Path, step: float, tolerance: float) -> tuple[float, floa
     ]
     by_python, by_native, theirs = np.min(turns, axis=0)
     return float(by_python / theirs), float(by_native / theirs)
+
+
+def native_speedup(folder: Path, step: float) -> float:
+    """Processor time with FMUs of Python over that with native ones, with relaxation in every cable, in turn."""
+    robot = with_effects(paper_robot(), same("relaxation", modulus=3e10, time=0.5))
+    python, native = (build_fmus(robot, folder / str(kind), native=kind) for kind in (False, True))
+    turns = [[by_fmus(fmus, FixedStep(step), process_time)[1] for fmus in (python, native)] for _ in range(RUNS)]
+    by_python, by_native = np.min(turns, axis=0)
+    return float(by_python / by_native)
 
 
 def by_importers(folder: Path) -> list[Curve]:

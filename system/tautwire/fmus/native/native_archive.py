@@ -31,6 +31,7 @@ FMI_VERSIONS = (2, 3)
 LICENSED_PACKAGES = ("tautwire",)
 # Old enough for every archive, and the same in all builds.
 ENTRY_DATE = (1980, 1, 1, 0, 0, 0)
+ENTRY_MODE = 0o100644
 
 
 @dataclass(frozen=True)
@@ -134,4 +135,6 @@ def _output_derivative_order(slave: Slave) -> int:
 def _write_archive(path: Path, contents: Mapping[str, bytes]) -> None:
     with zipfile.ZipFile(path, "w") as archive:
         for name, content in contents.items():
-            archive.writestr(zipfile.ZipInfo(name, ENTRY_DATE), content, zipfile.ZIP_DEFLATED)
+            entry = zipfile.ZipInfo(name, ENTRY_DATE)
+            entry.external_attr = ENTRY_MODE << 16
+            archive.writestr(entry, content, zipfile.ZIP_DEFLATED)
