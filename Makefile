@@ -70,6 +70,7 @@ bench-trace: $(READY)
 	$(BIN)/python -m tests.bench.trace --jobs 2 --empty 200
 	$(BIN)/python -m tests.bench.trace --jobs 2 --lifelike
 	$(BIN)/python -m tests.bench.trace --jobs 2 --lifelike --empty 200
+	$(BIN)/python -m tests.bench.trace --jobs 2 --platforms
 
 bench-control: $(READY)
 	$(BIN)/python -m tests.bench.control docs
