@@ -8,13 +8,18 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
+import pandas as pd  # type: ignore[import-untyped,unused-ignore]
 import pytest
+from scipy.spatial.transform import Rotation
 
 from tautwire.cli import run
-from tautwire.recordings.recording import Recording
+from tautwire.cosimulation.recording_simulation import read_recorded_inputs
+from tautwire.recordings.mistaken_motion import check_motion
+from tautwire.recordings.recording import Recording, read_recording
 from tautwire.robot.robot_file_writer import write_robot
-from tests.support.pose_recordings import noisy, wandering_recording
-from tests.support.rigid_robots import crane_robot
+from tautwire.robot.schema import Robot
+from tests.support.pose_recordings import noisy, rope_lengths, rotation_of, wandering_poses, wandering_recording
+from tests.support.rigid_robots import crane_robot, suspended_robot
 
 ROBOT = crane_robot()
 
@@ -61,3 +66,56 @@ def test_many_quaternions_of_another_norm_are_one_problem(tmp_path: Path, capsys
     assert status == 2 and problem["line"] == 2
     assert "has the norm 1.3 in qw, qx, qy, qz" in problem["problem"]
     assert "(and 500 more like it, last in line 502)" in problem["problem"]
+
+
+def round_trip(folder: Path, robot: Robot, speeds: np.ndarray, time: np.ndarray) -> Recording:
+    """The result of simulate over winch speeds (N, n), read as a recording of these, after check passed it."""
+    write_robot(robot, folder / "robot.toml")
+    program = pd.DataFrame({"time": time} | {f"winch_speed_{i}": column for i, column in enumerate(speeds.T, 1)})
+    program.to_csv(folder / "speeds.csv", index=False)
+    files = {name: str(folder / name) for name in ("robot.toml", "speeds.csv", "result.csv", "recording.csv")}
+    arguments = ["--speeds", files["speeds.csv"], "--out", files["result.csv"], "--step", "0.02"]
+    assert run(["simulate", files["robot.toml"], *arguments]) == 0
+    pd.read_csv(files["result.csv"]).merge(program, on="time").to_csv(files["recording.csv"], index=False)
+    assert run(["check", files["robot.toml"], files["recording.csv"]]) == 0
+    return read_recording(files["recording.csv"], robot.cable_count)
+
+
+def starting(time: np.ndarray) -> np.ndarray:
+    """A factor that rises smoothly from rest."""
+    return np.asarray(np.sin(0.5 * np.pi * np.clip(time / 0.5, 0.0, 1.0)) ** 2)
+
+
+def test_what_simulate_says_of_a_platform_on_four_cables_passes_the_check(tmp_path: Path) -> None:
+    time = np.arange(81) / 32.0
+    shape = 0.05 + 0.02 * np.array([1.0, 0.0, -1.0, 0.0])
+    speeds = (starting(time) * np.sin(1.3 * time))[:, None] * shape
+    recording = round_trip(tmp_path, suspended_robot(4), speeds, time)
+    assert np.ptp(recording.orientation[:, 1:], axis=0).max() > 1e-3
+    check = check_motion(suspended_robot(4), recording)
+    assert check is not None and check.misfit < 5e-3
+
+
+@pytest.mark.validate
+def test_what_simulate_says_of_a_platform_on_eight_cables_passes_the_check(tmp_path: Path) -> None:
+    time = np.arange(161) / 40.0
+    positions, rotations = wandering_poses(ROBOT, time, 0.1, 0.05)
+    factor = starting(time)[:, None]
+    positions = np.array(ROBOT.platform.start) + factor * (positions - np.array(ROBOT.platform.start))
+    turned = Rotation.from_rotvec(factor * rotations.as_rotvec())
+    speeds = -np.gradient(rope_lengths(ROBOT, positions, turned), time, axis=0)
+    recording = round_trip(tmp_path, ROBOT, speeds, time)
+    assert (rotation_of(recording.orientation[1:]) * turned[1:].inv()).magnitude().max() < 0.01
+    check = check_motion(ROBOT, recording)
+    assert check is not None and check.misfit < 0.02
+
+
+def test_simulate_starts_where_and_as_the_recording_does(tmp_path: Path) -> None:
+    recording = noisy(wandering_recording(ROBOT)).part(200, 300)
+    recording.frame().to_csv(tmp_path / "log.csv", index=False)
+    recorded = read_recorded_inputs(ROBOT, tmp_path / "log.csv")
+    platform = recorded.robot.platform
+    assert platform.start == pytest.approx(recording.position[:5].mean(axis=0), abs=1e-9)
+    turned = rotation_of(np.array(platform.start_orientation)) * rotation_of(recording.orientation[2]).inv()
+    assert turned.magnitude() < 2e-3
+    assert ["starts at" in note or "starts turned by" in note for note in recorded.notes[:2]] == [True, True]
