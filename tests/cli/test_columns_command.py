@@ -18,6 +18,9 @@ from tautwire.cli import run
 from tautwire.recordings.column_names import column_names
 from tautwire.recordings.column_proposal import propose_columns
 from tautwire.recordings.recording import read_recording
+from tautwire.robot.robot_file_writer import write_robot
+from tests.support.pose_recordings import noisy, wandering_recording
+from tests.support.rigid_robots import crane_robot
 from tests.support.robots import EXAMPLES
 from tests.support.trackers import split
 
@@ -379,3 +382,73 @@ def test_what_cannot_be_told_is_refused(
     places = {"fit": str(FIT), "robot": ROBOT} | {path.stem: str(path) for path in tmp_path.iterdir()}
     assert run(["columns", *(argument.format_map(places) for argument in arguments)]) == 2
     assert words in capsys.readouterr().err
+
+
+QUATERNIONS = {
+    "standard": (["qw", "qx", "qy", "qz"], ""),
+    "numbers": (["q0", "q1", "q2", "q3"], "numbered from 0: the scalar part has to be the first"),
+    "a word": (["quat_w", "quat_x", "quat_y", "quat_z"], ""),
+    "a message": ([f"pose.orientation.{part}" for part in "wxyz"], ""),
+    "a body": ([f"Rigid Body 1 Rotation {part}" for part in "WXYZ"], ""),
+    "numbered words": ([f"platform_quaternion{part}" for part in range(4)], "numbered from 0"),
+}
+
+
+@pytest.mark.parametrize("name", QUATERNIONS)
+def test_the_parts_of_a_quaternion_are_proposed(name: str, tmp_path: Path) -> None:
+    names, doubt = QUATERNIONS[name]
+    frame = standard().assign(**dict(zip(names, [[1.0] * 60, [0.0] * 60, [0.0] * 60, [0.0] * 60], strict=True)))
+    frame.to_csv(tmp_path / "log.csv", index=False)
+    proposal = propose_columns(column_names(tmp_path / "log.csv"), 3)
+    told = {each.column: each for each in proposal.columns if each.column.startswith("q")}
+    assert {column: each.name for column, each in told.items()} == dict(
+        zip(("qw", "qx", "qy", "qz"), names, strict=True)
+    )
+    assert all(each.doubt.startswith(doubt) and not each.unit for each in told.values())
+    assert all(bool(each.doubt) == bool(doubt) for each in told.values())
+
+
+@pytest.mark.parametrize(
+    "names",
+    [
+        ["Rotation_X", "Rotation_Y", "Rotation_Z"],
+        ["qw_set", "qx_set", "qy_set", "qz_set"],
+        ["q1", "q2", "q3", "q4"],
+        ["imu_quat_w", "imu_quat_x", "imu_quat_y", "imu_quat_z"],
+    ],
+)
+def test_angles_set_points_and_other_quaternions_are_not_the_platforms(names: list[str], tmp_path: Path) -> None:
+    standard().assign(**dict.fromkeys(names, 0.5)).to_csv(tmp_path / "log.csv", index=False)
+    proposal = propose_columns(column_names(tmp_path / "log.csv"), 3)
+    assert [each for each in proposal.columns if each.column.startswith("q")] == []
+    assert set(names) <= proposal.unused.keys()
+
+
+def test_an_orientation_beside_a_point_mass_is_not_proposed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    names = [f"pose.orientation.{part}" for part in "wxyz"]
+    standard().assign(**dict.fromkeys(names, 0.0)).to_csv(tmp_path / "log.csv", index=False)
+    assert run(["columns", str(tmp_path / "log.csv"), ROBOT, "--json"]) == 0
+    unused = json.loads(capsys.readouterr().out)["unused"]
+    assert [unused[name] for name in names] == [
+        f"looks like q{part}, and a point mass has no orientation" for part in "wxyz"
+    ]
+
+
+def test_the_proposal_for_a_rigid_platform_is_read_by_the_check(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    robot, recording = crane_robot(), noisy(wandering_recording(crane_robot()))
+    write_robot(robot, tmp_path / "crane.toml")
+    frame = recording.frame()
+    counts = {f"Enc{i}": np.round((1.0 - wound) / 2e-5) for i, wound in enumerate(recording.wound_lengths().T, 1)}
+    poses = {f"RB Rotation {part.upper()}": frame[f"q{part}"] for part in "xyzw"}
+    poses |= {f"RB Position {axis.upper()}": frame[axis] for axis in "xyz"}
+    cells = {f"Force {i} [N]": frame[f"tension_{i}"] for i in range(1, 9)}
+    pd.DataFrame({"t [s]": frame["time"]} | counts | poses | cells).to_csv(tmp_path / "log.csv", index=False)
+    files = [str(tmp_path / name) for name in ("log.csv", "crane.toml", "columns.toml")]
+    assert run(["columns", files[0], files[1], "--out", files[2]]) == 0
+    table = (tmp_path / "columns.toml").read_text()
+    assert 'qw = { name = "RB Rotation W" }' in table
+    assert "rope_length_8" in table and "factor = 2e-05" in table
+    assert run(["check", files[1], files[0], "--columns", files[2], "--json"]) == 0
+    assert json.loads(capsys.readouterr().out.splitlines()[-1])["problems"] == []

@@ -5,7 +5,9 @@ import pytest
 
 from tautwire.recordings.dead_channels import without_dead_channels
 from tautwire.recordings.recording import Recording
+from tests.support.pose_recordings import noisy, wandering_recording
 from tests.support.recordings import recorded
+from tests.support.rigid_robots import crane_robot
 from tests.support.robots import NAMES
 
 WHOLE = recorded("three", 1)
@@ -71,3 +73,31 @@ def test_a_coarse_sensor_is_no_slow_one() -> None:
     cleaned, notes = without_dead_channels(replace(WHOLE, tension=coarse))
     assert np.mean(np.isfinite(cleaned.tension)) > 0.8
     assert not any("repeated" in note for note in notes)
+
+
+RIGID = noisy(wandering_recording(crane_robot()))
+
+
+def test_an_orientation_that_is_constant_is_not_used() -> None:
+    still = replace(RIGID, orientation=np.tile([1.0, 0.0, 0.0, 0.0], (RIGID.sample_count, 1)))
+    cleaned, notes = without_dead_channels(still)
+    assert not cleaned.has_orientation
+    assert notes == ("log.csv: qw, qx, qy, qz are constant throughout: not used",)
+
+
+def test_of_an_orientation_that_is_held_the_first_sample_of_each_is_used() -> None:
+    held = replace(RIGID, orientation=np.repeat(RIGID.orientation[::4], 4, axis=0)[: RIGID.sample_count])
+    cleaned, notes = without_dead_channels(held)
+    assert np.flatnonzero(np.isfinite(cleaned.orientation).all(axis=1)).tolist() == list(
+        range(0, RIGID.sample_count, 4)
+    )
+    assert notes == ("log.csv: qw, qx, qy, qz: each value is repeated about 4 times: only the first was used",)
+
+
+def test_an_orientation_that_freezes_while_the_platform_moves_is_not_used_there() -> None:
+    orientation = RIGID.orientation.copy()
+    orientation[100:160] = orientation[99]
+    cleaned, notes = without_dead_channels(replace(RIGID, orientation=orientation))
+    assert np.flatnonzero(np.isnan(cleaned.orientation).any(axis=1)).tolist() == list(range(100, 160))
+    assert notes == ("log.csv: qw, qx, qy, qz: frozen for 60 samples while positions move: not used there",)
+    assert without_dead_channels(RIGID) == (RIGID, ())

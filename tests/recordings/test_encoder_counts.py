@@ -18,6 +18,10 @@ def position() -> NDArray[np.float64]:
     return np.array(ROBOT.platform.start) + np.column_stack([np.sin(PHASE), np.cos(1.7 * PHASE), np.sin(2.9 * PHASE)])
 
 
+def by_coordinates(places: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(np.linalg.norm(np.array(ROBOT.anchors) - places[:, None], axis=2))
+
+
 @pytest.mark.parametrize(
     ("values", "expected"),
     [
@@ -37,10 +41,10 @@ def test_counts_are_whole_and_change_by_small_steps(values: NDArray[np.float64],
 
 def test_coordinates_tell_cable_and_scale_of_counts_where_they_were_measured() -> None:
     places = position()
-    lengths = np.linalg.norm(np.array(ROBOT.anchors) - places[:, None], axis=2)
+    lengths = by_coordinates(places)
     places[::3] = np.nan
     counts = [np.round(lengths[:, cable] / scale) + 7e5 for cable, scale in ((2, 1e-5), (0, -2e-5), (1, 3e-5))]
-    told = rope_scales(ROBOT, [*counts, np.sin(40.0 * PHASE)], places)
+    told = rope_scales(by_coordinates(places), [*counts, np.sin(40.0 * PHASE)])
     assert told is not None
     assert told.cables.tolist() == [2, 0, 1, -1]
     assert told.scales[:3] == pytest.approx([1e-5, -2e-5, 3e-5], rel=1e-4)
@@ -49,10 +53,10 @@ def test_coordinates_tell_cable_and_scale_of_counts_where_they_were_measured() -
 
 def test_a_scale_of_a_known_cable_is_told_where_that_fits() -> None:
     places = position()
-    lengths = np.linalg.norm(np.array(ROBOT.anchors) - places[:, None], axis=2)
-    told = rope_scales(ROBOT, [lengths[:, 1] / 2e-5], places, [1])
+    lengths = by_coordinates(places)
+    told = rope_scales(by_coordinates(places), [lengths[:, 1] / 2e-5], [1])
     assert told is not None and told.scales == pytest.approx([2e-5])
-    assert rope_scales(ROBOT, [lengths[:, 1] / 2e-5], places, [2]) is None
+    assert rope_scales(by_coordinates(places), [lengths[:, 1] / 2e-5], [2]) is None
 
 
 @pytest.mark.parametrize(
@@ -60,7 +64,7 @@ def test_a_scale_of_a_known_cable_is_told_where_that_fits() -> None:
 )
 def test_counts_that_the_coordinates_do_not_tell_have_no_cables(case: str) -> None:
     places = position()
-    lengths = np.linalg.norm(np.array(ROBOT.anchors) - places[:, None], axis=2) / 1e-5
+    lengths = by_coordinates(places) / 1e-5
     counts = {
         "one cable twice": [lengths[:, 0], lengths[:, 0], lengths[:, 2]],
         "two columns of one cable": [*lengths.T, 0.5 * lengths[:, 1]],
@@ -70,4 +74,4 @@ def test_counts_that_the_coordinates_do_not_tell_have_no_cables(case: str) -> No
         "no positions": list(lengths.T),
     }[case]
     places = np.full_like(places, np.nan) if case == "no positions" else places
-    assert rope_scales(ROBOT, counts, places) is None
+    assert rope_scales(by_coordinates(places), counts) is None

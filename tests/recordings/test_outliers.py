@@ -2,11 +2,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from tautwire.errors import RecordingError
 from tautwire.recordings.outliers import outlier_indices, without_outliers
 from tautwire.recordings.recording import Recording
+from tests.support.pose_recordings import noisy, quaternions_of, rotation_of, wandering_recording
 from tests.support.recordings import recorded
+from tests.support.rigid_robots import crane_robot
 from tests.support.robots import NAMES
 
 KINKED = {
@@ -82,3 +85,25 @@ def test_a_winch_that_stops_speeding_up_is_no_outlier() -> None:
     noise = np.random.default_rng(5).normal(scale=1e-4, size=600)
     for acceleration in (0.5, 2.0, 20.0):
         assert not len(outlier_indices(np.minimum(acceleration * time, 3.0 * acceleration) + noise))
+
+
+def test_a_quaternion_that_jumps_once_is_removed_as_a_whole() -> None:
+    recording = noisy(wandering_recording(crane_robot()))
+    orientation = recording.orientation.copy()
+    # A tracker that takes one marker for another turns the platform by half a radian.
+    for row in (77, 300):
+        orientation[row] = quaternions_of(Rotation.from_rotvec([0.0, 0.5, 0.0]) * rotation_of(orientation[row]))
+    cleaned, notes = without_outliers(replace(recording, orientation=orientation))
+    assert np.flatnonzero(np.isnan(cleaned.orientation).any(axis=1)).tolist() == [77, 300]
+    assert np.isnan(cleaned.orientation[[77, 300]]).all()
+    assert "outliers beyond 25 sigma removed: 2 of qw, qx, qy, qz" in notes[0]
+    assert np.array_equal(cleaned.position, recording.position)
+    assert without_outliers(recording) == (recording, ())
+
+
+def test_a_tracker_that_loses_the_orientation_often_is_refused() -> None:
+    recording = noisy(wandering_recording(crane_robot()))
+    orientation = recording.orientation.copy()
+    orientation[10::20] = [0.0, 1.0, 0.0, 0.0]
+    with pytest.raises(RecordingError, match=r"column qw, qx, qy, qz: has outliers in .* more than 1 %"):
+        without_outliers(replace(recording, orientation=orientation))

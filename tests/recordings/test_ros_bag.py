@@ -266,7 +266,8 @@ PROPOSALS: dict[str, tuple[Topics, dict[str, str]]] = {
         {"/joint_states": STATES, "/tracker/pose": POSES},
         {f"winch_speed_{n}": f"/joint_states/velocity[winch_{n}]" for n in (1, 2, 3)}
         | {f"tension_{n}": f"/joint_states/effort[winch_{n}]" for n in (1, 2, 3)}
-        | {axis: f"/tracker/pose/pose.position.{axis}" for axis in "xyz"},
+        | {axis: f"/tracker/pose/pose.position.{axis}" for axis in "xyz"}
+        | {f"q{part}": f"/tracker/pose/pose.orientation.{part}" for part in "wxyz"},
     ),
     "wrenches along one axis": (
         {f"/load_cell_{n}": ("geometry_msgs/WrenchStamped", [(1.0, wrench(1.0, 5.0))]) for n in (1, 2, 3)},

@@ -31,33 +31,34 @@ def lengths(position: Array) -> Array:
 
 def tracked(begin: float, end: float, noise: float = 1e-4) -> tuple[Array, Array]:
     times = np.arange(begin, end, 1.0 / 60.0)
-    return times + OFFSET, motion(times) + noise * np.random.default_rng(1).standard_normal((len(times), 3))
+    places = motion(times) + noise * np.random.default_rng(1).standard_normal((len(times), 3))
+    return times + OFFSET, lengths(places)
 
 
 @pytest.mark.parametrize("span", [(0.0, 20.0), (-3.0, 24.0), (4.0, 20.0)], ids=["together", "longer", "later"])
 def test_scales_are_told_at_any_offset_of_the_clock(span: tuple[float, float]) -> None:
     counts = np.round(lengths(motion(LOG)) / SCALES).T
-    known = scales_by_tracker(ROBOT, LOG, list(counts), tracked(*span), [0, 1, 2])
+    known = scales_by_tracker(LOG, list(counts), tracked(*span), [0, 1, 2])
     assert known is not None and known.scales == pytest.approx(SCALES, rel=1e-3)
     order = [2, 0, 1]
     others = [np.sin(LOG), np.where(LOG[1003] == LOG, 1.0, 0.0)]
-    told = scales_by_tracker(ROBOT, LOG, [*counts[order], *others], tracked(*span), None)
+    told = scales_by_tracker(LOG, [*counts[order], *others], tracked(*span), None)
     assert told is not None and told.cables.tolist() == [*order, -1, -1]
     assert told.scales[:3] == pytest.approx(SCALES[order], rel=1e-3)
 
 
 def test_gaps_of_the_tracker_are_not_bridged() -> None:
-    times, positions = tracked(0.0, 20.0)
-    positions[300:600] = np.nan
+    times, by_tracker = tracked(0.0, 20.0)
+    by_tracker[300:600] = np.nan
     counts = lengths(motion(LOG)).T / SCALES[:, None]
-    told = scales_by_tracker(ROBOT, LOG, list(counts), (times, positions), [0, 1, 2])
+    told = scales_by_tracker(LOG, list(counts), (times, by_tracker), [0, 1, 2])
     assert told is not None and told.scales == pytest.approx(SCALES, rel=1e-3)
 
 
 def test_a_tracker_of_few_samples_a_second_tells_scales_too() -> None:
     times = np.arange(0.0, 20.0, 0.25)
     counts = lengths(motion(LOG)).T / SCALES[:, None]
-    told = scales_by_tracker(ROBOT, LOG, list(counts), (times + OFFSET, motion(times)), [0, 1, 2])
+    told = scales_by_tracker(LOG, list(counts), (times + OFFSET, lengths(motion(times))), [0, 1, 2])
     assert told is not None and told.scales == pytest.approx(SCALES, rel=5e-3)
 
 
@@ -74,5 +75,5 @@ def test_what_the_tracker_leaves_open_is_not_told(case: str) -> None:
         start, direction = np.array(ROBOT.platform.start), np.array([0.01, 0.0, 0.0])
         counts = list(lengths(start + np.sin(2.0 * LOG)[:, None] * direction).T)
         times = np.arange(0.0, 60.0, 0.02)
-        tracker = (times, start + np.sin(2.0 * times)[:, None] * direction)
-    assert scales_by_tracker(ROBOT, LOG, counts, tracker, [0, 1, 2]) is None
+        tracker = (times, lengths(start + np.sin(2.0 * times)[:, None] * direction))
+    assert scales_by_tracker(LOG, counts, tracker, [0, 1, 2]) is None

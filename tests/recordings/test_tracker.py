@@ -7,13 +7,17 @@ import numpy as np
 import pandas as pd
 import pytest
 from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+from scipy.spatial.transform import Rotation
 
 from tautwire.errors import RecordingError, RobotFileError
 from tautwire.recordings.recording import Recording, read_recording
-from tautwire.recordings.tracker import positions_at_rows, with_tracker
+from tautwire.recordings.tracker import samples_at_rows, with_tracker
 from tautwire.robot.robot_file_reader import read_columns_file, read_tracker_file, robot_from_text
 from tautwire.robot.robot_file_text import robot_text
 from tautwire.robot.schema import RecordedColumn, Tracker
+from tests.support.pose_recordings import rope_lengths, rotation_of, wandering_poses
+from tests.support.rigid_robots import crane_robot
 from tests.support.robots import EXAMPLES, example
 from tests.support.trackers import split
 
@@ -107,7 +111,7 @@ def test_a_file_without_positions_is_refused(tmp_path: Path) -> None:
 @pytest.mark.parametrize("samples_per_second", [120.0, 100.0, 237.0])
 def test_samples_are_moved_to_their_rows_without_error(samples_per_second: float) -> None:
     times = np.arange(-0.1, 10.1, 1.0 / samples_per_second) + 0.0021
-    placed = positions_at_rows(ROWS, times, swinging(times))
+    placed = samples_at_rows(ROWS, times, swinging(times))
     assert np.abs(placed - swinging(ROWS)).max() < 1e-5
 
 
@@ -115,7 +119,7 @@ def test_noise_stays_that_of_single_samples_and_white() -> None:
     times = np.arange(-0.1, 200.1, 1.0 / 120.0)
     rows = np.arange(0.0, 200.0, 0.01)
     noise = np.random.default_rng(2).normal(size=(len(times), 3))
-    placed = positions_at_rows(rows, times, noise)
+    placed = samples_at_rows(rows, times, noise)
     # Linear interpolation leaves two thirds of the variance on average.
     assert np.mean(placed**2) == pytest.approx(1.0, abs=0.03)
     assert abs(np.mean(placed[1:] * placed[:-1])) < 0.03
@@ -123,7 +127,7 @@ def test_noise_stays_that_of_single_samples_and_white() -> None:
 
 def test_rows_without_a_sample_are_empty() -> None:
     times = np.arange(0.0, 10.0, 1.0 / 30.0)
-    placed = positions_at_rows(ROWS, times, swinging(times))
+    placed = samples_at_rows(ROWS, times, swinging(times))
     filled = np.isfinite(placed[:, 0])
     assert np.count_nonzero(filled) == len(times)
     assert np.abs(placed[filled] - swinging(ROWS[filled])).max() < 5e-4
@@ -134,7 +138,7 @@ def test_gaps_stay_empty_and_are_not_bridged() -> None:
     positions = swinging(times)
     positions[(times > 3.0) & (times < 4.0), 1] = np.nan
     positions[(times > 6.0) & (times < 8.0) & (np.abs(times - 7.0) > 0.02)] = np.nan
-    filled = np.isfinite(positions_at_rows(ROWS, times, positions)).all(axis=1)
+    filled = np.isfinite(samples_at_rows(ROWS, times, positions)).all(axis=1)
     assert not filled[(ROWS > 3.01) & (ROWS < 3.99)].any()
     # Four samples between two gaps are too few to be moved.
     assert not filled[(ROWS > 6.01) & (ROWS < 7.99)].any()
@@ -169,3 +173,43 @@ def test_a_table_that_is_not_valid_is_refused(line: str, problem: str, tmp_path:
     with pytest.raises(RobotFileError) as caught:
         read_tracker_file(path)
     assert problem in str(caught.value)
+
+
+CRANE = crane_robot()
+
+
+def crane_log(duration: float = 20.0) -> Recording:
+    """The log of a rigid platform's winches, from rest to rest, without poses."""
+    time = np.arange(round(100.0 * duration) + 1) / 100.0
+    lengths = rope_lengths(CRANE, *shaken(time, duration))
+    nothing = np.full(lengths.shape, np.nan)
+    return Recording("log.csv", time, -CubicSpline(time, lengths)(time, 1), nothing, nothing[:, :3])
+
+
+def shaken(time: Array, duration: float) -> tuple[Array, Rotation]:
+    """Poses from rest to rest."""
+    window = np.sin(np.pi * np.clip(time / duration, 0.0, 1.0)) ** 2
+    positions, rotations = wandering_poses(CRANE, time, 0.4, 0.25)
+    start = np.array(CRANE.platform.start)
+    turned = Rotation.from_rotvec(window[:, None] * rotations.as_rotvec())
+    return start + window[:, None] * (positions - start), turned
+
+
+@pytest.mark.parametrize("is_clock_stated", [True, False])
+def test_poses_of_a_tracker_with_its_own_clock_are_put_onto_the_rows(is_clock_stated: bool, tmp_path: Path) -> None:
+    log, times = crane_log(), np.arange(0.0037, 19.99, 1.0 / 120.0)
+    positions, rotations = shaken(times, 20.0)
+    signs = np.where(np.arange(len(times)) % 2, 1.0, -1.0)[:, None]
+    quaternions = signs * rotations.as_quat()[:, [3, 0, 1, 2]]
+    lost = slice(700, 712)
+    quaternions[lost] = np.nan
+    columns = np.column_stack([times + 3.412, positions, quaternions])
+    frame = pd.DataFrame(columns, columns=["time", "x", "y", "z", "qw", "qx", "qy", "qz"])
+    frame.to_csv(tmp_path / "tracker.csv", index=False)
+    robot = replace(CRANE, tracker=Tracker(clock_offset=3.412)) if is_clock_stated else CRANE
+    recording = with_tracker(robot, log, tmp_path / "tracker.csv")
+    rows = np.isfinite(recording.orientation).all(axis=1)
+    assert 1950 < np.sum(rows) < np.isfinite(recording.position).all(axis=1).sum() < 2001
+    errors = rotation_of(recording.orientation[rows]) * shaken(log.time[rows], 20.0)[1].inv()
+    assert errors.magnitude().max() < (1e-5 if is_clock_stated else 3e-4)
+    assert np.abs(np.linalg.norm(recording.orientation[rows], axis=1) - 1.0).max() < 1e-12

@@ -38,10 +38,7 @@ def test_a_rigid_platform_is_refused(name: str) -> None:
 
 @pytest.mark.parametrize(
     "command",
-    (
-        ["excite", "ROBOT", "--out", "out.csv"],
-        ["columns", "hall.toml", "ROBOT"],
-    ),
+    (["excite", "ROBOT", "--out", "out.csv"],),
 )
 def test_a_command_refuses_a_rigid_platform(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], command: list[str]

@@ -10,7 +10,6 @@ import typer
 
 from ..errors import InputError
 from ..robot.robot_file_reader import MAX_CABLES, read_robot
-from ..robot.schema import require_point_mass
 from .console import AsJson, CommandOutput, Quiet, TrackerFile, columns_command, shell_quoted
 
 if TYPE_CHECKING:
@@ -47,7 +46,7 @@ def columns(
     from ..recordings.winch_columns import with_winch_scales
 
     output = CommandOutput(as_json, quiet)
-    robot = None if robot_file is None else require_point_mass(str(robot_file), read_robot(robot_file))
+    robot = None if robot_file is None else read_robot(robot_file)
     cable_count = _cable_count(robot, cables)
     refuse_other_formats(out, ".toml")
     refuse_overwriting_inputs([path for path in (recording, robot_file, tracker) if path], [out] if out else [])
@@ -71,12 +70,14 @@ def columns(
 def _proposed(path: Path, cable_count: int, robot: Robot | None) -> ProposedFile:
     """The proposal by names and values, and the samples."""
     from ..recordings.column_names import column_names
-    from ..recordings.column_proposal import propose_columns
+    from ..recordings.column_proposal import propose_columns, without_orientation
     from ..recordings.column_samples import column_samples
     from ..recordings.value_proposal import with_values
     from ..recordings.winch_columns import ProposedFile
 
     by_names, samples = propose_columns(column_names(path), cable_count), column_samples(path)
+    if robot is not None and not robot.platform.is_rigid_body:
+        by_names = without_orientation(by_names)
     return ProposedFile(with_values(by_names, samples, cable_count, robot), samples)
 
 

@@ -10,7 +10,7 @@ from pathlib import Path
 
 from ..errors import one_line
 from ..robot.recorded_columns import CABLE_COLUMNS
-from ..robot.schema import AXES
+from ..robot.schema import AXES, QUATERNION_COLUMNS
 from .column_names import ColumnName
 from .csv_lines import unit_in_name
 from .recording_table import known_columns
@@ -43,6 +43,9 @@ OTHER_WORDS = """
     temp temperature temperatur pressure druck acc accel acceleration beschleunigung gyro mag imu rate jerk
     quat quaternion rot rotation orientation euler roll pitch yaw cycle period duration delay latency jitter
 """
+# Words of a quaternion beside the letter of its part; those of the second row may also be of angles.
+QUATERNION_WORDS = ("q", "quat", "quaternion")
+ROTATION_WORDS = ("rot", "rotation", "orientation")
 # Factors of the units that are no units of length or speed, which only the laboratory's numbers convert.
 _PER_COUNT = "metres per count (2 pi * drum radius / counts per turn)"
 _COUNTS = dict.fromkeys(("counts", "count", "cnt", "inc", "ticks", "pulses"), _PER_COUNT)
@@ -73,6 +76,7 @@ ADD_FACTOR = "add factor = "
 SIGNS = {"winch_speed": "positive has to reel in", "rope_length": "has to fall as it reels in"}
 OTHER_QUANTITY = "words or a unit of other quantities"
 _NOT_NAMED = "quantity not named"
+_SCALAR_FIRST = "numbered from 0: the scalar part has to be the first"
 _PARTS = re.compile(r"[^\W\d_]+|[0-9]+")
 
 
@@ -148,11 +152,15 @@ def _claims(words: Mapping[str, str], cable_count: int) -> tuple[dict[str, list[
     claims: dict[str, list[str]] = {}
     unused: dict[str, str] = {}
     numbered: dict[str, dict[str, int]] = {kind: {} for kind in CABLE_COLUMNS}
+    parts = {name: part for name, text in words.items() if (part := _quaternion_part(text))}
+    is_whole = set(parts.values()) == set(QUATERNION_COLUMNS)
     for name, text in words.items():
         kind, _ = _kind(text)
         unit, number = unit_in_name(text), _cable_number(text)
         if not name.strip() or not name.isprintable():
             unused[name] = "blank, or not printable"
+        elif name in parts and is_whole:
+            claims.setdefault(parts[name], []).append(name)
         elif kind is None:
             is_other = bool(unit) or _has_any(_words(text), (*OTHER_WORDS.split(), *AXES))
             unused[name] = OTHER_QUANTITY if is_other else NOTHING_SAID
@@ -192,6 +200,14 @@ def without_positions(proposal: ColumnProposal, tracker: Path) -> ColumnProposal
     return ColumnProposal(columns, proposal.standard_names.difference(AXES), {**proposal.unused, **unused})
 
 
+def without_orientation(proposal: ColumnProposal) -> ColumnProposal:
+    """The proposal for a point mass, of which no orientation is read but by standard names."""
+    dropped = [each for each in proposal.columns if each.column in {*QUATERNION_COLUMNS} - proposal.standard_names]
+    unused = {each.name: f"looks like {each.column}, and a point mass has no orientation" for each in dropped}
+    kept = tuple(each for each in proposal.columns if each not in dropped)
+    return ColumnProposal(kept, proposal.standard_names, {**proposal.unused, **unused})
+
+
 def proposal_text(path: Path, proposal: ColumnProposal, cable_count: int) -> str:
     """The proposal as TOML that ``--columns`` reads; what it cannot tell is commented out, with the reason.
 
@@ -214,7 +230,7 @@ def proposal_text(path: Path, proposal: ColumnProposal, cable_count: int) -> str
 
 
 def _order(column: str) -> tuple[int, int]:
-    kinds = ("time", "winch_speed", "rope_length", "tension", *AXES)
+    kinds = ("time", "winch_speed", "rope_length", "tension", *AXES, *QUATERNION_COLUMNS)
     kind, _, number = column.rpartition("_")
     return (kinds.index(kind), int(number)) if kind else (kinds.index(column), 0)
 
@@ -279,6 +295,21 @@ def _kind(name: str) -> tuple[str | None, str]:
     return None, ""
 
 
+def _quaternion_part(name: str) -> str | None:
+    """The part of a quaternion that the words of a name tell, as ``qx``; None where they tell none."""
+    words = [word for word in _words(name) if word not in POSITION_WORDS]
+    told = [word for word in words if word in QUATERNION_COLUMNS]
+    others = OTHER_WORDS.split()
+    is_named = _has_any(words, QUATERNION_WORDS)
+    if is_named or _has_any(words, ROTATION_WORDS):
+        told += [f"q{word}" for word in words if f"q{word}" in QUATERNION_COLUMNS]
+        others = [word for word in others if word not in (*QUATERNION_WORDS, *ROTATION_WORDS)]
+    numbers = [int(word) for word in words if word.isdigit() and int(word) < len(QUATERNION_COLUMNS)]
+    if is_named and not told and len(numbers) == 1:
+        told = [QUATERNION_COLUMNS[numbers[0]]]
+    return told[0] if len(told) == 1 and not _has_any(words, others) else None
+
+
 def _has_any(words: Iterable[str], known: Iterable[str]) -> bool:
     return bool(set(words) & set(known))
 
@@ -295,6 +326,9 @@ def _proposed(column: str, name: str, words: str) -> ProposedColumn:
     stated, (_, doubt) = _stated_unit(words), _kind(words)
     unit, factor = find_unit(stated, column), _factor(stated, kind)
     known, factor_without_unit = _FACTOR_WORDS.get(kind, ((), ""))
+    if column in QUATERNION_COLUMNS:
+        is_lettered = any(column in (word, f"q{word}") for word in _words(words))
+        return ProposedColumn(column, name, "", "" if is_lettered else _SCALAR_FIRST)
     if unit is not None:
         scale = "" if unit_in_name(words).endswith(stated) else "unit by the name's end"
     elif factor or (not stated and _has_any(_words(words), known)):

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
+from ..robot.schema import QUATERNION_COLUMNS
 from .recording import Recording
 from .white_noise_estimate import white_noise_deviation
 
@@ -56,10 +58,35 @@ def without_dead_channels(
         for index, count in enumerate(_clear_frozen(columns, policy)):
             if count:
                 notes.append(f"{names[index]}: frozen for {count} samples while others move: not used there")
+    orientation, orientation_notes = _without_dead_orientation(recording, policy)
+    notes += orientation_notes
     if not notes:
         return recording, ()
     messages = tuple(f"{recording.path}: {note}" for note in notes)
-    return replace(recording, position=measured[:, :3], tension=measured[:, 3:]), messages
+    return replace(recording, position=measured[:, :3], tension=measured[:, 3:], orientation=orientation), messages
+
+
+def _without_dead_orientation(recording: Recording, policy: DeadChannelPolicy) -> tuple[Array, list[str]]:
+    """Quaternions (N, 4) without those that carry no information, and notes.
+
+    They are one channel: constant throughout, repeated from a slower sensor, or frozen while positions move.
+    """
+    quaternions, name, notes = recording.orientation.copy(), ", ".join(QUATERNION_COLUMNS), list[str]()
+    if not recording.has_orientation:
+        return quaternions, notes
+    if len(_constant_channels(quaternions)) == quaternions.shape[1]:
+        return np.full_like(quaternions, np.nan), [f"{name} are constant throughout: not used"]
+    hold_length = _hold_length(quaternions, policy)
+    if hold_length > 1:
+        _clear_repeats(quaternions)
+        return quaternions, [f"{name}: each value is repeated about {hold_length} times: only the first was used"]
+    is_frozen = np.zeros(len(quaternions), dtype=bool)
+    for rows in _repeated_stretches(~_changed_rows(quaternions), policy.min_frozen_samples):
+        is_frozen[rows] = _any_other_moves(recording.position, -1, rows, policy)
+    quaternions[is_frozen] = np.nan
+    if is_frozen.any():
+        notes.append(f"{name}: frozen for {np.sum(is_frozen)} samples while positions move: not used there")
+    return quaternions, notes
 
 
 def _clear_channels(columns: Array, names: tuple[str, ...], indices: list[int], reason: str) -> list[str]:
@@ -123,14 +150,19 @@ def _clear_frozen(columns: Array, policy: DeadChannelPolicy) -> list[int]:
     for index, column in enumerate(original.T):
         is_frozen = np.zeros(len(column), dtype=bool)
         is_repeated = np.append(False, column[1:] == column[:-1])
-        edges = np.flatnonzero(np.diff(np.concatenate([[0], is_repeated.astype(int), [0]])))
-        for first, last in zip(edges[::2], edges[1::2], strict=True):
-            rows = slice(first, last)
-            if last - first >= policy.min_frozen_samples and _any_other_moves(original, index, rows, policy):
-                is_frozen[rows] = True
+        for rows in _repeated_stretches(is_repeated, policy.min_frozen_samples):
+            is_frozen[rows] = _any_other_moves(original, index, rows, policy)
         columns[is_frozen, index] = np.nan
         counts.append(int(np.sum(is_frozen)))
     return counts
+
+
+def _repeated_stretches(is_repeated: NDArray[np.bool_], min_samples: int) -> Iterator[slice]:
+    """Rows of stretches of so many samples at least that repeat the one before."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[0], is_repeated.astype(int), [0]])))
+    for first, last in zip(edges[::2].tolist(), edges[1::2].tolist(), strict=True):
+        if last - first >= min_samples:
+            yield slice(first, last)
 
 
 def _any_other_moves(columns: Array, index: int, rows: slice, policy: DeadChannelPolicy) -> bool:

@@ -9,8 +9,6 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import linear_sum_assignment
 
-from ..robot.schema import Robot
-
 Array = NDArray[np.float64]
 
 # So many counts, of so many values, none further from the last than this share of all.
@@ -42,22 +40,19 @@ class RopeScales:
     misfits: Array
 
 
-def rope_scales(
-    robot: Robot, columns: Sequence[Array], position: Array, cables: Sequence[int] | None = None
-) -> RopeScales | None:
-    """Linear regression of rope lengths on columns (N,) that follow them, by positions (N, 3) in m.
+def rope_scales(lengths: Array, columns: Sequence[Array], cables: Sequence[int] | None = None) -> RopeScales | None:
+    """Linear regression of rope lengths (N, n) in m, NaN where not known, on columns (N,) that follow them.
 
     Of the ``cables`` from 0 that are known; else each cable has the column that alone fits it. None where these do not
     fit.
     """
-    rows = np.flatnonzero(np.isfinite(position).all(axis=1))
+    rows = np.flatnonzero(np.isfinite(lengths).all(axis=1))
     for column in columns:
         rows = rows[np.isfinite(column[rows])]
     if len(rows) < MIN_VALUES:
         return None
     rows = rows[:: 1 + len(rows) // MAX_ROWS]
-    lengths = np.linalg.norm(np.array(robot.anchors) - position[rows][:, None], axis=2)
-    lengths -= lengths.mean(axis=0)
+    lengths = lengths[rows] - lengths[rows].mean(axis=0)
     signals = np.array([column[rows] for column in columns])
     signals -= signals.mean(axis=1, keepdims=True)
     powers, covariances = (signals**2).sum(axis=1), signals @ lengths

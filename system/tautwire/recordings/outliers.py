@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scipy.ndimage import median_filter
 
 from ..errors import RecordingError
+from ..robot.schema import QUATERNION_COLUMNS
 from .recording import Recording
 from .white_noise_estimate import DIFFERENCE_ORDER, NORMAL_ABSOLUTE_MEDIAN, RELATIVE_RESOLUTION, white_noise_deviation
 
@@ -51,24 +52,19 @@ def without_outliers(
 ) -> tuple[Recording, tuple[str, ...]]:
     """The recording with outliers of outputs emptied and those of winch speeds interpolated, and a note.
 
-    Raises RecordingError where more than 1 % of a channel's samples are outliers.
+    A quaternion with an outlier in any of its numbers is one. Raises RecordingError where more than 1 % of a channel's
+    samples are outliers.
     """
     measured, winch_speed = recording.measured(), recording.winch_speed.copy()
     counts: dict[str, int] = {}
     names = (*recording.channel_names, *(f"winch_speed_{cable + 1}" for cable in range(recording.cable_count)))
-    for name, column in zip(names, (*measured.T, *winch_speed.T), strict=True):
-        measured_rows = np.flatnonzero(np.isfinite(column))
-        is_sparse = len(measured_rows) < policy.sparse_ratio * len(column)
-        channel_policy = replace(policy, sigmas=policy.sigmas * policy.sparse_factor) if is_sparse else policy
-        outlier_rows = measured_rows[outlier_indices(column[measured_rows], channel_policy)]
-        if not len(outlier_rows):
-            continue
-        if len(outlier_rows) > max(policy.max_ratio * len(measured_rows), policy.allowed_count):
-            problem = f"has outliers in {len(outlier_rows)} of {len(measured_rows)} samples, more than 1 %"
-            hint = "repair the sensor, or omit the column"
-            raise RecordingError(f"{recording.path}: column {name}", problem, hint)
-        counts[name] = len(outlier_rows)
-        column[outlier_rows] = np.nan
+    orientation = recording.orientation.copy()
+    channels = {name: column[:, None] for name, column in zip(names, (*measured.T, *winch_speed.T), strict=True)}
+    for name, columns in (channels | {", ".join(QUATERNION_COLUMNS): orientation}).items():
+        outlier_rows = _outlier_rows(columns, policy, f"{recording.path}: column {name}")
+        if len(outlier_rows):
+            counts[name] = len(outlier_rows)
+            columns[outlier_rows] = np.nan
     if not counts:
         return recording, ()
     for column in winch_speed.T:
@@ -76,8 +72,21 @@ def without_outliers(
         column[is_missing] = np.interp(recording.time[is_missing], recording.time[~is_missing], column[~is_missing])
     description = ", ".join(f"{count} of {name}" for name, count in counts.items())
     note = f"{recording.path}: outliers beyond {policy.sigmas:g} sigma removed: {description}"
-    cleaned = replace(recording, position=measured[:, :3], tension=measured[:, 3:])
+    cleaned = replace(recording, position=measured[:, :3], tension=measured[:, 3:], orientation=orientation)
     return cleaned.with_winch_speed(winch_speed), (note,)
+
+
+def _outlier_rows(columns: Array, policy: OutlierPolicy, where: str) -> NDArray[np.intp]:
+    """Rows of a channel's columns (N, k) with an outlier in any; raises RecordingError where there are too many."""
+    measured_rows = np.flatnonzero(np.isfinite(columns).all(axis=1))
+    is_sparse = len(measured_rows) < policy.sparse_ratio * len(columns)
+    channel_policy = replace(policy, sigmas=policy.sigmas * policy.sparse_factor) if is_sparse else policy
+    indices = [outlier_indices(column[measured_rows], channel_policy) for column in columns.T]
+    outlier_rows = measured_rows[np.unique(np.concatenate(indices))]
+    if len(outlier_rows) > max(policy.max_ratio * len(measured_rows), policy.allowed_count):
+        problem = f"has outliers in {len(outlier_rows)} of {len(measured_rows)} samples, more than 1 %"
+        raise RecordingError(where, problem, "repair the sensor, or omit the column")
+    return outlier_rows
 
 
 def outlier_indices(signal: Array, policy: OutlierPolicy = DEFAULT_OUTLIER_POLICY) -> NDArray[np.intp]:

@@ -1,4 +1,4 @@
-"""Positions of a tracker at the rows of a log whose winch columns have no scale yet."""
+"""Rope lengths by a tracker at the rows of a log whose winch columns have no scale yet."""
 
 from __future__ import annotations
 
@@ -9,7 +9,6 @@ from numpy.typing import NDArray
 from scipy.optimize import minimize_scalar
 from scipy.signal import correlation_lags
 
-from ..robot.schema import Robot
 from .encoder_counts import MAX_MISFIT, MIN_CONTRAST, RopeScales, rope_scales
 from .travel_correlation import TRAVEL_WINDOW, correlated, lowest_valleys, travel_on_grid
 
@@ -24,15 +23,15 @@ MAX_COARSE_MISFIT, EQUAL_SCALES = 0.2, 0.02
 
 
 def scales_by_tracker(
-    robot: Robot, log_time: Array, columns: Sequence[Array], tracker: tuple[Array, Array], cables: Sequence[int] | None
+    log_time: Array, columns: Sequence[Array], tracker: tuple[Array, Array], cables: Sequence[int] | None
 ) -> RopeScales | None:
-    """Scales of columns (N,) of a log at times (N,) by a ``tracker``'s times (M,) and positions (M, 3), in s and m.
+    """Scales of columns (N,) of a log at times (N,) by a ``tracker``'s times (M,) and rope lengths (M, n), in s and m.
 
     Offsets of the clock are compared by how well rope lengths regress on the columns, whatever the scale of each. None
     where no offset fits, or two fit with other scales.
     """
     rows = _thinned(np.asarray(np.isfinite(tracker[0]) & np.isfinite(tracker[1]).all(axis=1)))
-    times, positions = tracker[0][rows], tracker[1][rows]
+    times, lengths = tracker[0][rows], tracker[1][rows]
     rows = _thinned(np.asarray(np.isfinite([log_time, *columns]).all(axis=0)))
     log_time, signals = log_time[rows], np.array([column[rows] for column in columns])
     is_rising = all(len(each) > MIN_SAMPLES and np.all(np.diff(each) > 0.0) for each in (times, log_time))
@@ -40,13 +39,12 @@ def scales_by_tracker(
         return None
 
     def scales_at(offset: float) -> RopeScales | None:
-        return rope_scales(robot, list(signals), _at_rows(log_time + offset, times, positions), cables)
+        return rope_scales(_at_rows(log_time + offset, times, lengths), list(signals), cables)
 
     def misfit_at(offset: float) -> float:
         scales = scales_at(offset)
         return MAX_MISFIT if scales is None else float(np.nanmean(scales.misfits))
 
-    lengths = np.linalg.norm(np.array(robot.anchors) - positions[:, None], axis=2)
     offsets, interval = _coarse_offsets(log_time, signals, times, lengths, cables)
     fits: list[RopeScales] = []
     for coarse in offsets:
@@ -73,9 +71,9 @@ def _contradicts(best: RopeScales, other: RopeScales) -> bool:
     return not (np.array_equal(best.cables, other.cables) and is_alike[best.cables >= 0].all())
 
 
-def _at_rows(row_times: Array, times: Array, positions: Array) -> Array:
-    """Positions (N, 3) at times (N,) by linear interpolation; NaN outside, and in gaps of the tracker."""
-    at_rows = np.column_stack([np.interp(row_times, times, column) for column in positions.T])
+def _at_rows(row_times: Array, times: Array, lengths: Array) -> Array:
+    """Rope lengths (N, n) at times (N,) by linear interpolation; NaN outside, and in gaps of the tracker."""
+    at_rows = np.column_stack([np.interp(row_times, times, column) for column in lengths.T])
     after = np.clip(np.searchsorted(times, row_times), 1, len(times) - 1)
     is_known = times[after] - times[after - 1] <= max(TRAVEL_WINDOW, 2.0 * float(np.median(np.diff(times))))
     at_rows[~is_known | (row_times < times[0]) | (row_times > times[-1])] = np.nan

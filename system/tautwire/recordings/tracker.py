@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..errors import RecordingError
 from ..robot.schema import Robot
 from .consistency import travel_error
+from .quaternion_columns import unit_quaternions
 from .recording import Recording, read_tracker
 from .tracker_clock import TrackerClock, estimate_tracker_clock
 
@@ -48,7 +49,8 @@ def with_tracker(robot: Robot, log: Recording, path: str | Path) -> Recording:
     else:
         clock = TrackerClock(declared.clock_offset, declared.clock_rate)
         origin = "as stated in [recording.tracker]"
-    position = positions_at_rows(log.time, clock.log_times(tracker.time, log.time[0]), tracker.position)
+    times = clock.log_times(tracker.time, log.time[0])
+    position = samples_at_rows(log.time, times, tracker.position)
     filled = np.count_nonzero(np.isfinite(position).any(axis=1))
     if filled < 2:
         problem = f"has no samples during {log.path}, with {clock.offset:.6g} s on its clock at the first sample there"
@@ -57,23 +59,26 @@ def with_tracker(robot: Robot, log: Recording, path: str | Path) -> Recording:
         f"positions are from {path}, whose clock shows {clock.offset:.4f} s at the first sample here"
         f"{_pace(clock)}, {origin}; {filled} of {log.sample_count} rows have one"
     )
-    return replace(log, position=position, read_as=(*log.read_as, *tracker.read_as, note))
+    # Quaternions of continuous sign are moved as positions are, by small rotations.
+    orientation = unit_quaternions(samples_at_rows(log.time, times, tracker.orientation))
+    recording = replace(log, position=position, read_as=(*log.read_as, *tracker.read_as, note))
+    return replace(recording, orientation=orientation) if tracker.has_orientation else recording
 
 
 def _pace(clock: TrackerClock) -> str:
     return "" if clock.rate == 1.0 else f" and runs {clock.rate:.6f} times as fast"
 
 
-def positions_at_rows(row_times: Array, sample_times: Array, positions: Array) -> Array:
-    """Positions (N, 3) at the times (N,) of rows, of samples (M, 3) at other times (M,); NaN where a row has none.
+def samples_at_rows(row_times: Array, sample_times: Array, recorded: Array) -> Array:
+    """Values (N, k) at the times (N,) of rows, of samples (M, k) at other times (M,); NaN where a row has none.
 
     Each sample goes to the nearest row, and of several the nearest: a sample stays one sample, with its own noise. It
     is moved there by a cubic through its nine nearest neighbours, whose value at the sample itself is left out.
     """
-    placed = np.full((len(row_times), positions.shape[1]), np.nan)
-    measured = np.isfinite(positions).any(axis=0)
-    complete = np.flatnonzero(np.isfinite(positions[:, measured]).all(axis=1))
-    times, samples = sample_times[complete], positions[complete][:, measured]
+    placed = np.full((len(row_times), recorded.shape[1]), np.nan)
+    measured = np.isfinite(recorded).any(axis=0)
+    complete = np.flatnonzero(np.isfinite(recorded[:, measured]).all(axis=1))
+    times, samples = sample_times[complete], recorded[complete][:, measured]
     if len(times) < NEIGHBOURS:
         return placed
     rows = _nearest(row_times, times)

@@ -102,7 +102,10 @@ def _measured_rows(robot: Robot, tracker: Recording) -> NDArray[np.int64]:
     if not measured[list(robot.axes_in_plane)].all():
         hint = f"record every coordinate, {STATE_OFFSET_HINT}"
         raise RecordingError(tracker.path, "its positions are along too few axes to find its clock", hint)
-    rows = np.flatnonzero(np.isfinite(tracker.position[:, measured]).all(axis=1))
+    is_known = np.asarray(np.isfinite(tracker.position[:, measured]).all(axis=1))
+    if robot.platform.is_rigid_body and tracker.has_orientation:
+        is_known &= np.isfinite(tracker.orientation).all(axis=1)
+    rows = np.flatnonzero(is_known)
     if len(rows) < MIN_SAMPLES:
         problem = f"has {len(rows)} samples with every coordinate, at least {MIN_SAMPLES} are needed to find its clock"
         raise RecordingError(tracker.path, problem, f"record for longer, {STATE_OFFSET_HINT}")

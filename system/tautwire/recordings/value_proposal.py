@@ -15,6 +15,7 @@ from ..robot.schema import AXES, Robot
 from ..robot.static_equilibrium import static_tensions
 from .column_proposal import NO_UNIT, NOTHING_SAID, ColumnProposal, ProposedColumn, sorted_columns
 from .column_samples import ColumnSamples
+from .geometry_reading import GeometryReading, unturned
 from .units import UNITS, Unit, quantity_of
 
 Array = NDArray[np.float64]
@@ -90,7 +91,7 @@ def _expected_starts(
     if robot is None:
         return
     start, axes = np.array(robot.platform.start, dtype=float), list(robot.axes_in_plane)
-    lengths = np.linalg.norm(np.array(robot.anchors) - start, axis=1)
+    lengths = GeometryReading().directions(robot, unturned(start[None]))[0][0]
     tolerance = np.full(len(axes), POSITION_TOLERANCE * lengths.min())
     yield "position", [AXES[axis] for axis in axes], start[axes], tolerance, ("m", "cm", "mm")
     if cable_count:

@@ -9,10 +9,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..number_format import format_percent
-from ..robot.schema import AXES, Robot
+from ..robot.schema import AXES, QUATERNION_COLUMNS, Robot
 from .column_proposal import ADD_FACTOR, NO_UNIT, NOTHING_SAID, SIGNS, ColumnProposal, ProposedColumn, sorted_columns
 from .column_samples import ColumnSamples
 from .encoder_counts import RopeScales, are_counts, rope_scales
+from .geometry_reading import GeometryReading, RecordedPoses, unturned
+from .quaternion_columns import are_valid, unit_quaternions
 from .tracked_rows import scales_by_tracker
 from .units import UNITS, find_unit, quantity_of
 from .value_proposal import BY_VALUES, time_unit
@@ -47,16 +49,27 @@ class ProposedFile:
         values = self.samples.values[proposed.name]
         return values if unit is None else unit.to_si(values)
 
-    def position(self, robot: Robot) -> Array | None:
-        """Positions (N, 3) in m; None where a coordinate in which the robot moves is not known."""
-        known = {axis: self.si_values(AXES[axis]) for axis in robot.axes_in_plane}
-        columns = {axis: values for axis, values in known.items() if values is not None}
-        if len(columns) < len(known):
+    def rope_lengths(self, robot: Robot) -> Array | None:
+        """Rope lengths (N, n) in m by the poses, NaN where these are lost.
+
+        None where a coordinate in which the robot moves is not known, or a rigid platform's orientation.
+        """
+        position = self._columns([AXES[axis] for axis in robot.axes_in_plane])
+        if position is None:
             return None
-        position = np.tile(np.array(robot.platform.start, dtype=float), (len(next(iter(columns.values()))), 1))
-        for axis, values in columns.items():
-            position[:, axis] = values
-        return position
+        poses = unturned(np.full((len(position), len(AXES)), np.nan))
+        poses.position[:, robot.axes_in_plane] = position
+        if robot.platform.is_rigid_body:
+            quaternions = self._columns(QUATERNION_COLUMNS)
+            if quaternions is None or not are_valid(quaternions):
+                return None
+            poses = RecordedPoses(poses.position, unit_quaternions(quaternions))
+        return GeometryReading().directions(robot, poses)[0]
+
+    def _columns(self, names: Sequence[str]) -> Array | None:
+        """Columns side by side in SI units; None where one is not known."""
+        columns = [values for values in map(self.si_values, names) if values is not None]
+        return np.column_stack(columns) if len(columns) == len(names) else None
 
 
 def with_winch_scales(
@@ -105,13 +118,13 @@ class _Regression:
             return None
         known = [signal for signal in signals if signal is not None]
         if self.tracker is None:
-            position = self.log.position(self.robot)
-            return None if position is None else rope_scales(self.robot, known, position, cables)
-        time, positions = self.log.si_values("time"), self.tracker.position(self.robot)
+            lengths = self.log.rope_lengths(self.robot)
+            return None if lengths is None else rope_scales(lengths, known, cables)
+        time, lengths = self.log.si_values("time"), self.tracker.rope_lengths(self.robot)
         tracker_time = self.tracker.si_values("time")
-        if time is None or positions is None or tracker_time is None:
+        if time is None or lengths is None or tracker_time is None:
             return None
-        return scales_by_tracker(self.robot, time, known, (tracker_time, positions), cables)
+        return scales_by_tracker(time, known, (tracker_time, lengths), cables)
 
     def _signal(self, kind: str, values: Array) -> Array | None:
         if kind == "rope_length":
