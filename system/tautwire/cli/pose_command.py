@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING, Annotated, Any
 
-import numpy as np
 import typer
 
 from ..errors import InputError
@@ -70,6 +69,8 @@ def pose(
 
 
 def _pose_lines(robot: Robot, held: StaticPose) -> list[str]:
+    import numpy as np
+
     lines = [f"position {_listed(held.position, 6)} m"]
     if robot.platform.is_rigid_body:
         lines.append(f"orientation {_listed(held.orientation, 6)}")
