@@ -22,9 +22,10 @@ from ... import __version__
 from ...errors import ArgumentError
 from ..fmu_archive import DESCRIPTION_FILE, read_model_description
 from ..fmu_documentation import documentation_files
-from .c_toolchain import TargetPlatform, Toolchain, compile_library, find_toolchain, target_platforms
+from .c_toolchain import PLATFORMS, TargetPlatform, Toolchain, compile_library, find_toolchain, target_platforms
 from .component_sources import ENTRY_FILE, component_sources, rate_references
 from .fmi3_description import build_description, fmi3_description
+from .universal_binary import ARM_64, X86_64, universal_binary
 
 FMI_VERSIONS = (2, 3)
 # CasADi's generated code is free of its license, by its own word.
@@ -67,7 +68,7 @@ def write_native_fmu(kind: str, base: str, data: Mapping[str, Any], target: Nati
     slave.guid = str(uuid5(NAMESPACE_URL, json.dumps([anonymous, unidentified], sort_keys=True)))
     sources = component_sources(kind, slave, unidentified, slave.guid, target.fmi).files
     name = unidentified["model_name"]
-    compile_for = partial(compile_library, sources, toolchain=target.toolchain)
+    compile_for = partial(_compiled, sources, target)
     with ThreadPoolExecutor(os.cpu_count()) as threads:
         compiled = list(threads.map(compile_for, target.platforms))
     libraries = dict(zip((target.library(platform, name) for platform in target.platforms), compiled, strict=True))
@@ -81,6 +82,14 @@ def write_native_fmu(kind: str, base: str, data: Mapping[str, Any], target: Nati
     _write_archive(path, contents)
     additions = documentation_files(kind, unidentified, read_model_description(path), LICENSED_PACKAGES)
     _write_archive(path, contents | additions)
+
+
+def _compiled(sources: Mapping[str, str], target: NativeTarget, platform: TargetPlatform) -> bytes:
+    library = compile_library(sources, platform, target.toolchain)
+    if target.fmi != 2 or platform.name != "darwin64":
+        return library
+    for_arm = compile_library(sources, PLATFORMS["aarch64-darwin"], target.toolchain)
+    return universal_binary({X86_64: library, ARM_64: for_arm})
 
 
 def _xml(root: Element) -> bytes:
