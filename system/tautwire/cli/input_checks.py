@@ -16,7 +16,7 @@ from ..recordings.column_map import unit_errors
 from ..recordings.mdf_file import is_mdf
 from ..recordings.mistaken_orientation import orientation_notes
 from ..recordings.recording import Recording, read_recording, recording_errors
-from ..recordings.start_position import start_position
+from ..recordings.start_position import start_pose
 from ..recordings.tracker import with_tracker
 from ..recordings.white_noise_estimate import white_noise_deviation
 from ..robot.implausible_units import implausible_units
@@ -248,7 +248,7 @@ def _check_together(robot: Robot, recording: Recording, problems: list[Problem],
     with _collecting_problems(problems, path):
         prepared_notes = prepare_recordings(robot.as_modelled(), recording, None).notes
         noise = robot.sensors.position_noise or white_noise_deviation(recording.position)
-        notes.extend(start_position(robot, noise, recording)[1])
+        notes.extend(start_pose(robot, noise, recording)[1])
         notes.extend(_without_uncertainties(robot))
         notes.extend(prepared_notes)
 

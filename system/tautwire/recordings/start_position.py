@@ -32,13 +32,13 @@ class StartPose:
 
 
 def start_position(robot: Robot, position_noise: float, recording: Recording) -> tuple[Point, tuple[str, ...]]:
-    """The position of :func:`start_pose`, and its notes."""
-    pose, notes = start_pose(robot, position_noise, recording)
-    return pose.position, notes
+    """The position of :func:`start_pose`, and a note on it if it differs significantly from the robot file's."""
+    orientation, _ = _start_orientation(robot, recording)
+    return _start_position(robot, position_noise, recording, orientation)
 
 
 def start_pose(robot: Robot, position_noise: float, recording: Recording) -> tuple[StartPose, tuple[str, ...]]:
-    """The start of a recording, and a note if it differs significantly from the robot file's start.
+    """The start pose of a recording, and notes where it differs significantly from the robot file's.
 
     Its position is the robot file's, or one as the position sensor shows it, with the sensor's errors; an axis without
     positions starts as declared, and so does the one across the plane of a planar robot. Its orientation is the robot
@@ -48,6 +48,14 @@ def start_pose(robot: Robot, position_noise: float, recording: Recording) -> tup
     platform there; both name the recording.
     """
     orientation, orientation_notes = _start_orientation(robot, recording)
+    position, notes = _start_position(robot, position_noise, recording, orientation)
+    return StartPose(position, orientation), (*notes, *orientation_notes)
+
+
+def _start_position(
+    robot: Robot, position_noise: float, recording: Recording, orientation: Quaternion
+) -> tuple[Point, tuple[str, ...]]:
+    """The start position with this orientation, which the cables have to hold, and a note if it differs."""
     expected = np.array(shown_position(robot, robot.platform.start), dtype=float)
     offset, uncertainty = np.zeros(3), np.full(3, np.inf)
     for axis in robot.axes_in_plane:
@@ -59,10 +67,9 @@ def start_pose(robot: Robot, position_noise: float, recording: Recording) -> tup
                 position_noise / len(valid_samples) ** 0.5, robot.sensors.position_offset_uncertainty
             )
     if np.all(np.abs(offset) <= START_SIGNIFICANCE * uncertainty):
-        position, notes = robot.platform.start, orientation_notes
-        if orientation_notes:
-            _require_holdable(with_start(robot, position, orientation), recording)
-        return StartPose(position, orientation), notes
+        if orientation != robot.platform.start_orientation:
+            _require_holdable(with_start(robot, robot.platform.start, orientation), recording)
+        return robot.platform.start, ()
     start = np.where(np.isfinite(uncertainty), expected + offset, robot.platform.start)
     x, y, z = start.tolist()
     where = f"{recording.path}: first positions"
@@ -74,7 +81,7 @@ def start_pose(robot: Robot, position_noise: float, recording: Recording) -> tup
         f"{recording.path} starts at {coordinates} m, not at the robot file's start; the run starts there too, unless "
         "the zero of the position sensor is wrong"
     )
-    return StartPose((x, y, z), orientation), (note, *orientation_notes)
+    return (x, y, z), (note,)
 
 
 def _require_holdable(robot: Robot, recording: Recording, described: str = "") -> None:
