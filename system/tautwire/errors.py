@@ -129,17 +129,6 @@ class UnreachableError(InputError):
         self.reason = reason
 
 
-class RigidPlatformError(InputError):
-    """A robot has a rigid platform, and a point mass is all that was asked can compute."""
-
-    def __init__(self, where: str) -> None:
-        super().__init__(
-            where,
-            "the platform is a rigid body, which cannot be computed here yet",
-            "check, build or simulate it, or remove its inertia and attachments for a point mass",
-        )
-
-
 class DiskFullError(TautwireError):
     """No disk space was left to write ``target``; ``reason`` is the system's, ``temporary`` the temporary folder."""
 

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 from tautwire.cli import run
+from tautwire.errors import InputError
 from tautwire.estimation import input_design
 from tautwire.estimation.input_design import (
     DesignOptions,
@@ -16,7 +17,9 @@ from tautwire.estimation.input_design import (
     effects_by_name,
 )
 from tautwire.estimation.multisine import MultisinePath
+from tautwire.robot.pose_trajectory import PoseTrajectory
 from tautwire.robot.reference_simulation import integrate
+from tests.support.rigid_robots import crane_robot, octahedral_robot, suspended_robot
 from tests.support.robots import EXAMPLES, example
 
 THREE = example("three")
@@ -42,7 +45,7 @@ def test_a_path_of_sines_begins_and_ends_at_rest_and_has_its_own_derivatives() -
 @pytest.mark.parametrize(("programs", "tried"), [(96, 96), (64, 64), (1, 64)])
 def test_as_many_programs_are_tried_as_are_asked_for_and_progress_counts_them(programs: int, tried: int) -> None:
     class Bowl:
-        options = DesignOptions(LIMITS, 3.0, 0.05, programs)
+        options, robot = DesignOptions(LIMITS, 3.0, 0.05, programs), THREE
 
         @staticmethod
         def score(decision_variables: np.ndarray) -> float:
@@ -98,3 +101,35 @@ def test_effects_that_cannot_be_told_apart_are_refused(
     assert run(["excite", str(robot), "--effects", names, "--out", str(out)]) == 2
     assert part in capsys.readouterr().err
     assert not out.exists()
+
+
+@pytest.mark.validate
+def test_a_platform_that_six_cables_turn_is_turned_too() -> None:
+    robot = octahedral_robot()
+    limits = default_limits(robot)
+    effects = effects_by_name(robot, "damping,inertia")
+    found = design_excitation(robot, effects, DesignOptions(limits, 2.0, 0.05, 1), quiet)
+    assert isinstance(found.path, PoseTrajectory)
+    rotation = found.path.rotation.rotation_vector.position(found.time)
+    assert np.max(np.abs(rotation)) > 0.001 and not np.any(rotation[[0, -1]])
+    assert np.max(np.abs(found.winch_speed)) <= limits.speed
+    assert found.pairs[0].nats > 0.0
+
+
+def test_rotations_stay_within_their_limit_and_shrink_with_the_path() -> None:
+    robot = crane_robot()
+    limits = default_limits(robot)
+    assert limits.turn == pytest.approx(0.2)
+    options = DesignOptions(limits, 10.0, 0.05, 1)
+    problem = input_design._DesignProblem(robot, (), options, None, (), None, None)  # type: ignore[arg-type]
+    times = np.linspace(0.0, 10.0, 501)
+    paths = [problem._path(np.random.default_rng(5).uniform(size=36), scale) for scale in (1.0, 0.5)]
+    turns = [path.rotation.rotation_vector.position(times) for path in paths if isinstance(path, PoseTrajectory)]
+    assert 0.02 < np.max(np.abs(turns[0])) <= limits.turn
+    assert turns[1] == pytest.approx(0.5 * turns[0])
+    assert not np.any(paths[0].angular_velocity(times[[0, -1]]))  # type: ignore[attr-defined]
+
+
+def test_a_platform_on_fewer_cables_is_refused() -> None:
+    with pytest.raises(InputError, match="suspended: has a platform on 4 cables, whose orientation statics decides"):
+        default_limits(suspended_robot(4))

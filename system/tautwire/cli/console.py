@@ -27,7 +27,7 @@ from rich.progress import (
 from ..errors import InputError, UnreachableError
 from ..provenance import Provenance, provenance_of
 from ..robot.robot_file_reader import read_columns_file, read_robot, read_tracker_file
-from ..robot.schema import Robot, UserFmu, require_point_mass
+from ..robot.schema import Robot, UserFmu
 from .progress_lines import progress_lines
 
 RobotFile = Annotated[Path, typer.Argument(metavar="ROBOT.toml", help="The robot file.")]
@@ -100,11 +100,6 @@ INTERRUPTED = "interrupted; nothing was written"
 def read_holdable_robot(path: Path) -> Robot:
     """Reads a robot file; raises UnreachableError where its cables cannot hold the platform at the start."""
     return _require_holdable(read_robot(path), path)
-
-
-def read_point_mass_robot(path: Path) -> Robot:
-    """As read_holdable_robot, for what computes point masses only; raises RigidPlatformError for a rigid body."""
-    return _require_holdable(require_point_mass(str(path), read_robot(path)), path)
 
 
 def read_plausible_robot(path: Path) -> Robot:

@@ -29,7 +29,6 @@ from .console import (
     progress_bar,
     read_holdable_robot,
     read_plausible_robot,
-    read_point_mass_robot,
     shell_quoted,
     with_columns,
 )
@@ -283,7 +282,7 @@ def excite(
     refuse_other_formats(out, ".csv")
     refuse_foreign_csv_metadata(out)
     refuse_overwriting_inputs([robot_file], [out])
-    robot = read_point_mass_robot(robot_file)
+    robot = read_holdable_robot(robot_file)
     selected_effects = effects_by_name(robot, effects)
     with progress_bar(output) as progress:
         options = DesignOptions(default_limits(robot, speed, reach), duration, 1.0 / rate, programs, seed)

@@ -24,8 +24,11 @@ from threadpoolctl import threadpool_limits
 
 from ..errors import InputError, TautwireError
 from ..recordings.recording import Recording
-from ..robot.schema import Robot, require_point_mass
+from ..robot.pose_trajectory import OrientationTrajectory, PoseTrajectory
+from ..robot.rigid_equilibrium import FREEDOMS, platform_size
+from ..robot.schema import Point, Robot
 from ..robot.static_equilibrium import static_tensions
+from ..robot.trajectory import Trajectory
 from ..robot.winch_speeds import ideal_winch_speeds
 from .estimation_data import DataSet
 from .hypotheses import Hypothesis, hypotheses
@@ -44,6 +47,7 @@ Progress = Callable[[str, float], None]
 
 # Sines of each axis: slow ones that cover the workspace, and one near the lowest modes.
 SLOW_SINES, FAST_SINES = 2, 1
+SINES = SLOW_SINES + FAST_SINES
 SHRINK_FACTOR, MAX_SHRINKS = 0.7, 12
 INFEASIBLE_SCORE, MIN_SEPARATION = -99.0, 1e-12
 
@@ -61,12 +65,16 @@ class ExcitationError(TautwireError):
 
 @dataclass(frozen=True)
 class ExcitationLimits:
-    """Limits of an excitation: winch speed in m/s, distance from the start along each axis in m, tensions in N."""
+    """Limits of an excitation: winch speed in m/s, distance from the start along each axis in m, tensions in N.
+
+    ``turn``, in rad, limits the rotation about each axis of a platform that six cables or more turn.
+    """
 
     speed: float
     reach: float
     min_tension: float
     max_tension: float
+    turn: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -96,7 +104,7 @@ class Excitation:
     ``median_separation`` is the smallest separation in nats of the median program that was tried.
     """
 
-    path: MultisinePath
+    path: Trajectory
     time: Array
     winch_speed: Array
     pairs: tuple[EffectSeparation, ...]
@@ -135,7 +143,8 @@ def design_excitation(
 
 def _search(design: _DesignProblem, progress: Progress) -> tuple[Array, list[float]]:
     """The best decision variables, and the scores of all programs in the order in which they were tried."""
-    count = 6 * (SLOW_SINES + FAST_SINES)
+    # An amplitude and a frequency of each sine on each axis.
+    count = 2 * SINES * (6 if _turns(design.robot) else 3)
     # Sobol's sequence is balanced at powers of two.
     population = 2 ** ceil(log2(count))
     generations = max(1, round(design.options.programs / population) - 1)
@@ -172,32 +181,44 @@ class _DesignProblem:
         pairs = self.separations(program)
         return log10(max(pairs[0].nats, MIN_SEPARATION)) if pairs else INFEASIBLE_SCORE
 
-    def program(self, decision_variables: Array) -> tuple[MultisinePath, Recording]:
+    def program(self, decision_variables: Array) -> tuple[Trajectory, Recording]:
         """Decode decision variables between 0 and 1 into a path within the limits, and what sensors show along it."""
-        path = self._path(decision_variables)
-        for _ in range(MAX_SHRINKS):
+        for shrink in range(MAX_SHRINKS):
+            path = self._path(decision_variables, SHRINK_FACTOR**shrink)
             recording = self._simulated_within_limits(path)
             if recording is not None:
                 return path, recording
-            path = path.scaled(SHRINK_FACTOR)
         raise _InfeasibleError
 
-    def _path(self, decision_variables: Array) -> MultisinePath:
-        amplitude, frequency_fraction = np.asarray(decision_variables).reshape(2, SLOW_SINES + FAST_SINES, 3)
+    def _path(self, decision_variables: Array, scale: float) -> Trajectory:
+        """The path whose amplitudes are scaled; of a platform that turns, the last axes are those of its rotation."""
+        groups = np.asarray(decision_variables).reshape(2, SINES, -1)
+        limits, platform = self.options.limits, self.robot.platform
+        translation = self._multisine(platform.start, groups[:, :, :3], (limits.reach, limits.speed), scale)
+        if not _turns(self.robot):
+            return translation
+        of_rotation = (limits.turn, limits.speed / platform_size(self.robot))
+        rotation = self._multisine((0.0, 0.0, 0.0), groups[:, :, 3:], of_rotation, scale)
+        return PoseTrajectory(translation, OrientationTrajectory(platform.start_orientation, rotation))
+
+    def _multisine(
+        self, start: Point, decision_variables: Array, bounds: tuple[float, float], scale: float
+    ) -> MultisinePath:
+        """Sines of three axes from ``start``, within bounds of their deviation and its rate."""
+        amplitude, frequency_fraction = decision_variables
         slowest, middle, fastest = 1.0 / self.options.duration, 6.0 / self.options.duration, 0.2 / self.options.interval
         begin = np.array([slowest] * SLOW_SINES + [middle] * FAST_SINES)[:, None]
         end = np.array([middle] * SLOW_SINES + [max(min(fastest, 3.0), middle)] * FAST_SINES)[:, None]
         frequencies = begin * (end / begin) ** frequency_fraction
         # Amplitudes are limited by speed too: a fast sine is small.
         max_amplitude = np.minimum(
-            self.options.limits.reach / (SLOW_SINES + FAST_SINES),
-            self.options.limits.speed / (2.0 * np.pi * frequencies),
+            bounds[0] / SINES,
+            bounds[1] / (2.0 * np.pi * frequencies),
         )
-        return MultisinePath(
-            self.robot.platform.start, self.options.duration, _as_rows(amplitude * max_amplitude), _as_rows(frequencies)
-        )
+        amplitudes = _as_rows(amplitude * max_amplitude)
+        return MultisinePath(start, self.options.duration, amplitudes, _as_rows(frequencies)).scaled(scale)
 
-    def _simulated_within_limits(self, path: MultisinePath) -> Recording | None:
+    def _simulated_within_limits(self, path: Trajectory) -> Recording | None:
         """Simulated recording of sensors without noise; None where a limit is broken."""
         limits, interval = self.options.limits, self.options.interval
         time = np.asarray(interval * np.arange(round(self.options.duration / interval) + 1), dtype=np.float64)
@@ -256,6 +277,11 @@ class _InfeasibleError(Exception):
     """Even a small motion along this path breaks a limit."""
 
 
+def _turns(robot: Robot) -> bool:
+    """Whether the winches can turn the platform as they like: fewer cables leave its orientation to statics."""
+    return robot.platform.is_rigid_body and robot.cable_count >= FREEDOMS
+
+
 def _as_rows(matrix: Array) -> tuple[tuple[float, float, float], ...]:
     return tuple((float(x), float(y), float(z)) for x, y, z in matrix)
 
@@ -263,6 +289,8 @@ def _as_rows(matrix: Array) -> tuple[tuple[float, float, float], ...]:
 DEFAULT_SPEED_LIMIT = 0.5
 # Shares of the mean rope length, of the smallest and of the largest static tension.
 DEFAULT_REACH_RATIO, MIN_TENSION_RATIO, MAX_TENSION_RATIO = 0.05, 0.1, 3.0
+# rad, of a platform that turns; attachments then move about as far as its origin does.
+MAX_DEFAULT_TURN = 0.2
 
 
 def default_limits(robot: Robot, speed: float | None = None, reach: float | None = None) -> ExcitationLimits:
@@ -270,14 +298,19 @@ def default_limits(robot: Robot, speed: float | None = None, reach: float | None
 
     Without [tension] a tenth of the least static tension to three times the largest.
     """
-    tensions = static_tensions(require_point_mass(robot.name, robot))
+    if robot.platform.is_rigid_body and robot.cable_count < FREEDOMS:
+        problem = f"has a platform on {robot.cable_count} cables, whose orientation statics decides along a path"
+        raise InputError(robot.name, problem, "record a motion of your own; six cables or more turn it as designed")
+    tensions = static_tensions(robot)
     lengths = np.linalg.norm(np.array(robot.anchors) - np.array(robot.platform.start), axis=1)
     declared_speed = robot.winch.speed_limit if robot.winch else None
+    distance = reach or DEFAULT_REACH_RATIO * float(np.mean(lengths))
     return ExcitationLimits(
         speed=speed or declared_speed or DEFAULT_SPEED_LIMIT,
-        reach=reach or DEFAULT_REACH_RATIO * float(np.mean(lengths)),
+        reach=distance,
         min_tension=robot.tension.minimum if robot.tension else MIN_TENSION_RATIO * float(np.min(tensions)),
         max_tension=robot.tension.maximum if robot.tension else MAX_TENSION_RATIO * float(np.max(tensions)),
+        turn=min(MAX_DEFAULT_TURN, distance / platform_size(robot)) if _turns(robot) else 0.0,
     )
 
 

@@ -16,7 +16,6 @@ from ..errors import ArgumentError, UnreachableError
 from .pose_trajectory import (
     OrientationTrajectory,
     PoseTrajectory,
-    TurningTrajectory,
     evaluate_path,
     rotation_vectors_between,
     turns,
@@ -28,8 +27,9 @@ from .trajectory import Line, Trajectory
 
 Array = NDArray[np.float64]
 
-# Of the orientation in equilibrium along a path; a quintic spline between them is smooth in acceleration.
-EQUILIBRIUM_POINTS, SPLINE_DEGREE = 21, 5
+# Points of the orientation in equilibrium along a path, at first and at most; they are doubled until a quintic spline
+# through them, which is smooth in acceleration, meets those between them within a tolerance in rad.
+FIRST_POINTS, MAX_POINTS, SPLINE_DEGREE, SPLINE_TOLERANCE = 11, 641, 5, 1e-6
 # rad: a path may turn this far from the orientation in equilibrium, as one rounded to three decimals does.
 MAX_EQUILIBRIUM_DEVIATION = 2e-3
 
@@ -119,19 +119,29 @@ def _held_orientation(orientation: Quaternion, trajectory: Trajectory) -> Orient
 
 def _equilibrium_orientations(robot: Robot, trajectory: Trajectory) -> OrientationTrajectory:
     """Orientations in equilibrium along a path, nearest to those of the path or of the robot file."""
-    times = np.linspace(0.0, trajectory.duration, EQUILIBRIUM_POINTS)
-    positions = evaluate_path("pose_path", trajectory, "position", times)
-    if turns(trajectory):
-        orientations = _orientations_along(robot, trajectory, times, positions)
-    else:
-        orientations = np.array([static_equilibrium(robot, position).orientation for position in positions])
     start = start_orientation(robot)
-    vectors = rotation_vectors_between(orientations, np.array(start))
+
+    def vectors_at(times: Array) -> Array:
+        return rotation_vectors_between(_equilibria_along(robot, trajectory, times), np.array(start))
+
+    times = np.linspace(0.0, trajectory.duration, FIRST_POINTS)
+    vectors, is_exact = vectors_at(times), False
     spline = make_interp_spline(times, vectors, SPLINE_DEGREE)
+    while not is_exact and len(times) < MAX_POINTS:
+        middles = 0.5 * (times[1:] + times[:-1])
+        between = vectors_at(middles)
+        is_exact = bool(np.max(np.abs(spline(middles) - between)) <= SPLINE_TOLERANCE)
+        indices = np.arange(1, len(times))
+        times, vectors = np.insert(times, indices, middles), np.insert(vectors, indices, between, axis=0)
+        spline = make_interp_spline(times, vectors, SPLINE_DEGREE)
     return OrientationTrajectory(start, SplineTrajectory(spline, trajectory.duration))
 
 
-def _orientations_along(robot: Robot, trajectory: TurningTrajectory, times: Array, positions: Array) -> Array:
+def _equilibria_along(robot: Robot, trajectory: Trajectory, times: Array) -> Array:
+    """Orientations in equilibrium at times of a path, (N, 4)."""
+    positions = evaluate_path("pose_path", trajectory, "position", times)
+    if not turns(trajectory):
+        return np.array([static_equilibrium(robot, position).orientation for position in positions])
     orientations = []
     asked_orientations = evaluate_path("pose_path", trajectory, "orientation", times)
     for time, position, asked in zip(times.tolist(), positions, asked_orientations, strict=True):

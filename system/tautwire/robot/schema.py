@@ -4,7 +4,6 @@ from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
-from ..errors import RigidPlatformError
 from ..validation import validate_instance
 
 Point = tuple[float, float, float]
@@ -339,18 +338,6 @@ class Robot:
     def without_effects(self) -> "Robot":
         """This robot without any effect or formula."""
         return replace(self, effects=(), formulas=())
-
-
-def require_point_mass(where: str, robot: Robot) -> Robot:
-    """Returns a robot whose platform is a point mass; raises RigidPlatformError for one that turns."""
-    if robot.platform.is_rigid_body:
-        raise RigidPlatformError(where)
-    return robot
-
-
-def validate_point_mass_robot(where: str, value: object) -> Robot:
-    """Returns the value if it is a Robot with a point mass; raises ArgumentError or RigidPlatformError otherwise."""
-    return require_point_mass(where, validate_robot(where, value))
 
 
 def validate_robot(where: str, value: object) -> Robot:
