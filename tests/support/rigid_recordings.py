@@ -16,7 +16,7 @@ from tests.support.rigid_motion import integrated
 
 Array = NDArray[np.float64]
 
-POSITION_NOISE, TENSION_NOISE, ROTATION_NOISE, SPEED_NOISE = 1e-4, 1.0, 2e-4, 1e-4
+POSITION_NOISE, TENSION_NOISE, ROTATION_NOISE, SPEED_NOISE = 1e-4, 1.0, 2e-4, 1e-5
 
 
 def with_noise(robot: Robot) -> Robot:

@@ -1,0 +1,74 @@
+"""Whole traces of platforms that turn, on recordings by their textbook equations."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tautwire import trace
+from tautwire.estimation.disturbance import sensor_noise_only
+from tautwire.estimation.disturbance_posterior import disturbance_prior, logs_of
+from tautwire.estimation.likelihood import Likelihood
+from tautwire.estimation.measurement_noise import estimate_noise
+from tautwire.robot.schema import Robot
+from tests.support.rigid_recordings import rigid_recording, with_noise
+from tests.support.rigid_robots import crane_robot, octahedral_robot, suspended_robot
+
+OCTAHEDRAL = with_noise(octahedral_robot())
+
+
+def damped(robot: Robot, factor: float) -> Robot:
+    return replace(robot, cables=tuple(replace(each, damping=factor * each.damping) for each in robot.cables))
+
+
+@pytest.mark.validate
+@pytest.mark.parametrize(
+    ("declared", "truth", "effects"),
+    [
+        (OCTAHEDRAL, OCTAHEDRAL, ()),
+        (OCTAHEDRAL, damped(OCTAHEDRAL, 4.0), ("damping",)),
+        (with_noise(crane_robot()), damped(with_noise(crane_robot()), 4.0), ("damping",)),
+        (with_noise(suspended_robot(4)), damped(with_noise(suspended_robot(4)), 4.0), ("damping",)),
+    ],
+    ids=["none on six", "damping on six", "damping on eight", "damping on four"],
+)
+def test_what_a_platform_that_turns_lacks_is_named_alone(
+    declared: Robot, truth: Robot, effects: tuple[str, ...]
+) -> None:
+    fit, check = (rigid_recording(truth, 300, seed=seed) for seed in (1, 2))
+    result = trace(declared, fit, check)
+    assert tuple(each.name for each in result.effects) == effects
+    after = result.comparisons[-1].errors_after
+    assert after.orientation_rms == pytest.approx(result.noise_floor.orientation_rms, rel=0.25)
+    assert result.normalised_innovation_variance == pytest.approx(np.ones(6 + truth.cable_count), abs=0.4)
+
+
+def test_a_disturbance_of_no_size_changes_nothing() -> None:
+    recording = rigid_recording(OCTAHEDRAL, 60)
+    noise = estimate_noise(OCTAHEDRAL, recording)
+    nothing = sensor_noise_only(disturbance_prior(OCTAHEDRAL, noise).median, 0.0, 0.0, 0.0)
+    nothing = replace(
+        nothing, position_noise=noise.position, tension_noise=noise.tension, rotation_noise=noise.rotation or 0.0
+    )
+    plain = Likelihood(OCTAHEDRAL, (), noise, 0.01).innovations(recording, ())
+    beside = Likelihood(OCTAHEDRAL, (), replace(noise, disturbance=nothing), 0.01).innovations(recording, ())
+    assert beside.values == pytest.approx(plain.values, abs=1e-9)
+
+
+def test_the_numbers_of_a_disturbance_are_those_of_their_logs() -> None:
+    noise = estimate_noise(OCTAHEDRAL, rigid_recording(OCTAHEDRAL, 60))
+    prior = disturbance_prior(OCTAHEDRAL, noise)
+    logs = logs_of(prior.median)
+    assert len(logs) == prior.number_count == 11
+    assert logs_of(prior.disturbance_of(logs + 0.1)) == pytest.approx(logs + 0.1, abs=1e-12)
+    assert prior.disturbance_of(logs).moment_arm == prior.median.moment_arm > 0.5
+
+
+def test_the_random_moment_is_the_random_force_at_the_size_of_the_platform() -> None:
+    disturbance = disturbance_prior(OCTAHEDRAL, estimate_noise(OCTAHEDRAL, rigid_recording(OCTAHEDRAL, 60))).median
+    sizes = [each.rms for each in disturbance.processes(6)]
+    assert sizes[3:6] == pytest.approx([0.8 * size for size in sizes[:3]])
+    assert len(sizes) == 6 + 3 + 6 + 3
+    assert len(disturbance.white_variances(6)) == 12

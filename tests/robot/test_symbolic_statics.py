@@ -1,0 +1,67 @@
+"""The static start of rigid platforms as a function of parameters, against the statics of numbers."""
+
+from __future__ import annotations
+
+import casadi
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from tautwire.robot.rigid_equilibrium import static_equilibrium
+from tautwire.robot.schema import EffectSetting, Robot
+from tautwire.robot.symbolic_model import FreeParameter, SymbolicModel, symbolic_model
+from tautwire_fmu.laws.effects import BY_NAME
+from tests.support.rigid_robots import crane_robot, octahedral_robot, suspended_robot, underactuated_robot
+
+
+def with_value(robot: Robot, effect: str, parameter: str, value: float) -> Robot:
+    return robot.with_effect(EffectSetting(effect, BY_NAME[effect].completed_values({parameter: value})))
+
+
+def model_of(robot: Robot, effect: str, parameter: str) -> SymbolicModel:
+    """The model with the parameter free, compiled where it is neutral."""
+    neutral = with_value(robot, effect, parameter, 0.0)
+    return symbolic_model(
+        neutral, [FreeParameter(len(neutral.effects) - 1, parameter)], (), robot.platform.start_orientation
+    )
+
+
+def start_of(model: SymbolicModel, value: float) -> tuple[np.ndarray, np.ndarray]:
+    """Rotation vector of the start, and tensions there with the winches at rest."""
+    rest = [model.start, np.zeros(model.inputs.numel())]
+    spans = casadi.Function("spans", [model.states, model.inputs, model.parameters], [model.span_tensions])
+    start = casadi.Function("start", [model.parameters], [model.start, spans(*rest, model.parameters)])
+    state, tensions = start(value)
+    return np.array(state).ravel()[3:6], np.array(tensions).ravel()
+
+
+@pytest.mark.parametrize("value", [0.5, 20.0])
+@pytest.mark.parametrize("robot", [crane_robot(), octahedral_robot()], ids=["eight cables", "six cables"])
+def test_tensions_of_six_cables_and_more_follow_a_load_as_statics_has_it(robot: Robot, value: float) -> None:
+    rotation, tensions = start_of(model_of(robot, "payload", "mass"), value)
+    assert tensions == pytest.approx(static_equilibrium(with_value(robot, "payload", "mass", value)).tensions, rel=1e-9)
+    assert rotation == pytest.approx(np.zeros(3), abs=1e-12)
+
+
+@pytest.mark.parametrize("value", [0.0, 0.005])
+@pytest.mark.parametrize("robot", [underactuated_robot(), suspended_robot(3)], ids=["four cables", "three cables"])
+def test_orientation_and_tensions_of_few_cables_follow_a_shifted_mass(robot: Robot, value: float) -> None:
+    equilibrium = static_equilibrium(with_value(robot, "centre_of_mass", "x", value))
+    rotation, tensions = start_of(model_of(robot, "centre_of_mass", "x"), value)
+    declared, turned = (
+        Rotation.from_quat(np.roll(each, -1)) for each in (robot.platform.start_orientation, equilibrium.orientation)
+    )
+    assert rotation == pytest.approx((turned * declared.inv()).as_rotvec(), abs=1e-8)
+    assert tensions == pytest.approx(equilibrium.tensions, rel=1e-6)
+
+
+def test_the_first_derivative_of_an_orientation_is_that_of_statics() -> None:
+    robot, width = underactuated_robot(), 1e-4
+    model = model_of(robot, "centre_of_mass", "x")
+    slopes = casadi.Function("slopes", [model.parameters], [casadi.jacobian(model.start[3:6], model.parameters)])
+    more, less = (
+        Rotation.from_quat(np.roll(static_equilibrium(with_value(robot, "centre_of_mass", "x", at)).orientation, -1))
+        for at in (width, -width)
+    )
+    expected = (more * less.inv()).as_rotvec() / (2.0 * width)
+    assert np.array(slopes(0.0)).ravel() == pytest.approx(expected, rel=1e-3, abs=1e-3 * np.max(np.abs(expected)))
