@@ -15,12 +15,10 @@ if TYPE_CHECKING:
     from tests.rig.mechanics import Rig
 
 
-NEXT, LAST = [1, 2, 0], [2, 0, 1]
-
-
-def cross(a: Vector, b: Vector) -> Vector:
-    """The vector product of vectors, or of rows; several times faster than NumPy's."""
-    return np.asarray(a[..., NEXT] * b[..., LAST] - a[..., LAST] * b[..., NEXT], float)
+def torque_of(arms: Vector, forces: Vector) -> Vector:
+    """Sum of the moments of forces at the ends of arms, by rows."""
+    (_, xy, xz), (yx, _, yz), (zx, zy, _) = (arms.T @ forces).tolist()
+    return np.array([yz - zy, zx - xz, xy - yx])
 
 
 class Moment:
@@ -61,8 +59,7 @@ class Moment:
         """Add a force at the end of an arm, or forces at the ends of as many (rows)."""
         self.force = self.force + (force if force.ndim == 1 else force.sum(axis=0))
         if arm.any():
-            torque = cross(arm, force)
-            self.torque = self.torque + (torque if torque.ndim == 1 else torque.sum(axis=0))
+            self.torque = self.torque + torque_of(np.atleast_2d(arm), np.atleast_2d(force))
 
 
 @dataclass(kw_only=True)

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from tests.rig.effect import STAGES, Effect, Moment, cross
+from tests.rig.effect import STAGES, Effect, Moment, torque_of
 from tests.rig.hanging import hanging
 from tests.rig.program import Program
 from tests.rig.registry import EFFECTS
@@ -134,8 +134,8 @@ class Rig:
         self._pull(moment)
         moment.force = moment.pull @ moment.direction + self.weight
         if self.turning:
-            torques = cross(moment.arms, moment.pull[:, None] * moment.direction)
-            moment.torque = torques.sum(axis=0) + cross(moment.centre, self.weight)
+            moment.torque = torque_of(moment.arms, moment.pull[:, None] * moment.direction)
+            moment.torque = moment.torque + torque_of(moment.centre[None], self.weight[None])
         self._apply("load", moment)
         if self.turning:
             self.turning.accelerate(moment)

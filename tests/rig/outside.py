@@ -8,7 +8,7 @@ from typing import ClassVar
 
 import numpy as np
 
-from tests.rig.effect import Effect, Moment, cross
+from tests.rig.effect import Effect, Moment
 from tests.rig.robot import Vector
 
 
@@ -27,7 +27,7 @@ class Drag(Effect):
 
     def load(self, moment: Moment) -> None:
         """Brake the platform."""
-        velocity = moment.velocity + cross(moment.turning, moment.centre) if self.rig.turning else moment.velocity
+        velocity = moment.velocity + np.cross(moment.turning, moment.centre) if self.rig.turning else moment.velocity
         relative = velocity - np.asarray(self.wind, float)
         speed = np.sqrt(relative @ relative) ** (self.exponent - 1.0)
         moment.push(-0.5 * self.density * self.drag_area * speed * relative, moment.centre)

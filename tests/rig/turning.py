@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from tests.rig.effect import Moment, cross
+from tests.rig.effect import Moment
 from tests.rig.robot import Body, Robot, Vector
 
 STATES = 6
@@ -63,21 +63,16 @@ class Turning:
         moment.arms = self.body.attachments @ moment.rotation.T
         moment.centre = moment.rotation @ self.centre
         moment.ends = moment.position + moment.arms
-        moment.end_velocity = moment.velocity + cross(moment.turning, moment.arms)
+        moment.end_velocity = moment.velocity + self.body.attachments @ skew(turning).T @ moment.rotation.T
 
     def accelerate(self, moment: Moment) -> None:
         """Accelerations by force and moment about the origin."""
         gibbs, turning = moment.state[self.part].reshape(2, 3)
-        force, torque = moment.force @ moment.rotation, moment.torque @ moment.rotation
-        right = np.concatenate(
-            [
-                force - cross(turning, cross(turning, self.first)),
-                torque - cross(turning, self.inertia @ turning),
-            ]
-        )
+        force, torque, spin = moment.force @ moment.rotation, moment.torque @ moment.rotation, skew(turning)
+        right = np.concatenate([force - spin @ (spin @ self.first), torque - spin @ (self.inertia @ turning)])
         accelerations = self.inverse @ right
         moment.acceleration = moment.rotation @ accelerations[:3]
-        rate = 0.5 * (turning + cross(gibbs, turning) + (gibbs @ turning) * gibbs)
+        rate = 0.5 * (turning - spin @ gibbs + (gibbs @ turning) * gibbs)
         moment.rates[self.part] = np.concatenate([rate, accelerations[3:]])
 
     @property
