@@ -116,6 +116,8 @@ class GeometryReading:
             return np.tile(declared.platform.start_orientation, (len(shown.position), 1))
         quaternion = self.quaternion.read(shown.orientation)
         # A rotation seen in other axes turns about the mapped axis, the other way round where these are mirrored.
+        if (self.axes, self.signs, self.rotation) == ((0, 1, 2), (1, 1, 1), IDENTITY):
+            return quaternion
         axis = self._handedness * quaternion[:, 1:][:, self.axes] * self.signs
         in_frame = Rotation.from_matrix(self.rotation).as_quat()[[3, 0, 1, 2]].tolist()
         return np.column_stack(multiply(in_frame, (quaternion[:, 0], *axis.T)))

@@ -101,7 +101,7 @@ def check_motion(robot: Robot, recording: Recording) -> MotionCheck | None:
     if not misfit > MAX_MISFIT:
         is_tried = robot.platform.is_rigid_body and misfit > MIN_POSE_MISFIT
         return MotionCheck(misfit, _best(_pose_readings(motion), misfit) if is_tried else ())
-    readings = _readings(motion, units)
+    readings = _readings(motion, units, misfit / MIN_IMPROVEMENT)
     if "m" not in units.get("s", ()):
         # Of a fast motion every longer unit of time makes a slow one: it alone has to explain the recording.
         readings = [each for each in readings if each.winding.time_unit == "s" or len(each.mistakes) == 1]
@@ -138,8 +138,8 @@ def _declared_reading(motion: _RecordedMotion, geometry: GeometryReading) -> Mot
     return _reading(geometry, motion.declared, misfit, motion.recording)
 
 
-def _readings(motion: _RecordedMotion, units: Mapping[str, Sequence[str]]) -> list[MotionReading]:
-    """Readings of geometry and winding, with their misfits, for these units of time and anchors."""
+def _readings(motion: _RecordedMotion, units: Mapping[str, Sequence[str]], max_misfit: float) -> list[MotionReading]:
+    """Readings of geometry and winding with a misfit up to a maximum, for these units of time and anchors."""
     interval, travel = float(np.median(np.diff(motion.recording.time))), motion.travel
     readings = []
     for geometry in geometry_readings(motion.robot):
@@ -148,10 +148,15 @@ def _readings(motion: _RecordedMotion, units: Mapping[str, Sequence[str]]) -> li
             windings = list(winding_readings(ropes.lengths, travel, interval))
             # Where a rigid platform swings, travel says little of the winches, and poses may be mistaken all the same.
             windings += [motion.declared] if motion.robot.platform.is_rigid_body else []
-            readings += [
-                _reading(geometry, winding, ropes.misfit(travel, winding), motion.recording)
+            misfits = {
+                winding: ropes.misfit(travel, winding)
                 for winding in dict.fromkeys(windings)
                 if geometry.anchor_unit in units.get(winding.time_unit, ()) and are_of_one_system(geometry, winding)
+            }
+            readings += [
+                _reading(geometry, winding, misfit, motion.recording)
+                for winding, misfit in misfits.items()
+                if misfit <= max_misfit
             ]
     return readings
 
