@@ -6,13 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation
 
 from tautwire import trace
+from tautwire.cosimulation.robot_cosimulation import CosimulationResult
+from tautwire.estimation.cosimulation_validation import as_tracked
 from tautwire.estimation.disturbance import sensor_noise_only
 from tautwire.estimation.disturbance_posterior import disturbance_prior, logs_of
 from tautwire.estimation.likelihood import Likelihood
 from tautwire.estimation.measurement_noise import estimate_noise
-from tautwire.robot.schema import Robot
+from tautwire.robot.schema import EffectSetting, Robot
+from tautwire_fmu.laws.effects import BY_NAME
 from tests.support.rigid_recordings import rigid_recording, with_noise
 from tests.support.rigid_robots import crane_robot, octahedral_robot, suspended_robot
 
@@ -64,6 +68,19 @@ def test_the_numbers_of_a_disturbance_are_those_of_their_logs() -> None:
     assert len(logs) == prior.number_count == 11
     assert logs_of(prior.disturbance_of(logs + 0.1)) == pytest.approx(logs + 0.1, abs=1e-12)
     assert prior.disturbance_of(logs).moment_arm == prior.median.moment_arm > 0.5
+
+
+def test_a_tracker_that_lags_shows_a_past_orientation() -> None:
+    time = 0.01 * np.arange(50)
+    turned = Rotation.from_rotvec(np.outer(time, [0.0, 0.3, 0.4])).as_quat()
+    nothing = np.zeros((50, 6))
+    motion = CosimulationResult(time, *[np.zeros((50, 3))] * 2, *[nothing] * 4, orientation=np.roll(turned, 1, axis=1))
+    late = {**BY_NAME["sensor_delay"].completed_values({"position_delay": 0.025})}
+    shown = as_tracked(OCTAHEDRAL.with_effect(EffectSetting("sensor_delay", late, (1,))), motion).orientation
+    assert shown is not None
+    angles = Rotation.from_quat(np.roll(shown, -1, axis=1)).magnitude()
+    assert angles == pytest.approx(0.5 * np.maximum(time - 0.025, 0.0), abs=1e-12)
+    assert as_tracked(OCTAHEDRAL, motion) is motion
 
 
 def test_the_random_moment_is_the_random_force_at_the_size_of_the_platform() -> None:

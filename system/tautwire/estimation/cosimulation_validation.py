@@ -10,12 +10,16 @@ from tempfile import TemporaryDirectory
 import numpy as np
 from numpy.typing import NDArray
 
+from tautwire_fmu.laws import effect_stages as stages
+from tautwire_fmu.laws.mathematics import REAL
+
 from ..cosimulation.robot_cosimulation import CosimulationResult, cosimulate
 from ..fmus.packaging import build_fmus
 from ..recordings.recording import Recording
+from ..robot.active_effects import platform_effects
 from ..robot.schema import Robot
 from .estimation_data import DataSet
-from .measured_outputs import Outputs, measured_outputs, output_residuals
+from .measured_outputs import Outputs, measured_outputs, orientations, output_residuals, rotation_vectors
 from .parameter_fit import Fitter
 from .policy import DEFAULT_POLICY, CosimulationPolicy
 from .smoothed_states import calibrate, with_initial_state
@@ -41,7 +45,18 @@ def cosimulate_data_set(robot: Robot, data: DataSet) -> CosimulationResult:
     with TemporaryDirectory(prefix="tautwire-trace-") as folder:
         fmus = build_fmus(robot.as_modelled(), Path(folder))
         fmus = replace(fmus, relative_tolerance=DEFAULT_POLICY.cosimulation.relative_tolerance)
-        return cosimulate(fmus, data.recording.time, data.recording.winch_speed)
+        return as_tracked(robot, cosimulate(fmus, data.recording.time, data.recording.winch_speed))
+
+
+def as_tracked(robot: Robot, motion: CosimulationResult) -> CosimulationResult:
+    """A motion whose orientation is as late as the tracker shows it; the platform's FMU delays the position alone."""
+    delay = float(stages.sensor_delays(REAL, platform_effects(robot))[1])
+    if motion.orientation is None or delay == 0.0:
+        return motion
+    begin, time = motion.orientation[0].tolist(), motion.time
+    columns = rotation_vectors(motion.orientation, begin).T
+    shown = np.array([np.interp(time - delay, time, column) for column in columns]).T
+    return replace(motion, orientation=orientations(shown, begin))
 
 
 def validate_by_cosimulation(
