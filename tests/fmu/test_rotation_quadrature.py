@@ -75,7 +75,7 @@ def test_the_order_is_four_and_with_forces_in_the_middle_six(middle: bool, order
 def test_a_moment_by_the_angular_velocity_keeps_the_order(middle: bool, order: int) -> None:
     exact = exact_end_state(1.0, resists=True)
     assert np.max(np.abs(exact - exact_end_state(1.0))) > 0.01
-    coarse, fine = (np.max(np.abs(end_state(step, 1.0, middle, True) - exact)) for step in (0.1, 0.05))
+    coarse, fine = (np.max(np.abs(end_state(step, 1.0, middle, True) - exact)) for step in (0.025, 0.0125))
     assert np.log2(coarse / fine) == pytest.approx(order, abs=0.3)
 
 

@@ -148,7 +148,7 @@ def workspace(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Compute the workspace of a robot: where its cables, which only pull, can hold the platform.
+    """Compute the workspace: where the cables can hold the platform.
 
     Margins and static tensions on a grid of positions, or with --at of orientations at one position.
 

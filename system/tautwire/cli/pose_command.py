@@ -42,7 +42,7 @@ def pose(
     as_json: AsJson = False,
     quiet: Quiet = False,
 ) -> None:
-    """Compute a robot at rest at a pose: rope lengths, tensions, stiffness.
+    """Compute rope lengths, tensions and stiffness at a pose.
 
     With --lengths the other way round: the poses that ropes of these lengths lead to.
 
