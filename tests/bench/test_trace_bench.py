@@ -50,7 +50,7 @@ def test_the_cases_are_all_that_was_asked_for() -> None:
     listed = {
         (name, part.size) for case in cases if case.kind == "listed" for part in case.parts for name in case.names
     }
-    assert listed == {(effect.name, size) for effect in ALL if not effect.needs_rigid_body for size in SIZES}
+    assert listed == {(effect.name, size) for effect in ALL if effect.forms_on(is_rigid_body=False) for size in SIZES}
     unlisted = [case.parts[0].form.name for case in cases if case.kind == "unlisted"]
     assert set(unlisted) == set(EFFECTS) - set(BY_NAME) - LIFELIKE_ALONE
     assert len(unlisted) >= 10

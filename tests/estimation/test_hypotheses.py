@@ -10,7 +10,7 @@ from tautwire_fmu.laws.effects import ALL, BY_NAME
 from tests.support.rigid_robots import crane_robot
 from tests.support.robots import example
 
-OF_RIGID_BODIES = {"centre_of_mass", "attachment", "inertia", "rotational_drag"}
+OF_RIGID_BODIES = {"centre_of_mass", "attachment", "inertia", "rotational_drag", "transverse_damping"}
 
 
 def names(robot: Robot) -> set[str]:

@@ -36,7 +36,8 @@ def run_in_shell(script: str, folder: Path) -> None:
 
 def written_by(script: str) -> list[str]:
     """What the commands of a block are told to write."""
-    return re.findall(r"--(?:out|report|plot) (\S+)", script)
+    commands = "\n".join(line for line in script.splitlines() if not line.startswith("#"))
+    return re.findall(r"--(?:out|report|plot) (\S+)", commands)
 
 
 @pytest.mark.validate

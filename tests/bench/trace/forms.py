@@ -95,7 +95,6 @@ LISTED = (
     Form("sensor_offset", "sensor_offset", lambda s, r: {"force": s, "cables": [2]}, 1.0, 300.0),
     Form("sensor_offset-all", "sensor_offset", lambda s, r: {"force": s}, 1.0, 300.0),
     Form("sensor_offset-position", "sensor_offset", lambda s, r: {"place": [0.5 * s, -0.4 * s, 0.77 * s]}, 1e-3, 0.1),
-    Form("transverse_damping", "transverse_damping", lambda s, r: {"damping": s}, 1.0, 3000.0),
 )
 
 UNLISTED = (

@@ -207,7 +207,6 @@ RIGHT = (
         60.0,
         lambda s, w: {"force": w.sign * s * w.survey.tension_offset, "cables": [w.cable]},
     ),
-    Hidden("transverse_damping", "transverse_damping", "right", 0.01, 3.0, _transverse),
 )
 
 WRONG = (
@@ -276,14 +275,6 @@ WRONG = (
         0.03,
         0.2,
         lambda s, w: {"gain": 1 + w.sign * s, "bend": 0.3 * s, "cables": [w.cable]},
-    ),
-    Hidden(
-        "transverse_damping-quadratic",
-        "transverse_damping",
-        "wrong",
-        0.01,
-        3.0,
-        lambda s, w: {**_transverse(s, w), "exponent": 2.0, "reference": w.speed},
     ),
 )
 
@@ -370,6 +361,15 @@ PAIRS = (
 
 # Only on platforms that turn.
 ON_PLATFORMS = (
+    Hidden("transverse_damping", "transverse_damping", "right", 0.01, 3.0, _transverse),
+    Hidden(
+        "transverse_damping-quadratic",
+        "transverse_damping",
+        "wrong",
+        0.01,
+        3.0,
+        lambda s, w: {**_transverse(s, w), "exponent": 2.0, "reference": w.speed},
+    ),
     Hidden("centre_of_mass", "centre_of_mass", "right", 0.05, 0.6, _aside),
     Hidden("attachment", "attachment", "right", 0.01, 0.5, lambda s, w: {**_aside(s, w), "cables": [w.cable]}),
     Hidden(

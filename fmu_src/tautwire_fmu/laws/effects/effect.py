@@ -82,7 +82,8 @@ class Effect(NamedTuple):
 
     ``values`` is the class of the parameters (a NamedTuple, one field a parameter, in order). ``state_rates`` gives a
     tuple, one rate a state, from ``m, values, states, cable, motion``. ``forms`` are the sets of parameters that a fit
-    estimates together; the others stay neutral.
+    estimates together; the others stay neutral. One that is not ``is_tried_on_point_masses`` would take the name of
+    something else there.
     """
 
     name: str
@@ -92,6 +93,7 @@ class Effect(NamedTuple):
     values: Callable[..., Any]
     source: str
     forms: Tuple[Tuple[str, ...], ...] = ()
+    is_tried_on_point_masses: bool = True
     states: Tuple[State, ...] = ()
     state_rates: Optional[Callable[..., Any]] = None
     exit_point: Optional[Callable[..., Any]] = None
@@ -130,7 +132,9 @@ class Effect(NamedTuple):
         return bool(self.parameters) and all(parameter.needs_rigid_body for parameter in self.parameters)
 
     def forms_on(self, is_rigid_body: bool) -> Tuple[Tuple[str, ...], ...]:
-        """The forms that act on a platform that is a rigid body, or on one that is a point mass."""
+        """The forms to try on a platform that is a rigid body, or on one that is a point mass."""
+        if not (is_rigid_body or self.is_tried_on_point_masses):
+            return ()
         excluded = {parameter.name for parameter in self.parameters if parameter.needs_rigid_body and not is_rigid_body}
         return tuple(form for form in self.forms if not excluded & set(form))
 

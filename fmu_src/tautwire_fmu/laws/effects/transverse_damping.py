@@ -36,6 +36,8 @@ TRANSVERSE_DAMPING = Effect(
     ),
     values=Values,
     forms=(("damping",),),
+    # On all ropes of a point mass it is nearly a linear drag, which is no effect of the list.
+    is_tried_on_point_masses=False,
     lateral_force=lateral_force,
     source="viscous damping: Clough and Penzien (1993), Dynamics of Structures, section 2-2",
 )
