@@ -146,7 +146,7 @@ def _differentiate(integration: Integration, middles: Any, k: int) -> None:
         for r in range(size):
             over_part[r, r] += 1.0
         transition = _product(over_part, transition)
-        by_constants = _product_of_transposed(by_constants, over_part) + _product_of_transposed(slopes, gamma)
+        by_constants = np.dot(by_constants, over_part.T) + np.dot(slopes, gamma.T)
     _fill_in(integration, transition, by_constants)
 
 
@@ -170,11 +170,7 @@ def _fill_in(integration: Integration, transition: Any, by_constants: Any) -> No
     """Sort derivatives by constants, those of the static start by what it depends on, into the results."""
     by_theta, factors = integration.preparation.results[1], integration.preparation.results[2][0]
     theta_count, size, driving = len(by_theta), len(transition), len(factors)
-    for i in range(theta_count):
-        for s in range(by_theta.shape[1]):
-            slope = by_theta[i, s]
-            if slope != 0.0:
-                by_constants[i] += slope * by_constants[theta_count + s]
+    by_constants[:theta_count] += np.dot(by_theta, by_constants[theta_count:])
     result = integration.transition
     result[:size] = transition.T
     constant_count = len(result) - size - driving
@@ -207,19 +203,4 @@ def _product(first: Any, second: Any) -> Any:
             if factor != 0.0:
                 for j in range(second.shape[1]):
                     result[r, j] += factor * second[c, j]
-    return result
-
-
-@compiled
-def _product_of_transposed(columns: Any, matrix: Any) -> Any:
-    """Product of a matrix and of one that is stored by columns, by columns too."""
-    result = np.zeros((len(columns), len(matrix)))
-    for i in range(len(columns)):
-        if not np.any(columns[i]):
-            continue
-        for r in range(len(matrix)):
-            total = 0.0
-            for c in range(matrix.shape[1]):
-                total += columns[i, c] * matrix[r, c]
-            result[i, r] = total
     return result
