@@ -1,10 +1,12 @@
 """Effects whose slopes tell nothing are seen by running the model."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import pytest
 
 from tautwire.errors import UnreachableError
+from tautwire.estimation.disturbance_posterior import disturbance_prior
 from tautwire.estimation.estimation_data import DataSet, split_data
 from tautwire.estimation.grid_search import grid_points, grid_search, zero_slope_predictions
 from tautwire.estimation.hypotheses import Hypothesis
@@ -13,7 +15,7 @@ from tautwire.estimation.likelihood import Innovations
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fitter
 from tautwire.estimation.score_test import PredictedGain, score_test
-from tautwire.robot.schema import Robot
+from tautwire.robot.schema import EffectSetting, Robot
 from tautwire_fmu.laws.effects import DAMPING, HYSTERESIS, SLACK
 from tests.support.recordings import recorded
 from tests.support.robots import example
@@ -69,6 +71,28 @@ def test_a_predicted_gain_that_cannot_be_fitted_is_dropped(monkeypatch: pytest.M
     monkeypatch.setattr(fitter, "judged", unheld)
     unrun = PredictedGain(1.0, {"force": 0.5, "yield_strain": 1e-5})
     assert grid_search(context, context.robot, (), sample, {STICKY: unrun})[STICKY].gain > 1000.0
+
+
+def test_beside_a_disturbance_the_first_samples_rank_and_all_tell_the_gain(monkeypatch: pytest.MonkeyPatch) -> None:
+    context, fitter, _ = looked({"slack": {"softness": 400.0}})
+    noise = replace(fitter.noise, disturbance=disturbance_prior(context.robot, fitter.noise).median)
+    recording = recorded("three", 3, {"slack": {"softness": 400.0}})
+    sample = split_data(context.robot, noise, recording, recording).estimation
+    count = len(sample.rows)
+    beside, runs = Fitter(noise), []
+    judged = beside.judged
+    monkeypatch.setattr(beside, "judged", lambda *asked: runs.append(asked[2]) or judged(*asked))
+    context = replace(context, fitter=beside)
+    found = grid_search(context, context.robot, (), sample, {SOFT: PredictedGain(0.0, {})})[SOFT]
+    assert sum(len(each.rows) == count for each in runs) == 2 < len(runs)
+    without, softened = (
+        judged(robot, chosen, sample).log_likelihood(sample.rows)
+        for robot, chosen in (
+            (context.robot, ()),
+            (context.robot.with_effect(EffectSetting("slack", found.values, ALL)), (SOFT,)),
+        )
+    )
+    assert found.gain == pytest.approx(softened - without)
 
 
 def test_scales_are_looked_at_from_the_largest_each_with_all_shapes() -> None:

@@ -41,31 +41,53 @@ def grid_search(
 ) -> dict[Hypothesis, PredictedGain]:
     """Grid search of the hypotheses that have grid values: the best grid point, or the prediction if it gains more.
 
-    ``robot`` has the accepted hypotheses, whose parameters stay as they are.
+    ``robot`` has the accepted hypotheses, whose parameters stay as they are. Beside a disturbance, with a slow filter,
+    grid points are ranked by the first samples, and the gain of the best one alone is that of all.
     """
     candidates = [hypothesis for hypothesis in predictions if any(p.grid_values for p in hypothesis.parameters)]
     if not candidates:
         return {}
     fitter, policy = context.fitter, context.policy.grid_search
-    baseline = fitter.judged(robot, accepted, data).log_likelihood(data.rows)
-    tasks = [GridTask(robot, tuple(with_hypothesis(accepted, h)), predictions[h], baseline) for h in candidates]
-    results = context.workers.map_unordered(best_grid_point, [(fitter, task, data, policy) for task in tasks])
+    whole = Baseline(data, fitter.judged(robot, accepted, data).log_likelihood(data.rows))
+    ranking = whole
+    if fitter.has_disturbance:
+        head = data.head(context.policy.fit)
+        ranking = Baseline(head, fitter.judged(robot, accepted, head).log_likelihood(head.rows))
+    tasks = [GridTask(robot, tuple(with_hypothesis(accepted, h)), predictions[h], ranking, whole) for h in candidates]
+    results = context.workers.map_unordered(best_grid_point, [(fitter, task, policy) for task in tasks])
     return {candidates[number]: prospect for number, prospect in results}
 
 
 @dataclass(frozen=True)
+class Baseline:
+    """Samples, and their log-likelihood without the hypothesis that a grid search tries."""
+
+    data: DataSet
+    log_likelihood: float
+
+
+@dataclass(frozen=True)
 class GridTask:
-    """Grid search of the last of the chosen hypotheses; ``baseline`` is the log-likelihood of the data without it."""
+    """Grid search of the last of the chosen hypotheses: what ranks its points, and what the best one's gain is on."""
 
     robot: Robot
     chosen: tuple[Hypothesis, ...]
     prediction: PredictedGain
-    baseline: float
+    ranking: Baseline
+    whole: Baseline
 
 
-def best_grid_point(fitter: Fitter, task: GridTask, data: DataSet, policy: GridSearchPolicy) -> PredictedGain:
+def best_grid_point(fitter: Fitter, task: GridTask, policy: GridSearchPolicy) -> PredictedGain:
     """Best grid point of a task, or its predicted values where they gain more."""
-    prediction, gains = task.prediction, []
+    best = _best_ranked_point(fitter, task, policy)
+    if task.ranking is task.whole or best is task.prediction:
+        return best
+    gain = _gain_at(fitter, task, task.whole, best.values)
+    return PredictedGain(gain, best.values) if isfinite(gain) else task.prediction
+
+
+def _best_ranked_point(fitter: Fitter, task: GridTask, policy: GridSearchPolicy) -> PredictedGain:
+    prediction, data, gains = task.prediction, task.ranking, []
     if prediction.values and isfinite(simulated_gain := _gain_at(fitter, task, data, prediction.values)):
         gains.append((simulated_gain, prediction))
     for shapes in grid_points(task.chosen[-1]):
@@ -123,12 +145,12 @@ def grid_points(hypothesis: Hypothesis) -> Iterator[list[dict[str, float]]]:
         yield [dict(zip(names, (*scale_values, *values), strict=True)) for values in shaped]
 
 
-def _gain_at(fitter: Fitter, task: GridTask, data: DataSet, values: Mapping[str, float]) -> float:
+def _gain_at(fitter: Fitter, task: GridTask, baseline: Baseline, values: Mapping[str, float]) -> float:
     """Gain of log-likelihood with the last of the chosen at some values; NaN where the cables cannot hold them."""
     start = task.chosen[-1].setting(task.robot)
     setting = EffectSetting(start.name, {**start.values, **values}, start.cables)
     try:
-        innovations = fitter.judged(task.robot.with_effect(setting), task.chosen, data)
-        return innovations.log_likelihood(data.rows) - task.baseline
+        innovations = fitter.judged(task.robot.with_effect(setting), task.chosen, baseline.data)
+        return innovations.log_likelihood(baseline.data.rows) - baseline.log_likelihood
     except UnreachableError:
         return float("nan")
