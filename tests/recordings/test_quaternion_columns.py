@@ -152,10 +152,16 @@ def test_a_norm_that_is_not_1_is_refused_with_its_line_and_the_bound(tmp_path: P
     shows_the_turning(recording_from_frame(table, 3))
 
 
-def test_a_quaternion_of_zeros_is_refused(tmp_path: Path) -> None:
+def test_zeros_are_where_the_tracker_had_lost_the_platform(tmp_path: Path) -> None:
     table = frame()
-    table.loc[3, list(QUATERNION_COLUMNS)] = 0.0
-    assert "has the norm 0 in" in refused(table, tmp_path).problem
+    table.loc[3:5, list(QUATERNION_COLUMNS)] = 0.0
+    path = tmp_path / "fit.csv"
+    table.to_csv(path, index=False)
+    recording = read_recording(path, 3)
+    assert list(recording_errors(path, 3)) == []
+    assert np.flatnonzero(np.isnan(recording.orientation).all(axis=1)).tolist() == [3, 4, 5]
+    shows_the_turning(recording, slice(6, None))
+    assert recording.notes == (f"{path}: qw, qx, qy, qz: 3 samples of zeros are no orientation: not used",)
 
 
 def test_a_quaternion_with_empty_cells_is_refused(tmp_path: Path) -> None:

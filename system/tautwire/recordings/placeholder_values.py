@@ -1,4 +1,4 @@
-"""Placeholders among positions and tensions: one value that a sensor writes while it measures nothing."""
+"""Placeholders among what was measured: one value that a sensor writes while it measures nothing."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
-from ..robot.schema import AXES
+from ..robot.schema import AXES, QUATERNION_COLUMNS
 
 Array = NDArray[np.float64]
 
@@ -19,10 +19,11 @@ MAX_SHARE = 0.5
 
 
 def without_placeholders(columns: Mapping[str, Array]) -> tuple[dict[str, Array], tuple[str, ...]]:
-    """Positions and tensions (N,) without placeholders, as NaN, and a note on each.
+    """Positions, quaternions and tensions (N,) without placeholders, as NaN, and a note on each.
 
     A placeholder is one value, repeated exactly in a run or in several, to which the coordinates together, or a tension
-    alone, jump and from which they jump back; that of a tension is outside what the cell shows otherwise.
+    alone, jump and from which they jump back; that of a tension is outside what the cell shows otherwise. That of a
+    quaternion is zero, which is no orientation.
     """
     changed, notes = dict(columns), []
     axes = [name for name in AXES if name in columns]
@@ -35,6 +36,11 @@ def without_placeholders(columns: Mapping[str, Array]) -> tuple[dict[str, Array]
         notes.append(f"{', '.join(names)}: {count} are where nothing was measured, and not used")
         for name in names:
             changed[name] = np.where(rows, np.nan, columns[name])
+    if all(name in columns for name in QUATERNION_COLUMNS):
+        rows = np.all([columns[name] == 0.0 for name in QUATERNION_COLUMNS], axis=0)
+        if rows.any():
+            notes.append(f"{', '.join(QUATERNION_COLUMNS)}: {rows.sum()} samples of zeros are no orientation: not used")
+        changed |= {name: np.where(rows, np.nan, columns[name]) for name in QUATERNION_COLUMNS}
     return changed, tuple(notes)
 
 

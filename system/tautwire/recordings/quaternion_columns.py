@@ -19,8 +19,11 @@ MAX_NORM_ERROR = 0.01
 def quaternion_problem(quaternion: Mapping[str, float]) -> tuple[str, str] | None:
     """What is wrong with the quaternion of a sample, by its columns, and the hint; None where it is valid or missing.
 
-    All four numbers are missing (NaN) or none, and their norm is within 1 % of 1.
+    All four numbers are missing (NaN) or none; they are all zero, as a tracker writes them that has lost the platform,
+    or their norm is within 1 % of 1.
     """
+    if not any(quaternion.values()):
+        return None
     missing = [name for name, value in quaternion.items() if np.isnan(value)]
     hint = f"write a unit quaternion, or leave all of {', '.join(quaternion)} empty where the tracker lost the platform"
     if missing:
