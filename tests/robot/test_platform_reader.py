@@ -18,7 +18,7 @@ from tautwire.robot.robot_file_reader import read_robot, read_robot_with_sink, r
 from tautwire.robot.robot_file_text import robot_text
 from tautwire.robot.robot_file_writer import write_robot
 from tautwire.robot.schema import Robot
-from tests.support.rigid_robots import crane_robot, suspended_robot
+from tests.support.rigid_robots import crane_robot, suspended_robot, underactuated_robot
 from tests.support.robots import EXAMPLES
 
 HEAD = """\
@@ -217,6 +217,17 @@ def test_edited_files_keep_the_owner_s_comments(tmp_path: Path) -> None:
     assert text is not None and "# from CAD" in text and "# bolt A" in text and "# weighed" in text
     write_robot(changed, tmp_path / "out.toml", source=source)
     assert read_robot(tmp_path / "out.toml") == changed
+
+
+def test_a_swivel_axis_of_a_few_digits_is_written_and_read_back_as_a_unit_vector(tmp_path: Path) -> None:
+    robot = underactuated_robot()
+    write_robot(robot, tmp_path / "robot.toml")
+    again = read_robot(tmp_path / "robot.toml")
+    for cable, read in zip(robot.cables, again.cables, strict=True):
+        assert np.linalg.norm(cable.swivel_axis) != 1.0
+        assert np.linalg.norm(read.swivel_axis) == pytest.approx(1.0, abs=1e-15)
+        assert replace(read, swivel_axis=cable.swivel_axis) == cable
+        assert read.swivel_axis == pytest.approx(cable.swivel_axis, abs=1e-8)
 
 
 def test_a_rigid_robot_reads_back_from_its_file(tmp_path: Path) -> None:

@@ -22,6 +22,12 @@ MAX_ASYMMETRY = 1e-6
 NO_POINT = (math.nan, math.nan, math.nan)
 
 
+def normalised(numbers: tuple[float, ...]) -> tuple[float, ...]:
+    """A vector with norm 1; what was normalised once stays as it is, so that files read back equal."""
+    norm = math.hypot(*numbers)
+    return numbers if abs(norm - 1.0) <= NORM_ROUNDING else tuple(number / norm for number in numbers)
+
+
 class CheckedTable:
     """One table of a file, at ``key_path``, with validated access to its values.
 
@@ -88,8 +94,7 @@ class CheckedTable:
             scaled = ", ".join(f"{number / norm:.6g}" for number in numbers) if norm > 0.0 else ""
             problem = f"has norm {norm:.6g}, must have 1 within {MAX_NORM_ERROR:g}"
             self.refuse(key, problem, hint + (f", such as [{scaled}]" if scaled else ""))
-        # What was normalised once stays as it is, so that files read back equal.
-        return numbers if abs(norm - 1.0) <= NORM_ROUNDING else tuple(number / norm for number in numbers)
+        return normalised(numbers)
 
     def symmetric_matrix(self, key: str, meaning: str) -> tuple[Point, Point, Point]:
         """Three rows of three numbers, symmetric."""

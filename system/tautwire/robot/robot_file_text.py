@@ -9,6 +9,7 @@ from dataclasses import replace
 from tautwire_fmu.laws.effects import BY_NAME
 from tautwire_fmu.laws.formula import VARIABLES_BY_TARGET
 
+from .checked_table import normalised
 from .recorded_columns import COLUMN_NUMBERS
 from .schema import (
     PER_CABLE_COMPONENTS,
@@ -49,9 +50,13 @@ def robot_text(robot: Robot) -> str:
 
 
 def completed_robot(robot: Robot) -> Robot:
-    """The robot with the neutral values of its effects filled in."""
+    """The robot with the neutral values of its effects filled in, and unit vectors that are not only nearly ones."""
     effects = (replace(s, values=BY_NAME[s.name].completed_values(s.values)) for s in robot.effects)
-    return replace(robot, effects=tuple(effects))
+    axes = [normalised(cable.swivel_axis) for cable in robot.cables]
+    cables = (replace(cable, swivel_axis=(x, y, z)) for cable, (x, y, z) in zip(robot.cables, axes, strict=True))
+    w, x, y, z = normalised(robot.platform.start_orientation)
+    platform = replace(robot.platform, start_orientation=(w, x, y, z))
+    return replace(robot, platform=platform, cables=tuple(cables), effects=tuple(effects))
 
 
 def _number_line(key: str, value: float, comment: str) -> str:
