@@ -180,7 +180,7 @@ class CompiledFilter:
 
     @cached_property
     def _preparation(self) -> CompiledFunction:
-        function = preparation_function(self.model, self._noise, self._constant_count)
+        function = preparation_function(self.model, self._noise, self._constant_count, self._has_sensitivities)
         return CompiledFunction(function, max_compiled=sys.maxsize)
 
     @cached_property
@@ -191,7 +191,7 @@ class CompiledFilter:
     @cached_property
     def _slopes(self) -> CompiledFunction:
         arguments = (self.model, self._cable_count, self._noise, self._substeps, self._constant_count)
-        return CompiledFunction(slope_function(*arguments), max_compiled=sys.maxsize)
+        return CompiledFunction(slope_function(*arguments, self._has_sensitivities), max_compiled=sys.maxsize)
 
     @cached_property
     def _process(self) -> CompiledFunction:

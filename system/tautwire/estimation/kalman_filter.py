@@ -106,12 +106,15 @@ def process_function(model: SymbolicModel, cable_count: int, noise: Noise) -> Fu
     return Function("process", [step, drift, density, disturbance.arguments], [decay, process_noise])
 
 
-def preparation_function(model: SymbolicModel, noise: Noise, constant_count: int = 0) -> Function:
+def preparation_function(
+    model: SymbolicModel, noise: Noise, constant_count: int = 0, has_sensitivities: bool = True
+) -> Function:
     """What stays the same while a step is integrated: parameters, disturbance and constants, and the static start.
 
     Arguments: state, parameters, time step, disturbance. Results: the constants of :func:`trajectory_function` (q,);
     the derivatives of the static start, which are the last s of them, by the others (s, q - s); and what the
-    disturbances that drive the model are multiplied by, for their means over the step (d,).
+    disturbances that drive the model are multiplied by, for their means over the step (d,). Without sensitivities
+    there are no derivatives but those by the disturbances, on which the start does not depend: (0, d).
     """
     disturbance = disturbance_symbols(model, noise)
     state, step = SX.sym("state", model.states.numel() + disturbance.count), SX.sym("step")
@@ -120,6 +123,8 @@ def preparation_function(model: SymbolicModel, noise: Noise, constant_count: int
     driving = disturbance.mean_driving(state, step)
     theta = casadi.vertcat(model.parameters, driving, state[moving : model.states.numel()])
     statics, by_theta = _statics_at(reduced, theta)
+    if not has_sensitivities:
+        by_theta = SX(0, disturbance.driving_count)
     results = [casadi.vertcat(theta, statics), by_theta, disturbance.mean_decay(step)]
     return Function("preparation", [state, model.parameters, step, disturbance.arguments], results)
 
@@ -144,18 +149,28 @@ def trajectory_function(
 
 
 def slope_function(
-    model: SymbolicModel, cable_count: int, noise: Noise, substeps: Substeps, constant_count: int = 0
+    model: SymbolicModel,
+    cable_count: int,
+    noise: Noise,
+    substeps: Substeps,
+    constant_count: int = 0,
+    has_sensitivities: bool = True,
 ) -> Function:
     """Jacobians of the rates of the moving states in the middle of one of the parts of a step.
 
     Arguments: moving states, constants as :func:`preparation_function` gives them, speed, next speed, and the number of
-    the part, from 0. Results: Jacobians by the moving states (n, n), and by the constants (n, q).
+    the part, from 0. Results: Jacobians by the moving states (n, n), and by the constants (n, q); without sensitivities
+    by the disturbances among them alone (n, d).
     """
-    driven = disturbance_symbols(model, noise).driven(model)
+    disturbance = disturbance_symbols(model, noise)
+    driven = disturbance.driven(model)
     reduced = _with_statics_as_parameters(constants_as_parameters(driven, constant_count))
     speed, later, index = SX.sym("speed", cable_count), SX.sym("later", cable_count), SX.sym("index")
     middle = speed + (index + 0.5) / substeps.slope * (later - speed)
-    jacobians = [casadi.jacobian(reduced.rates, symbol) for symbol in (reduced.states, reduced.parameters)]
+    own_count, varied = model.parameters.numel(), reduced.parameters
+    if not has_sensitivities:
+        varied = varied[own_count : own_count + disturbance.driving_count]
+    jacobians = [casadi.jacobian(reduced.rates, symbol) for symbol in (reduced.states, varied)]
     slopes = Function("slope", [reduced.states, reduced.inputs, reduced.parameters], jacobians)
     results = slopes(reduced.states, with_no_wrench(reduced, middle), reduced.parameters)
     return Function("slopes", [reduced.states, reduced.parameters, speed, later, index], list(results))

@@ -76,7 +76,8 @@ class Integration(NamedTuple):
     ``preparation`` gives the constants (1, q) of the others: parameters, driving disturbances, uncertain constants, and
     the static start, with the derivatives of the latter by the former (q - s, s), and factors (1, d) of the former's
     driving disturbances. ``part`` takes ``moving`` states (1, n) over the part ``index`` (1, 1) of a step; ``slope``
-    gives the Jacobians of the rates at a ``middle`` (1, n) of a part by states (n, n) and by constants (q, n).
+    gives the Jacobians of the rates at a ``middle`` (1, n) of a part by states (n, n) and by constants (q, n). Without
+    sensitivities derivatives are by driving disturbances alone, (d, 0) and (d, n), and c and p are 0.
     ``steps`` (K,) are in s. Results: ``moving``, and derivatives of it by the states before, uncertain constants and
     driving disturbances, ``transition`` (n + c + d, n), and by parameters, ``direct`` (p, n).
     """
@@ -132,7 +133,7 @@ def _move(integration: Integration, state: Any, k: int) -> Any:
 @compiled
 def _differentiate(integration: Integration, middles: Any, k: int) -> None:
     """Derivatives of the end of the step, from the Jacobians in the middle of each larger part."""
-    division, size, count = integration.division, middles.shape[1], integration.constants.shape[1]
+    division, size, count = integration.division, middles.shape[1], len(integration.slope.results[1])
     part = integration.steps[k] / division.slope
     transition, by_constants = np.eye(size), np.zeros((count, size))
     places = np.empty_like(integration.slope.places)
@@ -146,7 +147,8 @@ def _differentiate(integration: Integration, middles: Any, k: int) -> None:
         for r in range(size):
             over_part[r, r] += 1.0
         transition = _product(over_part, transition)
-        by_constants = np.dot(by_constants, over_part.T) + np.dot(slopes, gamma.T)
+        if count > 0:
+            by_constants = np.dot(by_constants, over_part.T) + np.dot(slopes, gamma.T)
     _fill_in(integration, transition, by_constants)
 
 
@@ -170,7 +172,8 @@ def _fill_in(integration: Integration, transition: Any, by_constants: Any) -> No
     """Sort derivatives by constants, those of the static start by what it depends on, into the results."""
     by_theta, factors = integration.preparation.results[1], integration.preparation.results[2][0]
     theta_count, size, driving = len(by_theta), len(transition), len(factors)
-    by_constants[:theta_count] += np.dot(by_theta, by_constants[theta_count:])
+    if by_theta.shape[1] > 0:
+        by_constants[:theta_count] += np.dot(by_theta, by_constants[theta_count:])
     result = integration.transition
     result[:size] = transition.T
     constant_count = len(result) - size - driving
