@@ -16,7 +16,7 @@ from tautwire.robot.kinematics import inverse_kinematics, structure_matrix
 from tautwire.robot.robot_assembly import assemble_robot
 from tautwire.robot.schema import EffectSetting
 from tautwire.robot.static_equilibrium import static_tensions
-from tautwire.robot.symbolic_model import CASADI_MATHEMATICS
+from tautwire.robot.symbolic_equations import CASADI_MATHEMATICS
 from tests.support.fmus import Hand, in_hand
 from tests.support.robots import paper_robot
 

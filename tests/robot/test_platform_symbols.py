@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from tautwire.robot.platform_symbols import PlatformSymbols, StateIndices, platform_symbols
-from tautwire.robot.symbolic_model import CASADI_MATHEMATICS
+from tautwire.robot.symbolic_equations import CASADI_MATHEMATICS
 from tautwire_fmu.laws.point_mass import PointMassConstants
 from tests.support.rigid_robots import crane_robot
 

@@ -25,7 +25,8 @@ from tautwire_fmu.laws.rotation import multiply, quaternion_of, rotation_vector_
 from tautwire_fmu.laws.vectors import Vector, scale
 
 from ..robot.platform_symbols import vector_of
-from ..robot.symbolic_model import CASADI_MATHEMATICS, SymbolicModel
+from ..robot.symbolic_equations import CASADI_MATHEMATICS
+from ..robot.symbolic_model import SymbolicModel
 
 
 @dataclass(frozen=True)

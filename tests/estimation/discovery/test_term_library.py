@@ -5,7 +5,7 @@ import numpy as np
 
 from tautwire.estimation.discovery.candidate_terms import SHAPE_PARAMETER, Term, candidate_terms, signal_ranges
 from tautwire.estimation.discovery.formula_ports import PortSignals
-from tautwire.robot.symbolic_model import CASADI_MATHEMATICS
+from tautwire.robot.symbolic_equations import CASADI_MATHEMATICS
 from tautwire_fmu.laws.expression import evaluate, parse_expression
 from tautwire_fmu.laws.formula import CABLE_VARIABLES, FORCE_TARGETS, PLATFORM_VARIABLES, VARIABLES_BY_TARGET
 from tests.support.robots import example

@@ -10,7 +10,7 @@ import pint
 import pytest
 
 from tautwire.robot.robot_assembly import NUMPY_MATHEMATICS
-from tautwire.robot.symbolic_model import CASADI_MATHEMATICS
+from tautwire.robot.symbolic_equations import CASADI_MATHEMATICS
 from tautwire_fmu.laws.cable import (
     LAWS,
     CableConstants,

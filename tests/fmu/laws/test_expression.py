@@ -9,7 +9,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from tautwire.robot.symbolic_model import CASADI_MATHEMATICS
+from tautwire.robot.symbolic_equations import CASADI_MATHEMATICS
 from tautwire_fmu.laws.expression import (
     MAX_CHARACTERS,
     MAX_NESTING,

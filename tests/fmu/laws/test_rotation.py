@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from tautwire.robot.symbolic_model import CASADI_MATHEMATICS
+from tautwire.robot.symbolic_equations import CASADI_MATHEMATICS
 from tautwire_fmu.laws.mathematics import COMPLEX_STEP, REAL, rate_of, with_rate
 from tautwire_fmu.laws.rotation import (
     IDENTITY,
