@@ -95,6 +95,23 @@ def test_beside_a_disturbance_the_first_samples_rank_and_all_tell_the_gain(monke
     assert found.gain == pytest.approx(softened - without)
 
 
+def test_an_effect_that_is_not_felt_in_the_first_samples_is_looked_for_in_all(monkeypatch: pytest.MonkeyPatch) -> None:
+    context, fitter, _ = looked({"slack": {"softness": 400.0}})
+    noise = replace(fitter.noise, disturbance=disturbance_prior(context.robot, fitter.noise).median)
+    recording = recorded("three", 3, {"slack": {"softness": 400.0}})
+    sample = split_data(context.robot, noise, recording, recording).estimation
+    beside = Fitter(noise)
+    judged = beside.judged
+
+    def felt_late(robot: Robot, chosen: Sequence[Hypothesis], data: DataSet) -> Innovations:
+        return judged(robot, chosen, data) if data is sample else judged(context.robot, (), data)
+
+    monkeypatch.setattr(beside, "judged", felt_late)
+    context = replace(context, fitter=beside)
+    found = grid_search(context, context.robot, (), sample, {SOFT: PredictedGain(0.0, {})})[SOFT]
+    assert found.values == {"softness": 300.0}
+
+
 def test_scales_are_looked_at_from_the_largest_each_with_all_shapes() -> None:
     groups = list(grid_points(STICKY))
     values = [each for group in groups for each in group]

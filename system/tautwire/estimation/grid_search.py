@@ -42,7 +42,7 @@ def grid_search(
     """Grid search of the hypotheses that have grid values: the best grid point, or the prediction if it gains more.
 
     ``robot`` has the accepted hypotheses, whose parameters stay as they are. Beside a disturbance, with a slow filter,
-    grid points are ranked by the first samples, and the gain of the best one alone is that of all.
+    the first samples rank the grid points, unless no effect is felt there, and all tell the gain of the best one.
     """
     candidates = [hypothesis for hypothesis in predictions if any(p.grid_values for p in hypothesis.parameters)]
     if not candidates:
@@ -60,7 +60,7 @@ def grid_search(
 
 @dataclass(frozen=True)
 class Baseline:
-    """Samples, and their log-likelihood without the hypothesis that a grid search tries."""
+    """Samples by which grid points are judged, and their log-likelihood without the hypothesis that is tried."""
 
     data: DataSet
     log_likelihood: float
@@ -79,24 +79,30 @@ class GridTask:
 
 def best_grid_point(fitter: Fitter, task: GridTask, policy: GridSearchPolicy) -> PredictedGain:
     """Best grid point of a task, or its predicted values where they gain more."""
-    best = _best_ranked_point(fitter, task, policy)
+    ranked = _ranked_points(fitter, task, task.ranking, policy)
+    if all(abs(gain) < policy.negligible_gain for gain, _ in ranked) and task.ranking is not task.whole:
+        ranked = _ranked_points(fitter, task, task.whole, policy)
+    _, best = max(ranked, key=lambda each: each[0], default=(0.0, task.prediction))
     if task.ranking is task.whole or best is task.prediction:
         return best
     gain = _gain_at(fitter, task, task.whole, best.values)
     return PredictedGain(gain, best.values) if isfinite(gain) else task.prediction
 
 
-def _best_ranked_point(fitter: Fitter, task: GridTask, policy: GridSearchPolicy) -> PredictedGain:
-    prediction, data, gains = task.prediction, task.ranking, []
-    if prediction.values and isfinite(simulated_gain := _gain_at(fitter, task, data, prediction.values)):
-        gains.append((simulated_gain, prediction))
+def _ranked_points(
+    fitter: Fitter, task: GridTask, baseline: Baseline, policy: GridSearchPolicy
+) -> list[tuple[float, PredictedGain]]:
+    """The prediction, and the grid points down to the first that is not felt, each after its gain."""
+    prediction, ranked = task.prediction, []
+    if prediction.values and isfinite(simulated_gain := _gain_at(fitter, task, baseline, prediction.values)):
+        ranked.append((simulated_gain, prediction))
     for shapes in grid_points(task.chosen[-1]):
         points = [{**prediction.values, **values} for values in shapes]
-        point_gains = [_gain_at(fitter, task, data, values) for values in points]
-        gains += [(g, PredictedGain(g, values)) for g, values in zip(point_gains, points, strict=True) if isfinite(g)]
-        if all(abs(gain) < policy.negligible_gain for gain in point_gains):
+        gains = [_gain_at(fitter, task, baseline, values) for values in points]
+        ranked += [(g, PredictedGain(g, values)) for g, values in zip(gains, points, strict=True) if isfinite(g)]
+        if all(abs(gain) < policy.negligible_gain for gain in gains):
             break
-    return max(gains, key=lambda each: each[0], default=(0.0, prediction))[1]
+    return ranked
 
 
 def detectable_value(
