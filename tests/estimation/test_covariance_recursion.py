@@ -2,12 +2,16 @@
 
 from __future__ import annotations
 
+from hashlib import sha256
+from pathlib import Path
+
 import numpy as np
 import pytest
 from casadi import SX, Function, horzcat, mtimes, vertcat
 from numpy.typing import NDArray
 
-from tautwire.estimation.covariance_recursion import Moments, Record, Samples, run_recursion
+from tautwire.estimation import step_integration
+from tautwire.estimation.covariance_recursion import STEP_INTEGRATION_SHA256, Moments, Record, Samples, run_recursion
 from tautwire.estimation.native_functions import BoundFunction, CompiledFunction
 from tautwire.estimation.step_integration import Division, Integration, Step
 
@@ -128,3 +132,9 @@ def test_sensitivities_are_derivatives_by_a_parameter_of_a_linear_model() -> Non
             updated = state - gain @ rows @ state + NOISE_AT_START
             state = FULL_TRANSITION @ updated @ FULL_TRANSITION.T + NOISE_AT_END
         assert moments.sensitivities[parameter] == pytest.approx(change)
+
+
+def test_cached_machine_code_follows_the_integration_that_it_calls() -> None:
+    source = Path(step_integration.__file__).read_text(encoding="utf-8")
+    digest = sha256(source.encode()).hexdigest()
+    assert digest == STEP_INTEGRATION_SHA256, f"set STEP_INTEGRATION_SHA256 to {digest}"

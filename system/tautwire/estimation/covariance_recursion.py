@@ -10,8 +10,7 @@ the former is there from the step's start, so that what decays within a step fol
 
     P <- [F; diag d] (P + diag [q; 0]) [F; diag d]' + diag [0; q]
 
-Sensitivities to the free parameters are propagated with the gain held fixed. Of many states, those of a platform on
-eight cables whose survey is uncertain, products of matrices by the linear algebra library take half the time of loops.
+Sensitivities to the free parameters are propagated with the gain held fixed.
 
 Source: Bierman (1977), Factorization Methods for Discrete Sequential Estimation, ch. 2; Ljung (1999), ch. 11.
 """
@@ -23,6 +22,9 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from .step_integration import Integration, Step, compiled, evaluate, integrate_step
+
+# Numba caches machine code by the content of this file alone, and what it calls of that module is in it.
+STEP_INTEGRATION_SHA256 = "b3a6bc7df5804ce37ae8edbc75434cf57fc9a01502c97f7678e454046385670a"
 
 
 class Moments(NamedTuple):
@@ -90,9 +92,9 @@ def run_recursion(
 def _update_by_measurements(
     results: tuple[Any, ...], moments: Moments, samples: Samples, record: Record, k: int
 ) -> None:
-    """Update by the outputs of sample k: one after the other, the state's moments by all of them at once.
+    """Update by the outputs of sample k.
 
-    Elimination of each output from those behind it leaves what the former do not predict of the latter.
+    Gaussian elimination leaves of each output what those before it do not predict; the moments follow all at once.
     """
     by_state, white_variances = results[1], samples.white_variances
     innovations = samples.measured[k] - results[0][0]
@@ -103,8 +105,7 @@ def _update_by_measurements(
         variance = variances[i, i] + white_variances[i]
         deviation = np.sqrt(variance)
         innovations[i] /= deviation
-        for a in range(len(slopes)):
-            slopes[a, i] /= deviation
+        slopes[:, i] /= deviation
         record.values[k, i], record.log_variances[k, i] = innovations[i], np.log(variance)
         record.sensitivities[k, :, i] = slopes[:, i]
         if samples.observed[k, i] == 0.0:
@@ -116,10 +117,8 @@ def _update_by_measurements(
             factor = variances[later, i] / deviation
             innovations[later] -= factor * innovations[i]
             cross_covariances[later] -= factor * cross_covariances[i]
-            for a in range(len(slopes)):
-                slopes[a, later] -= factor * slopes[a, i]
-            for j in range(i + 1, len(innovations)):
-                variances[later, j] -= factor * variances[i, j] / deviation
+            slopes[:, later] -= factor * slopes[:, i]
+            variances[later] -= factor / deviation * variances[i]
     moments.state[:] += np.dot(innovations, cross_covariances)
     moments.sensitivities[:] += np.dot(slopes, cross_covariances)
     moments.covariance[:] -= np.dot(cross_covariances.T, cross_covariances)
