@@ -17,7 +17,9 @@ from tautwire.recordings.recording import read_recording
 from tautwire.recordings.recording_table import is_column_name
 from tautwire.recordings.value_proposal import with_values
 from tautwire.recordings.winch_columns import ProposedFile, with_winch_scales
-from tautwire.robot.schema import Robot
+from tautwire.robot.schema import QUATERNION_COLUMNS, Robot
+from tests.support.rigid_recordings import rigid_recording, with_noise
+from tests.support.rigid_robots import octahedral_robot
 from tests.support.robots import EXAMPLES
 
 Array = NDArray[np.float64]
@@ -166,6 +168,19 @@ def test_what_the_coordinates_do_not_fit_stays_as_its_name_has_it(robot: Robot, 
     assert {each.factor for each in columns.values()} == {None}
     assert all("add factor = metres per count" in each.doubt for each in columns.values())
     assert proposed({"enc_1": one} | axes(recorded), None)["rope_length_1"].factor is None
+
+
+def test_a_tracker_that_wrote_zeros_for_a_lost_platform_tells_the_factor_of_counts_too() -> None:
+    turning = octahedral_robot()
+    frame = rigid_recording(with_noise(turning), 800).frame()
+    values = {str(name): frame[name].to_numpy(copy=True) for name in frame}
+    wound = np.array([np.cumsum(values.pop(f"winch_speed_{cable}")) for cable in range(1, 7)])
+    steps = np.diff(values["time"])
+    for cable, each in enumerate(wound, start=1):
+        values[f"encoder_{cable}"] = np.round(each * steps[0] / -2.5e-6)
+    values |= {name: np.where(np.arange(len(steps) + 1) < 5, 0.0, values[name]) for name in QUATERNION_COLUMNS}
+    factors = [each.factor for each in proposed(values, turning, cables=6).values()]
+    assert factors == pytest.approx([2.5e-6] * 6, rel=0.02)
 
 
 def test_clock_times_are_in_seconds_whatever_their_doubt() -> None:

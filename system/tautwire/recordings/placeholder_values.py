@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..robot.schema import AXES, QUATERNION_COLUMNS
+from .quaternion_columns import zero_quaternions
 
 Array = NDArray[np.float64]
 
@@ -37,10 +38,10 @@ def without_placeholders(columns: Mapping[str, Array]) -> tuple[dict[str, Array]
         for name in names:
             changed[name] = np.where(rows, np.nan, columns[name])
     if all(name in columns for name in QUATERNION_COLUMNS):
-        rows = np.all([columns[name] == 0.0 for name in QUATERNION_COLUMNS], axis=0)
+        rows = zero_quaternions(np.column_stack([columns[name] for name in QUATERNION_COLUMNS]))
         if rows.any():
             notes.append(f"{', '.join(QUATERNION_COLUMNS)}: {rows.sum()} samples of zeros are no orientation: not used")
-        changed |= {name: np.where(rows, np.nan, columns[name]) for name in QUATERNION_COLUMNS}
+            changed |= {name: np.where(rows, np.nan, columns[name]) for name in QUATERNION_COLUMNS}
     return changed, tuple(notes)
 
 

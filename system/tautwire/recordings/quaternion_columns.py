@@ -35,6 +35,11 @@ def quaternion_problem(quaternion: Mapping[str, float]) -> tuple[str, str] | Non
     return f"has the norm {norm:.4g} in {', '.join(quaternion)}, must be within {MAX_NORM_ERROR:.0%} of 1", hint
 
 
+def zero_quaternions(quaternions: Array) -> NDArray[np.bool_]:
+    """Rows (N,) of quaternions (N, 4) that are zero: no orientation, as trackers write that have lost the platform."""
+    return np.all(quaternions == 0.0, axis=1)
+
+
 def are_valid(quaternions: Array) -> bool:
     """Whether :func:`quaternion_problem` sees none in any row of (N, 4)."""
     is_missing = np.isnan(quaternions)

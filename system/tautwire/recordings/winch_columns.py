@@ -14,7 +14,7 @@ from .column_proposal import ADD_FACTOR, NO_UNIT, NOTHING_SAID, SIGNS, ColumnPro
 from .column_samples import ColumnSamples
 from .encoder_counts import RopeScales, are_counts, rope_scales
 from .geometry_reading import GeometryReading, RecordedPoses, unturned
-from .quaternion_columns import are_valid, unit_quaternions
+from .quaternion_columns import are_valid, unit_quaternions, zero_quaternions
 from .tracked_rows import scales_by_tracker
 from .units import UNITS, find_unit, quantity_of
 from .value_proposal import BY_VALUES, time_unit
@@ -61,7 +61,10 @@ class ProposedFile:
         poses.position[:, robot.axes_in_plane] = position
         if robot.platform.is_rigid_body:
             quaternions = self._columns(QUATERNION_COLUMNS)
-            if quaternions is None or not are_valid(quaternions):
+            if quaternions is None:
+                return None
+            quaternions[zero_quaternions(quaternions)] = np.nan
+            if not are_valid(quaternions):
                 return None
             poses = RecordedPoses(poses.position, unit_quaternions(quaternions))
         return GeometryReading().directions(robot, poses)[0]
