@@ -219,6 +219,13 @@ def test_edited_files_keep_the_owner_s_comments(tmp_path: Path) -> None:
     assert read_robot(tmp_path / "out.toml") == changed
 
 
+def test_a_swivel_axis_of_zeros_is_one_error_among_all(tmp_path: Path) -> None:
+    path, problems = tmp_path / "robot.toml", list[str]()
+    path.write_text(HEAD + CABLES + "swivel_axis = [0.0, 0.0, 0.0]\n", encoding="utf-8")
+    read_robot_with_sink(path, lambda error: problems.append(error.problem))
+    assert problems == ["has norm 0, must have 1 within 0.001"]
+
+
 def test_a_swivel_axis_of_a_few_digits_is_written_and_read_back_as_a_unit_vector(tmp_path: Path) -> None:
     robot = underactuated_robot()
     write_robot(robot, tmp_path / "robot.toml")

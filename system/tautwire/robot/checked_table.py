@@ -23,9 +23,10 @@ NO_POINT = (math.nan, math.nan, math.nan)
 
 
 def normalised(numbers: tuple[float, ...]) -> tuple[float, ...]:
-    """A vector with norm 1; what was normalised once stays as it is, so that files read back equal."""
+    """A vector with norm 1, or zero; what was normalised once stays as it is, so that files read back equal."""
     norm = math.hypot(*numbers)
-    return numbers if abs(norm - 1.0) <= NORM_ROUNDING else tuple(number / norm for number in numbers)
+    needs_scaling = norm > 0.0 and abs(norm - 1.0) > NORM_ROUNDING
+    return tuple(number / norm for number in numbers) if needs_scaling else numbers
 
 
 class CheckedTable:
