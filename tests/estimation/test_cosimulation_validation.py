@@ -3,14 +3,16 @@
 import subprocess
 from collections.abc import Sequence
 from typing import Any
+from zipfile import ZipFile
 
 import numpy as np
 import pytest
 
-from tautwire.cosimulation.robot_cosimulation import CosimulationResult
+from tautwire.cosimulation.robot_cosimulation import CosimulationResult, cosimulate
 from tautwire.estimation.cosimulation_validation import cosimulate_data_set
 from tautwire.estimation.estimation_data import DataSet
 from tautwire.fmus.native import c_toolchain
+from tautwire.fmus.packaging import RobotFmus
 from tautwire.robot.schema import EffectSetting
 from tests.support.recordings import recorded
 from tests.support.robots import example
@@ -33,8 +35,16 @@ def by_python(monkeypatch: pytest.MonkeyPatch) -> CosimulationResult:
         return motion()
 
 
-def test_machine_code_moves_as_python_does(by_python: CosimulationResult) -> None:
+def test_machine_code_moves_as_python_does(by_python: CosimulationResult, monkeypatch: pytest.MonkeyPatch) -> None:
+    sources = []
+
+    def watched(fmus: RobotFmus, *inputs: Any) -> CosimulationResult:
+        sources.extend("sources/all.c" in ZipFile(path).namelist() for path in (fmus.platform, *fmus.cables))
+        return cosimulate(fmus, *inputs)
+
+    monkeypatch.setattr("tautwire.estimation.cosimulation_validation.cosimulate", watched)
     by_machine_code = motion()
+    assert sources == [True] * 4
     assert np.max(np.abs(by_machine_code.position - by_python.position)) < 1e-9
     assert np.max(np.abs(by_machine_code.tension - by_python.tension)) < 1e-5
 

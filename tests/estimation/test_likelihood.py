@@ -6,10 +6,13 @@ import numpy as np
 import pytest
 
 from tautwire.estimation.compiled_filter import FilterInputs, FilterResults, FilterState
+from tautwire.estimation.disturbance_posterior import disturbance_prior
+from tautwire.estimation.integration_steps import Substeps
+from tautwire.estimation.kalman_filter import preparation_function, slope_function
 from tautwire.estimation.likelihood import Likelihood
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.robot.schema import EffectSetting
-from tautwire.robot.symbolic_model import FreeParameter
+from tautwire.robot.symbolic_model import FreeParameter, symbolic_model
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.support.effect_cases import Case, same
 from tests.support.recordings import recorded
@@ -32,6 +35,26 @@ def test_innovations_of_a_true_model_are_white_with_unit_variance(name: str) -> 
     for lag in (1, 2, 5):
         alike = np.mean(values[lag:] * values[:-lag], axis=0)
         assert np.all(np.abs(alike) < 5.0 / np.sqrt(len(values)))
+
+
+def test_given_constants_at_zero_the_filter_is_that_of_the_declared_robot() -> None:
+    uncertain = replace(ROBOT, cables=tuple(replace(c, modulus_uncertainty=0.05 * c.modulus) for c in ROBOT.cables))
+    noise = replace(NOISE, disturbance=disturbance_prior(ROBOT, NOISE).median)
+    conditional = Likelihood(uncertain, (), noise, 0.02).given_constants(np.zeros(3))
+    innovations = conditional.innovations(RECORDING, ())
+    expected = Likelihood(ROBOT, (), noise, 0.02).innovations(RECORDING, ())
+    np.testing.assert_allclose(innovations.log_variances, expected.log_variances, atol=1e-9)
+    np.testing.assert_allclose(innovations.values, expected.values, atol=1e-9)
+
+
+def test_a_filter_without_sensitivities_takes_derivatives_by_disturbances_alone() -> None:
+    noise = replace(NOISE, disturbance=disturbance_prior(ROBOT, NOISE).median)
+    model = symbolic_model(ROBOT.with_effect(EffectSetting("payload", {"mass": 1.0})), [FreeParameter(0, "mass")])
+    slopes = slope_function(model, 3, noise, Substeps(5, 1), has_sensitivities=False)
+    preparation = preparation_function(model, noise, has_sensitivities=False)
+    forces = 3
+    assert slopes.size_out(1) == (model.states.numel(), forces)
+    assert preparation.size_out(1) == (0, forces)
 
 
 def test_slopes_are_the_derivatives_of_the_innovations() -> None:

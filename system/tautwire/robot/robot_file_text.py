@@ -50,7 +50,7 @@ def robot_text(robot: Robot) -> str:
 
 
 def completed_robot(robot: Robot) -> Robot:
-    """The robot with the neutral values of its effects filled in, and unit vectors that are not only nearly ones."""
+    """The robot with the neutral values of its effects filled in, and its unit vectors normalised."""
     effects = (replace(s, values=BY_NAME[s.name].completed_values(s.values)) for s in robot.effects)
     axes = [normalised(cable.swivel_axis) for cable in robot.cables]
     cables = (replace(cable, swivel_axis=(x, y, z)) for cable, (x, y, z) in zip(robot.cables, axes, strict=True))
