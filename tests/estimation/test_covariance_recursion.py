@@ -83,6 +83,7 @@ def recursion(keeps_covariances: bool) -> tuple[Moments, Record]:
     record = Record(
         np.empty((COUNT + 1, SIZE)),
         *np.zeros((2, COUNT * keeps_covariances, SIZE, SIZE)),
+        np.empty((COUNT * keeps_covariances, OUTPUTS, SIZE)),
         *np.empty((2, COUNT, OUTPUTS)),
         np.empty((COUNT, PARAMETERS, OUTPUTS)),
     )
@@ -99,6 +100,7 @@ def test_states_covariances_and_likelihood_are_those_of_the_joint_update() -> No
         assert record.states[k] == pytest.approx(expected_state, rel=1e-10, abs=1e-12)
         assert record.covariances[k] == pytest.approx(expected_covariance, rel=1e-10, abs=1e-12)
         assert record.transitions[k] == pytest.approx(FULL_TRANSITION, abs=1e-14)
+        assert record.output_matrices[k] == pytest.approx(BY_STATE, abs=1e-14)
         seen = OBSERVED[k] > 0.0
         rows, noise = BY_STATE[seen], np.diag(WHITE_VARIANCES[seen])
         variance = rows @ expected_covariance @ rows.T + noise

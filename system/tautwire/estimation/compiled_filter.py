@@ -62,13 +62,15 @@ class FilterState:
 class FilterResults:
     """Predicted ``states`` (n, K + 1) and whitened innovations.
 
-    ``covariances`` of the former and ``transitions`` to the next sample (K, n, n), none unless they are kept;
-    ``values`` and ``log_variances`` (K, m), ``sensitivities`` (K, m, p); ``end`` is the state after the last sample.
+    ``covariances`` of the former, ``transitions`` to the next sample (K, n, n) and ``output_matrices`` (K, m, n), none
+    unless they are kept; ``values`` and ``log_variances`` (K, m), ``sensitivities`` (K, m, p); ``end`` is the state
+    after the last sample.
     """
 
     states: Array
     covariances: Array
     transitions: Array
+    output_matrices: Array
     values: Array
     log_variances: Array
     sensitivities: Array
@@ -161,6 +163,7 @@ class CompiledFilter:
             np.empty((count + 1, size)),
             np.empty((kept_count, size, size)),
             np.zeros((kept_count, size, size)),
+            np.empty((kept_count, output_count, size)),
             np.empty((count, output_count)),
             np.empty((count, output_count)),
             np.empty((count, parameter_count, output_count)),
@@ -172,6 +175,7 @@ class CompiledFilter:
             record.states.T,
             record.covariances,
             record.transitions,
+            record.output_matrices,
             record.values,
             record.log_variances,
             record.sensitivities.swapaxes(1, 2),

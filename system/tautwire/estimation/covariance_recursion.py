@@ -47,13 +47,14 @@ class Record(NamedTuple):
     """Predicted states and innovations that a run fills in.
 
     ``states`` (K + 1, n); unless they are empty, ``covariances`` and ``transitions`` to the next sample (K, n, n), the
-    latter zero before; ``values`` and ``log_variances`` (K, m) of the innovations, and ``sensitivities`` (K, p, m) of
-    these.
+    latter zero before, and ``output_matrices`` (K, m, n); ``values`` and ``log_variances`` (K, m) of the innovations,
+    and ``sensitivities`` (K, p, m) of these.
     """
 
     states: Any
     covariances: Any
     transitions: Any
+    output_matrices: Any
     values: Any
     log_variances: Any
     sensitivities: Any
@@ -75,6 +76,8 @@ def run_recursion(
         if len(record.covariances):
             record.covariances[k] = moments.covariance
         evaluate(outputs, k, output_places)
+        if len(record.output_matrices):
+            record.output_matrices[k] = outputs.results[1].T
         _update_by_measurements(outputs.results, moments, samples, record, k)
         integrate_step(integration, moments.state, k)
         evaluate(process, k, process_places)

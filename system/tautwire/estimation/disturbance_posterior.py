@@ -25,6 +25,7 @@ from numpy.typing import NDArray
 
 from ..robot.schema import Robot
 from .disturbance import Disturbance, OrnsteinUhlenbeck
+from .disturbance_sensitivities import disturbance_sensitivities
 from .estimation_data import DataSet
 from .kalman_filter import Noise
 from .likelihood import Likelihood
@@ -34,7 +35,6 @@ from .preprocessing_policy import DisturbancePolicy
 Array = NDArray[np.float64]
 
 CONCURRENT_EVALUATIONS = 2
-DIFFERENCE_STEP = 1e-3
 
 
 @dataclass(frozen=True)
@@ -114,8 +114,9 @@ class ParameterBox:
 class Evaluation:
     """Posterior log-density at some coordinates, with what it is made of: whitened innovations, logs of variances.
 
-    ``slopes_by_parameters`` (p, N) are those of the innovations by the units of free parameters; ``constants`` (c) the
-    uncertain parameters there, in standard deviations.
+    These count N of the outputs (samples, m), where ``is_counted``. ``slopes_by_parameters`` (p, N) are those of the
+    innovations by the units of free parameters; ``constants`` (c) the uncertain parameters there, in standard
+    deviations.
     """
 
     coordinates: Array
@@ -124,6 +125,7 @@ class Evaluation:
     log_variances: Array
     slopes_by_parameters: Array
     constants: Array
+    is_counted: NDArray[np.bool_]
 
     @property
     def logs(self) -> Array:
@@ -173,14 +175,19 @@ class Posterior:
         """Its evaluation at some coordinates, or at the bounds that these exceed."""
         coordinates = np.clip(coordinates, *self.bounds)
         logs = coordinates[: self.prior.number_count]
-        likelihood = self.likelihood.with_disturbance(self.prior.disturbance_of(logs))
-        innovations = likelihood.innovations(self.data.recording, self.values_at(coordinates))
+        likelihood, parameters = self._at(coordinates)
+        innovations = likelihood.innovations(self.data.recording, parameters)
         mask = innovations.observed & self.data.rows[:, None]
         value = innovations.log_likelihood(self.data.rows) - 0.5 * float(np.sum(self.prior.penalty(logs) ** 2))
         value = value if np.isfinite(value) else -np.inf
         values, log_variances = innovations.values[mask], innovations.log_variances[mask]
         slopes = innovations.sensitivities[mask].T[: len(self.box.units)] * self.box.units[:, None]
-        return Evaluation(coordinates, value, values, log_variances, slopes, innovations.constants)
+        return Evaluation(coordinates, value, values, log_variances, slopes, innovations.constants, mask)
+
+    def _at(self, coordinates: Array) -> tuple[Likelihood, Array]:
+        """The likelihood with the disturbance, and the parameters, at some coordinates."""
+        disturbance = self.prior.disturbance_of(coordinates[: self.prior.number_count])
+        return self.likelihood.with_disturbance(disturbance), self.values_at(coordinates)
 
     def evaluations(self, points: Iterable[Array]) -> list[Evaluation]:
         """Evaluations at several coordinates, two at once: a compiled filter runs without Python's lock."""
@@ -188,11 +195,10 @@ class Posterior:
             return list(threads.map(self.evaluation, points))
 
     def score(self, evaluation: Evaluation) -> tuple[Array, Array]:
-        """Gradient and Fisher information by the coordinates; by logs from finite differences."""
-        moves = DIFFERENCE_STEP * np.eye(self.prior.number_count, len(evaluation.coordinates))
-        moved = self.evaluations(evaluation.coordinates + moves)
-        slopes = np.array([each.innovations - evaluation.innovations for each in moved]) / DIFFERENCE_STEP
-        log_slopes = np.array([each.log_variances - evaluation.log_variances for each in moved]) / DIFFERENCE_STEP
+        """Gradient and Fisher information by the coordinates."""
+        likelihood, values = self._at(evaluation.coordinates)
+        by_logs = disturbance_sensitivities(likelihood, self.data.recording, values)
+        slopes, log_slopes = (derivatives[evaluation.is_counted].T for derivatives in by_logs)
         slopes = np.vstack([slopes, evaluation.slopes_by_parameters])
         log_slopes = np.vstack([log_slopes, np.zeros_like(evaluation.slopes_by_parameters)])
         gradient = -slopes @ evaluation.innovations - 0.5 * np.sum(log_slopes, axis=1)

@@ -108,13 +108,12 @@ def linearise_filter(
     size = likelihood.model.states.numel()
     variances = likelihood.noise.white_variances(likelihood.cable_count)
     for segment in likelihood.segments(recording, values, acceleration_noise_density):
-        measured, observed, shift, speed, later, step, _, rotation = segment.columns
-        count = measured.shape[1]
+        _, observed, shift, speed, later, step, _, rotation = segment.columns
+        count = observed.shape[1]
         predicted = segment.states[:, :-1]
         is_observed = observed.T[:, :, None] > 0.0
         innovations = np.where(is_observed[:, :, 0], segment.values, 0.0)
-        outputs = likelihood.outputs(count, predicted, theta, shift, speed, later, step, rotation)
-        output_matrix = by_sample(outputs[1], count)
+        output_matrix = segment.output_matrices
         cross_covariance = segment.covariances @ np.where(is_observed, output_matrix, 0.0).swapaxes(1, 2)
         covariance = np.where(is_observed, output_matrix, 0.0) @ cross_covariance + np.diag(variances)
         covariance, cholesky_factor = factorised(covariance)

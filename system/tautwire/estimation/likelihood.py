@@ -74,7 +74,8 @@ class FilterSegment:
     ``columns`` are those of :class:`tautwire.estimation.compiled_filter.FilterInputs`;
     ``is_recorded`` tells which samples are the recording's, the others fill gaps. ``states`` (n, K + 1) and
     ``covariances`` (K, n, n) are those predicted, with a disturbance's behind the model's, and ``transitions``
-    (K, n, n) lead from the updated states to the next; of the latter two none unless they are kept. ``values``,
+    (K, n, n) lead from the updated states to the next, ``output_matrices`` (K, m, n) are the outputs' derivatives by
+    these; of the latter three none unless they are kept. ``values``,
     ``log_variances`` (K, m) and ``sensitivities`` (K, m, p) as in Innovations.
     """
 
@@ -83,6 +84,7 @@ class FilterSegment:
     states: Array
     covariances: Array
     transitions: Array
+    output_matrices: Array
     values: Array
     log_variances: Array
     sensitivities: Array
@@ -280,6 +282,7 @@ class Likelihood:
                 results.states,
                 results.covariances,
                 results.transitions,
+                results.output_matrices,
                 results.values,
                 results.log_variances,
                 results.sensitivities,

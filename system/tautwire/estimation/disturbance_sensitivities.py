@@ -1,0 +1,231 @@
+"""Sensitivities of the innovations to the logs of a disturbance's numbers: a Kalman filter's recursion differentiated.
+
+With the linearisation ``C`` and ``T`` of outputs and steps held, covariance ``P`` of the predicted state, Cholesky
+factor ``L`` of ``C P C' + R``, whitened innovations ``v``, ``W = L^-1 C`` and ``G = W P``, derivatives are
+
+    M_j = W P_j W' + N_j                     N_j = L^-1 R_j L^-T
+    v_j = -W x_j - Phi(M_j) v                l_j = diag M_j
+    x_j+ = (I - G' W) (x_j + P_j W' v) - G' N_j v
+    P_j+ = (I - G' W) P_j (I - G' W)' + G' N_j G
+
+where ``l`` are the logs of the innovations' variances, and ``Phi`` takes the lower triangle with half of the diagonal.
+Over a step
+
+    x_j' = T x_j+ + T_j x+                   P_j' = T P_j+ T' + T_j P+ T' + T P+ T_j' + Q_j
+
+All numbers share the products by ``T (I - G' W)``, so that they cost little more than the filter itself.
+
+Source: Gupta and Mehra (1974), IEEE Transactions on Automatic Control 19(6), 774-783; Särkkä (2013), Bayesian Filtering
+and Smoothing, sec. 12.3 and appendix A.3.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..recordings.recording import Recording
+from .disturbance import Disturbance
+from .likelihood import FilterSegment, Likelihood
+from .step_integration import compiled
+
+Array = NDArray[np.float64]
+
+
+class DisturbanceStates(NamedTuple):
+    """Which of a disturbance's processes each state of a filter is, and of which kind each output's white noise.
+
+    Of the n states ``process`` is the index of the Ornstein-Uhlenbeck process among the disturbance's, -1 of others;
+    ``decay_rate`` (1/s) and ``variance`` are its own. ``is_driving`` holds where a process acts on the platform.
+    ``sensor`` (m) is the index of each output's white noise among them, and ``white_variance`` (m) its variance.
+    """
+
+    process: Any
+    decay_rate: Any
+    variance: Any
+    is_driving: Any
+    sensor: Any
+    white_variance: Any
+
+
+class Run(NamedTuple):
+    """Filter's run over K samples, as :class:`tautwire.estimation.likelihood.FilterSegment` has it, samples first."""
+
+    states: Any
+    covariances: Any
+    transitions: Any
+    output_matrices: Any
+    values: Any
+    observed: Any
+    steps: Any
+
+
+class Derivatives(NamedTuple):
+    """Derivatives of the predicted ``state`` (n, k) and its ``covariance`` (n, k, n), changed in place."""
+
+    state: Any
+    covariance: Any
+
+
+def disturbance_sensitivities(
+    likelihood: Likelihood, recording: Recording, parameters: Sequence[float] | Array
+) -> tuple[Array, Array]:
+    """Derivatives of whitened innovations and of the logs of their variances by the logs of a disturbance's numbers.
+
+    Both (N, m, k), of the N samples of a recording; where nothing was observed they mean nothing. The k numbers are rms
+    and bandwidth of each process, then the white noise of each kind of sensor. The linearisation is held: where states
+    move with the numbers, differences of whole runs are not quite these.
+
+    Source: see the module.
+    """
+    disturbance = likelihood.noise.disturbance
+    if disturbance is None:
+        raise ValueError("the likelihood has no disturbance to differentiate by")
+    _, covariance = likelihood.start(parameters)
+    states = _disturbance_states(likelihood, disturbance, len(covariance))
+    number_count = 3 * (1 + int(states.sensor.max())) + 2
+    derivatives = _derivatives_at_start(states, number_count)
+    parts = []
+    for segment in likelihood.segments(recording, parameters):
+        run = _run_of(segment)
+        by_number = np.empty((2, *run.values.shape, number_count))
+        differentiate_recursion(run, states, derivatives, by_number)
+        parts.append(by_number[:, segment.is_recorded])
+    values, log_variances = np.concatenate(parts, axis=1)
+    return values, log_variances
+
+
+def _disturbance_states(likelihood: Likelihood, disturbance: Disturbance, size: int) -> DisturbanceStates:
+    cables, turning = likelihood.cable_count, disturbance.rotation is not None
+    sensor = np.repeat([0, 1, 2], [3, cables, 3 if turning else 0])
+    own_processes = np.append(np.zeros(6 if turning else 3, dtype=int), 1 + sensor)
+    rates, variances = np.split(likelihood.disturbance_arguments[:, 0], 2)
+    first, count = size - len(own_processes), len(own_processes)
+    process, decay_rate, variance = np.full(size, -1), np.zeros(size), np.zeros(size)
+    process[first:], decay_rate[first:], variance[first:] = own_processes, rates[-count:], variances[-count:]
+    white_variances = disturbance.white_variances(cables)
+    return DisturbanceStates(process, decay_rate, variance, process == 0, sensor, white_variances)
+
+
+def _derivatives_at_start(states: DisturbanceStates, number_count: int) -> Derivatives:
+    size = len(states.process)
+    derivatives = Derivatives(np.zeros((size, number_count)), np.zeros((size, number_count, size)))
+    for r in np.flatnonzero(states.process >= 0):
+        derivatives.covariance[r, 2 * states.process[r], r] = 2.0 * states.variance[r]
+    return derivatives
+
+
+def _run_of(segment: FilterSegment) -> Run:
+    _, observed, *_ = segment.columns
+    values = np.where(observed.T > 0.0, segment.values, 0.0)
+    rows = (segment.states.T, observed.T, segment.columns[5][0])
+    states, observed, steps = (np.ascontiguousarray(each) for each in rows)
+    return Run(states, segment.covariances, segment.transitions, segment.output_matrices, values, observed, steps)
+
+
+@compiled
+def differentiate_recursion(run: Run, states: DisturbanceStates, derivatives: Derivatives, by_number: Any) -> None:
+    """Differentiate a run's recursion; fills in ``by_number`` (2, K, m, k), see :func:`disturbance_sensitivities`."""
+    size, number_count = derivatives.state.shape
+    for k in range(len(run.values)):
+        innovations, transition = run.values[k], run.transitions[k]
+        whitening, output, gain = _whitened(run, states, k)
+        _differentiate_innovations(innovations, whitening, output, states, derivatives, by_number[:, k])
+        moved_gain = np.dot(transition, gain.T)
+        kept = transition - np.dot(moved_gain, output)
+        by_covariance = np.dot(derivatives.covariance.reshape((-1, size)), np.dot(innovations, output))
+        derivatives.state[:] = np.dot(kept, derivatives.state + by_covariance.reshape((size, number_count)))
+        half = np.dot(kept, derivatives.covariance.reshape((size, -1))).reshape((-1, size))
+        derivatives.covariance[:] = np.dot(half, kept.T).reshape((size, number_count, size))
+        onward = np.dot(run.covariances[k], transition.T) - np.dot(gain.T, moved_gain.T)
+        _add_white_noise(np.dot(moved_gain, whitening), np.dot(innovations, whitening), states, derivatives)
+        _add_processes(transition, run.states[k] + np.dot(innovations, gain), onward, run.steps[k], states, derivatives)
+
+
+@compiled
+def _whitened(run: Run, states: DisturbanceStates, k: int) -> Any:
+    """``L^-1``, ``L^-1 C`` and ``L^-1 C P`` of sample k; an output that was not observed is noise of its own."""
+    output = run.output_matrices[k].copy()
+    count = len(output)
+    for i in range(count):
+        output[i] *= run.observed[k, i]
+    gain, whitening = np.dot(output, run.covariances[k]), np.eye(count)
+    variances = np.dot(gain, output.T)
+    for i in range(count):
+        variances[i, i] += states.white_variance[i]
+        deviation = np.sqrt(variances[i, i])
+        output[i] /= deviation
+        gain[i] /= deviation
+        whitening[i] /= deviation
+        for later in range(i + 1, count):
+            factor = variances[later, i] / deviation
+            output[later] -= factor * output[i]
+            gain[later] -= factor * gain[i]
+            whitening[later] -= factor * whitening[i]
+            for c in range(i + 1, count):
+                variances[later, c] -= factor / deviation * variances[i, c]
+    return whitening, output, gain
+
+
+@compiled
+def _differentiate_innovations(
+    innovations: Any, whitening: Any, output: Any, states: DisturbanceStates, derivatives: Derivatives, by_number: Any
+) -> None:
+    count, size = output.shape
+    number_count = derivatives.state.shape[1]
+    first_white = number_count - 1 - states.sensor.max()
+    seen = np.dot(output, derivatives.covariance.reshape((size, -1))).reshape((-1, size))
+    by_covariance = np.dot(seen, output.T).reshape((count, number_count, count))
+    by_state = np.dot(output, derivatives.state)
+    for i in range(count):
+        for j in range(number_count):
+            by_number[0, i, j] = -by_state[i, j]
+        for c in range(i + 1):
+            weight = 0.5 if c == i else 1.0
+            for o in range(count):
+                noise = 2.0 * states.white_variance[o] * whitening[i, o] * whitening[c, o]
+                by_covariance[i, first_white + states.sensor[o], c] += noise
+            for j in range(number_count):
+                by_number[0, i, j] -= weight * by_covariance[i, j, c] * innovations[c]
+        for j in range(number_count):
+            by_number[1, i, j] = by_covariance[i, j, i]
+
+
+@compiled
+def _add_white_noise(gain: Any, errors: Any, states: DisturbanceStates, derivatives: Derivatives) -> None:
+    """Add what white noise changes by the filter's ``gain`` (n, m), from ``errors`` (m) over their variances."""
+    first_white = derivatives.state.shape[1] - 1 - states.sensor.max()
+    for i in range(len(errors)):
+        number, noise = first_white + states.sensor[i], 2.0 * states.white_variance[i]
+        for r in range(len(gain)):
+            scaled = noise * gain[r, i]
+            derivatives.state[r, number] -= scaled * errors[i]
+            for c in range(len(gain)):
+                derivatives.covariance[r, number, c] += scaled * gain[c, i]
+
+
+@compiled
+def _add_processes(
+    transition: Any, state: Any, onward: Any, step: float, states: DisturbanceStates, derivatives: Derivatives
+) -> None:
+    """Add what decay and size of the processes change in a step from an updated state; ``onward`` is ``P+ T'``."""
+    for i in range(len(state)):
+        process = states.process[i]
+        if process < 0:
+            continue
+        exponent = states.decay_rate[i] * step
+        # Means over a step decay half as far.
+        slopes = -0.5 * exponent * transition[:, i] if states.is_driving[i] else np.zeros(len(state))
+        slopes[i] = -exponent * transition[i, i]
+        for r in range(len(state)):
+            if slopes[r] != 0.0:
+                derivatives.state[r, 2 * process + 1] += slopes[r] * state[i]
+                for c in range(len(state)):
+                    derivatives.covariance[r, 2 * process + 1, c] += slopes[r] * onward[i, c]
+                    derivatives.covariance[c, 2 * process + 1, r] += slopes[r] * onward[i, c]
+        decayed = np.exp(-2.0 * exponent)
+        derivatives.covariance[i, 2 * process, i] += 2.0 * states.variance[i] * (1.0 - decayed)
+        derivatives.covariance[i, 2 * process + 1, i] += 2.0 * exponent * states.variance[i] * decayed
