@@ -135,8 +135,8 @@ def test_an_undeclared_weight_is_followed_as_a_force_downwards() -> None:
     recording = recorded("three", 1, {"payload": {"mass": 30.0 / 9.81}})
     slow = Disturbance(OrnsteinUhlenbeck(30.0, 1e-3), *[OrnsteinUhlenbeck(0.0, 1.0)] * 2, NOISE.position, NOISE.tension)
     likelihood = likelihood_of(replace(NOISE, disturbance=slow))
-    *_, last = likelihood.segments(recording, ())
-    size = likelihood.model.states.numel()
+    *_, segment = likelihood.segments(recording, ())
+    last, size = segment.results, likelihood.model.states.numel()
     force, deviations = last.states[size : size + 3, -1], np.sqrt(np.diag(last.covariances[-1]))[size : size + 3]
     # Its inertia is no constant force, and the reference tensions carry it: a part of it does not look like one.
     assert -35.0 < force[2] < -20.0
@@ -159,7 +159,7 @@ def test_the_linearised_filter_moves_disturbance_states_as_the_filter_does() -> 
     (segment,) = likelihood.segments(recording, ())
     (linearised,) = linearise_filter(likelihood, [], recording)
     size = likelihood.model.states.numel()
-    for k, (now, later) in enumerate(pairwise(segment.covariances)):
+    for k, (now, later) in enumerate(pairwise(segment.results.covariances)):
         gain, output = linearised.gain[k], linearised.output_matrix[k]
         transition, updated = linearised.transition[k], now - gain @ output @ now
         # Noise of the winch speeds acts on unstrained lengths from the start of the step on.

@@ -170,6 +170,6 @@ def test_a_run_can_be_ended_at_each_of_its_segments() -> None:
             raise KeyboardInterrupt
 
     segments = Likelihood(ROBOT, (), NOISE, 0.02, poll).segments(RECORDING, [])
-    assert len(next(segments).values) == 500
+    assert len(next(segments).results.values) == 500
     with pytest.raises(KeyboardInterrupt):
         next(segments)

@@ -52,7 +52,7 @@ class DisturbanceStates(NamedTuple):
 
 
 class Run(NamedTuple):
-    """Filter's run over K samples, as :class:`tautwire.estimation.likelihood.FilterSegment` has it, samples first."""
+    """Run of a filter over K samples, samples first: :class:`tautwire.estimation.compiled_filter.FilterResults`."""
 
     states: Any
     covariances: Any
@@ -119,11 +119,12 @@ def _derivatives_at_start(states: DisturbanceStates, number_count: int) -> Deriv
 
 
 def _run_of(segment: FilterSegment) -> Run:
-    _, observed, *_ = segment.columns
-    values = np.where(observed.T > 0.0, segment.values, 0.0)
-    rows = (segment.states.T, observed.T, segment.columns[5][0])
+    _, observed, _, _, _, step, *_ = segment.columns
+    results = segment.results
+    values = np.where(observed.T > 0.0, results.values, 0.0)
+    rows = (results.states.T, observed.T, step[0])
     states, observed, steps = (np.ascontiguousarray(each) for each in rows)
-    return Run(states, segment.covariances, segment.transitions, segment.output_matrices, values, observed, steps)
+    return Run(states, results.covariances, results.transitions, results.output_matrices, values, observed, steps)
 
 
 @compiled

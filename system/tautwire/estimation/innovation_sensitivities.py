@@ -50,7 +50,7 @@ class LinearisedSegment:
     (K, n, n), ``half_transition`` the same from half a step before the next sample, ``output_matrix`` C (K, m, n),
     ``gain`` K (K, n, m); ``whitening`` (K, m, m) makes innovations independent with unit variance and is zero where
     nothing was ``observed`` (K, m). ``transition``, ``output_matrix`` and ``gain`` have the states of a disturbance
-    behind the model's n. ``is_recorded``, ``values`` and ``sensitivities`` as for FilterSegment, values and
+    behind the model's n. ``is_recorded``, ``values`` and ``sensitivities`` as for FilterResults, values and
     sensitivities zero where nothing was observed.
     """
 
@@ -110,11 +110,11 @@ def linearise_filter(
     for segment in likelihood.segments(recording, values, acceleration_noise_density):
         _, observed, shift, speed, later, step, _, rotation = segment.columns
         count = observed.shape[1]
-        predicted = segment.states[:, :-1]
+        results, predicted = segment.results, segment.results.states[:, :-1]
         is_observed = observed.T[:, :, None] > 0.0
-        innovations = np.where(is_observed[:, :, 0], segment.values, 0.0)
-        output_matrix = segment.output_matrices
-        cross_covariance = segment.covariances @ np.where(is_observed, output_matrix, 0.0).swapaxes(1, 2)
+        innovations = np.where(is_observed[:, :, 0], results.values, 0.0)
+        output_matrix = results.output_matrices
+        cross_covariance = results.covariances @ np.where(is_observed, output_matrix, 0.0).swapaxes(1, 2)
         covariance = np.where(is_observed, output_matrix, 0.0) @ cross_covariance + np.diag(variances)
         covariance, cholesky_factor = factorised(covariance)
         whitening = np.where(is_observed, np.linalg.inv(cholesky_factor), 0.0)
@@ -123,20 +123,20 @@ def linearise_filter(
         updated = likelihood.with_true_lengths(predicted + corrections.T)
         rate_jacobian = by_sample(likelihood.rate_jacobian(count, updated, theta, speed)[0], count)
         yield LinearisedSegment(
-            likelihood.with_true_lengths(segment.states),
+            likelihood.with_true_lengths(results.states),
             np.hstack([speed, later[:, -1:]]),
             step[0],
             shift,
             rotation,
-            segment.transitions,
-            _half_transition(segment.transitions[:, :size, :size], rate_jacobian, step[0]),
+            results.transitions,
+            _half_transition(results.transitions[:, :size, :size], rate_jacobian, step[0]),
             output_matrix,
             gain,
             whitening,
             is_observed[:, :, 0],
             segment.is_recorded,
             innovations,
-            np.where(is_observed, segment.sensitivities, 0.0),
+            np.where(is_observed, results.sensitivities, 0.0),
         )
 
 

@@ -23,8 +23,9 @@ from ..recordings.recording import Recording
 from ..robot.schema import Robot
 from ..robot.symbolic_model import FreeParameter, SymbolicModel, symbolic_model
 from ..robot.uncertain_parameters import uncertain_parameters
-from .compiled_filter import CompiledFilter, FilterInputs, FilterState
+from .compiled_filter import CompiledFilter, FilterInputs, FilterResults, FilterState
 from .disturbance import Disturbance
+from .filter_columns import align_delayed_outputs, filter_columns
 from .initial_state_prior import initial_covariance
 from .integration_steps import substeps_of_robot
 from .kalman_filter import Noise
@@ -35,8 +36,6 @@ from .native_functions import CompiledFunction
 Array = NDArray[np.float64]
 
 CHUNK_SAMPLES = 500
-# In medians of the sample interval.
-MAX_STEP_TO_MEDIAN = 1.5
 
 
 @dataclass(frozen=True)
@@ -71,23 +70,13 @@ class Innovations:
 class FilterSegment:
     """Filter segment: K successive samples of a filter's run.
 
-    ``columns`` are those of :class:`tautwire.estimation.compiled_filter.FilterInputs`;
-    ``is_recorded`` tells which samples are the recording's, the others fill gaps. ``states`` (n, K + 1) and
-    ``covariances`` (K, n, n) are those predicted, with a disturbance's behind the model's, and ``transitions``
-    (K, n, n) lead from the updated states to the next, ``output_matrices`` (K, m, n) are the outputs' derivatives by
-    these; of the latter three none unless they are kept. ``values``,
-    ``log_variances`` (K, m) and ``sensitivities`` (K, m, p) as in Innovations.
+    ``columns`` are those of :class:`tautwire.estimation.compiled_filter.FilterInputs`; ``is_recorded`` (K) tells which
+    samples are the recording's, the others fill gaps.
     """
 
     columns: tuple[Array, ...]
     is_recorded: NDArray[np.bool_]
-    states: Array
-    covariances: Array
-    transitions: Array
-    output_matrices: Array
-    values: Array
-    log_variances: Array
-    sensitivities: Array
+    results: FilterResults
 
 
 class Likelihood:
@@ -211,7 +200,7 @@ class Likelihood:
     def simulated_outputs(self, recording: Recording, parameters: Sequence[float] | Array) -> SimulatedOutputs:
         """Simulated outputs without noise, as late as the sensors show them, over a recording's winch speeds."""
         nothing = np.zeros((recording.sample_count, output_count(self.model)))
-        columns, is_recorded = _filter_columns(recording, nothing, nothing)
+        columns, is_recorded = filter_columns(recording, nothing, nothing)
         theta, (speed, later, step) = self._arguments(parameters), columns[3:6]
         start, _ = self._filter_functions.start(theta)
         _, outputs = self._filter_functions.simulation(
@@ -261,7 +250,7 @@ class Likelihood:
         acceleration_noise_density: float,
         keeps_covariances: bool = False,
     ) -> Iterator[FilterSegment]:
-        columns, is_recorded = _filter_columns(recording, *outputs, rotation_count(self.model))
+        columns, is_recorded = filter_columns(recording, *outputs, rotation_count(self.model))
         theta = self._arguments(parameters)
         state, sensitivities = self._start(theta)
         now = FilterState(state.ravel(), start_covariance, sensitivities)
@@ -276,17 +265,7 @@ class Likelihood:
                 acceleration_noise_density,
             )
             results = self._filter_functions.run(now, inputs, keeps_covariances)
-            yield FilterSegment(
-                chunk,
-                is_recorded[begin : begin + CHUNK_SAMPLES],
-                results.states,
-                results.covariances,
-                results.transitions,
-                results.output_matrices,
-                results.values,
-                results.log_variances,
-                results.sensitivities,
-            )
+            yield FilterSegment(chunk, is_recorded[begin : begin + CHUNK_SAMPLES], results)
             now = results.end
 
     def _arguments(self, parameters: Sequence[float] | Array) -> Array:
@@ -331,8 +310,9 @@ def _concatenated(segments: Iterable[FilterSegment]) -> tuple[Array, Array, Arra
     """Innovations, log variances and sensitivities of the recording's samples; and the last state."""
     parts, last_state = [], np.zeros(0)
     for segment in segments:
-        rows, last_state = segment.is_recorded, segment.states[:, -1]
-        parts.append((segment.values[rows], segment.log_variances[rows], segment.sensitivities[rows]))
+        rows, results = segment.is_recorded, segment.results
+        parts.append((results.values[rows], results.log_variances[rows], results.sensitivities[rows]))
+        last_state = results.states[:, -1]
     values, log_variances, sensitivities = (np.concatenate(part) for part in zip(*parts, strict=True))
     return values, log_variances, sensitivities, last_state
 
@@ -344,60 +324,3 @@ def _fill_unaligned(values: Array, log_variances: Array, sensitivities: Array, u
         values[indices, column] = np.where(indices % 2, 1.0, -1.0)
         log_variances[indices, column] = np.median(np.delete(log_variances[:, column], indices))
         sensitivities[indices, column] = 0.0
-
-
-def align_delayed_outputs(time: Array, measured: Array, lags: Array) -> tuple[Array, Array]:
-    """Align the outputs of sensors that lag with the state at each time: the sample nearest to time plus lag.
-
-    Returns the values, NaN where there is none, and by how many seconds later than the state they were shown.
-    """
-    values, shift = measured.copy(), np.zeros_like(measured)
-    half_interval = 0.5 * float(np.median(np.diff(time)))
-    for column in np.flatnonzero(lags > half_interval):
-        shown_at = time + lags[column]
-        following = np.clip(np.searchsorted(time, shown_at), 1, len(time) - 1)
-        nearest = np.where(shown_at - time[following - 1] < time[following] - shown_at, following - 1, following)
-        is_near = np.abs(time[nearest] - shown_at) <= 2.0 * half_interval
-        values[:, column] = np.where(is_near, measured[nearest, column], np.nan)
-        shift[:, column] = np.where(is_near, time[nearest] - time, 0.0)
-    return values, shift
-
-
-def _filter_columns(
-    recording: Recording, measured: Array, shift: Array, rotation_columns: int = 0
-) -> tuple[tuple[Array, ...], NDArray[np.bool_]]:
-    """The filter's inputs, a column a sample, and whether each is one of the recording's samples.
-
-    The last ``rotation_columns`` of what was measured are rotation vectors, from which what is measured is zero. A gap
-    in time is filled with samples without measurements, so that no step is longer than usual.
-    """
-    steps = np.diff(recording.time)
-    step_counts = np.maximum(np.ceil(steps / (MAX_STEP_TO_MEDIAN * np.median(steps))), 1).astype(int)
-    rows = np.append(0, np.cumsum(step_counts))
-    time = np.interp(np.arange(rows[-1] + 1), rows, recording.time)
-    speed = np.array([np.interp(time, recording.time, column) for column in recording.winch_speed.T])
-    measured_columns = np.zeros((measured.shape[1], len(time)))
-    observed_columns, shift_columns = np.zeros_like(measured_columns), np.zeros_like(measured_columns)
-    observed = np.isfinite(measured)
-    measured_columns[:, rows] = np.where(observed, measured, 0.0).T
-    observed_columns[:, rows] = observed.T
-    shift_columns[:, rows] = shift.T
-    step = np.append(np.diff(time), 0.0)
-    drift = step * np.append(np.repeat(steps, step_counts), 0.0)
-    speeds = (speed, np.hstack([speed[:, 1:], speed[:, -1:]]))
-    is_recorded = np.zeros(len(time), dtype=bool)
-    is_recorded[rows] = True
-    rotation = _without_gaps(measured_columns, observed_columns, rotation_columns)
-    columns = (measured_columns, observed_columns, shift_columns, *speeds, step[None, :], drift[None, :], rotation)
-    return tuple(np.asfortranarray(column) for column in columns), is_recorded
-
-
-def _without_gaps(measured: Array, observed: Array, count: int) -> Array:
-    """The last ``count`` rows (count, K) of what was measured, interpolated in gaps, and zero there from now on."""
-    first = len(measured) - count
-    rotation, samples = measured[first:].copy(), np.arange(measured.shape[1])
-    measured[first:] = 0.0
-    for row, is_observed in zip(rotation, observed[first:] > 0.0, strict=True):
-        if np.any(is_observed):
-            row[:] = np.interp(samples, samples[is_observed], row[is_observed])
-    return rotation

@@ -40,8 +40,8 @@ def compressed_residuals(
         is_observed = segment.columns[1].T[segment.is_recorded] > 0.0
         is_selected = is_observed & rows
         residuals, slopes = (
-            segment.values[segment.is_recorded][is_selected],
-            segment.sensitivities[segment.is_recorded][is_selected],
+            segment.results.values[segment.is_recorded][is_selected],
+            segment.results.sensitivities[segment.is_recorded][is_selected],
         )
         fisher_information += slopes.T @ slopes
         score += slopes.T @ residuals

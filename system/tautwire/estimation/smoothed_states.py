@@ -141,8 +141,8 @@ def calibrate(fitter: Fitter, robot: Robot, sample: DataSet, chosen: Collection[
     *_, last_segment = likelihood.segments(sample.recording, values)
     end = likelihood.model.states.numel()
     rows = slice(end - len(parameters), end)
-    deviations = np.sqrt(np.maximum(np.diag(last_segment.covariances[-1])[rows], 0.0))
-    estimates = limited_perturbation(last_segment.states[rows, -1], np.sqrt)
+    deviations = np.sqrt(np.maximum(np.diag(last_segment.results.covariances[-1])[rows], 0.0))
+    estimates = limited_perturbation(last_segment.results.states[rows, -1], np.sqrt)
     return Calibration(parameters, estimates, deviations)
 
 

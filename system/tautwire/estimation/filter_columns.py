@@ -1,0 +1,73 @@
+"""Columns of a filter's inputs: samples of a recording, with gaps in time filled and outputs of late sensors aligned.
+
+What was measured late is moved to the sample whose state it shows.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..recordings.recording import Recording
+
+Array = NDArray[np.float64]
+
+# In medians of the sample interval.
+MAX_STEP_TO_MEDIAN = 1.5
+
+
+def align_delayed_outputs(time: Array, measured: Array, lags: Array) -> tuple[Array, Array]:
+    """Align the outputs of sensors that lag with the state at each time: the sample nearest to time plus lag.
+
+    Returns the values, NaN where there is none, and by how many seconds later than the state they were shown.
+    """
+    values, shift = measured.copy(), np.zeros_like(measured)
+    half_interval = 0.5 * float(np.median(np.diff(time)))
+    for column in np.flatnonzero(lags > half_interval):
+        shown_at = time + lags[column]
+        following = np.clip(np.searchsorted(time, shown_at), 1, len(time) - 1)
+        nearest = np.where(shown_at - time[following - 1] < time[following] - shown_at, following - 1, following)
+        is_near = np.abs(time[nearest] - shown_at) <= 2.0 * half_interval
+        values[:, column] = np.where(is_near, measured[nearest, column], np.nan)
+        shift[:, column] = np.where(is_near, time[nearest] - time, 0.0)
+    return values, shift
+
+
+def filter_columns(
+    recording: Recording, measured: Array, shift: Array, rotation_columns: int = 0
+) -> tuple[tuple[Array, ...], NDArray[np.bool_]]:
+    """The filter's inputs, a column a sample, and whether each is one of the recording's samples.
+
+    The last ``rotation_columns`` of what was measured are rotation vectors, from which what is measured is zero. A gap
+    in time is filled with samples without measurements, so that no step is longer than usual.
+    """
+    steps = np.diff(recording.time)
+    step_counts = np.maximum(np.ceil(steps / (MAX_STEP_TO_MEDIAN * np.median(steps))), 1).astype(int)
+    rows = np.append(0, np.cumsum(step_counts))
+    time = np.interp(np.arange(rows[-1] + 1), rows, recording.time)
+    speed = np.array([np.interp(time, recording.time, column) for column in recording.winch_speed.T])
+    measured_columns = np.zeros((measured.shape[1], len(time)))
+    observed_columns, shift_columns = np.zeros_like(measured_columns), np.zeros_like(measured_columns)
+    observed = np.isfinite(measured)
+    measured_columns[:, rows] = np.where(observed, measured, 0.0).T
+    observed_columns[:, rows] = observed.T
+    shift_columns[:, rows] = shift.T
+    step = np.append(np.diff(time), 0.0)
+    drift = step * np.append(np.repeat(steps, step_counts), 0.0)
+    speeds = (speed, np.hstack([speed[:, 1:], speed[:, -1:]]))
+    is_recorded = np.zeros(len(time), dtype=bool)
+    is_recorded[rows] = True
+    rotation = _without_gaps(measured_columns, observed_columns, rotation_columns)
+    columns = (measured_columns, observed_columns, shift_columns, *speeds, step[None, :], drift[None, :], rotation)
+    return tuple(np.asfortranarray(column) for column in columns), is_recorded
+
+
+def _without_gaps(measured: Array, observed: Array, count: int) -> Array:
+    """The last ``count`` rows (count, K) of what was measured, interpolated in gaps, and zero there from now on."""
+    first = len(measured) - count
+    rotation, samples = measured[first:].copy(), np.arange(measured.shape[1])
+    measured[first:] = 0.0
+    for row, is_observed in zip(rotation, observed[first:] > 0.0, strict=True):
+        if np.any(is_observed):
+            row[:] = np.interp(samples, samples[is_observed], row[is_observed])
+    return rotation
