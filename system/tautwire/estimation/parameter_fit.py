@@ -126,7 +126,7 @@ class Fitter:
         scaled_start = scaled = np.array([value_of(robot, f) for f in free]) / scale
         for noise_density, stage_tolerance in stages:
             residual = _Residual(likelihood, data, scale, noise_density, self.poll_interrupts)
-            if noise_density == 0.0:
+            if noise_density == 0.0 and not is_near:
                 scaled = max((scaled, scaled_start), key=residual.log_likelihood)
             # The first trust region is as large as the start: counted from one, a parameter near zero is not stuck.
             residual.origin = scaled - 1.0
