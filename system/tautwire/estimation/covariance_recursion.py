@@ -24,7 +24,7 @@ import numpy as np
 from .step_integration import Integration, Step, compiled, evaluate, integrate_step
 
 # Numba caches machine code by the content of this file alone, and what it calls of that module is in it.
-STEP_INTEGRATION_SHA256 = "b3a6bc7df5804ce37ae8edbc75434cf57fc9a01502c97f7678e454046385670a"
+STEP_INTEGRATION_SHA256 = "cc9d42e31811eac14b8afb632fcec07e2ee1e6a823224f65047e520103dbf386"
 
 
 class Moments(NamedTuple):
@@ -108,23 +108,33 @@ def _update_by_measurements(
         variance = variances[i, i] + white_variances[i]
         deviation = np.sqrt(variance)
         innovations[i] /= deviation
-        slopes[:, i] /= deviation
         record.values[k, i], record.log_variances[k, i] = innovations[i], np.log(variance)
-        record.sensitivities[k, :, i] = slopes[:, i]
+        for parameter in range(len(slopes)):
+            slopes[parameter, i] /= deviation
+            record.sensitivities[k, parameter, i] = slopes[parameter, i]
         if samples.observed[k, i] == 0.0:
             innovations[i] = 0.0
             cross_covariances[i] = 0.0
             continue
-        cross_covariances[i] /= deviation
+        for c in range(cross_covariances.shape[1]):
+            cross_covariances[i, c] /= deviation
         for later in range(i + 1, len(innovations)):
             factor = variances[later, i] / deviation
             innovations[later] -= factor * innovations[i]
-            cross_covariances[later] -= factor * cross_covariances[i]
-            slopes[:, later] -= factor * slopes[:, i]
-            variances[later] -= factor / deviation * variances[i]
+            subtract_row(cross_covariances, later, factor, i)
+            subtract_row(variances, later, factor / deviation, i)
+            for parameter in range(len(slopes)):
+                slopes[parameter, later] -= factor * slopes[parameter, i]
     moments.state[:] += np.dot(innovations, cross_covariances)
     moments.sensitivities[:] += np.dot(slopes, cross_covariances)
     moments.covariance[:] -= np.dot(cross_covariances.T, cross_covariances)
+
+
+@compiled
+def subtract_row(matrix: Any, row: int, factor: float, other: int) -> None:
+    """Subtract a multiple of another row of a matrix from one, without a copy."""
+    for c in range(matrix.shape[1]):
+        matrix[row, c] -= factor * matrix[other, c]
 
 
 @compiled

@@ -150,24 +150,27 @@ def differentiate_recursion(run: Run, states: DisturbanceStates, derivatives: De
 def _whitened(run: Run, states: DisturbanceStates, k: int) -> Any:
     """``L^-1``, ``L^-1 C`` and ``L^-1 C P`` of sample k; an output that was not observed is noise of its own."""
     output = run.output_matrices[k].copy()
-    count = len(output)
+    count, size = output.shape
     for i in range(count):
         output[i] *= run.observed[k, i]
     gain, whitening = np.dot(output, run.covariances[k]), np.eye(count)
     variances = np.dot(gain, output.T)
     for i in range(count):
-        variances[i, i] += states.white_variance[i]
-        deviation = np.sqrt(variances[i, i])
+        for earlier in range(i):
+            factor = variances[i, earlier]
+            for c in range(i, count):
+                variances[c, i] -= factor * variances[c, earlier]
+            for c in range(size):
+                output[i, c] -= factor * output[earlier, c]
+                gain[i, c] -= factor * gain[earlier, c]
+            for c in range(i):
+                whitening[i, c] -= factor * whitening[earlier, c]
+        deviation = np.sqrt(variances[i, i] + states.white_variance[i])
+        for c in range(i, count):
+            variances[c, i] /= deviation
         output[i] /= deviation
         gain[i] /= deviation
         whitening[i] /= deviation
-        for later in range(i + 1, count):
-            factor = variances[later, i] / deviation
-            output[later] -= factor * output[i]
-            gain[later] -= factor * gain[i]
-            whitening[later] -= factor * whitening[i]
-            for c in range(i + 1, count):
-                variances[later, c] -= factor / deviation * variances[i, c]
     return whitening, output, gain
 
 

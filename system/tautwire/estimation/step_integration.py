@@ -135,7 +135,7 @@ def _differentiate(integration: Integration, middles: Any, k: int) -> None:
     """Derivatives of the end of the step, from the Jacobians in the middle of each larger part."""
     division, size, count = integration.division, middles.shape[1], len(integration.slope.results[1])
     part = integration.steps[k] / division.slope
-    transition, by_constants = np.eye(size), np.zeros((count, size))
+    transition, by_constants, over_part = np.eye(size), np.zeros((count, size)), np.empty((size, size))
     places = np.empty_like(integration.slope.places)
     for j in range(division.slope):
         integration.index[0, 0] = j
@@ -143,11 +143,12 @@ def _differentiate(integration: Integration, middles: Any, k: int) -> None:
         evaluate(integration.slope, k, places)
         jacobian, slopes = integration.slope.results
         gamma = _integrated_exponential(jacobian, part, division)
-        over_part = _rates(jacobian, gamma)
-        for r in range(size):
-            over_part[r, r] += 1.0
-        transition = _product(over_part, transition)
-        if count > 0:
+        _set_exponential(jacobian, 1.0, gamma, over_part)
+        if j == 0:
+            transition[:] = over_part
+            by_constants[:] = np.dot(slopes, gamma.T)
+        else:
+            transition = np.dot(over_part, transition)
             by_constants = np.dot(by_constants, over_part.T) + np.dot(slopes, gamma.T)
     _fill_in(integration, transition, by_constants)
 
@@ -156,14 +157,14 @@ def _differentiate(integration: Integration, middles: Any, k: int) -> None:
 def _integrated_exponential(jacobian: Any, part: float, division: Division) -> Any:
     """Integral of the matrix exponential over a part: what a constant rate adds to the state."""
     step = part / 2**division.doublings
-    series = np.eye(len(jacobian))
+    series, longer = np.eye(len(jacobian)), np.empty_like(jacobian)
     for term in range(division.order, 1, -1):
-        series = (step / term) * _rates(jacobian, series)
-        for r in range(len(jacobian)):
-            series[r, r] += 1.0
+        _set_exponential(jacobian, step / term, series, longer)
+        series, longer = longer, series
     gamma = step * series
     for _ in range(division.doublings):
-        gamma = 2.0 * gamma + _product(_rates(jacobian, gamma), gamma)
+        _set_exponential(jacobian, 1.0, gamma, longer)
+        gamma = gamma + np.dot(longer, gamma)
     return gamma
 
 
@@ -185,25 +186,13 @@ def _fill_in(integration: Integration, transition: Any, by_constants: Any) -> No
 
 
 @compiled
-def _rates(jacobian: Any, matrix: Any) -> Any:
-    """Product of a Jacobian, stored by columns and mostly zeros, and a matrix."""
-    result = np.zeros_like(matrix)
+def _set_exponential(jacobian: Any, factor: float, matrix: Any, result: Any) -> None:
+    """Set ``I + factor F M`` of a Jacobian ``F``, which is stored by columns and mostly zeros, and a matrix ``M``."""
+    result[:] = 0.0
     for r in range(len(jacobian)):
+        result[r, r] = 1.0
         for c in range(len(jacobian)):
-            slope = jacobian[c, r]
+            slope = factor * jacobian[c, r]
             if slope != 0.0:
                 for j in range(matrix.shape[1]):
                     result[r, j] += slope * matrix[c, j]
-    return result
-
-
-@compiled
-def _product(first: Any, second: Any) -> Any:
-    result = np.zeros_like(second)
-    for r in range(len(first)):
-        for c in range(len(second)):
-            factor = first[r, c]
-            if factor != 0.0:
-                for j in range(second.shape[1]):
-                    result[r, j] += factor * second[c, j]
-    return result
