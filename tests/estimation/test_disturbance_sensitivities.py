@@ -34,7 +34,7 @@ def require_derivatives(robot: Robot, recording: Recording, noise: Noise, tolera
     prior = disturbance_prior(robot, noise)
     logs = logs_of(prior.median)
     observed = likelihood.innovations(recording, ()).observed
-    by_logs = disturbance_sensitivities(likelihood, recording, ())
+    by_logs = disturbance_sensitivities(likelihood, prior.median, recording, ())
     assert by_logs[0].shape == by_logs[1].shape == (*observed.shape, prior.number_count)
     for number in range(prior.number_count):
         move = STEP * np.eye(prior.number_count)[number]

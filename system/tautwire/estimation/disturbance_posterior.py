@@ -175,19 +175,14 @@ class Posterior:
         """Its evaluation at some coordinates, or at the bounds that these exceed."""
         coordinates = np.clip(coordinates, *self.bounds)
         logs = coordinates[: self.prior.number_count]
-        likelihood, parameters = self._at(coordinates)
-        innovations = likelihood.innovations(self.data.recording, parameters)
+        likelihood = self.likelihood.with_disturbance(self.prior.disturbance_of(logs))
+        innovations = likelihood.innovations(self.data.recording, self.values_at(coordinates))
         mask = innovations.observed & self.data.rows[:, None]
         value = innovations.log_likelihood(self.data.rows) - 0.5 * float(np.sum(self.prior.penalty(logs) ** 2))
         value = value if np.isfinite(value) else -np.inf
         values, log_variances = innovations.values[mask], innovations.log_variances[mask]
         slopes = innovations.sensitivities[mask].T[: len(self.box.units)] * self.box.units[:, None]
         return Evaluation(coordinates, value, values, log_variances, slopes, innovations.constants, mask)
-
-    def _at(self, coordinates: Array) -> tuple[Likelihood, Array]:
-        """The likelihood with the disturbance, and the parameters, at some coordinates."""
-        disturbance = self.prior.disturbance_of(coordinates[: self.prior.number_count])
-        return self.likelihood.with_disturbance(disturbance), self.values_at(coordinates)
 
     def evaluations(self, points: Iterable[Array]) -> list[Evaluation]:
         """Evaluations at several coordinates, two at once: a compiled filter runs without Python's lock."""
@@ -196,8 +191,8 @@ class Posterior:
 
     def score(self, evaluation: Evaluation) -> tuple[Array, Array]:
         """Gradient and Fisher information by the coordinates."""
-        likelihood, values = self._at(evaluation.coordinates)
-        by_logs = disturbance_sensitivities(likelihood, self.data.recording, values)
+        disturbance, values = self.prior.disturbance_of(evaluation.logs), self.values_at(evaluation.coordinates)
+        by_logs = disturbance_sensitivities(self.likelihood, disturbance, self.data.recording, values)
         slopes, log_slopes = (derivatives[evaluation.is_counted].T for derivatives in by_logs)
         slopes = np.vstack([slopes, evaluation.slopes_by_parameters])
         log_slopes = np.vstack([log_slopes, np.zeros_like(evaluation.slopes_by_parameters)])

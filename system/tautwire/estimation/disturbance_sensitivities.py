@@ -39,14 +39,13 @@ class DisturbanceStates(NamedTuple):
     """Which of a disturbance's processes each state of a filter is, and of which kind each output's white noise.
 
     Of the n states ``process`` is the index of the Ornstein-Uhlenbeck process among the disturbance's, -1 of others;
-    ``decay_rate`` (1/s) and ``variance`` are its own. ``is_driving`` holds where a process acts on the platform.
+    ``decay_rate`` (1/s) and ``variance`` are its own. The first process, 0, is the force that acts on the platform.
     ``sensor`` (m) is the index of each output's white noise among them, and ``white_variance`` (m) its variance.
     """
 
     process: Any
     decay_rate: Any
     variance: Any
-    is_driving: Any
     sensor: Any
     white_variance: Any
 
@@ -71,19 +70,18 @@ class Derivatives(NamedTuple):
 
 
 def disturbance_sensitivities(
-    likelihood: Likelihood, recording: Recording, parameters: Sequence[float] | Array
+    likelihood: Likelihood, disturbance: Disturbance, recording: Recording, parameters: Sequence[float] | Array
 ) -> tuple[Array, Array]:
     """Derivatives of whitened innovations and of the logs of their variances by the logs of a disturbance's numbers.
 
     Both (N, m, k), of the N samples of a recording; where nothing was observed they mean nothing. The k numbers are rms
-    and bandwidth of each process, then the white noise of each kind of sensor. The linearisation is held: where states
-    move with the numbers, differences of whole runs are not quite these.
+    and bandwidth of each process, then the white noise of each kind of sensor. The likelihood has to have a
+    disturbance. The linearisation is held: where states move with the numbers, differences of whole runs are not quite
+    these.
 
     Source: see the module.
     """
-    disturbance = likelihood.noise.disturbance
-    if disturbance is None:
-        raise ValueError("the likelihood has no disturbance to differentiate by")
+    likelihood = likelihood.with_disturbance(disturbance)
     _, covariance = likelihood.start(parameters)
     states = _disturbance_states(likelihood, disturbance, len(covariance))
     number_count = 3 * (1 + int(states.sensor.max())) + 2
@@ -107,14 +105,14 @@ def _disturbance_states(likelihood: Likelihood, disturbance: Disturbance, size: 
     process, decay_rate, variance = np.full(size, -1), np.zeros(size), np.zeros(size)
     process[first:], decay_rate[first:], variance[first:] = own_processes, rates[-count:], variances[-count:]
     white_variances = disturbance.white_variances(cables)
-    return DisturbanceStates(process, decay_rate, variance, process == 0, sensor, white_variances)
+    return DisturbanceStates(process, decay_rate, variance, sensor, white_variances)
 
 
-def _derivatives_at_start(states: DisturbanceStates, number_count: int) -> Derivatives:
-    size = len(states.process)
+def _derivatives_at_start(disturbance: DisturbanceStates, number_count: int) -> Derivatives:
+    size = len(disturbance.process)
     derivatives = Derivatives(np.zeros((size, number_count)), np.zeros((size, number_count, size)))
-    for r in np.flatnonzero(states.process >= 0):
-        derivatives.covariance[r, 2 * states.process[r], r] = 2.0 * states.variance[r]
+    for r in np.flatnonzero(disturbance.process >= 0):
+        derivatives.covariance[r, 2 * disturbance.process[r], r] = 2.0 * disturbance.variance[r]
     return derivatives
 
 
@@ -128,13 +126,13 @@ def _run_of(segment: FilterSegment) -> Run:
 
 
 @compiled
-def differentiate_recursion(run: Run, states: DisturbanceStates, derivatives: Derivatives, by_number: Any) -> None:
+def differentiate_recursion(run: Run, disturbance: DisturbanceStates, derivatives: Derivatives, by_number: Any) -> None:
     """Differentiate a run's recursion; fills in ``by_number`` (2, K, m, k), see :func:`disturbance_sensitivities`."""
     size, number_count = derivatives.state.shape
     for k in range(len(run.values)):
         innovations, transition = run.values[k], run.transitions[k]
-        whitening, output, gain = _whitened(run, states, k)
-        _differentiate_innovations(innovations, whitening, output, states, derivatives, by_number[:, k])
+        whitening, output, gain = _whitened(run, disturbance, k)
+        _differentiate_innovations(innovations, whitening, output, disturbance, derivatives, by_number[:, k])
         moved_gain = np.dot(transition, gain.T)
         kept = transition - np.dot(moved_gain, output)
         by_covariance = np.dot(derivatives.covariance.reshape((-1, size)), np.dot(innovations, output))
@@ -142,12 +140,13 @@ def differentiate_recursion(run: Run, states: DisturbanceStates, derivatives: De
         half = np.dot(kept, derivatives.covariance.reshape((size, -1))).reshape((-1, size))
         derivatives.covariance[:] = np.dot(half, kept.T).reshape((size, number_count, size))
         onward = np.dot(run.covariances[k], transition.T) - np.dot(gain.T, moved_gain.T)
-        _add_white_noise(np.dot(moved_gain, whitening), np.dot(innovations, whitening), states, derivatives)
-        _add_processes(transition, run.states[k] + np.dot(innovations, gain), onward, run.steps[k], states, derivatives)
+        _add_white_noise(np.dot(moved_gain, whitening), np.dot(innovations, whitening), disturbance, derivatives)
+        updated = run.states[k] + np.dot(innovations, gain)
+        _add_processes(transition, updated, onward, run.steps[k], disturbance, derivatives)
 
 
 @compiled
-def _whitened(run: Run, states: DisturbanceStates, k: int) -> Any:
+def _whitened(run: Run, disturbance: DisturbanceStates, k: int) -> Any:
     """``L^-1``, ``L^-1 C`` and ``L^-1 C P`` of sample k; an output that was not observed is noise of its own."""
     output = run.output_matrices[k].copy()
     count, size = output.shape
@@ -165,7 +164,7 @@ def _whitened(run: Run, states: DisturbanceStates, k: int) -> Any:
                 gain[i, c] -= factor * gain[earlier, c]
             for c in range(i):
                 whitening[i, c] -= factor * whitening[earlier, c]
-        deviation = np.sqrt(variances[i, i] + states.white_variance[i])
+        deviation = np.sqrt(variances[i, i] + disturbance.white_variance[i])
         for c in range(i, count):
             variances[c, i] /= deviation
         output[i] /= deviation
@@ -176,11 +175,16 @@ def _whitened(run: Run, states: DisturbanceStates, k: int) -> Any:
 
 @compiled
 def _differentiate_innovations(
-    innovations: Any, whitening: Any, output: Any, states: DisturbanceStates, derivatives: Derivatives, by_number: Any
+    innovations: Any,
+    whitening: Any,
+    output: Any,
+    disturbance: DisturbanceStates,
+    derivatives: Derivatives,
+    by_number: Any,
 ) -> None:
     count, size = output.shape
     number_count = derivatives.state.shape[1]
-    first_white = number_count - 1 - states.sensor.max()
+    first_white = number_count - 1 - disturbance.sensor.max()
     seen = np.dot(output, derivatives.covariance.reshape((size, -1))).reshape((-1, size))
     by_covariance = np.dot(seen, output.T).reshape((count, number_count, count))
     by_state = np.dot(output, derivatives.state)
@@ -190,8 +194,8 @@ def _differentiate_innovations(
         for c in range(i + 1):
             weight = 0.5 if c == i else 1.0
             for o in range(count):
-                noise = 2.0 * states.white_variance[o] * whitening[i, o] * whitening[c, o]
-                by_covariance[i, first_white + states.sensor[o], c] += noise
+                noise = 2.0 * disturbance.white_variance[o] * whitening[i, o] * whitening[c, o]
+                by_covariance[i, first_white + disturbance.sensor[o], c] += noise
             for j in range(number_count):
                 by_number[0, i, j] -= weight * by_covariance[i, j, c] * innovations[c]
         for j in range(number_count):
@@ -199,11 +203,11 @@ def _differentiate_innovations(
 
 
 @compiled
-def _add_white_noise(gain: Any, errors: Any, states: DisturbanceStates, derivatives: Derivatives) -> None:
+def _add_white_noise(gain: Any, errors: Any, disturbance: DisturbanceStates, derivatives: Derivatives) -> None:
     """Add what white noise changes by the filter's ``gain`` (n, m), from ``errors`` (m) over their variances."""
-    first_white = derivatives.state.shape[1] - 1 - states.sensor.max()
+    first_white = derivatives.state.shape[1] - 1 - disturbance.sensor.max()
     for i in range(len(errors)):
-        number, noise = first_white + states.sensor[i], 2.0 * states.white_variance[i]
+        number, noise = first_white + disturbance.sensor[i], 2.0 * disturbance.white_variance[i]
         for r in range(len(gain)):
             scaled = noise * gain[r, i]
             derivatives.state[r, number] -= scaled * errors[i]
@@ -213,16 +217,16 @@ def _add_white_noise(gain: Any, errors: Any, states: DisturbanceStates, derivati
 
 @compiled
 def _add_processes(
-    transition: Any, state: Any, onward: Any, step: float, states: DisturbanceStates, derivatives: Derivatives
+    transition: Any, state: Any, onward: Any, step: float, disturbance: DisturbanceStates, derivatives: Derivatives
 ) -> None:
     """Add what decay and size of the processes change in a step from an updated state; ``onward`` is ``P+ T'``."""
     for i in range(len(state)):
-        process = states.process[i]
+        process = disturbance.process[i]
         if process < 0:
             continue
-        exponent = states.decay_rate[i] * step
-        # Means over a step decay half as far.
-        slopes = -0.5 * exponent * transition[:, i] if states.is_driving[i] else np.zeros(len(state))
+        exponent = disturbance.decay_rate[i] * step
+        # A force's mean over a step has decayed half as far.
+        slopes = -0.5 * exponent * transition[:, i] if process == 0 else np.zeros(len(state))
         slopes[i] = -exponent * transition[i, i]
         for r in range(len(state)):
             if slopes[r] != 0.0:
@@ -231,5 +235,5 @@ def _add_processes(
                     derivatives.covariance[r, 2 * process + 1, c] += slopes[r] * onward[i, c]
                     derivatives.covariance[c, 2 * process + 1, r] += slopes[r] * onward[i, c]
         decayed = np.exp(-2.0 * exponent)
-        derivatives.covariance[i, 2 * process, i] += 2.0 * states.variance[i] * (1.0 - decayed)
-        derivatives.covariance[i, 2 * process + 1, i] += 2.0 * exponent * states.variance[i] * decayed
+        derivatives.covariance[i, 2 * process, i] += 2.0 * disturbance.variance[i] * (1.0 - decayed)
+        derivatives.covariance[i, 2 * process + 1, i] += 2.0 * exponent * disturbance.variance[i] * decayed
