@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from tautwire.estimation import disturbance_fit
 from tautwire.estimation.candidate_fits import fit_and_validate, maximised_validation_likelihood
 from tautwire.estimation.candidate_proposals import FitTask
 from tautwire.estimation.disturbance import Disturbance, OrnsteinUhlenbeck, sensor_noise_only
@@ -19,7 +20,7 @@ from tautwire.estimation.disturbance_fit import (
     marginal_log_likelihood,
     with_fitted_disturbance,
 )
-from tautwire.estimation.disturbance_posterior import ParameterBox, Posterior, disturbance_prior, logs_of
+from tautwire.estimation.disturbance_posterior import Evaluation, ParameterBox, Posterior, disturbance_prior, logs_of
 from tautwire.estimation.estimation_data import DataSet, DataSplit
 from tautwire.estimation.hypotheses import hypotheses
 from tautwire.estimation.identification_context import IdentificationContext
@@ -267,6 +268,23 @@ def test_a_fit_that_searches_begins_at_the_priors_median_as_well(searches: bool)
     effort = Effort(max_iterations=0, is_exact=True, searches=searches)
     reached = fit_disturbance(Posterior(likelihood, np.zeros(0), data, prior), effort=effort)
     assert logs_of(reached) == pytest.approx(logs_of(prior.median if searches else far_off))
+
+
+def test_a_fit_begins_at_a_start_that_is_a_little_less_probable_as_well(monkeypatch: pytest.MonkeyPatch) -> None:
+    data, prior = data_of(PAIR[0].first(200)), disturbance_prior(ROBOT, NOISE)
+    sizes = [replace(prior.median, tension=OrnsteinUhlenbeck(rms, 1.0)) for rms in (1.0, 1.1, 300.0)]
+    begun: list[float] = []
+
+    def unmoved(_: Posterior, start: Evaluation, *__: object) -> Evaluation:
+        begun.append(float(np.exp(start.logs[4])))
+        return start
+
+    monkeypatch.setattr(disturbance_fit, "_maximised", unmoved)
+    effort = Effort(max_iterations=1, is_exact=False, searches=False)
+    for other in sizes[1:]:
+        posterior = Posterior(likelihood_of(replace(NOISE, disturbance=sizes[0])), np.zeros(0), data, prior)
+        fit_disturbance(posterior, effort=effort, other=other)
+    assert begun == pytest.approx([1.0, 1.1, 1.0])
 
 
 def test_a_rival_is_judged_under_the_best_disturbance_of_the_unseen_data() -> None:

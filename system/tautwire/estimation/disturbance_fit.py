@@ -6,7 +6,7 @@ maximum's neighbourhood; where some nats matter, ascent under the likelihood its
 
 from __future__ import annotations
 
-from collections.abc import Collection
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass, replace
 from math import log
 
@@ -147,16 +147,23 @@ def fit_disturbance(
 ) -> Disturbance:
     """Maximise the posterior density over the disturbance; by default exactly.
 
-    Begins at the likelihood's own disturbance, or at the ``other`` where that is more probable; and at the prior's
+    Begins at the likelihood's own disturbance and at the ``other``, unless one is far less probable; and at the prior's
     median, or a larger one, where the effort is to search.
     """
     effort = effort or Effort(policy.max_iterations, is_exact=True)
     own, median = posterior.likelihood.noise.disturbance, posterior.prior.median
     known = [logs_of(each) for each in (own, other) if each not in (None, median)]
     fresh = _fresh_starts(posterior.prior, policy) if effort.searches or not known else []
-    best = [max(posterior.evaluations(starts), key=_value) for starts in (known, fresh) if starts]
-    reached = max((_maximised(posterior, start, policy, effort) for start in best), key=_value)
+    starts = _promising(posterior.evaluations(known), policy.max_start_deficit)
+    starts += [max(posterior.evaluations(fresh), key=_value)] if fresh else []
+    reached = max((_maximised(posterior, start, policy, effort) for start in starts), key=_value)
     return posterior.prior.disturbance_of(reached.logs)
+
+
+def _promising(evaluations: Sequence[Evaluation], max_deficit: float) -> list[Evaluation]:
+    """The best, and those so little below it (nats) that they may lead higher."""
+    best = max((each.value for each in evaluations), default=0.0)
+    return [each for each in evaluations if each.value >= best - max_deficit]
 
 
 def _maximised(posterior: Posterior, current: Evaluation, policy: DisturbancePolicy, effort: Effort) -> Evaluation:

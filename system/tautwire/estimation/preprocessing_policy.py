@@ -109,6 +109,8 @@ class DisturbancePolicy:
     noise_factor: float = 3.0
     # Factors by which sizes are larger where a fit may begin as well.
     start_factors: tuple[float, ...] = (30.0, 1000.0)
+    # Nats below a more probable start at which a fit begins as well: in one recording 12 led 130 higher.
+    max_start_deficit: float = 50.0
     # Levenberg's damping at first and at most, the longest step of a log, and the gain in nats that ends a fit, or one
     # given the uncertain parameters.
     first_damping: float = 1e-2
