@@ -55,6 +55,7 @@ def context_with(has_disturbance: bool) -> IdentificationContext:
     return IdentificationContext(robot, Fitter(noise), split_data(robot, noise, recording, None))
 
 
+@pytest.mark.validate(but=["False"])
 @pytest.mark.parametrize(("has_disturbance", "names"), [(False, ["damping", "payload"]), (True, ["damping"])])
 def test_beside_a_disturbance_a_further_effect_needs_a_share_of_the_first_ones_evidence(
     has_disturbance: bool, names: list[str], monkeypatch: pytest.MonkeyPatch
