@@ -42,11 +42,8 @@ def require_derivatives(robot: Robot, recording: Recording, noise: Noise, tolera
             likelihood.with_disturbance(prior.disturbance_of(logs + sign * move)).innovations(recording, ())
             for sign in (1.0, -1.0)
         ]
-        for derivatives, (later, earlier) in zip(
-            by_logs,
-            (tuple(end.values for end in ends), tuple(end.log_variances for end in ends)),
-            strict=True,
-        ):
+        moved = ([end.values for end in ends], [end.log_variances for end in ends])
+        for derivatives, (later, earlier) in zip(by_logs, moved, strict=True):
             expected = (later[observed] - earlier[observed]) / (2.0 * STEP)
             largest = float(np.max(np.abs(expected)))
             assert largest > 1e-4

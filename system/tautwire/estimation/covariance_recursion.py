@@ -24,7 +24,7 @@ import numpy as np
 from .step_integration import Integration, Step, compiled, evaluate, integrate_step
 
 # Numba caches machine code by the content of this file alone, and what it calls of that module is in it.
-STEP_INTEGRATION_SHA256 = "cc9d42e31811eac14b8afb632fcec07e2ee1e6a823224f65047e520103dbf386"
+STEP_INTEGRATION_SHA256 = "3b578dcac9bab9c4580bef7b4d967aad968261ba873afb93f9257e464ec01dbe"
 
 
 class Moments(NamedTuple):
@@ -121,8 +121,8 @@ def _update_by_measurements(
         for later in range(i + 1, len(innovations)):
             factor = variances[later, i] / deviation
             innovations[later] -= factor * innovations[i]
-            subtract_row(cross_covariances, later, factor, i)
-            subtract_row(variances, later, factor / deviation, i)
+            _subtract_row(cross_covariances, later, factor, i)
+            _subtract_row(variances, later, factor / deviation, i)
             for parameter in range(len(slopes)):
                 slopes[parameter, later] -= factor * slopes[parameter, i]
     moments.state[:] += np.dot(innovations, cross_covariances)
@@ -131,7 +131,7 @@ def _update_by_measurements(
 
 
 @compiled
-def subtract_row(matrix: Any, row: int, factor: float, other: int) -> None:
+def _subtract_row(matrix: Any, row: int, factor: float, other: int) -> None:
     """Subtract a multiple of another row of a matrix from one, without a copy."""
     for c in range(matrix.shape[1]):
         matrix[row, c] -= factor * matrix[other, c]

@@ -36,17 +36,17 @@ Array = NDArray[np.float64]
 
 
 class DisturbanceStates(NamedTuple):
-    """Which of a disturbance's processes each state of a filter is, and of which kind each output's white noise.
+    """By which of a disturbance's numbers each state of a filter moves, and the white noise of each output.
 
-    Of the n states ``process`` is the index of the Ornstein-Uhlenbeck process among the disturbance's, -1 of others;
-    ``decay_rate`` (1/s) and ``variance`` are its own. The first process, 0, is the force that acts on the platform.
-    ``sensor`` (m) is the index of each output's white noise among them, and ``white_variance`` (m) its variance.
+    Of the n states ``rms_number`` is the index of the rms among the numbers, before that of the bandwidth, and -1 where
+    a state has none; ``decay_rate`` (1/s) and ``variance`` are its own. Number 0 is the rms of the platform's force.
+    ``white_number`` (m) is the index of each output's white noise, ``white_variance`` (m) its variance.
     """
 
-    process: Any
+    rms_number: Any
     decay_rate: Any
     variance: Any
-    sensor: Any
+    white_number: Any
     white_variance: Any
 
 
@@ -84,8 +84,8 @@ def disturbance_sensitivities(
     likelihood = likelihood.with_disturbance(disturbance)
     _, covariance = likelihood.start(parameters)
     states = _disturbance_states(likelihood, disturbance, len(covariance))
-    number_count = 3 * (1 + int(states.sensor.max())) + 2
-    derivatives = _derivatives_at_start(states, number_count)
+    derivatives = _derivatives_at_start(states)
+    number_count = derivatives.state.shape[1]
     parts = []
     for segment in likelihood.segments(recording, parameters):
         run = _run_of(segment)
@@ -98,21 +98,21 @@ def disturbance_sensitivities(
 
 def _disturbance_states(likelihood: Likelihood, disturbance: Disturbance, size: int) -> DisturbanceStates:
     cables, turning = likelihood.cable_count, disturbance.rotation is not None
-    sensor = np.repeat([0, 1, 2], [3, cables, 3 if turning else 0])
-    own_processes = np.append(np.zeros(6 if turning else 3, dtype=int), 1 + sensor)
+    kinds = np.repeat([0, 1, 2], [3, cables, 3 if turning else 0])
+    numbers = np.append(np.zeros(6 if turning else 3, dtype=int), 2 + 2 * kinds)
     rates, variances = np.split(likelihood.disturbance_arguments[:, 0], 2)
-    first, count = size - len(own_processes), len(own_processes)
-    process, decay_rate, variance = np.full(size, -1), np.zeros(size), np.zeros(size)
-    process[first:], decay_rate[first:], variance[first:] = own_processes, rates[-count:], variances[-count:]
-    white_variances = disturbance.white_variances(cables)
-    return DisturbanceStates(process, decay_rate, variance, sensor, white_variances)
+    first, count = size - len(numbers), len(numbers)
+    rms_number, decay_rate, variance = np.full(size, -1), np.zeros(size), np.zeros(size)
+    rms_number[first:], decay_rate[first:], variance[first:] = numbers, rates[-count:], variances[-count:]
+    first_white = int(numbers.max()) + 2
+    return DisturbanceStates(rms_number, decay_rate, variance, first_white + kinds, disturbance.white_variances(cables))
 
 
-def _derivatives_at_start(disturbance: DisturbanceStates, number_count: int) -> Derivatives:
-    size = len(disturbance.process)
+def _derivatives_at_start(disturbance: DisturbanceStates) -> Derivatives:
+    size, number_count = len(disturbance.rms_number), 1 + int(disturbance.white_number.max())
     derivatives = Derivatives(np.zeros((size, number_count)), np.zeros((size, number_count, size)))
-    for r in np.flatnonzero(disturbance.process >= 0):
-        derivatives.covariance[r, 2 * disturbance.process[r], r] = 2.0 * disturbance.variance[r]
+    for r in np.flatnonzero(disturbance.rms_number >= 0):
+        derivatives.covariance[r, disturbance.rms_number[r], r] = 2.0 * disturbance.variance[r]
     return derivatives
 
 
@@ -184,7 +184,6 @@ def _differentiate_innovations(
 ) -> None:
     count, size = output.shape
     number_count = derivatives.state.shape[1]
-    first_white = number_count - 1 - disturbance.sensor.max()
     seen = np.dot(output, derivatives.covariance.reshape((size, -1))).reshape((-1, size))
     by_covariance = np.dot(seen, output.T).reshape((count, number_count, count))
     by_state = np.dot(output, derivatives.state)
@@ -195,7 +194,7 @@ def _differentiate_innovations(
             weight = 0.5 if c == i else 1.0
             for o in range(count):
                 noise = 2.0 * disturbance.white_variance[o] * whitening[i, o] * whitening[c, o]
-                by_covariance[i, first_white + disturbance.sensor[o], c] += noise
+                by_covariance[i, disturbance.white_number[o], c] += noise
             for j in range(number_count):
                 by_number[0, i, j] -= weight * by_covariance[i, j, c] * innovations[c]
         for j in range(number_count):
@@ -205,9 +204,8 @@ def _differentiate_innovations(
 @compiled
 def _add_white_noise(gain: Any, errors: Any, disturbance: DisturbanceStates, derivatives: Derivatives) -> None:
     """Add what white noise changes by the filter's ``gain`` (n, m), from ``errors`` (m) over their variances."""
-    first_white = derivatives.state.shape[1] - 1 - disturbance.sensor.max()
     for i in range(len(errors)):
-        number, noise = first_white + disturbance.sensor[i], 2.0 * disturbance.white_variance[i]
+        number, noise = disturbance.white_number[i], 2.0 * disturbance.white_variance[i]
         for r in range(len(gain)):
             scaled = noise * gain[r, i]
             derivatives.state[r, number] -= scaled * errors[i]
@@ -221,19 +219,19 @@ def _add_processes(
 ) -> None:
     """Add what decay and size of the processes change in a step from an updated state; ``onward`` is ``P+ T'``."""
     for i in range(len(state)):
-        process = disturbance.process[i]
-        if process < 0:
+        rms = disturbance.rms_number[i]
+        if rms < 0:
             continue
         exponent = disturbance.decay_rate[i] * step
         # A force's mean over a step has decayed half as far.
-        slopes = -0.5 * exponent * transition[:, i] if process == 0 else np.zeros(len(state))
+        slopes = -0.5 * exponent * transition[:, i] if rms == 0 else np.zeros(len(state))
         slopes[i] = -exponent * transition[i, i]
         for r in range(len(state)):
             if slopes[r] != 0.0:
-                derivatives.state[r, 2 * process + 1] += slopes[r] * state[i]
+                derivatives.state[r, rms + 1] += slopes[r] * state[i]
                 for c in range(len(state)):
-                    derivatives.covariance[r, 2 * process + 1, c] += slopes[r] * onward[i, c]
-                    derivatives.covariance[c, 2 * process + 1, r] += slopes[r] * onward[i, c]
+                    derivatives.covariance[r, rms + 1, c] += slopes[r] * onward[i, c]
+                    derivatives.covariance[c, rms + 1, r] += slopes[r] * onward[i, c]
         decayed = np.exp(-2.0 * exponent)
-        derivatives.covariance[i, 2 * process, i] += 2.0 * disturbance.variance[i] * (1.0 - decayed)
-        derivatives.covariance[i, 2 * process + 1, i] += 2.0 * exponent * disturbance.variance[i] * decayed
+        derivatives.covariance[i, rms, i] += 2.0 * disturbance.variance[i] * (1.0 - decayed)
+        derivatives.covariance[i, rms + 1, i] += 2.0 * exponent * disturbance.variance[i] * decayed

@@ -143,7 +143,7 @@ def _differentiate(integration: Integration, middles: Any, k: int) -> None:
         evaluate(integration.slope, k, places)
         jacobian, slopes = integration.slope.results
         gamma = _integrated_exponential(jacobian, part, division)
-        _set_exponential(jacobian, 1.0, gamma, over_part)
+        _set_identity_plus(jacobian, 1.0, gamma, over_part)
         if j == 0:
             transition[:] = over_part
             by_constants[:] = np.dot(slopes, gamma.T)
@@ -159,11 +159,11 @@ def _integrated_exponential(jacobian: Any, part: float, division: Division) -> A
     step = part / 2**division.doublings
     series, longer = np.eye(len(jacobian)), np.empty_like(jacobian)
     for term in range(division.order, 1, -1):
-        _set_exponential(jacobian, step / term, series, longer)
+        _set_identity_plus(jacobian, step / term, series, longer)
         series, longer = longer, series
     gamma = step * series
     for _ in range(division.doublings):
-        _set_exponential(jacobian, 1.0, gamma, longer)
+        _set_identity_plus(jacobian, 1.0, gamma, longer)
         gamma = gamma + np.dot(longer, gamma)
     return gamma
 
@@ -186,7 +186,7 @@ def _fill_in(integration: Integration, transition: Any, by_constants: Any) -> No
 
 
 @compiled
-def _set_exponential(jacobian: Any, factor: float, matrix: Any, result: Any) -> None:
+def _set_identity_plus(jacobian: Any, factor: float, matrix: Any, result: Any) -> None:
     """Set ``I + factor F M`` of a Jacobian ``F``, which is stored by columns and mostly zeros, and a matrix ``M``."""
     result[:] = 0.0
     for r in range(len(jacobian)):
