@@ -71,6 +71,12 @@ def test_example_of_the_controllers_page_runs(tmp_path: Path, monkeypatch: pytes
         assert abs(results["motion"].position - results[name].position).max() < 1e-9
     for name in ("filtered", "proportional"):
         assert abs(results[name].position[-1] - results["path"].end).max() < 0.02
+    for name in ("compensated", "steady"):
+        reference = results["path"].position(results[name].time)
+        assert abs(results[name].position - reference).max() < 1e-4
+    uncompensated, shaped_path = results["uncompensated"], results["shaped_path"]
+    assert uncompensated.time[-1] > shaped_path.duration > results["path"].duration
+    assert abs(uncompensated.position - shaped_path.position(uncompensated.time)).max() > 1e-3
 
 
 def test_an_effect_is_added_by_following_its_page(tmp_path: Path) -> None:
