@@ -14,6 +14,7 @@ from tautwire.robot.platform_reader import CABLE_KEYS, PLATFORM_KEYS
 from tautwire.robot.robot_file_reader import read_robot
 from tautwire.robot.robot_template import MAX_TEMPLATE_CABLES, MIN_TEMPLATE_CABLES, new_robot_text
 from tautwire.robot.static_equilibrium import static_tensions
+from tautwire_fmu.laws.effects import ALL
 
 
 @pytest.mark.parametrize("count", range(MIN_TEMPLATE_CABLES, MAX_TEMPLATE_CABLES + 1))
@@ -43,6 +44,7 @@ def test_what_is_commented_out_can_be_put_in(tmp_path: Path) -> None:
     place.write_text(text.replace("[fmu]\nplatform = ", "[fmu]\n# platform = "), encoding="utf-8")
     robot = read_robot(place)
     assert robot.winch and robot.effects and robot.formulas
+    assert robot.tracker.clock_offset == 3.412 and robot.tracker.columns
     assert robot.tension and robot.tension.preferred_uncertainty
 
 
@@ -53,6 +55,8 @@ def test_every_table_is_in_it() -> None:
     keys = (*reading.NOISE_RULES, *reading.OFFSET_RULES, *reading.WINCH_LIMIT_RULES, *reading.CABLE_UNCERTAINTY_RULES)
     for key in (*keys, "inertia", *PLATFORM_KEYS, *CABLE_KEYS, "swivel_axis"):
         assert re.search(rf"^(# )?{key} = ", text, re.MULTILINE), key
+    for effect in ALL:
+        assert re.search(rf"^# .*\b{effect.name}\b", text, re.MULTILINE), effect.name
 
 
 def test_the_command_never_overwrites_without_the_option(

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import json
 from math import cos, pi, sin
+from textwrap import fill
+
+from tautwire_fmu.laws.effects import ALL
 
 MIN_TEMPLATE_CABLES, MAX_TEMPLATE_CABLES = 3, 12
 
@@ -71,7 +74,8 @@ TEMPLATE_TAIL = """
 # speed_limit = 1.0               # m/s, of the rope
 # acceleration_limit = 5.0        # m/s^2
 
-# Effects that the plain model lacks; "tautwire trace" identifies them from recordings and writes such tables.
+# Effects that the plain model lacks; "tautwire trace" identifies them from recordings and writes such tables. All:
+{effects}
 # [effect.payload]
 # mass = 5.0                      # kg
 
@@ -90,8 +94,15 @@ TEMPLATE_TAIL = """
 
 # Recordings' columns by the laboratory's names; "tautwire columns" proposes this table.
 # [recording.columns]
-# time = { name = "t_ms", unit = "ms" }
-# "winch_speed_{}" = { name = "Drive{}.Velocity", unit = "mm/s", sign = -1 }
+# time = {{ name = "t_ms", unit = "ms" }}
+# "winch_speed_{{}}" = {{ name = "Drive{{}}.Velocity", unit = "mm/s", sign = -1 }}
+
+# A tracker's file beside the winches' log, given as --tracker: its clock where it is known, and its columns.
+# [recording.tracker]
+# clock_offset = 3.412            # s, what its clock shows at the first sample of the log
+# [recording.tracker.columns]
+# time = "Time (Seconds)"
+# x = {{ name = "Rigid Body 1 X", unit = "mm" }}
 """
 
 
@@ -107,8 +118,14 @@ def new_robot_text(name: str, cable_count: int = MIN_TEMPLATE_CABLES) -> str:
     return (
         head
         + "".join(_template_cable(number, cable_count, has_lower_anchors) for number in range(1, cable_count + 1))
-        + TEMPLATE_TAIL
+        + TEMPLATE_TAIL.format(effects=_effect_names())
     )
+
+
+def _effect_names() -> str:
+    """The names of all effects, as comment lines."""
+    names = ", ".join(effect.name for effect in ALL)
+    return fill(names, 118, initial_indent="# ", subsequent_indent="# ")
 
 
 def _template_cable(number: int, cable_count: int, has_lower_anchors: bool) -> str:
