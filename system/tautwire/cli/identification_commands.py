@@ -35,6 +35,7 @@ from .console import (
 
 if TYPE_CHECKING:
     from ..estimation import Trace
+    from ..estimation.hypotheses import Hypothesis
     from ..materials import MaterialOptions, MaterialVerdict
     from ..materials.material_table import MaterialTable
     from ..materials.viscoelastic_model import Material
@@ -292,10 +293,19 @@ def excite(
         excitation.frame().to_csv(scratch, index=False, float_format="%.10g")
     write_csv_metadata(out, provenance)
     pairs = [(pair.effect.label(robot), pair.other.label(robot), pair.nats) for pair in excitation.pairs]
-    lines = [f"{effect} and {other}: separation {nats:.3g} nats" for effect, other, nats in pairs[:5]]
+    lines = [
+        f"{_with_parameters(pair.effect, robot)} and {_with_parameters(pair.other, robot)}: "
+        f"separation {pair.nats:.3g} nats"
+        for pair in excitation.pairs[:5]
+    ]
     median_line = f"closest pair of the median program: {excitation.median_separation:.3g} nats"
     pair_records = [{"effect": effect, "other": other, "nats": nats} for effect, other, nats in pairs]
     document = {"program": out, "pairs": pair_records, "median": excitation.median_separation}
     output.result([*lines, median_line, out], {**document, "provenance": provenance.document()})
     trace_command = f"tautwire trace {shell_quoted(robot_file)} RECORDING.csv --out report/"
     output.suggest_next(f"run it on the robot, record positions and tensions, then {trace_command}")
+
+
+def _with_parameters(hypothesis: Hypothesis, robot: Robot) -> str:
+    """Its label with the parameters that are free: an effect can have several forms."""
+    return f"{hypothesis.label(robot)} ({', '.join(hypothesis.form)})"
