@@ -126,7 +126,7 @@ def test_a_case_is_made_once_and_gives_robot_recordings_and_truth(
     [
         (DAMPING, answer(DAMPING, "damping"), "right"),
         (DAMPING, answer(DAMPING, "damping", "drag", shares={"drag": 0.03}), "right"),
-        (DAMPING, answer(DAMPING, "damping", "drag", shares={"drag": 0.06}), "wrong"),
+        (DAMPING, answer(DAMPING, "damping", "drag", shares={"drag": 0.06}), "little"),
         (DAMPING, answer(DAMPING, "damping", "friction", shares={"friction": 0.03}), "wrong"),
         (DAMPING, answer(DAMPING, "drag", shares={"drag": 0.03}), "missed"),
         (DAMPING, answer(DAMPING, verdict="none"), "missed"),
@@ -138,7 +138,9 @@ def test_a_case_is_made_once_and_gives_robot_recordings_and_truth(
         (SWING, answer(SWING, verdict="discovered"), "right"),
         (SWING, answer(SWING, "modulus"), "wrong"),
         (EMPTY, answer(EMPTY, verdict="none"), "right"),
-        (EMPTY, answer(EMPTY, "drag", shares={"drag": 0.01}), "wrong"),
+        (EMPTY, answer(EMPTY, "drag", shares={"drag": 0.7}), "little"),
+        (EMPTY, answer(EMPTY, "drag", "friction"), "wrong"),
+        (SWING, answer(SWING, "drag"), "wrong"),
         (EMPTY, answer(EMPTY, verdict="unexplained"), "alarm"),
     ],
 )

@@ -82,7 +82,8 @@ def _lifelike(answers: Sequence[Scored], empty: Sequence[Scored]) -> list[str]:
         "jumps, winch speeds from counts, drifting load cells, ropes that warm up. What is hidden changes positions or "
         f"tensions by {LEAST_RATIO:.0f} times or more of what all these do: an effect of the list in its own form "
         "(listed) or in another (form), two effects, what is on no list, or nothing. Right are exactly the names that "
-        f"are hidden; a little thing may be named beside them with a share below {100 * MINOR_SHARE:.0f} %.",
+        f"are hidden; a little thing may be named beside them with a share below {100 * MINOR_SHARE:.0f} %. One "
+        "that is named with more, or alone where nothing is hidden, is there all the same: counted apart, as little.",
         "### Outcomes of lifelike recordings",
         tables.outcomes(answers),
         tables.meanings([*answers, *empty]),
@@ -105,10 +106,12 @@ def _alarms(empty: Sequence[Scored]) -> str:
     answered = [answer for answer in empty if answer.outcome != "failed"]
     wrong = rate(sum(answer.outcome == "wrong" for answer in answered), len(answered))
     alarm = rate(sum(answer.outcome == "alarm" for answer in answered), len(answered))
+    little = sum(answer.outcome == "little" for answer in answered)
+    small = f" That of a thing which is there in small: {little} of {len(answered)}." if little else ""
     return (
         f"Robots that do what their files say, none of them among the cases above. A name where nothing is hidden: "
-        f"{tables.shown_rate(wrong)}; `--alpha` was {ALPHA:g}. Unexplained or discovered: {tables.shown_rate(alarm)}. "
-        f"No answer: {len(empty) - len(answered)}."
+        f"{tables.shown_rate(wrong)}; `--alpha` was {ALPHA:g}.{small} "
+        f"Unexplained or discovered: {tables.shown_rate(alarm)}. No answer: {len(empty) - len(answered)}."
     )
 
 

@@ -18,9 +18,10 @@ from .motion import declared
 from .sizes import strengths
 from .truth import Interval, holds, in_one_way, law_values
 
-Outcome = Literal["right", "ambiguous", "place", "part", "abstained", "missed", "alarm", "wrong", "failed"]
+Outcome = Literal["right", "little", "ambiguous", "place", "part", "abstained", "missed", "alarm", "wrong", "failed"]
 MEANINGS: Mapping[Outcome, str] = {
     "right": "what is hidden, by name and place; nothing where nothing is; abstention where it is not on the list",
+    "little": "with it, as larger than it is, something that is there though only in small",
     "ambiguous": "a name that the data cannot tell from the true one, declared so with the true one in the set",
     "place": "the right name on other cables",
     "part": "some of the names and no wrong one",
@@ -77,6 +78,8 @@ def outcome(case: Case, line: Line) -> Outcome:
     if line.failure:
         return "failed"
     if line.verdict == "effects":
+        if case.kind == "empty" and line.effects:
+            return "little" if {effect.name for effect in line.effects} <= _minor(line) else "wrong"
         return _of_names(case, line) if case.kind in NAMED else "wrong"
     if line.verdict == "none":
         return "right" if case.kind == "empty" else "missed"
@@ -90,7 +93,14 @@ def _of_names(case: Case, line: Line) -> Outcome:
         return "right" if line.truth or _places(case) == _named_places(line) else "place"
     if line.names < case.names:
         return "part" if line.names else "missed"
+    if line.names - case.names <= _minor(line) and case.names <= line.names:
+        return "little"
     return "ambiguous" if _excused(case.names, line) else "wrong"
+
+
+def _minor(line: Line) -> frozenset[str]:
+    """What else is there in small, by name."""
+    return frozenset(line.truth.get("minor", ()))
 
 
 def _excused(truth: frozenset[str], line: Line) -> bool:
