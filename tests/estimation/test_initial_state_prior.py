@@ -7,14 +7,16 @@ import pytest
 
 from tautwire.estimation.initial_state_prior import initial_covariance, self_stress_deviation, self_stress_projection
 from tautwire.estimation.kalman_filter import Noise
+from tautwire.estimation.likelihood import Likelihood
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.recordings.recording import Recording
 from tautwire.robot.robot_file_reader import read_robot
 from tautwire.robot.robot_file_text import robot_text
 from tautwire.robot.robot_file_writer import write_robot
-from tautwire.robot.schema import InitialState
+from tautwire.robot.schema import EffectSetting, InitialState
 from tautwire.robot.static_equilibrium import static_tensions
 from tautwire.robot.symbolic_model import symbolic_model
+from tautwire_fmu.laws.effects.relaxation import RELAXATION
 from tests.support.recordings import recorded
 from tests.support.robots import example
 
@@ -52,6 +54,23 @@ def test_lengths_are_uncertain_by_what_such_tensions_stretch() -> None:
     stiffness = [c.modulus * c.area / np.linalg.norm(np.subtract(c.anchor, EIGHT.platform.start)) for c in EIGHT.cables]
     tensions = np.diag(stiffness) @ covariance @ np.diag(stiffness)
     assert tensions == pytest.approx(900.0 * self_stress_projection(EIGHT), abs=1e-6)
+
+
+def test_relaxed_ropes_have_relaxed_under_the_pretension_that_they_have() -> None:
+    """The filter's start with a branch in each rope: no direction in which it is uncertain makes a strain relax."""
+    relaxing = EIGHT.with_effect(
+        EffectSetting("relaxation", RELAXATION.completed_values({"modulus": 1e11, "time": 0.4}), EIGHT.cable_numbers)
+    )
+    likelihood = Likelihood(relaxing, (), Noise(1e-4, 1.0, 1e-5, 1e-4, self_stress=30.0), 0.01)
+    state, covariance = likelihood.start(())
+    model = likelihood.model
+    branches = [index for index, name in enumerate(model.state_names) if "relaxation" in name]
+    assert len(branches) == 8
+    jacobian = casadi.jacobian(model.rates, model.states)
+    (slopes,) = casadi.substitute([jacobian], [model.states, model.inputs], [state, np.zeros(model.inputs.shape)])
+    relaxing_rates = np.array(casadi.evalf(slopes))[branches] @ np.linalg.cholesky(covariance + 1e-18 * np.eye(22))
+    lengths = np.sqrt(np.diag(covariance)[6:14])
+    assert np.abs(relaxing_rates).max() < 1e-3 * lengths.min() / 0.4
 
 
 def test_pretension_is_uncertain_where_no_tension_is_measured_or_the_file_says_so() -> None:

@@ -15,9 +15,15 @@ from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fitter
 from tautwire.estimation.smoothed_states import Calibration, calibrate_beside_effects, with_initial_state
 from tautwire.estimation.trace_result import Estimate, FoundEffect
+from tautwire.recordings.recording import Recording
+from tautwire.robot.schema import AXES, EffectSetting
+from tautwire.robot.static_equilibrium import static_tensions
 from tautwire.robot.uncertain_parameters import uncertain_parameters
+from tautwire_fmu.laws.effects.relaxation import RELAXATION
+from tests.rig import make_recording, wander
 from tests.support.planar import VERTICAL, planar_case
 from tests.support.recordings import recorded
+from tests.support.rig_robots import rig_of
 from tests.support.robots import example
 
 
@@ -101,3 +107,23 @@ def test_a_planar_robot_starts_in_its_plane_beside_an_uncertain_pretension(tmp_p
     assert started.initial_state is not None
     assert started.platform.start[1] == 0.0
     assert started.platform.start != robot.platform.start
+
+
+def test_pretension_is_estimated_beside_ropes_that_relax() -> None:
+    """The rig's eight cables are 60 N tighter than the file says, and have long relaxed under it."""
+    robot = example("eight")
+    effect = {"modulus": float(robot.cables[0].modulus), "time": 0.4}
+    declared = rig_of(robot)
+    tight = replace(declared, tension=replace(declared.tension, preferred=declared.tension.preferred + 60.0))
+    program = wander(tight, 1, 0.8, slow=(5.0, 12.0), shake=0.6)
+    frame = make_recording(tight, {"relaxation": effect}, program, duration=4.0, rate=100.0, seed=1, noise=False)
+    columns = [[f"{name}_{cable}" for cable in robot.cable_numbers] for name in ("winch_speed", "tension")]
+    speeds, tensions = (frame[names].to_numpy() for names in columns)
+    recording = Recording("tight.csv", frame["time"].to_numpy(), speeds, tensions, frame[list(AXES)].to_numpy())
+    values = RELAXATION.completed_values(effect)
+    relaxing = robot.with_effect(EffectSetting("relaxation", values, robot.cable_numbers))
+    noise = replace(estimate_noise(robot, recording), self_stress=60.0)
+    data = DataSet(recording, robot.platform.start, np.ones(len(recording.time), dtype=bool))
+    started = with_initial_state(Fitter(noise), relaxing, data)
+    assert started.initial_state is not None
+    assert static_tensions(started) + started.initial_state.tensions == pytest.approx(tensions[0], abs=1.0)

@@ -11,6 +11,7 @@ from functools import cached_property
 
 import casadi
 import numpy as np
+from casadi import SX
 from numpy.typing import NDArray
 
 from ..robot.symbolic_model import SymbolicModel, constants_as_parameters
@@ -98,6 +99,7 @@ class CompiledFilter:
         parameters = model.parameters[: model.parameters.numel() if has_sensitivities else 0]
         start_sensitivities = casadi.jacobian(model.start, parameters)
         self.start = casadi.Function("start", [model.parameters], [model.start, start_sensitivities])
+        self.settling, self.settling_slopes = _settling_states(model, constant_count)
         self.lags = casadi.Function("lags", [model.parameters], [model.sensor_delays])
 
     @property
@@ -201,6 +203,16 @@ class CompiledFilter:
     def _process(self) -> CompiledFunction:
         function = process_function(self.model, self._cable_count, self._noise)
         return CompiledFunction(function, max_compiled=sys.maxsize)
+
+
+def _settling_states(model: SymbolicModel, constant_count: int) -> tuple[NDArray[np.int64], casadi.Function]:
+    """Internal states of ropes that have an equilibrium, and the slopes of their rates at the start by all states."""
+    internal = range(model.indices.lengths.stop, model.states.numel() - constant_count)
+    settling = [index for index in internal if index not in model.drifting]
+    slopes = casadi.jacobian(model.rates[settling], model.states) if settling else SX(0, model.states.numel())
+    at_rest = [casadi.densify(model.start), SX.zeros(*model.inputs.shape)]
+    at_start = casadi.substitute([slopes], [model.states, model.inputs], at_rest)
+    return np.array(settling, dtype=int), casadi.Function("settling_slopes", [model.parameters], at_start)
 
 
 def _step(function: BoundFunction) -> Step:

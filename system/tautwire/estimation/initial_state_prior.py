@@ -31,7 +31,8 @@ RANK_TOLERANCE = 1e-9
 def initial_covariance(robot: Robot, noise: Noise, state_count: int, constant_count: int = 0) -> Array:
     """Prior covariance (state_count, state_count) of the initial state.
 
-    Beside pose, twist and lengths only the last ``constant_count`` states are uncertain.
+    Beside pose, twist and lengths only the last ``constant_count`` states are uncertain; internal states of ropes
+    follow by :func:`settled_covariance`.
 
     Self-stress, the tensions in the null space of redundant robots' structure matrix, has the standard deviation
     ``noise.self_stress``: with ``U`` the ropes' directions and ``F = l / (E S)``, unstrained lengths by
@@ -50,6 +51,20 @@ def initial_covariance(robot: Robot, noise: Noise, state_count: int, constant_co
         length_modes = _cable_compliances(robot)[:, None] * self_stress_projection(robot)
         covariance[lengths, lengths] += noise.self_stress**2 * length_modes @ length_modes.T
     return covariance
+
+
+def settled_covariance(covariance: Array, rate_slopes: Array, settling: NDArray[np.int64]) -> Array:
+    """Covariance (n, n) of an initial state at rest, where the ropes' internal states have followed its uncertainty.
+
+    With the slopes (e, n) of the rates of the e ``settling`` states, ``A`` by themselves and ``B`` by the others,
+    ``de = -A^+ B dx``: a rope whose pretension differs has relaxed under the one that it has. One without equilibrium,
+    such as a memory of friction, has no slope and stays.
+    """
+    others = np.setdiff1d(np.arange(len(covariance)), settling)
+    follow = np.eye(len(covariance))
+    follow[np.ix_(settling, others)] = -np.linalg.pinv(rate_slopes[:, settling]) @ rate_slopes[:, others]
+    settled: Array = follow @ covariance @ follow.T
+    return settled
 
 
 def self_stress_projection(robot: Robot) -> Array:

@@ -47,6 +47,11 @@ class Noise:
     own: tuple[float, ...] = ()
     disturbance: Disturbance | None = None
 
+    @property
+    def at_rest(self) -> Noise:
+        """The same noise where recordings start at rest."""
+        return replace(self, start_velocity=0.0, start_stretch=0.0, start_angular_velocity=0.0)
+
     def of_outputs(self, cable_count: int) -> tuple[float, ...]:
         """Of x, y, z, each tension, and where the platform turns its rotation about each axis (m)."""
         rotations = () if self.rotation is None else (self.rotation,) * 3

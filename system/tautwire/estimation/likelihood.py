@@ -26,7 +26,7 @@ from ..robot.uncertain_parameters import uncertain_parameters
 from .compiled_filter import CompiledFilter, FilterInputs, FilterResults, FilterState
 from .disturbance import Disturbance
 from .filter_columns import align_delayed_outputs, filter_columns
-from .initial_state_prior import initial_covariance
+from .initial_state_prior import initial_covariance, settled_covariance
 from .integration_steps import substeps_of_robot
 from .kalman_filter import Noise
 from .measured_outputs import SimulatedOutputs, measured_outputs, orientations, require_small_rotations
@@ -122,7 +122,7 @@ class Likelihood:
         measured, shift = self._aligned_outputs(recording, parameters)
         observed = np.isfinite(measured)
         filter_segments = self._filter(
-            recording, (measured, shift), parameters, self._start_covariance(), acceleration_noise_density
+            recording, (measured, shift), parameters, self._start_covariance(parameters), acceleration_noise_density
         )
         values, log_variances, sensitivities, last_state = _concatenated(filter_segments)
         recorded = np.isfinite(self._measured(recording))
@@ -151,7 +151,7 @@ class Likelihood:
     def start(self, parameters: Sequence[float] | Array) -> tuple[Array, Array]:
         """Initial state (n,) and covariance (n, n) of the filter, disturbance included."""
         state, _ = self._start(self._arguments(parameters))
-        return state.ravel(), self._start_covariance()
+        return state.ravel(), self._start_covariance(parameters)
 
     def with_true_lengths(self, states: Array) -> Array:
         """The model's states (n, K) of a filter's, with the errors of recorded lengths added to its unstrained lengths.
@@ -192,7 +192,7 @@ class Likelihood:
         For ``acceleration_noise_density`` see :meth:`innovations`.
         """
         outputs = self._aligned_outputs(recording, parameters)
-        covariance = self._start_covariance()
+        covariance = self._start_covariance(parameters)
         yield from self._filter(
             recording, outputs, parameters, covariance, acceleration_noise_density, keeps_covariances
         )
@@ -285,10 +285,17 @@ class Likelihood:
         rates = [2.0 * pi * process.bandwidth for process in processes]
         return np.array([*rates, *(process.rms**2 for process in processes)])[:, None]
 
-    def _start_covariance(self) -> Array:
+    def _start_covariance(self, parameters: Sequence[float] | Array) -> Array:
         size, lengths = self.model.states.numel(), len(self.noise.rope_lengths)
         covariance = self._start_covariance_of_lengths()
-        covariance[:size, :size] += initial_covariance(self.robot, self.noise, size, len(self.uncertain))
+        prior, at_rest = (
+            initial_covariance(self.robot, noise, size, len(self.uncertain))
+            for noise in (self.noise, self.noise.at_rest)
+        )
+        slopes = np.array(self._filter_functions.settling_slopes(self._arguments(parameters)))
+        covariance[:size, :size] += (
+            prior - at_rest + settled_covariance(at_rest, slopes, self._filter_functions.settling)
+        )
         variances = [process.rms**2 for process in self.noise.processes(self.cable_count)[lengths:]]
         covariance[size + lengths :, size + lengths :] = np.diag(variances)
         return covariance
