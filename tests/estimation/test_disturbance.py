@@ -10,6 +10,7 @@ import pytest
 from numpy.typing import NDArray
 
 from tautwire.estimation import disturbance_fit
+from tautwire.estimation import likelihood as likelihoods
 from tautwire.estimation.candidate_fits import fit_and_validate, maximised_validation_likelihood
 from tautwire.estimation.candidate_proposals import FitTask
 from tautwire.estimation.disturbance import Disturbance, OrnsteinUhlenbeck, sensor_noise_only
@@ -62,10 +63,18 @@ def likelihood_of(noise: Noise) -> Likelihood:
     return Likelihood(ROBOT, (), noise, float(np.median(np.diff(PAIR[0].time))))
 
 
-def test_a_disturbance_of_no_size_changes_nothing() -> None:
+def test_a_disturbance_of_no_size_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(likelihoods, "MAX_STATE_ANGLE_BESIDE_DISTURBANCE", likelihoods.MAX_STATE_ANGLE)
     plain, other = (likelihood_of(noise).innovations(PAIR[0], ()) for noise in (NOISE, disturbed()))
     assert np.allclose(other.values, plain.values, atol=1e-8)
     assert np.allclose(other.log_variances, plain.log_variances, atol=1e-10)
+
+
+def test_coarser_steps_beside_a_disturbance_change_far_less_than_noise() -> None:
+    plain, other = (likelihood_of(noise).innovations(PAIR[0], ()) for noise in (NOISE, disturbed()))
+    rows = np.ones(len(plain.values), dtype=bool)
+    assert 0.0 < np.nanmax(np.abs(other.values - plain.values)) < 0.01
+    assert other.log_likelihood(rows) == pytest.approx(plain.log_likelihood(rows), abs=0.1)
 
 
 def test_errors_with_a_memory_add_their_variance_to_the_first_innovations() -> None:

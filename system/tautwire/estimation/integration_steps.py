@@ -29,8 +29,10 @@ class Substeps:
     doublings: int = 0
 
 
-# Radians of the fastest vibration in one step of the state, and of its derivatives.
+# Radians of the fastest vibration in one step of the state, and of its derivatives. An angle a errs by a^4/120 of the
+# frequency, of which a disturbance hides far more.
 MAX_STATE_ANGLE, MAX_SLOPE_ANGLE = 0.05, 0.7
+MAX_STATE_ANGLE_BESIDE_DISTURBANCE = 0.1
 # Time constants of the fastest decay likewise: what has died away causes no more error.
 MAX_STATE_DECAY, MAX_SLOPE_DECAY = 0.5, 2.0
 # Up to so many steps of the state, a decay is resolved as finely as a vibration.
@@ -48,13 +50,18 @@ MAX_EFFECT_SPEED_UP = 3.0
 DOUBLINGS, MANY_STATES_COUNT, DOUBLINGS_OF_MANY_STATES = 4, 24, 2
 
 
-def substeps_of_robot(robot: Robot, sample_time: float, state_count: int, has_effect_states: bool) -> Substeps:
-    """Integration steps for samples ``sample_time`` (s) apart; ``has_effect_states`` if effects add states."""
+def substeps_of_robot(
+    robot: Robot, sample_time: float, state_count: int, has_effect_states: bool, max_angle: float = MAX_STATE_ANGLE
+) -> Substeps:
+    """Integration steps for samples ``sample_time`` (s) apart; ``has_effect_states`` if effects add states.
+
+    One step of the state turns the fastest vibration by ``max_angle`` (rad) at most.
+    """
     doublings = DOUBLINGS_OF_MANY_STATES if state_count > MANY_STATES_COUNT else DOUBLINGS
     own, exponents = (eigenvalues_at_start(each) * sample_time for each in (replace(robot, effects=()), robot))
     limit = MAX_EFFECT_SPEED_UP * float(np.max(np.abs(own)))
     followed = exponents.real + 1j * np.clip(exponents.imag, -limit, limit)
-    return substeps_of_eigenvalues(followed, doublings if has_effect_states else 0)
+    return substeps_of_eigenvalues(followed, doublings if has_effect_states else 0, max_angle)
 
 
 def require_followable(robot: Robot, path: str, sample_time: float) -> None:
@@ -65,11 +72,11 @@ def require_followable(robot: Robot, path: str, sample_time: float) -> None:
         raise RecordingError(path, problem, "is the time in ms? It has to be in s; else record faster")
 
 
-def substeps_of_eigenvalues(exponents: Eigenvalues, doublings: int = 0) -> Substeps:
+def substeps_of_eigenvalues(exponents: Eigenvalues, doublings: int = 0, max_angle: float = MAX_STATE_ANGLE) -> Substeps:
     """Integration steps between samples over which the modes change by ``exp(exponents)``."""
     vibration, decay = float(np.max(np.abs(exponents.imag))), float(np.max(np.abs(exponents)))
-    fine_steps = min(ceil(decay / MAX_STATE_ANGLE), MAX_FINE_STEPS)
-    state = max(1, ceil(vibration / MAX_STATE_ANGLE), ceil(decay / MAX_STATE_DECAY), fine_steps)
+    fine_steps = min(ceil(decay / max_angle), MAX_FINE_STEPS)
+    state = max(1, ceil(vibration / max_angle), ceil(decay / MAX_STATE_DECAY), fine_steps)
     slope = max(1, ceil(vibration / MAX_SLOPE_ANGLE), ceil(decay / MAX_SLOPE_DECAY))
     parts, order = slope * 2**doublings, MIN_SERIES_ORDER
     while any(

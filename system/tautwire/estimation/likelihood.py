@@ -27,7 +27,7 @@ from .compiled_filter import CompiledFilter, FilterInputs, FilterResults, Filter
 from .disturbance import Disturbance
 from .filter_columns import align_delayed_outputs, filter_columns
 from .initial_state_prior import initial_covariance, settled_covariance
-from .integration_steps import substeps_of_robot
+from .integration_steps import MAX_STATE_ANGLE, MAX_STATE_ANGLE_BESIDE_DISTURBANCE, substeps_of_robot
 from .kalman_filter import Noise
 from .measured_outputs import SimulatedOutputs, measured_outputs, orientations, require_small_rotations
 from .measurement_model import output_count, rotation_count
@@ -101,7 +101,8 @@ class Likelihood:
         self.cable_count = robot.cable_count
         state_count = model.states.numel()
         has_effect_states = state_count > model.indices.lengths.stop + len(self.uncertain)
-        substeps = substeps_of_robot(robot, sample_time, state_count, has_effect_states)
+        max_angle = MAX_STATE_ANGLE_BESIDE_DISTURBANCE if noise.disturbance else MAX_STATE_ANGLE
+        substeps = substeps_of_robot(robot, sample_time, state_count, has_effect_states, max_angle)
         self._filter_functions = CompiledFilter(model, len(self.uncertain), robot.cable_count, noise, substeps)
         self._held_constants = np.zeros(0)
 
