@@ -127,3 +127,19 @@ def test_pretension_is_estimated_beside_ropes_that_relax() -> None:
     started = with_initial_state(Fitter(noise), relaxing, data)
     assert started.initial_state is not None
     assert static_tensions(started) + started.initial_state.tensions == pytest.approx(tensions[0], abs=1.0)
+
+
+def test_an_initial_state_is_that_of_the_robot_whose_numbers_the_simulation_has(tmp_path: Path) -> None:
+    """Positions alone, of a softer robot: a smoother would move its moduli along with the pretension."""
+    robot_file, _, _ = planar_case(
+        tmp_path, VERTICAL, {"modulus": {"modulus": 0.8e10}}, 1, preferred=60.0, duration=3.0
+    )
+    robot, recording = read_robot(robot_file), read_recording(tmp_path / "fit.csv", 4)
+    cables = tuple(replace(c, modulus_uncertainty=2.5e9, anchor_uncertainty=0.004) for c in robot.cables)
+    data = DataSet(recording, robot.platform.start, np.ones(len(recording.time), dtype=bool))
+    noise = replace(estimate_noise(robot, recording), self_stress=30.0)
+    known, uncertain = (
+        with_initial_state(Fitter(noise), each, data).initial_state for each in (robot, replace(robot, cables=cables))
+    )
+    assert known is not None and uncertain is not None
+    assert uncertain.tensions == pytest.approx(known.tensions, abs=1e-3)

@@ -104,7 +104,7 @@ def linearise_filter(
     With ``acceleration_noise_density`` (m/s^2 per root hertz) the run follows what was measured where the model does
     not.
     """
-    theta = np.array(values, dtype=float)[:, None]
+    theta = likelihood.arguments(values)[:, None]
     size = likelihood.model.states.numel()
     variances = likelihood.noise.white_variances(likelihood.cable_count)
     for segment in likelihood.segments(recording, values, acceleration_noise_density):

@@ -151,7 +151,7 @@ class Likelihood:
 
     def start(self, parameters: Sequence[float] | Array) -> tuple[Array, Array]:
         """Initial state (n,) and covariance (n, n) of the filter, disturbance included."""
-        state, _ = self._start(self._arguments(parameters))
+        state, _ = self._start(self.arguments(parameters))
         return state.ravel(), self._start_covariance(parameters)
 
     def with_true_lengths(self, states: Array) -> Array:
@@ -198,15 +198,18 @@ class Likelihood:
             recording, outputs, parameters, covariance, acceleration_noise_density, keeps_covariances
         )
 
-    def simulated_outputs(self, recording: Recording, parameters: Sequence[float] | Array) -> SimulatedOutputs:
-        """Simulated outputs without noise, as late as the sensors show them, over a recording's winch speeds."""
+    def simulated_outputs(
+        self, recording: Recording, parameters: Sequence[float] | Array, start_state: Array | None = None
+    ) -> SimulatedOutputs:
+        """Simulated outputs without noise, as late as the sensors show them, over a recording's winch speeds.
+
+        They begin at the ``start_state`` (n,) of the model, by default the robot's.
+        """
         nothing = np.zeros((recording.sample_count, output_count(self.model)))
         columns, is_recorded = filter_columns(recording, nothing, nothing)
-        theta, (speed, later, step) = self._arguments(parameters), columns[3:6]
-        start, _ = self._filter_functions.start(theta)
-        _, outputs = self._filter_functions.simulation(
-            len(is_recorded), np.array(start), theta[:, None], speed, later, step
-        )
+        theta, (speed, later, step) = self.arguments(parameters), columns[3:6]
+        start = np.array(self._filter_functions.start(theta)[0]) if start_state is None else start_state[:, None]
+        _, outputs = self._filter_functions.simulation(len(is_recorded), start, theta[:, None], speed, later, step)
         lags = np.array(self._filter_functions.lags(theta)).ravel()
         time, shown = recording.time, outputs[:, is_recorded]
         rows = np.array([np.interp(time - lag, time, column) for lag, column in zip(lags, shown, strict=True)]).T
@@ -226,7 +229,7 @@ class Likelihood:
             require_small_rotations(recording, self.model.reference_orientation)
 
     def _aligned_outputs(self, recording: Recording, parameters: Sequence[float] | Array) -> tuple[Array, Array]:
-        lags = np.array(self._filter_functions.lags(self._arguments(parameters))).ravel()
+        lags = np.array(self._filter_functions.lags(self.arguments(parameters))).ravel()
         return align_delayed_outputs(recording.time, self._measured(recording), lags)
 
     def open_loop_variances(self, recording: Recording, parameters: Sequence[float] | Array) -> Array:
@@ -252,7 +255,7 @@ class Likelihood:
         keeps_covariances: bool = False,
     ) -> Iterator[FilterSegment]:
         columns, is_recorded = filter_columns(recording, *outputs, rotation_count(self.model))
-        theta = self._arguments(parameters)
+        theta = self.arguments(parameters)
         state, sensitivities = self._start(theta)
         now = FilterState(state.ravel(), start_covariance, sensitivities)
         for begin in range(0, len(is_recorded), CHUNK_SAMPLES):
@@ -269,7 +272,7 @@ class Likelihood:
             yield FilterSegment(chunk, is_recorded[begin : begin + CHUNK_SAMPLES], results)
             now = results.end
 
-    def _arguments(self, parameters: Sequence[float] | Array) -> Array:
+    def arguments(self, parameters: Sequence[float] | Array) -> Array:
         """The free parameters, then the constants that are held."""
         return np.append(np.asarray(parameters, dtype=float), self._held_constants)
 
@@ -293,7 +296,7 @@ class Likelihood:
             initial_covariance(self.robot, noise, size, len(self.uncertain))
             for noise in (self.noise, self.noise.at_rest)
         )
-        slopes = np.array(self._filter_functions.settling_slopes(self._arguments(parameters)))
+        slopes = np.array(self._filter_functions.settling_slopes(self.arguments(parameters)))
         covariance[:size, :size] += (
             prior - at_rest + settled_covariance(at_rest, slopes, self._filter_functions.settling)
         )

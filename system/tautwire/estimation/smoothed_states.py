@@ -193,7 +193,11 @@ def with_initial_state(fitter: Fitter, robot: Robot, sample: DataSet) -> Robot:
     if not is_initial_state_uncertain(fitter.noise):
         return robot_at_start
     likelihood, values = fitter.likelihood(robot, (), sample)
-    state = _smoothed_initial_state(likelihood, values, sample)
+    # A simulation that begins there has the robot's own numbers, not those that the smoother would move too.
+    constants = np.zeros(len(likelihood.uncertain))
+    conditional = likelihood.given_constants(constants)
+    smoothed = _smoothed_initial_state(conditional, values, sample)
+    state = np.append(smoothed[: conditional.model.states.numel()], constants)
     in_plane, start = robot.axes_in_plane, robot_at_start.platform.start
     # Ropes in a plane cannot hold the platform beside it, where noise shows it.
     x, y, z = (float(state[axis]) if axis in in_plane else start[axis] for axis in range(3))
@@ -241,7 +245,7 @@ def _smoothed_initial_state(likelihood: Likelihood, values: list[float], sample:
 
 def _static_tensions_of(model: SymbolicModel, state: Array, cable_count: int) -> Array:
     """Static tensions of the ropes (n,) in N with platform and winches held at a state's position."""
-    static_state = state[: model.states.numel()].copy()
+    static_state = state.copy()
     static_state[model.indices.twist] = 0.0
     tensions = casadi.Function("tensions", [model.states, model.inputs], [model.span_tensions])
     result: Array = np.array(tensions(static_state, np.zeros(model.inputs.numel()))).ravel()
