@@ -10,6 +10,7 @@ from scipy.spatial.transform import Rotation
 
 from tautwire import trace
 from tautwire.cosimulation.robot_cosimulation import CosimulationResult
+from tautwire.estimation import likelihood
 from tautwire.estimation.cosimulation_validation import as_tracked
 from tautwire.estimation.disturbance import sensor_noise_only
 from tautwire.estimation.disturbance_posterior import disturbance_prior, logs_of
@@ -49,7 +50,8 @@ def test_what_a_platform_that_turns_lacks_is_named_alone(
     assert result.normalised_innovation_variance == pytest.approx(np.ones(6 + truth.cable_count), abs=0.4)
 
 
-def test_a_disturbance_of_no_size_changes_nothing() -> None:
+def test_a_disturbance_of_no_size_changes_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(likelihood, "MAX_STATE_ANGLE_BESIDE_DISTURBANCE", likelihood.MAX_STATE_ANGLE)
     recording = rigid_recording(OCTAHEDRAL, 60)
     noise = estimate_noise(OCTAHEDRAL, recording)
     nothing = sensor_noise_only(disturbance_prior(OCTAHEDRAL, noise).median, 0.0, 0.0, 0.0)
