@@ -48,14 +48,8 @@ def initial_covariance(robot: Robot, noise: Noise, state_count: int, constant_co
     covariance, lengths = np.diag(variances), indices.lengths
     covariance[state_count - constant_count :, state_count - constant_count :] = np.eye(constant_count)
     if noise.self_stress > 0.0:
-        covariance[lengths, lengths] += self_stress_covariance(robot, noise)
-    return covariance
-
-
-def self_stress_covariance(robot: Robot, noise: Noise) -> Array:
-    """Prior covariance (n, n) of unstrained lengths in m^2 by self-stress alone, see :func:`initial_covariance`."""
-    length_modes = _cable_compliances(robot)[:, None] * self_stress_projection(robot)
-    covariance: Array = noise.self_stress**2 * length_modes @ length_modes.T
+        length_modes = _cable_compliances(robot)[:, None] * self_stress_projection(robot)
+        covariance[lengths, lengths] += noise.self_stress**2 * length_modes @ length_modes.T
     return covariance
 
 

@@ -198,18 +198,15 @@ class Likelihood:
             recording, outputs, parameters, covariance, acceleration_noise_density, keeps_covariances
         )
 
-    def simulated_outputs(
-        self, recording: Recording, parameters: Sequence[float] | Array, start_state: Array | None = None
-    ) -> SimulatedOutputs:
-        """Simulated outputs without noise, as late as the sensors show them, over a recording's winch speeds.
-
-        They begin at the ``start_state`` (n,) of the model, by default the robot's.
-        """
+    def simulated_outputs(self, recording: Recording, parameters: Sequence[float] | Array) -> SimulatedOutputs:
+        """Simulated outputs without noise, as late as the sensors show them, over a recording's winch speeds."""
         nothing = np.zeros((recording.sample_count, output_count(self.model)))
         columns, is_recorded = filter_columns(recording, nothing, nothing)
         theta, (speed, later, step) = self.arguments(parameters), columns[3:6]
-        start = np.array(self._filter_functions.start(theta)[0]) if start_state is None else start_state[:, None]
-        _, outputs = self._filter_functions.simulation(len(is_recorded), start, theta[:, None], speed, later, step)
+        start, _ = self._filter_functions.start(theta)
+        _, outputs = self._filter_functions.simulation(
+            len(is_recorded), np.array(start), theta[:, None], speed, later, step
+        )
         lags = np.array(self._filter_functions.lags(theta)).ravel()
         time, shown = recording.time, outputs[:, is_recorded]
         rows = np.array([np.interp(time - lag, time, column) for lag, column in zip(lags, shown, strict=True)]).T
