@@ -222,6 +222,16 @@ def test_json_is_one_object_and_quiet_is_silent(
     assert tuple(capsys.readouterr()) == ("", "")
 
 
+def test_excite_tells_the_forms_of_an_effect_apart(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
+    program = str(tmp_path / "program.csv")
+    assert (
+        run(["excite", ROBOT, "--effects", "payload,drum", "--programs", "2", "--duration", "1", "--out", program]) == 0
+    )
+    pairs = [line.partition(":")[0] for line in capsys.readouterr().out.splitlines() if "separation" in line]
+    assert len(set(pairs)) == len(pairs) > 1
+    assert all("drum (" in pair for pair in pairs)
+
+
 @pytest.mark.validate
 def test_nothing_is_coloured_that_is_no_terminal(tmp_path: Path) -> None:
     for colour in ({}, {"NO_COLOR": "1"}):
