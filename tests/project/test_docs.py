@@ -10,6 +10,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import fmpy.ssp.simulation as ssp_simulation
 import pytest
 
 import tautwire
@@ -77,6 +78,18 @@ def test_example_of_the_controllers_page_runs(tmp_path: Path, monkeypatch: pytes
     uncompensated, shaped_path = results["uncompensated"], results["shaped_path"]
     assert uncompensated.time[-1] > shaped_path.duration > results["path"].duration
     assert abs(uncompensated.position - shaped_path.position(uncompensated.time)).max() > 1e-3
+
+
+def test_examples_of_the_fmus_page_run(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(tmp_path)
+    # The page replaces a function of FMPy.
+    monkeypatch.setattr(ssp_simulation, "instantiate_fmu", ssp_simulation.instantiate_fmu)
+    assert command(["example", "three", "."]) == 0
+    assert command(["build", "robot.toml", "--out", "build"]) == 0
+    results: dict[str, Any] = {}
+    for code in code_of("fmus.md").values():
+        exec(compile(code, "fmus.md", "exec"), results)
+    assert results["result"]["platform.position.z"][-1] == pytest.approx(example("three").platform.start[2], abs=1e-6)
 
 
 def test_an_effect_is_added_by_following_its_page(tmp_path: Path) -> None:
