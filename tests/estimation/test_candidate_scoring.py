@@ -18,6 +18,7 @@ from tautwire.estimation.hypotheses import Hypothesis
 from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fit, Fitter
+from tautwire.estimation.score_test import PredictedGain
 from tautwire.estimation.time_limit import TimeLimit
 from tautwire.robot.schema import Robot
 from tautwire_fmu.laws.effects import BY_NAME
@@ -89,3 +90,19 @@ def test_an_effect_that_a_large_disturbance_takes_up_is_a_candidate() -> None:
     under_large, under_small = candidate_scoring._predict_gains(context, search_round)
     assert under_small[payload].gain > 10.0 * max(under_large[payload].gain, 1.0)
     assert under_small[payload].values["mass"] == pytest.approx(3.0, rel=0.2)
+
+
+def test_fits_beside_a_disturbance_begin_where_runs_of_the_model_explain_most(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Slopes ask for a delay of a few milliseconds where it is longer than half a period of a mode."""
+    robot, recording = example("three"), recorded("three", 1, {"sensor_delay": {"seconds": 0.17}}).first(600)
+    noise = estimate_noise(robot, recording)
+    fitter = Fitter(replace(noise, disturbance=disturbance_prior(robot, noise).median))
+    context = IdentificationContext(robot, fitter, split_data(robot, noise, recording, None))
+    late = Hypothesis(BY_NAME["sensor_delay"], (1, 2, 3), ("tension_delay",))
+    predictions = {late: PredictedGain(100.0, {"tension_delay": 0.002})}
+    begun: dict[Hypothesis, tuple[Robot, ...]] = {}
+    monkeypatch.setattr(candidate_scoring, "_predict_gains", lambda *_: (dict(predictions), {}))
+    monkeypatch.setattr(candidate_scoring, "_scores_beside_disturbance", lambda *asked: begun.update(asked[3]) or {})
+    search_round = SearchRound(1, robot, (), None, is_white=True, is_ranking=True)
+    candidate_scoring.score_candidates(context, search_round)
+    assert begun[late][0].effects[0].values["tension_delay"] == pytest.approx(0.17, abs=0.011)

@@ -16,7 +16,7 @@ from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fitter
 from tautwire.estimation.score_test import PredictedGain, score_test
 from tautwire.robot.schema import EffectSetting, Robot
-from tautwire_fmu.laws.effects import DAMPING, HYSTERESIS, SLACK
+from tautwire_fmu.laws.effects import DAMPING, HYSTERESIS, SENSOR_DELAY, SLACK
 from tests.support.recordings import recorded
 from tests.support.robots import example
 
@@ -24,6 +24,7 @@ ALL = (1, 2, 3)
 SOFT = Hypothesis(SLACK, ALL)
 STICKY = Hypothesis(HYSTERESIS, ALL)
 VISCOUS = Hypothesis(DAMPING, ALL)
+LATE = Hypothesis(SENSOR_DELAY, ALL, ("tension_delay",))
 
 
 def looked(effects: dict[str, dict[str, float]]) -> tuple[IdentificationContext, Fitter, DataSet]:
@@ -41,6 +42,15 @@ def test_a_softness_that_slopes_cannot_see_is_seen_by_a_run() -> None:
     found = grid_search(context, context.robot, (), sample, zero_slope_predictions(slopes))
     assert found[SOFT].values == {"softness": 300.0}
     assert found[SOFT].gain > slopes[VISCOUS].gain > 0.0
+
+
+def test_a_delay_of_more_than_half_a_period_of_a_mode_is_seen_by_a_run() -> None:
+    context, fitter, sample = looked({"sensor_delay": {"seconds": 0.17}})
+    slopes = score_test(context.robot, (), [LATE], fitter, sample)
+    found = grid_search(context, context.robot, (), sample, slopes)[LATE]
+    assert slopes[LATE].values["tension_delay"] < 0.13
+    assert found.values["tension_delay"] == pytest.approx(0.17, abs=0.011)
+    assert found.gain > 1000.0
 
 
 def test_no_gain_is_predicted_where_nothing_is_hidden() -> None:

@@ -5,6 +5,9 @@ from typing import Any, NamedTuple, Tuple
 from ..mathematics import Mathematics
 from .effect import Effect, Parameter
 
+# Half a period of a mode explains less than no delay, a whole one nearly as much: fits stop on the way to longer ones.
+GRID_OF_DELAYS = (0.02, 0.04, 0.06, 0.08, 0.1, 0.12, 0.14, 0.16, 0.18, 0.2, 0.25, 0.3, 0.4, 0.5)
+
 
 class Values(NamedTuple):
     """Delays: of the load cells of the named cables, and of the platform's position."""
@@ -27,6 +30,7 @@ def _delay_parameter(quantity: str, sensor: str) -> Parameter:
         maximum=10.0,
         neutral=0.0,
         start=0.01,
+        grid_values=GRID_OF_DELAYS,
     )
 
 
