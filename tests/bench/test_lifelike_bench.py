@@ -90,6 +90,9 @@ def test_an_answer_serves_again_while_the_rig_is_the_same() -> None:
     line = replace(answer(SWING, verdict="discovered"), fingerprint=SWING.fingerprint({}), code="one")
     assert finished([SWING, DAMPING], [line], "one") == {SWING.key: line}
     assert finished([SWING], [replace(line, fingerprint="other")], "one") == {}
+    assert finished([SWING], [line], "two") == {}
+    newest = replace(line, code="two")
+    assert finished([SWING], [line, newest]) == {SWING.key: newest}
 
 
 def test_another_rig_makes_lifelike_recordings_anew(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -185,10 +188,15 @@ def test_a_lifelike_line_survives_its_file() -> None:
 
 
 def test_the_page_shows_lifelike_answers_beside_the_others() -> None:
-    lines = {DAMPING.key: answer(DAMPING, "damping"), EMPTY.key: answer(EMPTY, verdict="none")}
-    answers, empty = scored([DAMPING], lines), scored([EMPTY], lines)
-    text = page([], [], "abc", "picture.svg", answers, empty)
+    lines = {
+        DAMPING.key: answer(DAMPING, "damping"),
+        SWING.key: answer(SWING, verdict="discovered"),
+        EMPTY.key: replace(answer(EMPTY, verdict="none"), code="older"),
+    }
+    answers, empty = scored([DAMPING, SWING], lines), scored([EMPTY], lines)
+    text = page([], [], "picture.svg", answers, empty)
+    assert "sources c (2), older (1)." in text
     assert "## Robots as they are" in text
     assert "| lifelike-damping-3 | 10, 20 | damping | right |" in text
     assert "0 of 1 (0.0 %, 95 %: 0.0 to 97.5 %)" in text
-    assert "## Robots as they are" not in page([], [], "abc", "picture.svg")
+    assert "## Robots as they are" not in page([], [], "picture.svg")

@@ -277,7 +277,7 @@ def test_the_matrix_the_picture_and_the_page_show_each_answer(tmp_path: Path) ->
     assert b"nothing" in drawn
     save(confusion_figure(answers), str(path))
     assert path.read_bytes() == drawn
-    text = page(answers, scored(empty, lines), "abc", path.name)
+    text = page(answers, scored(empty, lines), path.name)
     assert path.name in text
     assert "0 of 1 (0.0 %, 95 %: 0.0 to 97.5 %)" in text
     assert "1 of 1 (100.0 %" in text

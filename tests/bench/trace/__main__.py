@@ -21,7 +21,6 @@ from .score import Scored, outcome, scored
 from .selection import ALARM, alarm_cases, chosen, code_version, lifelike_alarm_cases
 
 ROOT = EXAMPLES.parents[2]
-FEWEST_EMPTY = 200
 PICTURE = "tracer-confusion.svg"
 
 
@@ -35,7 +34,7 @@ def arguments() -> argparse.Namespace:
     parser.add_argument("--lifelike", action="store_true", help="robots as they are, also with --empty")
     parser.add_argument("--platforms", action="store_true", help="platforms that turn, exact and lifelike")
     parser.add_argument("--list", action="store_true", help="name the cases and stop")
-    parser.add_argument("--show", action="store_true", help="trace nothing; show the answers of the last tracer asked")
+    parser.add_argument("--show", action="store_true", help="trace nothing; show the newest answers")
     parser.add_argument("--folder", type=Path, default=ROOT / "build" / "bench-trace", help="where answers are kept")
     return parser.parse_args()
 
@@ -47,10 +46,9 @@ def main() -> None:
         print("\n".join(case.key for case in cases))
         return
     old = read_lines(asked.folder / "results.jsonl")
-    code = old[-1].code if asked.show and old else code_version()
-    lines = finished(cases, old, code) if asked.show else run(cases, asked.folder, code, asked.jobs, tell)
+    lines = finished(cases, old) if asked.show else run(cases, asked.folder, code_version(), asked.jobs, tell)
     show(scored(cases, lines))
-    write(asked.folder, code)
+    write(asked.folder)
 
 
 def cases_of(asked: argparse.Namespace) -> Sequence[Case]:
@@ -75,24 +73,26 @@ def show(answers: Sequence[Scored]) -> None:
         print(f"\n{text(answers)}")
 
 
-def write(folder: Path, code: str) -> None:
-    """The page and its picture into docs, if every case has an answer; else into the folder, as far as it goes."""
-    lines = [line for line in read_lines(folder / "results.jsonl") if line.code == code]
+def write(folder: Path) -> None:
+    """The page and its picture into docs, if every case has an answer; else into the folder, as far as it goes.
+
+    Of each case the newest answer counts; the page tells by which versions of the tracer.
+    """
+    lines = read_lines(folder / "results.jsonl")
 
     def answered(cases: Sequence[Case]) -> tuple[Scored, ...]:
-        return scored(cases, finished(cases, lines, code))
+        return scored(cases, finished(cases, lines))
 
     answers, lifelike = answered(main_cases()), answered(lifelike_cases())
     empty = answered(alarm_cases(_alarms_in(lines, f"{ALARM}-")))
     lifelike_empty = answered(lifelike_alarm_cases(_alarms_in(lines, LIFELIKE_ALARM)))
     if not answers:
         return
-    whole = len(answers) == len(main_cases()) and len(lifelike) == len(lifelike_cases())
-    done = whole and min(len(empty), len(lifelike_empty)) >= FEWEST_EMPTY
-    place = ROOT / "docs" if done else folder
+    is_whole = len(answers) == len(main_cases()) and len(lifelike) == len(lifelike_cases())
+    place = ROOT / "docs" if is_whole else folder
     place.mkdir(exist_ok=True)
     save(confusion_figure(answers), str(place / PICTURE))
-    (place / "tracer.md").write_text(page(answers, empty, code, PICTURE, lifelike, lifelike_empty), encoding="utf-8")
+    (place / "tracer.md").write_text(page(answers, empty, PICTURE, lifelike, lifelike_empty), encoding="utf-8")
     counts = f"{len(answers)} cases, {len(empty)} empty recordings"
     counts += f"; lifelike: {len(lifelike)} cases, {len(lifelike_empty)} empty recordings"
     print(f"\n{place / 'tracer.md'}: {counts}")

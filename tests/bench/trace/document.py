@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Sequence
 
 from tests.rig.lifelike.case import LEAST_RATIO
@@ -19,7 +20,6 @@ ALPHA = 0.01
 def page(
     answers: Sequence[Scored],
     empty: Sequence[Scored],
-    code: str,
     picture: str,
     lifelike: Sequence[Scored] = (),
     lifelike_empty: Sequence[Scored] = (),
@@ -29,7 +29,7 @@ def page(
         "\n\n".join(
             [
                 "# The tracer, blind",
-                f"Made by `{COMMAND}` from the tracer as of sources {code}; nothing here is written by hand.",
+                f"Made by `{COMMAND}`; nothing here is written by hand. {_versions([*answers, *empty])}",
                 _how(),
                 "## Outcomes",
                 tables.outcomes(answers),
@@ -71,6 +71,13 @@ def _how() -> str:
     )
 
 
+def _versions(answers: Sequence[Scored]) -> str:
+    """Which versions of the tracer gave how many of the answers, the newest of each case."""
+    counts = Counter(answer.line.code for answer in answers)
+    versions = ", ".join(f"{code} ({count})" for code, count in counts.most_common())
+    return f"Answers by the tracer as of sources {versions}."
+
+
 def _lifelike(answers: Sequence[Scored], empty: Sequence[Scored]) -> list[str]:
     return [
         "## Robots as they are",
@@ -84,11 +91,12 @@ def _lifelike(answers: Sequence[Scored], empty: Sequence[Scored]) -> list[str]:
         "(listed) or in another (form), two effects, what is on no list, or nothing. Right are exactly the names that "
         f"are hidden; a little thing may be named beside them with a share below {100 * MINOR_SHARE:.0f} %. One "
         "that is named with more, or alone where nothing is hidden, is there all the same: counted apart, as little.",
+        _versions([*answers, *empty]),
         "### Outcomes of lifelike recordings",
         tables.outcomes(answers),
         tables.meanings([*answers, *empty]),
         "### False alarms of lifelike recordings",
-        _alarms(empty) if empty else "None tried.",
+        _alarms(empty),
         "### Named, missed, and named elsewhere",
         tables.names(answers),
         tables.confusions(answers),
@@ -103,6 +111,8 @@ def _lifelike(answers: Sequence[Scored], empty: Sequence[Scored]) -> list[str]:
 
 
 def _alarms(empty: Sequence[Scored]) -> str:
+    if not empty:
+        return "None tried."
     answered = [answer for answer in empty if answer.outcome != "failed"]
     wrong = rate(sum(answer.outcome == "wrong" for answer in answered), len(answered))
     alarm = rate(sum(answer.outcome == "alarm" for answer in answered), len(answered))

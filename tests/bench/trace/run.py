@@ -46,10 +46,11 @@ def run(
     return done
 
 
-def finished(cases: Sequence[Case], lines: Sequence[Line], code: str) -> dict[str, Line]:
-    """The newest line of each case that is still true."""
+def finished(cases: Sequence[Case], lines: Sequence[Line], code: str | None = None) -> dict[str, Line]:
+    """The newest line of each case on the recordings of today, by one version of the tracer or by any."""
     fingerprints = {case.key: case.fingerprint(case.effects(strengths(case))) for case in cases}
-    return {line.key: line for line in lines if line.code == code and fingerprints.get(line.key) == line.fingerprint}
+    by_version = (line for line in lines if code in (None, line.code))
+    return {line.key: line for line in by_version if fingerprints.get(line.key) == line.fingerprint}
 
 
 def _alone(case: Case, folder: Path, code: str) -> Line:
