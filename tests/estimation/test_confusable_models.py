@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection
+from dataclasses import replace
 from math import inf
 from typing import Any
 
@@ -11,13 +12,14 @@ import pytest
 from tautwire.errors import UnreachableError
 from tautwire.estimation import trace
 from tautwire.estimation.confusable_models import replace_by_confusable_models
+from tautwire.estimation.disturbance_posterior import disturbance_prior
 from tautwire.estimation.estimation_data import DataSet, split_data
 from tautwire.estimation.hypotheses import Hypothesis
 from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.likelihood import Innovations
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fitter
-from tautwire.estimation.stepwise_selection import SelectionResult
+from tautwire.estimation.stepwise_selection import SelectionResult, with_disturbance_beside
 from tautwire.robot.schema import Robot
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.support.recordings import recorded
@@ -25,20 +27,25 @@ from tests.support.robots import example
 
 FRAME = {"unlisted_frame": {"stiffness_constant": 3e6, "viscosity": 2e3, "mass": 50.0}}
 SOFTER = {"modulus": {"modulus": 0.97e11, "cables": [1, 2]}}
+SOFT_FRAME = {"unlisted_frame": {"stiffness_constant": 5e5, "viscosity": 2e3, "mass": 50.0}}
+ALL_SOFTER = {"modulus": {"modulus": 0.97e11}}
 
 
-def judged(hidden: dict[str, Any], chosen: list[Hypothesis]) -> SelectionResult:
+def judged(hidden: dict[str, Any], chosen: list[Hypothesis], beside_disturbance: bool = False) -> SelectionResult:
     """What rivals leave of these hypotheses, fitted to recordings that hide something."""
     robot = example("three")
     noise = estimate_noise(robot, recorded("three", 9, hidden))
     evidence = split_data(robot, noise, recorded("three", 9, hidden), recorded("three", 59, hidden))
+    if beside_disturbance:
+        noise = replace(noise, disturbance=disturbance_prior(robot, noise).median)
     fitter, start = Fitter(noise), robot
     for hypothesis in chosen:
         start = start.with_effect(hypothesis.setting(robot))
     fit = fitter.fit_from([start], chosen, evidence.estimation, -inf)
+    context, fit = with_disturbance_beside(IdentificationContext(robot, fitter, evidence), chosen, fit)
     alike = tuple((hypothesis.effect.name, "creep") for hypothesis in chosen)
     found = SelectionResult(tuple(chosen), (100.0,) * len(chosen), fit, (), alike)
-    return replace_by_confusable_models(IdentificationContext(robot, fitter, evidence), found)
+    return replace_by_confusable_models(context, found)[1]
 
 
 def test_a_softer_rope_keeps_its_name() -> None:
@@ -54,6 +61,17 @@ def test_softer_ropes_with_damping_make_room_for_the_frame_that_they_stood_for()
     assert found.fit.values[0] == pytest.approx(1.0 / 3e6, rel=0.03)
     assert found.evidence[0] > 1000.0
     assert found.confusable == ()
+
+
+@pytest.mark.parametrize(("hidden", "expected"), [(SOFT_FRAME, "frame"), (ALL_SOFTER, "modulus")])
+def test_beside_a_disturbance_a_frame_takes_the_place_of_softer_ropes_only_where_it_is_one(
+    hidden: dict[str, Any], expected: str
+) -> None:
+    found = judged(hidden, [Hypothesis(BY_NAME["modulus"], (1, 2, 3))], beside_disturbance=True)
+    assert [hypothesis.effect.name for hypothesis in found.accepted] == [expected]
+    if expected == "frame":
+        assert found.fit.values[0] == pytest.approx(1.0 / 5e5, rel=0.03)
+        assert found.evidence[0] > 1000.0
 
 
 @pytest.mark.validate

@@ -16,6 +16,8 @@ from tautwire.estimation.parameter_fit import Fit, Fitter
 from tautwire.estimation.stepwise_selection import SelectionResult
 from tautwire.estimation.trace_result import FoundEffect
 from tautwire.estimation.verdict import verdict_beside_disturbance, verdict_of
+from tautwire.robot.schema import EffectSetting, Robot
+from tautwire_fmu.laws.effects import BY_NAME
 from tests.support.recordings import recorded
 from tests.support.robots import example
 
@@ -35,8 +37,13 @@ def shares(left: float, missed: float, **of_effects: tuple[float, float]) -> Exp
     return ExplainedShares(tuple(parts), tuple(sizes), (0.0,) * len(parts), left, missed, missed * left**0.5)
 
 
+def selected(*accepted: Hypothesis, robot: Robot = ROBOT) -> SelectionResult:
+    evidence, fit = (50.0,) * len(accepted), Fit.without_parameters(robot)
+    return SelectionResult(accepted, evidence, fit, (), ())
+
+
 def verdict(of: ExplainedShares, *names: str) -> tuple[str, str]:
-    return verdict_beside_disturbance(CONTEXT, [hypothesis(name) for name in names], of, REMAINING)
+    return verdict_beside_disturbance(CONTEXT, selected(*map(hypothesis, names)), of, REMAINING)
 
 
 def test_what_a_small_random_force_would_leave_lacks_nothing() -> None:
@@ -55,7 +62,7 @@ def test_an_effect_is_named_that_explains_a_good_part_of_little() -> None:
 def test_what_uncertain_numbers_explain_beside_the_one_effect_is_told() -> None:
     robot = replace(ROBOT, platform=replace(ROBOT.platform, mass_uncertainty=0.1))
     of = shares(0.12, 6.0, drum=(0.27, 5.0))
-    _, sentence = verdict_beside_disturbance(replace(CONTEXT, robot=robot), [hypothesis("drum")], of, REMAINING)
+    _, sentence = verdict_beside_disturbance(replace(CONTEXT, robot=robot), selected(hypothesis("drum")), of, REMAINING)
     assert "missed); 61 % lies within stated uncertainties, and 12 % remains, which" in sentence
 
 
@@ -80,6 +87,16 @@ def test_a_listed_effect_gets_no_credit_for_what_is_not_on_the_list(names: tuple
     assert all(name in sentence for name in names)
 
 
+def test_what_is_not_on_the_list_is_discovered_with_its_share() -> None:
+    frame = Hypothesis(BY_NAME["frame"], ROBOT.cable_numbers)
+    robot = ROBOT.with_effect(EffectSetting("frame", {"compliance": 1e-5}, ROBOT.cable_numbers))
+    of = shares(0.02, 60.0, frame=(0.98, 50.0))
+    word, sentence = verdict_beside_disturbance(CONTEXT, selected(frame, robot=robot), of, REMAINING)
+    assert word == "discovered"
+    assert "frame (98 % of what is missed); 2 % remains" in sentence
+    assert "This effect is not on the list of known ones: frame: compliance = 1e-05" in sentence
+
+
 def test_an_effect_whose_size_changes_from_stretch_to_stretch_gets_no_name() -> None:
     of = shares(0.45, 60.0, payload=(0.55, 40.0))
     assert verdict(of, "payload")[0] == "effects"
@@ -92,7 +109,8 @@ def test_an_effect_whose_size_changes_from_stretch_to_stretch_gets_no_name() -> 
 def test_effects_of_a_small_share_or_below_noise_are_listed_apart(share: float, size: float) -> None:
     effects = [FoundEffect(name, "cable", (), {}, 50.0) for name in ("damping", "friction")]
     of = shares(0.05, 60.0, damping=(share, size), friction=(0.9, 50.0))
-    large, small = effects_by_size(effects, of, CONTEXT.policy.size)
+    accepted = [Hypothesis(BY_NAME[name], ()) for name in ("damping", "friction")]
+    large, small = effects_by_size(effects, accepted, of, CONTEXT.policy.size)
     assert [(each.name, each.share) for each in large] == [("friction", 0.9)]
     assert [(each.name, each.share) for each in small] == [("damping", share)]
     word, sentence = verdict(of, "damping", "friction")

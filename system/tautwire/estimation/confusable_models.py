@@ -14,43 +14,56 @@ from tautwire_fmu.laws.effects import UNLISTED
 
 from ..errors import UnreachableError
 from ..robot.schema import EffectSetting, Robot
+from .candidate_fits import maximised_validation_likelihood
 from .candidate_scores import setting_of
 from .hypotheses import Hypothesis, with_hypothesis, with_larger_forms
 from .identification_context import IdentificationContext
 from .parameter_fit import Fit, NoFitError
 from .residual_analysis import residuals_are_white
-from .stepwise_selection import SelectionResult
+from .stepwise_selection import SelectionResult, with_disturbance_beside
 
 
-def replace_by_confusable_models(context: IdentificationContext, selection: SelectionResult) -> SelectionResult:
+def replace_by_confusable_models(
+    context: IdentificationContext, selection: SelectionResult
+) -> tuple[IdentificationContext, SelectionResult]:
     """The selection, or one with a confusable model instead: an unlisted effect or a larger form of one effect.
 
     The alternative has to explain more with no more parameters, or as much with fewer. Where the selection leaves more
     than noise, an unlisted effect is tried beside it too, and has to leave noise. Judged on validation data.
+
+    Beside a disturbance, which would make up for the form of any of them, only unlisted effects in place of accepted
+    ones, each beside a disturbance of its own. One has to be as much better as any effect has to be than none.
     """
-    robot, validation, tie_nats = context.robot, context.split.validation, context.policy.selection.tie_nats
-    is_adequate = _leaves_white_residuals(context, selection.fit.robot, selection.accepted)
+    robot, validation = context.robot, context.split.validation
+    has_disturbance = context.fitter.has_disturbance
+    is_adequate = has_disturbance or _leaves_white_residuals(context, selection.fit.robot, selection.accepted)
+    best = context, selection
     if is_adequate and not selection.accepted:
-        return selection
-    best = selection
+        return best
     log_likelihood = context.fitter.log_likelihood(selection.fit.robot, selection.accepted, validation)
     unlisted = _unlisted_alternatives(robot, selection.accepted, is_adequate)
-    alternatives = [*unlisted, *_larger_forms(selection.accepted, robot)]
+    larger_forms = [] if has_disturbance else _larger_forms(selection.accepted, robot)
+    alternatives = [*unlisted, *larger_forms]
     for number, chosen in enumerate(alternatives):
         context.progress(f"alternatives: {chosen[-1].label(robot)}", number / len(alternatives))
         fit = _fit_alternative(context, selection, chosen)
         if fit is None or not (is_adequate or _leaves_white_residuals(context, fit.robot, chosen)):
             continue
-        gain = context.fitter.log_likelihood(fit.robot, chosen, validation) - log_likelihood
-        extra_parameters = _parameter_count(chosen) - _parameter_count(best.accepted)
-        required = context.evidence_threshold(others=1)
-        if extra_parameters <= 0:
-            required = tie_nats if extra_parameters == 0 else -tie_nats
-        if gain > required:
+        beside, fit = with_disturbance_beside(context, chosen, fit)
+        gain = beside.fitter.log_likelihood(fit.robot, chosen, validation) - log_likelihood
+        if gain > _required_gain(context, _parameter_count(chosen) - _parameter_count(best[1].accepted)):
             log_likelihood += gain
-            evidence = log_likelihood - _log_likelihood_without_last(context, fit, chosen)
-            best = _with_alternative(selection, chosen, fit, evidence)
+            evidence = log_likelihood - _log_likelihood_without_last(beside, fit, chosen)
+            best = beside, _with_alternative(selection, chosen, fit, evidence)
     return best
+
+
+def _required_gain(context: IdentificationContext, extra_parameters: int) -> float:
+    """Gain of log-likelihood for which an alternative with some more parameters is taken."""
+    if context.fitter.has_disturbance or extra_parameters > 0:
+        return context.evidence_threshold(others=1)
+    tie_nats = context.policy.selection.tie_nats
+    return tie_nats if extra_parameters == 0 else -tie_nats
 
 
 def _leaves_white_residuals(context: IdentificationContext, robot: Robot, chosen: Sequence[Hypothesis]) -> bool:
@@ -118,12 +131,11 @@ def _parameter_count(chosen: Sequence[Hypothesis]) -> int:
 
 def _log_likelihood_without_last(context: IdentificationContext, fit: Fit, chosen: Sequence[Hypothesis]) -> float:
     """Log-likelihood of the validation data under the others at their best there; -inf where they cannot be run."""
-    fitter, validation, others, robot = context.fitter, context.split.validation, chosen[:-1], context.robot
+    others, robot = chosen[:-1], context.robot
     for hypothesis in others:
         robot = robot.with_effect(setting_of(fit.robot, hypothesis))
     try:
-        best = fitter.fit_from([robot], others, validation, -inf).robot if others else robot
-        return fitter.log_likelihood(best, others, validation)
+        return maximised_validation_likelihood(context, robot, others, -inf)
     except (UnreachableError, NoFitError):
         return -inf
 

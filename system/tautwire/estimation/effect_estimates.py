@@ -149,12 +149,15 @@ def _unless_declared(value: float, declared: float, digits: int = 10) -> float:
 
 
 def effects_by_size(
-    effects: Sequence[FoundEffect], shares: ExplainedShares, policy: SizePolicy
+    effects: Sequence[FoundEffect], accepted: Sequence[Hypothesis], shares: ExplainedShares, policy: SizePolicy
 ) -> tuple[tuple[FoundEffect, ...], tuple[FoundEffect, ...]]:
     """The effects with their shares, the largest first: those that matter, and those too small to matter."""
-    with_shares = [replace(effect, share=share) for effect, share in zip(effects, shares.effects, strict=True)]
-    large = shares.substantial(policy)
-    return tuple(with_shares[i] for i in large), tuple(e for i, e in enumerate(with_shares) if i not in large)
+    large = {(accepted[index].effect.name, accepted[index].cables) for index in shares.substantial(policy)}
+    with_shares = effects_with_shares(effects, accepted, shares)
+    return (
+        tuple(effect for effect in with_shares if (effect.name, effect.cables) in large),
+        tuple(effect for effect in with_shares if (effect.name, effect.cables) not in large),
+    )
 
 
 def effects_by_evidence(

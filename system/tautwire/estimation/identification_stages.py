@@ -70,13 +70,9 @@ def select_in_corrected_recordings(state: Identification) -> Identification:
 
 
 def try_confusable_models(state: Identification) -> Identification:
-    """Replace the selection by a model that is easily confused with it, where that explains more.
-
-    Not beside a disturbance, which would make up for the form of any of them.
-    """
-    if state.context.fitter.has_disturbance:
-        return state
-    return replace(state, selection=replace_by_confusable_models(state.context, state.selection))
+    """Replace the selection by a model that is easily confused with it, where that explains more."""
+    context, selection = replace_by_confusable_models(state.context, state.selection)
+    return replace(state, context=context, selection=selection)
 
 
 def try_declared_start(state: Identification) -> Identification:
@@ -177,7 +173,8 @@ def estimate_intervals(state: Identification) -> Identification:
     if state.shares is None:
         large, small = effects_by_evidence(effects, state.selection.substantial(state.context.policy.selection))
     else:
-        large, small = effects_by_size(effects, state.shares, state.context.policy.size)
+        size = state.context.policy.size
+        large, small = effects_by_size(effects, state.selection.accepted, state.shares, size)
     if not state.effects_hold:
         return replace(state, effects=(), small_effects=(*large, *small))
     return _with_calibrations(replace(state, effects=large, small_effects=small))
@@ -266,9 +263,9 @@ def _judged_beside_disturbance(state: Identification, shares: ExplainedShares) -
     """The state with its verdict; without an effect that matters, with the declared robot as the final one."""
     context, declared = state.context, state.prepared.fitter
     remaining = remaining_error(state.comparisons[-1].recording, state.comparisons[-1].after, state.noise_floors[-1])
-    verdict = verdict_beside_disturbance(context, state.selection.accepted, shares, remaining.sentence)
+    verdict = verdict_beside_disturbance(context, state.selection, shares, remaining.sentence)
     verdict = verdict_of_ended_search(verdict, context.time_limit)
-    state = replace(state, verdict=verdict, effects_hold=verdict[0] == "effects")
+    state = replace(state, verdict=verdict, effects_hold=verdict[0] in ("effects", "discovered"))
     if verdict[0] == "none":
         max_sigmas = context.policy.size.max_calibration_sigmas
         calibration = calibrate(declared, context.robot, context.split.estimation).clipped(max_sigmas)

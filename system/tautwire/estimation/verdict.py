@@ -42,7 +42,7 @@ def verdict_of(
     lacks = f"The model lacks {lacking}; with {pronoun}{with_small}, {IS_WHITE}."
     formula = confirmed_formula(robot, selection, effects_hold, discovery)
     if effects_hold and formula:
-        return "discovered", f"{lacks} This effect is not on the list of known ones: {formula}."
+        return "discovered", f"{lacks} {_not_listed(formula)}"
     if effects_hold:
         return "effects", lacks
     if discovery:
@@ -57,10 +57,10 @@ def verdict_of(
 
 
 def verdict_beside_disturbance(
-    context: IdentificationContext, accepted: Sequence[Hypothesis], shares: ExplainedShares, remaining: str
+    context: IdentificationContext, selection: SelectionResult, shares: ExplainedShares, remaining: str
 ) -> tuple[Verdict, str]:
     """Verdict and its sentence beside a disturbance; ``remaining`` says in words what error remains."""
-    policy = context.policy.size
+    policy, accepted = context.policy.size, selection.accepted
     large, labels = shares.substantial(policy), labels_by_effect(accepted, context.robot)
     names = list(dict.fromkeys(labels))
     explained = max((1.0 - shares.left, *(shares.effects[index] for index in large))) if large else 0.0
@@ -78,7 +78,9 @@ def verdict_beside_disturbance(
         is_stated = len(names) == 1 and others >= policy.min_share and uncertain_parameters(context.robot)
         uncertain = f"{_per_cent(others)} lies within stated uncertainties, and " if is_stated else ""
         lacks = f"The model lacks {named}; {uncertain}{_per_cent(shares.left)} remains{kind}."
-        return "effects", f"{lacks} The error is then {remaining}."
+        sentence = f"{lacks} The error is then {remaining}."
+        formula = confirmed_formula(context.robot, selection, effects_hold=True, discovery=None)
+        return ("discovered", f"{sentence} {_not_listed(formula)}") if formula else ("effects", sentence)
     is_steady = len(shares.steady(policy)) == len(accepted)
     varies = "" if is_steady else ", which would have to change from stretch to stretch"
     closest = f" Of it {_per_cent(1.0 - shares.left)} would go to {_sum_up(names)}{varies}." if names else ""
@@ -96,6 +98,10 @@ def verdict_of_ended_search(verdict: tuple[Verdict, str], limit: TimeLimit) -> t
     if word == "unexplained":
         return "unexplained", f"{ended}. Until then: {sentence[0].lower()}{sentence[1:]}"
     return word, f"{sentence} {ended}, before all was tried."
+
+
+def _not_listed(formula: str) -> str:
+    return f"This effect is not on the list of known ones: {formula}."
 
 
 def _per_cent(share: float) -> str:
