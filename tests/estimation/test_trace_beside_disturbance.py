@@ -92,3 +92,16 @@ def test_a_load_that_swings_gets_no_listed_name() -> None:
     assert found.verdict in ("unexplained", "discovered"), found.sentence
     assert found.effects == ()
     assert found.robot_after == found.robot_before
+
+
+@pytest.mark.validate
+def test_a_frame_that_gives_way_is_discovered_beside_a_disturbance() -> None:
+    found = traced({"unlisted_frame": {"stiffness_constant": 5e4, "viscosity": 2e3, "mass": 50.0}}, 1201)
+    assert found.verdict == "discovered", found.sentence
+    assert found.formula is not None and found.formula.startswith("frame: compliance = ")
+    assert float(found.formula.split()[3]) == pytest.approx(2e-5, rel=0.02)
+    assert "frame (" in found.sentence
+    # The frame's own viscosity, which the model's frame lacks, is the ropes' damping.
+    assert {effect.name for effect in found.effects} <= {"damping"}
+    before, after = found.comparisons[-1].errors_before, found.comparisons[-1].errors_after
+    assert after.tension_rms < 0.5 * before.tension_rms
