@@ -143,3 +143,18 @@ def test_an_initial_state_is_that_of_the_robot_whose_numbers_the_simulation_has(
     )
     assert known is not None and uncertain is not None
     assert uncertain.tensions == pytest.approx(known.tensions, abs=1e-3)
+
+
+def test_a_sensor_off_zero_moves_no_initial_state() -> None:
+    """Within its uncertainty it stays the sensor's: the platform starts where it is declared, held by the ropes."""
+    robot, recording = example("eight"), recorded("eight", 1)
+    robot = replace(robot, sensors=replace(robot.sensors, position_offset_uncertainty=2e-3))
+    off_zero = replace(recording, position=recording.position + np.array([4e-3, -2e-3, 1e-3]))
+    noise = replace(estimate_noise(robot, recording), self_stress=60.0)
+    true_start, started = (
+        with_initial_state(Fitter(noise), robot, DataSet(each, robot.platform.start, np.ones(len(each.time), bool)))
+        for each in (recording, off_zero)
+    )
+    assert started.platform.start == pytest.approx(true_start.platform.start, abs=2e-4)
+    assert true_start.initial_state is not None and started.initial_state is not None
+    assert started.initial_state.tensions == pytest.approx(true_start.initial_state.tensions, abs=2.0)
