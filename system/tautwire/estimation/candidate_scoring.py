@@ -36,7 +36,7 @@ def score_candidates(context: IdentificationContext, search_round: SearchRound) 
     context.progress(f"{label}: score test", 0.0)
     predictions, rough_predictions = _predict_gains(context, search_round)
     shortlisted = shortlist(predictions, rough_predictions, policy.score_test)
-    if not search_round.is_white or context.fitter.has_disturbance:
+    if search_round.is_ranking:
         coarse_data = context.split.estimation.first(policy.selection.coarse_samples)
         predictions |= grid_search(context, robot, accepted, coarse_data, {h: predictions[h] for h in shortlisted})
     starts = {

@@ -37,9 +37,9 @@ def replace_by_confusable_models(
     robot, validation = context.robot, context.split.validation
     has_disturbance = context.fitter.has_disturbance
     is_adequate = has_disturbance or _leaves_white_residuals(context, selection.fit.robot, selection.accepted)
-    best = context, selection
     if is_adequate and not selection.accepted:
-        return best
+        return context, selection
+    best_context, best = context, selection
     log_likelihood = context.fitter.log_likelihood(selection.fit.robot, selection.accepted, validation)
     unlisted = _unlisted_alternatives(robot, selection.accepted, is_adequate)
     larger_forms = [] if has_disturbance else _larger_forms(selection.accepted, robot)
@@ -51,11 +51,11 @@ def replace_by_confusable_models(
             continue
         beside, fit = with_disturbance_beside(context, chosen, fit)
         gain = beside.fitter.log_likelihood(fit.robot, chosen, validation) - log_likelihood
-        if gain > _required_gain(context, _parameter_count(chosen) - _parameter_count(best[1].accepted)):
+        if gain > _required_gain(context, _parameter_count(chosen) - _parameter_count(best.accepted)):
             log_likelihood += gain
             evidence = log_likelihood - _log_likelihood_without_last(beside, fit, chosen)
-            best = beside, _with_alternative(selection, chosen, fit, evidence)
-    return best
+            best_context, best = beside, _with_alternative(beside, selection, chosen, fit, evidence)
+    return best_context, best
 
 
 def _required_gain(context: IdentificationContext, extra_parameters: int) -> float:
@@ -141,7 +141,7 @@ def _log_likelihood_without_last(context: IdentificationContext, fit: Fit, chose
 
 
 def _with_alternative(
-    selection: SelectionResult, chosen: Sequence[Hypothesis], fit: Fit, evidence: float
+    context: IdentificationContext, selection: SelectionResult, chosen: Sequence[Hypothesis], fit: Fit, evidence: float
 ) -> SelectionResult:
     """The selection replaced by the chosen hypotheses, with the evidence of the last of them."""
     evidences = [
@@ -149,4 +149,11 @@ def _with_alternative(
     ]
     names = {hypothesis.effect.name for hypothesis in chosen}
     confusable = tuple(pair for pair in selection.confusable if pair[0] in names)
-    return replace(selection, accepted=tuple(chosen), evidence=tuple(evidences), fit=fit, confusable=confusable)
+    return replace(
+        selection,
+        accepted=tuple(chosen),
+        evidence=tuple(evidences),
+        fit=fit,
+        confusable=confusable,
+        disturbance=context.fitter.noise.disturbance,
+    )

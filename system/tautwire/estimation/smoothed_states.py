@@ -196,7 +196,7 @@ def with_initial_state(fitter: Fitter, robot: Robot, sample: DataSet) -> Robot:
     # A simulation that begins there has the robot's own numbers, not those that the smoother would move too.
     constants = np.zeros(len(likelihood.uncertain))
     conditional = likelihood.given_constants(constants)
-    # A sensor's zero and gain are not the robot's: they stay as the recording has them.
+    # Zeros and gains of sensors are not the robot's numbers: they are as the recording shows them.
     recording = calibrate(fitter, robot, sample).without_sensor_errors(sample.recording)
     smoothed = _smoothed_initial_state(conditional, values, replace(sample, recording=recording))
     state = np.append(smoothed[: conditional.model.states.numel()], constants)
