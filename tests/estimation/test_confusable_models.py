@@ -72,6 +72,9 @@ def test_beside_a_disturbance_a_frame_takes_the_place_of_softer_ropes_only_where
     if expected == "frame":
         assert found.fit.values[0] == pytest.approx(1.0 / 5e5, rel=0.03)
         assert found.evidence[0] > 1000.0
+        assert [(each.name, each.accepted, each.mean_square < 1.2) for each in found.candidates] == [
+            ("frame", True, True)
+        ]
 
 
 @pytest.mark.validate

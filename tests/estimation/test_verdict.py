@@ -94,7 +94,7 @@ def test_what_is_not_on_the_list_is_discovered_with_its_share() -> None:
     word, sentence = verdict_beside_disturbance(CONTEXT, selected(frame, robot=robot), of, REMAINING)
     assert word == "discovered"
     assert "frame (98 % of what is missed); 2 % remains" in sentence
-    assert "This effect is not on the list of known ones: frame: compliance = 1e-05" in sentence
+    assert "This effect is not on the list of known ones: frame: compliance = 1e-05 m/N." in sentence
 
 
 def test_an_effect_whose_size_changes_from_stretch_to_stretch_gets_no_name() -> None:

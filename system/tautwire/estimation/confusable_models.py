@@ -10,12 +10,14 @@ from dataclasses import replace
 from itertools import chain, combinations
 from math import inf
 
+import numpy as np
+
 from tautwire_fmu.laws.effects import UNLISTED
 
 from ..errors import UnreachableError
 from ..robot.schema import EffectSetting, Robot
 from .candidate_fits import maximised_validation_likelihood
-from .candidate_scores import setting_of
+from .candidate_scores import CandidateScore, setting_of
 from .hypotheses import Hypothesis, with_hypothesis, with_larger_forms
 from .identification_context import IdentificationContext
 from .parameter_fit import Fit, NoFitError
@@ -143,17 +145,22 @@ def _log_likelihood_without_last(context: IdentificationContext, fit: Fit, chose
 def _with_alternative(
     context: IdentificationContext, selection: SelectionResult, chosen: Sequence[Hypothesis], fit: Fit, evidence: float
 ) -> SelectionResult:
-    """The selection replaced by the chosen hypotheses, with the evidence of the last of them."""
+    """The selection replaced by the chosen hypotheses, the last of which has the evidence, as in a round of its own."""
     evidences = [
         selection.evidence[selection.accepted.index(h)] if h in selection.accepted else evidence for h in chosen
     ]
     names = {hypothesis.effect.name for hypothesis in chosen}
-    confusable = tuple(pair for pair in selection.confusable if pair[0] in names)
+    validation = context.split.validation
+    innovations = context.fitter.judged(fit.robot, chosen, validation)
+    mean_square = float(np.nanmean(innovations.mean_square(validation.rows)))
+    number = 1 + max((candidate.round for candidate in selection.candidates), default=0)
+    replacement = CandidateScore(chosen[-1], fit, evidence, mean_square).candidate(number, accepted=True)
     return replace(
         selection,
         accepted=tuple(chosen),
         evidence=tuple(evidences),
         fit=fit,
-        confusable=confusable,
+        candidates=(*selection.candidates, replacement),
+        confusable=tuple(pair for pair in selection.confusable if pair[0] in names),
         disturbance=context.fitter.noise.disturbance,
     )

@@ -10,6 +10,7 @@ from math import floor, isfinite, log10
 import numpy as np
 from numpy.typing import NDArray
 
+from tautwire_fmu.laws.effects import BY_NAME
 from tautwire_fmu.laws.expression import evaluate, parse_expression
 from tautwire_fmu.laws.formula import FORCE_TARGETS, VARIABLES_BY_TARGET
 
@@ -252,12 +253,13 @@ def formula_text(robot: Robot, formulas: Sequence[Formula]) -> str:
 
 
 def effects_text(settings: Iterable[tuple[str, EffectSetting]]) -> str:
-    """Labels of effects with their numbers, as in ``frame: compliance = 3.3e-07``."""
-    texts = (
-        f"{label}: {', '.join(f'{name} = {value:.4g}' for name, value in setting.values.items())}"
-        for label, setting in settings
-    )
-    return "; ".join(texts)
+    """Labels of effects with their numbers, as in ``frame: compliance = 3.3e-07 m/N``."""
+    return "; ".join(f"{label}: {', '.join(_numbers_of(setting))}" for label, setting in settings)
+
+
+def _numbers_of(setting: EffectSetting) -> Iterator[str]:
+    units = {parameter.name: parameter.unit for parameter in BY_NAME[setting.name].parameters}
+    return (f"{name} = {value:.4g} {units[name]}" for name, value in setting.values.items())
 
 
 def _site_label(robot: Robot, formula: Formula) -> str:
