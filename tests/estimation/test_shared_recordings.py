@@ -44,3 +44,15 @@ def test_a_swinging_load_on_a_robot_as_it_is_gets_no_listed_name() -> None:
     found = traced("lifelike/p4")
     assert found.verdict == "unexplained"
     assert found.effects == ()
+
+
+def test_of_a_real_planar_robot_the_drums_are_named_alone_and_the_error_falls_to_a_sixth() -> None:
+    """Rigid ropes along the encoders' lengths would have ratios of 0.936 to 0.943; these ropes stretch."""
+    found = traced("real-planar")
+    assert found.verdict == "effects"
+    assert {effect.name for effect in found.effects} == {"drum"}
+    assert sorted(cable for effect in found.effects for cable in effect.cables) == [1, 2, 3, 4]
+    ratios = [effect.parameters["radius_ratio"] for effect in found.effects]
+    assert all(0.92 < ratio.value < 0.97 and ratio.low < 0.945 for ratio in ratios)
+    check = found.comparisons[-1]
+    assert check.errors_after.position_rms < check.errors_before.position_rms / 6.0
