@@ -47,7 +47,7 @@ def test_a_swinging_load_on_a_robot_as_it_is_gets_no_listed_name() -> None:
 
 
 def test_of_a_real_planar_robot_the_drums_are_named_alone_and_the_error_falls_to_a_sixth() -> None:
-    """Rigid ropes along the encoders' lengths would have ratios of 0.936 to 0.943; these ropes stretch."""
+    """Geometry and the encoders' lengths alone give ratios of 0.936 to 0.943."""
     found = traced("real-planar")
     assert found.verdict == "effects"
     assert {effect.name for effect in found.effects} == {"drum"}

@@ -46,7 +46,7 @@ def fit_and_validate(fitter: Fitter, task: FitTask, data: DataSet, validation: D
             log_likelihood = max(log_likelihood, marginal)
     except (UnreachableError, NoFitError, np.linalg.LinAlgError):
         return None
-    mean_square = float(np.nanmean(innovations.mean_square(validation.rows)))
+    mean_square = innovations.overall_mean_square(validation.rows)
     return ValidatedFit(fit, log_likelihood, mean_square) if np.isfinite(log_likelihood) else None
 
 

@@ -10,8 +10,6 @@ from dataclasses import replace
 from itertools import chain, combinations
 from math import inf
 
-import numpy as np
-
 from tautwire_fmu.laws.effects import UNLISTED
 
 from ..errors import UnreachableError
@@ -151,8 +149,7 @@ def _with_alternative(
     ]
     names = {hypothesis.effect.name for hypothesis in chosen}
     validation = context.split.validation
-    innovations = context.fitter.judged(fit.robot, chosen, validation)
-    mean_square = float(np.nanmean(innovations.mean_square(validation.rows)))
+    mean_square = context.fitter.judged(fit.robot, chosen, validation).overall_mean_square(validation.rows)
     number = 1 + max((candidate.round for candidate in selection.candidates), default=0)
     replacement = CandidateScore(chosen[-1], fit, evidence, mean_square).candidate(number, accepted=True)
     return replace(

@@ -65,6 +65,10 @@ class Innovations:
         total = np.nansum(self.values[rows] ** 2, axis=0)
         return np.divide(total, count, out=np.full(len(total), np.nan), where=count > 0)
 
+    def overall_mean_square(self, rows: NDArray[np.bool_]) -> float:
+        """The mean of :meth:`mean_square` over the observed outputs."""
+        return float(np.nanmean(self.mean_square(rows)))
+
 
 @dataclass(frozen=True)
 class FilterSegment:

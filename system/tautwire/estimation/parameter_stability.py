@@ -92,7 +92,7 @@ def _intervals_of_recording(
     except (UnreachableError, NoFitError):
         return intervals
     innovations = limited.judged(fit.robot, chosen, data)
-    if np.nanmean(innovations.mean_square(data.rows)) > policy.max_mean_square:
+    if innovations.overall_mean_square(data.rows) > policy.max_mean_square:
         return intervals
     return intervals.hull(_intervals_about(policy, fit, innovations, data, neutral_values))
 

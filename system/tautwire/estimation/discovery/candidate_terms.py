@@ -254,10 +254,10 @@ def formula_text(robot: Robot, formulas: Sequence[Formula]) -> str:
 
 def effects_text(settings: Iterable[tuple[str, EffectSetting]]) -> str:
     """Labels of effects with their numbers, as in ``frame: compliance = 3.3e-07 m/N``."""
-    return "; ".join(f"{label}: {', '.join(_numbers_of(setting))}" for label, setting in settings)
+    return "; ".join(f"{label}: {', '.join(_values_with_units(setting))}" for label, setting in settings)
 
 
-def _numbers_of(setting: EffectSetting) -> Iterator[str]:
+def _values_with_units(setting: EffectSetting) -> Iterator[str]:
     units = {parameter.name: parameter.unit for parameter in BY_NAME[setting.name].parameters}
     return (f"{name} = {value:.4g} {units[name]}" for name, value in setting.values.items())
 

@@ -167,7 +167,7 @@ def _sufficient_noise_density(
     """The smallest acceleration noise density under which the run follows the data; else the largest."""
     for acceleration_noise_density in policy.acceleration_noise_densities:
         innovations = likelihood.innovations(data.recording, values, acceleration_noise_density)
-        if float(np.nanmean(innovations.mean_square(data.rows))) < policy.max_innovation_variance:
+        if innovations.overall_mean_square(data.rows) < policy.max_innovation_variance:
             return acceleration_noise_density
     return policy.acceleration_noise_densities[-1]
 
