@@ -16,12 +16,15 @@ from tautwire.estimation.explained_shares import (
     missed_with_effects,
     missed_without_effects,
     simulated_outputs,
+    time_deviation,
 )
+from tautwire.estimation.hypotheses import Hypothesis, free_parameters
 from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.measurement_noise import estimate_noise
-from tautwire.estimation.parameter_fit import Fitter
+from tautwire.estimation.parameter_fit import Fit, Fitter
 from tautwire.estimation.smoothed_states import with_initial_state
 from tautwire.robot.schema import EffectSetting
+from tautwire_fmu.laws.effects import BY_NAME
 from tests.support.recordings import recorded
 from tests.support.robots import example
 
@@ -52,6 +55,19 @@ def test_simulated_outputs_are_those_of_the_fmus(
     by_fmus = cosimulate_data_set(robot, SPLIT.validation)
     assert np.max(np.abs(simulated.position - by_fmus.position)) < max_position_error
     assert np.max(np.abs(simulated.tension - by_fmus.tension)) < 2e4 * max_position_error
+
+
+def test_the_best_determined_time_constant_counts_and_a_delay_is_none() -> None:
+    relaxation = Hypothesis(BY_NAME["relaxation"], (1, 2, 3), ("modulus", "time", "modulus_2", "time_2"))
+    delay = Hypothesis(BY_NAME["sensor_delay"], (1, 2, 3), ("tension_delay",))
+    values = {"modulus": 1e10, "time": 0.5, "modulus_2": 1e9, "time_2": 10.0}
+    robot = ROBOT.with_effect(relaxation.setting(ROBOT, values)).with_effect(delay.setting(ROBOT))
+    free = free_parameters(robot, (relaxation, delay))
+    deviations = {"modulus": 1e9, "time": 0.1, "modulus_2": 1e9, "time_2": 30.0, "tension_delay": 1.0}
+    fitted = np.array([{**values, "tension_delay": 0.01}[each.name] for each in free])
+    fit = Fit(robot, tuple(free), fitted, np.diag([deviations[each.name] ** 2 for each in free]))
+    assert time_deviation(fit, relaxation) == pytest.approx(0.2)
+    assert time_deviation(fit, delay) == 0.0
 
 
 def test_an_effect_that_grows_has_another_amplitude_on_each_stretch() -> None:

@@ -34,7 +34,8 @@ def hypothesis(name: str) -> Hypothesis:
 def shares(left: float, missed: float, **of_effects: tuple[float, float]) -> ExplainedShares:
     """Shares with (share, size) of each effect; what is left has its part of the mean square of what is missed."""
     parts, sizes = ([pair[k] for pair in of_effects.values()] for k in (0, 1))
-    return ExplainedShares(tuple(parts), tuple(sizes), (0.0,) * len(parts), left, missed, missed * left**0.5)
+    none = (0.0,) * len(parts)
+    return ExplainedShares(tuple(parts), tuple(sizes), none, none, left, missed, missed * left**0.5)
 
 
 def selected(*accepted: Hypothesis, robot: Robot = ROBOT) -> SelectionResult:
@@ -103,6 +104,18 @@ def test_an_effect_whose_size_changes_from_stretch_to_stretch_gets_no_name() -> 
     word, sentence = verdict(replace(of, spreads=(0.47,)), "payload")
     assert word == "unexplained"
     assert "Of it 55 % would go to payload, which would have to change from stretch to stretch." in sentence
+
+
+def test_an_effect_whose_time_constant_does_not_show_gets_no_name_and_leaves_the_others_theirs() -> None:
+    of = shares(0.05, 60.0, relaxation=(0.9, 40.0))
+    assert verdict(replace(of, time_deviations=(0.45,)), "relaxation")[0] == "effects"
+    word, sentence = verdict(replace(of, time_deviations=(0.7,)), "relaxation")
+    assert word == "unexplained"
+    assert "would go to relaxation, whose time constant these recordings do not determine." in sentence
+    both = replace(shares(0.05, 60.0, relaxation=(0.6, 40.0), drum=(0.4, 30.0)), time_deviations=(0.7, 0.0))
+    word, sentence = verdict(both, "relaxation", "drum")
+    assert word == "effects"
+    assert "drum" in sentence and "relaxation" not in sentence
 
 
 @pytest.mark.parametrize(("share", "size"), [(0.01, 9.0), (0.04, 9.0), (0.3, 0.5)])

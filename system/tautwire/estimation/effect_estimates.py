@@ -13,7 +13,6 @@ from numpy.typing import NDArray
 from tautwire_fmu.laws.effects import UNLISTED
 
 from ..robot.schema import Robot
-from ..robot.symbolic_model import FORMULA_INDEX
 from .explained_shares import ExplainedShares
 from .hypotheses import Hypothesis, declared_value
 from .identification_context import IdentificationContext
@@ -33,7 +32,6 @@ READABLE_DIGITS = 4
 
 def estimated_effects(context: IdentificationContext, selection: SelectionResult) -> tuple[FoundEffect, ...]:
     """Estimates of the accepted effects of the list, in order, on the estimation data that they were fitted to."""
-    indices = _parameter_indices(selection.fit)
     interval_ends, disagree = _interval_ends(context, selection)
     effects = []
     for hypothesis, evidence in zip(selection.accepted, selection.evidence, strict=True):
@@ -41,7 +39,7 @@ def estimated_effects(context: IdentificationContext, selection: SelectionResult
             continue
         estimates, unstable = {}, []
         for parameter in hypothesis.parameters:
-            index = indices[FittedParameter(hypothesis.effect.name, hypothesis.cables, parameter.name)]
+            index = selection.fit.parameter_index(hypothesis.effect.name, hypothesis.cables, parameter.name)
             low, high = interval_ends[index]
             declared = declared_value(context.robot, parameter, hypothesis.cables)
             unstable += [parameter.name] if disagree[index] else []
@@ -86,13 +84,14 @@ def _interval_ends(
 
 def _neutral_values(declared: Robot, selection: SelectionResult) -> Array:
     """Values (p,) of the fitted parameters without their effects: neutral, or as the robot file declares."""
-    indices, values = _parameter_indices(selection.fit), selection.fit.values.copy()
+    values = selection.fit.values.copy()
     for hypothesis in selection.accepted:
         for parameter in hypothesis.parameters:
             neutral = parameter.neutral
             if neutral is None:
                 neutral = declared_value(declared, parameter, hypothesis.cables) or 0.0
-            values[indices[FittedParameter(hypothesis.effect.name, hypothesis.cables, parameter.name)]] = neutral
+            index = selection.fit.parameter_index(hypothesis.effect.name, hypothesis.cables, parameter.name)
+            values[index] = neutral
     return values
 
 
@@ -204,23 +203,13 @@ def parameter_correlations(fit: Fit, effects: Sequence[FoundEffect]) -> tuple[Co
 
     ``C_ik / (d_i d_k)`` of the fit's covariance C and its deviations d; none where one has no deviation.
     """
-    indices, deviations = _parameter_indices(fit), fit.standard_deviations
+    deviations = fit.standard_deviations
     fitted = [FittedParameter(each.name, each.cables, parameter) for each in effects for parameter in each.parameters]
     correlations = []
     for first, second in combinations(fitted, 2):
-        i, k = indices[first], indices[second]
+        i, k = (fit.parameter_index(each.name, each.cables, each.parameter) for each in (first, second))
         scale = deviations[i] * deviations[k]
         if scale > 0.0:
             value = min(max(float(fit.covariance[i, k] / scale), -1.0), 1.0)
             correlations.append(Correlation((first, second), value))
     return tuple(correlations)
-
-
-def _parameter_indices(fit: Fit) -> dict[FittedParameter, int]:
-    """Index in the fit of each parameter of its robot's effects."""
-    of_effects = [(index, free) for index, free in enumerate(fit.free) if free.effect_index != FORMULA_INDEX]
-    settings = fit.robot.effects
-    return {
-        FittedParameter(settings[free.effect_index].name, settings[free.effect_index].cables, free.name): index
-        for index, free in of_effects
-    }

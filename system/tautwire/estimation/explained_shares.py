@@ -10,12 +10,15 @@ both. Without an effect all else stays as it is, the initial state included. An 
 a value each is one effect.
 
 An effect is the same from beginning to end; what is only like it now and then would need another size on each stretch.
+One with a state has a time constant that shows; without, it is only like another effect: a relaxation that takes far
+longer than the motion is a modulus, a far faster one damping.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from statistics import median
 
 import numpy as np
 from numpy.typing import NDArray
@@ -32,7 +35,7 @@ from .hypotheses import Hypothesis
 from .identification_context import IdentificationContext
 from .likelihood import Likelihood
 from .measured_outputs import Outputs, SimulatedOutputs, measured_outputs, output_names, output_residuals
-from .parameter_fit import Fitter
+from .parameter_fit import Fit, Fitter
 from .policy import SizePolicy
 from .smoothed_states import calibrate, with_initial_state
 from .trace_result import Comparison, Errors
@@ -45,13 +48,15 @@ class ExplainedShares:
     """Shares of the effects and of what is left, from 0 to 1, and sizes in standard deviations of one sample's noise.
 
     ``sizes`` are those of what each effect changes in the outputs, ``spreads`` how much they differ by stretch, see
-    :func:`amplitude_spread`; ``size_missed`` is the size of what the robot without effects misses beside noise, its
+    :func:`amplitude_spread`, and ``time_deviations`` the relative standard deviations of their time constants, zero for
+    those that have none. ``size_missed`` is the size of what the robot without effects misses beside noise, its
     uncertain numbers at their best, ``size_left`` that of what is left.
     """
 
     effects: tuple[float, ...]
     sizes: tuple[float, ...]
     spreads: tuple[float, ...]
+    time_deviations: tuple[float, ...]
     left: float
     size_missed: float
     size_left: float
@@ -60,9 +65,10 @@ class ExplainedShares:
         """Indices of the effects that matter, the largest first.
 
         Their shares are worth a name, and more than the form of the largest may leave; their sizes are beyond noise,
-        and about the same on all stretches.
+        and about the same on all stretches; their time constants show.
         """
-        ranked = sorted(self.steady(policy), key=lambda index: -self.effects[index])
+        shown = set(self.steady(policy)) & set(self.timed(policy))
+        ranked = sorted(shown, key=lambda index: (-self.effects[index], index))
         least = max(policy.min_share, policy.max_left_share_of_form * max(self.effects, default=0.0))
         return [i for i in ranked if self.effects[i] >= least and self.sizes[i] >= policy.min_size]
 
@@ -70,19 +76,25 @@ class ExplainedShares:
         """Indices of the effects that have about the same size on all stretches."""
         return [index for index, spread in enumerate(self.spreads) if spread <= policy.max_amplitude_spread]
 
+    def timed(self, policy: SizePolicy) -> list[int]:
+        """Indices of the effects whose time constants the recordings determine, or that have none."""
+        deviations = enumerate(self.time_deviations)
+        return [index for index, deviation in deviations if deviation <= policy.max_time_deviation]
+
 
 def explained_shares(
     context: IdentificationContext,
     declared: Fitter,
-    robot: Robot,
+    fit: Fit,
     accepted: Sequence[Hypothesis],
     data: DataSet,
     after: Comparison,
 ) -> ExplainedShares:
-    """Shares of the accepted effects of a robot, on some data.
+    """Shares of the accepted effects of a fit's robot, on some data.
 
     ``declared`` fits the robot without effects, ``after`` compares the robot with them.
     """
+    robot = fit.robot
     floor = sensor_noise_floor(context.fitter, robot, data)
     at_start = with_initial_state(context.fitter, robot, data)
     names = list(dict.fromkeys(hypothesis.effect.name for hypothesis in accepted))
@@ -104,6 +116,7 @@ def explained_shares(
             amplitude_spread(residual / noise, change / noise, data.rows, context.policy.stability.stretches)
             for change in changes
         ),
+        tuple(median([time_deviation(fit, h) for h in accepted if h.effect is each.effect]) for each in accepted),
         float(np.clip(left / total, 0.0, 1.0)),
         missed**0.5,
         left**0.5,
@@ -125,6 +138,13 @@ def amplitude_spread(residual: Array, signature: Array, rows: NDArray[np.bool_],
     by_stretch = np.array([part.sum() for part in np.array_split(products, stretch_count)])
     spread = np.sqrt(stretch_count * np.var(by_stretch) * stretch_count / (stretch_count - 1))
     return float(students_t.ppf(0.975, stretch_count - 1) * spread / max(energy, np.finfo(float).tiny))
+
+
+def time_deviation(fit: Fit, hypothesis: Hypothesis) -> float:
+    """Relative standard deviation of an effect's best determined time constant, by curvature; zero without any."""
+    times = [parameter.name for parameter in hypothesis.parameters if parameter.is_time_constant]
+    indices = [fit.parameter_index(hypothesis.effect.name, hypothesis.cables, name) for name in times]
+    return min((float(fit.standard_deviations[index] / fit.values[index]) for index in indices), default=0.0)
 
 
 def missed_without_effects(context: IdentificationContext, declared: Fitter, data: DataSet, floor: Errors) -> float:

@@ -227,7 +227,8 @@ def _disturbance_notes(state: Identification) -> list[str]:
     if disturbance is None:
         names = ", ".join(f"{each.name} ({each.evidence:.0f} nats)" for each in state.small_effects)
         return [f"established, but no more than what the form of a larger effect may leave: {names}"] if names else []
-    small = [f"{each.name} ({100.0 * (each.share or 0.0):.1f} % of what is missed)" for each in state.small_effects]
+    small_effects = () if state.verdict[0] == "unexplained" else state.small_effects
+    small = [f"{each.name} ({100.0 * (each.share or 0.0):.1f} % of what is missed)" for each in small_effects]
     unstable = ", ".join(dict.fromkeys(f"{name} of {each.name}" for each in state.effects for name in each.unstable))
     return [
         disturbance.sentence(fit.has_position, fit.has_tension, fit.has_orientation),

@@ -186,8 +186,8 @@ def share_out_what_was_missed(state: Identification) -> Identification:
         return state
     state.context.progress("shares", 0.0)
     selection, data, after = state.selection, state.prepared.data_sets[-1], state.comparisons[-1]
-    robot = state.final_robot
-    shares = explained_shares(state.context, state.prepared.fitter, robot, selection.accepted, data, after)
+    fit = replace(selection.fit, robot=state.final_robot)
+    shares = explained_shares(state.context, state.prepared.fitter, fit, selection.accepted, data, after)
     effects, small_effects = (
         effects_with_shares(each, selection.accepted, shares) for each in (state.effects, state.small_effects)
     )
@@ -246,7 +246,8 @@ def _explained_beside_disturbance(state: Identification) -> Identification:
     identified = calibrated_robot(context.fitter, selection.fit.robot, context.split.estimation)
     state = _with_final_robot(state, context.fitter, identified)
     data, after = state.prepared.data_sets[-1], state.comparisons[-1]
-    shares = explained_shares(context, state.prepared.fitter, identified, selection.accepted, data, after)
+    fit = replace(selection.fit, robot=identified)
+    shares = explained_shares(context, state.prepared.fitter, fit, selection.accepted, data, after)
     return replace(state, shares=shares)
 
 

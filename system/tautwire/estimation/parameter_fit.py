@@ -66,6 +66,15 @@ class Fit:
         half_width = NORMAL_QUANTILE_95 * float(self.standard_deviations[index])
         return float(self.values[index]) - half_width, float(self.values[index]) + half_width
 
+    def parameter_index(self, effect: str, cables: tuple[int, ...], parameter: str) -> int:
+        """Index of a fitted parameter of one effect on some cables."""
+        for index, free in enumerate(self.free):
+            if free.effect_index != FORMULA_INDEX and free.name == parameter:
+                setting = self.robot.effects[free.effect_index]
+                if (setting.name, setting.cables) == (effect, cables):
+                    return index
+        raise KeyError((effect, cables, parameter))
+
 
 class Fitter:
     """Fits robots to data sets; keeps compiled likelihoods, calls ``poll_interrupts`` before each run.

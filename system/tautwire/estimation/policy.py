@@ -219,6 +219,9 @@ class SizePolicy:
     # Half-width of an effect's amplitude over stretches, relative to it, above which it is none: a tank that fills was
     # a payload with 0.47; effects of the list had 0.15 at most in a dozen lifelike recordings.
     max_amplitude_spread: float = 0.3
+    # Standard deviation of a time constant, relative to it, above which no delay of the effect shows. A rope that
+    # stiffens with its tension was a relaxation with 0.4 to 1.2; effects of the list had 0.2 at most.
+    max_time_deviation: float = 0.5
     # Standard deviations within which an uncertain number of the robot without effects is taken at its best.
     max_calibration_sigmas: float = 3.0
     # Size of what is missed in co-simulation, in standard deviations of one sample's noise, that passes for a random

@@ -81,8 +81,11 @@ def verdict_beside_disturbance(
         sentence = f"{lacks} The error is then {remaining}."
         formula = confirmed_formula(context.robot, selection, effects_hold=True, discovery=None)
         return ("discovered", f"{sentence} {_not_listed(formula)}") if formula else ("effects", sentence)
-    is_steady = len(shares.steady(policy)) == len(accepted)
-    varies = "" if is_steady else ", which would have to change from stretch to stretch"
+    varies = ""
+    if len(shares.steady(policy)) < len(accepted):
+        varies = ", which would have to change from stretch to stretch"
+    elif len(shares.timed(policy)) < len(accepted):
+        varies = ", whose time constant these recordings do not determine"
     closest = f" Of it {_per_cent(1.0 - shares.left)} would go to {_sum_up(names)}{varies}." if names else ""
     return "unexplained", f"No known effect explains a substantial share of the residual: {remaining}.{closest}"
 

@@ -27,6 +27,11 @@ class Parameter(NamedTuple):
     grid_values: Tuple[float, ...] = ()
     needs_rigid_body: bool = False
 
+    @property
+    def is_time_constant(self) -> bool:
+        """Whether it is the time constant of a state, which is never zero; a delay is none."""
+        return self.unit == "s" and self.minimum > 0.0
+
 
 class State(NamedTuple):
     """State of an effect; it starts at zero.
