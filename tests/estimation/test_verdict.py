@@ -24,6 +24,7 @@ from tests.support.robots import example
 ROBOT, RECORDING = example("three"), recorded("three", 1)
 NOISE = estimate_noise(ROBOT, RECORDING)
 CONTEXT = IdentificationContext(ROBOT, Fitter(NOISE), split_data(ROBOT, NOISE, RECORDING, None))
+MISSED = "90 N in tension_1, strongest at 0.5 Hz"
 REMAINING = "40 N in tension_2, strongest at 1.2 Hz"
 
 
@@ -44,7 +45,7 @@ def selected(*accepted: Hypothesis, robot: Robot = ROBOT) -> SelectionResult:
 
 
 def verdict(of: ExplainedShares, *names: str) -> tuple[str, str]:
-    return verdict_beside_disturbance(CONTEXT, selected(*map(hypothesis, names)), of, REMAINING)
+    return verdict_beside_disturbance(CONTEXT, selected(*map(hypothesis, names)), of, MISSED, REMAINING)
 
 
 def test_what_a_small_random_force_would_leave_lacks_nothing() -> None:
@@ -63,7 +64,9 @@ def test_an_effect_is_named_that_explains_a_good_part_of_little() -> None:
 def test_what_uncertain_numbers_explain_beside_the_one_effect_is_told() -> None:
     robot = replace(ROBOT, platform=replace(ROBOT.platform, mass_uncertainty=0.1))
     of = shares(0.12, 6.0, drum=(0.27, 5.0))
-    _, sentence = verdict_beside_disturbance(replace(CONTEXT, robot=robot), selected(hypothesis("drum")), of, REMAINING)
+    _, sentence = verdict_beside_disturbance(
+        replace(CONTEXT, robot=robot), selected(hypothesis("drum")), of, MISSED, REMAINING
+    )
     assert "missed); 61 % lies within stated uncertainties, and 12 % remains, which" in sentence
 
 
@@ -84,7 +87,7 @@ def test_an_effect_is_named_although_more_than_noise_remains_and_that_is_said() 
 def test_a_listed_effect_gets_no_credit_for_what_is_not_on_the_list(names: tuple[str, ...]) -> None:
     word, sentence = verdict(shares(0.9, 120.0, **dict.fromkeys(names, (0.1, 40.0))), *names)
     assert word == "unexplained"
-    assert REMAINING in sentence
+    assert MISSED in sentence and REMAINING not in sentence
     assert all(name in sentence for name in names)
 
 
@@ -92,7 +95,7 @@ def test_what_is_not_on_the_list_is_discovered_with_its_share() -> None:
     frame = Hypothesis(BY_NAME["frame"], ROBOT.cable_numbers)
     robot = ROBOT.with_effect(EffectSetting("frame", {"compliance": 1e-5}, ROBOT.cable_numbers))
     of = shares(0.02, 60.0, frame=(0.98, 50.0))
-    word, sentence = verdict_beside_disturbance(CONTEXT, selected(frame, robot=robot), of, REMAINING)
+    word, sentence = verdict_beside_disturbance(CONTEXT, selected(frame, robot=robot), of, MISSED, REMAINING)
     assert word == "discovered"
     assert "frame (98 % of what is missed); 2 % remains" in sentence
     assert "This effect is not on the list of known ones: frame: compliance = 1e-05 m/N." in sentence

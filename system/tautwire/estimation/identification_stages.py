@@ -263,8 +263,11 @@ def _with_final_robot(state: Identification, fitter: Fitter, robot: Robot) -> Id
 def _judged_beside_disturbance(state: Identification, shares: ExplainedShares) -> Identification:
     """The state with its verdict; without an effect that matters, with the declared robot as the final one."""
     context, declared = state.context, state.prepared.fitter
-    remaining = remaining_error(state.comparisons[-1].recording, state.comparisons[-1].after, state.noise_floors[-1])
-    verdict = verdict_beside_disturbance(context, state.selection, shares, remaining.sentence)
+    comparison, floor = state.comparisons[-1], state.noise_floors[-1]
+    missed, remaining = (
+        remaining_error(comparison.recording, run, floor).sentence for run in (comparison.before, comparison.after)
+    )
+    verdict = verdict_beside_disturbance(context, state.selection, shares, missed, remaining)
     verdict = verdict_of_ended_search(verdict, context.time_limit)
     state = replace(state, verdict=verdict, effects_hold=verdict[0] in ("effects", "discovered"))
     if verdict[0] == "none":

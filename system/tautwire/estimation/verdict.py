@@ -57,9 +57,12 @@ def verdict_of(
 
 
 def verdict_beside_disturbance(
-    context: IdentificationContext, selection: SelectionResult, shares: ExplainedShares, remaining: str
+    context: IdentificationContext, selection: SelectionResult, shares: ExplainedShares, missed: str, remaining: str
 ) -> tuple[Verdict, str]:
-    """Verdict and its sentence beside a disturbance; ``remaining`` says in words what error remains."""
+    """Verdict and its sentence beside a disturbance.
+
+    ``missed`` says in words what the declared robot's error is, ``remaining`` what remains of it with the effects.
+    """
     policy, accepted = context.policy.size, selection.accepted
     large, labels = shares.substantial(policy), labels_by_effect(accepted, context.robot)
     names = list(dict.fromkeys(labels))
@@ -87,7 +90,7 @@ def verdict_beside_disturbance(
     elif len(shares.timed(policy)) < len(accepted):
         varies = ", whose time constant these recordings do not determine"
     closest = f" Of it {_per_cent(1.0 - shares.left)} would go to {_sum_up(names)}{varies}." if names else ""
-    return "unexplained", f"No known effect explains a substantial share of the residual: {remaining}.{closest}"
+    return "unexplained", f"No known effect explains a substantial share of the residual: {missed}.{closest}"
 
 
 def verdict_of_ended_search(verdict: tuple[Verdict, str], limit: TimeLimit) -> tuple[Verdict, str]:
