@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 
+from tautwire.estimation.disturbance import NEUTRAL, OrnsteinUhlenbeck
 from tautwire.estimation.effect_estimates import effects_by_size
 from tautwire.estimation.estimation_data import split_data
 from tautwire.estimation.explained_shares import ExplainedShares
@@ -52,6 +53,28 @@ def test_what_a_small_random_force_would_leave_lacks_nothing() -> None:
     word, sentence = verdict(shares(0.9, 4.0, drag=(0.1, 2.0)), "drag")
     assert word == "none"
     assert "Drag may act, too small to matter." in sentence
+
+
+@pytest.mark.parametrize(
+    ("force_to_weight", "error", "share", "word"),
+    [
+        (0.006, 2.0, 0.1, "none"),
+        (0.02, 2.0, 0.1, "unexplained"),
+        (0.006, 8.0, 0.1, "unexplained"),
+        (0.006, 2.0, 0.4, "unexplained"),
+    ],
+)
+def test_what_a_disturbance_of_usual_size_takes_up_lacks_nothing_however_well_it_is_seen(
+    force_to_weight: float, error: float, share: float, word: str
+) -> None:
+    force = OrnsteinUhlenbeck(force_to_weight * ROBOT.platform.mass * ROBOT.gravity, 1.0)
+    position, tension = (OrnsteinUhlenbeck(error * noise, 1.0) for noise in (NOISE.position, NOISE.tension))
+    fitter = Fitter(replace(NOISE, disturbance=replace(NEUTRAL, force=force, position=position, tension=tension)))
+    of = replace(shares(1.0 - share, 15.0, payload=(share, 8.0)), spreads=(0.5,))
+    context, selection = replace(CONTEXT, fitter=fitter), selected(hypothesis("payload"))
+    said, sentence = verdict_beside_disturbance(context, selection, of, MISSED, REMAINING)
+    assert said == word
+    assert MISSED in sentence
 
 
 def test_an_effect_is_named_that_explains_a_good_part_of_little() -> None:

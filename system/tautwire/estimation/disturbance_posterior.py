@@ -84,7 +84,7 @@ def disturbance_prior(
     robot: Robot, noise: Noise, policy: DisturbancePolicy = DEFAULT_POLICY.fit.disturbance
 ) -> DisturbancePrior:
     """Prior of a robot with these sensors: a force in proportion to its weight, and half of the noise coloured."""
-    share, weight = policy.coloured_noise_share, robot.platform.mass * max(robot.gravity, 1.0)
+    share, weight = policy.coloured_noise_share, reference_weight(robot)
     white = (1.0 - share**2) ** 0.5
     median = Disturbance(
         OrnsteinUhlenbeck(policy.force_to_weight * weight, policy.bandwidth),
@@ -99,6 +99,11 @@ def disturbance_prior(
     size, bandwidth, sensor = (log(f) for f in (policy.size_factor, policy.bandwidth_factor, policy.noise_factor))
     kinds = 2 if noise.rotation is None else 3
     return DisturbancePrior(median, (*[size, bandwidth] * (1 + kinds), *[sensor] * kinds))
+
+
+def reference_weight(robot: Robot) -> float:
+    """Weight (N) to which random forces compare: the platform's, under 1 m/s^2 where it does not hang."""
+    return robot.platform.mass * max(robot.gravity, 1.0)
 
 
 @dataclass(frozen=True)

@@ -11,6 +11,7 @@ from ..robot.uncertain_parameters import uncertain_parameters
 from .candidate_scores import setting_of
 from .discovery.candidate_terms import effects_text, formula_text
 from .discovery.formula_discovery import Discovery
+from .disturbance_posterior import reference_weight
 from .explained_shares import ExplainedShares
 from .hypotheses import Hypothesis, labels_by_effect
 from .identification_context import IdentificationContext
@@ -68,9 +69,10 @@ def verdict_beside_disturbance(
     names = list(dict.fromkeys(labels))
     explained = max((1.0 - shares.left, *(shares.effects[index] for index in large))) if large else 0.0
     is_explained = explained >= policy.min_explained_share
-    if shares.size_missed <= policy.max_size_of_disturbance and not is_explained:
+    is_little = shares.size_missed <= policy.max_size_of_disturbance
+    if not is_explained and (is_little or _is_small_disturbance(context, shares)):
         small = f" {_sum_up(names).capitalize()} may act, too small to matter." if names else ""
-        sentence = "What the model misses lies within stated uncertainties, noise and a small random force."
+        sentence = f"What the model misses lies within stated uncertainties, noise and a small random force: {missed}."
         return "none", sentence + small
     is_disturbance = shares.size_left <= policy.max_size_of_disturbance
     if large and (is_disturbance or is_explained):
@@ -91,6 +93,19 @@ def verdict_beside_disturbance(
         varies = ", whose time constant these recordings do not determine"
     closest = f" Of it {_per_cent(1.0 - shares.left)} would go to {_sum_up(names)}{varies}." if names else ""
     return "unexplained", f"No known effect explains a substantial share of the residual: {missed}.{closest}"
+
+
+def _is_small_disturbance(context: IdentificationContext, shares: ExplainedShares) -> bool:
+    """Whether a disturbance of usual size, and not the effects beside it, takes up what is missed."""
+    policy, noise, robot = context.policy.size, context.fitter.noise, context.robot
+    disturbance = noise.disturbance
+    if disturbance is None or 1.0 - shares.left >= policy.min_explained_share:
+        return False
+    errors = [disturbance.position.rms / noise.position, disturbance.tension.rms / noise.tension]
+    if disturbance.rotation and noise.rotation:
+        errors.append(disturbance.rotation.rms / noise.rotation)
+    is_small_force = disturbance.force.rms <= policy.max_force_to_weight * reference_weight(robot)
+    return is_small_force and max(errors) <= policy.max_sensor_error
 
 
 def verdict_of_ended_search(verdict: tuple[Verdict, str], limit: TimeLimit) -> tuple[Verdict, str]:
