@@ -61,6 +61,11 @@ class ExplainedShares:
     size_missed: float
     size_left: float
 
+    @property
+    def explained(self) -> float:
+        """Share that all effects explain together."""
+        return 1.0 - self.left
+
     def substantial(self, policy: SizePolicy) -> list[int]:
         """Indices of the effects that matter, the largest first.
 

@@ -16,7 +16,7 @@ from .cosimulation_validation import (
     validate_by_cosimulation,
 )
 from .declared_start import with_declared_start
-from .discovery.unexplained_residual import UnexplainedResidual, explain_residual
+from .discovery.unexplained_residual import UnexplainedResidual, explain_residual, resonances_beside_disturbance
 from .effect_estimates import effects_by_evidence, effects_by_size, effects_with_shares, estimated_effects
 from .explained_shares import ExplainedShares, explained_shares, remaining_error, sensor_noise_floor
 from .identifiability import analyse_identifiability
@@ -123,7 +123,9 @@ def confirm_effects(state: Identification) -> Identification:
 
 def explain_by_formula(state: Identification) -> Identification:
     """Look for a formula, confirmed by co-simulation, or resonances, where effects do not explain the residual."""
-    if state.effects_hold or _nothing_lacks(state) or state.shares:
+    if state.shares:
+        return replace(state, unexplained=resonances_beside_disturbance(state.context, state.shares))
+    if state.effects_hold or _nothing_lacks(state):
         return state
     unexplained = explain_residual(state.context, state.selection)
     state = replace(state, unexplained=unexplained)
@@ -267,7 +269,8 @@ def _judged_beside_disturbance(state: Identification, shares: ExplainedShares) -
     missed, remaining = (
         remaining_error(comparison.recording, run, floor).sentence for run in (comparison.before, comparison.after)
     )
-    verdict = verdict_beside_disturbance(context, state.selection, shares, missed, remaining)
+    has_resonance = bool(state.unexplained.resonances)
+    verdict = verdict_beside_disturbance(context, state.selection, shares, missed, remaining, has_resonance)
     verdict = verdict_of_ended_search(verdict, context.time_limit)
     state = replace(state, verdict=verdict, effects_hold=verdict[0] in ("effects", "discovered"))
     if verdict[0] == "none":

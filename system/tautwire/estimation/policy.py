@@ -229,8 +229,8 @@ class SizePolicy:
     max_size_of_disturbance: float = 8.0
     # What is larger passes too where a disturbance takes it up, its force in proportion to the weight and its errors to
     # the sensors' noise below these: 13 lifelike recordings with nothing hidden had 0.0004 to 0.006, one 0.02, and 2.0
-    # at most but for that one; with what is on no list 0.02 or more, or 8 of the noise, or missed less than the above.
-    max_force_to_weight: float = 0.01
+    # at most but for that one; what is on no list 0.009 or more, or 8 of the noise, or missed less than the above.
+    max_force_to_weight: float = 0.008
     max_sensor_error: float = 3.0
 
 

@@ -58,11 +58,17 @@ def verdict_of(
 
 
 def verdict_beside_disturbance(
-    context: IdentificationContext, selection: SelectionResult, shares: ExplainedShares, missed: str, remaining: str
+    context: IdentificationContext,
+    selection: SelectionResult,
+    shares: ExplainedShares,
+    missed: str,
+    remaining: str,
+    has_resonance: bool = False,
 ) -> tuple[Verdict, str]:
     """Verdict and its sentence beside a disturbance.
 
-    ``missed`` says in words what the declared robot's error is, ``remaining`` what remains of it with the effects.
+    ``missed`` says in words what the declared robot's error is, ``remaining`` what remains of it with the effects;
+    ``has_resonance`` tells whether the recordings show an oscillator that the model lacks.
     """
     policy, accepted = context.policy.size, selection.accepted
     large, labels = shares.substantial(policy), labels_by_effect(accepted, context.robot)
@@ -70,7 +76,7 @@ def verdict_beside_disturbance(
     explained = max((1.0 - shares.left, *(shares.effects[index] for index in large))) if large else 0.0
     is_explained = explained >= policy.min_explained_share
     is_little = shares.size_missed <= policy.max_size_of_disturbance
-    if not is_explained and (is_little or _is_small_disturbance(context, shares)):
+    if not is_explained and (is_little or (not has_resonance and _is_small_disturbance(context, shares))):
         small = f" {_sum_up(names).capitalize()} may act, too small to matter." if names else ""
         sentence = f"What the model misses lies within stated uncertainties, noise and a small random force: {missed}."
         return "none", sentence + small
@@ -99,7 +105,7 @@ def _is_small_disturbance(context: IdentificationContext, shares: ExplainedShare
     """Whether a disturbance of usual size, and not the effects beside it, takes up what is missed."""
     policy, noise, robot = context.policy.size, context.fitter.noise, context.robot
     disturbance = noise.disturbance
-    if disturbance is None or 1.0 - shares.left >= policy.min_explained_share:
+    if disturbance is None or shares.explained >= policy.min_explained_share:
         return False
     errors = [disturbance.position.rms / noise.position, disturbance.tension.rms / noise.tension]
     if disturbance.rotation and noise.rotation:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+from ..disturbance_posterior import disturbance_prior
+from ..explained_shares import ExplainedShares
 from ..identification_context import IdentificationContext, no_progress
 from ..stepwise_selection import SelectionResult
 from ..trace_result import Resonance
@@ -64,6 +66,22 @@ def explain_residual(context: IdentificationContext, selection: SelectionResult)
             f"{description}"
         )
     return UnexplainedResidual(None, lines, tuple(notes))
+
+
+def resonances_beside_disturbance(context: IdentificationContext, shares: ExplainedShares) -> UnexplainedResidual:
+    """Hidden resonances where much is missed and effects explain little of it.
+
+    Under the usual disturbance: the fitted one has taken up the oscillation.
+    """
+    size = context.policy.size
+    is_little = shares.size_missed <= size.max_size_of_disturbance
+    if is_little or shares.explained >= size.min_explained_share or context.robot.platform.is_rigid_body:
+        return UnexplainedResidual()
+    context.progress("hidden oscillators", 0.0)
+    prior = disturbance_prior(context.robot, context.fitter.noise, context.policy.fit.disturbance)
+    usual = context.fitter.with_disturbance(prior.median)
+    lines = find_resonances(context.robot, usual, context.split, context.policy.discovery.resonances)
+    return UnexplainedResidual(resonances=lines, notes=tuple(line.sentence for line in lines))
 
 
 def _if_accepted(discovery: Discovery | None, threshold: float, policy: FormulaPolicy) -> Discovery | None:
