@@ -1,5 +1,7 @@
 """Recordings that lie beside the project, where they do; the project needs none of them."""
 
+from math import pi
+
 import pytest
 
 from tautwire.estimation import Trace, trace
@@ -44,6 +46,8 @@ def test_a_swinging_load_on_a_robot_as_it_is_gets_no_listed_name() -> None:
     found = traced("lifelike/p4")
     assert found.verdict == "unexplained"
     assert found.effects == ()
+    # 60 kg on a string of 2 m.
+    assert [each.frequency for each in found.resonances] == pytest.approx([(9.81 / 2.0) ** 0.5 / (2.0 * pi)], rel=0.03)
 
 
 def test_of_a_real_planar_robot_the_drums_are_named_alone_and_the_error_falls_to_a_sixth() -> None:

@@ -75,6 +75,7 @@ def test_what_a_disturbance_of_usual_size_takes_up_lacks_nothing_however_well_it
     said, sentence = verdict_beside_disturbance(context, selection, of, MISSED, REMAINING)
     assert said == word
     assert MISSED in sentence
+    assert verdict_beside_disturbance(context, selection, of, MISSED, REMAINING, True)[0] == "unexplained"
 
 
 def test_an_effect_is_named_that_explains_a_good_part_of_little() -> None:
