@@ -27,9 +27,22 @@ from .policy import GridSearchPolicy
 from .score_test import PredictedGain
 
 
-def zero_slope_predictions(predictions: Mapping[Hypothesis, PredictedGain]) -> dict[Hypothesis, PredictedGain]:
-    """Predictions of hypotheses with a parameter that has grid values and no slope."""
-    return {h: p for h, p in predictions.items() if any(q.grid_values and q.name not in p.values for q in h.parameters)}
+def predictions_below_grid(
+    predictions: Mapping[Hypothesis, PredictedGain], cables: tuple[int, ...]
+) -> dict[Hypothesis, PredictedGain]:
+    """Predictions that tell nothing of a parameter's grid: it has no slope, or its step ends below all grid values.
+
+    The latter of hypotheses on all ``cables`` alone, which cost one search: a delay of half a period explains less than
+    none, so that a slope asks for a few milliseconds, or for none, where a tenth of a second is hidden.
+    """
+
+    def is_below(hypothesis: Hypothesis, prediction: PredictedGain) -> bool:
+        gridded = [parameter for parameter in hypothesis.parameters if parameter.grid_values]
+        has_no_slope = any(parameter.name not in prediction.values for parameter in gridded)
+        ends_below = any(abs(prediction.values.get(p.name, 0.0)) < min(p.grid_values) for p in gridded)
+        return has_no_slope or (ends_below and hypothesis.cables == cables)
+
+    return {h: prediction for h, prediction in predictions.items() if is_below(h, prediction)}
 
 
 def grid_search(
