@@ -57,17 +57,21 @@ def test_simulated_outputs_are_those_of_the_fmus(
     assert np.max(np.abs(simulated.tension - by_fmus.tension)) < 2e4 * max_position_error
 
 
-def test_the_best_determined_time_constant_counts_and_a_delay_is_none() -> None:
+def test_the_best_determined_time_constant_counts_but_for_delays_and_drifts() -> None:
     relaxation = Hypothesis(BY_NAME["relaxation"], (1, 2, 3), ("modulus", "time", "modulus_2", "time_2"))
     delay = Hypothesis(BY_NAME["sensor_delay"], (1, 2, 3), ("tension_delay",))
+    creep = Hypothesis(BY_NAME["creep"], (1, 2, 3))
     values = {"modulus": 1e10, "time": 0.5, "modulus_2": 1e9, "time_2": 10.0}
-    robot = ROBOT.with_effect(relaxation.setting(ROBOT, values)).with_effect(delay.setting(ROBOT))
-    free = free_parameters(robot, (relaxation, delay))
-    deviations = {"modulus": 1e9, "time": 0.1, "modulus_2": 1e9, "time_2": 30.0, "tension_delay": 1.0}
-    fitted = np.array([{**values, "tension_delay": 0.01}[each.name] for each in free])
-    fit = Fit(robot, tuple(free), fitted, np.diag([deviations[each.name] ** 2 for each in free]))
+    robot = ROBOT.with_effect(relaxation.setting(ROBOT, values))
+    for each in (delay, creep):
+        robot = robot.with_effect(each.setting(ROBOT))
+    free = free_parameters(robot, (relaxation, delay, creep))
+    deviations = {"modulus": 1e9, "time": 0.1, "modulus_2": 1e9, "time_2": 30.0}
+    fitted = np.array([values.get(each.name, 0.01) for each in free])
+    fit = Fit(robot, tuple(free), fitted, np.diag([deviations.get(each.name, 1.0) ** 2 for each in free]))
     assert time_deviation(fit, relaxation) == pytest.approx(0.2)
     assert time_deviation(fit, delay) == 0.0
+    assert time_deviation(fit, creep) == 0.0
 
 
 def test_an_effect_that_grows_has_another_amplitude_on_each_stretch() -> None:

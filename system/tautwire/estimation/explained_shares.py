@@ -10,8 +10,8 @@ both. Without an effect all else stays as it is, the initial state included. An 
 a value each is one effect.
 
 An effect is the same from beginning to end; what is only like it now and then would need another size on each stretch.
-One with a state has a time constant that shows; without, it is only like another effect: a relaxation that takes far
-longer than the motion is a modulus, a far faster one damping.
+One whose state settles has a time constant that shows; without, it is only like another effect: a relaxation that takes
+far longer than the motion is a modulus, a far faster one damping. A slow drift stays a drift.
 """
 
 from __future__ import annotations
@@ -146,7 +146,12 @@ def amplitude_spread(residual: Array, signature: Array, rows: NDArray[np.bool_],
 
 
 def time_deviation(fit: Fit, hypothesis: Hypothesis) -> float:
-    """Relative standard deviation of an effect's best determined time constant, by curvature; zero without any."""
+    """Relative standard deviation of an effect's best determined time constant, by curvature.
+
+    Zero without any, and where the effect drifts: a drift that takes far longer than the recording is the same effect.
+    """
+    if any(state.drifts for state in hypothesis.effect.states):
+        return 0.0
     times = [parameter.name for parameter in hypothesis.parameters if parameter.is_time_constant]
     indices = [fit.parameter_index(hypothesis.effect.name, hypothesis.cables, name) for name in times]
     return min((float(fit.standard_deviations[index] / fit.values[index]) for index in indices), default=0.0)
