@@ -92,6 +92,17 @@ def test_an_effect_that_a_large_disturbance_takes_up_is_a_candidate() -> None:
     assert under_small[payload].values["mass"] == pytest.approx(3.0, rel=0.2)
 
 
+def test_a_long_delay_is_predicted_although_the_slope_asks_for_a_short_one() -> None:
+    robot, recording = example("three"), recorded("three", 1, {"sensor_delay": {"seconds": 0.17}}).first(600)
+    noise = estimate_noise(robot, recording)
+    fitter = Fitter(replace(noise, disturbance=disturbance_prior(robot, noise).median))
+    context = IdentificationContext(robot, fitter, split_data(robot, noise, recording, None))
+    late = Hypothesis(BY_NAME["sensor_delay"], (1, 2, 3), ("tension_delay",))
+    search_round = SearchRound(1, robot, (), None, is_white=True, is_ranking=True)
+    for predictions in candidate_scoring._predict_gains(context, search_round):
+        assert predictions[late].values["tension_delay"] == pytest.approx(0.17, abs=0.011)
+
+
 def test_fits_beside_a_disturbance_begin_where_runs_of_the_model_explain_most(monkeypatch: pytest.MonkeyPatch) -> None:
     """Slopes ask for a delay of a few milliseconds where it is longer than half a period of a mode."""
     robot, recording = example("three"), recorded("three", 1, {"sensor_delay": {"seconds": 0.17}}).first(600)

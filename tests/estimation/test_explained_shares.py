@@ -16,7 +16,7 @@ from tautwire.estimation.explained_shares import (
     missed_with_effects,
     missed_without_effects,
     simulated_outputs,
-    time_deviation,
+    time_deviations,
 )
 from tautwire.estimation.hypotheses import Hypothesis, free_parameters
 from tautwire.estimation.identification_context import IdentificationContext
@@ -69,9 +69,17 @@ def test_the_best_determined_time_constant_counts_but_for_delays_and_drifts() ->
     deviations = {"modulus": 1e9, "time": 0.1, "modulus_2": 1e9, "time_2": 30.0}
     fitted = np.array([values.get(each.name, 0.01) for each in free])
     fit = Fit(robot, tuple(free), fitted, np.diag([deviations.get(each.name, 1.0) ** 2 for each in free]))
-    assert time_deviation(fit, relaxation) == pytest.approx(0.2)
-    assert time_deviation(fit, delay) == 0.0
-    assert time_deviation(fit, creep) == 0.0
+    assert time_deviations(fit, (relaxation, delay, creep)) == pytest.approx((0.2, 0.0, 0.0))
+
+
+def test_the_time_constants_of_cables_count_with_their_median() -> None:
+    by_cable = [Hypothesis(BY_NAME["relaxation"], (cable,)) for cable in ROBOT.cable_numbers]
+    robot = ROBOT
+    for each in by_cable:
+        robot = robot.with_effect(each.setting(ROBOT, {"modulus": 1e10, "time": 1.0}))
+    free = free_parameters(robot, by_cable)
+    fit = Fit(robot, tuple(free), np.ones(len(free)), np.diag(np.repeat([0.4, 0.7, 9.0], 2) ** 2))
+    assert time_deviations(fit, by_cable) == pytest.approx((0.7, 0.7, 0.7))
 
 
 def test_an_effect_that_grows_has_another_amplitude_on_each_stretch() -> None:

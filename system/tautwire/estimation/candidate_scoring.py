@@ -16,7 +16,7 @@ from .candidate_fits import (
 from .candidate_proposals import FitTask, SearchRound, shortlist, starting_robots
 from .candidate_scores import CandidateScore, most_parsimonious, unfitted_score
 from .disturbance_posterior import disturbance_prior
-from .grid_search import grid_search, predictions_below_grid
+from .grid_search import grid_search, misleading_predictions
 from .hypotheses import Hypothesis, with_hypothesis
 from .identification_context import IdentificationContext
 from .score_test import PredictedGain, score_test_in_workers
@@ -157,14 +157,14 @@ def _predict_gains(context: IdentificationContext, search_round: SearchRound) ->
     # A model far from noise shows it in a part of the recording; a model near noise needs all of it.
     data = context.split.estimation if search_round.is_white else context.head
     predictions = score_test_in_workers(context, robot, accepted, candidates, data)
-    below_grid = predictions_below_grid(predictions, robot.cable_numbers)
-    predictions |= grid_search(context, robot, accepted, data, below_grid)
+    misleading = misleading_predictions(predictions, robot.cable_numbers)
+    predictions |= grid_search(context, robot, accepted, data, misleading)
     if context.fitter.has_disturbance:
         prior = disturbance_prior(robot, context.fitter.noise, context.policy.fit.disturbance)
         under_median = replace(context, fitter=context.fitter.with_disturbance(prior.median))
         others = score_test_in_workers(under_median, robot, accepted, candidates, context.head)
-        below_grid = predictions_below_grid(others, robot.cable_numbers)
-        return predictions, others | grid_search(under_median, robot, accepted, context.head, below_grid)
+        misleading = misleading_predictions(others, robot.cable_numbers)
+        return predictions, others | grid_search(under_median, robot, accepted, context.head, misleading)
     if search_round.is_white:
         return predictions, {}
     density = context.policy.score_test.rough_noise_density

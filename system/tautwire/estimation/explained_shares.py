@@ -48,8 +48,8 @@ class ExplainedShares:
     """Shares of the effects and of what is left, from 0 to 1, and sizes in standard deviations of one sample's noise.
 
     ``sizes`` are those of what each effect changes in the outputs, ``spreads`` how much they differ by stretch, see
-    :func:`amplitude_spread`, and ``time_deviations`` the relative standard deviations of their time constants, zero for
-    those that have none. ``size_missed`` is the size of what the robot without effects misses beside noise, its
+    :func:`amplitude_spread`, and ``time_deviations`` how well their time constants show, see the function of that name.
+    ``size_missed`` is the size of what the robot without effects misses beside noise, its
     uncertain numbers at their best, ``size_left`` that of what is left.
     """
 
@@ -121,7 +121,7 @@ def explained_shares(
             amplitude_spread(residual / noise, change / noise, data.rows, context.policy.stability.stretches)
             for change in changes
         ),
-        tuple(median([time_deviation(fit, h) for h in accepted if h.effect is each.effect]) for each in accepted),
+        time_deviations(fit, accepted),
         float(np.clip(left / total, 0.0, 1.0)),
         missed**0.5,
         left**0.5,
@@ -145,11 +145,20 @@ def amplitude_spread(residual: Array, signature: Array, rows: NDArray[np.bool_],
     return float(students_t.ppf(0.975, stretch_count - 1) * spread / max(energy, np.finfo(float).tiny))
 
 
-def time_deviation(fit: Fit, hypothesis: Hypothesis) -> float:
-    """Relative standard deviation of an effect's best determined time constant, by curvature.
+def time_deviations(fit: Fit, accepted: Sequence[Hypothesis]) -> tuple[float, ...]:
+    """Relative standard deviations of the effects' best determined time constants, by curvature.
 
-    Zero without any, and where the effect drifts: a drift that takes far longer than the recording is the same effect.
+    An effect with a value for each cable has their median. Zero where an effect has no time constant, and where it
+    drifts: a drift that takes far longer than the recording is the same effect.
     """
+    own = [_time_deviation(fit, hypothesis) for hypothesis in accepted]
+    return tuple(
+        median(value for value, other in zip(own, accepted, strict=True) if other.effect is each.effect)
+        for each in accepted
+    )
+
+
+def _time_deviation(fit: Fit, hypothesis: Hypothesis) -> float:
     if any(state.drifts for state in hypothesis.effect.states):
         return 0.0
     times = [parameter.name for parameter in hypothesis.parameters if parameter.is_time_constant]

@@ -27,22 +27,20 @@ from .policy import GridSearchPolicy
 from .score_test import PredictedGain
 
 
-def predictions_below_grid(
+def misleading_predictions(
     predictions: Mapping[Hypothesis, PredictedGain], cables: tuple[int, ...]
 ) -> dict[Hypothesis, PredictedGain]:
-    """Predictions that tell nothing of a parameter's grid: it has no slope, or its step ends below all grid values.
+    """Predictions of hypotheses with grid values that are on all ``cables``, or have no slope at all.
 
-    The latter of hypotheses on all ``cables`` alone, which cost one search: a delay of half a period explains less than
-    none, so that a slope asks for a few milliseconds, or for none, where a tenth of a second is hidden.
+    A delay of half a period of a mode explains less than none: a slope asks for some milliseconds where a tenth of a
+    second is hidden. On single cables that would take a search for each.
     """
 
-    def is_below(hypothesis: Hypothesis, prediction: PredictedGain) -> bool:
-        gridded = [parameter for parameter in hypothesis.parameters if parameter.grid_values]
-        has_no_slope = any(parameter.name not in prediction.values for parameter in gridded)
-        ends_below = any(abs(prediction.values.get(p.name, 0.0)) < min(p.grid_values) for p in gridded)
-        return has_no_slope or (ends_below and hypothesis.cables == cables)
+    def is_misleading(hypothesis: Hypothesis, prediction: PredictedGain) -> bool:
+        gridded = [parameter.name for parameter in hypothesis.parameters if parameter.grid_values]
+        return bool(gridded) and (hypothesis.cables == cables or not prediction.values.keys() >= set(gridded))
 
-    return {h: prediction for h, prediction in predictions.items() if is_below(h, prediction)}
+    return {h: prediction for h, prediction in predictions.items() if is_misleading(h, prediction)}
 
 
 def grid_search(

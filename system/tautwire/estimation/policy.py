@@ -227,9 +227,8 @@ class SizePolicy:
     # Size of what is missed in co-simulation, in standard deviations of one sample's noise, that passes for a random
     # force that the sensors hardly show: 4 on the one lifelike recording with nothing hidden, 20 to 120 on others.
     max_size_of_disturbance: float = 8.0
-    # What is larger passes too where a disturbance takes it up, its force in proportion to the weight and its errors to
-    # the sensors' noise below these: 13 lifelike recordings with nothing hidden had 0.0004 to 0.006, one 0.02, and 2.0
-    # at most but for that one; what is on no list 0.009 or more, or 8 of the noise, or missed less than the above.
+    # What is larger passes too where a disturbance takes it up, its force over the weight and its errors over the
+    # sensors' noise below these: with nothing hidden ten lifelike recordings had 0.006 and 2 at most, one 0.02 and 6.
     max_force_to_weight: float = 0.008
     max_sensor_error: float = 3.0
 

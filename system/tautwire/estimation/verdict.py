@@ -73,7 +73,7 @@ def verdict_beside_disturbance(
     policy, accepted = context.policy.size, selection.accepted
     large, labels = shares.substantial(policy), labels_by_effect(accepted, context.robot)
     names = list(dict.fromkeys(labels))
-    explained = max((1.0 - shares.left, *(shares.effects[index] for index in large))) if large else 0.0
+    explained = max((shares.explained, *(shares.effects[index] for index in large))) if large else 0.0
     is_explained = explained >= policy.min_explained_share
     is_little = shares.size_missed <= policy.max_size_of_disturbance
     if not is_explained and (is_little or (not has_resonance and _is_small_disturbance(context, shares))):
@@ -85,7 +85,7 @@ def verdict_beside_disturbance(
         share_of = {labels[index]: shares.effects[index] for index in large}
         named = _sum_up([f"{name} ({_per_cent(share)} of what is missed)" for name, share in share_of.items()])
         kind = ", which is no more than a small random force" if is_disturbance else ""
-        others = 1.0 - shares.left - max(shares.effects)
+        others = shares.explained - max(shares.effects)
         is_stated = len(names) == 1 and others >= policy.min_share and uncertain_parameters(context.robot)
         uncertain = f"{_per_cent(others)} lies within stated uncertainties, and " if is_stated else ""
         lacks = f"The model lacks {named}; {uncertain}{_per_cent(shares.left)} remains{kind}."
@@ -97,7 +97,7 @@ def verdict_beside_disturbance(
         varies = ", which would have to change from stretch to stretch"
     elif len(shares.timed(policy)) < len(accepted):
         varies = ", whose time constant these recordings do not determine"
-    closest = f" Of it {_per_cent(1.0 - shares.left)} would go to {_sum_up(names)}{varies}." if names else ""
+    closest = f" Of it {_per_cent(shares.explained)} would go to {_sum_up(names)}{varies}." if names else ""
     return "unexplained", f"No known effect explains a substantial share of the residual: {missed}.{closest}"
 
 
