@@ -1,6 +1,7 @@
 """What a trace makes of a search: the co-simulation of the rebuilt FMUs has the last word."""
 
 from dataclasses import replace
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -9,6 +10,9 @@ import pytest
 from tautwire.cosimulation.robot_cosimulation import CosimulationResult, cosimulate
 from tautwire.estimation import Trace, trace
 from tautwire.estimation.cosimulation_validation import output_errors
+from tautwire.estimation.disturbance import NEUTRAL
+from tautwire.estimation.identification import _disturbance_notes
+from tautwire.estimation.trace_result import FoundEffect
 from tests.support.recordings import recorded
 from tests.support.robots import example
 
@@ -41,6 +45,20 @@ def test_what_was_found_comes_with_its_correlations() -> None:
     (correlation,) = found.correlations
     assert {each.name for each in correlation.between} == {"payload", "sensor_gain"}
     assert -1.0 < correlation.value < -0.9
+
+
+@pytest.mark.parametrize(("verdict", "is_told"), [("effects", True), ("none", True), ("unexplained", False)])
+def test_what_would_explain_all_but_has_no_name_is_not_called_small(verdict: str, is_told: bool) -> None:
+    fitter = SimpleNamespace(noise=SimpleNamespace(disturbance=NEUTRAL))
+    split = SimpleNamespace(estimation=SimpleNamespace(recording=recorded("three", 1)))
+    relaxation = FoundEffect("relaxation", "cable", (1, 2, 3), {}, 50.0, share=0.87)
+    state: Any = SimpleNamespace(
+        context=SimpleNamespace(fitter=fitter, split=split),
+        verdict=(verdict, ""),
+        effects=(),
+        small_effects=(relaxation,),
+    )
+    assert any("too small to matter: relaxation" in note for note in _disturbance_notes(state)) == is_told
 
 
 def test_no_name_is_given_where_the_rebuilt_fmus_miss_the_recording(monkeypatch: pytest.MonkeyPatch) -> None:
