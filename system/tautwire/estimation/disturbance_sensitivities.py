@@ -13,7 +13,8 @@ Over a step
 
     x_j' = T x_j+ + T_j x+                   P_j' = T P_j+ T' + T_j P+ T' + T P+ T_j' + Q_j
 
-All numbers share the products by ``T (I - G' W)``, so that they cost little more than the filter itself.
+With ``S_j = W P_j - M_j G / 2``, whose M_j is without N_j, the first product is ``P_j - G' S_j - S_j' G``; and of T
+only the states that move have more than their own decay. So n states take n^2 operations for each number, not n^3.
 
 Source: Gupta and Mehra (1974), IEEE Transactions on Automatic Control 19(6), 774-783; Särkkä (2013), Bayesian Filtering
 and Smoothing, sec. 12.3 and appendix A.3.
@@ -38,11 +39,13 @@ Array = NDArray[np.float64]
 class DisturbanceStates(NamedTuple):
     """By which of a disturbance's numbers each state of a filter moves, and the white noise of each output.
 
-    Of the n states ``rms_number`` is the index of the rms among the numbers, before that of the bandwidth, and -1 where
-    a state has none; ``decay_rate`` (1/s) and ``variance`` are its own. Number 0 is the rms of the platform's force.
+    Of the n states the first ``moving_count`` mix, the others only decay. ``rms_number`` is the index of the rms among
+    the numbers, before that of the bandwidth, and -1 where a state has none; ``decay_rate`` (1/s) and ``variance`` are
+    its own. Number 0 is the rms of the platform's force.
     ``white_number`` (m) is the index of each output's white noise, ``white_variance`` (m) its variance.
     """
 
+    moving_count: int
     rms_number: Any
     decay_rate: Any
     variance: Any
@@ -105,7 +108,8 @@ def _disturbance_states(likelihood: Likelihood, disturbance: Disturbance, size: 
     rms_number, decay_rate, variance = np.full(size, -1), np.zeros(size), np.zeros(size)
     rms_number[first:], decay_rate[first:], variance[first:] = numbers, rates[-count:], variances[-count:]
     first_white = int(numbers.max()) + 2
-    return DisturbanceStates(rms_number, decay_rate, variance, first_white + kinds, disturbance.white_variances(cables))
+    white_variances, moving_count = disturbance.white_variances(cables), likelihood.moving_count
+    return DisturbanceStates(moving_count, rms_number, decay_rate, variance, first_white + kinds, white_variances)
 
 
 def _derivatives_at_start(disturbance: DisturbanceStates) -> Derivatives:
@@ -129,19 +133,26 @@ def _run_of(segment: FilterSegment) -> Run:
 def differentiate_recursion(run: Run, disturbance: DisturbanceStates, derivatives: Derivatives, by_number: Any) -> None:
     """Differentiate a run's recursion; fills in ``by_number`` (2, K, m, k), see :func:`disturbance_sensitivities`."""
     size, number_count = derivatives.state.shape
+    first = size - np.count_nonzero(disturbance.rms_number >= 0)
     for k in range(len(run.values)):
         innovations, transition = run.values[k], run.transitions[k]
         whitening, output, gain = _whitened(run, disturbance, k)
-        _differentiate_innovations(innovations, whitening, output, disturbance, derivatives, by_number[:, k])
         moved_gain = np.dot(transition, gain.T)
-        kept = transition - np.dot(moved_gain, output)
         by_covariance = np.dot(derivatives.covariance.reshape((-1, size)), np.dot(innovations, output))
-        derivatives.state[:] = np.dot(kept, derivatives.state + by_covariance.reshape((size, number_count)))
-        half = np.dot(kept, derivatives.covariance.reshape((size, -1))).reshape((-1, size))
-        derivatives.covariance[:] = np.dot(half, kept.T).reshape((size, number_count, size))
-        onward = np.dot(run.covariances[k], transition.T) - np.dot(gain.T, moved_gain.T)
+        cross_covariances = np.dot(output, derivatives.covariance.reshape((size, -1))).reshape((-1, size))
+        variances = np.dot(cross_covariances, output.T)
+        _subtract_gain(gain, cross_covariances - 0.5 * np.dot(variances, gain), derivatives.covariance)
+        _move_covariances(transition, disturbance.moving_count, derivatives.covariance)
+        _differentiate_innovations(
+            innovations, whitening, np.dot(output, derivatives.state), variances, disturbance, by_number[:, k]
+        )
+        derivatives.state[:] += by_covariance.reshape((size, number_count))
+        kept = derivatives.state - np.dot(gain.T, np.dot(output, derivatives.state))
+        derivatives.state[:] = np.dot(transition, kept)
         _add_white_noise(np.dot(moved_gain, whitening), np.dot(innovations, whitening), disturbance, derivatives)
         updated = run.states[k] + np.dot(innovations, gain)
+        onward = np.dot(run.covariances[k, first:], transition.T)
+        onward -= np.dot(np.ascontiguousarray(gain[:, first:].T), moved_gain.T)
         _add_processes(transition, updated, onward, run.steps[k], disturbance, derivatives)
 
 
@@ -177,16 +188,14 @@ def _whitened(run: Run, disturbance: DisturbanceStates, k: int) -> Any:
 def _differentiate_innovations(
     innovations: Any,
     whitening: Any,
-    output: Any,
+    by_state: Any,
+    variances: Any,
     disturbance: DisturbanceStates,
-    derivatives: Derivatives,
     by_number: Any,
 ) -> None:
-    count, size = output.shape
-    number_count = derivatives.state.shape[1]
-    seen = np.dot(output, derivatives.covariance.reshape((size, -1))).reshape((-1, size))
-    by_covariance = np.dot(seen, output.T).reshape((count, number_count, count))
-    by_state = np.dot(output, derivatives.state)
+    """Fill in ``by_number`` (2, m, k) of a sample; ``variances`` (m k, m) are ``W P_j W'``, to which it adds N_j."""
+    count, number_count = by_state.shape
+    by_covariance = variances.reshape((count, number_count, count))
     for i in range(count):
         for j in range(number_count):
             by_number[0, i, j] = -by_state[i, j]
@@ -199,6 +208,34 @@ def _differentiate_innovations(
                 by_number[0, i, j] -= weight * by_covariance[i, j, c] * innovations[c]
         for j in range(number_count):
             by_number[1, i, j] = by_covariance[i, j, i]
+
+
+@compiled
+def _subtract_gain(gain: Any, shared: Any, covariance: Any) -> None:
+    """Turn ``P_j`` into ``P_j - G' S_j - S_j' G``, by ``shared`` S (m k, n)."""
+    size, number_count = covariance.shape[:2]
+    products = np.dot(gain.T, shared.reshape((len(gain), -1))).reshape((size, number_count, size))
+    for r in range(size):
+        for j in range(number_count):
+            for c in range(r + 1):
+                covariance[r, j, c] -= products[r, j, c] + products[c, j, r]
+                covariance[c, j, r] = covariance[r, j, c]
+
+
+@compiled
+def _move_covariances(transition: Any, moving_count: int, covariance: Any) -> None:
+    """Turn symmetric ``P_j`` into ``T P_j T'``; only the first states mix."""
+    size, number_count = covariance.shape[:2]
+    by_state = np.ascontiguousarray(transition[:moving_count])
+    moved = np.dot(by_state, covariance.reshape((size, -1))).reshape((-1, size))
+    both = np.dot(moved, by_state.T).reshape((moving_count, number_count, moving_count))
+    for r in range(moving_count, size):
+        for j in range(number_count):
+            for c in range(moving_count):
+                covariance[r, j, c] = covariance[c, j, r] = moved[c * number_count + j, r] * transition[r, r]
+            for c in range(moving_count, size):
+                covariance[r, j, c] *= transition[r, r] * transition[c, c]
+    covariance[:moving_count, :, :moving_count] = both
 
 
 @compiled
@@ -217,11 +254,13 @@ def _add_white_noise(gain: Any, errors: Any, disturbance: DisturbanceStates, der
 def _add_processes(
     transition: Any, state: Any, onward: Any, step: float, disturbance: DisturbanceStates, derivatives: Derivatives
 ) -> None:
-    """Add what decay and size of the processes change in a step from an updated state; ``onward`` is ``P+ T'``."""
-    for i in range(len(state)):
+    """Add what decay and size of the processes change in a step from an updated state.
+
+    ``onward`` are the last rows of ``P+ T'``, those of the processes.
+    """
+    first = len(state) - len(onward)
+    for i in range(first, len(state)):
         rms = disturbance.rms_number[i]
-        if rms < 0:
-            continue
         exponent = disturbance.decay_rate[i] * step
         # A force's mean over a step has decayed half as far.
         slopes = -0.5 * exponent * transition[:, i] if rms == 0 else np.zeros(len(state))
@@ -230,8 +269,8 @@ def _add_processes(
             if slopes[r] != 0.0:
                 derivatives.state[r, rms + 1] += slopes[r] * state[i]
                 for c in range(len(state)):
-                    derivatives.covariance[r, rms + 1, c] += slopes[r] * onward[i, c]
-                    derivatives.covariance[c, rms + 1, r] += slopes[r] * onward[i, c]
+                    derivatives.covariance[r, rms + 1, c] += slopes[r] * onward[i - first, c]
+                    derivatives.covariance[c, rms + 1, r] += slopes[r] * onward[i - first, c]
         decayed = np.exp(-2.0 * exponent)
         derivatives.covariance[i, rms, i] += 2.0 * disturbance.variance[i] * (1.0 - decayed)
         derivatives.covariance[i, rms + 1, i] += 2.0 * exponent * disturbance.variance[i] * decayed
