@@ -50,18 +50,22 @@ def _with_values_of(
     settings = [replace(setting, cables=hypothesis.cables) for hypothesis in separate]
     effects = [each for old in robot.effects for each in (settings if old is setting else [old])]
     fit = context.fitter.fit_from([replace(robot, effects=tuple(effects))], chosen, split.estimation, -inf)
+    accepted, evidence = selection.accepted, dict(zip(selection.accepted, selection.evidence, strict=True))
+    shared_likelihood = context.fitter.log_likelihood(robot, accepted, split.estimation)
+    price = _schwarz_price(context, len(fit.values) - len(selection.fit.values))
+    # The disturbance is the best one beside the shared values: to fit it anew adds less than they gain under it.
+    if context.fitter.log_likelihood(fit.robot, chosen, split.estimation) - shared_likelihood <= 0.5 * price:
+        return context, selection
     fitter = with_fitted_disturbance(context.fitter, fit.robot, chosen, split.estimation)
     fit = fitter.fit_from([fit.robot], chosen, split.estimation, -inf)
     fitter, fit = joint_fit(fitter, fit, chosen, split.estimation)
-    accepted, evidence = selection.accepted, dict(zip(selection.accepted, selection.evidence, strict=True))
-    gain = fitter.log_likelihood(fit.robot, chosen, split.estimation)
-    gain -= context.fitter.log_likelihood(robot, accepted, split.estimation)
+    gain = fitter.log_likelihood(fit.robot, chosen, split.estimation) - shared_likelihood
+    if gain <= price:
+        return context, selection
     unseen_gain = marginal_log_likelihood(fitter, fit.robot, chosen, split.validation, is_coarse=False)
     unseen_gain -= marginal_log_likelihood(context.fitter, robot, accepted, split.validation, is_coarse=False)
-    policy = context.policy.selection
-    left_by_form = policy.min_cable_evidence_ratio * evidence[shared]
-    is_worth_its_price = gain > _schwarz_price(context, len(fit.values) - len(selection.fit.values))
-    if not is_worth_its_price or gain + unseen_gain <= left_by_form:
+    left_by_form = context.policy.selection.min_cable_evidence_ratio * evidence[shared]
+    if gain + unseen_gain <= left_by_form:
         return context, selection
     evidence |= dict.fromkeys(separate, evidence[shared])
     separated = replace(
