@@ -14,7 +14,7 @@ from tautwire.estimation.estimation_data import split_data
 from tautwire.estimation.hypotheses import Hypothesis
 from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.measurement_noise import estimate_noise
-from tautwire.estimation.parameter_fit import Fit, Fitter
+from tautwire.estimation.parameter_fit import Fit, Fitter, NoFitError
 from tautwire.estimation.policy import DEFAULT_POLICY
 from tautwire.estimation.residual_analysis import residuals_are_white
 from tautwire.estimation.stepwise_selection import SelectionResult, select_effects
@@ -285,6 +285,17 @@ def test_an_effect_stands_with_its_fit_where_time_ends_while_its_disturbance_is_
         (selection.eliminate if swapped else selection.add)()
     result = selection.result()
     assert (result.accepted, result.evidence, result.fit) == ((relaxation,), (1000.0,), fits[relaxation])
+
+
+def test_a_search_ends_with_what_it_has_where_nothing_finite_can_be_fitted(monkeypatch: pytest.MonkeyPatch) -> None:
+    def not_finite(*_: object) -> None:
+        raise NoFitError(np.array([0.86, 4.3e-7]))
+
+    context = context_with(has_disturbance=True)
+    monkeypatch.setattr(stepwise_selection, "score_candidates", not_finite)
+    assert select_effects(context).accepted == ()
+    reason = "no fit can start at [0.86, 4.3e-07]: the model has no finite output there"
+    assert context.time_limit.untried == (f"The search for effects ended early: {reason}.",)
 
 
 HIDDEN: list[tuple[str, dict[str, Any]]] = [

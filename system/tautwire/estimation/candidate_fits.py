@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from contextlib import closing
 from dataclasses import dataclass
+from functools import reduce
 from math import inf
 
 import numpy as np
@@ -92,13 +93,22 @@ def leaves_noise(context: IdentificationContext, score: CandidateScore) -> bool:
 def fit_model(
     context: IdentificationContext, chosen: Sequence[Hypothesis], start: Robot | None = None, coarse: bool = False
 ) -> Fit:
-    """Fit of the chosen hypotheses, from the values of a robot that has them; coarse on a part of the samples."""
-    robot, policy = context.robot, context.policy.fit
-    for hypothesis in chosen:
-        robot = robot.with_effect(setting_of(start, hypothesis) if start else hypothesis.setting(robot))
+    """Fit of the chosen hypotheses, from the values of a robot that has them; coarse on a part of the samples.
+
+    From their default values without such a robot, and where its values give nothing finite.
+    """
+    starts, policy = [_with_default_values(context.robot, chosen)], context.policy.fit
+    if start is not None:
+        effects = [setting_of(start, hypothesis) for hypothesis in chosen]
+        starts.insert(0, reduce(Robot.with_effect, effects, context.robot))
     data = context.head if coarse else context.split.estimation
     tolerance = policy.coarse_cost_tolerance if coarse else policy.fine_cost_tolerance
-    return context.fitter.fit_from([robot], chosen, data, -inf, tolerance)
+    return context.fitter.fit_from(starts, chosen, data, -inf, tolerance)
+
+
+def _with_default_values(robot: Robot, chosen: Collection[Hypothesis]) -> Robot:
+    """The robot with the chosen hypotheses where fits begin."""
+    return reduce(lambda changed, hypothesis: changed.with_effect(hypothesis.setting(changed)), chosen, robot)
 
 
 def coarse_validation_likelihood(
@@ -131,7 +141,7 @@ def _maximised(
     """Log-likelihood of some data, maximised over the disturbance and the chosen hypotheses, with both as fitted."""
     fitter = with_fitted_disturbance(fitter, robot, chosen, data, is_coarse)
     tolerance = fitter.policy.coarse_cost_tolerance if is_coarse else fitter.policy.fine_cost_tolerance
-    fit = fitter.fit_from([robot], chosen, data, -inf, tolerance)
+    fit = fitter.fit_from([robot, _with_default_values(robot, chosen)], chosen, data, -inf, tolerance)
     if not is_coarse:
         fitter, fit = joint_fit(fitter, fit, chosen, data)
     return fitter.log_likelihood(fit.robot, chosen, data), fitter, fit.robot

@@ -12,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
+from ..errors import UnreachableError
 from ..robot.schema import Robot
 from .candidate_fits import fit_model, maximised_validation_likelihood
 from .candidate_proposals import SearchRound
@@ -22,7 +23,7 @@ from .disturbance_fit import joint_fit, marginal_log_likelihood, with_fitted_dis
 from .explained_shares import missed_with_effects, missed_without_effects, sensor_noise_floor
 from .hypotheses import Hypothesis, with_hypothesis
 from .identification_context import IdentificationContext
-from .parameter_fit import Fit, Fitter
+from .parameter_fit import Fit, Fitter, NoFitError
 from .policy import SelectionPolicy
 from .residual_analysis import residuals_are_white
 from .smoothed_states import calibrated_robot
@@ -69,6 +70,8 @@ def select_effects(context: IdentificationContext) -> SelectionResult:
         selection.eliminate()
     except OutOfTimeError:
         context.leave_untried("effects beyond those found, and alternatives to them")
+    except (NoFitError, UnreachableError) as error:
+        context.time_limit.leave_untried(f"The search for effects ended early: {error}.")
     return selection.result()
 
 
