@@ -103,6 +103,7 @@ def test_smoothed_lengths_leave_noise(monkeypatch: pytest.MonkeyPatch, count: fl
     assert f"with errors of {rms:.2g} m (rms)" in note and rms < max(0.3 * count, 1e-5)
 
 
+@pytest.mark.validate
 def test_errors_of_coarse_counts_have_a_memory_that_is_estimated() -> None:
     (found,) = prepare_data(THREE, counted(1, 1e-3), counted(2, 1e-3), WorkerPool(1))
     assert found.fitter.has_disturbance and all(error.rms > 5e-5 for error in found.fitter.noise.rope_lengths)

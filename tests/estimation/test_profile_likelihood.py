@@ -91,7 +91,7 @@ def several(names: tuple[str, ...], truth: dict[str, dict[str, float]]) -> Made:
     return fitter, chosen, sample, fitter.fit_from([robot], chosen, sample)
 
 
-@pytest.mark.validate(but=["friction"])
+@pytest.mark.validate
 @pytest.mark.parametrize(
     "names", [("modulus", "relaxation"), ("relaxation", "hysteresis"), ("friction", "thermal")], ids="-".join
 )

@@ -63,6 +63,7 @@ def test_examples_of_a_page_run(page: str, tmp_path: Path, monkeypatch: pytest.M
         exec(compile(code, page, "exec"), {})
 
 
+@pytest.mark.validate
 def test_example_of_the_controllers_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.chdir(tmp_path)
     results: dict[str, Any] = {}
