@@ -15,6 +15,7 @@ from tautwire.estimation.explained_shares import (
     amplitude_spread,
     missed_with_effects,
     missed_without_effects,
+    sensor_noise_floor,
     simulated_outputs,
     time_deviations,
 )
@@ -100,6 +101,15 @@ def test_what_was_not_measured_or_does_not_count_tells_nothing_of_the_amplitude(
     residual = np.where(rows[:, None], 0.0, 9.0) * signature
     residual[:, 1] = np.nan
     assert amplitude_spread(residual, signature, rows, 8) == 0.0
+
+
+def test_a_ropes_friction_stiffer_than_the_rope_does_not_raise_the_floor_of_noise() -> None:
+    """By its linearisation the sensors' noise would pass for any error."""
+    friction = EffectSetting("hysteresis", {"force": 1.0, "yield_strain": 2e-7}, ROBOT.cable_numbers)
+    stiff = ROBOT.with_effect(friction)
+    floors = [sensor_noise_floor(FITTER, robot, SPLIT.validation).by_output for robot in (ROBOT, stiff)]
+    assert np.array_equal(*floors)
+    assert noise_floor(FITTER, stiff, SPLIT.validation).by_output.max() > 10.0 * floors[0].max()
 
 
 def test_the_effect_that_is_there_leaves_little_of_what_the_robot_without_it_misses() -> None:

@@ -197,8 +197,12 @@ def simulated_outputs(fitter: Fitter, robot: Robot, data: DataSet) -> SimulatedO
 
 
 def sensor_noise_floor(fitter: Fitter, robot: Robot, data: DataSet) -> Errors:
-    """Errors that noise of the sensors and winch speeds alone would leave, without a force on the platform."""
-    noise = fitter.noise
+    """Errors that noise of the sensors and winch speeds alone would leave, without a force on the platform.
+
+    They are those of the robot without its effects, on which they hardly depend: with a rope's friction that is far
+    stiffer than the rope, the variances grow without bound.
+    """
+    noise, robot = fitter.noise, replace(robot, effects=())
     if noise.disturbance:
         limited = sensor_noise_only(noise.disturbance, noise.position, noise.tension, noise.rotation)
         fitter = fitter.with_disturbance(limited)
