@@ -179,6 +179,13 @@ def robots(draw: st.DrawFn) -> Robot:
     )
 
 
+def test_an_absent_effect_is_written_by_its_first_parameter_whatever_the_order_of_its_values(tmp_path: Path) -> None:
+    """A point mass may have a payload, but not a place of it."""
+    robot = HALL.with_effect(EffectSetting("payload", {"x": 0.0, "mass": 0.0, "y": 0.0, "z": 0.0}))
+    write_robot(robot, tmp_path / "robot.toml")
+    assert read_robot(tmp_path / "robot.toml") == robot
+
+
 @settings(max_examples=100, deadline=None)
 @given(robot=robots())
 def test_written_robots_read_back_equal(tmp_path_factory: pytest.TempPathFactory, robot: Robot) -> None:
