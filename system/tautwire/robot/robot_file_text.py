@@ -165,10 +165,11 @@ def _effect_block(robot: Robot, setting: EffectSetting) -> list[str]:
     effect = BY_NAME.get(setting.name)
     units = {parameter.name: parameter.unit for parameter in effect.parameters} if effect else {}
     neutral = {parameter.name: parameter.neutral for parameter in effect.parameters} if effect else {}
-    # Of an effect that is absent its first parameter stands for all: others may be of rigid bodies alone.
-    in_order = sorted(setting.values.items(), key=lambda item: list(units).index(item[0]) if item[0] in units else -1)
     written_values = {name: value for name, value in setting.values.items() if value != neutral.get(name)}
-    written_values = written_values or dict(in_order[:1])
+    if not written_values:
+        # Of an effect that is absent its first parameter stands for all: others may be of rigid bodies alone.
+        names = [name for name in (*units, *setting.values) if name in setting.values]
+        written_values = {name: setting.values[name] for name in names[:1]}
     is_single = sum(other.name == setting.name for other in robot.effects) == 1
     header = f"[effect.{setting.name}]" if is_single else f"[[effect.{setting.name}]]"
     lines = [header + (f"  # {effect.description}" if effect else "")]
