@@ -11,7 +11,6 @@ import control
 import numpy as np
 import pytest
 from numpy.typing import NDArray
-from pythonfmu.builder import FmuBuilder
 
 from tautwire.control import (
     ClosedLoopOptions,
@@ -31,6 +30,7 @@ from tautwire.cosimulation.robot_cosimulation import CosimulationResult
 from tautwire.errors import ArgumentError
 from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.robot.trajectory import Line
+from tests.support.pythonfmu_command import build_by_command
 from tests.support.robots import example
 
 Array = NDArray[np.float64]
@@ -134,7 +134,7 @@ def lqg_fmu(folder: Path, extra: tuple[str, ...] = (), script: str = SLAVE) -> P
     data = {name: np.asarray(getattr(system, name)).tolist() for name in "ABCD"}
     (folder / "regulator.py").write_text(script, encoding="utf-8")
     matrices.write_text(json.dumps({**data, "extra": extra}), encoding="utf-8")
-    return Path(FmuBuilder.build_FMU(folder / "regulator.py", dest=folder, project_files={matrices}))
+    return build_by_command(folder / "regulator.py", folder / "Regulator.fmu", matrices)
 
 
 def test_lqg_as_a_state_space_moves_as_it_does_natively(fmus: RobotFmus, native: CosimulationResult) -> None:

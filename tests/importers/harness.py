@@ -26,6 +26,7 @@ from tautwire.cosimulation.ssp_archive import COMPONENTS_ONLY, SYSTEM_STRUCTURE,
 from tautwire.fmus.packaging import build_fmus
 from tautwire.robot.reference_simulation import integrate
 from tautwire.robot.schema import AXES, Robot
+from tests.support.pythonfmu_command import build_by_command
 
 from .ramps import LIMIT, RAMP, STOP
 
@@ -101,10 +102,7 @@ def prepare(robot: Robot, folder: Path, native: bool = False) -> None:
 
 
 def _build_driver(folder: Path) -> Path:
-    """pythonfmu leaves modules behind in the process that builds; so another one does."""
-    command = [sys.executable, "-m", "pythonfmu", "build", "-f", str(HERE / "driver.py"), "-d", str(folder)]
-    _run([*command, "--no-external-tool", str(HERE / "ramps.py")], dict(os.environ), INSTALLING)
-    return (folder / "Driver.fmu").replace(folder / "driver.fmu")
+    return build_by_command(HERE / "driver.py", folder / "driver.fmu", HERE / "ramps.py")
 
 
 def _unpack(archive: Path, folder: Path) -> Path:

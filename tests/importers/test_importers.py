@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import zipfile
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from tautwire.fmus.pythonfmu_builder import with_immediate_return
 from tests.importers.harness import IMPORTERS, Importer, NotInstallableError, exact_end, prepare, run_client
 from tests.importers.ramps import LIMIT, RAMP, acceleration, speed, winches
 from tests.support.robots import paper_robot
@@ -39,6 +41,12 @@ def test_an_importer_ends_where_the_robot_ends(
     error = 1e3 * np.linalg.norm(np.array(result["position"]) - exact)
     assert np.isfinite(error)
     assert error <= importer.bounds[step], f"{error:.3g} mm"
+
+
+def test_the_driver_ends_with_its_process_as_our_fmus_do(folder: Path) -> None:
+    with zipfile.ZipFile(folder / "driver.fmu") as packed:
+        library = packed.read("binaries/linux64/Driver.so")
+    assert with_immediate_return(library) == library
 
 
 def test_the_winches_ramp_to_a_metre_a_second() -> None:

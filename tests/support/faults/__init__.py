@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import subprocess
-import sys
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from pathlib import Path
@@ -17,6 +15,7 @@ from tautwire.cosimulation import (
     Wiring,
     build_coupling_graph,
 )
+from tests.support.pythonfmu_command import build_by_command
 
 HERE = Path(__file__).parent
 NAMES = ("left", "right")
@@ -25,10 +24,8 @@ FAULT, NUMBERS = "TAUTWIRE_TEST_FAULT", "TAUTWIRE_TEST_NUMBERS"
 
 
 def build_faulty(folder: Path) -> Path:
-    """The FMU of ``faulty.py``; building leaves modules behind, so another process does it."""
-    command = [sys.executable, "-m", "pythonfmu", "build", "-f", str(HERE / "faulty.py"), "-d", str(folder)]
-    subprocess.run([*command, "--no-external-tool"], check=True, capture_output=True, timeout=120)
-    return folder / "Faulty.fmu"
+    """The FMU of ``faulty.py``."""
+    return build_by_command(HERE / "faulty.py", folder / "Faulty.fmu")
 
 
 @contextmanager

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 import shutil
 import subprocess
-import sys
 import zipfile
 from collections.abc import Mapping
 from pathlib import Path
 
 import fmpy
+
+from tests.support.pythonfmu_command import build_by_command
 
 HERE = Path(__file__).parent
 GUID = "{4a1d6f0e-0c55-4f8e-9b1c-2f6f0c9a7c11}"
@@ -18,19 +19,12 @@ LAG = 0.05  # s, of the winch
 
 def falling_mass(folder: Path) -> Path:
     """The paper's platform."""
-    return _plain("falling_mass.py", folder / "FallingMass.fmu")
+    return build_by_command(HERE / "falling_mass.py", folder / "FallingMass.fmu")
 
 
 def spring_cable(folder: Path) -> Path:
     """Cable 2 of the paper's robot with the linear law."""
-    return _plain("spring_cable.py", folder / "SpringCable.fmu")
-
-
-def _plain(script: str, path: Path) -> Path:
-    """An FMU by pythonfmu's own builder; it leaves modules behind, so another process runs it."""
-    command = [sys.executable, "-m", "pythonfmu", "build", "-f", str(HERE / script), "-d", str(path.parent)]
-    subprocess.run([*command, "--no-external-tool"], check=True, capture_output=True, timeout=120)
-    return path
+    return build_by_command(HERE / "spring_cable.py", folder / "SpringCable.fmu")
 
 
 def compiler() -> str | None:
