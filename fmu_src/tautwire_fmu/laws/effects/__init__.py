@@ -12,6 +12,7 @@ from .drum import DRUM
 from .effect import ActiveEffect, Effect, Parameter, State
 from .frame import FRAME
 from .friction import FRICTION
+from .hanging_load import HANGING_LOAD
 from .hysteresis import HYSTERESIS
 from .inertia import INERTIA
 from .modulus import MODULUS
@@ -53,7 +54,7 @@ ALL: Tuple[Effect, ...] = (
 )
 
 # Effects outside the list: a trace that selects one has discovered it.
-UNLISTED: Tuple[Effect, ...] = (FRAME,)
+UNLISTED: Tuple[Effect, ...] = (FRAME, HANGING_LOAD)
 
 BY_NAME: Dict[str, Effect] = {effect.name: effect for effect in (*ALL, *UNLISTED)}
 
