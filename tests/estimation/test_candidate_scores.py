@@ -82,6 +82,26 @@ def test_beside_a_disturbance_no_form_is_exact_so_that_a_tenth_of_the_evidence_t
     assert most_parsimonious([better, near], SelectionPolicy()) is better
 
 
+def test_of_those_alike_one_of_the_list_is_taken() -> None:
+    fit = Fit(ROBOT, (), np.zeros(0), np.zeros((0, 0)))
+    load, payload = (Hypothesis(BY_NAME[name], ()) for name in ("hanging_load", "payload"))
+    better, near, far = (
+        CandidateScore(h, fit, e, 1.0) for h, e in ((load, 1000.0), (payload, 910.0), (payload, 890.0))
+    )
+    assert most_parsimonious([better, near], SelectionPolicy(), has_disturbance=True) is near
+    assert most_parsimonious([better, far], SelectionPolicy(), has_disturbance=True) is better
+
+
+def test_of_those_alike_offsets_of_several_load_cells_are_taken_last() -> None:
+    fit = Fit(ROBOT, (), np.zeros(0), np.zeros((0, 0)))
+    load, offset = Hypothesis(BY_NAME["hanging_load"], ()), BY_NAME["sensor_offset"]
+    near, far = (CandidateScore(load, fit, evidence, 1.0) for evidence in (910.0, 890.0))
+    all_cells, one_cell = (CandidateScore(Hypothesis(offset, cables), fit, 1000.0, 1.0) for cables in ((1, 2, 3), (2,)))
+    assert most_parsimonious([all_cells, near], SelectionPolicy(), has_disturbance=True) is near
+    assert most_parsimonious([all_cells, far], SelectionPolicy(), has_disturbance=True) is all_cells
+    assert most_parsimonious([one_cell, near], SelectionPolicy(), has_disturbance=True) is one_cell
+
+
 def test_an_effect_is_confusable_with_what_explains_as_much_or_with_more_parameters_more() -> None:
     fit = Fit(ROBOT, (), np.zeros(0), np.zeros((0, 0)))
     relaxation, damping = (Hypothesis(BY_NAME[name], (1,)) for name in ("relaxation", "damping"))

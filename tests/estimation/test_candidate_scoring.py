@@ -36,7 +36,7 @@ def test_a_coarse_baseline_is_made_exact_where_it_decides(
     hypothesis = Hypothesis(BY_NAME["drag"], ())
     score = CandidateScore(hypothesis, Fit.without_parameters(robot), evidence, 1.0)
     monkeypatch.setattr(candidate_scoring, "maximised_validation_likelihood", lambda *_: 1040.0)
-    search_round = SearchRound(1, robot, (), None, is_white=True, is_ranking=False)
+    search_round = SearchRound(1, robot, (), None, is_white=True, has_disturbance=False)
     scores = candidate_scoring._with_exact_baseline(context, search_round, 1000.0, {hypothesis: score})
     assert scores[hypothesis].evidence == expected
 
@@ -86,7 +86,7 @@ def test_an_effect_that_a_large_disturbance_takes_up_is_a_candidate() -> None:
     fitter = Fitter(replace(noise, disturbance=large))
     context = IdentificationContext(robot, fitter, split_data(robot, noise, recording, None))
     payload = Hypothesis(BY_NAME["payload"], ())
-    search_round = SearchRound(1, robot, (), None, is_white=True, is_ranking=True)
+    search_round = SearchRound(1, robot, (), None, is_white=True, has_disturbance=True)
     under_large, under_small = candidate_scoring._predict_gains(context, search_round)
     assert under_small[payload].gain > 10.0 * max(under_large[payload].gain, 1.0)
     assert under_small[payload].values["mass"] == pytest.approx(3.0, rel=0.2)
@@ -98,7 +98,7 @@ def test_a_long_delay_is_predicted_although_the_slope_asks_for_a_short_one() -> 
     fitter = Fitter(replace(noise, disturbance=disturbance_prior(robot, noise).median))
     context = IdentificationContext(robot, fitter, split_data(robot, noise, recording, None))
     late = Hypothesis(BY_NAME["sensor_delay"], (1, 2, 3), ("tension_delay",))
-    search_round = SearchRound(1, robot, (), None, is_white=True, is_ranking=True)
+    search_round = SearchRound(1, robot, (), None, is_white=True, has_disturbance=True)
     for predictions in candidate_scoring._predict_gains(context, search_round):
         assert predictions[late].values["tension_delay"] == pytest.approx(0.17, abs=0.011)
 
@@ -114,6 +114,6 @@ def test_fits_beside_a_disturbance_begin_where_runs_of_the_model_explain_most(mo
     begun: dict[Hypothesis, tuple[Robot, ...]] = {}
     monkeypatch.setattr(candidate_scoring, "_predict_gains", lambda *_: (dict(predictions), {}))
     monkeypatch.setattr(candidate_scoring, "_scores_beside_disturbance", lambda *asked: begun.update(asked[3]) or {})
-    search_round = SearchRound(1, robot, (), None, is_white=True, is_ranking=True)
+    search_round = SearchRound(1, robot, (), None, is_white=True, has_disturbance=True)
     candidate_scoring.score_candidates(context, search_round)
     assert begun[late][0].effects[0].values["tension_delay"] == pytest.approx(0.17, abs=0.011)

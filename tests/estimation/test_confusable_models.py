@@ -77,28 +77,6 @@ def test_beside_a_disturbance_a_frame_takes_the_place_of_softer_ropes_only_where
         ]
 
 
-SWINGING = {"unlisted_swing": {"mass": 20.0, "length": 4.0}}
-
-
-@pytest.mark.parametrize(
-    ("hidden", "cables", "expected"),
-    [
-        (SWINGING, (1, 2, 3), "hanging_load"),
-        ({"sensor_offset": {"force": -80.0}}, (1, 2, 3), "sensor_offset"),
-        ({"sensor_offset": {"force": 80.0}}, (1, 2, 3), "sensor_offset"),
-        ({"sensor_offset": {"force": 80.0, "cables": [2]}}, (2,), "sensor_offset"),
-    ],
-)
-def test_a_load_takes_the_place_of_offsets_of_all_cells_only_where_one_hangs(
-    hidden: dict[str, Any], cables: tuple[int, ...], expected: str
-) -> None:
-    found = judged(hidden, [Hypothesis(BY_NAME["sensor_offset"], cables)], beside_disturbance=True)
-    assert [hypothesis.effect.name for hypothesis in found.accepted] == [expected]
-    if expected == "hanging_load":
-        assert found.fit.values[0] == pytest.approx(20.0 * 9.81, rel=0.05)
-        assert found.confusable == (("hanging_load", "sensor_offset"),)
-
-
 @pytest.mark.validate
 def test_a_frame_without_which_nothing_can_be_run_has_evidence_beyond_measure(monkeypatch: pytest.MonkeyPatch) -> None:
     as_it_is = Fitter.judged

@@ -22,6 +22,13 @@ def test_effects_of_rigid_bodies_are_tried_on_them_alone() -> None:
     assert names(crane_robot()) - names(example("eight")) == OF_RIGID_BODIES
 
 
+@pytest.mark.parametrize("robot", [crane_robot(), example("eight")])
+def test_a_hanging_load_is_tried_beside_a_disturbance_only(robot: Robot) -> None:
+    beside = hypotheses(robot, has_disturbance=True)
+    assert set(beside) - set(hypotheses(robot)) == {Hypothesis(BY_NAME["hanging_load"], ())}
+    assert len(beside) == len(hypotheses(robot)) + 1
+
+
 def test_an_attachment_is_tried_of_one_cable_at_a_time() -> None:
     cables = [hypothesis.cables for hypothesis in hypotheses(crane_robot()) if hypothesis.effect.name == "attachment"]
     assert cables == [(number,) for number in range(1, 9)]

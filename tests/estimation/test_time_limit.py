@@ -118,7 +118,7 @@ def test_what_was_fitted_in_time_gets_its_baseline_after_it(monkeypatch: pytest.
     context = IdentificationContext(robot, Fitter(noise), split, workers=workers, time_limit=limit)
     monkeypatch.setattr(candidate_scoring, "fit_candidates", fit_until_time_is_up)
     with limit.searching(0.6):
-        search_round = SearchRound(1, robot, (), None, is_white=True, is_ranking=False)
+        search_round = SearchRound(1, robot, (), None, is_white=True, has_disturbance=False)
         scores = candidate_scoring._scores_beside_disturbance(context, "round 1", search_round, {})
         with pytest.raises(OutOfTimeError):
             limit.check()

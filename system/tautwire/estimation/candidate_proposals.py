@@ -33,8 +33,8 @@ class FitTask:
 class SearchRound:
     """Round of a selection: every hypothesis beside the accepted ones, which ``robot`` has, is to be scored.
 
-    With a ``rival`` its alternatives are. ``is_white`` tells whether the robot's residual is white noise already,
-    ``is_ranking`` whether the one that is selected is fitted once more.
+    With a ``rival`` its alternatives are. ``is_white`` tells whether the robot's residual is white noise already, which
+    with a disturbance it is.
     """
 
     number: int
@@ -42,7 +42,12 @@ class SearchRound:
     accepted: tuple[Hypothesis, ...]
     rival: CandidateScore | None
     is_white: bool
-    is_ranking: bool
+    has_disturbance: bool
+
+    @property
+    def is_ranking(self) -> bool:
+        """Whether the hypothesis that is selected is fitted once more."""
+        return self.has_disturbance or not self.is_white
 
     @property
     def stops_at_first(self) -> bool:
@@ -52,7 +57,8 @@ class SearchRound:
     def candidates(self, declared: Robot) -> list[Hypothesis]:
         """Hypotheses on the declared robot that could act beside the accepted ones, and without the rival."""
         excluded = [*self.accepted, self.rival.hypothesis] if self.rival else self.accepted
-        return [h for h in hypotheses(declared) if not any(a.overlaps(h) for a in excluded)]
+        tried = hypotheses(declared, self.has_disturbance)
+        return [h for h in tried if not any(a.overlaps(h) for a in excluded)]
 
     def tasks(
         self, starts: Mapping[Hypothesis, tuple[Robot, ...]], min_log_likelihood: float, policy: FitPolicy

@@ -5,6 +5,8 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
+from tautwire_fmu.laws.effects import UNLISTED
+
 from ..robot.schema import EffectSetting, Robot
 from .hypotheses import Hypothesis
 from .parameter_fit import Fit
@@ -57,10 +59,21 @@ def setting_of(robot: Robot, hypothesis: Hypothesis) -> EffectSetting:
 def most_parsimonious(
     scores: Sequence[CandidateScore], policy: SelectionPolicy, has_disturbance: bool = False
 ) -> CandidateScore | None:
-    """Most parsimonious candidate: of those whose evidence ties with the best, the one with fewest parameters."""
+    """Most parsimonious candidate: of those whose evidence ties with the best, the one with fewest parameters.
+
+    Of several one that is on the list of effects comes first, and offsets of several load cells alike come last: one
+    forgotten load is far likelier than that.
+    """
     top = max((trial.evidence for trial in scores), default=0.0)
     tied = [trial for trial in scores if top - trial.evidence < policy.tie(top, has_disturbance)]
-    return min(tied, key=lambda trial: (trial.parameter_count, -trial.evidence), default=None)
+    return min(tied, key=_complexity, default=None)
+
+
+def _complexity(trial: CandidateScore) -> tuple[int, int, float]:
+    hypothesis = trial.hypothesis
+    are_offsets = hypothesis.effect.offset is not None and len(hypothesis.cables) > 1
+    rarity = 2 if are_offsets else int(hypothesis.effect in UNLISTED)
+    return trial.parameter_count, rarity, -trial.evidence
 
 
 def unfitted_score(robot: Robot, hypothesis: Hypothesis, prediction: PredictedGain) -> CandidateScore:

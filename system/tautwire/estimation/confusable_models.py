@@ -51,38 +51,19 @@ def replace_by_confusable_models(
             continue
         beside, fit = with_disturbance_beside(context, chosen, fit)
         gain = beside.fitter.log_likelihood(fit.robot, chosen, validation) - log_likelihood
-        required_gain = _required_gain(context, best.accepted, chosen)
-        if gain > required_gain:
+        if gain > _required_gain(context, _parameter_count(chosen) - _parameter_count(best.accepted)):
             log_likelihood += gain
             evidence = log_likelihood - _log_likelihood_without_last(beside, fit, chosen)
-            ties = best.accepted if gain < -required_gain else ()
             best_context, best = beside, _with_alternative(beside, selection, chosen, fit, evidence)
-            best = _with_ties(best, ties)
     return best_context, best
 
 
-def _required_gain(
-    context: IdentificationContext, accepted: Sequence[Hypothesis], alternative: Sequence[Hypothesis]
-) -> float:
-    """Gain of log-likelihood for which an alternative to the accepted hypotheses is taken.
-
-    Beside a disturbance one load in place of the zeros of all load cells may explain less: that all of them are off
-    alike is far less likely, so that they would have to be better by as much as any effect has to be than none.
-    """
-    extra_parameters = _parameter_count(alternative) - _parameter_count(accepted)
+def _required_gain(context: IdentificationContext, extra_parameters: int) -> float:
+    """Gain of log-likelihood for which an alternative with some more parameters is taken."""
     if context.fitter.has_disturbance or extra_parameters > 0:
-        threshold = context.evidence_threshold(others=1)
-        return -threshold if _is_load_for_offsets(context.robot, accepted, alternative) else threshold
+        return context.evidence_threshold(others=1)
     tie_nats = context.policy.selection.tie_nats
     return tie_nats if extra_parameters == 0 else -tie_nats
-
-
-def _is_load_for_offsets(robot: Robot, accepted: Sequence[Hypothesis], alternative: Sequence[Hypothesis]) -> bool:
-    """Whether an alternative has an effect on the platform in place of one offset of all load cells."""
-    replaced = [hypothesis for hypothesis in accepted if hypothesis not in alternative]
-    added = [hypothesis for hypothesis in alternative if hypothesis not in accepted]
-    are_offsets = all(h.effect.offset is not None and h.cables == robot.cable_numbers for h in replaced)
-    return bool(replaced) and are_offsets and all(h.effect.component == "platform" for h in added)
 
 
 def _leaves_white_residuals(context: IdentificationContext, robot: Robot, chosen: Sequence[Hypothesis]) -> bool:
@@ -113,7 +94,8 @@ def _unlisted_alternatives(
     for effect in UNLISTED:
         for cables in cable_groups if effect.component == "cable" else [()]:
             for part in parts:
-                yield tuple(with_hypothesis(part, Hypothesis(effect, cables)))
+                if (hypothesis := Hypothesis(effect, cables)) not in accepted:
+                    yield tuple(with_hypothesis(part, hypothesis))
 
 
 def _fit_alternative(
@@ -180,10 +162,3 @@ def _with_alternative(
         confusable=tuple(pair for pair in selection.confusable if pair[0] in names),
         disturbance=context.fitter.noise.disturbance,
     )
-
-
-def _with_ties(selection: SelectionResult, ties: Sequence[Hypothesis]) -> SelectionResult:
-    """The selection whose last hypothesis cannot be told from those of ``ties`` in whose place it stands."""
-    new = selection.accepted[-1].effect.name
-    names = {hypothesis.effect.name for hypothesis in ties if hypothesis not in selection.accepted}
-    return replace(selection, confusable=(*selection.confusable, *((new, name) for name in sorted(names))))

@@ -54,7 +54,8 @@ class IdentificationContext:
 
         Beside a disturbance it also has to be more than the disturbance's own form may lack on validation data.
         """
-        by_chance = log((len(hypotheses(self.robot)) + others) / self.alpha)
-        if not self.fitter.has_disturbance:
+        has_disturbance = self.fitter.has_disturbance
+        by_chance = log((len(hypotheses(self.robot, has_disturbance)) + others) / self.alpha)
+        if not has_disturbance:
             return by_chance
         return max(by_chance, self.policy.selection.min_evidence_rate * float(self.split.validation.rows.sum()))

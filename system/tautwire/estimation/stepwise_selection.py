@@ -100,7 +100,7 @@ def _search_round(
         residuals_are_white(context.fitter.innovations(robot, data), data.rows, context.policy.residual_analysis)
         for data in (context.split.validation, context.split.estimation)
     )
-    return SearchRound(number, robot, tuple(accepted), rival, is_white, has_disturbance or not is_white)
+    return SearchRound(number, robot, tuple(accepted), rival, is_white, has_disturbance)
 
 
 @dataclass
