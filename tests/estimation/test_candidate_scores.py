@@ -85,9 +85,8 @@ def test_beside_a_disturbance_no_form_is_exact_so_that_a_tenth_of_the_evidence_t
 def test_of_those_alike_one_of_the_list_is_taken() -> None:
     fit = Fit(ROBOT, (), np.zeros(0), np.zeros((0, 0)))
     load, payload = (Hypothesis(BY_NAME[name], ()) for name in ("hanging_load", "payload"))
-    better, near, far = (
-        CandidateScore(h, fit, e, 1.0) for h, e in ((load, 1000.0), (payload, 910.0), (payload, 890.0))
-    )
+    better = CandidateScore(load, fit, 1000.0, 1.0)
+    near, far = (CandidateScore(payload, fit, evidence, 1.0) for evidence in (910.0, 890.0))
     assert most_parsimonious([better, near], SelectionPolicy(), has_disturbance=True) is near
     assert most_parsimonious([better, far], SelectionPolicy(), has_disturbance=True) is better
 

@@ -10,11 +10,11 @@ from typing import Any
 import pytest
 
 from tautwire.errors import UnreachableError
-from tautwire.estimation import trace
+from tautwire.estimation import confusable_models, trace
 from tautwire.estimation.confusable_models import replace_by_confusable_models
 from tautwire.estimation.disturbance_posterior import disturbance_prior
 from tautwire.estimation.estimation_data import DataSet, split_data
-from tautwire.estimation.hypotheses import Hypothesis
+from tautwire.estimation.hypotheses import Hypothesis, hypotheses
 from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.likelihood import Innovations
 from tautwire.estimation.measurement_noise import estimate_noise
@@ -51,6 +51,16 @@ def judged(hidden: dict[str, Any], chosen: list[Hypothesis], beside_disturbance:
 def test_a_softer_rope_keeps_its_name() -> None:
     softer = [Hypothesis(BY_NAME["modulus"], (1, 2))]
     assert list(judged(SOFTER, softer).accepted) == softer
+
+
+@pytest.mark.parametrize(("has_disturbance", "expected"), [(False, {"frame", "hanging_load"}), (True, {"frame"})])
+def test_unlisted_effects_that_were_searched_for_are_not_tried_again(has_disturbance: bool, expected: set[str]) -> None:
+    robot, softer = example("three"), Hypothesis(BY_NAME["modulus"], (1, 2))
+    searched = hypotheses(robot, has_disturbance)
+    alternatives = list(confusable_models._unlisted_alternatives(robot, [softer], searched, is_adequate=False))
+    assert {chosen[-1].effect.name for chosen in alternatives} == expected
+    # Frames of the two cables and of all; each in place of the softer ropes, and beside them.
+    assert len(alternatives) == 2 * 2 + 2 * ("hanging_load" in expected)
 
 
 @pytest.mark.validate

@@ -5,7 +5,7 @@ They are known effects that are not on the list, and larger forms of fewer effec
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import replace
 from itertools import chain, combinations
 from math import inf
@@ -16,7 +16,7 @@ from ..errors import UnreachableError
 from ..robot.schema import EffectSetting, Robot
 from .candidate_fits import maximised_validation_likelihood
 from .candidate_scores import CandidateScore, setting_of
-from .hypotheses import Hypothesis, with_hypothesis, with_larger_forms
+from .hypotheses import Hypothesis, hypotheses, with_hypothesis, with_larger_forms
 from .identification_context import IdentificationContext
 from .parameter_fit import Fit, NoFitError
 from .residual_analysis import residuals_are_white
@@ -41,7 +41,8 @@ def replace_by_confusable_models(
         return context, selection
     best_context, best = context, selection
     log_likelihood = context.fitter.log_likelihood(selection.fit.robot, selection.accepted, validation)
-    unlisted = _unlisted_alternatives(robot, selection.accepted, is_adequate)
+    searched = hypotheses(robot, has_disturbance)
+    unlisted = _unlisted_alternatives(robot, selection.accepted, searched, is_adequate)
     larger_forms = [] if has_disturbance else _larger_forms(selection.accepted, robot)
     alternatives = [*unlisted, *larger_forms]
     for number, chosen in enumerate(alternatives):
@@ -83,9 +84,12 @@ def _larger_forms(accepted: Sequence[Hypothesis], robot: Robot) -> Iterator[tupl
 
 
 def _unlisted_alternatives(
-    robot: Robot, accepted: Sequence[Hypothesis], is_adequate: bool
+    robot: Robot, accepted: Sequence[Hypothesis], searched: Collection[Hypothesis], is_adequate: bool
 ) -> Iterator[tuple[Hypothesis, ...]]:
-    """Each unlisted effect beside parts of the accepted ones; beside all only where these leave more than noise."""
+    """Each unlisted effect that was not searched for, beside parts of the accepted ones.
+
+    Beside all of them only where these leave more than noise.
+    """
     max_size = len(accepted) - 1 if is_adequate else len(accepted)
     parts = list(chain.from_iterable(combinations(accepted, size) for size in range(max_size + 1)))
     cable_groups = dict.fromkeys(
@@ -93,9 +97,8 @@ def _unlisted_alternatives(
     )
     for effect in UNLISTED:
         for cables in cable_groups if effect.component == "cable" else [()]:
-            for part in parts:
-                if (hypothesis := Hypothesis(effect, cables)) not in accepted:
-                    yield tuple(with_hypothesis(part, hypothesis))
+            if (hypothesis := Hypothesis(effect, cables)) not in searched:
+                yield from (tuple(with_hypothesis(part, hypothesis)) for part in parts)
 
 
 def _fit_alternative(

@@ -60,5 +60,5 @@ def test_a_slow_pendulum_of_the_rig_is_it_where_the_platform_moves_fast(name: st
     values = {"weight": MASS * GRAVITY} if name == "hanging_load" else {"mass": MASS}
     run, plain = integrate(with_load(name, **values), times, speeds), integrate(example("three"), times, speeds)
     truth = swinging[[f"tension_{k}" for k in (1, 2, 3)]].to_numpy(dtype=float)
-    left = np.max(np.abs(run.tension - truth)) / np.max(np.abs(plain.tension - truth))
-    assert (left < 0.1) == (name == "hanging_load")
+    error_ratio = np.max(np.abs(run.tension - truth)) / np.max(np.abs(plain.tension - truth))
+    assert (error_ratio < 0.1) == (name == "hanging_load")

@@ -14,9 +14,9 @@ class Values(NamedTuple):
 
 
 def wrench(m: Mathematics, values: Values, states: Tuple[Any, ...], position: Vector, velocity: Vector) -> Vector:
-    """``(0, 0, -W)``, in N: the load without its swing, which a platform that moves fast leaves behind.
+    """``(0, 0, -W)``, in N: the pull of the sling on a platform that moves faster than the load swings.
 
-    Unlike a payload it has no inertia; its acceleration upward is neglected beside gravity's.
+    Unlike a payload the load has no inertia; the platform's vertical acceleration is neglected beside gravity.
     """
     return (0.0, 0.0, -values.weight)
 
