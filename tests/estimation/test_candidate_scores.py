@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 from tautwire.estimation.candidate_proposals import shortlist
-from tautwire.estimation.candidate_scores import CandidateScore, most_parsimonious
+from tautwire.estimation.candidate_scores import CandidateScore, load_before_offsets, most_parsimonious
 from tautwire.estimation.hypotheses import Hypothesis
 from tautwire.estimation.parameter_fit import Fit
 from tautwire.estimation.policy import ScoreTestPolicy, SelectionPolicy
@@ -91,14 +92,29 @@ def test_of_those_alike_one_of_the_list_is_taken() -> None:
     assert most_parsimonious([better, far], SelectionPolicy(), has_disturbance=True) is better
 
 
-def test_of_those_alike_offsets_of_several_load_cells_are_taken_last() -> None:
+@pytest.mark.parametrize("load", ["hanging_load", "payload"])
+def test_offsets_of_several_load_cells_have_to_explain_more_than_a_load(load: str) -> None:
+    fit, offset = Fit(ROBOT, (), np.zeros(0), np.zeros((0, 0))), BY_NAME["sensor_offset"]
+
+    def score(hypothesis: Hypothesis, evidence: float) -> CandidateScore:
+        return CandidateScore(hypothesis, fit, evidence, 1.0)
+
+    near, far = (score(Hypothesis(BY_NAME[load], ()), evidence) for evidence in (165.0, 155.0))
+    all_cells, one_cell = (score(Hypothesis(offset, cables), 200.0) for cables in ((1, 2, 3), (2,)))
+    tracker = score(
+        Hypothesis(offset, (1, 2, 3), ("position_offset_x", "position_offset_y", "position_offset_z")), 200.0
+    )
+    assert load_before_offsets(all_cells, [all_cells, near], 40.0) is near
+    assert load_before_offsets(all_cells, [all_cells, far], 40.0) is all_cells
+    assert load_before_offsets(one_cell, [one_cell, near], 40.0) is one_cell
+    assert load_before_offsets(tracker, [tracker, near], 40.0) is tracker
+
+
+def test_a_load_that_is_not_significant_takes_no_place() -> None:
     fit = Fit(ROBOT, (), np.zeros(0), np.zeros((0, 0)))
-    load, offset = Hypothesis(BY_NAME["hanging_load"], ()), BY_NAME["sensor_offset"]
-    near, far = (CandidateScore(load, fit, evidence, 1.0) for evidence in (910.0, 890.0))
-    all_cells, one_cell = (CandidateScore(Hypothesis(offset, cables), fit, 1000.0, 1.0) for cables in ((1, 2, 3), (2,)))
-    assert most_parsimonious([all_cells, near], SelectionPolicy(), has_disturbance=True) is near
-    assert most_parsimonious([all_cells, far], SelectionPolicy(), has_disturbance=True) is all_cells
-    assert most_parsimonious([one_cell, near], SelectionPolicy(), has_disturbance=True) is one_cell
+    load = CandidateScore(Hypothesis(BY_NAME["hanging_load"], ()), fit, 38.0, 1.0)
+    all_cells = CandidateScore(Hypothesis(BY_NAME["sensor_offset"], (1, 2, 3)), fit, 45.0, 1.0)
+    assert load_before_offsets(all_cells, [all_cells, load], 40.0) is all_cells
 
 
 def test_an_effect_is_confusable_with_what_explains_as_much_or_with_more_parameters_more() -> None:

@@ -259,6 +259,23 @@ def test_a_simpler_effect_ties_by_its_form_unless_it_leaves_more_than_a_form_may
     assert selection._best_candidate([], robot) is None
 
 
+@pytest.mark.parametrize(("has_disturbance", "name"), [(True, "hanging_load"), (False, "sensor_offset")])
+def test_beside_a_disturbance_a_load_comes_before_offsets_of_all_load_cells(has_disturbance: bool, name: str) -> None:
+    robot = example("three")
+    fit, check = pair("three", 5, {})
+    noise = estimate_noise(robot, fit)
+    noise = replace(noise, disturbance=disturbance_prior(robot, noise).median if has_disturbance else None)
+    context = IdentificationContext(robot, Fitter(noise), split_data(robot, noise, fit, check))
+    threshold, without = context.evidence_threshold(), Fit.without_parameters(robot)
+    scores = [
+        CandidateScore(Hypothesis(BY_NAME["sensor_offset"], (1, 2, 3)), without, 4.0 * threshold, 1.0),
+        CandidateScore(Hypothesis(BY_NAME["hanging_load"], ()), without, 3.1 * threshold, 1.0),
+    ]
+    best = stepwise_selection._StepwiseSelection(context, without, context.fitter)._best_candidate(scores, robot)
+    assert best is not None
+    assert best.hypothesis.effect.name == name
+
+
 @pytest.mark.parametrize("swapped", [False, True])
 def test_an_effect_stands_with_its_fit_where_time_ends_while_its_disturbance_is_fitted(
     swapped: bool, monkeypatch: pytest.MonkeyPatch

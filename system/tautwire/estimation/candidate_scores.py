@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tautwire_fmu.laws.effects import UNLISTED
+from tautwire_fmu.laws.effects import HANGING_LOAD, PAYLOAD, UNLISTED
 
 from ..robot.schema import EffectSetting, Robot
 from .hypotheses import Hypothesis
@@ -13,6 +13,8 @@ from .parameter_fit import Fit
 from .policy import SelectionPolicy
 from .score_test import PredictedGain
 from .trace_result import Candidate
+
+LOADS = (PAYLOAD, HANGING_LOAD)
 
 
 @dataclass(frozen=True)
@@ -61,19 +63,28 @@ def most_parsimonious(
 ) -> CandidateScore | None:
     """Most parsimonious candidate: of those whose evidence ties with the best, the one with fewest parameters.
 
-    Of several one that is on the list of effects comes first, and offsets of several load cells alike come last: one
-    forgotten load is far likelier than that.
+    Of several one that is on the list of effects comes first.
     """
     top = max((trial.evidence for trial in scores), default=0.0)
     tied = [trial for trial in scores if top - trial.evidence < policy.tie(top, has_disturbance)]
     return min(tied, key=_complexity, default=None)
 
 
-def _complexity(trial: CandidateScore) -> tuple[int, int, float]:
-    hypothesis = trial.hypothesis
-    are_offsets = hypothesis.effect.offset is not None and len(hypothesis.cables) > 1
-    rarity = 2 if are_offsets else int(hypothesis.effect in UNLISTED)
-    return trial.parameter_count, rarity, -trial.evidence
+def _complexity(trial: CandidateScore) -> tuple[int, bool, float]:
+    return trial.parameter_count, trial.hypothesis.effect in UNLISTED, -trial.evidence
+
+
+def load_before_offsets(best: CandidateScore, scores: Sequence[CandidateScore], threshold: float) -> CandidateScore:
+    """The best candidate, or a load on the platform in place of one offset of several load cells.
+
+    One forgotten load is far likelier than cells that are all off alike: they have to explain more than it by the
+    ``threshold`` (nats) by which an effect has to explain more than none.
+    """
+    if "tension_offset" not in best.hypothesis.form or len(best.hypothesis.cables) < 2:
+        return best
+    least = max(threshold, best.evidence - threshold)
+    loads = [trial for trial in scores if trial.hypothesis.effect in LOADS and trial.evidence > least]
+    return max(loads, key=lambda trial: trial.evidence, default=best)
 
 
 def unfitted_score(robot: Robot, hypothesis: Hypothesis, prediction: PredictedGain) -> CandidateScore:

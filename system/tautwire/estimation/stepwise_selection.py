@@ -16,7 +16,7 @@ from ..errors import UnreachableError
 from ..robot.schema import Robot
 from .candidate_fits import fit_model, maximised_validation_likelihood
 from .candidate_proposals import SearchRound
-from .candidate_scores import CandidateScore, most_parsimonious
+from .candidate_scores import CandidateScore, load_before_offsets, most_parsimonious
 from .candidate_scoring import score_candidates
 from .disturbance import Disturbance
 from .disturbance_fit import joint_fit, marginal_log_likelihood, with_fitted_disturbance
@@ -178,6 +178,13 @@ class _StepwiseSelection:
         return [missed_with_effects(context.fitter, robot, validation, floor) for robot in calibrated], floor
 
     def _best_candidate(self, scores: Sequence[CandidateScore], without: Robot) -> CandidateScore | None:
+        """Best candidate of a round; beside a disturbance a load before offsets of several load cells."""
+        best = self._best_or_simpler(scores, without)
+        if best is None or not self.context.fitter.has_disturbance:
+            return best
+        return load_before_offsets(best, scores, self.context.evidence_threshold())
+
+    def _best_or_simpler(self, scores: Sequence[CandidateScore], without: Robot) -> CandidateScore | None:
         """Best candidate of a round, or a simpler one that ties with it and explains nearly as much.
 
         Beside a disturbance candidates tie within what their forms may leave; the simpler one is taken where it leaves
