@@ -19,6 +19,7 @@ from tautwire.number_format import (
 )
 from tautwire.reports import trace_page, trace_table
 from tautwire.reports.trace_texts import ROLES, comparison_by_role, explained_share, format_evidence, values_text
+from tautwire.robot.schema import EffectSetting
 from tests.support.pages import Page
 from tests.support.traces import HOSTILE, made_trace, nothing_found, without_positions
 
@@ -128,6 +129,13 @@ def test_what_is_confusable_comes_with_the_motion_that_would_tell() -> None:
     joined = " ".join(text.split())
     assert "tautwire excite robot.toml --effects damping,relaxation --out" in joined
     assert "--effects damping,creep,thermal --out" in joined
+
+
+def test_a_listed_effect_is_possible_in_place_of_an_unlisted_one() -> None:
+    robot = made_trace().robot_before.with_effect(EffectSetting("hanging_load", {"weight": 321.0}, ()))
+    pair = ("hanging_load", "sensor_offset")
+    unlisted = replace(made_trace(), effects=(), robot_after=robot, also_possible=(pair,), verdict="discovered")
+    assert "sensor_offset in place of hanging_load" in rendered(unlisted)
 
 
 def test_markup_and_control_characters_in_texts_do_nothing() -> None:

@@ -176,7 +176,8 @@ def undetectable_effects(trace: Trace) -> list[str]:
 
 def alternative_texts(trace: Trace) -> list[str]:
     """What the data cannot tell from the effects, as in "pulley in place of sensor_offset"."""
-    found = {effect.name for effect in trace.effects}
+    # Unlisted effects, whose formula is the answer, are in the robot alone.
+    found = {setting.name for setting in trace.robot_after.effects if setting not in trace.robot_before.effects}
     texts = []
     for names in trace.also_possible:
         replaced, others = [n for n in names if n in found], [n for n in names if n not in found]
