@@ -54,3 +54,48 @@ def test_an_axis_without_values_hides_no_placeholder() -> None:
     recorded = {name: np.where(LOST & (name in "xz"), 0.0, values) for name, values in columns().items()}
     changed, notes = without_placeholders(recorded | {"y": np.full(1000, np.nan)})
     assert np.array_equal(np.isnan(changed["x"]), LOST) and len(notes) == 1
+
+
+def orientations(angle: float) -> Columns:
+    """A platform that turns by an angle (rad) about x, seen with noise."""
+    time, generator = np.arange(1000) / 100.0, np.random.default_rng(7)
+    half = 0.5 * angle * np.sin(time) + 1e-4 * generator.normal(size=1000)
+    return {"qw": np.cos(half), "qx": np.sin(half), "qy": np.zeros(1000), "qz": np.zeros(1000)}
+
+
+def lost_at(recorded: Columns, quaternion: tuple[float, float, float, float]) -> Columns:
+    placeholders = zip(recorded, quaternion, strict=True)
+    return {name: np.where(LOST, value, recorded[name]) for name, value in placeholders}
+
+
+@pytest.mark.parametrize("quaternion", [(1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0, 1.0), (0.0, 0.0, 0.0, 0.0)])
+def test_a_quaternion_that_the_platform_jumps_to_is_no_orientation(quaternion: tuple[float, ...]) -> None:
+    turned = orientations(0.2)
+    turned["qw"], turned["qz"] = 0.8 * turned["qw"] - 0.6 * turned["qz"], 0.6 * turned["qw"] + 0.8 * turned["qz"]
+    flipped = {name: np.where(np.arange(1000) < 500, values, -values) for name, values in turned.items()}
+    changed, (note,) = without_placeholders(columns() | lost_at(flipped, quaternion))
+    assert all(np.array_equal(np.isnan(changed[name]), LOST) for name in flipped)
+    assert note.startswith("qw, qx, qy, qz: 23 samples ") and note.endswith(" are no orientation: not used")
+
+
+def test_a_quaternion_near_the_measured_ones_is_lost_with_the_position() -> None:
+    """Identity, beside a platform that hardly turns: no jump shows it."""
+    recorded = columns() | lost_at(orientations(0.001), (1.0, 0.0, 0.0, 0.0))
+    assert without_placeholders(recorded)[1] == ()
+    lost = recorded | {name: np.where(LOST, 0.0, recorded[name]) for name in "xyz"}
+    changed, notes = without_placeholders(lost)
+    assert len(notes) == 2 and all(np.array_equal(np.isnan(changed[name]), LOST) for name in ("x", "qw", "qz"))
+
+
+def test_orientations_of_another_sensor_stay_where_the_position_is_lost() -> None:
+    recorded = columns() | orientations(0.01)
+    changed, notes = without_placeholders(recorded | {name: np.where(LOST, 0.0, recorded[name]) for name in "xyz"})
+    assert len(notes) == 1 and all(np.isfinite(changed[name]).all() for name in orientations(0.01))
+
+
+def test_a_platform_at_rest_whose_quaternion_changes_its_sign_is_measured() -> None:
+    time = np.arange(1000) / 100.0
+    half = 0.1 * np.sin(np.maximum(time - 5.0, 0.0))
+    sign = np.where((time > 2.0) & (time < 3.0), -1.0, 1.0)
+    recorded = {"qw": sign * np.cos(half), "qx": sign * np.sin(half), "qy": 0.0 * time, "qz": 0.0 * time}
+    assert without_placeholders(columns() | recorded)[1] == ()

@@ -2,14 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from ..robot.schema import AXES, QUATERNION_COLUMNS
-from .quaternion_columns import zero_quaternions
+from .quaternion_columns import with_continuous_signs, zero_quaternions
 
 Array = NDArray[np.float64]
 
@@ -22,27 +22,44 @@ MAX_SHARE = 0.5
 def without_placeholders(columns: Mapping[str, Array]) -> tuple[dict[str, Array], tuple[str, ...]]:
     """Positions, quaternions and tensions (N,) without placeholders, as NaN, and a note on each.
 
-    A placeholder is one value, repeated exactly in a run or in several, to which the coordinates together, or a tension
-    alone, jump and from which they jump back; that of a tension is outside what the cell shows otherwise. That of a
-    quaternion is zero, which is no orientation.
+    A placeholder is one value, repeated exactly in a run or in several, to which the coordinates together, the
+    quaternion, or a tension alone, jump and from which they jump back; that of a tension is outside what the cell shows
+    otherwise. A quaternion of zeros is no orientation, nor is one that stays the same wherever the position is lost.
     """
     changed, notes = dict(columns), []
+    is_lost = np.zeros(len(next(iter(columns.values()), ())), dtype=bool)
     axes = [name for name in AXES if name in columns]
     for names in (axes, *([name] for name in columns if name.startswith("tension_"))):
         rows = _placeholder_rows([columns[name] for name in names]) if names else np.array([], dtype=bool)
         if not rows.any() or (names != axes and not _is_outside(columns[names[0]], rows)):
             continue
-        shown = ", ".join(f"{columns[name][rows][0]:.6g}" for name in names)
-        count = f"{rows.sum()} samples at {shown}"
+        count = f"{rows.sum()} samples at {_text([columns[name][rows][0] for name in names])}"
         notes.append(f"{', '.join(names)}: {count} are where nothing was measured, and not used")
+        is_lost |= rows & (names == axes)
         for name in names:
             changed[name] = np.where(rows, np.nan, columns[name])
     if all(name in columns for name in QUATERNION_COLUMNS):
-        rows = zero_quaternions(np.column_stack([columns[name] for name in QUATERNION_COLUMNS]))
+        quaternions = np.column_stack([columns[name] for name in QUATERNION_COLUMNS])
+        rows = _lost_orientations(quaternions, is_lost)
         if rows.any():
-            notes.append(f"{', '.join(QUATERNION_COLUMNS)}: {rows.sum()} samples of zeros are no orientation: not used")
+            shown = "of zeros" if zero_quaternions(quaternions[rows]).all() else f"at {_text(quaternions[rows][-1])}"
+            notes.append(f"{', '.join(QUATERNION_COLUMNS)}: {rows.sum()} samples {shown} are no orientation: not used")
             changed |= {name: np.where(rows, np.nan, columns[name]) for name in QUATERNION_COLUMNS}
     return changed, tuple(notes)
+
+
+def _text(values: Iterable[float]) -> str:
+    return ", ".join(f"{value:.6g}" for value in values)
+
+
+def _lost_orientations(quaternions: Array, is_lost: NDArray[np.bool_]) -> NDArray[np.bool_]:
+    """Rows (N,) of quaternions (N, 4) that are placeholders, where ``is_lost`` says that positions are."""
+    zeros = zero_quaternions(quaternions)
+    # Of a sign that changes, which is no jump of the platform.
+    continuous = with_continuous_signs(np.where(zeros[:, None], np.nan, quaternions))
+    rows = zeros | _placeholder_rows(list(continuous.T))
+    shown = quaternions[is_lost & ~zeros]
+    return rows | (is_lost & bool(len(shown) > 1 and np.all(shown == shown[0])))
 
 
 def _placeholder_rows(columns: Sequence[Array]) -> NDArray[np.bool_]:
