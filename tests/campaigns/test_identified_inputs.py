@@ -18,7 +18,7 @@ from tautwire.errors import InputError
 from tautwire.estimation.effect_estimates import estimated_effects, parameter_correlations
 from tautwire.estimation.estimation_data import DataSplit
 from tautwire.estimation.identification_context import IdentificationContext
-from tautwire.estimation.stepwise_selection import SelectionResult
+from tautwire.estimation.selection_result import SelectionResult
 from tautwire.reports import trace_document
 from tautwire.robot.robot_file_reader import robot_from_content
 from tests.support.campaigns import plan_file, read

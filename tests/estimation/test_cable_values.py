@@ -15,7 +15,7 @@ from tautwire.estimation.hypotheses import Hypothesis, hypotheses, labels_by_eff
 from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fitter
-from tautwire.estimation.stepwise_selection import SelectionResult
+from tautwire.estimation.selection_result import SelectionResult
 from tests.support.recordings import recorded
 from tests.support.robots import example
 

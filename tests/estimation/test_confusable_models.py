@@ -19,7 +19,7 @@ from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.likelihood import Innovations
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fitter
-from tautwire.estimation.stepwise_selection import SelectionResult, with_disturbance_beside
+from tautwire.estimation.selection_result import SelectionResult, with_disturbance_beside
 from tautwire.robot.schema import Robot
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.support.recordings import recorded

@@ -16,7 +16,7 @@ from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import NORMAL_QUANTILE_95, Fit, Fitter, parameter_scales
 from tautwire.estimation.parameter_stability import half_widths_of_stretches, stable_intervals
 from tautwire.estimation.policy import DEFAULT_POLICY, StabilityPolicy
-from tautwire.estimation.stepwise_selection import SelectionResult
+from tautwire.estimation.selection_result import SelectionResult
 from tests.support.recordings import recorded
 from tests.support.robots import example
 

@@ -13,7 +13,7 @@ from tautwire.estimation.hypotheses import Hypothesis
 from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fitter
-from tautwire.estimation.stepwise_selection import SelectionResult, nothing_selected
+from tautwire.estimation.selection_result import SelectionResult, nothing_selected
 from tautwire.robot.schema import EffectSetting
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.support.recordings import recorded

@@ -14,7 +14,7 @@ from tautwire.estimation.hypotheses import Hypothesis, hypotheses
 from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fit, Fitter
-from tautwire.estimation.stepwise_selection import SelectionResult
+from tautwire.estimation.selection_result import SelectionResult
 from tautwire.estimation.trace_result import FoundEffect
 from tautwire.estimation.verdict import verdict_beside_disturbance, verdict_of
 from tautwire.robot.schema import EffectSetting, Robot

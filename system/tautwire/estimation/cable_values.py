@@ -27,7 +27,7 @@ from .hypotheses import PLATFORM_SENSOR_FORMS, Hypothesis, split_by_cable
 from .identification_context import IdentificationContext
 from .measured_outputs import measured_outputs
 from .parameter_fit import NoFitError
-from .stepwise_selection import SelectionResult
+from .selection_result import SelectionResult
 
 
 def with_values_of_cables(

@@ -20,7 +20,7 @@ from .hypotheses import Hypothesis, hypotheses, with_hypothesis, with_larger_for
 from .identification_context import IdentificationContext
 from .parameter_fit import Fit, NoFitError
 from .residual_analysis import residuals_are_white
-from .stepwise_selection import SelectionResult, with_disturbance_beside
+from .selection_result import SelectionResult, with_disturbance_beside
 
 
 def replace_by_confusable_models(

@@ -26,7 +26,7 @@ from .hypotheses import Hypothesis
 from .identification_context import IdentificationContext
 from .parameter_fit import Fit, NoFitError
 from .residual_analysis import residuals_are_white
-from .stepwise_selection import SelectionResult, with_disturbance_beside
+from .selection_result import SelectionResult, with_disturbance_beside
 
 OFFSET_FORM = tuple(f"position_offset_{axis}" for axis in AXES)
 # Two recordings begin at the same place where they differ by less than this share of the distance to the declared one.

@@ -20,7 +20,7 @@ from .parameter_fit import Fit
 from .parameter_stability import stable_intervals
 from .policy import SizePolicy
 from .profile_likelihood import profile_intervals
-from .stepwise_selection import SelectionResult
+from .selection_result import SelectionResult
 from .time_limit import OutOfTimeError
 from .trace_result import Correlation, Estimate, FittedParameter, FoundEffect
 

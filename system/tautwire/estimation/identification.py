@@ -24,8 +24,8 @@ from .localisation.fault_isolation import reconciled_with_effects
 from .policy import DEFAULT_POLICY, IdentificationPolicy
 from .preprocessing import prepare_data
 from .residual_analysis import largest_autocorrelations
+from .selection_result import nothing_selected
 from .smoothed_states import calibrate, initial_state_note, with_initial_state
-from .stepwise_selection import nothing_selected
 from .time_limit import OutOfTimeError, TimeLimit
 from .trace_result import Comparison, Trace
 from .verdict import confirmed_formula

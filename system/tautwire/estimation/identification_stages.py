@@ -10,25 +10,17 @@ from ..robot.schema import Robot
 from ..robot.uncertain_parameters import uncertain_parameters
 from .cable_values import with_values_of_cables
 from .confusable_models import replace_by_confusable_models
-from .cosimulation_validation import (
-    compare_cosimulations,
-    start_cosimulations,
-    validate_by_cosimulation,
-)
+from .cosimulation_validation import compare_cosimulations, start_cosimulations, validate_by_cosimulation
 from .declared_start import with_declared_start
 from .discovery.unexplained_residual import UnexplainedResidual, explain_residual, resonances_beside_disturbance
-from .effect_estimates import effects_by_evidence, effects_by_size, effects_with_shares, estimated_effects
-from .explained_shares import ExplainedShares, explained_shares, remaining_error, sensor_noise_floor
-from .identifiability import analyse_identifiability
-from .identification_state import Identification
+from .explained_shares import explained_shares
+from .identification_state import Identification, with_final_robot
 from .localisation.component_localisation import localise_residual
-from .parameter_fit import Fitter
 from .policy import TimeLimitPolicy
 from .preprocessing import calibrated_estimation_data, with_disturbance
-from .smoothed_states import calibrate, calibrate_beside_effects, calibrated_robot
+from .smoothed_states import calibrated_robot
 from .stepwise_selection import select_effects
-from .time_limit import OutOfTimeError
-from .verdict import verdict_beside_disturbance, verdict_of, verdict_of_ended_search
+from .verdict_stages import analyse_detectability, estimate_intervals, judge, share_out_what_was_missed
 
 
 def start_side_runs(state: Identification) -> Identification:
@@ -155,58 +147,6 @@ def select_beside_disturbance(state: Identification) -> Identification:
     return beside if is_form and has_fewer else state
 
 
-def judge(state: Identification) -> Identification:
-    """Put the verdict in words."""
-    if state.shares:
-        return _judged_beside_disturbance(state, state.shares)
-    substantial = state.selection.substantial(state.context.policy.selection)
-    verdict = verdict_of(
-        state.context.robot, state.selection, substantial, state.effects_hold, state.discovery, state.is_white_before
-    )
-    return replace(state, verdict=verdict_of_ended_search(verdict, state.context.time_limit))
-
-
-def estimate_intervals(state: Identification) -> Identification:
-    """Estimate the confirmed effects' parameters with intervals, and the uncertain numbers beside them."""
-    state.context.progress("intervals", 0.0)
-    if not state.effects_hold and not (state.shares and state.selection.accepted):
-        return state
-    effects = estimated_effects(state.context, state.selection)
-    if state.shares is None:
-        large, small = effects_by_evidence(effects, state.selection.substantial(state.context.policy.selection))
-    else:
-        size = state.context.policy.size
-        large, small = effects_by_size(effects, state.selection.accepted, state.shares, size)
-    if not state.effects_hold:
-        return replace(state, effects=(), small_effects=(*large, *small))
-    return _with_calibrations(replace(state, effects=large, small_effects=small))
-
-
-def share_out_what_was_missed(state: Identification) -> Identification:
-    """Give effects of exact form their shares too, which decide nothing there."""
-    if not state.effects_hold or state.shares:
-        return state
-    state.context.progress("shares", 0.0)
-    selection, data, after = state.selection, state.prepared.data_sets[-1], state.comparisons[-1]
-    fit = replace(selection.fit, robot=state.final_robot)
-    shares = explained_shares(state.context, state.prepared.fitter, fit, selection.accepted, data, after)
-    effects, small_effects = (
-        effects_with_shares(each, selection.accepted, shares) for each in (state.effects, state.small_effects)
-    )
-    return replace(state, shares=shares, effects=effects, small_effects=small_effects)
-
-
-def analyse_detectability(state: Identification) -> Identification:
-    """Tell what the recordings could have shown, where the model leaves white noise."""
-    if not (state.effects_hold or state.verdict[0] == "none"):
-        return state
-    state.context.progress("identifiability", 0.0)
-    selection = state.selection
-    return replace(
-        state, identifiability=analyse_identifiability(state.context, selection.fit.robot, selection.accepted)
-    )
-
-
 STAGES: tuple[Callable[[Identification], Identification], ...] = (
     start_side_runs,
     begin_localisation,
@@ -246,56 +186,11 @@ def _explained_beside_disturbance(state: Identification) -> Identification:
     """The state with the shares of the selected effects, and what the robot with them leaves in co-simulation."""
     context, selection = state.context, state.selection
     identified = calibrated_robot(context.fitter, selection.fit.robot, context.split.estimation)
-    state = _with_final_robot(state, context.fitter, identified)
+    state = with_final_robot(state, context.fitter, identified)
     data, after = state.prepared.data_sets[-1], state.comparisons[-1]
     fit = replace(selection.fit, robot=identified)
     shares = explained_shares(context, state.prepared.fitter, fit, selection.accepted, data, after)
     return replace(state, shares=shares)
-
-
-def _with_final_robot(state: Identification, fitter: Fitter, robot: Robot) -> Identification:
-    """The state with a robot as the final one, and what its co-simulations leave, near noise or not."""
-    context, data_sets = state.context, state.prepared.data_sets
-    runs = [run.result() for run in start_cosimulations(context.workers, fitter, robot, data_sets)]
-    comparisons, _ = compare_cosimulations(robot, fitter, data_sets, state.runs_before, runs)
-    floors = tuple(sensor_noise_floor(fitter, robot, data) for data in data_sets)
-    return replace(state, final_robot=robot, comparisons=comparisons, noise_floors=floors)
-
-
-def _judged_beside_disturbance(state: Identification, shares: ExplainedShares) -> Identification:
-    """The state with its verdict; without an effect that matters, with the declared robot as the final one."""
-    context, declared = state.context, state.prepared.fitter
-    comparison, floor = state.comparisons[-1], state.noise_floors[-1]
-    missed, remaining = (
-        remaining_error(comparison.recording, run, floor).sentence for run in (comparison.before, comparison.after)
-    )
-    has_resonance = bool(state.unexplained.resonances)
-    verdict = verdict_beside_disturbance(context, state.selection, shares, missed, remaining, has_resonance)
-    verdict = verdict_of_ended_search(verdict, context.time_limit)
-    state = replace(state, verdict=verdict, effects_hold=verdict[0] in ("effects", "discovered"))
-    if verdict[0] == "none":
-        max_sigmas = context.policy.size.max_calibration_sigmas
-        calibration = calibrate(declared, context.robot, context.split.estimation).clipped(max_sigmas)
-        return _with_final_robot(state, declared, calibration.calibrated_robot(context.robot))
-    if verdict[0] == "unexplained":
-        comparisons = tuple(replace(c, after=c.before, errors_after=c.errors_before) for c in state.comparisons)
-        return replace(state, final_robot=context.robot, comparisons=comparisons)
-    return state
-
-
-def _with_calibrations(state: Identification) -> Identification:
-    """The state with its effects, and the uncertain numbers of its final robot no better known than these let them."""
-    context, selection = state.context, state.selection
-    robot, effects = selection.fit.robot, (*state.effects, *state.small_effects)
-    try:
-        calibrations = [
-            calibrate_beside_effects(context.fitter, robot, selection.accepted, effects, data)
-            for data in state.prepared.data_sets
-        ]
-    except OutOfTimeError:
-        context.leave_untried("what the effects' intervals mean for uncertain numbers: their deviations are too small")
-        return state
-    return replace(state, final_robot=calibrations[0].calibrated_robot(robot), calibrations=tuple(calibrations))
 
 
 def _is_explained_by_few_effects(state: Identification) -> bool:

@@ -2,19 +2,20 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from ..cosimulation.robot_cosimulation import CosimulationResult
 from ..robot.schema import Robot
-from .cosimulation_validation import is_near_noise_floor
+from .cosimulation_validation import compare_cosimulations, is_near_noise_floor, start_cosimulations
 from .discovery.formula_discovery import Discovery
 from .discovery.unexplained_residual import UnexplainedResidual
-from .explained_shares import ExplainedShares
+from .explained_shares import ExplainedShares, sensor_noise_floor
 from .identification_context import IdentificationContext
 from .localisation.component_localisation import FaultLocalisation
+from .parameter_fit import Fitter
 from .preprocessing import PreparedData, all_residuals_white, innovations_of
+from .selection_result import SelectionResult
 from .smoothed_states import Calibration
-from .stepwise_selection import SelectionResult
 from .trace_result import Comparison, Errors, FoundEffect, Identifiability, Verdict
 from .worker_pool import PendingResult
 
@@ -78,3 +79,12 @@ class Identification:
         context, policy = self.context, self.context.policy.residual_analysis
         innovations = innovations_of(context.fitter, self.selection.fit.robot, context.split)
         return all_residuals_white(innovations, context.split, policy)
+
+
+def with_final_robot(state: Identification, fitter: Fitter, robot: Robot) -> Identification:
+    """The state with a robot as the final one, and what its co-simulations leave, near noise or not."""
+    context, data_sets = state.context, state.prepared.data_sets
+    runs = [run.result() for run in start_cosimulations(context.workers, fitter, robot, data_sets)]
+    comparisons, _ = compare_cosimulations(robot, fitter, data_sets, state.runs_before, runs)
+    floors = tuple(sensor_noise_floor(fitter, robot, data) for data in data_sets)
+    return replace(state, final_robot=robot, comparisons=comparisons, noise_floors=floors)

@@ -10,7 +10,7 @@ Source: Wasserman, Ramdas and Balakrishnan (2020), Universal inference, PNAS 117
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from ..errors import UnreachableError
 from ..robot.schema import Robot
@@ -18,42 +18,16 @@ from .candidate_fits import fit_model, maximised_validation_likelihood
 from .candidate_proposals import SearchRound
 from .candidate_scores import CandidateScore, load_before_offsets, most_parsimonious
 from .candidate_scoring import score_candidates
-from .disturbance import Disturbance
-from .disturbance_fit import joint_fit, marginal_log_likelihood, with_fitted_disturbance
+from .disturbance_fit import marginal_log_likelihood
 from .explained_shares import missed_with_effects, missed_without_effects, sensor_noise_floor
 from .hypotheses import Hypothesis, with_hypothesis
 from .identification_context import IdentificationContext
 from .parameter_fit import Fit, Fitter, NoFitError
-from .policy import SelectionPolicy
 from .residual_analysis import residuals_are_white
+from .selection_result import SelectionResult, with_disturbance_beside
 from .smoothed_states import calibrated_robot
 from .time_limit import OutOfTimeError
 from .trace_result import Candidate, Errors
-
-
-@dataclass(frozen=True)
-class SelectionResult:
-    """Result of a selection: the accepted hypotheses in order, evidence of each, their joint fit, all candidates.
-
-    ``disturbance`` is the one beside them, None where none was assumed.
-    """
-
-    accepted: tuple[Hypothesis, ...]
-    evidence: tuple[float, ...]
-    fit: Fit
-    candidates: tuple[Candidate, ...]
-    confusable: tuple[tuple[str, ...], ...]
-    disturbance: Disturbance | None = None
-
-    def substantial(self, policy: SelectionPolicy) -> tuple[Hypothesis, ...]:
-        """The accepted hypotheses with more evidence than what the strongest one's form may leave."""
-        least = policy.min_exact_evidence_ratio * max(self.evidence, default=0.0)
-        return tuple(h for h, evidence in zip(self.accepted, self.evidence, strict=True) if evidence >= least)
-
-
-def nothing_selected(robot: Robot) -> SelectionResult:
-    """The selection before any search: the robot as it is."""
-    return SelectionResult((), (), Fit.without_parameters(robot), (), ())
 
 
 def select_effects(context: IdentificationContext) -> SelectionResult:
@@ -73,18 +47,6 @@ def select_effects(context: IdentificationContext) -> SelectionResult:
     except (NoFitError, UnreachableError) as error:
         context.time_limit.leave_untried(f"The search for effects ended early: {error}.")
     return selection.result()
-
-
-def with_disturbance_beside(
-    context: IdentificationContext, accepted: Sequence[Hypothesis], fit: Fit
-) -> tuple[IdentificationContext, Fit]:
-    """The context with the disturbance fitted with the accepted hypotheses, and their fit."""
-    if not context.fitter.has_disturbance:
-        return context, fit
-    fitter = with_fitted_disturbance(context.fitter, fit.robot, accepted, context.split.estimation)
-    context = replace(context, fitter=fitter)
-    fitter, fit = joint_fit(fitter, fit_model(context, accepted, fit.robot), accepted, context.split.estimation)
-    return replace(context, fitter=fitter), fit
 
 
 def _search_round(

@@ -15,7 +15,7 @@ from .disturbance_posterior import reference_weight
 from .explained_shares import ExplainedShares
 from .hypotheses import Hypothesis, labels_by_effect
 from .identification_context import IdentificationContext
-from .stepwise_selection import SelectionResult
+from .selection_result import SelectionResult
 from .time_limit import TimeLimit
 from .trace_result import Verdict
 

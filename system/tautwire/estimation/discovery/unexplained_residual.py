@@ -7,7 +7,7 @@ from dataclasses import dataclass
 from ..disturbance_posterior import disturbance_prior
 from ..explained_shares import ExplainedShares
 from ..identification_context import IdentificationContext, no_progress
-from ..stepwise_selection import SelectionResult
+from ..selection_result import SelectionResult
 from ..trace_result import Resonance
 from .candidate_terms import formula_text
 from .formula_discovery import Discovery, discover_formula

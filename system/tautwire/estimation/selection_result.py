@@ -1,0 +1,53 @@
+"""Result of a selection of effects, and its change by one of them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+from ..robot.schema import Robot
+from .candidate_fits import fit_model
+from .disturbance import Disturbance
+from .disturbance_fit import joint_fit, with_fitted_disturbance
+from .hypotheses import Hypothesis
+from .identification_context import IdentificationContext
+from .parameter_fit import Fit
+from .policy import SelectionPolicy
+from .trace_result import Candidate
+
+
+@dataclass(frozen=True)
+class SelectionResult:
+    """Result of a selection: the accepted hypotheses in order, evidence of each, their joint fit, all candidates.
+
+    ``disturbance`` is the one beside them, None where none was assumed.
+    """
+
+    accepted: tuple[Hypothesis, ...]
+    evidence: tuple[float, ...]
+    fit: Fit
+    candidates: tuple[Candidate, ...]
+    confusable: tuple[tuple[str, ...], ...]
+    disturbance: Disturbance | None = None
+
+    def substantial(self, policy: SelectionPolicy) -> tuple[Hypothesis, ...]:
+        """The accepted hypotheses with more evidence than what the strongest one's form may leave."""
+        least = policy.min_exact_evidence_ratio * max(self.evidence, default=0.0)
+        return tuple(h for h, evidence in zip(self.accepted, self.evidence, strict=True) if evidence >= least)
+
+
+def nothing_selected(robot: Robot) -> SelectionResult:
+    """The selection before any search: the robot as it is."""
+    return SelectionResult((), (), Fit.without_parameters(robot), (), ())
+
+
+def with_disturbance_beside(
+    context: IdentificationContext, accepted: Sequence[Hypothesis], fit: Fit
+) -> tuple[IdentificationContext, Fit]:
+    """The context with the disturbance fitted with the accepted hypotheses, and their fit."""
+    if not context.fitter.has_disturbance:
+        return context, fit
+    fitter = with_fitted_disturbance(context.fitter, fit.robot, accepted, context.split.estimation)
+    context = replace(context, fitter=fitter)
+    fitter, fit = joint_fit(fitter, fit_model(context, accepted, fit.robot), accepted, context.split.estimation)
+    return replace(context, fitter=fitter), fit
