@@ -77,6 +77,12 @@ class ExplainedShares:
         least = max(policy.min_share, policy.max_left_share_of_form * max(self.effects, default=0.0))
         return [i for i in ranked if self.effects[i] >= least and self.sizes[i] >= policy.min_size]
 
+    def explains(self, policy: SizePolicy) -> bool:
+        """Whether effects that matter explain enough for a name where much is left."""
+        large = self.substantial(policy)
+        explained = max((self.explained, *(self.effects[index] for index in large)))
+        return bool(large) and explained >= policy.min_explained_share
+
     def steady(self, policy: SizePolicy) -> list[int]:
         """Indices of the effects that have about the same size on all stretches."""
         return [index for index, spread in enumerate(self.spreads) if spread <= policy.max_amplitude_spread]

@@ -18,6 +18,7 @@ from .identification_state import Identification, with_final_robot
 from .localisation.component_localisation import localise_residual
 from .policy import TimeLimitPolicy
 from .preprocessing import calibrated_estimation_data, with_disturbance
+from .selection_result import without_least_evident
 from .smoothed_states import calibrated_robot
 from .stepwise_selection import select_effects
 from .verdict_stages import analyse_detectability, estimate_intervals, judge, share_out_what_was_missed
@@ -113,6 +114,22 @@ def confirm_effects(state: Identification) -> Identification:
     return state
 
 
+def drop_unsteady_effects(state: Identification) -> Identification:
+    """Take out the least evident effects where none is the same on all stretches, if the others then explain enough.
+
+    Beside an effect whose form is not quite nature's another may stand for what is left, and neither keeps its size.
+    """
+    policy, fewer = state.context.policy.size, state
+    if state.shares is None or state.shares.substantial(policy):
+        return state
+    while len({hypothesis.effect for hypothesis in fewer.selection.accepted}) > 1:
+        context, selection = without_least_evident(fewer.context, fewer.selection)
+        fewer = _explained_beside_disturbance(replace(fewer, context=context, selection=selection))
+        if fewer.shares and fewer.shares.explains(policy):
+            return fewer
+    return state
+
+
 def explain_by_formula(state: Identification) -> Identification:
     """Look for a formula, confirmed by co-simulation, or resonances, where effects do not explain the residual."""
     if state.shares:
@@ -158,6 +175,7 @@ STAGES: tuple[Callable[[Identification], Identification], ...] = (
     separate_cables,
     cosimulate_before,
     confirm_effects,
+    drop_unsteady_effects,
     explain_by_formula,
     select_beside_disturbance,
     judge,
@@ -174,6 +192,7 @@ SEARCHES: Mapping[Callable[[Identification], Identification], tuple[Callable[[Ti
     try_confusable_models: (attrgetter("selection"), "models that are easily confused with the effects found"),
     try_declared_start: (attrgetter("selection"), "trying a sensor's offset in place of another start"),
     separate_cables: (attrgetter("values_of_cables"), "values of single cables"),
+    drop_unsteady_effects: (attrgetter("discovery"), "fewer effects"),
     explain_by_formula: (attrgetter("discovery"), "formulas and resonances"),
     select_beside_disturbance: (attrgetter("second_search"), "effects whose form is not quite nature's"),
     estimate_intervals: (attrgetter("refinement"), "estimates of the parameters"),

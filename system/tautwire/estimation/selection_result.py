@@ -51,3 +51,22 @@ def with_disturbance_beside(
     context = replace(context, fitter=fitter)
     fitter, fit = joint_fit(fitter, fit_model(context, accepted, fit.robot), accepted, context.split.estimation)
     return replace(context, fitter=fitter), fit
+
+
+def without_least_evident(
+    context: IdentificationContext, selection: SelectionResult
+) -> tuple[IdentificationContext, SelectionResult]:
+    """The selection without the effect that has the least evidence, and the others fitted anew."""
+    evidence = dict(zip(selection.accepted, selection.evidence, strict=True))
+    least = min(selection.accepted, key=lambda hypothesis: evidence[hypothesis]).effect
+    kept = [hypothesis for hypothesis in selection.accepted if hypothesis.effect is not least]
+    context, fit = with_disturbance_beside(context, kept, fit_model(context, kept, selection.fit.robot))
+    fewer = replace(
+        selection,
+        accepted=tuple(kept),
+        evidence=tuple(evidence[hypothesis] for hypothesis in kept),
+        fit=fit,
+        confusable=tuple(pair for pair in selection.confusable if pair[0] != least.name),
+        disturbance=context.fitter.noise.disturbance,
+    )
+    return context, fewer

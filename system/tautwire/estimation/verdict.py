@@ -73,8 +73,7 @@ def verdict_beside_disturbance(
     policy, accepted = context.policy.size, selection.accepted
     large, labels = shares.substantial(policy), labels_by_effect(accepted, context.robot)
     names = list(dict.fromkeys(labels))
-    explained = max((shares.explained, *(shares.effects[index] for index in large))) if large else 0.0
-    is_explained = explained >= policy.min_explained_share
+    is_explained = shares.explains(policy)
     is_little = shares.size_missed <= policy.max_size_of_disturbance
     if not is_explained and (is_little or (not has_resonance and _is_small_disturbance(context, shares))):
         small = f" {_sum_up(names).capitalize()} may act, too small to matter." if names else ""

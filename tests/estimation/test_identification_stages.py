@@ -1,0 +1,79 @@
+"""Stages of an identification: what each makes of what is known so far."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any, cast
+
+import pytest
+
+from tautwire.estimation import identification_stages
+from tautwire.estimation.explained_shares import ExplainedShares
+from tautwire.estimation.hypotheses import Hypothesis
+from tautwire.estimation.identification_context import IdentificationContext
+from tautwire.estimation.identification_stages import drop_unsteady_effects
+from tautwire.estimation.identification_state import Identification
+from tautwire.estimation.parameter_fit import Fit
+from tautwire.estimation.policy import DEFAULT_POLICY
+from tautwire.estimation.selection_result import SelectionResult
+from tautwire_fmu.laws.effects import BY_NAME
+from tests.support.robots import example
+
+ROBOT = example("three")
+
+
+@dataclass(frozen=True)
+class ContextWithPolicy:
+    """As much of a context as decides whether effects matter."""
+
+    policy: Any = DEFAULT_POLICY
+
+
+def with_effects(*names: str, **spreads: float) -> Identification:
+    """A state whose effects, the most evident first, have these spreads over stretches."""
+    hypotheses = tuple(Hypothesis(BY_NAME[name], (1, 2, 3)) for name in names)
+    evidence = tuple(1000.0 / (1 + rank) for rank in range(len(names)))
+    selection = SelectionResult(hypotheses, evidence, Fit.without_parameters(ROBOT), (), ())
+    context = cast("IdentificationContext", ContextWithPolicy())
+    return replace(
+        Identification(context, cast("Any", None), (), selection, ROBOT), shares=shares_of(selection, spreads)
+    )
+
+
+def shares_of(selection: SelectionResult, spreads: dict[str, float], share: float = 0.6) -> ExplainedShares:
+    count = len(selection.accepted)
+    by_effect = tuple(spreads[hypothesis.effect.name] for hypothesis in selection.accepted)
+    return ExplainedShares((share,) * count, (20.0,) * count, by_effect, (0.0,) * count, 1.0 - share, 30.0, 20.0)
+
+
+@pytest.mark.parametrize(
+    ("alone", "share", "names"),
+    [
+        ({"modulus": 0.4, "relaxation": 0.9, "slack": 0.5}, 0.6, ["modulus", "relaxation", "slack"]),
+        ({"modulus": 0.1, "relaxation": 0.9, "slack": 0.5}, 0.6, ["modulus"]),
+        ({"modulus": 0.1, "relaxation": 0.2, "slack": 0.5}, 0.6, ["modulus", "relaxation"]),
+        ({"modulus": 0.1, "relaxation": 0.2, "slack": 0.5}, 0.2, ["modulus", "relaxation", "slack"]),
+    ],
+)
+def test_the_least_evident_go_until_one_is_steady_and_explains_enough(
+    alone: dict[str, float], share: float, names: list[str], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def without_last(context: object, selection: SelectionResult) -> tuple[object, SelectionResult]:
+        return context, replace(selection, accepted=selection.accepted[:-1], evidence=selection.evidence[:-1])
+
+    def explained(state: Identification) -> Identification:
+        last = state.selection.accepted[-1].effect.name
+        spreads = dict.fromkeys(alone, 0.9) | {last: alone[last]}
+        return replace(state, shares=shares_of(state.selection, spreads, share))
+
+    monkeypatch.setattr(identification_stages, "without_least_evident", without_last)
+    monkeypatch.setattr(identification_stages, "_explained_beside_disturbance", explained)
+    state = with_effects("modulus", "relaxation", "slack", **dict.fromkeys(alone, 0.9))
+    fewer = drop_unsteady_effects(state)
+    assert [hypothesis.effect.name for hypothesis in fewer.selection.accepted] == names
+    assert len(names) < 3 or fewer is state
+
+
+def test_a_selection_of_which_one_effect_is_steady_stays_as_it_is() -> None:
+    state = with_effects("modulus", "relaxation", modulus=0.1, relaxation=0.9)
+    assert drop_unsteady_effects(state) is state
