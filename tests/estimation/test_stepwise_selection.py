@@ -79,6 +79,35 @@ def test_beside_a_disturbance_a_further_effect_needs_a_share_of_the_first_ones_e
     assert [hypothesis.effect.name for hypothesis in select_effects(context).accepted] == names
 
 
+@pytest.mark.parametrize(
+    ("first", "evidence", "explained", "is_significant"),
+    [
+        ("damping", 50.0, 6.0, True),
+        ("damping", 50.0, 0.2, False),
+        ("drag", 50.0, 6.0, False),
+        ("damping", 30.0, 6.0, False),
+        ("drag", 150.0, 0.2, True),
+    ],
+)
+def test_beside_a_disturbance_what_explains_much_in_another_component_needs_less_evidence(
+    first: str, evidence: float, explained: float, is_significant: bool
+) -> None:
+    """A payload of 6 kg is missed, of which a candidate explains some, beside another effect with 1,000 nats."""
+    robot = example("three")
+    fit, check = pair("three", 5, {"payload": {"mass": 6.0}})
+    noise = estimate_noise(robot, fit)
+    noise = replace(noise, disturbance=disturbance_prior(robot, noise).median)
+    policy = replace(DEFAULT_POLICY, selection=replace(DEFAULT_POLICY.selection, min_evidence_rate=0.1))
+    context = IdentificationContext(robot, Fitter(noise), split_data(robot, noise, fit, check), policy=policy)
+    assert 30.0 < context.evidence_threshold() < 50.0
+    selection = stepwise_selection._StepwiseSelection(context, Fit.without_parameters(robot), context.fitter)
+    other = Hypothesis(BY_NAME[first], () if first == "drag" else (1, 2, 3))
+    selection.forward_evidences = {other: 1000.0}
+    loaded = robot.with_effect(EffectSetting("payload", {"mass": explained}))
+    score = CandidateScore(Hypothesis(BY_NAME["payload"], ()), Fit.without_parameters(loaded), evidence, 1.0)
+    assert selection._is_significant(score, [other], robot) is is_significant
+
+
 @pytest.mark.parametrize("has_disturbance", [False, True])
 def test_beside_a_disturbance_an_effect_needs_evidence_by_the_number_of_samples(has_disturbance: bool) -> None:
     context = context_with(has_disturbance)

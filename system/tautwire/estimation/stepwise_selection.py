@@ -100,7 +100,7 @@ class _StepwiseSelection:
             if is_complete:
                 self.complete_rounds[tuple(self.accepted), None] = scores
             best = self._best_candidate(scores, self.current.robot)
-            significant = best is not None and best.evidence > self._required_evidence(self.accepted)
+            significant = best is not None and self._is_significant(best, self.accepted, self.current.robot)
             self.candidates += [trial.candidate(number, significant and trial is best) for trial in scores]
             if best is None or not significant:
                 break
@@ -115,6 +115,24 @@ class _StepwiseSelection:
     def _next_number(self) -> int:
         """Number of the round that follows those with candidates."""
         return 1 + max((candidate.round for candidate in self.candidates), default=0)
+
+    def _is_significant(self, score: CandidateScore, others: Sequence[Hypothesis], without: Robot) -> bool:
+        """Whether a hypothesis is established beside others, which the robot ``without`` it has.
+
+        What acts in another component, and explains a good share of what is missed, is nothing that their forms leave:
+        it has to be more than chance.
+        """
+        if score.evidence > self._required_evidence(others):
+            return True
+        components = {other.effect.component for other in others}
+        if score.evidence <= self.context.evidence_threshold() or score.hypothesis.effect.component in components:
+            return False
+        # The fits are there: time that is up must not lose them.
+        with self.context.time_limit.suspended():
+            (left_without, left), floor = self._missed_on_validation(without, score.fit.robot)
+            validation = self.context.split.validation
+            missed = missed_without_effects(self.context, self.without_effects, validation, floor)
+        return left_without - left >= self.context.policy.size.min_share_elsewhere * missed
 
     def _required_evidence(self, others: Sequence[Hypothesis]) -> float:
         """Evidence that a hypothesis needs beside the others."""
@@ -176,7 +194,7 @@ class _StepwiseSelection:
             others = [a for a in self.accepted if a is not tested]
             without = fit_model(self.context, others, self.current.robot, coarse=True)
             score = CandidateScore(tested, self.current, self._evidence(without, others), float("nan"))
-            if score.evidence < self._required_evidence(others):
+            if not self._is_significant(score, others, without.robot):
                 self._accept(others, fit_model(self.context, others, without.robot))
                 pending, dropped = list(others), [*dropped, tested]
                 continue
