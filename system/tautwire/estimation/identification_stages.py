@@ -192,7 +192,7 @@ SEARCHES: Mapping[Callable[[Identification], Identification], tuple[Callable[[Ti
     try_confusable_models: (attrgetter("selection"), "models that are easily confused with the effects found"),
     try_declared_start: (attrgetter("selection"), "trying a sensor's offset in place of another start"),
     separate_cables: (attrgetter("values_of_cables"), "values of single cables"),
-    drop_unsteady_effects: (attrgetter("discovery"), "fewer effects"),
+    drop_unsteady_effects: (attrgetter("second_search"), "fewer effects"),
     explain_by_formula: (attrgetter("discovery"), "formulas and resonances"),
     select_beside_disturbance: (attrgetter("second_search"), "effects whose form is not quite nature's"),
     estimate_intervals: (attrgetter("refinement"), "estimates of the parameters"),

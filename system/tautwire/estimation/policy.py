@@ -246,7 +246,7 @@ class TimeLimitPolicy:
     values_of_cables: float = 0.75
     # Formulas and resonances, which one more co-simulation confirms.
     discovery: float = 0.6
-    # Effects beside a disturbance, where exact sensors show that no form is exact.
+    # Effects beside a disturbance, where exact sensors show that no form is exact; and fewer, where none is steady.
     second_search: float = 0.85
     # Intervals, what could have been seen, and the component in question.
     refinement: float = 0.9
