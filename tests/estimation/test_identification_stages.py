@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 from typing import Any, cast
 
+import numpy as np
 import pytest
 
 from tautwire.estimation import identification_stages
@@ -13,7 +14,7 @@ from tautwire.estimation.hypotheses import Hypothesis
 from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.identification_stages import drop_unsteady_effects
 from tautwire.estimation.identification_state import Identification
-from tautwire.estimation.parameter_fit import Fit
+from tautwire.estimation.parameter_fit import Fit, NoFitError
 from tautwire.estimation.policy import DEFAULT_POLICY
 from tautwire.estimation.selection_result import SelectionResult
 from tautwire_fmu.laws.effects import BY_NAME
@@ -76,4 +77,13 @@ def test_the_least_evident_go_until_one_is_steady_and_explains_enough(
 
 def test_a_selection_of_which_one_effect_is_steady_stays_as_it_is() -> None:
     state = with_effects("modulus", "relaxation", modulus=0.1, relaxation=0.9)
+    assert drop_unsteady_effects(state) is state
+
+
+def test_a_selection_whose_others_cannot_be_fitted_stays_as_it_is(monkeypatch: pytest.MonkeyPatch) -> None:
+    def without_last(context: object, selection: SelectionResult) -> tuple[object, SelectionResult]:
+        raise NoFitError(np.array([0.0]))
+
+    monkeypatch.setattr(identification_stages, "without_least_evident", without_last)
+    state = with_effects("modulus", "relaxation", modulus=0.9, relaxation=0.9)
     assert drop_unsteady_effects(state) is state

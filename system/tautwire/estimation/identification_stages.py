@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import replace
 from operator import attrgetter
 
+from ..errors import UnreachableError
 from ..robot.schema import Robot
 from ..robot.uncertain_parameters import uncertain_parameters
 from .cable_values import with_values_of_cables
@@ -16,6 +17,7 @@ from .discovery.unexplained_residual import UnexplainedResidual, explain_residua
 from .explained_shares import explained_shares
 from .identification_state import Identification, with_final_robot
 from .localisation.component_localisation import localise_residual
+from .parameter_fit import NoFitError
 from .policy import TimeLimitPolicy
 from .preprocessing import calibrated_estimation_data, with_disturbance
 from .selection_result import without_least_evident
@@ -123,8 +125,11 @@ def drop_unsteady_effects(state: Identification) -> Identification:
     if state.shares is None or state.shares.substantial(policy):
         return state
     while len({hypothesis.effect for hypothesis in fewer.selection.accepted}) > 1:
-        context, selection = without_least_evident(fewer.context, fewer.selection)
-        fewer = _explained_beside_disturbance(replace(fewer, context=context, selection=selection))
+        try:
+            context, selection = without_least_evident(fewer.context, fewer.selection)
+            fewer = _explained_beside_disturbance(replace(fewer, context=context, selection=selection))
+        except (NoFitError, UnreachableError):
+            return state
         if fewer.shares and fewer.shares.explains(policy):
             return fewer
     return state
