@@ -15,7 +15,7 @@ import pytest
 from rich.console import Console
 
 from tautwire.errors import NumericalError
-from tautwire.estimation import Trace, candidate_scoring, identification, identification_stages, trace
+from tautwire.estimation import Trace, candidate_scoring, identification, identification_stages, trace, verdict_stages
 from tautwire.estimation.candidate_proposals import SearchRound
 from tautwire.estimation.candidate_scores import CandidateScore
 from tautwire.estimation.estimation_data import split_data
@@ -184,7 +184,7 @@ def test_effects_keep_their_intervals_where_time_ends_at_the_numbers_beside_them
     def out_of_time(*_: object) -> None:
         raise OutOfTimeError(600.0)
 
-    monkeypatch.setattr(identification_stages, "calibrate_beside_effects", out_of_time)
+    monkeypatch.setattr(verdict_stages, "calibrate_beside_effects", out_of_time)
     robot = example("three")
     robot = replace(robot, platform=replace(robot.platform, mass_uncertainty=0.1))
     found = trace(robot, *recordings)
