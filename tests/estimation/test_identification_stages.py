@@ -11,7 +11,7 @@ import pytest
 from tautwire.estimation import identification_stages
 from tautwire.estimation.explained_shares import ExplainedShares
 from tautwire.estimation.hypotheses import Hypothesis
-from tautwire.estimation.identification_context import IdentificationContext
+from tautwire.estimation.identification_context import IdentificationContext, no_progress
 from tautwire.estimation.identification_stages import drop_unsteady_effects
 from tautwire.estimation.identification_state import Identification
 from tautwire.estimation.parameter_fit import Fit, NoFitError
@@ -28,6 +28,7 @@ class ContextWithPolicy:
     """As much of a context as decides whether effects matter."""
 
     policy: Any = DEFAULT_POLICY
+    progress: Any = no_progress
 
 
 def with_effects(*names: str, **spreads: float) -> Identification:

@@ -15,9 +15,10 @@ from tautwire.estimation.hypotheses import Hypothesis
 from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fit, Fitter, NoFitError
-from tautwire.estimation.policy import DEFAULT_POLICY
+from tautwire.estimation.policy import DEFAULT_POLICY, IdentificationPolicy
 from tautwire.estimation.residual_analysis import residuals_are_white
-from tautwire.estimation.stepwise_selection import SelectionResult, select_effects
+from tautwire.estimation.selection_result import SelectionResult
+from tautwire.estimation.stepwise_selection import select_effects
 from tautwire.estimation.time_limit import OutOfTimeError, TimeLimit
 from tautwire.recordings.recording import Recording
 from tautwire.robot.schema import EffectSetting, Robot
@@ -53,6 +54,15 @@ def context_with(has_disturbance: bool) -> IdentificationContext:
     if has_disturbance:
         noise = replace(noise, disturbance=disturbance_prior(robot, noise).median)
     return IdentificationContext(robot, Fitter(noise), split_data(robot, noise, recording, None))
+
+
+def with_missed_payload(policy: IdentificationPolicy) -> IdentificationContext:
+    """Beside a disturbance, recordings whose platform is 6 kg heavier than the robot's."""
+    robot = example("three")
+    fit, check = pair("three", 5, {"payload": {"mass": 6.0}})
+    noise = estimate_noise(robot, fit)
+    noise = replace(noise, disturbance=disturbance_prior(robot, noise).median)
+    return IdentificationContext(robot, Fitter(noise), split_data(robot, noise, fit, check), policy=policy)
 
 
 @pytest.mark.validate(but=["False"])
@@ -92,13 +102,10 @@ def test_beside_a_disturbance_a_further_effect_needs_a_share_of_the_first_ones_e
 def test_beside_a_disturbance_what_explains_much_in_another_component_needs_less_evidence(
     first: str, evidence: float, explained: float, is_significant: bool
 ) -> None:
-    """A payload of 6 kg is missed, of which a candidate explains some, beside another effect with 1,000 nats."""
-    robot = example("three")
-    fit, check = pair("three", 5, {"payload": {"mass": 6.0}})
-    noise = estimate_noise(robot, fit)
-    noise = replace(noise, disturbance=disturbance_prior(robot, noise).median)
+    """Of a payload a candidate explains some, beside another effect with 1,000 nats."""
     policy = replace(DEFAULT_POLICY, selection=replace(DEFAULT_POLICY.selection, min_evidence_rate=0.1))
-    context = IdentificationContext(robot, Fitter(noise), split_data(robot, noise, fit, check), policy=policy)
+    context = with_missed_payload(policy)
+    robot = context.robot
     assert 30.0 < context.evidence_threshold() < 50.0
     selection = stepwise_selection._StepwiseSelection(context, Fit.without_parameters(robot), context.fitter)
     other = Hypothesis(BY_NAME[first], () if first == "drag" else (1, 2, 3))
@@ -211,12 +218,8 @@ def test_beside_a_disturbance_what_had_more_evidence_in_the_same_round_is_also_p
 def test_beside_a_disturbance_the_search_ends_where_what_is_left_could_not_matter(
     limits: dict[str, float], rounds: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    robot = example("three")
-    fit, check = pair("three", 5, {"payload": {"mass": 6.0}})
-    noise = estimate_noise(robot, fit)
-    noise = replace(noise, disturbance=disturbance_prior(robot, noise).median)
-    policy = replace(DEFAULT_POLICY, size=replace(DEFAULT_POLICY.size, **limits))
-    context = IdentificationContext(robot, Fitter(noise), split_data(robot, noise, fit, check), policy=policy)
+    context = with_missed_payload(replace(DEFAULT_POLICY, size=replace(DEFAULT_POLICY.size, **limits)))
+    robot = context.robot
     payload = Hypothesis(BY_NAME["payload"], ())
     with_payload = robot.with_effect(EffectSetting("payload", {"mass": 6.0}))
     scored = [CandidateScore(payload, Fit.without_parameters(with_payload), 1000.0, 1.0)]

@@ -125,6 +125,7 @@ def drop_unsteady_effects(state: Identification) -> Identification:
     if state.shares is None or state.shares.substantial(policy):
         return state
     while len({hypothesis.effect for hypothesis in fewer.selection.accepted}) > 1:
+        state.context.progress("fewer effects", 0.0)
         try:
             context, selection = without_least_evident(fewer.context, fewer.selection)
             fewer = _explained_beside_disturbance(replace(fewer, context=context, selection=selection))
@@ -197,7 +198,7 @@ SEARCHES: Mapping[Callable[[Identification], Identification], tuple[Callable[[Ti
     try_confusable_models: (attrgetter("selection"), "models that are easily confused with the effects found"),
     try_declared_start: (attrgetter("selection"), "trying a sensor's offset in place of another start"),
     separate_cables: (attrgetter("values_of_cables"), "values of single cables"),
-    drop_unsteady_effects: (attrgetter("second_search"), "fewer effects"),
+    drop_unsteady_effects: (attrgetter("second_search"), "taking out effects that differ from stretch to stretch"),
     explain_by_formula: (attrgetter("discovery"), "formulas and resonances"),
     select_beside_disturbance: (attrgetter("second_search"), "effects whose form is not quite nature's"),
     estimate_intervals: (attrgetter("refinement"), "estimates of the parameters"),

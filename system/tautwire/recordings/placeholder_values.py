@@ -35,7 +35,7 @@ def without_placeholders(columns: Mapping[str, Array]) -> tuple[dict[str, Array]
             continue
         count = f"{rows.sum()} samples at {_text([columns[name][rows][0] for name in names])}"
         notes.append(f"{', '.join(names)}: {count} are where nothing was measured, and not used")
-        is_lost |= rows & (names == axes)
+        is_lost = rows if names == axes else is_lost
         for name in names:
             changed[name] = np.where(rows, np.nan, columns[name])
     if all(name in columns for name in QUATERNION_COLUMNS):
