@@ -6,11 +6,12 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 
 from tautwire.robot.implausible_units import implausible_units
 from tautwire.robot.robot_file_reader import read_robot
-from tautwire.robot.schema import Robot
+from tautwire.robot.schema import Robot, TensionLimits
 from tests.support.rigid_robots import crane_robot
 from tests.support.robots import EXAMPLES, example
 
@@ -31,6 +32,7 @@ def test_shipped_robots_are_plausible(name: str) -> None:
         ({"modulus": 2.5}, "modulus", "in GPa as 2.5e+09"),
         ({"modulus": 9.5e4}, "modulus", "in MPa as 9.5e+10"),
         ({"area": 3.0}, "area", "in mm^2 as 3e-6"),
+        ({"area": 0.004}, "area", "the diameter in m as 1.257e-05"),
         ({"anchor": (0.0, 0.0, 12000.0)}, "anchor", "in mm multiply by 0.001"),
         ({"modulus": 1e9, "damping": 39e9}, "damping", "write it in Pa s"),
     ],
@@ -51,7 +53,7 @@ def test_a_start_in_mm_is_told() -> None:
 
 
 def test_modes_that_no_robot_has_are_told_in_khz() -> None:
-    robot = with_cables(example("caroca"), area=0.04, modulus=1e12)
+    robot = with_cables(example("caroca"), area=1e-4, modulus=4e14)
     robot = replace(robot, platform=replace(robot.platform, mass=1.0))
     (error,) = implausible_units(robot, "robot.toml")
     assert "kHz" in error.problem and "modulus (Pa)" in error.hint
@@ -62,6 +64,23 @@ def test_a_soft_rope_with_much_damping_is_plausible() -> None:
     for modulus, area in ((2e8, 8e-6), (2e6, 8e-4), (5e5, 0.01), (1e13, 1e-6)):
         robot = with_cables(example("caroca"), modulus=modulus, damping=0.1 * modulus, area=area)
         assert list(implausible_units(robot, "robot.toml")) == []
+
+
+@pytest.mark.parametrize(("diameter", "load"), [(0.0005, 3.0), (0.002, 30.0), (0.004, 300.0), (0.008, 5000.0)])
+def test_a_diameter_is_told_where_its_area_is_not(diameter: float, load: float) -> None:
+    """Steel and polymer ropes of a table-top robot and of a hall."""
+    robot = example("caroca")
+    robot = replace(robot, platform=replace(robot.platform, mass=load * robot.cable_count / robot.gravity))
+    for modulus in (5e9, 1e11):
+        area = 0.25 * np.pi * diameter**2
+        assert list(implausible_units(with_cables(robot, modulus=modulus, area=area), "robot.toml")) == []
+        errors = list(implausible_units(with_cables(robot, modulus=modulus, area=diameter), "robot.toml"))
+        assert {error.where.split("].")[-1] for error in errors} == {"area"}
+
+
+def test_a_thick_rope_of_a_large_crane_is_plausible() -> None:
+    robot = replace(example("eight"), tension=TensionLimits(minimum=1e3, maximum=1e6, preferred=1e5))
+    assert list(implausible_units(with_cables(robot, modulus=1.1e11, area=1.66e-3), "robot.toml")) == []
 
 
 def test_a_file_in_gpa_is_told_by_check_and_trace_alike(tmp_path: Path) -> None:

@@ -10,6 +10,8 @@ from .schema import Cable, Robot
 
 MAX_MODULUS_IN_GPA = 1000.0  # of any fibre
 MAX_AREA = 0.05  # m^2, of a rope 25 cm thick
+# A rope thicker than 16 mm is there to carry more than this: else its area is a diameter.
+MIN_THICK_AREA, MIN_STRESS, MIN_STRAIN = 2e-4, 1e6, 2e-4  # m^2, Pa
 MAX_COORDINATE = 2000.0  # m
 MAX_RETARDATION = 2.0  # s, damping by modulus; polymer ropes have some 1e-2
 MAX_SIZE_RATIO = 10.0  # of the platform, by the distance from it to the farthest exit point
@@ -24,8 +26,10 @@ def implausible_units(robot: Robot, file: str) -> Iterator[RobotFileError]:
     pi``.
     """
     weight = robot.platform.mass * robot.gravity / robot.cable_count
-    cables = enumerate(robot.cables, 1)
-    errors = [error for number, cable in cables for error in _cable_errors(cable, number, weight, file)]
+    load = max(weight, robot.tension.preferred if robot.tension else 0.0)
+    errors = []
+    for number, cable in enumerate(robot.cables, 1):
+        errors += [*_cable_errors(cable, number, weight, file), *_diameter_errors(cable, number, load, file)]
     errors += _platform_errors(robot, file)
     yield from errors
     if any(abs(coordinate) > MAX_COORDINATE for coordinate in robot.platform.start):
@@ -60,6 +64,16 @@ def _cable_errors(cable: Cable, number: int, weight: float, file: str) -> Iterat
         yield _error(
             file, ("cable", number - 1, "anchor"), problem, "write it in m, if this is in mm multiply by 0.001"
         )
+
+
+def _diameter_errors(cable: Cable, number: int, load: float, file: str) -> Iterator[RobotFileError]:
+    """Error for an area that makes a stiff rope far too thick for its load, in N: it is probably the diameter."""
+    area, stress = cable.area, load / cable.area
+    if MIN_THICK_AREA < area <= MAX_AREA and 0.0 < stress < min(MIN_STRESS, MIN_STRAIN * cable.modulus):
+        thickness = 2e3 * math.sqrt(area / math.pi)
+        problem = f"is {area:g} m^2, a rope {thickness:.0f} mm thick, and some {load:.3g} N are all that it carries"
+        hint = f"write the area in m^2, if this is the diameter in m as {math.pi / 4.0 * area**2:.4g}"
+        yield _error(file, ("cable", number - 1, "area"), problem, hint)
 
 
 def _platform_errors(robot: Robot, file: str) -> Iterator[RobotFileError]:
