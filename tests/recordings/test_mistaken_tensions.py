@@ -114,6 +114,23 @@ def test_effects_are_not_taken_for_odd_load_cells(effects: dict[str, Any]) -> No
     assert recording_mistakes(robot, recorded("three", 3, effects)) == ()
 
 
+def test_cells_that_show_nothing_at_the_start_are_not_taken_for_tared_ones(recwarn: pytest.WarningsRecorder) -> None:
+    robot, recording = shipped("three")
+    halved = np.where(recording.time[:, None] > recording.time[0] + 1.0, 0.5 * recording.tension, np.nan)
+    assert recording_mistakes(robot, replace(recording, tension=halved)) == ()
+    assert not recwarn.list
+
+
+@pytest.mark.parametrize(
+    "order", [[2, 0, 1, 3, 4, 5, 6, 7], [1, 0, 3, 2, 4, 5, 7, 6], [3, 6, 0, 5, 1, 7, 2, 4]], ids=str
+)
+def test_any_order_of_eight_load_cells_is_told(order: list[int]) -> None:
+    robot, recording = shipped("eight")
+    (error,) = recording_mistakes(robot, replace(recording, tension=recording.tension[:, order]))
+    cells = ", ".join(f"tension_{order.index(cable) + 1}" for cable in range(8))
+    assert f"load cells of cables 1 to 8 are {cells}" in error.problem
+
+
 def test_load_cells_in_a_circle_are_told() -> None:
     robot, recording = shipped("caroca")
     (error,) = recording_mistakes(robot, replace(recording, tension=recording.tension[:, [1, 2, 0]]))

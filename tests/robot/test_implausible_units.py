@@ -59,6 +59,21 @@ def test_modes_that_no_robot_has_are_told_in_khz() -> None:
     assert "kHz" in error.problem and "modulus (Pa)" in error.hint
 
 
+def test_a_damping_ratio_that_no_robot_has_is_told() -> None:
+    robot = with_cables(example("caroca"), area=5e-6, modulus=1e11, damping=1.9e11)
+    robot = replace(robot, platform=replace(robot.platform, mass=1.0))
+    (error,) = implausible_units(robot, "robot.toml")
+    assert error.key_path == ("cable", 0, "damping") and "damping ratios of up to" in error.problem
+
+
+def test_a_modulus_in_gpa_and_an_area_in_mm2_are_both_told() -> None:
+    robot = with_cables(example("caroca"), modulus=100.0, area=3.0)
+    errors = list(implausible_units(robot, "robot.toml"))
+    hints = {error.key_path[-1]: error.hint for error in errors}
+    assert hints.keys() == {"modulus", "area"} and len(errors) == 2 * robot.cable_count
+    assert "in GPa as 1e+11" in hints["modulus"] and "in mm^2 as 3e-6" in hints["area"]
+
+
 def test_a_soft_rope_with_much_damping_is_plausible() -> None:
     """Polymer ropes, rubber, springs, and ropes as good as rigid: whoever has such a robot is not refused."""
     for modulus, area in ((2e8, 8e-6), (2e6, 8e-4), (5e5, 0.01), (1e13, 1e-6)):

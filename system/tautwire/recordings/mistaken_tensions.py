@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from itertools import combinations, permutations
 
@@ -98,7 +98,7 @@ def check_tensions(
 
 def _likely_orders(balance: ForceBalance) -> list[tuple[int, ...]]:
     """The declared order of load cells, or those that divide the misfit, whatever the unit, by the factor."""
-    orders = list(_orders(balance.has_load_cell))
+    orders = list(_orders(balance))
     misfits = [balance.misfit(order, balance.best_factor(order)) for order in orders]
     best = min(misfits)
     tells_cells_apart = float(np.std(balance.directions, axis=0).max()) > MIN_DIRECTION_DEVIATION
@@ -118,22 +118,39 @@ def _unit_readings(balance: ForceBalance, order: tuple[int, ...]) -> Iterator[Te
             yield TensionReading(unit, -1 if factor < 0.0 else 1, order)
 
 
-def _orders(has_load_cell: tuple[bool, ...]) -> Iterator[tuple[int, ...]]:
-    """Orders of the load cells, the declared one first: all of a few, else all with two swapped or all shifted."""
-    cells = [index for index, has in enumerate(has_load_cell) if has]
-    count = len(has_load_cell)
+def _orders(balance: ForceBalance) -> Iterator[tuple[int, ...]]:
+    """Orders of the load cells, the declared one first: all of a few, else what swapping two at a time leads to."""
+    cells = [index for index, has in enumerate(balance.has_load_cell) if has]
+    declared = tuple(range(len(balance.has_load_cell)))
     if len(cells) <= MAX_PERMUTED_CABLES:
-        for permuted in permutations(cells):
-            order = list(range(count))
-            for cell, source in zip(cells, permuted, strict=True):
-                order[cell] = source
-            yield tuple(order)
+        yield from (_with_cells(declared, cells, permuted) for permuted in permutations(cells))
         return
-    yield tuple(range(count))
-    for first, second in combinations(cells, 2):
-        order = list(range(count))
-        order[first], order[second] = second, first
-        yield tuple(order)
-    if len(cells) == count:
-        yield tuple(reversed(range(count)))
-        yield from (tuple((index + shift) % count for index in range(count)) for shift in range(1, count))
+    yield declared
+    shifted = (cells[shift:] + cells[:shift] for shift in range(len(cells)))
+    starts = [_with_cells(declared, cells, permuted) for permuted in (*shifted, cells[::-1])]
+    reached = dict.fromkeys(_best_by_swaps(balance, start, cells) for start in starts)
+    yield from (order for order in reached if order != declared)
+
+
+def _with_cells(order: tuple[int, ...], cells: Sequence[int], sources: Sequence[int]) -> tuple[int, ...]:
+    """The order with the load cells of some cables read from others."""
+    changed = list(order)
+    for cell, source in zip(cells, sources, strict=True):
+        changed[cell] = source
+    return tuple(changed)
+
+
+def _best_by_swaps(balance: ForceBalance, order: tuple[int, ...], cells: Sequence[int]) -> tuple[int, ...]:
+    """The order that steepest descent by swaps of two load cells reaches, with the least misfit whatever the unit."""
+
+    def misfit(order: tuple[int, ...]) -> float:
+        return balance.misfit(order, balance.best_factor(order))
+
+    least = misfit(order)
+    while True:
+        swapped = [_with_cells(order, pair, (order[pair[1]], order[pair[0]])) for pair in combinations(cells, 2)]
+        misfits = [misfit(each) for each in swapped]
+        if not min(misfits) < least:
+            return order
+        least = min(misfits)
+        order = swapped[misfits.index(least)]

@@ -86,10 +86,10 @@ def _tared(robot: Robot, recording: Recording, balance: ForceBalance) -> Iterato
     except InputError:
         return
     has_load_cell = np.array(balance.has_load_cell)
-    begins = np.nanmean(
-        recording.tension[recording.time <= recording.time[0] + TARED_DURATION][:, has_load_cell], axis=0
-    )
-    if not np.all(np.abs(begins) <= MAX_TARED_SHARE * static[has_load_cell]):
+    start = recording.tension[recording.time <= recording.time[0] + TARED_DURATION][:, has_load_cell]
+    if not np.isfinite(start).any(axis=0).all():
+        return
+    if not np.all(np.abs(np.nanmean(start, axis=0)) <= MAX_TARED_SHARE * static[has_load_cell]):
         return
     names = ", ".join(f"tension_{cell + 1}" for cell in np.flatnonzero(has_load_cell))
     texts = [f"{value:.4g}" for value in static[has_load_cell]]

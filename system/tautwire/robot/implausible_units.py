@@ -16,14 +16,16 @@ MAX_COORDINATE = 2000.0  # m
 MAX_RETARDATION = 2.0  # s, damping by modulus; polymer ropes have some 1e-2
 MAX_SIZE_RATIO = 10.0  # of the platform, by the distance from it to the farthest exit point
 MAX_FREQUENCY = 5000.0  # Hz, of a platform on ropes
+MAX_DAMPING_RATIO = 500.0  # of the highest mode
+DAMPING_HINT = "write it in Pa s, as modulus times the rope's time of retardation; 0.01 s is usual"
 
 
 def implausible_units(robot: Robot, file: str) -> Iterator[RobotFileError]:
     """Errors for numbers that no cable robot has, each with the unit that was probably meant.
 
     They are modulus, area, damping and anchors of the cables, and what makes a rigid platform larger than its frame;
-    where each alone is plausible, an upper bound of the highest modal frequency, ``sqrt(sum_i E_i A_i / L_i / m) / 2
-    pi``.
+    where each alone is plausible, an upper bound of the highest modal frequency, ``f = sqrt(sum_i E_i A_i / L_i / m) /
+    2 pi``, and of its damping ratio, ``pi f max_i eta_i / E_i``.
     """
     weight = robot.platform.mass * robot.gravity / robot.cable_count
     load = max(weight, robot.tension.preferred if robot.tension else 0.0)
@@ -41,7 +43,8 @@ def implausible_units(robot: Robot, file: str) -> Iterator[RobotFileError]:
 
 def _cable_errors(cable: Cable, number: int, weight: float, file: str) -> Iterator[RobotFileError]:
     modulus, area = cable.modulus, cable.area
-    if area <= MAX_AREA and modulus * area < weight:
+    area_in_m2 = area if area <= MAX_AREA else 1e-6 * area
+    if modulus * area_in_m2 < weight:
         unit, factor = ("GPa", 1e9) if modulus <= MAX_MODULUS_IN_GPA else ("MPa", 1e6)
         problem = (
             f"is {modulus:g} Pa, with which its share of the weight, {weight:.3g} N, would stretch it to the double"
@@ -52,8 +55,7 @@ def _cable_errors(cable: Cable, number: int, weight: float, file: str) -> Iterat
         problem = (
             f"is {cable.damping:g} Pa s, {cable.damping / modulus:.3g} s times the modulus, ropes have at most 2 s"
         )
-        hint = "write it in Pa s, as modulus times the rope's time of retardation; 0.01 s is usual"
-        yield _error(file, ("cable", number - 1, "damping"), problem, hint)
+        yield _error(file, ("cable", number - 1, "damping"), problem, DAMPING_HINT)
     if area > MAX_AREA:
         problem = f"is {area:g} m^2, ropes have at most {MAX_AREA:g}"
         yield _error(
@@ -107,6 +109,15 @@ def _stiffness_errors(robot: Robot, file: str) -> Iterator[RobotFileError]:
         )
         hint = "compare the units of mass (kg), modulus (Pa), area (m^2) and anchors (m)"
         yield _error(file, ("platform", "mass"), problem, hint)
+        return
+    times = [cable.damping / cable.modulus for cable in robot.cables]
+    ratio = math.pi * frequency * max(times)
+    if ratio > MAX_DAMPING_RATIO:
+        problem = (
+            f"is {max(times):.3g} s times the modulus, with which modes of up to {frequency:.3g} Hz have damping "
+            f"ratios of up to {ratio:.0f}, robots have at most {MAX_DAMPING_RATIO:.0f}"
+        )
+        yield _error(file, ("cable", times.index(max(times)), "damping"), problem, DAMPING_HINT)
 
 
 def _error(file: str, key_path: tuple[str | int, ...], problem: str, hint: str) -> RobotFileError:
