@@ -16,6 +16,7 @@ from tautwire.reports.downsampling import unpack_float32
 from tautwire.reports.modes_page import DRAWN_SWING_SHARE, modes_data, modes_page
 from tautwire.robot.schema import Robot
 from tests.support.pages import FETCHING, MAX_PAGE_BYTES, Page
+from tests.support.rigid_robots import suspended_robot
 from tests.support.robots import EXAMPLES, example
 from tests.support.traces import HOSTILE
 
@@ -102,6 +103,13 @@ def test_linearise_writes_the_page_beside_the_model(tmp_path: Path) -> None:
     assert command(["linearise", robot, "--out", str(model), "--report", str(model)]) == 2
 
 
-def test_page_of_eight_cables_stays_small() -> None:
-    robot, plant = plant_of("eight")
-    assert len(modes_page(robot, plant, {}).encode()) < MAX_PAGE_BYTES
+@pytest.mark.parametrize(
+    "robot", [example("eight"), example("cogiro"), suspended_robot(12)], ids=lambda each: each.name
+)
+def test_page_of_many_cables_stays_small_and_keeps_the_peaks(robot: Robot) -> None:
+    plant = linearise(robot)
+    content = modes_page(robot, plant, {})
+    assert len(content.encode()) < MAX_PAGE_BYTES
+    frequency = unpack_float32(Page(content).data()["frequency"])
+    assert len(frequency) >= 100
+    assert np.isclose(plant.modes.frequencies[:, None], frequency, rtol=1e-6).any(axis=1).all()

@@ -5,7 +5,18 @@ from __future__ import annotations
 import numpy as np
 from scipy.spatial.transform import Rotation
 
-from tautwire.reports.robot_scene import RobotScene, hull_edges, measured_path, pack_columns, scene_data
+from tautwire.reports.check_figures import robot_scene
+from tautwire.reports.robot_scene import (
+    MAX_SCENE_NUMBERS,
+    RobotScene,
+    frame_indices,
+    hull_edges,
+    measured_path,
+    pack_columns,
+    scene_data,
+)
+from tests.support.rigid_robots import suspended_robot
+from tests.support.rigid_runs import made_rigid_recording
 
 TIME = 0.02 * np.arange(60)
 
@@ -42,3 +53,17 @@ def test_cables_of_a_body_end_at_its_attachments() -> None:
     assert len(data["edges"]) == 12
     assert data["attachments"] == [pack_columns(attachments[:, cable]) for cable in range(8)]
     assert scene_data(RobotScene(np.arange(2.0), np.zeros((2, 3)), np.zeros((2, 8)), ()))["edges"] == []
+
+
+def test_a_scene_has_fewer_frames_where_each_holds_more_and_both_ends() -> None:
+    counts = [len(frame_indices(5000, 2, cables, has)) for cables, has in ((3, False), (12, False), (12, True))]
+    assert counts[0] == 900 and counts[0] > counts[1] > counts[2] > 250
+    frames = frame_indices(5000, 2, 12, True)
+    assert (frames[0], frames[-1]) == (0, 4999)
+
+
+def test_attachments_are_within_the_budget_of_a_scene() -> None:
+    scene = robot_scene(suspended_robot(12), made_rigid_recording(suspended_robot(12), 4000))
+    assert scene.attachments is not None
+    drawn = [scene.time, scene.platform, scene.tension, scene.attachments, *(path.points for path in scene.paths)]
+    assert sum(each.size for each in drawn) <= MAX_SCENE_NUMBERS

@@ -15,8 +15,11 @@ from tautwire.cosimulation.robot_wiring import result_columns
 from tautwire.reports.downsampling import unpack_float32
 from tautwire.reports.run_overview import RunOverview
 from tautwire.reports.run_page import run_page
+from tautwire.robot.schema import Robot
 from tests.support.pages import FETCHING, MAX_PAGE_BYTES, Page
-from tests.support.robots import EXAMPLES
+from tests.support.rigid_robots import suspended_robot
+from tests.support.rigid_runs import made_rigid_run
+from tests.support.robots import EXAMPLES, example
 from tests.support.traces import HOSTILE, made_run
 
 THREE = EXAMPLES / "three"
@@ -179,6 +182,15 @@ def test_page_of_a_long_run_stays_small_and_keeps_peaks(eight: bool) -> None:
     assert position["unit"] == "mm"
     assert (drawn.min(), drawn.max()) == pytest.approx((1e3 * low, 1e3 * high), rel=1e-6)
     assert len(drawn) == len(unpack_float32(position["time"]))
+
+
+@pytest.mark.parametrize("robot", [example("cogiro"), suspended_robot(12)], ids=lambda each: each.name)
+def test_page_of_a_rigid_platform_on_many_cables_stays_small(robot: Robot) -> None:
+    content = run_page(made_rigid_run(robot, 4000), {})
+    assert len(content.encode()) < MAX_PAGE_BYTES
+    scene = Page(content).data()["choices"][0]["scene"]
+    assert len(scene["attachments"]) == robot.cable_count
+    assert len(unpack_float32(scene["time"])) >= 250
 
 
 def test_a_tracker_slower_than_the_log_is_drawn_as_lines() -> None:

@@ -17,12 +17,11 @@ from ..recordings.sensor_gaps import bridge_short_gaps
 from ..robot.cable_routes import attachment_points
 from ..robot.schema import Robot
 from .downsampling import envelope_times, evenly_spaced_indices, min_max_envelope, pack_float32
-from .robot_scene import RobotScene, ScenePath
+from .robot_scene import RobotScene, ScenePath, frame_indices
 
 Array = NDArray[np.float64]
 
 MAX_POINTS, MAX_NUMBERS = 2000, 60_000  # per curve, and in all curves of a page, which so weighs at most 1.5 MB
-MAX_PATH_POINTS = 900
 
 
 @dataclass(frozen=True)
@@ -71,7 +70,7 @@ def robot_scene(robot: Robot, recording: Recording | None) -> RobotScene:
         platform = np.array([robot.platform.start], dtype=float)
         nothing = np.full((1, robot.cable_count), np.nan)
         return RobotScene(np.zeros(1), platform, nothing, (), attachments=_attachments(robot, unturned(platform)))
-    rows = evenly_spaced_indices(recording.sample_count, MAX_PATH_POINTS)
+    rows = frame_indices(recording.sample_count, 1, robot.cable_count, robot.platform.is_rigid_body)
     position, orientation = GeometryReading().positions(robot, recorded_poses(recording)), recording.orientation
     platform = bridge_short_gaps(recording.time, position)[rows]
     turned = unit_quaternions(bridge_short_gaps(recording.time, orientation))[rows]

@@ -44,7 +44,8 @@ SWING_AMPLITUDE = 1e-3  # m, for which the change of tension is stated
 DRAWN_SWING_SHARE = 0.08  # of the robot's size, as drawn
 FRAME_COUNT = 73
 PLAYBACK_PERIOD = 2.0  # s, playback time of one period
-FREQUENCY_POINTS = 300
+MAX_GAIN_NUMBERS = 70_000  # in all gain curves of a page, which so weighs at most 1.5 MB
+MAX_FREQUENCY_POINTS, MIN_FREQUENCY_POINTS = 300, 50  # per curve, beside the modes
 FREQUENCY_MARGIN_FACTOR = 5.0
 
 
@@ -102,11 +103,19 @@ def _mode_data(robot: Robot, plant: LinearPlant, mode: int) -> dict[str, Any]:
 
 def _frequency_grid(plant: LinearPlant) -> Array:
     """Frequency grid in Hz around the modes, including the modal frequencies, where gains peak."""
-    modes = plant.modes.frequencies
-    around = np.geomspace(
-        modes.min() / FREQUENCY_MARGIN_FACTOR, modes.max() * FREQUENCY_MARGIN_FACTOR, FREQUENCY_POINTS
-    )
+    modes, curve_count = plant.modes.frequencies, 2 * len(_drawn_outputs(plant)) * plant.system.ninputs
+    points = int(np.clip(MAX_GAIN_NUMBERS // curve_count, MIN_FREQUENCY_POINTS, MAX_FREQUENCY_POINTS))
+    around = np.geomspace(modes.min() / FREQUENCY_MARGIN_FACTOR, modes.max() * FREQUENCY_MARGIN_FACTOR, points)
     return np.union1d(around, modes)
+
+
+def _drawn_outputs(plant: LinearPlant) -> list[tuple[int, str]]:
+    """Indices and names of the outputs whose gains are drawn."""
+    return [
+        (index, name)
+        for index, name in enumerate(plant.system.output_labels)
+        if name.rpartition("_")[0] in GAIN_OUTPUT_TITLES
+    ]
 
 
 def _gains_data(plant: LinearPlant, frequency: Array) -> list[dict[str, Any]]:
@@ -118,8 +127,7 @@ def _gains_data(plant: LinearPlant, frequency: Array) -> list[dict[str, Any]]:
             "label": signal_label(name),
             "from": [_gain_data(system, response, output_index, input_index) for input_index in range(system.ninputs)],
         }
-        for output_index, name in enumerate(system.output_labels)
-        if name.rpartition("_")[0] in GAIN_OUTPUT_TITLES
+        for output_index, name in _drawn_outputs(plant)
     ]
 
 

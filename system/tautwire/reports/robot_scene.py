@@ -11,12 +11,13 @@ from numpy.typing import NDArray
 from scipy.spatial import ConvexHull
 
 from ..recordings.sensor_gaps import bridge_short_gaps
-from .downsampling import pack_float32
+from .downsampling import evenly_spaced_indices, pack_float32
 
 Array = NDArray[np.float64]
 
 # s; a longer run is played faster.
 MAX_PLAYBACK_TIME = 60.0
+MAX_FRAMES, MAX_SCENE_NUMBERS = 900, 20_000  # of a scene, whose page so weighs at most 1.5 MB
 MAGNIFICATIONS = (1, 10, 100, 1000)
 # Deviations are magnified until the largest reaches this share of the robot's size, or of the path's extent.
 MAX_SHARE_OF_ROBOT_SIZE, MAX_SHARE_OF_PATH_SIZE = 0.03, 0.15
@@ -51,6 +52,15 @@ class RobotScene:
     measured_tension: Array | None = None
     magnification: int = 1
     attachments: Array | None = None
+
+
+def frame_indices(
+    sample_count: int, path_count: int, cable_count: int, has_attachments: bool = False
+) -> NDArray[np.int64]:
+    """Indices of the samples that become frames of a scene, spread evenly, so many as a page can hold."""
+    # Time, platform and paths; tensions of model and load cells, and attachments.
+    numbers_per_frame = 1 + 3 * (1 + path_count) + (5 if has_attachments else 2) * cable_count
+    return evenly_spaced_indices(sample_count, min(MAX_FRAMES, MAX_SCENE_NUMBERS // numbers_per_frame))
 
 
 def fill_unmeasured(points: Array, path: Array) -> Array:

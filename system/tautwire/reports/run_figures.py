@@ -17,12 +17,13 @@ from ..number_format import PAGE_UNITS, choose_unit, digits_for_range, format_si
 from ..recordings.sensor_gaps import bridge_short_gaps
 from ..robot.active_effects import attachments
 from ..robot.schema import AXES
-from .downsampling import envelope_times, evenly_spaced_indices, min_max_envelope, pack_float32
+from .downsampling import envelope_times, min_max_envelope, pack_float32
 from .robot_scene import (
     MAGNIFICATIONS,
     RobotScene,
     ScenePath,
     deviation_magnification,
+    frame_indices,
     measured_path,
     scene_data,
 )
@@ -34,7 +35,6 @@ Array = NDArray[np.float64]
 FIXED_UNITS = dict(PAGE_UNITS.values())
 MAX_SERIES_NUMBERS = 90_000  # in all curves of a page, times included, which so weighs at most 1.5 MB
 MAX_SERIES_POINTS, MIN_SERIES_POINTS = 3000, 300  # per curve
-MAX_PATH_POINTS = 900
 
 
 @dataclass(frozen=True)
@@ -170,8 +170,8 @@ def _range_texts(values: Array, digits: int) -> list[str]:
 
 def _run_scene(run: ReportedRun) -> RobotScene:
     """The scene of the run, with the recorded path beside the co-simulated one."""
-    overview, recording, magnification = run.overview, run.recording, 1
-    row_indices = evenly_spaced_indices(len(overview.rows), MAX_PATH_POINTS)
+    overview, recording, robot, magnification = run.overview, run.recording, run.robot, 1
+    row_indices = frame_indices(len(overview.rows), 2, robot.cable_count, robot.platform.is_rigid_body)
     rows = overview.rows[row_indices]
     recorded_rows = np.minimum(np.arange(len(overview.rows)) * overview.group_size, recording.sample_count - 1)
     sample_indices = recorded_rows[row_indices]
@@ -181,13 +181,11 @@ def _run_scene(run: ReportedRun) -> RobotScene:
     if recording.has_position:
         measured = measured_path(overview.time, recording.position[recorded_rows], path)[row_indices]
         paths.insert(0, ScenePath("recorded", measured, "before", 2, "dot"))
-        magnification = deviation_magnification(np.array(run.robot.anchors), platform, [measured - platform])
+        magnification = deviation_magnification(np.array(robot.anchors), platform, [measured - platform])
     return RobotScene(
         time=run.overview.time[row_indices],
         platform=platform,
-        tension=_columns_by_name(
-            rows, run.column_indices("tension_", run.robot.cable_numbers), run.robot.cable_numbers
-        ),
+        tension=_columns_by_name(rows, run.column_indices("tension_", robot.cable_numbers), robot.cable_numbers),
         paths=tuple(paths),
         measured_tension=recording.tension[sample_indices] if recording.has_tension else None,
         magnification=magnification,

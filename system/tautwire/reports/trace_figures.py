@@ -14,7 +14,6 @@ from ..number_format import format_significant
 from ..recordings.sensor_gaps import bridge_short_gaps
 from .downsampling import (
     envelope_times,
-    evenly_spaced_indices,
     min_max_envelope,
     pack_float32,
     residual_spectra,
@@ -27,6 +26,7 @@ from .robot_scene import (
     ScenePath,
     deviation_magnification,
     fill_unmeasured,
+    frame_indices,
     measured_path,
     scene_data,
 )
@@ -36,7 +36,6 @@ Array = NDArray[np.float64]
 
 MAX_RESIDUAL_POINTS = 40_000  # in all residual curves of a page, which so weighs at most 1.5 MB
 MAX_CURVE_POINTS, MIN_CURVE_POINTS = 3000, 400  # per curve
-MAX_PATH_POINTS, MAX_SCENE_NUMBERS = 900, 20_000  # in the scene of a recording
 ROLE_LABELS = {"fit": "Fit recording", "check": "Check recording"}
 
 
@@ -133,8 +132,7 @@ def _spectrum_data(time: Array, before: Array, after: Array, sigma: float) -> di
 def _trace_scene(trace: Trace, comparison: Comparison) -> RobotScene:
     """The scene of the extended model's run, with the paths of the declared model and of the recording."""
     recording = comparison.recording
-    column_count = 13 + 2 * trace.robot_after.cable_count  # time, platform, three paths, tensions of model and cells
-    indices = evenly_spaced_indices(recording.time.size, min(MAX_PATH_POINTS, MAX_SCENE_NUMBERS // column_count))
+    indices = frame_indices(recording.time.size, 3, trace.robot_after.cable_count)
     paths = [
         ScenePath("before", comparison.before.position[indices], "before", 4),
         ScenePath("after", comparison.after.position[indices], "accent", 5),
