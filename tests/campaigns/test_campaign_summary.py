@@ -13,7 +13,13 @@ import pytest
 from scipy.stats import norm
 
 from tautwire.campaigns.campaign_dataset import PartWriter, open_dataset, read_rows
-from tautwire.campaigns.campaign_figures import quantile_bands
+from tautwire.campaigns.campaign_figures import (
+    MAX_CURVE_NUMBERS,
+    QuantileBands,
+    _band_data,
+    _curve_points,
+    quantile_bands,
+)
 from tautwire.campaigns.campaign_heat_map import sobol_heat_maps
 from tautwire.campaigns.campaign_page import _sobol_rows
 from tautwire.campaigns.campaign_plan import Plan
@@ -200,6 +206,26 @@ def test_bands_of_positions_are_drawn_in_mm_about_their_median(tmp_path: Path) -
     assert (drawn["label"], drawn["unit"]) == ("z", "mm")
     for name, expected in (("low", low - middle), ("middle", middle), ("high", high - middle)):
         assert unpack_float32(drawn[name]) == pytest.approx(1e3 * expected, rel=1e-5)
+
+
+@pytest.mark.parametrize("count", [0, 9, 3000])
+def test_bands_of_long_paths_are_drawn_at_few_points_with_both_ends_and_their_full_width(count: int) -> None:
+    time, spread = np.linspace(0.0, 9.0, count), np.zeros(count)
+    spread[count // 2 :: 1 + count] = 1.0
+    bands = QuantileBands(time, {"tension_1": np.stack([-spread, 0.0 * time, spread])} if count else {}, 64)
+    drawn = _band_data(bands, ["tension_1"], 100)
+    times, (band,) = unpack_float32(drawn["time"]), drawn["bands"]
+    assert len(times) == min(count, 100)
+    if count:
+        assert (times[0], times[-1], band["width"]) == (0.0, 9.0, "2.00")
+        assert all(len(unpack_float32(band[name])) == len(times) for name in ("low", "middle", "high"))
+
+
+def test_all_bands_and_all_outputs_over_a_grid_stay_within_their_budget(tmp_path: Path) -> None:
+    plan = read(tmp_path, moving(64))
+    band_points, grid_points = _curve_points(plan, 19, 51)
+    assert 2 * band_points * (1 + 3 * 19) <= MAX_CURVE_NUMBERS and 2 * grid_points * 53 <= MAX_CURVE_NUMBERS
+    assert _curve_points(plan, 1, 1)[1] == 2000
 
 
 def test_the_heat_map_has_outputs_over_inputs_and_takes_the_total_where_it_is_known() -> None:

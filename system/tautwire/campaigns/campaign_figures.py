@@ -26,7 +26,8 @@ MAX_BAND_RUNS = 4000
 BAND_QUANTILE_LEVELS = (0.025, 0.5, 0.975)
 
 MAX_HISTOGRAM_BINS = 40
-MAX_GRID_POINTS = 2000
+MAX_CURVE_NUMBERS = 50_000  # in all bands of a page, and in all outputs over a grid
+MAX_GRID_POINTS, MIN_CURVE_POINTS = 2000, 50
 
 
 @dataclass(frozen=True)
@@ -76,16 +77,16 @@ class CampaignResults:
 
 def figure_data(plan: Plan, cable_count: int, results: CampaignResults) -> dict[str, Any]:
     """Quantile bands and histograms of each path with each controller, packed for the page."""
-    is_grid = plan.method == "grid"
+    is_grid, names = plan.method == "grid", series_columns(cable_count, plan.is_rigid)
+    band_points, grid_points = _curve_points(plan, len(names), len(numeric_outputs(results.columns)))
     variants = []
     for variant, (path, controller, rows) in enumerate(rows_by_variant(plan, results.rows)):
-        thinned_rows = rows.take(pa.array(evenly_spaced_indices(rows.num_rows, MAX_GRID_POINTS)))
+        thinned_rows = rows.take(pa.array(evenly_spaced_indices(rows.num_rows, grid_points)))
         spreads = [each for each in results.summary.spreads if (each.path, each.controller) == (path, controller)]
         quantiles = {each.name: each.quantiles for each in spreads}
         bands: dict[str, Any] = {"time": "", "bands": []}
         if plan.paths and plan.compute.series > 1:
-            names = series_columns(cable_count, plan.is_rigid)
-            bands = _band_data(quantile_bands(plan, results.folder, variant, names), names)
+            bands = _band_data(quantile_bands(plan, results.folder, variant, names), names, band_points)
         outputs = [
             _spread_data(rows, thinned_rows, each, quantiles, is_grid) for each in numeric_outputs(results.columns)
         ]
@@ -94,6 +95,13 @@ def figure_data(plan: Plan, cable_count: int, results: CampaignResults) -> dict[
     axes = [{"label": _axis_label(each), "place": place} for place, each in enumerate(plan.inputs)]
     # The scripts that all pages share read choices; those of campaigns read variants.
     return {"choices": [], "variants": variants, "inputs": axes}
+
+
+def _curve_points(plan: Plan, channel_count: int, output_count: int) -> tuple[int, int]:
+    """Points of each band and of each output over a grid, so many as a page can hold for all variants."""
+    numbers = MAX_CURVE_NUMBERS // len(plan.variants)
+    band_points, grid_points = numbers // (1 + 3 * channel_count), numbers // max(1, output_count + len(plan.inputs))
+    return max(MIN_CURVE_POINTS, band_points), int(np.clip(grid_points, MIN_CURVE_POINTS, MAX_GRID_POINTS))
 
 
 def _axis_label(varied: Input) -> str:
@@ -132,15 +140,19 @@ def channel_description(name: str) -> tuple[str, str, str]:
     return ("Orientation", name, "1") if name in ORIENTATION_COLUMNS else ("Position", name, "m")
 
 
-def _band_data(bands: QuantileBands, names: Sequence[str]) -> dict[str, Any]:
+def _band_data(bands: QuantileBands, names: Sequence[str], max_points: int) -> dict[str, Any]:
+    points = evenly_spaced_indices(bands.time.size, max_points)
     return {
-        "time": pack_float32(bands.time),
-        "bands": [_channel_data(name, bands.quantiles.get(name)) for name in names],
+        "time": pack_float32(bands.time[points]),
+        "bands": [_channel_data(name, bands.quantiles.get(name), points) for name in names],
     }
 
 
-def _channel_data(name: str, quantiles: Array | None) -> dict[str, Any]:
-    """A channel's median, and its band as distances from it: beside a long way float32 would round a narrow band."""
+def _channel_data(name: str, quantiles: Array | None, points: NDArray[np.int64]) -> dict[str, Any]:
+    """A channel's median, and its band as distances from it: beside a long way float32 would round a narrow band.
+
+    Both are drawn at some ``points``; the ``width`` is the largest at any time.
+    """
     title, label, si_unit = channel_description(name)
     unit, unit_size = page_unit(si_unit)
     description = {"title": title, "label": label, "unit": unit}
@@ -149,9 +161,9 @@ def _channel_data(name: str, quantiles: Array | None) -> dict[str, Any]:
     low, middle, high = quantiles / unit_size
     return {
         **description,
-        "low": pack_float32(low - middle),
-        "middle": pack_float32(middle),
-        "high": pack_float32(high - middle),
+        "low": pack_float32((low - middle)[points]),
+        "middle": pack_float32(middle[points]),
+        "high": pack_float32((high - middle)[points]),
         "width": format_significant(float(np.nanmax(high - low))),
     }
 
