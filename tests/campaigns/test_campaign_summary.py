@@ -31,8 +31,9 @@ from tautwire.campaigns.input_sampling import draw_samples
 from tautwire.campaigns.trace_summary import summarise_traces
 from tautwire.errors import InputError
 from tautwire.number_format import format_on_page
+from tautwire.reports import inline_charts as charts
 from tautwire.reports.downsampling import unpack_float32
-from tautwire.reports.page_rendering import HeatCell
+from tautwire.reports.page_rendering import HeatCell, Number
 from tests.support.campaigns import AT_REST, moving, read
 from tests.support.pages import FETCHING, MAX_PAGE_BYTES, Page
 from tests.support.traces import HOSTILE
@@ -292,6 +293,18 @@ def test_the_page_names_the_inputs_that_make_much_of_an_output(tmp_path: Path) -
     assert section.count("<tr") - 1 == len(shown)
     for each in shown:
         assert each["output"].replace("_", " ") in section and f"{each['total']:.2f} \N{PLUS-MINUS SIGN}" in section
+
+
+def test_the_table_of_indices_has_a_dash_for_one_whose_interval_contains_0() -> None:
+    by_interactions = SobolIndices("", "", "out", "gravity", 0.01, 0.1, 0.6, 0.1)
+    by_itself = SobolIndices("", "", "out", "cable.area", 0.3, 0.1, 0.2, 0.3)
+    unsure = SobolIndices("", "", "out", "platform.mass", 0.4, 0.5, 0.04, 0.01)
+    rows = _sobol_rows([by_itself, by_interactions, unsure])["at rest"]
+    plus_minus = "\N{PLUS-MINUS SIGN}"
+    assert rows == [
+        ["out", "gravity", Number("-"), "", Number(f"0.60 {plus_minus} 0.10")],
+        ["out", "cable.area", Number(f"0.30 {plus_minus} 0.10"), charts.bar(0.3, 1.0), Number("-")],
+    ]
 
 
 def test_an_output_that_depends_on_no_input_says_so(tmp_path: Path) -> None:

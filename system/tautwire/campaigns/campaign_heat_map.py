@@ -48,7 +48,7 @@ def sobol_heat_maps(dependences: Sequence[SobolIndices]) -> list[HeatMap]:
 
 def _heat_cell(each: SobolIndices, is_total: bool) -> HeatCell:
     """An index on a ground by its size; a dash where its interval contains 0."""
-    index, width = (each.total or 0.0, each.total_width or 0.0) if is_total else (each.first, each.first_width)
-    if not index > width:
+    if not (each.is_total_significant if is_total else each.is_first_significant):
         return HeatCell(ABSENT_TEXT, 0)
+    index = (each.total or 0.0) if is_total else each.first
     return HeatCell(f"{index:.2f}", bisect_right(LEVEL_BOUNDS, round(index, 2)))

@@ -9,6 +9,7 @@ from typing import Any
 import pyarrow as pa
 
 from ..number_format import (
+    ABSENT_TEXT,
     digits_for_range,
     format_engineering,
     format_on_page,
@@ -189,17 +190,22 @@ def _sobol_rows(dependences: Sequence[SobolIndices]) -> dict[str, list[Row]]:
 
 
 def _largest_index(each: SobolIndices) -> float:
-    return max(each.first, each.total or 0.0)
+    """The largest of the indices whose intervals exclude 0."""
+    return max(
+        each.first if each.is_first_significant else 0.0, (each.total or 0.0) if each.is_total_significant else 0.0
+    )
 
 
 def _sobol_row(each: SobolIndices) -> Row:
-    known = each.total is not None and each.total_width is not None
+    """The indices with their half-widths, dashes for those whose intervals contain 0."""
+    first = f"{each.first:.2f} ± {each.first_width:.2f}" if each.is_first_significant else ABSENT_TEXT
+    total = f"{each.total:.2f} ± {each.total_width:.2f}" if each.is_total_significant else ABSENT_TEXT
     return [
         column_label(each.output),
         each.input,
-        Number(f"{each.first:.2f} ± {each.first_width:.2f}"),
-        charts.bar(max(0.0, min(each.first, 1.0)), 1.0),
-        Number(f"{each.total:.2f} ± {each.total_width:.2f}") if known else "",
+        Number(first),
+        charts.bar(min(each.first, 1.0), 1.0) if each.is_first_significant else "",
+        "" if each.total is None else Number(total),
     ]
 
 

@@ -82,7 +82,17 @@ class SobolIndices:
     @property
     def is_significant(self) -> bool:
         """Whether the interval of an index excludes 0."""
-        return self.first > self.first_width or (self.total or 0.0) > (self.total_width or 0.0)
+        return self.is_first_significant or self.is_total_significant
+
+    @property
+    def is_first_significant(self) -> bool:
+        """Whether the interval of the first-order index excludes 0."""
+        return self.first > self.first_width
+
+    @property
+    def is_total_significant(self) -> bool:
+        """Whether there is a total-order index, and its interval excludes 0."""
+        return self.total is not None and self.total > (self.total_width or 0.0)
 
 
 @dataclass(frozen=True)
