@@ -11,6 +11,7 @@ pytest.importorskip("selenium", reason="the pages are not tried in a browser: se
 
 from tautwire.campaigns.campaign_runner import write_summary
 from tests.campaigns.test_campaign_summary import GRID, written
+from tests.reports.test_legibility_in_browser import BEYOND_PAPER, PAPER_WIDTH
 from tests.support.browser.browser import LAPTOP, MISSING, PHONE_DARK, Browser, Screen, chromium
 from tests.support.campaigns import AT_REST, moving
 
@@ -23,13 +24,22 @@ DRAW_ALL = "window.dispatchEvent(new Event('beforeprint'))"
 INDICES = AT_REST.replace('"sobol"\ncount = 8', '"saltelli"\ncount = 16').replace(
     "cable.modulus = {normal = [1.022e11, 2.2e9]}", '"cable[*].anchor[*]" = {normal = [40.0, 0.1]}'
 )
+# More inputs than a heat map on paper has room for beside each other.
+MANY = INDICES + "".join(
+    f'"{key}" = {{normal = [40.0, 0.1]}}\n'
+    for key in ("cable[*].modulus", "cable[*].area", "cable[*].damping", "platform.start[*]", "gravity")
+)
+# Cells of heat maps whose words do not fit in them, as far as they are seen.
+OVERFLOWING = """return [...document.querySelectorAll('table.heat :is(thead th, tbody th, td, .heat-cell)')]
+  .filter((each) => !each.closest('.many thead') && each.scrollWidth > each.clientWidth + 1)
+  .map((each) => each.outerHTML)"""
 MEDIANS = "return document.querySelector('figure[data-kind=band] .plot').data[2].y"
 
 
 @pytest.fixture(scope="module", params=["path", "grid", "indices"])
 def page(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """The page of samples along a path, that of a grid at rest, and one with Sobol indices of many inputs."""
-    texts = {"path": moving(64), "grid": GRID, "indices": INDICES}
+    """The page of samples along a path, that of a grid at rest, and those with Sobol indices of ten and more inputs."""
+    texts = {"path": moving(64), "grid": GRID, "indices": INDICES, "many": MANY}
     plan, out = written(tmp_path_factory.mktemp(request.param), texts[request.param])
     write_summary(plan, out)
     return out / "index.html"
@@ -92,6 +102,16 @@ def test_numbers_of_the_heat_map_can_be_read_on_every_ground(browser: Browser, p
         text, ground = colours_of(browser, f"{cell}.color", f"{cell}.backgroundColor")
         assert contrast(text, ground) >= 4.5, level
     assert browser.run("return document.querySelectorAll('table.heat .heat-cell').length") == 100
+
+
+@pytest.mark.parametrize("page", ["path", "grid", "indices", "many"], indirect=True)
+def test_nothing_of_a_campaign_is_cut_on_paper(browser: Browser, page: Path) -> None:
+    browser.show(LAPTOP)
+    browser.open(page)
+    browser.show_as_printed(PAPER_WIDTH)
+    beyond, is_shrunk = browser.run(BEYOND_PAPER, PAPER_WIDTH)
+    assert beyond == [] and is_shrunk
+    assert browser.run(OVERFLOWING) == []
 
 
 @pytest.mark.parametrize("page", ["path", "grid"], indirect=True)
