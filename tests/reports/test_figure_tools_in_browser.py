@@ -128,6 +128,25 @@ def test_figures_over_time_zoom_together_and_return(browser: Browser, pages: dic
     browser.wait(lambda: browser.run(DRAW_ALL) or browser.run(SPANS) == whole, "the zoom to be undone")
 
 
+def test_what_was_read_over_time_zooms_together_and_what_is_over_travel_stays(
+    browser: Browser, pages: dict[str, Path]
+) -> None:
+    opened(browser, pages["check"]).run(DRAW_ALL)
+    script = """return [...document.querySelectorAll('.panel > .plot.js-plotly-plot')]
+      .map((plot) => [plot._fullLayout.xaxis.title.text, plot._fullLayout.xaxis.range])"""
+    before = browser.run(script)
+    first = "document.querySelector('figure[data-kind=check] > .plot')"
+    browser.run(f"return Plotly.relayout({first}, {{ 'xaxis.range[0]': 2, 'xaxis.range[1]': 3 }})")
+    browser.run(DRAW_ALL)
+    after = browser.run(script)
+    assert {title for title, _ in after} == {"Time (s)", "Reeled in (mm)"} and len(after) == 9
+    for (title, span), (_, whole) in zip(after, before, strict=True):
+        assert span == ([2, 3] if title == "Time (s)" else whole)
+    browser.run(PRESS.format("figure[data-kind=check]", ":last-child"))
+    browser.run(DRAW_ALL)
+    assert browser.run(script) == before
+
+
 def test_another_recording_is_shown_whole(browser: Browser, pages: dict[str, Path]) -> None:
     opened(browser, pages["trace"]).see(RESIDUAL)
     browser.run("showSpan([5, 6])")

@@ -1,4 +1,4 @@
-// What was read of a recording: measured curves, and what the robot file makes of others.
+// What was read of a recording: measured curves, and what the robot file makes of others, over time or over travel.
 
 panelKinds.check = (choice, place) => {
   const { title, label, unit, xTitle, curves, range, numbers } = choice.channels[place];
@@ -13,3 +13,5 @@ panelKinds.check = (choice, place) => {
   const words = `${title}, ${label}: from ${range[0]} to ${range[1]} ${unit}; ${numbers}.`;
   return { numbers, words, traces, layout: layout(colour, axes) };
 };
+
+panelKinds.travel = panelKinds.check;

@@ -1,6 +1,6 @@
 // Zooming: the figures over time show the same span; a double click undoes the zoom.
 
-const overTime = ["residual", "output", "compared", "band"]
+const overTime = ["residual", "output", "compared", "band", "check"]
   .map((kind) => `figure[data-kind=${kind}]`).join(", ");
 
 /** Show a span of time in all figures over time, or all of it without one; ``zoomed`` shows it already. */
