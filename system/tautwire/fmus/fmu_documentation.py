@@ -30,6 +30,7 @@ LAWS: Mapping[str, ModuleType] = {
 TABLES = {"Inputs": "input", "Outputs": "output", "Parameters": "parameter", "States": "local"}
 # What travels inside an FMU of Python.
 LICENSED_PACKAGES = ("tautwire", "pythonfmu")
+ICON_PATHS = {"2.0": "model.png", "3.0": "terminalsAndIcons/icon.png"}
 CODE_PATTERN = re.compile(r"(?::\w+:)?(`{1,2})~?(.+?)\1", re.DOTALL)
 
 
@@ -39,14 +40,14 @@ def documentation_files(
     description: ModelDescription,
     packages: tuple[str, ...] = LICENSED_PACKAGES,
 ) -> dict[str, bytes]:
-    """Contents by path in the archive: ``documentation/index.html``, the licenses, and the icon ``model.png``.
+    """Contents by path in the archive: ``documentation/index.html``, the licenses, and the icon where FMI has it.
 
     ``kind`` is a key of :data:`LAWS`, ``data`` the resource of the FMU, ``packages`` those whose code is in it.
     """
     return {
         "documentation/index.html": documentation_page(kind, data, description).encode("utf-8"),
         "documentation/licenses/license.txt": license_text(packages).encode("utf-8"),
-        "model.png": files(__package__).joinpath(f"icons/{kind}.png").read_bytes(),
+        ICON_PATHS[_fmi_version(description)]: files(__package__).joinpath(f"icons/{kind}.png").read_bytes(),
     }
 
 
@@ -56,6 +57,7 @@ def documentation_page(kind: str, data: Mapping[str, Any], description: ModelDes
     return _template().render(
         name=description.modelName,
         description=description.description,
+        fmi_version=_fmi_version(description),
         tool=description.generationTool,
         component_blocks=_text_blocks(_slave_docstring(kind)),
         law=data.get("law"),
@@ -83,6 +85,10 @@ def _template() -> Template:
     loader = PackageLoader("tautwire.fmus")
     environment = Environment(loader=loader, autoescape=True, undefined=StrictUndefined, trim_blocks=True)
     return environment.get_template("fmu.html.jinja")
+
+
+def _fmi_version(description: ModelDescription) -> str:
+    return "3.0" if str(description.fmiVersion).startswith("3.") else "2.0"
 
 
 def _package_license(package: str) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import shutil
 import subprocess
 import zipfile
@@ -12,6 +13,7 @@ import numpy as np
 import pytest
 from fmpy.fmi3 import FMU3Slave
 from fmpy.validation import validate_fmu
+from PIL import Image
 
 from tautwire.cosimulation.robot_cosimulation import cosimulate
 from tautwire.errors import ArgumentError
@@ -51,6 +53,27 @@ def test_variables_are_the_same_and_time_is_behind_them(both_versions: tuple[Rob
 
 def test_nothing_is_wrong_with_them(both_versions: tuple[RobotFmus, RobotFmus]) -> None:
     assert [validate_fmu(str(path)) for path in both_versions[1].paths] == [[]] * 7
+
+
+def test_documentation_licenses_and_icon_lie_where_each_version_has_them(
+    both_versions: tuple[RobotFmus, RobotFmus],
+) -> None:
+    for fmus, version, icon_path in zip(
+        both_versions, ("2.0", "3.0"), ("model.png", "terminalsAndIcons/icon.png"), strict=True
+    ):
+        for path in fmus.paths:
+            with zipfile.ZipFile(path) as archive:
+                page, license_text = (
+                    archive.read(f"documentation/{name}").decode("utf-8")
+                    for name in ("index.html", "licenses/license.txt")
+                )
+                icon = Image.open(io.BytesIO(archive.read(icon_path)))
+                icons = [name for name in archive.namelist() if name.endswith(".png")]
+            assert f"FMI {version} co-simulation FMU by Tautwire" in page
+            for variable in fmpy.read_model_description(str(path)).modelVariables:
+                assert variable.causality == "independent" or f"<tr><td>{variable.name}</td>" in page
+            assert "Copyright (c) 2026 The Tautwire developers" in license_text
+            assert icon.format == "PNG" and icons == [icon_path]
 
 
 def test_the_master_gets_the_same_bits_from_either_version(both_versions: tuple[RobotFmus, RobotFmus]) -> None:
