@@ -60,12 +60,13 @@ def test_check_lists_problems_of_the_trackers_file(
 
 def test_a_tracker_in_another_unit_is_refused(files: tuple[str, str, str], capsys: pytest.CaptureFixture[str]) -> None:
     log, tracker, columns = files
-    Path(columns).write_text(TABLE.replace("mm", "cm"), encoding="utf-8")
+    Path(columns).write_text(TABLE.replace(', unit = "mm"', ""), encoding="utf-8")
     for command in (["check"], ["trace", "--out", str(Path(log).with_name("report"))]):
         name, *out = command
         assert run([name, ROBOT, log, "--tracker", tracker, "--columns", columns, *out]) == 2
         captured = capsys.readouterr()
-        assert "match the winch travel at no offset" in captured.out + captured.err
+        text = captured.out + captured.err
+        assert "match the winch travel at no offset of its clock, but do if its x, y, z are in" in text
 
 
 def test_a_tracker_without_its_log_is_refused(files: tuple[str, str, str], capsys: pytest.CaptureFixture[str]) -> None:

@@ -73,8 +73,8 @@ def both(first: Change, second: Change) -> Change:
 MISTAKES: dict[str, tuple[Change, str, str]] = {
     "time in ms": (time_in(1e-3), "if time is in ms", "multiply time by 0.001"),
     "time in us": (time_in(1e-6), "if time is in us", "multiply time by 1e-06"),
-    "speeds in mm/s": (speeds(1e3), "are in mm/s", "multiply them by 0.001"),
-    "speeds in m/min": (speeds(60.0), "are in m/min", "multiply them by 0.01667"),
+    "speeds in mm/s": (speeds(1e3), "are in mm/s", "multiply winch_speed_1 to winch_speed_"),
+    "speeds in m/min": (speeds(60.0), "are in m/min", " by 0.01667"),
     "speeds of angles": (speeds(1.0 / RADIUS), "of drums with a radius of 0.0", "the drum's radius"),
     "all signs": (speeds(-1.0), "winch_speed_1 to winch_speed_{n} have the other sign", "multiply by -1"),
     "winches swapped": (speeds_swapped, "winches of cables 1 to {n} are winch_speed_2, winch_speed_1", "rename"),

@@ -41,15 +41,15 @@ def checked(robot: Robot, recording: Recording) -> TensionCheck | None:
 @pytest.mark.parametrize(
     ("factor", "cause", "remedy"),
     [
-        (1e-3, "are in kN, or the robot file's platform.mass is 1000 times the true one", "multiply them by 1000"),
-        (1e3, "are in mN", "multiply them by 0.001"),
+        (1e-3, "are in kN, or the robot file's platform.mass is 1000 times the true one", " by 1000"),
+        (1e3, "are in mN", " by 0.001"),
         (
             1.0 / 9.80665,
             "are in kg",
-            'multiply them by 9.807, or declare the unit: tension_1 [kg] in the header of a CSV file, unit = "kg"',
+            ' by 9.807, or declare the unit: tension_1 [kg] in the header of a CSV file, unit = "kg"',
         ),
-        (1e3 / 9.80665, "are in g", "multiply them by 0.009807"),
-        (1.0 / 4.4482216, "are in lbf", "multiply them by 4.448"),
+        (1e3 / 9.80665, "are in g", " by 0.009807"),
+        (1.0 / 4.4482216, "are in lbf", " by 4.448"),
         (-1.0, "have the other sign", "multiply by -1"),
     ],
 )

@@ -71,7 +71,7 @@ def test_problem_of_speeds_in_mm_per_second_stands_on_the_page_with_what_mends_i
     recorded.to_csv(wrong, index=False)
     page = report_of(tmp_path, wrong, 2)
     assert sections(page) == ["problems", *SECTIONS]
-    assert "are in mm/s" in page.text and "multiply them by 0.001" in page.text
+    assert "are in mm/s" in page.text and "multiply winch_speed_1 to winch_speed_3 by 0.001" in page.text
     assert slopes(page) == pytest.approx([1e-3, 1e-3, 1e-3], rel=0.05)
 
 

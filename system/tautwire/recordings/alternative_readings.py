@@ -58,12 +58,13 @@ class WindingReading:
         if self.speed_unit is None:
             yield Mistake(
                 _factor_text(names, self.radius, bool(recording.rope_lengths)),
-                f"multiply them by {self.radius:.4g}, or declare that as factor in [recording.columns], better the one "
-                "that follows from the drum's radius and what is recorded in one turn of it",
+                f"multiply {_range_text(names)} by {self.radius:.4g}, or declare that as factor in "
+                "[recording.columns], better the one that follows from the drum's radius and what is recorded in one "
+                "turn of it",
             )
         elif self.speed_unit != "m/s":
             unit = self.speed_unit.removesuffix("/s") if recording.rope_lengths else self.speed_unit
-            remedy = convert("them", unit, SPEED_UNITS[self.speed_unit], names[0])
+            remedy = convert(_range_text(names), unit, SPEED_UNITS[self.speed_unit], names[0])
             yield Mistake(f"{_range_text(names)} are in {unit}", remedy)
         if any(sign < 0 for sign in self.signs):
             wrong = [names[column] for column, sign in sorted(zip(self.order, self.signs, strict=True)) if sign < 0]
@@ -86,9 +87,9 @@ class WindingReading:
             yield Mistake(f"the winches' clock is {offset} {side} the tracker's", remedy)
 
 
-def convert(what: str, unit: str, factor: float, column: str) -> str:
+def convert(what: str, unit: str, factor: float, column: str, table: str = "recording.columns") -> str:
     """The remedy for columns in another unit: convert them, or declare the unit."""
-    declared = f'{column} [{unit}] in the header of a CSV file, unit = "{unit}" in [recording.columns]'
+    declared = f'{column} [{unit}] in the header of a CSV file, unit = "{unit}" in [{table}]'
     return f"multiply {what} by {factor:.4g}, or declare the unit: {declared}"
 
 

@@ -99,27 +99,28 @@ def travel_error(robot: Robot, recording: Recording) -> RecordingError | None:
 
 def _motion_error(robot: Robot, path: str, motion: MotionCheck) -> RecordingError:
     shown = "poses" if robot.platform.is_rigid_body else "positions"
+    causes, remedies = mistakes_text([reading.mistakes for reading in motion.readings])
     problem = (
         f"winch travel does not match the {shown}: it is off by {_percentage(motion.misfit)}, by "
-        f"{_percentage(motion.readings[0].misfit)} if {_causes([r.mistakes for r in motion.readings])}"
+        f"{_percentage(motion.readings[0].misfit)} if {causes}"
     )
-    return RecordingError(path, problem, _remedies([reading.mistakes for reading in motion.readings]))
+    return RecordingError(path, problem, remedies)
 
 
 def _tension_error(path: str, tensions: TensionCheck) -> RecordingError:
+    causes, remedies = mistakes_text(tensions.mistakes)
     problem = (
         f"tensions do not match the platform's weight: they carry {_percentage(tensions.carried)} of it and are off by "
-        f"{_percentage(tensions.misfit)}, by {_percentage(tensions.corrected_misfit)} if {_causes(tensions.mistakes)}"
+        f"{_percentage(tensions.misfit)}, by {_percentage(tensions.corrected_misfit)} if {causes}"
     )
-    return RecordingError(path, problem, _remedies(tensions.mistakes))
+    return RecordingError(path, problem, remedies)
 
 
-def _causes(alternatives: Sequence[Sequence[Mistake]]) -> str:
-    return ", or if ".join(" and ".join(mistake.cause for mistake in mistakes) for mistakes in alternatives)
-
-
-def _remedies(alternatives: Sequence[Sequence[Mistake]]) -> str:
-    return ", or ".join(", and ".join(mistake.remedy for mistake in mistakes) for mistakes in alternatives)
+def mistakes_text(alternatives: Sequence[Sequence[Mistake]]) -> tuple[str, str]:
+    """Causes and remedies of alternative sets of mistakes, each as one clause."""
+    causes = ", or if ".join(" and ".join(mistake.cause for mistake in mistakes) for mistakes in alternatives)
+    remedies = ", or ".join(", and ".join(mistake.remedy for mistake in mistakes) for mistakes in alternatives)
+    return causes, remedies
 
 
 def _percentage(share: float) -> str:

@@ -49,7 +49,7 @@ class TensionReading:
         if self.unit != "N":
             other = f", or the robot file's platform.mass is {FORCE_UNITS[self.unit]:.4g} times the true one"
             yield Mistake(
-                f"{names} are in {self.unit}{other}", convert("them", self.unit, FORCE_UNITS[self.unit], "tension_1")
+                f"{names} are in {self.unit}{other}", convert(names, self.unit, FORCE_UNITS[self.unit], "tension_1")
             )
         if self.sign < 0:
             yield Mistake(f"{names} have the other sign", f"{NEGATE}: a rope that pulls has a positive tension")

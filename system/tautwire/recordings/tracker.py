@@ -10,10 +10,11 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError
 from ..robot.schema import Robot
-from .consistency import travel_error
+from .consistency import mistakes_text, travel_error
+from .mistaken_tracker import tracker_mistakes
 from .quaternion_columns import unit_quaternions
 from .recording import Recording, read_tracker
-from .tracker_clock import TrackerClock, estimate_tracker_clock
+from .tracker_clock import TrackerClock, UnmatchedTravelError, estimate_tracker_clock
 
 Array = NDArray[np.float64]
 
@@ -41,10 +42,7 @@ def with_tracker(robot: Robot, log: Recording, path: str | Path) -> Recording:
         raise RecordingError(str(path), "has no positions", hint)
     declared = robot.tracker
     if declared.clock_offset is None:
-        try:
-            clock = estimate_tracker_clock(robot, log, tracker)
-        except RecordingError as error:
-            raise travel_error(robot, log) or error from None
+        clock = _estimated_clock(robot, log, tracker)
         origin = f"from winch travel, +- {2e3 * clock.deviation:.2g} ms"
     else:
         clock = TrackerClock(declared.clock_offset, declared.clock_rate)
@@ -63,6 +61,21 @@ def with_tracker(robot: Robot, log: Recording, path: str | Path) -> Recording:
     orientation = unit_quaternions(samples_at_rows(log.time, times, tracker.orientation))
     recording = replace(log, position=position, read_as=(*log.read_as, *tracker.read_as, note))
     return replace(recording, orientation=orientation) if tracker.has_orientation else recording
+
+
+def _estimated_clock(robot: Robot, log: Recording, tracker: Recording) -> TrackerClock:
+    """The tracker's clock by the winch travel; where no offset fits, the error tells the likely mistakes."""
+    try:
+        return estimate_tracker_clock(robot, log, tracker)
+    except RecordingError as error:
+        of_travel = travel_error(robot, log)
+        is_mistaken = of_travel is not None or isinstance(error, UnmatchedTravelError)
+        alternatives = tracker_mistakes(robot, log, tracker) if is_mistaken else ()
+        if not alternatives:
+            raise of_travel or error from None
+        causes, remedies = mistakes_text(alternatives)
+        problem = f"its positions match the winch travel at no offset of its clock, but do if {causes}"
+        raise RecordingError(tracker.path, problem, remedies) from None
 
 
 def _pace(clock: TrackerClock) -> str:

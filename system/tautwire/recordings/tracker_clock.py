@@ -35,6 +35,17 @@ MAX_DEVIATION = 5e-3  # s
 STATE_OFFSET_HINT = "or state clock_offset in [recording.tracker]"
 
 
+class UnmatchedTravelError(RecordingError):
+    """A tracker's positions that match the winch travel at no offset of its clock."""
+
+    def __init__(self, path: str) -> None:
+        hint = (
+            "check units, factors and signs of the winches in [recording.columns], units, axes and origin of the "
+            f"tracker, and that it is that of this motion, {STATE_OFFSET_HINT}"
+        )
+        super().__init__(path, "its positions match the winch travel at no offset of its clock", hint)
+
+
 @dataclass(frozen=True)
 class TrackerClock:
     """A tracker's clock: it shows ``offset + rate * (t - t_1)`` at the time t of the log, whose first sample is at t_1.
@@ -66,7 +77,8 @@ def estimate_tracker_clock(robot: Robot, log: Recording, tracker: Recording) -> 
     Cross-correlation of travel gives candidates, and Gauss-Newton steps refine offset and rate of each. The rate is 1
     unless it differs significantly.
 
-    Raises RecordingError where nothing moves, no offset fits, several fit, or the best is uncertain.
+    Raises UnmatchedTravelError where no offset fits, RecordingError where nothing moves, several fit, or the best is
+    uncertain.
     """
     rows = _measured_rows(robot, tracker)
     times, positions = tracker.time[rows], tracker.position[rows]
@@ -76,12 +88,7 @@ def estimate_tracker_clock(robot: Robot, log: Recording, tracker: Recording) -> 
     alignments = [fit.refined(offset) for offset in _candidate_offsets(log, times, lengths)]
     fitting = sorted((each for each in alignments if each and each.misfit <= MAX_MISFIT), key=lambda each: each.misfit)
     if not fitting:
-        problem = "its positions match the winch travel at no offset of its clock"
-        hint = (
-            "check units, factors and signs of the winches in [recording.columns], units, axes and origin of the "
-            f"tracker, and that it is that of this motion, {STATE_OFFSET_HINT}"
-        )
-        raise RecordingError(tracker.path, problem, hint)
+        raise UnmatchedTravelError(tracker.path)
     best = fitting[0]
     _require_unique(tracker.path, best, fitting[1:])
     if best.clock.deviation > MAX_DEVIATION:
@@ -131,16 +138,42 @@ def _require_unique(path: str, best: _Alignment, others: list[_Alignment]) -> No
             raise RecordingError(path, problem, hint)
 
 
+def least_travel_mismatch(robot: Robot, log: Recording, tracker: Recording) -> float:
+    """Least energy of the sum of both travels over that of each, at any offset: 0 where they match, 1 where unlike."""
+    rows = _measured_rows(robot, tracker)
+    lengths = GeometryReading().directions(robot, recorded_poses(tracker, rows))[0]
+    travel = _correlated_travel(log, tracker.time[rows], lengths)
+    return float(travel.misfits.min()) if travel else np.inf
+
+
+@dataclass(frozen=True)
+class _CorrelatedTravel:
+    """Misfits of both travels by the lag (s) of one behind the other, on a grid of ``interval`` s."""
+
+    misfits: Array
+    lags: Array
+    interval: float
+
+
 def _candidate_offsets(log: Recording, times: Array, lengths: Array) -> list[float]:
     """Offsets at which the travel of both correlates best, the best first: local minima of the energy of their sum."""
+    travel = _correlated_travel(log, times, lengths)
+    if travel is None:
+        return []
+    limit = float(travel.misfits.min()) + MAX_COARSE_DIFFERENCE
+    reach = round(TRAVEL_WINDOW / travel.interval) + 1
+    return [float(times[0] + travel.lags[index]) for index in lowest_valleys(travel.misfits, limit, reach)]
+
+
+def _correlated_travel(log: Recording, times: Array, lengths: Array) -> _CorrelatedTravel | None:
+    """Cross-correlation of the travel of a log and of tracked lengths (M, n); None where one has none."""
     span = (times[-1] - times[0]) + log.duration
     intervals = [float(np.median(np.diff(each))) for each in (times, log.time)]
     interval = max(MIN_GRID_INTERVAL, *intervals, span / MAX_GRID_POINTS)
     reeled, is_reeled = travel_on_grid(log.time, log.wound_lengths(), interval)
     shortened, is_shortened = travel_on_grid(times, lengths, interval)
     if not (is_reeled.any() and is_shortened.any()):
-        return []
-
+        return None
     reeled_energy, shortened_energy = np.sum(reeled**2, axis=1), np.sum(shortened**2, axis=1)
     energy_of_log = correlated(is_shortened, reeled_energy)
     energy_of_tracker = correlated(shortened_energy, is_reeled)
@@ -149,10 +182,7 @@ def _candidate_offsets(log: Recording, times: Array, lengths: Array) -> list[flo
     energy = energy_of_log + energy_of_tracker
     is_shared = share >= MIN_MOTION_SHARE
     misfits = np.where(is_shared, 1.0 + 2.0 * product / np.where(is_shared, energy, 1.0), np.inf)
-    lags = correlation_lags(len(shortened), len(reeled))
-    limit = float(misfits.min()) + MAX_COARSE_DIFFERENCE
-    reach = round(TRAVEL_WINDOW / interval) + 1
-    return [float(times[0] + lags[index] * interval) for index in lowest_valleys(misfits, limit, reach)]
+    return _CorrelatedTravel(misfits, interval * correlation_lags(len(shortened), len(reeled)), interval)
 
 
 class _ClockFit:

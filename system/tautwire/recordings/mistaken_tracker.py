@@ -1,0 +1,105 @@
+"""Mistakes in units, signs or order between a log and a tracker's file, told where no offset of its clock fits."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from itertools import combinations, groupby, product
+
+import numpy as np
+
+from ..errors import RecordingError
+from ..robot.schema import Robot
+from .alternative_readings import LENGTH_UNITS, SPEED_UNITS, TIME_UNITS, Mistake, WindingReading, convert
+from .candidate_readings import SAMPLE_INTERVALS
+from .recording import Recording
+from .tracker_clock import estimate_tracker_clock, least_travel_mismatch
+
+POSITION_UNITS = ("m", "mm", "cm", "in")
+WINCH_SPEED_UNITS = ("m/s", "mm/s", "cm/s", "m/min")
+# Mistakes at once: with more, a wrong motion fits by chance.
+MAX_MISTAKES = 3
+# Of their energy: travels that differ by more fit at no offset, which takes long to find out.
+MAX_TRAVEL_MISMATCH = 0.3
+
+
+@dataclass(frozen=True)
+class TrackerReading:
+    """How a log and a tracker's file are read: units of the tracker's positions and time, and time and winches."""
+
+    position_unit: str = "m"
+    time_unit: str = "s"
+    winding: WindingReading = field(default_factory=WindingReading)
+
+    def tracker(self, shown: Recording) -> Recording:
+        """The tracker's file in m and s."""
+        position = shown.position * LENGTH_UNITS[self.position_unit]
+        return replace(shown, time=shown.time * TIME_UNITS[self.time_unit], position=position)
+
+    def log(self, shown: Recording) -> Recording:
+        """The log in m/s and s, its winches in the order and with the signs of the reading."""
+        winding = self.winding
+        speeds = shown.winch_speed[:, winding.order] * np.array(winding.signs) * SPEED_UNITS[winding.speed_unit or ""]
+        return replace(shown, time=shown.time * TIME_UNITS[winding.time_unit], winch_speed=speeds)
+
+    def mistakes(self, log: Recording) -> tuple[Mistake, ...]:
+        """What this reading changes."""
+        own, table = [], "recording.tracker.columns"
+        if self.time_unit != "s":
+            remedy = convert("its time", self.time_unit, TIME_UNITS[self.time_unit], "time", table)
+            own.append(Mistake(f"its time is in {self.time_unit}", remedy))
+        if self.position_unit != "m":
+            remedy = convert("its x, y, z", self.position_unit, LENGTH_UNITS[self.position_unit], "x", table)
+            own.append(Mistake(f"its x, y, z are in {self.position_unit}", remedy))
+        return (*own, *self.winding.mistakes(log))
+
+
+def tracker_mistakes(robot: Robot, log: Recording, tracker: Recording) -> tuple[tuple[Mistake, ...], ...]:
+    """Fewest mistakes with which the tracker's positions match the winch travel at one offset of its clock.
+
+    Tried are units of either file's time, of positions and speeds, the sign of all winches or of one, and two that are
+    swapped. Each entry is one set of mistakes that explains it; empty where none of up to three does.
+    """
+    readings = [(len(reading.mistakes(log)), reading) for reading in _readings(log, tracker)]
+    ranked = sorted(readings, key=lambda each: each[0])
+    for count, group in groupby(ranked, key=lambda each: each[0]):
+        fitting = [reading for _, reading in group if _fits(robot, reading.log(log), reading.tracker(tracker))]
+        if fitting:
+            return tuple(reading.mistakes(log) for reading in fitting) if count <= MAX_MISTAKES else ()
+    return ()
+
+
+def _readings(log: Recording, tracker: Recording) -> Iterator[TrackerReading]:
+    """Units and signs of all winches in any combination; one sign or a swap alone."""
+    count = log.cable_count
+    declared, all_positive = tuple(range(count)), (1,) * count
+    times = tuple(product(_likely_time_units(log), _likely_time_units(tracker)))
+    for (log_time, tracker_time), position, speed, sign in product(times, POSITION_UNITS, WINCH_SPEED_UNITS, (1, -1)):
+        yield TrackerReading(position, tracker_time, WindingReading(log_time, speed, (sign,) * count, declared))
+    for log_time, tracker_time in times:
+        for odd in range(count):
+            signs = tuple(-1 if cable == odd else 1 for cable in range(count))
+            yield TrackerReading("m", tracker_time, WindingReading(log_time, "m/s", signs, declared))
+        for first, second in combinations(range(count), 2):
+            order = list(declared)
+            order[first], order[second] = second, first
+            yield TrackerReading("m", tracker_time, WindingReading(log_time, "m/s", all_positive, tuple(order)))
+
+
+def _likely_time_units(recording: Recording) -> tuple[str, ...]:
+    """Units of time in which the samples are as far apart as those of a recording."""
+    interval = float(np.median(np.diff(recording.time)))
+    shortest, longest = SAMPLE_INTERVALS
+    likely = tuple(unit for unit, size in TIME_UNITS.items() if shortest <= interval * size <= longest)
+    return ("s",) if "s" in likely else likely
+
+
+def _fits(robot: Robot, log: Recording, tracker: Recording) -> bool:
+    """Whether the positions match the winch travel at one offset of the tracker's clock."""
+    try:
+        if least_travel_mismatch(robot, log, tracker) > MAX_TRAVEL_MISMATCH:
+            return False
+        estimate_tracker_clock(robot, log, tracker)
+    except RecordingError:
+        return False
+    return True

@@ -1,0 +1,79 @@
+"""Mistakes in a log or a tracker's file are told where no offset of the tracker's clock fits."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tautwire.errors import RecordingError
+from tautwire.recordings import tracker as tracker_module
+from tautwire.recordings.mistaken_tracker import tracker_mistakes
+from tautwire.recordings.recording import Recording, read_recording
+from tests.support.robots import EXAMPLES, example
+from tests.support.trackers import split
+
+Files = tuple[Recording, Recording]
+
+
+def files(name: str) -> Files:
+    """A log at the example's rate, and a tracker at 120 Hz, whose clock is 5.25 s ahead."""
+    recording = read_recording(EXAMPLES / name / "fit.csv", example(name).cable_count)
+    return split(recording, 120.0, 5.25, 1.0)
+
+
+def winches(change: Callable[[np.ndarray], np.ndarray]) -> Callable[[Files], Files]:
+    return lambda pair: (replace(pair[0], winch_speed=change(pair[0].winch_speed)), pair[1])
+
+
+def tracked(length: float = 1.0, time: float = 1.0) -> Callable[[Files], Files]:
+    return lambda pair: (pair[0], replace(pair[1], position=length * pair[1].position, time=time * pair[1].time))
+
+
+def with_one_sign(speeds: np.ndarray) -> np.ndarray:
+    return np.asarray(speeds * [1.0, -1.0, *[1.0] * (speeds.shape[1] - 2)])
+
+
+def swapped(speeds: np.ndarray) -> np.ndarray:
+    return speeds[:, [1, 0, *range(2, speeds.shape[1])]]
+
+
+CASES: dict[str, tuple[Callable[[Files], Files], list[str]]] = {
+    "tracker in mm": (tracked(length=1e3), ["its x, y, z are in mm"]),
+    "tracker's time in ms": (tracked(time=1e3), ["its time is in ms"]),
+    "log's time in ms": (lambda pair: (replace(pair[0], time=1e3 * pair[0].time), pair[1]), ["time is in ms"]),
+    "speeds in mm/s": (winches(lambda speeds: 1e3 * speeds), ["are in mm/s"]),
+    "all signs": (winches(lambda speeds: -speeds), ["have the other sign"]),
+    "one sign": (winches(with_one_sign), ["winch_speed_2 has the other sign"]),
+    "two winches swapped": (winches(swapped), ["are winch_speed_2, winch_speed_1"]),
+    "mm and mm/s": (
+        lambda pair: winches(lambda speeds: 1e3 * speeds)(tracked(length=1e3)(pair)),
+        ["its x, y, z are in mm", "are in mm/s"],
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CASES)
+@pytest.mark.parametrize("name", ["three", "eight"])
+def test_a_mistake_is_told_with_its_cause(name: str, case: str) -> None:
+    change, causes = CASES[case]
+    log, tracker = change(files(name))
+    (mistakes,) = tracker_mistakes(example(name), log, tracker)
+    assert len(mistakes) == len(causes)
+    assert all(cause in mistake.cause for cause, mistake in zip(causes, mistakes, strict=True))
+
+
+def test_a_wrong_motion_is_no_mistake_of_units() -> None:
+    log, tracker = winches(lambda speeds: speeds[:, ::-1] ** 2)(files("three"))
+    assert tracker_mistakes(example("three"), log, tracker) == ()
+
+
+def test_the_error_names_the_column_and_the_table_that_mend_it(monkeypatch: pytest.MonkeyPatch) -> None:
+    log, tracker = tracked(length=1e3)(files("three"))
+    monkeypatch.setattr(tracker_module, "read_tracker", lambda *_: tracker)
+    with pytest.raises(RecordingError, match="match the winch travel at no offset of its clock, but do if") as caught:
+        tracker_module.with_tracker(example("three"), log, "tracker.csv")
+    assert "multiply its x, y, z by 0.001, or declare the unit: x [mm]" in caught.value.hint
+    assert caught.value.hint.endswith('unit = "mm" in [recording.tracker.columns]')
