@@ -1,6 +1,8 @@
 """The pages under docs/: their Python runs as it stands, and together they make a site without a warning."""
 
+import importlib
 import os
+import pkgutil
 import re
 import shutil
 import subprocess
@@ -132,12 +134,22 @@ def test_the_site_builds_without_a_warning_and_asks_nothing_of_the_network(tmp_p
     reference = (tmp_path / "reference.html").read_text(encoding="utf-8")
     assert [name for name in tautwire.__all__ if f'id="tautwire.{name}"' not in reference] == []
     assert "Raises RobotFileError" in reference and ":func:" not in reference
+    packages = (tmp_path / "reference-packages.html").read_text(encoding="utf-8")
+    assert [name for name in public_names() if not re.search(rf'id="{name}"', packages)] == []
     for page in pages:
         loaded = re.findall(
             r"<(?:script|link|img|iframe)[^>]*?(?:src|href)=\"?([^\s\">]+)", page.read_text(encoding="utf-8")
         )
         assert loaded
         assert not [address for address in loaded if address.startswith(("http:", "https:", "//"))]
+
+
+def public_names() -> Iterator[str]:
+    """Patterns of the names in ``__all__`` of each package but the command line, which may stand under a module."""
+    for each in pkgutil.iter_modules(tautwire.__path__, "tautwire."):
+        if each.ispkg and each.name != "tautwire.cli":
+            for name in getattr(importlib.import_module(each.name), "__all__", ()):
+                yield rf"{re.escape(each.name)}\.(\w+\.)?{name}"
 
 
 def named_in(page: str) -> set[str]:
