@@ -18,6 +18,7 @@ import pytest
 import tautwire
 from tautwire.campaigns import plan_file as plans
 from tautwire.cli import run as command
+from tautwire.cli.progress_lines import LINE_INTERVAL
 from tautwire.cosimulation.robot_wiring import result_columns
 from tautwire.estimation.trace_result import Correlation, FittedParameter, Resonance
 from tautwire.linear import linearise
@@ -142,6 +143,11 @@ def test_the_site_builds_without_a_warning_and_asks_nothing_of_the_network(tmp_p
         )
         assert loaded
         assert not [address for address in loaded if address.startswith(("http:", "https:", "//"))]
+
+
+def test_the_first_page_says_how_often_a_piped_command_tells_its_progress() -> None:
+    assert LINE_INTERVAL == 10.0
+    assert "a line every ten seconds where output is piped" in (DOCS / "index.md").read_text(encoding="utf-8")
 
 
 def public_names() -> Iterator[str]:
