@@ -111,6 +111,25 @@ def test_a_line_of_units_tells_which_columns_need_a_factor(tmp_path: Path) -> No
     assert proposal["winch_speed_2"].doubt.startswith("add factor = radius * pi / 30")
 
 
+@pytest.mark.parametrize(
+    ("names", "count"),
+    [
+        ("Zeit;Motor 1;Motor 2;Motor 3;X", 3),
+        ("t;Enc0 cnt;Enc1 cnt;Kraft0 [N];Kraft1 [N]", 2),
+        ("time;winch_speed_1;winch_speed_2;winch_speed_3;winch_speed_4;tension_1", 4),
+    ],
+)
+def test_names_tell_the_number_of_cables_where_nothing_else_does(
+    names: str, count: int, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    log = tmp_path / "log.csv"
+    log.write_text(names + "\n" + ";".join("1" for _ in names.split(";")) + "\n", encoding="utf-8")
+    assert run(["columns", str(log), "--cables", str(count)]) == 0
+    expected = capsys.readouterr()
+    assert run(["columns", str(log)]) == 0
+    assert capsys.readouterr() == expected
+
+
 def test_what_is_ambiguous_or_missing_is_a_comment(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     log = tmp_path / "log.csv"
     log.write_text("t,Time,Drive1.Velocity,Enc2 cnt,blob\n0,0,1,2,3\n1,1,1,2,3\n", encoding="utf-8")
@@ -367,7 +386,7 @@ def test_what_a_trackers_file_does_not_tell_is_listed(tmp_path: Path, capsys: py
 @pytest.mark.parametrize(
     ("arguments", "words"),
     [
-        (["{fit}"], "--cables: is missing"),
+        (["{unnumbered}"], "--cables: is missing, and no column of"),
         (["{fit}", "{robot}", "--cables", "4"], "--cables: is 4, the robot has 3"),
         (["{robot}", "--cables", "3"], "no line of names above numbers"),
         (["{empty}", "--cables", "3"], "no line of names above numbers"),
@@ -378,6 +397,7 @@ def test_what_cannot_be_told_is_refused(
     arguments: list[str], words: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "empty.csv").write_text("1,2\n3,4\n", encoding="utf-8")
+    (tmp_path / "unnumbered.csv").write_text("time,speed,x,y,z\n0,1,2,3,4\n", encoding="utf-8")
     (tmp_path / "bad.parquet").write_bytes(b"PAR1 and no more of it")
     places = {"fit": str(FIT), "robot": ROBOT} | {path.stem: str(path) for path in tmp_path.iterdir()}
     assert run(["columns", *(argument.format_map(places) for argument in arguments)]) == 2

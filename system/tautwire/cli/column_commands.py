@@ -47,7 +47,7 @@ def columns(
 
     output = CommandOutput(as_json, quiet)
     robot = None if robot_file is None else read_robot(robot_file)
-    cable_count = _cable_count(robot, cables)
+    cable_count = _cable_count(recording, robot, cables)
     refuse_other_formats(out, ".toml")
     refuse_overwriting_inputs([path for path in (recording, robot_file, tracker) if path], [out] if out else [])
     log = _proposed(recording, cable_count, robot)
@@ -90,13 +90,28 @@ def _listed(proposal: ColumnProposal) -> dict[str, object]:
     }
 
 
-def _cable_count(robot: Robot | None, cables: int | None) -> int:
-    """The number of cables, by the robot file or the option; raises InputError where both are missing or differ."""
+def _cable_count(recording: Path, robot: Robot | None, cables: int | None) -> int:
+    """The number of cables, by the robot file, the option, or the columns' names.
+
+    Raises InputError where none of these tells it, or the first two differ.
+    """
     if robot is None and cables is None:
-        raise InputError("--cables", "is missing", "name the robot file, or give the number, as in --cables 4")
+        return _named_cable_count(recording)
     cable_count = cables if robot is None else robot.cable_count
     if cable_count is None or (cables is not None and cables != cable_count):
         raise InputError("--cables", f"is {cables}, the robot has {cable_count}", "omit one of the two")
+    return cable_count
+
+
+def _named_cable_count(recording: Path) -> int:
+    """The number of cables by the columns' names; raises InputError where these have no numbers."""
+    from ..recordings.column_names import column_names
+    from ..recordings.column_proposal import likely_cable_count
+
+    cable_count = likely_cable_count(column_names(recording))
+    if not cable_count:
+        problem = f"is missing, and no column of {recording} has the number of a cable"
+        raise InputError("--cables", problem, "name the robot file, or give the number, as in --cables 4")
     return cable_count
 
 

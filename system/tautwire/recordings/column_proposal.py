@@ -10,6 +10,7 @@ from pathlib import Path
 
 from ..errors import one_line
 from ..robot.recorded_columns import CABLE_COLUMNS
+from ..robot.robot_file_reader import MAX_CABLES
 from ..robot.schema import AXES, QUATERNION_COLUMNS
 from .column_names import ColumnName
 from .csv_lines import unit_in_name
@@ -140,6 +141,13 @@ def propose_columns(names: Sequence[ColumnName], cable_count: int) -> ColumnProp
             is_standard = column in standard
             columns.append(ProposedColumn(column, name) if is_standard else _proposed(column, name, words[name]))
     return ColumnProposal(sorted_columns(columns), standard & {each.column for each in columns}, unused)
+
+
+def likely_cable_count(names: Sequence[ColumnName]) -> int:
+    """The largest number of a cable in the names of winches and load cells; 0 where none has a number."""
+    columns = propose_columns(names, MAX_CABLES).columns
+    numbers = [_order(each.column)[1] for each in columns if each.column.rpartition("_")[0] in CABLE_COLUMNS]
+    return max(numbers, default=0)
 
 
 def sorted_columns(columns: Iterable[ProposedColumn]) -> tuple[ProposedColumn, ...]:
