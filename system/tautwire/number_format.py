@@ -17,7 +17,7 @@ SUPERSCRIPTS = {"2": "²", "3": "³"}
 MIN_PLAIN_NUMBER, MAX_PLAIN_NUMBER = 1e-4, 1e6
 INTEGER_DIGITS = 4
 # Units of pages whatever the size, as on workshop drawings, and their size in SI units.
-PAGE_UNITS = {"m": ("mm", 1e-3)}
+PAGE_UNITS = {"m": ("mm", 1e-3), "rad": ("mrad", 1e-3)}
 MAX_DIGITS = 8
 
 
@@ -49,12 +49,12 @@ def choose_unit(value: float, unit: str) -> tuple[str, float]:
 
 
 def page_unit(unit: str) -> tuple[str, float]:
-    """Unit in which pages state a quantity of an SI ``unit``, and its size in SI units: positions are in mm."""
+    """Unit in which pages state a quantity of an SI ``unit``, mm for m and mrad for rad; and its size in SI units."""
     return PAGE_UNITS.get(unit, (unit, 1.0))
 
 
 def format_on_page(value: float | None, unit: str, digits: int = 3) -> str:
-    """Formats a value in an SI unit as pages state it: a length in mm, anything else with a fitting prefix."""
+    """Formats a value in an SI unit as pages state it: lengths in mm, angles in mrad, others with a fitting prefix."""
     if unit not in PAGE_UNITS or value is None or not math.isfinite(value):
         return format_engineering(value, unit, digits)
     name, size = page_unit(unit)

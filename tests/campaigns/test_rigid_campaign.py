@@ -8,10 +8,11 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from tautwire.campaigns.campaign_dataset import PartWriter, open_dataset
 from tautwire.campaigns.campaign_plan import Plan, PlanError
-from tautwire.campaigns.campaign_run import build_context, run_job
-from tautwire.campaigns.campaign_runner import planned_jobs, run_count
-from tautwire.campaigns.dataset_schema import row_columns, series_columns
+from tautwire.campaigns.campaign_run import RunResult, build_context, run_job
+from tautwire.campaigns.campaign_runner import planned_jobs, run_count, write_summary
+from tautwire.campaigns.dataset_schema import Row, row_columns, series_columns
 from tautwire.campaigns.fmu_cache import build_bundle
 from tautwire.campaigns.parameter_space import KeyPathError, with_values
 from tautwire.campaigns.plan_file import read_plan
@@ -20,6 +21,7 @@ from tautwire.robot.pose_stiffness import stiffness_matrix
 from tautwire.robot.robot_file_reader import read_robot, robot_from_content
 from tautwire.robot.robot_file_writer import write_robot
 from tautwire.robot.static_equilibrium import static_tensions
+from tests.support.pages import Page, section_of
 from tests.support.rigid_robots import crane_robot
 from tests.support.robots import EXAMPLES
 
@@ -87,6 +89,27 @@ def test_a_run_along_a_turning_path_has_its_orientations(tmp_path: Path) -> None
     assert result.series["qz"][-1] == pytest.approx(end[3])
     names = {column.name for column in row_columns(plan, 8)}
     assert set(result.row) <= names and {"frequency_6", "end_qw", "path_error_angle_rms"} <= names
+
+
+def test_the_page_has_angles_in_mrad_and_quaternions_without_a_unit(tmp_path: Path) -> None:
+    plan, out = plan_of(tmp_path, VARIED.replace("count = 2", "count = 16") + TURNING), tmp_path / "out"
+    columns, names = row_columns(plan, 8), ("time", *series_columns(8, True))
+    with open_dataset(out, plan), PartWriter(out, columns) as parts:
+        for index in range(run_count(plan)):
+            row: Row = {each.name: 0.01 * (1 + index % 16) for each in columns if each.kind == "number"}
+            row |= {each.name: False for each in columns if each.kind == "flag"}
+            row |= {"index": index, "sample": index, "path": "turn", "controller": "none"}
+            parts.add([RunResult(row, {name: np.full(4, 0.01 * index) for name in names})])
+    write_summary(plan, out)
+    page = Page((out / "index.html").read_text(encoding="utf-8"))
+    (variant,) = page.data()["variants"]
+    units = {each["label"]: each["unit"] for each in variant["spreads"]}
+    assert (units["path error angle rms"], units["path error rms"], units["end qw"]) == ("mrad", "mm", "1")
+    assert {each["unit"] for each in variant["bands"] if each["title"] == "Orientation"} == {""}
+    (words,) = (each["words"] for each in variant["spreads"] if each["label"] == "path error angle rms")
+    assert words.endswith("mrad") and float(words.split()[0]) > 10.0
+    table = section_of((out / "index.html").read_text(encoding="utf-8"), "summary").text
+    assert "mrad" in table.partition("path error angle rms")[2][:40]
 
 
 def test_cached_fmus_have_the_numbers_of_the_run(tmp_path: Path) -> None:

@@ -184,6 +184,16 @@ def test_page_of_a_long_run_stays_small_and_keeps_peaks(eight: bool) -> None:
     assert len(drawn) == len(unpack_float32(position["time"]))
 
 
+def test_angular_velocities_are_in_mrad_per_second_and_quaternions_without_a_unit() -> None:
+    run = made_rigid_run(example("cogiro"), 200)
+    channels = Page(run_page(run, {})).data()["choices"][0]["channels"]
+    units = {each["title"]: each["unit"] for each in channels}
+    assert (units["Angular velocity"], units["Orientation"]) == ("mrad/s", "")
+    (drawn,) = (each for each in channels if (each["title"], each["label"]) == ("Angular velocity", "y"))
+    expected = 1e3 * run.overview.rows[:, run.columns.index("wy")]
+    assert unpack_float32(drawn["values"]) == pytest.approx(expected, rel=1e-5)
+
+
 @pytest.mark.parametrize("robot", [example("cogiro"), suspended_robot(12)], ids=lambda each: each.name)
 def test_page_of_a_rigid_platform_on_many_cables_stays_small(robot: Robot) -> None:
     content = run_page(made_rigid_run(robot, 4000), {})

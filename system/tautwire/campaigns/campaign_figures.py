@@ -137,7 +137,7 @@ def channel_description(name: str) -> tuple[str, str, str]:
     prefix, _, cable = name.rpartition("_")
     if prefix:
         return "Tension", f"cable {cable}", "N"
-    return ("Orientation", name, "1") if name in ORIENTATION_COLUMNS else ("Position", name, "m")
+    return ("Orientation", name, "") if name in ORIENTATION_COLUMNS else ("Position", name, "m")
 
 
 def _band_data(bands: QuantileBands, names: Sequence[str], max_points: int) -> dict[str, Any]:

@@ -81,7 +81,7 @@ def output_series(run: ReportedRun) -> list[OutputSeries]:
         ("Tension", "tension_", cables, "N", 1.0, tensions),
         ("Velocity", "v", AXES, "m/s", 1.0, {}),
         ("Orientation", "q", ORIENTATION_AXES, "", 1.0, {}),
-        ("Angular velocity", "w", AXES, "rad/s", 1.0, {}),
+        ("Angular velocity", "w", AXES, "mrad/s", 1e3, {}),
         ("Elongation", "elongation_", cables, "mm", 1e3, {}),
         ("Winch speed", "winch_speed_", cables, "m/s", 1.0, speeds),
     )

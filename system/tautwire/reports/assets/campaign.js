@@ -11,11 +11,13 @@ panelKinds.band = (_, place) => {
   const time = variant().time, [low, high] = [series(channel.low), series(channel.high)];
   const middle = series(channel.middle);
   const above = (ends) => middle.map((value, i) => (value === null || ends[i] === null ? null : value + ends[i]));
-  const hover = { hovertemplate: `%{y:.7~r} ${channel.unit}` };
+  // Quaternions have no unit.
+  const unit = channel.unit && ` ${channel.unit}`;
+  const hover = { hovertemplate: `%{y:.7~r}${unit}` };
   const line = (name, y, more) => ({ ...lineTrace(name, time, channel.middle, colour.text, hover), y, ...more });
   const edge = { line: { color: colour["band-fill"], width: 1 } };
   const fill = { ...edge, fill: "tonexty", fillcolor: colour["band-fill"] };
-  const below = { yaxis: "y2", hovertemplate: `%{y:.3~g} ${channel.unit}` };
+  const below = { yaxis: "y2", hovertemplate: `%{y:.3~g}${unit}` };
   const traces = [
     line("2.5th percentile", above(low), edge), line("97.5th percentile", above(high), fill),
     line("median", middle),
@@ -24,11 +26,11 @@ panelKinds.band = (_, place) => {
   ];
   const axes = {
     xaxis: axis(colour, "Time (s)", { hoverformat: ".4~g", anchor: "y2" }),
-    yaxis: axis(colour, channel.unit, { domain: [0.46, 1] }),
-    yaxis2: axis(colour, channel.unit, { domain: [0, 0.34], nticks: 4 }),
+    yaxis: axis(colour, channel.unit || "1", { domain: [0.46, 1] }),
+    yaxis2: axis(colour, channel.unit || "1", { domain: [0, 0.34], nticks: 4 }),
     shapes: [{ ...levelLine(0, { color: colour.text, width: 1 }), yref: "y2" }],
   };
-  const numbers = `band up to ${channel.width} ${channel.unit} wide`;
+  const numbers = `band up to ${channel.width}${unit} wide`;
   const words = `${what}: median and 2.5th to 97.5th percentile of runs, ${numbers}.`;
   return { numbers, words, traces, layout: layout(colour, axes) };
 };

@@ -10,7 +10,7 @@ function outputPanel(choice, place, isTall) {
   const unit = channel.unit && ` ${channel.unit}`;
   const hover = { hovertemplate: `%{y:.${channel.digits}~r}${unit}` };
   const traces = [lineTrace("co-simulated", channel.time, channel.values, colour.accent, hover)];
-  const axes = { xaxis: axis(colour, "Time (s)", { hoverformat: ".4~g" }), yaxis: axis(colour, channel.unit) };
+  const axes = { xaxis: axis(colour, "Time (s)", { hoverformat: ".4~g" }), yaxis: axis(colour, channel.unit || "1") };
   let words = `${what}: from ${low} to ${high}${unit}`;
   if (channel.recorded) {
     const { time, values } = channel.recorded;
