@@ -236,6 +236,23 @@ def test_an_effect_that_the_robot_file_declares_is_no_mistake() -> None:
     assert recording_mistakes(robot.with_effect(EffectSetting("sensor_offset", offset)), moved) == ()
 
 
+@pytest.mark.parametrize("name", ["drum", "payload"])
+def test_winches_are_judged_beside_declared_drums_and_payloads(name: str) -> None:
+    robot, recording = shipped("three")
+    values = {"drum": {"radius_ratio": 1.02}, "payload": {"mass": 40.0}}[name]
+    robot = robot.with_effect(EffectSetting(name, values, robot.cable_numbers if name == "drum" else ()))
+    assert recording_mistakes(robot, recording) == ()
+    (error,) = recording_mistakes(robot, speeds(-1.0)(recording))
+    assert "winch_speed_1 to winch_speed_3 have the other sign" in error.problem
+
+
+def test_tensions_are_not_judged_beside_a_declared_payload() -> None:
+    robot, recording = shipped("three")
+    recording = replace(recording, tension=1e-3 * recording.tension)
+    assert recording_mistakes(robot, recording)
+    assert recording_mistakes(robot.with_effect(EffectSetting("payload", {"mass": 40.0})), recording) == ()
+
+
 def test_a_sign_and_an_order_are_told_by_the_columns_of_the_file() -> None:
     robot, recording = shipped("caroca")
     changed = speeds_swapped(speeds([-1.0, 1.0, 1.0])(recording))

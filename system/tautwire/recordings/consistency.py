@@ -25,13 +25,11 @@ MAX_TRAVEL_TO_SIZE = 3.0
 # Share of the winch travel: stretch, wrong drums and drift stay far below, another robot mismatches by all of it.
 MAX_REELING_MISMATCH = 0.5
 CHECKED_DURATION = 60.0  # s
-# Their contributions to lengths, forces and readings are not computed here.
-EFFECTS_IN_BALANCES = frozenset(
-    (
-        *("drum", "frame", "payload", "sensor_delay", "sensor_gain", "sensor_offset"),
-        *("attachment", "centre_of_mass", "inertia"),
-    )
+# Their contributions to readings and points, and beside these to forces, are not computed here.
+EFFECTS_ON_POSES = frozenset(
+    ("frame", "sensor_delay", "sensor_gain", "sensor_offset", "attachment", "centre_of_mass"),
 )
+EFFECTS_ON_FORCES = EFFECTS_ON_POSES | {"payload", "hanging_load", "inertia"}
 # Rows at rest at the start, and the quantile of rows without outliers of the tracker.
 ROWS_AT_REST, INLIER_QUANTILE = 5, 0.95
 CONSISTENCY_HINT = (
@@ -53,11 +51,11 @@ def require_plausible(robot: Robot, recording: Recording) -> None:
 def recording_mistakes(robot: Robot, recording: Recording) -> tuple[RecordingError, ...]:
     """What the winch travel, the poses and the tensions say of mistakes in the recording or the robot file.
 
-    Empty where they say nothing. For a robot that declares effects which are no part of either balance only travel
-    beyond its size counts.
+    Empty where they say nothing. For a robot that declares effects which are no part of the kinematics only travel
+    beyond its size counts, and its tensions do not for one with effects that are no part of the balance of forces.
     """
-    travel = travel_error(robot, recording)
-    if robot.formulas or any(setting.name in EFFECTS_IN_BALANCES for setting in robot.effects):
+    travel, declared = travel_error(robot, recording), {setting.name for setting in robot.effects}
+    if declared & EFFECTS_ON_POSES:
         return (travel,) if travel else ()
     motion = check_motion(robot, recording)
     errors = []
@@ -69,6 +67,8 @@ def recording_mistakes(robot: Robot, recording: Recording) -> tuple[RecordingErr
         return (travel,)
     elif start := start_orientation_error(robot, recording):
         return (start,)
+    if robot.formulas or declared & EFFECTS_ON_FORCES:
+        return tuple(errors)
     tensions = check_tensions(robot, recording, geometry, winding)
     if tensions is not None and tensions.mistakes:
         errors.append(_tension_error(recording.path, tensions))
