@@ -155,6 +155,9 @@ def test_anchors_in_mm_are_told(with_start: bool) -> None:
     in_mm = replace(robot, cables=cables, platform=replace(robot.platform, start=start))
     (error,) = recording_mistakes(in_mm, recording)
     assert "anchors in the robot file are in mm" in error.problem
+    all_in_mm = replace(recording, position=1e3 * recording.position, winch_speed=1e3 * recording.winch_speed)
+    (error,) = recording_mistakes(in_mm, all_in_mm)
+    assert "all lengths alike seem to be in mm" in error.hint
 
 
 def test_readings_that_fit_equally_are_all_told() -> None:

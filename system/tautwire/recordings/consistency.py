@@ -22,6 +22,8 @@ Array = NDArray[np.float64]
 MIN_CHECKED_START_SHARE, MIN_REELED_SHARE = 0.1, 1e-3
 # In sizes of the robot: no winch moves more rope, counted from where it begins.
 MAX_TRAVEL_TO_SIZE = 3.0
+# m/s; the fastest cable robots reach a quarter of it.
+MAX_WINCH_SPEED, SPEED_QUANTILE = 60.0, 0.99
 # Share of the winch travel: stretch, wrong drums and drift stay far below, another robot mismatches by all of it.
 MAX_REELING_MISMATCH = 0.5
 CHECKED_DURATION = 60.0  # s
@@ -65,8 +67,8 @@ def recording_mistakes(robot: Robot, recording: Recording) -> tuple[RecordingErr
         geometry, winding = motion.readings[0].geometry, motion.readings[0].winding
     elif travel is not None:
         return (travel,)
-    elif start := start_orientation_error(robot, recording):
-        return (start,)
+    elif error := speed_error(recording) or start_orientation_error(robot, recording):
+        return (error,)
     if robot.formulas or declared & EFFECTS_ON_FORCES:
         return tuple(errors)
     tensions = check_tensions(robot, recording, geometry, winding)
@@ -94,6 +96,16 @@ def travel_error(robot: Robot, recording: Recording) -> RecordingError | None:
             f"give rope_length_{cable} in m: for counts add factor = 2 pi * drum radius / counts per turn to it in "
             "[recording.columns]"
         )
+    return RecordingError(recording.path, problem, hint)
+
+
+def speed_error(recording: Recording) -> RecordingError | None:
+    """The error of a recording whose winches are faster than those of any robot; None where they are not."""
+    speed = float(np.quantile(np.abs(recording.winch_speed), SPEED_QUANTILE))
+    if speed <= MAX_WINCH_SPEED:
+        return None
+    problem = f"winches reach {speed:,.4g} m/s, no robot's are faster than {MAX_WINCH_SPEED:g} m/s"
+    hint = "check that anchors and positions are in m, speeds in m/s and time in s; all lengths alike seem to be in mm"
     return RecordingError(recording.path, problem, hint)
 
 
