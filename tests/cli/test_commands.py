@@ -322,3 +322,14 @@ def test_linearise_says_that_winches_have_no_part_in_it(tmp_path: Path, capsys: 
     model, plain_model = (json.loads(path.read_text()) for path in (place, plain))
     assert model.pop("provenance")["inputs"] != plain_model.pop("provenance")["inputs"]
     assert model == plain_model
+
+
+def test_toml_files_that_are_to_be_filled_in_tell_where_they_are_from(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("log.csv").write_text("t,Motor 1,Motor 2\n0,1,2\n", encoding="utf-8")
+    assert run(["new", "hall"]) == 0 and run(["columns", "log.csv", "--out", "columns.toml"]) == 0
+    for file, line in {"hall.toml": "# command: tautwire new hall", "columns.toml": "# input: log.csv sha256 "}.items():
+        head = Path(file).read_text(encoding="utf-8").splitlines()[:3]
+        assert head[0].startswith("# Written by Tautwire ") and any(each.startswith(line) for each in head)

@@ -10,7 +10,7 @@ import typer
 
 from ..errors import InputError
 from ..robot.robot_file_reader import MAX_CABLES, read_robot
-from .console import AsJson, CommandOutput, Quiet, TrackerFile, columns_command, shell_quoted
+from .console import AsJson, CommandOutput, Quiet, TrackerFile, columns_command, command_provenance, shell_quoted
 
 if TYPE_CHECKING:
     from ..recordings.column_proposal import ColumnProposal
@@ -19,6 +19,7 @@ if TYPE_CHECKING:
 
 
 def columns(
+    context: typer.Context,
     recording: Annotated[
         Path, typer.Argument(metavar="RECORDING.csv", help="A recording; CSV, Parquet, .mat or a ROS bag.")
     ],
@@ -61,7 +62,8 @@ def columns(
     text = proposal_text(recording, proposal, cable_count) + text
     if out is not None:
         with atomic_file(out) as scratch:
-            scratch.write_text(text, encoding="utf-8")
+            provenance = command_provenance(context, recording, robot_file, tracker)
+            scratch.write_text(provenance.comment() + text, encoding="utf-8")
     document = _listed(proposal) | document | ({"table": out} if out else {})
     output.result([text.rstrip("\n") if out is None else out], document)
     output.suggest_next(_next_step(recording, robot_file, cable_count, tracker, out))

@@ -46,6 +46,7 @@ EXAMPLE_FILES = ("robot.toml", "fit.csv", "check.csv", "plan.toml")
 
 
 def new(
+    context: typer.Context,
     name: Annotated[str, typer.Argument(metavar="NAME", help="The robot's name; the file is NAME.toml.")],
     cables: Annotated[int, typer.Option(help="Number of cables.", min=3, max=12)] = 3,
     overwrite: Annotated[bool, typer.Option("--overwrite", help="Replace a file of that name.")] = False,
@@ -69,7 +70,7 @@ def new(
     if target.exists() and not overwrite:
         raise InputError(str(target), "exists already", "choose another name, or add --overwrite")
     with atomic_file(target) as scratch:
-        scratch.write_text(new_robot_text(robot_name, cables), encoding="utf-8")
+        scratch.write_text(command_provenance(context).comment() + new_robot_text(robot_name, cables), encoding="utf-8")
     output.result([target], {"robot": target})
     output.suggest_next(f"enter your robot's numbers in {target}, then tautwire check {shell_quoted(target)}")
 
