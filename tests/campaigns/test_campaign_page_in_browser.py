@@ -2,9 +2,11 @@
 
 from __future__ import annotations
 
+import csv
 import re
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 pytest.importorskip("selenium", reason="the pages are not tried in a browser: selenium is in the dev extra")
@@ -112,6 +114,23 @@ def test_nothing_of_a_campaign_is_cut_on_paper(browser: Browser, page: Path) -> 
     beyond, is_shrunk = browser.run(BEYOND_PAPER, PAPER_WIDTH)
     assert beyond == [] and is_shrunk
     assert browser.run(OVERFLOWING) == []
+
+
+@pytest.mark.parametrize("page", ["indices"], indirect=True)
+def test_numbers_of_the_heat_map_are_saved_with_their_outputs_and_inputs(
+    browser: Browser, page: Path, tmp_path: Path
+) -> None:
+    browser.show(LAPTOP)
+    browser.open(page)
+    file = browser.downloaded("document.querySelector('.saved-table [data-save=csv]').click()", tmp_path)
+    assert file.name == "sobol-indices-total-at-rest.csv" and browser.heard() == []
+    header, *rows = csv.reader(file.read_text(encoding="utf-8").splitlines())
+    shown = browser.run("""return [...document.querySelector('table.heat').rows]
+      .map((row) => [...row.cells].map((cell) => cell.innerText.trim()))""")
+    assert header == shown[0] and [row[0] for row in rows] == [row[0] for row in shown[1:]]
+    numbers = [["nan" if text == "\N{EN DASH}" else text for text in row[1:]] for row in shown[1:]]
+    saved = np.array([[cell or "nan" for cell in row[1:]] for row in rows], dtype=float)
+    np.testing.assert_array_equal(saved, np.array(numbers, dtype=float))
 
 
 @pytest.mark.parametrize("page", ["path", "grid"], indirect=True)

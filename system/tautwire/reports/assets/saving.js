@@ -2,13 +2,10 @@
 
 const titleHeight = 32;
 
-function slug(text) {
-  return text.toLowerCase().replace(/[^\p{L}\p{N}]+/gu, "-").replace(/^-|-$/g, "");
-}
-
-/** What a figure shows, with the chosen recording, mode or controller. */
+/** What a figure shows, with the chosen recording, mode or controller; a table does not depend on that. */
 function figureTitle(figure) {
-  const chosenNow = document.querySelector("input[name=choice]:checked + span");
+  const isTable = figure.classList.contains("saved-table");
+  const chosenNow = isTable ? null : document.querySelector("input[name=choice]:checked + span");
   return [figure.dataset.title, chosenNow?.textContent].filter(Boolean).join(", ");
 }
 
@@ -45,23 +42,19 @@ function sceneColumns(scene) {
   ];
 }
 
-/** The text of a CSV file: float32 holds eight significant digits at most; what is absent is empty. */
-function csvText(columns) {
-  const quoted = (text) => (/[",\r\n]/.test(text) ? `"${text.replaceAll('"', '""')}"` : text);
-  const cell = (value) => (value === null || value === undefined ? "" : String(Number(value.toPrecision(8))));
-  const count = Math.max(...columns.map(([, values]) => values.length));
-  const rows = Array.from({ length: count }, (_, row) => columns.map(([, values]) => cell(values[row])).join(","));
-  return [columns.map(([header]) => quoted(header)).join(","), ...rows, ""].join("\n");
+/** Columns of a table: its titles, in each row first a name, then numbers; a dash is absent. */
+function tableColumns(table) {
+  const number = (text) => (text === "–" ? null : Number(text.replace("−", "-")));
+  const texts = [...table.tBodies[0].rows].map((row) => [...row.cells].map((cell) => cell.textContent.trim()));
+  return [...table.tHead.rows[0].cells].map((title, place) => [
+    title.textContent.trim(), texts.map((row) => (place === 0 ? row[place] : number(row[place]))),
+  ]);
 }
 
-function saveTable(figure, filename) {
-  const isScene = figure.classList.contains("scene");
-  const columns = isScene ? sceneColumns(chosen().scene) : panelOf(figure).columns ?? panelColumns(panelOf(figure));
-  const link = document.createElement("a");
-  link.href = URL.createObjectURL(new Blob([csvText(columns)], { type: "text/csv" }));
-  link.download = `${filename}.csv`;
-  link.click();
-  setTimeout(() => URL.revokeObjectURL(link.href), 1000);
+function columnsOf(figure) {
+  if (figure.classList.contains("saved-table")) return tableColumns(figure.querySelector("table"));
+  if (figure.classList.contains("scene")) return sceneColumns(chosen().scene);
+  return panelOf(figure).columns ?? panelColumns(panelOf(figure));
 }
 
 /** Save a figure as it is drawn now, on a ground of its own and under its title. */
@@ -79,13 +72,13 @@ function savePicture(figure, filename, format) {
 function save(figure, format) {
   if (stale.has(figure)) drawFigure(figure);
   const filename = slug(`${figure.dataset.kind ?? ""} ${figureTitle(figure)}`);
-  if (format === "csv") saveTable(figure, filename);
+  if (format === "csv") download(new Blob([csvText(columnsOf(figure))], { type: "text/csv" }), `${filename}.csv`);
   else savePicture(figure, filename, format);
 }
 
 function startTools() {
   for (const button of document.querySelectorAll(".tools button")) {
-    const figure = button.closest("figure");
+    const figure = button.closest("figure, .saved-table");
     const { save: format } = button.dataset;
     button.addEventListener("click", () => (format ? save(figure, format) : resetZoom(figure)));
   }
