@@ -65,6 +65,29 @@ def with_missed_payload(policy: IdentificationPolicy) -> IdentificationContext:
     return IdentificationContext(robot, Fitter(noise), split_data(robot, noise, fit, check), policy=policy)
 
 
+def score_of(robot: Robot, name: str, values: dict[str, float], evidence: float) -> CandidateScore:
+    """Score of an effect of the platform with such values."""
+    extended = robot.with_effect(EffectSetting(name, values))
+    return CandidateScore(Hypothesis(BY_NAME[name], ()), Fit.without_parameters(extended), evidence, 1.0)
+
+
+def rounds_of_search(scores: list[CandidateScore], limits: dict[str, float], monkeypatch: pytest.MonkeyPatch) -> int:
+    """Rounds of a search beside a disturbance for a missed payload; the first has these scores, a second none."""
+    context = with_missed_payload(replace(DEFAULT_POLICY, size=replace(DEFAULT_POLICY.size, **limits)))
+    numbers: list[int] = []
+
+    def score_candidates(_: object, search_round: SearchRound) -> tuple[list[CandidateScore], bool]:
+        numbers.append(search_round.number)
+        return (scores if search_round.number == 1 else []), True
+
+    monkeypatch.setattr(stepwise_selection, "score_candidates", score_candidates)
+    monkeypatch.setattr(stepwise_selection, "fit_model", lambda *_, **__: Fit.without_parameters(context.robot))
+    monkeypatch.setattr(stepwise_selection, "with_disturbance_beside", lambda context, chosen, fit: (context, fit))
+    monkeypatch.setattr(stepwise_selection._StepwiseSelection, "eliminate", lambda self: None)
+    select_effects(context)
+    return len(numbers)
+
+
 @pytest.mark.validate(but=["False"])
 @pytest.mark.parametrize(("has_disturbance", "names"), [(False, ["damping", "payload"]), (True, ["damping"])])
 def test_beside_a_disturbance_a_further_effect_needs_a_share_of_the_first_ones_evidence(
@@ -218,23 +241,23 @@ def test_beside_a_disturbance_what_had_more_evidence_in_the_same_round_is_also_p
 def test_beside_a_disturbance_the_search_ends_where_what_is_left_could_not_matter(
     limits: dict[str, float], rounds: int, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    context = with_missed_payload(replace(DEFAULT_POLICY, size=replace(DEFAULT_POLICY.size, **limits)))
-    robot = context.robot
-    payload = Hypothesis(BY_NAME["payload"], ())
-    with_payload = robot.with_effect(EffectSetting("payload", {"mass": 6.0}))
-    scored = [CandidateScore(payload, Fit.without_parameters(with_payload), 1000.0, 1.0)]
-    numbers: list[int] = []
+    robot = example("three")
+    payload = score_of(robot, "payload", {"mass": 6.0}, 1000.0)
+    assert rounds_of_search([payload], limits, monkeypatch) == rounds
 
-    def score_candidates(_: object, search_round: SearchRound) -> tuple[list[CandidateScore], bool]:
-        numbers.append(search_round.number)
-        return (scored if search_round.number == 1 else []), True
 
-    monkeypatch.setattr(stepwise_selection, "score_candidates", score_candidates)
-    monkeypatch.setattr(stepwise_selection, "fit_model", lambda *_, **__: Fit.without_parameters(robot))
-    monkeypatch.setattr(stepwise_selection, "with_disturbance_beside", lambda context, chosen, fit: (context, fit))
-    monkeypatch.setattr(stepwise_selection._StepwiseSelection, "eliminate", lambda self: None)
-    select_effects(context)
-    assert len(numbers) == rounds
+@pytest.mark.parametrize(("evidence", "mass", "rounds"), [(100.0, 6.0, 2), (5.0, 6.0, 1), (100.0, 0.1, 1)])
+def test_beside_a_disturbance_the_search_goes_on_where_what_is_established_explains_a_small_force(
+    evidence: float, mass: float, rounds: int, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """What was accepted explains none of it; a payload with less evidence explains all, or little."""
+    robot = example("three")
+    scores = [
+        score_of(robot, "drag", {"drag_area": 1e-6}, 1000.0),
+        score_of(robot, "payload", {"mass": mass}, evidence),
+    ]
+    limits = {"max_left_share": 1e-9, "max_size_of_disturbance": 1e6}
+    assert rounds_of_search(scores, limits, monkeypatch) == rounds
 
 
 @pytest.mark.parametrize(
@@ -260,7 +283,7 @@ def test_beside_a_disturbance_what_came_first_is_tested_again_before_a_third_is_
     monkeypatch.setattr(stepwise_selection, "_search_round", lambda _, number, *__: number)
     monkeypatch.setattr(stepwise_selection, "fit_model", lambda *_, **__: Fit.without_parameters(robot))
     monkeypatch.setattr(stepwise_selection, "with_disturbance_beside", lambda context, chosen, fit: (context, fit))
-    monkeypatch.setattr(selection, "_leaves_little", lambda self: False)
+    monkeypatch.setattr(selection, "_leaves_little", lambda self, scores: False)
     monkeypatch.setattr(selection, "eliminate", lambda self: happened.append("elimination"))
     select_effects(context)
     assert happened == events

@@ -91,8 +91,9 @@ class _StepwiseSelection:
     def add(self) -> None:
         """Forward selection: the best hypothesis of each round, while it is significant."""
         self.current = fit_model(self.context, self.accepted)
+        scores: list[CandidateScore] = []
         for _ in range(self.context.policy.selection.max_rounds):
-            if self.accepted and self.context.fitter.has_disturbance and self._leaves_little():
+            if self.accepted and self.context.fitter.has_disturbance and self._leaves_little(scores):
                 break
             number = self._next_number()
             search_round = _search_round(self.context, number, self.current.robot, self.accepted)
@@ -141,14 +142,21 @@ class _StepwiseSelection:
         threshold = self.context.evidence_threshold()
         return self.context.policy.selection.required_evidence(threshold, first_evidence, has_disturbance)
 
-    def _leaves_little(self) -> bool:
-        """Whether the accepted hypotheses leave little, or explain little of what a small random force may be."""
+    def _leaves_little(self, scores: Sequence[CandidateScore]) -> bool:
+        """Whether the accepted hypotheses leave little, or all explain little of what a small random force may be.
+
+        All are they and those that the last round, with these ``scores``, established beside them.
+        """
         policy, validation = self.context.policy.size, self.context.split.validation
         (left,), floor = self._missed_on_validation(self.current.robot)
         missed = missed_without_effects(self.context, self.without_effects, validation, floor)
-        is_explained = left <= (1.0 - policy.min_explained_share) * missed
-        is_small = missed < policy.max_size_of_disturbance**2
-        return left < policy.max_left_share * missed or (is_small and not is_explained)
+        if left < policy.max_left_share * missed:
+            return True
+        established = [score.fit.robot for score in scores if score.evidence > self.context.evidence_threshold()]
+        enough = (1.0 - policy.min_explained_share) * missed
+        return missed < policy.max_size_of_disturbance**2 and not (
+            left <= enough or any(self._missed_on_validation(robot)[0][0] <= enough for robot in established)
+        )
 
     def _missed_on_validation(self, *robots: Robot) -> tuple[list[float], Errors]:
         """What robots with their effects, calibrated on FIT, miss on CHECK; the last one's noise counts as none."""
