@@ -97,7 +97,7 @@ Row: TypeAlias = Sequence[Cell]
 
 
 def render_page(template: str, header: PageHeader, figures: Any = None, **view: Any) -> str:
-    """Renders a template; without ``figures``, any JSON value that the scripts draw, the page has no scripts."""
+    """Renders a template; ``figures`` is any JSON value that the scripts draw, None where they draw nothing."""
     page = _environment().get_template(f"{template}.html.jinja")
     return page.render(header=header, figures=figures, contents=[], **view)
 
