@@ -91,7 +91,7 @@ def test_recorded_path_of_a_robot_measured_in_a_plane_lies_in_that_plane() -> No
 
 
 def test_page_stays_small_for_long_runs() -> None:
-    assert len(run_page(made_run(samples=40_000, eight=True), {})) < 7_000_000
+    assert len(run_page(made_run(samples=40_000, eight=True), {})) < MAX_PAGE_BYTES
 
 
 def test_slack_cables_and_failures_are_named_at_the_top() -> None:
