@@ -143,9 +143,9 @@ class _StepwiseSelection:
         return self.context.policy.selection.required_evidence(threshold, first_evidence, has_disturbance)
 
     def _leaves_little(self, scores: Sequence[CandidateScore]) -> bool:
-        """Whether the accepted hypotheses leave little, or all explain little of what a small random force may be.
+        """Whether the accepted hypotheses leave little, or nothing explains much of what a small random force may be.
 
-        All are they and those that the last round, with these ``scores``, established beside them.
+        Neither they nor any other that the last round, with these ``scores``, established.
         """
         policy, validation = self.context.policy.size, self.context.split.validation
         (left,), floor = self._missed_on_validation(self.current.robot)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -27,6 +27,13 @@ class Mistake:
 
     cause: str
     remedy: str
+
+
+def mistakes_text(alternatives: Sequence[Sequence[Mistake]]) -> tuple[str, str]:
+    """Causes and remedies of alternative sets of mistakes, each as one clause."""
+    causes = ", or if ".join(" and ".join(mistake.cause for mistake in mistakes) for mistakes in alternatives)
+    remedies = ", or ".join(", and ".join(mistake.remedy for mistake in mistakes) for mistakes in alternatives)
+    return causes, remedies
 
 
 @dataclass(frozen=True)

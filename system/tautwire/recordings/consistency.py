@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError
 from ..robot.schema import Robot
-from .alternative_readings import Mistake, WindingReading
+from .alternative_readings import WindingReading, mistakes_text
 from .geometry_reading import GeometryReading, recorded_poses
 from .mistaken_motion import MAX_MISFIT, MotionCheck, check_motion
 from .mistaken_orientation import start_orientation_error
@@ -126,13 +126,6 @@ def _tension_error(path: str, tensions: TensionCheck) -> RecordingError:
         f"{_percentage(tensions.misfit)}, by {_percentage(tensions.corrected_misfit)} if {causes}"
     )
     return RecordingError(path, problem, remedies)
-
-
-def mistakes_text(alternatives: Sequence[Sequence[Mistake]]) -> tuple[str, str]:
-    """Causes and remedies of alternative sets of mistakes, each as one clause."""
-    causes = ", or if ".join(" and ".join(mistake.cause for mistake in mistakes) for mistakes in alternatives)
-    remedies = ", or ".join(", and ".join(mistake.remedy for mistake in mistakes) for mistakes in alternatives)
-    return causes, remedies
 
 
 def _percentage(share: float) -> str:

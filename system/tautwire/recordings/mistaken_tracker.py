@@ -10,7 +10,7 @@ import numpy as np
 
 from ..errors import RecordingError
 from ..robot.schema import Robot
-from .alternative_readings import LENGTH_UNITS, SPEED_UNITS, TIME_UNITS, Mistake, WindingReading, convert
+from .alternative_readings import LENGTH_UNITS, TIME_UNITS, Mistake, WindingReading, convert
 from .candidate_readings import SAMPLE_INTERVALS
 from .recording import Recording
 from .tracker_clock import estimate_tracker_clock, least_travel_mismatch
@@ -38,9 +38,9 @@ class TrackerReading:
 
     def log(self, shown: Recording) -> Recording:
         """The log in m/s and s, its winches in the order and with the signs of the reading."""
-        winding = self.winding
-        speeds = shown.winch_speed[:, winding.order] * np.array(winding.signs) * SPEED_UNITS[winding.speed_unit or ""]
-        return replace(shown, time=shown.time * TIME_UNITS[winding.time_unit], winch_speed=speeds)
+        winding, second = self.winding, TIME_UNITS[self.winding.time_unit]
+        speeds = shown.winch_speed[:, winding.order] * np.array(winding.signs) * winding.factor / second
+        return replace(shown, time=shown.time * second, winch_speed=speeds)
 
     def mistakes(self, log: Recording) -> tuple[Mistake, ...]:
         """What this reading changes."""
@@ -60,12 +60,15 @@ def tracker_mistakes(robot: Robot, log: Recording, tracker: Recording) -> tuple[
     Tried are units of either file's time, of positions and speeds, the sign of all winches or of one, and two that are
     swapped. Each entry is one set of mistakes that explains it; empty where none of up to three does.
     """
-    readings = [(len(reading.mistakes(log)), reading) for reading in _readings(log, tracker)]
-    ranked = sorted(readings, key=lambda each: each[0])
-    for count, group in groupby(ranked, key=lambda each: each[0]):
-        fitting = [reading for _, reading in group if _fits(robot, reading.log(log), reading.tracker(tracker))]
+
+    def count(reading: TrackerReading) -> int:
+        return len(reading.mistakes(log))
+
+    readings = [each for each in _readings(log, tracker) if 0 < count(each) <= MAX_MISTAKES]
+    for _, group in groupby(sorted(readings, key=count), key=count):
+        fitting = [reading for reading in group if _fits(robot, reading.log(log), reading.tracker(tracker))]
         if fitting:
-            return tuple(reading.mistakes(log) for reading in fitting) if count <= MAX_MISTAKES else ()
+            return tuple(reading.mistakes(log) for reading in fitting)
     return ()
 
 

@@ -10,7 +10,8 @@ from numpy.typing import NDArray
 
 from ..errors import RecordingError
 from ..robot.schema import Robot
-from .consistency import mistakes_text, travel_error
+from .alternative_readings import mistakes_text
+from .consistency import travel_error
 from .mistaken_tracker import tracker_mistakes
 from .quaternion_columns import unit_quaternions
 from .recording import Recording, read_tracker
