@@ -24,6 +24,20 @@ def test_an_interrupt_waits_until_it_is_asked_for() -> None:
     assert reached
 
 
+def test_an_interrupt_that_nobody_asked_for_is_raised_at_the_end_of_the_block() -> None:
+    reached = False
+    with pytest.raises(KeyboardInterrupt), defer_interrupts():
+        signal.raise_signal(signal.SIGINT)
+        reached = True
+    assert reached
+
+
+def test_an_interrupt_goes_before_the_error_that_it_caused() -> None:
+    with pytest.raises(KeyboardInterrupt), defer_interrupts():
+        signal.raise_signal(signal.SIGINT)
+        raise OSError
+
+
 def test_the_outer_of_two_blocks_hears_what_the_inner_raised() -> None:
     with defer_interrupts(), pytest.raises(KeyboardInterrupt), defer_interrupts() as raise_interrupt:
         signal.raise_signal(signal.SIGINT)

@@ -47,8 +47,9 @@ def restore_default_signals() -> None:
 def defer_interrupts() -> Iterator[Callable[[], None]]:
     """Context manager that defers Ctrl-C and termination signals: within the block they are only recorded.
 
-    It yields a function that raises KeyboardInterrupt if one was received; call it where no foreign code runs. Only
-    the main thread receives signals; elsewhere nothing changes. Ignored signals stay ignored.
+    It yields a function that raises KeyboardInterrupt if one was received; call it where no foreign code runs. The
+    end of the block calls it too, so none is lost. Only the main thread receives signals; elsewhere nothing changes.
+    Ignored signals stay ignored.
     """
     if threading.current_thread() is not threading.main_thread():
         yield lambda: None
@@ -72,6 +73,7 @@ def defer_interrupts() -> Iterator[Callable[[], None]]:
     finally:
         for number in deferred:
             signal.signal(number, previous_handlers[number])
+        raise_pending()
 
 
 @contextmanager
