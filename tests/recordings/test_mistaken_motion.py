@@ -21,6 +21,7 @@ from tests.support.pose_recordings import noisy, rotation_of, swinging_recording
 from tests.support.recordings import recorded
 from tests.support.rigid_robots import crane_robot, octahedral_robot, underactuated_robot
 from tests.support.robots import EXAMPLES, example
+from tests.support.told_columns import assert_mended_by_told_lines
 
 Change = Callable[[Recording], Recording]
 RADIUS = 0.05
@@ -85,7 +86,7 @@ MISTAKES: dict[str, tuple[Change, str, str]] = {
     "another origin": (another_origin, "x, y, z have another origin, about [", "add that vector"),
     "clocks apart": (tracker_late, "the winches' clock is 0.7", "subtract that from the winches' times"),
     "time in days": (time_in(86_400.0), "if time is in d", "multiply time by 8.64e+04"),
-    "counts a second": (speeds(1.3e4), "1 of theirs is 7.", "or declare that as factor"),
+    "counts a second": (speeds(1.3e4), "1 of theirs is 7.", "or better by the factor that follows"),
     "turns a second": (speeds(1.0 / (2.0 * np.pi * RADIUS)), "m if in turns/s", "what is recorded in one turn"),
     "positions in inches": (positions(1.0 / 0.0254), "if x, y, z are in in", "multiply x, y, z by 0.0254"),
     "positions in feet": (positions(1.0 / 0.3048), "if x, y, z are in ft", "multiply x, y, z by 0.3048"),
@@ -351,18 +352,18 @@ def y_upwards(recording: Recording) -> Recording:
 
 CRANE = crane_robot()
 SCALAR_LAST, INVERSE = quaternions((1, 2, 3, 0)), quaternions((0, 1, 2, 3), (1, -1, -1, -1))
-LAST = 'qw = "qz", qx = "qw", qy = "qx", qz = "qy"'
-NEGATIVE = 'qx = { name = "qx", sign = -1 }, qy = { name = "qy", sign = -1 }, qz = { name = "qz", sign = -1 }'
+LAST = 'qw = { name = "qz" } and qx = { name = "qw" } and qy = { name = "qx" } and qz = { name = "qy" }'
+NEGATIVE = "qx = { sign = -1 } and qy = { sign = -1 } and qz = { sign = -1 }"
 POSE_MISTAKES: dict[str, tuple[Change, str, str]] = {
     "scalar last": (SCALAR_LAST, "if the quaternion is written as x, y, z, w", LAST),
     "world to platform": (INVERSE, "if the quaternion turns from the world's frame to the platform's", NEGATIVE),
     "both": (
         both(INVERSE, SCALAR_LAST),
         "is written as x, y, z, w and turns from the world's frame to the platform's",
-        'qw = "qz", qx = { name = "qw", sign = -1 }, qy = { name = "qx", sign = -1 }, qz = { name = "qy", sign = -1 }',
+        'qw = { name = "qz" } and qx = { name = "qw", sign = -1 } and qy = { name = "qx", sign = -1 } and qz = { name',
     ),
     "mm": (positions(1e3), "if x, y, z are in mm", "multiply x, y, z by 0.001"),
-    "mm, world to platform": (both(positions(1e3), INVERSE), "are in mm and the quaternion turns from the w", NEGATIVE),
+    "mm, world to platform": (both(positions(1e3), INVERSE), "platform's and x, y, z are in mm", NEGATIVE),
     "centre of mass": (of_centre_of_mass, "if x, y, z are those of the centre of mass", "record the frame's origin"),
     "y upwards": (y_upwards, "robot file's x, y, z are the recording's x, -z, y", "and qx, -qz, qy as qx, qy, qz"),
     "another origin": (another_origin, "x, y, z have another origin, about [", "add that vector"),
@@ -437,13 +438,27 @@ def test_a_platform_that_swings_on_standing_winches_tells_mistaken_quaternions()
         assert cause in error.problem and remedy in error.hint
 
 
-def test_the_told_columns_mend_the_recording(tmp_path: Path) -> None:
-    frame = both(INVERSE, SCALAR_LAST)(noisy(wandering_recording(CRANE))).frame()
-    frame.to_csv(tmp_path / "log.csv", index=False)
-    (error,) = recording_mistakes(CRANE, read_recording(tmp_path / "log.csv", 8))
-    lines = error.hint.removeprefix("declare in [recording.columns] ").replace(", q", "\nq")
-    (tmp_path / "columns.toml").write_text(f"[recording.columns]\n{lines}\n")
-    assert recording_mistakes(CRANE, read_recording(tmp_path / "log.csv", 8, tmp_path / "columns.toml")) == ()
+# Those that no line of a table mends.
+WITHOUT_LINES = ("clocks apart", "a frame that is turned", "centre of mass")
+
+
+@pytest.mark.parametrize("mistake", [mistake for mistake in MISTAKES if mistake not in WITHOUT_LINES])
+@pytest.mark.parametrize("name", ["three", "eight"])
+def test_the_told_lines_mend_the_recording(tmp_path: Path, name: str, mistake: str) -> None:
+    robot, recording = shipped(name)
+    assert_mended_by_told_lines(robot, MISTAKES[mistake][0](recording), tmp_path)
+
+
+@pytest.mark.parametrize("mistake", [mistake for mistake in POSE_MISTAKES if mistake not in WITHOUT_LINES])
+def test_the_told_lines_mend_the_recording_of_poses(tmp_path: Path, mistake: str) -> None:
+    assert_mended_by_told_lines(CRANE, POSE_MISTAKES[mistake][0](noisy(wandering_recording(CRANE))), tmp_path)
+
+
+def test_no_line_is_told_where_none_mends_the_recording() -> None:
+    robot, recording = shipped("three")
+    for mistake in WITHOUT_LINES[:2]:
+        (error,) = recording_mistakes(robot, MISTAKES[mistake][0](recording))
+        assert "[recording.columns]" not in error.hint
 
 
 def test_ropes_on_pulleys_are_checked_and_have_no_mistake() -> None:

@@ -34,14 +34,15 @@ def test_quaternions_in_another_order_are_told_by_their_beginning() -> None:
         "written as x, y, z, w"
     )
     assert error.hint.startswith(
-        'declare in [recording.columns] qw = "qz", qx = "qw", qy = "qx", qz = "qy", or correct'
+        'write into [recording.columns] qw = { name = "qz" } and qx = { name = "qw" } and qy = { name = "qx" } '
+        'and qz = { name = "qy" }, which is to read qz, qw, qx, qy as qw, qx, qy, qz, or correct start_orientation'
     )
 
 
 def test_quaternions_from_the_world_to_the_platform_are_told_by_their_beginning() -> None:
     (error,) = recording_mistakes(ROBOT, standing(ROBOT, np.array([0.96, 0.0, -0.28, 0.0])))
     assert "0 degrees if the quaternion turns from the world's frame to the platform's" in error.problem
-    assert 'qx = { name = "qx", sign = -1 }' in error.hint
+    assert "qx = { sign = -1 } and qy = { sign = -1 }" in error.hint
 
 
 def test_a_platform_that_begins_turned_otherwise_is_no_mistake() -> None:

@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
 from tautwire.recordings.alternative_readings import WindingReading
 from tautwire.recordings.consistency import recording_mistakes
@@ -20,7 +23,9 @@ from tests.support.pose_recordings import noisy, wandering_recording
 from tests.support.recordings import recorded
 from tests.support.rigid_robots import crane_robot, octahedral_robot
 from tests.support.robots import EXAMPLES, example
+from tests.support.told_columns import assert_mended_by_told_lines, told_columns
 
+Array = NDArray[np.float64]
 NAMES = ["three", "caroca", "eight"]
 
 
@@ -43,11 +48,7 @@ def checked(robot: Robot, recording: Recording) -> TensionCheck | None:
     [
         (1e-3, "are in kN, or the robot file's platform.mass is 1000 times the true one", " by 1000"),
         (1e3, "are in mN", " by 0.001"),
-        (
-            1.0 / 9.80665,
-            "are in kg",
-            ' by 9.807, or declare the unit: tension_1 [kg] in the header of a CSV file, unit = "kg"',
-        ),
+        (1.0 / 9.80665, "are in kg", '"tension_{}" = { unit = "kg" }, which is to multiply tension_1'),
         (1e3 / 9.80665, "are in g", " by 0.009807"),
         (1.0 / 4.4482216, "are in lbf", " by 4.448"),
         (-1.0, "have the other sign", "multiply by -1"),
@@ -72,8 +73,8 @@ def test_swapped_load_cells_are_told(name: str) -> None:
 @pytest.mark.parametrize(
     ("factor", "cause", "remedy"),
     [
-        (1e-3, "if tension_2 alone is in kN", "multiply it by 1000, or declare the unit: tension_2 [kN]"),
-        (-1.0, "if tension_2 alone has the other sign", "multiply by -1"),
+        (1e-3, "if tension_2 alone is in kN", 'tension_2 = { unit = "kN" }, which is to multiply it by 1000'),
+        (-1.0, "if tension_2 alone has the other sign", "tension_2 = { sign = -1 }"),
     ],
 )
 def test_one_load_cell_in_another_unit_or_of_the_other_sign_is_told(
@@ -100,8 +101,28 @@ def test_load_cells_that_were_tared_under_load_are_told_with_the_tensions_of_sta
     tared = replace(recording, tension=recording.tension - recording.tension[:10].mean(axis=0))
     (error,) = recording_mistakes(robot, tared)
     assert "were tared at the start" in error.problem
-    offsets = [float(text) for text in error.hint.split("offset = ")[1].split(" in [")[0].split(", ")]
+    columns = told_columns(error.hint)
+    offsets = [columns[f"tension_{cable}"]["offset"] for cable in robot.cable_numbers]
     assert offsets == pytest.approx(-static_tensions(robot), rel=1e-3)
+
+
+MISTAKES: dict[str, Callable[[Array], Array]] = {
+    "kN": lambda tension: 1e-3 * tension,
+    "other sign": lambda tension: -tension,
+    "other order": lambda tension: tension[:, ::-1],
+    "one in kN of the other sign": lambda tension: tension * np.where(np.arange(tension.shape[1]) == 1, -1e-3, 1.0),
+    "tared": lambda tension: tension - tension[:10].mean(axis=0),
+    "no cell at the last cable, and mN": lambda tension: (
+        1e3 * np.where(np.arange(tension.shape[1]) < tension.shape[1] - 1, tension, np.nan)
+    ),
+}
+
+
+@pytest.mark.parametrize("name", NAMES)
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_the_told_lines_mend_the_load_cells(tmp_path: Path, name: str, mistake: str) -> None:
+    robot, recording = shipped(name)
+    assert_mended_by_told_lines(robot, replace(recording, tension=MISTAKES[mistake](recording.tension)), tmp_path)
 
 
 @pytest.mark.parametrize(

@@ -13,6 +13,7 @@ from tautwire.recordings import tracker as tracker_module
 from tautwire.recordings.mistaken_tracker import tracker_mistakes
 from tautwire.recordings.recording import Recording, read_recording
 from tests.support.robots import EXAMPLES, example
+from tests.support.told_columns import told_columns
 from tests.support.trackers import split
 
 Files = tuple[Recording, Recording]
@@ -75,5 +76,14 @@ def test_the_error_names_the_column_and_the_table_that_mend_it(monkeypatch: pyte
     monkeypatch.setattr(tracker_module, "read_tracker", lambda *_: tracker)
     with pytest.raises(RecordingError, match="match the winch travel at no offset of its clock, but do if") as caught:
         tracker_module.with_tracker(example("three"), log, "tracker.csv")
-    assert "multiply its x, y, z by 0.001, or declare the unit: x [mm]" in caught.value.hint
-    assert caught.value.hint.endswith('unit = "mm" in [recording.tracker.columns]')
+    assert told_columns(caught.value.hint, "recording.tracker.columns") == {axis: {"unit": "mm"} for axis in "xyz"}
+    assert caught.value.hint.endswith("which is to multiply its x, y, z by 0.001")
+
+
+def test_the_lines_of_log_and_tracker_are_in_tables_of_their_own(monkeypatch: pytest.MonkeyPatch) -> None:
+    log, tracker = CASES["mm and mm/s"][0](files("three"))
+    monkeypatch.setattr(tracker_module, "read_tracker", lambda *_: tracker)
+    with pytest.raises(RecordingError) as caught:
+        tracker_module.with_tracker(example("three"), log, "tracker.csv")
+    assert told_columns(caught.value.hint, "recording.tracker.columns") == {axis: {"unit": "mm"} for axis in "xyz"}
+    assert told_columns(caught.value.hint) == {"winch_speed_{}": {"unit": "mm/s"}}

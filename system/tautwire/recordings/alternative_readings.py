@@ -7,12 +7,13 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from .column_corrections import ColumnCorrection, corrected_lines, negated, reordered, scaled
 from .recording import Recording
 from .units import UNITS
 
 DRUM_RADII = (0.005, 0.5)  # m
-NEGATE = "multiply by -1, or declare sign = -1 in [recording.columns]"
-REORDER = "rename the columns in this order, or declare their names so in [recording.columns]"
+NEGATE = "multiply by -1"
+REORDER = "rename the columns in this order"
 
 # Those that recordings are written in by mistake, and what one of each is in SI units.
 TIME_UNITS = {unit.symbol: unit.to_si(1.0) for unit in UNITS["time"]}
@@ -23,17 +24,38 @@ ANCHOR_UNITS = ("m", "cm", "mm")
 
 @dataclass(frozen=True)
 class Mistake:
-    """What was written otherwise than it is read: ``cause`` as a clause, ``remedy`` as an instruction."""
+    """What was written otherwise than it is read: ``cause`` as a clause, ``remedy`` as an instruction.
+
+    ``corrections`` are those of columns that do the same without another file; a tracker's are in a table of its own.
+    """
 
     cause: str
     remedy: str
+    corrections: tuple[ColumnCorrection, ...] = ()
+    is_of_tracker: bool = False
 
 
-def mistakes_text(alternatives: Sequence[Sequence[Mistake]]) -> tuple[str, str]:
-    """Causes and remedies of alternative sets of mistakes, each as one clause."""
+def mistakes_text(
+    alternatives: Sequence[Sequence[Mistake]], recording: Recording, tracker: Recording | None = None
+) -> tuple[str, str]:
+    """Causes and remedies of alternative sets of mistakes, each as one clause.
+
+    A remedy begins with the lines of TOML that read the recording right, or the tracker's file, where lines can.
+    """
     causes = ", or if ".join(" and ".join(mistake.cause for mistake in mistakes) for mistakes in alternatives)
-    remedies = ", or ".join(", and ".join(mistake.remedy for mistake in mistakes) for mistakes in alternatives)
-    return causes, remedies
+    return causes, ", or ".join(_remedies(mistakes, recording, tracker) for mistakes in alternatives)
+
+
+def _remedies(mistakes: Sequence[Mistake], recording: Recording, tracker: Recording | None) -> str:
+    parts = [mistake.remedy for mistake in mistakes if not mistake.corrections]
+    for is_of_tracker, source in ((True, tracker), (False, recording)):
+        group = [each for each in mistakes if each.corrections and each.is_of_tracker == is_of_tracker]
+        if group and source is not None:
+            table = "recording.tracker.columns" if is_of_tracker else "recording.columns"
+            lines = corrected_lines(source, [mistake.corrections for mistake in group])
+            by_hand = ", and ".join(mistake.remedy for mistake in group)
+            parts.append(f"write into [{table}] {' and '.join(lines)}, which is to {by_hand}")
+    return ", and ".join(parts)
 
 
 @dataclass(frozen=True)
@@ -61,18 +83,20 @@ class WindingReading:
         ]
         if self.time_unit != "s":
             unit = self.time_unit
-            yield Mistake(f"time is in {unit}", convert("time", unit, TIME_UNITS[unit], "time"))
+            factor = TIME_UNITS[unit]
+            yield Mistake(f"time is in {unit}", convert("time", factor), scaled(("time",), factor, unit))
         if self.speed_unit is None:
             yield Mistake(
                 _factor_text(names, self.radius, bool(recording.rope_lengths)),
-                f"multiply {_range_text(names)} by {self.radius:.4g}, or declare that as factor in "
-                "[recording.columns], better the one that follows from the drum's radius and what is recorded in one "
-                "turn of it",
+                f"multiply {_range_text(names)} by {self.radius:.4g}, or better by the factor that follows from the "
+                "drum's radius and what is recorded in one turn of it",
+                scaled(names, self.radius),
             )
         elif self.speed_unit != "m/s":
             unit = self.speed_unit.removesuffix("/s") if recording.rope_lengths else self.speed_unit
-            remedy = convert(_range_text(names), unit, SPEED_UNITS[self.speed_unit], names[0])
-            yield Mistake(f"{_range_text(names)} are in {unit}", remedy)
+            factor = SPEED_UNITS[self.speed_unit]
+            remedy = convert(_range_text(names), factor)
+            yield Mistake(f"{_range_text(names)} are in {unit}", remedy, scaled(names, factor, unit))
         if any(sign < 0 for sign in self.signs):
             wrong = [names[column] for column, sign in sorted(zip(self.order, self.signs, strict=True)) if sign < 0]
             verb = "has" if len(wrong) == 1 else "have"
@@ -80,10 +104,13 @@ class WindingReading:
             yield Mistake(
                 f"{subject} {verb} the other sign",
                 f"{NEGATE}: a winch that reels in has a positive speed",
+                negated(wrong),
             )
         if self.order != tuple(range(len(self.order))):
-            written = ", ".join(names[column] for column in self.order)
-            yield Mistake(f"the winches of cables 1 to {len(names)} are {written}", REORDER)
+            written = [names[column] for column in self.order]
+            is_one_kind = len(recording.rope_lengths) in (0, len(names))
+            corrections = reordered(names, written) if is_one_kind else ()
+            yield Mistake(f"the winches of cables 1 to {len(names)} are {', '.join(written)}", REORDER, corrections)
         if self.clock_offset:
             side, remedy = (
                 ("ahead of", "subtract that from the winches' times")
@@ -94,10 +121,9 @@ class WindingReading:
             yield Mistake(f"the winches' clock is {offset} {side} the tracker's", remedy)
 
 
-def convert(what: str, unit: str, factor: float, column: str, table: str = "recording.columns") -> str:
-    """The remedy for columns in another unit: convert them, or declare the unit."""
-    declared = f'{column} [{unit}] in the header of a CSV file, unit = "{unit}" in [{table}]'
-    return f"multiply {what} by {factor:.4g}, or declare the unit: {declared}"
+def convert(what: str, factor: float) -> str:
+    """The remedy for columns in a unit of so many SI units."""
+    return f"multiply {what} by {factor:.4g}"
 
 
 def _range_text(names: list[str]) -> str:

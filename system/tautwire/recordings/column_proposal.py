@@ -2,16 +2,15 @@
 
 from __future__ import annotations
 
-import json
 import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from ..errors import one_line
-from ..robot.recorded_columns import CABLE_COLUMNS
+from ..robot.recorded_columns import CABLE_COLUMNS, column_line
 from ..robot.robot_file_reader import MAX_CABLES
-from ..robot.schema import AXES, QUATERNION_COLUMNS
+from ..robot.schema import AXES, QUATERNION_COLUMNS, RecordedColumn
 from .column_names import ColumnName
 from .csv_lines import unit_in_name
 from .recording_table import known_columns
@@ -97,11 +96,9 @@ class ProposedColumn:
 
     def line(self) -> str:
         """The line of TOML, with the doubt as a comment behind it."""
-        entries = [f"name = {json.dumps(self.name, ensure_ascii=False)}"]
-        entries += [f'unit = "{self.unit}"'] if self.unit else []
-        entries += [f"factor = {self.factor!r}"] if self.factor is not None else []
-        entries += ["sign = -1"] if self.sign < 0 else []
-        return f"{self.column} = {{ {', '.join(entries)} }}" + (f"  # {self.doubt}" if self.doubt else "")
+        factor = 1.0 if self.factor is None else self.factor
+        line = column_line(RecordedColumn(self.column, self.name, self.unit, factor, self.sign))
+        return f"{line}  # {self.doubt}" if self.doubt else line
 
 
 @dataclass(frozen=True)

@@ -63,7 +63,7 @@ def recording_mistakes(robot: Robot, recording: Recording) -> tuple[RecordingErr
     errors = []
     geometry, winding = GeometryReading(), WindingReading()
     if motion is not None and motion.readings:
-        errors.append(_motion_error(robot, recording.path, motion))
+        errors.append(_motion_error(robot, recording, motion))
         geometry, winding = motion.readings[0].geometry, motion.readings[0].winding
     elif travel is not None:
         return (travel,)
@@ -73,7 +73,7 @@ def recording_mistakes(robot: Robot, recording: Recording) -> tuple[RecordingErr
         return tuple(errors)
     tensions = check_tensions(robot, recording, geometry, winding)
     if tensions is not None and tensions.mistakes:
-        errors.append(_tension_error(recording.path, tensions))
+        errors.append(_tension_error(recording, tensions))
     return tuple(errors)
 
 
@@ -109,23 +109,23 @@ def speed_error(recording: Recording) -> RecordingError | None:
     return RecordingError(recording.path, problem, hint)
 
 
-def _motion_error(robot: Robot, path: str, motion: MotionCheck) -> RecordingError:
+def _motion_error(robot: Robot, recording: Recording, motion: MotionCheck) -> RecordingError:
     shown = "poses" if robot.platform.is_rigid_body else "positions"
-    causes, remedies = mistakes_text([reading.mistakes for reading in motion.readings])
+    causes, remedies = mistakes_text([reading.mistakes for reading in motion.readings], recording)
     problem = (
         f"winch travel does not match the {shown}: it is off by {_percentage(motion.misfit)}, by "
         f"{_percentage(motion.readings[0].misfit)} if {causes}"
     )
-    return RecordingError(path, problem, remedies)
+    return RecordingError(recording.path, problem, remedies)
 
 
-def _tension_error(path: str, tensions: TensionCheck) -> RecordingError:
-    causes, remedies = mistakes_text(tensions.mistakes)
+def _tension_error(recording: Recording, tensions: TensionCheck) -> RecordingError:
+    causes, remedies = mistakes_text(tensions.mistakes, recording)
     problem = (
         f"tensions do not match the platform's weight: they carry {_percentage(tensions.carried)} of it and are off by "
         f"{_percentage(tensions.misfit)}, by {_percentage(tensions.corrected_misfit)} if {causes}"
     )
-    return RecordingError(path, problem, remedies)
+    return RecordingError(recording.path, problem, remedies)
 
 
 def _percentage(share: float) -> str:

@@ -89,7 +89,8 @@ def read_csv_text(file: str, max_size: int, columns: ColumnMap) -> CsvText:
     )
     # Nothing is copied of a file in the standard dialect, which may be long.
     text = text if source.is_standard else _rewritten(text, source)
-    return replace(text, header=replace(text.header, dialect=_in_words(text.header, source)))
+    read_as = replace(text.header, dialect=_in_words(text.header, source))
+    return replace(text, header=read_as.with_recorded_columns(read_as))
 
 
 def _require_no_markup(content: bytes, file: str) -> None:
@@ -203,7 +204,7 @@ def _in_words(read_as: Header, source: _Source) -> str:
     parts += [f"with {' and '.join(marks)}"] if marks else []
     if read_as.clock is not None:
         parts.append(f"time is {read_as.clock.style}, in s from the first sample")
-    parts += [units_in_words(header.units)] if header.units else []
+    parts += [words] if (words := units_in_words(header.units)) else []
     if header.is_comment:
         parts.append(f"the comment in line {header.index + 1} is the header")
     if header.has_text_above:

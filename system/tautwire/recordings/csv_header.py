@@ -32,7 +32,7 @@ MAX_FIRST_SAMPLES = 8
 class CsvHeader:
     """The header: the ``index`` from 0 of its line, the separator, and how many of the ``known`` columns it names.
 
-    ``names`` are its cells without their units, ``units`` those of known columns that are not SI; the first sample is
+    ``names`` are its cells without their units, ``units`` those that are stated of known columns; the first sample is
     in the line ``data_index``. ``is_certain`` where it names ``time`` and another column, ``is_standard`` where it is
     the first line, and nothing stands between it and the samples.
     """
@@ -84,7 +84,6 @@ def read_header(content: bytes, lines: Sequence[bytes], columns: ColumnMap, file
     if units_index is not None:
         units = _with_units_below(units, texts[units_index], units_index, header, columns, file)
     units = columns.units(units, where, header.index + 1)
-    units = {name: unit for name, unit in units.items() if not unit.is_si}
     is_standard = header.index == 0 and not header.is_comment and data_index == height
     return replace(header, units=units, data_index=data_index, is_standard=is_standard)
 

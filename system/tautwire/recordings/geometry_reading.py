@@ -15,6 +15,7 @@ from ..robot.cable_routes import cable_routes
 from ..robot.robot_assembly import NUMPY_MATHEMATICS
 from ..robot.schema import AXES, QUATERNION_COLUMNS, Point, Robot
 from .alternative_readings import LENGTH_UNITS, Mistake, convert
+from .column_corrections import ColumnCorrection, scaled
 from .recording import Recording
 
 Array = NDArray[np.float64]
@@ -61,19 +62,18 @@ class QuaternionReading:
     def mistakes(self) -> Iterator[Mistake]:
         """What this reading changes."""
         columns = ("qz", "qw", "qx", "qy") if self.is_scalar_last else QUATERNION_COLUMNS
-        signs = "".join(f'\n{each} = {{ name = "{name}", sign = -1 }}' for each, name in _vector_parts(columns))
-        names = ", ".join(f'{each} = "{name}"' for each, name in zip(QUATERNION_COLUMNS, columns, strict=True))
-        remedy = signs.replace("\n", ", ").removeprefix(", ") if self.is_inverse else names
-        if self.is_inverse and self.is_scalar_last:
-            remedy = f'{QUATERNION_COLUMNS[0]} = "{columns[0]}", {remedy}'
+        signs = (1.0, -1.0, -1.0, -1.0) if self.is_inverse else (1.0, 1.0, 1.0, 1.0)
         causes = ["is written as x, y, z, w"] if self.is_scalar_last else []
         causes += ["turns from the world's frame to the platform's"] if self.is_inverse else []
+        remedies = [f"read {', '.join(columns)} as qw, qx, qy, qz"] if self.is_scalar_last else []
+        remedies += ["negate qx, qy, qz"] if self.is_inverse else []
+        corrections = tuple(
+            ColumnCorrection(part, column, sign=sign)
+            for part, column, sign in zip(QUATERNION_COLUMNS, columns, signs, strict=True)
+            if (part, 1.0) != (column, sign)
+        )
         if causes:
-            yield Mistake(f"the quaternion {' and '.join(causes)}", f"declare in [recording.columns] {remedy}")
-
-
-def _vector_parts(columns: tuple[str, ...]) -> Iterator[tuple[str, str]]:
-    return zip(QUATERNION_COLUMNS[1:], columns[1:], strict=True)
+            yield Mistake(f"the quaternion {' and '.join(causes)}", " and ".join(remedies), corrections)
 
 
 @dataclass(frozen=True)
@@ -156,13 +156,14 @@ class GeometryReading:
 
     def mistakes(self, has_orientation: bool) -> Iterator[Mistake]:
         """What this reading changes, also of quaternions where there are any."""
+        yield from self.quaternion.mistakes()
         others = [axis for index, axis in enumerate(AXES) if index != self.odd_axis]
         if self.position_unit != "m":
-            unit, names = self.position_unit, ", ".join(others)
-            yield Mistake(f"{names} are in {unit}", convert(names, unit, LENGTH_UNITS[unit], others[0]))
+            unit, names, factor = self.position_unit, ", ".join(others), LENGTH_UNITS[self.position_unit]
+            yield Mistake(f"{names} are in {unit}", convert(names, factor), scaled(others, factor, unit))
         if self.odd_axis is not None and self.odd_unit != "m":
-            unit, name = self.odd_unit, AXES[self.odd_axis]
-            yield Mistake(f"{name} is in {unit}", convert(name, unit, LENGTH_UNITS[unit], name))
+            unit, name, factor = self.odd_unit, AXES[self.odd_axis], LENGTH_UNITS[self.odd_unit]
+            yield Mistake(f"{name} is in {unit}", convert(name, factor), scaled((name,), factor, unit))
         if self.anchor_unit != "m":
             yield _in_other_unit("anchors in the robot file are", self.anchor_unit)
         if self.attachment_unit != "m":
@@ -174,18 +175,30 @@ class GeometryReading:
             parts = [f"{'-' if sign < 0 else ''}q{AXES[axis]}" for axis, sign in zip(self.axes, signs, strict=True)]
             quaternion = f", and {', '.join(parts)} as qx, qy, qz" if has_orientation else ""
             remedy = f"write the columns {names} as x, y, z{quaternion}"
-            yield Mistake(f"the robot file's x, y, z are the recording's {names}", remedy)
+            corrections = self._axis_corrections(has_orientation)
+            yield Mistake(f"the robot file's x, y, z are the recording's {names}", remedy, corrections)
         offset = ", ".join(f"{coordinate:.3g}" for coordinate in self.origin)
         if self.rotation != IDENTITY:
             yield self._turned_frame(offset)
         elif any(self.origin):
             cause = f"x, y, z have another origin, about [{offset}] m in the robot file's frame"
-            yield Mistake(cause, "add that vector")
+            shifts = zip(AXES, self.origin, strict=True)
+            corrections = tuple(ColumnCorrection(axis, shift=shift) for axis, shift in shifts if shift)
+            yield Mistake(cause, "add that vector", corrections)
         if self.is_centre_of_mass:
             cause = "x, y, z are those of the centre of mass"
             remedy = "record the frame's origin, or subtract centre_of_mass from all attachments and from itself"
             yield Mistake(cause, remedy)
-        yield from self.quaternion.mistakes()
+
+    def _axis_corrections(self, has_orientation: bool) -> tuple[ColumnCorrection, ...]:
+        """Positions along other axes, and the vector parts of quaternions, which turn the other way if mirrored."""
+        parts = [("", 1.0)] + ([("q", self._handedness)] if has_orientation else [])
+        return tuple(
+            ColumnCorrection(f"{part}{AXES[index]}", f"{part}{AXES[axis]}", sign=handedness * sign)
+            for part, handedness in parts
+            for index, (axis, sign) in enumerate(zip(self.axes, self.signs, strict=True))
+            if (axis, handedness * sign) != (index, 1.0)
+        )
 
     def _turned_frame(self, offset: str) -> Mistake:
         angle = np.degrees(np.arccos(np.clip((np.trace(self.rotation) - 1.0) / 2.0, -1.0, 1.0)))

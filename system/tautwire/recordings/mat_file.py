@@ -81,7 +81,7 @@ def open_mat(path: str | Path, columns: ColumnMap, sink: ErrorSink = raise_error
         _require_readable_size(sources.values(), file)
         content = read_arrays(path, level, sources.values())
         numbers = {name: scaled.to_si(name, _numbers(column, content, file)) for name, column in wanted.items()}
-    return ColumnTable(file, header, numbers)
+    return ColumnTable(file, header.with_recorded_columns(scaled), numbers)
 
 
 def mat_column_names(path: str | Path) -> dict[str, str | None]:

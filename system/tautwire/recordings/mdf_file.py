@@ -109,12 +109,13 @@ def _read_channels(content: Any, file: str, columns: ColumnMap, sink: ErrorSink)
         text = signals[name].unit
         unit = columns.stated_unit(name, text, where) if text.strip() else None
         stated |= {name: unit} if unit else {}
-    units = {name: unit for name, unit in columns.units(stated, file).items() if not unit.is_si}
+    units = columns.units(stated, file)
     scaled = replace(header, units=units, scales=columns.scales)
     channels = {
         name: _channel(signal, name, scaled, f"{file}: channel {stored[name]}") for name, signal in signals.items()
     }
-    return replace(header, dialect=units_in_words(units)), channels
+    header = replace(header, dialect=units_in_words(units))
+    return header.with_recorded_columns(scaled), channels
 
 
 def _channel(signal: Any, name: str, scaled: Header, where: str) -> Channel:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from ..errors import RecordingError
 from ..number_format import format_significant
 from ..robot.schema import QUATERNION_COLUMNS, Quaternion, Robot
+from .alternative_readings import mistakes_text
 from .geometry_reading import GeometryReading, QuaternionReading
 from .mistaken_motion import EQUAL_DIFFERENCE, EQUAL_RATIO, MIN_IMPROVEMENT, misfit_of_geometry
 from .recording import Recording
@@ -52,12 +53,12 @@ def start_orientation_error(robot: Robot, recording: Recording) -> RecordingErro
             continue
         if as_declared is not None and misfit is not None and misfit > EQUAL_RATIO * as_declared + EQUAL_DIFFERENCE:
             continue
-        (mistake,) = reading.mistakes()
+        cause, remedy = mistakes_text([tuple(reading.mistakes())], recording)
         problem = (
             f"orientation begins {_degrees(angle)} from start_orientation in the robot file, {_degrees(corrected)} if "
-            f"{mistake.cause}"
+            f"{cause}"
         )
-        return RecordingError(recording.path, problem, f"{mistake.remedy}, or correct start_orientation")
+        return RecordingError(recording.path, problem, f"{remedy}, or correct start_orientation")
     return None
 
 

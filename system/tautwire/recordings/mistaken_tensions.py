@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from ..robot.schema import Robot
 from .alternative_readings import NEGATE, REORDER, Mistake, WindingReading, convert
+from .column_corrections import negated, reordered, scaled
 from .geometry_reading import GeometryReading
 from .mistaken_motion import MIN_IMPROVEMENT
 from .odd_load_cells import likely_cell_readings
@@ -44,20 +45,20 @@ class TensionReading:
 
     def mistakes(self) -> Iterator[Mistake]:
         """What this reading changes."""
-        columns = [f"tension_{cable + 1}" for cable in self.order]
+        declared = [f"tension_{cable + 1}" for cable in range(len(self.order))]
+        columns = [declared[cable] for cable in self.order]
         names = f"tension_1 to tension_{len(columns)}"
         if self.unit != "N":
-            other = f", or the robot file's platform.mass is {FORCE_UNITS[self.unit]:.4g} times the true one"
-            yield Mistake(
-                f"{names} are in {self.unit}{other}", convert(names, self.unit, FORCE_UNITS[self.unit], "tension_1")
-            )
+            factor = FORCE_UNITS[self.unit]
+            other = f", or the robot file's platform.mass is {factor:.4g} times the true one"
+            corrections = scaled(columns, factor, self.unit)
+            yield Mistake(f"{names} are in {self.unit}{other}", convert(names, factor), corrections)
         if self.sign < 0:
-            yield Mistake(f"{names} have the other sign", f"{NEGATE}: a rope that pulls has a positive tension")
+            remedy = f"{NEGATE}: a rope that pulls has a positive tension"
+            yield Mistake(f"{names} have the other sign", remedy, negated(columns))
         if list(self.order) != sorted(self.order):
-            yield Mistake(
-                f"the load cells of cables 1 to {len(columns)} are {', '.join(columns)}",
-                REORDER,
-            )
+            cause = f"the load cells of cables 1 to {len(columns)} are {', '.join(columns)}"
+            yield Mistake(cause, REORDER, reordered(declared, columns))
 
 
 @dataclass(frozen=True)

@@ -9,9 +9,10 @@ from itertools import combinations, groupby, product
 import numpy as np
 
 from ..errors import RecordingError
-from ..robot.schema import Robot
+from ..robot.schema import AXES, Robot
 from .alternative_readings import LENGTH_UNITS, TIME_UNITS, Mistake, WindingReading, convert
 from .candidate_readings import SAMPLE_INTERVALS
+from .column_corrections import scaled
 from .recording import Recording
 from .tracker_clock import estimate_tracker_clock, least_travel_mismatch
 
@@ -44,13 +45,14 @@ class TrackerReading:
 
     def mistakes(self, log: Recording) -> tuple[Mistake, ...]:
         """What this reading changes."""
-        own, table = [], "recording.tracker.columns"
-        if self.time_unit != "s":
-            remedy = convert("its time", self.time_unit, TIME_UNITS[self.time_unit], "time", table)
-            own.append(Mistake(f"its time is in {self.time_unit}", remedy))
-        if self.position_unit != "m":
-            remedy = convert("its x, y, z", self.position_unit, LENGTH_UNITS[self.position_unit], "x", table)
-            own.append(Mistake(f"its x, y, z are in {self.position_unit}", remedy))
+        own = []
+        for unit, size, what, verb, columns in (
+            (self.time_unit, TIME_UNITS[self.time_unit], "its time", "is", ("time",)),
+            (self.position_unit, LENGTH_UNITS[self.position_unit], "its x, y, z", "are", AXES),
+        ):
+            if size != 1.0:
+                corrections = scaled(columns, size, unit)
+                own.append(Mistake(f"{what} {verb} in {unit}", convert(what, size), corrections, is_of_tracker=True))
         return (*own, *self.winding.mistakes(log))
 
 

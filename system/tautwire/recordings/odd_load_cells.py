@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from ..errors import InputError
 from ..robot.schema import Robot
 from ..robot.static_equilibrium import static_tensions
-from .alternative_readings import NEGATE, Mistake, convert
+from .alternative_readings import Mistake, convert
+from .column_corrections import ColumnCorrection
 from .mistaken_motion import MIN_IMPROVEMENT
 from .recording import Recording
 from .weight_balance import FORCE_UNITS, ForceBalance
@@ -59,9 +60,9 @@ def _of_one_cell(balance: ForceBalance) -> Iterator[CellReading]:
                 name = f"tension_{cell + 1}"
                 parts = [f"is in {unit}"] if unit != "N" else []
                 parts += ["has the other sign"] if sign < 0.0 else []
-                remedies = [convert("it", unit, size, name)] if unit != "N" else []
-                remedies += [NEGATE] if sign < 0.0 else []
-                mistake = Mistake(f"{name} alone {' and '.join(parts)}", ", and ".join(remedies))
+                remedy = convert("it", sign * size)
+                corrections = (ColumnCorrection(name, unit=unit if unit != "N" else "", factor=size, sign=sign),)
+                mistake = Mistake(f"{name} alone {' and '.join(parts)}", remedy, corrections)
                 if parts:
                     yield CellReading(_misfit(balance, factors), mistake)
 
@@ -93,8 +94,12 @@ def _tared(robot: Robot, recording: Recording, balance: ForceBalance) -> Iterato
         return
     names = ", ".join(f"tension_{cell + 1}" for cell in np.flatnonzero(has_load_cell))
     texts = [f"{value:.4g}" for value in static[has_load_cell]]
+    corrections = tuple(
+        ColumnCorrection(f"tension_{cell + 1}", shift=float(static[cell])) for cell in np.flatnonzero(has_load_cell)
+    )
     mistake = Mistake(
         f"{names} were tared at the start, where statics gives {', '.join(texts)} N",
-        f"add that, or declare offset = -{', -'.join(texts)} in [recording.columns], or tare without load",
+        "add that, or tare without load",
+        corrections,
     )
     yield CellReading(_misfit(balance, np.ones(len(static)), static), mistake)

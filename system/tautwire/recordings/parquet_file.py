@@ -45,7 +45,7 @@ def open_parquet(path: str | Path, columns: ColumnMap, sink: ErrorSink = raise_e
             name: scaled.to_si(name, _read_column(content, stored[name], f"{file}: column {stored[name]}"))
             for name in header.known_names
         }
-    return ColumnTable(file, header, numbers)
+    return ColumnTable(file, header.with_recorded_columns(scaled), numbers)
 
 
 def parquet_column_names(path: str | Path) -> tuple[str, ...]:

@@ -46,6 +46,7 @@ class Recording:
     ``rope_length`` (N, n) in m, smaller as it reels in, is NaN where no length of a cable was recorded; where it was,
     the winch speed is its rate. None where no cable has one. ``orientation`` (N, 4) is the unit quaternion w, x, y, z
     from the platform's frame to the world, its sign continuous along time; NaN where it was not measured, the default.
+    ``columns`` are the names, units and scales of columns in the file, by their standard names, where it has any.
     """
 
     path: str
@@ -57,6 +58,7 @@ class Recording:
     read_as: tuple[str, ...] = ()
     rope_length: NDArray[np.float64] | None = None
     orientation: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 4)))
+    columns: Mapping[str, RecordedColumn] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not self.has_orientation:
@@ -232,6 +234,7 @@ def _validated_recording(table: CsvTable | ColumnTable, cable_count: int) -> Rec
         unknown_columns=table.header.unknown_names,
         rope_length=_stacked_columns(numbers, [f"rope_length_{cable}" for cable in cables]),
         read_as=(*dialect, *gap_notes, *wrap_notes, *placeholder_notes),
+        columns=table.header.recorded_columns,
     )
     if not _is_valid(recording):
         raise _first_error(table)

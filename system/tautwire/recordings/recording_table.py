@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 import re
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -35,7 +35,7 @@ class Header:
 
     Numbers are written with ``decimal_mark``; ``units`` are those of columns that are not in SI units, ``scales`` what
     is declared of columns; ``clock`` is the format of times that are no numbers. ``dialect`` says in words what differs
-    from the standard.
+    from the standard. ``recorded_columns`` are names, units and scales in the file, whatever the numbers here are in.
     """
 
     names: tuple[str, ...]
@@ -45,11 +45,21 @@ class Header:
     scales: Mapping[str, RecordedColumn] = field(default_factory=dict)
     clock: ClockFormat | None = None
     dialect: str = ""
+    recorded_columns: Mapping[str, RecordedColumn] = field(default_factory=dict)
 
     @property
     def known_names(self) -> tuple[str, ...]:
         """The columns that are read, in the file's order."""
         return tuple(name for name in self.names if name not in self.unknown_names)
+
+    def with_recorded_columns(self, scaled: Header) -> Header:
+        """The header of numbers in SI units, which knows how another scales them."""
+        stated = {name: RecordedColumn(name, name, unit.symbol) for name, unit in scaled.units.items()}
+        declared = {
+            name: replace(column, unit=stated[name].unit) if name in stated else column
+            for name, column in scaled.scales.items()
+        }
+        return replace(self, recorded_columns=stated | declared)
 
     def number(self, name: str, cell: str) -> float:
         """The number in a cell of a known column, in SI units; NaN where it is none."""

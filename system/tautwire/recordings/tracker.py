@@ -74,7 +74,7 @@ def _estimated_clock(robot: Robot, log: Recording, tracker: Recording) -> Tracke
         alternatives = tracker_mistakes(robot, log, tracker) if is_mistaken else ()
         if not alternatives:
             raise of_travel or error from None
-        causes, remedies = mistakes_text(alternatives)
+        causes, remedies = mistakes_text(alternatives, log, tracker)
         problem = f"its positions match the winch travel at no offset of its clock, but do if {causes}"
         raise RecordingError(tracker.path, problem, remedies) from None
 

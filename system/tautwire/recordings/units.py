@@ -174,8 +174,9 @@ def require_unit(text: str, column: str, where: str, line: int | None = None) ->
 
 
 def units_in_words(units: Mapping[str, Unit]) -> str:
-    """Columns by their units, as in ``x, y in mm; tension_1 in kN``."""
+    """Columns by their units that are not SI, as in ``x, y in mm; tension_1 in kN``."""
     by_symbol: dict[str, list[str]] = {}
     for name, unit in units.items():
-        by_symbol.setdefault(unit.symbol, []).append(name)
+        if not unit.is_si:
+            by_symbol.setdefault(unit.symbol, []).append(name)
     return "; ".join(f"{join_names(names)} in {symbol}" for symbol, names in by_symbol.items())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from collections.abc import Sequence
 
@@ -80,6 +81,17 @@ def recorded_name(standard_name: str, column: RecordedColumn) -> str:
     if _EVERY_CABLE not in column.column:
         return column.name
     return column.name.replace(_EVERY_CABLE, standard_name.rpartition("_")[2])
+
+
+def column_line(column: RecordedColumn) -> str:
+    """The line of TOML that declares a column; what is as by default is left out."""
+    scale = {"factor": column.factor, "sign": column.sign, "offset": column.offset}
+    entries = [f'unit = "{column.unit}"'] if column.unit else []
+    entries += [f"{key} = {value:.12g}" for key, value in scale.items() if value != COLUMN_NUMBERS[key].default]
+    if column.name != column.column or not entries:
+        entries.insert(0, f"name = {json.dumps(column.name, ensure_ascii=False)}")
+    key = f'"{column.column}"' if _EVERY_CABLE in column.column else column.column
+    return f"{key} = {{ {', '.join(entries)} }}"
 
 
 def _is_column(table: CheckedTable, key: str, cable_count: int) -> bool:
