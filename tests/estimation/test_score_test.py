@@ -1,6 +1,5 @@
 """What hypotheses promise, worked out here and by workers."""
 
-from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import numpy as np
@@ -53,21 +52,6 @@ def test_sensitivities_of_effects_serve_one_run_after_another() -> None:
     )
     assert np.any(first.fisher_information)
     assert np.array_equal(first.fisher_information, second.fisher_information)
-
-
-def test_threads_compute_the_same_statistics() -> None:
-    likelihood, values = Fitter(NOISE).likelihood(ROBOT, (), SAMPLE)
-    chosen = [h for h in hypotheses(ROBOT) if h.effect.name in ("relaxation", "payload")]
-    effects = effect_sensitivities(SAMPLE.placed(ROBOT), chosen, likelihood.model.state_names)
-    with ThreadPoolExecutor(2) as threads:
-        alone, shared = (
-            statistics_of_runs(
-                linearise_filter(likelihood, values, SAMPLE.recording), effects, SAMPLE.rows, threads=executor
-            )
-            for executor in (None, threads)
-        )
-    assert np.array_equal(alone.fisher_information, shared.fisher_information)
-    assert np.array_equal(alone.score, shared.score)
 
 
 def test_a_column_of_all_cables_is_the_sum_of_those_of_each() -> None:

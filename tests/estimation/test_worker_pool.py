@@ -1,12 +1,15 @@
 """Calls in processes of their own, and what is left when they are ended."""
 
 import os
+import sys
 import time
+from collections.abc import Callable
 from pathlib import Path
 
 import pytest
 
-from tautwire.estimation.worker_pool import WorkerLostError, WorkerPool, processors
+from tautwire.estimation import worker_pool
+from tautwire.estimation.worker_pool import WorkerLostError, WorkerPool, map_in_forks, processors
 
 
 def square(number: int) -> int:
@@ -93,3 +96,70 @@ def test_a_worker_that_ends_by_itself_is_told() -> None:
 
 def test_there_is_at_least_one_processor() -> None:
     assert processors() >= 1
+
+
+def ignore(begun: int) -> None:
+    """No report."""
+
+
+@pytest.fixture
+def two_processors(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(worker_pool, "processors", lambda: 2)
+
+
+@pytest.mark.parametrize("count", [0, 1, 2, 5])
+@pytest.mark.usefixtures("two_processors")
+def test_forks_answer_in_the_order_of_the_items(count: int) -> None:
+    offset = 0.5
+    assert map_in_forks(lambda item: item + offset, range(count), ignore) == [item + offset for item in range(count)]
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are forked on Linux only")
+@pytest.mark.usefixtures("two_processors")
+def test_every_second_item_is_of_a_fork_and_the_others_are_reported() -> None:
+    reported: list[int] = []
+    processes = map_in_forks(lambda _: os.getpid(), range(5), reported.append)
+    assert processes[0::2] == [os.getpid()] * 3 and len(set(processes[1::2])) == 1
+    assert processes[1] != os.getpid() and reported == [0, 2, 4]
+
+
+def raise_at(place: int) -> Callable[[int], int]:
+    def fail_there(item: int) -> int:
+        return fail(item) if item == place else item
+
+    return fail_there
+
+
+@pytest.mark.parametrize("place", [0, 1])
+@pytest.mark.usefixtures("two_processors")
+def test_errors_of_forks_are_raised_as_they_are_here(place: int) -> None:
+    with pytest.raises(ValueError, match=f"no {place}"):
+        map_in_forks(raise_at(place), range(4), ignore)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are forked on Linux only")
+@pytest.mark.usefixtures("two_processors")
+def test_a_fork_that_ends_is_an_error() -> None:
+    parent = os.getpid()
+    with pytest.raises(WorkerLostError):
+        map_in_forks(lambda _: os.getpid() == parent or os._exit(3), range(2), ignore)
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="processes are forked on Linux only")
+@pytest.mark.usefixtures("two_processors")
+def test_an_error_here_ends_the_fork(tmp_path: Path) -> None:
+    parent = os.getpid()
+
+    def work(item: int) -> None:
+        if os.getpid() == parent:
+            while not list(tmp_path.iterdir()):
+                time.sleep(0.01)
+            fail(item)
+        (tmp_path / str(os.getpid())).touch()
+        time.sleep(600.0)
+
+    with pytest.raises(ValueError, match="no 0"):
+        map_in_forks(work, range(2), ignore)
+    (begun,) = tmp_path.iterdir()
+    with pytest.raises(ProcessLookupError):
+        os.kill(int(begun.name), 0)

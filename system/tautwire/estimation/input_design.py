@@ -10,8 +10,7 @@ Storn and Price (1997), J. Global Optimization 11, 341-359.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from concurrent.futures import Executor, ThreadPoolExecutor
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from math import ceil, log2, log10
@@ -40,7 +39,7 @@ from .measurement_noise import estimate_noise
 from .multisine import MultisinePath
 from .parameter_fit import Fitter
 from .score_test import effect_sensitivities, statistics_of_runs
-from .worker_pool import processors
+from .worker_pool import map_in_forks
 
 Array = NDArray[np.float64]
 Progress = Callable[[str, float], None]
@@ -129,9 +128,9 @@ def design_excitation(
     Raises ExcitationError where none is within the limits.
     """
     # On matrices as small as these, threads wait for each other longer than one of them computes.
-    with threadpool_limits(1), ThreadPoolExecutor(processors()) as threads:
+    with threadpool_limits(1):
         progress("compiling the filter", 0.0)
-        design = _design_problem(robot, tuple(effects), options, threads)
+        design = _design_problem(robot, tuple(effects), options)
         best, scores = _search(design, progress)
         if max(scores) <= INFEASIBLE_SCORE:
             raise ExcitationError(len(scores))
@@ -151,13 +150,27 @@ def _search(design: _DesignProblem, progress: Progress) -> tuple[Array, list[flo
     scores: list[float] = []
 
     def cost(decision_variables: Array) -> float:
-        progress("trying programs", len(scores) / ((generations + 1) * population))
-        scores.append(design.score(decision_variables))
-        return -scores[-1]
+        return -design.score(decision_variables)
 
-    bounds, seed = Bounds(np.zeros(count), np.ones(count)), design.options.seed
+    def costs(function: Callable[[Array], float], generation: Iterable[Array]) -> list[float]:
+        def report(begun: int) -> None:
+            progress("trying programs", (len(scores) + begun) / ((generations + 1) * population))
+
+        values = map_in_forks(function, list(generation), report)
+        scores.extend(-value for value in values)
+        return values
+
     best = differential_evolution(
-        cost, bounds, init="sobol", popsize=1, maxiter=generations, polish=False, seed=seed, tol=0.0
+        cost,
+        Bounds(np.zeros(count), np.ones(count)),
+        init="sobol",
+        popsize=1,
+        maxiter=generations,
+        polish=False,
+        seed=design.options.seed,
+        tol=0.0,
+        updating="deferred",
+        workers=costs,
     )
     return best.x, scores
 
@@ -170,7 +183,6 @@ class _DesignProblem:
     likelihood: Likelihood
     sensitivities: tuple[EffectSensitivities, ...]
     fitter_for: Callable[[Noise], Fitter]
-    threads: Executor
 
     def score(self, decision_variables: Array) -> float:
         """Log10 of the smallest separation in nats."""
@@ -239,7 +251,7 @@ class _DesignProblem:
         every_row = np.ones(len(recording.time), dtype=bool)
         likelihood, values = fitter.likelihood(self.robot, (), DataSet(recording, self.robot.platform.start, every_row))
         runs = linearise_filter(likelihood, values, recording)
-        signatures = statistics_of_runs(runs, self.sensitivities, every_row, threads=self.threads)
+        signatures = statistics_of_runs(runs, self.sensitivities, every_row)
         start_directions = {one: start_steps(signatures, self.robot, one) for one in self.effects}
         # An effect that this motion would not show at all (slack, where no rope hangs) does not rank programs.
         visible_effects = [
@@ -260,9 +272,7 @@ class _DesignProblem:
         return sorted(separations, key=lambda pair: pair.nats)
 
 
-def _design_problem(
-    robot: Robot, effects: tuple[Hypothesis, ...], options: DesignOptions, threads: Executor
-) -> _DesignProblem:
+def _design_problem(robot: Robot, effects: tuple[Hypothesis, ...], options: DesignOptions) -> _DesignProblem:
     declared = robot.sensors
     noise = Noise(declared.position_noise or 0.0, declared.tension_noise or 0.0, declared.winch_speed_noise or 0.0, 0.0)
     if robot.platform.is_rigid_body:
@@ -270,7 +280,7 @@ def _design_problem(
     likelihood = Likelihood(robot, (), noise, options.interval)
     sensitivities = effect_sensitivities(robot, effects, likelihood.model.state_names)
     # Declared noise is the same for all programs: they share what one fitter has compiled.
-    return _DesignProblem(robot, effects, options, likelihood, sensitivities, lru_cache(maxsize=1)(Fitter), threads)
+    return _DesignProblem(robot, effects, options, likelihood, sensitivities, lru_cache(maxsize=1)(Fitter))
 
 
 class _InfeasibleError(Exception):

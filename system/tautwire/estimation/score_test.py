@@ -10,12 +10,10 @@ Source: Rao's score test, e.g. Cox and Hinkley (1974), Theoretical Statistics, s
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
-from concurrent.futures import Executor
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from math import prod
-from operator import methodcaller
 
 import numpy as np
 from numpy.typing import NDArray
@@ -124,13 +122,8 @@ def statistics_of_runs(
     rows: NDArray[np.bool_],
     own_columns: Sequence[SensitivityColumn] = (),
     own_values: Sequence[float] = (),
-    threads: Executor | None = None,
 ) -> ScoreStatistics:
-    """Score statistics of a linearised filter's own parameters and of effects beside them, by some recorded rows.
-
-    With ``threads`` the effects are shared out to them, and each segment of the run is computed while the one before it
-    is used.
-    """
+    """Score statistics of a linearised filter's own parameters and of effects beside them, by some recorded rows."""
     columns = (*own_columns, *(column for effect in effects for column in effect.columns))
     nominal_values = np.concatenate([np.array(own_values), *(effect.values for effect in effects)])
     fisher_information, score = np.zeros((len(nominal_values), len(nominal_values))), np.zeros(len(nominal_values))
@@ -138,11 +131,11 @@ def statistics_of_runs(
     recorded_rows = 0
     for effect in effects:
         effect.restart()
-    for run in runs if threads is None else _computed_ahead(runs, threads):
+    for run in runs:
         counting = np.zeros(len(run.is_recorded), dtype=bool)
         counting[run.is_recorded] = rows[recorded_rows : recorded_rows + int(np.sum(run.is_recorded))]
         recorded_rows += int(np.sum(run.is_recorded))
-        forcing_terms = (threads.map if threads else map)(methodcaller("forcing_terms", run), effects)
+        forcing_terms = [effect.forcing_terms(run) for effect in effects]
         state_sensitivities, innovation_sensitivities = run.propagate_sensitivities(
             state_sensitivities, *(np.concatenate(part, axis=2) for part in zip(*forcing_terms, strict=True))
         )
@@ -152,15 +145,6 @@ def statistics_of_runs(
         fisher_information += jacobian.T @ jacobian
         score += jacobian.T @ run.values[counting].ravel()
     return _without_non_finite(ScoreStatistics(columns, nominal_values, fisher_information, score))
-
-
-def _computed_ahead(runs: Iterable[LinearisedSegment], threads: Executor) -> Iterator[LinearisedSegment]:
-    """The segments, each computed while the one before it is in use."""
-    remaining = iter(runs)
-    pending = threads.submit(next, remaining, None)
-    while (run := pending.result()) is not None:
-        pending = threads.submit(next, remaining, None)
-        yield run
 
 
 def _without_non_finite(statistics: ScoreStatistics) -> ScoreStatistics:

@@ -1,25 +1,29 @@
-"""Pool of worker processes for what a trace can do in parallel: fits and co-simulations."""
+"""Worker processes: a pool for fits and co-simulations of a trace, and forks for what cannot be pickled."""
 
 from __future__ import annotations
 
 import os
 import signal
 import tempfile
+import warnings
 from collections.abc import Callable, Generator, Iterator, Sequence
 from concurrent.futures import FIRST_COMPLETED, Future, ProcessPoolExecutor, wait
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager
 from functools import cache, partial
 from multiprocessing import get_context
+from multiprocessing.connection import Connection
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Generic, TypeVar
 
 from threadpoolctl import threadpool_limits
 
+from ..cosimulation.isolation import start_method
 from ..errors import TautwireError
 from ..process_signals import TERMINATION_SIGNALS, exit_with_parent, restore_default_signals
 
+Item = TypeVar("Item")
 Result = TypeVar("Result")
 
 # Seconds between two checks whether the user wants to stop.
@@ -210,3 +214,57 @@ def _initialise_worker(folder: str) -> None:
     exit_with_parent(Path(folder))
     tempfile.tempdir = folder
     threadpool_limits(1)
+
+
+def map_in_forks(
+    function: Callable[[Item], Result], items: Sequence[Item], report: Callable[[int], None]
+) -> list[Result]:
+    """Results of a function of each item, computed here and in forks of this process, which share its memory.
+
+    Items and function need not be picklable, as results must. Where processes are not forked all is done here.
+    ``report`` gets about how many items are begun. The function must not wait for other threads: a fork has none.
+    Raises what the function raises, and WorkerLostError where a fork ends before it has answered.
+    """
+    count = min(processors(), len(items)) if start_method() == "fork" else 1
+    shares = [items[number::count] for number in range(count)]
+    with ExitStack() as stack:
+        receivers = [stack.enter_context(_forked(function, share)) for share in shares[1:]]
+        results: list[list[Result]] = [[]]
+        for number, item in enumerate(shares[0] if shares else []):
+            report(number * count)
+            results[0].append(function(item))
+        try:
+            answers = [receiver.recv() for receiver in receivers]
+        except EOFError as error:
+            raise WorkerLostError(count) from error
+        for answer in answers:
+            if isinstance(answer, Exception):
+                raise answer
+            results.append(answer)
+    return [results[index % count][index // count] for index in range(len(items))]
+
+
+@contextmanager
+def _forked(function: Callable[[Item], Result], items: Sequence[Item]) -> Iterator[Connection]:
+    """A pipe from a fork that sends the results of all items; the fork ends with the block, whatever it does."""
+    context = get_context("fork")
+    receiver, sender = context.Pipe(duplex=False)
+    process = context.Process(target=_send_results, args=(function, items, sender))
+    with _interrupts_blocked(), warnings.catch_warnings():
+        # Python 3.12 warns of any fork beside threads.
+        warnings.simplefilter("ignore", DeprecationWarning)
+        process.start()
+    sender.close()
+    try:
+        yield receiver
+    finally:
+        process.kill()
+        process.join()
+
+
+def _send_results(function: Callable[[Item], Result], items: Sequence[Item], sender: Connection) -> None:
+    restore_default_signals()
+    try:
+        sender.send([function(item) for item in items])
+    except Exception as error:
+        sender.send(error)

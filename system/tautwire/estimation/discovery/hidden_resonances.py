@@ -24,7 +24,6 @@ from threadpoolctl import threadpool_limits
 from tautwire_fmu.laws.formula import FORCE_TARGETS
 
 from ...errors import TautwireError
-from ...linear import linearise
 from ...robot.schema import Robot
 from ..estimation_data import DataSet, DataSplit
 from ..innovation_sensitivities import LinearisedSegment, linearise_filter
@@ -99,6 +98,9 @@ def _frequency_grid(data_sets: Sequence[DataSet], policy: ResonancePolicy) -> Ar
 
 def _modal_frequencies(robot: Robot) -> Array:
     try:
+        # Imported here: python-control takes half a second, and few commands that estimate need it.
+        from ...linear import linearise
+
         return linearise(robot).modes.frequencies
     except TautwireError:
         return np.zeros(0)
