@@ -27,7 +27,7 @@ run: $(READY)
 test validate floors: export OPENBLAS_NUM_THREADS = 1
 
 test: lint types
-	$(BIN)/$(PYTEST) -m "not validate"
+	$(BIN)/$(PYTEST) -m "not validate" -W error::RuntimeWarning
 
 validate: $(READY)
 	$(BIN)/$(PYTEST) -m validate

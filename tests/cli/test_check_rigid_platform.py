@@ -48,7 +48,7 @@ def test_quaternions_in_another_order_are_a_problem(tmp_path: Path, capsys: pyte
     status, result = checked(tmp_path, wrong, capsys)
     (problem,) = result["problems"]
     assert status == 2 and "if the quaternion is written as x, y, z, w" in problem["problem"]
-    assert 'qw = "qz"' in problem["hint"]
+    assert 'qw = { name = "qz" }' in problem["hint"]
 
 
 def test_a_recording_without_orientation_is_noted(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

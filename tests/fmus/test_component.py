@@ -35,6 +35,7 @@ def test_a_failing_fmu_is_named_with_time_and_inputs(three_fmus: RobotFmus) -> N
     assert "division by zero" in str(caught.value)
 
 
+@pytest.mark.filterwarnings("ignore:invalid value encountered in multiply")
 def test_a_value_that_is_not_finite_stops_the_run(three_fmus: RobotFmus) -> None:
     speeds = np.array([[0.0, 0.0, 0.0], [0.0, np.inf, 0.0]])
     source = PiecewiseLinearInput(np.array([0.0, 0.1]), speeds)
