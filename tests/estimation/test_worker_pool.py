@@ -163,3 +163,20 @@ def test_an_error_here_ends_the_fork(tmp_path: Path) -> None:
     (begun,) = tmp_path.iterdir()
     with pytest.raises(ProcessLookupError):
         os.kill(int(begun.name), 0)
+
+
+class UnpicklableError(Exception):
+    """An error that can be sent and not be made again."""
+
+    def __init__(self, first: str, second: str) -> None:
+        super().__init__(f"{first} {second}")
+
+
+@pytest.mark.usefixtures("two_processors")
+def test_an_error_of_a_fork_that_cannot_be_pickled_keeps_its_text() -> None:
+    def work(item: int) -> None:
+        if item == 1:
+            raise UnpicklableError("no", "number")
+
+    with pytest.raises(RuntimeError, match="UnpicklableError: no number"):
+        map_in_forks(work, range(2), ignore)

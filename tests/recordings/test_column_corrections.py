@@ -2,17 +2,27 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pandas as pd
 import pytest
 
-from tautwire.recordings.column_corrections import ColumnCorrection, corrected_lines, negated, reordered, scaled
+from tautwire.recordings import column_corrections
+from tautwire.recordings.column_corrections import ColumnCorrection, negated, reordered, scaled
 from tautwire.recordings.recording import Recording, read_recording
 
 COUNT = 3
 SPEEDS = [f"winch_speed_{cable}" for cable in (1, 2, 3)]
+
+
+def corrected_lines(recording: Recording, steps: Sequence[Sequence[ColumnCorrection]]) -> tuple[str, ...]:
+    """The lines of [recording.columns]."""
+    tables = column_corrections.corrected_lines(recording, steps)
+    assert list(tables) == ["recording.columns"]
+    return tables["recording.columns"]
 
 
 def log(folder: Path, names: dict[str, str], declared: str = "", suffix: str = "csv") -> Recording:
@@ -91,3 +101,28 @@ def test_a_later_step_corrects_what_the_one_before_it_reads(tmp_path: Path) -> N
 def test_a_column_that_is_not_in_the_file_has_no_line(tmp_path: Path) -> None:
     cells = [f"tension_{cable}" for cable in (1, 2, 3)]
     assert corrected_lines(log(tmp_path, {}), [negated(cells)]) == ("tension_1 = { sign = -1 }",)
+
+
+def test_all_digits_of_a_large_offset_count(tmp_path: Path) -> None:
+    recording = log(tmp_path, {}, "x = { offset = 4512345.678 }")
+    (line,) = corrected_lines(recording, [(ColumnCorrection("x", shift=-3.2),)])
+    assert line == "x = { offset = 4512348.878 }"
+
+
+def test_a_unit_of_another_quantity_is_written_as_its_factor(tmp_path: Path) -> None:
+    assert corrected_lines(log(tmp_path, {}), [scaled(["winch_speed_1", "x"], 1e-3, "mm")]) == (
+        "winch_speed_1 = { factor = 0.001 }",
+        'x = { unit = "mm" }',
+    )
+
+
+def test_units_in_the_header_of_all_cables_have_one_line(tmp_path: Path) -> None:
+    recording = log(tmp_path, {speed: f"{speed} [m/s]" for speed in SPEEDS})
+    assert corrected_lines(recording, [scaled(SPEEDS, 1e-3, "mm/s")]) == (
+        '"winch_speed_{}" = { unit = "m/s", factor = 0.001 }',
+    )
+
+
+def test_clock_times_have_no_line(tmp_path: Path) -> None:
+    recording = replace(log(tmp_path, {}), has_time_column=False)
+    assert column_corrections.corrected_lines(recording, [scaled(["time"], 60.0, "min")]) == {}

@@ -21,7 +21,7 @@ from tests.support.pose_recordings import noisy, rotation_of, swinging_recording
 from tests.support.recordings import recorded
 from tests.support.rigid_robots import crane_robot, octahedral_robot, underactuated_robot
 from tests.support.robots import EXAMPLES, example
-from tests.support.told_columns import assert_mended_by_told_lines
+from tests.support.told_columns import assert_mended_by_told_lines, told_columns
 
 Change = Callable[[Recording], Recording]
 RADIUS = 0.05
@@ -436,6 +436,15 @@ def test_a_platform_that_swings_on_standing_winches_tells_mistaken_quaternions()
         change, cause, remedy = POSE_MISTAKES[mistake]
         (error,) = recording_mistakes(robot, change(recording))
         assert cause in error.problem and remedy in error.hint
+
+
+def test_lengths_and_speeds_in_mm_have_each_their_own_unit() -> None:
+    robot, recording = shipped("three")
+    wound = -1e3 * recording.wound_lengths()
+    recording = replace(speeds(1e3)(recording), rope_length=np.where(np.arange(3) < 1, wound, np.nan))
+    (error,) = recording_mistakes(robot, recording)
+    told = told_columns(error.hint)
+    assert told == {"rope_length_1": {"unit": "mm"}} | {f"winch_speed_{i}": {"unit": "mm/s"} for i in (2, 3)}
 
 
 # Those that no line of a table mends.

@@ -4,14 +4,18 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from tautwire.errors import RecordingError
 from tautwire.recordings import tracker as tracker_module
+from tautwire.recordings.alternative_readings import mistakes_text
+from tautwire.recordings.consistency import recording_mistakes
 from tautwire.recordings.mistaken_tracker import tracker_mistakes
 from tautwire.recordings.recording import Recording, read_recording
+from tautwire.robot.schema import RecordedColumn, Tracker
 from tests.support.robots import EXAMPLES, example
 from tests.support.told_columns import told_columns
 from tests.support.trackers import split
@@ -87,3 +91,31 @@ def test_the_lines_of_log_and_tracker_are_in_tables_of_their_own(monkeypatch: py
         tracker_module.with_tracker(example("three"), log, "tracker.csv")
     assert told_columns(caught.value.hint, "recording.tracker.columns") == {axis: {"unit": "mm"} for axis in "xyz"}
     assert told_columns(caught.value.hint) == {"winch_speed_{}": {"unit": "mm/s"}}
+
+
+def test_axes_of_a_tracker_are_mended_in_its_table(tmp_path: Path) -> None:
+    """Positions in mm by other names, x and y swapped, and a clock that is stated."""
+    log, shown = files("three")
+    columns = {"time": "T", "x": "Body Y", "y": "Body X", "z": "Body Z"}
+    frame = shown.frame()[list(columns)].rename(columns=columns)
+    frame[["Body X", "Body Y", "Body Z"]] *= 1e3
+    file, table = tmp_path / "tracker.csv", "recording.tracker.columns"
+    frame.to_csv(file, index=False)
+    declared = tuple(
+        RecordedColumn(name, {"x": "Body X", "y": "Body Y"}.get(name, columns[name]), "" if name == "time" else "mm")
+        for name in columns
+    )
+    robot = replace(example("three").as_modelled(), tracker=Tracker(declared, 5.25, 1.0))
+    (error,) = recording_mistakes(robot, tracker_module.with_tracker(robot, log, file))
+    told = told_columns(error.hint, table)
+    assert told == {axis: {"name": columns[axis], "unit": "mm"} for axis in ("x", "y")}
+    mended = tuple(replace(column, name=told.get(column.column, {}).get("name", column.name)) for column in declared)
+    robot = replace(robot, tracker=Tracker(mended, 5.25, 1.0))
+    assert recording_mistakes(robot, tracker_module.with_tracker(robot, log, file)) == ()
+
+
+def test_a_clock_has_no_line_for_its_time() -> None:
+    log, tracker = files("three")
+    in_ms = replace(log, time=1e3 * log.time, has_time_column=False)
+    (mistakes,) = tracker_mistakes(example("three"), in_ms, tracker)
+    assert mistakes_text([mistakes], in_ms, tracker)[1] == "multiply time by 0.001"

@@ -14,7 +14,7 @@ from tautwire.toml_text import parse_toml
 
 def told_lines(hint: str, table: str = "recording.columns") -> str:
     """The lines that a hint tells to write into a table, the first where it has alternatives."""
-    match = re.search(rf"write into \[{re.escape(table)}\] (.*?), which is to ", hint)
+    match = re.search(rf"into \[{re.escape(table)}\] (.*?), (?:which is to|and into) ", hint)
     assert match is not None, hint
     return match.group(1).replace(" and ", "\n")
 

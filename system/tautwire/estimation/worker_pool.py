@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+import pickle
 import signal
 import tempfile
 import warnings
@@ -223,7 +224,8 @@ def map_in_forks(
 
     Items and function need not be picklable, as results must. Where processes are not forked all is done here.
     ``report`` gets about how many items are begun. The function must not wait for other threads: a fork has none.
-    Raises what the function raises, and WorkerLostError where a fork ends before it has answered.
+    Raises what the function raises, or its text where that cannot be pickled, and WorkerLostError where a fork ends
+    before it has answered.
     """
     count = min(processors(), len(items)) if start_method() == "fork" else 1
     shares = [items[number::count] for number in range(count)]
@@ -256,7 +258,8 @@ def _forked(function: Callable[[Item], Result], items: Sequence[Item]) -> Iterat
         process.start()
     sender.close()
     try:
-        yield receiver
+        with receiver:
+            yield receiver
     finally:
         process.kill()
         process.join()
@@ -267,4 +270,13 @@ def _send_results(function: Callable[[Item], Result], items: Sequence[Item], sen
     try:
         sender.send([function(item) for item in items])
     except Exception as error:
-        sender.send(error)
+        sender.send(_picklable(error))
+
+
+def _picklable(error: Exception) -> Exception:
+    """The error, or its text where it cannot be sent between processes."""
+    try:
+        pickle.loads(pickle.dumps(error))
+    except Exception:
+        return RuntimeError(f"{type(error).__name__}: {error}")
+    return error

@@ -7,7 +7,15 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .column_corrections import ColumnCorrection, corrected_lines, negated, reordered, scaled
+from ..robot.recorded_columns import LOG_TABLE, TRACKER_TABLE
+from .column_corrections import (
+    ColumnCorrection,
+    corrected_lines,
+    negated,
+    recorded_corrections,
+    reordered,
+    scaled,
+)
 from .recording import Recording
 from .units import UNITS
 
@@ -47,15 +55,17 @@ def mistakes_text(
 
 
 def _remedies(mistakes: Sequence[Mistake], recording: Recording, tracker: Recording | None) -> str:
-    parts = [mistake.remedy for mistake in mistakes if not mistake.corrections]
-    for is_of_tracker, source in ((True, tracker), (False, recording)):
-        group = [each for each in mistakes if each.corrections and each.is_of_tracker == is_of_tracker]
+    with_lines, parts = [], []
+    for is_of_tracker, source, table in ((True, tracker, TRACKER_TABLE), (False, recording, LOG_TABLE)):
+        own = [each for each in mistakes if each.is_of_tracker == is_of_tracker]
+        group = [each for each in own if source is not None and recorded_corrections(source, each.corrections)]
+        parts += [each.remedy for each in own if each not in group]
         if group and source is not None:
-            table = "recording.tracker.columns" if is_of_tracker else "recording.columns"
-            lines = corrected_lines(source, [mistake.corrections for mistake in group])
+            tables = corrected_lines(source, [mistake.corrections for mistake in group], table)
+            written = ", and into ".join(f"[{name}] {' and '.join(lines)}" for name, lines in tables.items())
             by_hand = ", and ".join(mistake.remedy for mistake in group)
-            parts.append(f"write into [{table}] {' and '.join(lines)}, which is to {by_hand}")
-    return ", and ".join(parts)
+            with_lines.append(f"write into {written}, which is to {by_hand}")
+    return ", and ".join([*parts, *with_lines])
 
 
 @dataclass(frozen=True)
@@ -90,13 +100,15 @@ class WindingReading:
                 _factor_text(names, self.radius, bool(recording.rope_lengths)),
                 f"multiply {_range_text(names)} by {self.radius:.4g}, or better by the factor that follows from the "
                 "drum's radius and what is recorded in one turn of it",
-                scaled(names, self.radius),
+                scaled(names, float(f"{self.radius:.6g}")),
             )
         elif self.speed_unit != "m/s":
             unit = self.speed_unit.removesuffix("/s") if recording.rope_lengths else self.speed_unit
             factor = SPEED_UNITS[self.speed_unit]
             remedy = convert(_range_text(names), factor)
-            yield Mistake(f"{_range_text(names)} are in {unit}", remedy, scaled(names, factor, unit))
+            units = {name: self.speed_unit.removesuffix("/s" if name.startswith("rope_") else "") for name in names}
+            corrections = tuple(ColumnCorrection(name, unit=own, factor=factor) for name, own in units.items())
+            yield Mistake(f"{_range_text(names)} are in {unit}", remedy, corrections)
         if any(sign < 0 for sign in self.signs):
             wrong = [names[column] for column, sign in sorted(zip(self.order, self.signs, strict=True)) if sign < 0]
             verb = "has" if len(wrong) == 1 else "have"

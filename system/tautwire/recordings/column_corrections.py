@@ -12,12 +12,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ..robot.recorded_columns import CABLE_COLUMNS, column_line, recorded_name
+from ..robot.recorded_columns import CABLE_COLUMNS, LOG_TABLE, column_line, recorded_name
 from ..robot.schema import AXES, RecordedColumn
 from .recording import Recording
 from .units import find_unit
 
-_DIGITS = 6
+SHIFT_DIGITS, FACTOR_DIGITS = 6, 15
 
 
 @dataclass(frozen=True)
@@ -52,27 +52,36 @@ def reordered(columns: Sequence[str], sources: Sequence[str]) -> tuple[ColumnCor
     return tuple(ColumnCorrection(column, source) for column, source in pairs if column != source)
 
 
-def corrected_lines(recording: Recording, steps: Sequence[Sequence[ColumnCorrection]]) -> tuple[str, ...]:
-    """Lines that declare the columns of a recording as corrected, with what is declared of them already.
+def corrected_lines(
+    recording: Recording, steps: Sequence[Sequence[ColumnCorrection]], table: str = LOG_TABLE
+) -> dict[str, tuple[str, ...]]:
+    """Lines that declare the columns of a recording as corrected, with what is declared of them already, by table.
 
     The corrections of one step are simultaneous, and correct what those of the steps before it read. A kind of column
-    whose lines are alike for all cables has one line for them.
+    whose lines are alike for all cables has one line for them. ``table`` is that of columns without a declaration.
     """
     declared, columns = recording.columns, dict[str, RecordedColumn]()
     for step in steps:
-        recorded = [each for each in step if _is_recorded(each.source or each.column, recording)]
-        columns |= {each.column: _corrected(_recorded(each, columns, declared), each) for each in recorded}
-    own = {name for name, column in declared.items() if column.column == name}
+        recorded = recorded_corrections(recording, step)
+        columns |= {each.column: _corrected(_recorded(each, columns, declared, table), each) for each in recorded}
+    own = {name for name, column in declared.items() if column.column == name and column.file}
     for kind in CABLE_COLUMNS:
         names = [f"{kind}_{cable}" for cable in range(1, recording.cable_count + 1)]
         alike = _for_all_cables(kind, [columns[name] for name in names if name in columns])
         if alike is not None and len(names) > 1 and columns.keys() >= set(names) and not own & set(names):
             columns = {alike.column: alike} | {name: column for name, column in columns.items() if name not in names}
-    return tuple(column_line(column) for column in columns.values())
+    tables = dict.fromkeys(column.table for column in columns.values())
+    return {name: tuple(column_line(each) for each in columns.values() if each.table == name) for name in tables}
+
+
+def recorded_corrections(recording: Recording, corrections: Sequence[ColumnCorrection]) -> tuple[ColumnCorrection, ...]:
+    """Those of columns that a recording has; a line for another would be an error, or not used."""
+    return tuple(each for each in corrections if _is_recorded(each.source or each.column, recording))
 
 
 def _is_recorded(column: str, recording: Recording) -> bool:
-    """Whether a column has a number anywhere; a line for one that is not in the file would be an error."""
+    if column == "time":
+        return recording.has_time_column
     kind, _, cable = column.rpartition("_")
     if kind == "tension":
         return bool(np.isfinite(recording.tension[:, int(cable) - 1]).any())
@@ -80,27 +89,33 @@ def _is_recorded(column: str, recording: Recording) -> bool:
 
 
 def _recorded(
-    correction: ColumnCorrection, columns: Mapping[str, RecordedColumn], declared: Mapping[str, RecordedColumn]
+    correction: ColumnCorrection,
+    columns: Mapping[str, RecordedColumn],
+    declared: Mapping[str, RecordedColumn],
+    table: str,
 ) -> RecordedColumn:
     """The column of the recording that a correction is for, as it is declared so far."""
     source = correction.source or correction.column
     if source in columns:
         return columns[source]
-    column = declared.get(source, RecordedColumn(source, source))
+    column = declared.get(source, RecordedColumn(source, source, table=table))
     return replace(column, column=source, name=recorded_name(source, column))
 
 
 def _corrected(recorded: RecordedColumn, correction: ColumnCorrection) -> RecordedColumn:
-    has_scale = bool(recorded.unit) or recorded.factor != 1.0 or not correction.unit
-    unit, factor = (recorded.unit, recorded.factor * correction.factor) if has_scale else (correction.unit, 1.0)
+    is_unit = find_unit(correction.unit, correction.column) is not None
+    has_scale = bool(recorded.unit) or recorded.factor != 1.0 or not is_unit
+    factor = _rounded(recorded.factor * correction.factor, FACTOR_DIGITS)
+    unit, factor = (recorded.unit, factor) if has_scale else (correction.unit, 1.0)
     sign, found = recorded.sign * correction.sign, find_unit(unit, correction.column)
     size = sign * factor * (1.0 if found is None else found.to_si(1.0))
-    offset = _rounded(recorded.offset - correction.shift / size) if correction.shift else recorded.offset
-    return replace(recorded, column=correction.column, unit=unit, factor=_rounded(factor), sign=sign, offset=offset)
+    # What was measured is the shift: of a large declared offset all digits count.
+    offset = _rounded(recorded.offset - _rounded(correction.shift / size, SHIFT_DIGITS), FACTOR_DIGITS)
+    return replace(recorded, column=correction.column, unit=unit, factor=factor, sign=sign, offset=offset)
 
 
-def _rounded(value: float) -> float:
-    return float(f"{value:.{_DIGITS}g}")
+def _rounded(value: float, digits: int) -> float:
+    return float(f"{value:.{digits}g}")
 
 
 def _for_all_cables(kind: str, columns: Sequence[RecordedColumn]) -> RecordedColumn | None:

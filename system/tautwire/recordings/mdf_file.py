@@ -114,7 +114,7 @@ def _read_channels(content: Any, file: str, columns: ColumnMap, sink: ErrorSink)
     channels = {
         name: _channel(signal, name, scaled, f"{file}: channel {stored[name]}") for name, signal in signals.items()
     }
-    header = replace(header, dialect=units_in_words(units))
+    header = replace(header, dialect=units_in_words(units), has_time_column=False)
     return header.with_recorded_columns(scaled), channels
 
 

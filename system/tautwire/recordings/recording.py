@@ -18,6 +18,7 @@ from ..errors import (
     raise_error,
 )
 from ..input_files import validate_path
+from ..robot.recorded_columns import TRACKER_TABLE
 from ..robot.robot_file_reader import MAX_CABLES, read_columns_file
 from ..robot.schema import AXES, QUATERNION_COLUMNS, RecordedColumn
 from ..validation import validate_instance, validate_integer
@@ -46,7 +47,8 @@ class Recording:
     ``rope_length`` (N, n) in m, smaller as it reels in, is NaN where no length of a cable was recorded; where it was,
     the winch speed is its rate. None where no cable has one. ``orientation`` (N, 4) is the unit quaternion w, x, y, z
     from the platform's frame to the world, its sign continuous along time; NaN where it was not measured, the default.
-    ``columns`` are the names, units and scales of columns in the file, by their standard names, where it has any.
+    ``columns`` are the names, units and scales of columns in the file, by their standard names, where it has any;
+    ``has_time_column`` unless times are clock times, or those of the file's format.
     """
 
     path: str
@@ -59,6 +61,7 @@ class Recording:
     rope_length: NDArray[np.float64] | None = None
     orientation: NDArray[np.float64] = field(default_factory=lambda: np.empty((0, 4)))
     columns: Mapping[str, RecordedColumn] = field(default_factory=dict)
+    has_time_column: bool = True
 
     def __post_init__(self) -> None:
         if not self.has_orientation:
@@ -203,7 +206,9 @@ def read_tracker(path: str | Path, columns: Sequence[RecordedColumn] = ()) -> Re
     validate_path("read_tracker: path", path)
     table, notes = _open_table(path, column_map(columns, 0), raise_error)
     recording = _validated_recording(table, 0)
-    return replace(recording, read_as=tuple(f"{path}: {note}" for note in (*notes, *recording.read_as)))
+    recorded = {name: replace(column, table=TRACKER_TABLE) for name, column in recording.columns.items()}
+    read_as = tuple(f"{path}: {note}" for note in (*notes, *recording.read_as))
+    return replace(recording, columns=recorded, read_as=read_as)
 
 
 def _declared_columns(columns: Sequence[RecordedColumn] | str | Path, cable_count: int) -> tuple[RecordedColumn, ...]:
@@ -235,6 +240,7 @@ def _validated_recording(table: CsvTable | ColumnTable, cable_count: int) -> Rec
         rope_length=_stacked_columns(numbers, [f"rope_length_{cable}" for cable in cables]),
         read_as=(*dialect, *gap_notes, *wrap_notes, *placeholder_notes),
         columns=table.header.recorded_columns,
+        has_time_column=table.header.has_time_column and table.header.clock is None,
     )
     if not _is_valid(recording):
         raise _first_error(table)

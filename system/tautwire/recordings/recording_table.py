@@ -35,7 +35,8 @@ class Header:
 
     Numbers are written with ``decimal_mark``; ``units`` are those of columns that are not in SI units, ``scales`` what
     is declared of columns; ``clock`` is the format of times that are no numbers. ``dialect`` says in words what differs
-    from the standard. ``recorded_columns`` are names, units and scales in the file, whatever the numbers here are in.
+    from the standard. ``recorded_columns`` are names, units and scales in the file, whatever the numbers here are in;
+    ``has_time_column`` unless times are the file's own.
     """
 
     names: tuple[str, ...]
@@ -46,6 +47,7 @@ class Header:
     clock: ClockFormat | None = None
     dialect: str = ""
     recorded_columns: Mapping[str, RecordedColumn] = field(default_factory=dict)
+    has_time_column: bool = True
 
     @property
     def known_names(self) -> tuple[str, ...]:

@@ -113,7 +113,7 @@ def open_bag(path: str | Path, columns: ColumnMap, sink: ErrorSink = raise_error
     stored = dict(zip(standard_names[1:], samples, strict=False))
     rows = align_on_winch_rows({name: samples[own].sampled(own) for name, own in stored.items()}, file)
     numbers = {name: scaled.to_si(name, column) for name, column in rows.columns.items()}
-    header = replace(header, dialect=rows.summary)
+    header = replace(header, dialect=rows.summary, has_time_column=False)
     return ColumnTable(file, header.with_recorded_columns(scaled), numbers)
 
 

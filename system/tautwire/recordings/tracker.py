@@ -9,7 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import RecordingError
-from ..robot.schema import Robot
+from ..robot.recorded_columns import POSE_COLUMNS, TRACKER_TABLE
+from ..robot.schema import RecordedColumn, Robot
 from .alternative_readings import mistakes_text
 from .consistency import travel_error
 from .mistaken_tracker import tracker_mistakes
@@ -60,7 +61,10 @@ def with_tracker(robot: Robot, log: Recording, path: str | Path) -> Recording:
     )
     # Quaternions of continuous sign are moved as positions are, by small rotations.
     orientation = unit_quaternions(samples_at_rows(log.time, times, tracker.orientation))
-    recording = replace(log, position=position, read_as=(*log.read_as, *tracker.read_as, note))
+    standard = {name: RecordedColumn(name, name, table=TRACKER_TABLE) for name in POSE_COLUMNS}
+    of_tracker = {name: tracker.columns.get(name, column) for name, column in standard.items()}
+    read_as = (*log.read_as, *tracker.read_as, note)
+    recording = replace(log, position=position, columns={**log.columns, **of_tracker}, read_as=read_as)
     return replace(recording, orientation=orientation) if tracker.has_orientation else recording
 
 

@@ -14,6 +14,7 @@ from .schema import AXES, QUATERNION_COLUMNS, RecordedColumn, Tracker
 
 CABLE_COLUMNS = ("winch_speed", "rope_length", "tension")
 POSE_COLUMNS = (*AXES, *QUATERNION_COLUMNS)
+LOG_TABLE, TRACKER_TABLE = "recording.columns", "recording.tracker.columns"
 COLUMN_NUMBERS = {
     "factor": NumberRule("the factor by which the column is multiplied", "", default=1.0),
     "sign": NumberRule("the sign of the column, 1 or -1", "", -1.0, 1.0, default=1.0),
@@ -87,7 +88,8 @@ def column_line(column: RecordedColumn) -> str:
     """The line of TOML that declares a column; what is as by default is left out."""
     scale = {"factor": column.factor, "sign": column.sign, "offset": column.offset}
     entries = [f'unit = "{column.unit}"'] if column.unit else []
-    entries += [f"{key} = {value:.12g}" for key, value in scale.items() if value != COLUMN_NUMBERS[key].default]
+    numbers = {key: repr(value).removesuffix(".0") for key, value in scale.items()}
+    entries += [f"{key} = {numbers[key]}" for key, value in scale.items() if value != COLUMN_NUMBERS[key].default]
     if column.name != column.column or not entries:
         entries.insert(0, f"name = {json.dumps(column.name, ensure_ascii=False)}")
     key = f'"{column.column}"' if _EVERY_CABLE in column.column else column.column
