@@ -9,10 +9,12 @@ from pathlib import Path
 import numpy as np
 import pandas as pd
 import pytest
+from scipy.io import savemat
 
 from tautwire.recordings import column_corrections
 from tautwire.recordings.column_corrections import ColumnCorrection, negated, reordered, scaled
 from tautwire.recordings.recording import Recording, read_recording
+from tautwire.robot.schema import RecordedColumn
 
 COUNT = 3
 SPEEDS = [f"winch_speed_{cable}" for cable in (1, 2, 3)]
@@ -48,6 +50,17 @@ def test_names_units_and_signs_stay(tmp_path: Path, suffix: str) -> None:
         'time = { name = "t", unit = "ms" }',
         'x = { name = "Body X", unit = "mm" }',
         'y = { unit = "mm" }',
+    )
+
+
+def test_names_in_a_matlab_file_stay(tmp_path: Path) -> None:
+    columns = {"t": np.arange(8.0), **{f"V{cable}": np.ones(8) for cable in (1, 2, 3)}}
+    savemat(tmp_path / "log.mat", columns)
+    declared = (RecordedColumn("time", "t"), RecordedColumn("winch_speed_{}", "V{}", sign=-1.0))
+    recording = read_recording(tmp_path / "log.mat", COUNT, declared)
+    assert corrected_lines(recording, [scaled(["time"], 1e-3, "ms"), negated(SPEEDS)]) == (
+        '"winch_speed_{}" = { name = "V{}" }',
+        'time = { name = "t", unit = "ms" }',
     )
 
 

@@ -89,6 +89,7 @@ def test_other_units_are_converted_with_a_note(tmp_path: Path) -> None:
     assert np.array_equal(recording.winch_speed, plain.winch_speed)
     (note,) = recording.notes
     assert note.partition(": read ")[2] == "tension_1 in kN; x in mm"
+    assert recording.columns["x"].unit == "mm" and not recording.has_time_column
 
 
 def test_what_cannot_be_right_is_refused(tmp_path: Path) -> None:

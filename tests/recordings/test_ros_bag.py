@@ -85,6 +85,7 @@ def test_columns_are_scaled_as_the_table_says(tmp_path: Path) -> None:
     recording = read(bag(tmp_path), speeds, lengths)
     np.testing.assert_allclose(recording.winch_speed, -0.05 * SPEEDS, rtol=1e-15)
     np.testing.assert_allclose(recording.position[:, 0], POSITIONS[:, 0] / 1e3, rtol=1e-15)
+    assert recording.columns["x"].unit == "mm" and not recording.has_time_column
 
 
 def test_joints_are_found_by_name_in_any_order_and_message(tmp_path: Path) -> None:

@@ -252,17 +252,18 @@ def _forked(function: Callable[[Item], Result], items: Sequence[Item]) -> Iterat
     context = get_context("fork")
     receiver, sender = context.Pipe(duplex=False)
     process = context.Process(target=_send_results, args=(function, items, sender))
-    with _interrupts_blocked(), warnings.catch_warnings():
-        # Python 3.12 warns of any fork beside threads.
-        warnings.simplefilter("ignore", DeprecationWarning)
-        process.start()
-    sender.close()
     try:
+        with _interrupts_blocked(), warnings.catch_warnings():
+            # Python 3.12 warns of any fork beside threads.
+            warnings.simplefilter("ignore", DeprecationWarning)
+            process.start()
+        sender.close()
         with receiver:
             yield receiver
     finally:
-        process.kill()
-        process.join()
+        if process.pid is not None:
+            process.kill()
+            process.join()
 
 
 def _send_results(function: Callable[[Item], Result], items: Sequence[Item], sender: Connection) -> None:

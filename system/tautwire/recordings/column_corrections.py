@@ -67,9 +67,10 @@ def corrected_lines(
     own = {name for name, column in declared.items() if column.column == name and column.file}
     for kind in CABLE_COLUMNS:
         names = [f"{kind}_{cable}" for cable in range(1, recording.cable_count + 1)]
-        alike = _for_all_cables(kind, [columns[name] for name in names if name in columns])
-        if alike is not None and len(names) > 1 and columns.keys() >= set(names) and not own & set(names):
-            columns = {alike.column: alike} | {name: column for name, column in columns.items() if name not in names}
+        if len(names) > 1 and columns.keys() >= set(names) and not own & set(names):
+            alike = _for_all_cables(kind, [columns[name] for name in names])
+            others = {name: column for name, column in columns.items() if name not in names}
+            columns = columns if alike is None else {alike.column: alike} | others
     tables = dict.fromkeys(column.table for column in columns.values())
     return {name: tuple(column_line(each) for each in columns.values() if each.table == name) for name in tables}
 
@@ -120,8 +121,6 @@ def _rounded(value: float, digits: int) -> float:
 
 def _for_all_cables(kind: str, columns: Sequence[RecordedColumn]) -> RecordedColumn | None:
     """The one declaration that is for all cables, counted from 1; None where there is none."""
-    if not columns:
-        return None
     name = columns[0].name
     ones = [match.start() for match in re.finditer("1", name)]
     for pattern in (name.replace("1", "{}"), *(f"{name[:index]}{{}}{name[index + 1 :]}" for index in ones)):

@@ -46,13 +46,16 @@ class TrackerReading:
     def mistakes(self, log: Recording) -> tuple[Mistake, ...]:
         """What this reading changes."""
         own = []
-        for unit, size, what, verb, columns in (
-            (self.time_unit, TIME_UNITS[self.time_unit], "its time", "is", ("time",)),
-            (self.position_unit, LENGTH_UNITS[self.position_unit], "its x, y, z", "are", AXES),
-        ):
-            if size != 1.0:
-                corrections = scaled(columns, size, unit)
-                own.append(Mistake(f"{what} {verb} in {unit}", convert(what, size), corrections, is_of_tracker=True))
+        if self.time_unit != "s":
+            factor = TIME_UNITS[self.time_unit]
+            corrections = scaled(("time",), factor, self.time_unit)
+            own.append(Mistake(f"its time is in {self.time_unit}", convert("its time", factor), corrections, True))
+        if self.position_unit != "m":
+            factor = LENGTH_UNITS[self.position_unit]
+            corrections = scaled(AXES, factor, self.position_unit)
+            own.append(
+                Mistake(f"its x, y, z are in {self.position_unit}", convert("its x, y, z", factor), corrections, True)
+            )
         return (*own, *self.winding.mistakes(log))
 
 

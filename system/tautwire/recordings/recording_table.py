@@ -33,10 +33,10 @@ _CABLE_COLUMN = re.compile(r"(?:winch_speed|rope_length|tension)_(0|[1-9][0-9]{0
 class Header:
     """Columns of a recording: ``names`` are all in the file's order, each once; ``unknown_names`` are not read.
 
-    Numbers are written with ``decimal_mark``; ``units`` are those of columns that are not in SI units, ``scales`` what
-    is declared of columns; ``clock`` is the format of times that are no numbers. ``dialect`` says in words what differs
+    Numbers are written with ``decimal_mark``; ``units`` are those that are stated of columns, ``scales`` what is
+    declared of them; ``clock`` is the format of times that are no numbers. ``dialect`` says in words what differs
     from the standard. ``recorded_columns`` are names, units and scales in the file, whatever the numbers here are in;
-    ``has_time_column`` unless times are the file's own.
+    ``has_time_column`` unless times are those of its format, as in MDF.
     """
 
     names: tuple[str, ...]

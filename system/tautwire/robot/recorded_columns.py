@@ -87,9 +87,9 @@ def recorded_name(standard_name: str, column: RecordedColumn) -> str:
 def column_line(column: RecordedColumn) -> str:
     """The line of TOML that declares a column; what is as by default is left out."""
     scale = {"factor": column.factor, "sign": column.sign, "offset": column.offset}
+    changed = {key: value for key, value in scale.items() if value != COLUMN_NUMBERS[key].default}
     entries = [f'unit = "{column.unit}"'] if column.unit else []
-    numbers = {key: repr(value).removesuffix(".0") for key, value in scale.items()}
-    entries += [f"{key} = {numbers[key]}" for key, value in scale.items() if value != COLUMN_NUMBERS[key].default]
+    entries += [f"{key} = {repr(value).removesuffix('.0')}" for key, value in changed.items()]
     if column.name != column.column or not entries:
         entries.insert(0, f"name = {json.dumps(column.name, ensure_ascii=False)}")
     key = f'"{column.column}"' if _EVERY_CABLE in column.column else column.column
