@@ -23,6 +23,9 @@ FLOOR_TESTS := $(addprefix tests/,$(addsuffix .py,cli/test_commands cli/test_inp
 run: $(READY)
 	$(BIN)/tautwire trace $(EXAMPLE)/robot.toml $(EXAMPLE)/fit.csv --check $(EXAMPLE)/check.csv --out build/three
 
+# Tests start hundreds of processes, which would compile every module anew.
+unexport PYTHONDONTWRITEBYTECODE
+
 # Two workers on two cores: threads of BLAS would wait for each other.
 test validate floors: export OPENBLAS_NUM_THREADS = 1
 
