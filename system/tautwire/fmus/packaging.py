@@ -3,12 +3,15 @@
 from __future__ import annotations
 
 import hashlib
+import importlib
 import itertools
 import json
 import shutil
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import AbstractContextManager, contextmanager, nullcontext
 from dataclasses import dataclass, field, replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 from uuid import NAMESPACE_URL, uuid5
@@ -49,6 +52,9 @@ FMU_OPTIONS = {
     "canSerializeFMUstate": True,
     "canInterpolateInputs": False,
 }
+
+# Writes the FMU of a component into a folder: module and class of its slave, its name, its resource.
+FmuWriter = Callable[[str, str, str, dict[str, Any], Path], Path]
 
 
 @dataclass(frozen=True)
@@ -114,36 +120,45 @@ def build_fmus(
     folder = validate_folder("build_fmus: folder", folder)
     validate_callable("build_fmus: progress", progress)
     check_user_fmus(robot)
-    write_fmu = native_fmu_writer(platforms, fmi) if native or robot.native_fmus else _build_fmu
     folder.mkdir(parents=True, exist_ok=True)
     user_fmus = {fmu.slot: fmu.path for fmu in robot.fmus}
     is_rigid = robot.platform.is_rigid_body
     platform_slave = ("rigid_body", "RigidBody") if is_rigid else ("point_mass", "PointMass")
     fmu_count, built_counter = 1 + robot.cable_count + len(robot.winch_numbers), itertools.count(1)
 
-    def build_or_use(module: str, base: str, name: str, data: dict[str, Any]) -> Path:
-        path = user_fmus[name] if name in user_fmus else write_fmu(module, base, name, data, folder)
-        if progress is not None:
-            progress(next(built_counter) / fmu_count)
-        return path
+    with fmu_writer(native or robot.native_fmus, platforms, fmi) as write_fmu:
 
-    return RobotFmus(
-        cables=tuple(
-            build_or_use("cable", "Cable", f"cable_{i}", data) for i, data in enumerate(cable_resources(robot), start=1)
-        ),
-        platform=build_or_use(*platform_slave, "platform", platform_resource(robot)),
-        winches=tuple(
-            build_or_use("winch", "Winch", f"winch_{i}", winch_resource(robot, i)) if i in robot.winch_numbers else None
-            for i in robot.cable_numbers
-        ),
-        user_start_values={slot: start_values(robot, slot) for slot in user_fmus},
-        has_position_sensor="platform" not in user_fmus and has_sensor_effects(robot),
-        is_rigid=is_rigid,
-    )
+        def build_or_use(module: str, base: str, name: str, data: dict[str, Any]) -> Path:
+            path = user_fmus[name] if name in user_fmus else write_fmu(module, base, name, data, folder)
+            if progress is not None:
+                progress(next(built_counter) / fmu_count)
+            return path
+
+        return RobotFmus(
+            cables=tuple(
+                build_or_use("cable", "Cable", f"cable_{i}", data)
+                for i, data in enumerate(cable_resources(robot), start=1)
+            ),
+            platform=build_or_use(*platform_slave, "platform", platform_resource(robot)),
+            winches=tuple(
+                build_or_use("winch", "Winch", f"winch_{i}", winch_resource(robot, i))
+                if i in robot.winch_numbers
+                else None
+                for i in robot.cable_numbers
+            ),
+            user_start_values={slot: start_values(robot, slot) for slot in user_fmus},
+            has_position_sensor="platform" not in user_fmus and has_sensor_effects(robot),
+            is_rigid=is_rigid,
+        )
 
 
-def native_fmu_writer(platforms: Sequence[str], fmi: int) -> Callable[[str, str, str, dict[str, Any], Path], Path]:
-    """Function that writes native FMUs for some platforms, by default this machine's, as :func:`_build_fmu` does.
+def fmu_writer(native: bool, platforms: Sequence[str], fmi: int) -> AbstractContextManager[FmuWriter]:
+    """Context with a function that writes FMUs: as machine code, see :func:`native_fmu_writer`, or by pythonfmu."""
+    return nullcontext(native_fmu_writer(platforms, fmi)) if native else pythonfmu_writer()
+
+
+def native_fmu_writer(platforms: Sequence[str], fmi: int) -> FmuWriter:
+    """Function that writes native FMUs for some platforms, by default this machine's.
 
     Raises NativeBuildError where there is no compiler, or none for these platforms.
     """
@@ -168,8 +183,8 @@ def native_fmu_writer(platforms: Sequence[str], fmi: int) -> Callable[[str, str,
 def package_controller_fmu(data: dict[str, Any], folder: Path, native: bool = False) -> Path:
     """Write ``controller.fmu`` into ``folder``; ``data`` is its resource ``controller.json``."""
     folder.mkdir(parents=True, exist_ok=True)
-    write_fmu = native_fmu_writer((), 2) if native else _build_fmu
-    return write_fmu("controller", "Controller", "controller", data, folder)
+    with fmu_writer(native, (), 2) as write_fmu:
+        return write_fmu("controller", "Controller", "controller", data, folder)
 
 
 def with_user_fmus_copied(fmus: RobotFmus, folder: Path) -> RobotFmus:
@@ -282,25 +297,32 @@ def _attachment_resources(robot: Robot) -> list[dict[str, Any]]:
     ]
 
 
-def _build_fmu(module: str, base: str, name: str, data: dict[str, Any], folder: Path) -> Path:
+@contextmanager
+def pythonfmu_writer() -> Iterator[FmuWriter]:
+    """Context with a function that writes FMUs by pythonfmu, and imports what travels inside once for all of them."""
     sources = Path(tautwire_fmu.__file__).parent
     package = f"tautwire_fmu_{_digest(sources)}"
-    data = data | {"model_name": name, "version": __version__}
-    text = json.dumps(data, sort_keys=True)
-    guid = str(uuid5(NAMESPACE_URL, package + module + text))
-    # An interrupt within one of the many imports may be raised in a callback, where it is lost.
-    with defer_interrupts() as raise_interrupt, tempfile.TemporaryDirectory(prefix="tautwire-build-") as scratch_name:
+    with tempfile.TemporaryDirectory(prefix="tautwire-build-") as scratch_name:
         scratch = Path(scratch_name)
         shutil.copytree(sources, scratch / package, ignore=shutil.ignore_patterns("__pycache__", "*.pyc"))
+        with installed_builder(scratch, (package,)):
+            # An interrupt within one of the many imports may be raised in a callback, where it is lost.
+            with defer_interrupts():
+                importlib.import_module(f"{package}.slaves")
+            yield partial(_write_python_fmu, scratch / package)
+
+
+def _write_python_fmu(package: Path, module: str, base: str, name: str, data: dict[str, Any], folder: Path) -> Path:
+    scratch, data = package.parent, data | {"model_name": name, "version": __version__}
+    guid = str(uuid5(NAMESPACE_URL, package.name + module + json.dumps(data, sort_keys=True)))
+    with defer_interrupts() as raise_interrupt:
         resource = scratch / f"{module}.json"
         resource.write_text(json.dumps(data | {"guid": guid}), encoding="utf-8")
         script = scratch / f"{name}_{guid.replace('-', '')[:12]}.py"
-        script.write_text(LAUNCHER.format(package=package, base=base), encoding="utf-8")
+        script.write_text(LAUNCHER.format(package=package.name, base=base), encoding="utf-8")
         unpatched_fmu = scratch / "built" / f"{name}.fmu"
-        with installed_builder(scratch, (package, script.stem)) as fmu_builder:
-            fmu_builder.build_FMU(
-                script, dest=unpatched_fmu, project_files=[scratch / package, resource], **FMU_OPTIONS
-            )
+        with installed_builder(scratch, (script.stem,)) as fmu_builder:
+            fmu_builder.build_FMU(script, dest=unpatched_fmu, project_files=[package, resource], **FMU_OPTIONS)
         patched_fmu = scratch / f"{name}.fmu"
         additions = documentation_files(module, data, read_model_description(unpatched_fmu))
         patch_wrapper_exit(unpatched_fmu, patched_fmu, additions)

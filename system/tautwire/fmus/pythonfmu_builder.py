@@ -18,6 +18,7 @@ import zipfile
 from collections.abc import Collection, Iterator, Mapping
 from contextlib import contextmanager
 from copy import copy
+from functools import lru_cache
 from pathlib import Path
 from types import ModuleType
 from typing import Any
@@ -56,6 +57,7 @@ def installed_builder(scratch: Path, names: Collection[str]) -> Iterator[Any]:
         if name.partition(".")[0] in reimported_packages:
             del sys.modules[name]
     sys.path[:] = [str(scratch), *(entry for entry in path if not (Path(entry) / FMU_RESOURCE_MARKER).is_file())]
+    importlib.invalidate_caches()
     try:
         yield _checked_builder(importlib.import_module(f"{PYTHONFMU}.builder"))
     finally:
@@ -99,6 +101,7 @@ def patch_wrapper_exit(fmu: Path, target: Path, additions: Mapping[str, bytes] |
             target_archive.writestr(name, content, zipfile.ZIP_DEFLATED)
 
 
+@lru_cache(maxsize=4)
 def with_immediate_return(library: bytes) -> bytes:
     """An x86-64 ELF library whose ``finalizePythonInterpreter`` returns at once; any other file as it is."""
     offset = _function_offset(library)
