@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from bisect import bisect_right
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -90,12 +91,16 @@ class SampledProgram:
     def travel(self, time: float) -> Vector:
         """Trapezes up to the last sample, and the part of one after it."""
         left, share = self._find(time)
-        elapsed = share * (self.times[left + 1] - self.times[left])
+        elapsed = share * (self._instants[left + 1] - self._instants[left])
         return self._travelled[left] + 0.5 * elapsed * (self.speeds[left] + self.speed(time))
 
     def _find(self, time: float) -> tuple[int, float]:
-        left = int(np.clip(np.searchsorted(self.times, time, "right") - 1, 0, len(self.times) - 2))
-        return left, (time - self.times[left]) / (self.times[left + 1] - self.times[left])
+        left = min(max(bisect_right(self._instants, time) - 1, 0), len(self._instants) - 2)
+        return left, (time - self._instants[left]) / (self._instants[left + 1] - self._instants[left])
+
+    @cached_property
+    def _instants(self) -> list[float]:
+        return [float(time) for time in self.times]
 
     @cached_property
     def _travelled(self) -> Vector:
