@@ -21,10 +21,19 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from .step_integration import Integration, Step, compiled, evaluate, integrate_step
+from .step_integration import (
+    Integration,
+    Step,
+    add_to_matrix,
+    assign,
+    assign_matrix,
+    compiled,
+    evaluate,
+    integrate_step,
+)
 
 # Numba caches machine code by the content of this file alone, and what it calls of that module is in it.
-STEP_INTEGRATION_SHA256 = "3b578dcac9bab9c4580bef7b4d967aad968261ba873afb93f9257e464ec01dbe"
+STEP_INTEGRATION_SHA256 = "2b1be67876283fb32bf86f8cbb74857205cdba95483e5e560581f614d17f2629"
 
 
 class Moments(NamedTuple):
@@ -72,12 +81,12 @@ def run_recursion(
     """
     output_places, process_places = np.empty_like(outputs.places), np.empty_like(process.places)
     for k in range(len(samples.measured)):
-        record.states[k] = moments.state
+        assign(record.states[k], moments.state)
         if len(record.covariances):
-            record.covariances[k] = moments.covariance
+            assign_matrix(record.covariances[k], moments.covariance)
         evaluate(outputs, k, output_places)
         if len(record.output_matrices):
-            record.output_matrices[k] = outputs.results[1].T
+            assign_matrix(record.output_matrices[k], outputs.results[1].T)
         _update_by_measurements(outputs.results, moments, samples, record, k)
         integrate_step(integration, moments.state, k)
         evaluate(process, k, process_places)
@@ -86,9 +95,10 @@ def run_recursion(
             _record_transition(integration.transition, decay, record.transitions[k])
         _update_covariance_over_step(integration.transition, decay, process_noise, moments.covariance)
         _update_sensitivities_over_step(integration, decay, moments.sensitivities)
-        moments.state[:] *= decay
-        moments.state[: integration.moving.shape[1]] = integration.moving[0]
-    record.states[len(samples.measured)] = moments.state
+        for i in range(len(decay)):
+            moments.state[i] *= decay[i]
+        assign(moments.state[: integration.moving.shape[1]], integration.moving[0])
+    assign(record.states[len(samples.measured)], moments.state)
 
 
 @compiled
@@ -114,7 +124,8 @@ def _update_by_measurements(
             record.sensitivities[k, parameter, i] = slopes[parameter, i]
         if samples.observed[k, i] == 0.0:
             innovations[i] = 0.0
-            cross_covariances[i] = 0.0
+            for c in range(cross_covariances.shape[1]):
+                cross_covariances[i, c] = 0.0
             continue
         for c in range(cross_covariances.shape[1]):
             cross_covariances[i, c] /= deviation
@@ -125,9 +136,11 @@ def _update_by_measurements(
             _subtract_row(variances, later, factor / deviation, i)
             for parameter in range(len(slopes)):
                 slopes[parameter, later] -= factor * slopes[parameter, i]
-    moments.state[:] += np.dot(innovations, cross_covariances)
-    moments.sensitivities[:] += np.dot(slopes, cross_covariances)
-    moments.covariance[:] -= np.dot(cross_covariances.T, cross_covariances)
+    corrections = np.dot(innovations, cross_covariances)
+    for r in range(len(corrections)):
+        moments.state[r] += corrections[r]
+    add_to_matrix(moments.sensitivities, 1.0, np.dot(slopes, cross_covariances))
+    add_to_matrix(moments.covariance, -1.0, np.dot(cross_covariances.T, cross_covariances))
 
 
 @compiled
@@ -140,7 +153,7 @@ def _subtract_row(matrix: Any, row: int, factor: float, other: int) -> None:
 @compiled
 def _record_transition(by_state: Any, decay: Any, transition: Any) -> None:
     from_count, moving_count = by_state.shape
-    transition[:moving_count, :from_count] = by_state.T
+    assign_matrix(transition[:moving_count, :from_count], by_state.T)
     for r in range(moving_count, len(transition)):
         transition[r, r] = decay[r]
 
@@ -168,5 +181,8 @@ def _update_covariance_over_step(transition: Any, decay: Any, process_noise: Any
 def _update_sensitivities_over_step(integration: Integration, decay: Any, sensitivities: Any) -> None:
     from_count, moving_count = integration.transition.shape
     moved = np.dot(np.ascontiguousarray(sensitivities[:, :from_count]), integration.transition)
-    sensitivities[:, :moving_count] = integration.direct + moved
-    sensitivities[:, moving_count:] *= decay[moving_count:]
+    for i in range(len(sensitivities)):
+        for j in range(moving_count):
+            sensitivities[i, j] = integration.direct[i, j] + moved[i, j]
+        for j in range(moving_count, len(decay)):
+            sensitivities[i, j] *= decay[j]

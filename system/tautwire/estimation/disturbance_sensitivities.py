@@ -146,9 +146,11 @@ def differentiate_recursion(run: Run, disturbance: DisturbanceStates, derivative
         _differentiate_innovations(
             innovations, whitening, np.dot(output, derivatives.state), variances, disturbance, by_number[:, k]
         )
-        derivatives.state[:] += by_covariance.reshape((size, number_count))
-        kept = derivatives.state - np.dot(gain.T, np.dot(output, derivatives.state))
-        derivatives.state[:] = np.dot(transition, kept)
+        kept = derivatives.state + by_covariance.reshape((size, number_count))
+        moved = np.dot(transition, kept - np.dot(gain.T, np.dot(output, kept)))
+        for r in range(size):
+            for j in range(number_count):
+                derivatives.state[r, j] = moved[r, j]
         _add_white_noise(np.dot(moved_gain, whitening), np.dot(innovations, whitening), disturbance, derivatives)
         updated = run.states[k] + np.dot(innovations, gain)
         onward = np.dot(run.covariances[k, first:], transition.T)
@@ -162,7 +164,7 @@ def _whitened(run: Run, disturbance: DisturbanceStates, k: int) -> Any:
     output = run.output_matrices[k].copy()
     count, size = output.shape
     for i in range(count):
-        output[i] *= run.observed[k, i]
+        _scale_row(output, i, run.observed[k, i])
     gain, whitening = np.dot(output, run.covariances[k]), np.eye(count)
     variances = np.dot(gain, output.T)
     for i in range(count):
@@ -178,10 +180,17 @@ def _whitened(run: Run, disturbance: DisturbanceStates, k: int) -> Any:
         deviation = np.sqrt(variances[i, i] + disturbance.white_variance[i])
         for c in range(i, count):
             variances[c, i] /= deviation
-        output[i] /= deviation
-        gain[i] /= deviation
-        whitening[i] /= deviation
+        _scale_row(output, i, 1.0 / deviation)
+        _scale_row(gain, i, 1.0 / deviation)
+        _scale_row(whitening, i, 1.0 / deviation)
     return whitening, output, gain
+
+
+@compiled
+def _scale_row(matrix: Any, row: int, factor: float) -> None:
+    """Multiply a row; written as ``matrix[row] *= factor``, it takes Numba seconds to compile."""
+    for c in range(matrix.shape[1]):
+        matrix[row, c] *= factor
 
 
 @compiled
@@ -235,7 +244,10 @@ def _move_covariances(transition: Any, moving_count: int, covariance: Any) -> No
                 covariance[r, j, c] = covariance[c, j, r] = moved[c * number_count + j, r] * transition[r, r]
             for c in range(moving_count, size):
                 covariance[r, j, c] *= transition[r, r] * transition[c, c]
-    covariance[:moving_count, :, :moving_count] = both
+    for r in range(moving_count):
+        for j in range(number_count):
+            for c in range(moving_count):
+                covariance[r, j, c] = both[r, j, c]
 
 
 @compiled

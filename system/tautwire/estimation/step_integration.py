@@ -96,9 +96,32 @@ class Integration(NamedTuple):
 
 
 @compiled
+def assign(target: Any, values: Any) -> None:
+    """Set a vector; ``target[:] = values`` takes Numba seconds to compile, for the message where their sizes differ."""
+    for i in range(len(target)):
+        target[i] = values[i]
+
+
+@compiled
+def assign_matrix(target: Any, values: Any) -> None:
+    """Set a matrix, as :func:`assign` sets a vector."""
+    for i in range(target.shape[0]):
+        for j in range(target.shape[1]):
+            target[i, j] = values[i, j]
+
+
+@compiled
+def add_to_matrix(target: Any, factor: float, values: Any) -> None:
+    """Add a multiple of a matrix to another one of its size."""
+    for i in range(target.shape[0]):
+        for j in range(target.shape[1]):
+            target[i, j] += factor * values[i, j]
+
+
+@compiled
 def evaluate(step: Step, k: int, places: Any) -> None:
     """Evaluate at sample k; ``places`` belong to the caller, so that they live as long as the call."""
-    places[:] = step.places + 8 * k * step.strides
+    assign(places, step.places + 8 * k * step.strides)
     _call(step.address, places.ctypes.data, step.strides.ctypes.data)
 
 
@@ -106,7 +129,7 @@ def evaluate(step: Step, k: int, places: Any) -> None:
 def integrate_step(integration: Integration, state: Any, k: int) -> None:
     """Integrate over the step from sample k, from a filter's ``state``, whose first states are the moving ones."""
     evaluate(integration.preparation, k, np.empty_like(integration.preparation.places))
-    integration.constants[:] = integration.preparation.results[0]
+    assign_matrix(integration.constants, integration.preparation.results[0])
     middles = _move(integration, state, k)
     _differentiate(integration, middles, k)
 
@@ -116,7 +139,7 @@ def _move(integration: Integration, state: Any, k: int) -> Any:
     """Move the moving states to the end of the step; returns them in the middle of each larger part, (parts, n)."""
     moving, parts, middle_count = integration.moving[0], integration.division.state, integration.division.slope
     middles, places = np.empty((middle_count, len(moving))), np.empty_like(integration.part.places)
-    moving[:] = state[: len(moving)]
+    assign(moving, state)
     for part in range(parts):
         integration.index[0, 0] = part
         evaluate(integration.part, k, places)
@@ -126,7 +149,7 @@ def _move(integration: Integration, state: Any, k: int) -> Any:
             if min(int(at), parts - 1) == part:
                 for r in range(len(moving)):
                     middles[j, r] = moving[r] + (at - part) * (reached[r] - moving[r])
-        moving[:] = reached
+        assign(moving, reached)
     return middles
 
 
@@ -139,14 +162,14 @@ def _differentiate(integration: Integration, middles: Any, k: int) -> None:
     places = np.empty_like(integration.slope.places)
     for j in range(division.slope):
         integration.index[0, 0] = j
-        integration.middle[0] = middles[j]
+        assign(integration.middle[0], middles[j])
         evaluate(integration.slope, k, places)
         jacobian, slopes = integration.slope.results
         gamma = _integrated_exponential(jacobian, part, division)
         _set_identity_plus(jacobian, 1.0, gamma, over_part)
         if j == 0:
-            transition[:] = over_part
-            by_constants[:] = np.dot(slopes, gamma.T)
+            transition = over_part.copy()
+            by_constants = np.dot(slopes, gamma.T)
         else:
             transition = np.dot(over_part, transition)
             by_constants = np.dot(by_constants, over_part.T) + np.dot(slopes, gamma.T)
@@ -174,15 +197,16 @@ def _fill_in(integration: Integration, transition: Any, by_constants: Any) -> No
     by_theta, factors = integration.preparation.results[1], integration.preparation.results[2][0]
     theta_count, size, driving = len(by_theta), len(transition), len(factors)
     if by_theta.shape[1] > 0:
-        by_constants[:theta_count] += np.dot(by_theta, by_constants[theta_count:])
+        add_to_matrix(by_constants[:theta_count], 1.0, np.dot(by_theta, by_constants[theta_count:]))
     result = integration.transition
-    result[:size] = transition.T
     constant_count = len(result) - size - driving
     first_constant = theta_count - constant_count
-    result[size : size + constant_count] = by_constants[first_constant:theta_count]
+    assign_matrix(result[:size], transition.T)
+    assign_matrix(result[size : size + constant_count], by_constants[first_constant:theta_count])
     for i in range(driving):
-        result[size + constant_count + i] = factors[i] * by_constants[first_constant - driving + i]
-    integration.direct[:] = by_constants[: len(integration.direct)]
+        for j in range(size):
+            result[size + constant_count + i, j] = factors[i] * by_constants[first_constant - driving + i, j]
+    assign_matrix(integration.direct, by_constants)
 
 
 @compiled
