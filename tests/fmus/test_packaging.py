@@ -1,8 +1,10 @@
 """FMUs as other tools see them."""
 
+import shutil
 import signal
 import subprocess
 import sys
+import tempfile
 import zipfile
 from pathlib import Path
 
@@ -11,7 +13,7 @@ import numpy as np
 import pytest
 from fmpy.validation import validate_fmu
 
-from tautwire.fmus import packaging
+from tautwire.fmus import pythonfmu_builder
 from tautwire.fmus.packaging import RobotFmus, build_fmus
 from tautwire.robot.schema import EffectSetting
 from tests.support.fmus import in_hand
@@ -144,7 +146,24 @@ def test_an_interrupt_while_pythonfmu_works_ends_the_build_and_leaves_no_fmu(
     def interrupted(*arguments: object) -> None:
         signal.raise_signal(signal.SIGINT)
 
-    monkeypatch.setattr(packaging, "patch_wrapper_exit", interrupted)
+    monkeypatch.setattr(pythonfmu_builder, "patch_wrapper_exit", interrupted)
     with pytest.raises(KeyboardInterrupt):
         build_fmus(paper_robot(), tmp_path)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_an_interrupt_before_the_first_fmu_waits_for_the_imports_and_restores_the_path(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def interrupted(*arguments: object, **options: object) -> None:
+        signal.raise_signal(signal.SIGINT)
+        copied.append(copy_folder(*arguments, **options))
+
+    copied: list[Path] = []
+    copy_folder, search_path = shutil.copytree, list(sys.path)
+    monkeypatch.setattr(shutil, "copytree", interrupted)
+    monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
+    with pytest.raises(KeyboardInterrupt):
+        build_fmus(paper_robot(), tmp_path)
+    assert copied
+    assert (list(tmp_path.iterdir()), sys.path) == ([], search_path)

@@ -79,6 +79,26 @@ if __name__ == "__main__":
     run(str(script))
 
 
+def test_what_travels_inside_is_imported_once_for_all_fmus_and_leaves_no_trace(tmp_path: Path) -> None:
+    code = f"""
+import sys
+from tautwire.fmus.packaging import build_fmus
+from tests.support.robots import paper_robot
+
+class Observer:
+    def find_spec(self, name, path=None, target=None):
+        if name.startswith("tautwire_fmu_") and name.endswith(".slaves"):
+            imported.append(name)
+
+imported, search_path = [], list(sys.path)
+sys.meta_path.insert(0, Observer())
+assert len(build_fmus(paper_robot(), {str(tmp_path)!r}).paths) == 4
+assert len(imported) == 1, imported
+assert (imported[0] in sys.modules, sys.path) == (False, search_path)
+"""
+    run("-c", code)
+
+
 def test_a_library_without_binaries_is_an_error(tmp_path: Path) -> None:
     code = f"""
 import shutil, sys

@@ -7,7 +7,7 @@ and XML that defines entities or is unbounded. fmpy gets no file that was not ch
 from __future__ import annotations
 
 import stat
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from io import BufferedReader, FileIO
 from pathlib import Path
@@ -51,6 +51,14 @@ def read_model_description(path: Path, check_contents: bool = False) -> ModelDes
     """
     require_valid_archive(path, check_contents)
     return fmpy.read_model_description(str(path))
+
+
+def put_atomically(transfer: Callable[[Path, Path], object], source: Path, target: Path) -> Path:
+    """Copies or moves a file to ``target``, which is replaced at once."""
+    partial_file = target.with_name(f".{target.name}.partial")
+    transfer(source, partial_file)
+    partial_file.replace(target)
+    return target
 
 
 def unpack(path: Path, folder: Path) -> None:

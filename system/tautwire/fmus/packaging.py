@@ -2,26 +2,17 @@
 
 from __future__ import annotations
 
-import hashlib
-import importlib
-import itertools
-import json
 import shutil
 import tempfile
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import AbstractContextManager, contextmanager, nullcontext
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from dataclasses import dataclass, field, replace
-from functools import partial
 from pathlib import Path
 from typing import Any
-from uuid import NAMESPACE_URL, uuid5
 
-import tautwire_fmu
 from tautwire_fmu.laws.effects import BY_NAME
 from tautwire_fmu.laws.winch_drive import NO_LIMIT
 
-from .. import __version__
-from ..process_signals import defer_interrupts
 from ..robot.active_effects import (
     attachment_settings,
     cable_settings,
@@ -33,28 +24,9 @@ from ..robot.robot_assembly import assemble_robot
 from ..robot.schema import EffectSetting, Robot, validate_robot
 from ..robot.static_equilibrium import start_attachments, start_orientation, static_forces, static_tensions
 from ..validation import validate_callable, validate_folder
-from .fmu_archive import read_model_description
-from .fmu_documentation import documentation_files
+from .fmu_archive import put_atomically
 from .fmu_slots import check_user_fmus
-from .pythonfmu_builder import installed_builder, patch_wrapper_exit
-
-# pythonfmu 0.7.0 runs the script at every instantiation and then releases a reference to its globals that it does
-# not own; without the one taken here the second instance gets an empty module.
-LAUNCHER = """import ctypes
-
-from {package}.slaves import {base}
-
-ctypes.pythonapi.Py_IncRef(ctypes.py_object(globals()))
-"""
-FMU_OPTIONS = {
-    "needsExecutionTool": False,
-    "canGetAndSetFMUstate": True,
-    "canSerializeFMUstate": True,
-    "canInterpolateInputs": False,
-}
-
-# Writes the FMU of a component into a folder: module and class of its slave, its name, its resource.
-FmuWriter = Callable[[str, str, str, dict[str, Any], Path], Path]
+from .pythonfmu_builder import FmuWriter, pythonfmu_writer
 
 
 @dataclass(frozen=True)
@@ -122,34 +94,28 @@ def build_fmus(
     check_user_fmus(robot)
     folder.mkdir(parents=True, exist_ok=True)
     user_fmus = {fmu.slot: fmu.path for fmu in robot.fmus}
-    is_rigid = robot.platform.is_rigid_body
-    platform_slave = ("rigid_body", "RigidBody") if is_rigid else ("point_mass", "PointMass")
-    fmu_count, built_counter = 1 + robot.cable_count + len(robot.winch_numbers), itertools.count(1)
-
+    components, paths = _components(robot), dict[str, Path]()
     with fmu_writer(native or robot.native_fmus, platforms, fmi) as write_fmu:
-
-        def build_or_use(module: str, base: str, name: str, data: dict[str, Any]) -> Path:
-            path = user_fmus[name] if name in user_fmus else write_fmu(module, base, name, data, folder)
+        for number, (name, (module, base, data)) in enumerate(components.items(), start=1):
+            paths[name] = user_fmus[name] if name in user_fmus else write_fmu(module, base, name, data, folder)
             if progress is not None:
-                progress(next(built_counter) / fmu_count)
-            return path
+                progress(number / len(components))
+    return RobotFmus(
+        cables=tuple(paths[f"cable_{i}"] for i in robot.cable_numbers),
+        platform=paths["platform"],
+        winches=tuple(paths.get(f"winch_{i}") for i in robot.cable_numbers),
+        user_start_values={slot: start_values(robot, slot) for slot in user_fmus},
+        has_position_sensor="platform" not in user_fmus and has_sensor_effects(robot),
+        is_rigid=robot.platform.is_rigid_body,
+    )
 
-        return RobotFmus(
-            cables=tuple(
-                build_or_use("cable", "Cable", f"cable_{i}", data)
-                for i, data in enumerate(cable_resources(robot), start=1)
-            ),
-            platform=build_or_use(*platform_slave, "platform", platform_resource(robot)),
-            winches=tuple(
-                build_or_use("winch", "Winch", f"winch_{i}", winch_resource(robot, i))
-                if i in robot.winch_numbers
-                else None
-                for i in robot.cable_numbers
-            ),
-            user_start_values={slot: start_values(robot, slot) for slot in user_fmus},
-            has_position_sensor="platform" not in user_fmus and has_sensor_effects(robot),
-            is_rigid=is_rigid,
-        )
+
+def _components(robot: Robot) -> dict[str, tuple[str, str, dict[str, Any]]]:
+    """Module and class of each component's slave, and its resource, by the component's name."""
+    slave = ("rigid_body", "RigidBody") if robot.platform.is_rigid_body else ("point_mass", "PointMass")
+    cables = {f"cable_{i}": ("cable", "Cable", data) for i, data in enumerate(cable_resources(robot), start=1)}
+    winches = {f"winch_{i}": ("winch", "Winch", winch_resource(robot, i)) for i in robot.winch_numbers}
+    return cables | {"platform": (*slave, platform_resource(robot))} | winches
 
 
 def fmu_writer(native: bool, platforms: Sequence[str], fmi: int) -> AbstractContextManager[FmuWriter]:
@@ -175,7 +141,7 @@ def native_fmu_writer(platforms: Sequence[str], fmi: int) -> FmuWriter:
         with tempfile.TemporaryDirectory(prefix="tautwire-build-") as scratch:
             built = Path(scratch) / f"{name}.fmu"
             write_native_fmu(module, base, data | {"model_name": name}, target, built)
-            return _put_atomically(shutil.move, built, folder / built.name)
+            return put_atomically(shutil.move, built, folder / built.name)
 
     return write_fmu
 
@@ -190,7 +156,7 @@ def package_controller_fmu(data: dict[str, Any], folder: Path, native: bool = Fa
 def with_user_fmus_copied(fmus: RobotFmus, folder: Path) -> RobotFmus:
     """The same FMUs with copies of the user FMUs in ``folder``, named as their slots."""
     copies = {
-        slot: _put_atomically(shutil.copyfile, fmus.by_component[slot], folder / f"{slot}.fmu")
+        slot: put_atomically(shutil.copyfile, fmus.by_component[slot], folder / f"{slot}.fmu")
         for slot in fmus.user_start_values
     }
     return replace(
@@ -295,52 +261,3 @@ def _attachment_resources(robot: Robot) -> list[dict[str, Any]]:
         for cable in robot.cable_numbers
         for setting in attachment_settings(robot, cable)
     ]
-
-
-@contextmanager
-def pythonfmu_writer() -> Iterator[FmuWriter]:
-    """Context with a function that writes FMUs by pythonfmu, and imports what travels inside once for all of them."""
-    sources = Path(tautwire_fmu.__file__).parent
-    package = f"tautwire_fmu_{_digest(sources)}"
-    with tempfile.TemporaryDirectory(prefix="tautwire-build-") as scratch_name:
-        scratch = Path(scratch_name)
-        shutil.copytree(sources, scratch / package, ignore=shutil.ignore_patterns("__pycache__", "*.pyc"))
-        with installed_builder(scratch, (package,)):
-            # An interrupt within one of the many imports may be raised in a callback, where it is lost.
-            with defer_interrupts():
-                importlib.import_module(f"{package}.slaves")
-            yield partial(_write_python_fmu, scratch / package)
-
-
-def _write_python_fmu(package: Path, module: str, base: str, name: str, data: dict[str, Any], folder: Path) -> Path:
-    scratch, data = package.parent, data | {"model_name": name, "version": __version__}
-    guid = str(uuid5(NAMESPACE_URL, package.name + module + json.dumps(data, sort_keys=True)))
-    with defer_interrupts() as raise_interrupt:
-        resource = scratch / f"{module}.json"
-        resource.write_text(json.dumps(data | {"guid": guid}), encoding="utf-8")
-        script = scratch / f"{name}_{guid.replace('-', '')[:12]}.py"
-        script.write_text(LAUNCHER.format(package=package.name, base=base), encoding="utf-8")
-        unpatched_fmu = scratch / "built" / f"{name}.fmu"
-        with installed_builder(scratch, (script.stem,)) as fmu_builder:
-            fmu_builder.build_FMU(script, dest=unpatched_fmu, project_files=[package, resource], **FMU_OPTIONS)
-        patched_fmu = scratch / f"{name}.fmu"
-        additions = documentation_files(module, data, read_model_description(unpatched_fmu))
-        patch_wrapper_exit(unpatched_fmu, patched_fmu, additions)
-        raise_interrupt()
-        return _put_atomically(shutil.move, patched_fmu, folder / f"{name}.fmu")
-
-
-def _digest(sources: Path) -> str:
-    digest = hashlib.sha256()
-    for path in sorted(sources.rglob("*.py")):
-        digest.update(path.relative_to(sources).as_posix().encode())
-        digest.update(path.read_bytes())
-    return digest.hexdigest()[:12]
-
-
-def _put_atomically(transfer: Callable[[Path, Path], object], source: Path, target: Path) -> Path:
-    """Copies or moves a file to ``target``, which is replaced at once."""
-    partial_file = target.with_name(f".{target.name}.partial")
-    transfer(source, partial_file)
-    partial_file.replace(target)
-    return target

@@ -1,4 +1,4 @@
-"""pythonfmu's FmuBuilder as it is installed, and a patch of its wrapper library.
+"""FMUs by pythonfmu: its FmuBuilder as it is installed, and a patch of its wrapper library.
 
 An FMU contains a copy of pythonfmu without binaries and puts it first on the path of the process that loads it, and so
 of those that this process spawns. FMUs built by such a copy have no library.
@@ -11,22 +11,33 @@ has been done by then, so it is patched to return at once.
 
 from __future__ import annotations
 
+import hashlib
 import importlib
 import io
+import json
+import shutil
 import sys
+import tempfile
 import zipfile
-from collections.abc import Collection, Iterator, Mapping
-from contextlib import contextmanager
+from collections.abc import Callable, Collection, Iterator, Mapping
+from contextlib import ExitStack, contextmanager
 from copy import copy
-from functools import lru_cache
+from functools import lru_cache, partial
 from pathlib import Path
 from types import ModuleType
 from typing import Any
+from uuid import NAMESPACE_URL, uuid5
 
 from elftools.elf.elffile import ELFFile
 from elftools.elf.sections import SymbolTableSection
 
+import tautwire_fmu
+
+from .. import __version__
 from ..errors import TautwireError
+from ..process_signals import defer_interrupts
+from .fmu_archive import put_atomically, read_model_description
+from .fmu_documentation import documentation_files
 
 PYTHONFMU = "pythonfmu"
 # File that pythonfmu puts beside the modules inside every FMU.
@@ -57,6 +68,7 @@ def installed_builder(scratch: Path, names: Collection[str]) -> Iterator[Any]:
         if name.partition(".")[0] in reimported_packages:
             del sys.modules[name]
     sys.path[:] = [str(scratch), *(entry for entry in path if not (Path(entry) / FMU_RESOURCE_MARKER).is_file())]
+    # Scripts may be younger than the listings of their folder.
     importlib.invalidate_caches()
     try:
         yield _checked_builder(importlib.import_module(f"{PYTHONFMU}.builder"))
@@ -78,6 +90,66 @@ def _checked_builder(module: ModuleType) -> Any:
     if not module.FmuBuilder.has_binary():
         raise FmuLibraryError(Path(module.__file__ or ".").parent)
     return module.FmuBuilder
+
+
+# pythonfmu 0.7.0 runs the script at every instantiation and then releases a reference to its globals that it does
+# not own; without the one taken here the second instance gets an empty module.
+LAUNCHER = """import ctypes
+
+from {package}.slaves import {base}
+
+ctypes.pythonapi.Py_IncRef(ctypes.py_object(globals()))
+"""
+FMU_OPTIONS = {
+    "needsExecutionTool": False,
+    "canGetAndSetFMUstate": True,
+    "canSerializeFMUstate": True,
+    "canInterpolateInputs": False,
+}
+
+# Writes the FMU of a component into a folder: module and class of its slave, its name, its resource.
+FmuWriter = Callable[[str, str, str, dict[str, Any], Path], Path]
+
+
+@contextmanager
+def pythonfmu_writer() -> Iterator[FmuWriter]:
+    """Context with a function that writes FMUs by pythonfmu, and imports what travels inside once for all of them."""
+    sources = Path(tautwire_fmu.__file__).parent
+    package = f"tautwire_fmu_{_digest(sources)}"
+    with ExitStack() as stack:
+        # An interrupt within one of the many imports may be raised in a callback, where it is lost.
+        with defer_interrupts():
+            scratch = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="tautwire-build-")))
+            shutil.copytree(sources, scratch / package, ignore=shutil.ignore_patterns("__pycache__", "*.pyc"))
+            stack.enter_context(installed_builder(scratch, (package,)))
+            importlib.import_module(f"{package}.slaves")
+        yield partial(_write_python_fmu, scratch / package)
+
+
+def _write_python_fmu(package: Path, module: str, base: str, name: str, data: dict[str, Any], folder: Path) -> Path:
+    scratch, data = package.parent, data | {"model_name": name, "version": __version__}
+    guid = str(uuid5(NAMESPACE_URL, package.name + module + json.dumps(data, sort_keys=True)))
+    with defer_interrupts() as raise_interrupt:
+        resource = scratch / f"{module}.json"
+        resource.write_text(json.dumps(data | {"guid": guid}), encoding="utf-8")
+        script = scratch / f"{name}_{guid.replace('-', '')[:12]}.py"
+        script.write_text(LAUNCHER.format(package=package.name, base=base), encoding="utf-8")
+        unpatched_fmu = scratch / "built" / f"{name}.fmu"
+        with installed_builder(scratch, (script.stem,)) as fmu_builder:
+            fmu_builder.build_FMU(script, dest=unpatched_fmu, project_files=[package, resource], **FMU_OPTIONS)
+        patched_fmu = scratch / f"{name}.fmu"
+        additions = documentation_files(module, data, read_model_description(unpatched_fmu))
+        patch_wrapper_exit(unpatched_fmu, patched_fmu, additions)
+        raise_interrupt()
+        return put_atomically(shutil.move, patched_fmu, folder / f"{name}.fmu")
+
+
+def _digest(sources: Path) -> str:
+    digest = hashlib.sha256()
+    for path in sorted(sources.rglob("*.py")):
+        digest.update(path.relative_to(sources).as_posix().encode())
+        digest.update(path.read_bytes())
+    return digest.hexdigest()[:12]
 
 
 WRAPPER_FOLDER = "binaries/linux64/"
