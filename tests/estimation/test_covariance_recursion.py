@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+import ast
 from hashlib import sha256
 from pathlib import Path
+from types import ModuleType
 
 import numpy as np
 import pytest
 from casadi import SX, Function, horzcat, mtimes, vertcat
 from numpy.typing import NDArray
 
-from tautwire.estimation import step_integration
+from tautwire.estimation import covariance_recursion, disturbance_sensitivities, step_integration
 from tautwire.estimation.covariance_recursion import STEP_INTEGRATION_SHA256, Moments, Record, Samples, run_recursion
 from tautwire.estimation.native_functions import BoundFunction, CompiledFunction
 from tautwire.estimation.step_integration import Division, Integration, Step
@@ -140,3 +142,19 @@ def test_cached_machine_code_follows_the_integration_that_it_calls() -> None:
     source = Path(step_integration.__file__).read_text(encoding="utf-8")
     digest = sha256(source.encode()).hexdigest()
     assert digest == STEP_INTEGRATION_SHA256, f"set STEP_INTEGRATION_SHA256 to {digest}"
+
+
+@pytest.mark.parametrize("module", [step_integration, covariance_recursion, disturbance_sensitivities])
+def test_no_compiled_loop_assigns_an_array_to_a_slice(module: ModuleType) -> None:
+    """Numba would compile a message for sizes that differ into each: half as long again in all, at a first trace."""
+    tree = ast.parse(Path(module.__file__ or "").read_text(encoding="utf-8"))
+    loops = [each for each in tree.body if isinstance(each, ast.FunctionDef) and each.decorator_list]
+    assignments = [each for loop in loops for each in ast.walk(loop) if isinstance(each, ast.Assign | ast.AugAssign)]
+    slices = [
+        ast.unparse(each)
+        for each in assignments
+        for target in (each.targets if isinstance(each, ast.Assign) else [each.target])
+        if isinstance(target, ast.Subscript) and any(isinstance(part, ast.Slice) for part in ast.walk(target.slice))
+        if not isinstance(each.value, ast.Constant)
+    ]
+    assert loops and not slices

@@ -33,7 +33,7 @@ from .step_integration import (
 )
 
 # Numba caches machine code by the content of this file alone, and what it calls of that module is in it.
-STEP_INTEGRATION_SHA256 = "2b1be67876283fb32bf86f8cbb74857205cdba95483e5e560581f614d17f2629"
+STEP_INTEGRATION_SHA256 = "581902eed04fb2d5ed6fbc9ffe928e9a2d044053ab95ce620d17e91cc38376fa"
 
 
 class Moments(NamedTuple):

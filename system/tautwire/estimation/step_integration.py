@@ -158,7 +158,7 @@ def _differentiate(integration: Integration, middles: Any, k: int) -> None:
     """Derivatives of the end of the step, from the Jacobians in the middle of each larger part."""
     division, size, count = integration.division, middles.shape[1], len(integration.slope.results[1])
     part = integration.steps[k] / division.slope
-    transition, by_constants, over_part = np.eye(size), np.zeros((count, size)), np.empty((size, size))
+    transition, by_constants, over_part = np.empty((size, size)), np.empty((count, size)), np.empty((size, size))
     places = np.empty_like(integration.slope.places)
     for j in range(division.slope):
         integration.index[0, 0] = j
@@ -168,8 +168,8 @@ def _differentiate(integration: Integration, middles: Any, k: int) -> None:
         gamma = _integrated_exponential(jacobian, part, division)
         _set_identity_plus(jacobian, 1.0, gamma, over_part)
         if j == 0:
-            transition = over_part.copy()
-            by_constants = np.dot(slopes, gamma.T)
+            assign_matrix(transition, over_part)
+            assign_matrix(by_constants, np.dot(slopes, gamma.T))
         else:
             transition = np.dot(over_part, transition)
             by_constants = np.dot(by_constants, over_part.T) + np.dot(slopes, gamma.T)
