@@ -19,7 +19,7 @@ from .identification_state import Identification, with_final_robot
 from .localisation.component_localisation import localise_residual
 from .parameter_fit import NoFitError
 from .policy import TimeLimitPolicy
-from .preprocessing import calibrated_estimation_data, with_disturbance
+from .preprocessing import with_disturbance
 from .selection_result import without_least_evident
 from .smoothed_states import calibrated_robot
 from .stepwise_selection import select_effects
@@ -30,9 +30,8 @@ def start_side_runs(state: Identification) -> Identification:
     """Co-simulate the declared robot, and localise its error in a component, beside all that follows."""
     context, prepared = state.context, state.prepared
     runs = start_cosimulations(context.workers, context.fitter, context.robot, prepared.data_sets)
-    robot, data = calibrated_estimation_data(prepared, context.robot)
     localisation = context.workers.submit(
-        localise_residual, robot, data, context.fitter.noise, context.policy.localisation
+        localise_residual, context.robot, prepared.split.estimation, context.fitter.noise, context.policy.localisation
     )
     return replace(state, pending_runs=tuple(runs), pending_localisation=(localisation,))
 

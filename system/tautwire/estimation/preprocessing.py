@@ -39,7 +39,6 @@ from .parameter_fit import Fitter
 from .policy import DEFAULT_POLICY, IdentificationPolicy, ResidualAnalysisPolicy
 from .preprocessing_policy import PreprocessingPolicy
 from .residual_analysis import has_enough_samples, residuals_are_white
-from .smoothed_states import calibrate
 from .speed_versions import speed_versions
 from .worker_pool import WorkerPool
 
@@ -197,15 +196,6 @@ def all_residuals_white(
     return all(
         residuals_are_white(residuals, data.rows, policy)
         for residuals, data in zip(innovations, data_sets, strict=True)
-    )
-
-
-def calibrated_estimation_data(prepared: PreparedData, robot: Robot) -> tuple[Robot, DataSet]:
-    """Robot and FIT with uncertain numbers as FIT has them: what is within their bounds is no component's residual."""
-    data = prepared.split.estimation
-    calibration = calibrate(prepared.fitter, robot, data)
-    return calibration.calibrated_robot(robot), replace(
-        data, recording=calibration.without_sensor_errors(data.recording)
     )
 
 

@@ -185,3 +185,101 @@ def test_errors_of_recorded_lengths_are_expected_in_the_place_of_a_drift() -> No
     length = float(np.linalg.norm(np.subtract(cable.anchor, robot.platform.start)))
     # The path leads some way from the start.
     assert np.sqrt(lengths**2 - bare**2) == pytest.approx(1e-4 * cable.modulus * cable.area / length, rel=0.1)
+
+
+def with_anchor_shifted(axis: int, shift: float) -> Robot:
+    robot = example("three")
+    anchor = list(robot.cables[0].anchor)
+    anchor[axis] += shift
+    x, y, z = anchor
+    return replace(robot, cables=(replace(robot.cables[0], anchor=(x, y, z)), *robot.cables[1:]))
+
+
+def with_cable(**changes: float) -> Robot:
+    robot = example("three")
+    return replace(robot, cables=(replace(robot.cables[0], **changes), *robot.cables[1:]))  # type: ignore[arg-type]
+
+
+def with_tensions(gain: float = 1.0, offset: float = 0.0, *, cable: int) -> Recording:
+    recording = recorded("three", 3)
+    tension = recording.tension.copy()
+    tension[:, cable] = gain * tension[:, cable] + offset
+    return replace(recording, tension=tension)
+
+
+def expected_increase(robot: Robot, component: str, quantity: str) -> float:
+    """By how much the expected mean square is larger than of the robot without uncertainties."""
+    stated, exact = (
+        residual_of(localise(each, recorded("three", 3)), component, quantity) for each in (robot, example("three"))
+    )
+    return stated.expected_rms**2 - exact.expected_rms**2
+
+
+def mean_square_changes(component: str, quantity: str, *changed: tuple[Robot, Recording]) -> float:
+    """Summed mean squares of what each of these changes alters in a residual."""
+    before = residual_of(localised({}), component, quantity).residual
+    after = [residual_of(localise(*each), component, quantity).residual for each in changed]
+    return float(sum(np.nanmean((residual - before) ** 2) for residual in after))
+
+
+@pytest.mark.validate(but=["anchor", "modulus"])
+@pytest.mark.parametrize(
+    ("stated", "changed"),
+    [
+        ({"anchor_uncertainty": 0.02}, [with_anchor_shifted(axis, 0.02) for axis in range(3)]),
+        ({"modulus_uncertainty": 1e9}, [with_cable(modulus=1.032e11)]),
+        ({"damping_uncertainty": 1e8}, [with_cable(damping=5e8)]),
+    ],
+    ids=["anchor", "modulus", "damping"],
+)
+def test_a_cables_residual_is_expected_to_hold_what_the_robot_file_calls_uncertain(
+    stated: dict[str, float], changed: list[Robot]
+) -> None:
+    increase = expected_increase(with_cable(**stated), "cable 1", "tension")
+    assert increase == pytest.approx(
+        mean_square_changes("cable 1", "tension", *((robot, recorded("three", 3)) for robot in changed)), rel=0.15
+    )
+
+
+@pytest.mark.parametrize(
+    ("stated", "changed"),
+    [
+        ({"tension_gain_uncertainty": 0.01}, [with_tensions(gain=1.01, cable=cable) for cable in range(3)]),
+        ({"tension_offset_uncertainty": 3.0}, [with_tensions(offset=3.0, cable=cable) for cable in range(3)]),
+    ],
+    ids=["gain", "offset"],
+)
+def test_the_platforms_residual_is_expected_to_hold_what_load_cells_are_uncertain_by(
+    stated: dict[str, float], changed: list[Recording]
+) -> None:
+    robot = example("three")
+    increase = expected_increase(replace(robot, sensors=replace(robot.sensors, **stated)), "platform", "force z")
+    assert increase == pytest.approx(
+        mean_square_changes("platform", "force z", *((robot, recording) for recording in changed)), rel=0.05
+    )
+
+
+@pytest.mark.validate
+def test_the_platforms_residual_is_expected_to_hold_uncertain_exit_points_and_mass() -> None:
+    robot, recording = example("three"), recorded("three", 3)
+    cables = tuple(replace(cable, anchor_uncertainty=0.5) for cable in robot.cables)
+    shifted = []
+    for index, cable in enumerate(robot.cables):
+        for axis in range(3):
+            anchor = tuple(value + 0.5 * (axis == number) for number, value in enumerate(cable.anchor))
+            moved = (*robot.cables[:index], replace(cable, anchor=anchor), *robot.cables[index + 1 :])
+            shifted.append((replace(robot, cables=moved), recording))
+    increase = expected_increase(replace(robot, cables=cables), "platform", "force x")
+    assert increase == pytest.approx(mean_square_changes("platform", "force x", *shifted), rel=0.05)
+    mass = replace(robot, platform=replace(robot.platform, mass_uncertainty=2.0))
+    assert expected_increase(mass, "platform", "force z") == pytest.approx((2.0 * 9.81) ** 2, rel=1e-6)
+
+
+def test_a_payload_within_what_load_cells_may_be_off_by_is_no_fault_of_the_platform() -> None:
+    robot, recording = example("three"), recorded("three", 3, {"payload": {"mass": 6.0}})
+    weight = 6.0 * 9.81
+    for gain_uncertainty, component in ((1e-4, "platform"), (weight / 300.0, "nothing")):
+        sensors = replace(robot.sensors, tension_gain_uncertainty=gain_uncertainty)
+        components = localise(replace(robot, sensors=sensors), recording)
+        assert components.faulty_component == component
+        assert residual_of(components, "platform", "force z").mean == pytest.approx(-weight, rel=0.02)

@@ -113,13 +113,19 @@ def exit_shift(run: CableSimulation, residual: Array, expected: float, max_shift
         min  mean (r - C s)^2 / expected^2 + |s|^2 / max_shift^2
     """
     is_measured = np.isfinite(residual)
-    direction = run.sensitivities[:, :3] / np.maximum(run.stiffness, np.finfo(float).tiny)[:, None]
-    columns = -run.stiffness[:, None] * (direction - direction[0])
+    columns = exit_shift_columns(run)
     columns = columns - np.mean(columns[is_measured], axis=0)
     weighted_columns = columns[is_measured] / (expected * np.sqrt(np.sum(is_measured)))
     weighted_residual = weighted_columns.T @ (residual[is_measured] / (expected * np.sqrt(np.sum(is_measured))))
     shift: Array = np.linalg.solve(weighted_columns.T @ weighted_columns + np.eye(3) / max_shift**2, weighted_residual)
     return shift, residual - columns @ shift
+
+
+def exit_shift_columns(run: CableSimulation) -> Array:
+    """Change of the tension for each metre by which the exit point shifts along each axis, C; (N, 3) in N/m."""
+    direction = run.sensitivities[:, :3] / np.maximum(run.stiffness, np.finfo(float).tiny)[:, None]
+    columns: Array = -run.stiffness[:, None] * (direction - direction[0])
+    return columns
 
 
 def _tension_sensitivities(component: Component, input_values: Array) -> Array:

@@ -74,14 +74,12 @@ def _evaluate_components(
         return FaultLocalisation(path.time, tuple(cables), *isolation_verdict(cables, ()), limitations)
     balance = _balance_under(recording.tension, measured, fmus, runs)
     measured_axes = np.flatnonzero(np.any(np.isfinite(balance.force), axis=0))
-    platform = [platform_residual(measured.path, int(axis), balance, policy) for axis in measured_axes]
+    directions = measured_forces(runs, np.ones_like(recording.tension), np.array(measured.robot.anchors), path.position)
+    platform = [platform_residual(measured, int(axis), balance, directions, policy) for axis in measured_axes]
     is_deviating = [cable.is_significant for cable in cables]
     balance_closes, candidates = False, []
     if any(axis.is_significant for axis in platform) and not any(is_deviating):
-        unit_forces = measured_forces(
-            runs, np.ones_like(recording.tension), np.array(measured.robot.anchors), path.position
-        )
-        candidates = offset_candidates(balance, unit_forces, path, policy.max_closure_ratio)
+        candidates = offset_candidates(balance, directions, path, policy.max_closure_ratio)
     elif any(axis.is_significant for axis in platform):
         simulated_tension = np.column_stack([run.tension for run in runs])
         mixed_tension = np.where(is_deviating, simulated_tension, recording.tension)

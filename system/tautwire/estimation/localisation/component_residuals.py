@@ -106,7 +106,8 @@ class ComponentResidual:
     """Residual of one FMU alone in one measured quantity, measured less simulated, in ``unit``.
 
     ``residual`` (N,) is NaN where nothing was measured; ``mean`` its mean, which is subtracted from a tension's.
-    ``rms`` is to be compared with ``expected_rms``, that of noise alone; chance does not reach the ratio ``threshold``.
+    ``rms`` is to be compared with ``expected_rms``, that of a right model, by noise and by what the robot file states
+    as uncertain; chance does not reach the ratio ``threshold``.
     ``resonance_frequency`` (Hz) is that of a hidden oscillator, None where there is none.
     """
 
@@ -123,12 +124,12 @@ class ComponentResidual:
 
     @property
     def ratio(self) -> float:
-        """Root mean square over that of noise alone."""
+        """Root mean square over that of a right model."""
         return self.rms / self.expected_rms
 
     @property
     def is_significant(self) -> bool:
-        """Whether the residual is more than noise."""
+        """Whether the residual is more than noise and stated uncertainties."""
         return self.ratio > self.threshold
 
 

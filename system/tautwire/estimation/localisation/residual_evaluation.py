@@ -1,4 +1,14 @@
-"""Residual evaluation: each component residual against the noise that it would have if the model were right."""
+"""Residual evaluation: each component residual against what it would be if the model were right.
+
+That is noise, errors of the sensors with a memory, and what the robot file states as uncertain. The last are constant,
+so that a longer recording does not make them smaller: with standard deviations ``s``, directions ``u`` of the cables,
+tensions ``T``, their part by damping ``D``, lengths ``L`` and the change ``C`` of a tension for each metre by which an
+exit point shifts, of a cable and of the platform along an axis
+
+    S_i^2 = (s_anchor^2 + s_x^2) sum var C_i + (s_gain^2 + (s_E / E)^2) var T_i + (s_c / c)^2 var D_i
+
+    S^2 = sum_i u_i^2 s_offset^2 + (s_gain u_i T_i)^2 + (s_anchor^2 + s_x^2) (1 - u_i^2) (T_i / L_i)^2 + (s_m g)^2
+"""
 
 from __future__ import annotations
 
@@ -9,9 +19,10 @@ from numpy.typing import NDArray
 
 from ...recordings.recording import Recording
 from ...robot.schema import AXES, Robot
+from ..disturbance import NEUTRAL, Disturbance, sensor_noise_only
 from ..kalman_filter import Noise
 from ..residual_spectrum import resonance_frequency
-from .cable_simulation import CableSimulation, drift_variance, tension_variance
+from .cable_simulation import CableSimulation, drift_variance, exit_shift_columns, tension_variance
 from .component_residuals import PLATFORM, ComponentResidual, root_mean_square, strongest_correlation
 from .force_balance import ForceBalance
 from .path_smoothing import SmoothedPath
@@ -19,8 +30,8 @@ from .policy import LocalisationPolicy
 
 Array = NDArray[np.float64]
 
-# Relative standard deviation of the mean square of a random walk about its mean.
-RANDOM_WALK_DEVIATION = 0.9
+# Relative standard deviations of the mean square of a random walk about its mean, and of one constant.
+RANDOM_WALK_DEVIATION, CONSTANT_DEVIATION = 0.9, 2.0**0.5
 
 
 @dataclass(frozen=True)
@@ -32,6 +43,18 @@ class MeasuredPorts:
     path: SmoothedPath
     noise: Noise
 
+    @property
+    def sensor_errors(self) -> Disturbance:
+        """Errors of the sensors with a memory, without what may be an error of the model."""
+        noise, disturbance = self.noise, self.noise.disturbance
+        return NEUTRAL if disturbance is None else sensor_noise_only(disturbance, noise.position, noise.tension)
+
+    @property
+    def point_variance(self) -> float:
+        """Variance (m^2) of a cable's ends relative to each other, on each axis, by the survey and the tracker."""
+        anchor = max(cable.anchor_uncertainty for cable in self.robot.cables)
+        return anchor**2 + self.robot.sensors.position_offset_uncertainty**2
+
 
 def cable_residual(
     measured: MeasuredPorts, number: int, run: CableSimulation, policy: LocalisationPolicy
@@ -40,9 +63,9 @@ def cable_residual(
 
     With ``k`` the sensitivities of the tension, ``P`` the path's covariance, ``kappa`` the stiffness and ``t`` the time
 
-        expected^2 = sigma_T^2 + k' P k + kappa^2 sigma_V^2 sum h^2, the last less that of its mean
+        expected^2 = sigma_T^2 + k' P k + kappa^2 sigma_V^2 sum h^2 + S^2, the third less that of its mean
 
-    and ``kappa^2`` times the variance of the length where that was recorded, in the last term's place.
+    and ``kappa^2`` times the variance of the length where that was recorded, in its place.
     """
     recording = measured.recording
     residual = recording.tension[:, number - 1] - run.tension
@@ -77,7 +100,10 @@ def _expected_variance(
     variance = tension_variance(run, path, load_cell_noise, speed_noise) + (run.stiffness * length_error) ** 2
     steady_variance = float(np.mean(variance[is_measured]))
     drift_excess = max(float(np.mean(drift[is_measured])) - drift_of_mean, 0.0)
-    expected = steady_variance + drift_excess
+    errors = measured.sensor_errors
+    memory = errors.tension.rms**2 + errors.position.rms**2 * float(np.mean(run.stiffness[is_measured] ** 2))
+    stated = _stated_cable_variance(measured, number, run)
+    expected = steady_variance + drift_excess + memory + stated
     independent_samples = (
         2.0 * (path.time[-1] - path.time[0]) * float(np.min(path.cutoff[path.measured])) / (2.0 * np.pi)
     )
@@ -86,19 +112,43 @@ def _expected_variance(
         load_cell_noise**2 * np.sqrt(2.0 / np.sum(is_measured)),
         path_variance * np.sqrt(2.0 / max(independent_samples, 1.0)),
         RANDOM_WALK_DEVIATION * drift_excess,
+        RANDOM_WALK_DEVIATION * memory,
+        CONSTANT_DEVIATION * stated,
     )
     return expected, float(np.sqrt(np.sum(np.square(terms)))) / expected
 
 
+def _stated_cable_variance(measured: MeasuredPorts, number: int, run: CableSimulation) -> float:
+    """Variance (N^2) of a cable's residual by what the robot file states as uncertain."""
+    cable, sensors, path = measured.robot.cables[number - 1], measured.robot.sensors, measured.path
+    of_shifts = np.var(exit_shift_columns(run)[:, list(measured.robot.axes_in_plane)], axis=0)
+    stretch_rate = _stretch_rate(path, measured.recording.winch_speed[:, number - 1], np.array(cable.anchor))
+    relative_modulus = cable.modulus_uncertainty / cable.modulus
+    relative_damping = cable.damping_uncertainty / cable.damping if cable.damping else 0.0
+    return float(
+        measured.point_variance * np.sum(of_shifts)
+        + (sensors.tension_gain_uncertainty**2 + relative_modulus**2) * np.var(run.tension)
+        + relative_damping**2 * np.var(run.sensitivities[:, 6] * stretch_rate)
+    )
+
+
 def platform_residual(
-    path: SmoothedPath, axis: int, balance: ForceBalance, policy: LocalisationPolicy
+    measured: MeasuredPorts, axis: int, balance: ForceBalance, directions: Array, policy: LocalisationPolicy
 ) -> ComponentResidual:
-    """Residual of the platform: the missing force along an axis."""
-    residual = balance.force[:, axis]
+    """Residual of the platform: the missing force along an axis; ``directions`` (N, n, 3) are the cables'."""
+    residual, path = balance.force[:, axis], measured.path
     is_known = np.isfinite(residual)
-    expected = root_mean_square(balance.expected_deviation[is_known, axis])
+    noise = root_mean_square(balance.expected_deviation[is_known, axis])
+    memory, stated = _slow_platform_variances(measured, axis, directions[is_known], is_known)
+    expected = float(np.sqrt(noise**2 + memory + stated))
     duration = (path.time[-1] - path.time[0]) * float(np.mean(is_known))
     independent_samples = max(2.0 * duration * float(balance.cutoff[axis]) / (2.0 * np.pi), 1.0)
+    terms = (
+        noise**2 * np.sqrt(2.0 / independent_samples),
+        RANDOM_WALK_DEVIATION * memory,
+        CONSTANT_DEVIATION * stated,
+    )
+    relative_deviation = float(np.sqrt(np.sum(np.square(terms)))) / expected**2
     return ComponentResidual(
         component=PLATFORM,
         quantity=f"force {AXES[axis]}",
@@ -107,12 +157,30 @@ def platform_residual(
         mean=float(np.mean(residual[is_known])) if np.any(is_known) else float("nan"),
         rms=root_mean_square(residual),
         expected_rms=expected,
-        threshold=_threshold(np.sqrt(2.0 / independent_samples), policy),
+        threshold=_threshold(relative_deviation, policy),
         correlated_signal=strongest_correlation(residual, _platform_signals(path), policy.correlation_level),
         resonance_frequency=resonance_frequency(
             path.time, residual, path.acceleration[:, axis], float(balance.cutoff[axis]), policy.resonance_peaks
         ),
     )
+
+
+def _slow_platform_variances(
+    measured: MeasuredPorts, axis: int, directions: Array, rows: NDArray[np.bool_]
+) -> tuple[float, float]:
+    """Variances (N^2) of the missing force by sensors' errors with a memory, and by what is stated as uncertain."""
+    robot, sensors = measured.robot, measured.robot.sensors
+    tension, squares = measured.recording.tension[rows], directions[:, :, axis] ** 2
+    to_anchors = np.array(robot.anchors) - measured.path.position[rows][:, None]
+    slopes = (tension / np.linalg.norm(to_anchors, axis=2)) ** 2 * (1.0 - squares)
+    weight = robot.platform.mass_uncertainty * robot.gravity if AXES[axis] == "z" else 0.0
+    memory = measured.sensor_errors.tension.rms**2 * float(np.sum(np.mean(squares, axis=0)))
+    of_cables = (
+        sensors.tension_offset_uncertainty**2 * squares
+        + (sensors.tension_gain_uncertainty * tension) ** 2 * squares
+        + measured.point_variance * slopes
+    )
+    return memory, float(np.sum(np.mean(of_cables, axis=0))) + weight**2
 
 
 def _threshold(deviation: float, policy: LocalisationPolicy) -> float:
@@ -123,7 +191,7 @@ def _threshold(deviation: float, policy: LocalisationPolicy) -> float:
 def _cable_signals(run: CableSimulation, winch_speed: Array, path: SmoothedPath, anchor: Array) -> dict[str, Array]:
     line = anchor - path.position
     length = np.linalg.norm(line, axis=1)
-    stretch_rate = winch_speed - np.sum(line * path.velocity, axis=1) / length
+    stretch_rate = _stretch_rate(path, winch_speed, anchor)
     travel = np.concatenate([[0.0], np.cumsum(0.5 * (winch_speed[1:] + winch_speed[:-1]) * np.diff(path.time))])
     return {
         "strain rate": stretch_rate / length,
@@ -134,6 +202,13 @@ def _cable_signals(run: CableSimulation, winch_speed: Array, path: SmoothedPath,
         "direction of stretching": np.sign(stretch_rate),
         **_slow_signals(path),
     }
+
+
+def _stretch_rate(path: SmoothedPath, winch_speed: Array, anchor: Array) -> Array:
+    """Rate (m/s) at which a rope is stretched, (N,): what the winch reels in beyond what the platform comes nearer."""
+    line = anchor - path.position
+    rate: Array = winch_speed - np.sum(line * path.velocity, axis=1) / np.linalg.norm(line, axis=1)
+    return rate
 
 
 def _platform_signals(path: SmoothedPath) -> dict[str, Array]:
