@@ -11,8 +11,9 @@ from tautwire.cosimulation.robot_cosimulation import CosimulationResult, cosimul
 from tautwire.estimation import Trace, trace
 from tautwire.estimation.cosimulation_validation import output_errors
 from tautwire.estimation.disturbance import NEUTRAL
-from tautwire.estimation.identification import _disturbance_notes
-from tautwire.estimation.trace_result import FoundEffect
+from tautwire.estimation.identification import _disturbance_notes, _interval_notes
+from tautwire.estimation.parameter_stability import RECORDINGS
+from tautwire.estimation.trace_result import Estimate, FoundEffect
 from tests.support.recordings import recorded
 from tests.support.robots import example
 
@@ -59,6 +60,19 @@ def test_what_would_explain_all_but_has_no_name_is_not_called_small(verdict: str
         small_effects=(relaxation,),
     )
     assert any("too small to matter: relaxation" in note for note in _disturbance_notes(state)) == is_told
+
+
+def test_intervals_that_are_wide_for_the_same_reason_share_a_note() -> None:
+    ends = ("kg", 1.0, 3.0, None)
+    effects = [
+        FoundEffect("payload", "platform", (), {"mass": Estimate(2.0, *ends, RECORDINGS)}, 50.0),
+        FoundEffect("drag", "platform", (), {"drag_area": Estimate(2.0, *ends, RECORDINGS)}, 50.0),
+        FoundEffect("creep", "cable", (), {"fluidity": Estimate(2.0, *ends)}, 50.0),
+    ]
+    assert _interval_notes(effects) == [
+        "the 95 % interval of mass of payload and of drag_area of drag is as wide as it is mostly because of two "
+        "recordings that give different values"
+    ]
 
 
 def test_no_name_is_given_where_the_rebuilt_fmus_miss_the_recording(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -14,7 +14,15 @@ from tautwire.estimation.hypotheses import hypotheses
 from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import NORMAL_QUANTILE_95, Fit, Fitter, parameter_scales
-from tautwire.estimation.parameter_stability import half_widths_of_stretches, stable_intervals
+from tautwire.estimation.parameter_stability import (
+    FORM,
+    RECORDINGS,
+    SMALLER_FORCE,
+    STRETCHES,
+    Intervals,
+    half_widths_of_stretches,
+    stable_intervals,
+)
 from tautwire.estimation.policy import DEFAULT_POLICY, StabilityPolicy
 from tautwire.estimation.selection_result import SelectionResult
 from tests.support.recordings import recorded
@@ -98,6 +106,33 @@ def test_a_parameter_on_which_recordings_disagree_is_unstable(ratio_of_check: fl
     assert effect.unstable == unstable
     assert low is not None and low < min(0.96, ratio_of_check)
     assert high is not None and high > max(0.96, ratio_of_check)
+
+
+@pytest.mark.parametrize(
+    ("form_tolerance", "estimation", "validation", "dominant"),
+    [
+        (0.1, (0.97,), (0.97,), FORM),
+        (0.0, (0.96,), (0.97,), RECORDINGS),
+        (0.0, (0.97, 0.975), (0.97, 0.975), STRETCHES),
+    ],
+)
+def test_what_most_of_an_intervals_width_is_for_is_told(
+    form_tolerance: float, estimation: tuple[float, ...], validation: tuple[float, ...], dominant: str
+) -> None:
+    data_sets = turned(1, *estimation), turned(2, *validation)
+    stability = replace(DEFAULT_POLICY.stability, form_tolerance=form_tolerance)
+    policy = replace(DEFAULT_POLICY, stability=stability)
+    context = IdentificationContext(ROBOT, FITTER, DataSplit(*data_sets, ()), policy=policy)
+    (effect,) = estimated_effects(context, SelectionResult((DRUM,), (100.0,), fit_to(data_sets[0]), (), ()))
+    assert effect.parameters["radius_ratio"].dominant_uncertainty == dominant
+
+
+def test_of_two_intervals_that_overlap_the_wider_one_tells_what_their_hull_is_wide_for() -> None:
+    narrow = Intervals(np.array([1.0, 1.0]), np.array([2.0, 2.0]), np.array([STRETCHES, STRETCHES]))
+    wide = Intervals(np.array([0.0, 5.0]), np.array([2.5, 7.0]), np.array([FORM, FORM]))
+    for hull in (narrow.hull(wide, SMALLER_FORCE), wide.hull(narrow, SMALLER_FORCE)):
+        assert hull.dominant.tolist() == [FORM, SMALLER_FORCE]
+        assert (hull.low.tolist(), hull.high.tolist()) == ([0.0, 1.0], [2.5, 7.0])
 
 
 def test_an_effects_form_is_trusted_no_better_than_stated() -> None:

@@ -32,7 +32,7 @@ READABLE_DIGITS = 4
 
 def estimated_effects(context: IdentificationContext, selection: SelectionResult) -> tuple[FoundEffect, ...]:
     """Estimates of the accepted effects of the list, in order, on the estimation data that they were fitted to."""
-    interval_ends, disagree = _interval_ends(context, selection)
+    interval_ends, disagree, dominant = _interval_ends(context, selection)
     effects = []
     for hypothesis, evidence in zip(selection.accepted, selection.evidence, strict=True):
         if hypothesis.effect in UNLISTED:
@@ -43,9 +43,8 @@ def estimated_effects(context: IdentificationContext, selection: SelectionResult
             low, high = interval_ends[index]
             declared = declared_value(context.robot, parameter, hypothesis.cables)
             unstable += [parameter.name] if disagree[index] else []
-            estimates[parameter.name] = Estimate(
-                float(selection.fit.values[index]), parameter.unit, low, high, declared
-            )
+            value = float(selection.fit.values[index])
+            estimates[parameter.name] = Estimate(value, parameter.unit, low, high, declared, dominant[index])
         name, component = hypothesis.effect.name, hypothesis.effect.component
         effect = FoundEffect(name, component, hypothesis.cables, estimates, evidence, unstable=tuple(unstable))
         effects.append(effect)
@@ -54,20 +53,21 @@ def estimated_effects(context: IdentificationContext, selection: SelectionResult
 
 def _interval_ends(
     context: IdentificationContext, selection: SelectionResult
-) -> tuple[Sequence[tuple[float, float]], Sequence[bool]]:
-    """Ends of the interval of each fitted parameter, and whether the recordings disagree on it.
+) -> tuple[Sequence[tuple[float, float]], Sequence[bool], Sequence[str]]:
+    """Ends of the interval of each fitted parameter, whether the recordings disagree on it, and what it is wide for.
 
     Beside a disturbance they are by the spread over stretches and recordings, else by profile likelihood; from the
     curvature alone where there is no time for more.
     """
     fit = selection.fit
-    agree = [False] * len(fit.values)
+    agree, unknown = [False] * len(fit.values), [""] * len(fit.values)
     try:
         context.time_limit.check()
         if context.fitter.has_disturbance:
             neutral_values = _neutral_values(context.robot, selection)
             stable, disagree = stable_intervals(context, fit, selection.accepted, neutral_values)
-            return list(zip(stable.low.tolist(), stable.high.tolist(), strict=True)), disagree.tolist()
+            ends = list(zip(stable.low.tolist(), stable.high.tolist(), strict=True))
+            return ends, disagree.tolist(), stable.dominant.tolist()
         ends = profile_intervals(
             context.fitter,
             fit,
@@ -78,8 +78,8 @@ def _interval_ends(
         )
     except OutOfTimeError:
         context.leave_untried("intervals of the parameters: those given are from the likelihood's curvature")
-        return [fit.interval(index) for index in range(len(fit.values))], agree
-    return ends, agree
+        return [fit.interval(index) for index in range(len(fit.values))], agree, unknown
+    return ends, agree, unknown
 
 
 def _neutral_values(declared: Robot, selection: SelectionResult) -> Array:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 
@@ -27,7 +27,7 @@ from .residual_analysis import largest_autocorrelations
 from .selection_result import nothing_selected
 from .smoothed_states import calibrate, initial_state_note, with_initial_state
 from .time_limit import OutOfTimeError, TimeLimit
-from .trace_result import Comparison, Trace
+from .trace_result import Comparison, FoundEffect, Trace
 from .verdict import confirmed_formula
 from .worker_pool import WorkerPool
 
@@ -234,6 +234,20 @@ def _disturbance_notes(state: Identification) -> list[str]:
         disturbance.sentence(fit.has_position, fit.has_tension, fit.has_orientation),
         *([f"established, but too small to matter: {', '.join(small)}"] if small else []),
         *([f"the two recordings do not agree on {unstable}; intervals hold what both show"] if unstable else []),
+        *_interval_notes(state.effects),
+    ]
+
+
+def _interval_notes(effects: Sequence[FoundEffect]) -> list[str]:
+    """A note for each reason that intervals are as wide as they are."""
+    parameters: dict[str, list[str]] = {}
+    for effect in effects:
+        for name, estimate in effect.parameters.items():
+            parameters.setdefault(estimate.dominant_uncertainty, []).append(f"{name} of {effect.name}")
+    return [
+        f"the 95 % interval of {' and of '.join(dict.fromkeys(names))} is as wide as it is mostly because of {reason}"
+        for reason, names in parameters.items()
+        if reason
     ]
 
 

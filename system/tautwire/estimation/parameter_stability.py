@@ -33,18 +33,32 @@ from .policy import StabilityPolicy
 
 Array = NDArray[np.float64]
 BooleanArray = NDArray[np.bool_]
+Names = NDArray[np.str_]
+
+# What an interval can be as wide as it is for.
+NOISE, FORM = "noise and what the robot file states as uncertain", "a formula that may not quite be nature's"
+STRETCHES = "stretches of a recording that give different values"
+SMALLER_FORCE = "another value under a smaller random force"
+RECORDINGS = "two recordings that give different values"
+# Of the wider of two intervals, beyond which one that holds both is wide because they differ.
+HULL_RATIO = 1.5
 
 
 @dataclass(frozen=True)
 class Intervals:
-    """Intervals of p parameters from ``low`` to ``high``, (p,) each."""
+    """Intervals of p parameters from ``low`` to ``high``, (p,) each; ``dominant`` tells what most of each is for."""
 
     low: Array
     high: Array
+    dominant: Names
 
-    def hull(self, other: Intervals) -> Intervals:
-        """The smallest intervals that hold both."""
-        return Intervals(np.minimum(self.low, other.low), np.maximum(self.high, other.high))
+    def hull(self, other: Intervals, difference: str) -> Intervals:
+        """The smallest intervals that hold both; ``difference`` is dominant where these are far apart."""
+        low, high = np.minimum(self.low, other.low), np.maximum(self.high, other.high)
+        widths, other_widths = self.high - self.low, other.high - other.low
+        of_wider = np.where(widths >= other_widths, self.dominant, other.dominant)
+        is_apart = high - low > HULL_RATIO * np.maximum(widths, other_widths)
+        return Intervals(low, high, np.where(is_apart, difference, of_wider))
 
     def is_apart(self, other: Intervals) -> BooleanArray:
         """Whether they have nothing in common with another's (p,)."""
@@ -72,7 +86,7 @@ def stable_intervals(
     other = _intervals_of_recording(
         context.policy.stability, fitter, other_fit, chosen, split.validation, neutral_values
     )
-    return own.hull(other), own.is_apart(other)
+    return own.hull(other, RECORDINGS), own.is_apart(other)
 
 
 def _intervals_of_recording(
@@ -94,7 +108,7 @@ def _intervals_of_recording(
     innovations = limited.judged(fit.robot, chosen, data)
     if innovations.overall_mean_square(data.rows) > policy.max_mean_square:
         return intervals
-    return intervals.hull(_intervals_about(policy, fit, innovations, data, neutral_values))
+    return intervals.hull(_intervals_about(policy, fit, innovations, data, neutral_values), SMALLER_FORCE)
 
 
 def _intervals_about(
@@ -102,11 +116,13 @@ def _intervals_about(
 ) -> Intervals:
     """Intervals by stretches and curvature, and by what the effect's form may lack."""
     units = parameter_scales(fit.robot, fit.free)
-    half_widths = half_widths_of_stretches(innovations, data.rows, units, policy.stretches)
-    half_widths = np.maximum(half_widths, NORMAL_QUANTILE_95 * fit.standard_deviations)
-    half_widths = np.hypot(half_widths, policy.form_tolerance * np.abs(fit.values - neutral_values))
+    by_stretch = half_widths_of_stretches(innovations, data.rows, units, policy.stretches)
+    by_noise = NORMAL_QUANTILE_95 * fit.standard_deviations
+    by_form = policy.form_tolerance * np.abs(fit.values - neutral_values)
+    dominant = np.array([NOISE, STRETCHES, FORM])[np.argmax([by_noise, by_stretch, by_form], axis=0)]
+    half_widths = np.hypot(np.maximum(by_stretch, by_noise), by_form)
     lower, upper = parameter_bounds(fit.robot, fit.free)
-    return Intervals(np.maximum(fit.values - half_widths, lower), np.minimum(fit.values + half_widths, upper))
+    return Intervals(np.maximum(fit.values - half_widths, lower), np.minimum(fit.values + half_widths, upper), dominant)
 
 
 def _with_smaller_force(fitter: Fitter, ratio: float) -> Fitter:

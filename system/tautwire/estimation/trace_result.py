@@ -21,13 +21,17 @@ Verdict = Literal["effects", "none", "discovered", "unexplained"]
 
 @dataclass(frozen=True)
 class Estimate:
-    """A parameter with its 95 % interval; ``declared`` is what the robot file says, where it says anything."""
+    """A parameter with its 95 % interval; ``declared`` is what the robot file says, where it says anything.
+
+    ``dominant_uncertainty`` tells in words what most of the interval's width is for, where that is known.
+    """
 
     value: float
     unit: str
     low: float
     high: float
     declared: float | None
+    dominant_uncertainty: str = ""
 
 
 @dataclass(frozen=True)
@@ -70,7 +74,8 @@ class Candidate:
 
     ``evidence`` is the natural log of its likelihood ratio on unseen data, against the model without it;
     ``mean_square`` the mean square of the whitened innovations there (one where the residual is white noise). A
-    fit estimates the parameters of its ``form``; the others are neutral.
+    fit estimates the parameters of its ``form``; the others are neutral. ``required_evidence`` is what one more effect
+    needs in that round, where that is known.
     """
 
     round: int
