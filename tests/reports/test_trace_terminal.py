@@ -9,7 +9,8 @@ from dataclasses import replace
 import pytest
 from rich.console import Console
 
-from tautwire.estimation.trace_result import Estimate, Trace
+from tautwire.estimation.disturbance import NEUTRAL, OrnsteinUhlenbeck
+from tautwire.estimation.trace_result import Candidate, Estimate, Trace
 from tautwire.number_format import (
     choose_unit,
     format_engineering,
@@ -225,3 +226,22 @@ def test_columns_that_were_not_read_are_noted_once_for_each_recording() -> None:
     for text in (rendered(trace), Page(trace_page(trace, {})).text):
         assert text.count("temperature") == len(trace.comparisons) == 2
         assert "data/fit.csv: not read: temperature" in " ".join(text.split())
+
+
+def test_each_candidate_tells_why_it_was_not_taken() -> None:
+    trace = made_trace()
+    by_evidence = {"damping": 800.0, "relaxation": 790.0, "creep": 804.0, "drag": 12.0}
+    tried = tuple(
+        Candidate(1, name, (), {}, evidence, 1.0, name == "damping", (), 40.0) for name, evidence in by_evidence.items()
+    )
+    rows = [line.split() for line in rendered(replace(trace, candidates=tried)).splitlines()]
+    status = {row[-1 - k]: row for row in rows for k in range(len(row)) if row[-1 - k] in by_evidence}
+    assert status["damping"][-1] == "taken" and status["relaxation"][-1] == "weaker"
+    assert status["creep"][-2:] == ["less", "simple"] and status["drag"][-2:] == ["needs", "40"]
+
+
+def test_beside_a_disturbance_it_is_told_in_place_of_what_is_no_white_noise() -> None:
+    disturbance = replace(NEUTRAL, force=OrnsteinUhlenbeck(2.9, 2.4))
+    text = " ".join(rendered(replace(made_trace(), noise_after=False, disturbance=disturbance)).split())
+    assert "a random force of 2.9 N on the platform is assumed beside it" in text
+    assert "leave more than white noise" not in text

@@ -39,7 +39,7 @@ class CandidateScore:
         gain = other.evidence - self.evidence
         return gain > (-policy.tie_nats if other.parameter_count <= self.parameter_count else policy.tie_nats)
 
-    def candidate(self, round_number: int, accepted: bool) -> Candidate:
+    def candidate(self, round_number: int, accepted: bool, required_evidence: float | None = None) -> Candidate:
         return Candidate(
             round=round_number,
             name=self.hypothesis.effect.name,
@@ -49,6 +49,7 @@ class CandidateScore:
             mean_square=self.mean_square,
             accepted=accepted,
             form=self.hypothesis.form,
+            required_evidence=required_evidence,
         )
 
 

@@ -102,7 +102,8 @@ class _StepwiseSelection:
                 self.complete_rounds[tuple(self.accepted), None] = scores
             best = self._best_candidate(scores, self.current.robot)
             significant = best is not None and self._is_significant(best, self.accepted, self.current.robot)
-            self.candidates += [trial.candidate(number, significant and trial is best) for trial in scores]
+            required = self._required_evidence(self.accepted)
+            self.candidates += [trial.candidate(number, significant and trial is best, required) for trial in scores]
             if best is None or not significant:
                 break
             before = list(self.accepted)
@@ -218,7 +219,8 @@ class _StepwiseSelection:
             allowed = [t for t in alternatives if not any(t.hypothesis.overlaps(each) for each in dropped)]
             best = self._best_candidate([contender, *allowed], without.robot)
             if known_scores is None:
-                self.candidates += [t.candidate(number, t is best) for t in alternatives]
+                required = self._required_evidence(others)
+                self.candidates += [t.candidate(number, t is best, required) for t in alternatives]
             if best is not None and best is not contender and swaps < policy.max_swaps:
                 self._accept_beside(others, best)
                 pending = [a for a in self.accepted if a is not self.accepted[-1]]

@@ -86,6 +86,7 @@ class Candidate:
     mean_square: float
     accepted: bool
     form: tuple[str, ...]
+    required_evidence: float | None = None
 
     @property
     def form_values(self) -> Mapping[str, float]:

@@ -25,6 +25,7 @@ from .trace_texts import (
     MeasuredOutput,
     alternative_texts,
     cables_text,
+    candidate_status,
     candidates_by_round,
     comparison_by_role,
     detectable_texts,
@@ -225,13 +226,17 @@ def _search_rounds(trace: Trace) -> list[SearchRound]:
     max_evidence = max((each.evidence for each in trace.candidates if math.isfinite(each.evidence)), default=0.0)
     rounds = []
     for number, candidates in candidates_by_round(trace.candidates):
-        fitted = [_fitted_row(trace, each, max_evidence) for each in candidates if math.isfinite(each.mean_square)]
+        fitted = [
+            _fitted_row(trace, each, candidate_status(each, candidates), max_evidence)
+            for each in candidates
+            if math.isfinite(each.mean_square)
+        ]
         others = [_unfitted_row(trace, each) for each in candidates if not math.isfinite(each.mean_square)]
         rounds.append(SearchRound(number, fitted[:MAX_ROWS_SHOWN], fitted[MAX_ROWS_SHOWN:], others))
     return rounds
 
 
-def _fitted_row(trace: Trace, candidate: Candidate, max_evidence: float) -> Row:
+def _fitted_row(trace: Trace, candidate: Candidate, status: str, max_evidence: float) -> Row:
     return [
         candidate.name,
         _candidate_location(trace, candidate),
@@ -239,7 +244,7 @@ def _fitted_row(trace: Trace, candidate: Candidate, max_evidence: float) -> Row:
         charts.bar(candidate.evidence, max_evidence, css_class="after" if candidate.accepted else "before"),
         Number(format_significant(candidate.mean_square)),
         Number(values_text(candidate.name, candidate.form_values)),
-        Label("taken", "taken") if candidate.accepted else "",
+        Label(status, "taken") if candidate.accepted else status,
     ]
 
 

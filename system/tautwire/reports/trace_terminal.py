@@ -19,6 +19,7 @@ from .trace_texts import (
     MeasuredOutput,
     alternative_texts,
     cables_text,
+    candidate_status,
     candidates_by_round,
     comparison_by_role,
     detectable_texts,
@@ -130,13 +131,15 @@ def _candidate_table(trace: Trace) -> Table:
     table.add_column("NIV", justify="right", no_wrap=True)
     table.add_column("", no_wrap=True)
     table.add_column("values", overflow="fold", ratio=1)
-    caption = "NIV: normalised innovation variance on unseen data, 1 for white noise"
+    caption = "NIV: normalised innovation variance on unseen data, 1 for white noise\n"
+    caption += "needs: evidence that one more effect needs there; less simple: more parameters than the one taken"
     hidden_count = 0
     for round_number, candidates in candidates_by_round(trace.candidates):
         fitted = [candidate for candidate in candidates if math.isfinite(candidate.mean_square)][:MAX_CANDIDATES_SHOWN]
         for index, candidate in enumerate(fitted):
             label = str(round_number) if index == 0 else ""
-            table.add_row(label, *_candidate_cells(candidate, trace.robot_before.cable_count))
+            status = candidate_status(candidate, candidates)
+            table.add_row(label, *_candidate_cells(candidate, status, trace.robot_before.cable_count))
         if not fitted:
             table.add_row(str(round_number), *["-"] * 5, "no predicted gain was large enough for a fit")
         hidden_count += len(candidates) - len(fitted)
@@ -146,14 +149,14 @@ def _candidate_table(trace: Trace) -> Table:
     return table
 
 
-def _candidate_cells(candidate: Candidate, cable_count: int) -> list[Text]:
+def _candidate_cells(candidate: Candidate, status: str, cable_count: int) -> list[Text]:
     cables = cables_text(candidate.cables, cable_count).removesuffix(" cables")
     return [
         Text(one_line(candidate.name)),
         Text(cables.removeprefix("cables ").removeprefix("cable ")),
         Text(format_evidence(candidate.evidence)),
         Text(format_significant(candidate.mean_square)),
-        Text("taken" if candidate.accepted else ""),
+        Text(status),
         Text(one_line(values_text(candidate.name, candidate.form_values))),
     ]
 

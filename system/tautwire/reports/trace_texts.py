@@ -152,6 +152,19 @@ def candidates_by_round(candidates: Sequence[Candidate]) -> list[tuple[int, list
     return [(number, list(group)) for number, group in groupby(ordered, key=lambda each: each.round)]
 
 
+def candidate_status(candidate: Candidate, of_round: Sequence[Candidate]) -> str:
+    """Why a fitted candidate was taken in its round or not, in a few words; blank where that is not known."""
+    if candidate.accepted:
+        return "taken"
+    required = candidate.required_evidence
+    if required is not None and candidate.evidence <= required:
+        return f"needs {required:.0f}"
+    accepted = next((each for each in of_round if each.accepted), None)
+    if accepted is None:
+        return ""
+    return "weaker" if candidate.evidence <= accepted.evidence else "less simple"
+
+
 def detectable_texts(trace: Trace) -> list[str]:
     """Smallest sizes that would have been detected, as in "payload: mass 1.2 kg"; where cables differ, on any."""
     largest: dict[tuple[str, str], Detectable] = {}
@@ -197,7 +210,10 @@ def separating_commands(trace: Trace) -> list[str]:
 
 
 def noise_sentence(trace: Trace) -> str:
-    """Whether the residual is white noise, before and after, in one sentence."""
+    """Whether the residual is white noise, before and after, or what was assumed beside it, in one sentence."""
+    if trace.disturbance:
+        force = format_engineering(trace.disturbance.force.rms, "N", 2)
+        return f"No real recording leaves white noise: a random force of {force} on the platform is assumed beside it."
     before, after = trace.noise_before, trace.noise_after
     if before and after:
         return "The residual of the declared model is already white noise."
