@@ -15,6 +15,7 @@ from tautwire.estimation.explained_shares import (
     amplitude_spread,
     missed_with_effects,
     missed_without_effects,
+    remaining_error,
     sensor_noise_floor,
     simulated_outputs,
     time_deviations,
@@ -24,6 +25,7 @@ from tautwire.estimation.identification_context import IdentificationContext
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.estimation.parameter_fit import Fit, Fitter
 from tautwire.estimation.smoothed_states import with_initial_state
+from tautwire.estimation.trace_result import Errors
 from tautwire.robot.schema import EffectSetting
 from tautwire_fmu.laws.effects import BY_NAME
 from tests.support.recordings import recorded
@@ -110,6 +112,18 @@ def test_a_ropes_friction_stiffer_than_the_rope_does_not_raise_the_floor_of_nois
     floors = [sensor_noise_floor(FITTER, robot, SPLIT.validation).by_output for robot in (ROBOT, stiff)]
     assert np.array_equal(*floors)
     assert noise_floor(FITTER, stiff, SPLIT.validation).by_output.max() > 10.0 * floors[0].max()
+
+
+def test_the_error_that_remains_is_told_beside_what_noise_leaves() -> None:
+    recording = SPLIT.validation.recording
+    swinging = 12.0 * np.sqrt(2.0) * np.sin(2.0 * np.pi * 1.5 * recording.time)
+    motion = cosimulate_data_set(LOADED, SPLIT.validation)
+    recording = replace(
+        recording, position=motion.position, tension=motion.tension + swinging[:, None] * [0.0, 1.0, 0.0]
+    )
+    floor = Errors(1e-4, 3.0, np.full(3, 1e-4), np.full(3, 3.0))
+    sentence = remaining_error(recording, motion, floor).sentence
+    assert sentence == "12 N in tension_2, where noise leaves 3 N; it is strongest at 1.5 Hz"
 
 
 def test_the_effect_that_is_there_leaves_little_of_what_the_robot_without_it_misses() -> None:

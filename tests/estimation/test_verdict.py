@@ -81,7 +81,7 @@ def test_what_a_disturbance_of_usual_size_takes_up_lacks_nothing_however_well_it
 def test_an_effect_is_named_that_explains_a_good_part_of_little() -> None:
     word, sentence = verdict(shares(0.12, 6.0, drum=(0.27, 5.0)), "drum")
     assert word == "effects"
-    assert "drum (27 % of what is missed); 12 % remains, which is no more than a small random force" in sentence
+    assert "drum (27 % of what is missed); 12 % remains, in all no more than 8 times the sensors' noise." in sentence
     assert sentence.endswith("The error is then 40 N in tension_2, strongest at 1.2 Hz.")
 
 
@@ -91,7 +91,12 @@ def test_what_uncertain_numbers_explain_beside_the_one_effect_is_told() -> None:
     _, sentence = verdict_beside_disturbance(
         replace(CONTEXT, robot=robot), selected(hypothesis("drum")), of, MISSED, REMAINING
     )
-    assert "missed); 61 % lies within stated uncertainties, and 12 % remains, which" in sentence
+    assert "missed); 61 % lies within stated uncertainties, and 12 % remains, in all" in sentence
+
+
+def test_shares_that_are_not_all_or_nothing_are_not_called_that() -> None:
+    _, sentence = verdict(shares(0.002, 100.0, damping=(0.998, 99.0)), "damping")
+    assert "damping (more than 99 % of what is missed); less than 1 % remains" in sentence
 
 
 def test_the_largest_effect_is_named_first_with_its_share() -> None:

@@ -237,17 +237,22 @@ def _size(change: Array, recording: Recording, floor: Errors) -> float:
 
 @dataclass(frozen=True)
 class RemainingError:
-    """Error that is left: of which output it is largest over noise, its root mean square, unit and main frequency."""
+    """Error that is left, of the output of which it is largest over noise.
+
+    Its root mean square, that of noise alone, both in ``unit``, and its main frequency in Hz.
+    """
 
     output: str
     rms: float
+    noise: float
     unit: str
     frequency: float
 
     @property
     def sentence(self) -> str:
         """In words."""
-        return f"{self.rms:.3g} {self.unit} in {self.output}, strongest at {self.frequency:.2g} Hz"
+        error = f"{self.rms:.3g} {self.unit} in {self.output}, where noise leaves {self.noise:.2g} {self.unit}"
+        return f"{error}; it is strongest at {self.frequency:.2g} Hz"
 
 
 def remaining_error(recording: Recording, motion: CosimulationResult, floor: Errors) -> RemainingError:
@@ -263,4 +268,4 @@ def remaining_error(recording: Recording, motion: CosimulationResult, floor: Err
     strongest = float(frequency[1 + int(np.argmax(power[1:]))])
     names = output_names(recording.cable_count, is_rigid=True)
     scale, unit = (1e3, "mm") if index < 3 else (1.0, "N") if index < 3 + recording.cable_count else (1e3, "mrad")
-    return RemainingError(names[index], scale * float(rms[index]), unit, strongest)
+    return RemainingError(names[index], scale * float(rms[index]), scale * float(noise[index]), unit, strongest)

@@ -83,7 +83,8 @@ def verdict_beside_disturbance(
     if large and (is_disturbance or is_explained):
         share_of = {labels[index]: shares.effects[index] for index in large}
         named = _sum_up([f"{name} ({_per_cent(share)} of what is missed)" for name, share in share_of.items()])
-        kind = ", which is no more than a small random force" if is_disturbance else ""
+        noise = f"{policy.max_size_of_disturbance:g} times the sensors' noise"
+        kind = f", in all no more than {noise}" if is_disturbance else ""
         others = shares.explained - max(shares.effects)
         is_stated = len(names) == 1 and others >= policy.min_share and uncertain_parameters(context.robot)
         uncertain = f"{_per_cent(others)} lies within stated uncertainties, and " if is_stated else ""
@@ -131,7 +132,10 @@ def _not_listed(formula: str) -> str:
 
 
 def _per_cent(share: float) -> str:
-    return f"{100.0 * share:.0f} %"
+    """A share in words, never as none or all of it where it is not."""
+    if 0.0 < share < 0.005:
+        return "less than 1 %"
+    return "more than 99 %" if 0.995 <= share < 1.0 else f"{100.0 * share:.0f} %"
 
 
 def _sum_up(names: Sequence[str]) -> str:
