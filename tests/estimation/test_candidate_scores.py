@@ -6,11 +6,17 @@ import numpy as np
 import pytest
 
 from tautwire.estimation.candidate_proposals import shortlist
-from tautwire.estimation.candidate_scores import CandidateScore, load_before_offsets, most_parsimonious
+from tautwire.estimation.candidate_scores import (
+    CandidateScore,
+    damping_before_fast_relaxation,
+    load_before_offsets,
+    most_parsimonious,
+)
 from tautwire.estimation.hypotheses import Hypothesis
 from tautwire.estimation.parameter_fit import Fit
 from tautwire.estimation.policy import ScoreTestPolicy, SelectionPolicy
 from tautwire.estimation.score_test import PredictedGain
+from tautwire.robot.schema import EffectSetting
 from tautwire_fmu.laws.effects import ALL, BY_NAME
 from tests.support.robots import example
 
@@ -126,3 +132,24 @@ def test_an_effect_is_confusable_with_what_explains_as_much_or_with_more_paramet
     larger = [CandidateScore(relaxation, fit, 100.0 + margin, 1.0) for margin in margins]
     assert [simple.is_confusable_with(each, policy) for each in alike] == [False, True, True, True]
     assert [simple.is_confusable_with(each, policy) for each in larger] == [False, False, False, True]
+
+
+@pytest.mark.parametrize(
+    ("time", "evidence_of_damping", "cables_of_damping", "name"),
+    [
+        (0.004, 600.0, (1, 2, 3), "damping"),
+        (0.02, 600.0, (1, 2, 3), "relaxation"),
+        (0.004, 400.0, (1, 2, 3), "relaxation"),
+        (0.004, 600.0, (1,), "relaxation"),
+    ],
+)
+def test_a_relaxation_within_a_sample_is_damping(
+    time: float, evidence_of_damping: float, cables_of_damping: tuple[int, ...], name: str
+) -> None:
+    relaxed = ROBOT.with_effect(EffectSetting("relaxation", {"modulus": 1e12, "time": time}, (1, 2, 3)))
+    fit = Fit(relaxed, (), np.zeros(0), np.zeros((0, 0)))
+    relaxation = Hypothesis(BY_NAME["relaxation"], (1, 2, 3), ("modulus", "time"))
+    best = CandidateScore(relaxation, fit, 1000.0, 1.0)
+    damping = CandidateScore(Hypothesis(BY_NAME["damping"], cables_of_damping), fit, evidence_of_damping, 1.0)
+    chosen = damping_before_fast_relaxation(best, [damping, best], 0.01, SelectionPolicy())
+    assert chosen.hypothesis.effect.name == name

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-from tautwire_fmu.laws.effects import HANGING_LOAD, PAYLOAD, UNLISTED
+from tautwire_fmu.laws.effects import DAMPING, HANGING_LOAD, PAYLOAD, RELAXATION, UNLISTED
 
 from ..robot.schema import EffectSetting, Robot
 from .hypotheses import Hypothesis
@@ -86,6 +86,24 @@ def load_before_offsets(best: CandidateScore, scores: Sequence[CandidateScore], 
     least = max(threshold, best.evidence - threshold)
     loads = [trial for trial in scores if trial.hypothesis.effect in LOADS and trial.evidence > least]
     return max(loads, key=lambda trial: trial.evidence, default=best)
+
+
+def damping_before_fast_relaxation(
+    best: CandidateScore, scores: Sequence[CandidateScore], sample_interval: float, policy: SelectionPolicy
+) -> CandidateScore:
+    """The best candidate, or damping in place of a relaxation whose branch relaxes within a sample (s).
+
+    To what is slower, all that the samples show, a branch of modulus E and time ``tau`` is damping, with one parameter:
+
+        E tau s / (1 + tau s)  ->  E tau s
+    """
+    if best.hypothesis.effect is not RELAXATION or best.parameter_count > 2:
+        return best
+    if setting_of(best.fit.robot, best.hypothesis).values["time"] >= sample_interval:
+        return best
+    least = policy.min_limit_evidence_ratio * best.evidence
+    limits = [t for t in scores if t.hypothesis.effect is DAMPING and t.hypothesis.cables == best.hypothesis.cables]
+    return next((trial for trial in limits if trial.evidence > least), best)
 
 
 def unfitted_score(robot: Robot, hypothesis: Hypothesis, prediction: PredictedGain) -> CandidateScore:

@@ -120,6 +120,9 @@ class SelectionPolicy:
     # Share of the first effect's evidence that a further one needs beside a disturbance: less may be what the first
     # one's form leaves. Relaxation had 18 nats after a modulus with 842, and 59 beside a drum in layers with 830.
     min_evidence_ratio: float = 0.1
+    # Share of the evidence of a relaxation within a sample from which damping, its limit, is taken in its place.
+    # Dampings by a power of the strain rate had 58 % and 83 %.
+    min_limit_evidence_ratio: float = 0.5
     # Share of an effect's evidence that values of single cables have to gain: they add no name. Drums of a real robot,
     # 0.93 to 0.97, gained more than 18 and less than 36 nats of 357.
     min_cable_evidence_ratio: float = 0.05

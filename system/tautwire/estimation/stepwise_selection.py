@@ -12,11 +12,18 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from ..errors import UnreachableError
 from ..robot.schema import Robot
 from .candidate_fits import fit_model, maximised_validation_likelihood
 from .candidate_proposals import SearchRound
-from .candidate_scores import CandidateScore, load_before_offsets, most_parsimonious
+from .candidate_scores import (
+    CandidateScore,
+    damping_before_fast_relaxation,
+    load_before_offsets,
+    most_parsimonious,
+)
 from .candidate_scoring import score_candidates
 from .disturbance_fit import marginal_log_likelihood
 from .explained_shares import missed_with_effects, missed_without_effects, sensor_noise_floor
@@ -167,10 +174,12 @@ class _StepwiseSelection:
         return [missed_with_effects(context.fitter, robot, validation, floor) for robot in calibrated], floor
 
     def _best_candidate(self, scores: Sequence[CandidateScore], without: Robot) -> CandidateScore | None:
-        """Best candidate of a round; beside a disturbance a load before offsets of several load cells."""
+        """Best candidate of a round; beside a disturbance the likelier one of two that samples hardly tell apart."""
         best = self._best_or_simpler(scores, without)
         if best is None or not self.context.fitter.has_disturbance:
             return best
+        sample_interval = float(np.median(np.diff(self.context.split.estimation.recording.time)))
+        best = damping_before_fast_relaxation(best, scores, sample_interval, self.context.policy.selection)
         return load_before_offsets(best, scores, self.context.evidence_threshold())
 
     def _best_or_simpler(self, scores: Sequence[CandidateScore], without: Robot) -> CandidateScore | None:
