@@ -366,7 +366,17 @@ def test_counts_of_a_log_get_their_factor_by_the_trackers_file(
     factors = [float(factor) for factor in re.findall(r"factor = ([0-9.e-]+), sign = -1 }", proposal)]
     assert factors == pytest.approx([2.5e-5] * 3, rel=2e-3)
     assert proposal.count("sign by the tracker's coordinates") == 3
-    assert run(["check", ROBOT, str(tmp_path / "log.csv"), "--columns", str(table), *files]) == 0
+    check = ["check", ROBOT, str(tmp_path / "log.csv"), "--columns", str(table), *files]
+    capsys.readouterr()
+    assert run(check) == 0
+    lines = [number for number, line in enumerate(proposal.splitlines(), 1) if line.startswith("rope_length_")]
+    note = f"{table}: lines {lines[0]} to {lines[-1]}: factors that were estimated from a recording hold the errors of"
+    captured = capsys.readouterr()
+    assert note in captured.err
+    assert captured.err.splitlines()[-1].endswith("add --check SECOND.csv --check-tracker ITS_TRACKER.csv")
+    table.write_text(re.sub(" +#.*", "", proposal), encoding="utf-8")
+    assert run(check) == 0
+    assert "were estimated" not in capsys.readouterr().err
 
 
 def test_what_a_trackers_file_does_not_tell_is_listed(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

@@ -9,9 +9,11 @@ from pathlib import Path
 from types import SimpleNamespace
 
 import pytest
+from scipy.io import savemat
 from typer.main import get_command
 
 from tautwire.cli import app, run
+from tautwire.recordings.recording import read_recording
 from tests.support.robots import EXAMPLES
 
 THREE = EXAMPLES / "three"
@@ -128,6 +130,16 @@ def test_a_checked_recording_is_traced_against_a_second_one(capsys: pytest.Captu
         .err.splitlines()[-1]
         .endswith("; with a second recording of the robot add --check SECOND.csv")
     )
+
+
+def test_the_second_recording_is_asked_for_in_the_format_of_the_first(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    recording = read_recording(FIT, 3).frame()
+    path = tmp_path / "fit.mat"
+    savemat(path, {name: recording[name].to_numpy() for name in recording.columns})
+    assert run(["check", ROBOT, str(path)]) == 0
+    assert capsys.readouterr().err.splitlines()[-1].endswith("add --check SECOND.mat")
 
 
 def test_the_papers_page_is_to_be_opened(

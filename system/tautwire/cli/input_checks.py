@@ -19,6 +19,7 @@ from ..recordings.recording import Recording, read_recording, recording_errors
 from ..recordings.start_position import start_pose
 from ..recordings.tracker import with_tracker
 from ..recordings.white_noise_estimate import white_noise_deviation
+from ..recordings.winch_columns import ESTIMATED_FACTOR
 from ..robot.implausible_units import implausible_units
 from ..robot.robot_file_reader import read_robot_with_sink, robot_file_text
 from ..robot.schema import Robot, fmu_slots
@@ -103,6 +104,8 @@ def check_files(
         recording = _check_recording(recording_file, reader, recording_problems, notes, command)
     if recording is not None and reader is not None and tracker_file is not None:
         recording = _with_tracker(reader, recording, tracker_file, recording_problems, notes, command)
+    if recording is not None:
+        notes.extend(_estimated_factors(columns_file or robot_file))
     if recording is not None and not problems:
         progress("checking both together", 0.0)
         _check_together(robot, recording, recording_problems, notes)
@@ -251,6 +254,16 @@ def _check_together(robot: Robot, recording: Recording, problems: list[Problem],
         notes.extend(start_pose(robot, noise, recording)[1])
         notes.extend(_without_uncertainties(robot))
         notes.extend(prepared_notes)
+
+
+def _estimated_factors(path: Path) -> tuple[str, ...]:
+    """A note where a file still has factors that were estimated for a proposal, as their remarks say."""
+    lines = [number for number, line in enumerate(robot_file_text(path).splitlines(), 1) if ESTIMATED_FACTOR in line]
+    if not lines:
+        return ()
+    where = f"line {lines[0]}" if len(lines) == 1 else f"lines {lines[0]} to {lines[-1]}"
+    problem = "factors that were estimated from a recording hold the errors of drum and rope, which no trace then finds"
+    return (f"{path}: {where}: {problem}; write those of the data sheet, without the remark",)
 
 
 def _without_uncertainties(robot: Robot) -> tuple[str, ...]:

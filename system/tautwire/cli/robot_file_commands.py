@@ -215,10 +215,12 @@ def check(
     if not as_json:
         output.result([f"{file}: no problems found" for file in (robot_file, recording, tracker) if file], {})
     if recording is None:
-        output.suggest_next(f"tautwire build {shell_quoted(robot_file)} --out build/")
+        next_command = f"tautwire build {shell_quoted(robot_file)} --out build/"
+        output.suggest_next(f"{next_command}; with a recording of the robot add RECORDING.csv to this check")
     else:
         next_command = trace_command(robot_file, recording, columns, tracker)
-        second = "--check SECOND.csv" if tracker is None else "--check SECOND.csv --check-tracker ITS_TRACKER.csv"
+        second = f"--check SECOND{recording.suffix}"
+        second += f" --check-tracker ITS_TRACKER{tracker.suffix}" if tracker else ""
         output.suggest_next(f"{next_command}; with a second recording of the robot add {second}")
 
 

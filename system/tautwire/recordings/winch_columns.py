@@ -26,6 +26,8 @@ UNIT_TOLERANCE, ALIKE_DRUMS = 0.05, 0.02
 MAX_UNNAMED, MIN_FINITE = 32, 0.9
 KINDS = ("rope_length", "winch_speed")
 _PER_COUNT = f"{ADD_FACTOR}metres per count"
+# In the remark on a factor that a proposal estimates.
+ESTIMATED_FACTOR = "an estimate with the errors of drum and rope in it"
 
 
 @dataclass(frozen=True)
@@ -215,7 +217,7 @@ def _scaled(
             scaled.append(replace(changed, unit=unit, doubt=doubt.replace(NO_UNIT, f"{unit} by {source}")))
         else:
             formula = column.doubt.partition(ADD_FACTOR)[2].partition("; ")[0] or "the data sheet's"
-            estimate = f"an estimate with the errors of drum and rope in it, replace it by {formula}"
+            estimate = f"{ESTIMATED_FACTOR}, replace it by {formula}"
             told = f"factor and sign by {source}, {rms}{alike}): {estimate}"
             rest = column.doubt.replace(f"{ADD_FACTOR}{formula}", told).replace(NO_UNIT, told).replace(f"; {asked}", "")
             scaled.append(replace(changed, factor=float(f"{factor:.4g}"), doubt=rest))
