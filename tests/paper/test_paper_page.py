@@ -4,10 +4,14 @@ from __future__ import annotations
 
 import re
 from dataclasses import replace
+from pathlib import Path
 
+import numpy as np
+import pandas as pd
+import pytest
 from matplotlib.figure import Figure
 
-from tautwire.paper.figure_style import PaperFigure, figure_style, write_figures
+from tautwire.paper.figure_style import PaperFigure, figure_style, figure_table, label_panel, write_figures
 from tautwire.paper.open_claims import OpenClaim
 from tautwire.paper.paper_claims import Claim, LedgerEntry
 from tautwire.paper.paper_extensions import ExtensionFigure
@@ -46,7 +50,10 @@ def test_page_has_every_claim_figure_and_trial_and_asks_for_nothing(tmp_path) ->
     assert 'aria-label="What &#34;fig_07&#34; shows"' in page
     assert "What came of it." in page and "2.81\u00a0\u00d7\u00a010⁶ N" in page
     links = re.findall(r'(?:src|href)="([^"]*)"', page)
-    assert [link for link in links if not link.startswith("#")] == ["claims.json"]
+    files = [link for link in links if not link.startswith("#")]
+    names = [name for figures in SECTION_FIGURES.values() for name in figures]
+    assert files == ["claims.json", *(f"{name}.csv" for name in names), "more.csv"]
+    assert all((tmp_path / file).is_file() for file in files if file.endswith(".csv"))
 
 
 def test_names_inside_the_figures_are_used_once(tmp_path) -> None:  # type: ignore[no-untyped-def]
@@ -67,3 +74,32 @@ def test_numbers_are_written_short() -> None:
     assert [number_text(value) for value in (None, 1e-15, 1594.2667, 0.00144210, (-0.5, 2.9))] == [
         "-", "0", "1594.3", "0.001442", "-0.5 to 2.9"
     ]  # fmt: skip
+
+
+def test_the_curves_of_a_figure_are_a_table_without_its_guides(tmp_path: Path) -> None:
+    time, other_time = np.linspace(0.0, 2.0, 5), np.linspace(0.0, 1.0, 3)
+    figure = Figure()
+    upper, lower = (figure.add_subplot(2, 1, number) for number in (1, 2))
+    upper.plot(time, np.sin(time), label="linear")
+    upper.plot(time, np.cos(time), label="logarithmic")
+    upper.axhline(0.5)
+    label_panel(upper, "r (mm)", "(a)")
+    lower.plot(time, time**2)
+    lower.plot(other_time, 3.0 * other_time)
+    write_figures([PaperFigure("one", "One", "Two panels", figure)], tmp_path)
+    table = pd.read_csv(tmp_path / "one.csv")
+    assert list(table.columns) == [
+        *("(a): Time (s)", "(a): linear: r (mm)", "(a): logarithmic: r (mm)"),
+        *("panel 2: x", "panel 2: curve 1: y", "panel 2: curve 2: x", "panel 2: curve 2: y"),
+    ]
+    assert table["(a): logarithmic: r (mm)"].to_numpy() == pytest.approx(np.cos(time), rel=1e-6)
+    assert table["panel 2: curve 2: y"].dropna().to_numpy() == pytest.approx(3.0 * other_time)
+
+
+def test_a_path_in_space_has_three_columns(tmp_path: Path) -> None:
+    figure = Figure()
+    axes = figure.add_subplot(projection="3d")
+    axes.plot([0.0, 1.0], [2.0, 3.0], [4.0, 5.0])
+    table = figure_table(figure)
+    assert table.to_numpy().tolist() == [[0.0, 2.0, 4.0], [1.0, 3.0, 5.0]]
+    assert list(table.columns) == ["x", "curve 1: y", "curve 1: z"]

@@ -9,9 +9,12 @@ from pathlib import Path
 from typing import Any
 
 import matplotlib as mpl
+import numpy as np
+import pandas as pd
 from matplotlib import rcsetup
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 
 # Legible on white and on the page's dark background, where the page's own text colour replaces this one.
 TEXT_COLOUR, BACKGROUND_COLOUR, GRID_COLOUR = "#1c2328", "#ffffff", "#8f9aa2"
@@ -86,10 +89,47 @@ def legend_above(figure: Figure, axes: Axes) -> None:
         figure.legend(handles, labels, loc="outside upper center", ncols=len(labels))
 
 
+def figure_table(figure: Figure) -> pd.DataFrame:
+    """The curves of a figure as columns, of each panel and curve one for each axis; blank behind the shorter ones.
+
+    Curves of a panel share the column of their abscissa where it is the same; lines that only guide the eye are none.
+    """
+    columns: dict[str, np.ndarray[Any, Any]] = {}
+    for index, axes in enumerate(figure.axes, start=1):
+        unnamed = f"panel {index}" if len(figure.axes) > 1 else ""
+        panel, names = axes.get_title(loc="left") or axes.get_title() or unnamed, _axis_names(axes)
+        for number, line in enumerate((line for line in axes.lines if _is_curve(axes, line)), start=1):
+            label = str(line.get_label())
+            curve = f"curve {number}" if label.startswith("_") else label
+            for axis, values in zip(names, _coordinates(line), strict=True):
+                shared, own = (": ".join(filter(None, (panel, *parts))) for parts in ((axis,), (curve, axis)))
+                if axis != names[0] or not np.array_equal(columns.setdefault(shared, values), values):
+                    columns[own] = values
+    return pd.DataFrame({name: pd.Series(values) for name, values in columns.items()})
+
+
+def _axis_names(axes: Axes) -> tuple[str, ...]:
+    labels = [axes.get_xlabel() or "x", axes.get_ylabel() or "y"]
+    return (*labels, *([axes.get_zlabel() or "z"] if hasattr(axes, "get_zlabel") else []))
+
+
+def _is_curve(axes: Axes, line: Line2D) -> bool:
+    """Whether a line has data on both axes, not a place on one of them alone."""
+    return hasattr(line, "get_data_3d") or line.get_transform() == axes.transData
+
+
+def _coordinates(line: Line2D) -> tuple[np.ndarray[Any, Any], ...]:
+    data = line.get_data_3d() if hasattr(line, "get_data_3d") else line.get_data()
+    return tuple(np.asarray(values, dtype=float) for values in data)
+
+
 def write_figures(
     figures: Sequence[PaperFigure], folder: Path, progress: Callable[[float], None] = lambda done: None
 ) -> dict[str, str]:
-    """Write each figure as PNG and SVG; returns the SVG texts by name. ``progress`` receives the share that is done."""
+    """Write each figure as PNG, SVG, and its curves as CSV; returns the SVG texts by name.
+
+    ``progress`` receives the share that is done.
+    """
     texts = {}
     for index, drawn in enumerate(figures):
         progress(index / len(figures))
@@ -97,5 +137,6 @@ def write_figures(
         with mpl.rc_context({"svg.hashsalt": drawn.name}):
             drawn.figure.savefig(folder / f"{drawn.name}.png", dpi=DOTS_PER_INCH)
             drawn.figure.savefig(folder / f"{drawn.name}.svg", metadata={"Date": None})
+        figure_table(drawn.figure).to_csv(folder / f"{drawn.name}.csv", index=False, float_format="%.7g")
         texts[drawn.name] = (folder / f"{drawn.name}.svg").read_text(encoding="utf-8")
     return texts
