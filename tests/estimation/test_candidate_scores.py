@@ -8,9 +8,10 @@ import pytest
 from tautwire.estimation.candidate_proposals import shortlist
 from tautwire.estimation.candidate_scores import (
     CandidateScore,
-    damping_before_fast_relaxation,
     load_before_offsets,
     most_parsimonious,
+    unfitted_score,
+    without_fast_relaxations,
 )
 from tautwire.estimation.hypotheses import Hypothesis
 from tautwire.estimation.parameter_fit import Fit
@@ -135,21 +136,34 @@ def test_an_effect_is_confusable_with_what_explains_as_much_or_with_more_paramet
 
 
 @pytest.mark.parametrize(
-    ("time", "evidence_of_damping", "cables_of_damping", "name"),
+    ("time", "evidence_of_damping", "cables_of_damping", "is_damping"),
     [
-        (0.004, 600.0, (1, 2, 3), "damping"),
-        (0.02, 600.0, (1, 2, 3), "relaxation"),
-        (0.004, 400.0, (1, 2, 3), "relaxation"),
-        (0.004, 600.0, (1,), "relaxation"),
+        (0.004, 600.0, (1, 2, 3), True),
+        (0.02, 600.0, (1, 2, 3), False),
+        (0.004, 400.0, (1, 2, 3), False),
+        (0.004, 600.0, (1,), False),
     ],
 )
+@pytest.mark.parametrize("is_accepted", [False, True])
 def test_a_relaxation_within_a_sample_is_damping(
-    time: float, evidence_of_damping: float, cables_of_damping: tuple[int, ...], name: str
+    time: float, evidence_of_damping: float, cables_of_damping: tuple[int, ...], is_damping: bool, is_accepted: bool
 ) -> None:
+    fit_of_damping = Fit(ROBOT, (), np.zeros(0), np.zeros((0, 0)))
     relaxed = ROBOT.with_effect(EffectSetting("relaxation", {"modulus": 1e12, "time": time}, (1, 2, 3)))
-    fit = Fit(relaxed, (), np.zeros(0), np.zeros((0, 0)))
     relaxation = Hypothesis(BY_NAME["relaxation"], (1, 2, 3), ("modulus", "time"))
-    best = CandidateScore(relaxation, fit, 1000.0, 1.0)
-    damping = CandidateScore(Hypothesis(BY_NAME["damping"], cables_of_damping), fit, evidence_of_damping, 1.0)
-    chosen = damping_before_fast_relaxation(best, [damping, best], 0.01, SelectionPolicy())
-    assert chosen.hypothesis.effect.name == name
+    fast = CandidateScore(relaxation, Fit(relaxed, (), np.zeros(0), np.zeros((0, 0))), 1000.0, 1.0)
+    damping = CandidateScore(
+        Hypothesis(BY_NAME["damping"], cables_of_damping), fit_of_damping, evidence_of_damping, 1.0
+    )
+    robot, scores = ROBOT, [damping, fast]
+    if is_accepted:
+        robot, scores = ROBOT.with_effect(EffectSetting("damping", {"damping": 1e9}, cables_of_damping)), [fast]
+        is_damping = time < 0.01 and cables_of_damping == (1, 2, 3)
+    kept = without_fast_relaxations(scores, robot, 0.01, SelectionPolicy())
+    assert kept == [score for score in scores if score is not fast or not is_damping]
+
+
+def test_a_relaxation_that_was_not_fitted_has_no_time() -> None:
+    unfitted = unfitted_score(ROBOT, Hypothesis(BY_NAME["relaxation"], (1,)), PredictedGain(0.0, {"time": 0.001}))
+    robot = ROBOT.with_effect(EffectSetting("damping", {"damping": 1e9}, (1,)))
+    assert without_fast_relaxations([unfitted], robot, 0.01, SelectionPolicy()) == [unfitted]

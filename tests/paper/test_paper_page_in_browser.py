@@ -48,9 +48,7 @@ def test_every_figure_has_its_buttons(browser: Browser, page: Path) -> None:
       .map((f) => [...f.querySelectorAll('.tools button')].map((b) => b.textContent))"""
     buttons = browser.run(script)
     assert len(buttons) > 10 and all(each == ["PNG", "SVG", "Reset"] for each in buttons)
-    links = (
-        "return [...document.querySelectorAll('.tools a')].map((a) => a.textContent + a.getAttribute('href'))"
-    )
+    links = "return [...document.querySelectorAll('.tools a')].map((a) => a.textContent + a.getAttribute('href'))"
     assert "CSVfig_07.csv" in browser.run(links) and len(browser.run(links)) == len(buttons)
     assert browser.heard() == []
 

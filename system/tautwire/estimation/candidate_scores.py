@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -88,22 +89,27 @@ def load_before_offsets(best: CandidateScore, scores: Sequence[CandidateScore], 
     return max(loads, key=lambda trial: trial.evidence, default=best)
 
 
-def damping_before_fast_relaxation(
-    best: CandidateScore, scores: Sequence[CandidateScore], sample_interval: float, policy: SelectionPolicy
-) -> CandidateScore:
-    """The best candidate, or damping in place of a relaxation whose branch relaxes within a sample (s).
+def without_fast_relaxations(
+    scores: Sequence[CandidateScore], robot: Robot, sample_interval: float, policy: SelectionPolicy
+) -> list[CandidateScore]:
+    """The scores without relaxations within a sample (s) for which damping stands: the robot's, or a candidate.
 
     To what is slower, all that the samples show, a branch of modulus E and time ``tau`` is damping, with one parameter:
 
         E tau s / (1 + tau s)  ->  E tau s
     """
-    if best.hypothesis.effect is not RELAXATION or best.parameter_count > 2:
-        return best
-    if setting_of(best.fit.robot, best.hypothesis).values["time"] >= sample_interval:
-        return best
-    least = policy.min_limit_evidence_ratio * best.evidence
-    limits = [t for t in scores if t.hypothesis.effect is DAMPING and t.hypothesis.cables == best.hypothesis.cables]
-    return next((trial for trial in limits if trial.evidence > least), best)
+
+    def is_damping(trial: CandidateScore) -> bool:
+        hypothesis, cables = trial.hypothesis, trial.hypothesis.cables
+        if hypothesis.effect is not RELAXATION or trial.parameter_count > 2 or not math.isfinite(trial.mean_square):
+            return False
+        if setting_of(trial.fit.robot, hypothesis).values["time"] >= sample_interval:
+            return False
+        limits = [t.evidence for t in scores if t.hypothesis.effect is DAMPING and t.hypothesis.cables == cables]
+        is_present = any((each.name, each.cables) == (DAMPING.name, cables) for each in robot.effects)
+        return is_present or max(limits, default=-math.inf) > policy.min_limit_evidence_ratio * trial.evidence
+
+    return [trial for trial in scores if not is_damping(trial)]
 
 
 def unfitted_score(robot: Robot, hypothesis: Hypothesis, prediction: PredictedGain) -> CandidateScore:

@@ -20,9 +20,9 @@ from .candidate_fits import fit_model, maximised_validation_likelihood
 from .candidate_proposals import SearchRound
 from .candidate_scores import (
     CandidateScore,
-    damping_before_fast_relaxation,
     load_before_offsets,
     most_parsimonious,
+    without_fast_relaxations,
 )
 from .candidate_scoring import score_candidates
 from .disturbance_fit import marginal_log_likelihood
@@ -175,12 +175,12 @@ class _StepwiseSelection:
 
     def _best_candidate(self, scores: Sequence[CandidateScore], without: Robot) -> CandidateScore | None:
         """Best candidate of a round; beside a disturbance the likelier one of two that samples hardly tell apart."""
-        best = self._best_or_simpler(scores, without)
-        if best is None or not self.context.fitter.has_disturbance:
-            return best
+        if not self.context.fitter.has_disturbance:
+            return self._best_or_simpler(scores, without)
         sample_interval = float(np.median(np.diff(self.context.split.estimation.recording.time)))
-        best = damping_before_fast_relaxation(best, scores, sample_interval, self.context.policy.selection)
-        return load_before_offsets(best, scores, self.context.evidence_threshold())
+        scores = without_fast_relaxations(scores, without, sample_interval, self.context.policy.selection)
+        best = self._best_or_simpler(scores, without)
+        return best and load_before_offsets(best, scores, self.context.evidence_threshold())
 
     def _best_or_simpler(self, scores: Sequence[CandidateScore], without: Robot) -> CandidateScore | None:
         """Best candidate of a round, or a simpler one that ties with it and explains nearly as much.

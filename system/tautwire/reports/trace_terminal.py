@@ -34,6 +34,11 @@ from .trace_texts import (
 )
 
 MAX_CANDIDATES_SHOWN = 5
+CANDIDATES_CAPTION = """\
+NIV: normalised innovation variance on unseen data, 1 for white noise
+needs: evidence that one more effect needs there
+less simple: more parameters than the one taken
+ruled out: an effect that is accepted already, as relaxation within a sample is"""
 
 
 def trace_table(trace: Trace) -> RenderableType:
@@ -131,8 +136,7 @@ def _candidate_table(trace: Trace) -> Table:
     table.add_column("NIV", justify="right", no_wrap=True)
     table.add_column("", no_wrap=True)
     table.add_column("values", overflow="fold", ratio=1)
-    caption = "NIV: normalised innovation variance on unseen data, 1 for white noise\n"
-    caption += "needs: evidence that one more effect needs there; less simple: more parameters than the one taken"
+    caption = CANDIDATES_CAPTION
     hidden_count = 0
     for round_number, candidates in candidates_by_round(trace.candidates):
         fitted = [candidate for candidate in candidates if math.isfinite(candidate.mean_square)][:MAX_CANDIDATES_SHOWN]

@@ -161,7 +161,7 @@ def candidate_status(candidate: Candidate, of_round: Sequence[Candidate]) -> str
         return f"needs {required:.0f}"
     accepted = next((each for each in of_round if each.accepted), None)
     if accepted is None:
-        return ""
+        return "" if required is None else "ruled out"
     return "weaker" if candidate.evidence <= accepted.evidence else "less simple"
 
 
