@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
@@ -92,6 +93,13 @@ def test_a_note_says_by_how_many_standard_deviations_a_number_moved() -> None:
     assert "gain of tension 2 0.98, +- 0.002 (-2.0 declared standard deviations)" in note
     assert "offset of tension 1 -4 N, +- 0.39 (-2.0 declared standard deviations)" in note
     assert calibration(0.1).notes(example("three"), "fit.csv") == ()
+
+
+def test_the_number_that_moved_farthest_comes_first() -> None:
+    moved = calibration(1.0)
+    (note,) = replace(moved, estimates=np.linspace(-1.0, 2.5, len(moved.parameters))).notes(example("three"), "fit.csv")
+    sizes = [abs(float(size)) for size in re.findall(r"\(([+-][0-9.]+) declared", note)]
+    assert len(sizes) > 2 and sizes == sorted(sizes, reverse=True)
 
 
 def test_a_planar_robot_starts_in_its_plane_beside_an_uncertain_pretension(tmp_path: Path) -> None:

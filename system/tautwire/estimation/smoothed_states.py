@@ -111,11 +111,10 @@ class Calibration:
         )
 
     def notes(self, robot: Robot, path: str) -> tuple[str, ...]:
-        """A note of the constants that differ significantly from their declared values."""
+        """A note of the constants that differ significantly from their declared values, the farthest first."""
         significant = []
-        for parameter, estimate, deviation in zip(
-            self.parameters, self.estimates.tolist(), self.standard_deviations.tolist(), strict=True
-        ):
+        constants = zip(self.parameters, self.estimates.tolist(), self.standard_deviations.tolist(), strict=True)
+        for parameter, estimate, deviation in sorted(constants, key=lambda constant: -abs(constant[1])):
             if abs(estimate) < MIN_REPORTED_SIGMAS * deviation:
                 continue
             value, half_width = (
