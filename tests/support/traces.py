@@ -124,7 +124,7 @@ def made_components(cables: tuple[int, ...]) -> FaultLocalisation:
     balance = [
         ComponentResidual("platform", f"force {a}", "N", 0.25 * noise, 0.0, 0.25, 0.25, 1.4, None) for a in "xyz"
     ]
-    sentence = "The tensions of all cables deviate; the platform's force balance is within noise."
+    sentence = "The tensions of all cables deviate; the platform's force balance closes as expected."
     return FaultLocalisation(np.linspace(0.0, 40.0, 400), (*tensions, *balance), "cables (rope or winch)", sentence, ())
 
 

@@ -275,6 +275,16 @@ def test_the_platforms_residual_is_expected_to_hold_uncertain_exit_points_and_ma
     assert expected_increase(mass, "platform", "force z") == pytest.approx((2.0 * 9.81) ** 2, rel=1e-6)
 
 
+def test_friction_that_uncertain_exit_points_hide_at_its_cable_is_not_put_on_the_platform() -> None:
+    hidden = {"friction": {"coefficient": 0.02, "cables": [2]}}
+    assert localised(hidden).faulty_component == "load cell 2 or friction before it"
+    robot = example("three")
+    cables = tuple(replace(cable, anchor_uncertainty=0.2) for cable in robot.cables)
+    components = localise(replace(robot, cables=cables), recorded("three", 3, hidden))
+    assert not any(part.is_significant for part in components.residuals if part.component != "platform")
+    assert components.faulty_component == "platform; load cells 1, 2, 3 or friction before them"
+
+
 def test_a_payload_within_what_load_cells_may_be_off_by_is_no_fault_of_the_platform() -> None:
     robot, recording = example("three"), recorded("three", 3, {"payload": {"mass": 6.0}})
     weight = 6.0 * 9.81

@@ -51,7 +51,7 @@ def test_the_sentence_has_the_figures() -> None:
     platform = [part("platform", "force x", 1.3)]
     assert isolation_verdict(cables, platform) == (
         "cable 2 (rope or winch)",
-        "Cable 2's tension deviates by 14 N rms (expected 1.3 N); the platform's force balance is within noise. "
+        "Cable 2's tension deviates by 14 N rms (expected 1.3 N); the platform's force balance closes as expected. "
         "In question: cable 2 (rope or winch).",
     )
 
@@ -82,7 +82,7 @@ def test_an_effect_of_all_cables_that_stands_out_at_one_puts_all_in_question() -
     told = reconciled_with_effects(localised(1.2, 14.1), [("modulus", (1, 2))])
     assert told.faulty_component == "cables 1, 2, most of all cable 2"
     assert told.sentence == (
-        "Cable 2's tension deviates by 14 N rms (expected 1.3 N); the platform's force balance is within noise. "
+        "Cable 2's tension deviates by 14 N rms (expected 1.3 N); the platform's force balance closes as expected. "
         "In question: cables 1, 2, most of all cable 2; modulus acts on them and shows at none of the others alone."
     )
 

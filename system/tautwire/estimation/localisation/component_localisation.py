@@ -25,7 +25,7 @@ from ..estimation_data import DataSet
 from ..kalman_filter import Noise
 from ..policy import DEFAULT_POLICY
 from .cable_simulation import CableSimulation, exit_shift, simulate_cable
-from .component_residuals import ComponentResidual, FaultLocalisation, root_mean_square
+from .component_residuals import PLATFORM, ComponentResidual, FaultLocalisation, root_mean_square
 from .fault_isolation import isolation_verdict, numbered
 from .force_balance import ForceBalance, force_balance, measured_forces, offset_candidates, simulate_platform
 from .path_smoothing import MIN_MEASURED_SAMPLES, smooth_path
@@ -80,6 +80,8 @@ def _evaluate_components(
     balance_closes, candidates = False, []
     if any(axis.is_significant for axis in platform) and not any(is_deviating):
         candidates = offset_candidates(balance, directions, path, policy.max_closure_ratio)
+        if not candidates and _may_be_load_cells(cables, platform):
+            candidates = [PLATFORM, numbered("load cell", numbers), "friction before them"]
     elif any(axis.is_significant for axis in platform):
         simulated_tension = np.column_stack([run.tension for run in runs])
         mixed_tension = np.where(is_deviating, simulated_tension, recording.tension)
@@ -125,6 +127,13 @@ def _may_be_exit_point(cable: ComponentResidual, run: CableSimulation, platform:
     max_shift = detectable_force * float(np.min(run.length)) / float(np.max(run.tension))
     _, remaining = exit_shift(run, cable.residual, cable.expected_rms, max_shift)
     return root_mean_square(remaining) < cable.threshold * cable.expected_rms
+
+
+def _may_be_load_cells(cables: Sequence[ComponentResidual], platform: Sequence[ComponentResidual]) -> bool:
+    """Whether load cells may miss the varying force that a platform misses without standing out at their cables."""
+    worst = max(platform, key=lambda part: part.ratio)
+    spread = worst.rms**2 - worst.mean**2
+    return spread > worst.mean**2 and spread <= max(part.threshold * part.expected_rms for part in cables) ** 2
 
 
 def _has_path(robot: Robot, recording: Recording) -> bool:

@@ -24,14 +24,14 @@ def isolate_fault(
     be evaluated; ``platform_deviates`` whether the platform's balance does, None where it could not be.
     ``balance_closes`` tells that the balance closes with the tensions of those cables' FMUs; ``exit_candidates`` are
     cables whose residual a shifted exit point would explain without showing in the balance, ``offset_candidates``
-    components by whose constant error the balance would close.
+    components by whose error the balance would close though no cable's tension deviates.
 
     ==================== ================ ====================================================
     deviating tensions   platform's force component
     ==================== ================ ====================================================
-    none                 within noise     nothing
-    none                 deviates         platform, or the zero of a load cell: a mean shows at no cable
-    of cable i           within noise     cable i (rope or winch): its measured tension is real
+    none                 as expected      nothing
+    none                 deviates         platform, or load cells: a zero, or less than what is uncertain at a cable
+    of cable i           as expected      cable i (rope or winch): its measured tension is real
     of cable i           deviates, closes load cell i, or friction between it and the platform
     of cable i           deviates         load cell i or exit point i, or several components
     of cable i           not known        cable i (rope, winch, load cell or exit point)
@@ -128,8 +128,8 @@ def _verdict_without_evidence(faulty_component: str) -> str:
 def _cable_facts(cables: Sequence[ComponentResidual]) -> list[str]:
     deviating = [part for part in cables if part.is_significant]
     if not deviating:
-        subject = "the cables' tensions are" if len(cables) > 1 else "the cable's tension is"
-        return [f"{subject} within noise"] if cables else []
+        subject = "the cables' tensions deviate" if len(cables) > 1 else "the cable's tension deviates"
+        return [f"{subject} no more than expected"] if cables else []
     if len(deviating) == 1:
         return [f"{deviating[0].component}'s tension deviates {_deviation_text(deviating[0])}"]
     worst = max(deviating, key=lambda part: part.ratio)
@@ -142,7 +142,7 @@ def _platform_facts(platform: Sequence[ComponentResidual]) -> list[str]:
         return []
     worst = max(platform, key=lambda part: part.ratio)
     if not worst.is_significant:
-        return ["the platform's force balance is within noise"]
+        return ["the platform's force balance closes as expected"]
     return [f"the platform's {worst.quantity} deviates {_deviation_text(worst)}"]
 
 
