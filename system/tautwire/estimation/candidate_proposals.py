@@ -127,7 +127,9 @@ def shortlist(
 def _ranked(predictions: Mapping[Hypothesis, PredictedGain], policy: ScoreTestPolicy) -> list[Hypothesis]:
     ranked: list[Hypothesis] = []
     for hypothesis in sorted(predictions, key=lambda hypothesis: -predictions[hypothesis].gain):
-        if sum(hypothesis.effect is other.effect for other in ranked) < policy.max_fits_per_effect:
+        alike = [other for other in ranked if other.effect is hypothesis.effect]
+        has_all_cables = any(len(other.cables) > 1 for other in alike)
+        if len(alike) < (1 + policy.max_single_cables if has_all_cables else policy.max_fits_per_effect):
             ranked.append(hypothesis)
     min_gain = policy.min_predicted_gain
     if ranked:
