@@ -20,7 +20,7 @@ from numpy.typing import NDArray
 from ...fmus.packaging import RobotFmus, build_fmus
 from ...recordings.recording import Recording
 from ...recordings.start_position import with_start
-from ...robot.schema import Robot
+from ...robot.schema import AXES, Robot
 from ..estimation_data import DataSet
 from ..kalman_filter import Noise
 from ..policy import DEFAULT_POLICY
@@ -80,8 +80,10 @@ def _evaluate_components(
     balance_closes, candidates = False, []
     if any(axis.is_significant for axis in platform) and not any(is_deviating):
         candidates = offset_candidates(balance, directions, path, policy.max_closure_ratio)
-        if not candidates and _may_be_load_cells(cables, platform):
-            candidates = [PLATFORM, numbered("load cell", numbers), "friction before them"]
+        hidden = [] if candidates else _load_cells_in_question(cables, platform, directions)
+        if hidden:
+            friction = "friction before it" if len(hidden) == 1 else "friction before them"
+            candidates = [PLATFORM, numbered("load cell", hidden), friction]
     elif any(axis.is_significant for axis in platform):
         simulated_tension = np.column_stack([run.tension for run in runs])
         mixed_tension = np.where(is_deviating, simulated_tension, recording.tension)
@@ -129,11 +131,25 @@ def _may_be_exit_point(cable: ComponentResidual, run: CableSimulation, platform:
     return root_mean_square(remaining) < cable.threshold * cable.expected_rms
 
 
-def _may_be_load_cells(cables: Sequence[ComponentResidual], platform: Sequence[ComponentResidual]) -> bool:
-    """Whether load cells may miss the varying force that a platform misses without standing out at their cables."""
+def _load_cells_in_question(
+    cables: Sequence[ComponentResidual], platform: Sequence[ComponentResidual], directions: Array
+) -> list[int]:
+    """Load cells that may miss the varying force that a platform misses without standing out at their cables.
+
+    ``directions`` (N, n, 3) are the cables'; a force that hardly varies is a weight or a zero.
+    """
     worst = max(platform, key=lambda part: part.ratio)
-    spread = worst.rms**2 - worst.mean**2
-    return spread > worst.mean**2 and spread <= max(part.threshold * part.expected_rms for part in cables) ** 2
+    variance = worst.rms**2 - worst.mean**2
+    if variance <= worst.mean**2:
+        return []
+    axis = AXES.index(worst.quantity[-1])
+    projections = np.sqrt(np.mean(directions[:, :, axis] ** 2, axis=0))
+    limits = [part.threshold * part.expected_rms * float(projections[_number(part) - 1]) for part in cables]
+    return [_number(part) for part, limit in zip(cables, limits, strict=True) if limit**2 >= variance]
+
+
+def _number(cable: ComponentResidual) -> int:
+    return int(cable.component.split()[1])
 
 
 def _has_path(robot: Robot, recording: Recording) -> bool:

@@ -24,13 +24,13 @@ def isolate_fault(
     be evaluated; ``platform_deviates`` whether the platform's balance does, None where it could not be.
     ``balance_closes`` tells that the balance closes with the tensions of those cables' FMUs; ``exit_candidates`` are
     cables whose residual a shifted exit point would explain without showing in the balance, ``offset_candidates``
-    components by whose error the balance would close though no cable's tension deviates.
+    components that may err though no cable's tension deviates.
 
     ==================== ================ ====================================================
     deviating tensions   platform's force component
     ==================== ================ ====================================================
     none                 as expected      nothing
-    none                 deviates         platform, or load cells: a zero, or less than what is uncertain at a cable
+    none                 deviates         platform, or load cells: a zero, or errors that no cable could show
     of cable i           as expected      cable i (rope or winch): its measured tension is real
     of cable i           deviates, closes load cell i, or friction between it and the platform
     of cable i           deviates         load cell i or exit point i, or several components
@@ -79,7 +79,7 @@ def isolation_verdict(
     )
     facts = [*_cable_facts(cables), *_platform_facts(platform)]
     oscillating = [part for part in platform if part.is_significant and part.resonance_frequency is not None]
-    if faulty_component == PLATFORM and oscillating:
+    if oscillating and not any(deviating_by_cable.values()):
         frequency = max(oscillating, key=lambda part: part.ratio).resonance_frequency
         facts.append(f"it oscillates at {frequency:.2f} Hz, as a swinging load or a shaker does")
     evidence = "; ".join(facts)

@@ -21,7 +21,7 @@ class ResonancePeakPolicy:
 
 @dataclass(frozen=True)
 class LocalisationPolicy:
-    """When the residual of a component is more than noise, and what it resembles."""
+    """When the residual of a component is more than that of a correct model, and what it resembles."""
 
     # Samples that are evaluated: the cost grows with them, and these are enough. Chosen, not calibrated.
     max_samples: int = 20_000

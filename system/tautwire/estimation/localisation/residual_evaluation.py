@@ -1,13 +1,16 @@
 """Residual evaluation: each component residual against what it would be if the model were right.
 
 That is noise, errors of the sensors with a memory, and what the robot file states as uncertain. The last are constant,
-so that a longer recording does not make them smaller: with standard deviations ``s``, directions ``u`` of the cables,
-tensions ``T``, their part by damping ``D``, lengths ``L`` and the change ``C`` of a tension for each metre by which an
-exit point shifts, of a cable and of the platform along an axis
+so that a longer recording does not make them smaller: with standard deviations ``s``, the cables' directions ``u``,
+tensions ``T``, lengths ``L``, areas ``A``, rates ``r`` of stretching, and the change ``C`` of a tension for each metre
+by which an exit point shifts, of a cable and of the platform along an axis ``a``
 
-    S_i^2 = (s_anchor^2 + s_x^2) sum var C_i + (s_gain^2 + (s_E / E)^2) var T_i + (s_c / c)^2 var D_i
+    S_i^2 = (s_anchor^2 + s_x^2) sum var C_i + (s_gain^2 + (s_E / E)^2) var T_i + s_c^2 var (A_i r_i / L_i)
 
-    S^2 = sum_i u_i^2 s_offset^2 + (s_gain u_i T_i)^2 + (s_anchor^2 + s_x^2) (1 - u_i^2) (T_i / L_i)^2 + (s_m g)^2
+    S^2 = sum_i u_ia^2 (s_offset^2 + s_gain^2 T_i^2) + s_anchor^2 (1 - u_ia^2) (T_i / L_i)^2
+        + s_x^2 sum_b (sum_i (delta_ab - u_ia u_ib) T_i / L_i)^2 + s_m^2 (a_a + g delta_az)^2
+
+The tracker's offset ``s_x`` is one for all cables. Errors of positions with a memory are left out at the platform.
 """
 
 from __future__ import annotations
@@ -49,12 +52,6 @@ class MeasuredPorts:
         noise, disturbance = self.noise, self.noise.disturbance
         return NEUTRAL if disturbance is None else sensor_noise_only(disturbance, noise.position, noise.tension)
 
-    @property
-    def point_variance(self) -> float:
-        """Variance (m^2) of a cable's ends relative to each other, on each axis, by the survey and the tracker."""
-        anchor = max(cable.anchor_uncertainty for cable in self.robot.cables)
-        return anchor**2 + self.robot.sensors.position_offset_uncertainty**2
-
 
 def cable_residual(
     measured: MeasuredPorts, number: int, run: CableSimulation, policy: LocalisationPolicy
@@ -63,9 +60,10 @@ def cable_residual(
 
     With ``k`` the sensitivities of the tension, ``P`` the path's covariance, ``kappa`` the stiffness and ``t`` the time
 
-        expected^2 = sigma_T^2 + k' P k + kappa^2 sigma_V^2 sum h^2 + S^2, the third less that of its mean
+        expected^2 = sigma_T^2 + k' P k + kappa^2 sigma_V^2 sum h^2 + M^2 + S^2, the third less that of its mean
 
-    and ``kappa^2`` times the variance of the length where that was recorded, in its place.
+    with ``kappa^2`` times the variance of the length where that was recorded, in its place, and M of errors with a
+    memory of load cell and tracker.
     """
     recording = measured.recording
     residual = recording.tension[:, number - 1] - run.tension
@@ -102,7 +100,7 @@ def _expected_variance(
     drift_excess = max(float(np.mean(drift[is_measured])) - drift_of_mean, 0.0)
     errors = measured.sensor_errors
     memory = errors.tension.rms**2 + errors.position.rms**2 * float(np.mean(run.stiffness[is_measured] ** 2))
-    stated = _stated_cable_variance(measured, number, run)
+    stated = _stated_cable_variance(measured, number, run, is_measured)
     expected = steady_variance + drift_excess + memory + stated
     independent_samples = (
         2.0 * (path.time[-1] - path.time[0]) * float(np.min(path.cutoff[path.measured])) / (2.0 * np.pi)
@@ -118,17 +116,19 @@ def _expected_variance(
     return expected, float(np.sqrt(np.sum(np.square(terms)))) / expected
 
 
-def _stated_cable_variance(measured: MeasuredPorts, number: int, run: CableSimulation) -> float:
+def _stated_cable_variance(
+    measured: MeasuredPorts, number: int, run: CableSimulation, rows: NDArray[np.bool_]
+) -> float:
     """Variance (N^2) of a cable's residual by what the robot file states as uncertain."""
     cable, sensors, path = measured.robot.cables[number - 1], measured.robot.sensors, measured.path
-    of_shifts = np.var(exit_shift_columns(run)[:, list(measured.robot.axes_in_plane)], axis=0)
+    of_shifts = np.var(exit_shift_columns(run)[rows][:, list(measured.robot.axes_in_plane)], axis=0)
     stretch_rate = _stretch_rate(path, measured.recording.winch_speed[:, number - 1], np.array(cable.anchor))
+    points = cable.anchor_uncertainty**2 + sensors.position_offset_uncertainty**2
     relative_modulus = cable.modulus_uncertainty / cable.modulus
-    relative_damping = cable.damping_uncertainty / cable.damping if cable.damping else 0.0
     return float(
-        measured.point_variance * np.sum(of_shifts)
-        + (sensors.tension_gain_uncertainty**2 + relative_modulus**2) * np.var(run.tension)
-        + relative_damping**2 * np.var(run.sensitivities[:, 6] * stretch_rate)
+        points * np.sum(of_shifts)
+        + (sensors.tension_gain_uncertainty**2 + relative_modulus**2) * np.var(run.tension[rows])
+        + cable.damping_uncertainty**2 * np.var((cable.area * stretch_rate / run.length)[rows])
     )
 
 
@@ -169,18 +169,22 @@ def _slow_platform_variances(
     measured: MeasuredPorts, axis: int, directions: Array, rows: NDArray[np.bool_]
 ) -> tuple[float, float]:
     """Variances (N^2) of the missing force by sensors' errors with a memory, and by what is stated as uncertain."""
-    robot, sensors = measured.robot, measured.robot.sensors
+    robot, sensors, path = measured.robot, measured.robot.sensors, measured.path
     tension, squares = measured.recording.tension[rows], directions[:, :, axis] ** 2
-    to_anchors = np.array(robot.anchors) - measured.path.position[rows][:, None]
-    slopes = (tension / np.linalg.norm(to_anchors, axis=2)) ** 2 * (1.0 - squares)
-    weight = robot.platform.mass_uncertainty * robot.gravity if AXES[axis] == "z" else 0.0
+    slopes = tension / np.linalg.norm(np.array(robot.anchors) - path.position[rows][:, None], axis=2)
+    anchors = np.array([cable.anchor_uncertainty for cable in robot.cables])
+    # By how much all cables together pull otherwise for each metre by which the platform is elsewhere, (N, 3).
+    across = np.eye(3)[axis] - directions[:, :, axis, None] * directions
+    of_offset = np.sum((slopes[:, :, None] * across).sum(axis=1) ** 2, axis=1)
+    weight = path.acceleration[rows, axis] + (robot.gravity if AXES[axis] == "z" else 0.0)
     memory = measured.sensor_errors.tension.rms**2 * float(np.sum(np.mean(squares, axis=0)))
     of_cables = (
         sensors.tension_offset_uncertainty**2 * squares
         + (sensors.tension_gain_uncertainty * tension) ** 2 * squares
-        + measured.point_variance * slopes
+        + anchors**2 * (1.0 - squares) * slopes**2
     )
-    return memory, float(np.sum(np.mean(of_cables, axis=0))) + weight**2
+    of_all = (sensors.position_offset_uncertainty**2 * of_offset) + (robot.platform.mass_uncertainty * weight) ** 2
+    return memory, float(np.mean(of_cables.sum(axis=1) + of_all))
 
 
 def _threshold(deviation: float, policy: LocalisationPolicy) -> float:
