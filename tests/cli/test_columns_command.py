@@ -370,7 +370,7 @@ def test_counts_of_a_log_get_their_factor_by_the_trackers_file(
     capsys.readouterr()
     assert run(check) == 0
     lines = [number for number, line in enumerate(proposal.splitlines(), 1) if line.startswith("rope_length_")]
-    note = f"{table}: lines {lines[0]} to {lines[-1]}: factors that were estimated from a recording hold the errors of"
+    note = f"{table}: lines {', '.join(map(str, lines))}: factors that were estimated from a recording hold the errors"
     captured = capsys.readouterr()
     assert note in captured.err
     assert captured.err.splitlines()[-1].endswith("add --check SECOND.csv --check-tracker ITS_TRACKER.csv")

@@ -123,7 +123,7 @@ def test_the_error_that_remains_is_told_beside_what_noise_leaves() -> None:
     )
     floor = Errors(1e-4, 3.0, np.full(3, 1e-4), np.full(3, 3.0))
     sentence = remaining_error(recording, motion, floor).sentence
-    assert sentence == "12 N in tension_2, where noise leaves 3 N; it is strongest at 1.5 Hz"
+    assert sentence == "12.0 N in tension_2, where noise leaves 3.0 N; it is strongest at 1.5 Hz"
 
 
 def test_the_effect_that_is_there_leaves_little_of_what_the_robot_without_it_misses() -> None:

@@ -70,8 +70,8 @@ def test_intervals_that_are_wide_for_the_same_reason_share_a_note() -> None:
         FoundEffect("creep", "cable", (), {"fluidity": Estimate(2.0, *ends)}, 50.0),
     ]
     assert _interval_notes(effects) == [
-        "the 95 % interval of mass of payload and of drag_area of drag is as wide as it is mostly because of two "
-        "recordings that give different values"
+        "the width of the 95 % interval of mass of payload and of drag_area of drag is mostly due to two recordings "
+        "that give different values"
     ]
 
 

@@ -23,6 +23,7 @@ from tautwire.estimation.parameter_stability import (
     half_widths_of_stretches,
     stable_intervals,
 )
+from tautwire.estimation.parameter_stability import NOISE as BY_NOISE
 from tautwire.estimation.policy import DEFAULT_POLICY, StabilityPolicy
 from tautwire.estimation.selection_result import SelectionResult
 from tests.support.recordings import recorded
@@ -114,6 +115,7 @@ def test_a_parameter_on_which_recordings_disagree_is_unstable(ratio_of_check: fl
         (0.1, (0.97,), (0.97,), FORM),
         (0.0, (0.96,), (0.97,), RECORDINGS),
         (0.0, (0.97, 0.975), (0.97, 0.975), STRETCHES),
+        (0.0, (0.97,), (0.97,), BY_NOISE),
     ],
 )
 def test_what_most_of_an_intervals_width_is_for_is_told(

@@ -25,8 +25,8 @@ from tests.support.robots import example
 ROBOT, RECORDING = example("three"), recorded("three", 1)
 NOISE = estimate_noise(ROBOT, RECORDING)
 CONTEXT = IdentificationContext(ROBOT, Fitter(NOISE), split_data(ROBOT, NOISE, RECORDING, None))
-MISSED = "90 N in tension_1, strongest at 0.5 Hz"
-REMAINING = "40 N in tension_2, strongest at 1.2 Hz"
+MISSED = "90 N in tension_1, where noise leaves 2 N; it is strongest at 0.5 Hz"
+REMAINING = "40 N in tension_2, where noise leaves 2 N; it is strongest at 1.2 Hz"
 
 
 def hypothesis(name: str) -> Hypothesis:
@@ -81,8 +81,8 @@ def test_what_a_disturbance_of_usual_size_takes_up_lacks_nothing_however_well_it
 def test_an_effect_is_named_that_explains_a_good_part_of_little() -> None:
     word, sentence = verdict(shares(0.12, 6.0, drum=(0.27, 5.0)), "drum")
     assert word == "effects"
-    assert "drum (27 % of what is missed); 12 % remains, in all no more than 8 times the sensors' noise." in sentence
-    assert sentence.endswith("The error is then 40 N in tension_2, strongest at 1.2 Hz.")
+    assert "drum (27 % of what is missed); 12 % remains, in all no more than 8 times what noise leaves." in sentence
+    assert sentence.endswith("The error is then 40 N in tension_2, where noise leaves 2 N; it is strongest at 1.2 Hz.")
 
 
 def test_what_uncertain_numbers_explain_beside_the_one_effect_is_told() -> None:

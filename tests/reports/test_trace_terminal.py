@@ -244,5 +244,5 @@ def test_each_candidate_tells_why_it_was_not_taken() -> None:
 def test_beside_a_disturbance_it_is_told_in_place_of_what_is_no_white_noise() -> None:
     disturbance = replace(NEUTRAL, force=OrnsteinUhlenbeck(2.9, 2.4))
     text = " ".join(rendered(replace(made_trace(), noise_after=False, disturbance=disturbance)).split())
-    assert "a random force of 2.9 N on the platform is assumed beside it" in text
+    assert "Beside white noise a random force of 2.9 N on the platform is assumed" in text
     assert "leave more than white noise" not in text

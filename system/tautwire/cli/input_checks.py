@@ -261,7 +261,7 @@ def _estimated_factors(path: Path) -> tuple[str, ...]:
     lines = [number for number, line in enumerate(robot_file_text(path).splitlines(), 1) if ESTIMATED_FACTOR in line]
     if not lines:
         return ()
-    where = f"line {lines[0]}" if len(lines) == 1 else f"lines {lines[0]} to {lines[-1]}"
+    where = f"line {lines[0]}" if len(lines) == 1 else f"lines {', '.join(map(str, lines))}"
     problem = "factors that were estimated from a recording hold the errors of drum and rope, which no trace then finds"
     return (f"{path}: {where}: {problem}; write those of the data sheet, without the remark",)
 

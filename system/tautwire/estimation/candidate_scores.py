@@ -94,7 +94,7 @@ def without_fast_relaxations(
 ) -> list[CandidateScore]:
     """The scores without relaxations within a sample (s) for which damping stands: the robot's, or a candidate.
 
-    To what is slower, all that the samples show, a branch of modulus E and time ``tau`` is damping, with one parameter:
+    To what is slower, nearly all that the samples show, a branch of modulus E and time ``tau`` is damping:
 
         E tau s / (1 + tau s)  ->  E tau s
     """

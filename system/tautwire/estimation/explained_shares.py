@@ -26,6 +26,7 @@ from scipy.signal import periodogram
 from scipy.stats import t as students_t
 
 from ..cosimulation.robot_cosimulation import CosimulationResult
+from ..number_format import format_significant
 from ..recordings.recording import Recording
 from ..robot.schema import Robot
 from .cosimulation_validation import noise_floor, output_errors
@@ -251,7 +252,8 @@ class RemainingError:
     @property
     def sentence(self) -> str:
         """In words."""
-        error = f"{self.rms:.3g} {self.unit} in {self.output}, where noise leaves {self.noise:.2g} {self.unit}"
+        rms, noise = format_significant(self.rms, 3), format_significant(self.noise, 2)
+        error = f"{rms} {self.unit} in {self.output}, where noise leaves {noise} {self.unit}"
         return f"{error}; it is strongest at {self.frequency:.2g} Hz"
 
 

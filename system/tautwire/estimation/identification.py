@@ -20,7 +20,7 @@ from .identification_context import IdentificationContext, Progress, no_progress
 from .identification_stages import SEARCHES, STAGES
 from .identification_state import Identification
 from .localisation.component_residuals import FaultLocalisation
-from .localisation.fault_isolation import reconciled_with_effects
+from .localisation.fault_isolation import numbered, reconciled_with_effects
 from .policy import DEFAULT_POLICY, IdentificationPolicy
 from .preprocessing import prepare_data
 from .residual_analysis import largest_autocorrelations
@@ -243,9 +243,10 @@ def _interval_notes(effects: Sequence[FoundEffect]) -> list[str]:
     parameters: dict[str, list[str]] = {}
     for effect in effects:
         for name, estimate in effect.parameters.items():
-            parameters.setdefault(estimate.dominant_uncertainty, []).append(f"{name} of {effect.name}")
+            cable = f" ({numbered('cable', effect.cables)})" if len(effect.cables) == 1 else ""
+            parameters.setdefault(estimate.dominant_uncertainty, []).append(f"{name} of {effect.name}{cable}")
     return [
-        f"the 95 % interval of {' and of '.join(dict.fromkeys(names))} is as wide as it is mostly because of {reason}"
+        f"the width of the 95 % interval of {' and of '.join(names)} is mostly due to {reason}"
         for reason, names in parameters.items()
         if reason
     ]

@@ -36,12 +36,14 @@ BooleanArray = NDArray[np.bool_]
 Names = NDArray[np.str_]
 
 # What an interval can be as wide as it is for.
-NOISE, FORM = "noise and what the robot file states as uncertain", "a formula that may not quite be nature's"
+NOISE, FORM = "noise and what the robot file states as uncertain", "the 5 % that are allowed for the effect's formula"
 STRETCHES = "stretches of a recording that give different values"
 SMALLER_FORCE = "another value under a smaller random force"
 RECORDINGS = "two recordings that give different values"
 # Of the wider of two intervals, beyond which one that holds both is wide because they differ.
-HULL_RATIO = 1.5
+HULL_RATIO = 2.0
+# Of the half-width by noise, beyond which that by eight stretches is no chance: 1.206 sqrt(chi^2 / 7) at 95 %.
+STRETCH_RATIO = 1.71
 
 
 @dataclass(frozen=True)
@@ -119,7 +121,7 @@ def _intervals_about(
     by_stretch = half_widths_of_stretches(innovations, data.rows, units, policy.stretches)
     by_noise = NORMAL_QUANTILE_95 * fit.standard_deviations
     by_form = policy.form_tolerance * np.abs(fit.values - neutral_values)
-    dominant = np.array([NOISE, STRETCHES, FORM])[np.argmax([by_noise, by_stretch, by_form], axis=0)]
+    dominant = np.array([NOISE, STRETCHES, FORM])[np.argmax([by_noise, by_stretch / STRETCH_RATIO, by_form], axis=0)]
     half_widths = np.hypot(np.maximum(by_stretch, by_noise), by_form)
     lower, upper = parameter_bounds(fit.robot, fit.free)
     return Intervals(np.maximum(fit.values - half_widths, lower), np.minimum(fit.values + half_widths, upper), dominant)

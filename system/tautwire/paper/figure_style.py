@@ -100,7 +100,7 @@ def figure_table(figure: Figure) -> pd.DataFrame:
         panel, names = axes.get_title(loc="left") or axes.get_title() or unnamed, _axis_names(axes)
         for number, line in enumerate((line for line in axes.lines if _is_curve(axes, line)), start=1):
             label = str(line.get_label())
-            curve = f"curve {number}" if label.startswith("_") else label
+            curve = f"curve {number}" if label.startswith("_") else plain_label(label)
             for axis, values in zip(names, _coordinates(line), strict=True):
                 shared, own = (": ".join(filter(None, (panel, *parts))) for parts in ((axis,), (curve, axis)))
                 if axis != names[0] or not np.array_equal(columns.setdefault(shared, values), values):
@@ -110,7 +110,13 @@ def figure_table(figure: Figure) -> pd.DataFrame:
 
 def _axis_names(axes: Axes) -> tuple[str, ...]:
     labels = [axes.get_xlabel() or "x", axes.get_ylabel() or "y"]
-    return (*labels, *([axes.get_zlabel() or "z"] if hasattr(axes, "get_zlabel") else []))
+    labels += [axes.get_zlabel() or "z"] if hasattr(axes, "get_zlabel") else []
+    return tuple(map(plain_label, labels))
+
+
+def plain_label(label: str) -> str:
+    """A label without its mathematical markup."""
+    return label.replace("$", "").replace("\\Delta", "error").replace("_", " ").replace("\\dot", "rate of")
 
 
 def _is_curve(axes: Axes, line: Line2D) -> bool:

@@ -20,6 +20,7 @@ from .figure_style import (
     label_panel,
     legend_above,
     panel_grid,
+    plain_label,
 )
 from .paper_parameters import DATA_FOLDER, PaperParameters, ParameterSetName, read_data
 from .rope_tests import (
@@ -189,13 +190,9 @@ def _fits_printed_axis(panel: TimePanel, records: Records) -> bool:
 
 
 def _description(figure: TimeFigure) -> str:
-    panel_texts = "; ".join(f"({panel.letter or 'a'}) {_plain_label(panel.label)}" for panel in figure.panels)
+    panel_texts = "; ".join(f"({panel.letter or 'a'}) {plain_label(panel.label)}" for panel in figure.panels)
     runs = " and ".join(label for label in figure.labels if label)
     return f"{figure.title}, over time{': ' + runs if runs else ''}. {panel_texts}."
-
-
-def _plain_label(label: str) -> str:
-    return label.replace("$", "").replace("\\Delta", "error").replace("_", " ").replace("\\dot", "rate of")
 
 
 def _read_figure(number: str, table: Mapping[str, Any]) -> TimeFigure:

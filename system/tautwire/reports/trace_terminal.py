@@ -36,9 +36,8 @@ from .trace_texts import (
 MAX_CANDIDATES_SHOWN = 5
 CANDIDATES_CAPTION = """\
 NIV: normalised innovation variance on unseen data, 1 for white noise
-needs: evidence that one more effect needs there
-less simple: more parameters than the one taken
-ruled out: an effect that is accepted already, as relaxation within a sample is"""
+needs: evidence that one more effect needs there, if it acts where the first one does
+less simple: more parameters than the one taken, or offsets in place of one load"""
 
 
 def trace_table(trace: Trace) -> RenderableType:

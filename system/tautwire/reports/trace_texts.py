@@ -161,7 +161,7 @@ def candidate_status(candidate: Candidate, of_round: Sequence[Candidate]) -> str
         return f"needs {required:.0f}"
     accepted = next((each for each in of_round if each.accepted), None)
     if accepted is None:
-        return "" if required is None else "ruled out"
+        return ""
     return "weaker" if candidate.evidence <= accepted.evidence else "less simple"
 
 
@@ -213,7 +213,7 @@ def noise_sentence(trace: Trace) -> str:
     """Whether the residual is white noise, before and after, or what was assumed beside it, in one sentence."""
     if trace.disturbance:
         force = format_engineering(trace.disturbance.force.rms, "N", 2)
-        return f"No real recording leaves white noise: a random force of {force} on the platform is assumed beside it."
+        return f"Beside white noise a random force of {force} on the platform is assumed: see the notes."
     before, after = trace.noise_before, trace.noise_after
     if before and after:
         return "The residual of the declared model is already white noise."
