@@ -103,7 +103,8 @@ def without_fast_relaxations(
         hypothesis, cables = trial.hypothesis, trial.hypothesis.cables
         if hypothesis.effect is not RELAXATION or trial.parameter_count > 2 or not math.isfinite(trial.mean_square):
             return False
-        if setting_of(trial.fit.robot, hypothesis).values["time"] >= sample_interval:
+        settings = [each for each in trial.fit.robot.effects if (each.name, each.cables) == (RELAXATION.name, cables)]
+        if not settings or settings[0].values["time"] >= sample_interval:
             return False
         limits = [t.evidence for t in scores if t.hypothesis.effect is DAMPING and t.hypothesis.cables == cables]
         is_present = any((each.name, each.cables) == (DAMPING.name, cables) for each in robot.effects)
