@@ -75,7 +75,8 @@ def test_values_are_those_of_the_trace() -> None:
     assert document["residual_is_noise"] == {"before": False, "after": True}
     assert document["also_possible"] == [["relaxation"], ["creep", "thermal"]]
     damping = document["effects"][0]["parameters"]["damping"]
-    assert damping == {"value": 2.1034e9, "unit": "Pa s", "low": 2.05e9, "high": 2.16e9, "declared": 4e8}
+    values = {"value": 2.1034e9, "unit": "Pa s", "low": 2.05e9, "high": 2.16e9, "declared": 4e8}
+    assert damping == {**values, "dominant_uncertainty": ""}
     assert document["seconds"] == 12.34
     assert list(document["left"]) == ["x", "y", "z", "tension_1", "tension_2", "tension_3"]
 
