@@ -198,16 +198,17 @@ def test_both_laws_part_by_the_integral_of_strain_over_length(records: Records) 
         assert gap == pytest.approx(by["now"] - by["integral"], abs=3e-5)
 
 
-def test_folder_holds_ledger_page_and_every_figure_twice(paper: PaperReproduction, folder: Path) -> None:
+def test_folder_holds_ledger_page_and_every_figure_in_three_formats(paper: PaperReproduction, folder: Path) -> None:
     assert json.loads((folder / "claims.json").read_text()) == [entry.document() for entry in paper.entries]
     page = (folder / "claims.html").read_text(encoding="utf-8")
     assert page.count("</tr>") > len(paper.entries) and page.count("<figure") == len(FIGURE_NAMES)
     assert "nan" not in re.sub(r"<[^>]*>", " ", page).lower().split()
-    names = {f"{name}.{kind}" for name in FIGURE_NAMES for kind in ("png", "svg")}
+    names = {f"{name}.{kind}" for name in FIGURE_NAMES for kind in ("png", "svg", "csv")}
     results = {path.name: path.stat().st_size for path in folder.iterdir()}
     assert results.pop("provenance.json") > 0
     assert set(results) == names | {"claims.json", "claims.html"}
-    assert min(results.values()) > 5000
+    assert min(size for name, size in results.items() if not name.endswith(".csv")) > 5000
+    assert min(size for name, size in results.items() if name.endswith(".csv")) > 100
 
 
 def test_time_figures_have_the_printed_panels_and_axes(records: Records) -> None:
