@@ -117,3 +117,23 @@ def test_fits_beside_a_disturbance_begin_where_runs_of_the_model_explain_most(mo
     search_round = SearchRound(1, robot, (), None, is_white=True, has_disturbance=True)
     candidate_scoring.score_candidates(context, search_round)
     assert begun[late][0].effects[0].values["tension_delay"] == pytest.approx(0.17, abs=0.011)
+
+
+@pytest.mark.parametrize("has_disturbance", [True, False])
+def test_a_round_beside_a_disturbance_has_the_shortlist_for_it(
+    has_disturbance: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    robot, recording = example("three"), recorded("three", 1)
+    noise = estimate_noise(robot, recording)
+    fitter: Any = SimpleNamespace(has_disturbance=has_disturbance)
+    context = IdentificationContext(robot, fitter, split_data(robot, noise, recording, None))
+    gains = {(1, 2, 3): 90.0, (1,): 80.0, (2,): 70.0, (3,): 60.0}
+    slack = {Hypothesis(BY_NAME["slack"], cables): gain for cables, gain in gains.items()}
+    predictions = {hypothesis: PredictedGain(gain, {"softness": 100.0}) for hypothesis, gain in slack.items()}
+    begun: list[Hypothesis] = []
+    for name in ("_scores_beside_disturbance", "_scores_beside_noise"):
+        monkeypatch.setattr(candidate_scoring, name, lambda *asked: begun.extend(asked[3]) or {})
+    monkeypatch.setattr(candidate_scoring, "_predict_gains", lambda *_: (dict(predictions), {}))
+    monkeypatch.setattr(candidate_scoring, "grid_search", lambda *_: {})
+    candidate_scoring.score_candidates(context, SearchRound(1, robot, (), None, True, has_disturbance))
+    assert len(begun) == (2 if has_disturbance else 3)

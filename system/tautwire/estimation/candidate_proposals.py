@@ -112,24 +112,27 @@ def shortlist(
     predictions: Mapping[Hypothesis, PredictedGain],
     rough_predictions: Mapping[Hypothesis, PredictedGain] | None = None,
     policy: ScoreTestPolicy = DEFAULT_POLICY.score_test,
+    has_disturbance: bool = False,
 ) -> list[Hypothesis]:
     """Shortlist of the best predictions, few of each effect; the best of ``rough_predictions`` replace the last.
 
     Those are of another score test of the same hypotheses, with process noise.
     """
-    ranked, others = _ranked(predictions, policy), _ranked(rough_predictions or {}, policy)
+    ranked, others = (_ranked(each, policy, has_disturbance) for each in (predictions, rough_predictions or {}))
     leading = ranked[: policy.max_fits - policy.max_rough_fits]
     added = [hypothesis for hypothesis in others[: policy.max_rough_fits] if hypothesis not in leading]
     remaining = [hypothesis for hypothesis in ranked if hypothesis not in added]
     return [*remaining[: policy.max_fits - len(added)], *added]
 
 
-def _ranked(predictions: Mapping[Hypothesis, PredictedGain], policy: ScoreTestPolicy) -> list[Hypothesis]:
+def _ranked(
+    predictions: Mapping[Hypothesis, PredictedGain], policy: ScoreTestPolicy, has_disturbance: bool
+) -> list[Hypothesis]:
     ranked: list[Hypothesis] = []
     for hypothesis in sorted(predictions, key=lambda hypothesis: -predictions[hypothesis].gain):
         alike = [other for other in ranked if other.effect is hypothesis.effect]
-        has_all_cables = any(len(other.cables) > 1 for other in alike)
-        if len(alike) < (1 + policy.max_single_cables if has_all_cables else policy.max_fits_per_effect):
+        is_limited = has_disturbance and any(len(other.cables) > 1 for other in alike)
+        if len(alike) < (policy.max_fits_beside_disturbance if is_limited else policy.max_fits_per_effect):
             ranked.append(hypothesis)
     min_gain = policy.min_predicted_gain
     if ranked:

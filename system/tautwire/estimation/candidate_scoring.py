@@ -35,10 +35,7 @@ def score_candidates(context: IdentificationContext, search_round: SearchRound) 
     label = f"round {search_round.number}"
     context.progress(f"{label}: score test", 0.0)
     predictions, rough_predictions = _predict_gains(context, search_round)
-    score_test = policy.score_test
-    if context.fitter.has_disturbance:
-        score_test = replace(score_test, max_single_cables=score_test.max_single_cables_beside_disturbance)
-    shortlisted = shortlist(predictions, rough_predictions, score_test)
+    shortlisted = shortlist(predictions, rough_predictions, policy.score_test, context.fitter.has_disturbance)
     if search_round.is_ranking:
         coarse_data = context.split.estimation.first(policy.selection.coarse_samples)
         predictions |= grid_search(context, robot, accepted, coarse_data, {h: predictions[h] for h in shortlisted})

@@ -63,10 +63,9 @@ class ScoreTestPolicy:
     max_rough_fits: int = 3
     # One effect on each of eight cables must not crowd out the others. Chosen, not calibrated.
     max_fits_per_effect: int = 3
-    # Single cables beside all of them: these have the largest gain where it is the effect, and their own values come
-    # later. Beside a disturbance three slacks and three moduli left no place for sag: slack had 6,685 nats, sag 13,946.
-    max_single_cables: int = 2
-    max_single_cables_beside_disturbance: int = 1
+    # Beside a disturbance, where all cables are one of them: values of single cables come later. Three slacks and three
+    # moduli left no place for sag: slack had 6,685 nats, sag 13,946.
+    max_fits_beside_disturbance: int = 2
     # Acceleration noise density (m/s^2 per root hertz) of the second test: where a model has lost the phase of an
     # oscillation, scores ask for damping whatever it lacks. Tried on a planar robot whose payload lacks 1 kg: found.
     rough_noise_density: float = 0.1
