@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from types import SimpleNamespace
 from typing import Any, cast
 
 import numpy as np
@@ -88,3 +89,18 @@ def test_a_selection_whose_others_cannot_be_fitted_stays_as_it_is(monkeypatch: p
     monkeypatch.setattr(identification_stages, "without_least_evident", without_last)
     state = with_effects("modulus", "relaxation", modulus=0.9, relaxation=0.9)
     assert drop_unsteady_effects(state) is state
+
+
+def test_the_declared_robot_is_localised_whatever_uncertain_numbers_would_take_up(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    submitted: list[tuple[Any, ...]] = []
+    workers = SimpleNamespace(submit=lambda *call: submitted.append(call))
+    context: Any = SimpleNamespace(
+        robot=ROBOT, workers=workers, fitter=SimpleNamespace(noise="noise"), policy=DEFAULT_POLICY
+    )
+    prepared: Any = SimpleNamespace(data_sets=(), split=SimpleNamespace(estimation="FIT as recorded"))
+    monkeypatch.setattr(identification_stages, "start_cosimulations", lambda *_: [])
+    state = with_effects()
+    identification_stages.start_side_runs(replace(state, context=context, prepared=prepared))
+    assert [call[1:4] for call in submitted] == [(ROBOT, "FIT as recorded", "noise")]

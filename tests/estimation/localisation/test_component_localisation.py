@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from tautwire.estimation.disturbance import OrnsteinUhlenbeck
+from tautwire.estimation.disturbance import Disturbance, OrnsteinUhlenbeck
 from tautwire.estimation.estimation_data import split_data
 from tautwire.estimation.localisation.component_localisation import localise_residual
 from tautwire.estimation.localisation.component_residuals import ComponentResidual, FaultLocalisation
@@ -342,3 +342,27 @@ def test_a_payload_within_what_load_cells_may_be_off_by_is_no_fault_of_the_platf
         components = localise(replace(robot, sensors=sensors), recording)
         assert components.faulty_component == component
         assert residual_of(components, "platform", "force z").mean == pytest.approx(-weight, rel=0.02)
+
+
+def test_errors_of_sensors_with_a_memory_are_expected_no_larger_than_their_noise() -> None:
+    robot, recording = example("three"), recorded("three", 3)
+    white = estimate_noise(robot, recording)
+
+    def expected(tension: float, position: float, component: str, quantity: str) -> float:
+        memories = OrnsteinUhlenbeck(position, 1.0), OrnsteinUhlenbeck(tension, 1.0)
+        noise = replace(white, disturbance=Disturbance(OrnsteinUhlenbeck(99.0, 1.0), *memories, 1.0, 1.0))
+        sample = split_data(robot, noise, recording, recording).estimation
+        return residual_of(localise_residual(robot, sample, noise), component, quantity).expected_rms ** 2
+
+    half, noise = 0.5 * white.tension, white.position
+    at_cable, without = (expected(size, 0.0, "cable 1", "tension") for size in (half, 0.0))
+    assert at_cable - without == pytest.approx(half**2)
+    length = np.linalg.norm(np.subtract(robot.cables[0].anchor, robot.platform.start))
+    stiffness = robot.cables[0].modulus * robot.cables[0].area / length
+    # The path leads some way from the start.
+    limited = expected(0.0, 10.0 * noise, "cable 1", "tension") - without
+    assert limited == pytest.approx((stiffness * noise) ** 2, rel=0.1)
+    on_platform = expected(half, 0.0, "platform", "force z") - expected(0.0, 0.0, "platform", "force z")
+    directions = np.subtract(robot.anchors, robot.platform.start)
+    squares = (directions[:, 2] / np.linalg.norm(directions, axis=1)) ** 2
+    assert on_platform == pytest.approx(half**2 * squares.sum(), rel=0.1)

@@ -61,6 +61,8 @@ def test_the_sentence_tells_what_rings_at_the_platform_alone() -> None:
     platform = [part("platform", "force x", 9.0, 0.451), part("platform", "force z", 2.0, 0.9)]
     assert "oscillates at 0.45 Hz" in isolation_verdict(cables, platform)[1]
     assert "oscillates" not in isolation_verdict(wrong, platform)[1]
+    in_question, sentence = isolation_verdict(cables, platform, hidden_candidates=["platform", "load cell 1"])
+    assert in_question == "platform or load cell 1" and "oscillates at 0.45 Hz" in sentence
 
 
 def test_where_nothing_was_looked_at_the_sentence_says_so() -> None:

@@ -80,10 +80,7 @@ def _evaluate_components(
     balance_closes, candidates = False, []
     if any(axis.is_significant for axis in platform) and not any(is_deviating):
         candidates = offset_candidates(balance, directions, path, policy.max_closure_ratio)
-        hidden = [] if candidates else _load_cells_in_question(cables, platform, directions)
-        if hidden:
-            friction = "friction before it" if len(hidden) == 1 else "friction before them"
-            candidates = [PLATFORM, numbered("load cell", hidden), friction]
+        candidates = candidates or _load_cell_candidates(cables, platform, directions)
     elif any(axis.is_significant for axis in platform):
         simulated_tension = np.column_stack([run.tension for run in runs])
         mixed_tension = np.where(is_deviating, simulated_tension, recording.tension)
@@ -131,12 +128,12 @@ def _may_be_exit_point(cable: ComponentResidual, run: CableSimulation, platform:
     return root_mean_square(remaining) < cable.threshold * cable.expected_rms
 
 
-def _load_cells_in_question(
+def _load_cell_candidates(
     cables: Sequence[ComponentResidual], platform: Sequence[ComponentResidual], directions: Array
-) -> list[int]:
-    """Load cells that may miss the varying force that a platform misses without standing out at their cables.
+) -> list[str]:
+    """The platform and load cells that may err by the varying force that it misses, without standing out at a cable.
 
-    ``directions`` (N, n, 3) are the cables'; a force that hardly varies is a weight or a zero.
+    ``directions`` (N, n, 3) are the cables'. None where that force hardly varies: it is a weight or a zero.
     """
     worst = max(platform, key=lambda part: part.ratio)
     variance = worst.rms**2 - worst.mean**2
@@ -144,12 +141,15 @@ def _load_cells_in_question(
         return []
     axis = AXES.index(worst.quantity[-1])
     projections = np.sqrt(np.mean(directions[:, :, axis] ** 2, axis=0))
-    limits = [part.threshold * part.expected_rms * float(projections[_number(part) - 1]) for part in cables]
-    return [_number(part) for part, limit in zip(cables, limits, strict=True) if limit**2 >= variance]
-
-
-def _number(cable: ComponentResidual) -> int:
-    return int(cable.component.split()[1])
+    numbers = [
+        part.cable_number
+        for part in cables
+        if (part.threshold * part.expected_rms * projections[part.cable_number - 1]) ** 2 >= variance
+    ]
+    if not numbers:
+        return []
+    friction = "friction before it" if len(numbers) == 1 else "friction before them"
+    return [PLATFORM, numbered("load cell", numbers), friction]
 
 
 def _has_path(robot: Robot, recording: Recording) -> bool:

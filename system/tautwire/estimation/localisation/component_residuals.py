@@ -106,7 +106,7 @@ class ComponentResidual:
     """Residual of one FMU alone in one measured quantity, measured less simulated, in ``unit``.
 
     ``residual`` (N,) is NaN where nothing was measured; ``mean`` its mean, which is subtracted from a tension's.
-    ``rms`` is to be compared with ``expected_rms``, that of a right model, by noise and by what the robot file states
+    ``rms`` is to be compared with ``expected_rms``, that of a correct model, by noise and by what the robot file states
     as uncertain; chance does not reach the ratio ``threshold``.
     ``resonance_frequency`` (Hz) is that of a hidden oscillator, None where there is none.
     """
@@ -123,8 +123,13 @@ class ComponentResidual:
     resonance_frequency: float | None = None
 
     @property
+    def cable_number(self) -> int:
+        """The number of its cable; 0 for the platform."""
+        return 0 if self.component == PLATFORM else int(self.component.split()[1])
+
+    @property
     def ratio(self) -> float:
-        """Root mean square over that of a right model."""
+        """Root mean square over that of a correct model."""
         return self.rms / self.expected_rms
 
     @property

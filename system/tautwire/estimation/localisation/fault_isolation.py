@@ -16,14 +16,14 @@ def isolate_fault(
     platform_deviates: bool | None,
     balance_closes: bool = False,
     exit_candidates: Collection[int] = (),
-    offset_candidates: Sequence[str] = (),
+    hidden_candidates: Sequence[str] = (),
 ) -> str:
     """The component in question, by the pattern of significant residuals.
 
     ``deviating_by_cable`` tells by number whether the tension of a cable's FMU deviates, without cables that could not
     be evaluated; ``platform_deviates`` whether the platform's balance does, None where it could not be.
     ``balance_closes`` tells that the balance closes with the tensions of those cables' FMUs; ``exit_candidates`` are
-    cables whose residual a shifted exit point would explain without showing in the balance, ``offset_candidates``
+    cables whose residual a shifted exit point would explain without showing in the balance, ``hidden_candidates``
     components that may err though no cable's tension deviates.
 
     ==================== ================ ====================================================
@@ -45,7 +45,7 @@ def isolate_fault(
     if platform_deviates is None:
         return _without_balance(deviating_by_cable, deviating_cables)
     if not deviating_cables:
-        return alternatives(offset_candidates or [PLATFORM]) if platform_deviates else NO_COMPONENT
+        return alternatives(hidden_candidates or [PLATFORM]) if platform_deviates else NO_COMPONENT
     position_sensor = ["the position sensor"] if len(deviating_cables) == len(deviating_by_cable) > 1 else []
     if not platform_deviates:
         cable_parts = "rope, winch or exit point" if set(deviating_cables) <= set(exit_candidates) else "rope or winch"
@@ -66,16 +66,16 @@ def isolation_verdict(
     platform: Sequence[ComponentResidual],
     balance_closes: bool = False,
     exit_candidates: Collection[int] = (),
-    offset_candidates: Sequence[str] = (),
+    hidden_candidates: Sequence[str] = (),
 ) -> tuple[str, str]:
     """The component in question, and the sentence that says why; ``platform`` is empty where it was not evaluated."""
-    deviating_by_cable = {int(part.component.split()[1]): part.is_significant for part in cables}
+    deviating_by_cable = {part.cable_number: part.is_significant for part in cables}
     faulty_component = isolate_fault(
         deviating_by_cable,
         any(part.is_significant for part in platform) if platform else None,
         balance_closes,
         exit_candidates,
-        offset_candidates,
+        hidden_candidates,
     )
     facts = [*_cable_facts(cables), *_platform_facts(platform)]
     oscillating = [part for part in platform if part.is_significant and part.resonance_frequency is not None]
@@ -102,8 +102,8 @@ def reconciled_with_effects(
     A component alone shows less than all outputs together, so an effect of several cables may stand out at one of them.
     """
     cables = sorted({cable for _, of_effect in effects for cable in of_effect})
-    deviating = [part.component for part in localisation.residuals if part.is_significant]
-    at_cables = [int(component.split()[1]) for component in deviating if component != PLATFORM]
+    deviating = [part.cable_number for part in localisation.residuals if part.is_significant]
+    at_cables = [number for number in deviating if number]
     if not effects or not localisation.residuals:
         return localisation
     if at_cables and set(at_cables) < set(cables):
@@ -133,7 +133,7 @@ def _cable_facts(cables: Sequence[ComponentResidual]) -> list[str]:
     if len(deviating) == 1:
         return [f"{deviating[0].component}'s tension deviates {_deviation_text(deviating[0])}"]
     worst = max(deviating, key=lambda part: part.ratio)
-    numbers = numbered("cable", [int(part.component.split()[1]) for part in deviating])
+    numbers = numbered("cable", [part.cable_number for part in deviating])
     return [f"the tensions of {numbers} deviate, that of {worst.component} most, {_deviation_text(worst)}"]
 
 

@@ -1,4 +1,4 @@
-"""Residual evaluation: each component residual against what it would be if the model were right.
+"""Residual evaluation: each component residual against what it would be if the model were correct.
 
 That is noise, errors of the sensors with a memory, and what the robot file states as uncertain. The last are constant,
 so that a longer recording does not make them smaller: with standard deviations ``s``, the cables' directions ``u``,
@@ -100,20 +100,23 @@ def _expected_variance(
     drift_excess = max(float(np.mean(drift[is_measured])) - drift_of_mean, 0.0)
     errors = measured.sensor_errors
     memory = errors.tension.rms**2 + errors.position.rms**2 * float(np.mean(run.stiffness[is_measured] ** 2))
-    stated = _stated_cable_variance(measured, number, run, is_measured)
-    expected = steady_variance + drift_excess + memory + stated
     independent_samples = (
         2.0 * (path.time[-1] - path.time[0]) * float(np.min(path.cutoff[path.measured])) / (2.0 * np.pi)
     )
     path_variance = max(steady_variance - load_cell_noise**2, 0.0)
-    terms = (
-        load_cell_noise**2 * np.sqrt(2.0 / np.sum(is_measured)),
-        path_variance * np.sqrt(2.0 / max(independent_samples, 1.0)),
-        RANDOM_WALK_DEVIATION * drift_excess,
-        RANDOM_WALK_DEVIATION * memory,
-        CONSTANT_DEVIATION * stated,
+    return _total_variance(
+        (min(load_cell_noise**2, steady_variance), np.sqrt(2.0 / np.sum(is_measured))),
+        (path_variance, np.sqrt(2.0 / max(independent_samples, 1.0))),
+        (drift_excess + memory, RANDOM_WALK_DEVIATION),
+        (_stated_cable_variance(measured, number, run, is_measured), CONSTANT_DEVIATION),
     )
-    return expected, float(np.sqrt(np.sum(np.square(terms)))) / expected
+
+
+def _total_variance(*parts: tuple[float, float]) -> tuple[float, float]:
+    """The sum of variances that each have a relative standard deviation, and that of the sum."""
+    variances, deviations = np.array(parts, dtype=float).T
+    total = float(np.sum(variances))
+    return total, float(np.linalg.norm(variances * deviations)) / total
 
 
 def _stated_cable_variance(
@@ -140,15 +143,11 @@ def platform_residual(
     is_known = np.isfinite(residual)
     noise = root_mean_square(balance.expected_deviation[is_known, axis])
     memory, stated = _slow_platform_variances(measured, axis, directions[is_known], is_known)
-    expected = float(np.sqrt(noise**2 + memory + stated))
     duration = (path.time[-1] - path.time[0]) * float(np.mean(is_known))
     independent_samples = max(2.0 * duration * float(balance.cutoff[axis]) / (2.0 * np.pi), 1.0)
-    terms = (
-        noise**2 * np.sqrt(2.0 / independent_samples),
-        RANDOM_WALK_DEVIATION * memory,
-        CONSTANT_DEVIATION * stated,
+    expected, relative_deviation = _total_variance(
+        (noise**2, np.sqrt(2.0 / independent_samples)), (memory, RANDOM_WALK_DEVIATION), (stated, CONSTANT_DEVIATION)
     )
-    relative_deviation = float(np.sqrt(np.sum(np.square(terms)))) / expected**2
     return ComponentResidual(
         component=PLATFORM,
         quantity=f"force {AXES[axis]}",
@@ -156,7 +155,7 @@ def platform_residual(
         residual=residual,
         mean=float(np.mean(residual[is_known])) if np.any(is_known) else float("nan"),
         rms=root_mean_square(residual),
-        expected_rms=expected,
+        expected_rms=float(np.sqrt(expected)),
         threshold=_threshold(relative_deviation, policy),
         correlated_signal=strongest_correlation(residual, _platform_signals(path), policy.correlation_level),
         resonance_frequency=resonance_frequency(
@@ -183,7 +182,7 @@ def _slow_platform_variances(
         + (sensors.tension_gain_uncertainty * tension) ** 2 * squares
         + anchors**2 * (1.0 - squares) * slopes**2
     )
-    of_all = (sensors.position_offset_uncertainty**2 * of_offset) + (robot.platform.mass_uncertainty * weight) ** 2
+    of_all = sensors.position_offset_uncertainty**2 * of_offset + (robot.platform.mass_uncertainty * weight) ** 2
     return memory, float(np.mean(of_cables.sum(axis=1) + of_all))
 
 
