@@ -1,5 +1,6 @@
 """What a trace makes of a search: the co-simulation of the rebuilt FMUs has the last word."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any
@@ -11,7 +12,7 @@ from tautwire.cosimulation.robot_cosimulation import CosimulationResult, cosimul
 from tautwire.estimation import Trace, trace
 from tautwire.estimation.cosimulation_validation import output_errors
 from tautwire.estimation.disturbance import NEUTRAL
-from tautwire.estimation.identification import _disturbance_notes, _interval_notes
+from tautwire.estimation.identification import _disturbance_notes
 from tautwire.estimation.parameter_stability import RECORDINGS
 from tautwire.estimation.trace_result import Estimate, FoundEffect
 from tests.support.recordings import recorded
@@ -48,17 +49,18 @@ def test_what_was_found_comes_with_its_correlations() -> None:
     assert -1.0 < correlation.value < -0.9
 
 
-@pytest.mark.parametrize(("verdict", "is_told"), [("effects", True), ("none", True), ("unexplained", False)])
-def test_what_would_explain_all_but_has_no_name_is_not_called_small(verdict: str, is_told: bool) -> None:
+def beside_disturbance(verdict: str, effects: Sequence[FoundEffect], small: Sequence[FoundEffect] = ()) -> Any:
+    """As much of a state as its notes on a disturbance are made of."""
     fitter = SimpleNamespace(noise=SimpleNamespace(disturbance=NEUTRAL))
     split = SimpleNamespace(estimation=SimpleNamespace(recording=recorded("three", 1)))
+    context = SimpleNamespace(fitter=fitter, split=split)
+    return SimpleNamespace(context=context, verdict=(verdict, ""), effects=effects, small_effects=small)
+
+
+@pytest.mark.parametrize(("verdict", "is_told"), [("effects", True), ("none", True), ("unexplained", False)])
+def test_what_would_explain_all_but_has_no_name_is_not_called_small(verdict: str, is_told: bool) -> None:
     relaxation = FoundEffect("relaxation", "cable", (1, 2, 3), {}, 50.0, share=0.87)
-    state: Any = SimpleNamespace(
-        context=SimpleNamespace(fitter=fitter, split=split),
-        verdict=(verdict, ""),
-        effects=(),
-        small_effects=(relaxation,),
-    )
+    state = beside_disturbance(verdict, (), (relaxation,))
     assert any("too small to matter: relaxation" in note for note in _disturbance_notes(state)) == is_told
 
 
@@ -69,7 +71,7 @@ def test_intervals_that_are_wide_for_the_same_reason_share_a_note() -> None:
         FoundEffect("drag", "platform", (), {"drag_area": Estimate(2.0, *ends, RECORDINGS)}, 50.0),
         FoundEffect("creep", "cable", (), {"fluidity": Estimate(2.0, *ends)}, 50.0),
     ]
-    assert _interval_notes(effects) == [
+    assert _disturbance_notes(beside_disturbance("effects", effects))[1:] == [
         "the width of the 95 % interval of mass of payload and of drag_area of drag is mostly due to two recordings "
         "that give different values"
     ]

@@ -118,7 +118,7 @@ def test_a_parameter_on_which_recordings_disagree_is_unstable(ratio_of_check: fl
         (0.0, (0.97,), (0.97,), BY_NOISE),
     ],
 )
-def test_what_most_of_an_intervals_width_is_for_is_told(
+def test_what_accounts_for_most_of_an_intervals_width_is_told(
     form_tolerance: float, estimation: tuple[float, ...], validation: tuple[float, ...], dominant: str
 ) -> None:
     data_sets = turned(1, *estimation), turned(2, *validation)
@@ -129,12 +129,13 @@ def test_what_most_of_an_intervals_width_is_for_is_told(
     assert effect.parameters["radius_ratio"].dominant_uncertainty == dominant
 
 
-def test_of_two_intervals_that_overlap_the_wider_one_tells_what_their_hull_is_wide_for() -> None:
-    narrow = Intervals(np.array([1.0, 1.0]), np.array([2.0, 2.0]), np.array([STRETCHES, STRETCHES]))
-    wide = Intervals(np.array([0.0, 5.0]), np.array([2.5, 7.0]), np.array([FORM, FORM]))
+def test_of_two_intervals_the_wider_one_tells_what_makes_their_hull_wide_unless_they_are_far_apart() -> None:
+    """The first two overlap, the second two adjoin, the third two leave more between them than either is wide."""
+    narrow = Intervals(np.ones(3), np.full(3, 2.0), np.full(3, STRETCHES))
+    wide = Intervals(np.array([0.0, 1.9, 5.0]), np.array([2.5, 2.95, 7.0]), np.full(3, FORM))
     for hull in (narrow.hull(wide, SMALLER_FORCE), wide.hull(narrow, SMALLER_FORCE)):
-        assert hull.dominant.tolist() == [FORM, SMALLER_FORCE]
-        assert (hull.low.tolist(), hull.high.tolist()) == ([0.0, 1.0], [2.5, 7.0])
+        assert hull.dominant.tolist() == [FORM, FORM, SMALLER_FORCE]
+        assert (hull.low.tolist(), hull.high.tolist()) == ([0.0, 1.0, 1.0], [2.5, 2.95, 7.0])
 
 
 def test_an_effects_form_is_trusted_no_better_than_stated() -> None:

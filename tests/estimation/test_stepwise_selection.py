@@ -109,7 +109,11 @@ def test_beside_a_disturbance_a_further_effect_needs_a_share_of_the_first_ones_e
     monkeypatch.setattr(stepwise_selection, "fit_model", lambda *_, **__: fit)
     monkeypatch.setattr(stepwise_selection, "with_disturbance_beside", lambda context, chosen, fit: (context, fit))
     monkeypatch.setattr(stepwise_selection._StepwiseSelection, "eliminate", lambda self: None)
-    assert [hypothesis.effect.name for hypothesis in select_effects(context).accepted] == names
+    found = select_effects(context)
+    assert [hypothesis.effect.name for hypothesis in found.accepted] == names
+    required = {candidate.name: candidate.required_evidence for candidate in found.candidates}
+    assert required["damping"] == context.evidence_threshold()
+    assert required["payload"] == (100.0 if has_disturbance else context.evidence_threshold())
 
 
 @pytest.mark.parametrize(
@@ -314,13 +318,27 @@ def test_a_simpler_effect_ties_by_its_form_unless_it_leaves_more_than_a_form_may
     assert selection._best_candidate([], robot) is None
 
 
+@pytest.mark.parametrize(("has_disturbance", "name"), [(True, "damping"), (False, "relaxation")])
+def test_beside_a_disturbance_a_relaxation_within_a_sample_is_damping(has_disturbance: bool, name: str) -> None:
+    context, cables = context_with(has_disturbance), (1, 2, 3)
+    without = Fit.without_parameters(context.robot)
+    relaxed = context.robot.with_effect(EffectSetting("relaxation", {"modulus": 1e12, "time": 1e-3}, cables))
+    scores = [
+        CandidateScore(Hypothesis(BY_NAME["damping"], cables), without, 600.0, 1.0),
+        CandidateScore(Hypothesis(BY_NAME["relaxation"], cables), Fit.without_parameters(relaxed), 1000.0, 1.0),
+    ]
+    selection = stepwise_selection._StepwiseSelection(context, without, context.fitter)
+    best = selection._best_candidate(scores, context.robot)
+    assert best is not None and best.hypothesis.effect.name == name
+    if has_disturbance:
+        damped = context.robot.with_effect(EffectSetting("damping", {"damping": 1e9}, cables))
+        assert selection._best_candidate(scores[1:], damped) is None
+
+
 @pytest.mark.parametrize(("has_disturbance", "name"), [(True, "hanging_load"), (False, "sensor_offset")])
 def test_beside_a_disturbance_a_load_comes_before_offsets_of_all_load_cells(has_disturbance: bool, name: str) -> None:
-    robot = example("three")
-    fit, check = pair("three", 5, {})
-    noise = estimate_noise(robot, fit)
-    noise = replace(noise, disturbance=disturbance_prior(robot, noise).median if has_disturbance else None)
-    context = IdentificationContext(robot, Fitter(noise), split_data(robot, noise, fit, check))
+    context = context_with(has_disturbance)
+    robot = context.robot
     threshold, without = context.evidence_threshold(), Fit.without_parameters(robot)
     scores = [
         CandidateScore(Hypothesis(BY_NAME["sensor_offset"], (1, 2, 3)), without, 4.0 * threshold, 1.0),

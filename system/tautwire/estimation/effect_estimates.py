@@ -54,7 +54,7 @@ def estimated_effects(context: IdentificationContext, selection: SelectionResult
 def _interval_ends(
     context: IdentificationContext, selection: SelectionResult
 ) -> tuple[Sequence[tuple[float, float]], Sequence[bool], Sequence[str]]:
-    """Ends of the interval of each fitted parameter, whether the recordings disagree on it, and what it is wide for.
+    """Ends of the interval of each fitted parameter, whether the recordings disagree on it, and what makes it wide.
 
     Beside a disturbance they are by the spread over stretches and recordings, else by profile likelihood; from the
     curvature alone where there is no time for more.

@@ -35,8 +35,8 @@ Array = NDArray[np.float64]
 BooleanArray = NDArray[np.bool_]
 Names = NDArray[np.str_]
 
-# What an interval can be as wide as it is for.
-NOISE, FORM = "noise and what the robot file states as uncertain", "the 5 % that are allowed for the effect's formula"
+# What can account for most of an interval's width.
+NOISE, FORM = "noise and what the robot file states as uncertain", "what is allowed for the effect's formula"
 STRETCHES = "stretches of a recording that give different values"
 SMALLER_FORCE = "another value under a smaller random force"
 RECORDINGS = "two recordings that give different values"
@@ -48,7 +48,7 @@ STRETCH_RATIO = 1.71
 
 @dataclass(frozen=True)
 class Intervals:
-    """Intervals of p parameters from ``low`` to ``high``, (p,) each; ``dominant`` tells what most of each is for."""
+    """Intervals of p parameters from ``low`` to ``high``, (p,) each; ``dominant`` is what makes them wide."""
 
     low: Array
     high: Array

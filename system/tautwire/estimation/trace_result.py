@@ -23,7 +23,7 @@ Verdict = Literal["effects", "none", "discovered", "unexplained"]
 class Estimate:
     """A parameter with its 95 % interval; ``declared`` is what the robot file says, where it says anything.
 
-    ``dominant_uncertainty`` tells in words what most of the interval's width is for, where that is known.
+    ``dominant_uncertainty`` tells in words what accounts for most of the interval's width, where that is known.
     """
 
     value: float
