@@ -10,7 +10,7 @@ import pytest
 
 from tautwire.estimation.disturbance import Disturbance, OrnsteinUhlenbeck
 from tautwire.estimation.estimation_data import split_data
-from tautwire.estimation.localisation.component_localisation import localise_residual
+from tautwire.estimation.localisation.component_localisation import _load_cell_candidates, localise_residual
 from tautwire.estimation.localisation.component_residuals import ComponentResidual, FaultLocalisation
 from tautwire.estimation.measurement_noise import estimate_noise
 from tautwire.recordings.recording import Recording
@@ -324,11 +324,34 @@ def test_the_platforms_residual_is_expected_to_hold_uncertain_exit_points_and_ma
         assert expected_increase(mass, "platform", quantity) == pytest.approx(changes, rel=tolerance)
 
 
+@pytest.mark.parametrize(
+    ("spread", "mean", "candidates"),
+    [
+        (20.0, 0.0, ["platform", "load cell 2", "friction before it"]),
+        (40.0, 0.0, ["platform", "load cells 1, 2", "friction before them"]),
+        (60.0, 0.0, []),
+        (20.0, 30.0, []),
+    ],
+)
+def test_load_cells_are_in_question_alone_or_together_where_none_could_show_so_much(
+    spread: float, mean: float, candidates: list[str]
+) -> None:
+    """Along x, at 60 degrees to both cables; up to 2 * 18 N and 2 * 39 N show at none."""
+
+    def part(component: str, quantity: str, rms: float, expected: float, mean: float = 0.0) -> ComponentResidual:
+        return ComponentResidual(component, quantity, "N", np.zeros(4), mean, rms, expected, 2.0, None)
+
+    cables = [part("cable 1", "tension", 1.0, 18.0), part("cable 2", "tension", 1.0, 39.0)]
+    platform = [part("platform", "force x", float(np.hypot(spread, mean)), 1.0, mean)]
+    directions = np.tile([0.5, 0.0, 0.75**0.5], (4, 2, 1))
+    assert _load_cell_candidates(cables, platform, directions) == candidates
+
+
 def test_friction_that_uncertain_exit_points_hide_at_its_cable_is_not_put_on_the_platform() -> None:
     hidden = {"friction": {"coefficient": 0.02, "cables": [2]}}
     assert localised(hidden).faulty_component == "load cell 2 or friction before it"
     robot = example("three")
-    cables = tuple(replace(cable, anchor_uncertainty=0.2) for cable in robot.cables)
+    cables = tuple(replace(cable, anchor_uncertainty=0.1) for cable in robot.cables)
     components = localise(replace(robot, cables=cables), recorded("three", 3, hidden))
     assert not any(part.is_significant for part in components.residuals if part.component != "platform")
     assert components.faulty_component == "platform; load cells 1, 2 or friction before them"

@@ -133,7 +133,8 @@ def _load_cell_candidates(
 ) -> list[str]:
     """The platform and load cells that may err by the varying force that it misses, without standing out at a cable.
 
-    ``directions`` (N, n, 3) are the cables'. None where that force hardly varies: it is a weight or a zero.
+    Each that could alone, or else all together; ``directions`` (N, n, 3) are the cables'. None where that force hardly
+    varies: it is a weight or a zero.
     """
     worst = max(platform, key=lambda part: part.ratio)
     variance = worst.rms**2 - worst.mean**2
@@ -141,13 +142,13 @@ def _load_cell_candidates(
         return []
     axis = AXES.index(worst.quantity[-1])
     projections = np.sqrt(np.mean(directions[:, :, axis] ** 2, axis=0))
-    numbers = [
-        part.cable_number
+    limits = {
+        part.cable_number: (part.threshold * part.expected_rms * float(projections[part.cable_number - 1])) ** 2
         for part in cables
-        if (part.threshold * part.expected_rms * projections[part.cable_number - 1]) ** 2 >= variance
-    ]
-    if not numbers:
+    }
+    if sum(limits.values()) < variance:
         return []
+    numbers = [number for number, limit in limits.items() if limit >= variance] or list(limits)
     friction = "friction before it" if len(numbers) == 1 else "friction before them"
     return [PLATFORM, numbered("load cell", numbers), friction]
 
