@@ -10,11 +10,10 @@ from typing import Any
 import pytest
 
 from tautwire_fmu.laws.effects import ALL, BY_NAME
+from tests.bench.trace import document, tables
 from tests.bench.trace import lifelike_cases as lifelike_module
 from tests.bench.trace import recordings as recordings_module
-from tests.bench.trace import tables
 from tests.bench.trace.cases import Case
-from tests.bench.trace.document import page
 from tests.bench.trace.lifelike_cases import NEVER_PLANAR, LifelikeCase, lifelike_cases
 from tests.bench.trace.line import Line, NamedEffect, line_from
 from tests.bench.trace.platform_cases import platform_cases
@@ -194,9 +193,15 @@ def test_the_page_shows_lifelike_answers_beside_the_others() -> None:
         EMPTY.key: replace(answer(EMPTY, verdict="none"), code="older"),
     }
     answers, empty = scored([DAMPING, SWING], lines), scored([EMPTY], lines)
-    text = page([], [], "picture.svg", answers, empty)
-    assert "sources c (2), older (1)." in text
-    assert "## Robots as they are" in text
+    text = document.page("", document.lifelike(answers) | document.lifelike_alarms(empty))
+    assert "sources c (2)." in text
+    assert "sources older (1)." in text
     assert "| lifelike-damping-3 | 10, 20 | damping | right |" in text
     assert "0 of 1 (0.0 %, 95 %: 0.0 to 97.5 %)" in text
-    assert "## Robots as they are" not in page([], [], "picture.svg")
+
+
+def test_the_page_shows_platforms_that_turn_also_where_no_little_thing_is() -> None:
+    exact = case_called("platform-exact-inertia-8")
+    line = answer(exact, "inertia", size_of_little_rms={"check": [0.0, 0.0]})
+    text = document.page("", document.platforms(scored([exact], {exact.key: line})))
+    assert "| platform-exact-inertia-8 | -, - | inertia | right |" in text

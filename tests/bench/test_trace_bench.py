@@ -9,9 +9,10 @@ import numpy as np
 import pytest
 
 from tautwire_fmu.laws.effects import ALL, BY_NAME
+from tests.bench.trace import document
 from tests.bench.trace import run as runner
+from tests.bench.trace.__main__ import FEWEST_ALARMS, finished_sections
 from tests.bench.trace.cases import SIZES, Case, Kind, Part, main_cases, quick_cases
-from tests.bench.trace.document import page
 from tests.bench.trace.figure import confusion_figure, save
 from tests.bench.trace.forms import FORMS, LISTED, UNLISTED
 from tests.bench.trace.line import Line, NamedEffect, Used, line_from, line_of, read_lines
@@ -277,10 +278,34 @@ def test_the_matrix_the_picture_and_the_page_show_each_answer(tmp_path: Path) ->
     assert b"nothing" in drawn
     save(confusion_figure(answers), str(path))
     assert path.read_bytes() == drawn
-    text = page(answers, scored(empty, lines), path.name)
+    sections = document.exact(answers, path.name) | document.exact_alarms(scored(empty, lines))
+    text = document.page("", sections)
     assert path.name in text
     assert "0 of 1 (0.0 %, 95 %: 0.0 to 97.5 %)" in text
     assert "1 of 1 (100.0 %" in text
+
+
+def test_a_part_made_anew_leaves_the_other_parts_of_the_page_as_they_stand() -> None:
+    answers = scored([DAMPING], {DAMPING.key: measured(0.99 * TRUE_DAMPING, 1.01 * TRUE_DAMPING)})
+    empty = alarm_cases(1)
+    alarms = document.exact_alarms(scored(empty, {empty[0].key: Line(empty[0].key, "f", "later", verdict="none")}))
+    exact = document.page("", document.exact(answers, "picture.svg"))
+    both = document.page(exact, alarms)
+    assert both.index("## Outcomes") < both.index("## False alarms") < both.index("## What was hidden")
+    assert both.replace(f"## False alarms\n\n{alarms['## False alarms']}\n\n", "") == exact
+    assert document.page(both, alarms) == both
+    with pytest.raises(KeyError, match="Later"):
+        document.page("## Later\n\ntext\n", alarms)
+
+
+def test_only_parts_whose_every_case_has_an_answer_go_to_the_page() -> None:
+    def none(case: Case) -> Line:
+        return Line(case.key, case.fingerprint(case.effects(strengths(case))), "c", verdict="none")
+
+    alarms = tuple(map(none, alarm_cases(FEWEST_ALARMS)))
+    assert set(finished_sections(alarms)) == {document.EXACT_ALARMS}
+    assert finished_sections(alarms[:-1]) == {}
+    assert finished_sections(tuple(map(none, main_cases()[1:]))) == {}
 
 
 def test_the_robots_move_within_their_ropes() -> None:

@@ -3,14 +3,13 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 from tests.support.robots import EXAMPLES
 
-from . import tables
+from . import document, tables
 from .cases import Case, main_cases, quick_cases
-from .document import page
 from .figure import confusion_figure, save
 from .lifelike_cases import ALARM as LIFELIKE_ALARM
 from .lifelike_cases import lifelike_cases
@@ -22,6 +21,8 @@ from .selection import ALARM, alarm_cases, chosen, code_version, lifelike_alarm_
 
 ROOT = EXAMPLES.parents[2]
 PICTURE = "tracer-confusion.svg"
+# Fewer empty recordings do not go to the page.
+FEWEST_ALARMS = 30
 
 
 def arguments() -> argparse.Namespace:
@@ -74,33 +75,44 @@ def show(answers: Sequence[Scored]) -> None:
 
 
 def write(folder: Path) -> None:
-    """The page and its picture into docs, if every case has an answer; else into the folder, as far as it goes.
+    """The page and its picture in docs, with the parts whose every case has an answer; the others stay as they are.
 
     Of each case the newest answer counts; the page tells by which versions of the tracer.
     """
-    lines = read_lines(folder / "results.jsonl")
+    sections = finished_sections(read_lines(folder / "results.jsonl"))
+    path = ROOT / "docs" / "tracer.md"
+    if sections:
+        old = path.read_text(encoding="utf-8") if path.exists() else ""
+        path.write_text(document.page(old, sections), encoding="utf-8")
+        print(f"\n{path}: {'; '.join(heading.lstrip('# ') for heading in sections)}")
 
-    def answered(cases: Sequence[Case]) -> tuple[Scored, ...]:
-        return scored(cases, finished(cases, lines))
 
-    answers, lifelike = answered(main_cases()), answered(lifelike_cases())
-    empty = answered(alarm_cases(_alarms_in(lines, f"{ALARM}-")))
-    lifelike_empty = answered(lifelike_alarm_cases(_alarms_in(lines, LIFELIKE_ALARM)))
-    if not answers:
-        return
-    is_whole = len(answers) == len(main_cases()) and len(lifelike) == len(lifelike_cases())
-    place = ROOT / "docs" if is_whole else folder
-    place.mkdir(exist_ok=True)
-    save(confusion_figure(answers), str(place / PICTURE))
-    (place / "tracer.md").write_text(page(answers, empty, PICTURE, lifelike, lifelike_empty), encoding="utf-8")
-    counts = f"{len(answers)} cases, {len(empty)} empty recordings"
-    counts += f"; lifelike: {len(lifelike)} cases, {len(lifelike_empty)} empty recordings"
-    print(f"\n{place / 'tracer.md'}: {counts}")
+def finished_sections(lines: Sequence[Line]) -> dict[str, str]:
+    """The page's sections, heading to text, of the parts whose every case has an answer."""
+    parts: tuple[tuple[Sequence[Case], Callable[[Sequence[Scored]], dict[str, str]]], ...] = (
+        (main_cases(), _exact_with_picture),
+        (alarm_cases(_alarms_in(lines, f"{ALARM}-")), document.exact_alarms),
+        (lifelike_cases(), document.lifelike),
+        (lifelike_alarm_cases(_alarms_in(lines, LIFELIKE_ALARM)), document.lifelike_alarms),
+        (platform_cases(), document.platforms),
+    )
+    sections: dict[str, str] = {}
+    for cases, sections_of in parts:
+        answers = scored(cases, finished(cases, lines))
+        if answers and len(answers) == len(cases):
+            sections |= sections_of(answers)
+    return sections
+
+
+def _exact_with_picture(answers: Sequence[Scored]) -> dict[str, str]:
+    save(confusion_figure(answers), str(ROOT / "docs" / PICTURE))
+    return document.exact(answers, PICTURE)
 
 
 def _alarms_in(lines: Sequence[Line], prefix: str) -> int:
     numbers = [int(line.key.removeprefix(prefix)) for line in lines if line.key.startswith(prefix)]
-    return max(numbers, default=-1) + 1
+    count = max(numbers, default=-1) + 1
+    return count if count >= FEWEST_ALARMS else 0
 
 
 if __name__ == "__main__":

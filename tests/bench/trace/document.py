@@ -1,9 +1,10 @@
-"""The page that a whole run leaves: docs/tracer.md, made from the lines alone."""
+"""The page that whole parts of the benchmark leave: docs/tracer.md, made from the lines alone."""
 
 from __future__ import annotations
 
+import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 from tests.rig.lifelike.case import LEAST_RATIO
 
@@ -15,41 +16,97 @@ from .sizes import NATS
 
 COMMAND = "make bench-trace"
 ALPHA = 0.01
+EXACT = (
+    "# The tracer, blind",
+    "## Outcomes",
+    "## What was hidden, and what was said",
+    "## Do the 95 % intervals hold the truth",
+    "## Error, and time",
+)
+EXACT_ALARMS = "## False alarms"
+LIFELIKE = (
+    "## Robots as they are",
+    "### Outcomes of lifelike recordings",
+    "### Named, missed, and named elsewhere",
+    "### Do the 95 % intervals hold the truth there",
+    "### Error, and time, of lifelike recordings",
+)
+LIFELIKE_ALARMS = "### False alarms of lifelike recordings"
+PLATFORMS = (
+    "## Platforms that turn",
+    "### Outcomes on platforms",
+    "### Named, missed, and named elsewhere on platforms",
+    "### Do the 95 % intervals hold the truth on platforms",
+    "### Error, and time, of platforms",
+)
+HEADINGS = (*EXACT[:2], EXACT_ALARMS, *EXACT[2:], *LIFELIKE[:2], LIFELIKE_ALARMS, *LIFELIKE[2:], *PLATFORMS)
+SIZE = "Size is by how many times as much as the little things the hidden one changes CHECK: positions, tensions."
+PLATFORM_ROBOTS = (
+    "Rigid platforms on 4 and 8 cables, recorded with their orientation: exact but for white noise, and lifelike as "
+    "above."
+)
 
 
-def page(
-    answers: Sequence[Scored],
-    empty: Sequence[Scored],
-    picture: str,
-    lifelike: Sequence[Scored] = (),
-    lifelike_empty: Sequence[Scored] = (),
-) -> str:
-    """All of it as Markdown; ``picture`` is the file of the confusion matrix beside it."""
+def page(old: str, sections: Mapping[str, str]) -> str:
+    """The page ``old`` as Markdown with these sections, heading to text, in place of its own of the same headings.
+
+    Parts of the benchmark take hours each, so that a session makes one anew and leaves the others as they stand; each
+    says which version of the tracer answered.
+    """
+    merged = {**_sections(old), **sections}
+    unknown = set(merged) - set(HEADINGS)
+    if unknown:
+        raise KeyError(f"not among the page's headings: {', '.join(sorted(unknown))}")
+    return "\n\n".join(f"{heading}\n\n{merged[heading]}" for heading in HEADINGS if heading in merged) + "\n"
+
+
+def exact(answers: Sequence[Scored], picture: str) -> dict[str, str]:
+    """Sections of the exact recordings; ``picture`` is the file of the confusion matrix beside the page."""
+    made = f"Made by `{COMMAND}`; nothing here is written by hand."
+    texts = (
+        f"{made} {_versions(answers)}\n\n{_how()}",
+        f"{tables.outcomes(answers)}\n\n{tables.meanings(answers)}",
+        f"![Hidden by rows, said by columns]({picture})\n\n{tables.confusions(answers)}",
+        f"Of rightly named effects, every fitted parameter.\n\n{tables.coverage(answers)}",
+        f"{_errors(answers)}\n\n{tables.times(answers)}\n\n{tables.errors(answers)}",
+    )
+    return dict(zip(EXACT, texts, strict=True))
+
+
+def exact_alarms(empty: Sequence[Scored]) -> dict[str, str]:
+    """The section of false alarms on exact recordings."""
+    return {EXACT_ALARMS: _alarms(empty)}
+
+
+def lifelike(answers: Sequence[Scored]) -> dict[str, str]:
+    """Sections of the lifelike recordings."""
+    texts = (f"{_little_things()}\n\n{_versions(answers)}", *_answered(answers))
+    return dict(zip(LIFELIKE, texts, strict=True))
+
+
+def lifelike_alarms(empty: Sequence[Scored]) -> dict[str, str]:
+    """The section of false alarms on lifelike recordings."""
+    return {LIFELIKE_ALARMS: _alarms(empty)}
+
+
+def platforms(answers: Sequence[Scored]) -> dict[str, str]:
+    """Sections of the platforms that turn."""
+    return dict(zip(PLATFORMS, (f"{PLATFORM_ROBOTS}\n\n{_versions(answers)}", *_answered(answers)), strict=True))
+
+
+def _sections(text: str) -> dict[str, str]:
+    """Heading to text of a page as :func:`page` wrote it."""
+    parts = re.split(r"^(#+ .+)$", text, flags=re.MULTILINE)
+    return {heading: body.strip() for heading, body in zip(parts[1::2], parts[2::2], strict=True)}
+
+
+def _answered(answers: Sequence[Scored]) -> tuple[str, ...]:
+    """Outcomes, names, intervals, and errors with times."""
     return (
-        "\n\n".join(
-            [
-                "# The tracer, blind",
-                f"Made by `{COMMAND}`; nothing here is written by hand. {_versions([*answers, *empty])}",
-                _how(),
-                "## Outcomes",
-                tables.outcomes(answers),
-                tables.meanings([*answers, *empty]),
-                "## False alarms",
-                _alarms(empty),
-                "## What was hidden, and what was said",
-                f"![Hidden by rows, said by columns]({picture})",
-                tables.confusions(answers),
-                "## Do the 95 % intervals hold the truth",
-                "Of rightly named effects, every fitted parameter.",
-                tables.coverage(answers),
-                "## Error, and time",
-                _errors(answers),
-                tables.times([*answers, *empty]),
-                tables.errors(answers),
-                *(_lifelike(lifelike, lifelike_empty) if lifelike else ()),
-            ]
-        )
-        + "\n"
+        f"{tables.outcomes(answers)}\n\n{tables.meanings(answers)}",
+        f"{tables.names(answers)}\n\n{tables.confusions(answers)}",
+        f"Of rightly named effects whose form is that of the list.\n\n{tables.coverage(answers)}",
+        f"{SIZE}\n\n{tables.times(answers)}\n\n{tables.errors(answers)}",
     )
 
 
@@ -78,9 +135,8 @@ def _versions(answers: Sequence[Scored]) -> str:
     return f"Answers by the tracer as of sources {versions}."
 
 
-def _lifelike(answers: Sequence[Scored], empty: Sequence[Scored]) -> list[str]:
-    return [
-        "## Robots as they are",
+def _little_things() -> str:
+    return (
         "No robot is quite what its file says. `tests/rig/lifelike` draws robots of 1 m and 1 kg to 100 m and hundreds "
         "of kg on 3 to 8 cables, each recorded twice for 40 s at 100 Hz. Anchors, mass, moduli, dampings, and gains "
         "and zeros of the sensors are off within the uncertainties that the file states. Beside white noise there is "
@@ -90,29 +146,11 @@ def _lifelike(answers: Sequence[Scored], empty: Sequence[Scored]) -> list[str]:
         f"tensions by {LEAST_RATIO:.0f} times or more of what all these do: an effect of the list in its own form "
         "(listed) or in another (form), two effects, what is on no list, or nothing. Right are exactly the names that "
         f"are hidden; a little thing may be named beside them with a share below {100 * MINOR_SHARE:.0f} %. One "
-        "that is named with more, or alone where nothing is hidden, is there all the same: counted apart, as little.",
-        _versions([*answers, *empty]),
-        "### Outcomes of lifelike recordings",
-        tables.outcomes(answers),
-        tables.meanings([*answers, *empty]),
-        "### False alarms of lifelike recordings",
-        _alarms(empty),
-        "### Named, missed, and named elsewhere",
-        tables.names(answers),
-        tables.confusions(answers),
-        "### Do the 95 % intervals hold the truth there",
-        "Of rightly named effects whose form is that of the list.",
-        tables.coverage(answers),
-        "### Error, and time, of lifelike recordings",
-        "Size is by how many times as much as the little things the hidden one changes CHECK: positions, tensions.",
-        tables.times([*answers, *empty]),
-        tables.errors(answers),
-    ]
+        "that is named with more, or alone where nothing is hidden, is there all the same: counted apart, as little."
+    )
 
 
 def _alarms(empty: Sequence[Scored]) -> str:
-    if not empty:
-        return "None tried."
     answered = [answer for answer in empty if answer.outcome != "failed"]
     wrong = rate(sum(answer.outcome == "wrong" for answer in answered), len(answered))
     alarm = rate(sum(answer.outcome == "alarm" for answer in answered), len(answered))
@@ -121,7 +159,8 @@ def _alarms(empty: Sequence[Scored]) -> str:
     return (
         f"Robots that do what their files say, none of them among the cases above. A name where nothing is hidden: "
         f"{tables.shown_rate(wrong)}; `--alpha` was {ALPHA:g}.{small} "
-        f"Unexplained or discovered: {tables.shown_rate(alarm)}. No answer: {len(empty) - len(answered)}."
+        f"Unexplained or discovered: {tables.shown_rate(alarm)}. No answer: {len(empty) - len(answered)}. "
+        f"{_versions(empty)}\n\n{tables.times(empty)}"
     )
 
 

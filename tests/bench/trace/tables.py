@@ -110,9 +110,9 @@ def _size(case: str, part: Part) -> str:
 
 
 def _beside_little(truth: Mapping[str, Any]) -> str:
-    """How much more than the little things the hidden one changes CHECK: positions, tensions."""
+    """How much more than the little things, if there are any, the hidden one changes CHECK: positions, tensions."""
     sizes = (truth[f"size_of_{which}_rms"]["check"] for which in ("hidden", "little"))
-    return ", ".join(f"{hidden / little:.2g}" for hidden, little in zip(*sizes, strict=True))
+    return ", ".join(f"{hidden / little:.2g}" if little else "-" for hidden, little in zip(*sizes, strict=True))
 
 
 def _worst(line: Line) -> float:
