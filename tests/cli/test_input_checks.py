@@ -270,7 +270,7 @@ def test_a_recording_in_other_units_is_refused_by_check_and_trace_in_the_same_wo
 def test_check_that_is_fit_is_refused() -> None:
     robot = read_robot(THREE / "robot.toml")
     fit = read_recording(THREE / "fit.csv", 3)
-    with pytest.raises(RecordingError, match="has the same samples as FIT") as caught:
+    with pytest.raises(RecordingError, match="has all of its 4001 samples in common with FIT") as caught:
         trace(robot, fit, read_recording(THREE / "fit.csv", 3))
     assert "a recording of another motion" in caught.value.hint
 

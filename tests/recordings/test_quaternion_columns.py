@@ -112,7 +112,6 @@ def test_a_lost_platform_has_no_orientation_and_the_sign_goes_on_behind_it(tmp_p
     shows_the_turning(recording, slice(15, None))
     assert recording.orientation[9] @ recording.orientation[15] > 0.0
     assert recording.part(9, 16).orientation.shape == (7, 4)
-    assert not recording.has_same_samples(recording_from_frame(frame(), 3))
 
 
 def test_a_tracker_file_has_orientations(tmp_path: Path) -> None:

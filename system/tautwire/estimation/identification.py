@@ -13,6 +13,7 @@ from threadpoolctl import threadpool_limits
 from ..errors import ArgumentError, NumericalError, RecordingError
 from ..process_signals import defer_interrupts
 from ..recordings.recording import Recording, require_outputs
+from ..recordings.shared_samples import shared_sample_count
 from ..robot.schema import Robot, validate_robot
 from ..validation import NumberRule, validate_callable, validate_instance, validate_integer, validate_number
 from .effect_estimates import parameter_correlations, series_stiffness_notes, with_readable_values
@@ -31,6 +32,7 @@ from .trace_result import Comparison, FoundEffect, Trace
 from .verdict import confirmed_formula
 from .worker_pool import WorkerPool
 
+MAX_SHARED_SAMPLES = 0.1  # of those that validate
 FALSE_ALARM_RATE_RULE = NumberRule("a false-alarm rate below 1, such as 0.01", "", positive=True)
 
 
@@ -58,9 +60,18 @@ def validate_trace_arguments(
             problem = f"has winch speeds of {recording.cable_count} cables, the robot has {robot.cable_count}"
             raise ArgumentError(argument, recording, problem, "give a recording of this robot")
         require_outputs(recording)
-    if check is not None and check.has_same_samples(fit):
+    if check is not None:
+        _require_unseen(fit, check)
+
+
+def _require_unseen(fit: Recording, check: Recording) -> None:
+    """Raises RecordingError where too many samples of a recording were fitted."""
+    shared = shared_sample_count(check, fit)
+    if shared >= MAX_SHARED_SAMPLES * check.sample_count:
+        count = "all" if shared == check.sample_count else f"{shared}"
+        problem = f"has {count} of its {check.sample_count} samples in common with FIT, which they cannot validate"
         hint = "give a recording of another motion, or none: then the second half of FIT validates"
-        raise RecordingError(check.path, "has the same samples as FIT, and can validate nothing", hint)
+        raise RecordingError(check.path, problem, hint)
 
 
 def validated_false_alarm_rate(argument: str, value: object) -> float:

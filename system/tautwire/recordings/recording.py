@@ -154,15 +154,6 @@ class Recording:
         is_same = np.all(winch_speed == self.winch_speed, axis=0)
         return replace(self, winch_speed=winch_speed, rope_length=np.where(is_same, self.rope_length, np.nan))
 
-    def has_same_samples(self, other: "Recording") -> bool:
-        """Whether another recording has the same numbers in all its samples."""
-        return (
-            np.array_equal(self.time, other.time)
-            and np.array_equal(self.winch_speed, other.winch_speed)
-            and np.array_equal(self.measured(), other.measured(), equal_nan=True)
-            and np.array_equal(self.orientation, other.orientation, equal_nan=True)
-        )
-
     def frame(self) -> pd.DataFrame:
         """The recording as a table with the columns of a recording file, NaN where missing; orientation if measured."""
         speeds = [f"winch_speed_{cable}" for cable in range(1, self.cable_count + 1)]

@@ -1,0 +1,51 @@
+"""Samples that two recordings have in common: a copy in other digits, a part, or every second row of the other."""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.spatial import cKDTree
+
+from .recording import Recording
+from .white_noise_estimate import white_noise_deviation
+
+Array = NDArray[np.float64]
+
+# Digits that a file leaves out change a sample by less than its noise.
+TOLERANCE_IN_NOISE = 0.1
+RELATIVE_TOLERANCE = 1e-6
+
+
+def shared_sample_count(recording: Recording, other: Recording) -> int:
+    """Number of samples of a recording that another one has too, in the same order and at a constant stride.
+
+    Outputs alone are compared: commanded winch speeds are the same whenever a motion is repeated, white noise never
+    is. A sample that repeats the one before it, as of a robot at rest without noise, counts in neither recording.
+    """
+    mine, others = (np.hstack((each.measured(), each.orientation)) for each in (recording, other))
+    common = np.isfinite(mine).any(axis=0) & np.isfinite(others).any(axis=0)
+    if not common.any():
+        return 0
+    tolerance = _tolerances(mine[:, common])
+    mine, others = (_changing(np.nan_to_num(each[:, common]) / tolerance) for each in (mine, others))
+    # Balancing the tree takes quadratic time where many samples are alike.
+    tree = cKDTree(others, balanced_tree=False)
+    distance, index = tree.query(mine, p=np.inf, distance_upper_bound=1.0)
+    steps = np.diff(index)[np.isfinite(distance[:-1]) & np.isfinite(distance[1:])]
+    strides = np.bincount(steps[steps > 0])
+    return int(strides.max()) + 1 if len(strides) else 0
+
+
+def _tolerances(outputs: Array) -> Array:
+    """How far apart the same value may be in each column, shape (k,)."""
+    noise = np.array([white_noise_deviation(column[:, None]) for column in outputs.T])
+    largest = np.nanmax(np.abs(outputs), axis=0)
+    tolerances: Array = np.maximum(TOLERANCE_IN_NOISE * noise, RELATIVE_TOLERANCE * largest)
+    return np.maximum(tolerances, np.finfo(float).tiny)
+
+
+def _changing(samples: Array) -> Array:
+    """Samples that differ from the one before them."""
+    differs = np.any(np.diff(samples, axis=0) != 0.0, axis=1)
+    changing: Array = samples[np.concatenate(([True], differs))]
+    return changing
