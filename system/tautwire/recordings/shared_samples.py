@@ -27,7 +27,7 @@ def shared_sample_count(recording: Recording, other: Recording) -> int:
     if not common.any():
         return 0
     tolerance = _tolerances(mine[:, common])
-    mine, others = (_changing(np.nan_to_num(each[:, common]) / tolerance) for each in (mine, others))
+    mine, others = (_changing(np.where(np.isnan(each), 0.0, each)[:, common] / tolerance) for each in (mine, others))
     # Balancing the tree takes quadratic time where many samples are alike.
     tree = cKDTree(others, balanced_tree=False)
     distance, index = tree.query(mine, p=np.inf, distance_upper_bound=1.0)
