@@ -4,6 +4,7 @@ import importlib
 import os
 import pkgutil
 import re
+import shlex
 import shutil
 import subprocess
 import sys
@@ -14,9 +15,11 @@ from typing import Any
 
 import fmpy.ssp.simulation as ssp_simulation
 import pytest
+import typer
 
 import tautwire
 from tautwire.campaigns import plan_file as plans
+from tautwire.cli import app
 from tautwire.cli import run as command
 from tautwire.cli.progress_lines import LINE_INTERVAL
 from tautwire.cosimulation.robot_wiring import result_columns
@@ -234,3 +237,20 @@ def test_pages_name_only_what_is_there() -> None:
     for page in (*DOCS.glob("*.md"), ROOT / "README.md", ROOT / "CONTRIBUTING.md"):
         for place in re.findall(r"`((?:tests|system|fmu_src|docs)/[\w/.]+)`", page.read_text(encoding="utf-8")):
             assert (ROOT / place).exists(), f"{page.name}: {place}"
+
+
+def test_pages_show_commands_and_options_that_exist() -> None:
+    group = typer.main.get_command(app)
+    assert isinstance(group, typer.core.TyperGroup)
+    shown = [line for page in DOCS.glob("*.md") for line in commands_of(page.read_text(encoding="utf-8"))]
+    assert len(shown) > 20
+    for line in shown:
+        name, *arguments = shlex.split(line, comments=True)[1:]
+        group.commands[name].make_context(name, arguments)
+    with pytest.raises(Exception, match="No such option"):
+        group.commands["build"].make_context("build", ["robot.toml", "--oot", "build/"])
+
+
+def commands_of(page: str) -> list[str]:
+    """Lines of its blocks that run the command line."""
+    return re.findall(r"^tautwire .*", page.replace("\\\n", " "), re.MULTILINE)

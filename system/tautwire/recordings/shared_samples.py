@@ -29,16 +29,16 @@ def shared_sample_count(recording: Recording, other: Recording) -> int:
     tolerance = _tolerances(mine[:, common])
     mine, others = (_changing(np.where(np.isnan(each), 0.0, each)[:, common] / tolerance) for each in (mine, others))
     # Balancing the tree takes quadratic time where many samples are alike.
-    tree = cKDTree(others, balanced_tree=False)
-    distance, index = tree.query(mine, p=np.inf, distance_upper_bound=1.0)
-    steps = np.diff(index)[np.isfinite(distance[:-1]) & np.isfinite(distance[1:])]
+    distances, indices = cKDTree(others, balanced_tree=False).query(mine, p=np.inf, distance_upper_bound=1.0)
+    is_shared = np.isfinite(distances)
+    steps = np.diff(indices)[is_shared[:-1] & is_shared[1:]]
     strides = np.bincount(steps[steps > 0])
     return int(strides.max()) + 1 if len(strides) else 0
 
 
 def _tolerances(outputs: Array) -> Array:
     """How far apart the same value may be in each column, shape (k,)."""
-    noise = np.array([white_noise_deviation(column[:, None]) for column in outputs.T])
+    noise = np.array([white_noise_deviation(column) for column in np.split(outputs, outputs.shape[1], axis=1)])
     largest = np.nanmax(np.abs(outputs), axis=0)
     tolerances: Array = np.maximum(TOLERANCE_IN_NOISE * noise, RELATIVE_TOLERANCE * largest)
     return np.maximum(tolerances, np.finfo(float).tiny)
