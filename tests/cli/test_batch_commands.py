@@ -7,10 +7,12 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterator
+from hashlib import sha256
 from pathlib import Path
 from typing import NamedTuple
 from urllib.request import urlopen
 
+import pyarrow.parquet as pq
 import pytest
 
 pytest.importorskip("distributed", reason='Dask is not installed: pip install "dask[distributed]" SALib')
@@ -18,6 +20,7 @@ pytest.importorskip("distributed", reason='Dask is not installed: pip install "d
 from distributed import Client
 
 from tautwire.campaigns.plan_file import read_plan
+from tautwire.provenance import PROVENANCE_KEY
 from tests.support.campaigns import moving, plan_file
 from tests.support.clusters import bare_rows, cluster, rows_of
 
@@ -65,7 +68,12 @@ def test_two_workers_of_the_users_make_what_a_bare_loop_makes(users: Users, tmp_
     page, rows = out / "index.html", out / "runs"
     assert completed.stderr.splitlines()[-1] == f"next: open {page}; pandas.read_parquet('{rows}') has one row per run"
     assert rows_of(out) == bare_rows(read_plan(file), tmp_path / "bare")
-    assert json.loads((out / "summary.json").read_text(encoding="utf-8"))["failed"] == 0
+    document = json.loads((out / "summary.json").read_text(encoding="utf-8"))
+    assert document["failed"] == 0
+    assert document["provenance"]["inputs"][str(file)] == sha256(file.read_bytes()).hexdigest()
+    parts = [json.loads(pq.read_schema(part).metadata[PROVENANCE_KEY.encode()]) for part in rows.glob("*.parquet")]
+    assert parts and all(part["inputs"] == document["provenance"]["inputs"] for part in parts)
+    assert document["provenance"]["inputs"][str(file)] in page.read_text(encoding="utf-8")
     again = users.campaign(file, out)
     assert (again.returncode, again.stdout.splitlines()[0]) == (0, "16 runs, 0 of them now, 0 failed")
 

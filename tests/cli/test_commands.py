@@ -7,6 +7,7 @@ import subprocess
 import sys
 import time
 from pathlib import Path
+from typing import Any
 
 import pandas as pd
 import pytest
@@ -215,11 +216,23 @@ def test_json_is_one_object_and_quiet_is_silent(
     place = str(tmp_path / out)
     assert run([*arguments, "--out", place, "--json", "--quiet"]) == 0
     captured = capsys.readouterr()
-    assert keys <= set(json.loads(captured.out))
+    document = json.loads(captured.out)
+    assert keys <= set(document)
     assert place in captured.out
     assert captured.err == ""
+    assert_provenance_written(tmp_path, document)
     assert run([*arguments, "--out", place, "--quiet"]) == 0
     assert tuple(capsys.readouterr()) == ("", "")
+
+
+def assert_provenance_written(folder: Path, document: dict[str, Any]) -> None:
+    """Each file that holds text names the command and the hashes of its inputs; an FMU has the version alone."""
+    files = [path for path in folder.rglob("*") if path.suffix in (".csv", ".json", ".toml")]
+    metadata = [path.with_name(f"{path.name}-metadata.json") for path in files if path.suffix == ".csv"]
+    for file in [*metadata, *(path for path in files if path.suffix != ".csv")]:
+        text = file.read_text(encoding="utf-8")
+        assert f"tautwire {document['provenance']['command'].split()[1]} " in text, file
+        assert all(digest in text for digest in document["provenance"]["inputs"].values()), file
 
 
 def test_excite_tells_the_forms_of_an_effect_apart(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:

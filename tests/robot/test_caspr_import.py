@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -170,7 +171,9 @@ def test_the_command_writes_a_robot_file_that_can_be_linearised(
     robot, plant = tmp_path / "hall.toml", tmp_path / "model.json"
     assert run(["import", str(model(tmp_path)), "--out", str(robot), "--area", "2e-5"]) == 0
     assert "assumed, as CASPR has none" in capsys.readouterr().err
-    assert "# assumed, as CASPR has none" in robot.read_text(encoding="utf-8")
+    text = robot.read_text(encoding="utf-8")
+    assert "# assumed, as CASPR has none" in text
+    assert "tautwire import " in text and len(re.findall(r"\b[0-9a-f]{64}\b", text)) == 2
     assert read_robot(robot) == read_caspr_robot(tmp_path, rope=Rope(area=2e-5)).robot
     assert run(["linearise", str(robot), "--out", str(plant)]) == 0
     assert run(["import", str(tmp_path), "--out", str(robot), "--modulus", "-1"]) == 2
