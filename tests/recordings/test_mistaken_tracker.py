@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -13,7 +14,7 @@ from tautwire.errors import RecordingError
 from tautwire.recordings import tracker as tracker_module
 from tautwire.recordings.alternative_readings import mistakes_text
 from tautwire.recordings.consistency import recording_mistakes
-from tautwire.recordings.mistaken_tracker import tracker_mistakes
+from tautwire.recordings.mistaken_tracker import frame_mistakes, tracker_mistakes
 from tautwire.recordings.recording import Recording, read_recording
 from tautwire.robot.schema import RecordedColumn, Tracker
 from tests.support.robots import EXAMPLES, example
@@ -112,6 +113,64 @@ def test_axes_of_a_tracker_are_mended_in_its_table(tmp_path: Path) -> None:
     mended = tuple(replace(column, name=told.get(column.column, {}).get("name", column.name)) for column in declared)
     robot = replace(robot, tracker=Tracker(mended, 5.25, 1.0))
     assert recording_mistakes(robot, tracker_module.with_tracker(robot, log, file)) == ()
+
+
+TURN = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
+FRAMES = {
+    "origin": (lambda position: position - [20.0, -8.0, 4.0], ["x, y, z have another origin"]),
+    "z down": (lambda position: position * [1.0, 1.0, -1.0], ["are the recording's x, y, -z"]),
+    "a quarter turn": (lambda position: position @ TURN, ["are the recording's"]),
+    "a left-handed frame in mm": (
+        lambda position: 1e3 * (position * [1.0, -1.0, 1.0] - [2.0, 0.5, 1.0]),
+        ["x, y, z are in mm", "are the recording's x, -y, z", "x, y, z have another origin"],
+    ),
+}
+
+
+@pytest.mark.parametrize("frame", FRAMES)
+def test_the_frame_of_a_tracker_is_told_whatever_its_clock(monkeypatch: pytest.MonkeyPatch, frame: str) -> None:
+    change, causes = FRAMES[frame]
+    log, tracker = files("three")
+    framed = replace(tracker, position=change(tracker.position))
+    assert tracker_mistakes(example("three"), log, framed) == ()
+    (mistakes,) = frame_mistakes(example("three"), log, framed)
+    assert len(mistakes) == len(causes) and all(mistake.is_of_tracker for mistake in mistakes)
+    assert all(cause in mistake.cause for cause, mistake in zip(causes, mistakes, strict=True))
+    columns = told_columns(mistakes_text([mistakes], log, framed)[1], "recording.tracker.columns")
+    mended = np.column_stack([_read(framed, axis, columns.get(axis, {})) for axis in "xyz"])
+    assert np.nanmax(np.abs(mended - tracker.position)) < 0.1
+    monkeypatch.setattr(tracker_module, "read_tracker", lambda *_: replace(tracker, position=mended))
+    assert recording_mistakes(example("three"), tracker_module.with_tracker(example("three"), log, "t.csv")) == ()
+
+
+def _read(tracker: Recording, axis: str, column: dict[str, Any]) -> np.ndarray:
+    """What a declared column reads."""
+    source = tracker.position[:, "xyz".index(column.get("name", axis))]
+    unit = {"": 1.0, "mm": 1e-3}[column.get("unit", "")]
+    return np.asarray(column.get("sign", 1.0) * unit * (source - column.get("offset", 0.0)))
+
+
+def test_another_motion_is_no_mistake_of_the_frame() -> None:
+    log, tracker = files("three")
+    random = np.random.default_rng(3)
+    steps = np.cumsum(np.cumsum(random.standard_normal(tracker.position.shape), axis=0), axis=0)
+    other = tracker.position[0] + 3.0 * steps / np.abs(steps).max()
+    assert frame_mistakes(example("three"), log, replace(tracker, position=other)) == ()
+
+
+@pytest.mark.parametrize(("stated", "unit", "size"), [("cm", "mm", 1e3), ("mm", "m", 1.0)])
+def test_a_unit_that_is_stated_wrongly_is_told(
+    monkeypatch: pytest.MonkeyPatch, stated: str, unit: str, size: float
+) -> None:
+    log, tracker = files("three")
+    columns = {axis: RecordedColumn(axis, f"Body {axis}", stated, table="recording.tracker.columns") for axis in "xyz"}
+    read = replace(tracker, position=size * tracker.position * {"cm": 1e-2, "mm": 1e-3}[stated], columns=columns)
+    monkeypatch.setattr(tracker_module, "read_tracker", lambda *_: read)
+    with pytest.raises(RecordingError, match=f"but do if x, y, z are in {unit}, not in {stated}") as caught:
+        tracker_module.with_tracker(example("three"), log, "tracker.csv")
+    told = told_columns(caught.value.hint, "recording.tracker.columns")
+    factor = {"cm": 0.1, "mm": 1000}[stated]
+    assert told == {axis: {"name": f"Body {axis}", "unit": stated, "factor": factor} for axis in "xyz"}
 
 
 def test_a_clock_has_no_line_for_its_time() -> None:

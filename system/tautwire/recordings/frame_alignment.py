@@ -40,7 +40,7 @@ def aligned_frames(robot: Robot, poses: RecordedPoses, wound: Array) -> Iterator
     recorded, in_plane = poses.position, list(robot.axes_in_plane)
     if robot.platform.is_rigid_body or not np.isfinite(recorded[:, in_plane]).all():
         return
-    scale, axes = _procrustes(recorded[:, in_plane], _forward_kinematics(robot, wound)[:, in_plane])
+    scale, axes = _procrustes(recorded[:, in_plane], forward_kinematics_of_travel(robot, wound)[:, in_plane])
     unit = min(LENGTH_UNITS, key=lambda symbol: abs(np.log(max(scale, 1e-300) / LENGTH_UNITS[symbol])))
     if axes is None or abs(scale / LENGTH_UNITS[unit] - 1.0) > MAX_SCALE_ERROR:
         return
@@ -50,8 +50,8 @@ def aligned_frames(robot: Robot, poses: RecordedPoses, wound: Array) -> Iterator
     yield _with_fitted_frame(robot, geometry, poses, wound, is_turned=error > MAX_AXES_ERROR)
 
 
-def _forward_kinematics(robot: Robot, wound: Array) -> Array:
-    """Positions (M, 3) at which straight ropes have the lengths that winches wound (M, n), by Gauss and Newton."""
+def forward_kinematics_of_travel(robot: Robot, wound: Array) -> Array:
+    """Positions (M, 3) of a point mass, by Gauss and Newton, at which straight ropes have the lengths wound (M, n)."""
     anchors, in_plane = np.array(robot.anchors), list(robot.axes_in_plane)
     positions = np.tile(np.array(robot.platform.start, dtype=float), (len(wound), 1))
     lengths = np.linalg.norm(anchors - positions[:1], axis=1) - (wound - wound[0])

@@ -81,8 +81,8 @@ class GeometryReading:
     """How poses and the robot file's points are read: units, axes with their signs, frame, and quaternion.
 
     ``p = rotation @ (signs * shown[axes] * unit) + origin``, in the robot file's frame. The recorded ``odd_axis`` is in
-    a unit of its own. ``attachment_unit`` is also that of the centre of mass, whose positions are recorded where
-    ``is_centre_of_mass``.
+    a unit of its own; positions were read as if they were in their ``stated_unit``. ``attachment_unit`` is also that of
+    the centre of mass, whose positions are recorded where ``is_centre_of_mass``.
     """
 
     position_unit: str = "m"
@@ -96,6 +96,7 @@ class GeometryReading:
     attachment_unit: str = "m"
     quaternion: QuaternionReading = QuaternionReading()
     is_centre_of_mass: bool = False
+    stated_unit: str = "m"
 
     def robot(self, declared: Robot) -> Robot:
         """The robot with its points in m."""
@@ -122,6 +123,10 @@ class GeometryReading:
         in_frame = Rotation.from_matrix(self.rotation).as_quat()[[3, 0, 1, 2]].tolist()
         return np.column_stack(multiply(in_frame, (quaternion[:, 0], *axis.T)))
 
+    def _factor(self, unit: str) -> float:
+        """By what positions in a unit, read in the stated one, have to be multiplied."""
+        return LENGTH_UNITS[unit] / LENGTH_UNITS[self.stated_unit]
+
     @property
     def _handedness(self) -> float:
         """1 where the axes are right-handed as recorded, -1 where they are mirrored."""
@@ -133,9 +138,9 @@ class GeometryReading:
         A coordinate that was not measured is the start's.
         """
         robot = self.robot(declared)
-        sizes = np.full(len(AXES), LENGTH_UNITS[self.position_unit])
+        sizes = np.full(len(AXES), self._factor(self.position_unit))
         if self.odd_axis is not None:
-            sizes[self.odd_axis] = LENGTH_UNITS[self.odd_unit]
+            sizes[self.odd_axis] = self._factor(self.odd_unit)
         read = (shown.position * sizes)[:, self.axes] * self.signs
         for axis in range(len(AXES)):
             if axis not in declared.axes_in_plane or not np.isfinite(read[:, axis]).any():
@@ -158,12 +163,13 @@ class GeometryReading:
         """What this reading changes, also of quaternions where there are any."""
         yield from self.quaternion.mistakes()
         others = [axis for index, axis in enumerate(AXES) if index != self.odd_axis]
-        if self.position_unit != "m":
-            unit, names, factor = self.position_unit, ", ".join(others), LENGTH_UNITS[self.position_unit]
-            yield Mistake(f"{names} are in {unit}", convert(names, factor), scaled(others, factor, unit))
-        if self.odd_axis is not None and self.odd_unit != "m":
-            unit, name, factor = self.odd_unit, AXES[self.odd_axis], LENGTH_UNITS[self.odd_unit]
-            yield Mistake(f"{name} is in {unit}", convert(name, factor), scaled((name,), factor, unit))
+        stated = "" if self.stated_unit == "m" else f", not in {self.stated_unit}"
+        if self.position_unit != self.stated_unit:
+            unit, names, factor = self.position_unit, ", ".join(others), self._factor(self.position_unit)
+            yield Mistake(f"{names} are in {unit}{stated}", convert(names, factor), scaled(others, factor, unit))
+        if self.odd_axis is not None and self.odd_unit != self.stated_unit:
+            unit, name, factor = self.odd_unit, AXES[self.odd_axis], self._factor(self.odd_unit)
+            yield Mistake(f"{name} is in {unit}{stated}", convert(name, factor), scaled((name,), factor, unit))
         if self.anchor_unit != "m":
             yield _in_other_unit("anchors in the robot file are", self.anchor_unit)
         if self.attachment_unit != "m":

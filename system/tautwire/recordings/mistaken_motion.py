@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from ..robot.schema import Robot
-from .alternative_readings import TIME_UNITS, Mistake, WindingReading
+from ..robot.schema import AXES, Robot
+from .alternative_readings import LENGTH_UNITS, TIME_UNITS, Mistake, WindingReading
 from .candidate_readings import (
     SAMPLE_INTERVALS,
     are_of_one_system,
@@ -45,6 +45,12 @@ class MotionReading:
     misfit: float
     mistakes: tuple[Mistake, ...]
     penalty: int = 0
+
+    @property
+    def is_of_winches(self) -> bool:
+        """Whether winches are read otherwise than declared."""
+        winding = self.winding
+        return winding != WindingReading(signs=(1,) * len(winding.signs), order=tuple(range(len(winding.order))))
 
 
 @dataclass(frozen=True)
@@ -92,6 +98,27 @@ def check_motion(robot: Robot, recording: Recording) -> MotionCheck | None:
     fewest mistakes are returned. None where the winches or the platform hardly move, or so fast that it swings on its
     ropes, and where positions are known along too few axes, or a rigid platform's orientation is not.
     """
+    check, unit = _check_as_read(robot, recording), _stated_unit(recording)
+    if check is None or not check.misfit > MAX_MISFIT or unit == "m":
+        return check
+    in_metres = _check_as_read(robot, replace(recording, position=recording.position / LENGTH_UNITS[unit]))
+    if in_metres is None:
+        return check
+    declared = WindingReading(signs=(1,) * robot.cable_count, order=tuple(range(robot.cable_count)))
+    others = [(each.geometry, each.winding, each.misfit) for each in in_metres.readings]
+    others += [(GeometryReading(), declared, in_metres.misfit)] if in_metres.misfit <= MAX_MISFIT else []
+    stated = [_reading(replace(each[0], stated_unit=unit), *each[1:], recording) for each in others]
+    return replace(check, readings=_best([*check.readings, *stated], check.misfit))
+
+
+def _stated_unit(recording: Recording) -> str:
+    """The unit other than m that all positions are said to be in; else m."""
+    units = {recording.columns[axis].unit if axis in recording.columns else "" for axis in AXES}
+    (unit, *others) = sorted(units)
+    return unit if not others and unit in LENGTH_UNITS else "m"
+
+
+def _check_as_read(robot: Robot, recording: Recording) -> MotionCheck | None:
     rows = moving_rows(robot, recording)
     units = {} if rows is None else quasi_static_units(robot, recording, rows)
     if rows is None or not units:

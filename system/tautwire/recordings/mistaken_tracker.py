@@ -7,14 +7,21 @@ from dataclasses import dataclass, field, replace
 from itertools import combinations, groupby, product
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..errors import RecordingError
 from ..robot.schema import AXES, Robot
 from .alternative_readings import LENGTH_UNITS, TIME_UNITS, Mistake, WindingReading, convert
 from .candidate_readings import SAMPLE_INTERVALS
 from .column_corrections import scaled
+from .frame_alignment import forward_kinematics_of_travel
+from .geometry_reading import recorded_poses
+from .mistaken_motion import EQUAL_DIFFERENCE, EQUAL_RATIO, MAX_MISFIT, MotionReading, check_motion
 from .recording import Recording
-from .tracker_clock import estimate_tracker_clock, least_travel_mismatch
+from .tracker_clock import MIN_GRID_INTERVAL, estimate_tracker_clock, least_travel_mismatch
+from .travel_correlation import distance_lags
+
+Array = NDArray[np.float64]
 
 POSITION_UNITS = ("m", "mm", "cm", "in")
 WINCH_SPEED_UNITS = ("m/s", "mm/s", "cm/s", "m/min")
@@ -22,6 +29,7 @@ WINCH_SPEED_UNITS = ("m/s", "mm/s", "cm/s", "m/min")
 MAX_MISTAKES = 3
 # Of their energy: travels that differ by more fit at no offset, which takes long to find out.
 MAX_TRAVEL_MISMATCH = 0.3
+MAX_OFFSETS = 3
 
 
 @dataclass(frozen=True)
@@ -75,6 +83,58 @@ def tracker_mistakes(robot: Robot, log: Recording, tracker: Recording) -> tuple[
         if fitting:
             return tuple(reading.mistakes(log) for reading in fitting)
     return ()
+
+
+def frame_mistakes(robot: Robot, log: Recording, tracker: Recording) -> tuple[tuple[Mistake, ...], ...]:
+    """Mistakes in unit, axes, rotation and origin of a tracker of a point mass, at whatever offset of its clock.
+
+    Distances travelled, which no frame changes, tell the offset against positions by forward kinematics of the winches.
+    Each entry is one set of mistakes that explains the tracker; empty where none does.
+    """
+    measured = np.asarray(np.isfinite(tracker.position).any(axis=0))
+    rows = np.flatnonzero(np.isfinite(tracker.position[:, measured]).all(axis=1))
+    if robot.platform.is_rigid_body or not measured[list(robot.axes_in_plane)].all() or not np.any(log.winch_speed):
+        return ()
+    followed = forward_kinematics_of_travel(robot, log.wound_lengths())
+    shown, start = np.where(measured, tracker.position[rows], 0.0), tracker.time[rows[0]]
+    interval = max(MIN_GRID_INTERVAL, *(float(np.median(np.diff(each.time))) for each in (log, tracker)))
+    lags = distance_lags((tracker.time[rows], shown), (log.time, followed), interval)
+    readings = [reading for lag in lags[:MAX_OFFSETS] for reading in _of_frame(robot, log, tracker, float(lag + start))]
+    best = min((reading.misfit for reading in readings), default=np.inf)
+    fitting = [each for each in readings if each.misfit <= min(MAX_MISFIT, EQUAL_RATIO * best + EQUAL_DIFFERENCE)]
+    return tuple(dict.fromkeys(tuple(replace(m, is_of_tracker=True) for m in each.mistakes) for each in fitting))
+
+
+def _of_frame(robot: Robot, log: Recording, tracker: Recording, offset: float) -> list[MotionReading]:
+    """Readings of the tracker's frame alone near an offset of its clock, which then follows from each of them."""
+    readings = []
+    for rough in _frames(robot, log, tracker, offset):
+        read = replace(tracker, position=rough.geometry.positions(robot, recorded_poses(tracker)))
+        try:
+            clock = estimate_tracker_clock(robot, log, read)
+        except RecordingError:
+            continue
+        readings += _frames(robot, log, tracker, clock.offset)
+    return readings
+
+
+def _frames(robot: Robot, log: Recording, tracker: Recording, offset: float) -> list[MotionReading]:
+    check = check_motion(robot, _merged(log, tracker, offset))
+    return [] if check is None else [reading for reading in check.readings if not reading.is_of_winches]
+
+
+def _merged(log: Recording, tracker: Recording, offset: float) -> Recording:
+    """The log with the tracker's positions, whose clock shows the offset at the log's first sample."""
+    times = tracker.time - offset + log.time[0]
+    columns = [_at(log.time, times, column) for column in tracker.position.T]
+    return replace(log, position=np.column_stack(columns), columns={**log.columns, **tracker.columns})
+
+
+def _at(wanted: Array, times: Array, column: Array) -> Array:
+    finite = np.isfinite(column)
+    if not finite.any():
+        return np.full(len(wanted), np.nan)
+    return np.interp(wanted, times[finite], column[finite], left=np.nan, right=np.nan)
 
 
 def _readings(log: Recording, tracker: Recording) -> Iterator[TrackerReading]:

@@ -13,7 +13,7 @@ from ..robot.recorded_columns import POSE_COLUMNS, TRACKER_TABLE
 from ..robot.schema import RecordedColumn, Robot
 from .alternative_readings import mistakes_text
 from .consistency import travel_error
-from .mistaken_tracker import tracker_mistakes
+from .mistaken_tracker import frame_mistakes, tracker_mistakes
 from .quaternion_columns import unit_quaternions
 from .recording import Recording, read_tracker
 from .tracker_clock import TrackerClock, UnmatchedTravelError, estimate_tracker_clock
@@ -76,6 +76,8 @@ def _estimated_clock(robot: Robot, log: Recording, tracker: Recording) -> Tracke
         of_travel = travel_error(robot, log)
         is_mistaken = of_travel is not None or isinstance(error, UnmatchedTravelError)
         alternatives = tracker_mistakes(robot, log, tracker) if is_mistaken else ()
+        if not alternatives and isinstance(error, UnmatchedTravelError):
+            alternatives = frame_mistakes(robot, log, tracker)
         if not alternatives:
             raise of_travel or error from None
         causes, remedies = mistakes_text(alternatives, log, tracker)

@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.signal import correlate
+from scipy.signal import correlate, correlation_lags
 
 Array = NDArray[np.float64]
 
 TRAVEL_WINDOW = 0.2  # s; travel over a shorter time drowns in a tracker's noise
 MAX_CANDIDATES = 8
+# Of distances: the share of the motion of one that the other has to have recorded too, and what candidates may miss.
+MIN_SHARED_MOTION, MAX_DISTANCE_MISFIT = 0.5, 0.1
 
 
 def travel_on_grid(times: Array, lengths: Array, interval: float) -> tuple[Array, Array]:
@@ -51,3 +53,27 @@ def _valley(misfits: Array, index: int, reach: int) -> slice:
     while last + 1 < len(misfits) and (last - index < reach or misfits[last + 1] >= misfits[last]):
         last += 1
     return slice(first, last + 1)
+
+
+def distance_lags(first: tuple[Array, Array], second: tuple[Array, Array], interval: float) -> list[float]:
+    """Lags (s) at which the distances travelled in both paths correlate best, the best first, in whatever frames.
+
+    A path is its times (K,) and positions (K, 3); neither unit, axes nor origin of either change the normalised
+    cross-correlation of the distances over the window. A lag is that of the first behind the second, both counted from
+    their first sample.
+    """
+    distances, known = zip(*(_distances_on_grid(*path, interval) for path in (first, second)), strict=True)
+    squares = [distance**2 for distance in distances]
+    energies = correlated(squares[0], known[1]), correlated(known[0], squares[1])
+    shares = np.maximum(*(energy / max(np.sum(own), 1e-300) for energy, own in zip(energies, squares, strict=True)))
+    is_shared = shares >= MIN_SHARED_MOTION
+    scale = np.sqrt(np.where(is_shared, np.maximum(energies[0] * energies[1], 1e-300), 1.0))
+    misfits = np.where(is_shared, 1.0 - correlated(distances[0], distances[1]) / scale, np.inf)
+    lags = interval * correlation_lags(len(distances[0]), len(distances[1]))
+    reach = round(TRAVEL_WINDOW / interval) + 1
+    return [float(lags[index]) for index in lowest_valleys(misfits, float(misfits.min()) + MAX_DISTANCE_MISFIT, reach)]
+
+
+def _distances_on_grid(times: Array, positions: Array, interval: float) -> tuple[Array, Array]:
+    travel, known = travel_on_grid(times, positions, interval)
+    return np.linalg.norm(travel, axis=1), known
