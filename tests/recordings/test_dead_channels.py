@@ -101,3 +101,13 @@ def test_an_orientation_that_freezes_while_the_platform_moves_is_not_used_there(
     assert np.flatnonzero(np.isnan(cleaned.orientation).any(axis=1)).tolist() == list(range(100, 160))
     assert notes == ("log.csv: qw, qx, qy, qz: frozen for 60 samples while positions move: not used there",)
     assert without_dead_channels(RIGID) == (RIGID, ())
+
+
+def test_positions_that_a_tracker_repeats_while_winches_move_are_emptied() -> None:
+    position = WHOLE.position.copy()
+    position[300:500] = position[300]
+    cleaned, notes = without_dead_channels(replace(WHOLE, position=position))
+    assert np.isnan(cleaned.position[301:500]).all() and np.isfinite(cleaned.position[:301]).all()
+    assert notes == (f"{WHOLE.path}: x, y, z: frozen for 199 samples while winches move: not used there",)
+    at_rest = replace(WHOLE, position=position, winch_speed=np.zeros_like(WHOLE.winch_speed))
+    assert without_dead_channels(at_rest)[1] == ()

@@ -14,6 +14,7 @@ from .geometry_reading import GeometryReading, recorded_poses
 from .mistaken_motion import MAX_MISFIT, MotionCheck, check_motion
 from .mistaken_orientation import start_orientation_error
 from .mistaken_tensions import TensionCheck, check_tensions
+from .odd_winches import OddWinch, odd_winches
 from .recording import Recording
 
 Array = NDArray[np.float64]
@@ -69,6 +70,8 @@ def recording_mistakes(robot: Robot, recording: Recording) -> tuple[RecordingErr
         return (travel,)
     elif error := speed_error(recording) or start_orientation_error(robot, recording):
         return (error,)
+    elif motion is not None and motion.misfit > MAX_MISFIT:
+        errors += [_odd_winch_error(recording, each) for each in odd_winches(robot, recording)]
     if robot.formulas or declared & EFFECTS_ON_FORCES:
         return tuple(errors)
     tensions = check_tensions(robot, recording, geometry, winding)
@@ -117,6 +120,11 @@ def _motion_error(robot: Robot, recording: Recording, motion: MotionCheck) -> Re
         f"{_percentage(motion.readings[0].misfit)} if {causes}"
     )
     return RecordingError(recording.path, problem, remedies)
+
+
+def _odd_winch_error(recording: Recording, odd: OddWinch) -> RecordingError:
+    problem = f"winch travel of cable {odd.cable} does not match the positions: it is off by {_percentage(odd.misfit)}"
+    return RecordingError(recording.path, problem + (f", and {odd.cause}" if odd.cause else ""), odd.remedy)
 
 
 def _tension_error(recording: Recording, tensions: TensionCheck) -> RecordingError:

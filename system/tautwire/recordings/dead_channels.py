@@ -58,12 +58,25 @@ def without_dead_channels(
         for index, count in enumerate(_clear_frozen(columns, policy)):
             if count:
                 notes.append(f"{names[index]}: frozen for {count} samples while others move: not used there")
+    if count := _clear_lost_positions(measured[:, :3], recording.wound_lengths(), policy):
+        notes.append(f"x, y, z: frozen for {count} samples while winches move: not used there")
     orientation, orientation_notes = _without_dead_orientation(recording, policy)
     notes += orientation_notes
     if not notes:
         return recording, ()
     messages = tuple(f"{recording.path}: {note}" for note in notes)
     return replace(recording, position=measured[:, :3], tension=measured[:, 3:], orientation=orientation), messages
+
+
+def _clear_lost_positions(positions: Array, wound: Array, policy: DeadChannelPolicy) -> int:
+    """Empty positions (N, 3) that a tracker repeats while ropes (N, n) are wound; returns the number of samples."""
+    is_lost = np.zeros(len(positions), dtype=bool)
+    noise = white_noise_deviation(positions)
+    for rows in _repeated_stretches(~_changed_rows(positions), policy.min_frozen_samples):
+        travel = float(np.ptp(wound[rows], axis=0).max())
+        is_lost[rows] = bool(np.isfinite(positions[rows]).any()) and travel > policy.live_noise_ratio * noise
+    positions[is_lost] = np.nan
+    return int(np.sum(is_lost))
 
 
 def _without_dead_orientation(recording: Recording, policy: DeadChannelPolicy) -> tuple[Array, list[str]]:

@@ -1,0 +1,121 @@
+"""Faults of one winch or one exit point are told with their cause; effects on ropes are not taken for them."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from tautwire.recordings.consistency import recording_mistakes
+from tautwire.recordings.odd_winches import odd_winches
+from tautwire.recordings.recording import Recording, read_recording
+from tautwire.robot.schema import Robot
+from tests.support.robots import EXAMPLES, example
+
+CABLE = 2
+Change = Callable[[np.ndarray, np.ndarray], None]
+
+
+def recorded(name: str = "three") -> Recording:
+    return read_recording(EXAMPLES / name / "fit.csv", example(name).cable_count)
+
+
+def with_speeds(change: Change) -> Recording:
+    """The recording of the example after a change of winch speeds (N, 3) at its times (N,)."""
+    recording = recorded()
+    speeds = recording.winch_speed.copy()
+    change(recording.time, speeds)
+    return recording.with_winch_speed(speeds)
+
+
+def stuck(time: np.ndarray, speeds: np.ndarray) -> None:
+    speeds[time >= 12.0, CABLE - 1] = 0.0
+
+
+def copied(time: np.ndarray, speeds: np.ndarray) -> None:
+    speeds[:, CABLE - 1] = speeds[:, 2]
+
+
+def clipped(time: np.ndarray, speeds: np.ndarray) -> None:
+    largest = 0.3 * np.abs(speeds).max()
+    # Noise lets it leave the limit in between, so that it is never held for long.
+    is_seen = np.arange(len(speeds)) % 8 > 0
+    speeds[is_seen] = np.clip(speeds[is_seen], -largest, largest)
+    speeds[~is_seen] = np.clip(speeds[~is_seen], -0.99 * largest, 0.99 * largest)
+
+
+def unsigned(time: np.ndarray, speeds: np.ndarray) -> None:
+    speeds[:, CABLE - 1] = np.abs(speeds[:, CABLE - 1])
+
+
+def lost(time: np.ndarray, speeds: np.ndarray) -> None:
+    speeds[(time > 15.0) & (time <= 15.5), CABLE - 1] += 8.0
+
+
+def wrapped(time: np.ndarray, speeds: np.ndarray) -> None:
+    speeds[[900, 1700, 2500], CABLE - 1] += [400.0, -900.0, 700.0]
+
+
+FAULTS: dict[str, tuple[Change, str]] = {
+    "stuck": (stuck, "winch_speed_2 stays at 0 from 12 to 40 s"),
+    "copied": (copied, "winch_speed_2 repeats winch_speed_3"),
+    "clipped": (clipped, "is clipped at"),
+    "unsigned": (unsigned, "winch_speed_2 is never negative"),
+    "counts lost": (lost, "its rope is"),
+    "counts wrapped": (wrapped, "as where counts wrap"),
+}
+
+
+@pytest.mark.parametrize("fault", FAULTS)
+def test_a_fault_of_a_winch_is_told_with_its_cause(fault: str) -> None:
+    change, cause = FAULTS[fault]
+    recording = with_speeds(change)
+    told = {odd.cable: odd for odd in odd_winches(example("three"), recording)}
+    assert cause in told[CABLE].cause
+    assert fault == "clipped" or set(told) == {CABLE}
+    errors = recording_mistakes(example("three"), recording)
+    assert any(f"winch travel of cable {CABLE} does not match" in error.problem for error in errors)
+
+
+def moved_anchor(robot: Robot, by: tuple[float, float, float]) -> Robot:
+    cables = list(robot.cables)
+    anchor = tuple(np.add(cables[CABLE - 1].anchor, by).tolist())
+    cables[CABLE - 1] = replace(cables[CABLE - 1], anchor=anchor)
+    return replace(robot, cables=tuple(cables))
+
+
+def test_a_wrong_exit_point_is_told_with_where_it_fits() -> None:
+    (odd,) = odd_winches(moved_anchor(example("three"), (18.0, -9.0, 0.0)), recorded())
+    assert odd.cable == CABLE
+    assert odd.remedy == "correct cable[2].anchor in the robot file"
+    point = np.array([float(text) for text in odd.cause.split("[")[1].split("]")[0].split(",")])
+    assert point == pytest.approx(example("three").anchors[CABLE - 1], abs=1.5)
+
+
+def test_a_cable_without_a_cause_has_what_to_check() -> None:
+    def other_motion(time: np.ndarray, speeds: np.ndarray) -> None:
+        speeds[:, CABLE - 1] = np.std(speeds[:, CABLE - 1]) * np.sin(2.9 * time) * np.cos(0.41 * time)
+
+    (odd,) = odd_winches(example("three"), with_speeds(other_motion))
+    assert (odd.cable, odd.cause) == (CABLE, "")
+    assert "winch_speed_2, cable[2].anchor" in odd.remedy
+
+
+@pytest.mark.parametrize("name", ["three", "caroca", "eight"])
+def test_drums_drift_and_a_late_clock_are_no_faults(name: str) -> None:
+    recording = recorded(name)
+    late = np.column_stack(
+        [np.interp(recording.time - 0.1, recording.time, column) for column in recording.winch_speed.T]
+    )
+    assert odd_winches(example(name), recording) == ()
+    for speeds in (0.9 * recording.winch_speed, recording.winch_speed + 2e-3, late):
+        assert odd_winches(example(name), recording.with_winch_speed(speeds)) == ()
+
+
+def test_what_happened_in_a_gap_is_not_judged() -> None:
+    recording = recorded()
+    is_kept = (recording.time < 10.0) | (recording.time > 15.0)
+    parts = {name: getattr(recording, name)[is_kept] for name in ("time", "winch_speed", "tension", "position")}
+    assert odd_winches(example("three"), replace(recording, **parts, orientation=recording.orientation[is_kept])) == ()
